@@ -1,0 +1,56 @@
+# make demo   the AMB mass-hanging calibration on the simulated TSBS rig, with a report under runs/
+# make test   the tests
+# Both set everything up by themselves: a virtual environment, the locked dependencies, the C core.
+
+PYTHON ?= python3
+BIN := .venv/bin
+READY := .venv/.ready
+
+.PHONY: demo test check format ci-long campaigns bench clean lock setup
+
+demo: setup
+	$(BIN)/bench run amb-calibration --rig tsbs12 --seed 1
+
+test: setup
+	$(BIN)/python -m pytest -q -m "not long"
+
+check: setup
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(MAKE) test
+
+ci-long: setup
+	$(BIN)/python -m pytest -q -m long tests
+
+campaigns: setup
+	$(BIN)/python benchmarks/coverage.py amb-calibration --runs 1000
+	$(BIN)/python benchmarks/coverage.py amb-calibration --runs 1000 --first-seed 1000000
+
+bench: setup
+	$(BIN)/python benchmarks/core.py
+	$(BIN)/python benchmarks/decode.py
+	$(BIN)/python benchmarks/path.py
+	$(BIN)/python benchmarks/startup.py
+
+format: setup
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+setup: $(READY)
+	@$(BIN)/python -m sim_backend.core.build
+
+$(READY): requirements.lock pyproject.toml
+	$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or newer is needed, found " + sys.version.split()[0] if sys.version_info < (3, 11) else 0)'
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps -e .
+	@touch $@
+
+lock:
+	uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
+	    --no-header --quiet -o requirements.lock
+
+clean:
+	rm -rf .venv build *.egg-info sim_backend/core/*.so

@@ -1,0 +1,90 @@
+"""What can be run, and on what: a literal table of procedures, and the rig files that lie in `rigs/`.
+
+Nothing heavy is imported: `bench --help` and `bench list` read this. A test holds the table against the modules.
+"""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from bench.errors import ConfigError
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A procedure's name, the module that holds it as `procedure`, and what it does in one line."""
+
+    name: str
+    module: str
+    about: str
+
+
+PROCEDURES = (
+    Entry("amb-calibration", "procedures.amb_calibration", "AMB force-current constants by hanging known masses"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class RigEntry:
+    """A rig file that was found: its name is the file's stem."""
+
+    name: str
+    path: Path
+    title: str
+
+
+INSTALLED = Path(__file__).resolve().parent.parent / "rigs"
+
+
+def entry(name: str) -> Entry:
+    """The table's line of a procedure.
+
+    Raises:
+        ConfigError: there is no such procedure.
+    """
+    for candidate in PROCEDURES:
+        if candidate.name == name:
+            return candidate
+    raise ConfigError(_unknown("procedure", name, [p.name for p in PROCEDURES]))
+
+
+def rigs() -> Iterator[RigEntry]:
+    """The rig files in `./rigs`, then those installed; a name in `./rigs` hides the installed one."""
+    seen: set[str] = set()
+    for folder in (Path("rigs"), INSTALLED):
+        for path in sorted(folder.glob("*.toml")):
+            if path.stem not in seen:
+                seen.add(path.stem)
+                yield RigEntry(path.stem, path, _title(path))
+
+
+def rig_path(rig: str) -> Path:
+    """The file of a rig: `rig` is a path, else a name in `./rigs`, else a name in the installed `rigs/`.
+
+    Raises:
+        ConfigError: there is no such file.
+    """
+    if Path(rig).is_file():
+        return Path(rig)
+    for folder in (Path("rigs"), INSTALLED):
+        path = folder / f"{rig.removesuffix('.toml')}.toml"
+        if path.is_file():
+            return path
+    raise ConfigError(_unknown("rig", rig, [r.name for r in rigs()]) + f" (looked for a path, in ./rigs and {INSTALLED})")
+
+
+def _unknown(kind: str, name: str, known: list[str]) -> str:
+    close = difflib.get_close_matches(name, known, 1)
+    hint = f"; did you mean {close[0]}?" if close else ""
+    return f"unknown {kind} {name!r}; expected one of {', '.join(known) or '(none found)'}{hint} Next: `bench list`"
+
+
+def _title(path: Path) -> str:
+    try:
+        return str(tomllib.loads(path.read_text(encoding="utf-8")).get("title", ""))
+    except (OSError, ValueError):
+        return "(cannot be read; see `bench check`)"

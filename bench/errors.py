@@ -1,0 +1,74 @@
+"""The error tree. A message says what, where, found, expected and the next step.
+
+    BenchError
+      ConfigError        rig, plan, spec or usage is wrong; nothing was started      exit 2
+      LinkError          a link is lost, silent or corrupt                           exit 3
+      RecordingError     a recording cannot be written or read                       exit 3
+      AnalysisError      the data do not allow the number                            exit 3
+      Aborted            the run was stopped on purpose                              exit 4
+        InterlockError   the envelope refused a command or tripped on telemetry
+        DeviceFault      the controller reported a fault
+        OperatorAbort    the operator said stop
+        SignalAbort      SIGINT or SIGTERM
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+class BenchError(Exception):
+    """Root of every error that Levbench raises on purpose; its text is fit for the user."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong with an input: where it stands, what was found, what is expected."""
+
+    file: str
+    key: str
+    found: str
+    expected: str
+
+    def __str__(self) -> str:
+        return f"{self.file}: {self.key}: found {self.found}; expected {self.expected}"
+
+
+class ConfigError(BenchError):
+    """Rig file, plan, spec or usage is wrong. Carries every problem found, not only the first."""
+
+    def __init__(self, message: str, problems: tuple[Problem, ...] = ()) -> None:
+        super().__init__("\n".join([message, *(f"  {p}" for p in problems)]))
+        self.problems = problems
+
+
+class LinkError(BenchError):
+    """A link is lost, silent past its timeout, or delivers bytes that cannot be right."""
+
+
+class RecordingError(BenchError):
+    """A recording cannot be written, or what is read is not one, is newer, or fails its CRC."""
+
+
+class AnalysisError(BenchError):
+    """The data do not allow the number that was asked for."""
+
+
+class Aborted(BenchError):
+    """The run was stopped on purpose: by the operator, a signal, an interlock or the controller."""
+
+
+class InterlockError(Aborted):
+    """The envelope refused a command (nothing was sent) or tripped on live telemetry."""
+
+
+class DeviceFault(Aborted):
+    """The controller reported a fault."""
+
+
+class OperatorAbort(Aborted):
+    """The operator said stop."""
+
+
+class SignalAbort(Aborted):
+    """SIGINT or SIGTERM arrived."""

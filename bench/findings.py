@@ -1,0 +1,24 @@
+"""Findings: what a record must say beyond its numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Effect(StrEnum):
+    """What a finding does to the outcome of its run. PASS is only possible when every finding is a NOTE."""
+
+    NOTE = "note"
+    INDETERMINATE = "indeterminate"
+    ERROR = "error"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A code (kebab-case, stable), a sentence for the reader, where it was seen, and its effect on the outcome."""
+
+    code: str
+    text: str
+    where: str = ""
+    effect: Effect = Effect.NOTE

@@ -1,0 +1,48 @@
+"""Frames: timestamped id and bytes, in batches. The unit that links carry and `/raw` records."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+FRAME: Final = np.dtype(
+    [
+        ("t_ns", "<i8"),  # host time of receipt or sending, UNIX ns (virtual in simulation)
+        ("id", "<u4"),  # CAN identifier; bit 31 set for extended identifiers
+        ("flags", "u1"),  # bit 0: sent by the host; bit 1: CAN FD; bit 2: error frame
+        ("length", "u1"),  # payload bytes, 0..64
+        ("data", "u1", (64,)),
+    ]
+)
+SENT: Final = 1
+FD: Final = 2
+ERROR: Final = 4
+
+FrameBatch = npt.NDArray[np.void]
+"""A one-dimensional structured array of dtype FRAME, in order of arrival."""
+
+
+def empty_batch() -> FrameBatch:
+    """A batch without frames."""
+    return np.empty(0, FRAME)
+
+
+def frame(identifier: int, payload: bytes, *, t_ns: int = 0, flags: int = 0) -> FrameBatch:
+    """A batch of one frame.
+
+    Raises:
+        ValueError: the payload is longer than 64 bytes.
+    """
+    if len(payload) > 64:
+        raise ValueError(f"payload of {len(payload)} bytes; a CAN FD frame holds at most 64")
+    batch = np.zeros(1, FRAME)
+    batch["t_ns"], batch["id"], batch["flags"], batch["length"] = t_ns, identifier, flags, len(payload)
+    batch["data"][0, : len(payload)] = np.frombuffer(payload, np.uint8)
+    return batch
+
+
+def payload(record: np.void) -> bytes:
+    """The payload bytes of one frame of a batch."""
+    return bytes(record["data"][: int(record["length"])].tobytes())

@@ -1,0 +1,88 @@
+"""What a procedure is made of: declared quantities, a plan, `acquire`, `analyse` and figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from pydantic import BaseModel, ConfigDict
+
+from bench.figures import Figure
+from bench.findings import Finding
+from bench.roles import RigState
+
+if TYPE_CHECKING:
+    from bench.recorder import Recorder
+    from bench.recording import Recording
+    from bench.rig import Rig
+    from bench.rigfile import RigFile
+    from bench.uncertainty import Estimate
+
+
+class BenchPlan(BaseModel):
+    """The settings a procedure is done with, SI. Unknown keys and wrong types are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A declared measurand: its name in records and truth, its unit and its definition in one line."""
+
+    name: str
+    unit: str
+    about: str
+
+    def measured(self, estimate: Estimate, where: str = "") -> Measured:
+        """This quantity's value in this run."""
+        return Measured(self, estimate, where)
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """A quantity with its estimate; `where` says at which place of the machine, when that is not the name."""
+
+    quantity: Quantity
+    estimate: Estimate
+    where: str = ""
+
+
+def _no_figures(_: Recording[Any]) -> Iterable[Figure]:
+    return ()
+
+
+def _no_problems(_rig: RigFile, _plan: Any) -> Iterable[str]:
+    return ()
+
+
+def _no_settings(_: Any) -> Mapping[str, float]:
+    return {}
+
+
+def _unknown_count(_: Any) -> int:
+    return 0
+
+
+@dataclass(frozen=True)
+class Procedure:
+    """A procedure. `acquire` moves the machine, `analyse` is pure and sees only the closed file.
+
+    `check` looks at a plan against a rig file before anything starts and names what cannot work. `settings` are the
+    controller parameters (SI) that the runner writes in READY, before it levitates. `step_count` is how many steps
+    `acquire` will record, for the progress display; 0 is unknown.
+    `analyse` yields what it measured and what it found, in the order of the report.
+    """
+
+    name: str
+    title: str
+    measures: tuple[Quantity, ...]
+    state: RigState
+    plan: type[BenchPlan]
+    acquire: Callable[[Rig, Any, Recorder], None]
+    analyse: Callable[[Recording[Any]], Iterator[Measured | Finding]]
+    figures: Callable[[Recording[Any]], Iterable[Figure]] = field(default=_no_figures)
+    check: Callable[[RigFile, Any], Iterable[str]] = field(default=_no_problems)
+    settings: Callable[[Any], Mapping[str, float]] = field(default=_no_settings)
+    step_count: Callable[[Any], int] = field(default=_unknown_count)
+    method: str = ""  # the report's method section: plain paragraphs, blank-line separated

@@ -1,0 +1,55 @@
+"""Roles: what a device can do for a procedure. Drivers implement them; procedures ask the rig for them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol
+
+
+class RigState(StrEnum):
+    """Where the rig stands. Transitions between them live in `bench.states` and nowhere else."""
+
+    OFF = "OFF"
+    READY = "READY"
+    LEVITATED = "LEVITATED"
+    SPINNING = "SPINNING"
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """What hangs on the hook besides the hanger: a label of the rig file's `masses` table, or nothing."""
+
+    label: str  # "" is nothing
+
+
+NOTHING = Load("")
+
+
+class Levitation(Protocol):
+    """The device that holds the rotor. Every call returns when the controller reports the state, or raises."""
+
+    @property
+    def state(self) -> RigState: ...
+    def enable(self) -> None: ...  # OFF -> READY
+    def levitate(self) -> None: ...  # READY -> LEVITATED
+    def land(self) -> None: ...  # LEVITATED -> READY
+    def disable(self) -> None: ...  # READY -> OFF
+    def set(self, parameter: str, value: float) -> None: ...  # SI; passes the envelope; read back
+    def get(self, parameter: str) -> float: ...  # SI
+
+
+class Rotation(Protocol):
+    """The device that turns the rotor."""
+
+    @property
+    def speed_rad_s(self) -> float: ...
+    def point(self, angle_rad: float) -> None: ...  # returns when the rotor stands at that angle
+    def stop(self) -> None: ...  # returns when the rotor is below the landing speed
+
+
+class Operator(Protocol):
+    """A person, or what stands in for one."""
+
+    def hang(self, load: Load) -> None: ...  # the hanger stays on; returns when done
+    def ask(self, question: str) -> str: ...

@@ -1,0 +1,1 @@
+"""Procedures: what is done to the machine, and how a closed recording becomes numbers. One file each."""

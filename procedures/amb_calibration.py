@@ -1,0 +1,266 @@
+"""AMB force-current constants by hanging known masses (thesis 6.6.1; equilibrium 6.11 with the corrected signs).
+
+Measurand: dF/di of each radial AMB in the vertical axis at zero control current, rotor held where the position sensors
+read zero, at the stated bias, mean over a full turn of the rotor. With it K2 (half of the second derivative) and the
+tangent at the current that carries the rotor's own weight. Horizontal constants are not measured: no load acts there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import Field
+
+from bench.figures import Figure
+from bench.findings import Effect, Finding
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.rig import Rig
+from bench.rigfile import RigFile
+from bench.roles import NOTHING, Load, RigState
+from bench.uncertainty import Estimate, Influence, propagate
+from procedures import amb_calibration_figures as drawn
+from procedures.estimators import consistency, mass_hanging
+from procedures.estimators.hanging_data import HangingData, read_hangings
+from procedures.estimators.inputs import certified
+from procedures.estimators.mass_hanging import Fit
+from procedures.estimators.repeatability import OUTPUTS, Scatter, covariance_over_a_turn, scatter
+
+K_I = Quantity("K_i", "N/A", "inboard AMB: dF/di at zero control current, mean over a turn")
+K_O = Quantity("K_o", "N/A", "outboard AMB: dF/di at zero control current, mean over a turn")
+K2_I = Quantity("K2_i", "N/A^2", "inboard AMB: (d²F/di²)/2, mean over a turn")
+K2_O = Quantity("K2_o", "N/A^2", "outboard AMB: (d²F/di²)/2, mean over a turn")
+KW_I = Quantity("Kw_i", "N/A", "inboard AMB: dF/di at the current that carries the rotor's own weight")
+KW_O = Quantity("Kw_o", "N/A", "outboard AMB: dF/di at the current that carries the rotor's own weight")
+MEASURES = (K_I, K_O, K2_I, K2_O, KW_I, KW_O)
+
+
+class Plan(BenchPlan):
+    """Settings of the calibration, SI."""
+
+    masses: tuple[str, ...] = Field(("M1", "M2", "M3", "M4"), min_length=4)  # labels of the rig's masses, ascending
+    angles: int = Field(8, ge=8)  # equally spaced over a turn
+    bias_A: float = Field(3.0, gt=0)
+    settle_s: float = Field(2.0, gt=0)
+    average_s: float = Field(1.0, ge=0.1)
+    max_position_m: float = Field(5e-8, gt=0)  # settled: |mean position| and its drift within a step
+    max_drift_A: float = Field(2e-3, gt=0)  # settled: drift of a control current within a step
+    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
+
+
+def settings(plan: Plan) -> dict[str, float]:
+    """Controller parameters that the runner writes before levitation."""
+    return {"bias_i": plan.bias_A, "bias_o": plan.bias_A}
+
+
+def sequence(plan: Plan) -> list[tuple[Load, int]]:
+    """Loads at one angle with their branch: up and down, mirrored in time, so that linear drift cancels.
+
+    The first zero was reached by unloading (at the previous angle, or by the exercise before the first).
+    """
+    up = [Load(label) for label in plan.masses]
+    return [(NOTHING, -1), *((x, 1) for x in up), *((x, -1) for x in reversed(up[:-1])), (NOTHING, -1)]
+
+
+def step_count(plan: Plan) -> int:
+    """How many steps `acquire` records, for the progress display."""
+    return plan.angles * len(sequence(plan))
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Hang every mass up and down at each angle; the hanger stays on throughout."""
+    assert rig.levitation and rig.rotation and rig.operator
+    rig.operator.hang(Load(plan.masses[-1]))  # exercise: the first zero is then reached by unloading, like the others
+    rig.clock.sleep(plan.settle_s)
+    rig.operator.hang(NOTHING)
+    for turn in range(plan.angles):
+        angle = 2 * math.pi * turn / plan.angles
+        rig.rotation.point(angle)
+        for load, branch in sequence(plan):
+            if load != NOTHING or branch < 0:
+                rig.operator.hang(load)
+            rig.clock.sleep(plan.settle_s)
+            with record.step("hang", angle_rad=angle, load=load.label, branch=branch):
+                rig.clock.sleep(plan.average_s)
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Everything the measurements, findings and figures are made of."""
+
+    data: HangingData
+    inputs: dict[str, Estimate]
+    fit: Fit
+    scatter: Scatter
+    estimates: dict[str, Estimate]
+
+
+def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
+    """Findings first (they decide what the numbers are worth), then the six quantities."""
+    data = read_hangings(recording, recording.plan.masses)
+    findings = list(consistency.of_signals(data, recording.plan))
+    yield from findings
+    if any(f.code in consistency.FATAL for f in findings):
+        return
+    result = evaluate(recording, data)
+    values = {name: e.value for name, e in result.inputs.items()}
+    yield from consistency.of_fit(data, result.fit, result.scatter, values, recording.plan, masses_u(recording))
+    for quantity in MEASURES:
+        yield quantity.measured(result.estimates[quantity.name])
+
+
+def evaluate(recording: Recording[Plan], data: HangingData) -> Analysis:
+    """Fit, scatter and the six estimates with their influences."""
+    plan = recording.plan
+    inputs = fit_inputs(recording.rig, plan)
+    count = len(plan.masses)
+
+    def model(p: dict[str, float]) -> dict[str, float]:
+        return mass_hanging.over_a_turn(mass_hanging.fit(data.hangings, p, plan.bias_A, count), p)
+
+    values = {name: e.value for name, e in inputs.items()}
+    fitted = mass_hanging.fit(data.hangings, values, plan.bias_A, count)
+    spread = scatter(fitted, data.hangings, count)
+    share = np.array(mass_hanging.hung_shares(values["hook_to_outboard"], values["amb_span"]))
+    hanger = mass_hanging.weight(values["hanger"], values["gravity"], values["air_density"], values["mass_density"])
+    covariance = covariance_over_a_turn(fitted, spread, -share * float(hanger))
+    estimates = propagate(model, inputs)
+    half_branch = mass_hanging.over_a_turn(
+        mass_hanging.fit(data.hangings, values, plan.bias_A, count, top_branch=0.0), values
+    )
+    for name, extra in _scatter_terms(covariance, spread.dof).items():
+        turning = _turning_point(name, half_branch[name] - estimates[name].value)
+        estimates[name] = estimates[name] + extra + turning + _unresolved_angles(name, fitted, plan, values)
+    return Analysis(data, inputs, fitted, spread, estimates)
+
+
+def fit_inputs(rig: RigFile, plan: Plan) -> dict[str, Estimate]:
+    """What the fit needs besides the recording: certificates of the rig file, each as an influence by identity."""
+    g = rig.geometry
+    inputs = {
+        "gravity": certified("site/gravity", rig.site.gravity, "local gravity"),
+        "air_density": certified("site/air_density", rig.site.air_density, "air density (buoyancy)"),
+        "mass_density": certified("masses/density", rig.mass_density, "density of the masses (buoyancy)"),
+        "hook_to_outboard": certified("geometry/hook_to_outboard", g["hook_to_outboard"], "span hook to outboard AMB"),
+        "amb_span": certified("geometry/amb_span", g["amb_span"], "span AMB to AMB"),
+        "motor_to_outboard": Estimate.exact(g["com_to_motor"].value - g["com_to_outboard_amb"].value),
+        "amb_gap": certified("geometry/amb_gap", g["amb_gap"], "AMB gap (residual position)"),
+        "motor_stiffness": certified("geometry/motor_stiffness", g["motor_stiffness"], "motor stiffness (residual pos.)"),
+        "hanger": certified("masses/hanger", rig.hanger, "hanger"),
+    }
+    for k, label in enumerate(plan.masses):
+        inputs[f"mass_{k}"] = certified(f"masses/{label}", rig.masses[label], f"mass {label}")
+    for bearing in "io":
+        for coil in "pn":
+            channel = f"i_y{bearing}_{coil}"
+            sensor = rig.sensors[channel]
+            inputs[f"gain_{bearing}{coil}"] = certified(f"sensors/{channel}/gain", sensor.gain, f"gain of {channel}")
+            inputs[f"offset_{bearing}{coil}"] = certified(
+                f"sensors/{channel}/offset", sensor.offset, f"offset of {channel}"
+            )
+    return inputs
+
+
+def _scatter_terms(covariance: np.ndarray, dof: int) -> dict[str, Estimate]:
+    """Type A estimates of value zero that carry `covariance` between the outputs, through independent influences."""
+    root = np.linalg.cholesky(covariance + 1e-15 * np.diag(np.diag(covariance)))
+    parts = [
+        Influence(id=f"scatter/{k + 1}", name=f"scatter of the hangings ({k + 1})", u=1.0, unit="1", kind="A",
+                  distribution="normal", dof=float(dof), source="residuals of the fits")
+        for k in range(len(root))
+    ]  # fmt: skip
+    return {
+        name: sum((Estimate.of(0.0, part) * float(root[row, k]) for k, part in enumerate(parts[: row + 1])),
+                  Estimate.exact(0.0))
+        for row, name in enumerate(OUTPUTS)
+    }  # fmt: skip
+
+
+def _turning_point(name: str, shift: float) -> Estimate:
+    """The heaviest load is where loading turns: it counts as loading, and at most half of that could be wrong."""
+    u = abs(shift) / math.sqrt(3)
+    influence = Influence(id=f"hysteresis/{name}", name="hysteresis at the turning point", u=u, unit="1", kind="B",
+                          distribution="rectangular", source="branch of the heaviest load set to zero")  # fmt: skip
+    return Estimate.of(0.0, influence) if u > 0 else Estimate.exact(0.0)
+
+
+def _unresolved_angles(name: str, f: Fit, plan: Plan, p: dict[str, float]) -> Estimate:
+    """What a mean over equally spaced angles can miss: orders of K(angle) that are multiples of their number.
+
+    The zero-load current shows the eccentricity of the journal by order (i = xi b / gap). K grows with the square of
+    xi / gap (T 2.4: factor 1 + 3 (xi/gap)^2), so order n of K needs products of eccentricity orders that add to n; the
+    orders above half of the number of angles are bounded by the smallest that is resolved.
+    """
+    bearing = 0 if name.endswith("i") else 1
+    current = f.control[bearing][:, [0, -1]].mean(axis=1)
+    orders = np.abs(np.fft.rfft(current)) * 2 / plan.angles * p["amb_gap"] / plan.bias_A
+    ratio = 3 * float(orders[1:].max() * orders[1:].min()) / p["amb_gap"] ** 2
+    scale = abs(float(f.terms[bearing, :, 1].mean())) / (plan.bias_A if name.startswith("K2") else 1.0)
+    influence = Influence(id=f"angle/{name}", name="angle dependence not resolved", u=ratio * scale / math.sqrt(3),
+                          unit="1", kind="B", distribution="rectangular", source="orders of the zero-load current")  # fmt: skip
+    return Estimate.of(0.0, influence)
+
+
+def masses_u(recording: Recording[Plan]) -> np.ndarray:
+    """Standard uncertainty in kg of the hanger (nothing hung) and of each mass."""
+    rig = recording.rig
+    return np.array([rig.hanger.standard_uncertainty,
+                     *(rig.masses[m].standard_uncertainty for m in recording.plan.masses)])  # fmt: skip
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts."""
+    unknown = [m for m in plan.masses if m not in rig.masses]
+    if unknown:
+        yield f"masses: found {', '.join(unknown)}; the rig file certifies {', '.join(rig.masses)}"
+        return
+    kg = [rig.masses[m].value for m in plan.masses]
+    if kg != sorted(kg) or len(set(kg)) != len(kg):
+        yield f"masses: found {kg} kg; expected different masses in ascending order"
+
+
+def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+    """Fit, residuals, one step over time, and both polar plots; empty when the data carry no fit."""
+    data = read_hangings(recording, recording.plan.masses)
+    if any(f.code in consistency.FATAL for f in consistency.of_signals(data, recording.plan)):
+        return ()
+    result = evaluate(recording, data)
+    values = {name: e.value for name, e in result.inputs.items()}
+    return drawn.all_figures(recording, data, result.fit, values)
+
+
+METHOD = """\
+The shaft is levitated by both radial AMBs at the stated bias. Known masses hang from a hook outboard of the outboard
+AMB, up and down, at equally spaced rotor angles; the hanger stays on throughout. With d from hook to outboard AMB and
+s from AMB to AMB, a hung weight W changes the forces of the AMBs by -W d/s (inboard) and +W (1 + d/s) (outboard).
+W is the conventional mass times local gravity, corrected for buoyancy.
+
+At each angle F = F0 + K i + K2 i² is fitted per bearing by least squares, in a form that allows for coil currents whose
+sum is not exactly twice the bias, with a term for the direction of loading that takes hysteresis and drift out of K.
+Forces are referred to the sensors' zero by the residual displacement times the stiffness. The reported values are means
+over the angles. The vertical axis is calibrated; the horizontal one is not loaded and not reported.
+
+What no data can show: an error common to all masses, to gravity or to the ratio of the spans scales K by itself. It is
+in the budget as far as the certificates state it, and nowhere else.
+"""
+
+procedure = Procedure(
+    name="amb-calibration",
+    title="Force-current constants of the radial AMBs by hanging known masses",
+    measures=MEASURES,
+    state=RigState.LEVITATED,
+    plan=Plan,
+    acquire=acquire,
+    analyse=analyse,
+    figures=figures,
+    check=check,
+    settings=settings,
+    step_count=step_count,
+    method=METHOD,
+)
+
+__all__ = ["Effect", "Plan", "procedure"]

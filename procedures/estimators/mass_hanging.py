@@ -1,0 +1,151 @@
+"""Force constants of two radial AMBs from known weights at a hook (thesis 6.6.1, corrected signs of 6.11).
+
+Static equilibrium about the outboard AMB, with d from hook to outboard AMB and s from AMB to AMB, gives the change of
+the bearing forces under a hung weight W (T 6.11, the moment row with its sign corrected)
+
+    dF_i = -W d / s          dF_o = +W (1 + d / s)
+
+Each bearing is a pair of opposing coils (T 2.4) with currents i_p, i_n:  F = A i_p^2 - B i_n^2. At the stated bias b,
+with K = 2 b (A + B) the slope at zero control current and K2 = A - B,
+
+    F = F_0 + K u + K2 v,   u = (i_p^2 - i_n^2) / (4 b),   v = (i_p^2 + i_n^2) / 2 - b^2
+
+which is F_0 + K i + K2 i^2 when the sum of the currents is exactly 2 b, and stays right when the current sensors
+disagree and it is not. A branch term H (+1 loading, -1 unloading) takes hysteresis and linear drift out of K and K2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+CONVENTIONAL_AIR = 1.2  # kg/m^3, OIML R 111: the air in which conventional mass is defined
+CONVENTIONAL_DENSITY = 8000.0  # kg/m^3, likewise
+INBOARD, OUTBOARD = 0, 1
+
+
+@dataclass(frozen=True)
+class Hangings:
+    """Step means of one calibration. A = angles, P = hangings per angle; bearing axis first: 0 inboard, 1 outboard.
+
+    currents (2, 2, A, P): A, [bearing, coil p or n]; as the current sensors read them
+    positions (2, A, P): m, at the AMB planes, from the sensor readings
+    motor_m (A, P): m, at the motor plane
+    load (A, P): index into the masses, -1 for nothing besides the hanger
+    branch (A, P): +1 reached by loading, -1 by unloading
+    angles (A,): rad
+    """
+
+    currents: Array
+    positions: Array
+    motor_m: Array
+    load: Ints
+    branch: Array
+    angles: Array
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Per bearing and angle: `terms` (2, A, 4) = F_0 N, K N/A, K2 N/A^2, H N; `residuals` (2, A, P) N;
+    `solvers` (2, A, 4, P) maps forces to terms; `forces` (2, A, P) N; `control` (2, A, P) the control current A."""
+
+    terms: Array
+    residuals: Array
+    solvers: Array
+    forces: Array
+    control: Array
+
+
+def weight(mass_kg: float | Array, gravity: float, air_density: float, mass_density: float) -> float | Array:
+    """Force in N of a conventional mass in air (OIML D 28: buoyancy against the conventional 1.2 and 8000 kg/m^3).
+
+    The true mass of a body of density r with conventional mass m is m (1 - 1.2/8000) / (1 - 1.2/r).
+    """
+    true = mass_kg * (1 - CONVENTIONAL_AIR / CONVENTIONAL_DENSITY) / (1 - CONVENTIONAL_AIR / mass_density)
+    return true * gravity * (1 - air_density / mass_density)
+
+
+def hung_shares(hook_to_outboard: float, span: float) -> tuple[float, float]:
+    """Share of a hung weight that the inboard and the outboard AMB carry (T 6.11, corrected): -d/s, 1 + d/s."""
+    return -hook_to_outboard / span, 1 + hook_to_outboard / span
+
+
+def fit(h: Hangings, p: Mapping[str, float], bias_A: float, masses: int, *, top_branch: float = 1.0) -> Fit:
+    """Fit F_0, K, K2 and H per bearing and angle, by least squares on the force.
+
+    `p` holds: gravity, air_density, mass_density, hook_to_outboard, amb_span, motor_to_outboard, amb_gap,
+    motor_stiffness, mass_0 .. mass_{n-1}, and gain_bc, offset_bc for bearing b in "io" and coil c in "pn".
+    `top_branch` is the branch assumed for the heaviest load, where loading turns into unloading.
+
+    The forces are referred to a rotor exactly at the sensors' zero: what the residual displacement adds by the
+    stiffness of the bearing (K b / gap, T 2.4) and of the motor (T 6.5) is taken off, in a second pass that uses the
+    first one's K.
+    """
+    ip, i_n = _true_currents(h.currents, p)
+    u = (ip**2 - i_n**2) / (4 * bias_A)
+    v = (ip**2 + i_n**2) / 2 - bias_A**2
+    branch = np.where(h.load == masses - 1, top_branch, h.branch)
+    design = np.stack([np.ones_like(u), u, v, np.broadcast_to(branch, u.shape)], axis=-1)
+    solvers = np.linalg.pinv(design)
+    applied = _applied_forces(h.load, p, masses)
+    terms = np.einsum("bafp,bap->baf", solvers, applied)
+    stiffness = terms[:, :, 1].mean(axis=1) * bias_A / p["amb_gap"]
+    forces = applied + _motor_forces(h.motor_m, p) - stiffness[:, None, None] * h.positions
+    terms = np.einsum("bafp,bap->baf", solvers, forces)
+    residuals = forces - np.einsum("bapf,baf->bap", design, terms)
+    return Fit(terms, residuals, solvers, forces, (ip - i_n) / 2)
+
+
+def _true_currents(currents: Array, p: Mapping[str, float]) -> tuple[Array, Array]:
+    """Coil currents (2, A, P) freed of the sensors' offsets and gains."""
+    out = [
+        np.stack([(currents[b, c] - p[f"offset_{bearing}{coil}"]) / p[f"gain_{bearing}{coil}"]
+                  for b, bearing in enumerate("io")])
+        for c, coil in enumerate("pn")
+    ]  # fmt: skip
+    return out[0], out[1]
+
+
+def _applied_forces(load: Ints, p: Mapping[str, float], masses: int) -> Array:
+    """Force (2, A, P) in N that each bearing adds to carry the hung masses; the hanger is on for every point."""
+    kg = np.array([p[f"mass_{k}"] for k in range(masses)] + [0.0])  # index -1 is nothing
+    newtons = np.asarray(weight(kg[load], p["gravity"], p["air_density"], p["mass_density"]))
+    inboard, outboard = hung_shares(p["hook_to_outboard"], p["amb_span"])
+    return np.stack([inboard * newtons, outboard * newtons])
+
+
+def _motor_forces(motor_m: Array, p: Mapping[str, float]) -> Array:
+    """Force (2, A, P) in N that the bearings add against the motor's pull off centre (T 6.5, alpha_x)."""
+    pull = p["motor_stiffness"] * motor_m
+    lever = p["motor_to_outboard"] / p["amb_span"]
+    return np.stack([lever * pull, -(1 + lever) * pull])
+
+
+def tangents(terms: Array, share: Array, hanger_N: float) -> Array:
+    """dF/di in N/A at the current that carries the rotor's own weight without the hanger, (2, A).
+
+    On F_0 + K i + K2 i^2 = L the slope is sqrt(K^2 + 4 K2 (L - F_0)); L = -hanger_N * share, because the fit's zero
+    of force has the hanger on. `share` (2,) is that of `hung_shares`.
+    """
+    f0, k, k2 = terms[:, :, 0], terms[:, :, 1], terms[:, :, 2]
+    own = -hanger_N * share[:, None]
+    slope: Array = np.sign(k) * np.sqrt(np.maximum(k**2 + 4 * k2 * (own - f0), 0.0))
+    return slope
+
+
+def over_a_turn(f: Fit, p: Mapping[str, float]) -> dict[str, float]:
+    """Means over the angles: K_i, K_o N/A; K2_i, K2_o N/A^2; Kw_i, Kw_o N/A (the tangent at own weight)."""
+    share = np.array(hung_shares(p["hook_to_outboard"], p["amb_span"]))
+    hanger = float(weight(p["hanger"], p["gravity"], p["air_density"], p["mass_density"]))
+    slope = tangents(f.terms, share, hanger)
+    mean = f.terms.mean(axis=1)
+    out = {}
+    for b, bearing in enumerate("io"):
+        out |= {f"K_{bearing}": mean[b, 1], f"K2_{bearing}": mean[b, 2], f"Kw_{bearing}": float(slope[b].mean())}
+    return {name: float(x) for name, x in out.items()}

@@ -1,0 +1,291 @@
+"""From a record and what surrounds it to the view model."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from reports import tables, text
+from reports.figures import Drawn
+from reports.view import (
+    ABOUT_UNCERTAINTY,
+    DECISION_RULE,
+    NO_RESULTS,
+    SIMULATED,
+    STATEMENTS,
+    Fact,
+    FigureEntry,
+    FindingRow,
+    ReportView,
+    ResultRow,
+    Table,
+    Tone,
+)
+
+Content = Mapping[str, Any]
+_TONES: dict[str, Tone] = {"pass": "pass", "fail": "fail", "indeterminate": "indeterminate", "error": "error"}
+_TONES |= {"aborted": "error", "missing": "error"}
+# What only people know: key in [laboratory] of the rig file, label, clause letter of 7.8.2.1.
+_PEOPLE = (
+    ("name", "Laboratory"),  # b
+    ("address", "Address"),  # b
+    ("customer", "Customer and contact"),  # e
+    ("item_condition", "Condition of the item"),  # g
+    ("received", "Item received on"),  # h
+    ("deviations", "Deviations from the method"),  # n
+    ("external_results", "Results from external providers"),  # p
+    ("issued", "Date of issue"),  # j
+    ("authorised_by", "Authorised by (name, signature)"),  # o
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class Surroundings:
+    """What a report needs beside the record: plain content, so that an old run needs no procedure to be printed."""
+
+    title: str
+    method: str = ""
+    definitions: Mapping[str, str] = dataclasses.field(default_factory=dict)  # quantity name -> definition
+    rig: Content = dataclasses.field(default_factory=dict)  # the rig file's content
+    integrity: Any = None
+    events: Sequence[Any] = ()
+    conditions: Mapping[str, str] = dataclasses.field(default_factory=dict)  # measured ones: label -> text
+    truncated: bool = False
+    readable: bool = True  # False: there is no recording that could be read
+
+
+def view_of(record: Content, around: Surroundings, figures: Iterable[Drawn] = ()) -> ReportView:
+    """The report of one record. Equal inputs give an equal view: nothing here asks for the time."""
+    outcome = str(record.get("outcome", "ERROR"))
+    measurements = [m for m in record.get("measurements") or () if isinstance(m, Mapping)]
+    findings = tuple(_findings(record, around))
+    rows = tuple(_result(m, around.definitions) for m in measurements)
+    rig_name = str(around.rig.get("name") or record.get("rig") or text.DASH)
+    return ReportView(
+        title=around.title,
+        run_id=str(record.get("run_id") or text.DASH),
+        rig=rig_name,
+        uut=_uut(record.get("uut")),
+        date=text.moment(record.get("started"))[:10],
+        simulated=SIMULATED if record.get("seed") is not None else "",
+        outcome=outcome,
+        tone=_TONES.get(outcome.lower(), "none"),
+        outcome_text=_outcome_text(outcome, rows, findings),
+        identification=_identification(record, around, rig_name),
+        results=rows,
+        no_results="" if rows else NO_RESULTS,
+        about_uncertainty=ABOUT_UNCERTAINTY,
+        decision_rule=DECISION_RULE,
+        findings=findings,
+        budgets=tuple(tables.budget_table(m) for m in measurements if m.get("budget")),
+        method=_paragraphs(around.method),
+        figures=tuple(FigureEntry(n, f.key, f.title, f.caption, f.svg) for n, f in enumerate(figures, 1)),
+        conditions=_conditions(around),
+        traceability=tables.traceability(around.rig),
+        calibrations=_calibrations(record.get("calibrations")),
+        link=_link(record.get("link"), around),
+        link_note=_link_note(around),
+        correlations=tables.correlations(record),
+        plan=tuple(tables.facts(record.get("plan") or {})),
+        versions=tuple(tables.facts(record.get("versions") or {})),
+        recording=_recording(record.get("recording")),
+        laboratory=_laboratory(around.rig.get("laboratory")),
+        statements=STATEMENTS,
+        end=f"End of report {record.get('run_id') or ''}".rstrip(),
+    )
+
+
+def _result(m: Content, definitions: Mapping[str, str]) -> ResultRow:
+    name, unit = str(m.get("name", "")), str(m.get("unit") or "")
+    expanded, verdict = m.get("expanded_uncertainty"), str(m.get("verdict") or "none")
+    limit = m.get("limit")
+    where = str(m.get("where") or "")
+    return ResultRow(
+        symbol=tables.symbol_of(name),
+        about=definitions.get(name, ""),
+        where="" if where == name else where,
+        result=text.result(m.get("value"), expanded, unit),
+        interval=_telling_interval(m, unit),
+        k=text.DASH if m.get("coverage_factor") is None else f"{m['coverage_factor']:.2f}",
+        dof=text.degrees_of_freedom(m.get("dof")),
+        probability=text.probability(m.get("coverage_probability")),
+        limit=_limit(limit, unit),
+        limit_source=_limit_source(limit),
+        verdict="no limit" if verdict.lower() == "none" else verdict.lower(),
+        tone=_TONES.get(verdict.lower(), "none"),
+    )
+
+
+def _telling_interval(m: Content, unit: str) -> str:
+    """The interval where it came from Monte Carlo or is not value ± U to the printed digits."""
+    low, high = m.get("interval") or (None, None)
+    value, expanded = m.get("value"), m.get("expanded_uncertainty")
+    if low is None or high is None or value is None:
+        return ""
+    middle = abs((low + high) / 2 - value) > 0.05 * (high - low)
+    if not middle and m.get("method") != "monte-carlo":
+        return ""
+    how = " by Monte Carlo (JCGM 101)" if m.get("method") == "monte-carlo" else ""
+    return (
+        f"{text.probability(m.get('coverage_probability'))} interval{how}: {text.interval(low, high, expanded, unit)}"
+    )
+
+
+def _limit(limit: Content | None, unit: str) -> str:
+    if not limit:
+        return text.DASH
+    low, high = limit.get("low"), limit.get("high")
+    if low is not None and high is not None:
+        return f"{text.plain(low)} to {text.with_unit(text.plain(high), unit)}"
+    if low is not None:
+        return f"≥ {text.with_unit(text.plain(low), unit)}"
+    return text.DASH if high is None else f"≤ {text.with_unit(text.plain(high), unit)}"
+
+
+def _limit_source(limit: Content | None) -> str:
+    if not limit:
+        return ""
+    source = str(limit.get("source") or "source not stated")
+    return source if limit.get("verified") else f"{source} (limit not verified against its source)"
+
+
+def _findings(record: Content, around: Surroundings) -> Iterable[FindingRow]:
+    known = {str(f.get("code")) for f in record.get("findings") or ()}
+    if around.truncated and not any("truncated" in code for code in known):
+        said = "The recording is truncated: it was not closed. Everything here comes from its complete part."
+        yield FindingRow("truncated-recording", said, "recording", "note", True)
+    for f in record.get("findings") or ():
+        effect = str(f.get("effect") or "note")
+        loud = effect != "note"
+        yield FindingRow(str(f.get("code", "")), str(f.get("text", "")), str(f.get("where") or ""), effect, loud)
+
+
+def _outcome_text(outcome: str, rows: Sequence[ResultRow], findings: Sequence[FindingRow]) -> str:
+    named = {tone: ", ".join(r.symbol.plain for r in rows if r.tone == tone) for tone in _TONES.values()}
+    loud = ", ".join(dict.fromkeys(f.code for f in findings if f.loud))
+    match outcome:
+        case "PASS" if any(r.tone == "pass" for r in rows):
+            return "Every declared quantity was measured, and every limit is met by the whole 95 % interval."
+        case "PASS":
+            return "Every declared quantity was measured. No acceptance limit was applied."
+        case "FAIL":
+            return f"Outside the limits with the whole 95 % interval: {named['fail']}." if named["fail"] else ""
+        case "INDETERMINATE":
+            undecided = (
+                f"The 95 % interval crosses a limit: {named['indeterminate']}. " if named["indeterminate"] else ""
+            )
+            return (undecided + (f"Findings that prevent a decision: {loud}." if loud else "")).strip()
+        case "ABORTED":
+            return "The run was stopped before its end. " + (f"See the finding {loud}." if loud else "")
+        case _:
+            return "The bench could not tell. " + (f"See the finding {loud}." if loud else "")
+
+
+def _uut(uut: Any) -> str:
+    if not isinstance(uut, Mapping):
+        return str(uut or text.DASH)
+    name = str(uut.get("name") or uut.get("type") or uut.get("model") or "")
+    serial = uut.get("serial") or uut.get("serial_number") or ""
+    parts = [name, f"serial no. {serial}" if serial else ""]
+    return ", ".join(p for p in parts if p) or ", ".join(str(v) for v in uut.values()) or text.DASH
+
+
+def _identification(record: Content, around: Surroundings, rig_name: str) -> tuple[Fact, ...]:
+    started, ended = text.moment(record.get("started")), text.moment(record.get("ended"))
+    rig_title = str(around.rig.get("title") or "")
+    site = around.rig.get("site")
+    site_name = str(site.get("name") or "") if isinstance(site, Mapping) else ""
+    seed = record.get("seed")
+    found = [
+        Fact("Report and run", str(record.get("run_id") or text.DASH)),
+        Fact("Item under test", _uut(record.get("uut"))),
+        Fact("Rig", f"{rig_name} – {rig_title}" if rig_title else rig_name),
+        Fact("Procedure", str(record.get("procedure") or text.DASH)),
+        Fact("Performed", f"{started} to {ended}" if record.get("ended") else f"{started}, end not recorded"),
+        Fact("Location", site_name, blank=not site_name),  # 7.8.2.1 c
+    ]
+    if seed is not None:
+        found.append(Fact("Virtual rig", f"seed {seed}"))
+    return tuple(found)
+
+
+def _conditions(around: Surroundings) -> tuple[Fact, ...]:
+    site = around.rig.get("site")
+    at_site = {k: v for k, v in site.items() if k != "name" and v is not None} if isinstance(site, Mapping) else {}
+    stated = [dataclasses.replace(f, label=_words(f.label)) for f in tables.facts(at_site)]
+    return (*stated, *(Fact(label, said) for label, said in around.conditions.items()))
+
+
+def _words(key: str) -> str:
+    """`latitude_deg` -> `Latitude (°)`, `air_density` -> `Air density`."""
+    head, _, tail = key.rpartition("_")
+    units = {"deg": "°", "m": "m", "c": "°C", "k": "K", "pa": "Pa"}
+    words, unit = (head, f" ({units[tail]})") if head and tail in units else (key, "")
+    words = words.replace("_", " ")
+    return words[:1].upper() + words[1:] + unit
+
+
+def _calibrations(found: Any) -> tuple[Fact, ...]:
+    if not found:
+        return (Fact("Earlier calibrations used", "none"),)
+    return tuple(tables.facts(found if isinstance(found, Mapping) else {"calibration": found}))
+
+
+def _link(link: Any, around: Surroundings) -> tuple[Table, ...]:
+    made = [*counts("Link", link), *counts("Recording", around.integrity)]
+    kinds = Counter(str(e.get("kind") if isinstance(e, Mapping) else getattr(e, "kind", "")) for e in around.events)
+    if kinds:
+        rows = tuple((kind, text.plain(n)) for kind, n in sorted(kinds.items()))
+        made.append(Table("Events", ("Kind", "Count"), rows, (1,)))
+    return tuple(made)
+
+
+def counts(title: str, tree: Any) -> Iterable[Table]:
+    """Counts as tables: one of the plain values, one for each group of like entries (a row per link or stream)."""
+    if dataclasses.is_dataclass(tree) and not isinstance(tree, type):
+        tree = dataclasses.asdict(tree)
+    if not isinstance(tree, Mapping) or not tree:
+        return
+    flat = {k: v for k, v in tree.items() if not isinstance(v, Mapping)}
+    nested = {k: v for k, v in tree.items() if isinstance(v, Mapping) and v}
+    if flat:
+        yield Table(title, ("", "Count"), tuple((_words(str(k)), tables.inline(v)) for k, v in flat.items()), (1,))
+    leaves = {k: v for k, v in nested.items() if not any(isinstance(x, Mapping) for x in v.values())}
+    if leaves:
+        columns = tuple(dict.fromkeys(str(c) for v in leaves.values() for c in v))
+        rows = tuple(
+            (str(k), *(tables.inline(v[c]) if c in v else text.DASH for c in columns)) for k, v in leaves.items()
+        )
+        yield Table(title, ("", *map(_words, columns)), rows, tuple(range(1, len(columns) + 1)))
+    for key in nested.keys() - leaves.keys():
+        yield from counts(f"{title}: {key}", nested[key])
+
+
+def _link_note(around: Surroundings) -> str:
+    if not around.readable:
+        return "There is no recording that can be read."
+    if around.truncated:
+        return "The recording is truncated: its closing counts are missing and its last part may be lost."
+    return "The recording was closed with its counts."
+
+
+def _recording(recording: Any) -> tuple[Fact, ...]:
+    if not isinstance(recording, Mapping) or not recording.get("sha256"):
+        return (Fact("Recording", "none, or its digest was not taken"),)
+    return (
+        Fact("File", str(recording.get("file") or text.DASH)),
+        Fact("SHA-256", str(recording["sha256"])),
+    )
+
+
+def _laboratory(given: Any) -> tuple[Fact, ...]:
+    known: Content = given if isinstance(given, Mapping) else {}
+    asked = {key for key, _ in _PEOPLE}
+    facts = [Fact(label, str(known.get(key) or ""), blank=not known.get(key)) for key, label in _PEOPLE]
+    return (*facts[:-2], *(Fact(_words(k), tables.inline(v)) for k, v in known.items() if k not in asked), *facts[-2:])
+
+
+def _paragraphs(method: str) -> tuple[str, ...]:
+    return tuple(" ".join(p.split()) for p in method.split("\n\n") if p.strip())

@@ -1,0 +1,249 @@
+"""Draws `bench.figures.Figure` as SVG, for both outputs, at the width it is printed (half of an A4 text block).
+
+No pyplot (it costs half a second and keeps global state) and no mathtext: labels are plain text, so `$` is a dollar.
+Equal figures give equal bytes.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import warnings
+from dataclasses import dataclass
+from textwrap import shorten
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure as Canvas
+from matplotlib.ticker import MaxNLocator, ScalarFormatter
+
+from bench.errors import BenchError
+from bench.figures import Array, Figure, Series
+
+WIDTH_IN, HEIGHT_IN = 3.42, 2.75  # 87 mm: half of the A4 text block
+MAX_LINE_POINTS = 1200  # about three per printed dot column at 300 dpi; beyond, min and max per bin
+# Okabe and Ito (2008), told apart with any colour vision; the yellow is left out: too pale on white.
+PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+INK, GRID = "#30363d", "#d9dde2"
+STYLE: Any = {
+    "font.family": ["DejaVu Sans"],
+    "font.size": 7.0,
+    "text.parse_math": False,
+    "axes.unicode_minus": True,
+    "axes.linewidth": 0.6,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "axes.formatter.useoffset": False,
+    "axes.formatter.limits": (-3, 5),
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.direction": "out",
+    "lines.linewidth": 1.0,
+    "lines.markersize": 3.2,
+    "legend.fontsize": 6.5,
+    "legend.frameon": False,
+    "path.simplify": True,
+    "svg.fonttype": "path",  # the same glyphs everywhere; nothing can be clipped by another font
+    "svg.hashsalt": "levbench",
+}
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A drawn figure: SVG text whose ids all start with the figure's key, with its title and caption."""
+
+    key: str
+    title: str
+    caption: str
+    svg: str
+
+
+def draw(figure: Figure) -> Drawn:
+    """The figure as SVG.
+
+    Raises:
+        BenchError: a series has x, y or u of different lengths, or cannot be drawn.
+    """
+    for series in figure.series:
+        _same_length(figure, series)
+    with warnings.catch_warnings(), mpl.rc_context(STYLE):
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")  # a box in a label, not a failed report
+        try:
+            svg = _svg(figure)
+        except (ValueError, TypeError, OverflowError) as error:
+            raise BenchError(f"figure {figure.key!r} cannot be drawn: {error}") from error
+    return Drawn(figure.key, figure.title, figure.caption, _with_own_ids(svg, figure.key))
+
+
+def _same_length(figure: Figure, series: Series) -> None:
+    lengths = {"x": np.size(series.x), "y": np.size(series.y)}
+    if series.u is not None:
+        lengths["u"] = np.size(series.u)
+    if len(set(lengths.values())) > 1:
+        raise BenchError(
+            f"figure {figure.key!r}, series {series.label!r}: found lengths {lengths}; expected equal ones"
+        )
+
+
+def _svg(figure: Figure) -> str:
+    polar = figure.kind == "polar"
+    size = (WIDTH_IN, HEIGHT_IN + (0.45 if polar else 0.0))
+    canvas = Canvas(figsize=size, layout="constrained")
+    FigureCanvasSVG(canvas)
+    axes = canvas.add_subplot(projection="polar" if polar else None)
+    dense = [_finite(s) for s in figure.series]
+    drawn = [
+        _plot(axes, _closed(series) if polar else series, _look(position, len(dense)))
+        for position, series in enumerate(dense)
+    ]
+    if polar:
+        drawn += _polar_axes(axes, figure, dense)
+    else:
+        drawn += _plain_axes(axes, figure)
+    if not any(s.x.size for s in dense):
+        axes.text(0.5, 0.5, "no data", transform=axes.transAxes, ha="center", va="center", color=INK)
+    _legend(canvas, drawn)
+    out = io.StringIO()
+    canvas.savefig(out, format="svg", metadata={"Date": None, "Creator": None})
+    return out.getvalue()
+
+
+def _look(position: int, count: int) -> dict[str, Any]:
+    """Colour and marker of a series: seven distinct colours, beyond that an ordered scale."""
+    marker = MARKERS[position % len(MARKERS)]
+    if count <= len(PALETTE):
+        return {"color": PALETTE[position], "marker": marker}
+    return {"color": mpl.colormaps["viridis"](0.92 * position / (count - 1)), "marker": marker}
+
+
+def _finite(series: Series) -> Series:
+    """The series without points that are not finite, long lines reduced to their envelope."""
+    x, y = np.asarray(series.x, np.float64), np.asarray(series.y, np.float64)
+    u = None if series.u is None else np.asarray(series.u, np.float64)
+    keep = np.isfinite(x) & np.isfinite(y)
+    x, y, u = x[keep], y[keep], None if u is None else u[keep]
+    if x.size > MAX_LINE_POINTS and u is None:
+        x, y = envelope(x, y, MAX_LINE_POINTS)
+    return Series(series.label, x, y, series.style, u)
+
+
+def envelope(x: Array, y: Array, points: int) -> tuple[Array, Array]:
+    """At most `points` of the curve: per bin of samples its least and its greatest y, in their order.
+
+    Every extreme that a full plot would show is kept, which plain thinning does not promise.
+    """
+    bins = points // 2
+    edges = np.linspace(0, y.size, bins + 1).astype(np.intp)
+    starts = edges[:-1]
+    bin_of = np.repeat(np.arange(bins), np.diff(edges))
+    order = np.lexsort((y, bin_of))
+    lowest, highest = order[starts], order[edges[1:] - 1]
+    chosen = np.unique(np.concatenate([lowest, highest]))
+    return x[chosen], y[chosen]
+
+
+def _closed(series: Series) -> Series:
+    """A line all around the circle ends where it began."""
+    x = series.x
+    if series.style == "points" or x.size < 3:
+        return series
+    step = float(np.max(np.diff(x), initial=0.0))
+    if not 0 < 2 * np.pi - (x[-1] - x[0]) <= 1.5 * step:
+        return series
+    u = None if series.u is None else np.append(series.u, series.u[0])
+    return Series(series.label, np.append(x, x[0] + 2 * np.pi), np.append(series.y, series.y[0]), series.style, u)
+
+
+def _plot(axes: Axes, series: Series, look: dict[str, Any]) -> Artist:
+    """Draws one series and returns what stands for it in the legend."""
+    face = {} if series.style == "line" else {"markerfacecolor": "white", "markeredgewidth": 0.9}
+    style = {
+        "linestyle": "none" if series.style == "points" else "-",
+        "marker": "" if series.style == "line" else look["marker"],
+        "color": look["color"],
+        "label": _short(series.label),
+        **face,
+    }
+    if series.u is None:
+        return axes.plot(series.x, series.y, **style)[0]
+    u = np.where(np.isfinite(series.u), np.abs(series.u), 0.0)
+    return axes.errorbar(series.x, series.y, yerr=u, elinewidth=0.8, capsize=2.0, capthick=0.8, **style)  # type: ignore[return-value]
+
+
+def _short(label: str) -> str:
+    """A label that fits its legend line; a leading underscore would hide it from the legend."""
+    return shorten(label, 48, placeholder="…").lstrip("_") or "series"
+
+
+def _line_style(position: int) -> dict[str, Any]:
+    return {"color": INK, "linestyle": ("--", ":", "-.")[position % 3], "linewidth": 0.8}
+
+
+def _plain_axes(axes: Axes, figure: Figure) -> list[Artist]:
+    axes.set_xlabel(figure.x_label)
+    axes.set_ylabel(figure.y_label)
+    axes.grid(True, color=GRID, linewidth=0.5)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.margins(x=0.04, y=0.08)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 2.5, 5, 10]))
+        axis.set_major_formatter(_tick_text())
+    return [
+        axes.axhline(level, label=_short(label), **_line_style(position))
+        for position, (label, level) in enumerate(figure.lines)
+    ]
+
+
+def _tick_text() -> ScalarFormatter:
+    """Plain numbers, with a power of ten where they are large or small; never an offset, which readers miss."""
+    formatter = ScalarFormatter(useOffset=False, useMathText=False)
+    formatter.set_powerlimits((-5, 6))
+    return formatter
+
+
+def _polar_axes(axes: Any, figure: Figure, dense: list[Series]) -> list[Artist]:
+    """The radial axis spans the data, not zero: what matters around a turn is the variation."""
+    ys = [y for s in dense for u in (0.0 if s.u is None else s.u,) for y in (s.y - u, s.y + u) if s.y.size]
+    values = np.concatenate([*ys, [level for _, level in figure.lines]]) if ys or figure.lines else np.zeros(1)
+    low, high = float(np.min(values)), float(np.max(values))
+    span = (high - low) or abs(high) or 1.0
+    axes.set_rlim(low - 0.6 * span, high + 0.1 * span)
+    axes.yaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10]))
+    axes.yaxis.set_major_formatter(_tick_text())
+    axes.set_rlabel_position(67.5)
+    for text in axes.get_yticklabels():  # readable where a curve passes behind
+        text.set_bbox({"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.6})
+    axes.set_xlabel(f"angle: {figure.x_label}\nradius: {figure.y_label}")
+    axes.grid(True, color=GRID, linewidth=0.5)
+    axes.spines["polar"].set_color(GRID)
+    turn = np.linspace(0, 2 * np.pi, 181)
+    return [
+        axes.plot(turn, np.full(turn.size, level), label=_short(label), **_line_style(position))[0]
+        for position, (label, level) in enumerate(figure.lines)
+    ]
+
+
+def _legend(canvas: Canvas, drawn: list[Artist]) -> None:
+    """Under the axes, so that it never covers data; as many columns as the labels allow. None for a single series."""
+    if len(drawn) < 2:
+        return
+    longest = max(len(str(artist.get_label())) for artist in drawn)
+    columns = max(1, min(len(drawn), 56 // (longest + 7)))
+    canvas.legend(handles=drawn, loc="outside lower center", ncols=columns, handlelength=1.8, columnspacing=1.2)
+
+
+def _with_own_ids(svg: str, key: str) -> str:
+    """The drawing alone, with ids of its own: several stand in one HTML page."""
+    body = svg[svg.index("<svg") :]
+    own = re.sub(r"[^A-Za-z0-9_-]", "-", key)
+    body = re.sub(r'\bid="', f'id="{own}-', body)
+    body = re.sub(r"url\(#", f"url(#{own}-", body)
+    return re.sub(r'href="#', f'href="#{own}-', body)

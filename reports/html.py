@@ -1,0 +1,42 @@
+"""The view model as one self-contained HTML page."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import files
+
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template, TemplateError
+from markupsafe import Markup
+
+from bench.errors import BenchError
+from reports.view import ReportView
+
+
+@cache
+def _template() -> Template:
+    environment = Environment(
+        loader=PackageLoader("reports", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("report.html.j2")
+
+
+@cache
+def _style() -> Markup:
+    return Markup((files("reports.templates") / "report.css").read_text("utf-8"))
+
+
+def render(view: ReportView) -> str:
+    """The page: no script, nothing fetched, every text escaped. Equal views give equal pages.
+
+    Raises:
+        BenchError: the template cannot be filled.
+    """
+    drawings = {figure.key: Markup(figure.svg) for figure in view.figures}  # ours, from data; texts in it are glyphs
+    try:
+        return _template().render(r=view, style=_style(), drawings=drawings)
+    except TemplateError as error:
+        raise BenchError(f"the HTML report cannot be made: {error}") from error

@@ -1,0 +1,161 @@
+"""Rows of the report from the content of a rig file and of a record."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from reports import text
+from reports.view import BudgetRow, BudgetTable, Correlations, Fact, Symbol, Table
+
+SMALL_SHARE = 0.0005  # of the variance; smaller influences are summed in one line, all of them are in record.json
+NOT_INPUTS = ("simulation", "plans", "envelope", "parameters", "laboratory", "settling")
+Content = Mapping[str, Any]
+
+
+def symbol_of(name: str) -> Symbol:
+    letter, subscript = text.symbol(name)
+    return Symbol(name, letter, subscript)
+
+
+def budget_table(measurement: Content) -> BudgetTable:
+    """The budget of one measurement of record.json, largest share first."""
+    unit = str(measurement.get("unit") or "")
+    entries = sorted(measurement.get("budget") or (), key=lambda e: -abs(float(e.get("contribution") or 0.0)))
+    variance = math.fsum(float(e.get("contribution") or 0.0) ** 2 for e in entries)
+    shares = [float(e.get("contribution") or 0.0) ** 2 / variance if variance > 0 else 0.0 for e in entries]
+    shown = [i for i, share in enumerate(shares) if share >= SMALL_SHARE]
+    rest = [e for i, e in enumerate(entries) if shares[i] < SMALL_SHARE]
+    method = "Monte Carlo (JCGM 101)" if measurement.get("method") == "monte-carlo" else "GUM (JCGM 100)"
+    return BudgetTable(
+        symbol=symbol_of(str(measurement.get("name", ""))),
+        unit=text.unit_text(unit),
+        result=text.result(measurement.get("value"), measurement.get("expanded_uncertainty"), unit),
+        standard_uncertainty=text.with_unit(text.significant(measurement.get("standard_uncertainty")), unit),
+        dof=text.degrees_of_freedom(measurement.get("dof")),
+        method=method,
+        rows=tuple(_budget_row(entries[i], shares[i]) for i in shown),
+        rest=_rest(rest, unit),
+    )
+
+
+def _budget_row(entry: Content, share: float) -> BudgetRow:
+    sensitivity = entry.get("sensitivity")
+    return BudgetRow(
+        name=str(entry.get("name", "")),
+        kind=str(entry.get("type") or text.DASH),
+        distribution=str(entry.get("distribution") or text.DASH),
+        dof=text.degrees_of_freedom(entry.get("dof")),
+        sensitivity=text.significant(sensitivity, 3),
+        contribution=text.significant(abs(float(entry.get("contribution") or 0.0))),
+        share=f"{100 * share:.1f}{text.NARROW}%",
+        percent=round(100 * share, 2),
+    )
+
+
+def _rest(entries: Sequence[Content], unit: str) -> str:
+    if not entries:
+        return ""
+    combined = math.sqrt(math.fsum(float(e.get("contribution") or 0.0) ** 2 for e in entries))
+    noun = "influence" if len(entries) == 1 else "influences"
+    amount = text.with_unit(text.significant(combined), unit)
+    return f"{len(entries)} further {noun}, each below {100 * SMALL_SHARE:g}{text.NARROW}% of the variance: {amount}"
+
+
+def stated(entry: Content) -> str:
+    """The uncertainty of a rig file's number, as its source states it."""
+    unit = str(entry.get("unit") or "")
+    if entry.get("half_width") is not None:
+        amount = f"± {text.with_unit(text.plain(entry['half_width']), unit)}"
+    elif entry.get("u") is not None:
+        k = entry.get("k") or 1
+        amount = f"{'u' if k == 1 else 'U'} = {text.with_unit(text.plain(entry['u']), unit)} (k = {text.plain(k)})"
+    else:
+        return "none stated"
+    distribution = entry.get("distribution")
+    return f"{amount}, {distribution}" if distribution else amount
+
+
+def toleranced(tree: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Content]]:
+    """Every number with a tolerance in a rig file's content, with its path, in file order."""
+    if isinstance(tree, Mapping):
+        if isinstance(tree.get("value"), int | float) and ("u" in tree or "half_width" in tree):
+            yield path, tree
+            return
+        for key, branch in tree.items():
+            if path or key not in NOT_INPUTS:  # what only the simulator draws from is no reader's business
+                yield from toleranced(branch, (*path, str(key)))
+    elif isinstance(tree, list | tuple):
+        for index, branch in enumerate(tree):
+            yield from toleranced(branch, (*path, str(index + 1)))
+
+
+def traceability(rig: Content) -> Table:
+    """The toleranced numbers of the rig file with their sources; equal sensors share one row."""
+    groups: dict[tuple[str, ...], list[tuple[str, ...]]] = {}
+    for path, entry in toleranced(rig):
+        unit = str(entry.get("unit") or "")
+        value = text.with_unit(text.plain(entry["value"]), unit)
+        source = str(entry.get("source") or "source not stated")
+        kind = path[0] + "." + path[-1] if len(path) > 2 else ".".join(path)
+        groups.setdefault((kind, value, stated(entry), source), []).append(path)
+    rows = tuple((_group_name(paths), *key[1:]) for key, paths in groups.items())
+    return Table("", ("Rig file entry", "Value", "Uncertainty as stated", "Source"), rows)
+
+
+def _group_name(paths: Sequence[tuple[str, ...]]) -> str:
+    if len(paths) == 1:
+        return ".".join(paths[0])
+    members = ", ".join(".".join(p[1:-1]) for p in paths)
+    return f"{paths[0][0]}: {paths[0][-1]} of {members}"
+
+
+def correlations(record: Content) -> Correlations | None:
+    """The matrix over the measurements; None for fewer than two.
+
+    Accepts a square list of rows in the order of the measurements, or the same under `names` and `matrix`.
+    """
+    found = record.get("correlations")
+    names = [str(m.get("name", "")) for m in record.get("measurements") or ()]
+    if isinstance(found, Mapping):
+        names, found = [str(n) for n in found.get("names", names)], found.get("matrix")
+    if not found or len(names) < 2 or len(found) != len(names):
+        return None
+    rows = tuple(tuple(_coefficient(r) for r in row) for row in found)
+    return Correlations(tuple(symbol_of(n) for n in names), rows)
+
+
+def _coefficient(r: float | None) -> str:
+    if r is None:
+        return text.DASH
+    rounded = f"{r:.2f}"
+    return rounded.replace("-", text.MINUS) if float(rounded) else "0"
+
+
+def facts(tree: Any, prefix: str = "") -> Iterator[Fact]:
+    """Settings, flat: `masses[2].value` style labels, short lists on one line."""
+    if isinstance(tree, Mapping) and "value" in tree and ("u" in tree or "half_width" in tree):
+        value = text.with_unit(text.plain(tree["value"]), str(tree.get("unit") or ""))
+        yield Fact(prefix, f"{value}; {stated(tree)}")
+    elif isinstance(tree, Mapping):
+        for key, branch in tree.items():
+            yield from facts(branch, f"{prefix}.{key}" if prefix else str(key))
+    elif isinstance(tree, list | tuple) and any(isinstance(b, Mapping) for b in tree):
+        for index, branch in enumerate(tree):
+            yield from facts(branch, f"{prefix}[{index + 1}]")
+    else:
+        yield Fact(prefix, inline(tree))
+
+
+def inline(value: Any) -> str:
+    """One setting on one line."""
+    if value is None:
+        return "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int | float):
+        return text.plain(value)
+    if isinstance(value, list | tuple):
+        return ", ".join(inline(v) for v in value) or "none"
+    return str(value)

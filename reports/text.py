@@ -1,0 +1,165 @@
+"""Numbers, units and names as a reader expects them: one place, used by the view model only.
+
+Rounding follows JCGM 100:2008, 7.2.6: the expanded uncertainty keeps two significant digits, the value is rounded
+to the same decimal place. Digits are grouped in threes and units set off by a narrow no-break space (ISO 80000-1).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from datetime import datetime
+from decimal import ROUND_HALF_EVEN, Decimal
+
+NARROW = "\u202f"  # narrow no-break space
+MINUS = "\u2212"
+TIMES = "\u00d7"
+DASH = "\u2013"
+_SUPERSCRIPTS = str.maketrans("0123456789-+", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺")
+_UNIT_WORDS = {"um": "µm", "us": "µs", "uA": "µA", "deg": "°", "degC": "°C", "ohm": "Ω", "Ohm": "Ω", "percent": "%"}
+
+
+def unit_text(unit: str | None) -> str:
+    """A unit as printed: `A s/m` -> `A·s/m`, `N/A^2` -> `N/A²`, `um` -> `µm`; the unit one is the empty string."""
+    text = (unit or "").strip()
+    if text in ("", "1"):
+        return ""
+    text = re.sub(r"\^\(?(-?\d+)\)?|(?<=[A-Za-z])(-?\d+)", lambda m: (m[1] or m[2]).translate(_SUPERSCRIPTS), text)
+    text = re.sub(r"[A-Za-z]+", lambda m: _UNIT_WORDS.get(m[0], m[0]), text)
+    return re.sub(r"\s*[*·]\s*|\s+", "·", text)
+
+
+def with_unit(number: str, unit: str | None) -> str:
+    """Number and unit with a narrow no-break space between; angles in degrees take none."""
+    printed = unit_text(unit)
+    if not printed:
+        return number
+    return number + printed if printed == "°" else number + NARROW + printed
+
+
+def grouped(number: str) -> str:
+    """Plain decimal digits with a true minus sign and groups of three where there are more than four digits."""
+    sign, digits = (MINUS, number[1:]) if number.startswith("-") else ("", number)
+    whole, point, fraction = digits.partition(".")
+    if len(whole) > 4:
+        whole = re.sub(r"(?<=\d)(?=(?:\d{3})+$)", NARROW, whole)
+    if len(fraction) > 4:
+        fraction = re.sub(r"(\d{3})(?=\d)", rf"\1{NARROW}", fraction)
+    return sign + whole + point + fraction
+
+
+def power_of_ten(exponent: int) -> str:
+    """` × 10⁻⁶`, with the spaces that keep it on one line."""
+    return f"{NARROW}{TIMES}{NARROW}10{str(exponent).translate(_SUPERSCRIPTS)}"
+
+
+def _fixed(number: float, last: int, shift: int) -> str:
+    """`number` / 10^shift, rounded at the decade `last` of the unshifted number; never a negative zero."""
+    scaled = Decimal(repr(float(number))).quantize(Decimal(1).scaleb(last), ROUND_HALF_EVEN).scaleb(-shift)
+    text = format(abs(scaled) if scaled.is_zero() else scaled, "f")
+    return grouped(text)
+
+
+def _shift(largest: float, last: int) -> int:
+    """The power of ten to take out, zero where the plain number reads well; multiples of three where possible."""
+    exponent = math.floor(math.log10(largest)) if largest > 0 else 0
+    if last <= 0 and -3 <= exponent < 6:
+        return 0
+    thousand = 3 * math.floor(exponent / 3)
+    return thousand if last <= thousand else exponent
+
+
+def rounded_together(numbers: list[float], uncertainty: float, digits: int = 2) -> tuple[list[str], str, int]:
+    """All `numbers`, and the uncertainty, to `digits` significant digits of the uncertainty.
+
+    Returns the texts, the uncertainty's text, and the common power of ten (0 if none).
+    """
+    if not uncertainty > 0:
+        return [plain(n) for n in numbers], "0", 0
+    last = int(f"{uncertainty:.{digits - 1}e}".partition("e")[2]) - digits + 1
+    shift = _shift(max(abs(uncertainty), *(abs(n) for n in numbers)), last)
+    return [_fixed(n, last, shift) for n in numbers], _fixed(uncertainty, last, shift), shift
+
+
+def result(value: float | None, expanded: float | None, unit: str) -> str:
+    """`23.412 ± 0.034 N/A`; the whole in brackets where a unit or a power of ten follows and binds both."""
+    if value is None:
+        return DASH
+    if expanded is None:
+        return with_unit(plain(value), unit)
+    (number,), u, shift = rounded_together([value], expanded)
+    pair = f"{number} ± {u}"
+    if not shift and not unit_text(unit):
+        return pair
+    pair = f"({pair})"
+    return with_unit(pair + (power_of_ten(shift) if shift else ""), unit)
+
+
+def interval(low: float | None, high: float | None, expanded: float | None, unit: str) -> str:
+    """`[23.31, 23.56] N/A`, rounded like the result it belongs to."""
+    if low is None or high is None:
+        return DASH
+    (a, b), _, shift = rounded_together([low, high], expanded or (high - low) / 2)
+    return with_unit(f"[{a}, {b}]" + (power_of_ten(shift) if shift else ""), unit)
+
+
+def significant(number: float | None, digits: int = 2) -> str:
+    """A number to `digits` significant digits, `0.00051` as `5.1 × 10⁻⁴`."""
+    if number is None:
+        return DASH
+    if number == 0:
+        return "0"
+    mantissa, _, exponent = f"{number:.{digits - 1}e}".partition("e")
+    e = int(exponent)
+    if -3 <= e < max(digits, 4):
+        return _fixed(number, min(e - digits + 1, 0), 0)
+    return mantissa.replace("-", MINUS) + power_of_ten(e)
+
+
+def plain(number: float | int) -> str:
+    """A setting as it was written: up to twelve significant digits, no trailing zeros."""
+    if isinstance(number, bool):
+        return "yes" if number else "no"
+    if isinstance(number, int):
+        return grouped(str(number))
+    if not math.isfinite(number):
+        return str(number)
+    short = f"{number:.12g}"
+    if number != 0 and not 1e-4 <= abs(number) < 1e7:
+        mantissa, _, exponent = f"{number:.11e}".partition("e")
+        mantissa = mantissa.rstrip("0").rstrip(".")
+        return mantissa.replace("-", MINUS) + power_of_ten(int(exponent))
+    return grouped(short)
+
+
+def degrees_of_freedom(dof: float | None) -> str:
+    """Truncated to the next lower integer (JCGM 100, G.4.1 note 1); null in a record means infinite."""
+    if dof is None:
+        return "∞"
+    return grouped(str(math.floor(dof + 1e-9))) if dof < 1000 else "> 999"
+
+
+def probability(p: float | None) -> str:
+    """`0.95` -> `95 %`."""
+    return DASH if p is None else f"{p * 100:.4g}{NARROW}%"
+
+
+def moment(text: str | None) -> str:
+    """An ISO 8601 time as `2026-01-01 00:00:05 UTC`; anything else as it stands."""
+    if not text:
+        return DASH
+    try:
+        at = datetime.fromisoformat(text)
+    except ValueError:
+        return text
+    offset = at.utcoffset()
+    zone = "" if offset is None else " UTC" if not offset else at.strftime(" UTC%z")
+    return at.strftime("%Y-%m-%d %H:%M:%S") + zone
+
+
+def symbol(name: str) -> tuple[str, str]:
+    """A quantity's name as (letter, subscript): `K_i` -> K, i; `K2_o` -> K, 2,o; a word stays whole, no subscript."""
+    match = re.fullmatch(r"([A-Za-z])(\d*)(?:_([A-Za-z0-9]{1,6}))?", name)
+    if not match or not (match[2] or match[3] or len(name) == 1):
+        return name, ""
+    return match[1], ",".join(part for part in (match[2], match[3]) if part)

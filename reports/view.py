@@ -1,0 +1,170 @@
+"""The view model: everything a report says, as finished text, in the order it says it.
+
+Both outputs print these strings and compute nothing, so the HTML and the PDF cannot disagree. The letters in the
+comments are the clauses of ISO/IEC 17025:2017, 7.8.2.1 and 7.8.4.1, that a field answers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Tone = Literal["pass", "fail", "indeterminate", "error", "none"]
+
+SIMULATED = "Simulated rig – not a calibration certificate"
+DECISION_RULE = (
+    "Decision rule (JCGM 106:2012, guarded by the expanded uncertainty): a result passes if its whole 95 % coverage "
+    "interval lies inside the limits, fails if the whole interval lies outside them, and is indeterminate otherwise. "
+    "For a stated pass the probability that the true value lies beyond a given limit is at most 2.5 %. A result "
+    "without a limit is reported without a verdict. The outcome is PASS only if every declared quantity was measured, "
+    "no verdict is fail or indeterminate, and no finding affects the outcome."
+)
+STATEMENTS = (
+    "The results relate only to the item tested, in the state and under the conditions given above.",
+    "This report shall not be reproduced except in full.",
+)
+ABOUT_UNCERTAINTY = (
+    "The number after ± is the expanded uncertainty U = k·u, with the coverage factor k for the effective degrees of "
+    "freedom ν and the coverage probability p stated beside it (JCGM 100:2008)."
+)
+NO_RESULTS = "No result was obtained. This report makes no statement about the item tested."
+
+
+@dataclass(frozen=True)
+class Symbol:
+    """A quantity's name: a letter set in italics with a subscript, or a whole word and no subscript."""
+
+    plain: str
+    letter: str
+    subscript: str
+
+
+@dataclass(frozen=True)
+class Fact:
+    """A label and its text; `blank` is a line to fill in by hand."""
+
+    label: str
+    text: str
+    blank: bool = False
+
+
+@dataclass(frozen=True)
+class ResultRow:
+    """One line of the results table."""
+
+    symbol: Symbol
+    about: str
+    where: str
+    result: str  # value ± U with unit
+    interval: str  # only where it says more than value ± U does, else empty
+    k: str
+    dof: str
+    probability: str
+    limit: str
+    limit_source: str
+    verdict: str
+    tone: Tone
+
+
+@dataclass(frozen=True)
+class FindingRow:
+    """A finding; `loud` ones affect the outcome."""
+
+    code: str
+    text: str
+    where: str
+    effect: str
+    loud: bool
+
+
+@dataclass(frozen=True)
+class BudgetRow:
+    """One influence: its standard uncertainty contribution in the measurand's unit, and its share of the variance."""
+
+    name: str
+    kind: str
+    distribution: str
+    dof: str
+    sensitivity: str
+    contribution: str
+    share: str
+    percent: float  # 0..100, the length of the bar
+
+
+@dataclass(frozen=True)
+class BudgetTable:
+    """The uncertainty budget of one quantity."""
+
+    symbol: Symbol
+    unit: str
+    result: str
+    standard_uncertainty: str
+    dof: str
+    method: str
+    rows: tuple[BudgetRow, ...]
+    rest: str  # what the rows leave out, or empty
+
+
+@dataclass(frozen=True)
+class Table:
+    """A plain table: header cells and rows of texts; `numeric` names the columns set flush right."""
+
+    title: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    numeric: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Correlations:
+    """The correlation matrix of the results."""
+
+    symbols: tuple[Symbol, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True)
+class FigureEntry:
+    """A drawn figure with its number. `svg` is our own drawing, safe to place in a page as it is."""
+
+    number: int
+    key: str
+    title: str
+    caption: str
+    svg: str
+
+
+@dataclass(frozen=True)
+class ReportView:
+    """One report. The order of the fields is the order of the page."""
+
+    title: str  # 7.8.2.1 a
+    run_id: str  # 7.8.2.1 d: unique identification, on every page
+    rig: str
+    uut: str  # 7.8.2.1 g: unambiguous identification of the item
+    date: str
+    simulated: str  # the banner, empty for a real rig
+    outcome: str
+    tone: Tone
+    outcome_text: str
+    identification: tuple[Fact, ...]  # 7.8.2.1 c, g, i
+    results: tuple[ResultRow, ...]  # 7.8.2.1 m, 7.8.4.1 a (uncertainty in the measurand's unit), 7.8.4.1 e
+    no_results: str
+    about_uncertainty: str
+    decision_rule: str  # 7.8.6
+    findings: tuple[FindingRow, ...]  # 7.8.2.1 n: deviations the bench itself noticed
+    budgets: tuple[BudgetTable, ...]  # 7.8.4.1 a
+    method: tuple[str, ...]  # 7.8.2.1 f
+    figures: tuple[FigureEntry, ...]
+    conditions: tuple[Fact, ...]  # 7.8.4.1 b
+    traceability: Table  # 7.8.4.1 c
+    calibrations: tuple[Fact, ...]  # 7.8.4.1 c, d: earlier results this run used
+    link: tuple[Table, ...]
+    link_note: str
+    correlations: Correlations | None
+    plan: tuple[Fact, ...]  # 7.8.2.1 f, k: settings; no sampling beyond them
+    versions: tuple[Fact, ...]
+    recording: tuple[Fact, ...]  # the file that everything above was computed from
+    laboratory: tuple[Fact, ...]  # 7.8.2.1 b, e, h, j, n, o, p: what only people know; from [laboratory] or blank
+    statements: tuple[str, ...]  # 7.8.2.1 l and its note
+    end: str  # 7.8.2.1 d: a clear end
