@@ -155,7 +155,7 @@ def _findings(record: Content, around: Surroundings) -> Iterable[FindingRow]:
     known = {str(f.get("code")) for f in record.get("findings") or ()}
     if around.truncated and not any("truncated" in code for code in known):
         said = "The recording is truncated: it was not closed. Everything here comes from its complete part."
-        yield FindingRow("truncated-recording", said, "recording", "note", True)
+        yield FindingRow("truncated-recording", said, "recording", "", True)
     for f in record.get("findings") or ():
         effect = str(f.get("effect") or "note")
         loud = effect != "note"
@@ -164,7 +164,8 @@ def _findings(record: Content, around: Surroundings) -> Iterable[FindingRow]:
 
 def _outcome_text(outcome: str, rows: Sequence[ResultRow], findings: Sequence[FindingRow]) -> str:
     named = {tone: ", ".join(r.symbol.plain for r in rows if r.tone == tone) for tone in _TONES.values()}
-    loud = ", ".join(dict.fromkeys(f.code for f in findings if f.loud))
+    said = [f for f in findings if f.effect]  # all but our own remark on a truncated recording
+    loud = ", ".join(dict.fromkeys(f.code for f in [f for f in said if f.loud] or said))
     match outcome:
         case "PASS" if any(r.tone == "pass" for r in rows):
             return "Every declared quantity was measured, and every limit is met by the whole 95 % interval."
@@ -178,9 +179,9 @@ def _outcome_text(outcome: str, rows: Sequence[ResultRow], findings: Sequence[Fi
             )
             return (undecided + (f"Findings that prevent a decision: {loud}." if loud else "")).strip()
         case "ABORTED":
-            return "The run was stopped before its end. " + (f"See the finding {loud}." if loud else "")
+            return "The run was stopped before its end." + (f" See the finding {loud}." if loud else "")
         case _:
-            return "The bench could not tell. " + (f"See the finding {loud}." if loud else "")
+            return "The bench could not tell." + (f" See the finding {loud}." if loud else "")
 
 
 def _uut(uut: Any) -> str:
@@ -199,7 +200,6 @@ def _identification(record: Content, around: Surroundings, rig_name: str) -> tup
     site_name = str(site.get("name") or "") if isinstance(site, Mapping) else ""
     seed = record.get("seed")
     found = [
-        Fact("Report and run", str(record.get("run_id") or text.DASH)),
         Fact("Item under test", _uut(record.get("uut"))),
         Fact("Rig", f"{rig_name} – {rig_title}" if rig_title else rig_name),
         Fact("Procedure", str(record.get("procedure") or text.DASH)),

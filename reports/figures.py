@@ -187,8 +187,8 @@ def _line_style(position: int) -> dict[str, Any]:
 
 
 def _plain_axes(axes: Axes, figure: Figure) -> list[Artist]:
-    axes.set_xlabel(figure.x_label)
-    axes.set_ylabel(figure.y_label)
+    axes.set_xlabel(shorten(figure.x_label, 56, placeholder="…"))
+    axes.set_ylabel(shorten(figure.y_label, 40, placeholder="…"))
     axes.grid(True, color=GRID, linewidth=0.5)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)

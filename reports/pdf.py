@@ -40,7 +40,8 @@ def render(view: ReportView, issued: str | None = None) -> bytes:
     try:
         made = typst.compile(sources, ignore_system_fonts=bundled_suffices, timestamp=_seconds(issued))
     except (RuntimeError, ValueError) as error:
-        raise BenchError(f"the PDF report cannot be made: {error}") from error
+        said = str(getattr(error, "diagnostic", "") or error).strip()  # with the template's line
+        raise BenchError(f"the PDF report cannot be made: {said}") from error
     return bytes(made)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from textwrap import shorten
 from typing import Any
 
 from reports import text
@@ -123,7 +124,7 @@ def correlations(record: Content) -> Correlations | None:
     if not found or len(names) < 2 or len(found) != len(names):
         return None
     rows = tuple(tuple(_coefficient(r) for r in row) for row in found)
-    return Correlations(tuple(symbol_of(n) for n in names), rows)
+    return Correlations(tuple(symbol_of(shorten(n, 20, placeholder="…")) for n in names), rows)
 
 
 def _coefficient(r: float | None) -> str:

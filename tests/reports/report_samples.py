@@ -145,18 +145,33 @@ def figures() -> list[Figure]:
         points = Series("measured", amps, 23.4 * amps, "points", np.full(10, 0.4))
         fit = (points, Series("quadratic fit", line, 23.4 * line))
         about = "Force at the bearing against its control current, up and down at 0°."
-        made.append(Figure(f"fit-{key}", f"Force and current, {place} AMB", about, "control current / A", "force / N", fit))
+        made.append(
+            Figure(f"fit-{key}", f"Force and current, {place} AMB", about, "control current / A", "force / N", fit)
+        )
         cloud = tuple(Series(f"{d}°", amps, rng.normal(0, 5, 10), "points") for d in range(0, 360, 45))
         zero = (("zero", 0.0),)
         about = "Residuals of the quadratic fit at every angle."
         made.append(
-            Figure(f"res-{key}", f"Residuals, {place}", about, "control current / A", "residual / mN", cloud, lines=zero)
+            Figure(
+                f"res-{key}", f"Residuals, {place}", about, "control current / A", "residual / mN", cloud, lines=zero
+            )
         )
         turn = (Series("tangent at zero current", angles, 23.4 + 0.1 * np.cos(angles), "both", np.full(8, 0.05)),)
         about = "The radial axis does not begin at zero."
         made.append(
-            Figure(f"turn-{key}", f"Around a turn, {place}", about, "rotor / °", "K / (N/A)", turn, "polar", (("mean", 23.4),))
+            Figure(
+                f"turn-{key}",
+                f"Around a turn, {place}",
+                about,
+                "rotor / °",
+                "K / (N/A)",
+                turn,
+                "polar",
+                (("mean", 23.4),),
+            )
         )
         curves = (Series("inboard", t, 10 * ring + rng.normal(0, 0.1, t.size)), Series("outboard", t, 6 * ring))
-        made.append(Figure(f"step-{key}", f"One step, {place}", "2 kg hung at t = 0.", "time / s", "position / µm", curves))
+        made.append(
+            Figure(f"step-{key}", f"One step, {place}", "2 kg hung at t = 0.", "time / s", "position / µm", curves)
+        )
     return made

@@ -1,0 +1,132 @@
+"""The supervisor: whatever stops a run ends in the same ordered make-safe.
+
+Signals only set a flag while the machine moves; the clock's pump asks `check` after each slice of a sleep (at most
+0.1 s of bench time), so a stop takes effect in the middle of a sleep and never inside a half-sent command. Where
+nothing moves (start-up, analysis) a signal raises at once.
+
+During make-safe nothing is raised for a signal any more: it is logged and ignored. A step that takes too long, or
+whose link is dead, is logged and the next one still runs. What a step calls must not block outside of `clock.sleep`;
+links never do (`receive` never waits).
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from enum import Enum
+
+from bench import signals
+from bench.errors import LinkError, SignalAbort
+from bench.findings import Effect, Finding
+
+logger = logging.getLogger("bench.supervisor")
+
+
+@dataclass(frozen=True, slots=True)
+class SafeStep:
+    """One step of make-safe: what it does, in bench time of at most `timeout_s`."""
+
+    name: str
+    action: Callable[[], None]
+    timeout_s: float
+
+
+class _Mode(Enum):
+    AT_ONCE = "a signal raises where the program stands"
+    AT_CHECK = "a signal raises at the next check"
+    IGNORED = "a signal is logged"
+
+
+class Supervisor:
+    """Owns the stopping of one run. Use within `with supervisor.watching():`."""
+
+    def __init__(self) -> None:
+        self._mode = _Mode.AT_ONCE
+        self._signal: str | None = None
+        self._ignored: list[str] = []  # handlers do not log: a signal may arrive inside a write to the same stream
+        self._deadline_ns: int | None = None
+        self._step = ""
+
+    @property
+    def stopped_by(self) -> str | None:
+        """The name of the signal that stops this run, if one arrived in time to do so."""
+        return self._signal
+
+    @contextmanager
+    def watching(self) -> Iterator[Supervisor]:
+        """SIGINT and SIGTERM come here within the block and go where they went before after it."""
+        with signals.delivered_to(self._received):
+            yield self
+        self._log_ignored()
+
+    @contextmanager
+    def moving(self) -> Iterator[None]:
+        """The machine may move within the block: signals wait for `check`."""
+        with self._in(_Mode.AT_CHECK):
+            yield
+        self._raise_if_stopped()  # arrived after the last check: the run still ends as it was told to
+
+    @contextmanager
+    def finishing(self) -> Iterator[None]:
+        """What is written within the block must be whole: signals are logged and ignored."""
+        with self._in(_Mode.IGNORED):
+            yield
+        self._log_ignored()
+
+    @contextmanager
+    def _in(self, mode: _Mode) -> Iterator[None]:
+        before, self._mode = self._mode, mode
+        try:
+            yield
+        finally:
+            self._mode = before
+
+    def check(self, now_ns: int) -> None:
+        """Called by the clock's pump.
+
+        Raises:
+            SignalAbort: a signal asks the run to stop.
+            LinkError: the present step of make-safe has run out of time.
+        """
+        if self._mode is _Mode.IGNORED:
+            self._log_ignored()
+            if self._deadline_ns is not None and now_ns > self._deadline_ns:
+                raise LinkError(f"make-safe step {self._step!r} did not end within its time")
+            return
+        self._raise_if_stopped()
+
+    def make_safe(self, steps: Sequence[SafeStep], now_ns: Callable[[], int]) -> tuple[Finding, ...]:
+        """Do every step in order, whatever happens to the ones before; returns a finding per step that failed."""
+        failed: list[Finding] = []
+        with self.finishing():
+            for step in steps:
+                logger.info("make safe: %s", step.name)
+                self._step, self._deadline_ns = step.name, now_ns() + round(step.timeout_s * 1e9)
+                try:
+                    step.action()
+                except Exception as error:
+                    # Anything at all: the next step must run.
+                    logger.warning("make safe: %s failed: %s", step.name, error)
+                    text = f"make-safe step {step.name!r} failed: {error or type(error).__name__}"
+                    failed.append(Finding("make-safe-failed", text, step.name, Effect.ERROR))
+                finally:
+                    self._deadline_ns = None
+        return tuple(failed)
+
+    def _received(self, name: str) -> None:
+        if self._mode is _Mode.IGNORED or self._signal is not None:
+            self._ignored.append(name)
+            return
+        self._signal = name
+        if self._mode is _Mode.AT_ONCE:
+            self._raise_if_stopped()
+
+    def _raise_if_stopped(self) -> None:
+        if self._signal is not None:
+            raise SignalAbort(f"stopped by {self._signal}")
+
+    def _log_ignored(self) -> None:
+        while self._ignored:
+            logger.warning("%s ignored: the run is already being stopped", self._ignored.pop(0))

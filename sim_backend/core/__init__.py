@@ -1,0 +1,200 @@
+"""The C core behind a typed facade: parameters as frozen dataclasses, `Plant.run` as the only way time passes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+from cffi import FFI
+
+from sim_backend.core.build import library
+from sim_backend.core.params import ControlParams, PlantParams
+
+Array = npt.NDArray[np.float64]
+
+CHANNELS: Final = (
+    *("pos_xi", "pos_yi", "pos_xo", "pos_yo", "pos_z", "angle", "speed"),
+    *(f"i_{axis}_{coil}" for axis in ("xi", "yi", "xo", "yo", "z") for coil in "pn"),
+    *(f"i_m{k}" for k in range(1, 5)),
+    "flags",
+)
+TICK_S: Final = 1e-4
+PERIOD_TICKS: Final = 10
+OFF, READY, LIFT, LEVITATE, LAND = range(5)
+TRIPS: Final = {1: "LEVITATION_LOST", 2: "OVERCURRENT", 4: "OVERSPEED"}
+
+
+def _open() -> tuple[FFI, Any]:
+    header = (Path(__file__).parent / "tsbs.h").read_text(encoding="utf-8")
+    declarations = header.split("/* declarations begin */")[1].split("/* declarations end */")[0]
+    ffi = FFI()
+    ffi.cdef(declarations)
+    return ffi, ffi.dlopen(str(library()))
+
+
+_ffi, _lib = _open()
+
+
+def _fill(struct: Any, values: Mapping[str, Any]) -> None:
+    for name, value in values.items():
+        if isinstance(value, tuple):
+            getattr(struct, name)[0 : len(value)] = list(value)
+        else:
+            setattr(struct, name, value)
+
+
+class Plant:
+    """The machine with its controller's law. Owns its time: `run` is the only thing that advances it.
+
+    Args:
+        params: the plant; every field has the nominal machine's value.
+        control: initial values of the law's parameters.
+        seed: of all noise.
+        substeps: integration steps per control tick.
+    """
+
+    def __init__(
+        self,
+        params: PlantParams | None = None,
+        seed: int = 0,
+        *,
+        control: ControlParams | None = None,
+        substeps: int = 2,
+    ) -> None:
+        self.params = params or PlantParams()
+        self._p = _ffi.new("tsbs_params *")
+        self._c = _ffi.new("tsbs_control *")
+        self._s = _ffi.new("tsbs_state *")
+        _fill(self._p, vars(self.params))
+        _fill(self._c, vars(control or ControlParams()))
+        self._s.substeps = substeps
+        _lib.tsbs_start(self._p, self._c, self._s, seed & (2**64 - 1))
+
+    @property
+    def tick(self) -> int:
+        """Control ticks since the start."""
+        return int(self._s.tick)
+
+    @property
+    def mode(self) -> int:
+        """OFF, READY, LIFT, LEVITATE or LAND; the law follows it from the next tick on."""
+        return int(self._s.law.mode)
+
+    @mode.setter
+    def mode(self, mode: int) -> None:
+        state = self._s.law
+        if mode == LIFT or state.mode == OFF:
+            state.fresh = 1
+        state.lift_clock = 0
+        state.mode = mode
+
+    @property
+    def moved(self) -> bool:
+        """Whether the lift or landing has run its course."""
+        return bool(self._s.law.lift_clock >= self._c.lift_time_s)
+
+    @property
+    def speed(self) -> float:
+        """Speed in rad/s as the controller's filter sees it."""
+        return float(self._s.speed)
+
+    @property
+    def age_ticks(self) -> int:
+        """Ticks run since the last completed telemetry period."""
+        return int(self._s.in_period)
+
+    def set(self, name: str, value: float) -> None:
+        """Set a parameter of the law by its name, SI.
+
+        Raises:
+            KeyError: the law has no such parameter.
+        """
+        if name not in ControlParams.__dataclass_fields__:
+            raise KeyError(name)
+        setattr(self._c, name, value)
+
+    def get(self, name: str) -> float:
+        """A parameter of the law, SI."""
+        if name not in ControlParams.__dataclass_fields__:
+            raise KeyError(name)
+        return float(getattr(self._c, name))
+
+    def load(self, mass_kg: float, weight_N: float, ramp_s: float) -> None:
+        """Hang `mass_kg` in place of what hangs; its weight (net of buoyancy) is handed over in `ramp_s`."""
+        s = self._s
+        if s.hung_mass == 0:
+            s.s[12] = s.s[1] - self._p.z_hook * s.s[3]
+            s.s[13] = s.s[7] - self._p.z_hook * s.s[9]
+        s.hung_mass = mass_kg
+        s.weight_to = weight_N
+        s.weight_rate = abs(weight_N - s.weight) / max(ramp_s, TICK_S)
+
+    @property
+    def trips(self) -> int:
+        """Latched trip bits (see TRIPS)."""
+        return int(self._s.trips)
+
+    def clear_trips(self) -> None:
+        """Forget latched trips."""
+        self._s.trips = 0
+        self._s.lost_ticks = 0
+
+    def run(self, ticks: int) -> Array:
+        """Advance by `ticks` control ticks, or to the end of the telemetry period in which a trip occurs.
+
+        Returns:
+            (n, len(CHANNELS)) float64, one row per completed telemetry period of ten ticks.
+        """
+        limit = (ticks + PERIOD_TICKS - 1) // PERIOD_TICKS + 1
+        rows = np.empty((limit, len(CHANNELS)))
+        done = _lib.tsbs_run(self._p, self._c, self._s, ticks, _ffi.cast("double *", rows.ctypes.data), limit)
+        before = (self.tick - done) // PERIOD_TICKS
+        return rows[: self.tick // PERIOD_TICKS - before]
+
+    def state(self) -> dict[str, Any]:
+        """True state, for tests: `s` (14,) positions and rates, `coil` (10,), `segment` (4,), weight in N."""
+        s = self._s
+        return {
+            "s": np.array(list(s.s)),
+            "coil": np.array(list(s.coil)),
+            "segment": np.array(list(s.segment)),
+            "weight": float(s.weight),
+        }
+
+    def set_state(self, s: Array) -> None:
+        """Put the shaft somewhere, for tests: (14,) positions and rates."""
+        self._s.s[0:14] = [float(x) for x in s]
+
+
+def derivative(
+    params: PlantParams,
+    s: Array,
+    coil: Array,
+    segment: Array,
+    *,
+    play: Array | None = None,
+    gamma: float = 0.0,
+    hung_mass: float = 0.0,
+    weight: float = 0.0,
+) -> Array:
+    """Right-hand side of the mechanics, (14,), for tests against the reference."""
+    p = _ffi.new("tsbs_params *")
+    _fill(p, vars(params))
+
+    def c(x: Array) -> Any:
+        return _ffi.new("double[]", [float(v) for v in x])
+
+    out = _ffi.new("double[14]")
+    _lib.tsbs_derivative(p, c(s), c(coil), c(segment), c(np.zeros(4) if play is None else play), gamma, hung_mass,
+                         weight, out)  # fmt: skip
+    return np.array(list(out))
+
+
+def normals(seed: int, stream: int, count: int) -> Array:
+    """`count` draws of the core's normal generator, for tests."""
+    out = np.empty(count)
+    _lib.tsbs_normals(seed, stream, _ffi.cast("double *", out.ctypes.data), count)
+    return out

@@ -1,0 +1,51 @@
+"""Builds the C core: a plain shared library beside its sources, named by the digest of what it is made from."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+from bench.errors import ConfigError
+
+HERE = Path(__file__).resolve().parent
+FLAGS = ("-std=c11", "-O2", "-flto", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off", "-fPIC", "-shared", "-Wall", "-Wextra")
+# -ffp-contract=off: no fused multiply-add, so that the same seed gives the same bytes on every processor.
+
+
+def library() -> Path:
+    """The built library; builds it when a source, a header or a flag has changed.
+
+    Raises:
+        ConfigError: there is no C compiler, or it fails; its output is in the message.
+    """
+    sources = sorted(HERE.glob("*.c"))
+    parts = [path.read_bytes() for path in (*sources, *sorted(HERE.glob("*.h")))]
+    digest = hashlib.sha256(b"\0".join([*parts, " ".join(FLAGS).encode()])).hexdigest()[:16]
+    target = HERE / f"tsbs-{digest}.so"
+    if not target.exists():
+        _compile(sources, target)
+    return target
+
+
+def _compile(sources: list[Path], target: Path) -> None:
+    compiler = os.environ.get("CC") or next((c for c in ("cc", "gcc", "clang") if shutil.which(c)), None)
+    if compiler is None:
+        raise ConfigError("no C compiler found (looked for cc, gcc, clang); install one, or name it in CC")
+    with tempfile.TemporaryDirectory(dir=HERE) as folder:
+        made = Path(folder) / "core.so"
+        command = [compiler, *FLAGS, "-o", str(made), *map(str, sources), "-lm"]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            raise ConfigError(f"{compiler} could not build the simulator core:\n{done.stderr}")
+        os.replace(made, target)
+    for old in HERE.glob("tsbs-*.so"):
+        if old != target:
+            old.unlink(missing_ok=True)
+
+
+if __name__ == "__main__":
+    library()

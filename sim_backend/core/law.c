@@ -1,0 +1,104 @@
+/* Control law: a pure function of the readings, its own state and its parameters, called every 100 us.
+ * PID in the actuator planes, constant current sum; slew-limited angle; open-loop motor currents through T (6.9). */
+#include <math.h>
+#include <string.h>
+#include "tsbs.h"
+
+#define TWO_PI 6.283185307179586
+/* share of a first-order filter's memory that survives a tick (backward Euler) */
+#define KEEP(hz) (1 / (1 + TWO_PI * (hz) * TICK))
+
+static double clip(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
+
+static double toward(double from, double to, double step) { return from + clip(to - from, -step, step); }
+
+/* share of the way that the references have gone from the rest position to the set point */
+static double lifted(const tsbs_control *c, tsbs_law_state *l) {
+    if (l->mode == LEVITATE) return 1;
+    double t = l->lift_clock / c->lift_time_s;
+    l->lift_clock += TICK;
+    if (l->lift_clock > c->lift_time_s) l->lift_clock = c->lift_time_s;
+    double smooth = t * t * (3 - 2 * t);
+    return l->mode == LIFT ? smooth : 1 - smooth;
+}
+
+static void radial(const tsbs_control *c, tsbs_law_state *l, const double *plane, tsbs_reference *out) {
+    const double kp[] = {c->kp_i, c->kp_i, c->kp_o, c->kp_o, c->kp_z}, kd[] = {c->kd_i, c->kd_i, c->kd_o, c->kd_o, c->kd_z};
+    const double ki[] = {c->ki_i, c->ki_i, c->ki_o, c->ki_o, c->ki_z};
+    const double bias[] = {c->bias_i, c->bias_i, c->bias_o, c->bias_o, c->bias_z};
+    const double set[] = {c->ref_xi, c->ref_yi, c->ref_xo, c->ref_yo, c->ref_z};
+    double up = lifted(c, l), keep = KEEP(c->derivative_hz);
+    for (int a = 0; a < 5; a++) {
+        double error = l->rest[a] + up * (set[a] - l->rest[a]) - plane[a];
+        l->filtered[a] = keep * l->filtered[a] + (1 - keep) * (plane[a] - l->previous[a]) / TICK;
+        l->previous[a] = plane[a];
+        double control = kp[a] * error + l->integral[a] - kd[a] * l->filtered[a], room = c->current_limit - bias[a];
+        if (fabs(control) < room || control * error < 0) l->integral[a] += ki[a] * error * TICK;
+        control = clip(control, -room, room);
+        out->coil[2 * a] = clip(bias[a] + control, 0, c->current_limit);
+        out->coil[2 * a + 1] = clip(bias[a] - control, 0, c->current_limit);
+    }
+}
+
+static void rotation(const tsbs_control *c, tsbs_law_state *l, double angle, tsbs_reference *out) {
+    double keep = KEEP(c->angle_hz);
+    l->angle_filtered = keep * l->angle_filtered + (1 - keep) * (angle - l->angle_previous) / TICK;
+    l->angle_previous = angle;
+    if (c->torque_on == 0) { /* coasting: stand ready to take over where the rotor is */
+        l->angle_target = angle;
+        l->speed_target = l->angle_filtered;
+        l->angle_integral = 0;
+    } else if (c->speed_ref != 0 || l->speed_target != 0) {
+        l->speed_target = toward(l->speed_target, c->speed_ref, c->acceleration * TICK);
+        l->angle_target += l->speed_target * TICK;
+    } else {
+        l->angle_target = toward(l->angle_target, c->angle_ref, c->angle_slew * TICK);
+    }
+    double error = l->angle_target - angle;
+    /* one encoder count is no error: an integrator that believed it would hunt against the Coulomb friction */
+    double beyond = error - clip(error, -1.6e-3, 1.6e-3);
+    l->angle_integral = clip(l->angle_integral + c->ki_theta * beyond * TICK, -2, 2);
+    double i = c->kp_theta * error + l->angle_integral + c->kd_theta * (l->speed_target - l->angle_filtered);
+    i = c->torque_on == 0 ? 0 : clip(i, -10, 10);
+    l->i_x = toward(l->i_x, c->i_x, c->ramp_A_s * TICK);
+    l->i_y = toward(l->i_y, c->i_y, c->ramp_A_s * TICK);
+    out->segment[0] = i + l->i_y; /* T (6.9) */
+    out->segment[1] = i - l->i_x;
+    out->segment[2] = i - l->i_y;
+    out->segment[3] = i + l->i_x;
+    out->gamma = c->gamma;
+}
+
+void tsbs_law(const tsbs_control *c, tsbs_law_state *l, const tsbs_reading *r, tsbs_reference *out) {
+    const double *y = r->position;
+    double plane[5];
+    for (int a = 0; a < 2; a++) { /* T (6.7) with the controller's own geometry */
+        plane[a] = y[a] + c->share_i * (y[a + 2] - y[a]);
+        plane[a + 2] = y[a] + c->share_o * (y[a + 2] - y[a]);
+    }
+    plane[4] = y[4];
+    memset(out, 0, sizeof *out);
+    if (l->fresh) { /* first tick after a change from rest: no derivative kick, references start where the rotor lies */
+        memcpy(l->previous, plane, sizeof plane);
+        l->angle_previous = r->angle;
+        if (l->mode == LIFT) {
+            memcpy(l->rest, plane, sizeof plane);
+            memset(l->integral, 0, sizeof l->integral);
+            memset(l->filtered, 0, sizeof l->filtered);
+            l->angle_target = r->angle;
+            l->speed_target = l->angle_integral = l->angle_filtered = l->i_x = l->i_y = 0;
+        }
+        l->fresh = 0;
+    }
+    if (l->mode < LIFT) {
+        memcpy(l->previous, plane, sizeof plane);
+        double keep = KEEP(c->angle_hz);
+        l->angle_filtered = keep * l->angle_filtered + (1 - keep) * (r->angle - l->angle_previous) / TICK;
+        l->angle_previous = r->angle;
+        l->angle_target = r->angle;
+        return;
+    }
+    radial(c, l, plane, out);
+    rotation(c, l, r->angle, out);
+    if (l->mode == LAND && l->lift_clock >= c->lift_time_s) memset(out, 0, sizeof *out);
+}

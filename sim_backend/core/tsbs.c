@@ -1,0 +1,162 @@
+/* Mechanics and forces: T (6.6) with (6.5) and (2.4), plus gyroscopics, unbalance, runout, touchdown and the hung mass. */
+#include <math.h>
+#include <string.h>
+#include "tsbs.h"
+
+/* cos and sin of 1..4 times an angle near d->angle: two short series and recurrence, good to the last digit for 0.02 rad */
+static void turn(const tsbs_derived *d, double angle, double *c, double *s) {
+    double e = angle - d->angle, q = e * e;
+    if (q > 4e-4) {
+        tsbs_turn(angle, c, s);
+        return;
+    }
+    double ce = 1 - q / 2 * (1 - q / 12 * (1 - q / 30)), se = e * (1 - q / 6 * (1 - q / 20 * (1 - q / 42)));
+    c[0] = d->turn_c * ce - d->turn_s * se;
+    s[0] = d->turn_s * ce + d->turn_c * se;
+    for (int n = 1; n < 4; n++) {
+        c[n] = c[n - 1] * c[0] - s[n - 1] * s[0];
+        s[n] = s[n - 1] * c[0] + c[n - 1] * s[0];
+    }
+}
+
+void tsbs_turn(double angle, double *c, double *s) {
+    c[0] = cos(angle);
+    s[0] = sin(angle);
+    for (int n = 1; n < 4; n++) {
+        c[n] = c[n - 1] * c[0] - s[n - 1] * s[0];
+        s[n] = s[n - 1] * c[0] + c[n - 1] * s[0];
+    }
+}
+
+/* sum a_n cos(n angle + p_n), n = 1..4, and with sin for the quadrature axis; c_n = a_n cos p_n, s_n = a_n sin p_n */
+double tsbs_harmonics(const double *c, const double *s, const double *tc, const double *ts, double *quadrature) {
+    double x = 0, y = 0;
+    for (int n = 0; n < 4; n++) {
+        x += c[n] * tc[n] - s[n] * ts[n];
+        y += c[n] * ts[n] + s[n] * tc[n];
+    }
+    *quadrature = y;
+    return x;
+}
+
+void tsbs_commutate(const tsbs_params *p, double gamma, tsbs_derived *d) {
+    double turn = p->pole_pairs * (gamma - p->gamma_zero);
+    d->motor_c = cos(turn);
+    d->motor_s = sin(turn);
+}
+
+void tsbs_derive(const tsbs_params *p, double step, tsbs_derived *d) {
+    for (int n = 0; n < 8; n++) {
+        d->runout_c[n] = p->runout[n] * cos(p->runout_phase[n]);
+        d->runout_s[n] = p->runout[n] * sin(p->runout_phase[n]);
+        d->target_c[n] = p->target[n] * cos(p->target_phase[n]);
+        d->target_s[n] = p->target[n] * sin(p->target_phase[n]);
+    }
+    d->detent_c = cos(p->detent_phase);
+    d->detent_s = sin(p->detent_phase);
+    d->angle = 0;
+    d->turn_c = 1;
+    d->turn_s = 0;
+    d->tilt_c = cos(p->tilt);
+    d->tilt_s = sin(p->tilt);
+    d->unbalance_c = cos(p->eccentricity_phase);
+    d->unbalance_s = sin(p->eccentricity_phase);
+    d->coil_keep = exp(-p->amplifier_rate * step / 2);
+    d->segment_keep = exp(-p->segment_rate * step / 2);
+    d->speed_keep = exp(-6.283185307179586 * 20 * TICK);
+    tsbs_commutate(p, 0, d);
+}
+
+/* T (2.4): F = beta (ip^2/(gap - xi)^2 - in^2/(gap + xi)^2); the gap never closes below 20 um */
+double tsbs_amb_force(double beta, double gap, double xi, double ip, double in) {
+    double near = gap - xi > 20e-6 ? gap - xi : 20e-6, far = gap + xi > 20e-6 ? gap + xi : 20e-6;
+    double a = ip * far, b = in * near, both = near * far; /* on one denominator: a division costs more than the rest */
+    return beta * (a - b) * (a + b) / (both * both);
+}
+
+typedef struct {
+    double fx, fy, fz, mphi, mpsi, torque;
+} wrench;
+
+static void add(wrench *w, double z, double fx, double fy) {
+    w->fx += fx;
+    w->fy += fy;
+    w->mphi -= z * fy; /* T (6.6d): J phi'' = l_ia F_i - l_oa F_o - l_m F_m */
+    w->mpsi += z * fx; /* T (6.6e) */
+}
+
+static void touchdown(const tsbs_params *p, const double *s, int b, wrench *w) {
+    double z = p->z_sensor[b];
+    double x = s[0] + z * s[4] - p->ring_x[b], y = s[1] - z * s[3] - p->ring_y[b];
+    double r = sqrt(x * x + y * y);
+    if (r <= p->clearance) return;
+    double vx = s[6] + z * s[10], vy = s[7] - z * s[9];
+    double nx = x / r, ny = y / r;
+    double push = p->ring_stiffness * (r - p->clearance) + p->ring_damping * (vx * nx + vy * ny);
+    if (push <= 0) return;
+    double slip = -vx * ny + vy * nx + p->ring_radius * s[11];
+    double drag = p->ring_friction * push * tanh(slip / 0.01);
+    add(w, z, -push * nx + drag * ny, -push * ny - drag * nx);
+    w->torque -= drag * p->ring_radius;
+}
+
+/* Coulomb friction is smoothed by x / sqrt(1 + x^2) about standstill */
+static void motor(const tsbs_params *p, const tsbs_derived *d, const double *s, const double *i,
+                  const double *tc, const double *ts, wrench *w) {
+    double e[4];
+    for (int k = 0; k < 4; k++) e[k] = i[k] * p->segment_gain[k];
+    double ix = (e[3] - e[1]) / 2, iy = (e[0] - e[2]) / 2, mean = (e[0] + e[1] + e[2] + e[3]) / 4;
+    double c8 = 2 * tc[3] * tc[3] - 1, s8 = 2 * tc[3] * ts[3], c16 = 2 * c8 * c8 - 1, s16 = 2 * c8 * s8;
+    double c = d->motor_c, q = d->motor_s, slow = s[11] / p->coulomb_speed;
+    double x = s[0] + p->z_motor * s[4] + p->motor_x, y = s[1] - p->z_motor * s[3] + p->motor_y;
+    add(w, p->z_motor, p->alpha_d * c * ix - p->alpha_c * q * iy + p->alpha_x * x,
+        p->alpha_d * c * iy + p->alpha_c * q * ix + p->alpha_x * y);
+    w->torque += p->alpha_tau * c * mean - p->viscous * s[11] - p->coulomb * slow / sqrt(1 + slow * slow) -
+                 p->detent * (s16 * d->detent_c + c16 * d->detent_s);
+}
+
+void tsbs_rates(const tsbs_params *p, const tsbs_derived *d, const double *s, const double *coil,
+                const double *segment, const double *play, double hung_mass, double weight, double *ds) {
+    wrench w = {0};
+    double tc[4], ts[4];
+    turn(d, s[5], tc, ts);
+    for (int b = 0; b < 2; b++) {
+        double z = p->z_amb[b], ry, rx = tsbs_harmonics(d->runout_c + 4 * b, d->runout_s + 4 * b, tc, ts, &ry);
+        const double *i = coil + 4 * b, *h = play + 2 * b;
+        double xi = s[0] + z * s[4] + p->offset_x[b] + rx, eta = s[1] - z * s[3] + p->offset_y[b] + ry;
+        add(&w, z, tsbs_amb_force(p->beta[b], p->gap[b], xi, i[0] - h[0], i[1] + h[0]),
+            tsbs_amb_force(p->beta[b], p->gap[b], eta, i[2] - h[1], i[3] + h[1]));
+        touchdown(p, s, b, &w);
+    }
+    w.fz = tsbs_amb_force(p->beta_z, p->gap_z, s[2], coil[8], coil[9]);
+    motor(p, d, s, segment, tc, ts, &w);
+    double sx = d->tilt_s, sy = -d->tilt_c;
+    double rate = 0;
+    if (hung_mass > 0) { /* strap: one vertical degree of freedom */
+        double hook = s[1] - p->z_hook * s[3], hook_rate = s[7] - p->z_hook * s[9];
+        /* s[12] is the height of the mass plus the strap's length: below the hook it stretches the strap */
+        double tension = p->strap_stiffness * (hook - s[12]) + p->strap_damping * (hook_rate - s[13]);
+        if (tension < 0) tension = 0;
+        add(&w, p->z_hook, tension * sx, tension * sy);
+        rate = (tension - weight) / hung_mass;
+    }
+    double spin = s[11], unbalance = p->mass * p->eccentricity * spin * spin;
+    double ec = d->unbalance_c, es = d->unbalance_s;
+    memcpy(ds, s + 6, 6 * sizeof *ds);
+    ds[6] = (w.fx + unbalance * (tc[0] * ec - ts[0] * es)) / p->mass + p->gravity * sx;
+    ds[7] = (w.fy + unbalance * (ts[0] * ec + tc[0] * es)) / p->mass + p->gravity * sy;
+    ds[8] = w.fz / p->mass;
+    ds[9] = (w.mphi - p->polar_inertia * spin * s[10]) / p->inertia;
+    ds[10] = (w.mpsi + p->polar_inertia * spin * s[9]) / p->inertia;
+    ds[11] = w.torque / p->polar_inertia;
+    ds[12] = hung_mass > 0 ? s[13] : 0;
+    ds[13] = rate;
+}
+
+void tsbs_derivative(const tsbs_params *p, const double *s, const double *coil, const double *segment,
+                     const double *play, double gamma, double hung_mass, double weight, double *ds) {
+    tsbs_derived d;
+    tsbs_derive(p, TICK, &d);
+    tsbs_commutate(p, gamma, &d);
+    tsbs_rates(p, &d, s, coil, segment, play, hung_mass, weight, ds);
+}

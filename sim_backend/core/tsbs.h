@@ -1,0 +1,106 @@
+/* Simulated TSBS rig: 6-DOF shaft on two radial AMBs, an axial AMB and a toothless self-bearing motor.
+ * Units are SI. Bearing index 0 inboard, 1 outboard. Axis order xi, yi, xo, yo, z; coil order is axis by axis, p then n.
+ * Between the marks is what Python reads as declarations: plain C, no preprocessor. */
+#ifndef TSBS_H
+#define TSBS_H
+#include <stdint.h>
+
+/* declarations begin */
+typedef struct {
+    /* shaft (T 6.6, Table 6.1); planes are signed distances from the centre of mass, outboard positive */
+    double mass, inertia, polar_inertia, gravity, tilt, eccentricity, eccentricity_phase;
+    double z_amb[2], z_sensor[2], z_motor, z_hook;
+    /* radial AMBs (T 2.4): force constant, gap, magnetic offset, runout harmonics 1..4 of the journal, hysteresis */
+    double beta[2], gap[2], offset_x[2], offset_y[2], runout[8], runout_phase[8], hysteresis;
+    double beta_z, gap_z;
+    /* motor (T 6.5) */
+    double alpha_d, alpha_c, alpha_x, alpha_tau, motor_x, motor_y, gamma_zero, segment_gain[4], pole_pairs;
+    double viscous, coulomb, coulomb_speed, detent, detent_phase;
+    /* touchdown rings at the sensor planes, strap of the hanger */
+    double clearance, ring_stiffness, ring_damping, ring_friction, ring_radius, ring_x[2], ring_y[2];
+    double strap_stiffness, strap_damping;
+    /* amplifiers and current sensors, per coil and per segment */
+    double amplifier_rate, segment_rate, segment_limit, coil_limit[10];
+    double current_gain[10], current_offset[10], current_drift[10], current_noise, current_lsb;
+    /* position sensors xi yi xo yo z; a stuck sensor reads stuck_value; runout of the sensor targets */
+    double position_gain[5], position_offset[5], position_sign[5], position_noise, position_lsb;
+    double stuck[5], stuck_value, target[8], target_phase[8], exchange_axes[2];
+    double encoder_counts, encoder_offset, encoder_sign;
+    /* trips */
+    double lost_radius, lost_time, trip_current, trip_speed;
+} tsbs_params;
+
+typedef struct {
+    double bias_i, bias_o, bias_z;
+    double kp_i, kd_i, ki_i, kp_o, kd_o, ki_o, kp_z, kd_z, ki_z;
+    double ref_xi, ref_yi, ref_xo, ref_yo, ref_z;
+    double angle_ref, angle_slew, kp_theta, kd_theta, ki_theta, speed_ref;
+    double i_x, i_y, gamma;
+    double lift_time_s, current_limit;
+    double torque_on, derivative_hz, angle_hz, ramp_A_s, acceleration;
+    /* the controller's own idea of the planes: plane = share * outboard reading + (1 - share) * inboard reading */
+    double share_i, share_o;
+} tsbs_control;
+
+typedef struct {
+    double integral[5], filtered[5], previous[5], rest[5];
+    double angle_target, speed_target, angle_integral, angle_filtered, angle_previous, i_x, i_y;
+    double lift_clock;
+    int32_t mode, fresh;
+} tsbs_law_state;
+
+typedef struct {
+    double position[5], angle;
+} tsbs_reading;
+
+typedef struct {
+    double coil[10], segment[4], gamma;
+} tsbs_reference;
+
+typedef struct {
+    uint64_t key, counter;
+} tsbs_noise;
+
+typedef struct {
+    double s[14];           /* x y z phi psi theta and their rates; height and speed of the hung mass */
+    double coil[10], segment[4], play[4], follow[4];
+    double hung_mass, weight, weight_to, weight_rate;
+    tsbs_reference applied, next;
+    tsbs_law_state law;
+    tsbs_noise noise;
+    double speed, angle_before, sums[24];
+    int64_t tick, trip_tick;
+    int32_t trips, lost_ticks, flags, in_period, substeps;
+} tsbs_state;
+
+void tsbs_start(const tsbs_params *, const tsbs_control *, tsbs_state *, uint64_t seed);
+int64_t tsbs_run(const tsbs_params *, const tsbs_control *, tsbs_state *, int64_t ticks, double *rows, int64_t row_limit);
+void tsbs_derivative(const tsbs_params *, const double *s, const double *coil, const double *segment,
+                     const double *play, double gamma, double hung_mass, double weight, double *ds);
+void tsbs_law(const tsbs_control *, tsbs_law_state *, const tsbs_reading *, tsbs_reference *);
+double tsbs_amb_force(double beta, double gap, double xi, double coil_p, double coil_n);
+void tsbs_normals(uint64_t seed, uint64_t stream, double *out, int64_t count);
+/* declarations end */
+
+enum { OFF, READY, LIFT, LEVITATE, LAND };
+enum { SATURATED = 1, SEGMENT_SATURATED = 2, CONTACT_I = 4, CONTACT_O = 8 };
+enum { TRIP_LOST = 1, TRIP_CURRENT = 2, TRIP_SPEED = 4 };
+#define TICK 1e-4
+#define PERIOD 10
+#define COLUMNS 22
+
+void tsbs_noise_seed(tsbs_noise *, uint64_t seed, uint64_t stream);
+double tsbs_normal(tsbs_noise *);
+/* what does not change inside a run or a tick: harmonic coefficients a cos p and a sin p, sines, decays */
+typedef struct {
+    double runout_c[8], runout_s[8], target_c[8], target_s[8], tilt_c, tilt_s, motor_c, motor_s;
+    double angle, turn_c, turn_s, detent_c, detent_s, unbalance_c, unbalance_s, coil_keep, segment_keep, speed_keep;
+} tsbs_derived;
+void tsbs_derive(const tsbs_params *, double step, tsbs_derived *);
+void tsbs_commutate(const tsbs_params *, double gamma, tsbs_derived *);
+void tsbs_turn(double angle, double *c, double *s);
+double tsbs_harmonics(const double *c, const double *s, const double *turn_c, const double *turn_s, double *quadrature);
+void tsbs_rates(const tsbs_params *, const tsbs_derived *, const double *s, const double *coil, const double *segment,
+                const double *play, double hung_mass, double weight, double *ds);
+void tsbs_sense(const tsbs_params *, tsbs_derived *, tsbs_state *, tsbs_reading *, double *coil, double *segment);
+#endif

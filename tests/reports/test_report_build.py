@@ -1,0 +1,264 @@
+"""Whole reports: numbers, required fields, escaping, the SIMULATED mark, equal bytes, errors."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+from report_samples import (
+    HOSTILE,
+    RUN_ID,
+    SampleRecording,
+    SampleRig,
+    figures,
+    measurement,
+    record,
+    rig_content,
+    toleranced,
+)
+
+import reports
+from bench.errors import BenchError
+from bench.procedure import Quantity
+from reports import compose, html, pdf
+from reports.view import SIMULATED, ReportView
+
+K_I = Quantity("K_i", "N/A", "inboard AMB: dF/di at zero control current")
+TITLE = "AMB force-current constants"
+
+
+def around(**changes: Any) -> compose.Surroundings:
+    sample = SampleRecording()
+    made = compose.Surroundings(
+        title=TITLE,
+        method="Masses are hung.\n\nA fit is made.",
+        definitions={"K_i": K_I.about},
+        rig=rig_content(),
+        integrity=sample.integrity,
+        events=sample.events(),
+    )
+    return dataclasses.replace(made, **changes)
+
+
+def view(surroundings: compose.Surroundings | None = None, **changes: Any) -> ReportView:
+    return compose.view_of(record(**changes), surroundings or around())
+
+
+class Page(HTMLParser):
+    """The words of a page, and its tags."""
+
+    def __init__(self, source: str) -> None:
+        super().__init__()
+        self.words: list[str] = []
+        self.tags: list[str] = []
+        self.feed(source)
+        self.text = " ".join(" ".join(self.words).split())
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+
+    def handle_data(self, data: str) -> None:
+        self.words.append(data)
+
+
+def test_numbers_of_the_results_table() -> None:
+    row = view().results[0]
+    assert row.result == "(23.412 ± 0.082)\u202fN/A"
+    assert (row.k, row.dof, row.probability) == ("1.96", "812", "95\u202f%")
+    assert (row.limit, row.limit_source, row.verdict) == ("22 to 25\u202fN/A", "drawing 12-004, table 2", "pass")
+    assert row.interval == ""  # value ± U says it
+
+
+def test_an_unverified_limit_and_an_unsymmetric_interval_say_so() -> None:
+    limit = {"low": None, "high": 3.0, "source": "ISO 14839-3", "verified": False}
+    lopsided = measurement(limit=limit, method="monte-carlo", interval=[23.30, 23.55])
+    row = view(measurements=[lopsided]).results[0]
+    assert row.limit_source == "ISO 14839-3 (limit not verified against its source)"
+    assert "Monte Carlo" in row.interval
+    assert "[23.300, 23.550]" in row.interval
+
+
+def test_budget_shares_add_up_and_the_small_rest_is_stated() -> None:
+    table = view().budgets[0]
+    assert [row.name for row in table.rows][:2] == ["current sensor gain, inboard", "AMB span"]
+    assert table.rows[0].share == "88.2\u202f%"
+    assert sum(row.percent for row in table.rows) == pytest.approx(100, abs=0.2)
+    assert table.rest.startswith("3 further influences, each below 0.05\u202f% of the variance: 9.2\u202f×\u202f10⁻⁴")
+
+
+def test_what_only_the_simulator_knows_is_not_printed_and_like_sensors_share_a_row() -> None:
+    rows = view().traceability.rows
+    assert not any("42.4242" in cell for row in rows for cell in row)
+    assert rows[-1][0] == "sensors: gain of i_xi_p, i_xi_n, i_yi_p, i_yi_n"
+    certificate = ("masses.M1", "0.5\u202fkg", "U = 5\u202f×\u202f10⁻⁵\u202fkg (k = 2), normal")
+    assert certificate in [row[:3] for row in rows]
+
+
+def test_every_required_field_is_in_the_page_in_order() -> None:
+    page = Page(html.render(view())).text
+    wanted = [
+        TITLE,
+        RUN_ID,
+        "TSBS-12-001",
+        "tsbs12",
+        "2026-01-01 00:00:00 UTC",
+        "Edmonton",
+        "PASS",
+        "Results",
+        K_I.about,
+    ]
+    wanted += [
+        "23.412",
+        "Decision rule",
+        "Findings",
+        "Return to zero",
+        "Uncertainty budget",
+        "Method",
+        "A fit is made.",
+    ]
+    wanted += ["Conditions", "Gravity", "Air density", "Traceability", "certificate SIM-M-001", "Link and recording"]
+    wanted += ["872\u202f341", "Correlations", "−0.43", "Plan settings", "settle_s", "Versions and digest", "a3f1" * 16]
+    wanted += [
+        "Laboratory",
+        "Customer",
+        "Item received",
+        "Date of issue",
+        "Authorised by",
+        "relate only",
+        "except in full",
+    ]
+    wanted += [f"End of report {RUN_ID}"]
+    at = 0
+    for words in wanted:
+        words = " ".join(words.split())
+        found = page.find(words, at if words != RUN_ID else 0)
+        assert found >= 0, f"{words!r} is missing or out of order"
+        at = found if words not in (RUN_ID, TITLE) else at
+
+
+def test_unknown_people_are_blank_and_known_ones_are_named() -> None:
+    blank = {f.label: f.blank for f in view().laboratory}
+    assert all(blank.values())
+    rig = rig_content() | {"laboratory": {"name": "Bearing Laboratory", "accreditation": "none"}}
+    known = {f.label: f for f in view(around(rig=rig)).laboratory}
+    assert known["Laboratory"].text == "Bearing Laboratory"
+    assert known["Accreditation"].text == "none"
+    assert known["Customer and contact"].blank
+
+
+def test_simulated_is_marked_even_for_seed_zero_and_never_on_a_real_rig() -> None:
+    assert SIMULATED in Page(html.render(view(seed=0))).text
+    assert SIMULATED not in html.render(view(seed=None))
+    assert view(seed=0).simulated == SIMULATED
+
+
+def test_findings_that_affect_the_outcome_are_loud() -> None:
+    loud = {"code": "mass-suspect", "text": "M3 is off the line.", "where": "M3", "effect": "indeterminate"}
+    made = view(findings=[loud], outcome="INDETERMINATE")
+    assert made.findings[0].loud
+    assert "mass-suspect" in made.outcome_text
+    assert 'class="finding loud"' in html.render(made)
+
+
+def test_pass_without_limits_claims_no_conformity() -> None:
+    made = view(measurements=[measurement(verdict="none", limit=None)])
+    assert made.outcome_text.endswith("No acceptance limit was applied.")
+
+
+def test_an_error_without_measurements_says_that_it_says_nothing() -> None:
+    lost = {"code": "link-lost", "text": "No frame for 0.5 s.", "where": "can0", "effect": "error"}
+    made = view(
+        around(rig={}, integrity=None, events=(), readable=False),
+        outcome="ERROR", measurements=[], correlations=[], ended=None, recording=None, findings=[lost],
+    )  # fmt: skip
+    page = Page(html.render(made)).text
+    assert "makes no statement about the item tested" in page
+    assert "end not recorded" in page
+    assert "link-lost" in made.outcome_text
+    assert pdf.render(made).startswith(b"%PDF")
+
+
+def test_a_truncated_recording_is_said_aloud() -> None:
+    stopped = {"code": "operator-abort", "text": "Stopped.", "where": ""}
+    made = view(around(truncated=True), outcome="ABORTED", findings=[stopped])
+    assert made.findings[0].loud
+    assert "truncated" in made.link_note
+    assert made.outcome_text == "The run was stopped before its end. See the finding operator-abort."
+
+
+def hostile() -> tuple[dict[str, Any], SampleRecording]:
+    h = HOSTILE
+    entry = {
+        "name": h,
+        "influence": h,
+        "contribution": 1.0,
+        "sensitivity": 1.0,
+        "type": h,
+        "distribution": h,
+        "dof": None,
+    }
+    limit = {"low": 1, "high": None, "source": h, "verified": False}
+    made = record(
+        uut={"name": h, "serial": h}, run_id=h, rig=h, procedure=h, plan={h: h}, versions={h: h}, link={h: h},
+        findings=[{"code": h, "text": h, "where": h, "effect": h}], recording={"file": h, "sha256": h},
+        measurements=[measurement(h, unit=h, where=h, verdict=h, limit=limit, budget=[entry])] * 2,
+    )  # fmt: skip
+    rig = {
+        "name": h, "title": h, "site": {"name": h, h: h}, "laboratory": {"name": h, h: h},
+        "masses": {h: toleranced(1.0, h, u=1.0, k=2, source=h)},
+    }  # fmt: skip
+    return made, SampleRecording(SampleRig(rig))
+
+
+def test_hostile_texts_are_printed_and_not_obeyed(tmp_path: Path) -> None:
+    made, recording = hostile()
+    drawn = dataclasses.replace(figures()[0], title=HOSTILE, caption=HOSTILE, x_label=HOSTILE, y_label=HOSTILE)
+    paths = reports.build(tmp_path, recording, made, [drawn], title=HOSTILE, method=HOSTILE)  # type: ignore[arg-type]
+    page = Page(paths.html.read_text("utf-8"))
+    assert "script" not in page.tags
+    assert page.text.count(" ".join(HOSTILE.split())) > 20
+    assert "49" not in re.findall(r"\{\{ (\S+) \}\}", page.text)
+    assert paths.pdf.read_bytes().startswith(b"%PDF")  # `#include "a.typ"` obeyed would not compile
+
+
+def test_equal_input_gives_equal_bytes_and_a_build_leaves_its_input_alone(tmp_path: Path) -> None:
+    given = record()
+    before = copy.deepcopy(given)
+    outputs = []
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        built = reports.build(tmp_path / name, SampleRecording(), given, figures()[2:4], title=TITLE, measures=[K_I])  # type: ignore[arg-type]
+        outputs.append((built.html.read_bytes(), built.pdf.read_bytes()))
+        assert sorted(p.name for p in (tmp_path / name).iterdir()) == ["report.html", "report.pdf"]
+    assert outputs[0] == outputs[1]
+    assert given == before
+
+
+def test_the_page_fetches_nothing() -> None:
+    source = html.render(view())
+    assert not re.search(r"(?:src|href)\s*=\s*[\"'](?!#)", source)
+    assert "@import" not in source
+
+
+def test_a_record_that_cannot_be_printed_is_our_error(tmp_path: Path) -> None:
+    with pytest.raises(BenchError, match="cannot be made"):
+        reports.build(tmp_path, None, record(measurements=[measurement(value="many")]), title=TITLE)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_refusal_of_typst_is_our_error() -> None:
+    bad = compose.FigureEntry(1, "bad", "t", "c", "this is not SVG")
+    with pytest.raises(BenchError, match="the PDF report cannot be made"):
+        pdf.render(dataclasses.replace(view(), figures=(bad,)))
+
+
+def test_an_unwritable_run_directory_is_our_error(tmp_path: Path) -> None:
+    in_the_way = tmp_path / "file"
+    in_the_way.write_text("x")
+    with pytest.raises(BenchError, match="cannot be written"):
+        reports.build(in_the_way, None, record(), title=TITLE)

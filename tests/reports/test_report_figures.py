@@ -1,0 +1,65 @@
+"""Drawing figures: equal bytes, own ids, honest decimation, clear errors."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+from report_samples import HOSTILE, figures
+
+from bench.errors import BenchError
+from bench.figures import Figure, Series
+from reports.figures import MAX_LINE_POINTS, draw, envelope
+
+
+def one(series: Series, **changes: object) -> Figure:
+    return dataclasses.replace(Figure("key", "t", "c", "x / s", "y / m", (series,)), **changes)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("figure", figures()[:4], ids=lambda f: f.key)
+def test_equal_figures_give_equal_svg_with_ids_of_their_own(figure: Figure) -> None:
+    svg = draw(figure).svg
+    assert svg == draw(figure).svg
+    ids = re.findall(r'\bid="([^"]*)"', svg)
+    assert ids
+    assert all(i.startswith(f"{figure.key}-") for i in ids)
+    assert set(re.findall(r"url\(#([^)]*)\)", svg)) | set(re.findall(r'href="#([^"]*)"', svg)) <= set(ids)
+    assert not re.search(r"\d{4}-\d\d-\d\dT", svg)
+
+
+def test_a_hostile_label_is_a_drawing_and_not_markup() -> None:
+    x = np.arange(3.0)
+    svg = draw(one(Series(HOSTILE, x, x), x_label=HOSTILE, y_label="$\\frac{1$", lines=((HOSTILE, 1.0),))).svg
+    ET.fromstring(svg)
+    assert "<script" not in svg
+
+
+def test_the_envelope_keeps_every_extreme() -> None:
+    x = np.arange(100_000.0)
+    y = np.sin(x / 500)
+    y[54_321] = 7.0
+    y[12_345] = -9.0
+    small_x, small_y = envelope(x, y, MAX_LINE_POINTS)
+    assert small_x.size <= MAX_LINE_POINTS
+    assert np.all(np.diff(small_x) > 0)
+    assert {7.0, -9.0} <= set(small_y.tolist())
+    assert np.array_equal(small_y, y[small_x.astype(int)])
+
+
+def test_a_long_line_gives_a_small_drawing() -> None:
+    t = np.arange(60_000) / 1000
+    assert len(draw(one(Series("noise", t, np.random.default_rng(0).normal(size=t.size)))).svg) < 120_000
+
+
+def test_points_that_are_not_finite_and_empty_series_are_drawn_around() -> None:
+    broken = np.array([1.0, np.nan, np.inf, 2.0])
+    assert draw(one(Series("a", np.arange(4.0), broken, "both", broken))).svg
+    assert draw(one(Series("a", np.array([]), np.array([])), kind="polar")).svg
+
+
+def test_unequal_lengths_are_named() -> None:
+    with pytest.raises(BenchError, match=r"'key', series 'a'.*'x': 3.*'y': 4"):
+        draw(one(Series("a", np.arange(3.0), np.arange(4.0))))
