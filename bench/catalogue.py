@@ -74,7 +74,8 @@ def rig_path(rig: str) -> Path:
         path = folder / f"{rig.removesuffix('.toml')}.toml"
         if path.is_file():
             return path
-    raise ConfigError(_unknown("rig", rig, [r.name for r in rigs()]) + f" (looked for a path, in ./rigs and {INSTALLED})")
+    looked = f"(looked for a path, in ./rigs and in {INSTALLED})"
+    raise ConfigError(f"{_unknown('rig', rig, [r.name for r in rigs()])} {looked}")
 
 
 def _unknown(kind: str, name: str, known: list[str]) -> str:

@@ -50,7 +50,7 @@ def assemble(
             except ConfigError as error:
                 problems.append(Problem(source, key, repr(value), str(error)))
     try:
-        made = plan.model_validate(_tuples(values))
+        made = plan.model_validate(_tuples(values), strict=True)
     except ValidationError as error:
         problems += [_problem(e, origin) for e in error.errors(include_url=False)]
     if problems:

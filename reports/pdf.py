@@ -7,6 +7,7 @@ import json
 from datetime import datetime
 from functools import cache
 from importlib.resources import files
+from typing import Any
 
 import typst
 
@@ -21,6 +22,16 @@ def _template() -> bytes:
     return (files("reports.templates") / "report.typ").read_bytes()
 
 
+def sources(view: ReportView) -> dict[str, bytes]:
+    """What typst compiles, all in memory: the template, the view as JSON and the drawings."""
+    content = dataclasses.asdict(view)
+    for figure in content["figures"]:
+        figure["file"] = f"figure-{figure['number']}.svg"
+        del figure["svg"]
+    made = {"main.typ": _template(), "view.json": json.dumps(content, ensure_ascii=False).encode()}
+    return made | {f"figure-{figure.number}.svg": figure.svg.encode() for figure in view.figures}
+
+
 def render(view: ReportView, issued: str | None = None) -> bytes:
     """The PDF. Equal views give equal bytes; `issued` (ISO 8601, the record's end) becomes the file's date.
 
@@ -29,16 +40,10 @@ def render(view: ReportView, issued: str | None = None) -> bytes:
     Raises:
         BenchError: typst refuses the document.
     """
-    content = dataclasses.asdict(view)
-    for figure in content["figures"]:
-        figure["file"] = f"figure-{figure['number']}.svg"
-        del figure["svg"]
-    document = json.dumps(content, ensure_ascii=False)
-    sources = {"main.typ": _template(), "view.json": document.encode()}
-    sources |= {f"figure-{figure.number}.svg": figure.svg.encode() for figure in view.figures}
-    bundled_suffices = not any(ord(c) >= _FIRST_WIDE for c in document)
+    files_by_name: Any = sources(view)  # typst takes files in memory by name; its stubs do not say so
+    bundled_suffices = not any(ord(c) >= _FIRST_WIDE for c in files_by_name["view.json"].decode())
     try:
-        made = typst.compile(sources, ignore_system_fonts=bundled_suffices, timestamp=_seconds(issued))
+        made = typst.compile(files_by_name, ignore_system_fonts=bundled_suffices, timestamp=_seconds(issued))
     except (RuntimeError, ValueError) as error:
         said = str(getattr(error, "diagnostic", "") or error).strip()  # with the template's line
         raise BenchError(f"the PDF report cannot be made: {said}") from error

@@ -75,8 +75,9 @@ def read_hangings(recording: Recording[Any], masses: tuple[str, ...]) -> Hanging
         mean,
         {c: stack("drift", c) for c in CHANNELS},
         {c: stack("spread", c) for c in CHANNELS},
-        np.array([[float(s.lost) for s in row] for row in steps]),
-        np.array([[float(s.expected) for s in row] for row in steps]),
+        np.array([[max(0.0, s.expected() - one["count"]) for s, one in zip(row, ones, strict=True)]
+                  for row, ones in zip(steps, read, strict=True)]),
+        np.array([[float(s.expected()) for s in row] for row in steps]),
         np.array([[one["flags"] for one in row] for row in read]),
         masses,
     )
@@ -93,6 +94,7 @@ def _reduce(step: Step) -> dict[str, Any]:
         out["mean"][channel] = x.mean()
         out["drift"][channel] = x[half:].mean() - x[:half].mean()
         out["spread"][channel] = x.std()
+    out["count"] = len(data["flags"])
     out["flags"] = int(np.bitwise_or.reduce(data["flags"].astype(np.int64)))
     return out
 

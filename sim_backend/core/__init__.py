@@ -122,9 +122,11 @@ class Plant:
             raise KeyError(name)
         return float(getattr(self._c, name))
 
-    def load(self, mass_kg: float, weight_N: float, ramp_s: float) -> None:
-        """Hang `mass_kg` in place of what hangs; its weight (net of buoyancy) is handed over in `ramp_s`."""
+    def load(self, mass_kg: float, weight_N: float, ramp_s: float, *, seat_m: float = 0.0) -> None:
+        """Hang `mass_kg` in place of what hangs; its weight (net of buoyancy) is handed over in `ramp_s`. `seat_m` is
+        how far outboard of the hook plane the strap seats."""
         s = self._s
+        self._p.z_hook = self.params.z_hook + seat_m
         if s.hung_mass == 0:
             s.s[12] = s.s[1] - self._p.z_hook * s.s[3]
             s.s[13] = s.s[7] - self._p.z_hook * s.s[9]

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import json
 import re
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import pytest
+import typst
 from report_samples import (
     HOSTILE,
     RUN_ID,
@@ -26,6 +28,7 @@ import reports
 from bench.errors import BenchError
 from bench.procedure import Quantity
 from reports import compose, html, pdf
+from reports.figures import draw
 from reports.view import SIMULATED, ReportView
 
 K_I = Quantity("K_i", "N/A", "inboard AMB: dF/di at zero control current")
@@ -239,6 +242,15 @@ def test_equal_input_gives_equal_bytes_and_a_build_leaves_its_input_alone(tmp_pa
     assert given == before
 
 
+def test_the_pdf_has_the_sections_of_the_page_in_the_same_order() -> None:
+    made = compose.view_of(record(), around(), [draw(figures()[0])])
+    in_page = re.findall(r"<h2>(.*?)</h2>", html.render(made))
+    asked = typst.query(pdf.sources(made), "heading.where(level: 1)", field="body", ignore_system_fonts=True)
+    in_pdf = [heading["text"] for heading in json.loads(asked)]
+    assert in_pdf == in_page
+    assert len(in_pdf) == 12
+
+
 def test_the_page_fetches_nothing() -> None:
     source = html.render(view())
     assert not re.search(r"(?:src|href)\s*=\s*[\"'](?!#)", source)
@@ -247,7 +259,7 @@ def test_the_page_fetches_nothing() -> None:
 
 def test_a_record_that_cannot_be_printed_is_our_error(tmp_path: Path) -> None:
     with pytest.raises(BenchError, match="cannot be made"):
-        reports.build(tmp_path, None, record(measurements=[measurement(value="many")]), title=TITLE)
+        reports.build(tmp_path, None, record(measurements=[measurement() | {"value": "many"}]), title=TITLE)
     assert not list(tmp_path.iterdir())
 
 

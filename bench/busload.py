@@ -1,0 +1,49 @@
+"""Worst-case load of a CAN bus from a message map: every frame stuffed as badly as the standard allows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from bench.messages import Message, MessageMap
+
+REFUSE, WARN = 0.90, 0.70
+ON_DEMAND_HZ = 50.0  # allowance for commands and their replies, per message without a period
+
+
+@dataclass(frozen=True)
+class BusLoad:
+    """Share of the bus's time, in all and by message."""
+
+    total: float
+    by_message: dict[str, float]
+
+
+def frame_seconds(m: Message, bitrate: float, data_bitrate: float | None) -> float:
+    """Longest time of one frame with its interframe space, ISO 11898-1.
+
+    Classic: 44 bits (64 extended) and the data; stuffed from start of frame to CRC at worst one bit in four. FD: the
+    arbitration phase at the nominal rate, from the bit-rate switch to the CRC at the data rate; the CRC field carries
+    fixed stuff bits (one at its start and one after every four bits) and a stuff count of four bits.
+    """
+    extended = bool(m.identifier >> 31)
+    if not m.fd:
+        stuffable = (54 if extended else 34) + 8 * m.length
+        return (stuffable + math.floor((stuffable - 1) / 4) + 13) / bitrate
+    head = 36 if extended else 17  # start of frame, identifier, control bits up to and with the bit-rate switch
+    head += math.floor((head - 1) / 4)
+    body = 5 + 8 * m.length  # error state, length code, data
+    body += math.ceil(body / 4)
+    crc = 21 if m.length > 16 else 17
+    body += 4 + crc + math.ceil((4 + crc) / 4) + 1
+    tail = 1 + 2 + 7 + 3  # CRC delimiter, acknowledge, end of frame, interframe space
+    return (head + tail) / bitrate + body / (data_bitrate or bitrate)
+
+
+def bus_load(messages: MessageMap, bitrate: float, data_bitrate: float | None) -> BusLoad:
+    """The load of every periodic message, and of the others at an allowance of ON_DEMAND_HZ each."""
+    parts = {
+        m.name: frame_seconds(m, bitrate, data_bitrate) * (1 / m.period_s if m.period_s else ON_DEMAND_HZ)
+        for m in messages.messages.values()
+    }
+    return BusLoad(sum(parts.values()), parts)

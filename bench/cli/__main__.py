@@ -1,0 +1,197 @@
+"""The command `bench`: what can be typed, and the exit status that it ends with.
+
+Only the declarations live here; each command imports its module when it is used, so that `--help` and `list` are fast.
+
+    0 PASS    1 FAIL    2 usage or configuration    3 ERROR    4 ABORTED    5 INDETERMINATE
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from bench.errors import Aborted, BenchError, ConfigError
+
+USAGE, ERROR, ABORTED = 2, 3, 4
+
+app = typer.Typer(
+    help="Test and calibrate magnetically levitated machines, real or simulated.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+
+class Backend(StrEnum):
+    """What stands behind the rig's links."""
+
+    SIM = "sim"
+    LIVE = "live"
+
+
+class OperatorKind(StrEnum):
+    """Who hangs the masses and answers the questions."""
+
+    CONSOLE = "console"
+    AUTO = "auto"
+
+
+class Table(StrEnum):
+    """File formats of `bench export`."""
+
+    PARQUET = "parquet"
+    CSV = "csv"
+
+
+Out = Annotated[Path, typer.Option("--out", help="Folder of the run directories.")]
+RunArgument = Annotated[Path, typer.Argument(metavar="RUN", help="A run directory.")]
+
+
+@app.command("list")
+def list_() -> int:
+    """Show the procedures and rigs that are there."""
+    from bench.cli.check import show_list
+
+    return show_list()
+
+
+@app.command()
+def check(rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig file, or its name in rigs/.")]) -> int:
+    """Validate a rig file and name every error at once."""
+    from bench.cli.check import check_rig_file
+
+    return check_rig_file(rig)
+
+
+@app.command()
+def run(
+    procedure: Annotated[str, typer.Argument(metavar="PROCEDURE", help="A name that `bench list` shows.")],
+    rig: Annotated[str, typer.Option("--rig", metavar="RIG", help="A rig file, or its name in rigs/.")],
+    backend: Annotated[Backend, typer.Option(help="The simulated rig, or the real one.")] = Backend.SIM,
+    seed: Annotated[int | None, typer.Option(min=0, help="Which virtual rig (simulation only; default 0).")] = None,
+    plan: Annotated[list[str] | None, typer.Option(metavar="KEY=VALUE", help="A setting; repeatable.")] = None,
+    plan_file: Annotated[Path | None, typer.Option("--plan-file", help="Settings from a TOML file.")] = None,
+    truth: Annotated[
+        list[str] | None, typer.Option("--truth", metavar="KEY=VALUE", help="Fix what the simulator draws; repeatable.")
+    ] = None,
+    link: Annotated[
+        list[str] | None, typer.Option("--link", metavar="NAME=URL", help="Another address for a link; repeatable.")
+    ] = None,
+    out: Out = Path("runs"),
+    operator: Annotated[
+        OperatorKind | None, typer.Option(help="Default: auto in simulation, console on a terminal.")
+    ] = None,
+    no_report: Annotated[bool, typer.Option("--no-report", help="Leave the report out.")] = False,
+) -> int:
+    """Run a procedure on a rig. The last line on standard output is the run directory."""
+    from bench.cli.run import Request, run_command
+
+    return run_command(
+        Request(
+            procedure=procedure,
+            rig=rig,
+            backend=backend.value,
+            seed=seed,
+            plan=tuple(plan or ()),
+            plan_file=plan_file,
+            truth=tuple(truth or ()),
+            links=tuple(link or ()),
+            out=out,
+            operator=operator.value if operator else None,
+            report=not no_report,
+        )
+    )
+
+
+@app.command()
+def analyse(run: RunArgument) -> int:
+    """Analyse a stored run again, from its recording alone.
+
+    Writes RUN/analyses/<UTC>/record.json; the original stays as it is.
+    """
+    from bench.cli.runs import analyse_command
+
+    return analyse_command(run)
+
+
+@app.command()
+def report(run: RunArgument) -> int:
+    """Build the report of a stored run again."""
+    from bench.cli.runs import report_command
+
+    return report_command(run)
+
+
+@app.command()
+def runs(out: Out = Path("runs")) -> int:
+    """List the runs with their outcomes."""
+    from bench.cli.runs import runs_command
+
+    return runs_command(out)
+
+
+@app.command()
+def export(
+    run: RunArgument, to: Annotated[Table, typer.Option("--to", help="File format of the tables.")] = Table.PARQUET
+) -> int:
+    """Write the channels of a run as tables.
+
+    One file per stream, in RUN/export.
+    """
+    from bench.cli.export import export_command
+
+    return export_command(run, to.value)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; returns its exit status. Nothing that goes wrong leaves as a traceback."""
+    try:
+        return _dispatch(sys.argv[1:] if arguments is None else list(arguments))
+    except ConfigError as error:
+        return _told(str(error), USAGE)
+    except (Aborted, KeyboardInterrupt, typer.Abort) as error:
+        return _told(str(error) or "stopped", ABORTED)
+    except BenchError as error:
+        return _told(str(error), ERROR)
+    except BrokenPipeError:
+        # Whoever read our output stopped reading, as `head` does; the interpreter must not flush into it again.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return ERROR
+    except Exception as error:
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        place = f"{Path(where.filename).name}:{where.lineno}"
+        return _told(f"unexpected {type(error).__name__} in {place}: {error}; please report it", ERROR)
+
+
+def _dispatch(arguments: list[str]) -> int:
+    command = typer.main.get_command(app)
+    try:
+        status: Any = command.main(arguments, prog_name="bench", standalone_mode=False)
+    except typer.Exit as stop:
+        return int(stop.exit_code)
+    except Exception as error:
+        # The library's usage errors have no public common class across its versions, but they all can show themselves.
+        show = getattr(error, "show", None)
+        if show is None or not hasattr(error, "format_message"):
+            raise
+        show()
+        return USAGE
+    return status if isinstance(status, int) else 0
+
+
+def _told(text: str, status: int) -> int:
+    sys.stderr.write(f"bench: {text}\n")
+    sys.stderr.flush()
+    return status
+
+
+if __name__ == "__main__":
+    sys.exit(main())

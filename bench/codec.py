@@ -1,0 +1,144 @@
+"""Between payload bytes and values, in batches: numpy extractors made once per message from its signals.
+
+Bits are numbered as in a DBC: little-endian signals start at their least significant bit, big-endian ones at their
+most significant bit in the sawtooth numbering. Neighbours of one aligned little-endian type are read by one view.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Mapping
+from itertools import groupby
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.errors import ConfigError
+from bench.frames import FrameBatch
+from bench.messages import Message, Signal
+
+Array = npt.NDArray[np.float64]
+Payloads = npt.NDArray[np.uint8]
+Extractor = Callable[[Payloads], list[Array]]
+
+
+class Decoder:
+    """Decodes frames of one message."""
+
+    def __init__(self, message: Message) -> None:
+        self.message = message
+        self._names = [s.name for group in _groups(message) for s in group]
+        self._extractors = [_extractor(group) for group in _groups(message)]
+
+    def decode(self, batch: FrameBatch) -> tuple[dict[str, Array], int]:
+        """Values of every frame of this message in a batch.
+
+        Returns:
+            float64 arrays by signal, in order of arrival, and the number of frames of this identifier whose length is
+            wrong; those are left out, never read.
+        """
+        mine = batch[batch["id"] == self.message.identifier]
+        right = mine["length"] == self.message.length
+        wrong = int(len(mine) - np.count_nonzero(right))
+        return self.decode_payloads((mine if wrong == 0 else mine[right])["data"]), wrong
+
+    def decode_payloads(self, payloads: Payloads) -> dict[str, Array]:
+        """Values of payloads (n, at least message.length), one row a frame."""
+        columns = [column for extract in self._extractors for column in extract(payloads)]
+        return dict(zip(self._names, columns, strict=True))
+
+
+def _fast(s: Signal) -> str:
+    """numpy type of a signal that a view can read, or ""."""
+    if not s.little_endian or s.start % 8 or s.length not in (8, 16, 32, 64):
+        return ""
+    kind = "f" if s.is_float else "i" if s.signed else "u"
+    return f"<{kind}{s.length // 8}" if kind != "f" or s.length > 8 else ""
+
+
+def _groups(message: Message) -> list[list[Signal]]:
+    """Signals in payload order, with neighbours that one view can read together."""
+    ordered = sorted(message.signals, key=lambda s: s.start)
+    place = {s.name: s.start - k * s.length for k, s in enumerate(ordered)}
+    return [list(g) for _, g in groupby(ordered, key=lambda s: (_fast(s) or s.name, place[s.name] if _fast(s) else 0))]
+
+
+def _extractor(group: list[Signal]) -> Extractor:
+    first, kind = group[0], _fast(group[0])
+    if not kind:
+        return lambda payloads: [_bits(payloads, first)]
+    low, high = first.start // 8, (group[-1].start + group[-1].length) // 8
+    scales = np.array([s.scale for s in group])[:, None]
+    offsets = np.array([s.offset for s in group])[:, None]
+    plain = bool((scales == 1).all() and (offsets == 0).all())
+
+    def view(payloads: Payloads) -> list[Array]:
+        raw = np.ascontiguousarray(payloads[:, low:high]).view(kind).T.astype(np.float64)
+        return list(raw if plain else raw * scales + offsets)
+
+    return view
+
+
+def _bits(payloads: Payloads, s: Signal) -> Array:
+    """A signal at any place: its bytes are gathered into a 64-bit word (and a ninth byte where it straddles)."""
+    first_bit, order = _layout(s)
+    word = np.zeros(len(payloads), np.uint64)
+    for k, byte in enumerate(order):  # least significant first
+        shift = 8 * k - first_bit
+        column = payloads[:, byte].astype(np.uint64)
+        word |= column << np.uint64(shift) if shift >= 0 else column >> np.uint64(-shift)
+    if s.length < 64:
+        word &= np.uint64((1 << s.length) - 1)
+    if s.is_float:
+        kind = {16: np.float16, 32: np.float32, 64: np.float64}[s.length]
+        raw = word.astype(f"<u{s.length // 8}").view(kind).astype(np.float64)
+    elif s.signed:
+        up = np.uint64(64 - s.length)
+        raw = ((word << up).view(np.int64) >> np.int64(up)).astype(np.float64)
+    else:
+        raw = word.astype(np.float64)
+    return raw * s.scale + s.offset
+
+
+def _layout(s: Signal) -> tuple[int, list[int]]:
+    """Bit of the first byte where the signal's least significant bit lies, and its bytes, least significant first."""
+    if s.little_endian:
+        return s.start % 8, list(range(s.start // 8, (s.start + s.length - 1) // 8 + 1))
+    top = 8 * (s.start // 8) + 7 - s.start % 8  # position counted from the first byte's most significant bit
+    last = top + s.length - 1
+    return 7 - last % 8, list(range(last // 8, top // 8 - 1, -1))
+
+
+def encode(message: Message, values: Mapping[str, float]) -> bytes:
+    """The payload of a message; signals that are not given are zero raw.
+
+    Raises:
+        ConfigError: an unknown signal, or a value that its bits cannot hold.
+    """
+    out = 0
+    for name, value in values.items():
+        try:
+            s = message.signal(name)
+        except KeyError:
+            known = ", ".join(x.name for x in message.signals)
+            raise ConfigError(f"{message.name}: no signal {name!r}; expected one of {known}") from None
+        raw = _raw(message, s, value)
+        first_bit, order = _layout(s)
+        shifted = raw << first_bit
+        for k, byte in enumerate(order):
+            out |= (shifted >> (8 * k) & 0xFF) << (8 * byte)
+    return out.to_bytes(message.length, "little")
+
+
+def _raw(message: Message, s: Signal, value: float) -> int:
+    scaled = (value - s.offset) / s.scale
+    if s.is_float:
+        packed = struct.pack({16: "<e", 32: "<f", 64: "<d"}[s.length], scaled)
+        return int.from_bytes(packed, "little")
+    low, high = (-(1 << s.length - 1), (1 << s.length - 1) - 1) if s.signed else (0, (1 << s.length) - 1)
+    if not low - 0.5 <= scaled <= high + 0.5:
+        limits = sorted((low * s.scale + s.offset, high * s.scale + s.offset))
+        raise ConfigError(
+            f"{message.name}.{s.name}: {value:g} {s.unit} does not fit; expected {limits[0]:g} to {limits[1]:g}"
+        )
+    return min(max(round(scaled), low), high) & ((1 << s.length) - 1)

@@ -1,0 +1,110 @@
+"""The message map of a rig: a DBC file read into plain frozen dataclasses. cantools does not leave this module."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import cantools
+
+from bench.errors import ConfigError
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """Where a number lies in a payload (DBC conventions) and value = raw * scale + offset in `unit`."""
+
+    name: str
+    start: int
+    length: int
+    little_endian: bool
+    signed: bool
+    is_float: bool
+    scale: float
+    offset: float
+    unit: str
+    choices: Mapping[int, str]
+    comment: str
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One message: identifier (bit 31 set when extended), payload bytes, period (0: on demand)."""
+
+    name: str
+    identifier: int
+    length: int
+    fd: bool
+    period_s: float
+    sender: str
+    signals: tuple[Signal, ...]
+    comment: str
+
+    def signal(self, name: str) -> Signal:
+        """The signal of that name (KeyError when there is none)."""
+        for s in self.signals:
+            if s.name == name:
+                return s
+        raise KeyError(name)
+
+
+@dataclass(frozen=True)
+class MessageMap:
+    """All messages of a rig, by name."""
+
+    messages: Mapping[str, Message]
+
+    def __getitem__(self, name: str) -> Message:
+        return self.messages[name]
+
+    def code(self, message: str, signal: str, choice: str) -> int:
+        """The number that a value table gives a name (KeyError when it has none)."""
+        for number, name in self.messages[message].signal(signal).choices.items():
+            if name == choice:
+                return number
+        raise KeyError(f"{message}.{signal} has no value named {choice}")
+
+
+def load_messages(dbc: str, name: str = "dbc") -> MessageMap:
+    """Read DBC text.
+
+    Raises:
+        ConfigError: it is not a DBC, or signals overlap or do not fit.
+    """
+    try:
+        database = cantools.database.load_string(dbc, database_format="dbc", strict=True)
+    except Exception as error:  # cantools raises a dozen kinds, all meaning this
+        raise ConfigError(f"{name}: not a usable DBC: {error}") from error
+    return MessageMap({m.name: _message(m) for m in database.messages})
+
+
+def _message(m: Any) -> Message:
+    identifier = m.frame_id | (1 << 31 if m.is_extended_frame else 0)
+    fd = bool(m.is_fd) or m.length > 8
+    period = (m.cycle_time or 0) * 1e-3
+    sender = m.senders[0] if m.senders else ""
+    return Message(
+        m.name, identifier, m.length, fd, period, sender, tuple(_signal(s) for s in m.signals), _text(m.comment)
+    )
+
+
+def _signal(s: Any) -> Signal:
+    choices = {int(k): str(v) for k, v in (s.choices or {}).items()}
+    return Signal(
+        name=s.name,
+        start=s.start,
+        length=s.length,
+        little_endian=s.byte_order == "little_endian",
+        signed=bool(s.is_signed),
+        is_float=bool(s.is_float),
+        scale=float(s.scale),
+        offset=float(s.offset),
+        unit=s.unit or "",
+        choices=choices,
+        comment=_text(s.comment),
+    )
+
+
+def _text(comment: Any) -> str:
+    return str(comment or "")

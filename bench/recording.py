@@ -1,0 +1,235 @@
+"""A recording read back: the only thing that `analyse` and reports get to see.
+
+Steps are read through the chunk index, block by block, so an hour-long file takes little memory.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Generic, TypeVar, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from bench import layout
+from bench.errors import AnalysisError, RecordingError
+from bench.frames import FRAME, FrameBatch
+from bench.layout import DecodedBlock
+from bench.mcapfile import McapFile, index
+from bench.procedure import BenchPlan
+from bench.rigfile import RigFile
+from bench.samples import ChannelInfo, StreamLayout
+
+P = TypeVar("P", bound=BenchPlan)
+BLOCK_NS = 2_000_000_000  # no block is longer: how far back a block that reaches into an interval can begin
+
+
+class Recording(Generic[P]):
+    """One recording, closed. Open with `Recording.open`."""
+
+    def __init__(self, file: McapFile, plan: type[P] | None) -> None:
+        self._file, self._plan_class = file, plan
+        self.path = file.path
+        self.integrity: Mapping[str, Any] | None = _integrity(file)
+        self.truncated = file.truncated or self.integrity is None
+
+    @classmethod
+    def open(cls, path: Path, plan: type[P] | None = None) -> Recording[P]:
+        """Open and check a recording.
+
+        Raises:
+            RecordingError: not a recording of ours, of a newer layout, or damaged. A file that was only cut off opens
+            with `truncated` set.
+        """
+        file = index(path)
+        version = file.metadata.get("layout", {}).get("version")
+        if file.profile != "levbench" or version is None:
+            raise RecordingError(f"{path} is MCAP but no Levbench recording (profile {file.profile!r}, layout {version})")
+        if int(version) > layout.VERSION:
+            raise RecordingError(
+                f"{path}: layout version: found {version}; expected at most {layout.VERSION}. It was recorded with a "
+                "newer Levbench: use that one, or `bench export` there"
+            )
+        return cls(file, plan)
+
+    @cached_property
+    def rig(self) -> RigFile:
+        """The rig file as it was when the run was made."""
+        return RigFile.parse(self.attachment("rig.toml"), self.attachment("rig.dbc"), "rig.toml (from the recording)")
+
+    @cached_property
+    def plan(self) -> P:
+        """The plan the run was made with."""
+        if self._plan_class is None:
+            raise AnalysisError("the recording was opened without a plan type")
+        return self._plan_class.model_validate_json(self.attachment("plan.json"))
+
+    @property
+    def plan_dict(self) -> dict[str, Any]:
+        return cast(dict[str, Any], json.loads(self.attachment("plan.json")))
+
+    @property
+    def versions(self) -> dict[str, str]:
+        return self._file.metadata.get("versions", {})
+
+    @property
+    def wall(self) -> dict[str, str]:
+        """What came from the wall clock: dates, host, durations."""
+        return self._file.metadata.get("wall", {})
+
+    @property
+    def run(self) -> dict[str, str]:
+        """Procedure, backend and seed as strings."""
+        return self._file.metadata.get("run", {})
+
+    @property
+    def procedure(self) -> str:
+        return self.run.get("procedure", "")
+
+    @property
+    def seed(self) -> int | None:
+        text = self.run.get("seed", "")
+        return int(text) if text else None
+
+    def attachment(self, name: str) -> str:
+        """An attached text.
+
+        Raises:
+            RecordingError: the recording has none of that name.
+        """
+        try:
+            return self._file.attachments[name].decode("utf-8")
+        except (KeyError, UnicodeDecodeError) as error:
+            raise RecordingError(f"recording {self.path}: attachment {name!r} is missing or not text") from error
+
+    def digest(self) -> str:
+        """SHA-256 of the file."""
+        with self.path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+
+    @cached_property
+    def streams(self) -> dict[str, StreamLayout]:
+        """The recorded streams by name."""
+        out = {}
+        for topic, metadata in self._file.topics.values():
+            if topic.endswith("/block") and "layout" in metadata:
+                described = json.loads(metadata["layout"])
+                name = topic.split("/")[1]
+                out[name] = StreamLayout(name, described["period_ns"], tuple(ChannelInfo(*c) for c in described["channels"]))
+        return out
+
+    def blocks(self, stream: str, start_ns: int = 0, end_ns: int = 1 << 63) -> Iterator[DecodedBlock]:
+        """Decoded blocks that may hold samples of an interval, in order."""
+        for _, data in self._file.messages(layout.block_topic(stream), max(0, start_ns - BLOCK_NS), end_ns):
+            block = DecodedBlock(self.streams[stream], data)
+            if block.count and block.t_ns[-1] >= start_ns:
+                yield block
+
+    def read(self, channels: tuple[str, ...], start_ns: int, end_ns: int) -> dict[str, npt.NDArray[Any]]:
+        """Samples with start <= t < end: float64 by channel, `t_ns`, and `index` (counts lost samples too).
+
+        Raises:
+            AnalysisError: a channel was not recorded, or the channels are of different streams.
+        """
+        stream = self._stream_of(channels)
+        parts: dict[str, list[npt.NDArray[Any]]] = {name: [] for name in (*channels, "t_ns", "index")}
+        for block in self.blocks(stream, start_ns, end_ns):
+            a, b = np.searchsorted(block.t_ns, [start_ns, end_ns])
+            parts["t_ns"].append(block.t_ns[a:b])
+            parts["index"].append(np.arange(block.first + a, block.first + b))
+            for name in channels:
+                parts[name].append(block.columns[name][a:b].astype(np.float64))
+        empty = np.zeros(0)
+        return {name: np.concatenate(x) if x else empty for name, x in parts.items()}
+
+    def _stream_of(self, channels: tuple[str, ...]) -> str:
+        for name, stream in self.streams.items():
+            known = {c.name for c in stream.channels}
+            if known.issuperset(channels):
+                return name
+        raise AnalysisError(f"channels {', '.join(channels)}: not all recorded in one stream of {self.path.name}")
+
+    @cached_property
+    def _events(self) -> list[dict[str, Any]]:
+        return [json.loads(data) for _, data in self._file.messages(layout.EVENTS)]
+
+    def events(self, kind: str | None = None) -> list[dict[str, Any]]:
+        """Events in order: `kind`, `t_ns` and their data."""
+        return [e for e in self._events if kind is None or e["kind"] == kind]
+
+    def steps(self, kind: str) -> Steps:
+        """The completed steps of a kind, in time order."""
+        ends = {e["step"]: e["t_ns"] for e in self.events("step-end")}
+        return Steps(tuple(
+            Step(self, kind, dict(e["labels"]), int(e["t_ns"]), int(ends[e["step"]]))
+            for e in self.events("step-begin") if e["name"] == kind and e["step"] in ends
+        ))  # fmt: skip
+
+    def frames(self, link: str) -> Iterator[FrameBatch]:
+        """Raw frames, batch by batch as they were recorded."""
+        for _, data in self._file.messages(layout.raw_topic(link)):
+            _, records = layout.decode_frames(data)
+            yield np.frombuffer(records, FRAME)
+
+    def close(self) -> None:
+        """Nothing stays open between reads; here for symmetry with the recorder."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A labelled interval."""
+
+    recording: Recording[Any]
+    kind: str
+    labels: Mapping[str, Any]
+    start_ns: int
+    end_ns: int
+
+    def read(self, *channels: str) -> dict[str, npt.NDArray[Any]]:
+        """float64 samples by channel, with `t_ns` and `index`."""
+        return self.recording.read(channels, self.start_ns, self.end_ns)
+
+    def mean(self, channel: str) -> float:
+        """Mean of a channel over the step.
+
+        Raises:
+            AnalysisError: the step holds no sample.
+        """
+        x = self.read(channel)[channel]
+        if len(x) == 0:
+            raise AnalysisError(f"step {self.kind} {dict(self.labels)}: no samples of {channel}")
+        return float(x.mean())
+
+    def expected(self, stream: str = "telemetry") -> int:
+        """Samples that the step should hold at the stream's period."""
+        return round((self.end_ns - self.start_ns) / self.recording.streams[stream].period_ns)
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Steps in time order."""
+
+    items: tuple[Step, ...]
+
+    def __iter__(self) -> Iterator[Step]:
+        return iter(self.items)
+
+    def __len__(self) -> int:
+        return len(self.items)
+
+    def by(self, label: str) -> Iterator[tuple[Any, list[Step]]]:
+        """Groups of equal label, in order of first appearance."""
+        groups: dict[Any, list[Step]] = {}
+        for step in self.items:
+            groups.setdefault(step.labels[label], []).append(step)
+        yield from groups.items()
+
+
+def _integrity(file: McapFile) -> dict[str, Any] | None:
+    found = file.metadata.get("integrity")
+    return None if found is None else {k: json.loads(v) for k, v in found.items()}

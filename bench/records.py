@@ -1,0 +1,319 @@
+"""`record.json`: the data of one run. `record.schema.json` beside this file describes it for other readers."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import os
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, ClassVar, Literal
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+from bench.errors import ConfigError
+from bench.findings import Effect, Finding
+from bench.limits import Limit, Verdict, judge
+from bench.procedure import Measured, Quantity
+from bench.uncertainty import PROBABILITY, Estimate, budget, correlation_matrix, interval
+
+SCHEMA = 1
+SCHEMA_FILE = Path(__file__).with_name("record.schema.json")
+_STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+
+class Outcome(StrEnum):
+    """The outcome of a run, strongest first."""
+
+    ABORTED = "ABORTED"
+    ERROR = "ERROR"
+    FAIL = "FAIL"
+    INDETERMINATE = "INDETERMINATE"
+    PASS = "PASS"
+
+
+@dataclass(frozen=True)
+class BudgetEntry:
+    """One influence of a measurement; `contribution` in its unit, `dof` None is infinite."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    name: str
+    influence: str
+    contribution: float
+    sensitivity: float
+    type: Literal["A", "B"]
+    distribution: str
+    dof: float | None
+
+
+@dataclass(frozen=True)
+class LimitEntry:
+    """The acceptance range, in the measurement's unit; None is open."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    low: float | None
+    high: float | None
+    unit: str
+    source: str
+    verified: bool
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """One quantity of a run. All numbers are None where it is missing; `dof` None is infinite."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    name: str
+    unit: str
+    value: float | None
+    standard_uncertainty: float | None
+    dof: float | None
+    coverage_factor: float | None
+    expanded_uncertainty: float | None
+    method: Literal["gum", "monte-carlo"] | None
+    verdict: Verdict
+    limit: LimitEntry | None
+    where: str
+    interval: tuple[float, float] | None
+    coverage_probability: float | None
+    budget: tuple[BudgetEntry, ...]
+
+
+@dataclass(frozen=True)
+class FindingEntry:
+    """A finding, with its effect on the outcome."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    code: str
+    text: str
+    where: str
+    effect: Effect
+
+
+@dataclass(frozen=True)
+class RecordingFile:
+    """The recording's file name in the run directory and its digest, None if it was not taken."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    file: str
+    sha256: str | None
+
+
+@dataclass(frozen=True)
+class LinkCounts:
+    """What the link delivered: frames, gaps in the telemetry, error frames."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    frames: int = 0
+    gaps: int = 0
+    errors: int = 0
+
+
+@dataclass(frozen=True)
+class Correlations:
+    """Correlation coefficients of the measured quantities, in the order of `names`."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    names: tuple[str, ...]
+    matrix: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
+class Record:
+    """`record.json`. Times are ISO 8601 UTC; `seed` is None for a real rig; `plan` is in SI."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    schema: Literal[1]
+    run_id: str
+    procedure: str
+    rig: str
+    uut: Mapping[str, Any]
+    outcome: Outcome
+    started: str
+    ended: str | None
+    seed: int | None
+    plan: Mapping[str, Any]
+    calibrations: tuple[Mapping[str, Any], ...]
+    versions: Mapping[str, str]
+    recording: RecordingFile | None
+    link: LinkCounts
+    findings: tuple[FindingEntry, ...]
+    measurements: tuple[Measurement, ...]
+    correlations: Correlations
+
+
+_RECORD: TypeAdapter[Record] = TypeAdapter(Record)
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema that ships as `record.schema.json`."""
+    found = _RECORD.json_schema(mode="serialization")
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **found}
+
+
+def to_json(record: Record) -> str:
+    """The record as text.
+
+    Raises:
+        ValueError: a number is NaN or infinite.
+        TypeError: a value of the plan, the UUT or a calibration has no JSON form.
+    """
+    return json.dumps(dataclasses.asdict(record), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def from_json(text: str, name: str = "record") -> Record:
+    """The record in `text`; `name` stands in the messages.
+
+    Raises:
+        ConfigError: not a record, a newer one, unknown or missing keys, NaN.
+    """
+    try:
+        content = json.loads(text)
+        json.dumps(content, allow_nan=False)  # json.loads takes NaN, Infinity and 1e999
+    except (ValueError, RecursionError) as error:
+        raise ConfigError(f"{name}: not a record: {error}; expected JSON without NaN or Infinity") from error
+    schema = content.get("schema") if isinstance(content, dict) else None
+    if type(schema) is not int:
+        raise ConfigError(f"{name}: not a record: found no schema number; expected schema = {SCHEMA}")
+    if schema != SCHEMA:
+        newer = " It was written by a newer Levbench." if schema > SCHEMA else ""
+        raise ConfigError(f"{name}: schema: found {schema}; expected {SCHEMA}.{newer}")
+    try:
+        return _RECORD.validate_json(text)
+    except ValidationError as error:
+        listed = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors(include_url=False)]
+        raise ConfigError("\n  ".join([f"{name}: not a record of schema {SCHEMA}:", *listed])) from error
+
+
+def write_record(path: Path, record: Record) -> None:
+    """Write or replace the file; a reader sees the old or the new one, never a part, also after a crash.
+
+    Raises:
+        OSError, ValueError, TypeError: nothing was replaced.
+    """
+    text = to_json(record)
+    descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
+    try:
+        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fchmod(file.fileno(), 0o644)  # mkstemp makes it private
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)  # the rename itself
+    finally:
+        os.close(folder)
+
+
+def read_record(path: Path) -> Record:
+    """The record in a file.
+
+    Raises:
+        ConfigError: it cannot be read, or is not a record this version knows.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        raise ConfigError(f"{path}: cannot be read: {error}; expected a record.json") from error
+    return from_json(text, str(path))
+
+
+def unfinished(
+    *, run_id: str, procedure: str, rig: str, uut: Mapping[str, Any], started: str, seed: int | None,
+    plan: Mapping[str, Any], versions: Mapping[str, str], calibrations: Sequence[Mapping[str, Any]] = (),
+) -> Record:  # fmt: skip
+    """What is written before anything moves: if the run dies, this is what it says."""
+    said = Finding("unfinished", "The run did not end: its process was killed or lost power.", "", Effect.ERROR)
+    return Record(
+        schema=SCHEMA, run_id=run_id, procedure=procedure, rig=rig, uut=uut, outcome=Outcome.ERROR, started=started,
+        ended=None, seed=seed, plan=plan, calibrations=tuple(calibrations), versions=versions, recording=None,
+        link=LinkCounts(), findings=findings_of([said]), measurements=(), correlations=Correlations((), ()),
+    )  # fmt: skip
+
+
+def finished(
+    record: Record, *, ended: str, recording: RecordingFile | None, link: LinkCounts, findings: Iterable[Finding],
+    measurements: Sequence[Measurement], correlations: Correlations, stopped: Outcome | None = None,
+) -> Record:  # fmt: skip
+    """An unfinished record with its end; the outcome follows from what it holds."""
+    listed = list(findings)
+    return replace(
+        record, ended=ended, recording=recording, link=link, findings=findings_of(listed),
+        measurements=tuple(measurements), correlations=correlations,
+        outcome=outcome_of(measurements, listed, stopped),
+    )  # fmt: skip
+
+
+def findings_of(findings: Iterable[Finding]) -> tuple[FindingEntry, ...]:
+    """Findings as a record holds them."""
+    return tuple(FindingEntry(f.code, f.text, f.where, f.effect) for f in findings)
+
+
+def measurement(measured: Measured, limit: Limit | None, seed: int | None = 0) -> Measurement:
+    """A measured quantity with its interval, verdict and budget. A number that is not finite is a missing one.
+
+    Raises:
+        ConfigError: the limit is in another unit.
+        AnalysisError: the Monte Carlo of its interval fails.
+    """
+    quantity, estimate = measured.quantity, measured.estimate
+    if limit is not None and limit.unit != quantity.unit:
+        raise ConfigError(f"limit of {quantity.name}: found unit {limit.unit!r}; expected {quantity.unit!r}")
+    if not (math.isfinite(estimate.value) and math.isfinite(estimate.u)):
+        return missing(quantity, limit, measured.where)
+    found = interval(estimate, seed or 0)
+    return replace(
+        missing(quantity, limit, measured.where), value=estimate.value, standard_uncertainty=estimate.u,
+        dof=_finite(found.dof), coverage_factor=found.k, expanded_uncertainty=found.U, method=found.method,
+        verdict=judge(found, limit), interval=(found.low, found.high), coverage_probability=PROBABILITY,
+        budget=_budget(estimate),
+    )  # fmt: skip
+
+
+def missing(quantity: Quantity, limit: Limit | None = None, where: str = "") -> Measurement:
+    """The entry of a quantity that was declared but not measured."""
+    bounds = None if limit is None else LimitEntry(limit.low, limit.high, limit.unit, limit.source, limit.verified)
+    return Measurement(
+        name=quantity.name, unit=quantity.unit, value=None, standard_uncertainty=None, dof=None, coverage_factor=None,
+        expanded_uncertainty=None, method=None, verdict=Verdict.MISSING, limit=bounds, where=where, interval=None,
+        coverage_probability=None, budget=(),
+    )  # fmt: skip
+
+
+def correlations_of(measured: Sequence[Measured]) -> Correlations:
+    """Correlations of the measured quantities, from the influences that they share."""
+    finite = [m for m in measured if math.isfinite(m.estimate.value) and math.isfinite(m.estimate.u)]
+    matrix = correlation_matrix([m.estimate for m in finite])
+    return Correlations(tuple(m.quantity.name for m in finite), tuple(tuple(row) for row in matrix))
+
+
+def outcome_of(
+    measurements: Iterable[Measurement], findings: Iterable[Finding | FindingEntry], stopped: Outcome | None = None
+) -> Outcome:
+    """The strongest of what stopped the run (if anything did), the verdicts and the findings' effects."""
+    by_verdict = {Verdict.MISSING: Outcome.ERROR, Verdict.FAIL: Outcome.FAIL,
+                  Verdict.INDETERMINATE: Outcome.INDETERMINATE}  # fmt: skip
+    by_effect = {Effect.ERROR: Outcome.ERROR, Effect.INDETERMINATE: Outcome.INDETERMINATE}
+    found = {stopped, *(by_verdict.get(m.verdict) for m in measurements), *(by_effect.get(f.effect) for f in findings)}
+    return next((outcome for outcome in Outcome if outcome in found), Outcome.PASS)
+
+
+def _budget(estimate: Estimate) -> tuple[BudgetEntry, ...]:
+    return tuple(
+        BudgetEntry(r.name, r.id, r.contribution, r.sensitivity, "A" if r.kind == "A" else "B", r.distribution,
+                    _finite(r.dof))
+        for r in budget(estimate)
+    )  # fmt: skip
+
+
+def _finite(x: float) -> float | None:
+    return x if math.isfinite(x) else None

@@ -1,0 +1,24 @@
+"""The live rig: devices in roles, one clock, and what looks after them while a procedure sleeps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from bench.clock import Clock
+from bench.rigfile import RigFile
+from bench.roles import Levitation, Operator, Rotation
+from bench.telemetry import Counters
+
+
+@dataclass
+class Rig:
+    """What `acquire` gets. `close` releases the links; `counters` are the link's."""
+
+    file: RigFile
+    clock: Clock
+    levitation: Levitation
+    rotation: Rotation
+    operator: Operator
+    counters: Counters
+    close: Callable[[], None]

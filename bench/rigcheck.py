@@ -1,0 +1,155 @@
+"""What the types of a rig file cannot say: units that fit, geometry that exists, bindings that lead somewhere."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+
+from bench import units
+from bench.busload import REFUSE, BusLoad, bus_load
+from bench.errors import ConfigError, Problem
+from bench.messages import MessageMap
+from bench.rigfile import RigFile, read_rig
+
+GEOMETRY = {
+    "hook_to_outboard": "hook plane to outboard AMB plane",
+    "amb_span": "AMB plane to AMB plane",
+    "com_to_outboard_amb": "centre of mass to outboard AMB",
+    "com_to_inboard_amb": "centre of mass to inboard AMB",
+    "com_to_motor": "centre of mass to motor",
+    "com_to_outboard_sensor": "centre of mass to outboard sensors",
+    "com_to_inboard_sensor": "centre of mass to inboard sensors",
+    "amb_gap": "air gap of the radial AMBs",
+    "clearance": "clearance of the touchdown bearings",
+    "motor_stiffness": "negative stiffness of the motor",
+}
+FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
+
+
+def check_rig(rig: str) -> tuple[tuple[Problem, ...], BusLoad | None]:
+    """Every problem of a rig file at once, and the bus load when the DBC can be read.
+
+    Raises:
+        ConfigError: there is no such rig, or its files cannot be read at all.
+    """
+    text = read_rig(rig)
+    try:
+        loaded = RigFile.parse(text.toml, text.dbc, str(text.path))
+    except ConfigError as error:
+        return error.problems or (Problem(str(text.path), "(file)", str(error), "a rig file"),), None
+    load = None
+    try:
+        load = bus_load(loaded.messages, loaded.link.bitrate, loaded.link.data_bitrate)
+    except (ConfigError, KeyError):
+        pass
+    return tuple(problems_of(loaded)), load
+
+
+def problems_of(rig: RigFile) -> list[Problem]:
+    """What is wrong with a parsed rig file."""
+    found = [*_devices(rig), *_units(rig), *_geometry(rig), *_masses(rig), *_parameters(rig)]
+    if not any(p.key.startswith("devices") for p in found):
+        try:
+            messages = rig.messages
+        except ConfigError as error:
+            return [*found, Problem(rig.link.dbc, "(file)", str(error), "a usable DBC")]
+        found += [*_bindings(rig, messages), *_bus(rig, messages)]
+    return found
+
+
+def _devices(rig: RigFile) -> Iterator[Problem]:
+    if "controller" not in rig.devices:
+        yield Problem(rig.path, "devices", ", ".join(rig.devices) or "nothing", "[devices.controller]")
+    elif rig.devices["controller"].link not in rig.links:
+        yield Problem(rig.path, "devices.controller.link", rig.devices["controller"].link,
+                      f"one of {', '.join(rig.links)}")  # fmt: skip
+
+
+def _units(rig: RigFile) -> Iterator[Problem]:
+    named = {f"channels.{n}.unit": c.unit for n, c in rig.channels.items()}
+    named |= {f"parameters.{n}.unit": p.unit for n, p in rig.parameters.items()}
+    for key, symbol in named.items():
+        if symbol not in units.UNITS:
+            close = difflib.get_close_matches(symbol, units.UNITS, 1)
+            yield Problem(rig.path, key, repr(symbol), f"a known unit{f', such as {close[0]!r}' if close else ''}")
+    kinds = {f"geometry.{n}": (g, "N/m" if n == "motor_stiffness" else "m") for n, g in rig.geometry.items()}
+    kinds |= {f"masses.{n}": (m, "kg") for n, m in rig.masses.items()}
+    kinds |= {"hanger": (rig.hanger, "kg"), "mass_density": (rig.mass_density, "kg/m^3"),
+              "site.gravity": (rig.site.gravity, "m/s^2"), "site.air_density": (rig.site.air_density, "kg/m^3")}  # fmt: skip
+    for key, (toleranced, si) in kinds.items():
+        if toleranced.unit != si:
+            yield Problem(rig.path, f"{key}.unit", toleranced.unit, f"a unit of the kind of {si}")
+
+
+def _geometry(rig: RigFile) -> Iterator[Problem]:
+    g = rig.geometry
+    for key in sorted(GEOMETRY.keys() - g.keys()):
+        yield Problem(rig.path, f"geometry.{key}", "nothing", f"{GEOMETRY[key]}, with its certificate")
+    for key in sorted(g.keys() - GEOMETRY.keys()):
+        close = difflib.get_close_matches(key, GEOMETRY, 1)
+        yield Problem(rig.path, f"geometry.{key}", "a length nobody asks for",
+                      f"did you mean {close[0]}?" if close else "no such key")  # fmt: skip
+    if GEOMETRY.keys() - g.keys():
+        return
+    for key, length in g.items():
+        if length.value <= 0:
+            yield Problem(rig.path, f"geometry.{key}.value", f"{length.value:g} {length.unit}", "a positive number")
+    span = g["com_to_inboard_amb"].value + g["com_to_outboard_amb"].value
+    if abs(span - g["amb_span"].value) > 1e-3:
+        yield Problem(rig.path, "geometry.amb_span.value", f"{g['amb_span'].value:g} m",
+                      f"within 1 mm of com_to_inboard_amb + com_to_outboard_amb = {span:g} m")  # fmt: skip
+    if g["clearance"].value >= g["amb_gap"].value:
+        yield Problem(rig.path, "geometry.clearance.value", f"{g['clearance'].value:g} m",
+                      f"less than amb_gap = {g['amb_gap'].value:g} m, or the journal strikes the AMB first")  # fmt: skip
+
+
+def _masses(rig: RigFile) -> Iterator[Problem]:
+    for name, mass in {**rig.masses, "hanger": rig.hanger}.items():
+        key = name if name == "hanger" else f"masses.{name}"
+        if mass.value <= 0:
+            yield Problem(rig.path, f"{key}.value", f"{mass.value:g} kg", "a positive mass")
+        elif mass.value > rig.envelope.max_hung_kg:
+            yield Problem(rig.path, f"{key}.value", f"{mass.value:g} kg",
+                          f"at most envelope.max_hung_kg = {rig.envelope.max_hung_kg:g} kg")  # fmt: skip
+
+
+def _parameters(rig: RigFile) -> Iterator[Problem]:
+    taken: dict[int, str] = {}
+    for name, p in rig.parameters.items():
+        if p.low > p.high:
+            yield Problem(rig.path, f"parameters.{name}", f"low {p.low:g} above high {p.high:g}", "low <= high")
+        elif not p.low <= p.default <= p.high:
+            yield Problem(rig.path, f"parameters.{name}.default", f"{p.default:g} {p.unit}", f"{p.low:g} to {p.high:g}")
+        if p.index in taken:
+            yield Problem(rig.path, f"parameters.{name}.index", str(p.index), f"an index of its own ({taken[p.index]})")
+        taken.setdefault(p.index, name)
+
+
+def _bindings(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
+    for name, channel in rig.channels.items():
+        message, _, signal = channel.signal.partition(".")
+        known = {s.name: s for s in messages.messages[message].signals} if message in messages.messages else {}
+        if signal not in known:
+            close = difflib.get_close_matches(signal, known, 1)
+            yield Problem(rig.path, f"channels.{name}.signal", channel.signal,
+                          f"a signal of {rig.link.dbc}" + (f", such as {message}.{close[0]}" if close else ""))  # fmt: skip
+            continue
+        dbc_unit = known[signal].unit
+        if dbc_unit not in units.UNITS:
+            yield Problem(rig.link.dbc, channel.signal, f"unit {dbc_unit!r}", "a known unit")
+        elif channel.unit in units.UNITS and units.UNITS[dbc_unit].si != units.UNITS[channel.unit].si:
+            yield Problem(rig.path, f"channels.{name}.unit", channel.unit, f"the kind of {dbc_unit} ({channel.signal})")
+    for needed in ("Telemetry", "Heartbeat", "Command", "CommandReply", "ParamSet", "ParamGet", "ParamReply"):
+        if needed not in messages.messages:
+            yield Problem(rig.link.dbc, needed, "no such message", "the message, as in the rig reference")
+
+
+def _bus(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
+    for m in messages.messages.values():
+        if m.length not in FD_LENGTHS:
+            yield Problem(rig.link.dbc, m.name, f"{m.length} bytes", f"a CAN FD length: {FD_LENGTHS}")
+    load = bus_load(messages, rig.link.bitrate, rig.link.data_bitrate)
+    if load.total > REFUSE:
+        worst = max(load.by_message, key=lambda name: load.by_message[name])
+        yield Problem(rig.path, f"links.{rig.devices['controller'].link}", f"a bus load of {load.total:.0%}",
+                      f"at most {REFUSE:.0%}; {worst} takes {load.by_message[worst]:.0%}")  # fmt: skip

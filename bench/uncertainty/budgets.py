@@ -1,0 +1,44 @@
+"""Uncertainty budgets, and rounding a result to its uncertainty."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from decimal import ROUND_HALF_EVEN, Decimal
+
+from bench.uncertainty.estimate import Estimate
+
+
+@dataclass(frozen=True, slots=True)
+class BudgetRow:
+    """One influence: contribution |c u| in the estimate's unit, sensitivity c, and its share of the variance, 0..1."""
+
+    name: str
+    id: str
+    contribution: float
+    sensitivity: float
+    kind: str
+    distribution: str
+    dof: float
+    share: float
+
+
+def budget(estimate: Estimate) -> list[BudgetRow]:
+    """All influences, the largest contribution first; equal ones by id."""
+    u = estimate.u
+    rows = [
+        BudgetRow(i.name, i.id, abs(c * i.u), c, i.kind, i.distribution, i.dof, (c * i.u / u) ** 2 if u > 0 else 0.0)
+        for i, c in estimate.sensitivities.items()
+    ]
+    return sorted(rows, key=lambda row: (-row.contribution, row.id))
+
+
+def round_to_uncertainty(value: float, expanded: float) -> tuple[str, str]:
+    """Value and expanded uncertainty as text: two significant digits of U, the value to the same place (GUM 7.2.6)."""
+    if not (math.isfinite(value) and math.isfinite(expanded)) or expanded <= 0:
+        return repr(value), repr(expanded)
+    place = int(f"{expanded:.1e}".partition("e")[2]) - 1  # after rounding: 0.0996 is 1.0e-01
+    step = Decimal(1).scaleb(place)
+    rounded = ((Decimal(repr(x)) / step).quantize(Decimal(1), ROUND_HALF_EVEN) * step for x in (value, expanded))
+    low, high = (f"{x:f}" if place < 0 else f"{int(x)}" for x in rounded)
+    return low, high

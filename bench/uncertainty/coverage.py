@@ -1,0 +1,106 @@
+"""Coverage intervals: effective degrees of freedom, coverage factor, and Monte Carlo where the GUM's do not hold."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.special import ndtri, stdtrit
+
+from bench.errors import AnalysisError
+from bench.uncertainty.estimate import Array, Estimate, Influence
+
+PROBABILITY = 0.95
+DRAWS = 200_000
+DOMINANT = 0.5  # share of the variance beyond which one non-normal component decides the shape
+_HALF_WIDTHS = {"rectangular": math.sqrt(3), "triangular": math.sqrt(6), "arcsine": math.sqrt(2)}  # of u, GUM 4.3
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A 95 % coverage interval [low, high]; U is its half width and k is U/u. `why` says what chose the method."""
+
+    low: float
+    high: float
+    k: float
+    U: float
+    dof: float
+    method: Literal["gum", "monte-carlo"]
+    why: str
+
+
+def welch_satterthwaite(estimate: Estimate) -> float:
+    """Effective degrees of freedom (GUM eq. G.2b), truncated down to an integer (G.6.4); inf if all are exact."""
+    u = estimate.u
+    if u == 0:
+        return math.inf
+    # Ratios first: the fourth power of a small u would underflow.
+    inverse = math.fsum((c * i.u / u) ** 4 / i.dof for i, c in estimate.sensitivities.items())
+    if inverse == 0:
+        return math.inf
+    effective = 1 / inverse
+    return max(1.0, float(math.floor(effective * (1 + 1e-12))))  # 1e-12: a sum of one dof is that dof
+
+
+def coverage_factor(dof: float) -> float:
+    """k = t_0.975(dof), for 95 % (GUM G.3.4)."""
+    tail = (1 + PROBABILITY) / 2
+    return float(ndtri(tail)) if math.isinf(dof) else float(stdtrit(dof, tail))
+
+
+def interval(estimate: Estimate, seed: int = 0) -> Interval:
+    """The 95 % interval: value -+ k u, or probabilistically symmetric from Monte Carlo (JCGM 101, 7.7).
+
+    Monte Carlo takes over where one non-normal component carries more than half of the variance (the central limit
+    does not help, GUM G.2.2) or the model is not linear over the spread of its inputs (5.1.2 note).
+
+    Raises:
+        AnalysisError: value or uncertainty is not finite, or the model fails for drawn inputs.
+    """
+    if not (math.isfinite(estimate.value) and math.isfinite(estimate.u)):
+        raise AnalysisError(f"found {estimate.value} with u {estimate.u}; expected finite numbers")
+    dof = welch_satterthwaite(estimate)
+    reason = _against_gum(estimate)
+    if not reason:
+        k = coverage_factor(dof)
+        wide = k * estimate.u
+        why = "normal or many comparable components, linear model"
+        return Interval(estimate.value - wide, estimate.value + wide, k, wide, dof, "gum", why)
+    deviations = {i.id: draw(i, seed, DRAWS) for i in estimate.sensitivities}
+    low, high = (float(q) for q in np.quantile(estimate.sampled(deviations), [0.025, 0.975]))
+    if not (math.isfinite(low) and math.isfinite(high)):
+        raise AnalysisError("the model does not give finite numbers over the spread of its inputs")
+    half = (high - low) / 2
+    return Interval(low, high, half / estimate.u if estimate.u > 0 else 0.0, half, dof, "monte-carlo", reason)
+
+
+def _against_gum(estimate: Estimate) -> str:
+    if estimate.nonlinear:
+        return "the model is not linear over the spread of its inputs"
+    variance = estimate.u**2
+    for influence, c in estimate.sensitivities.items():
+        if influence.distribution != "normal" and (c * influence.u) ** 2 > DOMINANT * variance:
+            return f"the {influence.distribution} component {influence.id} carries over half of the variance"
+    return ""
+
+
+def draw(influence: Influence, seed: int, count: int) -> Array:
+    """Deviations drawn for one influence, (count,): the same for the same seed and id, whatever else is drawn.
+
+    A normal one with finite degrees of freedom is drawn from the scaled t distribution (JCGM 101, 6.4.9).
+    """
+    digest = hashlib.sha256(influence.id.encode()).digest()
+    rng = np.random.default_rng([seed, int.from_bytes(digest[:8], "little")])
+    if influence.distribution == "normal":
+        if math.isinf(influence.dof):
+            return influence.u * rng.standard_normal(count)
+        return influence.u * rng.standard_t(influence.dof, count)
+    a = influence.u * _HALF_WIDTHS[influence.distribution]
+    if influence.distribution == "rectangular":
+        return rng.uniform(-a, a, count)
+    if influence.distribution == "arcsine":
+        return a * np.sin(rng.uniform(-math.pi, math.pi, count))
+    return a * (rng.random(count) + rng.random(count) - 1)

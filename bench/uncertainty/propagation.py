@@ -1,0 +1,77 @@
+"""Propagation through a model that is only known as a function."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import overload
+
+import numpy as np
+
+from bench.errors import AnalysisError
+from bench.uncertainty.estimate import Array, Deviations, Estimate, Influence, Sampler, merged
+
+NONLINEAR = 0.1  # share of the combined u that a second difference may reach
+Inputs = Mapping[str, Estimate]
+_ONE = ""  # name of the output of a model that returns one number
+
+
+@overload
+def propagate(f: Callable[[dict[str, float]], float], inputs: Inputs) -> Estimate: ...
+@overload
+def propagate(f: Callable[[dict[str, float]], dict[str, float]], inputs: Inputs) -> dict[str, Estimate]: ...
+def propagate(
+    f: Callable[[dict[str, float]], float] | Callable[[dict[str, float]], dict[str, float]], inputs: Inputs
+) -> Estimate | dict[str, Estimate]:
+    """Estimates of the outputs of `f`, by central differences, one elementary influence at a time.
+
+    The step is the influence's u, carried to every input that shares it (GUM 5.1.3 note 2). An output whose second
+    difference exceeds a tenth of its combined u for any influence is `nonlinear` and keeps the model for Monte Carlo.
+    Curvature between two influences (a product of two values near zero) is not looked for. Units are left empty.
+
+    Raises:
+        AnalysisError: an output is not finite, or one id stands for two different influences.
+    """
+    centre = f({name: e.value for name, e in inputs.items()})
+    middle = _named(centre)
+    influences = [i for i in merged((1.0, e) for e in inputs.values()) if i.u > 0]
+    slopes: dict[str, dict[Influence, float]] = {name: {} for name in middle}
+    bends: dict[str, float] = dict.fromkeys(middle, 0.0)
+    for influence in influences:
+        up, down = (_named(f(_shifted(inputs, influence, side))) for side in (1.0, -1.0))
+        for name in middle:
+            slopes[name][influence] = (up[name] - down[name]) / (2 * influence.u)
+            bends[name] = max(bends[name], abs(up[name] - 2 * middle[name] + down[name]))
+    out = {}
+    for name, value in middle.items():
+        linear = Estimate(value, "", slopes[name])
+        bent = bends[name] > NONLINEAR * linear.u or any(e.nonlinear for e in inputs.values())
+        out[name] = Estimate(value, "", slopes[name], _sampler(f, inputs, name)) if bent else linear
+    return out if isinstance(centre, dict) else out[_ONE]
+
+
+def _named(result: float | dict[str, float]) -> dict[str, float]:
+    named = {k: float(v) for k, v in result.items()} if isinstance(result, dict) else {_ONE: float(result)}
+    for name, value in named.items():
+        if not math.isfinite(value):
+            raise AnalysisError(f"the model gives {value} for {name or 'its output'}; expected a finite number")
+    return named
+
+
+def _shifted(inputs: Inputs, influence: Influence, side: float) -> dict[str, float]:
+    return {name: e.value + side * e.contributions.get(influence.id, 0.0) for name, e in inputs.items()}
+
+
+def _sampler(
+    f: Callable[[dict[str, float]], float] | Callable[[dict[str, float]], dict[str, float]], inputs: Inputs, name: str
+) -> Sampler:
+    def sampled(deviations: Deviations) -> Array:
+        drawn = {key: e.sampled(deviations) for key, e in inputs.items()}
+        count = max((len(v) for v in drawn.values()), default=1)
+        full = {key: np.broadcast_to(v, (count,)) for key, v in drawn.items()}
+        out = np.empty(count)
+        for k in range(count):
+            out[k] = _named(f({key: float(v[k]) for key, v in full.items()}))[name]
+        return out
+
+    return sampled

@@ -1,0 +1,131 @@
+"""`pytest procedures --rig RIG`: the procedures as tests of a machine. A composition root.
+
+One item per procedure, collected only when `--rig` is given. FAIL and INDETERMINATE fail the item, ERROR and ABORTED
+are errors (the run happens in the item's set-up, so that pytest counts them as such). Measured quantities become
+JUnit properties of the item, provenance becomes properties of the suite.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from bench import __version__, catalogue
+from bench.errors import BenchError
+
+if TYPE_CHECKING:
+    from bench.runner import RunResult
+
+ROOT = Path(__file__).resolve().parent
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    group = parser.getgroup("levbench", "procedures on a rig: pytest procedures --rig RIG")
+    group.addoption("--rig", metavar="RIG", help="a rig file, or its name in rigs/")
+    group.addoption("--backend", choices=("sim", "live"), default="sim", help="the simulated rig, or the real one")
+    group.addoption("--seed", type=int, help="which virtual rig (simulation only)")
+    group.addoption("--plan", action="append", default=[], metavar="KEY=VALUE", help="a setting; repeatable")
+    group.addoption("--out", type=Path, default=Path("runs"), help="folder of the run directories")
+
+
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> ProcedureFile | None:
+    """The modules that the catalogue names, once there is a rig to run them on."""
+    if parent.config.getoption("--rig") is None or file_path not in _modules():
+        return None
+    return ProcedureFile.from_parent(parent, path=file_path)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Provenance into the JUnit file, if one is written."""
+    rig = config.getoption("--rig")
+    if rig is None:
+        return
+    from _pytest.junitxml import xml_key  # pytest offers suite properties to fixtures only
+
+    if (xml := config.stash.get(xml_key, None)) is not None:
+        for name in ("rig", "backend", "seed"):
+            xml.add_global_property(f"levbench.{name}", str(config.getoption(f"--{name}")))
+        xml.add_global_property("levbench.version", __version__)
+        xml.add_global_property("python", sys.version.split()[0])
+
+
+def _modules() -> dict[Path, catalogue.Entry]:
+    return {ROOT.joinpath(*e.module.split(".")).with_suffix(".py"): e for e in catalogue.PROCEDURES}
+
+
+class ProcedureFile(pytest.File):
+    """A module of `procedures/` that the catalogue names."""
+
+    def collect(self) -> Iterator[pytest.Item]:
+        entry = _modules()[self.path]
+        yield ProcedureItem.from_parent(self, name=entry.name)
+
+
+class ProcedureItem(pytest.Item):
+    """One procedure on the rig of the command line."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self.result: RunResult | None = None
+        self.add_marker(pytest.mark.timeout(0))  # a calibration takes as long as it takes
+
+    def setup(self) -> None:
+        from bench.cli.run import Request, execute
+        from bench.outcomes import Outcome
+
+        option = self.config.getoption
+        request = Request(
+            procedure=self.name,
+            rig=option("--rig"),
+            backend=option("--backend"),
+            seed=option("--seed"),
+            plan=tuple(option("--plan")),
+            out=option("--out"),
+        )
+        with warnings.catch_warnings():
+            warnings.simplefilter("default")  # the machine is on trial here, not the software
+            self.result = execute(request)
+        self._note(self.result)
+        if self.result.stopped_by_signal:
+            self.session.shouldstop = self.result.reason
+        if self.result.outcome in (Outcome.ERROR, Outcome.ABORTED):
+            raise NotMeasured(self.result)
+
+    def runtest(self) -> None:
+        from bench.outcomes import Outcome
+
+        assert self.result is not None
+        if self.result.outcome is not Outcome.PASS:
+            raise NotPassed(self.result)
+
+    def _note(self, result: RunResult) -> None:
+        self.user_properties.append(("run", str(result.directory)))
+        self.user_properties.append(("outcome", str(result.outcome)))
+        for m in result.record["measurements"]:
+            for field in ("value", "expanded_uncertainty", "unit", "verdict"):
+                self.user_properties.append((f"{m['name']}.{field}", m[field]))
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
+        """A sentence instead of a traceback, for what Levbench raises on purpose."""
+        if isinstance(excinfo.value, BenchError):
+            return str(excinfo.value)
+        return super().repr_failure(excinfo, style)
+
+    def reportinfo(self) -> tuple[Path, int, str]:
+        return self.path, 0, f"{self.name} on {self.config.getoption('--rig')}"
+
+
+class NotPassed(BenchError):  # noqa: N818 - a verdict, not an error
+    """FAIL or INDETERMINATE."""
+
+    def __init__(self, result: RunResult) -> None:
+        super().__init__(f"{result.outcome}: {result.reason}\n{result.directory}")
+
+
+class NotMeasured(NotPassed):
+    """ERROR or ABORTED."""

@@ -1,0 +1,1 @@
+"""Drivers: from roles to bytes."""

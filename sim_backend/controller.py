@@ -1,0 +1,270 @@
+"""The simulated controller: bytes in, bytes out. A state machine, parameters, telemetry, faults and a watchdog around
+the plant. It has its own copy of the message map and shares no object with the driver."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bench.codec import Decoder, encode
+from bench.frames import FD, FrameBatch, empty_batch, frame
+from bench.messages import load_messages
+from bench.rigfile import RigFile
+from sim_backend import core
+from sim_backend.core import PERIOD_TICKS, TICK_S, Plant
+from sim_backend.telemetry import TelemetryEncoder
+from sim_backend.truth import Truth
+
+SETTLED_M, SETTLED_S = 20e-6, 0.05
+LIFT_TIMEOUT_S = 5.0
+TAKEOVER_S = 1.0
+RESTING = ("OFF", "READY")
+TURNING = ("LEVITATED", "SPINNING", "COASTING")
+
+
+@dataclass
+class Owner:
+    """The host that the controller obeys: its session and when its last heartbeat came (ticks)."""
+
+    session: int = 0
+    heartbeat: int = 0
+    armed: bool = False
+
+
+class SimulatedController:
+    """The device end of the rig's link."""
+
+    def __init__(self, rig: RigFile, truth: Truth) -> None:
+        self._map = load_messages(rig.dbc_text)
+        self._decoders = {m.identifier: Decoder(m) for m in self._map.messages.values() if m.sender == "Host"}
+        self._parameters = {p.index: (name, p) for name, p in rig.parameters.items()}
+        self._own = {name: p.default for name, p in rig.parameters.items()}
+        self.truth = truth
+        self.plant = Plant(truth.plant, truth.seed)
+        for name, value in self._own.items():
+            self._apply(name, value)
+        self.state, self.fault = "OFF", "NONE"
+        self._owner = Owner()
+        self._since, self._steady = 0, 0
+        self._encoder = TelemetryEncoder(self._map, truth)
+        self._out: list[FrameBatch] = []
+
+    def advance(self, ticks: int, incoming: FrameBatch, t0_ns: int) -> FrameBatch:
+        """Run for `ticks`; frames are taken at their `t_ns`, which counts from `t0_ns` at the present tick.
+
+        Returns:
+            What the controller sent, with its times.
+        """
+        start = self.plant.tick
+        self._out = []
+        clock = (t0_ns, start)
+        due = np.clip((incoming["t_ns"] - t0_ns) // 100_000, 0, ticks) + start
+        for at, one in zip(due.tolist(), incoming, strict=True):
+            self._run_to(int(at), clock)
+            self._receive(one, clock)
+        self._run_to(start + ticks, clock)
+        return np.concatenate(self._out) if self._out else empty_batch()
+
+    def _run_to(self, tick: int, clock: tuple[int, int]) -> None:
+        """Run the plant in parts no longer than the state machine or the watchdog may wait."""
+        while self.plant.tick < tick:
+            deadline = self._owner.heartbeat + int(self._own["watchdog_s"] / TICK_S) + 1
+            until = min(tick, deadline) if self._watching() and deadline > self.plant.tick else tick
+            if self.state in ("LIFTING", "LANDING", "COASTING"):
+                until = min(until, self.plant.tick + 10 * PERIOD_TICKS)
+            before = self.plant.tick
+            rows = self.plant.run(until - before)
+            state = (self.state, self.fault)
+            self._out.append(self._encoder.encode(rows, before, clock, state, self._owner.heartbeat, self._owner.armed))
+            self._progress(rows)
+
+    def _watching(self) -> bool:
+        return self._owner.armed and self.state not in ("OFF", "FAULT")
+
+    def _progress(self, rows: core.Array) -> None:
+        """What the state machine does by itself: trips, watchdog, end of lift, landing and coasting."""
+        plant = self.plant
+        defect = self.truth.defects["fault_after_s"]
+        if plant.trips or (defect and plant.tick * TICK_S > defect and self.fault == "NONE"):
+            self._trip()
+        elif self._watching() and (plant.tick - self._owner.heartbeat) * TICK_S > self._own["watchdog_s"]:
+            self._lose_host()
+        elapsed = (plant.tick - self._since) * TICK_S
+        if self.state == "LIFTING" and len(rows):
+            still = bool((np.abs(rows[:, :4]) < SETTLED_M).all()) and plant.moved
+            self._steady = self._steady + len(rows) if still else 0
+            if self._steady * PERIOD_TICKS * TICK_S >= SETTLED_S:
+                plant.mode = core.LEVITATE
+                self._enter("LEVITATED")
+            elif elapsed > LIFT_TIMEOUT_S + self._own["lift_time_s"]:
+                self._fail("LIFT_TIMEOUT")
+        elif self.state == "LANDING" and plant.moved:
+            if self.fault == "NONE":
+                plant.mode = core.READY
+                self._enter("READY")
+            else:
+                plant.mode = core.OFF
+                self._enter("FAULT")
+        elif self.state == "COASTING" and abs(plant.speed) < self._own["landing_speed"]:
+            self._land()
+        elif self.state in ("LEVITATED", "SPINNING"):
+            turning = abs(plant.speed) > self._own["landing_speed"]
+            self.state = "SPINNING" if turning else "LEVITATED"
+
+    def _trip(self) -> None:
+        bits = self.plant.trips
+        name = next((n for bit, n in core.TRIPS.items() if bits & bit), "SENSOR")
+        self._fail(name)
+
+    def _fail(self, fault: str) -> None:
+        self.fault = fault if self.fault == "NONE" else self.fault
+        self.plant.clear_trips()
+        if fault in ("OVERCURRENT", "OVERSPEED", "SENSOR") and self.state in TURNING:
+            self._safe()
+        else:
+            self.plant.mode = core.OFF
+            self._enter("FAULT")
+
+    def _lose_host(self) -> None:
+        self.fault = "HEARTBEAT_LOST" if self.fault == "NONE" else self.fault
+        self._owner.armed = False
+        self._safe()
+
+    def _safe(self) -> None:
+        """Coast while turning fast, then land; amplifiers off where the rotor rests already."""
+        if self.state in TURNING:
+            self.plant.set("torque_on", 0.0)
+            self.plant.set("speed_ref", 0.0)
+            if abs(self.plant.speed) > self._own["landing_speed"]:
+                self._enter("COASTING")
+            else:
+                self._land()
+        elif self.state == "LIFTING":
+            self._land()
+        elif self.state in RESTING:
+            self.plant.mode = core.OFF
+            self._enter("OFF" if self.fault == "NONE" else "FAULT")
+
+    def _land(self) -> None:
+        self.plant.mode = core.LAND
+        self._enter("LANDING")
+
+    def _enter(self, state: str) -> None:
+        self.state, self._since, self._steady = state, self.plant.tick, 0
+
+    def _receive(self, one: np.void, clock: tuple[int, int]) -> None:
+        decoder = self._decoders.get(int(one["id"]))
+        if decoder is None or int(one["length"]) != decoder.message.length:
+            return
+        columns = decoder.decode_payloads(one["data"][None, :])
+        values = {k: float(v[0]) for k, v in columns.items()}
+        if not all(np.isfinite(list(values.values()))):
+            return
+        {"Heartbeat": self._heartbeat, "Command": self._command, "ParamSet": self._set, "ParamGet": self._get}[
+            decoder.message.name
+        ](values, clock)
+
+    def _owns(self, session: int) -> bool:
+        """Whether a session may command: the owner's, or any when there is no owner or it is gone and the rotor rests."""
+        gone = (self.plant.tick - self._owner.heartbeat) * TICK_S > TAKEOVER_S and self.state in (*RESTING, "FAULT")
+        if session and (self._owner.session in (0, session) or gone):
+            if self._owner.session != session:
+                self._owner = Owner(session, self.plant.tick)
+            return True
+        return False
+
+    def _heartbeat(self, v: dict[str, float], _: tuple[int, int]) -> None:
+        if self._owns(int(v["session"])):
+            self._owner.heartbeat = self.plant.tick
+            self._owner.armed = self._owner.armed or self.state not in ("OFF", "FAULT")
+
+    def _command(self, v: dict[str, float], clock: tuple[int, int]) -> None:
+        code = int(v["code"])
+        names = self._map["Command"].signal("code").choices
+        name = names.get(code, "")
+        if not name:
+            status = "UNKNOWN"
+        elif not self._owns(int(v["session"])):
+            status = "WRONG_SESSION"
+        else:
+            status = "OK" if self._obey(name) else "WRONG_STATE"
+        if name == "IDENTIFY" and status == "OK":
+            self._send("Identity", {"protocol": 1, "map_version": 1, "serial": 1}, clock)
+        reply = {"code": code if name else 8, "token": v["token"], "status": self._status(status),
+                 "state": self._map.code("CommandReply", "state", self.state)}  # fmt: skip
+        self._send("CommandReply", reply, clock)
+
+    def _obey(self, name: str) -> bool:
+        """Carry out a command, or refuse it in this state."""
+        state, plant = self.state, self.plant
+        if name == "IDENTIFY":
+            return True
+        if name == "MAKE_SAFE":
+            self._safe()
+            return True
+        if name == "CLEAR_FAULT" and state == "FAULT":
+            self.fault = "NONE"
+            plant.clear_trips()
+            self._enter("OFF")
+        elif name == "ENABLE" and state == "OFF":
+            plant.mode = core.READY
+            self._enter("READY")
+        elif name == "DISABLE" and state in RESTING:
+            plant.mode = core.OFF
+            self._owner.armed = False
+            self._enter("OFF")
+        elif name == "LEVITATE" and state == "READY":
+            plant.set("torque_on", 1.0)
+            plant.mode = core.LIFT
+            self._enter("LIFTING")
+        elif name == "LAND" and state == "LEVITATED" and abs(plant.speed) <= self._own["landing_speed"]:
+            self._land()
+        elif name == "SPIN" and state in ("LEVITATED", "SPINNING"):
+            plant.set("speed_ref", self._own["speed_ref"])
+        elif name == "STOP" and state in ("LEVITATED", "SPINNING"):
+            plant.set("speed_ref", 0.0)
+        else:
+            return False
+        return True
+
+    def _set(self, v: dict[str, float], clock: tuple[int, int]) -> None:
+        index, value = int(v["index"]), v["value"]
+        if index not in self._parameters:
+            self._reply_parameter(index, "UNKNOWN", v["token"], 0.0, clock)
+            return
+        name, p = self._parameters[index]
+        if not p.low <= round(value, 12) <= p.high and not np.isclose(value, (p.low, p.high), rtol=1e-6).any():
+            status = "OUT_OF_RANGE"
+        elif p.when == "resting" and self.state not in RESTING:
+            status = "WRONG_STATE"
+        else:
+            status = "OK"
+            self._own[name] = value
+            self._apply(name, value)
+        self._reply_parameter(index, status, v["token"], self._own[name], clock)
+
+    def _get(self, v: dict[str, float], clock: tuple[int, int]) -> None:
+        index = int(v["index"])
+        known = self._parameters.get(index)
+        value = self._own[known[0]] if known else 0.0
+        self._reply_parameter(index, "OK" if known else "UNKNOWN", v["token"], value, clock)
+
+    def _apply(self, name: str, value: float) -> None:
+        if name in ("watchdog_s", "landing_speed", "speed_ref"):
+            return  # the interface's own; speed_ref acts on SPIN
+        if name.startswith("ki_") and name != "ki_theta":
+            value *= self.truth.defects["integrator_factor"]
+        self.plant.set(name, value)
+
+    def _reply_parameter(self, index: int, status: str, token: float, value: float, clock: tuple[int, int]) -> None:
+        self._send("ParamReply", {"index": index, "status": self._status(status), "token": token, "value": value}, clock)
+
+    def _status(self, name: str) -> int:
+        return self._map.code("CommandReply", "status", name)
+
+    def _send(self, message: str, values: dict[str, float], clock: tuple[int, int]) -> None:
+        m = self._map[message]
+        at = clock[0] + (self.plant.tick - clock[1]) * 100_000
+        self._out.append(frame(m.identifier, encode(m, values), t_ns=at, flags=FD))
+

@@ -1,0 +1,116 @@
+"""The in-process end of a link, its clock and the operator: no threads, no wall clock. Sleeping advances the machine."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bench.codec import encode
+from bench.errors import LinkError
+from bench.frames import FD, FRAME, SENT, FrameBatch, empty_batch, frame
+from bench.messages import load_messages
+from bench.rigfile import RigFile
+from sim_backend.controller import SimulatedController
+from sim_backend.truth import Truth, uniform
+
+EPOCH_NS = 1_767_225_600 * 10**9  # 2026-01-01T00:00:00Z
+TICK_NS = 100_000
+HEARTBEAT_NS = 20_000_000
+LEASE_NS = 1_000_000_000
+HAND_OVER_S = 0.3  # how long the operator takes to let a mass go
+
+
+class SimulatedRig:
+    """A simulated rig in this process. It is the rig's clock, its link (`link`) and its operator's line (`request`)."""
+
+    def __init__(self, rig: RigFile, truth: Truth, session: int = 1) -> None:
+        self.device = SimulatedController(rig, truth)
+        self.truth = truth
+        self.link = InProcessLink(rig, self, session)
+        self._now = EPOCH_NS
+        self._hangings = 0
+        self._seat = rig.hook_seat.half_width or 0.0
+
+    def now_ns(self) -> int:
+        """The present, UNIX ns of the virtual clock."""
+        return self._now
+
+    def sleep(self, seconds: float) -> None:
+        """Advance the machine. Frames queued on the link are applied at their due tick."""
+        ticks = round(seconds * 1e9 / TICK_NS)
+        if ticks:
+            self.link.exchange(self.device, ticks, self._now)
+            self._now += ticks * TICK_NS
+
+    def request(self, line: str) -> str:
+        """The operator's line: `hang M2`, `hang -`, `ask TEXT`. Answers `ok SECONDS` (when it will be done), `yes`
+        or `error TEXT`."""
+        verb, _, rest = line.strip().partition(" ")
+        if verb == "ask":
+            return "yes"
+        label = "" if rest == "-" else rest
+        if verb != "hang" or (label and f"masses.{label}" not in self.truth.values):
+            return f"error cannot {line.strip()!r}"
+        kg, newtons = self.truth.load(label)
+        self._hangings += 1
+        seat = self._seat * (2 * uniform(self.truth.seed, f"seat:{self._hangings}") - 1)
+        self.device.plant.load(kg, newtons, HAND_OVER_S, seat_m=seat)
+        return f"ok {HAND_OVER_S}"
+
+
+class InProcessLink:
+    """A `bench.link.Link` whose other end is in this process."""
+
+    def __init__(self, rig: RigFile, clock: SimulatedRig, session: int) -> None:
+        self._clock, self._session = clock, session
+        self._heartbeat = load_messages(rig.dbc_text)["Heartbeat"]
+        self._queued: list[FrameBatch] = []
+        self._arrived: list[FrameBatch] = []
+        self._lease_until = 0
+        self._next_beat = EPOCH_NS
+        self._counter = 0
+        self._dead_after = clock.truth.defects["dead_after_s"]
+        self.name = rig.devices["controller"].link
+
+    @property
+    def _dead(self) -> bool:
+        return bool(self._dead_after) and self._clock.now_ns() - EPOCH_NS > self._dead_after * 1e9
+
+    def send(self, batch: FrameBatch) -> None:
+        """Queue frames for the next slice, due now.
+
+        Raises:
+            LinkError: the link is dead (a planted defect).
+        """
+        if self._dead:
+            raise LinkError(f"link {self.name}: lost; nothing can be sent")
+        batch = batch.copy()
+        batch["t_ns"] = self._clock.now_ns()
+        self._queued.append(batch)
+
+    def receive(self) -> FrameBatch:
+        """Everything that arrived since the last call; nothing when the link is dead."""
+        arrived, self._arrived = self._arrived, []
+        return np.concatenate(arrived) if arrived and not self._dead else empty_batch()
+
+    def renew_lease(self) -> None:
+        """Heartbeats go on for one more second of bench time."""
+        self._lease_until = self._clock.now_ns() + LEASE_NS
+
+    def close(self) -> None:
+        """Stop heartbeats."""
+        self._lease_until = 0
+
+    def exchange(self, device: SimulatedController, ticks: int, now_ns: int) -> None:
+        """One slice: queued frames and heartbeats to the device, what it sends back."""
+        end = now_ns + ticks * TICK_NS
+        beats = []
+        while self._next_beat < end:
+            if now_ns <= self._next_beat <= self._lease_until and not self._dead:
+                self._counter = (self._counter + 1) & 0xFFFF
+                payload = encode(self._heartbeat, {"session": self._session, "counter": self._counter})
+                beats.append(frame(self._heartbeat.identifier, payload, t_ns=self._next_beat, flags=FD | SENT))
+            self._next_beat += HEARTBEAT_NS
+        incoming = np.concatenate([np.empty(0, FRAME), *self._queued, *beats])
+        self._queued = []
+        order = np.argsort(incoming["t_ns"], kind="stable")
+        self._arrived.append(device.advance(ticks, incoming[order], now_ns))

@@ -1,0 +1,50 @@
+"""Every test leaves the process as it found it: no thread, child process or socket of its own stays behind."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+GRACE_S = 2.0  # for a thread that was told to end and is on its way
+
+
+@pytest.fixture(autouse=True)
+def nothing_left_behind() -> Iterator[None]:
+    """Fails the test that leaks a thread, a process or a socket."""
+    threads, children, sockets = set(threading.enumerate()), _children(), _sockets()
+    yield
+    started = [t for t in threading.enumerate() if t not in threads]
+    for thread in started:
+        thread.join(GRACE_S)
+    left = [f"thread {t.name}" for t in started if t.is_alive()]
+    left += [f"process {pid}" for pid in sorted(_children() - children)]
+    left += [f"socket {name}" for name in sorted(_sockets() - sockets)]
+    if left:
+        pytest.fail(f"left behind: {', '.join(left)}")
+
+
+def _children() -> set[str]:
+    """Process ids of our children, where the system tells (Linux)."""
+    found: set[str] = set()
+    for listing in Path("/proc/self/task").glob("*/children"):
+        try:
+            found.update(listing.read_text().split())
+        except OSError:  # that thread has ended meanwhile
+            continue
+    return found
+
+
+def _sockets() -> set[str]:
+    found: set[str] = set()
+    for descriptor in Path("/proc/self/fd").glob("*"):
+        try:
+            target = os.readlink(descriptor)
+        except OSError:
+            continue
+        if target.startswith("socket:"):
+            found.add(target)
+    return found
