@@ -19,7 +19,7 @@ from bench.errors import ConfigError
 from bench.findings import Effect, Finding
 from bench.limits import Limit, Verdict, judge
 from bench.procedure import Measured, Quantity
-from bench.uncertainty import PROBABILITY, Estimate, budget, correlation_matrix, interval
+from bench.uncertainty import PROBABILITY, budget, correlation_matrix, interval
 
 SCHEMA = 1
 SCHEMA_FILE = Path(__file__).with_name("record.schema.json")
@@ -234,22 +234,9 @@ def unfinished(
     """What is written before anything moves: if the run dies, this is what it says."""
     said = Finding("unfinished", "The run did not end: its process was killed or lost power.", "", Effect.ERROR)
     return Record(
-        schema=SCHEMA, run_id=run_id, procedure=procedure, rig=rig, uut=uut, outcome=Outcome.ERROR, started=started,
+        schema=1, run_id=run_id, procedure=procedure, rig=rig, uut=uut, outcome=Outcome.ERROR, started=started,
         ended=None, seed=seed, plan=plan, calibrations=tuple(calibrations), versions=versions, recording=None,
         link=LinkCounts(), findings=findings_of([said]), measurements=(), correlations=Correlations((), ()),
-    )  # fmt: skip
-
-
-def finished(
-    record: Record, *, ended: str, recording: RecordingFile | None, link: LinkCounts, findings: Iterable[Finding],
-    measurements: Sequence[Measurement], correlations: Correlations, stopped: Outcome | None = None,
-) -> Record:  # fmt: skip
-    """An unfinished record with its end; the outcome follows from what it holds."""
-    listed = list(findings)
-    return replace(
-        record, ended=ended, recording=recording, link=link, findings=findings_of(listed),
-        measurements=tuple(measurements), correlations=correlations,
-        outcome=outcome_of(measurements, listed, stopped),
     )  # fmt: skip
 
 
@@ -275,7 +262,8 @@ def measurement(measured: Measured, limit: Limit | None, seed: int | None = 0) -
         missing(quantity, limit, measured.where), value=estimate.value, standard_uncertainty=estimate.u,
         dof=_finite(found.dof), coverage_factor=found.k, expanded_uncertainty=found.U, method=found.method,
         verdict=judge(found, limit), interval=(found.low, found.high), coverage_probability=PROBABILITY,
-        budget=_budget(estimate),
+        budget=tuple(BudgetEntry(r.name, r.id, r.contribution, r.sensitivity, r.kind, r.distribution, _finite(r.dof))
+                     for r in budget(estimate)),
     )  # fmt: skip
 
 
@@ -305,14 +293,6 @@ def outcome_of(
     by_effect = {Effect.ERROR: Outcome.ERROR, Effect.INDETERMINATE: Outcome.INDETERMINATE}
     found = {stopped, *(by_verdict.get(m.verdict) for m in measurements), *(by_effect.get(f.effect) for f in findings)}
     return next((outcome for outcome in Outcome if outcome in found), Outcome.PASS)
-
-
-def _budget(estimate: Estimate) -> tuple[BudgetEntry, ...]:
-    return tuple(
-        BudgetEntry(r.name, r.id, r.contribution, r.sensitivity, "A" if r.kind == "A" else "B", r.distribution,
-                    _finite(r.dof))
-        for r in budget(estimate)
-    )  # fmt: skip
 
 
 def _finite(x: float) -> float | None:

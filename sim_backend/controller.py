@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.codec import Decoder, encode
-from bench.frames import FD, FrameBatch, empty_batch, frame
+from bench.frames import FD, FrameBatch, frame
 from bench.messages import load_messages
 from bench.rigfile import RigFile
 from sim_backend import core
 from sim_backend.core import PERIOD_TICKS, TICK_S, Plant
-from sim_backend.telemetry import TelemetryEncoder
+from sim_backend.telemetry import Span, TelemetryEncoder
 from sim_backend.truth import Truth
 
 SETTLED_M, SETTLED_S = 20e-6, 0.05
@@ -49,6 +49,7 @@ class SimulatedController:
         self._since, self._steady = 0, 0
         self._encoder = TelemetryEncoder(self._map, truth)
         self._out: list[FrameBatch] = []
+        self._spans: list[Span] = []
 
     def advance(self, ticks: int, incoming: FrameBatch, t0_ns: int) -> FrameBatch:
         """Run for `ticks`; frames are taken at their `t_ns`, which counts from `t0_ns` at the present tick.
@@ -57,16 +58,17 @@ class SimulatedController:
             What the controller sent, with its times.
         """
         start = self.plant.tick
-        self._out = []
+        self._out, self._spans = [], []
         clock = (t0_ns, start)
         due = np.clip((incoming["t_ns"] - t0_ns) // 100_000, 0, ticks) + start
         for at, one in zip(due.tolist(), incoming, strict=True):
-            self._run_to(int(at), clock)
+            self._run_to(int(at))
             self._receive(one, clock)
-        self._run_to(start + ticks, clock)
-        return np.concatenate(self._out) if self._out else empty_batch()
+        self._run_to(start + ticks)
+        sent = np.concatenate([self._encoder.encode(self._spans, clock), *self._out])
+        return sent[np.argsort(sent["t_ns"], kind="stable")] if self._out else sent
 
-    def _run_to(self, tick: int, clock: tuple[int, int]) -> None:
+    def _run_to(self, tick: int) -> None:
         """Run the plant in parts no longer than the state machine or the watchdog may wait."""
         while self.plant.tick < tick:
             deadline = self._owner.heartbeat + int(self._own["watchdog_s"] / TICK_S) + 1
@@ -75,8 +77,7 @@ class SimulatedController:
                 until = min(until, self.plant.tick + 10 * PERIOD_TICKS)
             before = self.plant.tick
             rows = self.plant.run(until - before)
-            state = (self.state, self.fault)
-            self._out.append(self._encoder.encode(rows, before, clock, state, self._owner.heartbeat, self._owner.armed))
+            self._spans.append(Span(rows, before, self.state, self.fault, self._owner.heartbeat, self._owner.armed))
             self._progress(rows)
 
     def _watching(self) -> bool:

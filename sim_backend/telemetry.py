@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from bench.frames import FD, FRAME, FrameBatch
+from bench.frames import FD, FRAME, FrameBatch, empty_batch
 from bench.messages import MessageMap
 from sim_backend.core import CHANNELS, PERIOD_TICKS, TICK_S
 from sim_backend.truth import Truth, uniform
@@ -16,6 +17,18 @@ SUPPLY_V = 148.0
 AMBIENT_K, RISE_K, WARM_S = 295.0, 12.0, 600.0
 WATCHDOG_ARMED = 16
 _DEFECT_COLUMNS = {name: k for k, name in enumerate(CHANNELS)}
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """Rows of the core whose first completes a period after `first_tick`, and the controller's state over them."""
+
+    rows: npt.NDArray[np.float64]
+    first_tick: int
+    state: str
+    fault: str
+    heartbeat_tick: int
+    armed: bool
 
 
 class TelemetryEncoder:
@@ -29,37 +42,42 @@ class TelemetryEncoder:
         }
         signals = self._message.signals[2:]
         self._names = [s.name for s in signals]
+        self._place = {name: k for k, name in enumerate(self._names)}
+        self._columns = [self._place[name] for name in CHANNELS]
         self._scale = np.array([s.scale for s in signals])
         self._offset = np.array([s.offset for s in signals])
         self._low = np.array([-32768 if s.signed else 0 for s in signals])
         self._high = np.array([32767 if s.signed else 65535 for s in signals])
         self._sequence = 0
         self._truth = truth
-        self._last: npt.NDArray[np.float64] | None = None
 
-    def encode(
-        self,
-        rows: npt.NDArray[np.float64],
-        first_tick: int,
-        clock: tuple[int, int],
-        state: tuple[str, str],
-        heartbeat_tick: int,
-        armed: bool,
-    ) -> FrameBatch:
-        """Frames for rows of the core whose first completes a period after `first_tick`; `clock` is a time in ns and
-        the tick it belongs to. Frames that a planted loss takes are left out, their sequence numbers are used up."""
-        n = len(rows)
-        ticks = (first_tick // PERIOD_TICKS + 1 + np.arange(n)) * PERIOD_TICKS
-        values = self._values(rows, ticks, state, heartbeat_tick, armed)
+    def encode(self, spans: list[Span], clock: tuple[int, int]) -> FrameBatch:
+        """Frames for what ran, in order; `clock` is a time in ns and the tick it belongs to. Frames that a planted loss
+        takes are left out, their sequence numbers are used up."""
+        spans = [s for s in spans if len(s.rows)]
+        if not spans:
+            return empty_batch()
+        counts = [len(s.rows) for s in spans]
+        ticks = np.concatenate([(s.first_tick // PERIOD_TICKS + 1 + np.arange(len(s.rows))) * PERIOD_TICKS for s in spans])
+        n = len(ticks)
+        values = self._values(np.concatenate([s.rows for s in spans]), ticks)
+        for name, column in (
+            ("state", [self._codes["state"][s.state] for s in spans]),
+            ("fault", [self._codes["fault"][s.fault] for s in spans]),
+        ):
+            values[:, self._place[name]] = np.repeat(np.array(column, float), counts)
+        values[:, self._place["flags"]] += np.repeat([WATCHDOG_ARMED if s.armed else 0 for s in spans], counts)
+        beats = np.repeat([s.heartbeat_tick for s in spans], counts)
+        values[:, self._place["host_age"]] = np.maximum(ticks - beats, 0) * TICK_S
         raw = np.rint((values - self._offset) / self._scale)
-        words = np.clip(raw, self._low, self._high).astype(np.int64).astype(np.uint16)
+        words = np.clip(raw, self._low, self._high).astype(np.int64).astype("<u2")
         batch = np.zeros(n, FRAME)
         batch["t_ns"] = clock[0] + (ticks - clock[1]) * 100_000
         batch["id"], batch["flags"], batch["length"] = self._message.identifier, FD, 64
         sequence = (self._sequence + np.arange(n)) & 0xFFFF
         batch["data"][:, 0:2] = sequence.astype("<u2").view(np.uint8).reshape(n, 2)
         batch["data"][:, 2:6] = (ticks & 0xFFFFFFFF).astype("<u4").view(np.uint8).reshape(n, 4)
-        batch["data"][:, 6:64] = np.ascontiguousarray(words.astype("<u2")).view(np.uint8).reshape(n, 58)
+        batch["data"][:, 6:64] = words.view(np.uint8).reshape(n, 58)
         start, self._sequence = self._sequence, self._sequence + n
         dropped = self._truth.defects["drop_fraction"]
         if dropped:
@@ -67,26 +85,17 @@ class TelemetryEncoder:
             batch = batch[np.array(keep, dtype=bool)]
         return batch
 
-    def _values(
-        self,
-        rows: npt.NDArray[np.float64],
-        ticks: npt.NDArray[np.int64],
-        state: tuple[str, str],
-        heartbeat_tick: int,
-        armed: bool,
-    ) -> npt.NDArray[np.float64]:
+    def _values(self, rows: npt.NDArray[np.float64], ticks: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
         rows = self._wired(rows)
-        column = {name: rows[:, k] for k, name in enumerate(CHANNELS)}
-        column["angle"] = (column["angle"] + math.pi) % (2 * math.pi) - math.pi
-        seconds = ticks * TICK_S
-        warm = AMBIENT_K + RISE_K * (1 - np.exp(-seconds / WARM_S))
-        n = len(rows)
-        column |= {"supply": np.full(n, SUPPLY_V), "temp_i": warm, "temp_o": warm + 2, "temp_m": warm - 3}
-        column["state"] = np.full(n, float(self._codes["state"][state[0]]))
-        column["fault"] = np.full(n, float(self._codes["fault"][state[1]]))
-        column["flags"] = column["flags"] + (WATCHDOG_ARMED if armed else 0)
-        column["host_age"] = np.maximum((ticks - heartbeat_tick) * TICK_S, 0)
-        return np.stack([column[name] for name in self._names], axis=1)
+        values = np.zeros((len(rows), len(self._names)))
+        values[:, self._columns] = rows
+        angle = self._place["angle"]
+        values[:, angle] = (values[:, angle] + math.pi) % (2 * math.pi) - math.pi
+        warm = AMBIENT_K + RISE_K * (1 - np.exp(-ticks * TICK_S / WARM_S))
+        values[:, self._place["supply"]] = SUPPLY_V
+        for name, above in (("temp_i", 0.0), ("temp_o", 2.0), ("temp_m", -3.0)):
+            values[:, self._place[name]] = warm + above
+        return values
 
     def _wired(self, rows: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Planted wiring defects of the current telemetry."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from decimal import ROUND_HALF_EVEN, Decimal
+from typing import Literal
 
 from bench.uncertainty.estimate import Estimate
 
@@ -17,7 +18,7 @@ class BudgetRow:
     id: str
     contribution: float
     sensitivity: float
-    kind: str
+    kind: Literal["A", "B"]
     distribution: str
     dof: float
     share: float

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -56,8 +56,8 @@ class Influence:
 def _same(a: Influence, b: Influence) -> None:
     if (a.u, a.dof, a.distribution) != (b.u, b.dof, b.distribution):
         raise AnalysisError(
-            f"influence {a.id}: found twice, with u {a.u}, dof {a.dof}, {a.distribution} and with u {b.u}, dof {b.dof}, "
-            f"{b.distribution}; expected one identity to mean one influence"
+            f"influence {a.id}: found twice, with u {a.u}, dof {a.dof}, {a.distribution} and with "
+            f"u {b.u}, dof {b.dof}, {b.distribution}; expected one identity to mean one influence"
         )
 
 
@@ -69,6 +69,7 @@ class Estimate:
     `sampler` is set where that is not enough (see `propagate`): it evaluates the model for drawn influences.
     """
 
+    __array_ufunc__: ClassVar[None] = None  # a numpy number on the left leaves the arithmetic to us
     value: float
     unit: str = ""
     sensitivities: Mapping[Influence, float] = field(default_factory=dict)

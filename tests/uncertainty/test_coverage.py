@@ -1,0 +1,145 @@
+"""Intervals, budgets and series: golden numbers and small coverage checks."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from bench.errors import AnalysisError
+from bench.uncertainty import (
+    Estimate,
+    Influence,
+    batch_means,
+    budget,
+    coverage_factor,
+    interval,
+    propagate,
+    round_to_uncertainty,
+    welch_satterthwaite,
+)
+from bench.uncertainty.coverage import draw
+
+
+def estimate(identity: str, value: float, u: float, dof: float = math.inf, distribution: str = "normal") -> Estimate:
+    return Estimate.of(value, Influence(identity, identity, u, "", "B", distribution, dof))  # type: ignore[arg-type]
+
+
+def test_end_gauge_of_the_gum() -> None:
+    # JCGM 100:2008, H.1: nm and degrees of freedom; u_c = 32 nm, nu_eff = 16 (H.1.6 prints 16 from rounded terms).
+    parts = ((25.0, 18.0), (5.8, 24.0), (3.9, 5.0), (6.7, 8.0), (2.9, 50.0), (16.6, 2.0))
+    total = sum((estimate(str(k), 0.0, u, nu) for k, (u, nu) in enumerate(parts)), Estimate.exact(0.0))
+    assert total.u == pytest.approx(31.7, abs=0.1)
+    assert welch_satterthwaite(total) == 16
+    assert interval(total).k == pytest.approx(2.12, abs=0.005)
+
+
+@pytest.mark.parametrize(("dof", "k"), [(1, 12.706), (8, 2.306), (20, 2.086), (math.inf, 1.95996)])
+def test_coverage_factors_of_table_g2(dof: float, k: float) -> None:
+    assert coverage_factor(dof) == pytest.approx(k, abs=5e-4)
+
+
+def test_effective_degrees_of_freedom_truncate_down_and_survive_tiny_numbers() -> None:
+    both = estimate("a", 0.0, 1e-90, 5) + estimate("b", 0.0, 0.5e-90, 7)
+    assert welch_satterthwaite(both) == math.floor(1.25**2 / (1 / 5 + 0.5**4 / 7))
+    assert welch_satterthwaite(estimate("a", 0.0, 0.3, 49)) == 49
+    assert welch_satterthwaite(Estimate.exact(1.0)) == math.inf
+
+
+def test_a_dominant_rectangle_goes_to_monte_carlo() -> None:
+    found = interval(estimate("r", 5.0, 1.0, distribution="rectangular"))
+    assert found.method == "monte-carlo"
+    assert "rectangular component r" in found.why
+    assert (found.low, found.high) == pytest.approx((5 - 0.95 * 3**0.5, 5 + 0.95 * 3**0.5), abs=0.01)
+    assert found.k == pytest.approx(1.645, abs=0.01)
+
+
+def test_half_of_the_variance_is_the_border() -> None:
+    normal = estimate("n", 0.0, 1.0)
+    assert interval(normal + estimate("r", 0.0, 0.99, distribution="rectangular")).method == "gum"
+    assert interval(normal + estimate("r", 0.0, 1.01, distribution="rectangular")).method == "monte-carlo"
+
+
+def test_monte_carlo_is_seeded_and_independent_of_order() -> None:
+    r, n = estimate("r", 0.0, 1.0, distribution="rectangular"), estimate("n", 0.0, 0.2, 9)
+    assert interval(r + n, 3) == interval(r + n, 3)
+    assert interval(r + n, 3).low == pytest.approx(interval(n + r, 3).low, rel=1e-12)
+    assert interval(r + n, 3) != interval(r + n, 4)
+
+
+def test_a_square_gets_the_interval_of_chi_squared() -> None:
+    square = propagate(lambda p: p["x"] ** 2, {"x": estimate("x", 0.0, 1.0)})
+    found = interval(square + 1)
+    assert found.method == "monte-carlo"
+    assert found.low == pytest.approx(1.00098, abs=2e-4)
+    assert found.high == pytest.approx(6.0239, abs=0.08)
+
+
+@pytest.mark.parametrize("distribution", ["normal", "rectangular", "triangular", "arcsine"])
+def test_draws_have_the_stated_standard_uncertainty(distribution: str) -> None:
+    drawn = draw(Influence("x", "x", 0.3, "", "B", distribution), 1, 100_000)  # type: ignore[arg-type]
+    assert drawn.std() == pytest.approx(0.3, rel=0.01)
+    assert drawn.mean() == pytest.approx(0.0, abs=0.005)
+    width = {"normal": 4.0, "rectangular": 3**0.5, "triangular": 6**0.5, "arcsine": 2**0.5}[distribution]
+    assert np.abs(drawn).max() / 0.3 == pytest.approx(width, rel=0.25 if distribution == "normal" else 0.01)
+
+
+def test_numbers_that_are_not_finite_have_no_interval() -> None:
+    with pytest.raises(AnalysisError):
+        interval(estimate("a", math.nan, 1.0))
+
+
+def test_exact_values_have_an_interval_of_no_width() -> None:
+    found = interval(Estimate.exact(2.0))
+    assert (found.low, found.high, found.U, found.method) == (2.0, 2.0, 0.0, "gum")
+
+
+def test_batch_means_cover_an_ar1_series() -> None:
+    rng = np.random.default_rng(5)
+    runs, n, phi = 400, 4000, 0.9
+    x = np.zeros((runs, n))
+    noise = rng.standard_normal((runs, n))
+    x[:, 0] = noise[:, 0] / math.sqrt(1 - phi**2)
+    for k in range(1, n):
+        x[:, k] = phi * x[:, k - 1] + noise[:, k]
+    means = [batch_means(row) for row in x]
+    hits = sum(abs(m.value) <= coverage_factor(m.dof) * m.u for m in means)
+    assert hits / runs == pytest.approx(0.95, abs=3.3 * math.sqrt(0.95 * 0.05 / runs))
+    naive = sum(abs(row.mean()) <= 1.96 * row.std() / math.sqrt(n) for row in x)
+    assert naive / runs < 0.6  # what the method is for
+
+
+@pytest.mark.parametrize("series", [np.ones(31), np.ones((4, 40)), np.r_[np.ones(50), np.nan]])
+def test_batch_means_refuse_what_they_cannot_use(series: np.ndarray) -> None:
+    with pytest.raises(AnalysisError):
+        batch_means(series)
+
+
+def test_batch_means_golden() -> None:
+    found = batch_means([9.0, 1.0, 3.0, 5.0, 7.0], batches=2)
+    assert (found.value, found.dof) == (5.0, 1.0)
+    assert found.u == pytest.approx(2.0)
+
+
+def test_budget_is_sorted_and_its_shares_add_up() -> None:
+    rows = budget(2 * estimate("a", 1.0, 0.1) - 30 * estimate("b", 1.0, 0.1, 7) + estimate("c", 0.0, 0.1))
+    assert [r.id for r in rows] == ["b", "a", "c"]
+    assert (rows[0].sensitivity, rows[0].dof) == (-30.0, 7)
+    assert rows[0].contribution == pytest.approx(3.0)
+    assert math.fsum(r.share for r in rows) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("value", "expanded", "text"),
+    [
+        (73.21478, 0.1234, ("73.21", "0.12")),
+        (73.21478, 0.0996, ("73.21", "0.10")),
+        (73.21478, 4.44, ("73.2", "4.4")),
+        (7321.478, 1234.0, ("7300", "1200")),
+        (-0.000012344, 3.21e-7, ("-0.00001234", "0.00000032")),
+        (1.0, 0.0, ("1.0", "0.0")),
+    ],
+)
+def test_rounding(value: float, expanded: float, text: tuple[str, str]) -> None:
+    assert round_to_uncertainty(value, expanded) == text
