@@ -69,6 +69,13 @@ class Supervisor:
         self._raise_if_stopped()  # arrived after the last check: the run still ends as it was told to
 
     @contextmanager
+    def waiting(self) -> Iterator[None]:
+        """A person is being asked within the block: signals raise at once."""
+        with self._in(_Mode.AT_ONCE):
+            self._raise_if_stopped()
+            yield
+
+    @contextmanager
     def finishing(self) -> Iterator[None]:
         """What is written within the block must be whole: signals are logged and ignored."""
         with self._in(_Mode.IGNORED):

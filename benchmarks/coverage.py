@@ -43,7 +43,7 @@ class One:
 
 def calibrate(procedure: str, seed: int, plan: dict[str, float], keep: str) -> One:
     """Calibrate one virtual rig."""
-    from bench.cli.compose import simulate
+    from bench.cli.virtual import simulate
     from bench.findings import Finding
     from bench.uncertainty import interval
 

@@ -1,164 +1,203 @@
-"""The TSBS rig's mechanics once more in plain Python: with `reference_loop` the oracle of the C core.
+"""The readable reference of the TSBS rig: the same equations as the C core, written to be read, noise-free and slow.
 
-Written for the reader: one function per equation, no shortcuts, no noise, no quantisation. T is the thesis; equation
-numbers are its own. Planes are signed distances zeta from the centre of mass, outboard positive. State `s`, shape
-(14,): x, y, z, phi, psi, theta, their rates, height and rate of the hung mass; SI.
+It is the oracle of the core (tests hold both together to 1e-6) and is itself held against an adaptive integrator. T is
+the thesis; x horizontal, y up; planes are signed distances from the centre of mass, outboard positive.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from sim_backend.core.params import PlantParams
+import numpy as np
+import numpy.typing as npt
 
-LEAST_GAP_M = 20e-6
+from sim_backend.core.params import ControlParams, PlantParams
+
+Array = npt.NDArray[np.float64]
+TICK_S = 1e-4
+OFF, READY, LIFT, LEVITATE, LAND = range(5)
 
 
-@dataclass(frozen=True)
-class Inputs:
-    """What acts on the mechanics besides its own state: coil (10,) and segment (4,) currents in A, the hysteresis lag
-    (4,) in A, the commutation angle in rad, the hung mass in kg and its weight in N."""
+def harmonics(amplitudes: tuple[float, ...], phases: tuple[float, ...], angle: float) -> tuple[float, float]:
+    """Runout at an angle: sum a_n cos(n angle + p_n) on the x axis and the same with sin on the y axis, n = 1..4."""
+    terms = [(a, (n + 1) * angle + p) for n, (a, p) in enumerate(zip(amplitudes, phases, strict=True))]
+    return sum(a * math.cos(t) for a, t in terms), sum(a * math.sin(t) for a, t in terms)
 
-    coil: Sequence[float]
-    segment: Sequence[float]
-    play: Sequence[float] = (0.0, 0.0, 0.0, 0.0)
+
+def amb_force(beta: float, gap: float, xi: float, positive: float, negative: float) -> float:
+    """T (2.4): two opposing coils; the gap is never less than 20 um."""
+    return beta * (positive**2 / max(gap - xi, 20e-6) ** 2 - negative**2 / max(gap + xi, 20e-6) ** 2)
+
+
+@dataclass
+class Loads:
+    """What acts on the mechanics besides its state: true currents (10,), (4,), hysteresis lag (4,), phase angle gamma,
+    hung mass kg and its weight N."""
+
+    coil: Array
+    segment: Array
+    play: Array
     gamma: float = 0.0
     hung_mass: float = 0.0
     weight: float = 0.0
 
 
-@dataclass
-class Wrench:
-    """Sum of forces in N and of moments in N m about the centre of mass; `phi` turns about x, `psi` about y."""
-
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
-    phi: float = 0.0
-    psi: float = 0.0
-    theta: float = 0.0
-
-    def add(self, zeta: float, fx: float, fy: float) -> None:
-        """A radial force in the plane zeta: right sides of T (6.6d) and (6.6e)."""
-        self.x += fx
-        self.y += fy
-        self.phi -= zeta * fy
-        self.psi += zeta * fx
-
-
-def displacement(s: Sequence[float], zeta: float) -> tuple[float, float]:
-    """Radial displacement (x, y) in m of the plane zeta, T (6.7)."""
-    return s[0] + zeta * s[4], s[1] - zeta * s[3]
-
-
-def velocity(s: Sequence[float], zeta: float) -> tuple[float, float]:
-    """Time derivative of `displacement`, m/s."""
-    return s[6] + zeta * s[10], s[7] - zeta * s[9]
-
-
-def runout(amplitudes: Sequence[float], phases: Sequence[float], theta: float) -> tuple[float, float]:
-    """Harmonics n = 1, 2, ... of a turning surface: sum a_n cos(n theta + p_n) in x, with sine in y; m."""
-    terms = [(a, n * theta + p) for n, (a, p) in enumerate(zip(amplitudes, phases, strict=True), start=1)]
-    return sum(a * math.cos(q) for a, q in terms), sum(a * math.sin(q) for a, q in terms)
-
-
-def amb_force(beta: float, gap: float, xi: float, i_p: float, i_n: float) -> float:
-    """Force in N of an opposing pair of magnets at distance xi from its magnetic centre, T (2.4)."""
-    near, far = max(gap - xi, LEAST_GAP_M), max(gap + xi, LEAST_GAP_M)
-    return beta * (i_p**2 / near**2 - i_n**2 / far**2)
-
-
-def bearing(p: PlantParams, b: int, s: Sequence[float], u: Inputs, w: Wrench) -> None:
-    """Radial AMB `b` (0 inboard, 1 outboard) with magnetic offset, journal runout and the lag of its hysteresis."""
-    part = slice(4 * b, 4 * b + 4)
-    zeta, i, lag = p.z_amb[b], u.coil[part], u.play[2 * b : 2 * b + 2]
-    x, y = displacement(s, zeta)
-    rx, ry = runout(p.runout[part], p.runout_phase[part], s[5])
-    fx = amb_force(p.beta[b], p.gap[b], x + p.offset_x[b] + rx, i[0] - lag[0], i[1] + lag[0])
-    fy = amb_force(p.beta[b], p.gap[b], y + p.offset_y[b] + ry, i[2] - lag[1], i[3] + lag[1])
-    w.add(zeta, fx, fy)
+def derivative(p: PlantParams, s: Array, u: Loads) -> Array:
+    """Rates of s = (x, y, z, phi, psi, theta, their rates, height and speed of the hung mass), (14,)."""
+    x, y, z, phi, psi, theta, vx, vy, vz, wphi, wpsi, spin, hung, hung_rate = s
+    forces: list[tuple[float, float, float]] = []  # plane, Fx, Fy
+    torque = 0.0
+    for b in (0, 1):
+        plane = p.z_amb[b]
+        rx, ry = harmonics(p.runout[4 * b : 4 * b + 4], p.runout_phase[4 * b : 4 * b + 4], theta)
+        i, lag = u.coil[4 * b : 4 * b + 4], u.play[2 * b : 2 * b + 2]
+        xi, eta = x + plane * psi + p.offset_x[b] + rx, y - plane * phi + p.offset_y[b] + ry  # T (6.7)
+        forces.append((plane,
+                       amb_force(p.beta[b], p.gap[b], xi, i[0] - lag[0], i[1] + lag[0]),
+                       amb_force(p.beta[b], p.gap[b], eta, i[2] - lag[1], i[3] + lag[1])))  # fmt: skip
+        contact, drag = touchdown(p, b, s)
+        forces.append(contact)
+        torque += drag
+    current = u.segment * np.array(p.segment_gain)
+    ix, iy, mean = (current[3] - current[1]) / 2, (current[0] - current[2]) / 2, current.mean()
+    c, q = math.cos(p.pole_pairs * (u.gamma - p.gamma_zero)), math.sin(p.pole_pairs * (u.gamma - p.gamma_zero))
+    mx, my = x + p.z_motor * psi + p.motor_x, y - p.z_motor * phi + p.motor_y
+    forces.append((p.z_motor, p.alpha_d * c * ix - p.alpha_c * q * iy + p.alpha_x * mx,  # T (6.5a)
+                   p.alpha_d * c * iy + p.alpha_c * q * ix + p.alpha_x * my))  # T (6.5b)  # fmt: skip
+    slow = spin / p.coulomb_speed
+    torque += p.alpha_tau * c * mean - p.viscous * spin  # T (6.5c), (6.6f)
+    torque -= p.coulomb * slow / math.sqrt(1 + slow**2) + p.detent * math.sin(16 * theta + p.detent_phase)
+    down = np.array([math.sin(p.tilt), -math.cos(p.tilt)])
+    rate = 0.0
+    if u.hung_mass > 0:
+        stretch, stretch_rate = y - p.z_hook * phi - hung, vy - p.z_hook * wphi - hung_rate
+        tension = max(0.0, p.strap_stiffness * stretch + p.strap_damping * stretch_rate)
+        forces.append((p.z_hook, tension * down[0], tension * down[1]))
+        rate = (tension - u.weight) / u.hung_mass
+    unbalance = p.mass * p.eccentricity * spin**2
+    at = theta + p.eccentricity_phase
+    fx = sum(f[1] for f in forces) + unbalance * math.cos(at)
+    fy = sum(f[2] for f in forces) + unbalance * math.sin(at)
+    fz = amb_force(p.beta_z, p.gap_z, z, u.coil[8], u.coil[9])
+    m_phi = sum(-f[0] * f[2] for f in forces)  # T (6.6d)
+    m_psi = sum(f[0] * f[1] for f in forces)  # T (6.6e)
+    return np.array([vx, vy, vz, wphi, wpsi, spin,
+                     fx / p.mass + p.gravity * down[0], fy / p.mass + p.gravity * down[1], fz / p.mass,
+                     (m_phi - p.polar_inertia * spin * wpsi) / p.inertia,
+                     (m_psi + p.polar_inertia * spin * wphi) / p.inertia,
+                     torque / p.polar_inertia,
+                     hung_rate if u.hung_mass > 0 else 0.0, rate])  # fmt: skip
 
 
-def motor(p: PlantParams, s: Sequence[float], u: Inputs, w: Wrench) -> None:
-    """Self-bearing motor, T (6.5), with friction and detent torque; Coulomb friction is smoothed about standstill."""
-    i1, i2, i3, i4 = (gain * i for gain, i in zip(p.segment_gain, u.segment, strict=True))
-    ix, iy, mean = (i4 - i2) / 2, (i1 - i3) / 2, (i1 + i2 + i3 + i4) / 4
-    angle = p.pole_pairs * (u.gamma - p.gamma_zero)
-    c, q = math.cos(angle), math.sin(angle)
-    x, y = displacement(s, p.z_motor)
-    fx = p.alpha_d * c * ix - p.alpha_c * q * iy + p.alpha_x * (x + p.motor_x)
-    fy = p.alpha_d * c * iy + p.alpha_c * q * ix + p.alpha_x * (y + p.motor_y)
-    w.add(p.z_motor, fx, fy)
-    slow = s[11] / p.coulomb_speed
-    friction = p.viscous * s[11] + p.coulomb * slow / math.hypot(1, slow)
-    w.theta += p.alpha_tau * c * mean - friction - p.detent * math.sin(16 * s[5] + p.detent_phase)
-
-
-def touchdown(p: PlantParams, b: int, s: Sequence[float], w: Wrench) -> None:
-    """Ring at sensor plane `b`: spring and damper along the normal, never pulling, and friction against the slip."""
-    zeta = p.z_sensor[b]
-    (x, y), (vx, vy) = displacement(s, zeta), velocity(s, zeta)
-    x, y = x - p.ring_x[b], y - p.ring_y[b]
+def touchdown(p: PlantParams, b: int, s: Array) -> tuple[tuple[float, float, float], float]:
+    """Force of a touchdown ring on the shaft (plane, Fx, Fy) and its torque: a damped spring with smoothed friction."""
+    plane = p.z_sensor[b]
+    x, y = s[0] + plane * s[4] - p.ring_x[b], s[1] - plane * s[3] - p.ring_y[b]
     r = math.hypot(x, y)
     if r <= p.clearance:
-        return
-    nx, ny = x / r, y / r
-    normal = max(0.0, p.ring_stiffness * (r - p.clearance) + p.ring_damping * (vx * nx + vy * ny))
-    slip = vy * nx - vx * ny + p.ring_radius * s[11]
-    drag = p.ring_friction * normal * math.tanh(slip / 0.01)
-    w.add(zeta, -normal * nx + drag * ny, -normal * ny - drag * nx)
-    w.theta -= drag * p.ring_radius
+        return (plane, 0.0, 0.0), 0.0
+    vx, vy, nx, ny = s[6] + plane * s[10], s[7] - plane * s[9], x / r, y / r
+    push = p.ring_stiffness * (r - p.clearance) + p.ring_damping * (vx * nx + vy * ny)
+    if push <= 0:
+        return (plane, 0.0, 0.0), 0.0
+    drag = p.ring_friction * push * math.tanh((-vx * ny + vy * nx + p.ring_radius * s[11]) / 0.01)
+    return (plane, -push * nx + drag * ny, -push * ny - drag * nx), -drag * p.ring_radius
 
 
-def strap(p: PlantParams, s: Sequence[float], u: Inputs, w: Wrench) -> tuple[float, float]:
-    """Hung mass on its strap, which never pushes. Returns the rates of its height and speed."""
-    if u.hung_mass <= 0:
-        return 0.0, 0.0
-    hook, hook_rate = displacement(s, p.z_hook)[1], velocity(s, p.z_hook)[1]
-    tension = max(0.0, p.strap_stiffness * (hook - s[12]) + p.strap_damping * (hook_rate - s[13]))
-    w.add(p.z_hook, tension * math.sin(p.tilt), -tension * math.cos(p.tilt))
-    return s[13], (tension - u.weight) / u.hung_mass
+@dataclass
+class Reference:
+    """The levitated machine in closed loop: sample, law with one tick of delay, exact amplifiers, RK4 mechanics."""
 
+    p: PlantParams
+    c: ControlParams = field(default_factory=ControlParams)
+    substeps: int = 2
 
-def rates(p: PlantParams, s: Sequence[float], u: Inputs) -> list[float]:
-    """Right-hand side of the mechanics, 14 numbers: T (6.6) with gyroscopic moments and unbalance.
+    def __post_init__(self) -> None:
+        self.s = np.zeros(14)
+        self.loads = Loads(np.zeros(10), np.zeros(4), np.zeros(4))
+        self.follow = np.zeros(4)
+        self.applied = self.next = (np.zeros(10), np.zeros(4))
+        self.integral, self.filtered, self.previous = np.zeros(5), np.zeros(5), np.zeros(5)
+        self.angle_target = self.angle_integral = self.angle_filtered = self.angle_previous = 0.0
+        self.weight_to = self.weight_rate = 0.0
+        self.tick = 0
 
-    The unbalance acts in the plane of the centre of mass; its tangential part, proportional to the angular
-    acceleration, is left out.
-    """
-    w = Wrench()
-    for b in (0, 1):
-        bearing(p, b, s, u, w)
-        touchdown(p, b, s, w)
-    w.z = amb_force(p.beta_z, p.gap_z, s[2], u.coil[8], u.coil[9])
-    motor(p, s, u, w)
-    mass_rates = strap(p, s, u, w)
-    spin = s[11]
-    swing = p.mass * p.eccentricity * spin**2
-    heavy = s[5] + p.eccentricity_phase
-    return [
-        *s[6:12],
-        (w.x + swing * math.cos(heavy)) / p.mass + p.gravity * math.sin(p.tilt),
-        (w.y + swing * math.sin(heavy)) / p.mass - p.gravity * math.cos(p.tilt),
-        w.z / p.mass,
-        (w.phi - p.polar_inertia * spin * s[10]) / p.inertia,
-        (w.psi + p.polar_inertia * spin * s[9]) / p.inertia,
-        w.theta / p.polar_inertia,
-        *mass_rates,
-    ]
+    def readings(self) -> tuple[Array, float]:
+        """Noise-free positions (5,) and angle."""
+        s, p = self.s, self.p
+        raw = []
+        for b in (0, 1):
+            tx, ty = harmonics(p.target[4 * b : 4 * b + 4], p.target_phase[4 * b : 4 * b + 4], s[5])
+            raw += [s[0] + p.z_sensor[b] * s[4] + tx, s[1] - p.z_sensor[b] * s[3] + ty]
+        positions = np.array([*raw, s[2]]) * p.position_gain + np.array(p.position_offset)
+        return positions, float(s[5])
 
+    def law(self) -> tuple[Array, Array]:
+        """PID in the actuator planes with constant current sum; angle PID; T (6.9) without force currents."""
+        c, (y, angle) = self.c, self.readings()
+        plane = np.array([*(y[:2] + c.share_i * (y[2:4] - y[:2])), *(y[:2] + c.share_o * (y[2:4] - y[:2])), y[4]])
+        error = -plane
+        keep = 1 / (1 + 2 * math.pi * c.derivative_hz * TICK_S)
+        self.filtered = keep * self.filtered + (1 - keep) * (plane - self.previous) / TICK_S
+        self.previous = plane
+        kp, kd, ki, bias = (
+            np.array([*[getattr(c, f"{g}_i")] * 2, *[getattr(c, f"{g}_o")] * 2, getattr(c, f"{g}_z")])
+            for g in ("kp", "kd", "ki", "bias")
+        )
+        control = kp * error + self.integral - kd * self.filtered
+        free = (np.abs(control) < c.current_limit - bias) | (control * error < 0)
+        self.integral += np.where(free, ki * error * TICK_S, 0.0)
+        control = np.clip(control, bias - c.current_limit, c.current_limit - bias)
+        coil = np.stack([bias + control, bias - control], axis=1).clip(0, c.current_limit).reshape(10)
+        keep = 1 / (1 + 2 * math.pi * c.angle_hz * TICK_S)
+        self.angle_filtered = keep * self.angle_filtered + (1 - keep) * (angle - self.angle_previous) / TICK_S
+        self.angle_previous = angle
+        step = c.angle_slew * TICK_S
+        self.angle_target += min(max(c.angle_ref - self.angle_target, -step), step)
+        off = self.angle_target - angle
+        self.angle_integral += c.ki_theta * (off - min(max(off, -1.6e-3), 1.6e-3)) * TICK_S
+        current = c.kp_theta * off + self.angle_integral - c.kd_theta * self.angle_filtered
+        return coil, np.full(4, min(max(current, -10.0), 10.0))
 
-def read_positions(p: PlantParams, s: Sequence[float]) -> list[float]:
-    """What the position sensors xi, yi, xo, yo, z read in m, without noise and quantisation."""
-    raw: list[float] = []
-    for b in (0, 1):
-        part = slice(4 * b, 4 * b + 4)
-        (x, y), (rx, ry) = displacement(s, p.z_sensor[b]), runout(p.target[part], p.target_phase[part], s[5])
-        pair = [x + rx, y + ry]
-        raw += pair[::-1] if p.exchange_axes[b] else pair
-    raw.append(s[2])
-    rows = zip(raw, p.position_gain, p.position_offset, p.position_sign, strict=True)
-    read = [sign * (gain * y + offset) for y, gain, offset, sign in rows]
-    return [p.stuck_value if stuck else y for y, stuck in zip(read, p.stuck, strict=True)]
+    def advance(self, ticks: int) -> Array:
+        """Run control ticks; returns the states at the end of each, (ticks, 14)."""
+        out = []
+        for _ in range(ticks):
+            self.applied, self.next = self.next, self.law()
+            for a in range(4):
+                control = (self.loads.coil[2 * a] - self.loads.coil[2 * a + 1]) / 2
+                self.follow[a] = min(max(self.follow[a], control - self.p.hysteresis), control + self.p.hysteresis)
+                self.loads.play[a] = control - self.follow[a]
+            self.interval()
+            self.tick += 1
+            out.append(self.s.copy())
+        return np.array(out)
+
+    def targets(self) -> tuple[Array, Array]:
+        """What the inner loops settle on: they close on their own sensors."""
+        p, (coil, segment) = self.p, self.applied
+        drift = np.array(p.current_drift) * self.tick * TICK_S
+        true = (np.clip(coil, 0, p.coil_limit) - np.array(p.current_offset) - drift) / np.array(p.current_gain)
+        return np.maximum(true, 0.0), np.clip(segment, -p.segment_limit, p.segment_limit)
+
+    def loads_at(self, t: float) -> Loads:
+        """Exact currents, and the weight, at a time t after the start of the control interval."""
+        p, (coil, segment), at = self.p, self.targets(), self.loads
+        left = self.weight_to - at.weight
+        weight = at.weight + math.copysign(min(abs(left), self.weight_rate * t), left)
+        return Loads(coil + (at.coil - coil) * math.exp(-p.amplifier_rate * t),
+                     segment + (at.segment - segment) * math.exp(-p.segment_rate * t),
+                     at.play, at.gamma, at.hung_mass, weight)  # fmt: skip
+
+    def interval(self) -> None:
+        """One control interval of classical Runge-Kutta."""
+        h = TICK_S / self.substeps
+        for k in range(self.substeps):
+            a, b, c = (self.loads_at((k + part) * h) for part in (0.0, 0.5, 1.0))
+            k1 = derivative(self.p, self.s, a)
+            k2 = derivative(self.p, self.s + h / 2 * k1, b)
+            k3 = derivative(self.p, self.s + h / 2 * k2, b)
+            k4 = derivative(self.p, self.s + h * k3, c)
+            self.s = self.s + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        self.loads = self.loads_at(TICK_S)

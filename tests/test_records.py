@@ -187,3 +187,10 @@ def of_verdict(verdict: str) -> Any:
 def test_the_strongest_wins(verdicts: list[str], effects: list[str], stopped: Outcome | None, outcome: str) -> None:
     findings = [Finding("c", "t", "", Effect(e)) for e in effects]
     assert outcome_of(map(of_verdict, verdicts), findings, stopped) == outcome
+
+
+def test_a_failed_replacement_leaves_nothing_behind(tmp_path: Path) -> None:
+    (tmp_path / "record.json").mkdir()
+    with pytest.raises(OSError, match="directory"):
+        write_record(tmp_path / "record.json", start())
+    assert [p.name for p in tmp_path.iterdir()] == ["record.json"]

@@ -1,0 +1,60 @@
+"""The report of a run: the procedure's words and figures, and the measured conditions, handed to `reports`."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.procedure import Procedure
+from bench.recording import Recording
+from bench.records import Record
+
+CELSIUS = 273.15
+
+
+def build(directory: Path, record: Record, procedure: Procedure, recording: Recording[Any] | None) -> None:
+    """Write `report.html` and `report.pdf`.
+
+    Raises:
+        BenchError: a figure, a page or a file cannot be made.
+    """
+    import reports
+
+    analysed = recording is not None and any(m.value is not None for m in record.measurements)
+    reports.build(
+        directory,
+        recording,
+        json.loads(json.dumps(dataclasses.asdict(record))),
+        procedure.figures(recording) if recording is not None and analysed else (),
+        title=procedure.title,
+        method=procedure.method,
+        measures=procedure.measures,
+        conditions={} if recording is None else conditions(recording),
+    )
+
+
+def conditions(recording: Recording[Any]) -> dict[str, str]:
+    """Range over the run of every recorded temperature and voltage: the channel's description and a text with unit."""
+    found: dict[str, str] = {}
+    for stream in recording.streams.values():
+        wanted = {c.name: c.unit for c in stream.channels if c.unit in ("K", "V")}
+        low, high = dict.fromkeys(wanted, np.inf), dict.fromkeys(wanted, -np.inf)
+        for block in recording.blocks(stream.name) if wanted else ():
+            for name in wanted:
+                low[name] = min(low[name], float(block.columns[name].min()))
+                high[name] = max(high[name], float(block.columns[name].max()))
+        for name, unit in wanted.items():
+            if np.isfinite(low[name]):
+                about = recording.rig.channels[name].about if name in recording.rig.channels else ""
+                found[about or name] = _range(low[name], high[name], unit)
+    return found
+
+
+def _range(low: float, high: float, unit: str) -> str:
+    shift, symbol = (CELSIUS, "°C") if unit == "K" else (0.0, unit)
+    a, b = f"{low - shift:.1f}", f"{high - shift:.1f}"
+    return f"{a} {symbol}" if a == b else f"{a} to {b} {symbol}"

@@ -1,0 +1,150 @@
+"""From a closed recording to what a record says: measurements with verdicts, correlations and findings.
+
+The runner and `bench analyse` both come here, and neither hands over anything but the file.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from bench.errors import AnalysisError, BenchError, RecordingError, SignalAbort
+from bench.findings import Effect, Finding
+from bench.limits import Limit
+from bench.procedure import Measured, Procedure
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.records import (
+    Correlations,
+    LinkCounts,
+    Measurement,
+    Outcome,
+    Record,
+    RecordingFile,
+    correlations_of,
+    findings_of,
+    measurement,
+    missing,
+    outcome_of,
+)
+
+logger = logging.getLogger("bench.evaluation")
+RUN_END = "run-end"
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How the machine's part of a run ended: what stopped it early, if anything, and what was noticed on the way."""
+
+    stopped: Outcome | None = None
+    findings: tuple[Finding, ...] = ()
+    link: LinkCounts = LinkCounts()
+
+    def write(self, recorder: Recorder) -> None:
+        """Into the recording, so that a later analysis knows it too."""
+        recorder.event(
+            RUN_END,
+            stopped=None if self.stopped is None else self.stopped.value,
+            findings=[asdict(f) for f in self.findings],
+            link=asdict(self.link),
+        )
+
+    @classmethod
+    def read(cls, recording: Recording[Any]) -> Ending:
+        """From a recording; one that was cut off says so.
+
+        Raises:
+            RecordingError: the entry is there and cannot be understood.
+        """
+        events = recording.events(RUN_END)
+        if recording.truncated or not events:
+            text = "the recording was cut off: its process was killed or lost power; what was written before is whole"
+            return cls(Outcome.ERROR, (Finding("recording-truncated", text, recording.path.name, Effect.ERROR),))
+        try:
+            e = events[-1]
+            found = tuple(Finding(f["code"], f["text"], f["where"], Effect(f["effect"])) for f in e["findings"])
+            return cls(Outcome(e["stopped"]) if e["stopped"] else None, found, LinkCounts(**e["link"]))
+        except (KeyError, TypeError, ValueError) as error:
+            raise RecordingError(f"{recording.path}: its event {RUN_END} cannot be read: {error!r}") from error
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What a record takes from a recording."""
+
+    measurements: tuple[Measurement, ...]
+    correlations: Correlations
+    findings: tuple[Finding, ...]
+
+    def finish(self, record: Record, ending: Ending, ended: str, recording: RecordingFile | None) -> Record:
+        """An unfinished record with its end; the outcome follows from what it holds."""
+        findings = (*ending.findings, *self.findings)
+        return replace(
+            record, ended=ended, recording=recording, link=ending.link, findings=findings_of(findings),
+            measurements=self.measurements, correlations=self.correlations,
+            outcome=outcome_of(self.measurements, findings, ending.stopped),
+        )  # fmt: skip
+
+
+def evaluate(
+    procedure: Procedure, recording: Recording[Any], limits: Mapping[str, Limit], *, stopped: bool
+) -> Evaluation:
+    """Run `analyse` on the file and judge what it yields; what was declared and not yielded is missing.
+
+    A run that was stopped early is not analysed: its recording is kept, its quantities are missing. An analysis that
+    fails is a finding, not an exception.
+
+    Raises:
+        SignalAbort: the user stops it.
+    """
+    if stopped:
+        return Evaluation(_in_order(procedure, {}, limits), Correlations((), ()), ())
+    measured: dict[tuple[str, str], Measured] = {}
+    findings: list[Finding] = []
+    entries: dict[tuple[str, str], Measurement] = {}
+    correlations = Correlations((), ())
+    try:
+        for item in procedure.analyse(recording):
+            if isinstance(item, Finding):
+                findings.append(item)
+            else:
+                _accept(procedure, item, measured)
+        for key, item in measured.items():
+            entries[key] = measurement(item, limits.get(item.quantity.name), recording.seed)
+        correlations = correlations_of(list(measured.values()))
+    except SignalAbort:
+        raise
+    except Exception as error:
+        findings.append(_failed(error))
+        entries, correlations = {}, Correlations((), ())
+    return Evaluation(_in_order(procedure, entries, limits), correlations, tuple(findings))
+
+
+def _accept(procedure: Procedure, item: Measured, measured: dict[tuple[str, str], Measured]) -> None:
+    key = (item.quantity.name, item.where)
+    if item.quantity not in procedure.measures:
+        raise AnalysisError(f"{procedure.name} yields {item.quantity.name}, which it does not declare")
+    if key in measured:
+        raise AnalysisError(f"{procedure.name} yields {item.quantity.name} {item.where} twice")
+    measured[key] = item
+
+
+def _in_order(
+    procedure: Procedure, entries: Mapping[tuple[str, str], Measurement], limits: Mapping[str, Limit]
+) -> tuple[Measurement, ...]:
+    """As declared, with a missing entry where nothing was yielded."""
+    out: list[Measurement] = []
+    for quantity in procedure.measures:
+        found = [m for (name, _), m in entries.items() if name == quantity.name]
+        out += found or [missing(quantity, limits.get(quantity.name))]
+    return tuple(out)
+
+
+def _failed(error: Exception) -> Finding:
+    if isinstance(error, BenchError):
+        logger.warning("the analysis failed: %s", error)
+        return Finding("analysis-failed", str(error), "analyse", Effect.ERROR)
+    logger.error("the analysis failed: %s: %s", type(error).__name__, error, exc_info=error)
+    return Finding("analysis-failed", f"{type(error).__name__}: {error}; see the log", "analyse", Effect.ERROR)

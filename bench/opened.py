@@ -1,0 +1,45 @@
+"""An open rig as the composition root hands it to the runner: the live rig and what only its opener knows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from bench.clock import Clock
+from bench.recorder import Recorder
+from bench.rig import Rig
+from bench.samples import StreamLayout
+from bench.supervisor import SafeStep
+
+
+@dataclass(frozen=True)
+class OpenRig:
+    """A rig whose links are open and on which nothing has moved yet.
+
+    `attach` gives the recorder to everything that records (None takes it away), `unguard` ends interlocks and silence
+    checks so that make-safe can talk to a machine that has tripped, `safe_steps` are the ordered make-safe. `truth` is
+    what a simulated rig drew, for `truth.json`.
+    """
+
+    rig: Rig
+    streams: Sequence[StreamLayout]
+    attach: Callable[[Recorder | None], None]
+    unguard: Callable[[], None]
+    safe_steps: Sequence[SafeStep]
+    truth: Mapping[str, Any] | None = field(default=None)
+
+
+class WatchedClock:
+    """A rig's own clock that renews the heartbeat's lease before each slice and asks the supervisor after it."""
+
+    def __init__(self, base: Clock, renew: Callable[[], None], check: Callable[[int], None]) -> None:
+        self._base, self._renew, self._check = base, renew, check
+
+    def now_ns(self) -> int:
+        return self._base.now_ns()
+
+    def sleep(self, seconds: float) -> None:
+        self._renew()
+        self._base.sleep(seconds)
+        self._check(self._base.now_ns())
