@@ -80,8 +80,8 @@ def rig_path(rig: str) -> Path:
 
 def _unknown(kind: str, name: str, known: list[str]) -> str:
     close = difflib.get_close_matches(name, known, 1)
-    hint = f"; did you mean {close[0]}?" if close else ""
-    return f"unknown {kind} {name!r}; expected one of {', '.join(known) or '(none found)'}{hint} Next: `bench list`"
+    hint = f" Did you mean {close[0]}?" if close else ""
+    return f"unknown {kind} {name!r}; expected one of: {', '.join(known) or '(none found)'}.{hint} Next: `bench list`"
 
 
 def _title(path: Path) -> str:

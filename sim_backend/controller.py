@@ -18,6 +18,7 @@ from sim_backend.truth import Truth
 
 SETTLED_M, SETTLED_S = 20e-6, 0.05
 LIFT_TIMEOUT_S = 5.0
+REST_TICKS = 5000  # it has been on for half a second when the host connects: the rotor lies still on its rings
 TAKEOVER_S = 1.0
 RESTING = ("OFF", "READY")
 TURNING = ("LEVITATED", "SPINNING", "COASTING")
@@ -42,6 +43,7 @@ class SimulatedController:
         self._own = {name: p.default for name, p in rig.parameters.items()}
         self.truth = truth
         self.plant = Plant(truth.plant, truth.seed)
+        self.plant.run(REST_TICKS)
         for name, value in self._own.items():
             self._apply(name, value)
         self.state, self.fault = "OFF", "NONE"

@@ -26,8 +26,8 @@ def harmonics(amplitudes: tuple[float, ...], phases: tuple[float, ...], angle: f
 
 
 def amb_force(beta: float, gap: float, xi: float, positive: float, negative: float) -> float:
-    """T (2.4): two opposing coils; the gap is never less than 20 um."""
-    return beta * (positive**2 / max(gap - xi, 20e-6) ** 2 - negative**2 / max(gap + xi, 20e-6) ** 2)
+    """T (2.4): two opposing coils; below a gap of 0.2 mm the iron saturates."""
+    return beta * (positive**2 / max(gap - xi, 2e-4) ** 2 - negative**2 / max(gap + xi, 2e-4) ** 2)
 
 
 @dataclass

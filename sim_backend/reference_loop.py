@@ -1,6 +1,7 @@
-"""The sampled loop of the TSBS rig in plain Python: law, amplifiers and integration around `reference`.
+"""The whole sampled loop of the TSBS rig in plain Python, around the mechanics of `reference`: every law and error.
 
-No noise and no quantisation; about 0.1 times real time, so it serves windows of a few tenths of a second.
+Sensor and amplifier errors, hysteresis, motor currents, rotation, hangings. No noise and no quantisation; about 0.1
+times real time, so it serves windows of a few tenths of a second.
 """
 
 from __future__ import annotations
@@ -10,15 +11,26 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
 from sim_backend.core.params import ControlParams, PlantParams
-from sim_backend.reference import Inputs, displacement, rates, read_positions, velocity
+from sim_backend.reference import TICK_S, Array, Loads, derivative, harmonics
 
-Array = npt.NDArray[np.float64]
-TICK_S = 1e-4
 RADIAL = 4  # axes xi, yi, xo, yo; the fifth is z
+
+
+def read_positions(p: PlantParams, s: Sequence[float]) -> list[float]:
+    """What the position sensors xi, yi, xo, yo, z read in m, T (6.7), without noise and quantisation."""
+    raw: list[float] = []
+    for b, zeta in enumerate(p.z_sensor):
+        part = slice(4 * b, 4 * b + 4)
+        rx, ry = harmonics(p.target[part], p.target_phase[part], s[5])
+        pair = [s[0] + zeta * s[4] + rx, s[1] - zeta * s[3] + ry]
+        raw += pair[::-1] if p.exchange_axes[b] else pair
+    raw.append(s[2])
+    rows = zip(raw, p.position_gain, p.position_offset, p.position_sign, strict=True)
+    read = [sign * (gain * y + offset) for y, gain, offset, sign in rows]
+    return [p.stuck_value if stuck else y for y, stuck in zip(read, p.stuck, strict=True)]
 
 
 def clip(x: float, low: float, high: float) -> float:
@@ -139,11 +151,11 @@ class Interval:
     hanging: Hanging
     weight_before: float
 
-    def inputs(self, part: float) -> Inputs:
+    def loads(self, part: float) -> Loads:
         """What acts after the share `part` of the tick."""
-        i = amplifier(self.p, self.currents, self.target, part * TICK_S)
+        i = np.array(amplifier(self.p, self.currents, self.target, part * TICK_S))
         weight = self.hanging.weight(self.weight_before, self.tick + part)
-        return Inputs(i[:10], i[10:], self.lag, self.gamma, self.hanging.mass_kg, weight)
+        return Loads(i[:10], i[10:], np.array(self.lag), self.gamma, self.hanging.mass_kg, weight)
 
 
 def runge_kutta(interval: Interval, s: Sequence[float], substeps: int) -> list[float]:
@@ -152,7 +164,7 @@ def runge_kutta(interval: Interval, s: Sequence[float], substeps: int) -> list[f
     y = np.array(s)
 
     def f(part: float, y: Array) -> Array:
-        return TICK_S * np.array(rates(interval.p, y.tolist(), interval.inputs(part)))
+        return TICK_S * derivative(interval.p, y, interval.loads(part))
 
     for n in range(substeps):
         t = n * h
@@ -167,8 +179,8 @@ def runge_kutta(interval: Interval, s: Sequence[float], substeps: int) -> list[f
 def dop853(interval: Interval, s: Sequence[float]) -> list[float]:
     """State at the end of the tick by scipy's eighth-order method at a relative tolerance of 1e-12."""
 
-    def f(part: float, y: Array) -> list[float]:
-        return [TICK_S * x for x in rates(interval.p, y.tolist(), interval.inputs(part))]
+    def f(part: float, y: Array) -> Array:
+        return TICK_S * derivative(interval.p, y, interval.loads(part))
 
     done = solve_ivp(f, (0, 1), s, method="DOP853", rtol=1e-12, atol=1e-16, first_step=0.5)
     return [float(x) for x in done.y[:, -1]]
@@ -197,7 +209,7 @@ def simulate(
     for tick in range(ticks):
         for new in (h for h in hangings if h.tick == tick):
             if hanging.mass_kg == 0:  # the strap is just taut
-                s = [*s[:12], displacement(s, p.z_hook)[1], velocity(s, p.z_hook)[1]]
+                s = [*s[:12], s[1] - p.z_hook * s[3], s[7] - p.z_hook * s[9]]
             hanging, before = new, weight
         target = settled_currents(p, reference, tick * TICK_S)  # of the sample before: one sample of delay
         interval = Interval(p, tick, currents, target, hysteresis(p, currents, follow), gamma, hanging, before)

@@ -56,8 +56,8 @@ class PlantParams:
     detent: float = 0.01
     detent_phase: float = 0.4
     clearance: float = 2.5e-4
-    ring_stiffness: float = 5e6
-    ring_damping: float = 500.0
+    ring_stiffness: float = 5e7
+    ring_damping: float = 5e3
     ring_friction: float = 0.1
     ring_radius: float = 0.038
     ring_x: Two = (0.0, 0.0)

@@ -67,9 +67,9 @@ void tsbs_derive(const tsbs_params *p, double step, tsbs_derived *d) {
     tsbs_commutate(p, 0, d);
 }
 
-/* T (2.4): F = beta (ip^2/(gap - xi)^2 - in^2/(gap + xi)^2); the gap never closes below 20 um */
+/* T (2.4): F = beta (ip^2/(gap - xi)^2 - in^2/(gap + xi)^2); below a gap of 0.2 mm the iron saturates */
 double tsbs_amb_force(double beta, double gap, double xi, double ip, double in) {
-    double near = gap - xi > 20e-6 ? gap - xi : 20e-6, far = gap + xi > 20e-6 ? gap + xi : 20e-6;
+    double near = gap - xi > 2e-4 ? gap - xi : 2e-4, far = gap + xi > 2e-4 ? gap + xi : 2e-4;
     double a = ip * far, b = in * near, both = near * far; /* on one denominator: a division costs more than the rest */
     return beta * (a - b) * (a + b) / (both * both);
 }

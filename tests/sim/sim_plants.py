@@ -13,7 +13,13 @@ NONE4, NONE8 = (0.0,) * 4, (0.0,) * 8
 
 def quiet(**changes: Any) -> PlantParams:
     """The nominal machine without noise and quantisation."""
-    silent = {"position_noise": 0.0, "current_noise": 0.0, "position_lsb": 0.0, "current_lsb": 0.0, "encoder_counts": 0.0}
+    silent = {
+        "position_noise": 0.0,
+        "current_noise": 0.0,
+        "position_lsb": 0.0,
+        "current_lsb": 0.0,
+        "encoder_counts": 0.0,
+    }
     return dataclasses.replace(PlantParams(), **silent | changes)
 
 

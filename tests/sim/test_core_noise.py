@@ -38,7 +38,7 @@ def ziggurat(source: Iterator[int]) -> Iterator[float]:
     edge = [V / f, R]
     while len(edge) < LAYERS:
         edge.append(math.sqrt(-2 * math.log(V / edge[-1] + f)))
-        f = math.exp(-edge[-1] ** 2 / 2)
+        f = math.exp(-(edge[-1] ** 2) / 2)
     edge.append(0.0)
 
     def uniform() -> float:

@@ -1,0 +1,71 @@
+"""`bench analyse`, `bench report` and `bench runs`: what is done with stored runs."""
+
+from __future__ import annotations
+
+import logging
+import sqlite3
+import sys
+from pathlib import Path
+from typing import Any
+
+from bench import index, reanalysis, rundir, runlog
+from bench.cli import reporting
+from bench.cli.compose import load_procedure
+from bench.cli.run import STATUS, summary
+from bench.errors import BenchError, ConfigError, RecordingError
+from bench.recording import Recording
+from bench.records import read_record
+from bench.supervisor import Supervisor
+
+logger = logging.getLogger("bench.cli")
+
+
+def _line(text: str) -> None:
+    sys.stderr.write(text + "\n")
+
+
+def analyse_command(run: Path) -> int:
+    """Analyse again; the verdict's exit status, the analysis directory on standard output."""
+    with Supervisor().watching(), runlog.to_lines(_line):
+        result = reanalysis.analyse(run, load_procedure)
+    sys.stderr.write(summary(result.record))
+    sys.stdout.write(f"{result.directory}\n")
+    return STATUS[result.outcome]
+
+
+def report_command(run: Path) -> int:
+    """Build the report again from the stored record and recording."""
+    directory = rundir.existing(run)
+    record = read_record(directory.record)
+    procedure = load_procedure(record.procedure)
+    recording: Recording[Any] | None = None
+    with Supervisor().watching(), runlog.to_lines(_line):
+        try:
+            recording = Recording.open(directory.recording, procedure.plan)
+        except RecordingError as error:
+            logger.warning("the report goes without its recording: %s", error)
+        reporting.build(directory.path, record, procedure, recording)
+    for name in ("report.html", "report.pdf"):
+        sys.stdout.write(f"{directory.path / name}\n")
+    return 0
+
+
+def runs_command(out: Path) -> int:
+    """The runs in a folder, oldest first.
+
+    Raises:
+        ConfigError: it is not a folder.
+        BenchError: the index can neither be read nor rebuilt.
+    """
+    if out.exists() and not out.is_dir():
+        raise ConfigError(f"--out {out}: found a file; expected a folder of run directories")
+    try:
+        found = index.entries(out)
+    except (sqlite3.Error, OSError) as error:
+        raise BenchError(f"{out / index.NAME}: the index cannot be used: {error}") from error
+    for e in found:
+        seed = "" if e.seed is None else f"seed {e.seed}"
+        sys.stdout.write(f"{e.outcome:13} {e.started:25} {e.rig:12} {seed:10} {out / e.run_id}\n")
+    if not found:
+        sys.stderr.write(f"no runs in {out}\n")
+    return 0

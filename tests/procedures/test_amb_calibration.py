@@ -1,0 +1,83 @@
+"""The AMB calibration through the whole path: it recovers the truth, follows it, and never passes a defect off as sound."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from bench.cli.virtual import simulate
+from bench.errors import DeviceFault, InterlockError
+from bench.findings import Effect, Finding
+from bench.limits import Verdict, judge
+from bench.procedure import Measured
+from bench.specs import load_spec
+from bench.uncertainty import interval
+
+QUICK = {"settle_s": 0.5, "average_s": 0.3}
+
+
+def calibrate(
+    folder: Path, seed: int, truth: Mapping[str, float] | None = None
+) -> tuple[Mapping[str, float], dict[str, Measured], list[Finding]]:
+    true, results = simulate("amb-calibration", "tsbs12", seed, QUICK, folder / "recording.mcap", truth)
+    measured = {m.quantity.name: m for m in results if isinstance(m, Measured)}
+    return true, measured, [f for f in results if isinstance(f, Finding)]
+
+
+def test_a_sound_rig_is_recovered_within_its_intervals(tmp_path: Path) -> None:
+    """Seed fixed before any tuning; three standard uncertainties, so that an honest rig does not fail by chance."""
+    true, measured, findings = calibrate(tmp_path, 2026)
+    assert set(measured) == {"K_i", "K_o", "K2_i", "K2_o", "Kw_i", "Kw_o"}
+    assert [f for f in findings if f.effect is not Effect.NOTE] == []
+    for name, m in measured.items():
+        assert abs(m.estimate.value - true[name]) < 3 * m.estimate.u, name
+        assert m.estimate.u < 0.01 * abs(measured["K_o"].estimate.value)
+    limits = load_spec("tsbs12", "amb-calibration")
+    for name in ("K_i", "K_o"):
+        assert judge(interval(measured[name].estimate), limits[name]) is Verdict.PASS
+
+
+@pytest.mark.parametrize("factor", [0.8, 1.2])
+def test_the_result_follows_the_truth(tmp_path: Path, factor: float) -> None:
+    """Printed values are no input: with the truth 20 % off they are 20 % off, and the limits say so."""
+    wanted = {"K_i": factor * 73.2, "K_o": factor * 74.4}
+    true, measured, _ = calibrate(tmp_path, 11, wanted)
+    limits = load_spec("tsbs12", "amb-calibration")
+    for name, value in wanted.items():
+        assert true[name] == pytest.approx(value, rel=1e-9)
+        assert abs(measured[name].estimate.value - value) < 3 * measured[name].estimate.u
+        assert judge(interval(measured[name].estimate), limits[name]) is Verdict.FAIL
+
+
+@pytest.mark.parametrize(
+    ("defect", "code", "named"),
+    [
+        ({"current_sign_o": -1}, "wrong-sign", "outboard"),
+        ({"current_sign_i": -1}, "wrong-sign", "inboard"),
+        ({"exchange_current_axes": 1}, "axes-exchanged", "x and y"),
+        ({"exchange_current_bearings": 1}, "bearings-exchanged", "inboard and outboard"),
+        ({"mass_error_M1": 0.02}, "load-inconsistent", "M1"),
+        ({"mass_error_M3": -0.02}, "load-inconsistent", "M3"),
+        ({"hanger_off_at_zero": 1}, "load-inconsistent", "hanger"),
+        ({"drop_fraction": 0.02}, "missing-samples", "missing"),
+        ({"integrator_factor": 0.02}, "unsettled", "integrator"),
+        ({"stuck_current_yo_p": 1}, "stuck-channel", "i_yo_p"),
+    ],
+)
+def test_a_defect_is_named_and_does_not_pass(tmp_path: Path, defect: dict[str, float], code: str, named: str) -> None:
+    _, _, findings = calibrate(tmp_path, 3, defect)
+    fatal = [f for f in findings if f.effect is not Effect.NOTE]
+    assert code in {f.code for f in fatal}, fatal
+    assert any(named in f.text for f in fatal if f.code == code)
+
+
+@pytest.mark.parametrize(
+    "defect",
+    [{"position_sign_yo": -1}, {"exchange_position_axes_o": 1}, {"stuck_position_yo": 1}, {"coil_limit_yo_p": 4.2}],
+)
+def test_a_rotor_that_cannot_levitate_stops_the_run(tmp_path: Path, defect: dict[str, float]) -> None:
+    with pytest.raises((DeviceFault, InterlockError)) as stopped:
+        calibrate(tmp_path, 3, defect)
+    assert "check" in str(stopped.value) or "envelope" in str(stopped.value)
