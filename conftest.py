@@ -75,8 +75,9 @@ class ProcedureItem(pytest.Item):
         self.add_marker(pytest.mark.timeout(0))  # a calibration takes as long as it takes
 
     def setup(self) -> None:
-        from bench.cli.run import Request, execute
-        from bench.outcomes import Outcome
+        from bench.cli.compose import Request
+        from bench.cli.run import execute
+        from bench.records import Outcome
 
         option = self.config.getoption
         request = Request(
@@ -97,7 +98,7 @@ class ProcedureItem(pytest.Item):
             raise NotMeasured(self.result)
 
     def runtest(self) -> None:
-        from bench.outcomes import Outcome
+        from bench.records import Outcome
 
         assert self.result is not None
         if self.result.outcome is not Outcome.PASS:
@@ -106,9 +107,9 @@ class ProcedureItem(pytest.Item):
     def _note(self, result: RunResult) -> None:
         self.user_properties.append(("run", str(result.directory)))
         self.user_properties.append(("outcome", str(result.outcome)))
-        for m in result.record["measurements"]:
+        for m in result.record.measurements:
             for field in ("value", "expanded_uncertainty", "unit", "verdict"):
-                self.user_properties.append((f"{m['name']}.{field}", m[field]))
+                self.user_properties.append((f"{m.name}.{field}", str(getattr(m, field))))
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         """A sentence instead of a traceback, for what Levbench raises on purpose."""
@@ -120,7 +121,7 @@ class ProcedureItem(pytest.Item):
         return self.path, 0, f"{self.name} on {self.config.getoption('--rig')}"
 
 
-class NotPassed(BenchError):  # noqa: N818 - a verdict, not an error
+class NotPassed(BenchError):
     """FAIL or INDETERMINATE."""
 
     def __init__(self, result: RunResult) -> None:

@@ -1,15 +1,15 @@
 """The error tree. A message says what, where, found, expected and the next step.
 
-    BenchError
-      ConfigError        rig, plan, spec or usage is wrong; nothing was started      exit 2
-      LinkError          a link is lost, silent or corrupt                           exit 3
-      RecordingError     a recording cannot be written or read                       exit 3
-      AnalysisError      the data do not allow the number                            exit 3
-      Aborted            the run was stopped on purpose                              exit 4
-        InterlockError   the envelope refused a command or tripped on telemetry
-        DeviceFault      the controller reported a fault
-        OperatorAbort    the operator said stop
-        SignalAbort      SIGINT or SIGTERM
+BenchError
+  ConfigError        rig, plan, spec or usage is wrong; nothing was started      exit 2
+  LinkError          a link is lost, silent or corrupt                           exit 3
+  RecordingError     a recording cannot be written or read                       exit 3
+  AnalysisError      the data do not allow the number                            exit 3
+  Aborted            the run was stopped on purpose                              exit 4
+    InterlockError   the envelope refused a command or tripped on telemetry
+    DeviceFault      the controller reported a fault
+    OperatorAbort    the operator said stop
+    SignalAbort      SIGINT or SIGTERM
 """
 
 from __future__ import annotations

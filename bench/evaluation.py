@@ -40,7 +40,7 @@ class Ending:
 
     stopped: Outcome | None = None
     findings: tuple[Finding, ...] = ()
-    link: LinkCounts = LinkCounts()
+    link: LinkCounts = field(default_factory=LinkCounts)
 
     def write(self, recorder: Recorder) -> None:
         """Into the recording, so that a later analysis knows it too."""

@@ -58,7 +58,7 @@ def _file(name: str, fields: list[tuple[str, int, int, bool]]) -> bytes:
             if repeated
             else descriptor_pb2.FieldDescriptorProto.LABEL_OPTIONAL
         )
-        message.field.add(name=field, number=number, type=kind, label=label)  # type: ignore[arg-type]
+        message.field.add(name=field, number=number, type=kind, label=label)
     return descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString()
 
 
@@ -82,7 +82,9 @@ def block_schema(layout: StreamLayout) -> bytes:
 
 def view_schema(layout: StreamLayout) -> bytes:
     """`View_<stream>`: scalars, mean, minimum and maximum of each measured channel and the last value of each code."""
-    return _file(f"View_{layout.name}", [(n, k + 1, _kind("TYPE_FLOAT"), False) for k, n in enumerate(view_names(layout))])
+    return _file(
+        f"View_{layout.name}", [(n, k + 1, _kind("TYPE_FLOAT"), False) for k, n in enumerate(view_names(layout))]
+    )
 
 
 def view_names(layout: StreamLayout) -> list[str]:

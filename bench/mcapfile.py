@@ -158,8 +158,15 @@ def _take(out: McapFile, record: object, after: int) -> None:
         out.topics[record.id] = (record.topic, dict(record.metadata))
     elif isinstance(record, Chunk):
         out.chunks.append(
-            ChunkPlace(after - len(record.data), len(record.data), record.uncompressed_size, record.uncompressed_crc,
-                       record.compression, record.message_start_time, record.message_end_time)  # fmt: skip
+            ChunkPlace(
+                after - len(record.data),
+                len(record.data),
+                record.uncompressed_size,
+                record.uncompressed_crc,
+                record.compression,
+                record.message_start_time,
+                record.message_end_time,
+            )
         )
     elif isinstance(record, DataEnd | Footer):
         pass

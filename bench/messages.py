@@ -73,7 +73,7 @@ def load_messages(dbc: str, name: str = "dbc") -> MessageMap:
         ConfigError: it is not a DBC, or signals overlap or do not fit.
     """
     try:
-        database = cantools.database.load_string(dbc, database_format="dbc", strict=True)
+        database: Any = cantools.database.load_string(dbc, database_format="dbc", strict=True)
     except Exception as error:  # cantools raises a dozen kinds, all meaning this
         raise ConfigError(f"{name}: not a usable DBC: {error}") from error
     return MessageMap({m.name: _message(m) for m in database.messages})

@@ -15,8 +15,8 @@ from bench.limits import Limit
 from bench.procedure import Procedure
 from bench.recording import Recording
 from bench.records import Record, RecordingFile, read_record, unfinished, write_record
-from bench.runner import RunResult, versions
 from bench.rundir import RunDirectory
+from bench.runner import RunResult, versions
 
 
 def analyse(path: Path, load_procedure: Callable[[str], Procedure]) -> RunResult:

@@ -170,7 +170,7 @@ class _Writer:
 
     def __init__(self, file: Any, streams: Mapping[str, StreamLayout], header: RunHeader, start_ns: int) -> None:
         self._file, self._streams, self._start = file, streams, start_ns
-        self._mcap = Writer(file, chunk_size=1 << 20, compression=CompressionType.LZ4, index_types=IndexType.ALL,
+        self._mcap: Any = Writer(file, chunk_size=1 << 20, compression=CompressionType.LZ4, index_types=IndexType.ALL,
                             enable_crcs=True, enable_data_crcs=True)  # fmt: skip
         self._mcap.start(profile="levbench", library="levbench")
         self._channels: dict[str, int] = {}
@@ -239,7 +239,11 @@ class _Writer:
         for c in plan.channels:
             x = columns[c.name]
             if c.dtype == "f4":
-                values += [np.add.reduceat(x, edges) / counts, np.minimum.reduceat(x, edges), np.maximum.reduceat(x, edges)]
+                values += [
+                    np.add.reduceat(x, edges) / counts,
+                    np.minimum.reduceat(x, edges),
+                    np.maximum.reduceat(x, edges),
+                ]
             else:
                 values.append(x[edges + counts - 1])
         rows = np.zeros(len(edges), [(f"f{k}", [("tag", "u1", (2 if k >= 15 else 1,)), ("v", "<f4")])

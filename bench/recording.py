@@ -49,7 +49,9 @@ class Recording(Generic[P]):
         file = index(path)
         version = file.metadata.get("layout", {}).get("version")
         if file.profile != "levbench" or version is None:
-            raise RecordingError(f"{path} is MCAP but no Levbench recording (profile {file.profile!r}, layout {version})")
+            raise RecordingError(
+                f"{path} is MCAP but no Levbench recording (profile {file.profile!r}, layout {version})"
+            )
         if int(version) > layout.VERSION:
             raise RecordingError(
                 f"{path}: layout version: found {version}; expected at most {layout.VERSION}. It was recorded with a "
@@ -120,7 +122,9 @@ class Recording(Generic[P]):
             if topic.endswith("/block") and "layout" in metadata:
                 described = json.loads(metadata["layout"])
                 name = topic.split("/")[1]
-                out[name] = StreamLayout(name, described["period_ns"], tuple(ChannelInfo(*c) for c in described["channels"]))
+                out[name] = StreamLayout(
+                    name, described["period_ns"], tuple(ChannelInfo(*c) for c in described["channels"])
+                )
         return out
 
     def blocks(self, stream: str, start_ns: int = 0, end_ns: int = 1 << 63) -> Iterator[DecodedBlock]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 from collections.abc import Iterator
 
@@ -38,10 +39,8 @@ def check_rig(rig: str) -> tuple[tuple[Problem, ...], BusLoad | None]:
     except ConfigError as error:
         return error.problems or (Problem(str(text.path), "(file)", str(error), "a rig file"),), None
     load = None
-    try:
+    with contextlib.suppress(ConfigError, KeyError):
         load = bus_load(loaded.messages, loaded.link.bitrate, loaded.link.data_bitrate)
-    except (ConfigError, KeyError):
-        pass
     return tuple(problems_of(loaded)), load
 
 

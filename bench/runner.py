@@ -83,9 +83,15 @@ class RunResult:
         return self.record.outcome
 
     @property
+    def stopped_by_signal(self) -> bool:
+        return any(f.code == "signal" for f in self.record.findings)
+
+    @property
     def reason(self) -> str:
         """The outcome's causes in one line."""
-        verdicts = [f"{m.name} {m.verdict.value}" for m in self.record.measurements if m.verdict not in ("pass", "none")]
+        verdicts = [
+            f"{m.name} {m.verdict.value}" for m in self.record.measurements if m.verdict not in ("pass", "none")
+        ]
         found = [f"{f.code}: {f.text}" for f in self.record.findings if f.effect is not Effect.NOTE]
         return "; ".join([*found, *verdicts])
 
@@ -247,9 +253,7 @@ class WatchedSteps:
         return getattr(self._recorder, name)
 
 
-def _ending(
-    cause: BaseException | None, findings: tuple[Finding, ...], live: OpenRig, recorder: Recorder
-) -> Ending:
+def _ending(cause: BaseException | None, findings: tuple[Finding, ...], live: OpenRig, recorder: Recorder) -> Ending:
     counters = live.rig.counters
     # Lost samples are gaps; everything else that a clean link does not do is an error.
     errors = counters.wrong_length + counters.duplicates + counters.reordered + counters.reboots

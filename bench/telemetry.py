@@ -123,8 +123,15 @@ class TelemetryDecoder:
             self._index += lost
             part = slice(int(a), int(b))
             out.append(
-                SampleBlock(STREAM, self._index, ticks[part].astype(np.uint64), self._segment.offset_ns + ticks[part] * TICK_NS,
-                            host_ns, lost, {n: x[part] for n, x in columns.items()})  # fmt: skip
+                SampleBlock(
+                    STREAM,
+                    self._index,
+                    ticks[part].astype(np.uint64),
+                    self._segment.offset_ns + ticks[part] * TICK_NS,
+                    host_ns,
+                    lost,
+                    {n: x[part] for n, x in columns.items()},
+                )
             )
             self._index += int(b - a)
         self._segment.sequence, self._segment.tick = int(sequence[-1]), int(ticks[-1])

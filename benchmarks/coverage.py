@@ -24,7 +24,7 @@ from pathlib import Path
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(variable, "1")  # one process per core: library threads would fight over them
 
-import numpy as np
+import numpy as np  # noqa: E402  (after the thread limits)
 
 PLAN = {"settle_s": 0.5, "average_s": 0.3}
 JUDGED = ("K_i", "K_o")

@@ -86,7 +86,9 @@ class CanController:
     def _check(self) -> None:
         silent = (self._base.now_ns() - self._last_ns) * 1e-9
         if silent > SILENCE_S:
-            raise LinkError(f"link {self._link.name}: no telemetry for {silent:.2f} s; expected one message a millisecond")
+            raise LinkError(
+                f"link {self._link.name}: no telemetry for {silent:.2f} s; expected one message a millisecond"
+            )
         fault = self.fault
         if fault != "NONE":
             raise DeviceFault(f"the controller reports {fault}: {ADVICE.get(fault, 'see its documentation')}")
@@ -200,7 +202,7 @@ class CanController:
         code = self.rig.messages.code("Command", "code", name)
         if self.recorder is not None:
             self.recorder.event("command", name=name)
-        values = {"session": self._session, "code": code}
+        values: dict[str, float] = {"session": self._session, "code": code}
         reply = self._ask("Command", values, "CommandReply", f"the reply to {name}")
         status = self._status("CommandReply", reply)
         if status == "WRONG_SESSION":

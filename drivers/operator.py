@@ -44,7 +44,9 @@ class LineOperator:
 class ConsoleOperator:
     """A person at a terminal; what they confirm is passed on to `then` (a simulated rig's line), if there is one."""
 
-    def __init__(self, prompt: Callable[[str], str], clock: Clock, envelope: Envelope, then: LineOperator | None) -> None:
+    def __init__(
+        self, prompt: Callable[[str], str], clock: Clock, envelope: Envelope, then: LineOperator | None
+    ) -> None:
         self._prompt, self._clock, self._envelope, self._then = prompt, clock, envelope, then
         self.recorder: Recorder | None = None
 

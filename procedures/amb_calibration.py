@@ -73,7 +73,6 @@ def step_count(plan: Plan) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Hang every mass up and down at each angle; the hanger stays on throughout."""
-    assert rig.levitation and rig.rotation and rig.operator
     rig.operator.hang(Load(plan.masses[-1]))  # exercise: the first zero is then reached by unloading, like the others
     rig.clock.sleep(plan.settle_s)
     rig.operator.hang(NOTHING)
@@ -149,7 +148,9 @@ def fit_inputs(rig: RigFile, plan: Plan) -> dict[str, Estimate]:
         "amb_span": certified("geometry/amb_span", g["amb_span"], "span AMB to AMB"),
         "motor_to_outboard": Estimate.exact(g["com_to_motor"].value - g["com_to_outboard_amb"].value),
         "amb_gap": certified("geometry/amb_gap", g["amb_gap"], "AMB gap (residual position)"),
-        "motor_stiffness": certified("geometry/motor_stiffness", g["motor_stiffness"], "motor stiffness (residual pos.)"),
+        "motor_stiffness": certified(
+            "geometry/motor_stiffness", g["motor_stiffness"], "motor stiffness (residual pos.)"
+        ),
         "hanger": certified("masses/hanger", rig.hanger, "hanger"),
     }
     for k, label in enumerate(plan.masses):

@@ -54,7 +54,7 @@ def _one_step(recording: Recording[Any]) -> Iterator[Figure]:
     heaviest = recording.plan.masses[-1]
     step = next(s for s in recording.steps("hang") if s.labels["load"] == heaviest)
     data = step.read("pos_yi", "pos_yo", "i_yo_p", "i_yo_n")
-    t = (data["t_ns"] - data["t_ns"][0]) * 1e-9 if "t_ns" in data else np.arange(len(data["pos_yi"])) * 1e-3
+    t = (data["t_ns"] - data["t_ns"][0]).astype(np.float64) * 1e-9
     yield Figure("step-position", f"Position during one step ({heaviest})",
                  "Vertical position at both sensor planes while the heaviest mass hangs.", "time (s)", "position (µm)",
                  (Series("inboard", t, 1e6 * data["pos_yi"]), Series("outboard", t, 1e6 * data["pos_yo"])))  # fmt: skip
@@ -70,7 +70,9 @@ def _closed(angles: Array, values: Array) -> tuple[Array, Array]:
 
 
 def _slopes(data: HangingData, f: Fit) -> Figure:
-    series = tuple(Series(name, *_closed(data.hangings.angles, f.terms[b, :, 1]), "both") for b, name in enumerate(NAMES))
+    series = tuple(
+        Series(name, *_closed(data.hangings.angles, f.terms[b, :, 1]), "both") for b, name in enumerate(NAMES)
+    )
     return Figure("polar-slope", "Slope at zero control current over the rotor angle",
                   "K at each angle in N/A. The reported value is the mean over the turn.", "rotor angle", "K (N/A)",
                   series, kind="polar")  # fmt: skip

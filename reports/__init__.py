@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any
 from bench.errors import BenchError
 
 if TYPE_CHECKING:
-    from bench.recording import Recording
-
     from bench.figures import Figure
     from bench.procedure import Quantity
+    from bench.recording import Recording
 
 __all__ = ["ReportPaths", "build"]
 

@@ -261,7 +261,9 @@ class SimulatedController:
         self.plant.set(name, value)
 
     def _reply_parameter(self, index: int, status: str, token: float, value: float, clock: tuple[int, int]) -> None:
-        self._send("ParamReply", {"index": index, "status": self._status(status), "token": token, "value": value}, clock)
+        self._send(
+            "ParamReply", {"index": index, "status": self._status(status), "token": token, "value": value}, clock
+        )
 
     def _status(self, name: str) -> int:
         return self._map.code("CommandReply", "status", name)
@@ -270,4 +272,3 @@ class SimulatedController:
         m = self._map[message]
         at = clock[0] + (self.plant.tick - clock[1]) * 100_000
         self._out.append(frame(m.identifier, encode(m, values), t_ns=at, flags=FD))
-

@@ -58,7 +58,9 @@ class TelemetryEncoder:
         if not spans:
             return empty_batch()
         counts = [len(s.rows) for s in spans]
-        ticks = np.concatenate([(s.first_tick // PERIOD_TICKS + 1 + np.arange(len(s.rows))) * PERIOD_TICKS for s in spans])
+        ticks = np.concatenate(
+            [(s.first_tick // PERIOD_TICKS + 1 + np.arange(len(s.rows))) * PERIOD_TICKS for s in spans]
+        )
         n = len(ticks)
         values = self._values(np.concatenate([s.rows for s in spans]), ticks)
         for name, column in (

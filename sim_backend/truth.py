@@ -99,7 +99,9 @@ def draw(rig: RigFile, seed: int, overrides: Mapping[str, float] | None = None) 
         if name not in table:
             known = [*stated, *defects, "K_i", "K_o"]
             close = difflib.get_close_matches(name, known, 3)
-            raise ConfigError(f"--truth {name}: no such value; {'did you mean ' + ', '.join(close) if close else known}")
+            raise ConfigError(
+                f"--truth {name}: no such value; {'did you mean ' + ', '.join(close) if close else known}"
+            )
         table[name] = float(value)
     for name, value in targets.items():  # K is proportional to the slope at the centre
         slope = f"slope_{name[-1]}"
@@ -215,7 +217,11 @@ def _quantities(p: PlantParams, v: Mapping[str, float], rig: RigFile, bias: floa
     slope = np.sqrt(k**2 - 4 * k2 * (k2 * bias**2 - force))  # on F = K2 (b^2 + i^2) + K i
     out: dict[str, float] = {}
     for b, name in enumerate("io"):
-        out |= {f"K_{name}": float(k[b].mean()), f"K2_{name}": float(k2[b].mean()), f"Kw_{name}": float(slope[b].mean())}
+        out |= {
+            f"K_{name}": float(k[b].mean()),
+            f"K2_{name}": float(k2[b].mean()),
+            f"Kw_{name}": float(slope[b].mean()),
+        }
     return out
 
 

@@ -92,7 +92,8 @@ def run(
     no_report: Annotated[bool, typer.Option("--no-report", help="Leave the report out.")] = False,
 ) -> int:
     """Run a procedure on a rig. The last line on standard output is the run directory."""
-    from bench.cli.run import Request, run_command
+    from bench.cli.compose import Request
+    from bench.cli.run import run_command
 
     return run_command(
         Request(

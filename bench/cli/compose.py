@@ -90,7 +90,9 @@ def _refuse_mixed_backends(request: Request) -> None:
     if request.backend == "live":
         given = [name for name, value in (("--truth", request.truth), ("--seed", request.seed is not None)) if value]
         if given:
-            raise ConfigError(f"{' and '.join(given)}: a real rig has no seed and no truth to set; expected --backend sim, or none of these")
+            raise ConfigError(
+                f"{' and '.join(given)}: a real rig has no seed and no truth to set; expected --backend sim, or none of these"
+            )
     elif request.links:
         raise ConfigError("--link: the simulated rig runs in this process; expected --backend live, or leave it out")
 

@@ -121,7 +121,7 @@ def _wiring(data: HangingData) -> Iterator[Finding]:
 
     def answer(axis: str) -> float:
         control = (data.mean[f"i_{axis}_p"] - data.mean[f"i_{axis}_n"]) / 2
-        return float((control[heavy].mean() - control[light].mean()))
+        return float(control[heavy].mean() - control[light].mean())
 
     yi, yo, xi, xo = (answer(axis) for axis in ("yi", "yo", "xi", "xo"))
     exchanged = [name for name, y, x in (("inboard", yi, xi), ("outboard", yo, xo)) if abs(x) > 0.5 * abs(y)]

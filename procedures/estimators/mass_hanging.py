@@ -145,7 +145,7 @@ def over_a_turn(f: Fit, p: Mapping[str, float]) -> dict[str, float]:
     hanger = float(weight(p["hanger"], p["gravity"], p["air_density"], p["mass_density"]))
     slope = tangents(f.terms, share, hanger)
     mean = f.terms.mean(axis=1)
-    out = {}
+    out: dict[str, float] = {}
     for b, bearing in enumerate("io"):
         out |= {f"K_{bearing}": mean[b, 1], f"K2_{bearing}": mean[b, 2], f"Kw_{bearing}": float(slope[b].mean())}
     return {name: float(x) for name, x in out.items()}

@@ -65,12 +65,13 @@ class Plant:
         substeps: int = 2,
     ) -> None:
         self.params = params or PlantParams()
-        self._p = _ffi.new("tsbs_params *")
-        self._c = _ffi.new("tsbs_control *")
-        self._s = _ffi.new("tsbs_state *")
+        self._p: Any = _ffi.new("tsbs_params *")
+        self._c: Any = _ffi.new("tsbs_control *")
+        state: Any = _ffi.new("tsbs_state *")
+        state.substeps = substeps
+        self._s: Any = state
         _fill(self._p, vars(self.params))
         _fill(self._c, vars(control or ControlParams()))
-        self._s.substeps = substeps
         _lib.tsbs_start(self._p, self._c, self._s, seed & (2**64 - 1))
 
     @property

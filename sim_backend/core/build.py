@@ -12,7 +12,18 @@ from pathlib import Path
 from bench.errors import ConfigError
 
 HERE = Path(__file__).resolve().parent
-FLAGS = ("-std=c11", "-O2", "-flto", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off", "-fPIC", "-shared", "-Wall", "-Wextra")
+FLAGS = (
+    "-std=c11",
+    "-O2",
+    "-flto",
+    "-fno-math-errno",
+    "-fno-trapping-math",
+    "-ffp-contract=off",
+    "-fPIC",
+    "-shared",
+    "-Wall",
+    "-Wextra",
+)
 # -ffp-contract=off: no fused multiply-add, so that the same seed gives the same bytes on every processor.
 
 

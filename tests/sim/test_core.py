@@ -14,7 +14,9 @@ from sim_backend.core import Plant, derivative, normals
 from sim_backend.core.params import PlantParams
 from sim_backend.reference import Loads, Reference
 
-QUIET = replace(PlantParams(), position_noise=0.0, current_noise=0.0, position_lsb=0.0, current_lsb=0.0, encoder_counts=0.0)
+QUIET = replace(
+    PlantParams(), position_noise=0.0, current_noise=0.0, position_lsb=0.0, current_lsb=0.0, encoder_counts=0.0
+)
 SIGNALS = [0, 1, 2, 3, 4, 5]
 
 
@@ -100,8 +102,10 @@ def test_derivative_equals_the_reference_at_random_states() -> None:
 BARE = replace(QUIET, offset_x=(0.0, 0.0), offset_y=(0.0, 0.0), runout=(0.0,) * 8, motor_x=0.0, motor_y=0.0, tilt=0.0)
 
 
-def rates(coil: dict[int, float] | None = None, segment: tuple[float, ...] = (0, 0, 0, 0), **state: float) -> np.ndarray:
-    names = "x y z phi psi theta vx vy vz wphi wpsi spin".split()
+def rates(
+    coil: dict[int, float] | None = None, segment: tuple[float, ...] = (0, 0, 0, 0), **state: float
+) -> np.ndarray:
+    names = ["x", "y", "z", "phi", "psi", "theta", "vx", "vy", "vz", "wphi", "wpsi", "spin"]
     s = np.zeros(14)
     for name, value in state.items():
         s[names.index(name)] = value
@@ -159,7 +163,9 @@ def test_hung_weight_divides_by_the_spans() -> None:
     plant.run(12_000)
     after = plant.run(2000).mean(axis=0)
     names = core.CHANNELS
-    change = {b: ((after - before)[names.index(f"i_y{b}_p")] - (after - before)[names.index(f"i_y{b}_n")]) / 2 for b in "io"}
+    change = {
+        b: ((after - before)[names.index(f"i_y{b}_p")] - (after - before)[names.index(f"i_y{b}_n")]) / 2 for b in "io"
+    }
     d, s = p.z_hook - p.z_amb[1], p.z_amb[1] - p.z_amb[0]
     slope = [4 * p.beta[b] * 3 / p.gap[b] ** 2 for b in (0, 1)]
     assert change["i"] * slope[0] == pytest.approx(-20 * d / s, rel=2e-3)

@@ -1,0 +1,76 @@
+"""Small procedures that do one thing each: what the tests of the runner and of the command line run."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from typing import Any, Literal
+
+from bench.errors import OperatorAbort
+from bench.findings import Effect, Finding
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.rig import Rig
+from bench.roles import NOTHING, RigState
+from bench.uncertainty import Estimate, Influence
+
+SUPPLY = Quantity("supply", "V", "mean supply voltage")
+
+
+class Plan(BenchPlan):
+    """`act` is what happens in the middle of acquire, `then` what analyse does."""
+
+    act: Literal["measure", "raise", "refuse", "stop", "wait"] = "measure"
+    then: Literal["yield", "nothing", "doubt", "raise"] = "yield"
+    seconds: float = 0.5
+    bias_A: float = 3.0
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """One step before the act and one after it."""
+    for n in range(2):
+        rig.operator.hang(NOTHING)
+        with record.step("look", number=n):
+            rig.clock.sleep(plan.seconds)
+        if n == 0:
+            _act(rig, plan)
+
+
+def _act(rig: Rig, plan: Plan) -> None:
+    if plan.act == "raise":
+        raise ZeroDivisionError("a mistake in the procedure")
+    if plan.act == "refuse":
+        rig.levitation.set("bias_i", 99.0)
+    if plan.act == "stop":
+        raise OperatorAbort("the operator said stop")
+    if plan.act == "wait":
+        sys.stderr.write("waiting\n")
+        sys.stderr.flush()
+        rig.clock.sleep(1e6)
+
+
+def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
+    """The mean of the first step's supply voltage."""
+    plan = recording.plan
+    if plan.then == "raise":
+        raise ZeroDivisionError("a mistake in the analysis")
+    if plan.then == "nothing":
+        return
+    if plan.then == "doubt":
+        yield Finding("doubt", "this number is not to be trusted", "supply", Effect.INDETERMINATE)
+    step = next(iter(recording.steps("look")))
+    meter = Influence("meter", "voltmeter", 0.1, "V", "B", "normal")
+    yield SUPPLY.measured(Estimate.of(step.mean("supply"), meter))
+
+
+def _made(name: str, state: RigState) -> Procedure:
+    return Procedure(
+        name=name, title=f"A look at the supply, {state}", measures=(SUPPLY,), state=state, plan=Plan, acquire=acquire,
+        analyse=analyse, settings=lambda plan: {"bias_i": plan.bias_A}, step_count=lambda _: 2,
+    )  # fmt: skip
+
+
+resting: Any = _made("tiny-resting", RigState.READY)
+levitated: Any = _made("tiny-levitated", RigState.LEVITATED)
+procedure = resting
