@@ -117,7 +117,7 @@ def test_saturated_amplifier_is_flagged_and_limits_the_current() -> None:
     rows = plant.run(20000)
     assert rows[:, COLUMN["i_yo_p"]].max() < 4.05
     saturated = rows[rows[:, COLUMN["flags"]].astype(int) & SATURATED != 0]
-    assert saturated[0, COLUMN["i_yo_p"]] > 3.9
+    assert saturated[:, COLUMN["i_yo_p"]].max() > 3.99
     assert saturated[0, COLUMN["pos_yo"]] > -1e-4  # flagged well before the rotor is lost
     assert plant.trips == 1
 
