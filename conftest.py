@@ -30,6 +30,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--backend", choices=("sim", "live"), default="sim", help="the simulated rig, or the real one")
     group.addoption("--seed", type=int, help="which virtual rig (simulation only)")
     group.addoption("--plan", action="append", default=[], metavar="KEY=VALUE", help="a setting; repeatable")
+    group.addoption("--no-report", action="store_true", help="leave the reports out")
     group.addoption("--out", type=Path, default=Path("runs"), help="folder of the run directories")
 
 
@@ -40,10 +41,10 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> ProcedureF
     return ProcedureFile.from_parent(parent, path=file_path)
 
 
-def pytest_configure(config: pytest.Config) -> None:
+def pytest_sessionstart(session: pytest.Session) -> None:
     """Provenance into the JUnit file, if one is written."""
-    rig = config.getoption("--rig")
-    if rig is None:
+    config = session.config
+    if config.getoption("--rig") is None:
         return
     from _pytest.junitxml import xml_key  # pytest offers suite properties to fixtures only
 
@@ -87,6 +88,7 @@ class ProcedureItem(pytest.Item):
             seed=option("--seed"),
             plan=tuple(option("--plan")),
             out=option("--out"),
+            report=not option("--no-report"),
         )
         with warnings.catch_warnings():
             warnings.simplefilter("default")  # the machine is on trial here, not the software

@@ -21,7 +21,7 @@ SUPPLY = Quantity("supply", "V", "mean supply voltage")
 class Plan(BenchPlan):
     """`act` is what happens in the middle of acquire, `then` what analyse does."""
 
-    act: Literal["measure", "raise", "refuse", "stop", "wait"] = "measure"
+    act: Literal["measure", "raise", "refuse", "stop", "count"] = "measure"
     then: Literal["yield", "nothing", "doubt", "raise"] = "yield"
     seconds: float = 0.5
     bias_A: float = 3.0
@@ -44,10 +44,10 @@ def _act(rig: Rig, plan: Plan) -> None:
         rig.levitation.set("bias_i", 99.0)
     if plan.act == "stop":
         raise OperatorAbort("the operator said stop")
-    if plan.act == "wait":
-        sys.stderr.write("waiting\n")
+    while plan.act == "count":  # until a signal ends it; each second of bench time is a line
+        sys.stderr.write(f"at {rig.clock.now_ns()}\n")
         sys.stderr.flush()
-        rig.clock.sleep(1e6)
+        rig.clock.sleep(1.0)
 
 
 def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
@@ -73,4 +73,4 @@ def _made(name: str, state: RigState) -> Procedure:
 
 resting: Any = _made("tiny-resting", RigState.READY)
 levitated: Any = _made("tiny-levitated", RigState.LEVITATED)
-procedure = resting
+procedure = levitated

@@ -1,0 +1,105 @@
+"""From telemetry frames to blocks: order, losses, duplicates, wrap-around and reboot, counted exactly."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bench.codec import encode
+from bench.envelope import Envelope
+from bench.errors import InterlockError
+from bench.frames import FrameBatch, empty_batch, frame
+from bench.rigfile import load_rig
+from bench.samples import SampleBlock
+from bench.telemetry import TelemetryDecoder
+
+RIG = load_rig("tsbs12")
+MESSAGE = RIG.messages["Telemetry"]
+T0 = 10_000_000_000_000
+
+
+def one(sequence: int, tick: int | None = None, **values: float) -> FrameBatch:
+    tick = sequence * 10 if tick is None else tick
+    payload = encode(MESSAGE, {"seq": sequence & 0xFFFF, "tick": tick & 0xFFFFFFFF, "temp_i": 295, "temp_o": 295,
+                               "temp_m": 295, **values})  # fmt: skip
+    return frame(MESSAGE.identifier, payload, t_ns=T0 + sequence * 1_000_000)
+
+
+def batch(*sequences: int) -> FrameBatch:
+    return np.concatenate([empty_batch(), *(one(s) for s in sequences)])
+
+
+def test_a_gap_starts_a_block_that_says_how_many_are_missing() -> None:
+    decoder = TelemetryDecoder(RIG)
+    blocks = decoder.decode(batch(1, 2, 3, 7, 8))
+    assert [(b.first_index, len(b), b.lost_before) for b in blocks] == [(0, 3, 0), (6, 2, 3)]
+    (later,) = decoder.decode(batch(10))
+    assert (later.first_index, later.lost_before) == (9, 1)
+    assert (decoder.counters.lost, decoder.counters.gaps) == (4, 2)
+    assert later.t_ns[0] - blocks[0].t_ns[0] == 9_000_000
+
+
+def test_duplicates_and_reordering_are_put_right_and_counted() -> None:
+    decoder = TelemetryDecoder(RIG)
+    (block,) = decoder.decode(batch(1, 3, 2, 2, 4))
+    assert block.ticks.tolist() == [10, 20, 30, 40]
+    assert (decoder.counters.duplicates, decoder.counters.reordered, decoder.counters.lost) == (1, 1, 0)
+
+
+def test_counters_wrap() -> None:
+    decoder = TelemetryDecoder(RIG)
+    near = (1 << 32) - 20
+    frames = [one(65534 + k, near + 10 * k) for k in range(4)]
+    (block,) = decoder.decode(np.concatenate(frames))
+    assert np.diff(block.ticks.astype(np.int64)).tolist() == [10, 10, 10]
+    assert decoder.counters.lost == 0
+
+
+def test_a_reboot_starts_over() -> None:
+    decoder = TelemetryDecoder(RIG)
+    decoder.decode(np.concatenate([one(5000 + k, 500_000 + 10 * k) for k in range(3)]))
+    blocks = decoder.decode(np.concatenate([one(6000 + k, 10 * k + 10) for k in range(3)]))
+    assert decoder.counters.reboots == 1
+    assert sum(len(b) for b in blocks) == 3
+
+
+def test_wrong_lengths_are_counted_and_never_read() -> None:
+    decoder = TelemetryDecoder(RIG)
+    short = one(2)
+    short["length"] = 20
+    (block,) = decoder.decode(np.concatenate([one(1), short, one(3)]))[:1]
+    assert decoder.counters.wrong_length == 1
+    assert decoder.counters.lost == 1
+    assert len(block) == 1
+
+
+def block(**values: float) -> SampleBlock:
+    (made,) = TelemetryDecoder(RIG).decode(one(1, None, **values))
+    return made
+
+
+@pytest.mark.parametrize(
+    ("values", "name"),
+    [({"speed": 76.0}, "speed"), ({"i_yo_p": 13.0}, "i_yo_p"), ({"temp_m": 360.0}, "temp_m"),
+     ({"pos_yi": 1.6e-4, "state": 3}, "pos_yi"), ({"pos_xo": -1.6e-4, "state": 4}, "pos_xo")],
+)  # fmt: skip
+def test_the_envelope_trips_and_names_the_channel(values: dict[str, float], name: str) -> None:
+    with pytest.raises(InterlockError, match=name):
+        Envelope(RIG).check_block(block(**values))
+
+
+def test_the_envelope_lets_a_resting_rotor_rest() -> None:
+    Envelope(RIG).check_block(block(pos_yi=-2.5e-4, state=0, speed=74.9))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("bias_i", 5.1), ("bias_i", -0.1), ("nothing", 0.0), ("gamma", float("nan"))]
+)
+def test_the_envelope_refuses_a_command(name: str, value: float) -> None:
+    with pytest.raises(InterlockError, match="nothing was sent"):
+        Envelope(RIG).check_parameter(name, value)
+
+
+@pytest.mark.parametrize("value", [0.0, 5.0, 3.0])
+def test_boundaries_belong_to_the_envelope(value: float) -> None:
+    Envelope(RIG).check_parameter("bias_i", value)
