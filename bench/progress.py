@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Protocol, TextIO
 
 PLAIN_LINES = 20  # about as many lines in a run, however many steps it has
@@ -51,8 +51,9 @@ class PlainProgress:
             self.line(f"step {_count(self._begun, self._total)}: {text}{self._left()}")
 
     def line(self, text: str) -> None:
-        self._stream.write(text + "\n")
-        self._stream.flush()
+        with suppress(OSError, ValueError):  # nobody reads any more; the run goes on
+            self._stream.write(text + "\n")
+            self._stream.flush()
 
     def _left(self) -> str:
         done = self._begun - 1
@@ -90,8 +91,9 @@ class TerminalProgress:
         self._bar.stop()
 
     def stage(self, text: str) -> None:
-        self._bar.update(self._task, stage=text, description="", refresh=True)
-        self._bar.console.print(text, markup=False, highlight=False)
+        with suppress(OSError):
+            self._bar.update(self._task, stage=text, description="", refresh=True)
+            self._bar.console.print(text, markup=False, highlight=False)
 
     def total(self, steps: int) -> None:
         self._begun = 0
@@ -99,10 +101,12 @@ class TerminalProgress:
 
     def step(self, text: str) -> None:
         self._begun += 1
-        self._bar.update(self._task, completed=self._begun - 1, description=text, refresh=True)
+        with suppress(OSError):  # the terminal was closed; the run goes on
+            self._bar.update(self._task, completed=self._begun - 1, description=text, refresh=True)
 
     def line(self, text: str) -> None:
-        self._bar.console.print(text, markup=False, highlight=False, soft_wrap=True)
+        with suppress(OSError):
+            self._bar.console.print(text, markup=False, highlight=False, soft_wrap=True)
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 ROOMS = ("bench", "drivers", "procedures", "reports", "sim_backend")
@@ -19,7 +19,9 @@ class _Forward(logging.Handler):
         self._sink = sink
 
     def emit(self, record: logging.LogRecord) -> None:
-        self._sink(record)
+        # What cannot be shown or recorded (a closed terminal, a full disk) must never stop a make-safe.
+        with suppress(Exception):
+            self._sink(record)
 
 
 @contextmanager

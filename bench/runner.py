@@ -12,7 +12,7 @@ import logging
 import platform
 import socket
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
@@ -215,11 +215,18 @@ def _moved(
         except BaseException as error:
             # Whatever it is, also SystemExit: the machine is made safe first.
             cause = error
-            logger.warning("stopped: %s", error or type(error).__name__)
-        progress.stage("make safe")
-        live.unguard()
-        findings = supervisor.make_safe([_recording_or_not(s, live) for s in live.safe_steps], rig.clock.now_ns)
+        finally:
+            with supervisor.finishing(), suppress(Exception):
+                _told(cause, progress)
+            live.unguard()
+            findings = supervisor.make_safe([_recording_or_not(s, live) for s in live.safe_steps], rig.clock.now_ns)
     return cause, findings
+
+
+def _told(cause: BaseException | None, progress: Progress) -> None:
+    if cause is not None:
+        logger.warning("stopped: %s", str(cause) or type(cause).__name__)
+    progress.stage("make safe")
 
 
 def _recording_or_not(step: SafeStep, live: OpenRig) -> SafeStep:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import io
 import json
@@ -303,6 +304,19 @@ def test_a_cut_recording_is_analysed_as_truncated(run: Run) -> None:
     assert again.outcome is Outcome.ERROR
     assert codes(again) == ["recording-truncated"]
     assert again.record.started == result.record.started
+
+
+def test_a_display_that_nobody_reads_does_not_stop_a_run(tmp_path: Path, rig: RigFile) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    job = Job(tiny_procedures.resting, rig, Plan(), {}, "sim", 1)
+    stream = os.fdopen(writer, "w")
+    with Supervisor().watching() as supervisor:
+        connect = simulated(rig, 1, {}, "auto")
+        result = runner.run(job, tmp_path, connect, supervisor, PlainProgress(stream), None)
+    with contextlib.suppress(BrokenPipeError):
+        stream.close()
+    assert result.outcome is Outcome.PASS
 
 
 def test_warnings_are_events(run: Run) -> None:

@@ -154,6 +154,16 @@ def export(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns its exit status. Nothing that goes wrong leaves as a traceback."""
+    status = _status(arguments)
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Whoever read our output stopped reading, as `head` does; the interpreter must not flush into it again.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return status
+
+
+def _status(arguments: Sequence[str] | None) -> int:
     try:
         return _dispatch(sys.argv[1:] if arguments is None else list(arguments))
     except ConfigError as error:
@@ -163,9 +173,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BenchError as error:
         return _told(str(error), ERROR)
     except BrokenPipeError:
-        # Whoever read our output stopped reading, as `head` does; the interpreter must not flush into it again.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return ERROR
+    except OSError as error:
+        return _told(f"{error.filename or 'a file'}: {error.strerror or error}", ERROR)
     except Exception as error:
         where = traceback.extract_tb(error.__traceback__)[-1]
         place = f"{Path(where.filename).name}:{where.lineno}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 
 from bench import runlog, runner
 from bench.cli import reporting
@@ -31,8 +32,10 @@ def execute(request: Request, supervisor: Supervisor | None = None) -> RunResult
 def run_command(request: Request) -> int:
     """Run, say the outcome on standard error and the run directory on standard output; the outcome's exit status."""
     result = execute(request)
-    sys.stderr.write(summary(result.record))
-    sys.stdout.write(f"{result.directory}\n")
+    with suppress(BrokenPipeError):  # nobody reads any more; the outcome stands all the same
+        sys.stderr.write(summary(result.record))
+        sys.stdout.write(f"{result.directory}\n")
+        sys.stdout.flush()
     return STATUS[result.outcome]
 
 

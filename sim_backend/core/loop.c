@@ -6,7 +6,12 @@
 static double least(double a, double b) { return a < b ? a : b; }
 static double most(double a, double b) { return a > b ? a : b; }
 
-static double quantise(double x, double lsb) { return lsb > 0 ? lsb * floor(x / lsb + 0.5) : x; }
+/* nearest multiple of lsb; through an integer, because floor is a library call on plain x86-64 */
+static double quantise(double x, double lsb, double per_lsb) {
+    if (lsb <= 0) return x;
+    double counts = x * per_lsb;
+    return lsb * (double)(int64_t)(counts + (counts < 0 ? -0.5 : 0.5));
+}
 
 static double plane(const double *s, double z, int axis) { return axis ? s[1] - z * s[3] : s[0] + z * s[4]; }
 
@@ -27,17 +32,17 @@ void tsbs_sense(const tsbs_params *p, tsbs_derived *d, tsbs_state *st, tsbs_read
     for (int k = 0; k < 5; k++) {
         double noise = p->position_noise > 0 ? p->position_noise * tsbs_normal(&st->noise) : 0;
         double y = p->position_sign[k] * (p->position_gain[k] * raw[k] + p->position_offset[k]) + noise;
-        r->position[k] = p->stuck[k] != 0 ? p->stuck_value : quantise(y, p->position_lsb);
+        r->position[k] = p->stuck[k] != 0 ? p->stuck_value : quantise(y, p->position_lsb, d->per_position_lsb);
     }
     double now = st->tick * TICK;
     for (int k = 0; k < 10; k++) {
         double noise = p->current_noise > 0 ? p->current_noise * tsbs_normal(&st->noise) : 0;
         double i = p->current_gain[k] * st->coil[k] + p->current_offset[k] + p->current_drift[k] * now + noise;
-        coil[k] = quantise(i, p->current_lsb);
+        coil[k] = quantise(i, p->current_lsb, d->per_current_lsb);
     }
     for (int k = 0; k < 4; k++) {
         double noise = p->current_noise > 0 ? p->current_noise * tsbs_normal(&st->noise) : 0;
-        segment[k] = quantise(st->segment[k] + noise, p->current_lsb);
+        segment[k] = quantise(st->segment[k] + noise, p->current_lsb, d->per_current_lsb);
     }
     double angle = p->encoder_sign * (s[5] + p->encoder_offset);
     r->angle = p->encoder_counts > 0 ? floor(angle * p->encoder_counts / 6.283185307179586 + 0.5) *
@@ -45,12 +50,12 @@ void tsbs_sense(const tsbs_params *p, tsbs_derived *d, tsbs_state *st, tsbs_read
                                      : angle;
 }
 
-static void amplifiers(const tsbs_params *p, const tsbs_state *st, double *coil, double *segment) {
+static void amplifiers(const tsbs_params *p, const tsbs_derived *d, const tsbs_state *st, double *coil, double *segment) {
     double now = st->tick * TICK;
     int enabled = st->law.mode != OFF;
     for (int k = 0; k < 10; k++) { /* the inner loop closes on its own sensor */
         double ref = enabled ? least(most(st->applied.coil[k], 0), p->coil_limit[k]) : 0;
-        coil[k] = enabled ? most((ref - p->current_offset[k] - p->current_drift[k] * now) / p->current_gain[k], 0) : 0;
+        coil[k] = enabled ? most((ref - p->current_offset[k] - p->current_drift[k] * now) * d->per_gain[k], 0) : 0;
     }
     for (int k = 0; k < 4; k++)
         segment[k] = enabled ? least(most(st->applied.segment[k], -p->segment_limit), p->segment_limit) : 0;
@@ -100,9 +105,9 @@ static void watch(const tsbs_params *p, tsbs_state *st, const double *coil, doub
     int trips = 0, lost = 0;
     for (int b = 0; b < 2; b++) {
         double x = plane(st->s, p->z_sensor[b], 0) - p->ring_x[b], y = plane(st->s, p->z_sensor[b], 1) - p->ring_y[b];
-        double r = sqrt(x * x + y * y);
-        if (r > p->clearance) st->flags |= b ? CONTACT_O : CONTACT_I;
-        lost |= r > p->lost_radius;
+        double square = x * x + y * y;
+        if (square > p->clearance * p->clearance) st->flags |= b ? CONTACT_O : CONTACT_I;
+        lost |= square > p->lost_radius * p->lost_radius;
     }
     st->lost_ticks = st->law.mode == LEVITATE && lost ? st->lost_ticks + 1 : 0;
     if (st->lost_ticks * TICK > p->lost_time) trips |= TRIP_LOST;
@@ -159,7 +164,7 @@ int64_t tsbs_run(const tsbs_params *p, const tsbs_control *c, tsbs_state *st, in
         st->sums[6] += st->speed;
         for (int k = 0; k < 10; k++) st->sums[7 + k] += coil[k];
         for (int k = 0; k < 4; k++) st->sums[17 + k] += segment[k];
-        amplifiers(p, st, coil_to, segment_to);
+        amplifiers(p, &d, st, coil_to, segment_to);
         hysteresis(p, st);
         for (int k = 0; k < st->substeps; k++) step(p, &d, st, coil_to, segment_to, TICK / st->substeps);
         st->tick++;

@@ -57,6 +57,9 @@ void tsbs_derive(const tsbs_params *p, double step, tsbs_derived *d) {
     d->angle = 0;
     d->turn_c = 1;
     d->turn_s = 0;
+    d->per_position_lsb = p->position_lsb > 0 ? 1 / p->position_lsb : 0;
+    d->per_current_lsb = p->current_lsb > 0 ? 1 / p->current_lsb : 0;
+    for (int k = 0; k < 10; k++) d->per_gain[k] = 1 / p->current_gain[k];
     d->tilt_c = cos(p->tilt);
     d->tilt_s = sin(p->tilt);
     d->unbalance_c = cos(p->eccentricity_phase);
@@ -88,8 +91,8 @@ static void add(wrench *w, double z, double fx, double fy) {
 static void touchdown(const tsbs_params *p, const double *s, int b, wrench *w) {
     double z = p->z_sensor[b];
     double x = s[0] + z * s[4] - p->ring_x[b], y = s[1] - z * s[3] - p->ring_y[b];
+    if (x * x + y * y <= p->clearance * p->clearance) return;
     double r = sqrt(x * x + y * y);
-    if (r <= p->clearance) return;
     double vx = s[6] + z * s[10], vy = s[7] - z * s[9];
     double nx = x / r, ny = y / r;
     double push = p->ring_stiffness * (r - p->clearance) + p->ring_damping * (vx * nx + vy * ny);

@@ -94,6 +94,7 @@ double tsbs_normal(tsbs_noise *);
 /* what does not change inside a run or a tick: harmonic coefficients a cos p and a sin p, sines, decays */
 typedef struct {
     double runout_c[8], runout_s[8], target_c[8], target_s[8], tilt_c, tilt_s, motor_c, motor_s;
+    double per_position_lsb, per_current_lsb, per_gain[10];
     double angle, turn_c, turn_s, detent_c, detent_s, unbalance_c, unbalance_s, coil_keep, segment_keep, speed_keep;
 } tsbs_derived;
 void tsbs_derive(const tsbs_params *, double step, tsbs_derived *);
