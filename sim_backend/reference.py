@@ -7,16 +7,15 @@ the thesis; x horizontal, y up; planes are signed distances from the centre of m
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from sim_backend.core.params import ControlParams, PlantParams
+from sim_backend.core.params import PlantParams
 
 Array = npt.NDArray[np.float64]
 TICK_S = 1e-4
-OFF, READY, LIFT, LEVITATE, LAND = range(5)
 
 
 def harmonics(amplitudes: tuple[float, ...], phases: tuple[float, ...], angle: float) -> tuple[float, float]:
@@ -103,101 +102,3 @@ def touchdown(p: PlantParams, b: int, s: Array) -> tuple[tuple[float, float, flo
         return (plane, 0.0, 0.0), 0.0
     drag = p.ring_friction * push * math.tanh((-vx * ny + vy * nx + p.ring_radius * s[11]) / 0.01)
     return (plane, -push * nx + drag * ny, -push * ny - drag * nx), -drag * p.ring_radius
-
-
-@dataclass
-class Reference:
-    """The levitated machine in closed loop: sample, law with one tick of delay, exact amplifiers, RK4 mechanics."""
-
-    p: PlantParams
-    c: ControlParams = field(default_factory=ControlParams)
-    substeps: int = 2
-
-    def __post_init__(self) -> None:
-        self.s = np.zeros(14)
-        self.loads = Loads(np.zeros(10), np.zeros(4), np.zeros(4))
-        self.follow = np.zeros(4)
-        self.applied = self.next = (np.zeros(10), np.zeros(4))
-        self.integral, self.filtered, self.previous = np.zeros(5), np.zeros(5), np.zeros(5)
-        self.angle_target = self.angle_integral = self.angle_filtered = self.angle_previous = 0.0
-        self.weight_to = self.weight_rate = 0.0
-        self.tick = 0
-
-    def readings(self) -> tuple[Array, float]:
-        """Noise-free positions (5,) and angle."""
-        s, p = self.s, self.p
-        raw = []
-        for b in (0, 1):
-            tx, ty = harmonics(p.target[4 * b : 4 * b + 4], p.target_phase[4 * b : 4 * b + 4], s[5])
-            raw += [s[0] + p.z_sensor[b] * s[4] + tx, s[1] - p.z_sensor[b] * s[3] + ty]
-        positions = np.array([*raw, s[2]]) * p.position_gain + np.array(p.position_offset)
-        return positions, float(s[5])
-
-    def law(self) -> tuple[Array, Array]:
-        """PID in the actuator planes with constant current sum; angle PID; T (6.9) without force currents."""
-        c, (y, angle) = self.c, self.readings()
-        plane = np.array([*(y[:2] + c.share_i * (y[2:4] - y[:2])), *(y[:2] + c.share_o * (y[2:4] - y[:2])), y[4]])
-        error = -plane
-        keep = 1 / (1 + 2 * math.pi * c.derivative_hz * TICK_S)
-        self.filtered = keep * self.filtered + (1 - keep) * (plane - self.previous) / TICK_S
-        self.previous = plane
-        kp, kd, ki, bias = (
-            np.array([*[getattr(c, f"{g}_i")] * 2, *[getattr(c, f"{g}_o")] * 2, getattr(c, f"{g}_z")])
-            for g in ("kp", "kd", "ki", "bias")
-        )
-        control = kp * error + self.integral - kd * self.filtered
-        free = (np.abs(control) < c.current_limit - bias) | (control * error < 0)
-        self.integral += np.where(free, ki * error * TICK_S, 0.0)
-        control = np.clip(control, bias - c.current_limit, c.current_limit - bias)
-        coil = np.stack([bias + control, bias - control], axis=1).clip(0, c.current_limit).reshape(10)
-        keep = 1 / (1 + 2 * math.pi * c.angle_hz * TICK_S)
-        self.angle_filtered = keep * self.angle_filtered + (1 - keep) * (angle - self.angle_previous) / TICK_S
-        self.angle_previous = angle
-        step = c.angle_slew * TICK_S
-        self.angle_target += min(max(c.angle_ref - self.angle_target, -step), step)
-        off = self.angle_target - angle
-        self.angle_integral += c.ki_theta * (off - min(max(off, -1.6e-3), 1.6e-3)) * TICK_S
-        current = c.kp_theta * off + self.angle_integral - c.kd_theta * self.angle_filtered
-        return coil, np.full(4, min(max(current, -10.0), 10.0))
-
-    def advance(self, ticks: int) -> Array:
-        """Run control ticks; returns the states at the end of each, (ticks, 14)."""
-        out = []
-        for _ in range(ticks):
-            self.applied, self.next = self.next, self.law()
-            for a in range(4):
-                control = (self.loads.coil[2 * a] - self.loads.coil[2 * a + 1]) / 2
-                self.follow[a] = min(max(self.follow[a], control - self.p.hysteresis), control + self.p.hysteresis)
-                self.loads.play[a] = control - self.follow[a]
-            self.interval()
-            self.tick += 1
-            out.append(self.s.copy())
-        return np.array(out)
-
-    def targets(self) -> tuple[Array, Array]:
-        """What the inner loops settle on: they close on their own sensors."""
-        p, (coil, segment) = self.p, self.applied
-        drift = np.array(p.current_drift) * self.tick * TICK_S
-        true = (np.clip(coil, 0, p.coil_limit) - np.array(p.current_offset) - drift) / np.array(p.current_gain)
-        return np.maximum(true, 0.0), np.clip(segment, -p.segment_limit, p.segment_limit)
-
-    def loads_at(self, t: float) -> Loads:
-        """Exact currents, and the weight, at a time t after the start of the control interval."""
-        p, (coil, segment), at = self.p, self.targets(), self.loads
-        left = self.weight_to - at.weight
-        weight = at.weight + math.copysign(min(abs(left), self.weight_rate * t), left)
-        return Loads(coil + (at.coil - coil) * math.exp(-p.amplifier_rate * t),
-                     segment + (at.segment - segment) * math.exp(-p.segment_rate * t),
-                     at.play, at.gamma, at.hung_mass, weight)  # fmt: skip
-
-    def interval(self) -> None:
-        """One control interval of classical Runge-Kutta."""
-        h = TICK_S / self.substeps
-        for k in range(self.substeps):
-            a, b, c = (self.loads_at((k + part) * h) for part in (0.0, 0.5, 1.0))
-            k1 = derivative(self.p, self.s, a)
-            k2 = derivative(self.p, self.s + h / 2 * k1, b)
-            k3 = derivative(self.p, self.s + h / 2 * k2, b)
-            k4 = derivative(self.p, self.s + h * k3, c)
-            self.s = self.s + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-        self.loads = self.loads_at(TICK_S)

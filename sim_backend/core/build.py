@@ -16,6 +16,7 @@ FLAGS = (
     "-std=c11",
     "-O2",
     "-flto",
+    "-fno-semantic-interposition",
     "-fno-math-errno",
     "-fno-trapping-math",
     "-ffp-contract=off",
