@@ -39,7 +39,7 @@ format: setup
 	$(BIN)/ruff check --fix .
 
 setup: $(READY)
-	@$(BIN)/python -m sim_backend.core.build
+	@$(BIN)/python -c "import sim_backend.core"
 
 $(READY): requirements.lock pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or newer is needed, found " + sys.version.split()[0] if sys.version_info < (3, 11) else 0)'

@@ -130,11 +130,14 @@ def index(path: Path) -> McapFile:
         with path.open("rb") as file:
             for record in StreamReader(file, emit_chunks=True, validate_crcs=True, record_size_limit=MAX_CHUNK).records:
                 _take(out, record, file.tell())
+                if isinstance(record, Footer):
+                    _check_summary(path, record)
         out.truncated = False
     except CRCValidationError as error:
         raise RecordingError(f"recording {path}: fails its CRC; the file was damaged after it was written") from error
-    except EndOfFile:
-        pass  # cut off: what is complete has been indexed
+    except EndOfFile as error:  # cut off: what is complete has been indexed
+        if not out.profile:
+            raise RecordingError(f"{path} is not an MCAP recording: it ends before a header") from error
     except McapError as error:
         if not out.profile:
             raise RecordingError(f"{path} is not an MCAP recording: {error}") from error
@@ -145,6 +148,16 @@ def index(path: Path) -> McapFile:
     if out.truncated:
         out.learn_channels()
     return out
+
+
+def _check_summary(path: Path, footer: Footer) -> None:
+    """The stream reader does not check the summary, and the channels of a whole file are taken from there."""
+    if not footer.summary_crc or not footer.summary_start:
+        return
+    with path.open("rb") as file:
+        file.seek(footer.summary_start)
+        if zlib.crc32(file.read()[:-12]) != footer.summary_crc:  # up to the CRC itself and the closing magic
+            raise RecordingError(f"recording {path}: its summary fails its CRC; the file was damaged after it was written")
 
 
 def _take(out: McapFile, record: object, after: int) -> None:

@@ -1,16 +1,33 @@
-"""An open rig as the composition root hands it to the runner: the live rig and what only its opener knows."""
+"""What the composition root hands to the runner: the job, how to open its rig, and what only the opener knows."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Any
 
 from bench.clock import Clock
+from bench.limits import Limit
+from bench.procedure import BenchPlan, Procedure
 from bench.recorder import Recorder
 from bench.rig import Rig
+from bench.rigfile import RigFile
 from bench.samples import StreamLayout
-from bench.supervisor import SafeStep
+from bench.supervisor import SafeStep, Supervisor
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is to be run. `seed` is None on a real rig; `lock` is what others must not share, None in simulation."""
+
+    procedure: Procedure
+    rig: RigFile
+    plan: BenchPlan
+    limits: Mapping[str, Limit]
+    backend: str
+    seed: int | None = None
+    lock: AbstractContextManager[Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -43,3 +60,7 @@ class WatchedClock:
         self._renew()
         self._base.sleep(seconds)
         self._check(self._base.now_ns())
+
+
+Connect = Callable[[Supervisor], AbstractContextManager[OpenRig]]
+"""Opens a rig for the block; its clock asks the given supervisor."""

@@ -13,10 +13,11 @@ from bench.errors import ConfigError, RecordingError
 from bench.evaluation import Ending, evaluate
 from bench.limits import Limit
 from bench.procedure import Procedure
+from bench.provenance import versions
 from bench.recording import Recording
 from bench.records import Record, RecordingFile, read_record, unfinished, write_record
 from bench.rundir import RunDirectory
-from bench.runner import RunResult, versions
+from bench.runner import RunResult
 
 
 def analyse(path: Path, load_procedure: Callable[[str], Procedure]) -> RunResult:

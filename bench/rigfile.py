@@ -50,7 +50,10 @@ class Toleranced(Part):
     @classmethod
     def _si(cls, data: Any) -> Any:
         if isinstance(data, dict) and isinstance(data.get("unit"), str):
-            unit = units.unit(data["unit"])
+            try:
+                unit = units.unit(data["unit"])
+            except ConfigError as error:  # a ValueError is reported with its key and next to the other problems
+                raise ValueError(str(error)) from None
             scaled = {n: data[n] * unit.factor for n in ("u", "half_width") if isinstance(data.get(n), int | float)}
             if isinstance(data.get("value"), int | float):
                 scaled["value"] = data["value"] * unit.factor + unit.offset
@@ -62,7 +65,7 @@ class Toleranced(Part):
         if (self.u is None) == (self.half_width is None):
             raise ValueError("expected either u (normal) or half_width (rectangular, triangular, arcsine)")
         if (self.u is not None) != (self.distribution == "normal"):
-            raise ValueError(f"distribution {self.distribution!r} goes with {'u' if self.half_width else 'half_width'}")
+            raise ValueError(f"distribution {self.distribution!r} goes with {'half_width' if self.u is None else 'u'}")
         return self
 
     @property

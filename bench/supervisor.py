@@ -4,9 +4,9 @@ Signals only set a flag while the machine moves; the clock's pump asks `check` a
 0.1 s of bench time), so a stop takes effect in the middle of a sleep and never inside a half-sent command. Where
 nothing moves (start-up, analysis) a signal raises at once.
 
-During make-safe nothing is raised for a signal any more: it is logged and ignored. A step that takes too long, or
-whose link is dead, is logged and the next one still runs. What a step calls must not block outside of `clock.sleep`;
-links never do (`receive` never waits).
+During make-safe nothing is raised: a second signal is logged and ignored, a first one waits until the machine is safe
+(`checkpoint`). A step that takes too long, or whose link is dead, is logged and the next one still runs. What a step
+calls must not block outside of `clock.sleep`; links never do (`receive` never waits).
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class SafeStep:
 class _Mode(Enum):
     AT_ONCE = "a signal raises where the program stands"
     AT_CHECK = "a signal raises at the next check"
-    IGNORED = "a signal is logged"
+    LATER = "a signal raises at the next checkpoint"
 
 
 class Supervisor:
@@ -45,6 +45,7 @@ class Supervisor:
     def __init__(self) -> None:
         self._mode = _Mode.AT_ONCE
         self._signal: str | None = None
+        self._answered = False  # the signal has ended what it was to end
         self._ignored: list[str] = []  # handlers do not log: a signal may arrive inside a write to the same stream
         self._deadline_ns: int | None = None
         self._step = ""
@@ -63,22 +64,38 @@ class Supervisor:
 
     @contextmanager
     def moving(self) -> Iterator[None]:
-        """The machine may move within the block: signals wait for `check`."""
-        with self._in(_Mode.AT_CHECK):
-            yield
-        self._raise_if_stopped()  # arrived after the last check: the run still ends as it was told to
+        """The machine may move within the block: signals wait for `check`, or for the end of the block.
+
+        Raises:
+            SignalAbort: a signal has arrived.
+        """
+        try:
+            with self._in(_Mode.AT_CHECK):
+                yield
+            self.checkpoint()
+        except SignalAbort:
+            self._answered = True
+            raise
 
     @contextmanager
-    def waiting(self) -> Iterator[None]:
-        """A person is being asked within the block: signals raise at once."""
-        with self._in(_Mode.AT_ONCE):
-            self._raise_if_stopped()
-            yield
+    def interruptible(self) -> Iterator[None]:
+        """Nothing moves and nothing half done is lost within the block: signals raise at once.
+
+        Raises:
+            SignalAbort: a signal has arrived, now or before the block, that has not yet ended anything.
+        """
+        try:
+            with self._in(_Mode.AT_ONCE):
+                self.checkpoint()
+                yield
+        except SignalAbort:
+            self._answered = True
+            raise
 
     @contextmanager
     def finishing(self) -> Iterator[None]:
-        """What is written within the block must be whole: signals are logged and ignored."""
-        with self._in(_Mode.IGNORED):
+        """What is done within the block must be whole: a signal waits for the next checkpoint."""
+        with self._in(_Mode.LATER):
             yield
         self._log_ignored()
 
@@ -97,12 +114,12 @@ class Supervisor:
             SignalAbort: a signal asks the run to stop.
             LinkError: the present step of make-safe has run out of time.
         """
-        if self._mode is _Mode.IGNORED:
+        if self._mode is _Mode.LATER:
             self._log_ignored()
             if self._deadline_ns is not None and now_ns > self._deadline_ns:
                 raise LinkError(f"make-safe step {self._step!r} did not end within its time")
             return
-        self._raise_if_stopped()
+        self.checkpoint()
 
     def make_safe(self, steps: Sequence[SafeStep], now_ns: Callable[[], int]) -> tuple[Finding, ...]:
         """Do every step in order, whatever happens to the ones before; returns a finding per step that failed."""
@@ -123,15 +140,20 @@ class Supervisor:
         return tuple(failed)
 
     def _received(self, name: str) -> None:
-        if self._mode is _Mode.IGNORED or self._signal is not None:
+        if self._signal is not None:
             self._ignored.append(name)
             return
         self._signal = name
         if self._mode is _Mode.AT_ONCE:
-            self._raise_if_stopped()
+            self.checkpoint()
 
-    def _raise_if_stopped(self) -> None:
-        if self._signal is not None:
+    def checkpoint(self) -> None:
+        """End here if a signal has asked for it.
+
+        Raises:
+            SignalAbort: one has, and nothing has been ended for it yet.
+        """
+        if self._signal is not None and not self._answered:
             raise SignalAbort(f"stopped by {self._signal}")
 
     def _log_ignored(self) -> None:

@@ -24,12 +24,13 @@ from bench import reanalysis, runner
 from bench.cli.compose import simulated
 from bench.errors import BenchError
 from bench.limits import Limit, Verdict
+from bench.opened import Job
 from bench.procedure import Procedure
 from bench.progress import PlainProgress
 from bench.recording import Recording
 from bench.records import SCHEMA_FILE, Outcome, Record
 from bench.rigfile import RigFile, load_rig
-from bench.runner import Job, RunResult
+from bench.runner import RunResult
 from bench.supervisor import Supervisor
 
 Run = Callable[..., RunResult]
@@ -175,7 +176,13 @@ def test_a_dead_link_is_an_error_and_every_step_of_make_safe_is_tried(run: Run) 
     assert codes(result)[0] == "link-lost"
     tried = [line for line in (result.directory / "run.log").read_text().splitlines() if "make safe: " in line]
     begun = [line.split("make safe: ")[1] for line in tried if "failed" not in line]
-    assert begun == ["stop the rotor", "land the rotor", "switch the amplifiers off", "the controller's own make-safe"]
+    assert begun == [
+        "see where the machine stands",
+        "stop the rotor",
+        "land the rotor",
+        "switch the amplifiers off",
+        "the controller's own make-safe",
+    ]
     assert [f.where for f in result.record.findings if f.code == "make-safe-failed"] == [
         "land the rotor",
         "the controller's own make-safe",
@@ -199,8 +206,34 @@ def test_a_signal_in_the_middle_of_a_sleep(run: Run, rig: RigFile, number: signa
     assert result.stopped_by_signal
     assert last_state(result, rig) == "OFF"
     recording: Recording[Any] = Recording.open(result.directory / "recording.mcap")
+    stopped = recording.events("log")[0]
     landing = next(e for e in recording.events("command") if e["name"] == "LAND")
-    assert landing["t_ns"] - times[0] <= 100_000_000
+    assert stopped["t_ns"] - times[0] <= 100_000_000
+    assert landing["t_ns"] - stopped["t_ns"] <= 50_000_000
+
+
+class Interrupting(PlainProgress):
+    """Sends a signal when a stage begins."""
+
+    def __init__(self, at: str) -> None:
+        super().__init__(io.StringIO())
+        self._at = at
+
+    def stage(self, text: str) -> None:
+        if text == self._at:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+
+@pytest.mark.parametrize("stage", ["bring the rig to LEVITATED", "acquire", "make safe", "analyse", "report"])
+def test_a_signal_in_any_part_of_a_run_lands_and_ends_aborted(tmp_path: Path, rig: RigFile, stage: str) -> None:
+    job = Job(tiny_procedures.levitated, rig, Plan(), {}, "sim", 1)
+    connect = simulated(rig, 1, {}, "auto")
+    with Supervisor().watching() as supervisor:
+        result = runner.run(job, tmp_path, connect, supervisor, Interrupting(stage), lambda *_: None)
+    assert result.outcome is Outcome.ABORTED
+    assert codes(result) == ["signal"]
+    assert last_state(result, rig) == "OFF"
+    assert json.loads((result.directory / "record.json").read_text())["outcome"] == "ABORTED"
 
 
 @pytest.mark.parametrize(

@@ -154,8 +154,17 @@ def test_a_second_signal_during_make_safe_is_logged_and_ignored(
     assert supervisor.stopped_by == "SIGINT"
 
 
-def test_a_first_signal_during_make_safe_does_not_turn_the_run_into_an_abort(supervisor: Supervisor) -> None:
-    step = SafeStep("land", lambda: os.kill(os.getpid(), signal.SIGINT), 5.0)
-    assert supervisor.make_safe((step,), lambda: 0) == ()
-    supervisor.check(0)
-    assert supervisor.stopped_by is None
+def test_a_first_signal_during_make_safe_waits_until_the_machine_is_safe(supervisor: Supervisor) -> None:
+    base = StillClock()
+    clock = PumpedClock(base, lambda: supervisor.check(base.t_ns))
+    done: list[str] = []
+
+    def land() -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        clock.sleep(1.0)
+        done.append("landed")
+
+    assert supervisor.make_safe((SafeStep("land", land, 5.0),), base.now_ns) == ()
+    assert done == ["landed"]
+    with pytest.raises(SignalAbort, match="SIGINT"):
+        supervisor.checkpoint()

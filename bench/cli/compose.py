@@ -18,13 +18,12 @@ from bench import catalogue, plans
 from bench.clock import Clock
 from bench.envelope import Envelope
 from bench.errors import ConfigError, OperatorAbort
-from bench.opened import OpenRig, WatchedClock
+from bench.opened import Connect, Job, OpenRig, WatchedClock
 from bench.procedure import Procedure
 from bench.recorder import Recorder
 from bench.rig import Rig
 from bench.rigfile import RigFile, load_rig
 from bench.roles import Operator
-from bench.runner import Connect, Job
 from bench.specs import load_spec
 from bench.supervisor import SafeStep, Supervisor
 
@@ -168,6 +167,9 @@ def safe_steps(controller: CanController) -> tuple[SafeStep, ...]:
     controller's own. Levitation is not released while the rotor turns above the landing speed: the controller refuses.
     """
 
+    def look() -> None:
+        controller.clock.sleep(0.02)  # a command may have been sent whose effect nobody has seen yet
+
     def stop() -> None:
         if controller.mode == "SPINNING":
             controller.stop()
@@ -189,6 +191,7 @@ def safe_steps(controller: CanController) -> tuple[SafeStep, ...]:
             _until(lambda: controller.mode in ("OFF", "FAULT"), controller.clock)
 
     return (
+        SafeStep("see where the machine stands", look, COMMAND_S),
         SafeStep("stop the rotor", stop, STOP_S),
         SafeStep("land the rotor", land, LAND_S),
         SafeStep("switch the amplifiers off", disable, COMMAND_S),
@@ -208,7 +211,7 @@ def _prompt(supervisor: Supervisor) -> Callable[[str], str]:
     def ask(question: str) -> str:
         sys.stderr.write(question)
         sys.stderr.flush()
-        with supervisor.waiting():
+        with supervisor.interruptible():
             answer = sys.stdin.readline()
         if not answer:
             raise OperatorAbort("standard input is closed: nobody can answer")

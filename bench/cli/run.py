@@ -12,6 +12,7 @@ from bench.progress import shown_on
 from bench.records import Outcome, Record
 from bench.runner import RunResult
 from bench.supervisor import Supervisor
+from bench.uncertainty import round_to_uncertainty
 
 STATUS = {Outcome.PASS: 0, Outcome.FAIL: 1, Outcome.ERROR: 3, Outcome.ABORTED: 4, Outcome.INDETERMINATE: 5}
 
@@ -45,7 +46,8 @@ def summary(record: Record) -> str:
     for m in record.measurements:
         value = "missing"
         if m.value is not None and m.expanded_uncertainty is not None:
-            value = f"{m.value:.6g} +- {m.expanded_uncertainty:.2g} {m.unit}"
+            value, expanded = round_to_uncertainty(m.value, m.expanded_uncertainty)
+            value = f"{value} +- {expanded} {m.unit}"
         lines.append(f"  {m.name:8} {value:32} {m.verdict.value}")
     lines += [f"  {f.effect.value}: {f.code}: {f.text}" for f in record.findings]
     return "\n".join([*lines, f"outcome {record.outcome.value}"]) + "\n"

@@ -89,7 +89,9 @@ class Plant:
         state = self._s.law
         if mode == LIFT or state.mode == OFF:
             state.fresh = 1
-        state.lift_clock = 0
+        # A lift that is broken off is landed from where it stands: the smooth step is its own mirror image.
+        broken_off = mode == LAND and state.mode == LIFT
+        state.lift_clock = self._c.lift_time_s - state.lift_clock if broken_off else 0
         state.mode = mode
 
     @property

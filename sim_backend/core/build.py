@@ -50,14 +50,13 @@ def _compile(sources: list[Path], target: Path) -> None:
     with tempfile.TemporaryDirectory(dir=HERE) as folder:
         made = Path(folder) / "core.so"
         command = [compiler, *FLAGS, "-o", str(made), *map(str, sources), "-lm"]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, check=False)
+        except OSError as error:
+            raise ConfigError(f"the C compiler {compiler!r} (from CC) cannot be started: {error.strerror}") from error
         if done.returncode != 0:
             raise ConfigError(f"{compiler} could not build the simulator core:\n{done.stderr}")
         os.replace(made, target)
     for old in HERE.glob("tsbs-*.so"):
         if old != target:
             old.unlink(missing_ok=True)
-
-
-if __name__ == "__main__":
-    library()

@@ -12,6 +12,9 @@ static double clip(double x, double low, double high) { return x < low ? low : x
 
 static double toward(double from, double to, double step) { return from + clip(to - from, -step, step); }
 
+/* a set angle is meant within a turn: after spinning, the nearest such angle is the target, not the way back */
+static double whole_turns(double angle) { return TWO_PI * floor(angle / TWO_PI + 0.5); }
+
 /* share of the way that the references have gone from the rest position to the set point */
 static double lifted(const tsbs_control *c, tsbs_law_state *l) {
     if (l->mode == LEVITATE) return 1;
@@ -48,11 +51,13 @@ static void rotation(const tsbs_control *c, tsbs_law_state *l, double angle, tsb
         l->angle_target = angle;
         l->speed_target = l->angle_filtered;
         l->angle_integral = 0;
+        l->turns = whole_turns(angle - c->angle_ref);
     } else if (c->speed_ref != 0 || l->speed_target != 0) {
         l->speed_target = toward(l->speed_target, c->speed_ref, c->acceleration * TICK);
         l->angle_target += l->speed_target * TICK;
+        l->turns = whole_turns(l->angle_target - c->angle_ref);
     } else {
-        l->angle_target = toward(l->angle_target, c->angle_ref, c->angle_slew * TICK);
+        l->angle_target = toward(l->angle_target, c->angle_ref + l->turns, c->angle_slew * TICK);
     }
     double error = l->angle_target - angle;
     /* one encoder count is no error: an integrator that believed it would hunt against the Coulomb friction */
@@ -87,6 +92,7 @@ void tsbs_law(const tsbs_control *c, tsbs_law_state *l, const tsbs_reading *r, t
             memset(l->filtered, 0, sizeof l->filtered);
             l->angle_target = r->angle;
             l->speed_target = l->angle_integral = l->angle_filtered = l->i_x = l->i_y = 0;
+            l->turns = whole_turns(r->angle - c->angle_ref);
         }
         l->fresh = 0;
     }

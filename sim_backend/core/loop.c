@@ -109,8 +109,9 @@ static void watch(const tsbs_params *p, tsbs_state *st, const double *coil, doub
         if (square > p->clearance * p->clearance) st->flags |= b ? CONTACT_O : CONTACT_I;
         lost |= square > p->lost_radius * p->lost_radius;
     }
-    st->lost_ticks = st->law.mode == LEVITATE && lost ? st->lost_ticks + 1 : 0;
-    if (st->lost_ticks * TICK > p->lost_time) trips |= TRIP_LOST;
+    /* a rotor that bounces between the rings is lost too: a tick outside counts two, a tick inside takes one back */
+    st->lost_ticks = st->law.mode != LEVITATE ? 0 : lost ? st->lost_ticks + 2 : st->lost_ticks > 0 ? st->lost_ticks - 1 : 0;
+    if (st->lost_ticks * TICK > 2 * p->lost_time) trips |= TRIP_LOST;
     for (int k = 0; k < 10; k++) {
         if (fabs(coil[k]) > p->trip_current) trips |= TRIP_CURRENT;
         if (st->applied.coil[k] >= p->coil_limit[k]) st->flags |= SATURATED;

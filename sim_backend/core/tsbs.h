@@ -45,7 +45,7 @@ typedef struct {
 typedef struct {
     double integral[5], filtered[5], previous[5], rest[5];
     double angle_target, speed_target, angle_integral, angle_filtered, angle_previous, i_x, i_y;
-    double lift_clock;
+    double lift_clock, turns;
     int32_t mode, fresh;
 } tsbs_law_state;
 

@@ -1,0 +1,170 @@
+"""The machine's part of a run: bring the rig to its state, acquire, and make safe, always."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from datetime import datetime
+from typing import Any, cast
+
+from bench import provenance, runlog
+from bench.errors import (
+    Aborted,
+    BenchError,
+    DeviceFault,
+    InterlockError,
+    LinkError,
+    OperatorAbort,
+    RecordingError,
+    SignalAbort,
+)
+from bench.evaluation import Ending
+from bench.findings import Effect, Finding
+from bench.opened import Connect, Job, OpenRig
+from bench.progress import Progress
+from bench.recorder import Recorder
+from bench.records import LinkCounts, Outcome
+from bench.roles import RigState
+from bench.rundir import RunDirectory
+from bench.states import transition
+from bench.supervisor import SafeStep, Supervisor
+
+logger = logging.getLogger("bench.runner")
+CODES: tuple[tuple[type[BaseException], str], ...] = (
+    (SignalAbort, "signal"), (OperatorAbort, "operator-stop"), (DeviceFault, "controller-fault"),
+    (InterlockError, "interlock"), (LinkError, "link-lost"), (RecordingError, "recording-failed"),
+    (BenchError, "run-failed"),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Acquired:
+    """The machine's part of a run: how and when it ended, and the truth if the rig is simulated."""
+
+    ending: Ending
+    ended: str
+    truth: Mapping[str, Any] | None
+
+
+def acquired(
+    job: Job, directory: RunDirectory, started: datetime, connect: Connect, supervisor: Supervisor, progress: Progress
+) -> Acquired:
+    """Open the rig and the recording, move, make safe, close. Raises nothing: what went wrong is in the ending."""
+    truth: Mapping[str, Any] | None = None
+    ending: Ending | None = None
+    wall = provenance.wall(directory, started)
+    try:
+        with connect(supervisor) as live:
+            truth = live.truth
+            recorder = Recorder(
+                directory.recording, clock=live.rig.clock, streams=live.streams, header=provenance.header(job),
+                live=job.backend == "live",
+            )  # fmt: skip
+            with recorder:
+                live.attach(recorder)
+                cause, findings = _moved(job, live, recorder, supervisor, progress)
+                ending = _ending(cause, findings, live, recorder)
+                wall = provenance.wall(directory, started)
+                recorder.wall |= wall
+                with suppress(RecordingError):  # closing raises the same failure again
+                    ending.write(recorder)
+    except Exception as error:
+        stopped, finding = cause_of(error)
+        before = ending or Ending()
+        known = finding.code in [f.code for f in before.findings]  # a failed recorder raises again when it is closed
+        findings = before.findings if known else (*before.findings, finding)
+        ending = replace(before, stopped=before.stopped or stopped, findings=findings)
+    assert ending is not None
+    return Acquired(ending, wall["ended"], truth)
+
+
+def _moved(
+    job: Job, live: OpenRig, recorder: Recorder, supervisor: Supervisor, progress: Progress
+) -> tuple[BaseException | None, tuple[Finding, ...]]:
+    """Bring the rig to the procedure's state, acquire, make safe; what ended it early, and what make-safe could not do."""
+    cause: BaseException | None = None
+    rig, procedure = live.rig, job.procedure
+    with runlog.warnings_to(lambda room, text: recorder.event("log", room=room, text=text)):
+        try:
+            with supervisor.moving():
+                progress.stage(f"bring the rig to {procedure.state}")
+                transition(rig, RigState.READY)
+                for name, value in procedure.settings(job.plan).items():
+                    rig.levitation.set(name, value)
+                transition(rig, procedure.state)
+                progress.stage("acquire")
+                progress.total(procedure.step_count(job.plan))
+                procedure.acquire(rig, job.plan, cast(Recorder, WatchedSteps(recorder, progress)))
+        except BaseException as error:
+            # Whatever it is, also SystemExit: the machine is made safe first.
+            cause = error
+        finally:
+            with supervisor.finishing(), suppress(Exception):
+                _told(cause, progress)
+            live.unguard()
+            findings = supervisor.make_safe([_recording_or_not(s, live) for s in live.safe_steps], rig.clock.now_ns)
+    return cause, findings
+
+
+def _told(cause: BaseException | None, progress: Progress) -> None:
+    if cause is not None:
+        logger.warning("stopped: %s", str(cause) or type(cause).__name__)
+    progress.stage("make safe")
+
+
+def _recording_or_not(step: SafeStep, live: OpenRig) -> SafeStep:
+    """A recorder that fails (a full disk) must not keep the machine from being made safe."""
+
+    def action() -> None:
+        try:
+            step.action()
+        except RecordingError as error:
+            live.attach(None)
+            logger.error("recording stopped: %s", error)
+            step.action()
+
+    return SafeStep(step.name, action, step.timeout_s)
+
+
+class WatchedSteps:
+    """The recorder as `acquire` sees it, with each step told to the progress display."""
+
+    def __init__(self, recorder: Recorder, progress: Progress) -> None:
+        self._recorder, self._progress = recorder, progress
+
+    @contextmanager
+    def step(self, kind: str, **labels: Any) -> Iterator[None]:
+        said = ", ".join(f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in labels.items() if v != "")
+        self._progress.step(f"{kind} {said}")
+        with self._recorder.step(kind, **labels):
+            yield
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._recorder, name)
+
+
+def _ending(cause: BaseException | None, findings: tuple[Finding, ...], live: OpenRig, recorder: Recorder) -> Ending:
+    counters = live.rig.counters
+    # Lost samples are gaps; everything else that a clean link does not do is an error.
+    errors = counters.wrong_length + counters.duplicates + counters.reordered + counters.reboots
+    link = LinkCounts(sum(recorder.integrity.frames.values()), counters.gaps, errors)
+    if counters.lost:
+        text = f"{counters.lost} samples were lost in {counters.gaps} gaps"
+        findings = (*findings, Finding("samples-lost", text, "telemetry"))
+    if cause is None:
+        return Ending(None, findings, link)
+    stopped, finding = cause_of(cause)
+    return Ending(stopped, (finding, *findings), link)
+
+
+def cause_of(error: BaseException) -> tuple[Outcome, Finding]:
+    """Outcome and finding of what ended a run early; an error nobody raised on purpose leaves its traceback in the log."""
+    code = next((code for kind, code in CODES if isinstance(error, kind)), "exception")
+    text = str(error)
+    if code == "exception":
+        text = f"{type(error).__name__}: {error}"
+        logger.error("unexpected %s (traceback in run.log)", text, exc_info=error)
+    stopped = Outcome.ABORTED if isinstance(error, Aborted | KeyboardInterrupt) else Outcome.ERROR
+    return stopped, Finding(code, text, "acquire", Effect.ERROR)

@@ -1,0 +1,140 @@
+"""Every message of tsbs12, byte by byte, written down by hand from the message map's description."""
+
+from __future__ import annotations
+
+import pytest
+
+from bench.codec import Decoder, encode
+from bench.frames import frame
+from bench.messages import MessageMap
+from bench.rigfile import load_rig
+
+TELEMETRY = [
+    ("seq", 4660, "34 12"),  # 0x1234, low byte first
+    ("tick", 74565, "45 23 01 00"),  # 0x00012345
+    ("pos_xi", 50e-6, "C4 09"),  # 50 um / 20 nm = 2500 = 0x09C4
+    ("pos_yi", -100e-6, "78 EC"),  # -100 um / 20 nm = -5000; 65536 - 5000 = 60536 = 0xEC78
+    ("pos_xo", 0.0, "00 00"),
+    ("pos_yo", 20e-9, "01 00"),  # one step
+    ("pos_z", -20e-9, "FF FF"),  # one step down
+    ("angle", -1.5707963267948966, "00 C0"),  # -pi/2 / (2 pi / 65536) = -16384; 65536 - 16384 = 0xC000
+    ("speed", 40.0, "40 1F"),  # 40 / 0.005 = 8000 = 0x1F40
+    ("i_xi_p", 3.0, "70 17"),  # 3 / 0.0005 = 6000 = 0x1770
+    ("i_xi_n", 2.5, "88 13"),  # 5000 = 0x1388
+    ("i_yi_p", 4.0, "40 1F"),  # 8000 = 0x1F40
+    ("i_yi_n", 2.0, "A0 0F"),  # 4000 = 0x0FA0
+    ("i_xo_p", 3.0005, "71 17"),  # 6001 = 0x1771
+    ("i_xo_n", -0.0005, "FF FF"),  # -1
+    ("i_yo_p", 12.0, "C0 5D"),  # 24000 = 0x5DC0
+    ("i_yo_n", 0.1, "C8 00"),  # 200 = 0x00C8
+    ("i_z_p", 1.5, "B8 0B"),  # 3000 = 0x0BB8
+    ("i_z_n", 16.3835, "FF 7F"),  # 32767, the top of the range
+    ("i_m1", -16.384, "00 80"),  # -32768, the bottom of the range
+    ("i_m2", 1.0, "D0 07"),  # 2000 = 0x07D0
+    ("i_m3", -1.0, "30 F8"),  # 65536 - 2000 = 63536 = 0xF830
+    ("i_m4", -2.5, "78 EC"),  # 65536 - 5000 = 0xEC78
+    ("supply", 48.0, "C0 12"),  # 48 / 0.01 = 4800 = 0x12C0
+    ("temp_i", 293.15, "83 72"),  # 29315 = 0x7283
+    ("temp_o", 300.0, "30 75"),  # 30000 = 0x7530
+    ("temp_m", 353.0, "E4 89"),  # 35300 = 0x89E4
+    ("state", 3, "03 00"),  # LEVITATED
+    ("fault", 4, "04 00"),  # HEARTBEAT_LOST
+    ("flags", 21, "15 00"),  # bits 0, 2 and 4: 1 + 4 + 16
+    ("host_age", 0.08, "50 00"),  # 80 ms / 1 ms = 80 = 0x50
+]
+
+GOLDEN = {
+    "Telemetry": (0x100, TELEMETRY),
+    "Heartbeat": (0x010, [
+        ("session", 3735928559, "EF BE AD DE"),  # 0xDEADBEEF
+        ("counter", 513, "01 02"),  # 2 * 256 + 1
+        ("spare", 0, "00 00"),
+    ]),
+    "Command": (0x011, [
+        ("session", 1, "01 00 00 00"),
+        ("code", 4, "04"),  # SPIN
+        ("token", 254, "FE"),
+        ("spare", 0, "00 00"),
+    ]),
+    "ParamSet": (0x012, [
+        ("index", 35, "23 00"),  # 2 * 16 + 3
+        ("value", -40.0, "00 00 20 C2"),  # -1.25 * 2^5: sign 1, exponent 127 + 5 = 0x84, fraction 0.25 -> 0xC2200000
+        ("token", 7, "07"),
+        ("spare", 0, "00"),
+    ]),
+    "ParamGet": (0x013, [("index", 258, "02 01"), ("token", 9, "09"), ("spare", 0, "00")]),  # 256 + 2
+    "CommandReply": (0x021, [
+        ("code", 6, "06"),  # CLEAR_FAULT
+        ("token", 11, "0B"),
+        ("status", 3, "03"),  # WRONG_STATE
+        ("state", 7, "07"),  # FAULT
+    ]),
+    "ParamReply": (0x022, [
+        ("index", 1, "01 00"),
+        ("status", 2, "02"),  # OUT_OF_RANGE
+        ("token", 128, "80"),
+        ("value", 3.0, "00 00 40 40"),  # 1.5 * 2^1: exponent 128 = 0x80, fraction 0.5 -> 0x40400000
+    ]),
+    "Identity": (0x023, [
+        ("protocol", 1, "01 00"),
+        ("map_version", 258, "02 01"),
+        ("serial", 4000000000, "00 28 6B EE"),  # 0xEE6B2800
+    ]),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def messages() -> MessageMap:
+    return load_rig("tsbs12").messages
+
+
+def test_every_message_has_a_golden_frame(messages: MessageMap) -> None:
+    assert GOLDEN.keys() == messages.messages.keys()
+    for name, (_, signals) in GOLDEN.items():
+        assert [n for n, _, _ in signals] == [s.name for s in messages[name].signals], name
+
+
+@pytest.mark.parametrize("name", GOLDEN)
+def test_bytes_to_values(messages: MessageMap, name: str) -> None:
+    identifier, signals = GOLDEN[name]
+    payload = bytes.fromhex("".join(text for _, _, text in signals))
+    values, wrong = Decoder(messages[name]).decode(frame(identifier, payload))
+    assert wrong == 0
+    for signal, value, _ in signals:
+        assert values[signal].tolist() == [pytest.approx(value, rel=1e-14, abs=0)], signal
+
+
+@pytest.mark.parametrize("name", GOLDEN)
+def test_values_to_bytes(messages: MessageMap, name: str) -> None:
+    identifier, signals = GOLDEN[name]
+    payload = encode(messages[name], {signal: value for signal, value, _ in signals})
+    assert payload.hex(" ").upper() == " ".join(text for _, _, text in signals)
+    assert messages[name].identifier == identifier
+    assert messages[name].length == len(payload)
+    assert messages[name].fd
+
+
+@pytest.mark.parametrize(
+    ("message", "signal", "names"),
+    [
+        ("Telemetry", "state", "OFF READY LIFTING LEVITATED SPINNING LANDING COASTING FAULT"),
+        ("CommandReply", "state", "OFF READY LIFTING LEVITATED SPINNING LANDING COASTING FAULT"),
+        ("Telemetry", "fault", "NONE CONTACT OVERCURRENT OVERSPEED HEARTBEAT_LOST LEVITATION_LOST SENSOR LIFT_TIMEOUT "
+                               "OVERTEMPERATURE"),
+        ("Command", "code", "DISABLE ENABLE LEVITATE LAND SPIN STOP CLEAR_FAULT MAKE_SAFE IDENTIFY"),
+        ("CommandReply", "code", "DISABLE ENABLE LEVITATE LAND SPIN STOP CLEAR_FAULT MAKE_SAFE IDENTIFY"),
+        ("CommandReply", "status", "OK UNKNOWN OUT_OF_RANGE WRONG_STATE WRONG_SESSION READ_ONLY"),
+        ("ParamReply", "status", "OK UNKNOWN OUT_OF_RANGE WRONG_STATE WRONG_SESSION READ_ONLY"),
+    ],
+)  # fmt: skip
+def test_codes_have_their_names(messages: MessageMap, message: str, signal: str, names: str) -> None:
+    for number, name in enumerate(names.split()):
+        assert messages.code(message, signal, name) == number
+    assert len(messages[message].signal(signal).choices) == len(names.split())
+
+
+def test_periods_and_senders(messages: MessageMap) -> None:
+    assert messages["Telemetry"].period_s == pytest.approx(1e-3)
+    assert messages["Heartbeat"].period_s == pytest.approx(20e-3)
+    sent = {n for n, m in messages.messages.items() if m.sender == "Host"}
+    assert sent == {"Heartbeat", "Command", "ParamSet", "ParamGet"}
