@@ -170,7 +170,6 @@ def test_check_names_every_problem_at_once(bench: Bench, tmp_path: Path) -> None
     assert not (tmp_path / "runs").exists()
 
 
-@pytest.mark.xfail(strict=True, reason="bench.rigfile: an unknown unit hides the other problems of the file")
 def test_check_names_an_unknown_unit_beside_the_other_problems(bench: Bench, tmp_path: Path) -> None:
     source = catalogue.rig_path("tsbs12")
     text = source.read_text(encoding="utf-8").replace("latitude_deg = 53.527", "latitude_deg = 153")

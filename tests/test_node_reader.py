@@ -1,0 +1,56 @@
+"""A recording read in full by the reference implementation in another language. Runs where npm and its packages are."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from recordings import gapped, record
+
+NODE = Path(__file__).resolve().parent / "node"
+
+
+@pytest.fixture(scope="module")
+def reader() -> list[str]:
+    """The command that reads a file; installs its packages once, next to the script."""
+    npm, node = shutil.which("npm"), shutil.which("node")
+    if npm is None or node is None:
+        pytest.skip("npm is not installed")
+    if not (NODE / "node_modules" / "@mcap" / "support").is_dir():
+        command = [npm, "install", "--no-audit", "--no-fund", "--silent", "--no-package-lock"]
+        done = subprocess.run(command, cwd=NODE, capture_output=True, text=True, timeout=100)
+        if done.returncode:
+            pytest.skip(f"npm install failed: {done.stderr[-200:]}")
+    return [node, str(NODE / "read.mjs")]
+
+
+def read(command: list[str], path: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([*command, str(path)], capture_output=True, text=True, timeout=60)
+
+
+def test_the_reference_reader_reads_everything(reader: list[str], tmp_path: Path) -> None:
+    record(tmp_path / "a.mcap", gapped())
+    done = read(reader, tmp_path / "a.mcap")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    # blocks of 500, 500, 200, then after the gap 500, 500, 100 samples; the gap ends at 1205 and blocks end inside a
+    # 10 ms window at 1705 and 2205, which makes a second view of these two windows
+    counts = {"/telemetry/block": 6, "/telemetry/view": 120 + 110 + 1 + 2, "/raw/can0": 24, "/events": 2 + 2 * 23}
+    assert found["sequential"] == counts
+    assert found["indexed"] == counts
+    assert found["stated"] == counts
+    assert found["metadata"] == ["layout", "run", "versions", "integrity", "wall"]
+    assert found["attachments"] == ["rig.toml", "plan.json"]
+
+
+def test_the_reference_reader_refuses_a_flipped_byte(reader: list[str], tmp_path: Path) -> None:
+    record(tmp_path / "a.mcap", gapped())
+    data = bytearray((tmp_path / "a.mcap").read_bytes())
+    data[len(data) // 3] ^= 0x10
+    (tmp_path / "a.mcap").write_bytes(data)
+    done = read(reader, tmp_path / "a.mcap")
+    assert done.returncode != 0
+    assert "sequential" not in done.stdout

@@ -1,0 +1,242 @@
+"""Rig files: the shipped one, and every way of getting one wrong, alone and several at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from bench import rigfile
+from bench.errors import ConfigError, Problem
+from bench.rigcheck import check_rig
+from bench.rigfile import RigFile, load_rig
+
+RIGS = Path(__file__).resolve().parent.parent / "rigs"
+TOML = (RIGS / "tsbs12.toml").read_text(encoding="utf-8")
+DBC = (RIGS / "tsbs12.dbc").read_text(encoding="utf-8")
+SPAN = 'amb_span = { value = 125.0, unit = "mm", u = 0.05, distribution = "normal", source = "certificate SIM-L-102" }'
+
+
+def changed(text: str, *changes: tuple[str, str]) -> str:
+    for old, new in changes:
+        assert text.count(old) >= 1, old
+        text = text.replace(old, new, 1)
+    return text
+
+
+def written(folder: Path, toml: str = TOML, dbc: str = DBC) -> str:
+    (folder / "tsbs12.dbc").write_text(dbc, encoding="utf-8")
+    (folder / "rig.toml").write_text(toml, encoding="utf-8")
+    return str(folder / "rig.toml")
+
+
+def problems(folder: Path, toml: str = TOML, dbc: str = DBC) -> dict[str, Problem]:
+    """The problems by key; loading must refuse the rig for the same reasons."""
+    path = written(folder, toml, dbc)
+    found, _ = check_rig(path)
+    with pytest.raises(ConfigError) as caught:
+        load_rig(path)
+    if caught.value.problems:
+        assert {p.key for p in caught.value.problems} <= {p.key for p in found}
+    for p in found:
+        assert p.file
+        assert p.found
+        assert p.expected
+    return {p.key: p for p in found}
+
+
+def test_the_shipped_rig_has_no_problem_and_is_si() -> None:
+    found, load = check_rig("tsbs12")
+    assert found == ()
+    assert load is not None
+    assert 0.1 < load.total < 0.3
+    rig = load_rig("tsbs12")
+    assert rig.geometry["hook_to_outboard"].value == pytest.approx(0.150, rel=1e-14)
+    assert rig.geometry["hook_to_outboard"].standard_uncertainty == pytest.approx(5e-5, rel=1e-14)
+    assert rig.geometry["motor_stiffness"].unit == "N/m"
+    assert rig.geometry["motor_stiffness"].value == pytest.approx(242.6e3, rel=1e-14)
+    assert rig.masses["M4"].standard_uncertainty == pytest.approx(0.3e-3 / 2, rel=1e-14)  # U is given at k = 2
+    assert rig.mass_density.standard_uncertainty == pytest.approx(140 / 3**0.5, rel=1e-14)
+
+
+def test_the_digest_is_of_both_texts() -> None:
+    one = RigFile.parse(TOML, DBC).digest
+    assert one == RigFile.parse(TOML, DBC).digest
+    assert one != RigFile.parse(TOML + "\n# a comment\n", DBC).digest
+    assert one != RigFile.parse(TOML, DBC + "\n").digest
+
+
+def test_a_rig_file_is_frozen() -> None:
+    rig = load_rig("tsbs12")
+    with pytest.raises(ValueError, match="frozen"):
+        rig.name = "other"  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "expected"),
+    [
+        ('serial = "SIM-0001"', 'serial = "SIM-0001"\ncolour = "red"', "uut.colour", "no such key"),
+        ('name = "tsbs12"', 'name = "tsbs12"\ncolour = "red"', "colour", "no such key"),
+        ('serial = "SIM-0001"', "", "uut.serial", "a value"),
+        ("latitude_deg = 53.527", "latitude_deg = 153.527", "site.latitude_deg", "less than or equal to 90"),
+        ('unit = "A", default = 3, low = 0', 'unit = "Amp", default = 3, low = 0', "parameters.bias_i.unit", "known unit"),
+        ('signal = "Telemetry.speed", unit = "rad/s"', 'signal = "Telemetry.speed", unit = "rpm"', "channels.speed.unit",
+         "known unit"),
+        ('signal = "Telemetry.speed", unit = "rad/s"', 'signal = "Telemetry.speed", unit = "A"', "channels.speed.unit",
+         "the kind of rad/s"),
+        (', source = "certificate SIM-L-102"', "", "geometry.amb_span.source", "a value"),
+        ('source = "certificate SIM-L-102"', 'source = ""', "geometry.amb_span.source", "at least 1 character"),
+        ('125.0, unit = "mm", u = 0.05', '125.0, unit = "mm"', "geometry.amb_span", "expected either u"),
+        ('u = 0.05, distribution = "normal", source = "certificate SIM-L-102"',
+         'u = 0.05, distribution = "rectangular", source = "x"', "geometry.amb_span", "goes with half_width"),
+        ('half_width = 0.02, distribution = "rectangular", source = "groove',
+         'half_width = 0, distribution = "normal", source = "groove', "hook_seat", "goes with u"),
+        ('125.0, unit = "mm"', '125.0, unit = "furlong"', "geometry.amb_span", "unknown unit 'furlong'"),
+        ('125.0, unit = "mm"', '125.0, unit = "kg"', "geometry.amb_span.unit", "the kind of m"),
+        ("125.0, unit", "nan, unit", "geometry.amb_span.value", "finite number"),
+        ("amb_span =", "amb_spam =", "geometry.amb_span", "AMB plane to AMB plane, with its certificate"),
+        ("amb_span =", "amb_spam =", "geometry.amb_spam", "did you mean amb_span?"),
+        ("value = 125.0", "value = 140.0", "geometry.amb_span.value", "within 1 mm of"),
+        ("com_to_motor = { value = 122", "com_to_motor = { value = -122", "geometry.com_to_motor.value", "a positive"),
+        ("clearance = { value = 0.25", "clearance = { value = 0.6", "geometry.clearance.value", "less than amb_gap"),
+        ("M4 = { value = 3.0", "M4 = { value = 30.0", "masses.M4.value", "at most envelope.max_hung_kg"),
+        ("M4 = { value = 3.0", "M4 = { value = -3.0", "masses.M4.value", "a positive mass"),
+        ("default = 3, low = 0, high = 5", "default = 6, low = 0, high = 5", "parameters.bias_i.default", "0 to 5"),
+        ("default = 3, low = 0, high = 5", "default = 3, low = 5, high = 0", "parameters.bias_i", "low <= high"),
+        ("bias_o = { index = 2", "bias_o = { index = 1", "parameters.bias_o.index", "an index of its own (bias_i)"),
+        ('"Telemetry.pos_xi"', '"Telemetry.pos_xj"', "channels.pos_xi.signal", "such as Telemetry."),
+        ("[devices.controller]", "[devices.controler]", "devices", "[devices.controller]"),
+        ('link = "can0"', 'link = "can1"', "devices.controller.link", "one of can0"),
+        ("data_bitrate = 5_000_000", "", "links.can0", "Telemetry takes 71%"),
+        ("bitrate = 1_000_000", "bitrate = 0", "links.can0.bitrate", "greater than 0"),
+        ("max_hung_kg = 3.5", "", "envelope.max_hung_kg", "a value"),
+    ],
+)  # fmt: skip
+def test_one_mistake_is_named_with_its_key(tmp_path: Path, old: str, new: str, key: str, expected: str) -> None:
+    toml = changed(TOML, (old, new))
+    if key == "links.can0":  # at one rate telemetry alone takes 714 us a ms: half the rate is too much
+        toml = changed(toml, ("bitrate = 1_000_000", "bitrate = 500_000"))
+        expected = "at most 90%; Telemetry takes 143%"
+    found = problems(tmp_path, toml)
+    assert key in found, found
+    assert expected in found[key].expected
+    assert str(tmp_path) in found[key].file
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "expected"),
+    [
+        (" SG_ pos_xi : 48|16@1-", " SG_ pos_xj : 48|16@1-", "channels.pos_xi.signal", "such as Telemetry.pos_x"),
+        ('[-0.00065536|0.00065534] "m" Host', '[-0.00065536|0.00065534] "thou" Host', "Telemetry.pos_xi", "a known unit"),
+        ('[-163.84|163.835] "rad/s" Host', '[-163.84|163.835] "A" Host', "channels.speed.unit", "the kind of A"),
+        ("BO_ 16 Heartbeat:", "BO_ 16 Heartbeet:", "Heartbeat", "the message"),
+        ("ParamGet: 4 Host", "ParamGet: 9 Host", "ParamGet", "a CAN FD length"),
+        (" SG_ tick : 16|32", " SG_ tick : 15|32", "(file)", "a usable DBC"),
+        ("BO_ 256 Telemetry: 64", "BO_ 256 Telemetry: 48", "(file)", "a usable DBC"),
+        ('BA_ "GenMsgCycleTime" BO_ 16 20;', 'BA_ "GenMsgCycleTime" BO_ 16 0;\nBA_ "GenMsgCycleTime" BO_ 35 0;', "", ""),
+    ],
+)
+def test_a_mistake_in_the_dbc_is_named(tmp_path: Path, old: str, new: str, key: str, expected: str) -> None:
+    if not key:  # a control: a change that is no mistake is no problem
+        assert check_rig(written(tmp_path, dbc=changed(DBC, (old, new))))[0] == ()
+        return
+    found = problems(tmp_path, dbc=changed(DBC, (old, new)))
+    assert key in found, found
+    assert expected in found[key].expected
+
+
+def test_an_overfilled_bus_is_refused_with_its_load(tmp_path: Path) -> None:
+    slow = changed(TOML, ("bitrate = 1_000_000", "bitrate = 125_000"), ("data_bitrate = 5_000_000", "data_bitrate = 1e6"))
+    found = problems(tmp_path, slow)
+    # 34 bits at 125 kbit/s and 680 at 1 Mbit/s: 272 us + 680 us = 952 us a ms
+    assert list(found) == ["links.can0"]
+    assert "at most 90%; Telemetry takes 95%" in found["links.can0"].expected
+    assert found["links.can0"].found.startswith("a bus load of ")
+
+
+def test_several_mistakes_of_all_kinds_are_listed_at_once(tmp_path: Path) -> None:
+    toml = changed(
+        TOML,
+        ('serial = "SIM-0001"', 'serial = "SIM-0001"\ncolour = "red"'),
+        (', source = "certificate SIM-M-203"', ""),
+        ('150.0, unit = "mm"', '150.0, unit = "furlong"'),
+        ("clearance = { value = 0.25", "clearance = { value = 0.6"),
+        ("M4 = { value = 3.0", "M4 = { value = 30.0"),
+        ("default = 3, low = 0, high = 5", "default = 6, low = 0, high = 5"),
+        ("bitrate = 1_000_000", "bitrate = 100_000"),
+    )
+    dbc = changed(DBC, (" SG_ pos_xi : 48|16@1-", " SG_ pos_xj : 48|16@1-"))
+    found = problems(tmp_path, toml, dbc)
+    assert set(found) == {
+        "uut.colour", "masses.M3.source", "geometry.hook_to_outboard", "geometry.clearance.value", "masses.M4.value",
+        "parameters.bias_i.default", "links.can0", "channels.pos_xi.signal",
+    }  # fmt: skip
+
+
+def test_loading_names_every_problem_in_its_message(tmp_path: Path) -> None:
+    toml = changed(TOML, ('serial = "SIM-0001"', ""), ("max_hung_kg = 3.5", ""))
+    with pytest.raises(ConfigError) as caught:
+        load_rig(written(tmp_path, toml))
+    lines = str(caught.value).splitlines()
+    assert len(lines) == 3
+    assert "uut.serial: found nothing; expected a value" in lines[1]
+    assert "envelope.max_hung_kg: found nothing; expected a value" in lines[2]
+
+
+@pytest.mark.parametrize(
+    ("schema", "message"),
+    [
+        ("schema = 2", "schema: found 2; expected 1; it was written for a newer Levbench"),
+        ('schema = "1"', "schema: found '1'; expected 1"),
+        ("", "schema: found None; expected 1"),
+        ("schema = 0", "schema: found 0; no way from there to 1"),
+    ],
+)
+def test_another_schema_is_refused(tmp_path: Path, schema: str, message: str) -> None:
+    path = written(tmp_path, changed(TOML, ("schema = 1", schema)))
+    with pytest.raises(ConfigError) as caught:
+        load_rig(path)
+    assert message in str(caught.value)
+    found, load = check_rig(path)
+    assert len(found) == 1
+    assert load is None
+
+
+def test_an_older_schema_is_migrated_step_by_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def renamed(data: dict[str, object]) -> dict[str, object]:
+        return {("title" if k == "heading" else k): v for k, v in data.items()}
+
+    def rounded(data: dict[str, object]) -> dict[str, object]:
+        assert data["schema"] == 2
+        return {**data, "title": f"{data['title']}!"}
+
+    monkeypatch.setattr(rigfile, "SCHEMA", 3)
+    monkeypatch.setattr(rigfile, "MIGRATIONS", {1: renamed, 2: rounded})
+    rig = load_rig(written(tmp_path, changed(TOML, ('title = "Toothless', 'heading = "Toothless'))))
+    assert rig.schema_ == 3
+    assert rig.title.startswith("Toothless self-bearing")
+    assert rig.title.endswith("!")
+    monkeypatch.setattr(rigfile, "MIGRATIONS", {1: renamed})
+    with pytest.raises(ConfigError, match="found 2; no way from there to 3"):
+        load_rig(written(tmp_path))
+
+
+def test_an_unknown_rig_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(ConfigError, match=r"unknown rig 'tsbs13'; expected one of: .*Did you mean tsbs12\?"):
+        check_rig("tsbs13")
+
+
+def test_files_that_cannot_be_read_are_one_clear_error(tmp_path: Path) -> None:
+    path = Path(written(tmp_path))
+    (tmp_path / "tsbs12.dbc").unlink()
+    with pytest.raises(ConfigError, match=r"dbc: cannot read .*tsbs12\.dbc: .*No such file"):
+        check_rig(str(path))
+    path.write_text(changed(TOML, ('dbc = "tsbs12.dbc"', "")), encoding="utf-8")
+    with pytest.raises(ConfigError, match="links: found no dbc"):
+        check_rig(str(path))
+    path.write_text("name = tsbs12", encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"rig\.toml: not TOML: .*line 1"):
+        check_rig(str(path))
+    path.write_bytes(b"name = '\xff'")
+    with pytest.raises(ConfigError, match=r"rig\.toml: cannot be read: 'utf-8' codec"):
+        check_rig(str(path))
