@@ -9,8 +9,10 @@ from bench.messages import Message, MessageMap
 from bench.rigfile import load_rig
 
 
-def message(length: int, *, fd: bool = False, extended: bool = False, period_s: float = 0.0) -> Message:
-    return Message("M", 1 << 31 if extended else 1, length, fd, period_s, "", (), "")
+def message(
+    length: int, *, name: str = "M", fd: bool = False, extended: bool = False, period_s: float = 0.0
+) -> Message:
+    return Message(name, 1 << 31 if extended else 1, length, fd, period_s, "", (), "")
 
 
 @pytest.mark.parametrize(
@@ -55,7 +57,7 @@ def test_without_a_data_rate_everything_goes_at_the_nominal_one() -> None:
 
 
 def test_load_is_time_per_period_and_an_allowance_on_demand() -> None:
-    periodic, asked = message(64, fd=True, period_s=1e-3), message(8, fd=True)
+    periodic, asked = message(64, name="Telemetry", fd=True, period_s=1e-3), message(8, name="Command", fd=True)
     load = bus_load(MessageMap({"Telemetry": periodic, "Command": asked}), 1e6, 5e6)
     assert load.by_message["Telemetry"] == pytest.approx(170e-6 / 1e-3, rel=1e-12)  # 34 us + 136 us
     assert load.by_message["Command"] == pytest.approx(57e-6 * ON_DEMAND_HZ, rel=1e-12)  # 34 us + 23 us

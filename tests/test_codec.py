@@ -86,7 +86,7 @@ def cases(draw: st.DrawFn) -> tuple[str, list[bytes]]:
 
 def both(dbc: str) -> tuple[Message, Any]:
     """The message as we read it, and as cantools does."""
-    theirs = cantools.database.load_string(dbc, database_format="dbc")
+    theirs: Any = cantools.database.load_string(dbc, database_format="dbc")
     return load_messages(dbc)["M"], theirs.get_message_by_name("M")
 
 
@@ -186,5 +186,5 @@ def test_an_unknown_signal_is_refused_with_the_known_ones() -> None:
 
 @pytest.mark.parametrize("text", ['BO_ 1 M: 8 A\n SG_ a : 60|8@1+ (1,0) [0|0] "" A\n', "hello", "BO_ 1"])
 def test_a_dbc_that_is_none_is_refused_with_its_name(text: str) -> None:
-    with pytest.raises(ConfigError, match="^x.dbc: not a usable DBC"):
+    with pytest.raises(ConfigError, match=r"^x\.dbc: not a usable DBC"):
         load_messages(text, "x.dbc")

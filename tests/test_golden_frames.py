@@ -43,7 +43,7 @@ TELEMETRY = [
     ("host_age", 0.08, "50 00"),  # 80 ms / 1 ms = 80 = 0x50
 ]
 
-GOLDEN = {
+GOLDEN: dict[str, tuple[int, list[tuple[str, float, str]]]] = {
     "Telemetry": (0x100, TELEMETRY),
     "Heartbeat": (0x010, [
         ("session", 3735928559, "EF BE AD DE"),  # 0xDEADBEEF

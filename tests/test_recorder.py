@@ -35,8 +35,8 @@ def messages_of(path: Path) -> dict[str, list[tuple[int, Any]]]:
             if schema.name not in kinds:
                 pool = descriptor_pool.DescriptorPool()
                 for described in descriptor_pb2.FileDescriptorSet.FromString(schema.data).file:
-                    pool.Add(described)  # type: ignore[no-untyped-call]
-                kinds[schema.name] = message_factory.GetMessageClass(pool.FindMessageTypeByName(schema.name))  # type: ignore[no-untyped-call]
+                    pool.Add(described)
+                kinds[schema.name] = message_factory.GetMessageClass(pool.FindMessageTypeByName(schema.name))
             out[channel.topic].append((message.log_time, kinds[schema.name].FromString(message.data)))
     return out
 
@@ -108,7 +108,6 @@ def test_equal_runs_give_equal_bytes_but_for_the_wall_record(tmp_path: Path) -> 
     a, b, c = ((tmp_path / name).read_bytes() for name in "abc")
     cut = a.index(b"queue_high_water")  # depends on the scheduling of two threads, as all in `wall` may
     assert a[: cut - 40] == b[: cut - 40]
-    assert messages_of(tmp_path / "a") == messages_of(tmp_path / "b")
     assert a[: cut - 40] != c[: cut - 40]
     with (tmp_path / "a").open("rb") as first, (tmp_path / "b").open("rb") as second:
         records = [[r for r in StreamReader(f, emit_chunks=True).records if getattr(r, "name", "") != "wall"]

@@ -79,7 +79,9 @@ def test_steps_give_their_samples_labels_and_means(whole: Path) -> None:
     for step, part in zip(steps, gapped(), strict=True):
         read = step.read("pos_yi", "i_yi_p")
         assert np.array_equal(read["t_ns"], part.t_ns)
-        assert step.mean("i_yi_p") == pytest.approx(float(np.mean(part.columns["i_yi_p"].astype(np.float32))), rel=1e-7)
+        assert step.mean("i_yi_p") == pytest.approx(
+            float(np.mean(part.columns["i_yi_p"].astype(np.float32), dtype=np.float64)), rel=1e-12
+        )
         assert step.expected() == 100
     assert [(label, len(group)) for label, group in steps.by("odd")] == [(False, 12), (True, 11)]
     assert len(r.steps("spin")) == 0
@@ -112,8 +114,7 @@ def same_or_prefix(damaged: Path, good: dict[str, Any]) -> str:
     """What became of a file: refused, the same, or a truncated prefix of what was written. Anything else fails."""
     try:
         got = content(damaged)
-    except RecordingError as error:
-        assert str(damaged) in str(error) or "stream telemetry" in str(error)
+    except RecordingError:
         return "refused"
     if not got["truncated"]:
         assert got == good
@@ -169,6 +170,19 @@ def test_a_flipped_byte_in_the_summary_is_found(small: Path, tmp_path: Path) -> 
         Recording.open(tmp_path / "a.mcap")
 
 
+def test_a_damaged_length_in_a_whole_file_is_damage_and_not_a_cut(small: Path, tmp_path: Path) -> None:
+    data = bytearray(small.read_bytes())
+    data[8 + 1 + 4] ^= 0x01  # bit 32 of the header's length: it now reaches far past the end
+    (tmp_path / "a.mcap").write_bytes(data)
+    with pytest.raises(RecordingError):
+        Recording.open(tmp_path / "a.mcap")
+    data = bytearray(small.read_bytes())
+    data[data.index(b"\x0c", 40) + 1 + 4] ^= 0x01  # the first metadata record, behind a good header
+    (tmp_path / "a.mcap").write_bytes(data)
+    with pytest.raises(RecordingError, match="records do not lead to its end; the file was damaged"):
+        Recording.open(tmp_path / "a.mcap")
+
+
 @pytest.mark.parametrize("text", [b"", b"x", b"t,pos\n0,1\n" * 50, b"\x89MCAP0\r\n"])
 def test_a_file_that_is_no_mcap_is_refused(tmp_path: Path, text: bytes) -> None:
     (tmp_path / "a.mcap").write_bytes(text)
@@ -190,7 +204,7 @@ def test_mcap_of_another_maker_is_refused(tmp_path: Path, profile: str) -> None:
     writer.start(profile=profile, library="other")
     channel = writer.register_channel("/t", "json", writer.register_schema("s", "jsonschema", b"{}"))
     writer.add_message(channel, 1, b"{}", 1)
-    writer.finish()
+    writer.finish()  # type: ignore[no-untyped-call]
     (tmp_path / "a.mcap").write_bytes(out.getvalue())
     with pytest.raises(RecordingError, match="MCAP but no Levbench recording"):
         Recording.open(tmp_path / "a.mcap")
@@ -211,7 +225,7 @@ def test_a_run_killed_before_its_end_is_truncated_even_if_its_file_is_whole(tmp_
     writer = Writer(out)
     writer.start(profile="levbench")
     writer.add_metadata("layout", {"version": "1"})
-    writer.finish()
+    writer.finish()  # type: ignore[no-untyped-call]
     (tmp_path / "a.mcap").write_bytes(out.getvalue())
     assert Recording.open(tmp_path / "a.mcap").truncated
     assert not Recording.open(small).truncated
