@@ -37,10 +37,12 @@ class Decoder:
             float64 arrays by signal, in order of arrival, and the number of frames of this identifier whose length is
             wrong; those are left out, never read.
         """
-        mine = batch[batch["id"] == self.message.identifier]
-        right = mine["length"] == self.message.length
-        wrong = int(len(mine) - np.count_nonzero(right))
-        return self.decode_payloads((mine if wrong == 0 else mine[right])["data"]), wrong
+        mine = batch["id"] == self.message.identifier
+        right = mine & (batch["length"] == self.message.length)
+        count = int(np.count_nonzero(right))
+        data = batch["data"][:, : self.message.length]
+        payloads = np.ascontiguousarray(data if count == len(batch) else data[right])  # whole records are not copied
+        return self.decode_payloads(payloads), int(np.count_nonzero(mine)) - count
 
     def decode_payloads(self, payloads: Payloads) -> dict[str, Array]:
         """Values of payloads (n, at least message.length), one row a frame."""

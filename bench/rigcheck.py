@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import difflib
+import tomllib
 from collections.abc import Iterator
+from typing import Any
+
+from pydantic import ValidationError
 
 from bench import units
 from bench.busload import REFUSE, BusLoad, bus_load
 from bench.errors import ConfigError, Problem
 from bench.messages import MessageMap
-from bench.rigfile import RigFile, read_rig
+from bench.rigfile import RigFile, RigText, migrated, read_rig
 
 GEOMETRY = {
     "hook_to_outboard": "hook plane to outboard AMB plane",
@@ -37,11 +41,32 @@ def check_rig(rig: str) -> tuple[tuple[Problem, ...], BusLoad | None]:
     try:
         loaded = RigFile.parse(text.toml, text.dbc, str(text.path))
     except ConfigError as error:
-        return error.problems or (Problem(str(text.path), "(file)", str(error), "a rig file"),), None
+        if not error.problems:
+            return (Problem(str(text.path), "(file)", str(error), "a rig file"),), None
+        return error.problems + tuple(_behind(text, error.problems)), None
     load = None
     with contextlib.suppress(ConfigError, KeyError):
         load = bus_load(loaded.messages, loaded.link.bitrate, loaded.link.data_bitrate)
     return tuple(problems_of(loaded)), load
+
+
+def _behind(text: RigText, problems: tuple[Problem, ...]) -> Iterator[Problem]:
+    """What else is wrong with a file that breaks the types: the entries at fault are left out and the rest checked."""
+    data = migrated(tomllib.loads(text.toml), str(text.path))
+    left_out = {".".join(p.key.split(".")[:2]) for p in problems}
+    for p in problems:
+        table: Any = data
+        keys = p.key.split(".")
+        depth = len(keys) if p.expected == "no such key" else min(2, len(keys))
+        for key in keys[: depth - 1]:
+            table = table.get(key, {}) if isinstance(table, dict) else {}
+        if isinstance(table, dict):
+            table.pop(keys[depth - 1], None)
+    try:
+        rest = RigFile.model_validate({**data, "toml_text": text.toml, "dbc_text": text.dbc, "path": str(text.path)})
+    except ValidationError:  # a table that cannot be missing is at fault; the rest cannot be judged without it
+        return
+    yield from (p for p in problems_of(rest) if ".".join(p.key.split(".")[:2]) not in left_out)
 
 
 def problems_of(rig: RigFile) -> list[Problem]:
@@ -88,16 +113,15 @@ def _geometry(rig: RigFile) -> Iterator[Problem]:
         close = difflib.get_close_matches(key, GEOMETRY, 1)
         yield Problem(rig.path, f"geometry.{key}", "a length nobody asks for",
                       f"did you mean {close[0]}?" if close else "no such key")  # fmt: skip
-    if GEOMETRY.keys() - g.keys():
-        return
     for key, length in g.items():
         if length.value <= 0:
             yield Problem(rig.path, f"geometry.{key}.value", f"{length.value:g} {length.unit}", "a positive number")
-    span = g["com_to_inboard_amb"].value + g["com_to_outboard_amb"].value
-    if abs(span - g["amb_span"].value) > 1e-3:
-        yield Problem(rig.path, "geometry.amb_span.value", f"{g['amb_span'].value:g} m",
-                      f"within 1 mm of com_to_inboard_amb + com_to_outboard_amb = {span:g} m")  # fmt: skip
-    if g["clearance"].value >= g["amb_gap"].value:
+    if {"com_to_inboard_amb", "com_to_outboard_amb", "amb_span"} <= g.keys():
+        span = g["com_to_inboard_amb"].value + g["com_to_outboard_amb"].value
+        if abs(span - g["amb_span"].value) > 1e-3:
+            yield Problem(rig.path, "geometry.amb_span.value", f"{g['amb_span'].value:g} m",
+                          f"within 1 mm of com_to_inboard_amb + com_to_outboard_amb = {span:g} m")  # fmt: skip
+    if {"clearance", "amb_gap"} <= g.keys() and g["clearance"].value >= g["amb_gap"].value:
         yield Problem(rig.path, "geometry.clearance.value", f"{g['clearance'].value:g} m",
                       f"less than amb_gap = {g['amb_gap'].value:g} m, or the journal strikes the AMB first")  # fmt: skip
 

@@ -65,7 +65,9 @@ class Toleranced(Part):
         if (self.u is None) == (self.half_width is None):
             raise ValueError("expected either u (normal) or half_width (rectangular, triangular, arcsine)")
         if (self.u is not None) != (self.distribution == "normal"):
-            raise ValueError(f"distribution {self.distribution!r} goes with {'half_width' if self.u is None else 'u'}")
+            raise ValueError(
+                f"distribution {self.distribution!r} goes with {'u' if self.distribution == 'normal' else 'half_width'}"
+            )
         return self
 
     @property
@@ -229,7 +231,7 @@ def migrated(data: dict[str, Any], path: str) -> dict[str, Any]:
 def _problem(error: Any, path: str) -> Problem:
     key = ".".join(str(part) for part in error["loc"] if part != "schema_") or "(file)"
     found = "nothing" if error["type"] == "missing" else repr(error.get("input"))
-    if isinstance(error.get("input"), dict):
+    if error["type"] != "missing" and isinstance(error.get("input"), dict):
         found = "a table with " + ", ".join(error["input"])
     expected = {"missing": "a value", "extra_forbidden": "no such key"}.get(error["type"], error["msg"])
     return Problem(path, key, found, expected)
