@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -136,7 +137,7 @@ class WatchedSteps:
 
     @contextmanager
     def step(self, kind: str, **labels: Any) -> Iterator[None]:
-        said = ", ".join(f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in labels.items() if v != "")
+        said = ", ".join(_label(k, v) for k, v in labels.items())
         self._progress.step(f"{kind} {said}")
         with self._recorder.step(kind, **labels):
             yield
@@ -168,3 +169,12 @@ def cause_of(error: BaseException) -> tuple[Outcome, Finding]:
         logger.error("unexpected %s (traceback in run.log)", text, exc_info=error)
     stopped = Outcome.ABORTED if isinstance(error, Aborted | KeyboardInterrupt) else Outcome.ERROR
     return stopped, Finding(code, text, "acquire", Effect.ERROR)
+
+
+def _label(name: str, value: Any) -> str:
+    """A step's label for people: angles in degrees, nothing as "none"."""
+    if name.endswith("_rad") and isinstance(value, float):
+        return f"{name.removesuffix('_rad')} {math.degrees(value):.0f}°"
+    if isinstance(value, float):
+        return f"{name} {value:.4g}"
+    return f"{name} {'none' if value == '' else value}"

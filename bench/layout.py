@@ -7,7 +7,7 @@ protobuf runtime is ten times slower at that. The schema is an ordinary FileDesc
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -130,14 +130,67 @@ def encode_block(
     return b"".join(parts)
 
 
+class ViewWindows:
+    """Reduces samples to one scalar message per window of `width_ns`: mean, minimum and maximum, or the last code.
+
+    A window may come in parts: what falls into the newest one is kept until its end is known.
+    """
+
+    def __init__(self, layout: StreamLayout, width_ns: int) -> None:
+        self._layout, self._width_ns = layout, width_ns
+        self._t_ns: npt.NDArray[np.int64] = np.empty(0, np.int64)
+        self._columns: dict[str, npt.NDArray[Any]] = {}
+
+    def take(self, t_ns: npt.NDArray[np.int64], columns: Mapping[str, npt.NDArray[Any]]) -> list[tuple[int, bytes]]:
+        """Time and message of each window that these samples end."""
+        if len(self._t_ns):
+            t_ns = np.concatenate([self._t_ns, t_ns])
+            columns = {n: np.concatenate([x, columns[n]]) for n, x in self._columns.items()}
+        windows = t_ns // self._width_ns
+        done = len(t_ns) - int(np.argmax(windows[::-1] != windows[-1])) if windows[0] != windows[-1] else 0
+        self._t_ns, self._columns = t_ns[done:], {n: x[done:] for n, x in columns.items()}
+        return self._messages(t_ns[:done], {n: x[:done] for n, x in columns.items()}) if done else []
+
+    def rest(self) -> list[tuple[int, bytes]]:
+        """The window that the last samples began."""
+        t_ns, self._t_ns = self._t_ns, self._t_ns[:0]
+        return self._messages(t_ns, self._columns) if len(t_ns) else []
+
+    def _messages(
+        self, t_ns: npt.NDArray[np.int64], columns: Mapping[str, npt.NDArray[Any]]
+    ) -> list[tuple[int, bytes]]:
+        edges = np.flatnonzero(np.diff(t_ns // self._width_ns, prepend=-1))
+        counts = np.diff(np.append(edges, len(t_ns)))
+        values: list[npt.NDArray[Any]] = []
+        for c in self._layout.channels:
+            x = columns[c.name]
+            if c.dtype == "f4":
+                mean = np.add.reduceat(x, edges) / counts
+                values += [mean, np.minimum.reduceat(x, edges), np.maximum.reduceat(x, edges)]
+            else:
+                values.append(x[edges + counts - 1])
+        return list(zip(t_ns[edges].tolist(), encode_scalars(values), strict=True))
+
+
+def encode_scalars(values: Sequence[npt.NDArray[Any]]) -> list[bytes]:
+    """Messages of float fields numbered from 1: one message a row, one field for each of `values`, as float32."""
+    tags = [list(varint(k << 3 | 5)) for k in range(1, len(values) + 1)]
+    rows = np.empty(len(values[0]), [(f"f{k}", [("tag", "u1", (len(t),)), ("v", "<f4")]) for k, t in enumerate(tags)])
+    for k, (tag, x) in enumerate(zip(tags, values, strict=True)):
+        rows[f"f{k}"]["tag"] = tag
+        rows[f"f{k}"]["v"] = x
+    data, size = rows.tobytes(), rows.itemsize
+    return [data[at : at + size] for at in range(0, len(data), size)]
+
+
 class DecodedBlock:
     """A block read back: head numbers, ticks, times and columns by channel, read-only views of the message."""
 
     __slots__ = ("columns", "count", "first", "host_ns", "lost", "t_ns", "ticks")
 
     def __init__(self, layout: StreamLayout, data: bytes) -> None:
-        fields = dict(_fields(data))
         try:
+            fields = dict(_fields(data))
             self.first, self.count, self.lost = int(fields[1]), int(fields[2]), int(fields.get(3, 0))
             self.host_ns = int(fields.get(4, 0))
             self.ticks = np.frombuffer(fields[TICKS], "<u8")
@@ -146,7 +199,7 @@ class DecodedBlock:
                 c.name: np.frombuffer(fields[FIRST_COLUMN + k], _TYPES[c.dtype][1])
                 for k, c in enumerate(layout.channels)
             }
-        except (KeyError, ValueError) as error:
+        except (KeyError, ValueError, TypeError, struct.error, RecordingError) as error:
             raise RecordingError(f"a block of stream {layout.name} cannot be read: {error}") from error
         if any(len(x) != self.count for x in (self.ticks, self.t_ns, *self.columns.values())):
             raise RecordingError(f"a block of stream {layout.name} has columns of different lengths")

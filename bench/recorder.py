@@ -1,7 +1,8 @@
 """The recorder: raw frames, decoded blocks, a 100 Hz view and events into one MCAP file, by one writer thread.
 
-Everything but the metadata record `wall` is a function of what was recorded, so equal runs give equal files. A chunk is
-closed every half second of bench time: what a killed process leaves behind holds all but the last second.
+Everything but the metadata record `wall` is a function of what was recorded, so equal runs give equal files. Every half
+second of bench time what is pending is written and the chunk is closed: what a killed process leaves behind holds all
+but the last second.
 """
 
 from __future__ import annotations
@@ -10,22 +11,17 @@ import json
 import queue
 import threading
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from mcap.writer import CompressionType, IndexType, Writer
-
-from bench import layout
 from bench.clock import Clock
 from bench.errors import RecordingError
 from bench.frames import FRAME, FrameBatch
+from bench.mcapwriter import McapWriter
 from bench.samples import SampleBlock, StreamLayout
 
-FLUSH_NS = 500_000_000
-VIEW_NS = 10_000_000
 QUEUE_ITEMS = 400  # a live link hands over at most some tens of batches a second, so this is seconds
 
 
@@ -40,11 +36,13 @@ class RunHeader:
 
 @dataclass
 class Integrity:
-    """Counts at close. Frames by link, samples and losses by stream."""
+    """Counts at close: frames by link; samples, losses and blocks by stream. Only what was written is counted; `complete`
+    is false when a live queue overflowed, `overflows` times."""
 
     frames: dict[str, int] = field(default_factory=dict)
     samples: dict[str, int] = field(default_factory=dict)
     lost: dict[str, int] = field(default_factory=dict)
+    blocks: dict[str, int] = field(default_factory=dict)
     events: int = 0
     steps: int = 0
     overflows: int = 0
@@ -57,10 +55,10 @@ class Recorder:
     Args:
         path: must not exist.
         clock: gives the time of events and steps.
-        live: a full queue raises instead of blocking.
+        live: a full queue raises instead of blocking, and closing raises again, so the run cannot pass unnoticed.
 
     Raises:
-        RecordingError: the file cannot be made.
+        RecordingError: the file cannot be made; later from any call: the writer thread could not write.
     """
 
     def __init__(
@@ -75,8 +73,13 @@ class Recorder:
         self._high_water = 0
         try:
             self._file = path.open("xb")
-            self._writer = _Writer(self._file, self._streams, header, clock.now_ns())
         except OSError as error:
+            raise RecordingError(f"recording {path}: cannot be written: {error.strerror or error}") from error
+        try:
+            self._writer = McapWriter(self._file, self._streams, header.metadata, header.attachments, clock.now_ns())
+        except OSError as error:
+            with suppress(OSError):  # closing tries the same bytes again
+                self._file.close()
             raise RecordingError(f"recording {path}: cannot be written: {error.strerror or error}") from error
         self._queue: queue.Queue[tuple[str, tuple[Any, ...]] | None] = queue.Queue(QUEUE_ITEMS)
         self._thread = threading.Thread(target=self._drain, name="recorder", daemon=True)
@@ -85,21 +88,26 @@ class Recorder:
     def frames(self, link: str, batch: FrameBatch) -> None:
         """Record frames as they came, or as they were sent (flag SENT)."""
         if len(batch):
-            self.integrity.frames[link] = self.integrity.frames.get(link, 0) + len(batch)
             self._put("frames", link, int(batch["t_ns"][-1]), batch.astype(FRAME, copy=True))
+            _add(self.integrity.frames, link, len(batch))
 
     def samples(self, block: SampleBlock) -> None:
-        """Record decoded samples; small blocks are merged."""
-        counts = self.integrity
-        counts.samples[block.stream] = counts.samples.get(block.stream, 0) + len(block)
-        counts.lost[block.stream] = counts.lost.get(block.stream, 0) + block.lost_before
-        self._put("samples", block)
+        """Record decoded samples; small blocks are merged, large ones split.
+
+        Raises:
+            RecordingError: the block does not fit its stream's layout.
+        """
+        self._check(block)
+        if len(block):
+            self._put("samples", block)
+            _add(self.integrity.samples, block.stream, len(block))
+            _add(self.integrity.lost, block.stream, block.lost_before)
 
     def event(self, kind: str, t_ns: int | None = None, **data: Any) -> None:
         """Record something that happened; `data` are JSON values."""
-        self.integrity.events += 1
         at = self._clock.now_ns() if t_ns is None else t_ns
         self._put("event", at, json.dumps({"kind": kind, "t_ns": at, **data}, allow_nan=False).encode())
+        self.integrity.events += 1
 
     @contextmanager
     def step(self, kind: str, **labels: Any) -> Iterator[None]:
@@ -114,7 +122,7 @@ class Recorder:
         """Write what is pending, the integrity and the wall record, and close the file.
 
         Raises:
-            RecordingError: something could not be written, now or before.
+            RecordingError: something could not be written, now or before, or samples were lost on the way to the disk.
         """
         if not self._closed:
             self._closed = True
@@ -123,27 +131,52 @@ class Recorder:
             try:
                 if self._failure is None:
                     self.wall["queue_high_water"] = str(self._high_water)
-                    self._writer.finish(self.integrity, self.wall)
-                self._file.close()
-            except OSError as error:
+                    self.integrity.blocks.update(self._writer.blocks)
+                    counts = {k: json.dumps(v, sort_keys=True) for k, v in vars(self.integrity).items()}
+                    self._writer.finish(counts, self.wall)
+            except Exception as error:
                 self._failure = error
+            finally:
+                try:
+                    self._file.close()
+                except OSError as error:
+                    self._failure = self._failure or error
         self._raise()
+        if self.integrity.overflows:
+            raise RecordingError(f"{self._too_slow()}; {self.integrity.overflows} batches are missing from it")
         return self.integrity
 
     def __enter__(self) -> Recorder:
         return self
 
-    def __exit__(self, kind: object, *_: object) -> None:
+    def __exit__(self, kind: object, cause: BaseException | None, _: object) -> None:
         try:
             self.close()
-        except RecordingError:
-            if kind is None:
+        except RecordingError as error:
+            if cause is None:
                 raise
+            cause.add_note(str(error))  # what ended the run comes first; this must not get lost either
 
     def _raise(self) -> None:
         if self._failure is not None:
-            why = getattr(self._failure, "strerror", None) or self._failure
+            why = getattr(self._failure, "strerror", None) or repr(self._failure)
             raise RecordingError(f"recording {self.path}: cannot be written: {why}") from self._failure
+
+    def _too_slow(self) -> str:
+        return f"recording {self.path}: the disk did not keep up with the live link"
+
+    def _check(self, block: SampleBlock) -> None:
+        layout_of = self._streams.get(block.stream)
+        if layout_of is None:
+            known = ", ".join(self._streams) or "none"
+            raise RecordingError(f"recording {self.path}: found samples of stream {block.stream!r}; expected {known}")
+        for name in ("t_ns", *(c.name for c in layout_of.channels)):
+            column = block.t_ns if name == "t_ns" else block.columns.get(name, ())
+            if len(column) != len(block):
+                raise RecordingError(
+                    f"recording {self.path}: stream {block.stream}: found {len(column)} samples of {name}; "
+                    f"expected {len(block)}, one for each device tick"
+                )
 
     def _put(self, what: str, *arguments: Any) -> None:
         self._raise()
@@ -153,7 +186,8 @@ class Recorder:
             self._queue.put((what, arguments), block=not self._live)
         except queue.Full:
             self.integrity.overflows += 1
-            raise RecordingError(f"recording {self.path}: the disk does not keep up; samples were lost") from None
+            self.integrity.complete = False
+            raise RecordingError(f"{self._too_slow()}; {what} were lost") from None
         self._high_water = max(self._high_water, self._queue.qsize())
 
     def _drain(self) -> None:
@@ -165,112 +199,5 @@ class Recorder:
                     self._failure = error
 
 
-class _Writer:
-    """What the thread does with each item: owns the mcap writer, merges blocks, makes the view."""
-
-    def __init__(self, file: Any, streams: Mapping[str, StreamLayout], header: RunHeader, start_ns: int) -> None:
-        self._file, self._streams, self._start = file, streams, start_ns
-        self._mcap: Any = Writer(file, chunk_size=1 << 20, compression=CompressionType.LZ4, index_types=IndexType.ALL,
-                            enable_crcs=True, enable_data_crcs=True)  # fmt: skip
-        self._mcap.start(profile="levbench", library="levbench")
-        self._channels: dict[str, int] = {}
-        self._sequence: dict[str, int] = {}
-        self._pending: dict[str, list[SampleBlock]] = {name: [] for name in streams}
-        self._next_flush = start_ns + FLUSH_NS
-        self._mcap.add_metadata("layout", {"version": str(layout.VERSION)})
-        for name, values in header.metadata.items():
-            self._mcap.add_metadata(name, dict(values))
-        for name, data in header.attachments.items():
-            self._mcap.add_attachment(0, 0, name, "text/plain", data)
-        for stream in streams.values():
-            described = {"layout": json.dumps({"period_ns": stream.period_ns,
-                         "channels": [[c.name, c.unit, c.dtype] for c in stream.channels]})}  # fmt: skip
-            self._register(layout.block_topic(stream.name), f"levbench.Block_{stream.name}",
-                           layout.block_schema(stream), described)  # fmt: skip
-            self._register(layout.view_topic(stream.name), f"levbench.View_{stream.name}", layout.view_schema(stream))
-        schema = self._mcap.register_schema("levbench.Event", "jsonschema", layout.EVENT_SCHEMA)
-        self._channels[layout.EVENTS] = self._mcap.register_channel(layout.EVENTS, "json", schema)
-        file.flush()
-
-    def _register(self, topic: str, name: str, schema: bytes, metadata: Mapping[str, str] | None = None) -> None:
-        number = self._mcap.register_schema(name, "protobuf", schema)
-        self._channels[topic] = self._mcap.register_channel(topic, "protobuf", number, dict(metadata or {}))
-
-    def frames(self, link: str, t_ns: int, batch: FrameBatch) -> None:
-        topic = layout.raw_topic(link)
-        if topic not in self._channels:
-            self._register(topic, "levbench.Frames", layout.raw_schema())
-        self._message(topic, t_ns, layout.encode_frames(t_ns, len(batch), batch.tobytes()))
-
-    def samples(self, block: SampleBlock) -> None:
-        pending = self._pending[block.stream]
-        if block.lost_before and pending:
-            self._write_blocks(block.stream)
-            pending = self._pending[block.stream]
-        pending.append(block)
-        period = self._streams[block.stream].period_ns
-        if sum(len(b) for b in pending) >= max(1, min(1000, FLUSH_NS // period)):
-            self._write_blocks(block.stream)
-
-    def event(self, t_ns: int, data: bytes) -> None:
-        self._message(layout.EVENTS, t_ns, data)
-
-    def _write_blocks(self, stream: str) -> None:
-        blocks, self._pending[stream] = self._pending[stream], []
-        if not blocks:
-            return
-        plan = self._streams[stream]
-        ticks = np.concatenate([b.ticks for b in blocks])
-        t_ns = np.concatenate([b.t_ns for b in blocks])
-        columns = {c.name: np.concatenate([b.columns[c.name] for b in blocks]) for c in plan.channels}
-        first = blocks[0]
-        for start in range(0, len(ticks), 1000):
-            part = slice(start, start + 1000)
-            data = layout.encode_block(plan, first.first_index + start, first.lost_before if start == 0 else 0,
-                                       first.host_ns, ticks[part], t_ns[part],
-                                       {n: x[part] for n, x in columns.items()})  # fmt: skip
-            self._message(layout.block_topic(stream), int(t_ns[start]), data)
-        self._write_view(plan, t_ns, columns)
-
-    def _write_view(self, plan: StreamLayout, t_ns: Any, columns: Mapping[str, Any]) -> None:
-        edges = np.flatnonzero(np.diff(t_ns // VIEW_NS, prepend=-1))
-        counts = np.diff(np.append(edges, len(t_ns)))
-        values = []
-        for c in plan.channels:
-            x = columns[c.name]
-            if c.dtype == "f4":
-                values += [
-                    np.add.reduceat(x, edges) / counts,
-                    np.minimum.reduceat(x, edges),
-                    np.maximum.reduceat(x, edges),
-                ]
-            else:
-                values.append(x[edges + counts - 1])
-        rows = np.zeros(len(edges), [(f"f{k}", [("tag", "u1", (2 if k >= 15 else 1,)), ("v", "<f4")])
-                                     for k in range(len(values))])  # fmt: skip
-        for k, x in enumerate(values):
-            rows[f"f{k}"]["tag"] = list(layout.varint((k + 1) << 3 | 5))
-            rows[f"f{k}"]["v"] = x
-        topic = layout.view_topic(plan.name)
-        for row, at in zip(rows, t_ns[edges].tolist(), strict=True):
-            self._message(topic, at, row.tobytes())
-
-    def _message(self, topic: str, t_ns: int, data: bytes) -> None:
-        sequence = self._sequence.get(topic, 0)
-        self._sequence[topic] = sequence + 1
-        self._mcap.add_message(self._channels[topic], t_ns, data, t_ns, sequence & 0xFFFFFFFF)
-        if t_ns >= self._next_flush:
-            self._next_flush = t_ns + FLUSH_NS
-            self._mcap.flush()
-            self._file.flush()
-
-    def finish(self, integrity: Integrity, wall: Mapping[str, str]) -> None:
-        for stream in self._pending:
-            self._write_blocks(stream)
-        self._mcap.flush()
-        counts = {k: json.dumps(v, sort_keys=True) for k, v in vars(integrity).items()}
-        self._mcap.add_metadata("integrity", counts)
-        if wall:
-            self._mcap.add_metadata("wall", dict(wall))
-        self._mcap.finish()
-        self._file.flush()
+def _add(counts: dict[str, int], name: str, count: int) -> None:
+    counts[name] = counts.get(name, 0) + count

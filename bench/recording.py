@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Generic, TypeVar, cast
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +26,8 @@ from bench.rigfile import RigFile
 from bench.samples import ChannelInfo, StreamLayout
 
 P = TypeVar("P", bound=BenchPlan)
+Q = TypeVar("Q", bound=BenchPlan)
+J = TypeVar("J", dict[str, Any], list[Any])
 BLOCK_NS = 2_000_000_000  # no block is longer: how far back a block that reaches into an interval can begin
 
 
@@ -47,10 +49,10 @@ class Recording(Generic[P]):
             with `truncated` set.
         """
         file = index(path)
-        version = file.metadata.get("layout", {}).get("version")
-        if file.profile != "levbench" or version is None:
+        version = file.metadata.get("layout", {}).get("version", "")
+        if file.profile != "levbench" or not version.isascii() or not version.isdigit():
             raise RecordingError(
-                f"{path} is MCAP but no Levbench recording (profile {file.profile!r}, layout {version})"
+                f"{path} is MCAP but no Levbench recording (profile {file.profile!r}, layout {version!r})"
             )
         if int(version) > layout.VERSION:
             raise RecordingError(
@@ -69,11 +71,43 @@ class Recording(Generic[P]):
         """The plan the run was made with."""
         if self._plan_class is None:
             raise AnalysisError("the recording was opened without a plan type")
-        return self._plan_class.model_validate_json(self.attachment("plan.json"))
+        return self.plan_as(self._plan_class)
+
+    def plan_as(self, kind: type[Q]) -> Q:
+        """The plan as a type of one's choice.
+
+        Raises:
+            RecordingError: the stored plan is not of that type.
+        """
+        try:
+            return kind.model_validate_json(self.attachment("plan.json"))
+        except ValueError as error:
+            raise RecordingError(f"{self.path}: its plan is no {kind.__name__}: {error}") from error
 
     @property
     def plan_dict(self) -> dict[str, Any]:
-        return cast(dict[str, Any], json.loads(self.attachment("plan.json")))
+        return self._json("plan.json", dict)
+
+    @property
+    def spec(self) -> dict[str, Any]:
+        """The acceptance limits that the run was made with, by quantity."""
+        return self._json("spec.json", dict)
+
+    @property
+    def calibrations(self) -> list[Any]:
+        """The calibrations that the run used."""
+        return self._json("calibrations.json", list)
+
+    def _json(self, name: str, kind: type[J]) -> J:
+        try:
+            found = json.loads(self.attachment(name))
+        except ValueError as error:
+            raise RecordingError(f"recording {self.path}: attachment {name!r} is not JSON: {error}") from error
+        if not isinstance(found, kind):
+            raise RecordingError(
+                f"recording {self.path}: attachment {name!r}: found a {type(found).__name__}; expected a {kind.__name__}"
+            )
+        return found
 
     @property
     def versions(self) -> dict[str, str]:
@@ -96,7 +130,10 @@ class Recording(Generic[P]):
     @property
     def seed(self) -> int | None:
         text = self.run.get("seed", "")
-        return int(text) if text else None
+        try:
+            return int(text) if text else None
+        except ValueError as error:
+            raise RecordingError(f"recording {self.path}: seed: found {text!r}; expected an integer") from error
 
     def attachment(self, name: str) -> str:
         """An attached text.
@@ -148,8 +185,26 @@ class Recording(Generic[P]):
             parts["index"].append(np.arange(block.first + a, block.first + b))
             for name in channels:
                 parts[name].append(block.columns[name][a:b].astype(np.float64))
-        empty = np.zeros(0)
-        return {name: np.concatenate(x) if x else empty for name, x in parts.items()}
+        empty = {"t_ns": np.zeros(0, np.int64), "index": np.zeros(0, np.int64)}
+        return {name: np.concatenate(x) if x else empty.get(name, np.zeros(0)) for name, x in parts.items()}
+
+    def channel(self, name: str, start_ns: int = 0, end_ns: int = 1 << 62) -> dict[str, npt.NDArray[Any]]:
+        """One channel with start <= t < end, float64, with `t_ns` and `index`; the whole recording by default."""
+        return self.read((name,), start_ns, end_ns)
+
+    def lost(self, stream: str, start_ns: int, end_ns: int) -> int:
+        """How many samples with start <= t < end are missing: those that blocks count as lost before them, and those
+        after the last block, where a recording was cut off."""
+        period, missing, last = self.streams[stream].period_ns, 0, None
+        for block in self.blocks(stream, start_ns):
+            first, last = int(block.t_ns[0]), int(block.t_ns[-1])
+            # The k-th lost sample before a block was due at first - k periods.
+            missing += max(0, min(block.lost, (first - start_ns) // period) - max(0, (first - end_ns) // period))
+            if first >= end_ns:
+                break
+        if last is None:
+            return round((end_ns - start_ns) / period)
+        return missing + max(0, (end_ns - 1 - last) // period)
 
     def _stream_of(self, channels: tuple[str, ...]) -> str:
         for name, stream in self.streams.items():
@@ -213,6 +268,10 @@ class Step:
         """Samples that the step should hold at the stream's period."""
         return round((self.end_ns - self.start_ns) / self.recording.streams[stream].period_ns)
 
+    def lost(self, stream: str = "telemetry") -> int:
+        """Samples of the stream that are missing from the step."""
+        return self.recording.lost(stream, self.start_ns, self.end_ns)
+
 
 @dataclass(frozen=True)
 class Steps:
@@ -236,4 +295,7 @@ class Steps:
 
 def _integrity(file: McapFile) -> dict[str, Any] | None:
     found = file.metadata.get("integrity")
-    return None if found is None else {k: json.loads(v) for k, v in found.items()}
+    try:
+        return None if found is None else {k: json.loads(v) for k, v in found.items()}
+    except ValueError as error:
+        raise RecordingError(f"recording {file.path}: its integrity record cannot be read: {error}") from error

@@ -158,8 +158,10 @@ def moment(text: str | None) -> str:
 
 
 def symbol(name: str) -> tuple[str, str]:
-    """A quantity's name as (letter, subscript): `K_i` -> K, i; `K2_o` -> K, 2,o; a word stays whole, no subscript."""
-    match = re.fullmatch(r"([A-Za-z])(\d*)(?:_([A-Za-z0-9]{1,6}))?", name)
+    """A quantity's name as (letter, subscript): `K_i` -> K, i; `K2_o` -> K, 2,o; `Kw_i` -> K, w,i; a word stays whole, no subscript."""
+    match = re.fullmatch(r"([A-Za-z])(\d*)(?:_([A-Za-z0-9]{1,6}))?", name) or re.fullmatch(
+        r"([A-Z])([a-z])_([A-Za-z0-9]{1,6})", name
+    )
     if not match or not (match[2] or match[3] or len(name) == 1):
         return name, ""
     return match[1], ",".join(part for part in (match[2], match[3]) if part)

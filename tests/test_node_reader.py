@@ -36,9 +36,9 @@ def test_the_reference_reader_reads_everything(reader: list[str], tmp_path: Path
     done = read(reader, tmp_path / "a.mcap")
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
-    # blocks of 500, 500, 200, then after the gap 500, 500, 100 samples; the gap ends at 1205 and blocks end inside a
-    # 10 ms window at 1705 and 2205, which makes a second view of these two windows
-    counts = {"/telemetry/block": 6, "/telemetry/view": 120 + 110 + 1 + 2, "/raw/can0": 24, "/events": 2 + 2 * 23}
+    # blocks end at the gap before 1205 and where half a second of bench time is over; 120 view windows before the gap
+    # and 111 after it, the first and the last of them with five samples
+    counts = {"/telemetry/block": 6, "/telemetry/view": 120 + 111, "/raw/can0": 24, "/events": 2 + 2 * 23}
     assert found["sequential"] == counts
     assert found["indexed"] == counts
     assert found["stated"] == counts

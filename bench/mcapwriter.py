@@ -1,0 +1,147 @@
+"""What the recorder's thread does with each item: merges samples into blocks, makes the view, writes MCAP.
+
+Half a second of bench time after the last flush, what is pending is written and the chunk is closed.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from typing import Any, BinaryIO
+
+import numpy as np
+from mcap.writer import CompressionType, IndexType, Writer
+
+from bench import layout
+from bench.frames import FrameBatch
+from bench.samples import SampleBlock, StreamLayout
+
+FLUSH_NS = 500_000_000
+VIEW_NS = 10_000_000
+BLOCK_NS = 1_000_000_000
+BLOCK_ROWS = 1000
+
+
+class McapWriter:
+    """Owns the mcap writer: header first, then frames, samples and events as they come, then counts.
+
+    `blocks` counts the blocks written, by stream. Not safe for more than one thread.
+    """
+
+    def __init__(
+        self,
+        file: BinaryIO,
+        streams: Mapping[str, StreamLayout],
+        metadata: Mapping[str, Mapping[str, str]],
+        attachments: Mapping[str, bytes],
+        start_ns: int,
+    ) -> None:
+        self._file, self._streams = file, streams
+        self.blocks = dict.fromkeys(streams, 0)
+        self._mcap: Any = Writer(file, chunk_size=1 << 20, compression=CompressionType.LZ4, index_types=IndexType.ALL,
+                            enable_crcs=True, enable_data_crcs=True)  # fmt: skip
+        self._mcap.start(profile="levbench", library="levbench")
+        self._channels: dict[str, int] = {}
+        self._sequence: dict[str, int] = {}
+        self._pending: dict[str, list[SampleBlock]] = {name: [] for name in streams}
+        self._windows = {name: layout.ViewWindows(stream, VIEW_NS) for name, stream in streams.items()}
+        self._next_flush = start_ns + FLUSH_NS
+        self._mcap.add_metadata("layout", {"version": str(layout.VERSION)})
+        for name, values in metadata.items():
+            self._mcap.add_metadata(name, dict(values))
+        for name, data in attachments.items():
+            self._mcap.add_attachment(0, 0, name, "text/plain", data)
+        for stream in streams.values():
+            described = {"layout": json.dumps({"period_ns": stream.period_ns,
+                         "channels": [[c.name, c.unit, c.dtype] for c in stream.channels]})}  # fmt: skip
+            self._register(layout.block_topic(stream.name), f"levbench.Block_{stream.name}",
+                           layout.block_schema(stream), described)  # fmt: skip
+            self._register(layout.view_topic(stream.name), f"levbench.View_{stream.name}", layout.view_schema(stream))
+        schema = self._mcap.register_schema("levbench.Event", "jsonschema", layout.EVENT_SCHEMA)
+        self._channels[layout.EVENTS] = self._mcap.register_channel(layout.EVENTS, "json", schema)
+        file.flush()
+
+    def _register(self, topic: str, name: str, schema: bytes, metadata: Mapping[str, str] | None = None) -> None:
+        number = self._mcap.register_schema(name, "protobuf", schema)
+        self._channels[topic] = self._mcap.register_channel(topic, "protobuf", number, dict(metadata or {}))
+
+    def frames(self, link: str, t_ns: int, batch: FrameBatch) -> None:
+        topic = layout.raw_topic(link)
+        if topic not in self._channels:
+            self._register(topic, "levbench.Frames", layout.raw_schema())
+        self._message(topic, t_ns, layout.encode_frames(t_ns, len(batch), batch.tobytes()))
+        self._flush_if_due(t_ns)
+
+    def samples(self, block: SampleBlock) -> None:
+        stream = block.stream
+        pending, plan = self._pending[stream], self._streams[stream]
+        if pending and not _follows(pending[-1], block, plan.period_ns):
+            self._write_blocks(stream)
+        self._pending[stream].append(block)
+        if sum(map(len, self._pending[stream])) >= _rows(plan):
+            self._write_blocks(stream)
+        self._flush_if_due(int(block.t_ns[-1]))
+
+    def event(self, t_ns: int, data: bytes) -> None:
+        self._message(layout.EVENTS, t_ns, data)
+        self._flush_if_due(t_ns)
+
+    def _write_blocks(self, stream: str) -> None:
+        blocks, self._pending[stream] = self._pending[stream], []
+        if not blocks:
+            return
+        plan, first = self._streams[stream], blocks[0]
+        ticks = np.concatenate([b.ticks for b in blocks])
+        t_ns = np.concatenate([b.t_ns for b in blocks])
+        columns = {c.name: np.concatenate([b.columns[c.name] for b in blocks]) for c in plan.channels}
+        for start in range(0, len(ticks), _rows(plan)):
+            part = slice(start, start + _rows(plan))
+            data = layout.encode_block(plan, first.first_index + start, first.lost_before if start == 0 else 0,
+                                       first.host_ns, ticks[part], t_ns[part],
+                                       {n: x[part] for n, x in columns.items()})  # fmt: skip
+            self._message(layout.block_topic(stream), int(t_ns[start]), data)
+            self.blocks[stream] += 1
+        self._write_view(stream, self._windows[stream].take(t_ns, columns))
+
+    def _write_view(self, stream: str, view: Iterable[tuple[int, bytes]]) -> None:
+        for t_ns, data in view:
+            self._message(layout.view_topic(stream), t_ns, data)
+
+    def _message(self, topic: str, t_ns: int, data: bytes) -> None:
+        sequence = self._sequence.get(topic, 0)
+        self._sequence[topic] = sequence + 1
+        self._mcap.add_message(self._channels[topic], t_ns, data, t_ns, sequence & 0xFFFFFFFF)
+
+    def _flush_if_due(self, t_ns: int) -> None:
+        if t_ns >= self._next_flush:
+            self._next_flush = t_ns + FLUSH_NS
+            for stream in self._pending:
+                self._write_blocks(stream)
+            self._mcap.flush()
+            self._file.flush()
+
+    def finish(self, counts: Mapping[str, str], wall: Mapping[str, str]) -> None:
+        """Write what is pending, the counts as metadata `integrity`, the wall record and the summary."""
+        for stream in self._pending:
+            self._write_blocks(stream)
+            self._write_view(stream, self._windows[stream].rest())
+        self._mcap.flush()
+        self._mcap.add_metadata("integrity", dict(counts))
+        if wall:
+            self._mcap.add_metadata("wall", dict(wall))
+        self._mcap.finish()
+        self._file.flush()
+
+
+def _rows(stream: StreamLayout) -> int:
+    """Samples in a block at most: 1000, or a second."""
+    return max(1, min(BLOCK_ROWS, BLOCK_NS // stream.period_ns))
+
+
+def _follows(before: SampleBlock, after: SampleBlock, period_ns: int) -> bool:
+    """Whether a block continues the one before: no loss, no restart of the sample clock between them."""
+    return (
+        after.lost_before == 0
+        and after.first_index == before.first_index + len(before)
+        and int(after.t_ns[0]) == int(before.t_ns[-1]) + period_ns
+    )
