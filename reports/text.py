@@ -158,7 +158,8 @@ def moment(text: str | None) -> str:
 
 
 def symbol(name: str) -> tuple[str, str]:
-    """A quantity's name as (letter, subscript): `K_i` -> K, i; `K2_o` -> K, 2,o; `Kw_i` -> K, w,i; a word stays whole, no subscript."""
+    """A quantity's name as (letter, subscript): `K_i` -> K, i; `K2_o` -> K, 2,o; a word stays whole, no subscript."""
+    # A letter behind a capital is a subscript too: `Kw_i` -> K, w,i.
     match = re.fullmatch(r"([A-Za-z])(\d*)(?:_([A-Za-z0-9]{1,6}))?", name) or re.fullmatch(
         r"([A-Z])([a-z])_([A-Za-z0-9]{1,6})", name
     )

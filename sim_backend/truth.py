@@ -82,8 +82,14 @@ def _weight(kg: float, v: Mapping[str, float]) -> float:
     return true * v["site.gravity"] * (1 - v["site.air_density"] / density)
 
 
-def draw(rig: RigFile, seed: int, overrides: Mapping[str, float] | None = None) -> Truth:
-    """Draw a rig. `overrides` set drawn values or defects by name, or the truth of K_i and K_o directly.
+def draw(
+    rig: RigFile,
+    seed: int,
+    overrides: Mapping[str, float] | None = None,
+    settings: Mapping[str, float] | None = None,
+) -> Truth:
+    """Draw a rig. `overrides` set drawn values or defects by name, or the truth of K_i and K_o directly. `settings` are
+    the controller parameters that a procedure will write: the measurands hold for the bias among them.
 
     Raises:
         ConfigError: an override names nothing.
@@ -93,6 +99,7 @@ def draw(rig: RigFile, seed: int, overrides: Mapping[str, float] | None = None) 
     values |= {k: float(v) for k, v in rig.simulation.items() if isinstance(v, int | float)}
     defects = dict(DEFECTS)
     wanted = dict(overrides or {})
+    bias = tuple({**{n: p.default for n, p in rig.parameters.items()}, **(settings or {})}[f"bias_{b}"] for b in "io")
     targets = {k: wanted.pop(k) for k in ("K_i", "K_o") if k in wanted}
     for name, value in wanted.items():
         table = defects if name in defects else values
@@ -105,9 +112,9 @@ def draw(rig: RigFile, seed: int, overrides: Mapping[str, float] | None = None) 
         table[name] = float(value)
     for name, value in targets.items():  # K is proportional to the slope at the centre
         slope = f"slope_{name[-1]}"
-        values[slope] *= value / _quantities(_plant(values, defects), values, rig)[name]
+        values[slope] *= value / _quantities(_plant(values, defects), bias)[name]
     plant = _plant(values, defects)
-    return Truth(seed, values, defects, plant, _quantities(plant, values, rig))
+    return Truth(seed, values, defects, plant, _quantities(plant, bias))
 
 
 def _stated(rig: RigFile) -> dict[str, Toleranced]:
@@ -206,11 +213,11 @@ def eccentricity(p: PlantParams, angles: Array) -> Array:
     return np.array(out)
 
 
-def _quantities(p: PlantParams, v: Mapping[str, float], rig: RigFile, bias: float = 3.0) -> dict[str, float]:
+def _quantities(p: PlantParams, bias_A: tuple[float, ...]) -> dict[str, float]:
     """K, K2 and the tangent at own weight, by the measurand's definition (see `procedures.amb_calibration`)."""
     angles = np.linspace(0, 2 * math.pi, 720, endpoint=False)
     xi = eccentricity(p, angles)
-    beta, gap = np.array(p.beta)[:, None], np.array(p.gap)[:, None]
+    beta, gap, bias = (np.array(x)[:, None] for x in (p.beta, p.gap, bias_A))
     near, far = beta / (gap - xi) ** 2, beta / (gap + xi) ** 2
     k, k2 = 2 * bias * (near + far), near - far
     force = _own_weight(p, angles)

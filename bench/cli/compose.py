@@ -81,7 +81,7 @@ def prepare(request: Request) -> tuple[Job, Connect]:
     seed = 0 if request.seed is None else request.seed
     overrides = dict(plans.assignment(text) for text in request.truth)
     _refuse_words(overrides)
-    connect = simulated(rig, seed, overrides, request.operator or "auto")
+    connect = simulated(rig, seed, overrides, procedure.settings(plan), request.operator or "auto")
     return Job(procedure, rig, plan, limits, request.backend, seed), connect
 
 
@@ -110,7 +110,9 @@ def _refuse_words(overrides: Mapping[str, Any]) -> None:
             raise ConfigError(f"--truth {key}: found {value!r}; expected a number, SI")
 
 
-def simulated(rig: RigFile, seed: int, overrides: Mapping[str, float], operator: str) -> Connect:
+def simulated(
+    rig: RigFile, seed: int, overrides: Mapping[str, float], settings: Mapping[str, float], operator: str
+) -> Connect:
     """How to open a simulated rig. The truth is drawn now, so that a wrong override is found before the start.
 
     Raises:
@@ -119,7 +121,7 @@ def simulated(rig: RigFile, seed: int, overrides: Mapping[str, float], operator:
     from sim_backend.endpoint import SimulatedRig
     from sim_backend.truth import draw
 
-    truth = draw(rig, seed, overrides)
+    truth = draw(rig, seed, overrides, settings)
     facts = {
         "schema": 1, "seed": seed, "quantities": dict(truth.quantities), "values": dict(truth.values),
         "defects": dict(truth.defects),

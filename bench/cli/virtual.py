@@ -38,7 +38,7 @@ def simulate(
     chosen: Procedure = importlib.import_module(catalogue.entry(procedure).module).procedure
     file = load_rig(rig)
     settings = chosen.plan.model_validate({**file.plans.get(procedure, {}), **plan})
-    drawn = draw(file, seed, truth)
+    drawn = draw(file, seed, truth, chosen.settings(settings))
     simulated = SimulatedRig(file, drawn)
     controller = CanController(file, simulated.link, simulated)
     operator = LineOperator(simulated.request, controller.clock, controller.envelope)

@@ -12,8 +12,10 @@ from bench.errors import DeviceFault, InterlockError
 from bench.findings import Effect, Finding
 from bench.limits import Verdict, judge
 from bench.procedure import Measured
+from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import interval
+from sim_backend.truth import draw
 
 QUICK = {"settle_s": 0.5, "average_s": 0.3}
 
@@ -49,6 +51,17 @@ def test_the_result_follows_the_truth(tmp_path: Path, factor: float) -> None:
         assert true[name] == pytest.approx(value, rel=1e-9)
         assert abs(measured[name].estimate.value - value) < 3 * measured[name].estimate.u
         assert judge(interval(measured[name].estimate), limits[name]) is Verdict.FAIL
+
+
+def test_the_constants_hold_for_the_bias_of_the_plan(tmp_path: Path) -> None:
+    """K = 2 b (A + B): at 2.5 A five sixths of the value at 3 A, in the truth as in the result."""
+    true, results = simulate("amb-calibration", "tsbs12", 12, {**QUICK, "bias_A": 2.5}, tmp_path / "recording.mcap")
+    rig = load_rig("tsbs12")
+    at_three = draw(rig, 12).quantities
+    measured = {m.quantity.name: m.estimate for m in results if isinstance(m, Measured)}
+    for name in ("K_i", "K_o"):
+        assert true[name] == pytest.approx(at_three[name] * 2.5 / 3, rel=1e-9)
+        assert abs(measured[name].value - true[name]) < 3 * measured[name].u
 
 
 @pytest.mark.parametrize(
