@@ -48,6 +48,11 @@ def view_topic(stream: str) -> str:
     return f"/{stream}/view"
 
 
+def sample_topic(stream: str) -> str:
+    """Only in exports: one scalar message per sample."""
+    return f"/{stream}/sample"
+
+
 def _file(name: str, fields: list[tuple[str, int, int, bool]]) -> bytes:
     """A FileDescriptorSet with one message of (name, number, type, repeated) fields."""
     file = descriptor_pb2.FileDescriptorProto(name=f"{name}.proto", package="levbench", syntax="proto3")
@@ -82,9 +87,16 @@ def block_schema(layout: StreamLayout) -> bytes:
 
 def view_schema(layout: StreamLayout) -> bytes:
     """`View_<stream>`: scalars, mean, minimum and maximum of each measured channel and the last value of each code."""
-    return _file(
-        f"View_{layout.name}", [(n, k + 1, _kind("TYPE_FLOAT"), False) for k, n in enumerate(view_names(layout))]
-    )
+    return _scalars(f"View_{layout.name}", view_names(layout))
+
+
+def sample_schema(layout: StreamLayout) -> bytes:
+    """`Sample_<stream>`: scalars, one for each channel."""
+    return _scalars(f"Sample_{layout.name}", [c.name for c in layout.channels])
+
+
+def _scalars(name: str, fields: Sequence[str]) -> bytes:
+    return _file(name, [(field, k + 1, _kind("TYPE_FLOAT"), False) for k, field in enumerate(fields)])
 
 
 def view_names(layout: StreamLayout) -> list[str]:

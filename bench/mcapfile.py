@@ -181,6 +181,8 @@ def _scan(out: McapFile, file: BinaryIO, size: int) -> bool:
             return file.read() == MAGIC
         else:
             crc = zlib.crc32(data, zlib.crc32(head, crc))
+            if head[0] == Opcode.ATTACHMENT and int.from_bytes(data[-4:], "little") not in (0, zlib.crc32(data[:-4])):
+                raise RecordingError(f"recording {out.path}: an attachment fails its CRC; {DAMAGED}")
             if head[0] in RECORDS:
                 _take(out, RECORDS[head[0]].read(stream), file.tell())
 

@@ -120,12 +120,15 @@ class McapWriter:
             self._mcap.flush()
             self._file.flush()
 
-    def finish(self, counts: Mapping[str, str], wall: Mapping[str, str]) -> None:
-        """Write what is pending, the counts as metadata `integrity`, the wall record and the summary."""
+    def write_pending(self) -> None:
+        """Write the samples that wait for more; no more may come. `blocks` is final afterwards."""
         for stream in self._pending:
             self._write_blocks(stream)
             self._write_view(stream, self._windows[stream].rest())
         self._mcap.flush()
+
+    def finish(self, counts: Mapping[str, str], wall: Mapping[str, str]) -> None:
+        """Write the counts as metadata `integrity`, the wall record and the summary."""
         self._mcap.add_metadata("integrity", dict(counts))
         if wall:
             self._mcap.add_metadata("wall", dict(wall))

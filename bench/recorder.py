@@ -22,7 +22,8 @@ from bench.frames import FRAME, FrameBatch
 from bench.mcapwriter import McapWriter
 from bench.samples import SampleBlock, StreamLayout
 
-QUEUE_ITEMS = 400  # a live link hands over at most some tens of batches a second, so this is seconds
+LIVE_ITEMS = 400  # a live link hands over at most some tens of batches a second, so this is seconds
+WAITING_ITEMS = 8  # where the maker waits; in bench time it runs ahead of the disk by less than half a second
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,9 @@ class Recorder:
             with suppress(OSError):  # closing tries the same bytes again
                 self._file.close()
             raise RecordingError(f"recording {path}: cannot be written: {error.strerror or error}") from error
-        self._queue: queue.Queue[tuple[str, tuple[Any, ...]] | None] = queue.Queue(QUEUE_ITEMS)
+        self._queue: queue.Queue[tuple[str, tuple[Any, ...]] | None] = queue.Queue(
+            LIVE_ITEMS if live else WAITING_ITEMS
+        )
         self._thread = threading.Thread(target=self._drain, name="recorder", daemon=True)
         self._thread.start()
 
@@ -131,6 +134,7 @@ class Recorder:
             try:
                 if self._failure is None:
                     self.wall["queue_high_water"] = str(self._high_water)
+                    self._writer.write_pending()
                     self.integrity.blocks.update(self._writer.blocks)
                     counts = {k: json.dumps(v, sort_keys=True) for k, v in vars(self.integrity).items()}
                     self._writer.finish(counts, self.wall)

@@ -20,15 +20,24 @@ def reader() -> list[str]:
     if npm is None or node is None:
         pytest.skip("npm is not installed")
     if not (NODE / "node_modules" / "@mcap" / "support").is_dir():
-        command = [npm, "install", "--no-audit", "--no-fund", "--silent", "--no-package-lock"]
+        command = [npm, "ci", "--no-audit", "--no-fund", "--silent", "--ignore-scripts"]
         done = subprocess.run(command, cwd=NODE, capture_output=True, text=True, timeout=100)
         if done.returncode:
-            pytest.skip(f"npm install failed: {done.stderr[-200:]}")
+            pytest.skip(f"npm ci failed: {done.stderr[-200:]}")
     return [node, str(NODE / "read.mjs")]
 
 
 def read(command: list[str], path: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run([*command, str(path)], capture_output=True, text=True, timeout=60)
+
+
+def test_the_lock_pins_every_package_by_its_hash_and_names_no_registry() -> None:
+    text = (NODE / "package-lock.json").read_text()
+    packages = {name: p for name, p in json.loads(text)["packages"].items() if name}
+    assert packages["node_modules/@mcap/core"]["version"] == "2.2.2"
+    assert all(p["integrity"].startswith("sha512-") for p in packages.values())
+    assert "resolved" not in text
+    assert "://" not in text
 
 
 def test_the_reference_reader_reads_everything(reader: list[str], tmp_path: Path) -> None:

@@ -81,7 +81,7 @@ def prepare(request: Request) -> tuple[Job, Connect]:
     seed = 0 if request.seed is None else request.seed
     overrides = dict(plans.assignment(text) for text in request.truth)
     _refuse_words(overrides)
-    connect = simulated(rig, seed, overrides, procedure.settings(plan), request.operator or "auto")
+    connect = simulated(rig, seed, overrides, request.operator or "auto", procedure.settings(plan))
     return Job(procedure, rig, plan, limits, request.backend, seed), connect
 
 
@@ -111,7 +111,11 @@ def _refuse_words(overrides: Mapping[str, Any]) -> None:
 
 
 def simulated(
-    rig: RigFile, seed: int, overrides: Mapping[str, float], settings: Mapping[str, float], operator: str
+    rig: RigFile,
+    seed: int,
+    overrides: Mapping[str, float],
+    operator: str,
+    settings: Mapping[str, float] | None = None,
 ) -> Connect:
     """How to open a simulated rig. The truth is drawn now, so that a wrong override is found before the start.
 

@@ -1,0 +1,105 @@
+"""Exports: every sample of every channel in each format, whole files or none, and the run untouched."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from pyarrow import parquet
+from recordings import START_NS, gapped, record
+from test_recorder import messages_of
+
+from bench import rundir
+from bench.errors import BenchError, ConfigError, RecordingError
+from bench.export import export
+from bench.recording import Recording
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    path = tmp_path / "amb-calibration-20260101T000000Z-0000"
+    path.mkdir()
+    record(path / "recording.mcap", gapped())
+    return path
+
+
+def written(name: str) -> np.ndarray[Any, Any]:
+    return np.concatenate([b.columns[name] for b in gapped()]).astype(np.float32)
+
+
+INDEX = np.r_[0:1200, 1205:2305]
+
+
+def test_parquet_holds_every_sample_with_its_unit(run: Path, tmp_path: Path) -> None:
+    files = export(run, "parquet", tmp_path / "out" / "deep")
+    assert [f.name for f in files] == ["telemetry.parquet", "events.parquet"]
+    table = parquet.read_table(files[0])
+    assert np.array_equal(table["index"], INDEX)
+    assert np.array_equal(table["t_ns"], START_NS + INDEX * 1_000_000)
+    assert np.array_equal(table["tick"], INDEX * 10)
+    for name in ("pos_yi", "i_yi_p", "state"):
+        assert np.array_equal(table[name], written(name)), name
+    assert table.schema.field("pos_yi").metadata == {b"unit": b"m"}
+    events = parquet.read_table(files[1]).to_pylist()
+    assert len(events) == 48
+    assert events[0] == {"t_ns": START_NS, "kind": "state", "data": '{"now": "LEVITATED", "note": ""}'}
+
+
+def test_csv_holds_every_sample_with_the_unit_in_the_heading(run: Path) -> None:
+    files = export(run, "csv")
+    assert files[0] == run / "export" / "telemetry.csv"
+    with files[0].open(newline="") as file:
+        head, *rows = csv.reader(file)
+    assert head == ["t_ns", "index", "tick", "pos_yi [m]", "i_yi_p [A]", "state"]
+    assert np.array_equal(np.array([row[3] for row in rows], np.float32), written("pos_yi"))
+
+
+def test_mcap_holds_one_scalar_message_per_sample(run: Path) -> None:
+    (path,) = export(run, "mcap")
+    found = messages_of(path)
+    assert set(found) == {"/telemetry/sample", "/events"}
+    assert [t for t, _ in found["/telemetry/sample"]] == (START_NS + INDEX * 1_000_000).tolist()
+    for name in ("pos_yi", "i_yi_p", "state"):
+        assert np.array_equal([getattr(m, name) for _, m in found["/telemetry/sample"]], written(name)), name
+    assert [m for _, m in found["/events"]] == Recording.open(run / "recording.mcap").events()
+    with path.open("rb") as file:
+        (told,) = make_reader(file, validate_crcs=True).iter_metadata()
+    assert told.metadata["sha256"] == Recording.open(run / "recording.mcap").digest()
+
+
+def test_an_export_is_not_taken_for_a_recording(run: Path) -> None:
+    (path,) = export(run, "mcap")
+    with pytest.raises(RecordingError, match="no Levbench recording"):
+        Recording.open(path)
+
+
+@pytest.mark.parametrize("to", ["parquet", "csv", "mcap"])
+def test_a_second_export_replaces_the_first_and_the_run_is_untouched(run: Path, to: Any) -> None:
+    before = (run / "recording.mcap").read_bytes()
+    first = {f: f.read_bytes() for f in export(run, to)}
+    assert {f: f.read_bytes() for f in export(run, to)} == first
+    assert (run / "recording.mcap").read_bytes() == before
+    assert not list((run / "export").glob("*.part"))
+
+
+@pytest.mark.parametrize("to", ["parquet", "csv", "mcap"])
+def test_a_truncated_recording_gives_what_there_is(run: Path, to: Any) -> None:
+    path = run / "recording.mcap"
+    path.write_bytes(path.read_bytes()[:-9000])
+    assert Recording.open(path).truncated
+    for file in export(run, to):
+        assert file.stat().st_size > 100
+
+
+def test_what_cannot_be_exported_is_said(run: Path, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError):
+        export(tmp_path / "absent", "csv")
+    (tmp_path / "file").write_text("precious")
+    with pytest.raises(BenchError, match=r"file: cannot be written: .*; the run is untouched"):
+        export(run, "csv", tmp_path / "file")
+    assert (tmp_path / "file").read_text() == "precious"
+    assert rundir.existing(run).recording.is_file()

@@ -1,0 +1,158 @@
+"""What analysis asks of a recording: lost samples of a step, plans, limits, and long files in little memory."""
+
+from __future__ import annotations
+
+import tracemalloc
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.writer import Writer
+from recordings import PERIOD_NS, START_NS, STREAM, SetClock, block, frames_of, record
+
+from bench.errors import RecordingError
+from bench.procedure import BenchPlan
+from bench.recorder import Recorder, RunHeader
+from bench.recording import Recording
+
+
+class Angles(BenchPlan):
+    angles: int
+
+
+class Masses(BenchPlan):
+    masses: tuple[str, ...]
+
+
+def opened(
+    path: Path, attachments: dict[str, bytes], metadata: dict[str, dict[str, str]] | None = None
+) -> Recording[Any]:
+    record(path, [block(0, 10)], header=RunHeader(metadata or {}, attachments))
+    return Recording.open(path)
+
+
+PRESENT = np.r_[0:300, 320:321, 350:1200, 1205:2300]
+
+
+@pytest.fixture(scope="module")
+def holed(tmp_path_factory: pytest.TempPathFactory) -> Recording[Any]:
+    """Samples 300-319, 321-349 and 1200-1204 are missing, and it was cut off after 2299."""
+    path = tmp_path_factory.mktemp("holed") / "a.mcap"
+    blocks = [block(0, 300), block(320, 1, lost=20), block(350, 850, lost=29), block(1205, 1095, lost=5)]
+    with Recorder(path, clock=SetClock(), streams=[STREAM], header=RunHeader({}, {})) as recorder:
+        for part in blocks:
+            recorder.samples(part)
+    return Recording.open(path)
+
+
+@pytest.mark.parametrize(
+    ("start", "end"),
+    [(0, 300), (0, 301), (299, 321), (305, 310), (310, 345), (300, 350), (320, 321), (321, 322), (349, 350), (350, 1200),
+     (0, 2300), (1199, 1206), (1204, 1205), (1205, 2300), (1202, 1203), (1000, 1203), (2290, 2350), (2300, 2310), (0, 2400)],
+)  # fmt: skip
+def test_lost_samples_of_any_interval(holed: Recording[Any], start: int, end: int) -> None:
+    """Against a plain count of the indexes that are not there."""
+    expected = len(set(range(start, end)) - set(PRESENT.tolist()))
+    for early in (0, PERIOD_NS // 3):  # a step that begins and ends between samples
+        found = holed.lost("telemetry", START_NS + start * PERIOD_NS - early, START_NS + end * PERIOD_NS - early)
+        assert found == expected
+
+
+def test_a_step_knows_what_it_lost(tmp_path: Path) -> None:
+    clock = SetClock()
+    with Recorder(tmp_path / "a.mcap", clock=clock, streams=[STREAM], header=RunHeader({}, {})) as recorder:
+        for first, lost in ((0, 0), (110, 10), (210, 0)):
+            clock.now = START_NS + (first - lost) * PERIOD_NS
+            with recorder.step("dwell"):
+                recorder.samples(block(first, 100, lost))
+                clock.now = START_NS + (first + 100) * PERIOD_NS
+    steps = list(Recording.open(tmp_path / "a.mcap").steps("dwell"))
+    assert [(s.lost(), s.expected(), len(s.read("state")["t_ns"])) for s in steps] == [
+        (0, 100, 100),
+        (10, 110, 100),
+        (0, 100, 100),
+    ]
+
+
+def test_one_channel_of_an_interval_and_of_the_whole(holed: Recording[Any]) -> None:
+    whole = holed.channel("i_yi_p")
+    assert np.array_equal(whole["index"], PRESENT)
+    part = holed.channel("i_yi_p", START_NS + 100 * PERIOD_NS, START_NS + 330 * PERIOD_NS)
+    assert part["index"].tolist() == [*range(100, 300), 320]
+    assert np.array_equal(part["i_yi_p"], whole["i_yi_p"][100:301])
+    assert holed.channel("state", 0, 1)["t_ns"].dtype == np.int64
+
+
+def test_the_plan_as_a_type(tmp_path: Path) -> None:
+    recording = opened(tmp_path / "a.mcap", {"plan.json": b'{"angles": 8}'})
+    assert recording.plan_as(Angles).angles == 8
+    assert Recording.open(tmp_path / "a.mcap", Angles).plan.angles == 8
+    with pytest.raises(RecordingError, match="its plan is no Masses"):
+        recording.plan_as(Masses)
+
+
+def test_limits_and_calibrations(tmp_path: Path) -> None:
+    recording = opened(tmp_path / "a.mcap", {"spec.json": b'{"K_i": {"low": 1.0}}', "calibrations.json": b"[]"})
+    assert recording.spec == {"K_i": {"low": 1.0}}
+    assert recording.calibrations == []
+
+
+def test_a_damaged_attachment_is_found_even_where_the_file_was_cut_off_too(tmp_path: Path) -> None:
+    """The CRC of the data section stands at the end, which such a file has not."""
+    path = tmp_path / "a.mcap"
+    opened(path, {"rig.toml": b"span = 0.125"})
+    data = bytearray(path.read_bytes()[:-500])
+    path.write_bytes(data)
+    assert Recording.open(path).truncated
+    data[data.index(b"0.125") + 2] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(RecordingError, match="an attachment fails its CRC"):
+        Recording.open(path)
+
+
+@pytest.mark.parametrize("text", [b"{", b"[1]", b"\xff"])
+def test_an_attachment_that_is_not_what_it_should_be(tmp_path: Path, text: bytes) -> None:
+    with pytest.raises(RecordingError, match=r"a\.mcap: attachment 'spec.json'"):
+        _ = opened(tmp_path / "a.mcap", {"spec.json": text}).spec
+
+
+def test_a_seed_that_is_no_number(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"a\.mcap: seed: found 'seven'; expected an integer"):
+        _ = opened(tmp_path / "a.mcap", {}, {"run": {"seed": "seven"}}).seed
+
+
+@pytest.mark.parametrize("version", ["", "one", "-1", "1.5", "\u00b2"])
+def test_a_layout_version_that_is_no_number(tmp_path: Path, version: str) -> None:
+    with (tmp_path / "a.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="levbench")
+        writer.add_metadata("layout", {"version": version})
+        writer.finish()  # type: ignore[no-untyped-call]
+    with pytest.raises(RecordingError, match="no Levbench recording"):
+        Recording.open(tmp_path / "a.mcap")
+
+
+def test_a_long_file_is_read_step_by_step_in_little_memory(tmp_path: Path) -> None:
+    """200 s: 16 MB of frames and 5 MB of samples. An hour at 29 channels follows by proportion, as nothing that is kept
+    grows with the length but the places of the chunks and the events."""
+    clock, seconds = SetClock(), 200
+    with Recorder(tmp_path / "a.mcap", clock=clock, streams=[STREAM], header=RunHeader({}, {})) as recorder:
+        template = frames_of(block(0, 1000))
+        noise = np.random.default_rng(0).integers(0, 256, (1000, 56), np.uint8)
+        template["data"][:, 8:] = noise
+        for n in range(seconds):
+            part = block(n * 1000, 1000)
+            template["t_ns"] = part.t_ns
+            with recorder.step("dwell", number=n):
+                recorder.frames("can0", template)
+                recorder.samples(part)
+                clock.now += 1000 * PERIOD_NS
+    tracemalloc.start()
+    recording: Recording[Any] = Recording.open(tmp_path / "a.mcap")
+    means = [step.mean("i_yi_p") for step in recording.steps("dwell")]
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(means) == seconds
+    assert (tmp_path / "a.mcap").stat().st_size > 10e6
+    assert peak < 6e6
