@@ -32,6 +32,7 @@ bench: setup
 	$(BIN)/python benchmarks/core.py
 	$(BIN)/python benchmarks/decode.py
 	$(BIN)/python benchmarks/path.py
+	$(BIN)/python benchmarks/recorder.py
 	$(BIN)/python benchmarks/startup.py
 
 format: setup

@@ -49,6 +49,7 @@ class Table(StrEnum):
 
     PARQUET = "parquet"
     CSV = "csv"
+    MCAP = "mcap"
 
 
 Out = Annotated[Path, typer.Option("--out", help="Folder of the run directories.")]
