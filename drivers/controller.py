@@ -9,7 +9,7 @@ import numpy as np
 from bench.clock import Clock, PumpedClock
 from bench.codec import Decoder, encode
 from bench.envelope import Envelope
-from bench.errors import BenchError, DeviceFault, InterlockError, LinkError
+from bench.errors import BenchError, DeviceFault, LinkError
 from bench.frames import FD, SENT, FrameBatch, frame
 from bench.link import Link
 from bench.recorder import Recorder
@@ -241,6 +241,3 @@ class CanController:
             if self._base.now_ns() >= deadline:
                 raise LinkError(f"link {self._link.name}: waited {timeout_s:g} s for {what}; it did not come")
             self.clock.sleep(WAIT_SLICE_S)
-
-
-__all__ = ["CanController", "InterlockError"]

@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import Field
 
 from bench.figures import Figure
-from bench.findings import Effect, Finding
+from bench.findings import Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recorder import Recorder
 from bench.recording import Recording
@@ -263,5 +263,3 @@ procedure = Procedure(
     step_count=step_count,
     method=METHOD,
 )
-
-__all__ = ["Effect", "Plan", "procedure"]
