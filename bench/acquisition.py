@@ -23,10 +23,10 @@ from bench.errors import (
 )
 from bench.evaluation import Ending
 from bench.findings import Effect, Finding
-from bench.opened import Connect, Job, OpenRig
+from bench.opened import Job, OpenRig
 from bench.progress import Progress
 from bench.recorder import Recorder
-from bench.records import LinkCounts, Outcome
+from bench.records import Outcome
 from bench.roles import RigState
 from bench.rundir import RunDirectory
 from bench.states import transition
@@ -50,27 +50,24 @@ class Acquired:
 
 
 def acquired(
-    job: Job, directory: RunDirectory, started: datetime, connect: Connect, supervisor: Supervisor, progress: Progress
+    job: Job, directory: RunDirectory, started: datetime, live: OpenRig, supervisor: Supervisor, progress: Progress
 ) -> Acquired:
-    """Open the rig and the recording, move, make safe, close. Raises nothing: what went wrong is in the ending."""
-    truth: Mapping[str, Any] | None = None
+    """Open the recording, move, make safe, close it. Raises nothing: what went wrong is in the ending."""
     ending: Ending | None = None
     wall = provenance.wall(directory, started)
     try:
-        with connect(supervisor) as live:
-            truth = live.truth
-            recorder = Recorder(
-                directory.recording, clock=live.rig.clock, streams=live.streams, header=provenance.header(job),
-                live=job.backend == "live",
-            )  # fmt: skip
-            with recorder:
-                live.attach(recorder)
-                cause, findings = _moved(job, live, recorder, supervisor, progress)
-                ending = _ending(cause, findings, live, recorder)
-                wall = provenance.wall(directory, started)
-                recorder.wall |= wall
-                with suppress(RecordingError):  # closing raises the same failure again
-                    ending.write(recorder)
+        recorder = Recorder(
+            directory.recording, clock=live.rig.clock, streams=live.streams, header=provenance.header(job),
+            live=job.backend == "live",
+        )  # fmt: skip
+        with recorder:
+            live.attach(recorder)
+            cause, findings = _moved(job, live, recorder, supervisor, progress)
+            ending = _ending(cause, findings, live, recorder)
+            wall = provenance.wall(directory, started)
+            recorder.wall |= wall
+            with suppress(RecordingError):  # closing raises the same failure again
+                ending.write(recorder)
     except Exception as error:
         stopped, finding = cause_of(error)
         before = ending or Ending()
@@ -78,7 +75,7 @@ def acquired(
         findings = before.findings if known else (*before.findings, finding)
         ending = replace(before, stopped=before.stopped or stopped, findings=findings)
     assert ending is not None
-    return Acquired(ending, wall["ended"], truth)
+    return Acquired(ending, wall["ended"], live.truth)
 
 
 def _moved(
@@ -147,13 +144,9 @@ class WatchedSteps:
 
 
 def _ending(cause: BaseException | None, findings: tuple[Finding, ...], live: OpenRig, recorder: Recorder) -> Ending:
-    counters = live.rig.counters
-    # Lost samples are gaps; everything else that a clean link does not do is an error.
-    errors = counters.wrong_length + counters.duplicates + counters.reordered + counters.reboots
-    link = LinkCounts(sum(recorder.integrity.frames.values()), counters.gaps, errors)
-    if counters.lost:
-        text = f"{counters.lost} samples were lost in {counters.gaps} gaps"
-        findings = (*findings, Finding("samples-lost", text, "telemetry"))
+    health = live.rig.health()
+    link = health.counts(sum(recorder.integrity.frames.values()))
+    findings = (*live.findings, *findings, *health.findings())
     if cause is None:
         return Ending(None, findings, link)
     stopped, finding = cause_of(cause)

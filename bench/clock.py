@@ -20,10 +20,13 @@ class Clock(Protocol):
 
 
 class WallClock:
-    """The host's clock, for live rigs."""
+    """The host's clock, for live rigs: UNIX time at the start, then the monotonic clock, so that it never steps."""
+
+    def __init__(self) -> None:
+        self._offset_ns = time.time_ns() - time.monotonic_ns()
 
     def now_ns(self) -> int:
-        return time.time_ns()
+        return self._offset_ns + time.monotonic_ns()
 
     def sleep(self, seconds: float) -> None:
         time.sleep(seconds)
@@ -36,11 +39,16 @@ class PumpedClock:
     interlock ends a procedure in the middle of a sleep.
     """
 
-    def __init__(self, base: Clock, pump: Callable[[], None], slice_s: float = 0.1) -> None:
-        self._base, self._pump, self._slice_s = base, pump, slice_s
+    def __init__(
+        self, base: Clock, pump: Callable[[], None], slice_s: float = 0.1, lag_ns: Callable[[], int] = lambda: 0
+    ) -> None:
+        self._base, self._pump, self._slice_s, self._lag_ns = base, pump, slice_s, lag_ns
+        self._latest = 0
 
     def now_ns(self) -> int:
-        return self._base.now_ns()
+        """The present on the sample clock: the base's time less its lag behind the device's; never goes back."""
+        self._latest = max(self._latest, self._base.now_ns() - self._lag_ns())
+        return self._latest
 
     def sleep(self, seconds: float) -> None:
         left = seconds

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -20,6 +21,12 @@ class Envelope:
     """Protection of one rig, from its rig file."""
 
     rig: RigFile
+
+    @cached_property
+    def _held(self) -> list[int]:
+        """Codes of the controller's states in which the rotor is held."""
+        choices = self.rig.choices("state")
+        return [code for code, name in choices.items() if self.rig.binding.mode(name) in HELD]
 
     def check_parameter(self, name: str, value: float) -> None:
         """Refuse a parameter write out of its range.
@@ -70,9 +77,8 @@ class Envelope:
             elif name.startswith("temp_"):
                 self._trip(block, name, x, e.max_temperature_K, "K")
         self._trip(block, "speed", np.abs(c["speed"]), e.max_speed_rad_s, "rad/s")
-        codes = [self.rig.messages.code("Telemetry", "state", s) for s in HELD]
-        held = np.isin(c["state"], codes)
-        for name in POSITIONS:
+        held = np.isin(c["state"], self._held)
+        for name in (n for n in POSITIONS if n in c):
             self._trip(block, name, np.where(held, np.abs(c[name]), 0.0), e.max_levitated_position_m, "m")
 
     @staticmethod

@@ -10,6 +10,7 @@ import numpy.typing as npt
 FRAME: Final = np.dtype(
     [
         ("t_ns", "<i8"),  # host time of receipt or sending, UNIX ns (virtual in simulation)
+        ("hw_ns", "<i8"),  # the interface's own timestamp, ns on a clock of its own; 0 where it has none
         ("id", "<u4"),  # CAN identifier; bit 31 set for extended identifiers
         ("flags", "u1"),  # bit 0: sent by the host; bit 1: CAN FD; bit 2: error frame
         ("length", "u1"),  # payload bytes, 0..64
@@ -19,6 +20,8 @@ FRAME: Final = np.dtype(
 SENT: Final = 1
 FD: Final = 2
 ERROR: Final = 4
+EXTENDED: Final = 1 << 31
+"""Bit of `id`: an identifier of 29 bits."""
 
 FrameBatch = npt.NDArray[np.void]
 """A one-dimensional structured array of dtype FRAME, in order of arrival."""
@@ -40,6 +43,17 @@ def frame(identifier: int, payload: bytes, *, t_ns: int = 0, flags: int = 0) -> 
     batch = np.zeros(1, FRAME)
     batch["t_ns"], batch["id"], batch["flags"], batch["length"] = t_ns, identifier, flags, len(payload)
     batch["data"][0, : len(payload)] = np.frombuffer(payload, np.uint8)
+    return batch
+
+
+def frames_of(records: bytes, version: int) -> FrameBatch:
+    """A batch from the bytes of a recording of that layout version; version 1 knew no `hw_ns`."""
+    if version > 1:
+        return np.frombuffer(records, FRAME)
+    old = np.frombuffer(records, np.dtype([(n, FRAME[n]) for n in FRAME.names or () if n != "hw_ns"]))
+    batch = np.zeros(len(old), FRAME)
+    for name in old.dtype.names or ():
+        batch[name] = old[name]
     return batch
 
 

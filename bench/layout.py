@@ -17,7 +17,8 @@ from google.protobuf import descriptor_pb2
 from bench.errors import RecordingError
 from bench.samples import StreamLayout
 
-VERSION: Final = 1
+VERSION: Final = 2
+"""2: frames carry the interface's own timestamp."""
 EVENTS: Final = "/events"
 _TYPES: Final = {"f4": ("TYPE_FLOAT", "<f4"), "u2": ("TYPE_FIXED32", "<u4")}
 HEAD: Final = (

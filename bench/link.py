@@ -2,9 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol
 
 from bench.frames import FrameBatch
+
+
+@dataclass
+class LinkStats:
+    """What was counted between the wire and the buffer. All but the first two are zero on a clean link."""
+
+    received: int = 0  # frames
+    sent: int = 0  # frames, heartbeats included
+    crc_errors: int = 0  # packets whose CRC fails
+    malformed: int = 0  # packets or lines that cannot be taken apart, and frames of an impossible length
+    packets_lost: int = 0  # by the packets' own sequence numbers
+    error_frames: int = 0  # destroyed frames that the interface reports
+    refused: int = 0  # frames or commands that the interface refuses to send
+    overflows: int = 0  # frames dropped because nobody took them from the buffer
+    bus_off: int = 0
+    reconnects: int = 0
+    heartbeats: int = 0
+    longest_heartbeat_gap_ns: int = 0
 
 
 class Link(Protocol):
@@ -13,6 +32,11 @@ class Link(Protocol):
     @property
     def name(self) -> str:
         """The link's name in the rig file; its frames are recorded under `/raw/<name>`."""
+        ...
+
+    @property
+    def stats(self) -> LinkStats:
+        """Counts since the link was opened."""
         ...
 
     def send(self, batch: FrameBatch) -> None:
@@ -36,5 +60,5 @@ class Link(Protocol):
         ...
 
     def close(self) -> None:
-        """Release the transport. Calling it twice is harmless."""
+        """Stop the heartbeat and release the transport. Calling it twice is harmless."""
         ...

@@ -65,11 +65,13 @@ class McapWriter:
         number = self._mcap.register_schema(name, "protobuf", schema)
         self._channels[topic] = self._mcap.register_channel(topic, "protobuf", number, dict(metadata or {}))
 
-    def frames(self, link: str, t_ns: int, batch: FrameBatch) -> None:
+    def frames(self, link: str, lag_ns: int, batch: FrameBatch) -> None:
+        host_ns = int(batch["t_ns"][-1])
+        t_ns = host_ns - lag_ns
         topic = layout.raw_topic(link)
         if topic not in self._channels:
             self._register(topic, "levbench.Frames", layout.raw_schema())
-        self._message(topic, t_ns, layout.encode_frames(t_ns, len(batch), batch.tobytes()))
+        self._message(topic, t_ns, layout.encode_frames(host_ns, len(batch), batch.tobytes()))
         self._flush_if_due(t_ns)
 
     def samples(self, block: SampleBlock) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from bench.clock import Clock
+from bench.findings import Finding
 from bench.limits import Limit
 from bench.procedure import BenchPlan, Procedure
 from bench.recorder import Recorder
@@ -36,7 +37,7 @@ class OpenRig:
 
     `attach` gives the recorder to everything that records (None takes it away), `unguard` ends interlocks and silence
     checks so that make-safe can talk to a machine that has tripped, `safe_steps` are the ordered make-safe. `truth` is
-    what a simulated rig drew, for `truth.json`.
+    what a simulated rig drew, for `truth.json`; `findings` are what was noticed while opening it.
     """
 
     rig: Rig
@@ -45,6 +46,7 @@ class OpenRig:
     unguard: Callable[[], None]
     safe_steps: Sequence[SafeStep]
     truth: Mapping[str, Any] | None = field(default=None)
+    findings: Sequence[Finding] = ()
 
 
 class WatchedClock:
@@ -52,12 +54,14 @@ class WatchedClock:
 
     def __init__(self, base: Clock, renew: Callable[[], None], check: Callable[[int], None]) -> None:
         self._base, self._renew, self._check = base, renew, check
+        self.renewing = True  # the last thing make-safe can do is to let the heartbeat end
 
     def now_ns(self) -> int:
         return self._base.now_ns()
 
     def sleep(self, seconds: float) -> None:
-        self._renew()
+        if self.renewing:
+            self._renew()
         self._base.sleep(seconds)
         self._check(self._base.now_ns())
 

@@ -88,10 +88,10 @@ class Recorder:
         self._thread = threading.Thread(target=self._drain, name="recorder", daemon=True)
         self._thread.start()
 
-    def frames(self, link: str, batch: FrameBatch) -> None:
-        """Record frames as they came, or as they were sent (flag SENT)."""
+    def frames(self, link: str, batch: FrameBatch, lag_ns: int = 0) -> None:
+        """Record frames as they came, or as they were sent (flag SENT); host time less `lag_ns` is sample time."""
         if len(batch):
-            self._put("frames", link, int(batch["t_ns"][-1]), batch.astype(FRAME, copy=True))
+            self._put("frames", link, lag_ns, batch.astype(FRAME, copy=True))
             _add(self.integrity.frames, link, len(batch))
 
     def samples(self, block: SampleBlock) -> None:

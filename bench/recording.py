@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from bench import layout
 from bench.errors import AnalysisError, RecordingError
-from bench.frames import FRAME, FrameBatch
+from bench.frames import FrameBatch, frames_of
 from bench.layout import DecodedBlock
 from bench.mcapfile import McapFile, index
 from bench.procedure import BenchPlan
@@ -36,6 +36,7 @@ class Recording(Generic[P]):
 
     def __init__(self, file: McapFile, plan: type[P] | None) -> None:
         self._file, self._plan_class = file, plan
+        self.version = int(file.metadata["layout"]["version"])
         self.path = file.path
         self.integrity: Mapping[str, Any] | None = _integrity(file)
         self.truncated = file.truncated or self.integrity is None
@@ -233,7 +234,7 @@ class Recording(Generic[P]):
         """Raw frames, batch by batch as they were recorded."""
         for _, data in self._file.messages(layout.raw_topic(link)):
             _, records = layout.decode_frames(data)
-            yield np.frombuffer(records, FRAME)
+            yield frames_of(records, self.version)
 
     def close(self) -> None:
         """Nothing stays open between reads; here for symmetry with the recorder."""

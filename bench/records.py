@@ -105,12 +105,20 @@ class RecordingFile:
 
 @dataclass(frozen=True)
 class LinkCounts:
-    """What the link delivered: frames, gaps in the telemetry, error frames."""
+    """What the controller's link delivered: frames, gaps in the telemetry, everything that a clean link does not do.
+
+    `counts` has it all by name (docs/reference/record.md). `drift_ppm` is host clock against device clock with its
+    expanded uncertainty; `latest_ms` the greatest lateness of a sample; None where it was not measured.
+    """
 
     __pydantic_config__: ClassVar[ConfigDict] = _STRICT
     frames: int = 0
     gaps: int = 0
     errors: int = 0
+    counts: Mapping[str, int] = dataclasses.field(default_factory=dict)
+    drift_ppm: float | None = None
+    drift_expanded_ppm: float | None = None
+    latest_ms: float | None = None
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bench.clock import Clock
+from bench.linkhealth import Health
 from bench.rigfile import RigFile
 from bench.roles import Levitation, Operator, Rotation
 from bench.telemetry import Counters
@@ -13,7 +14,7 @@ from bench.telemetry import Counters
 
 @dataclass
 class Rig:
-    """What `acquire` gets. `close` releases the links; `counters` are the link's."""
+    """What `acquire` gets. `close` releases the links; `counters` are the telemetry's; `health` is the whole link's."""
 
     file: RigFile
     clock: Clock
@@ -21,4 +22,5 @@ class Rig:
     rotation: Rotation
     operator: Operator
     counters: Counters
+    health: Callable[[], Health]
     close: Callable[[], None]

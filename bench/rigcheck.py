@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from bench import units
+from bench import binding, units
 from bench.busload import REFUSE, BusLoad, bus_load
 from bench.errors import ConfigError, Problem
 from bench.messages import MessageMap
@@ -46,7 +46,7 @@ def check_rig(rig: str) -> tuple[tuple[Problem, ...], BusLoad | None]:
         return error.problems + tuple(_behind(text, error.problems)), None
     load = None
     with contextlib.suppress(ConfigError, KeyError):
-        load = bus_load(loaded.messages, loaded.link.bitrate, loaded.link.data_bitrate)
+        load = bus_load(loaded.messages, loaded.link.bitrate, loaded.link.data_bitrate) if loaded.link.bitrate else None
     return tuple(problems_of(loaded)), load
 
 
@@ -143,9 +143,12 @@ def _parameters(rig: RigFile) -> Iterator[Problem]:
             yield Problem(rig.path, f"parameters.{name}", f"low {p.low:g} above high {p.high:g}", "low <= high")
         elif not p.low <= p.default <= p.high:
             yield Problem(rig.path, f"parameters.{name}.default", f"{p.default:g} {p.unit}", f"{p.low:g} to {p.high:g}")
-        if p.index in taken:
+        if (p.index is None) == (not p.signal):
+            yield Problem(rig.path, f"parameters.{name}", "both or neither", "either index or signal")
+        elif p.index is not None and p.index in taken:
             yield Problem(rig.path, f"parameters.{name}.index", str(p.index), f"an index of its own ({taken[p.index]})")
-        taken.setdefault(p.index, name)
+        if p.index is not None:
+            taken.setdefault(p.index, name)
 
 
 def _bindings(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
@@ -162,15 +165,16 @@ def _bindings(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
             yield Problem(rig.link.dbc, channel.signal, f"unit {dbc_unit!r}", "a known unit")
         elif channel.unit in units.UNITS and units.UNITS[dbc_unit].si != units.UNITS[channel.unit].si:
             yield Problem(rig.path, f"channels.{name}.unit", channel.unit, f"the kind of {dbc_unit} ({channel.signal})")
-    for needed in ("Telemetry", "Heartbeat", "Command", "CommandReply", "ParamSet", "ParamGet", "ParamReply"):
-        if needed not in messages.messages:
-            yield Problem(rig.link.dbc, needed, "no such message", "the message, as in the rig reference")
+    for key, found, expected in binding.problems_of(rig, messages):
+        yield Problem(rig.path, key, found, expected)
 
 
 def _bus(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
     for m in messages.messages.values():
         if m.length not in FD_LENGTHS:
             yield Problem(rig.link.dbc, m.name, f"{m.length} bytes", f"a CAN FD length: {FD_LENGTHS}")
+    if rig.link.bitrate is None:
+        return  # no CAN bus
     load = bus_load(messages, rig.link.bitrate, rig.link.data_bitrate)
     if load.total > REFUSE:
         worst = max(load.by_message, key=lambda name: load.by_message[name])

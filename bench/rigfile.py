@@ -6,7 +6,6 @@ The `[simulation]` table is parsed like the rest and read by the simulated backe
 from __future__ import annotations
 
 import hashlib
-import math
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -14,79 +13,19 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, ValidationError
 
-from bench import catalogue, units
+from bench import catalogue
+from bench.binding import Binding
 from bench.errors import ConfigError, Problem
 from bench.messages import MessageMap, load_messages
+from bench.part import Part
+from bench.registers import Register
+from bench.toleranced import Toleranced, simulated
 
 SCHEMA = 1
 MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
 """From an older schema to the next one."""
-
-
-class Part(BaseModel):
-    """A table of the rig file: frozen, no unknown keys, no NaN."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-Distribution = Literal["normal", "rectangular", "triangular", "arcsine"]
-DIVISOR = {"rectangular": math.sqrt(3), "triangular": math.sqrt(6), "arcsine": math.sqrt(2)}
-
-
-class Toleranced(Part):
-    """A number with what is known of its error: `u` (with its coverage factor `k`), or `half_width`. SI after reading."""
-
-    value: float
-    unit: str
-    u: float | None = Field(None, ge=0)
-    k: float = Field(1.0, gt=0)
-    half_width: float | None = Field(None, ge=0)
-    distribution: Distribution
-    source: str = Field(min_length=1)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _si(cls, data: Any) -> Any:
-        if isinstance(data, dict) and isinstance(data.get("unit"), str):
-            try:
-                unit = units.unit(data["unit"])
-            except ConfigError as error:  # a ValueError is reported with its key and next to the other problems
-                raise ValueError(str(error)) from None
-            scaled = {n: data[n] * unit.factor for n in ("u", "half_width") if isinstance(data.get(n), int | float)}
-            if isinstance(data.get("value"), int | float):
-                scaled["value"] = data["value"] * unit.factor + unit.offset
-            return {**data, **scaled, "unit": unit.si}
-        return data
-
-    @model_validator(mode="after")
-    def _one_width(self) -> Toleranced:
-        if (self.u is None) == (self.half_width is None):
-            raise ValueError("expected either u (normal) or half_width (rectangular, triangular, arcsine)")
-        if (self.u is not None) != (self.distribution == "normal"):
-            raise ValueError(
-                f"distribution {self.distribution!r} goes with {'u' if self.distribution == 'normal' else 'half_width'}"
-            )
-        return self
-
-    @property
-    def standard_uncertainty(self) -> float:
-        """One standard deviation, SI."""
-        if self.u is not None:
-            return self.u / self.k
-        return (self.half_width or 0.0) / DIVISOR[self.distribution]
-
-
-def _simulated(value: Any) -> Any:
-    """Tables with a `distribution` become Toleranced, at any depth; everything else stays."""
-    if isinstance(value, dict):
-        return (
-            Toleranced.model_validate(value)
-            if "distribution" in value
-            else {k: _simulated(v) for k, v in value.items()}
-        )
-    return value
 
 
 class Uut(Part):
@@ -103,17 +42,37 @@ class Site(Part):
 
 
 class LinkSpec(Part):
-    kind: Literal["can"]
+    """A link by its URL (see `bench.linkurl`); `dbc` where messages travel, bit rates where it is a CAN bus."""
+
     url: str
-    bitrate: float = Field(gt=0)
+    bitrate: float | None = Field(None, gt=0)
     data_bitrate: float | None = Field(None, gt=0)
-    dbc: str
+    dbc: str = ""
     encoding: str = "utf-8"
+    options: Mapping[str, str | int | float | bool] = {}  # passed on to the interface's library as they are
+    reconnect_s: float = Field(0.0, ge=0)  # how long to try again after the link was lost; 0: not at all
+    heartbeat: Literal["process", "thread"] = "process"
+
+
+Role = Literal["levitation", "rotation", "operator", "drive", "supply", "thermal"]
 
 
 class Device(Part):
+    """A device in its roles. `protocol` and `map_version` are what a controller's Identity must say; `registers`,
+    `commands` and `faults` are a Modbus device's."""
+
     link: str
-    roles: tuple[Literal["levitation", "rotation", "operator"], ...]
+    roles: tuple[Role, ...]
+    protocol: int | None = None
+    map_version: int | None = None
+    tick_s: float = Field(1e-4, gt=0)
+    binding: Binding = Binding()
+    unit: int = Field(1, ge=0, le=255)
+    word_order: Literal["big", "little"] = "big"
+    poll_s: float = Field(0.2, ge=0.02)
+    registers: Mapping[str, Register] = {}
+    commands: Mapping[str, Mapping[str, int]] = {}
+    faults: Mapping[str, str] = {}
 
 
 class Channel(Part):
@@ -123,7 +82,10 @@ class Channel(Part):
 
 
 class Parameter(Part):
-    index: int = Field(ge=0, le=65535)
+    """What the controller lets the host set: by `index` (ParamSet), or by a `signal` of one of its own messages."""
+
+    index: int | None = Field(None, ge=0, le=65535)
+    signal: str = ""
     unit: str
     default: float
     low: float
@@ -168,7 +130,7 @@ class RigFile(Part):
     sensors: Mapping[str, Sensor]
     envelope: Envelope
     plans: Mapping[str, Mapping[str, Any]] = {}
-    simulation: Annotated[Mapping[str, Any], BeforeValidator(_simulated)] = {}
+    simulation: Annotated[Mapping[str, Any], BeforeValidator(simulated)] = {}
     toml_text: str = Field("", exclude=True)
     dbc_text: str = Field("", exclude=True)
     path: str = Field("", exclude=True)
@@ -196,6 +158,16 @@ class RigFile(Part):
     def messages(self) -> MessageMap:
         """The message map of the rig's DBC."""
         return load_messages(self.dbc_text, self.link.dbc)
+
+    @property
+    def binding(self) -> Binding:
+        """How the controller's messages are used."""
+        return self.devices["controller"].binding
+
+    def choices(self, channel: str) -> Mapping[int, str]:
+        """The names of a channel's codes, from the DBC's value table."""
+        message, _, signal = self.channels[channel].signal.partition(".")
+        return self.messages[message].signal(signal).choices
 
     @property
     def link(self) -> LinkSpec:

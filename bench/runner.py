@@ -1,7 +1,7 @@
 """The runner: everything around a procedure, in the one order that a run has.
 
-Lock the rig, make the run directory, write the record as unfinished, open the recording, bring the rig to the
-procedure's state, acquire, make safe (always), close; then, from the closed file alone, analyse and judge, write the
+Lock the rig, open its links, make the run directory, write the record as unfinished, open the recording, bring the rig
+to the procedure's state, acquire, make safe (always), close; then, from the closed file alone, analyse and judge, write the
 record, the truth of a simulated rig, the report, and the line in the index.
 """
 
@@ -64,20 +64,23 @@ def run(
     """Run a procedure; whatever goes wrong after the run directory exists ends in its record.
 
     Raises:
-        ConfigError: the rig is in use or the run directory cannot be made; nothing was started.
+        ConfigError: the rig is in use or not the one of the rig file, a link cannot be opened, or the run directory
+            cannot be made; nothing was started.
+        LinkError: the controller does not talk; nothing was started.
         OSError: the record cannot be written (a full disk); the one that says unfinished stays.
     """
     started = datetime.now(UTC)
     with ExitStack() as stack:
         stack.enter_context(job.lock or nullcontext())
         stack.enter_context(supervisor.finishing())  # from here on a signal ends in the record, not in a traceback
-        directory = rundir.create(out, job.procedure.name, started)
-        record = _unfinished(job, directory, started)
-        write_record(directory.record, record)
-        stack.enter_context(runlog.to_file(directory.log))
-        logger.info("run %s on rig %s, backend %s, seed %s", directory.run_id, job.rig.name, job.backend, job.seed)
-        progress.stage(f"{job.procedure.name} on {job.rig.name} ({job.backend}), run {directory.run_id}")
-        machine = acquired(job, directory, started, connect, supervisor, progress)
+        with connect(supervisor) as live:  # what is wrong with a link is said before anything exists
+            directory = rundir.create(out, job.procedure.name, started)
+            record = _unfinished(job, directory, started)
+            write_record(directory.record, record)
+            stack.enter_context(runlog.to_file(directory.log))
+            logger.info("run %s on rig %s, backend %s, seed %s", directory.run_id, job.rig.name, job.backend, job.seed)
+            progress.stage(f"{job.procedure.name} on {job.rig.name} ({job.backend}), run {directory.run_id}")
+            machine = acquired(job, directory, started, live, supervisor, progress)
         progress.stage("analyse")
         result = _concluded(job, directory, record, machine, supervisor)
         write_record(directory.record, result.record)

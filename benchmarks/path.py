@@ -13,7 +13,8 @@ from pathlib import Path
 
 from bench.recorder import Recorder, RunHeader
 from bench.rigfile import load_rig
-from drivers.controller import CanController
+from bench.cli.opening import SIMULATED
+from drivers.controller import Controller
 from sim_backend.endpoint import SimulatedRig
 from sim_backend.truth import draw
 
@@ -47,12 +48,12 @@ def whole_path(folder: Path) -> float:
     return time.perf_counter() - begun
 
 
-def open_rig(rig: object) -> tuple[SimulatedRig, CanController]:
+def open_rig(rig: object) -> tuple[SimulatedRig, Controller]:
     simulated = SimulatedRig(rig, draw(rig, 1))  # type: ignore[arg-type]
-    return simulated, CanController(rig, simulated.link, simulated)  # type: ignore[arg-type]
+    return simulated, Controller(rig, simulated.link, simulated, SIMULATED)  # type: ignore[arg-type]
 
 
-def levitate(controller: CanController) -> None:
+def levitate(controller: Controller) -> None:
     controller.clock.sleep(0.1)
     controller.enable()
     controller.levitate()

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
+from bench import units
 from bench.clock import Clock, PumpedClock
-from bench.codec import Decoder, encode
 from bench.envelope import Envelope
 from bench.errors import BenchError, DeviceFault, LinkError
-from bench.frames import FD, SENT, FrameBatch, frame
 from bench.link import Link
 from bench.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.roles import RigState
+from bench.session import Session
 from bench.telemetry import TelemetryDecoder
+from drivers import handshake
+from drivers.dialogue import Dialogue, commanded, no_reply, status_of
 
-REPLY_S, SILENCE_S, WAIT_SLICE_S = 0.5, 0.5, 0.01
-SESSION = 1
+SILENCE_S, WAIT_SLICE_S = 0.5, 0.01
+FIRST_S = 1.5  # for the first telemetry, and for the last owner to be gone
 STATES = {"OFF": RigState.OFF, "READY": RigState.READY, "LIFTING": RigState.READY, "LEVITATED": RigState.LEVITATED,
           "SPINNING": RigState.SPINNING, "LANDING": RigState.LEVITATED, "COASTING": RigState.SPINNING,
           "FAULT": RigState.OFF}  # fmt: skip
@@ -34,27 +37,67 @@ ADVICE = {
 }
 
 
-class CanController:
-    """A controller on a CAN-like link. `clock` is what procedures sleep on: it polls while they do.
+class Controller:
+    """A controller on a link. `clock` is what procedures sleep on: it polls while they do.
 
     While `guarded`, polling raises on faults, envelope trips and silence; make-safe switches that off.
     """
 
-    def __init__(self, rig: RigFile, link: Link, base: Clock, session: int = SESSION) -> None:
-        self.rig, self._link, self._base, self._session = rig, link, base, session
+    def __init__(self, rig: RigFile, link: Link, base: Clock, session: Session, slice_s: float = 0.1) -> None:
+        self.rig, self.link, self._base, self._session = rig, link, base, session
         self.envelope = Envelope(rig)
         self.telemetry = TelemetryDecoder(rig)
-        self.recorder: Recorder | None = None
-        self.clock = PumpedClock(base, self.poll)
+        self._recorder: Recorder | None = None
+        self._dialogue = Dialogue(rig, link, base.now_ns)
+        self.clock = PumpedClock(base, self.poll, slice_s, lambda: self.telemetry.host.lag_ns)
         self.guarded = True
-        messages = rig.messages
-        self._replies = {n: Decoder(messages[n]) for n in ("CommandReply", "ParamReply")}
-        self._answers: list[tuple[str, dict[str, float]]] = []
-        self._states = messages["Telemetry"].signal("state").choices
-        self._faults = messages["Telemetry"].signal("fault").choices
-        self._token = 0
+        self._states, self._faults = rig.choices("state"), rig.choices("fault")
         self._last_ns = base.now_ns()
         self._angle = 0.0
+        self._reboots = 0
+        self.cleared = ""
+        for p in rig.parameters.values():
+            if p.signal:
+                message, _, signal = p.signal.partition(".")
+                self._dialogue.hold(message, signal, self._raw(p.signal, p.default))
+
+    @property
+    def recorder(self) -> Recorder | None:
+        """What records; None while nothing does."""
+        return self._recorder
+
+    @recorder.setter
+    def recorder(self, recorder: Recorder | None) -> None:
+        self._recorder = self._dialogue.recorder = recorder
+        if recorder is not None:
+            self.telemetry.start_counting()
+
+    def connect(self) -> None:
+        """See that the controller talks, that nobody else owns it, and that it is the one the rig file means. A fault
+        that an earlier run left is cleared; `cleared` then names it.
+
+        Raises:
+            LinkError: no telemetry, or no answer.
+            ConfigError: another host owns it, or its protocol or message map is another one.
+        """
+        self.guarded = False
+        self.link.renew_lease()
+        silent = (
+            f"no telemetry within {FIRST_S:g} s. Is the controller on, the port right, the bit rate that of the bus?"
+        )
+        self.wait(lambda: bool(self.telemetry.latest), FIRST_S, LinkError(f"link {self.link.name}: {silent}"))
+        handshake.claim(self._dialogue, self.rig, self._session, self.clock, self._wait)
+        handshake.identify(self._dialogue, self.rig, self._session, self._wait)
+        if self.mode == "FAULT":
+            self.cleared = self.fault
+            self._command("CLEAR_FAULT", "OFF", 1.0)
+        self._last_ns = self._base.now_ns()
+        self.guarded = True
+
+    def release(self) -> None:
+        """Let another bench have the controller, which must be at rest."""
+        if self._dialogue.has("Claim"):
+            self._send_command("RELEASE")
 
     def poll(self) -> None:
         """Read the link, record, decode, and look after the machine.
@@ -62,46 +105,52 @@ class CanController:
         Raises:
             LinkError: no telemetry for half a second.
             InterlockError: the envelope tripped.
-            DeviceFault: the controller reports a fault.
+            DeviceFault: the controller reports a fault, or has restarted.
         """
-        batch = self._link.receive()
-        if self.recorder is not None:
-            self.recorder.frames(self._link.name, batch)
-        for name, decoder in self._replies.items():
-            values, _ = decoder.decode(batch)
-            for k in range(len(next(iter(values.values())))):
-                self._answers.append((name, {s: float(v[k]) for s, v in values.items()}))
+        batch = self.link.receive()
+        if self._recorder is not None:
+            self._recorder.frames(self.link.name, batch, lag_ns=self.telemetry.host.lag_ns)
+        self._dialogue.take(batch)
         blocks = self.telemetry.decode(batch)
         for block in blocks:
-            if self.recorder is not None:
-                self.recorder.samples(block)
+            if self._recorder is not None:
+                self._recorder.samples(block)
         if blocks:
             self._last_ns = self._base.now_ns()
         if self.guarded:
-            self._link.renew_lease()
+            self.link.renew_lease()
             for block in blocks:
                 self.envelope.check_block(block)
             self._check()
 
     def _check(self) -> None:
-        silent = (self._base.now_ns() - self._last_ns) * 1e-9
-        if silent > SILENCE_S:
-            raise LinkError(
-                f"link {self._link.name}: no telemetry for {silent:.2f} s; expected one message a millisecond"
-            )
+        if self.silent_s > SILENCE_S:
+            text = f"no telemetry for {self.silent_s:.2f} s; the link or the controller is lost"
+            raise LinkError(f"link {self.link.name}: {text}")
+        if self.telemetry.counters.reboots > self._reboots:
+            self._reboots = self.telemetry.counters.reboots
+            raise DeviceFault("the controller restarted during the run: its tick began anew; look at its supply")
         fault = self.fault
         if fault != "NONE":
             raise DeviceFault(f"the controller reports {fault}: {ADVICE.get(fault, 'see its documentation')}")
 
     @property
+    def silent_s(self) -> float:
+        """How long no telemetry has come."""
+        return (self._base.now_ns() - self._last_ns) * 1e-9
+
+    @property
     def mode(self) -> str:
-        """The controller's own name of its state."""
-        return self._states.get(int(self.telemetry.latest.get("state", 0)), "OFF")
+        """What the controller's state amounts to: one of bench.binding.MODES."""
+        name = self._states.get(int(self.telemetry.latest.get("state", 0)), "OFF")
+        return self.rig.binding.mode(name) or "FAULT"
 
     @property
     def fault(self) -> str:
         """The latched fault, NONE without one."""
-        return self._faults.get(int(self.telemetry.latest.get("fault", 0)), "NONE")
+        code = int(self.telemetry.latest.get("fault", 0))
+        name = self._faults.get(code, f"code {code}" if code else "NONE")
+        return "NONE" if name in self.rig.binding.no_fault else name
 
     @property
     def state(self) -> RigState:
@@ -114,11 +163,11 @@ class CanController:
 
     def levitate(self) -> None:
         """READY to LEVITATED."""
-        self._command("LEVITATE", "LEVITATED", self.rig.parameters["lift_time_s"].default + 6.0)
+        self._command("LEVITATE", "LEVITATED", self._lift_s + 6.0)
 
     def land(self) -> None:
         """LEVITATED to READY."""
-        self._command("LAND", "READY", self.rig.parameters["lift_time_s"].default + 3.0)
+        self._command("LAND", "READY", self._lift_s + 3.0)
 
     def disable(self) -> None:
         """READY to OFF."""
@@ -129,9 +178,20 @@ class CanController:
         self._send_command("MAKE_SAFE")
 
     @property
+    def _lift_s(self) -> float:
+        p = self.rig.parameters.get("lift_time_s")
+        return p.default if p else 5.0
+
+    @property
     def speed_rad_s(self) -> float:
         """Rotor speed."""
         return self.telemetry.latest.get("speed", 0.0)
+
+    @property
+    def landing_speed(self) -> float:
+        """Below this the rotor may be landed, rad/s."""
+        p = self.rig.parameters.get("landing_speed")
+        return p.default if p else 1.0
 
     def point(self, angle_rad: float) -> None:
         """Turn the rotor the shorter way to an angle and wait until it stands there.
@@ -157,7 +217,7 @@ class CanController:
     def stop(self) -> None:
         """Brake to a stop, and wait until the rotor is below the landing speed."""
         self._send_command("STOP")
-        limit = self.rig.parameters["landing_speed"].default
+        limit = self.landing_speed
         self._wait(lambda: abs(self.speed_rad_s) < limit, 60.0, f"speed below {limit:g} rad/s")
 
     def set(self, parameter: str, value: float) -> None:
@@ -168,13 +228,19 @@ class CanController:
             BenchError: the controller refuses, or reads back something else.
         """
         self.envelope.check_parameter(parameter, value)
-        index = self.rig.parameters[parameter].index
-        if self.recorder is not None:
-            self.recorder.event("parameter", name=parameter, value=value)
-        reply = self._ask("ParamSet", {"index": index, "value": value}, "ParamReply", f"the reply to {parameter}")
-        status = self._status("ParamReply", reply)
+        p = self.rig.parameters[parameter]
+        if self._recorder is not None:
+            self._recorder.event("parameter", name=parameter, value=value)
+        if p.signal:
+            message, _, signal = p.signal.partition(".")
+            self._dialogue.send_held(message, {signal: self._raw(p.signal, value)})
+            return
+        values = {"index": float(p.index or 0), "value": value}
+        if any(s.name == "session8" for s in self.rig.messages["ParamSet"].signals):
+            values["session8"] = self._session.low_byte
+        reply = self._dialogue.ask("ParamSet", values, "ParamReply", f"the reply to {parameter}", self._wait)
+        status = status_of(self.rig.messages["ParamReply"], reply)
         if status != "OK":
-            p = self.rig.parameters[parameter]
             raise BenchError(
                 f"the controller refuses {parameter} = {value:g} {p.unit}: {status} in state {self.mode}; in force is "
                 f"{reply['value']:g} {p.unit}"
@@ -186,58 +252,57 @@ class CanController:
         """Read a parameter, SI.
 
         Raises:
-            BenchError: the controller does not know it.
+            BenchError: the controller does not know it, or it is one that can only be written.
         """
-        index = self.rig.parameters[parameter].index
-        reply = self._ask("ParamGet", {"index": index}, "ParamReply", f"the value of {parameter}")
-        if self._status("ParamReply", reply) != "OK":
-            raise BenchError(f"the controller does not know parameter {parameter} (index {index})")
+        p = self.rig.parameters[parameter]
+        if p.index is None:
+            raise BenchError(
+                f"parameter {parameter} is a signal that the host sends; the controller cannot be asked for it"
+            )
+        reply = self._dialogue.ask(
+            "ParamGet", {"index": p.index}, "ParamReply", f"the value of {parameter}", self._wait
+        )
+        if status_of(self.rig.messages["ParamReply"], reply) != "OK":
+            raise BenchError(f"the controller does not know parameter {parameter} (index {p.index})")
         return reply["value"]
+
+    def _raw(self, path: str, value: float) -> float:
+        """A value in SI in the unit of its signal."""
+        message, _, signal = path.partition(".")
+        return value / units.UNITS[self.rig.messages[message].signal(signal).unit].factor
 
     def _command(self, name: str, goal: str, timeout_s: float) -> None:
         self._send_command(name)
         self._wait(lambda: self.mode == goal, timeout_s, f"state {goal} after {name}")
 
     def _send_command(self, name: str) -> None:
-        code = self.rig.messages.code("Command", "code", name)
-        if self.recorder is not None:
-            self.recorder.event("command", name=name)
-        values: dict[str, float] = {"session": self._session, "code": code}
-        reply = self._ask("Command", values, "CommandReply", f"the reply to {name}")
-        status = self._status("CommandReply", reply)
-        if status == "WRONG_SESSION":
-            raise BenchError(f"the controller refuses {name}: another host owns it")
-        if status != "OK":
-            raise BenchError(f"the controller refuses {name}: {status} in state {self.mode}")
+        if self._recorder is not None:
+            self._recorder.event("command", name=name)
+        messages, by_message = self.rig.messages, commanded(self.rig, name)
+        for message, values in by_message.items():
+            if any(s.name == "session" for s in messages[message].signals):
+                values["session"] = self._session.number
+            if message != "Command" or not self._dialogue.has("CommandReply"):
+                self._dialogue.send_held(message, values)
+                continue
+            reply = self._dialogue.ask(message, values, "CommandReply", f"the reply to {name}", self._wait)
+            status = status_of(messages["CommandReply"], reply)
+            if status == "WRONG_SESSION":
+                raise BenchError(f"the controller refuses {name}: another host owns it")
+            if status != "OK":
+                raise BenchError(f"the controller refuses {name}: {status} in state {self.mode}")
 
-    def _status(self, message: str, reply: dict[str, float]) -> str:
-        return self.rig.messages[message].signal("status").choices.get(int(reply["status"]), "UNKNOWN")
+    def _wait(self, done: Callable[[], bool], timeout_s: float, what: str) -> None:
+        self.wait(done, timeout_s, no_reply(self.link.name, what, timeout_s))
 
-    def _ask(self, message: str, values: dict[str, float], reply: str, what: str) -> dict[str, float]:
-        """Send a request and wait for the reply with its token."""
-        self._token = (self._token + 1) & 0xFF
-        self._answers.clear()
-        m = self.rig.messages[message]
-        self._send(frame(m.identifier, encode(m, {**values, "token": self._token}), flags=FD | SENT))
-        found: list[dict[str, float]] = []
+    def wait(self, done: Callable[[], bool], timeout_s: float, error: LinkError) -> None:
+        """Let the clock run until something is true.
 
-        def arrived() -> bool:
-            found.extend(v for n, v in self._answers if n == reply and v["token"] == self._token)
-            return bool(found)
-
-        self._wait(arrived, REPLY_S, what)
-        return found[0]
-
-    def _send(self, batch: FrameBatch) -> None:
-        batch["t_ns"] = self._base.now_ns()
-        self._link.send(batch)
-        if self.recorder is not None:
-            self.recorder.frames(self._link.name, batch)
-
-    def _wait(self, done: object, timeout_s: float, what: str) -> None:
-        assert callable(done)
+        Raises:
+            LinkError: the given one, when time runs out.
+        """
         deadline = self._base.now_ns() + round(timeout_s * 1e9)
         while not done():
             if self._base.now_ns() >= deadline:
-                raise LinkError(f"link {self._link.name}: waited {timeout_s:g} s for {what}; it did not come")
+                raise error
             self.clock.sleep(WAIT_SLICE_S)

@@ -3,8 +3,6 @@ the plant. It has its own copy of the message map and shares no object with the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from bench.codec import Decoder, encode
@@ -13,24 +11,17 @@ from bench.messages import load_messages
 from bench.rigfile import RigFile
 from sim_backend import core
 from sim_backend.core import PERIOD_TICKS, TICK_S, Plant
+from sim_backend.ownership import Ownership
 from sim_backend.telemetry import Span, TelemetryEncoder
 from sim_backend.truth import Truth
 
 SETTLED_M, SETTLED_S = 20e-6, 0.05
 LIFT_TIMEOUT_S = 5.0
+MAP_VERSION = 2
 REST_TICKS = 5000  # it has been on for half a second when the host connects: the rotor lies still on its rings
-TAKEOVER_S = 1.0
 RESTING = ("OFF", "READY")
+AT_REST = (*RESTING, "FAULT")
 TURNING = ("LEVITATED", "SPINNING", "COASTING")
-
-
-@dataclass
-class Owner:
-    """The host that the controller obeys: its session and when its last heartbeat came (ticks)."""
-
-    session: int = 0
-    heartbeat: int = 0
-    armed: bool = False
 
 
 class SimulatedController:
@@ -47,7 +38,7 @@ class SimulatedController:
         for name, value in self._own.items():
             self._apply(name, value)
         self.state, self.fault = "OFF", "NONE"
-        self._owner = Owner()
+        self._owner = Ownership()
         self._since, self._steady = 0, 0
         self._encoder = TelemetryEncoder(self._map, truth)
         self._out: list[FrameBatch] = []
@@ -164,23 +155,14 @@ class SimulatedController:
         values = {k: float(v[0]) for k, v in columns.items()}
         if not all(np.isfinite(list(values.values()))):
             return
-        {"Heartbeat": self._heartbeat, "Command": self._command, "ParamSet": self._set, "ParamGet": self._get}[
-            decoder.message.name
-        ](values, clock)
-
-    def _owns(self, session: int) -> bool:
-        """Whether a session may command: the owner's, or any when there is no owner or it is gone and the rotor rests."""
-        gone = (self.plant.tick - self._owner.heartbeat) * TICK_S > TAKEOVER_S and self.state in (*RESTING, "FAULT")
-        if session and (self._owner.session in (0, session) or gone):
-            if self._owner.session != session:
-                self._owner = Owner(session, self.plant.tick)
-            return True
-        return False
+        {"Heartbeat": self._heartbeat, "Command": self._command, "ParamSet": self._set, "ParamGet": self._get,
+         "Claim": self._claim}[decoder.message.name](values, clock)  # fmt: skip
 
     def _heartbeat(self, v: dict[str, float], _: tuple[int, int]) -> None:
-        if self._owns(int(v["session"])):
-            self._owner.heartbeat = self.plant.tick
-            self._owner.armed = self._owner.armed or self.state not in ("OFF", "FAULT")
+        self._owner.beat(v, self.plant.tick, self.state in AT_REST)
+
+    def _claim(self, v: dict[str, float], clock: tuple[int, int]) -> None:
+        self._send("Owner", self._owner.claim(v, self.plant.tick, self.state in AT_REST), clock)
 
     def _command(self, v: dict[str, float], clock: tuple[int, int]) -> None:
         code = int(v["code"])
@@ -188,12 +170,12 @@ class SimulatedController:
         name = names.get(code, "")
         if not name:
             status = "UNKNOWN"
-        elif not self._owns(int(v["session"])):
+        elif not self._owner.takes(int(v["session"]), self.plant.tick, self.state in AT_REST):
             status = "WRONG_SESSION"
         else:
             status = "OK" if self._obey(name) else "WRONG_STATE"
         if name == "IDENTIFY" and status == "OK":
-            self._send("Identity", {"protocol": 1, "map_version": 1, "serial": 1}, clock)
+            self._send("Identity", {"protocol": 1, "map_version": MAP_VERSION, "serial": 1}, clock)
         reply = {"code": code if name else 8, "token": v["token"], "status": self._status(status),
                  "state": self._map.code("CommandReply", "state", self.state)}  # fmt: skip
         self._send("CommandReply", reply, clock)
@@ -206,11 +188,14 @@ class SimulatedController:
         if name == "MAKE_SAFE":
             self._safe()
             return True
-        if name == "CLEAR_FAULT" and state == "FAULT":
+        if name == "RELEASE" and state in AT_REST:
+            self._owner.release()
+        elif name == "CLEAR_FAULT" and state == "FAULT":
             self.fault = "NONE"
             plant.clear_trips()
             self._enter("OFF")
         elif name == "ENABLE" and state == "OFF":
+            self._owner.arm(plant.tick)
             plant.mode = core.READY
             self._enter("READY")
         elif name == "DISABLE" and state in RESTING:
@@ -237,7 +222,9 @@ class SimulatedController:
             self._reply_parameter(index, "UNKNOWN", v["token"], 0.0, clock)
             return
         name, p = self._parameters[index]
-        if not p.low <= round(value, 12) <= p.high and not np.isclose(value, (p.low, p.high), rtol=1e-6).any():
+        if not self._owner.may_write(int(v["session8"])):
+            status = "WRONG_SESSION"
+        elif not p.low <= round(value, 12) <= p.high and not np.isclose(value, (p.low, p.high), rtol=1e-6).any():
             status = "OUT_OF_RANGE"
         elif p.when == "resting" and self.state not in RESTING:
             status = "WRONG_STATE"

@@ -7,16 +7,17 @@ import numpy as np
 from bench.codec import encode
 from bench.errors import LinkError
 from bench.frames import FD, FRAME, SENT, FrameBatch, empty_batch, frame
+from bench.link import LinkStats
 from bench.messages import load_messages
 from bench.rigfile import RigFile
 from sim_backend.controller import SimulatedController
-from sim_backend.truth import Truth, uniform
+from sim_backend.operator import SimulatedOperator
+from sim_backend.truth import Truth
 
 EPOCH_NS = 1_767_225_600 * 10**9  # 2026-01-01T00:00:00Z
 TICK_NS = 100_000
 HEARTBEAT_NS = 20_000_000
 LEASE_NS = 1_000_000_000
-HAND_OVER_S = 0.3  # how long the operator takes to let a mass go
 
 
 class SimulatedRig:
@@ -27,8 +28,7 @@ class SimulatedRig:
         self.truth = truth
         self.link = InProcessLink(rig, self, session)
         self._now = EPOCH_NS
-        self._hangings = 0
-        self._seat = rig.hook_seat.half_width or 0.0
+        self._operator = SimulatedOperator(self.device.plant, truth, rig.hook_seat.half_width or 0.0)
 
     def now_ns(self) -> int:
         """The present, UNIX ns of the virtual clock."""
@@ -42,19 +42,8 @@ class SimulatedRig:
             self._now += ticks * TICK_NS
 
     def request(self, line: str) -> str:
-        """The operator's line: `hang M2`, `hang -`, `ask TEXT`. Answers `ok SECONDS` (when it will be done), `yes`
-        or `error TEXT`."""
-        verb, _, rest = line.strip().partition(" ")
-        if verb == "ask":
-            return "yes"
-        label = "" if rest == "-" else rest
-        if verb != "hang" or (label and f"masses.{label}" not in self.truth.values):
-            return f"error cannot {line.strip()!r}"
-        kg, newtons = self.truth.load(label)
-        self._hangings += 1
-        seat = self._seat * (2 * uniform(self.truth.seed, f"seat:{self._hangings}") - 1)
-        self.device.plant.load(kg, newtons, HAND_OVER_S, seat_m=seat)
-        return f"ok {HAND_OVER_S}"
+        """The operator's line: `hang M2`, `hang -`, `ask TEXT`."""
+        return self._operator.request(line)
 
 
 class InProcessLink:
@@ -70,6 +59,7 @@ class InProcessLink:
         self._counter = 0
         self._dead_after = clock.truth.defects["dead_after_s"]
         self.name = rig.devices["controller"].link
+        self.stats = LinkStats()
 
     @property
     def _dead(self) -> bool:
@@ -86,11 +76,16 @@ class InProcessLink:
         batch = batch.copy()
         batch["t_ns"] = self._clock.now_ns()
         self._queued.append(batch)
+        self.stats.sent += len(batch)
 
     def receive(self) -> FrameBatch:
         """Everything that arrived since the last call; nothing when the link is dead."""
         arrived, self._arrived = self._arrived, []
-        return np.concatenate(arrived) if arrived and not self._dead else empty_batch()
+        if not arrived or self._dead:
+            return empty_batch()
+        batch = np.concatenate(arrived)
+        self.stats.received += len(batch)
+        return batch
 
     def renew_lease(self) -> None:
         """Heartbeats go on for one more second of bench time."""
@@ -112,5 +107,7 @@ class InProcessLink:
             self._next_beat += HEARTBEAT_NS
         incoming = np.concatenate([np.empty(0, FRAME), *self._queued, *beats])
         self._queued = []
+        self.stats.heartbeats += len(beats)
+        self.stats.sent += len(beats)
         order = np.argsort(incoming["t_ns"], kind="stable")
         self._arrived.append(device.advance(ticks, incoming[order], now_ns))

@@ -61,10 +61,10 @@ def record(path: Path, blocks: list[SampleBlock], *, header: RunHeader = HEADER,
         for k, part in enumerate(blocks):
             clock.now = int(part.t_ns[0])
             with recorder.step("dwell", block=k, odd=bool(k % 2)):
-                recorder.frames("can0", frames_of(part))
+                recorder.frames("controller", frames_of(part))
                 recorder.samples(part)
                 clock.now = int(part.t_ns[-1]) + PERIOD_NS
-        recorder.frames("can0", frame(0x11, b"\1\0\0\0\4\0\0\0", t_ns=clock.now, flags=SENT | FD))
+        recorder.frames("controller", frame(0x11, b"\1\0\0\0\4\0\0\0", t_ns=clock.now, flags=SENT | FD))
         recorder.event("state", now="READY")
         recorder.wall["started"] = "2026-01-01"
         return recorder.close()

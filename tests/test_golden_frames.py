@@ -43,6 +43,15 @@ TELEMETRY = [
     ("host_age", 0.08, "50 00"),  # 80 ms / 1 ms = 80 = 0x50
 ]
 
+OWNED = [
+    ("session", 305419896, "78 56 34 12"),  # 0x12345678
+    ("since", 1767225600, "00 B9 55 69"),  # 2026-01-01T00:00:00Z = 0x6955B900
+    ("name0", 0x406C6F727261, "61 72 72 6F 6C 40"),  # "arrol@" first byte lowest
+    ("name1", 0x000000626C, "6C 62 00 00 00 00"),  # "lb"
+    *((f"name{k}", 0, "00 00 00 00 00 00") for k in range(2, 9)),
+    ("spare", 0, "00 00"),
+]
+
 GOLDEN: dict[str, tuple[int, list[tuple[str, float, str]]]] = {
     "Telemetry": (0x100, TELEMETRY),
     "Heartbeat": (0x010, [
@@ -60,7 +69,7 @@ GOLDEN: dict[str, tuple[int, list[tuple[str, float, str]]]] = {
         ("index", 35, "23 00"),  # 2 * 16 + 3
         ("value", -40.0, "00 00 20 C2"),  # -1.25 * 2^5: sign 1, exponent 127 + 5 = 0x84, fraction 0.25 -> 0xC2200000
         ("token", 7, "07"),
-        ("spare", 0, "00"),
+        ("session8", 205, "CD"),  # 12 * 16 + 13, the low byte of session 0x1234ABCD
     ]),
     "ParamGet": (0x013, [("index", 258, "02 01"), ("token", 9, "09"), ("spare", 0, "00")]),  # 256 + 2
     "CommandReply": (0x021, [
@@ -75,6 +84,8 @@ GOLDEN: dict[str, tuple[int, list[tuple[str, float, str]]]] = {
         ("token", 128, "80"),
         ("value", 3.0, "00 00 40 40"),  # 1.5 * 2^1: exponent 128 = 0x80, fraction 0.5 -> 0x40400000
     ]),
+    "Claim": (0x014, OWNED),
+    "Owner": (0x024, OWNED),
     "Identity": (0x023, [
         ("protocol", 1, "01 00"),
         ("map_version", 258, "02 01"),
@@ -121,8 +132,8 @@ def test_values_to_bytes(messages: MessageMap, name: str) -> None:
         ("CommandReply", "state", "OFF READY LIFTING LEVITATED SPINNING LANDING COASTING FAULT"),
         ("Telemetry", "fault", "NONE CONTACT OVERCURRENT OVERSPEED HEARTBEAT_LOST LEVITATION_LOST SENSOR LIFT_TIMEOUT "
                                "OVERTEMPERATURE"),
-        ("Command", "code", "DISABLE ENABLE LEVITATE LAND SPIN STOP CLEAR_FAULT MAKE_SAFE IDENTIFY"),
-        ("CommandReply", "code", "DISABLE ENABLE LEVITATE LAND SPIN STOP CLEAR_FAULT MAKE_SAFE IDENTIFY"),
+        ("Command", "code", "DISABLE ENABLE LEVITATE LAND SPIN STOP CLEAR_FAULT MAKE_SAFE IDENTIFY RELEASE"),
+        ("CommandReply", "code", "DISABLE ENABLE LEVITATE LAND SPIN STOP CLEAR_FAULT MAKE_SAFE IDENTIFY RELEASE"),
         ("CommandReply", "status", "OK UNKNOWN OUT_OF_RANGE WRONG_STATE WRONG_SESSION READ_ONLY"),
         ("ParamReply", "status", "OK UNKNOWN OUT_OF_RANGE WRONG_STATE WRONG_SESSION READ_ONLY"),
     ],
@@ -137,4 +148,4 @@ def test_periods_and_senders(messages: MessageMap) -> None:
     assert messages["Telemetry"].period_s == pytest.approx(1e-3)
     assert messages["Heartbeat"].period_s == pytest.approx(20e-3)
     sent = {n for n, m in messages.messages.items() if m.sender == "Host"}
-    assert sent == {"Heartbeat", "Command", "ParamSet", "ParamGet"}
+    assert sent == {"Heartbeat", "Command", "ParamSet", "ParamGet", "Claim"}

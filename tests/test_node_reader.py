@@ -46,7 +46,7 @@ def test_the_reference_reader_reads_everything(reader: list[str], tmp_path: Path
     found = json.loads(done.stdout)
     # blocks end at the gap before 1205 and where half a second of bench time is over; 120 view windows before the gap
     # and 111 after it, the first and the last of them with five samples
-    counts = {"/telemetry/block": 6, "/telemetry/view": 120 + 111, "/raw/can0": 24, "/events": 2 + 2 * 23}
+    counts = {"/telemetry/block": 6, "/telemetry/view": 120 + 111, "/raw/controller": 24, "/events": 2 + 2 * 23}
     assert found["sequential"] == counts
     assert found["indexed"] == counts
     assert found["stated"] == counts

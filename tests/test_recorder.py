@@ -74,7 +74,7 @@ def test_the_view_is_mean_minimum_maximum_and_last_code_of_ten_milliseconds(tmp_
 def test_raw_frames_are_written_as_they_came(tmp_path: Path) -> None:
     blocks = gapped()
     record(tmp_path / "a.mcap", blocks)
-    raw = [m for _, m in messages_of(tmp_path / "a.mcap")["/raw/can0"]]
+    raw = [m for _, m in messages_of(tmp_path / "a.mcap")["/raw/controller"]]
     assert [m.count for m in raw] == [100] * len(blocks) + [1]
     assert b"".join(m.frames for m in raw[:-1]) == b"".join(frames_of(b).tobytes() for b in blocks)
 
@@ -96,7 +96,7 @@ def test_events_and_steps_carry_their_times_and_labels(tmp_path: Path) -> None:
 
 def test_integrity_counts_what_was_recorded(tmp_path: Path) -> None:
     integrity = record(tmp_path / "a.mcap", gapped())
-    assert integrity.frames == {"can0": 2301}
+    assert integrity.frames == {"controller": 2301}
     assert integrity.samples == {"telemetry": 2300}
     assert integrity.lost == {"telemetry": 5}
     assert (integrity.events, integrity.steps, integrity.overflows, integrity.complete) == (2 + 2 * 23, 23, 0, True)

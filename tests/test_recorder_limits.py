@@ -44,7 +44,7 @@ def test_what_is_on_disk_at_any_moment_holds_all_but_the_last_second(tmp_path: P
         for n, first in enumerate(range(lead_ms, lead_ms + 2600, rows)):
             part = block(first, rows)
             now = int(part.t_ns[-1]) + PERIOD_NS
-            writer.frames("can0", now, frames_of(part))
+            writer.frames("controller", 0, frames_of(part))
             seen = len(path.read_bytes())  # a kill between frames and samples
             writer.samples(part)
             writer.event(now, b'{"kind":"x","t_ns":0}')
@@ -72,7 +72,7 @@ recorder = Recorder(Path({path!r}), clock=clock, streams=[STREAM], header=HEADER
 for n in range(0, 10**9, 100):
     part = block(n, 100)
     clock.now = int(part.t_ns[-1]) + PERIOD_NS
-    recorder.frames("can0", frames_of(part))
+    recorder.frames("controller", frames_of(part))
     recorder.samples(part)
     print(clock.now, flush=True)
 """

@@ -43,7 +43,7 @@ def content(path: Path) -> dict[str, Any]:
     return {
         "samples": list(zip(*(data[n] for n in sorted(data)), strict=True)),
         "events": [json.dumps(e, sort_keys=True) for e in r.events()],
-        "frames": [f.tobytes() for f in r.frames("can0")],
+        "frames": [f.tobytes() for f in r.frames("controller")],
         "layouts": [repr(s) for s in r.streams.values()],
         "attachments": sorted(r._file.attachments.items()),
         "metadata": sorted((n, sorted(m.items())) for n, m in r._file.metadata.items()),
@@ -95,7 +95,7 @@ def test_events_header_and_frames_come_back(whole: Path) -> None:
     assert r.wall["started"] == "2026-01-01"
     assert r.plan_dict == {"angles": 8}
     assert r.streams == {"telemetry": STREAM}
-    batches = list(r.frames("can0"))
+    batches = list(r.frames("controller"))
     assert len(batches) == 24
     assert batches[3].tobytes() == frames_of(gapped()[3]).tobytes()
 
@@ -214,9 +214,9 @@ def test_a_newer_layout_is_refused_and_an_older_reader_says_what_to_do(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as newer:
-        newer.setattr(layout, "VERSION", 2)
+        newer.setattr(layout, "VERSION", 3)
         record(tmp_path / "a.mcap", [block(0, 10)])
-    with pytest.raises(RecordingError, match=r"layout version: found 2; expected at most 1\. .* newer Levbench"):
+    with pytest.raises(RecordingError, match=r"layout version: found 3; expected at most 2\. .* newer Levbench"):
         Recording.open(tmp_path / "a.mcap")
 
 

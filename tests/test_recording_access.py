@@ -145,7 +145,7 @@ def test_a_long_file_is_read_step_by_step_in_little_memory(tmp_path: Path) -> No
             part = block(n * 1000, 1000)
             template["t_ns"] = part.t_ns
             with recorder.step("dwell", number=n):
-                recorder.frames("can0", template)
+                recorder.frames("controller", template)
                 recorder.samples(part)
                 clock.now += 1000 * PERIOD_NS
     tracemalloc.start()

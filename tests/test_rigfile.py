@@ -106,15 +106,15 @@ def test_a_rig_file_is_frozen() -> None:
         ("bias_o = { index = 2", "bias_o = { index = 1", "parameters.bias_o.index", "an index of its own (bias_i)"),
         ('"Telemetry.pos_xi"', '"Telemetry.pos_xj"', "channels.pos_xi.signal", "such as Telemetry."),
         ("[devices.controller]", "[devices.controler]", "devices", "[devices.controller]"),
-        ('link = "can0"', 'link = "can1"', "devices.controller.link", "one of can0"),
-        ("data_bitrate = 5_000_000", "", "links.can0", "Telemetry takes 71%"),
-        ("bitrate = 1_000_000", "bitrate = 0", "links.can0.bitrate", "greater than 0"),
+        ('link = "controller"', 'link = "can1"', "devices.controller.link", "one of controller"),
+        ("data_bitrate = 5_000_000", "", "links.controller", "Telemetry takes 71%"),
+        ("bitrate = 1_000_000", "bitrate = 0", "links.controller.bitrate", "greater than 0"),
         ("max_hung_kg = 3.5", "", "envelope.max_hung_kg", "a value"),
     ],
 )  # fmt: skip
 def test_one_mistake_is_named_with_its_key(tmp_path: Path, old: str, new: str, key: str, expected: str) -> None:
     toml = changed(TOML, (old, new))
-    if key == "links.can0":  # at one rate telemetry alone takes 714 us a ms: half the rate is too much
+    if key == "links.controller":  # at one rate telemetry alone takes 714 us a ms: half the rate is too much
         toml = changed(toml, ("bitrate = 1_000_000", "bitrate = 500_000"))
         expected = "at most 90%; Telemetry takes 143%"
     found = problems(tmp_path, toml)
@@ -139,7 +139,7 @@ def test_one_mistake_is_named_with_its_key(tmp_path: Path, old: str, new: str, k
             "a known unit",
         ),
         ('[-163.84|163.835] "rad/s" Host', '[-163.84|163.835] "A" Host', "channels.speed.unit", "the kind of A"),
-        ("BO_ 16 Heartbeat:", "BO_ 16 Heartbeet:", "Heartbeat", "the message"),
+        ("BO_ 16 Heartbeat:", "BO_ 16 Heartbeet:", "devices.controller.binding.heartbeat", "a message"),
         ("ParamGet: 4 Host", "ParamGet: 9 Host", "ParamGet", "a CAN FD length"),
         (" SG_ tick : 16|32", " SG_ tick : 15|32", "(file)", "a usable DBC"),
         ("BO_ 256 Telemetry: 64", "BO_ 256 Telemetry: 48", "(file)", "a usable DBC"),
@@ -166,9 +166,9 @@ def test_an_overfilled_bus_is_refused_with_its_load(tmp_path: Path) -> None:
     )
     found = problems(tmp_path, slow)
     # 34 bits at 125 kbit/s and 680 at 1 Mbit/s: 272 us + 680 us = 952 us a ms
-    assert list(found) == ["links.can0"]
-    assert "at most 90%; Telemetry takes 95%" in found["links.can0"].expected
-    assert found["links.can0"].found.startswith("a bus load of ")
+    assert list(found) == ["links.controller"]
+    assert "at most 90%; Telemetry takes 95%" in found["links.controller"].expected
+    assert found["links.controller"].found.startswith("a bus load of ")
 
 
 def test_several_mistakes_of_all_kinds_are_listed_at_once(tmp_path: Path) -> None:
@@ -186,7 +186,7 @@ def test_several_mistakes_of_all_kinds_are_listed_at_once(tmp_path: Path) -> Non
     found = problems(tmp_path, toml, dbc)
     assert set(found) == {
         "uut.colour", "masses.M3.source", "geometry.hook_to_outboard", "geometry.clearance.value", "masses.M4.value",
-        "parameters.bias_i.default", "links.can0", "channels.pos_xi.signal",
+        "parameters.bias_i.default", "links.controller", "channels.pos_xi.signal",
     }  # fmt: skip
 
 

@@ -182,10 +182,12 @@ def test_a_dead_link_is_an_error_and_every_step_of_make_safe_is_tried(run: Run) 
         "land the rotor",
         "switch the amplifiers off",
         "the controller's own make-safe",
+        "the controller's watchdog",
     ]
     assert [f.where for f in result.record.findings if f.code == "make-safe-failed"] == [
         "land the rotor",
         "the controller's own make-safe",
+        "the controller's watchdog",
     ]
     assert not Recording.open(result.directory / "recording.mcap").truncated
 

@@ -8,30 +8,20 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from bench import catalogue, plans
-from bench.clock import Clock
+from bench import catalogue, linkurl, plans
+from bench.cli.opening import live, simulated
 from bench.envelope import Envelope
-from bench.errors import ConfigError, OperatorAbort
-from bench.opened import Connect, Job, OpenRig, WatchedClock
+from bench.errors import ConfigError
+from bench.lock import rig_lock
+from bench.opened import Connect, Job
 from bench.procedure import Procedure
-from bench.recorder import Recorder
-from bench.rig import Rig
 from bench.rigfile import RigFile, load_rig
-from bench.roles import Operator
 from bench.specs import load_spec
-from bench.supervisor import SafeStep, Supervisor
-
-if TYPE_CHECKING:
-    from drivers.controller import CanController
-
-RESTING = ("OFF", "READY", "FAULT")
-LAND_S, STOP_S, COMMAND_S = 20.0, 90.0, 5.0
 
 
 @dataclass(frozen=True)
@@ -69,7 +59,7 @@ def prepare(request: Request) -> tuple[Job, Connect]:
     """
     _refuse_mixed_backends(request)
     procedure = load_procedure(request.procedure)
-    rig = load_rig(request.rig)
+    rig = with_links(load_rig(request.rig), request.links)
     defaults = (f"{rig.path} [plans.{procedure.name}]", rig.plans.get(procedure.name, {}))
     plan = plans.assemble(procedure.plan, defaults, request.plan_file, request.plan)
     problems = [*procedure.check(rig, plan), *Envelope(rig).problems_of(dict(procedure.settings(plan)))]
@@ -77,7 +67,10 @@ def prepare(request: Request) -> tuple[Job, Connect]:
         raise ConfigError("\n  ".join(["the plan does not fit the rig; nothing was started:", *problems]))
     limits = load_spec(rig.name, procedure.name, [q.name for q in procedure.measures])
     if request.backend == "live":
-        raise _no_live(rig)
+        kind = request.operator or ("console" if sys.stdin.isatty() else "auto")
+        addresses = " ".join(link.url for link in rig.links.values())
+        job = Job(procedure, rig, plan, limits, "live", None, rig_lock(f"{rig.name} {addresses}"))
+        return job, live(rig, kind)
     seed = 0 if request.seed is None else request.seed
     overrides = dict(plans.assignment(text) for text in request.truth)
     _refuse_words(overrides)
@@ -96,131 +89,23 @@ def _refuse_mixed_backends(request: Request) -> None:
         raise ConfigError("--link: the simulated rig runs in this process; expected --backend live, or leave it out")
 
 
-def _no_live(rig: RigFile) -> ConfigError:
-    urls = ", ".join(f"{name} is {link.url!r}" for name, link in rig.links.items())
-    return ConfigError(
-        f"--backend live: rig {rig.name}: {urls}; links of this rig exist only within one process, in simulation. "
-        "Next: leave --backend out"
-    )
+def with_links(rig: RigFile, assignments: Sequence[str]) -> RigFile:
+    """The rig with other link URLs: NAME=URL.
+
+    Raises:
+        ConfigError: no such link, or no such URL.
+    """
+    links = dict(rig.links)
+    for text in assignments:
+        name, equals, url = text.partition("=")
+        if not equals or name not in links:
+            raise ConfigError(f"--link {text}: expected NAME=URL with NAME one of {', '.join(links)}")
+        linkurl.parse(url)
+        links[name] = links[name].model_copy(update={"url": url})
+    return rig.model_copy(update={"links": links})
 
 
 def _refuse_words(overrides: Mapping[str, Any]) -> None:
     for key, value in overrides.items():
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise ConfigError(f"--truth {key}: found {value!r}; expected a number, SI")
-
-
-def simulated(
-    rig: RigFile,
-    seed: int,
-    overrides: Mapping[str, float],
-    operator: str,
-    settings: Mapping[str, float] | None = None,
-) -> Connect:
-    """How to open a simulated rig. The truth is drawn now, so that a wrong override is found before the start.
-
-    Raises:
-        ConfigError: an override names nothing.
-    """
-    from sim_backend.endpoint import SimulatedRig
-    from sim_backend.truth import draw
-
-    truth = draw(rig, seed, overrides, settings)
-    facts = {
-        "schema": 1, "seed": seed, "quantities": dict(truth.quantities), "values": dict(truth.values),
-        "defects": dict(truth.defects),
-    }  # fmt: skip
-
-    @contextmanager
-    def connect(supervisor: Supervisor) -> Iterator[OpenRig]:
-        from drivers.controller import CanController
-        from drivers.operator import ConsoleOperator, LineOperator
-
-        machine = SimulatedRig(rig, truth)
-        base = WatchedClock(machine, machine.link.renew_lease, supervisor.check)
-        controller = CanController(rig, machine.link, base)
-        line = LineOperator(machine.request, controller.clock, controller.envelope)
-        person: Operator = line
-        recorders: list[Any] = [controller, line]
-        if operator == "console":
-            person = ConsoleOperator(_prompt(supervisor), controller.clock, controller.envelope, line)
-            recorders.append(person)
-        try:
-            yield _opened(rig, controller, person, recorders, facts, machine.link.close)
-        finally:
-            machine.link.close()
-
-    return connect
-
-
-def _opened(
-    rig: RigFile, controller: CanController, operator: Operator, recorders: Sequence[Any], truth: Mapping[str, Any],
-    close: Callable[[], None],
-) -> OpenRig:  # fmt: skip
-    def attach(recorder: Recorder | None) -> None:
-        for part in recorders:
-            part.recorder = recorder
-
-    def unguard() -> None:
-        controller.guarded = False
-
-    live = Rig(rig, controller.clock, controller, controller, operator, controller.telemetry.counters, close)
-    return OpenRig(live, [controller.telemetry.layout], attach, unguard, safe_steps(controller), truth)
-
-
-def safe_steps(controller: CanController) -> tuple[SafeStep, ...]:
-    """The ordered make-safe of a controller: stop the rotor, land it, switch the amplifiers off; if that fails, the
-    controller's own. Levitation is not released while the rotor turns above the landing speed: the controller refuses.
-    """
-
-    def look() -> None:
-        controller.clock.sleep(0.02)  # a command may have been sent whose effect nobody has seen yet
-
-    def stop() -> None:
-        if controller.mode == "SPINNING":
-            controller.stop()
-
-    def land() -> None:
-        if controller.mode == "LEVITATED":
-            controller.land()
-        elif controller.mode == "LIFTING":
-            controller.make_safe()
-        _until(lambda: controller.mode in RESTING, controller.clock)
-
-    def disable() -> None:
-        if controller.mode == "READY":
-            controller.disable()
-
-    def own() -> None:
-        if controller.mode not in ("OFF", "FAULT"):
-            controller.make_safe()
-            _until(lambda: controller.mode in ("OFF", "FAULT"), controller.clock)
-
-    return (
-        SafeStep("see where the machine stands", look, COMMAND_S),
-        SafeStep("stop the rotor", stop, STOP_S),
-        SafeStep("land the rotor", land, LAND_S),
-        SafeStep("switch the amplifiers off", disable, COMMAND_S),
-        SafeStep("the controller's own make-safe", own, STOP_S + LAND_S),
-    )
-
-
-def _until(done: Callable[[], bool], clock: Clock) -> None:
-    """Wait; the supervisor ends it when the step runs out of time."""
-    while not done():
-        clock.sleep(0.05)
-
-
-def _prompt(supervisor: Supervisor) -> Callable[[str], str]:
-    """Asks on standard error (standard output belongs to the run directory); a signal ends the waiting at once."""
-
-    def ask(question: str) -> str:
-        sys.stderr.write(question)
-        sys.stderr.flush()
-        with supervisor.interruptible():
-            answer = sys.stdin.readline()
-        if not answer:
-            raise OperatorAbort("standard input is closed: nobody can answer")
-        return answer
-
-    return ask

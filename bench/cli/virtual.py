@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from bench import catalogue
+from bench.cli.opening import SIMULATED
 from bench.findings import Finding
+from bench.linkhealth import Health
 from bench.procedure import Measured, Procedure
 from bench.recorder import Recorder, RunHeader
 from bench.recording import Recording
@@ -16,7 +18,7 @@ from bench.rig import Rig
 from bench.rigfile import load_rig
 from bench.roles import RigState
 from bench.states import transition
-from drivers.controller import CanController
+from drivers.controller import Controller
 from drivers.operator import LineOperator
 from sim_backend.endpoint import SimulatedRig
 from sim_backend.truth import draw
@@ -40,11 +42,11 @@ def simulate(
     settings = chosen.plan.model_validate({**file.plans.get(procedure, {}), **plan})
     drawn = draw(file, seed, truth, chosen.settings(settings))
     simulated = SimulatedRig(file, drawn)
-    controller = CanController(file, simulated.link, simulated)
+    controller = Controller(file, simulated.link, simulated, SIMULATED)
     operator = LineOperator(simulated.request, controller.clock, controller.envelope)
-    live = Rig(
-        file, controller.clock, controller, controller, operator, controller.telemetry.counters, simulated.link.close
-    )
+    counters = controller.telemetry.counters
+    live = Rig(file, controller.clock, controller, controller, operator, counters,
+               lambda: Health(counters, simulated.link.stats, None, 0), simulated.link.close)  # fmt: skip
     header = RunHeader(
         {"run": {"procedure": procedure, "seed": str(seed)}, "versions": {}},
         {

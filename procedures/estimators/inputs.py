@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bench.rigfile import Toleranced
+from bench.toleranced import Toleranced
 from bench.uncertainty import Estimate, Influence
 
 

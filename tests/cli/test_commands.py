@@ -84,7 +84,7 @@ USAGE = [
     (run("--backend", "live", "--seed", "1"), "no seed"),
     (run("--backend", "live", "--truth", "K_i=70"), "no truth"),
     (run("--backend", "live"), "inprocess"),
-    (run("--link", "can0=socketcan:can0"), "--link"),
+    (run("--link", "controller=can:socketcan:can0"), "--link"),
     (run("--truth", "K_x=70"), "K_x"),
     (run("--truth", 'K_i="much"'), "a number"),
     (run("--plan", "secunds=1"), "secunds"),

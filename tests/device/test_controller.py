@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from bench.codec import Decoder, encode
 from bench.frames import FD, SENT, FrameBatch, empty_batch, frame
 from bench.rigfile import RigFile, load_rig
+from bench.session import Session
 from sim_backend.controller import SimulatedController
 from sim_backend.truth import draw
 
@@ -17,7 +18,7 @@ RIG: RigFile = load_rig("tsbs12")
 MESSAGES = RIG.messages
 T0 = 1_000_000_000_000
 SLICE = 200  # ticks
-COMMANDS = ["DISABLE", "ENABLE", "LEVITATE", "LAND", "SPIN", "STOP", "CLEAR_FAULT", "MAKE_SAFE", "IDENTIFY"]
+COMMANDS = ["DISABLE", "ENABLE", "LEVITATE", "LAND", "SPIN", "STOP", "CLEAR_FAULT", "MAKE_SAFE", "IDENTIFY", "RELEASE"]
 
 
 class Host:
@@ -25,15 +26,17 @@ class Host:
 
     def __init__(self, **defects: float) -> None:
         self.device = SimulatedController(RIG, draw(RIG, 5, defects))
-        self.now, self.beating, self.session = T0, True, 7
+        self.now, self.beating, self.session, self.count = T0, True, 7, 0
         self.seen: list[FrameBatch] = []
+        self.run(0.02)  # the first heartbeat makes this host the owner
 
     def run(self, seconds: float, *sent: FrameBatch) -> FrameBatch:
         out = []
         frames = list(sent)
         for _ in range(round(seconds * 1e4 / SLICE)):
             if self.beating:
-                frames.append(self.message("Heartbeat", session=self.session, counter=1))
+                self.count += 1
+                frames.append(self.message("Heartbeat", session=self.session, counter=self.count))
             out.append(self.device.advance(SLICE, np.concatenate([empty_batch(), *frames]), self.now))
             self.now += SLICE * 100_000
             frames = []
@@ -51,7 +54,7 @@ class Host:
 
     def set(self, name: str, value: float) -> tuple[str, float]:
         index = RIG.parameters[name].index
-        batch = self.run(0.02, self.message("ParamSet", index=index, value=value, token=3))
+        batch = self.run(0.02, self.message("ParamSet", index=index, value=value, token=3, session8=self.session))
         return status(batch, "ParamReply"), float(Decoder(MESSAGES["ParamReply"]).decode(batch)[0]["value"][0])
 
     def levitate(self) -> None:
@@ -87,12 +90,12 @@ def test_lift_hold_land_and_switch_off() -> None:
 
 
 ALLOWED = {
-    "OFF": {"ENABLE", "DISABLE", "MAKE_SAFE", "IDENTIFY"},
-    "READY": {"DISABLE", "LEVITATE", "MAKE_SAFE", "IDENTIFY"},
+    "OFF": {"ENABLE", "DISABLE", "MAKE_SAFE", "IDENTIFY", "RELEASE"},
+    "READY": {"DISABLE", "LEVITATE", "MAKE_SAFE", "IDENTIFY", "RELEASE"},
     "LIFTING": {"MAKE_SAFE", "IDENTIFY"},
     "LEVITATED": {"LAND", "SPIN", "STOP", "MAKE_SAFE", "IDENTIFY"},
     "LANDING": {"MAKE_SAFE", "IDENTIFY"},
-    "FAULT": {"CLEAR_FAULT", "MAKE_SAFE", "IDENTIFY"},
+    "FAULT": {"CLEAR_FAULT", "MAKE_SAFE", "IDENTIFY", "RELEASE"},
 }
 
 
@@ -170,7 +173,55 @@ def test_a_second_host_is_refused_while_the_first_lives() -> None:
     host = Host()
     host.levitate()
     assert host.command("LAND", session=8) == "WRONG_SESSION"
+    batch = host.run(0.02, host.message("ParamSet", index=21, value=5e-6, token=1, session8=8))
+    assert status(batch, "ParamReply") == "WRONG_SESSION"
     assert host.device.state == "LEVITATED"
+
+
+def owner(host: Host, session: int, name: str) -> Session:
+    fields = Session(session, 1_767_225_600, name).fields()
+    values, _ = Decoder(MESSAGES["Owner"]).decode(host.run(0.02, host.message("Claim", **fields)))
+    return Session.of({k: float(v[0]) for k, v in values.items()})
+
+
+def test_a_claim_is_answered_with_who_owns_the_controller_and_since_when() -> None:
+    host = Host()
+    assert str(owner(host, 7, "ärger@lab pid 1")) == "ärger@lab pid 1, session 0x00000007, since 2026-01-01 00:00:00 UTC"
+    assert owner(host, 8, "second").name == "ärger@lab pid 1"
+    host.beating = False
+    host.run(0.9)
+    assert owner(host, 8, "second").number == 7  # gone for less than a second
+    host.run(0.2)
+    assert owner(host, 8, "second").name == "second"
+
+
+def test_an_owner_that_releases_lets_the_next_one_in_at_once_but_not_while_levitated() -> None:
+    host = Host()
+    host.levitate()
+    assert host.command("RELEASE") == "WRONG_STATE"
+    host.command("LAND")
+    host.run(1.5)
+    assert host.command("DISABLE") == "OK"
+    host.beating = False
+    assert host.command("RELEASE") == "OK"
+    assert owner(host, 8, "second").number == 8
+
+
+def test_a_heartbeat_whose_counter_stands_still_shows_no_life() -> None:
+    host = Host()
+    host.levitate()
+    host.beating = False
+    for _ in range(10):
+        host.run(0.02, host.message("Heartbeat", session=host.session, counter=host.count))
+    assert host.device.fault == "HEARTBEAT_LOST"
+
+
+def test_a_host_that_enables_and_dies_is_noticed() -> None:
+    host = Host()
+    host.beating = False
+    assert host.command("ENABLE") == "OK"
+    host.run(0.1)
+    assert (host.device.state, host.device.fault) == ("FAULT", "HEARTBEAT_LOST")
 
 
 def test_a_fault_latches_until_it_is_cleared() -> None:

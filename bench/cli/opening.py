@@ -1,0 +1,192 @@
+"""How a rig is opened: a simulated one in this process, or a live one over its links. Both end in the same OpenRig."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from typing import TYPE_CHECKING, Any
+
+from bench import linkurl
+from bench.cli.safety import safe_steps
+from bench.clock import WallClock
+from bench.errors import BenchError, ConfigError, OperatorAbort
+from bench.findings import Finding
+from bench.linkhealth import Health
+from bench.opened import Connect, OpenRig, WatchedClock
+from bench.recorder import Recorder
+from bench.rig import Rig
+from bench.rigfile import RigFile
+from bench.roles import Operator
+from bench.session import Session, new_session
+from bench.supervisor import Supervisor
+
+if TYPE_CHECKING:
+    from drivers.controller import Controller
+    from drivers.operator import LineOperator
+
+logger = logging.getLogger("bench.opening")
+LIVE_SLICE_S = 0.02
+SIMULATED = Session(1, 1_767_225_600, "simulation")
+
+
+def simulated(
+    rig: RigFile,
+    seed: int,
+    overrides: Mapping[str, float],
+    operator: str,
+    settings: Mapping[str, float] | None = None,
+) -> Connect:
+    """How to open a simulated rig. The truth is drawn now, so that a wrong override is found before the start.
+
+    Raises:
+        ConfigError: an override names nothing.
+    """
+    from sim_backend.endpoint import SimulatedRig
+    from sim_backend.truth import draw
+
+    truth = draw(rig, seed, overrides, settings)
+    facts = {
+        "schema": 1, "seed": seed, "quantities": dict(truth.quantities), "values": dict(truth.values),
+        "defects": dict(truth.defects),
+    }  # fmt: skip
+
+    @contextmanager
+    def connect(supervisor: Supervisor) -> Iterator[OpenRig]:
+        from drivers.controller import Controller
+        from drivers.operator import LineOperator
+
+        machine = SimulatedRig(rig, truth, SIMULATED.number)
+        base = WatchedClock(machine, machine.link.renew_lease, supervisor.check)
+        controller = Controller(rig, machine.link, base, SIMULATED)
+        line = LineOperator(machine.request, controller.clock, controller.envelope)
+        try:
+            controller.connect()
+            yield _opened(controller, base, _operators(operator, line, controller, supervisor), facts)
+        finally:
+            machine.link.close()
+
+    return connect
+
+
+def live(rig: RigFile, operator: str) -> Connect:
+    """How to open a live rig: its controller's link with its heartbeat, its other devices, and the operator.
+
+    Raises:
+        ConfigError: a link's URL is none, or of a kind that its device cannot have.
+    """
+    spec = rig.link
+    scheme = linkurl.parse(spec.url).scheme
+    if scheme not in linkurl.CONTROLLER_SCHEMES[1:]:
+        known = ", ".join(linkurl.EXAMPLES[s] for s in linkurl.CONTROLLER_SCHEMES[1:])
+        raise ConfigError(f"link {rig.devices['controller'].link}: found {spec.url!r}; expected such as {known}")
+
+    @contextmanager
+    def connect(supervisor: Supervisor) -> Iterator[OpenRig]:
+        from drivers.live_link import LiveLink
+        from drivers.wires import open_wire
+
+        from drivers.controller import Controller
+        from drivers.operator import LineOperator
+        from drivers.operator_line import OperatorLine
+
+        session, name = new_session(), rig.devices["controller"].link
+        identifiers = [m.identifier for m in rig.messages.messages.values()]
+        with ExitStack() as stack:
+            stack.enter_context(supervisor.finishing())
+            link = LiveLink(name, lambda: open_wire(spec, name, identifiers), beat_of(rig, session),
+                            heartbeat=spec.heartbeat, reconnect_s=spec.reconnect_s)  # fmt: skip
+            stack.callback(link.close)
+            base = WatchedClock(WallClock(), link.renew_lease, supervisor.check)
+            controller = Controller(rig, link, base, session, LIVE_SLICE_S)
+            controller.connect()
+            stack.callback(_released, controller)
+            line = None
+            if "operator" in rig.devices and operator != "console":
+                line = stack.enter_context(OperatorLine.open(rig.links[rig.devices["operator"].link].url))
+            hands = None if line is None else LineOperator(line.request, controller.clock, controller.envelope)
+            yield _opened(controller, base, _operators(operator, hands, controller, supervisor), None)
+
+    return connect
+
+
+def beat_of(rig: RigFile, session: Session) -> Any:
+    """The heartbeat that a rig's DBC describes.
+
+    Raises:
+        ConfigError: its counter is not a little-endian number of 16 bits at a whole byte.
+    """
+    from drivers.heartbeat import Beat
+
+    from bench.codec import encode
+
+    b = rig.binding
+    message = rig.messages[b.heartbeat]
+    counter = message.signal(b.heartbeat_counter)
+    if counter.start % 8 or counter.length != 16 or not counter.little_endian:
+        raise ConfigError(
+            f"{rig.link.dbc}: {b.heartbeat}.{counter.name}: found {counter.length} bits at {counter.start}; expected 16 "
+            "bits, little endian, at a whole byte"
+        )
+    owned = {"session": session.number} if any(s.name == "session" for s in message.signals) else {}
+    period = message.period_s or 0.02
+    return Beat(message.identifier, encode(message, owned), counter.start // 8, message.fd, period_s=period)
+
+
+def _released(controller: Controller) -> None:
+    """A bench that ends well lets the next one in at once; one that does not is forgotten after a second."""
+    controller.guarded = False
+    with suppress(BenchError):
+        controller.release()
+
+
+def _operators(kind: str, line: LineOperator | None, controller: Controller, supervisor: Supervisor) -> list[Operator]:
+    """The operator, and whoever else records what is done by hand."""
+    from drivers.operator import ConsoleOperator
+
+    if kind == "console" or line is None:
+        person = ConsoleOperator(_prompt(supervisor), controller.clock, controller.envelope, line)
+        return [person, line] if line is not None else [person]
+    return [line]
+
+
+def _opened(
+    controller: Controller, base: WatchedClock, operators: Sequence[Any], truth: Mapping[str, Any] | None
+) -> OpenRig:
+    recording: list[Any] = [controller, *operators]
+
+    def attach(recorder: Recorder | None) -> None:
+        for part in recording:
+            part.recorder = recorder
+
+    def unguard() -> None:
+        controller.guarded = False
+
+    def health() -> Health:
+        telemetry = controller.telemetry
+        return Health(telemetry.counters, controller.link.stats, telemetry.host.drift(), telemetry.host.latest_ns)
+
+    rig = Rig(controller.rig, controller.clock, controller, controller, operators[0], controller.telemetry.counters,
+              health, controller.link.close)  # fmt: skip
+    found = []
+    if controller.cleared:
+        found.append(
+            Finding("fault-cleared", f"fault {controller.cleared} of an earlier run was cleared", "controller")
+        )
+    return OpenRig(rig, [controller.telemetry.layout], attach, unguard, safe_steps(controller, base), truth, found)
+
+
+def _prompt(supervisor: Supervisor) -> Callable[[str], str]:
+    """Asks on standard error (standard output belongs to the run directory); a signal ends the waiting at once."""
+
+    def ask(question: str) -> str:
+        sys.stderr.write(question)
+        sys.stderr.flush()
+        with supervisor.interruptible():
+            answer = sys.stdin.readline()
+        if not answer:
+            raise OperatorAbort("standard input is closed: nobody can answer")
+        return answer
+
+    return ask

@@ -1,0 +1,74 @@
+"""The ordered make-safe of a rig: stop what turns the rotor, land it, switch the amplifiers off; if that fails, leave it
+to the controller, first by command and at last by withholding the heartbeat.
+
+Levitation is not released while the rotor turns above the landing speed: the controller refuses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from bench.clock import Clock
+from bench.errors import LinkError
+from bench.opened import WatchedClock
+from bench.supervisor import SafeStep
+
+if TYPE_CHECKING:
+    from drivers.controller import Controller
+
+RESTING = ("OFF", "READY", "FAULT")
+SAFE = ("OFF", "FAULT")
+LAND_S, STOP_S, COMMAND_S = 20.0, 90.0, 5.0
+BLIND_S = 5.0  # the heartbeat's lease, the watchdog and a landing take less
+
+
+def safe_steps(controller: Controller, base: WatchedClock) -> tuple[SafeStep, ...]:
+    """The steps for a controller whose heartbeat `base` renews."""
+
+    def look() -> None:
+        controller.clock.sleep(0.02)  # a command may have been sent whose effect nobody has seen yet
+
+    def stop() -> None:
+        if controller.mode == "SPINNING":
+            controller.stop()
+
+    def land() -> None:
+        if controller.mode == "LEVITATED":
+            controller.land()
+        elif controller.mode == "LIFTING":
+            controller.make_safe()
+        _until(lambda: controller.mode in RESTING, controller.clock)
+
+    def disable() -> None:
+        if controller.mode == "READY":
+            controller.disable()
+
+    def own() -> None:
+        if controller.mode not in SAFE:
+            controller.make_safe()
+            _until(lambda: controller.mode in SAFE, controller.clock)
+
+    def watchdog() -> None:
+        if controller.mode not in SAFE:
+            base.renewing = False
+            _until(lambda: controller.mode in SAFE or controller.silent_s > BLIND_S, controller.clock)
+        if controller.mode not in SAFE:
+            raise LinkError(
+                f"nobody sees the machine: no telemetry for {controller.silent_s:.0f} s. Look at it before going near"
+            )
+
+    return (
+        SafeStep("see where the machine stands", look, COMMAND_S),
+        SafeStep("stop the rotor", stop, STOP_S),
+        SafeStep("land the rotor", land, LAND_S),
+        SafeStep("switch the amplifiers off", disable, COMMAND_S),
+        SafeStep("the controller's own make-safe", own, STOP_S + LAND_S),
+        SafeStep("the controller's watchdog", watchdog, STOP_S + LAND_S),
+    )
+
+
+def _until(done: Callable[[], bool], clock: Clock) -> None:
+    """Wait; the supervisor ends it when the step runs out of time."""
+    while not done():
+        clock.sleep(0.05)

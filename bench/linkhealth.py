@@ -1,0 +1,64 @@
+"""What a run says about its link: counts for the record, and a finding for everything that a clean link does not do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+
+from bench.findings import Effect, Finding
+from bench.hosttime import Drift
+from bench.link import LinkStats
+from bench.records import LinkCounts
+from bench.telemetry import Counters
+
+LATE_S = 0.1  # telemetry that comes later than this is worth a word
+PERIODS = 3  # of a heartbeat; a longer gap comes near the watchdog
+
+
+@dataclass(frozen=True)
+class Health:
+    """Telemetry counters and transport counts at one moment, drift of the clocks, and the greatest lateness."""
+
+    counters: Counters
+    stats: LinkStats
+    drift: Drift | None
+    latest_ns: int
+
+    def counts(self, frames: int) -> LinkCounts:
+        """As the record has it; `frames` is how many were recorded, in both directions."""
+        c, s = self.counters, self.stats
+        named = {**asdict(c), **asdict(s)}
+        errors = c.wrong_length + c.duplicates + c.reordered + c.late + c.unknown + c.reboots + s.crc_errors
+        errors += s.malformed + s.packets_lost + s.error_frames + s.refused + s.overflows + s.bus_off + s.reconnects
+        drift = self.drift
+        return LinkCounts(frames, c.gaps, errors, named, drift.ppm if drift else None,
+                          drift.expanded_ppm if drift else None, self.latest_ns * 1e-6)  # fmt: skip
+
+    def findings(self) -> Iterator[Finding]:
+        """One for each kind of trouble, with its count and what it means for the data."""
+        c, s = self.counters, self.stats
+        told = (
+            (c.lost, "samples-lost", f"{c.lost} samples were lost in {c.gaps} gaps", Effect.NOTE),
+            (c.late, "samples-late", f"{c.late} samples came after their successors and stay lost", Effect.NOTE),
+            (c.duplicates, "frames-duplicated", f"{c.duplicates} samples came twice; one of each was kept", Effect.NOTE),
+            (c.reordered, "frames-reordered", f"{c.reordered} samples came out of order and were put back", Effect.NOTE),
+            (c.wrong_length, "wrong-length", f"{c.wrong_length} frames do not have the length of the DBC; they were left "
+             "out. Does the firmware's message map match the rig file's?", Effect.INDETERMINATE),
+            (c.unknown, "unknown-frames", f"{c.unknown} frames have identifiers that the DBC does not know", Effect.NOTE),
+            (c.reboots, "controller-restarted", f"the controller restarted {c.reboots} times", Effect.ERROR),
+            (s.crc_errors, "packets-corrupt", f"{s.crc_errors} packets failed their CRC and were dropped", Effect.NOTE),
+            (s.malformed, "bytes-malformed", f"{s.malformed} pieces of the byte stream could not be taken apart",
+             Effect.NOTE),
+            (s.packets_lost, "packets-lost", f"{s.packets_lost} packets are missing by their own numbers", Effect.NOTE),
+            (s.error_frames, "error-frames", f"the interface reported {s.error_frames} destroyed frames", Effect.NOTE),
+            (s.refused, "frames-refused", f"the interface refused {s.refused} frames or commands", Effect.NOTE),
+            (s.overflows, "buffer-overflow", f"{s.overflows} frames were dropped: the bench did not keep up",
+             Effect.ERROR),
+            (s.bus_off, "bus-off", f"the bus went off {s.bus_off} times", Effect.ERROR),
+            (s.reconnects, "link-reconnected", f"the link was lost and came back {s.reconnects} times",
+             Effect.INDETERMINATE),
+        )  # fmt: skip
+        yield from (Finding(code, text, "link", effect) for count, code, text, effect in told if count)
+        if self.latest_ns > LATE_S * 1e9:
+            text = f"telemetry came up to {self.latest_ns * 1e-9:.2f} s late; samples carry the device's own time"
+            yield Finding("telemetry-late", text, "link")

@@ -1,0 +1,104 @@
+"""Requests to a controller and their replies: one at a time, each with a token, each recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from bench.codec import Decoder, encode
+from bench.errors import LinkError
+from bench.frames import FD, SENT, FrameBatch, frame
+from bench.link import Link
+from bench.messages import Message
+from bench.recorder import Recorder
+from bench.rigfile import RigFile
+
+REPLY_S = 0.5
+REPLIES = ("CommandReply", "ParamReply", "Identity", "Owner")
+
+
+class Dialogue:
+    """What is asked of a controller and what it answers. `wait` lets the clock run until something is true."""
+
+    def __init__(self, rig: RigFile, link: Link, now_ns: Callable[[], int]) -> None:
+        self._rig, self._link, self._now_ns = rig, link, now_ns
+        self._decoders = {n: Decoder(m) for n, m in rig.messages.messages.items() if n in REPLIES}
+        self._answers: list[tuple[str, dict[str, float]]] = []
+        self._held: dict[str, dict[str, float]] = {}
+        self._token = 0
+        self.recorder: Recorder | None = None
+
+    def has(self, message: str) -> bool:
+        """Whether the controller's DBC knows a message."""
+        return message in self._rig.messages.messages
+
+    def take(self, batch: FrameBatch) -> None:
+        """Keep the replies in a batch for who waits for them."""
+        for name, decoder in self._decoders.items():
+            values, _ = decoder.decode(batch)
+            for k in range(len(next(iter(values.values())))):
+                self._answers.append((name, {s: float(v[k]) for s, v in values.items()}))
+
+    def ask(
+        self, message: str, values: Mapping[str, float], reply: str, what: str, wait: Callable[..., None]
+    ) -> dict[str, float]:
+        """Send a request and wait for its reply: the one with its token, where the reply has one.
+
+        Raises:
+            LinkError: no reply within half a second.
+        """
+        self._token = (self._token + 1) & 0xFF
+        self._answers.clear()
+        request, answer = self._rig.messages[message], self._rig.messages[reply]
+        tokens = _has(request, "token") and _has(answer, "token")
+        self.send(message, {**values, "token": self._token} if tokens else values)
+        found: list[dict[str, float]] = []
+
+        def arrived() -> bool:
+            found.extend(v for n, v in self._answers if n == reply and (not tokens or v["token"] == self._token))
+            return bool(found)
+
+        wait(arrived, REPLY_S, what)
+        return found[0]
+
+    def send(self, message: str, values: Mapping[str, float]) -> None:
+        """Send a message as it is."""
+        m = self._rig.messages[message]
+        batch = frame(m.identifier, encode(m, values), flags=SENT | (FD if m.fd else 0), t_ns=self._now_ns())
+        self._link.send(batch)
+        if self.recorder is not None:
+            self.recorder.frames(self._link.name, batch)
+
+    def send_held(self, message: str, values: Mapping[str, float]) -> None:
+        """Send a message whose other signals keep the values that they were last given."""
+        held = self._held.setdefault(message, {})
+        held.update(values)
+        self.send(message, held)
+
+    def hold(self, message: str, signal: str, value: float) -> None:
+        """What a signal of a held message starts from."""
+        self._held.setdefault(message, {}).setdefault(signal, value)
+
+
+def status_of(message: Message, reply: Mapping[str, float]) -> str:
+    """The name of a reply's status."""
+    return message.signal("status").choices.get(int(reply["status"]), f"status {reply['status']:g}")
+
+
+def no_reply(link: str, what: str, timeout_s: float) -> LinkError:
+    """Telemetry may go on: the text does not claim that the link is dead."""
+    return LinkError(f"link {link}: waited {timeout_s:g} s for {what}; it did not come")
+
+
+def _has(message: Message, signal: str) -> bool:
+    return any(s.name == signal for s in message.signals)
+
+
+def commanded(rig: RigFile, command: str) -> dict[str, dict[str, float]]:
+    """Values by message that ask for a command, names replaced by their codes."""
+    out: dict[str, dict[str, float]] = {}
+    found: Mapping[str, int | float | str] = rig.binding.command(command)
+    for path, value in found.items():
+        message, _, signal = path.partition(".")
+        code = rig.messages.code(message, signal, value) if isinstance(value, str) else float(value)
+        out.setdefault(message, {})[signal] = code
+    return out

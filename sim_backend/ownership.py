@@ -1,0 +1,58 @@
+"""Which host the simulated controller obeys, and whether that host is alive (docs/reference/protocol.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from sim_backend.core import TICK_S
+
+TAKEOVER_S = 1.0
+NAME_PARTS = tuple(f"name{k}" for k in range(9))
+
+
+@dataclass
+class Ownership:
+    """The owner's session (0: nobody), its claim, and the tick of its last heartbeat that counted."""
+
+    session: int = 0
+    since: int = 0
+    name: Mapping[str, float] = field(default_factory=dict)
+    heartbeat: int = 0
+    counter: int = -1
+    armed: bool = False
+
+    def takes(self, session: int, tick: int, resting: bool) -> bool:
+        """Whether a session may command. A free controller is taken by the first that asks; one whose owner has been
+        silent for a second is free again while its rotor rests."""
+        gone = resting and (tick - self.heartbeat) * TICK_S > TAKEOVER_S
+        if not session or (self.session not in (0, session) and not gone):
+            return False
+        if self.session != session:
+            self.release()
+            self.session, self.heartbeat = session, tick
+        return True
+
+    def claim(self, values: Mapping[str, float], tick: int, resting: bool) -> dict[str, float]:
+        """Answer a Claim: the values of Owner."""
+        if self.takes(int(values["session"]), tick, resting):
+            self.since = int(values["since"])
+            self.name = {part: values[part] for part in NAME_PARTS}
+        return {"session": self.session, "since": self.since, **self.name}
+
+    def beat(self, values: Mapping[str, float], tick: int, resting: bool) -> None:
+        """Take a heartbeat; one whose counter stands still shows no life."""
+        if self.takes(int(values["session"]), tick, resting) and int(values["counter"]) != self.counter:
+            self.heartbeat, self.counter = tick, int(values["counter"])
+
+    def arm(self, tick: int) -> None:
+        """The watchdog watches from here on; the command that leaves OFF is itself a sign of life."""
+        self.armed, self.heartbeat = True, tick
+
+    def may_write(self, session8: int) -> bool:
+        """Whether a parameter write with this low byte of a session comes from the owner."""
+        return bool(self.session) and self.session & 0xFF == session8
+
+    def release(self) -> None:
+        """Nobody owns the controller."""
+        self.session, self.since, self.name, self.counter, self.armed = 0, 0, {}, -1, False
