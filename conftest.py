@@ -3,13 +3,15 @@
 One item per procedure, collected only when `--rig` is given. FAIL and INDETERMINATE fail the item, ERROR and ABORTED
 are errors (the run happens in the item's set-up, so that pytest counts them as such). Measured quantities become
 JUnit properties of the item, provenance becomes properties of the suite.
+
+The fixture `inject` runs a procedure while faults happen to the link or the controller.
 """
 
 from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +32,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--backend", choices=("sim", "live"), default="sim", help="the simulated rig, or the real one")
     group.addoption("--seed", type=int, help="which virtual rig (simulation only)")
     group.addoption("--plan", action="append", default=[], metavar="KEY=VALUE", help="a setting; repeatable")
+    group.addoption("--fault", action="append", default=[], metavar="FAULT", help="a fault to inject; repeatable")
     group.addoption("--no-report", action="store_true", help="leave the reports out")
     group.addoption("--out", type=Path, default=Path("runs"), help="folder of the run directories")
 
@@ -53,6 +56,22 @@ def pytest_sessionstart(session: pytest.Session) -> None:
             xml.add_global_property(f"levbench.{name}", str(config.getoption(f"--{name}")))
         xml.add_global_property("levbench.version", __version__)
         xml.add_global_property("python", sys.version.split()[0])
+
+
+@pytest.fixture
+def inject(tmp_path: Path) -> Callable[..., RunResult]:
+    """Runs a procedure on the simulated rig while faults happen: `inject("stall@12", procedure="amb-calibration")`.
+
+    Further keywords are those of `bench.cli.compose.Request`: `rig`, `seed`, `plan`, `truth`, `backend`, `links`. The run
+    directory lies in `tmp_path`; what comes back is a `bench.runner.RunResult`.
+    """
+    from bench.cli.compose import Request
+    from bench.cli.run import execute
+
+    def run(*faults: str, procedure: str, rig: str = "tsbs12", **options: Any) -> RunResult:
+        return execute(Request(procedure, rig, faults=faults, out=tmp_path / "runs", report=False, **options))
+
+    return run
 
 
 def _modules() -> dict[Path, catalogue.Entry]:
@@ -87,6 +106,7 @@ class ProcedureItem(pytest.Item):
             backend=option("--backend"),
             seed=option("--seed"),
             plan=tuple(option("--plan")),
+            faults=tuple(option("--fault")),
             out=option("--out"),
             report=not option("--no-report"),
         )

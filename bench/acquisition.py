@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -24,7 +23,7 @@ from bench.errors import (
 from bench.evaluation import Ending
 from bench.findings import Effect, Finding
 from bench.opened import Job, OpenRig
-from bench.progress import Progress
+from bench.progress import Progress, described
 from bench.recorder import Recorder
 from bench.records import Outcome
 from bench.roles import RigState
@@ -134,8 +133,7 @@ class WatchedSteps:
 
     @contextmanager
     def step(self, kind: str, **labels: Any) -> Iterator[None]:
-        said = ", ".join(_label(k, v) for k, v in labels.items())
-        self._progress.step(f"{kind} {said}")
+        self._progress.step(f"{kind} {described(labels)}")
         with self._recorder.step(kind, **labels):
             yield
 
@@ -162,12 +160,3 @@ def cause_of(error: BaseException) -> tuple[Outcome, Finding]:
         logger.error("unexpected %s (traceback in run.log)", text, exc_info=error)
     stopped = Outcome.ABORTED if isinstance(error, Aborted | KeyboardInterrupt) else Outcome.ERROR
     return stopped, Finding(code, text, "acquire", Effect.ERROR)
-
-
-def _label(name: str, value: Any) -> str:
-    """A step's label for people: angles in degrees, nothing as "none"."""
-    if name.endswith("_rad") and isinstance(value, float):
-        return f"{name.removesuffix('_rad')} {math.degrees(value):.0f}°"
-    if isinstance(value, float):
-        return f"{name} {value:.4g}"
-    return f"{name} {'none' if value == '' else value}"

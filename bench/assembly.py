@@ -2,12 +2,16 @@
 
 On classic CAN the first message (SYNC) carries sequence and tick, each other one the low bits of the sequence it belongs
 to. A sample is complete when all its messages came; one that stays incomplete is lost and shows as a gap.
+
+Low bits alone do not say which sample a message belongs to: after a loss of 16 samples a count of 4 bits is the same
+again. So messages wait for the next SYNC, which says how far the sequence went on meanwhile; where it went too far for
+the count to tell, what waited is left out. A row is never made of parts of different samples.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -36,14 +40,37 @@ class Rows:
         return len(self.sequence)
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Part:
-    """One telemetry message: its decoder, its channels with their factors to SI, and what still waits for the rest."""
+    """One telemetry message: its decoder, and its channels with signal, factor and offset to SI."""
 
     message: Message
     decoder: Decoder
-    channels: dict[str, tuple[str, float]]
-    waiting: dict[int, list[float]] = field(default_factory=dict)
+    channels: dict[str, tuple[str, float, float]]
+
+    def si(self, values: dict[str, Values]) -> dict[str, Values]:
+        """Values in SI by channel."""
+        return {n: values[signal] * factor + offset for n, (signal, factor, offset) in self.channels.items()}
+
+
+@dataclass
+class _Sample:
+    """What has come of one sample: raw counters and host time of its SYNC, SI values by part."""
+
+    values: list[Values | None]
+    sequence: int = 0
+    tick: int = 0
+    arrived: int = 0
+
+
+@dataclass
+class _Frames:
+    """The frames of one part in a batch: what it counts by, ticks (SYNC only), SI values (n, channels), host times."""
+
+    count: list[int]
+    tick: list[int]
+    values: Values
+    arrived: list[int]
 
 
 class Assembler:
@@ -57,8 +84,7 @@ class Assembler:
         sync = self._parts[0].message
         self.sequence_bits = sync.signal(b.sequence).length
         self.tick_bits = sync.signal(b.tick).length
-        self._arrived: dict[int, int] = {}  # host time of the SYNC of what waits
-        self._newest = 0  # last sequence number that SYNC showed
+        self._joiner = Joiner(self.sequence_bits, [p.message.signal(b.counter).length for p in self._parts[1:]])
 
     def take(self, batch: FrameBatch) -> Rows:
         """The samples that a batch completes."""
@@ -71,62 +97,116 @@ class Assembler:
         values, wrong = part.decoder.decode(batch)
         self.wrong_length += wrong
         mine = (batch["id"] == part.message.identifier) & (batch["length"] == part.message.length)
-        columns = {name: values[signal] * factor for name, (signal, factor) in part.channels.items()}
-        return Rows(values[b.sequence].astype(np.int64), values[b.tick].astype(np.int64), batch["t_ns"][mine], columns)
+        sequence, tick = (values[name].astype(np.int64) for name in (b.sequence, b.tick))
+        return Rows(sequence, tick, batch["t_ns"][mine], part.si(values))
 
     def _several(self, batch: FrameBatch) -> Rows:
-        for part in self._parts:
-            self.wrong_length += part.decoder.decode(batch)[1]
-        b = self._binding
-        complete: list[list[float]] = []
-        arrived: list[int] = []
-        known = {p.message.identifier: p for p in self._parts}
-        mine = batch[np.isin(batch["id"], list(known))]
-        for one in mine:  # classic CAN brings some thousand frames a second at most
-            part = known[int(one["id"])]
-            if one["length"] != part.message.length:
-                continue
-            v = {k: float(x[0]) for k, x in part.decoder.decode_payloads(one["data"][None, :]).items()}
-            si = [v[signal] * factor for signal, factor in part.channels.values()]
-            if part is self._parts[0]:
-                self._newest = number = int(v[b.sequence])
-                self._arrived[number] = int(one["t_ns"])
-                si = [float(number), v[b.tick], *si]
+        kind = np.full(len(batch), -1)
+        frames = []
+        for k, part in enumerate(self._parts):
+            values, wrong = part.decoder.decode(batch)
+            self.wrong_length += wrong
+            mine = (batch["id"] == part.message.identifier) & (batch["length"] == part.message.length)
+            kind[mine] = k
+            frames.append(self._frames(part, values, batch["t_ns"][mine]))
+        done: list[_Sample] = []
+        place = [0] * len(frames)
+        for k in kind[kind >= 0].tolist():
+            f, j = frames[k], place[k]
+            place[k] += 1
+            if k == 0:
+                done += self._joiner.sync(f.count[j], f.tick[j], f.arrived[j], f.values[j])
             else:
-                number = self._belongs(int(v[b.counter]), part.message.signal(b.counter).length)
-            part.waiting[number] = si
-            if all(number in p.waiting for p in self._parts):
-                complete.append([x for p in self._parts for x in p.waiting.pop(number)])
-                arrived.append(self._arrived.pop(number))
-        self._forget()
-        return self._rows(complete, arrived)
+                self._joiner.data(k, f.count[j], f.values[j])
+        return self._rows(done)
 
-    def _belongs(self, count: int, bits: int) -> int:
-        """The sequence number near the newest one whose low bits are `count`."""
-        half = 1 << (bits - 1)
-        off = (count - self._newest + half) % (1 << bits) - half
-        return (self._newest + off) % (1 << self.sequence_bits)
+    def _frames(self, part: _Part, values: dict[str, Values], arrived: Integers) -> _Frames:
+        b, first = self._binding, part is self._parts[0]
+        counts = values[b.sequence if first else b.counter].astype(np.int64).tolist()
+        ticks = values[b.tick].astype(np.int64).tolist() if first else []
+        si = list(part.si(values).values())
+        table = np.stack(si, axis=1) if si else np.empty((len(counts), 0))
+        return _Frames(counts, ticks, table, arrived.tolist())
 
-    def _forget(self) -> None:
-        """What has waited too long stays incomplete; numbers just ahead of SYNC (it may be late) stay too."""
-        size = 1 << self.sequence_bits
-        stores: list[dict[int, Any]] = [self._arrived, *(p.waiting for p in self._parts)]
-        for waiting in stores:
-            for number in [n for n in waiting if KEPT < (self._newest - n) % size < size - KEPT]:
-                del waiting[number]
-
-    def _rows(self, complete: list[list[float]], arrived: list[int]) -> Rows:
+    def _rows(self, done: list[_Sample]) -> Rows:
         names = [n for p in self._parts for n in p.channels]
-        table = np.array(complete).reshape(len(complete), len(names) + 2)
-        columns = dict(zip(names, table.T[2:], strict=True))
-        sequence, tick = (table[:, k].astype(np.int64) for k in range(2))
-        return Rows(sequence, tick, np.array(arrived, np.int64), columns)
+        table = np.array([np.concatenate([v for v in s.values if v is not None]) for s in done])
+        table = table.reshape(len(done), len(names))
+        counters = np.array([(s.sequence, s.tick, s.arrived) for s in done], np.int64).reshape(len(done), 3)
+        columns = dict(zip(names, np.ascontiguousarray(table.T), strict=True))
+        return Rows(counters[:, 0], counters[:, 1], counters[:, 2], columns)
+
+
+@dataclass
+class Joiner:
+    """Joins the messages of a sample. Inside, sequence numbers do not wrap.
+
+    Args:
+        sequence_bits: of the number in SYNC.
+        count_bits: of the counts in the other messages.
+    """
+
+    sequence_bits: int
+    count_bits: Sequence[int]
+    _newest: int | None = None
+    _pending: list[tuple[int, int, Values]] = field(default_factory=list)  # part, count, values since the newest SYNC
+    _waiting: dict[int, _Sample] = field(default_factory=dict)
+
+    def data(self, part: int, count: int, values: Values) -> None:
+        """One message that is not SYNC; `part` counts from 1."""
+        if self._newest is not None and len(self._pending) < 1 << 12:  # without SYNC nothing can be told
+            self._pending.append((part, count, values))
+
+    def sync(self, sequence: int, tick: int, arrived: int, values: Values) -> list[_Sample]:
+        """One SYNC: settles where the messages since the one before belong; the samples that are complete by now."""
+        half, size = 1 << (self.sequence_bits - 1), 1 << self.sequence_bits
+        if self._newest is None:
+            self._newest = sequence
+        ahead = (sequence - self._newest + half) % size - half
+        number = self._newest + ahead
+        if ahead > 0:
+            self._settle(ahead)
+            self._newest = number
+        elif ahead < -KEPT:  # the controller has started anew
+            self._pending.clear()
+            self._waiting.clear()
+            self._newest = number
+        sample = self._waiting.setdefault(number, _Sample([None] * (len(self.count_bits) + 1)))
+        if sample.values[0] is not None and sample.tick != tick:  # started anew while its numbers were still small
+            self._pending.clear()
+            self._waiting.clear()
+            sample = self._waiting[number] = _Sample([None] * (len(self.count_bits) + 1))
+        sample.values[0], sample.sequence, sample.tick, sample.arrived = values, sequence, tick, arrived
+        return self._complete()
+
+    def _settle(self, ahead: int) -> None:
+        """Give what waited its sequence numbers: those within reach of the newest SYNC and the one that came now."""
+        assert self._newest is not None
+        for part, count, values in self._pending:
+            size = 1 << self.count_bits[part - 1]
+            slack = (size - 1 - ahead) // 2  # samples that a message may be early or late
+            if slack < max(1, size // 8):
+                continue  # too much is missing to tell which sample this belongs to
+            low = self._newest - slack
+            number = low + (count - low) % size
+            sample = self._waiting.setdefault(number, _Sample([None] * (len(self.count_bits) + 1)))
+            sample.values[part] = values
+        self._pending.clear()
+
+    def _complete(self) -> list[_Sample]:
+        assert self._newest is not None
+        done = [n for n, s in self._waiting.items() if all(v is not None for v in s.values)]
+        out = [self._waiting.pop(n) for n in sorted(done)]
+        for number in [n for n in self._waiting if abs(self._newest - n) > KEPT]:
+            del self._waiting[number]
+        return out
 
 
 def _part(rig: RigFile, message: Message) -> _Part:
-    channels = {
-        name: (signal, units.UNITS[message.signal(signal).unit].factor)
-        for name, (owner, _, signal) in ((n, c.signal.partition(".")) for n, c in rig.channels.items())
-        if owner == message.name
-    }
+    channels = {}
+    for name, channel in rig.channels.items():
+        owner, _, signal = channel.signal.partition(".")
+        if owner == message.name:
+            unit = units.UNITS[message.signal(signal).unit]
+            channels[name] = (signal, unit.factor, unit.offset)
     return _Part(message, Decoder(message), channels)

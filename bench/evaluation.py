@@ -29,6 +29,7 @@ from bench.records import (
     missing,
     outcome_of,
 )
+from bench.stepgaps import incomplete_steps
 
 logger = logging.getLogger("bench.evaluation")
 RUN_END = "run-end"
@@ -102,7 +103,7 @@ def evaluate(
     if stopped:
         return Evaluation(_in_order(procedure, {}, limits), Correlations((), ()), ())
     measured: dict[tuple[str, str], Measured] = {}
-    findings: list[Finding] = []
+    findings = list(incomplete_steps(recording))
     entries: dict[tuple[str, str], Measurement] = {}
     correlations = Correlations((), ())
     try:

@@ -10,20 +10,22 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy import stats
 
 WINDOW_NS = 1_000_000_000
 MAX_DRIFT = 200e-6  # two crystals differ by less; what goes faster is latency
 JITTER_NS = 2_000_000
+FEWEST, MOST = 8, 600  # windows for a slope
 
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """Host clock against device clock: `ppm` is positive when the host's runs faster; U at 95 % with its dof."""
+    """Host clock against device clock: `ppm` is positive when the host's runs faster; U at 95 %, and how many windows."""
 
     ppm: float
     expanded_ppm: float
-    dof: int
+    windows: int
 
 
 class HostMap:
@@ -37,29 +39,31 @@ class HostMap:
         self.latest_ns = latest_ns  # greatest lateness beyond drift
         self.lag_ns = 0  # host time less this is sample time
 
-    def take(self, sample_ns: int, host_ns: int) -> None:
-        """One arrival: the newest sample of a batch and when it came."""
+    def take(self, samples_ns: npt.NDArray[np.int64], hosts_ns: npt.NDArray[np.int64]) -> None:
+        """One batch: sample times and when each arrived."""
+        lateness = hosts_ns - samples_ns
+        best = int(lateness.argmin())
+        sample_ns, late = int(samples_ns[best]), int(lateness[best])
         if self._first_ns is None:
             self._first_ns = sample_ns
-        late, window = host_ns - sample_ns, (sample_ns - self._first_ns) // WINDOW_NS
+        window = (sample_ns - self._first_ns) // WINDOW_NS
         if window != self._window and self._least is not None:
             self._minima.append(self._least)
             self._window, self._least = window, None
         if self._least is None or late < self._least[1]:
             self._least = (sample_ns, late)
+        # Earlier than ever is a proof that the first sample itself was late; later than any drift is latency.
         bound = JITTER_NS + round(MAX_DRIFT * (sample_ns - self._first_ns))
-        seen = min(x for _, x in [*self._minima[-2:], self._least])
-        self.lag_ns = max(-bound, min(bound, seen))
-        self.latest_ns = max(self.latest_ns, late - self.lag_ns)
+        self.lag_ns = min(bound, *(x for _, x in [*self._minima[-2:], self._least]))
+        self.latest_ns = max(self.latest_ns, int(lateness.max()) - self.lag_ns)
 
     def drift(self) -> Drift | None:
-        """Slope of the windows' minima; None with fewer than four windows or where nothing varies (simulation)."""
-        points = np.array(
-            [p for p in self._minima if abs(p[1]) <= JITTER_NS + MAX_DRIFT * (p[0] - (self._first_ns or 0))]
-        )
-        if len(points) < 4 or np.ptp(points[:, 1]) == 0:
+        """Slope of the windows' minima (Theil and Sen: no latency of a few windows moves it); None with too few
+        windows, or where nothing varies (simulation)."""
+        points = np.array(self._minima[1:], float)  # the first window may be short
+        if len(points) < FEWEST or np.ptp(points[:, 1]) == 0:
             return None
-        x, y = points[:, 0] - points[0, 0], points[:, 1].astype(float)
-        fit = stats.linregress(x.astype(float), y)
-        dof = len(points) - 2
-        return Drift(float(fit.slope) * 1e6, float(stats.t.ppf(0.975, dof) * fit.stderr) * 1e6, dof)
+        points = points[:: -(-len(points) // MOST)]
+        x, y = points[:, 0] - points[0, 0], points[:, 1] - points[0, 1]
+        slope, _, low, high = stats.theilslopes(y, x, 0.95)
+        return Drift(float(slope) * 1e6, float(high - low) / 2 * 1e6, len(points))

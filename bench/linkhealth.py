@@ -12,7 +12,7 @@ from bench.records import LinkCounts
 from bench.telemetry import Counters
 
 LATE_S = 0.1  # telemetry that comes later than this is worth a word
-PERIODS = 3  # of a heartbeat; a longer gap comes near the watchdog
+PERIODS, PERIOD_S = 3, 0.02  # of a heartbeat; a longer gap comes near the watchdog
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,10 @@ class Health:
              Effect.INDETERMINATE),
         )  # fmt: skip
         yield from (Finding(code, text, "link", effect) for count, code, text, effect in told if count)
+        if s.longest_heartbeat_gap_ns > PERIODS * PERIOD_S * 1e9:
+            gap = s.longest_heartbeat_gap_ns * 1e-6
+            yield Finding("heartbeat-late", f"two heartbeats were {gap:.0f} ms apart; the watchdog ends a run at 80 ms "
+                          "by default. Was the host busy?", "link")  # fmt: skip
         if self.latest_ns > LATE_S * 1e9:
             text = f"telemetry came up to {self.latest_ns * 1e-9:.2f} s late; samples carry the device's own time"
             yield Finding("telemetry-late", text, "link")

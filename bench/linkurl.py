@@ -15,6 +15,7 @@ PORT is a device (`/dev/ttyACM0`, `COM3`), `socket://HOST:PORT` or `rfc2217://HO
 from __future__ import annotations
 
 import difflib
+import re
 from dataclasses import dataclass, field
 from urllib.parse import parse_qsl
 
@@ -31,6 +32,7 @@ EXAMPLES = {
     "line": "line:127.0.0.1:28504",
 }
 CONTROLLER_SCHEMES = ("inprocess", "slcan", "can", "serial")
+TCP_SCHEMES = ("modbus-tcp", "modbus-rtu-tcp", "line")
 MODBUS_SCHEMES = ("modbus-tcp", "modbus-rtu", "modbus-rtu-tcp")
 
 
@@ -50,8 +52,10 @@ class LinkUrl:
             ConfigError: `rest` is not HOST:PORT.
         """
         host, _, port = self.rest.rpartition(":")
-        if not host or not port.isdigit() or int(port) > 65535:
-            raise ConfigError(f"link {self.scheme}:{self.rest}: expected HOST:PORT, such as {EXAMPLES[self.scheme]}")
+        host = host[1:-1] if host.startswith("[") and host.endswith("]") else host  # IPv6: [::1]:502
+        if not host or not re.fullmatch("[0-9]{1,5}", port) or int(port) > 65535:
+            such = EXAMPLES[self.scheme if self.scheme in TCP_SCHEMES else "line"]
+            raise ConfigError(f"link {self.scheme}:{self.rest}: expected HOST:PORT, such as {such}")
         return host, int(port)
 
 

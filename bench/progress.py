@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from typing import Protocol, TextIO
+from typing import Any, Protocol, TextIO
 
 PLAIN_LINES = 20  # about as many lines in a run, however many steps it has
 
@@ -141,3 +142,16 @@ def clock_text(seconds: float) -> str:
 
 def _count(begun: int, total: int) -> str:
     return f"{begun}/{total}" if total else str(begun)
+
+
+def described(labels: Mapping[str, Any]) -> str:
+    """A step's labels for people: angles in degrees, nothing as "none"."""
+    return ", ".join(_label(name, value) for name, value in labels.items())
+
+
+def _label(name: str, value: Any) -> str:
+    if name.endswith("_rad") and isinstance(value, float):
+        return f"{name.removesuffix('_rad')} {math.degrees(value):.0f}°"
+    if isinstance(value, float):
+        return f"{name} {value:.4g}"
+    return f"{name} {'none' if value == '' else value}"

@@ -224,10 +224,14 @@ class Recording(Generic[P]):
 
     def steps(self, kind: str) -> Steps:
         """The completed steps of a kind, in time order."""
+        return Steps(tuple(s for s in self.all_steps() if s.kind == kind))
+
+    def all_steps(self) -> Steps:
+        """The completed steps of every kind, in time order."""
         ends = {e["step"]: e["t_ns"] for e in self.events("step-end")}
         return Steps(tuple(
-            Step(self, kind, dict(e["labels"]), int(e["t_ns"]), int(ends[e["step"]]))
-            for e in self.events("step-begin") if e["name"] == kind and e["step"] in ends
+            Step(self, e["name"], dict(e["labels"]), int(e["t_ns"]), int(ends[e["step"]]))
+            for e in self.events("step-begin") if e["step"] in ends
         ))  # fmt: skip
 
     def frames(self, link: str) -> Iterator[FrameBatch]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from bench.clock import Clock
 from bench.linkhealth import Health
 from bench.rigfile import RigFile
-from bench.roles import Levitation, Operator, Rotation
+from bench.roles import Drive, Levitation, Operator, Rotation, Supply, Thermal
 from bench.telemetry import Counters
 
 
@@ -24,3 +24,6 @@ class Rig:
     counters: Counters
     health: Callable[[], Health]
     close: Callable[[], None]
+    drive: Drive | None = None
+    supply: Supply | None = None
+    thermal: Thermal | None = None

@@ -10,11 +10,12 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from bench import binding, units
+from bench import binding, linkurl, units
 from bench.busload import REFUSE, BusLoad, bus_load
 from bench.errors import ConfigError, Problem
 from bench.messages import MessageMap
 from bench.rigfile import RigFile, RigText, migrated, read_rig
+from bench.units import Unit
 
 GEOMETRY = {
     "hook_to_outboard": "hook plane to outboard AMB plane",
@@ -71,7 +72,7 @@ def _behind(text: RigText, problems: tuple[Problem, ...]) -> Iterator[Problem]:
 
 def problems_of(rig: RigFile) -> list[Problem]:
     """What is wrong with a parsed rig file."""
-    found = [*_devices(rig), *_units(rig), *_geometry(rig), *_masses(rig), *_parameters(rig)]
+    found = [*_devices(rig), *_links(rig), *_units(rig), *_geometry(rig), *_masses(rig), *_parameters(rig)]
     if not any(p.key.startswith("devices") for p in found):
         try:
             messages = rig.messages
@@ -84,15 +85,49 @@ def problems_of(rig: RigFile) -> list[Problem]:
 def _devices(rig: RigFile) -> Iterator[Problem]:
     if "controller" not in rig.devices:
         yield Problem(rig.path, "devices", ", ".join(rig.devices) or "nothing", "[devices.controller]")
-    elif rig.devices["controller"].link not in rig.links:
-        yield Problem(rig.path, "devices.controller.link", rig.devices["controller"].link,
-                      f"one of {', '.join(rig.links)}")  # fmt: skip
+    for name, device in rig.devices.items():
+        if device.link not in rig.links:
+            yield Problem(
+                rig.path, f"devices.{name}.link", device.link, f"one of {', '.join(rig.links) or '(no links)'}"
+            )
+    controller = rig.devices.get("controller")
+    if controller is not None and controller.link in rig.links and not rig.links[controller.link].dbc:
+        yield Problem(rig.path, f"devices.controller.link: links.{controller.link}.dbc", "nothing", 'dbc = "FILE.dbc"')
+
+
+SCHEMES = {"controller": linkurl.CONTROLLER_SCHEMES, "operator": ("line",)}
+"""URL schemes that a device can be on; the others' are Modbus."""
+
+
+def _links(rig: RigFile) -> Iterator[Problem]:
+    """URLs that can be taken apart, of a kind that their devices can have, with the bit rates that they need."""
+    for name, link in rig.links.items():
+        key = f"links.{name}"
+        try:
+            url = linkurl.parse(link.url)
+            if url.scheme in linkurl.TCP_SCHEMES:
+                _ = url.address
+        except ConfigError as error:
+            yield Problem(rig.path, f"{key}.url", repr(link.url), str(error))
+            continue
+        for device in (n for n, d in rig.devices.items() if d.link == name):
+            fit = SCHEMES.get(device, linkurl.MODBUS_SCHEMES)
+            if url.scheme not in fit:
+                such = ", ".join(linkurl.EXAMPLES[x] for x in fit)
+                yield Problem(rig.path, f"{key}.url", link.url, f"a URL for the {device}, such as {such}")
+        stated = link.bitrate is not None or "bitrate" in {**url.query, **link.options}
+        if url.scheme in ("slcan", "can") and not stated:
+            yield Problem(rig.path, f"{key}.bitrate", "nothing", "the bit rate of the CAN bus, bit/s")
 
 
 def _units(rig: RigFile) -> Iterator[Problem]:
     named = {f"channels.{n}.unit": c.unit for n, c in rig.channels.items()}
     named |= {f"parameters.{n}.unit": p.unit for n, p in rig.parameters.items()}
     for key, symbol in named.items():
+        if key.startswith("parameters.") and symbol in units.UNITS and not _is_si(units.UNITS[symbol]):
+            yield Problem(
+                rig.path, key, symbol, f"{units.UNITS[symbol].si}: default and range are in SI; the DBC may differ"
+            )
         if symbol not in units.UNITS:
             close = difflib.get_close_matches(symbol, units.UNITS, 1)
             yield Problem(rig.path, key, repr(symbol), f"a known unit{f', such as {close[0]!r}' if close else ''}")
@@ -103,6 +138,10 @@ def _units(rig: RigFile) -> Iterator[Problem]:
     for key, (toleranced, si) in kinds.items():
         if toleranced.unit != si:
             yield Problem(rig.path, f"{key}.unit", toleranced.unit, f"a unit of the kind of {si}")
+
+
+def _is_si(unit: Unit) -> bool:
+    return (unit.factor, unit.offset) == (1.0, 0.0)
 
 
 def _geometry(rig: RigFile) -> Iterator[Problem]:
@@ -165,8 +204,35 @@ def _bindings(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
             yield Problem(rig.link.dbc, channel.signal, f"unit {dbc_unit!r}", "a known unit")
         elif channel.unit in units.UNITS and units.UNITS[dbc_unit].si != units.UNITS[channel.unit].si:
             yield Problem(rig.path, f"channels.{name}.unit", channel.unit, f"the kind of {dbc_unit} ({channel.signal})")
+    yield from _signals_of_parameters(rig, messages)
     for key, found, expected in binding.problems_of(rig, messages):
         yield Problem(rig.path, key, found, expected)
+
+
+def _signals_of_parameters(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
+    """Parameters that are signals of the host's messages: they exist, in a unit of the kind, and can hold the range."""
+    taken: dict[str, str] = {}
+    for name, p in rig.parameters.items():
+        if not p.signal:
+            continue
+        key = f"parameters.{name}.signal"
+        if wrong := binding.find(messages, p.signal):
+            yield Problem(rig.path, key, wrong, f"a signal of {rig.link.dbc}")
+            continue
+        signal = binding.signal_at(messages, p.signal)
+        assert signal is not None
+        if p.signal in taken:
+            yield Problem(rig.path, key, p.signal, f"a signal of its own ({taken[p.signal]})")
+        taken.setdefault(p.signal, name)
+        unit = units.UNITS.get(signal.unit)
+        if unit is None:
+            yield Problem(rig.link.dbc, p.signal, f"unit {signal.unit!r}", "a known unit")
+        elif p.unit in units.UNITS and unit.si != units.UNITS[p.unit].si:
+            yield Problem(rig.path, f"parameters.{name}.unit", p.unit, f"the kind of {signal.unit} ({p.signal})")
+        elif not all(binding.fits(signal, (x - unit.offset) / unit.factor) for x in (p.low, p.high, p.default)):
+            yield Problem(
+                rig.path, f"parameters.{name}", f"{p.low:g} to {p.high:g} {p.unit}", f"a range that {p.signal} can hold"
+            )
 
 
 def _bus(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
@@ -45,6 +46,7 @@ class Rotation(Protocol):
     @property
     def speed_rad_s(self) -> float: ...
     def point(self, angle_rad: float) -> None: ...  # returns when the rotor stands at that angle
+    def spin(self, rad_s: float) -> None: ...  # returns when the rotor turns at that speed
     def stop(self) -> None: ...  # returns when the rotor is below the landing speed
 
 
@@ -53,3 +55,39 @@ class Operator(Protocol):
 
     def hang(self, load: Load) -> None: ...  # the hanger stays on; returns when done
     def ask(self, question: str) -> str: ...
+
+
+class Drive(Protocol):
+    """An external drive that turns the shaft. Every call returns when the drive reports what was asked, or raises."""
+
+    @property
+    def speed_rad_s(self) -> float: ...  # as the drive measures it
+    @property
+    def fault(self) -> str: ...  # its name, "" without one
+    @property
+    def running(self) -> bool: ...  # it gives torque
+    def set_speed(self, rad_s: float) -> None: ...  # passes the envelope; takes effect while it runs
+    def run(self) -> None: ...  # it gives torque; the speed follows
+    def reach(self, rad_s: float) -> None: ...  # set_speed, run; returns at that speed
+    def coast(self) -> None: ...  # no torque
+    def stop(self) -> None: ...  # brakes; returns at standstill
+
+
+class Supply(Protocol):
+    """The power supply of the amplifiers."""
+
+    @property
+    def voltage_V(self) -> float: ...
+    @property
+    def current_A(self) -> float: ...
+    @property
+    def on(self) -> bool: ...
+
+
+class Thermal(Protocol):
+    """What measures temperatures."""
+
+    @property
+    def temperatures_K(self) -> Mapping[str, float]: ...  # of the windings, by name
+    @property
+    def ambient_K(self) -> float: ...

@@ -28,15 +28,17 @@ class Session:
 
     def fields(self) -> dict[str, int]:
         """As the message Claim carries it; the name is cut at 54 bytes, never within a character."""
-        raw = self.name.encode()[: PARTS * PART_BYTES].decode(errors="ignore").encode().ljust(PARTS * PART_BYTES, b"\0")
+        room = PARTS * PART_BYTES
+        raw = self.name.encode(errors="replace")[:room].decode(errors="ignore").encode().ljust(room, b"\0")
         parts = {f"name{k}": int.from_bytes(raw[k * PART_BYTES : (k + 1) * PART_BYTES], "little") for k in range(PARTS)}
         return {"session": self.number, "since": self.since, **parts}
 
     @classmethod
     def of(cls, fields: dict[str, float]) -> Session:
-        """From a message Owner; bytes that are no UTF-8 are replaced."""
+        """From a message Owner; bytes that are no UTF-8, and what a terminal would obey instead of show, are replaced."""
         raw = b"".join(int(fields[f"name{k}"]).to_bytes(PART_BYTES, "little") for k in range(PARTS))
-        name = raw.rstrip(b"\0").decode(errors="replace")
+        text = raw.rstrip(b"\0").decode(errors="replace")
+        name = "".join(c if c.isprintable() else "\ufffd" for c in text)
         return cls(int(fields["session"]), int(fields["since"]), name)
 
     def __str__(self) -> str:

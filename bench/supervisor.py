@@ -122,8 +122,8 @@ class Supervisor:
         self.checkpoint()
 
     def make_safe(self, steps: Sequence[SafeStep], now_ns: Callable[[], int]) -> tuple[Finding, ...]:
-        """Do every step in order, whatever happens to the ones before; returns a finding per step that failed."""
-        failed: list[Finding] = []
+        """Do every step in order, whatever happens to the ones before; returns a finding per reason that steps failed."""
+        failed: dict[str, list[str]] = {}
         with self.finishing():
             for step in steps:
                 logger.info("make safe: %s", step.name)
@@ -132,12 +132,16 @@ class Supervisor:
                     step.action()
                 except Exception as error:
                     # Anything at all: the next step must run.
-                    logger.warning("make safe: %s failed: %s", step.name, error)
-                    text = f"make-safe step {step.name!r} failed: {error or type(error).__name__}"
-                    failed.append(Finding("make-safe-failed", text, step.name, Effect.ERROR))
+                    text = str(error) or type(error).__name__
+                    if text not in failed:
+                        logger.warning("make safe: %s failed: %s", step.name, text)
+                    failed.setdefault(text, []).append(step.name)
                 finally:
                     self._deadline_ns = None
-        return tuple(failed)
+        return tuple(
+            Finding("make-safe-failed", f"make-safe failed ({', '.join(names)}): {text}", names[0], Effect.ERROR)
+            for text, names in failed.items()
+        )
 
     def _received(self, name: str) -> None:
         if self._signal is not None:

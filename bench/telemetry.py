@@ -110,7 +110,7 @@ class TelemetryDecoder:
             return []
         columns = {name: x[keep] for name, x in rows.columns.items()}
         self.latest = {name: float(x[-1]) for name, x in columns.items()}
-        self.host.take(s.offset_ns + int(ticks[keep][-1]) * self._tick_ns, int(rows.arrived[keep][-1]))
+        self.host.take(s.offset_ns + ticks[keep] * self._tick_ns, rows.arrived[keep])
         return self._split(sequence[keep], ticks[keep], columns, int(rows.arrived.max()))
 
     def _restart(self, rows: Rows) -> int:

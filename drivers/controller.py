@@ -10,7 +10,7 @@ import numpy as np
 from bench import units
 from bench.clock import Clock, PumpedClock
 from bench.envelope import Envelope
-from bench.errors import BenchError, DeviceFault, LinkError
+from bench.errors import BenchError, DeviceFault, InterlockError, LinkError
 from bench.link import Link
 from bench.recorder import Recorder
 from bench.rigfile import RigFile
@@ -21,6 +21,9 @@ from drivers import handshake
 from drivers.dialogue import Dialogue, commanded, no_reply, status_of
 
 SILENCE_S, WAIT_SLICE_S = 0.5, 0.01
+SPIN_S = 60.0
+SLOWEST_SLEW = 0.2  # rad/s, of a controller that does not say how fast it turns to an angle
+STANDING = {"OFF": "DISABLE", "READY": "ENABLE"}
 FIRST_S = 1.5  # for the first telemetry, and for the last owner to be gone
 STATES = {"OFF": RigState.OFF, "READY": RigState.READY, "LIFTING": RigState.READY, "LEVITATED": RigState.LEVITATED,
           "SPINNING": RigState.SPINNING, "LANDING": RigState.LEVITATED, "COASTING": RigState.SPINNING,
@@ -56,6 +59,8 @@ class Controller:
         self._angle = 0.0
         self._reboots = 0
         self.cleared = ""
+        self.companions: list[Callable[[], None]] = []  # polled with it: other devices of the rig
+        self._commanded: set[str] = set()  # messages that a command was sent by
         for p in rig.parameters.values():
             if p.signal:
                 message, _, signal = p.signal.partition(".")
@@ -122,6 +127,17 @@ class Controller:
             for block in blocks:
                 self.envelope.check_block(block)
             self._check()
+        for pump in self.companions:
+            pump()
+
+    def require_levitated(self) -> None:
+        """Raise unless the rotor is held.
+
+        Raises:
+            InterlockError: it is not.
+        """
+        if self.mode not in ("LEVITATED", "SPINNING"):
+            raise InterlockError(f"the shaft must not be driven in state {self.mode}: nothing holds it")
 
     def _check(self) -> None:
         if self.silent_s > SILENCE_S:
@@ -133,6 +149,10 @@ class Controller:
         fault = self.fault
         if fault != "NONE":
             raise DeviceFault(f"the controller reports {fault}: {ADVICE.get(fault, 'see its documentation')}")
+        if self.mode == "FAULT":
+            code = int(self.telemetry.latest.get("state", 0))
+            name = self._states.get(code, f"{code}, which its DBC does not name")
+            raise DeviceFault(f"the controller reports no fault, but its state is {name}: see its documentation")
 
     @property
     def silent_s(self) -> float:
@@ -141,9 +161,12 @@ class Controller:
 
     @property
     def mode(self) -> str:
-        """What the controller's state amounts to: one of bench.binding.MODES."""
-        name = self._states.get(int(self.telemetry.latest.get("state", 0)), "OFF")
-        return self.rig.binding.mode(name) or "FAULT"
+        """What the controller's state amounts to: one of bench.binding.MODES. A state without a name is FAULT: nobody
+        knows what the machine does in it."""
+        if not self.telemetry.latest:
+            return "OFF"
+        name = self._states.get(int(self.telemetry.latest.get("state", 0)))
+        return (self.rig.binding.mode(name) if name is not None else None) or "FAULT"
 
     @property
     def fault(self) -> str:
@@ -203,7 +226,8 @@ class Controller:
         turn = (angle_rad - here + math.pi) % (2 * math.pi) - math.pi
         self._angle += (angle_rad - self._angle + math.pi) % (2 * math.pi) - math.pi
         self.set("angle_ref", self._angle)
-        slew = self.rig.parameters["angle_slew"].default
+        p = self.rig.parameters.get("angle_slew")
+        slew = p.default if p and p.default > 0 else SLOWEST_SLEW
         deadline = self._base.now_ns() + round((abs(turn) / slew + 5.0) * 1e9)
         steady = 0
         while steady < 5:
@@ -213,6 +237,23 @@ class Controller:
             steady = steady + 1 if abs(error) < 4e-3 and abs(now["speed"]) < 0.5 else 0
             if self._base.now_ns() > deadline:
                 raise LinkError(f"the rotor did not reach {angle_rad:.3f} rad: it stands {error:+.4f} rad off")
+
+    def spin(self, rad_s: float) -> None:
+        """Turn the rotor at a speed; returns when it has kept within 2 % or 0.3 rad/s of it for a tenth of a second.
+
+        Raises:
+            LinkError: it does not get there in time.
+        """
+        self.set("speed_ref", rad_s)
+        self._send_command("SPIN")
+        tolerance, steady = max(0.02 * abs(rad_s), 0.3), 0
+        deadline = self._base.now_ns() + round(SPIN_S * 1e9)
+        while steady < 5:
+            self.clock.sleep(0.02)
+            steady = steady + 1 if abs(self.speed_rad_s - rad_s) < tolerance else 0
+            if self._base.now_ns() > deadline:
+                raise LinkError(f"the rotor did not reach {rad_s:.1f} rad/s within {SPIN_S:g} s: it turns at "
+                                f"{self.speed_rad_s:.1f} rad/s")  # fmt: skip
 
     def stop(self) -> None:
         """Brake to a stop, and wait until the rotor is below the landing speed."""
@@ -232,8 +273,10 @@ class Controller:
         if self._recorder is not None:
             self._recorder.event("parameter", name=parameter, value=value)
         if p.signal:
+            if p.when == "resting" and self.mode not in STANDING:  # nobody answers: the refusal must be ours
+                raise BenchError(f"parameter {parameter} can be written at rest only; the controller is {self.mode}")
             message, _, signal = p.signal.partition(".")
-            self._dialogue.send_held(message, {signal: self._raw(p.signal, value)})
+            self._send_held(message, {**self._standing(message), signal: self._raw(p.signal, value)})
             return
         values = {"index": float(p.index or 0), "value": value}
         if any(s.name == "session8" for s in self.rig.messages["ParamSet"].signals):
@@ -269,28 +312,57 @@ class Controller:
     def _raw(self, path: str, value: float) -> float:
         """A value in SI in the unit of its signal."""
         message, _, signal = path.partition(".")
-        return value / units.UNITS[self.rig.messages[message].signal(signal).unit].factor
+        unit = units.UNITS[self.rig.messages[message].signal(signal).unit]
+        return (value - unit.offset) / unit.factor
 
     def _command(self, name: str, goal: str, timeout_s: float) -> None:
         self._send_command(name)
         self._wait(lambda: self.mode == goal, timeout_s, f"state {goal} after {name}")
 
     def _send_command(self, name: str) -> None:
+        messages = self.rig.messages
+        if not self.rig.binding.knows(name, messages):
+            raise BenchError(
+                f"the controller has no command {name}: {self.rig.path} names none under devices.controller.binding.commands. "
+                "Next: name it there, or do by hand what it asks for"
+            )
         if self._recorder is not None:
             self._recorder.event("command", name=name)
-        messages, by_message = self.rig.messages, commanded(self.rig, name)
-        for message, values in by_message.items():
+        for message, values in commanded(self.rig, name).items():
+            self._commanded.add(message)
+            if message != "Command" or not self._dialogue.has("CommandReply"):
+                self._send_held(message, values)
+                continue
             if any(s.name == "session" for s in messages[message].signals):
                 values["session"] = self._session.number
-            if message != "Command" or not self._dialogue.has("CommandReply"):
-                self._dialogue.send_held(message, values)
-                continue
             reply = self._dialogue.ask(message, values, "CommandReply", f"the reply to {name}", self._wait)
             status = status_of(messages["CommandReply"], reply)
             if status == "WRONG_SESSION":
                 raise BenchError(f"the controller refuses {name}: another host owns it")
             if status != "OK":
                 raise BenchError(f"the controller refuses {name}: {status} in state {self.mode}")
+
+    def _send_held(self, message: str, values: dict[str, float]) -> None:
+        owned = any(s.name == "session" for s in self.rig.messages[message].signals)
+        self._dialogue.send_held(message, {**values, "session": self._session.number} if owned else values)
+
+    def _standing(self, message: str) -> dict[str, float]:
+        """A parameter may share its message with commands. Before the first command the message must ask for the state
+        that the controller is in, or it would ask for whatever zero means.
+
+        Raises:
+            BenchError: the controller is in a state that no command of ours keeps; nothing was sent.
+        """
+        commands = self.rig.binding.commands
+        shared = any(path.partition(".")[0] == message for c in commands for path in commands[c])
+        if message in self._commanded or not shared:
+            return {}
+        if self.mode not in STANDING:
+            raise BenchError(
+                f"message {message} carries commands too, and the controller is {self.mode}: what to command with the "
+                "parameter is unknown; nothing was sent. Next: land the rotor, then write parameters"
+            )
+        return commanded(self.rig, STANDING[self.mode]).get(message, {})
 
     def _wait(self, done: Callable[[], bool], timeout_s: float, what: str) -> None:
         self.wait(done, timeout_s, no_reply(self.link.name, what, timeout_s))

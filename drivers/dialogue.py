@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Mapping
 
 from bench.codec import Decoder, encode
@@ -14,6 +15,7 @@ from bench.rigfile import RigFile
 
 REPLY_S = 0.5
 REPLIES = ("CommandReply", "ParamReply", "Identity", "Owner")
+KEPT = 256  # replies that nobody waits for: another host may ask too
 
 
 class Dialogue:
@@ -22,7 +24,7 @@ class Dialogue:
     def __init__(self, rig: RigFile, link: Link, now_ns: Callable[[], int]) -> None:
         self._rig, self._link, self._now_ns = rig, link, now_ns
         self._decoders = {n: Decoder(m) for n, m in rig.messages.messages.items() if n in REPLIES}
-        self._answers: list[tuple[str, dict[str, float]]] = []
+        self._answers: deque[tuple[str, dict[str, float]]] = deque(maxlen=KEPT)
         self._held: dict[str, dict[str, float]] = {}
         self._token = 0
         self.recorder: Recorder | None = None
@@ -35,7 +37,7 @@ class Dialogue:
         """Keep the replies in a batch for who waits for them."""
         for name, decoder in self._decoders.items():
             values, _ = decoder.decode(batch)
-            for k in range(len(next(iter(values.values())))):
+            for k in range(len(next(iter(values.values()), ()))):
                 self._answers.append((name, {s: float(v[k]) for s, v in values.items()}))
 
     def ask(
@@ -69,9 +71,11 @@ class Dialogue:
             self.recorder.frames(self._link.name, batch)
 
     def send_held(self, message: str, values: Mapping[str, float]) -> None:
-        """Send a message whose other signals keep the values that they were last given."""
-        held = self._held.setdefault(message, {})
-        held.update(values)
+        """Send a message whose other signals keep the values that they were last given. A value that the message cannot
+        carry is not kept: what comes after it, such as make-safe, must get through."""
+        held = {**self._held.get(message, {}), **values}
+        encode(self._rig.messages[message], held)
+        self._held[message] = held
         self.send(message, held)
 
     def hold(self, message: str, signal: str, value: float) -> None:

@@ -10,7 +10,7 @@ from bench import linkurl
 from bench.errors import ConfigError, LinkError
 
 CONNECT_S, ANSWER_S = 3.0, 10.0
-LONGEST = 4096
+LONGEST = 4096  # bytes of an answer
 
 
 class OperatorLine:
@@ -18,7 +18,7 @@ class OperatorLine:
 
     def __init__(self, connection: socket.socket, where: str) -> None:
         self._connection, self._where = connection, where
-        self._rest = b""
+        self._lost = ""  # why, once it is
 
     @classmethod
     @contextmanager
@@ -33,28 +33,58 @@ class OperatorLine:
             raise ConfigError(f"link operator: found {url!r}; expected such as {linkurl.EXAMPLES['line']!r}")
         try:
             connection = socket.create_connection(parsed.address, CONNECT_S)
-        except OSError as error:
+        except (OSError, UnicodeError) as error:  # a host name that cannot be one is a UnicodeError
+            why = getattr(error, "strerror", None) or error
             raise ConfigError(
-                f"link operator: {url}: {error.strerror or error}. Next: start what answers there, or give --operator console"
+                f"link operator: {url}: {why}. Next: start what answers there, or give --operator console"
             ) from error
         with connection:
             connection.settimeout(ANSWER_S)
             yield cls(connection, url)
 
     def request(self, line: str) -> str:
-        """Ask, and wait for the answer.
+        """Ask, and wait for the answer. A line that was lost once stays so: a late answer must not be taken for that to
+        the next question.
 
         Raises:
-            LinkError: the line is lost or stays silent.
+            LinkError: the line is lost, stays silent, or says something unasked.
         """
+        if self._lost:
+            raise LinkError(f"link operator: {self._where}: {self._lost}")
         try:
-            self._connection.sendall(line.replace("\n", " ").encode() + b"\n")
-            while b"\n" not in self._rest:
-                data = self._connection.recv(LONGEST)
-                if not data or len(self._rest) > LONGEST:
-                    raise LinkError(f"link operator: {self._where}: the line is lost")
-                self._rest += data
+            return self._ask(line)
         except OSError as error:
-            raise LinkError(f"link operator: {self._where}: {error.strerror or error}") from error
-        answer, _, self._rest = self._rest.partition(b"\n")
-        return answer.decode("utf-8", "replace").strip()
+            self._lost = str(error.strerror or error)
+        except LinkError as error:
+            self._lost = str(error)
+        raise LinkError(f"link operator: {self._where}: {self._lost}")
+
+    def _ask(self, line: str) -> str:
+        if unasked := self._unasked():
+            raise LinkError(f"found {unasked[:60]!r} before anything was asked; expected one line for each question")
+        text = " ".join(line.splitlines())
+        self._connection.sendall(text.encode("utf-8", "replace") + b"\n")
+        found = b""
+        while not found.endswith(b"\n"):
+            data = self._connection.recv(LONGEST)
+            if not data:
+                raise LinkError("its other end closed")
+            found += data
+            if len(found) > LONGEST:
+                raise LinkError(f"found an answer of over {LONGEST} bytes")
+            if b"\n" in found[:-1]:
+                raise LinkError(f"found {found[:60]!r}; expected one line for each question")
+        return found.decode("utf-8", "replace").strip()
+
+    def _unasked(self) -> bytes:
+        """What has come while nothing was asked; nothing, as a rule."""
+        self._connection.settimeout(0.0)
+        try:
+            data = self._connection.recv(LONGEST)
+        except BlockingIOError:
+            return b""
+        finally:
+            self._connection.settimeout(ANSWER_S)
+        if not data:
+            raise LinkError("its other end closed")
+        return data

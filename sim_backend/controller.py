@@ -3,14 +3,18 @@ the plant. It has its own copy of the message map and shares no object with the 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from bench.codec import Decoder, encode
+from bench.faults import Fault
 from bench.frames import FD, FrameBatch, frame
 from bench.messages import load_messages
 from bench.rigfile import RigFile
 from sim_backend import core
 from sim_backend.core import PERIOD_TICKS, TICK_S, Plant
+from sim_backend.device_faults import DeviceFaults
 from sim_backend.ownership import Ownership
 from sim_backend.telemetry import Span, TelemetryEncoder
 from sim_backend.truth import Truth
@@ -25,21 +29,27 @@ TURNING = ("LEVITATED", "SPINNING", "COASTING")
 
 
 class SimulatedController:
-    """The device end of the rig's link."""
+    """The device end of the rig's link.
 
-    def __init__(self, rig: RigFile, truth: Truth) -> None:
+    Args:
+        rig: its message map and parameters.
+        truth: which machine it has.
+        faults: that happen inside it (`bench.faults`): reboot, stuck-heartbeat, mute.
+
+    Raises:
+        ConfigError: a fault of another kind.
+    """
+
+    def __init__(self, rig: RigFile, truth: Truth, faults: Sequence[Fault] = ()) -> None:
         self._map = load_messages(rig.dbc_text)
         self._decoders = {m.identifier: Decoder(m) for m in self._map.messages.values() if m.sender == "Host"}
         self._parameters = {p.index: (name, p) for name, p in rig.parameters.items()}
-        self._own = {name: p.default for name, p in rig.parameters.items()}
         self.truth = truth
         self.plant = Plant(truth.plant, truth.seed)
         self.plant.run(REST_TICKS)
-        for name, value in self._own.items():
-            self._apply(name, value)
-        self.state, self.fault = "OFF", "NONE"
+        self.faults = DeviceFaults(rig, faults) if faults else None
+        self.restart()
         self._owner = Ownership()
-        self._since, self._steady = 0, 0
         self._encoder = TelemetryEncoder(self._map, truth)
         self._out: list[FrameBatch] = []
         self._spans: list[Span] = []
@@ -50,6 +60,12 @@ class SimulatedController:
         Returns:
             What the controller sent, with its times.
         """
+        if self.faults is None:
+            return self.run(ticks, incoming, t0_ns)
+        return self.faults.advance(self, ticks, incoming, t0_ns)
+
+    def run(self, ticks: int, incoming: FrameBatch, t0_ns: int) -> FrameBatch:
+        """`advance` as if there were no faults."""
         start = self.plant.tick
         self._out, self._spans = [], []
         clock = (t0_ns, start)
@@ -60,6 +76,18 @@ class SimulatedController:
         self._run_to(start + ticks)
         sent = np.concatenate([self._encoder.encode(self._spans, clock), *self._out])
         return sent[np.argsort(sent["t_ns"], kind="stable")] if self._out else sent
+
+    def restart(self) -> None:
+        """As after power-on: OFF, nobody's, default parameters. The machine goes on as it is, without currents."""
+        self.state, self.fault = "OFF", "NONE"
+        self._since, self._steady = self.plant.tick, 0
+        self._owner = Ownership(heartbeat=self.plant.tick)
+        self.plant.mode = core.OFF
+        self.plant.clear_trips()
+        self.plant.set("speed_ref", 0.0)
+        self._own = {name: p.default for name, p in self._parameters.values()}
+        for name, value in self._own.items():
+            self._apply(name, value)
 
     def _run_to(self, tick: int) -> None:
         """Run the plant in parts no longer than the state machine or the watchdog may wait."""

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from bench.codec import encode
 from bench.errors import LinkError
-from bench.frames import FD, FRAME, SENT, FrameBatch, empty_batch, frame
+from bench.faults import CUTS, Fault, FrameFaults, divided, lost
+from bench.frames import ERROR, FD, FRAME, SENT, FrameBatch, empty_batch, frame
 from bench.link import LinkStats
 from bench.messages import load_messages
 from bench.rigfile import RigFile
@@ -21,12 +24,20 @@ LEASE_NS = 1_000_000_000
 
 
 class SimulatedRig:
-    """A simulated rig in this process. It is the rig's clock, its link (`link`) and its operator's line (`request`)."""
+    """A simulated rig in this process. It is the rig's clock, its link (`link`) and its operator's line (`request`).
 
-    def __init__(self, rig: RigFile, truth: Truth, session: int = 1) -> None:
-        self.device = SimulatedController(rig, truth)
+    Args:
+        rig: the rig file.
+        truth: which machine it is.
+        session: of its heartbeat.
+        faults: of its controller and of its link (`bench.faults`); the truth's seed says which frames they hit.
+    """
+
+    def __init__(self, rig: RigFile, truth: Truth, session: int = 1, faults: Sequence[Fault] = ()) -> None:
+        on_link, in_device = divided(faults, simulated=True)
+        self.device = SimulatedController(rig, truth, in_device)
         self.truth = truth
-        self.link = InProcessLink(rig, self, session)
+        self.link = InProcessLink(rig, self, session, on_link)
         self._now = EPOCH_NS
         self._operator = SimulatedOperator(self.device.plant, truth, rig.hook_seat.half_width or 0.0)
 
@@ -49,7 +60,7 @@ class SimulatedRig:
 class InProcessLink:
     """A `bench.link.Link` whose other end is in this process."""
 
-    def __init__(self, rig: RigFile, clock: SimulatedRig, session: int) -> None:
+    def __init__(self, rig: RigFile, clock: SimulatedRig, session: int, faults: Sequence[Fault] = ()) -> None:
         self._clock, self._session = clock, session
         self._heartbeat = load_messages(rig.dbc_text)["Heartbeat"]
         self._queued: list[FrameBatch] = []
@@ -59,7 +70,15 @@ class InProcessLink:
         self._counter = 0
         self._dead_after = clock.truth.defects["dead_after_s"]
         self.name = rig.devices["controller"].link
-        self.stats = LinkStats()
+        self._reconnect_s = rig.link.reconnect_s
+        self._counts = LinkStats()
+        self._inward = FrameFaults(faults, clock.truth.seed)
+        self._outward = FrameFaults([f for f in faults if f.kind in ("stall", *CUTS)], clock.truth.seed)
+
+    @property
+    def stats(self) -> LinkStats:
+        """Counts since the start."""
+        return self._inward.counted(self._counts, self._clock.now_ns())
 
     @property
     def _dead(self) -> bool:
@@ -69,22 +88,31 @@ class InProcessLink:
         """Queue frames for the next slice, due now.
 
         Raises:
-            LinkError: the link is dead (a planted defect).
+            LinkError: the link is dead (a planted defect), or cut by a fault.
         """
         if self._dead:
             raise LinkError(f"link {self.name}: lost; nothing can be sent")
+        now = self._clock.now_ns()
+        if (cut := self._inward.cut(now)) is not None:
+            raise lost(self.name, cut)
         batch = batch.copy()
-        batch["t_ns"] = self._clock.now_ns()
+        batch["t_ns"] = now
         self._queued.append(batch)
-        self.stats.sent += len(batch)
+        self._counts.sent += len(batch)
 
     def receive(self) -> FrameBatch:
-        """Everything that arrived since the last call; nothing when the link is dead."""
-        arrived, self._arrived = self._arrived, []
-        if not arrived or self._dead:
-            return empty_batch()
-        batch = np.concatenate(arrived)
-        self.stats.received += len(batch)
+        """Everything that arrived since the last call; nothing when the link is dead.
+
+        Raises:
+            LinkError: cut by a fault; what arrived before comes first.
+        """
+        batch = empty_batch() if self._dead else np.concatenate([empty_batch(), *self._arrived])
+        batch, later, cut = self._inward.up_to_cut(batch, self._clock.now_ns(), self._reconnect_s)
+        self._arrived = [later]
+        if cut is not None:
+            raise lost(self.name, cut)
+        self._counts.received += len(batch)
+        self._counts.error_frames += int((batch["flags"] & ERROR != 0).sum())
         return batch
 
     def renew_lease(self) -> None:
@@ -107,7 +135,11 @@ class InProcessLink:
             self._next_beat += HEARTBEAT_NS
         incoming = np.concatenate([np.empty(0, FRAME), *self._queued, *beats])
         self._queued = []
-        self.stats.heartbeats += len(beats)
-        self.stats.sent += len(beats)
-        order = np.argsort(incoming["t_ns"], kind="stable")
-        self._arrived.append(device.advance(ticks, incoming[order], now_ns))
+        self._counts.heartbeats += len(beats)
+        self._counts.sent += len(beats)
+        incoming = incoming[np.argsort(incoming["t_ns"], kind="stable")]
+        if len(incoming):
+            self._inward.start(int(incoming["t_ns"][0]))
+            self._outward.start(int(incoming["t_ns"][0]))
+        heard = self._outward.apply(incoming, end - 1)
+        self._arrived.append(self._inward.apply(device.advance(ticks, heard, now_ns), end))

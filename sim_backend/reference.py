@@ -32,7 +32,7 @@ def amb_force(beta: float, gap: float, xi: float, positive: float, negative: flo
 @dataclass
 class Loads:
     """What acts on the mechanics besides its state: true currents (10,), (4,), hysteresis lag (4,), phase angle gamma,
-    hung mass kg and its weight N."""
+    hung mass kg and its weight N, and the external drive."""
 
     coil: Array
     segment: Array
@@ -40,6 +40,20 @@ class Loads:
     gamma: float = 0.0
     hung_mass: float = 0.0
     weight: float = 0.0
+    drive: Drive | None = None
+
+
+@dataclass(frozen=True)
+class Drive:
+    """An external drive at one instant: the speed it is to hold in rad/s, its gain N m s/rad and its limit N m."""
+
+    speed: float
+    gain: float
+    limit: float
+
+    def torque(self, spin: float) -> float:
+        """What it gives at a shaft speed, N m."""
+        return min(max(self.gain * (self.speed - spin), -self.limit), self.limit)
 
 
 def derivative(p: PlantParams, s: Array, u: Loads) -> Array:
@@ -67,6 +81,7 @@ def derivative(p: PlantParams, s: Array, u: Loads) -> Array:
     slow = spin / p.coulomb_speed
     torque += p.alpha_tau * c * mean - p.viscous * spin  # T (6.5c), (6.6f)
     torque -= p.coulomb * slow / math.sqrt(1 + slow**2) + p.detent * math.sin(16 * theta + p.detent_phase)
+    torque += u.drive.torque(spin) if u.drive else 0.0
     down = np.array([math.sin(p.tilt), -math.cos(p.tilt)])
     rate = 0.0
     if u.hung_mass > 0:

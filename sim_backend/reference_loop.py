@@ -14,7 +14,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from sim_backend.core.params import ControlParams, PlantParams
-from sim_backend.reference import TICK_S, Array, Loads, derivative, harmonics
+from sim_backend.reference import TICK_S, Array, Drive, Loads, derivative, harmonics
 
 RADIAL = 4  # axes xi, yi, xo, yo; the fifth is z
 
@@ -99,7 +99,8 @@ class Law:
         before = angle if self.angle_previous is None else self.angle_previous
         self.angle_slope = k * self.angle_slope + (1 - k) * (angle - before) / TICK_S
         self.angle_previous = angle
-        if not c.torque_on:
+        released = not c.torque_on or c.kp_theta == c.kd_theta == c.ki_theta == 0
+        if released:
             self.angle_target, self.speed_target, self.angle_integral = angle, self.angle_slope, 0.0
         elif c.speed_ref or self.speed_target:
             self.speed_target = toward(self.speed_target, c.speed_ref, c.acceleration * TICK_S)
@@ -110,7 +111,7 @@ class Law:
         beyond = error - clip(error, -1.6e-3, 1.6e-3)  # one encoder count is no error
         self.angle_integral = clip(self.angle_integral + c.ki_theta * beyond * TICK_S, -2, 2)
         damping = c.kd_theta * (self.speed_target - self.angle_slope)
-        i = clip(c.kp_theta * error + self.angle_integral + damping, -10, 10) if c.torque_on else 0.0
+        i = clip(c.kp_theta * error + self.angle_integral + damping, -10, 10) if not released else 0.0
         self.i_x, self.i_y = (toward(a, b, c.ramp_A_s * TICK_S) for a, b in ((self.i_x, c.i_x), (self.i_y, c.i_y)))
         return [i + self.i_y, i - self.i_x, i - self.i_y, i + self.i_x]
 
@@ -128,6 +129,17 @@ class Hanging:
         """Weight in N at a time in ticks, `before` being what was carried when this hanging began."""
         share = (at_tick - self.tick) * TICK_S / max(self.ramp_s, TICK_S)
         return before + clip(share, 0, 1) * (self.weight_N - before)
+
+
+@dataclass(frozen=True)
+class Driving:
+    """From the start of tick `tick` on an external drive takes the shaft to a speed; `gain` 0 is a drive that is off."""
+
+    tick: int
+    target: float
+    gain: float
+    limit: float
+    ramp: float
 
 
 @dataclass(frozen=True)
@@ -150,12 +162,13 @@ class Interval:
     gamma: float
     hanging: Hanging
     weight_before: float
+    drive: Drive | None
 
     def loads(self, part: float) -> Loads:
         """What acts after the share `part` of the tick."""
         i = np.array(amplifier(self.p, self.currents, self.target, part * TICK_S))
         weight = self.hanging.weight(self.weight_before, self.tick + part)
-        return Loads(i[:10], i[10:], np.array(self.lag), self.gamma, self.hanging.mass_kg, weight)
+        return Loads(i[:10], i[10:], np.array(self.lag), self.gamma, self.hanging.mass_kg, weight, self.drive)
 
 
 def runge_kutta(interval: Interval, s: Sequence[float], substeps: int) -> list[float]:
@@ -193,6 +206,7 @@ def simulate(
     ticks: int,
     *,
     hangings: Sequence[Hanging] = (),
+    drivings: Sequence[Driving] = (),
     advance: Callable[[Interval, Sequence[float]], list[float]] | None = None,
 ) -> Trace:
     """Closed loop from the state `start`, currents at zero, the law levitating from tick 0.
@@ -205,14 +219,17 @@ def simulate(
     s, law = [float(x) for x in start], Law(c)
     currents, reference, gamma, follow = [0.0] * 14, [0.0] * 14, 0.0, [0.0] * RADIAL
     hanging, before, weight = Hanging(0, 0.0, 0.0, 0.0), 0.0, 0.0
+    driving, drive = Driving(0, 0.0, 0.0, 0.0, 0.0), None
     states, flows = [s], [currents]
     for tick in range(ticks):
         for new in (h for h in hangings if h.tick == tick):
             if hanging.mass_kg == 0:  # the strap is just taut
                 s = [*s[:12], s[1] - p.z_hook * s[3], s[7] - p.z_hook * s[9]]
             hanging, before = new, weight
+        driving = next((d for d in drivings if d.tick == tick), driving)
+        drive = driven(driving, drive, s[11])
         target = settled_currents(p, reference, tick * TICK_S)  # of the sample before: one sample of delay
-        interval = Interval(p, tick, currents, target, hysteresis(p, currents, follow), gamma, hanging, before)
+        interval = Interval(p, tick, currents, target, hysteresis(p, currents, follow), gamma, hanging, before, drive)
         angle = p.encoder_sign * (s[5] + p.encoder_offset)
         reference, gamma = [*law.radial(read_positions(p, s)), *law.rotation(angle)], c.gamma
         s = advance(interval, s)
@@ -220,6 +237,14 @@ def simulate(
         states.append(s)
         flows.append(currents)
     return Trace(np.array(states), np.array(flows))
+
+
+def driven(driving: Driving, before: Drive | None, spin: float) -> Drive | None:
+    """The drive over one tick: its speed ramps to the target from where it was, or from the shaft's when it starts."""
+    if driving.gain == 0:
+        return None
+    speed = spin if before is None else before.speed
+    return Drive(toward(speed, driving.target, driving.ramp * TICK_S), driving.gain, driving.limit)
 
 
 def settled_currents(p: PlantParams, reference: Sequence[float], now_s: float) -> list[float]:

@@ -17,7 +17,8 @@ import numpy.typing as npt
 from scipy import special
 
 from bench.errors import ConfigError
-from bench.rigfile import RigFile, Toleranced
+from bench.rigfile import RigFile
+from bench.toleranced import Toleranced
 from sim_backend.core.params import PlantParams, beta_of
 
 Array = npt.NDArray[np.float64]
@@ -28,7 +29,7 @@ DEFECTS = {
     "position_sign_yi": 1.0, "position_sign_yo": 1.0, "exchange_position_axes_o": 0.0, "stuck_position_yo": 0.0,
     "stuck_current_yo_p": 0.0, "coil_limit_yo_p": 0.0, "mass_error_M1": 0.0, "mass_error_M2": 0.0, "mass_error_M3": 0.0,
     "mass_error_M4": 0.0, "hanger_off_at_zero": 0.0, "drop_fraction": 0.0, "integrator_factor": 1.0, "dead_after_s": 0.0,
-    "fault_after_s": 0.0,
+    "fault_after_s": 0.0, "drive_fault_after_s": 0.0,
 }  # fmt: skip
 """Planted defects and their harmless values. Mass errors are relative."""
 
@@ -107,7 +108,7 @@ def draw(
             known = [*stated, *defects, "K_i", "K_o"]
             close = difflib.get_close_matches(name, known, 3)
             raise ConfigError(
-                f"--truth {name}: no such value; {'did you mean ' + ', '.join(close) if close else known}"
+                f"--truth {name}: no such value; {'did you mean' if close else 'expected one of'} {', '.join(close or known)}"
             )
         table[name] = float(value)
     for name, value in targets.items():  # K is proportional to the slope at the centre

@@ -67,6 +67,6 @@ def test_load_is_time_per_period_and_an_allowance_on_demand() -> None:
 def test_the_load_of_tsbs12() -> None:
     rig = load_rig("tsbs12")
     load = bus_load(rig.messages, rig.link.bitrate, rig.link.data_bitrate)
-    # telemetry 170 us a ms; heartbeat 57 us in 20 ms; 57 us (8 bytes), 49 us (4 bytes) or 170 us (64 bytes) 50 times a second on demand
+    # telemetry 170 us a ms; heartbeat 57 us in 20 ms; on demand 50 times a second 57 us (8 bytes), 49 us (4), 170 us (64)
     by_hand = 0.170 + 57e-6 / 20e-3 + ON_DEMAND_HZ * (4 * 57e-6 + 2 * 49e-6 + 2 * 170e-6)
     assert load.total == pytest.approx(by_hand, rel=1e-12)

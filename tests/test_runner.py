@@ -8,6 +8,7 @@ import io
 import json
 import logging
 import os
+import re
 import signal
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -178,17 +179,17 @@ def test_a_dead_link_is_an_error_and_every_step_of_make_safe_is_tried(run: Run) 
     begun = [line.split("make safe: ")[1] for line in tried if "failed" not in line]
     assert begun == [
         "see where the machine stands",
+        "stop the drive",
         "stop the rotor",
         "land the rotor",
         "switch the amplifiers off",
         "the controller's own make-safe",
         "the controller's watchdog",
     ]
-    assert [f.where for f in result.record.findings if f.code == "make-safe-failed"] == [
-        "land the rotor",
-        "the controller's own make-safe",
-        "the controller's watchdog",
-    ]
+    failed = [f.text for f in result.record.findings if f.code == "make-safe-failed"]
+    assert failed[0].startswith("make-safe failed (land the rotor, the controller's own make-safe): ")
+    assert failed[1].startswith("make-safe failed (the controller's watchdog): the machine cannot be seen")
+    assert len(failed) == 2
     assert not Recording.open(result.directory / "recording.mcap").truncated
 
 
@@ -291,7 +292,10 @@ def test_a_signal_while_the_report_is_built_makes_the_run_aborted(run: Run) -> N
 def test_lost_frames_are_counted_and_noted(run: Run) -> None:
     result = run(truth={"drop_fraction": 0.02})
     assert result.record.link.gaps > 0
-    assert codes(result) == ["samples-lost"]
+    assert codes(result) == ["samples-lost", "step-incomplete", "step-incomplete"]
+    assert re.fullmatch(
+        r"step 2 \(look number 1\): \d+ of 500 samples of telemetry are missing", result.record.findings[2].text
+    )
 
 
 def content(path: Path) -> list[Any]:

@@ -21,7 +21,7 @@ SUPPLY = Quantity("supply", "V", "mean supply voltage")
 class Plan(BenchPlan):
     """`act` is what happens in the middle of acquire, `then` what analyse does."""
 
-    act: Literal["measure", "raise", "refuse", "stop", "count"] = "measure"
+    act: Literal["measure", "raise", "refuse", "stop", "count", "spin"] = "measure"
     then: Literal["yield", "nothing", "doubt", "raise"] = "yield"
     seconds: float = 0.5
     bias_A: float = 3.0
@@ -44,7 +44,9 @@ def _act(rig: Rig, plan: Plan) -> None:
         rig.levitation.set("bias_i", 99.0)
     if plan.act == "stop":
         raise OperatorAbort("the operator said stop")
-    while plan.act == "count":  # until a signal ends it; each second of bench time is a line
+    if plan.act == "spin":
+        rig.rotation.spin(30.0)
+    while plan.act in ("count", "spin"):  # until a signal ends it; each second of bench time is a line
         sys.stderr.write(f"at {rig.clock.now_ns()}\n")
         sys.stderr.flush()
         rig.clock.sleep(1.0)

@@ -86,6 +86,9 @@ def run(
     link: Annotated[
         list[str] | None, typer.Option("--link", metavar="NAME=URL", help="Another address for a link; repeatable.")
     ] = None,
+    fault: Annotated[
+        list[str] | None, typer.Option("--fault", metavar="FAULT", help="A fault to inject; repeatable.")
+    ] = None,
     out: Out = Path("runs"),
     operator: Annotated[
         OperatorKind | None, typer.Option(help="Default: auto in simulation, console on a terminal.")
@@ -106,6 +109,7 @@ def run(
             plan_file=plan_file,
             truth=tuple(truth or ()),
             links=tuple(link or ()),
+            faults=tuple(fault or ()),
             out=out,
             operator=operator.value if operator else None,
             report=not no_report,
@@ -151,6 +155,41 @@ def export(
     from bench.cli.export import export_command
 
     return export_command(run, to.value)
+
+
+@app.command()
+def serve(
+    rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig file, or its name in rigs/.")],
+    seed: Annotated[int, typer.Option(min=0, help="Which virtual rig.")] = 0,
+    truth: Annotated[
+        list[str] | None, typer.Option("--truth", metavar="KEY=VALUE", help="Fix what the simulator draws; repeatable.")
+    ] = None,
+    bind: Annotated[str, typer.Option(metavar="ADDR", help="Address of every TCP port.")] = "127.0.0.1",
+    truth_file: Annotated[Path | None, typer.Option("--truth-file", help="Write what was drawn to this file.")] = None,
+    link: Annotated[
+        list[str] | None, typer.Option("--link", metavar="NAME=URL", help="Listen somewhere else; repeatable.")
+    ] = None,
+    fault: Annotated[
+        list[str] | None, typer.Option("--fault", metavar="FAULT", help="A fault to inject; repeatable.")
+    ] = None,
+) -> int:
+    """Serve the simulated rig in real time, for `run --backend live` and for programs of your own.
+
+    Prints an endpoint a line, then `ready`; ends on Ctrl-C.
+    """
+    from bench.cli.serve import ServeRequest, serve_command
+
+    return serve_command(
+        ServeRequest(
+            rig=rig,
+            seed=seed,
+            truth=tuple(truth or ()),
+            bind=bind,
+            truth_file=truth_file,
+            links=tuple(link or ()),
+            faults=tuple(fault or ()),
+        )
+    )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

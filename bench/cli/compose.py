@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bench import catalogue, linkurl, plans
+from bench import catalogue, faults, linkurl, plans
 from bench.cli.opening import live, simulated
 from bench.envelope import Envelope
 from bench.errors import ConfigError
@@ -36,6 +36,7 @@ class Request:
     plan_file: Path | None = None
     truth: tuple[str, ...] = ()
     links: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
     out: Path = Path("runs")
     operator: str | None = None
     report: bool = True
@@ -66,15 +67,16 @@ def prepare(request: Request) -> tuple[Job, Connect]:
     if problems:
         raise ConfigError("\n  ".join(["the plan does not fit the rig; nothing was started:", *problems]))
     limits = load_spec(rig.name, procedure.name, [q.name for q in procedure.measures])
+    injected = [faults.parse(text) for text in request.faults]
     if request.backend == "live":
         kind = request.operator or ("console" if sys.stdin.isatty() else "auto")
         addresses = " ".join(link.url for link in rig.links.values())
         job = Job(procedure, rig, plan, limits, "live", None, rig_lock(f"{rig.name} {addresses}"))
-        return job, live(rig, kind)
+        return job, live(rig, kind, injected)
     seed = 0 if request.seed is None else request.seed
     overrides = dict(plans.assignment(text) for text in request.truth)
     _refuse_words(overrides)
-    connect = simulated(rig, seed, overrides, request.operator or "auto", procedure.settings(plan))
+    connect = simulated(rig, seed, overrides, request.operator or "auto", procedure.settings(plan), injected)
     return Job(procedure, rig, plan, limits, request.backend, seed), connect
 
 

@@ -8,14 +8,17 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
-from bench import linkurl
+from bench import faults, linkurl
 from bench.cli.safety import safe_steps
 from bench.clock import WallClock
 from bench.errors import BenchError, ConfigError, OperatorAbort
+from bench.faults import Fault
 from bench.findings import Finding
+from bench.link import Link
 from bench.linkhealth import Health
 from bench.opened import Connect, OpenRig, WatchedClock
 from bench.recorder import Recorder
+from bench.registers import RegisterPort
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import Operator
@@ -24,6 +27,7 @@ from bench.supervisor import Supervisor
 
 if TYPE_CHECKING:
     from drivers.controller import Controller
+    from drivers.fieldbus import Fieldbus
     from drivers.operator import LineOperator
 
 logger = logging.getLogger("bench.opening")
@@ -37,6 +41,7 @@ def simulated(
     overrides: Mapping[str, float],
     operator: str,
     settings: Mapping[str, float] | None = None,
+    injected: Sequence[Fault] = (),
 ) -> Connect:
     """How to open a simulated rig. The truth is drawn now, so that a wrong override is found before the start.
 
@@ -55,27 +60,34 @@ def simulated(
     @contextmanager
     def connect(supervisor: Supervisor) -> Iterator[OpenRig]:
         from drivers.controller import Controller
+        from drivers.fieldbus import open_devices
         from drivers.operator import LineOperator
+        from sim_backend.registers import Followed, RegisterBank
 
-        machine = SimulatedRig(rig, truth, SIMULATED.number)
-        base = WatchedClock(machine, machine.link.renew_lease, supervisor.check)
+        machine = SimulatedRig(rig, truth, SIMULATED.number, injected)
+        bank = RegisterBank(rig, truth, machine.device.plant)
+        base = WatchedClock(Followed(machine, bank), machine.link.renew_lease, supervisor.check)
         controller = Controller(rig, machine.link, base, SIMULATED)
         line = LineOperator(machine.request, controller.clock, controller.envelope)
         try:
             controller.connect()
-            yield _opened(controller, base, _operators(operator, line, controller, supervisor), facts)
+            with open_devices(rig, bank.port, controller.clock, controller.envelope) as bus:
+                hands = _operators(operator, line, controller, supervisor)
+                yield _opened(controller, base, bus, hands, facts, injected)
         finally:
             machine.link.close()
 
     return connect
 
 
-def live(rig: RigFile, operator: str) -> Connect:
+def live(rig: RigFile, operator: str, injected: Sequence[Fault] = ()) -> Connect:
     """How to open a live rig: its controller's link with its heartbeat, its other devices, and the operator.
 
     Raises:
-        ConfigError: a link's URL is none, or of a kind that its device cannot have.
+        ConfigError: a link's URL is none, or of a kind that its device cannot have; a fault that only a simulated
+            controller can have.
     """
+    faults.divided(injected, simulated=False)
     spec = rig.link
     scheme = linkurl.parse(spec.url).scheme
     if scheme not in linkurl.CONTROLLER_SCHEMES[1:]:
@@ -84,21 +96,29 @@ def live(rig: RigFile, operator: str) -> Connect:
 
     @contextmanager
     def connect(supervisor: Supervisor) -> Iterator[OpenRig]:
-        from drivers.live_link import LiveLink
-        from drivers.wires import open_wire
-
         from drivers.controller import Controller
+        from drivers.faulty_link import FaultyLink
+        from drivers.fieldbus import open_devices
+        from drivers.live_link import LiveLink
+        from drivers.modbus import open_lines
         from drivers.operator import LineOperator
         from drivers.operator_line import OperatorLine
+        from drivers.wires import open_wire
 
         session, name = new_session(), rig.devices["controller"].link
         identifiers = [m.identifier for m in rig.messages.messages.values()]
         with ExitStack() as stack:
             stack.enter_context(supervisor.finishing())
-            link = LiveLink(name, lambda: open_wire(spec, name, identifiers), beat_of(rig, session),
+            real = LiveLink(name, lambda: open_wire(spec, name, identifiers), beat_of(rig, session),
                             heartbeat=spec.heartbeat, reconnect_s=spec.reconnect_s)  # fmt: skip
+            wall = WallClock()
+            telemetry = [rig.messages[m].identifier for m in rig.binding.telemetry]
+            link: Link = real
+            if injected:
+                link = FaultyLink(real, injected, 0, wall, telemetry=telemetry, hush=real.hush,
+                                  reconnect_s=spec.reconnect_s)  # fmt: skip
             stack.callback(link.close)
-            base = WatchedClock(WallClock(), link.renew_lease, supervisor.check)
+            base = WatchedClock(wall, link.renew_lease, supervisor.check)
             controller = Controller(rig, link, base, session, LIVE_SLICE_S)
             controller.connect()
             stack.callback(_released, controller)
@@ -106,7 +126,13 @@ def live(rig: RigFile, operator: str) -> Connect:
             if "operator" in rig.devices and operator != "console":
                 line = stack.enter_context(OperatorLine.open(rig.links[rig.devices["operator"].link].url))
             hands = None if line is None else LineOperator(line.request, controller.clock, controller.envelope)
-            yield _opened(controller, base, _operators(operator, hands, controller, supervisor), None)
+            lines = stack.enter_context(open_lines(rig))
+
+            def port_of(device: str) -> RegisterPort:
+                return lines[rig.devices[device].link].port(rig.devices[device].unit)
+
+            bus = stack.enter_context(open_devices(rig, port_of, controller.clock, controller.envelope, threaded=True))
+            yield _opened(controller, base, bus, _operators(operator, hands, controller, supervisor), None, injected)
 
     return connect
 
@@ -117,9 +143,8 @@ def beat_of(rig: RigFile, session: Session) -> Any:
     Raises:
         ConfigError: its counter is not a little-endian number of 16 bits at a whole byte.
     """
-    from drivers.heartbeat import Beat
-
     from bench.codec import encode
+    from drivers.heartbeat import Beat
 
     b = rig.binding
     message = rig.messages[b.heartbeat]
@@ -152,29 +177,36 @@ def _operators(kind: str, line: LineOperator | None, controller: Controller, sup
 
 
 def _opened(
-    controller: Controller, base: WatchedClock, operators: Sequence[Any], truth: Mapping[str, Any] | None
-) -> OpenRig:
-    recording: list[Any] = [controller, *operators]
+    controller: Controller, base: WatchedClock, bus: Fieldbus, operators: Sequence[Any], truth: Mapping[str, Any] | None,
+    injected: Sequence[Fault],
+) -> OpenRig:  # fmt: skip
+    recording: list[Any] = [controller, bus, *operators]
+    controller.companions.append(bus.pump)
+    if bus.drive is not None:
+        bus.drive.may_run = controller.require_levitated
 
     def attach(recorder: Recorder | None) -> None:
         for part in recording:
             part.recorder = recorder
 
     def unguard() -> None:
-        controller.guarded = False
+        controller.guarded = bus.guarded = False
 
     def health() -> Health:
         telemetry = controller.telemetry
         return Health(telemetry.counters, controller.link.stats, telemetry.host.drift(), telemetry.host.latest_ns)
 
     rig = Rig(controller.rig, controller.clock, controller, controller, operators[0], controller.telemetry.counters,
-              health, controller.link.close)  # fmt: skip
-    found = []
+              health, controller.link.close, bus.drive, bus.supply, bus.thermal)  # fmt: skip
+    found = [faults.announced(injected)] if injected else []
     if controller.cleared:
         found.append(
             Finding("fault-cleared", f"fault {controller.cleared} of an earlier run was cleared", "controller")
         )
-    return OpenRig(rig, [controller.telemetry.layout], attach, unguard, safe_steps(controller, base), truth, found)
+    if bus.cleared:
+        found.append(Finding("fault-cleared", f"fault {bus.cleared} of an earlier run was cleared", "drive"))
+    streams = [controller.telemetry.layout, *bus.layouts]
+    return OpenRig(rig, streams, attach, unguard, safe_steps(controller, base, bus.drive), truth, found)
 
 
 def _prompt(supervisor: Supervisor) -> Callable[[str], str]:

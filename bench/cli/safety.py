@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from bench.clock import Clock
 from bench.errors import LinkError
 from bench.opened import WatchedClock
+from bench.roles import Drive
 from bench.supervisor import SafeStep
 
 if TYPE_CHECKING:
@@ -23,11 +24,19 @@ LAND_S, STOP_S, COMMAND_S = 20.0, 90.0, 5.0
 BLIND_S = 5.0  # the heartbeat's lease, the watchdog and a landing take less
 
 
-def safe_steps(controller: Controller, base: WatchedClock) -> tuple[SafeStep, ...]:
-    """The steps for a controller whose heartbeat `base` renews."""
+def safe_steps(controller: Controller, base: WatchedClock, drive: Drive | None = None) -> tuple[SafeStep, ...]:
+    """The steps for a controller whose heartbeat `base` renews, and an external drive on its shaft."""
 
     def look() -> None:
         controller.clock.sleep(0.02)  # a command may have been sent whose effect nobody has seen yet
+
+    def brake() -> None:
+        if drive is None or not drive.running:
+            return
+        try:
+            drive.stop()
+        finally:
+            drive.coast()
 
     def stop() -> None:
         if controller.mode == "SPINNING":
@@ -52,20 +61,31 @@ def safe_steps(controller: Controller, base: WatchedClock) -> tuple[SafeStep, ..
     def watchdog() -> None:
         if controller.mode not in SAFE:
             base.renewing = False
-            _until(lambda: controller.mode in SAFE or controller.silent_s > BLIND_S, controller.clock)
+            _until(lambda: controller.mode in SAFE or _blind(controller), controller.clock)
         if controller.mode not in SAFE:
             raise LinkError(
-                f"nobody sees the machine: no telemetry for {controller.silent_s:.0f} s. Look at it before going near"
+                "the machine cannot be seen. No heartbeat goes out any more, so that its controller lands it by itself; "
+                "look at it before going near"
             )
 
     return (
         SafeStep("see where the machine stands", look, COMMAND_S),
+        *([SafeStep("stop the drive", brake, STOP_S)] if drive is not None else []),
         SafeStep("stop the rotor", stop, STOP_S),
         SafeStep("land the rotor", land, LAND_S),
         SafeStep("switch the amplifiers off", disable, COMMAND_S),
         SafeStep("the controller's own make-safe", own, STOP_S + LAND_S),
         SafeStep("the controller's watchdog", watchdog, STOP_S + LAND_S),
     )
+
+
+def _blind(controller: Controller) -> bool:
+    """Nothing comes from the controller, and nothing will."""
+    try:
+        controller.poll()
+    except LinkError:
+        return True
+    return controller.silent_s > BLIND_S
 
 
 def _until(done: Callable[[], bool], clock: Clock) -> None:

@@ -75,12 +75,7 @@ def read_hangings(recording: Recording[Any], masses: tuple[str, ...]) -> Hanging
         mean,
         {c: stack("drift", c) for c in CHANNELS},
         {c: stack("spread", c) for c in CHANNELS},
-        np.array(
-            [
-                [max(0.0, s.expected() - one["count"]) for s, one in zip(row, ones, strict=True)]
-                for row, ones in zip(steps, read, strict=True)
-            ]
-        ),
+        np.array([[float(s.lost()) for s in row] for row in steps]),
         np.array([[float(s.expected()) for s in row] for row in steps]),
         np.array([[one["flags"] for one in row] for row in read]),
         masses,

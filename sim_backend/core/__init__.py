@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -44,6 +45,18 @@ def _fill(struct: Any, values: Mapping[str, Any]) -> None:
             getattr(struct, name)[0 : len(value)] = list(value)
         else:
             setattr(struct, name, value)
+
+
+@dataclass(frozen=True, slots=True)
+class DriveLaw:
+    """An external speed-controlled drive on the shaft: torque = gain * (speed - shaft's speed), at most `limit`.
+
+    `gain` N m s/rad, `limit` N m, `ramp` rad/s^2: how fast the speed goes to its target.
+    """
+
+    gain: float
+    limit: float
+    ramp: float
 
 
 class Plant:
@@ -136,6 +149,33 @@ class Plant:
         s.hung_mass = mass_kg
         s.weight_to = weight_N
         s.weight_rate = abs(weight_N - s.weight) / max(ramp_s, TICK_S)
+
+    def drive(self, law: DriveLaw | None, target_rad_s: float = 0.0) -> None:
+        """Let an external drive turn the shaft to a speed from the next tick on; None: it gives no torque. A drive that
+        is switched on takes over at the speed that the shaft has."""
+        s = self._s
+        if law is None:
+            s.drive_gain = 0.0
+            return
+        if s.drive_gain == 0:
+            s.drive_speed = s.s[11]
+        s.drive_gain, s.drive_limit, s.drive_ramp, s.drive_target = law.gain, law.limit, law.ramp, target_rad_s
+
+    @property
+    def shaft_speed(self) -> float:
+        """True speed of the shaft, rad/s."""
+        return float(self._s.s[11])
+
+    @property
+    def drive_torque(self) -> float:
+        """Torque of the external drive at the present, N m."""
+        s = self._s
+        return float(min(max(s.drive_gain * (s.drive_speed - s.s[11]), -s.drive_limit), s.drive_limit))
+
+    @property
+    def currents(self) -> tuple[float, ...]:
+        """True currents in A: ten coils, then four motor segments."""
+        return (*self._s.coil, *self._s.segment)
 
     @property
     def trips(self) -> int:

@@ -47,7 +47,9 @@ static void rotation(const tsbs_control *c, tsbs_law_state *l, double angle, tsb
     double keep = KEEP(c->angle_hz);
     l->angle_filtered = keep * l->angle_filtered + (1 - keep) * (angle - l->angle_previous) / TICK;
     l->angle_previous = angle;
-    if (c->torque_on == 0) { /* coasting: stand ready to take over where the rotor is */
+    /* without torque (coasting, or no gains because something else turns the shaft) stand ready to take over where it is */
+    int released = c->torque_on == 0 || (c->kp_theta == 0 && c->kd_theta == 0 && c->ki_theta == 0);
+    if (released) {
         l->angle_target = angle;
         l->speed_target = l->angle_filtered;
         l->angle_integral = 0;
@@ -64,7 +66,7 @@ static void rotation(const tsbs_control *c, tsbs_law_state *l, double angle, tsb
     double beyond = error - clip(error, -1.6e-3, 1.6e-3);
     l->angle_integral = clip(l->angle_integral + c->ki_theta * beyond * TICK, -2, 2);
     double i = c->kp_theta * error + l->angle_integral + c->kd_theta * (l->speed_target - l->angle_filtered);
-    i = c->torque_on == 0 ? 0 : clip(i, -10, 10);
+    i = released ? 0 : clip(i, -10, 10);
     l->i_x = toward(l->i_x, c->i_x, c->ramp_A_s * TICK);
     l->i_y = toward(l->i_y, c->i_y, c->ramp_A_s * TICK);
     out->segment[0] = i + l->i_y; /* T (6.9) */

@@ -101,6 +101,15 @@ static void hysteresis(const tsbs_params *p, tsbs_state *st) {
     }
 }
 
+/* the external drive's speed goes to its target; it is held over the tick */
+static void drive(tsbs_state *st, tsbs_derived *d) {
+    double left = st->drive_target - st->drive_speed, step = st->drive_ramp * TICK;
+    st->drive_speed += least(most(left, -step), step);
+    d->drive_gain = st->drive_gain;
+    d->drive_limit = st->drive_limit;
+    d->drive_speed = st->drive_speed;
+}
+
 static void watch(const tsbs_params *p, tsbs_state *st, const double *coil, double speed) {
     int trips = 0, lost = 0;
     for (int b = 0; b < 2; b++) {
@@ -167,6 +176,7 @@ int64_t tsbs_run(const tsbs_params *p, const tsbs_control *c, tsbs_state *st, in
         for (int k = 0; k < 4; k++) st->sums[17 + k] += segment[k];
         amplifiers(p, &d, st, coil_to, segment_to);
         hysteresis(p, st);
+        drive(st, &d);
         for (int k = 0; k < st->substeps; k++) step(p, &d, st, coil_to, segment_to, TICK / st->substeps);
         st->tick++;
         done++;

@@ -67,6 +67,7 @@ void tsbs_derive(const tsbs_params *p, double step, tsbs_derived *d) {
     d->coil_keep = exp(-p->amplifier_rate * step / 2);
     d->segment_keep = exp(-p->segment_rate * step / 2);
     d->speed_keep = exp(-6.283185307179586 * 20 * TICK);
+    d->drive_gain = d->drive_limit = d->drive_speed = 0;
     tsbs_commutate(p, 0, d);
 }
 
@@ -133,6 +134,10 @@ void tsbs_rates(const tsbs_params *p, const tsbs_derived *d, const double *s, co
     }
     w.fz = tsbs_amb_force(p->beta_z, p->gap_z, s[2], coil[8], coil[9]);
     motor(p, d, s, segment, tc, ts, &w);
+    if (d->drive_gain > 0) {
+        double torque = d->drive_gain * (d->drive_speed - s[11]), limit = d->drive_limit;
+        w.torque += torque > limit ? limit : torque < -limit ? -limit : torque;
+    }
     double sx = d->tilt_s, sy = -d->tilt_c;
     double rate = 0;
     if (hung_mass > 0) { /* strap: one vertical degree of freedom */

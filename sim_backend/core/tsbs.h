@@ -65,6 +65,8 @@ typedef struct {
     double s[14];           /* x y z phi psi theta and their rates; height and speed of the hung mass */
     double coil[10], segment[4], play[4], follow[4];
     double hung_mass, weight, weight_to, weight_rate;
+    /* external drive: torque = gain * (speed - the shaft's), at most limit; speed goes to its target by the ramp; gain 0: off */
+    double drive_gain, drive_limit, drive_ramp, drive_target, drive_speed;
     tsbs_reference applied, next;
     tsbs_law_state law;
     tsbs_noise noise;
@@ -96,6 +98,7 @@ typedef struct {
     double runout_c[8], runout_s[8], target_c[8], target_s[8], tilt_c, tilt_s, motor_c, motor_s;
     double per_position_lsb, per_current_lsb, per_gain[10];
     double angle, turn_c, turn_s, detent_c, detent_s, unbalance_c, unbalance_s, coil_keep, segment_keep, speed_keep;
+    double drive_gain, drive_limit, drive_speed; /* of this tick */
 } tsbs_derived;
 void tsbs_derive(const tsbs_params *, double step, tsbs_derived *);
 void tsbs_commutate(const tsbs_params *, double gamma, tsbs_derived *);

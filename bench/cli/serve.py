@@ -1,0 +1,179 @@
+"""`bench serve`: the simulated rig in real time on its endpoints. A part of the composition root."""
+
+from __future__ import annotations
+
+import json
+import selectors
+import sys
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bench import faults, linkurl, plans
+from bench.cli.compose import with_links
+from bench.clock import WallClock
+from bench.errors import ConfigError
+from bench.rigfile import RigFile, load_rig
+from bench.signals import delivered_to
+
+if TYPE_CHECKING:
+    from sim_backend.core import Plant
+    from sim_backend.serving.ports import Port
+    from sim_backend.serving.service import Service
+    from sim_backend.serving.wirefaults import WireFaults
+    from sim_backend.truth import Truth
+
+LOOPBACK = "127.0.0.1"
+SOCKET = "socket://"
+
+
+@dataclass(frozen=True)
+class ServeRequest:
+    """A rig to serve, as it was asked for. `bind`: the address of every TCP port."""
+
+    rig: str
+    seed: int = 0
+    truth: tuple[str, ...] = ()
+    bind: str = LOOPBACK
+    truth_file: Path | None = None
+    links: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
+
+
+def serve_command(request: ServeRequest) -> int:
+    """Serve until SIGINT or SIGTERM; endpoints and `ready` on standard output, status on standard error.
+
+    Raises:
+        ConfigError: usage, rig file, an address that cannot be listened on, an unwritable truth file.
+    """
+    from sim_backend.controller import SimulatedController
+    from sim_backend.modbus_server import open_fieldbus
+    from sim_backend.registers import RegisterBank
+    from sim_backend.serving.loop import Server
+    from sim_backend.serving.wirefaults import WireFaults
+    from sim_backend.truth import draw
+
+    rig = with_links(load_rig(request.rig), request.links)
+    _check_links(rig, request.links)
+    on_link, in_device = faults.divided([faults.parse(text) for text in request.faults], simulated=True)
+    truth = draw(rig, request.seed, _overrides(request.truth))
+    controller = SimulatedController(rig, truth, in_device)
+    wire = WireFaults(on_link, request.seed, [rig.messages[name].identifier for name in rig.binding.telemetry])
+    stopped: list[str] = []
+    with ExitStack() as stack:
+        stack.enter_context(delivered_to(stopped.append))
+        selector = stack.enter_context(selectors.DefaultSelector())
+        bank = RegisterBank(rig, truth, controller.plant)
+        services: Sequence[Service] = (bank,)
+        ports: list[Port] = []
+        stack.callback(_close, ports)
+        open_ports(rig, controller.plant, truth, request.bind, selector, ports, wire)
+        open_fieldbus(rig, bank, request.bind, selector, ports)
+        lines = [port.line for port in ports]
+        for service in services:
+            stack.callback(service.stop)
+            lines += service.start()
+        if request.truth_file is not None:
+            write_truth(request.truth_file, truth)
+        server = Server(rig, controller, selector, ports, WallClock(), _say, services, wire)
+        sys.stdout.write("".join(f"{line}\n" for line in [*lines, "ready"]))
+        sys.stdout.flush()
+        if request.faults:
+            _say(faults.announced([*on_link, *in_device]).text)
+        server.run(lambda: bool(stopped))
+        _say(f"{stopped[0]}: stopped, controller {controller.state}; {server.statistics()}")
+    return 0
+
+
+def _close(ports: Sequence[Port]) -> None:
+    for port in ports:
+        port.close()
+
+
+def open_ports(
+    rig: RigFile, plant: Plant, truth: Truth, bind: str, selector: selectors.BaseSelector, ports: list[Port],
+    wire: WireFaults,
+) -> None:  # fmt: skip
+    """Open the endpoints of the controller and the operator, into `ports` one by one.
+
+    Raises:
+        ConfigError: a port is in use, or `bind` is no address of this host.
+    """
+    from sim_backend.operator import SimulatedOperator
+    from sim_backend.serving import ptys
+    from sim_backend.serving.adapter import SlcanAdapter
+    from sim_backend.serving.peers import LinePeer, PacketPeer
+    from sim_backend.serving.ports import PtyPort, TcpPort
+
+    name = rig.devices["controller"].link
+    spec = rig.link
+
+    def adapter() -> SlcanAdapter:
+        return SlcanAdapter(spec.bitrate, spec.data_bitrate, wire.bus_off)
+
+    for scheme, peer in (("slcan", adapter), ("serial", lambda: PacketPeer(wire.corrupt))):
+        if ptys.AVAILABLE:
+            ports.append(PtyPort(f"{name} {scheme}:{{}}", peer, selector))
+        address = (bind, _port(spec.url, scheme))
+        ports.append(TcpPort(f"{name} {scheme}:{SOCKET}{{}}", address, peer, selector))
+    if "operator" in rig.devices:
+        operator = SimulatedOperator(plant, truth, rig.hook_seat.half_width or 0.0)
+        name = rig.devices["operator"].link
+        address = (bind, _port(rig.links[name].url, "line"))
+        ports.append(TcpPort(f"{name} line:{{}}", address, lambda: LinePeer(operator.request), selector))
+
+
+def _port(url: str, scheme: str) -> int:
+    """The TCP port that a link's URL names for a scheme; 0, any free one, when it names none."""
+    parsed = linkurl.parse(url)
+    if parsed.scheme != scheme or (scheme != "line" and not parsed.rest.startswith(SOCKET)):
+        return 0
+    return linkurl.LinkUrl(scheme, parsed.rest.removeprefix(SOCKET)).address[1]
+
+
+def _check_links(rig: RigFile, assignments: Sequence[str]) -> None:
+    """An address given on purpose must be one that can be listened on; the rig file may name a real adapter."""
+    expected: dict[str, tuple[str, ...]] = {}
+    expected[rig.devices["controller"].link] = ("slcan:socket://HOST:PORT", "serial:socket://HOST:PORT")
+    if "operator" in rig.devices:
+        expected[rig.devices["operator"].link] = ("line:HOST:PORT",)
+    for device in rig.devices.values():
+        if device.registers:
+            expected[device.link] = ("modbus-tcp:HOST:PORT", "modbus-rtu-tcp:HOST:PORT")
+    for text in assignments:
+        name, _, url = text.partition("=")
+        if name in expected and not any(url.startswith(form.partition("HOST")[0]) for form in expected[name]):
+            forms = " or ".join(expected[name])
+            raise ConfigError(f"--link {text}: cannot listen there; expected {name}={forms}; port 0 takes any free one")
+
+
+def _overrides(assignments: Sequence[str]) -> Mapping[str, float]:
+    values = dict(plans.assignment(text) for text in assignments)
+    for key, value in values.items():
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise ConfigError(f"--truth {key}: found {value!r}; expected a number, SI")
+    return values
+
+
+def write_truth(path: Path, truth: Truth) -> None:
+    """What was drawn, as `truth.json` of a simulated run has it.
+
+    Raises:
+        ConfigError: the file cannot be written.
+    """
+    facts: dict[str, Any] = {
+        "schema": 1, "seed": truth.seed, "quantities": dict(truth.quantities), "values": dict(truth.values),
+        "defects": dict(truth.defects),
+    }  # fmt: skip
+    try:
+        path.write_text(json.dumps(facts, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"--truth-file {path}: cannot be written: {error.strerror or error}") from error
+
+
+def _say(text: str) -> None:
+    with suppress(OSError):  # whoever listened has gone; the rig is still served
+        sys.stderr.write(f"{text}\n")
+        sys.stderr.flush()

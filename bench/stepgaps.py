@@ -1,0 +1,28 @@
+"""Steps that miss samples: each is named, so that nobody takes a mean over a gap for a mean over the step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from bench.findings import Finding
+from bench.progress import described
+from bench.recording import Recording
+
+NAMED = 12  # more are counted together
+
+
+def incomplete_steps(recording: Recording[Any]) -> Iterator[Finding]:
+    """A finding for each step in which samples of a stream are missing."""
+    if not any((recording.integrity or {}).get("lost", {}).values()):
+        return
+    found = [
+        f"step {number} ({step.kind} {described(step.labels)}): {lost} of {step.expected(stream)} samples of {stream} "
+        "are missing"
+        for number, step in enumerate(recording.all_steps(), 1)
+        for stream in recording.streams
+        if (lost := step.lost(stream))
+    ]
+    yield from (Finding("step-incomplete", text, "acquire") for text in found[:NAMED])
+    if len(found) > NAMED:
+        yield Finding("step-incomplete", f"{len(found) - NAMED} more steps miss samples", "acquire")

@@ -1,0 +1,263 @@
+"""The register devices of a rig: opened and probed, polled while its clock runs, recorded as streams.
+
+with open_lines(rig) as lines:                      # live; in simulation the bank of the simulated devices has ports
+    port_of = lambda name: lines[rig.devices[name].link].port(rig.devices[name].unit)
+    with open_devices(rig, port_of, clock, envelope, threaded=True) as bus:
+        bus.drive.reach(40.0)
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from typing import Any
+
+from bench.clock import Clock
+from bench.envelope import Envelope
+from bench.errors import BenchError, ConfigError, DeviceFault, LinkError
+from bench.recorder import Recorder
+from bench.registers import RegisterPort, RegisterRefused
+from bench.rigfile import RigFile
+from bench.samples import StreamLayout
+from drivers.fielddrive import FieldDrive
+from drivers.monitors import FieldSupply, FieldThermal
+from drivers.polling import Poll, PolledStream, Reading
+from drivers.registerdevice import RegisterDevice
+
+logger = logging.getLogger("drivers.fieldbus")
+ROLES = ("drive", "supply", "thermal")
+WAIT_SLICE_S = 0.05
+PUMP_S = 0.1  # without a thread nothing is polled faster: a clock calls `pump` that often
+SILENT_POLLS, SILENT_S = 3, 1.0
+
+
+class Fieldbus:
+    """Drive, supply and thermal monitor, where the rig has them. `pump` is to be called while its clock runs.
+
+    While `guarded`, `pump` raises on what polling found: a device that is lost or refuses, a drive in fault. `recorder`
+    gets the streams of `layouts` and the drive's commands as events. `cleared` names a fault that an earlier run left.
+
+    Args:
+        rig: its devices in the roles drive, supply and thermal.
+        port_of: gives a device's port by the device's name.
+        clock: what waiting sleeps on, and whose time samples have.
+        envelope: every set speed passes it.
+        threaded: poll in a thread for each link, as a live rig needs; else inside `pump`.
+
+    Raises:
+        ConfigError: a device lacks what its role cannot do without, or two devices have one role.
+    """
+
+    def __init__(
+        self, rig: RigFile, port_of: Callable[[str], RegisterPort], clock: Clock, envelope: Envelope, *,
+        threaded: bool = False,
+    ) -> None:  # fmt: skip
+        names = register_devices(rig)
+        self.devices = {n: RegisterDevice(n, rig.devices[n], port_of(n)) for n in names}
+        self.guarded, self.cleared = True, ""
+        self._clock, self._threaded = clock, threaded
+        self._recorder: Recorder | None = None
+        periods = {n: round(max(d.spec.poll_s, 0 if threaded else PUMP_S) * 1e9) for n, d in self.devices.items()}
+        self._polls = {n: Poll(d, periods[n], clock) for n, d in self.devices.items()}
+        self._streams = {n: PolledStream(d, periods[n]) for n, d in self.devices.items()}
+        patience = {n: SILENT_S + SILENT_POLLS * periods[n] * 1e-9 for n in names}
+        self._patience = {n: s + rig.links[rig.devices[n].link].reconnect_s for n, s in patience.items()}
+        self._latest: dict[str, Mapping[str, float]] = {}
+        self._answered = dict.fromkeys(names, 0)
+        self._refreshed = dict.fromkeys(names, 0)
+        self._trouble: dict[str, BenchError] = {}
+        self._arrived: deque[Reading] = deque(maxlen=10_000)
+        self._ended = threading.Event()
+        self._threads: list[threading.Thread] = []
+        role = _by_role(self.devices)
+        self.drive = FieldDrive(self, role["drive"], envelope) if "drive" in role else None
+        self.supply = FieldSupply(role["supply"], self.latest) if "supply" in role else None
+        self.thermal = FieldThermal(role["thermal"], self.latest) if "thermal" in role else None
+
+    @property
+    def layouts(self) -> tuple[StreamLayout, ...]:
+        """One stream for each device."""
+        return tuple(stream.layout for stream in self._streams.values())
+
+    @property
+    def recorder(self) -> Recorder | None:
+        """What records; None while nothing does."""
+        return self._recorder
+
+    @recorder.setter
+    def recorder(self, recorder: Recorder | None) -> None:
+        self._recorder = recorder
+        if recorder is not None:
+            for stream in self._streams.values():
+                stream.start_counting()
+
+    def connect(self) -> None:
+        """See that every device has the registers of its map, clear a fault that an earlier run left, and begin to poll.
+
+        Raises:
+            ConfigError: a register that a device does not have.
+            LinkError: a device does not answer.
+            DeviceFault: the drive's fault stays.
+        """
+        for name, device in self.devices.items():
+            self._latest[name] = device.check()
+            self._answered[name] = self._refreshed[name] = self._clock.now_ns()
+        if self.drive is not None and self.drive.fault:
+            self.cleared = self.drive.fault
+            self.drive.reset()
+        links: dict[str, list[Poll]] = {}
+        for name, poll in self._polls.items():
+            poll.start()
+            links.setdefault(self.devices[name].spec.link, []).append(poll)
+        if self._threaded and not self._threads:
+            for link, polls in links.items():
+                thread = threading.Thread(target=self._keep_polling, args=(polls,), name=f"poll {link}", daemon=True)
+                self._threads.append(thread)
+                thread.start()
+
+    def close(self) -> None:
+        """End polling. Calling it twice is harmless."""
+        self._ended.set()
+        for thread in self._threads:
+            thread.join()
+        self._threads.clear()
+
+    def latest(self, device: str) -> Mapping[str, float]:
+        """The newest values of a device, SI by register."""
+        return self._latest[device]
+
+    def refresh(self, device: str) -> Mapping[str, float]:
+        """Values read now. They are no sample of the stream, which keeps its period.
+
+        Raises:
+            LinkError: the device does not answer, or refuses.
+        """
+        values = self.devices[device].read()
+        self._latest[device] = values
+        self._answered[device] = self._refreshed[device] = self._clock.now_ns()
+        return values
+
+    def pump(self) -> None:
+        """Take what polling found; poll what is due where no thread does.
+
+        Raises:
+            LinkError: a device is lost, or refuses (while guarded).
+            DeviceFault: the drive reports a fault (while guarded).
+        """
+        if not self._threaded:
+            self._poll(self._polls.values())
+        while self._arrived:
+            self._take(self._arrived.popleft())
+        if self.guarded:
+            self._check()
+
+    def wait(self, done: Callable[[], bool], timeout_s: float, what: str) -> None:
+        """Let the clock run until something is true.
+
+        Raises:
+            LinkError: time runs out.
+        """
+        deadline = self._clock.now_ns() + round(timeout_s * 1e9)
+        while not done():
+            if self._clock.now_ns() >= deadline:
+                raise LinkError(f"waited {timeout_s:g} s for {what}; it did not come")
+            self._clock.sleep(WAIT_SLICE_S)
+            self.pump()
+
+    def record(self, kind: str, **data: Any) -> None:
+        """An event in the recording, where there is one."""
+        if self._recorder is not None:
+            self._recorder.event(kind, **data)
+
+    @contextmanager
+    def unguarded(self) -> Iterator[None]:
+        """Raise nothing in `pump` for the block."""
+        before, self.guarded = self.guarded, False
+        try:
+            yield
+        finally:
+            self.guarded = before
+
+    def _poll(self, polls: Iterable[Poll]) -> None:
+        for poll in polls:
+            reading = poll.take()
+            if reading is not None:
+                self._arrived.append(reading)
+
+    def _keep_polling(self, polls: Sequence[Poll]) -> None:
+        """One link's devices. Goes on after an error, so that make-safe finds them when they are there again."""
+        while not self._ended.wait(max(0.001, (min(p.due_ns for p in polls) - self._clock.now_ns()) * 1e-9)):
+            self._poll(polls)
+
+    def _take(self, reading: Reading) -> None:
+        name = reading.device
+        if reading.values is None:
+            if name not in self._trouble:
+                logger.warning("device %s: no reading: %s", name, reading.error)
+            self._trouble[name] = reading.error or LinkError(f"device {name}: no reading")
+            return
+        if name in self._trouble:
+            logger.warning("device %s: answers again", name)
+            del self._trouble[name]
+        if reading.t_ns >= self._refreshed[name]:  # a poll from before a command must not hide what came of it
+            self._latest[name] = reading.values
+        self._answered[name] = max(self._answered[name], reading.t_ns)
+        block = self._streams[name].block(reading)
+        if self._recorder is not None and block is not None:
+            self._recorder.samples(block)
+
+    def _check(self) -> None:
+        for error in self._trouble.values():
+            if isinstance(error, RegisterRefused):
+                raise error
+        now = self._clock.now_ns()
+        for name, device in self.devices.items():
+            silent = (now - self._answered[name]) * 1e-9
+            if silent > self._patience[name]:
+                why = f": {self._trouble[name]}" if name in self._trouble else ""
+                raise LinkError(f"device {name} on link {device.spec.link}: no reading for {silent:.1f} s{why}")
+        if self.drive is not None and self.drive.fault:
+            raise DeviceFault(f"the drive reports {self.drive.fault}; look at it before the next run")
+
+
+def register_devices(rig: RigFile) -> tuple[str, ...]:
+    """Names of the rig's devices in the roles of this module."""
+    return tuple(name for name, d in rig.devices.items() if set(d.roles) & set(ROLES))
+
+
+def _by_role(devices: Mapping[str, RegisterDevice]) -> dict[str, RegisterDevice]:
+    out: dict[str, RegisterDevice] = {}
+    for device in devices.values():
+        for role in device.spec.roles:
+            other = out.setdefault(role, device)
+            if other is not device:
+                raise ConfigError(
+                    f"devices.{device.name}.roles: found {role}, which {other.name} has; expected one device"
+                )
+    return out
+
+
+@contextmanager
+def open_devices(
+    rig: RigFile, port_of: Callable[[str], RegisterPort], clock: Clock, envelope: Envelope, *, threaded: bool = False
+) -> Iterator[Fieldbus]:
+    """The rig's register devices, probed and polled for the block; nothing where it has none. However the block ends, a
+    drive is told to coast.
+
+    Raises:
+        ConfigError: a map that cannot be, or a register that a device does not have.
+        LinkError: a device does not answer.
+        DeviceFault: the drive has a fault that stays.
+    """
+    bus = Fieldbus(rig, port_of, clock, envelope, threaded=threaded)
+    bus.connect()  # where that fails nothing may be written to a device that is not the one of the rig file
+    try:
+        yield bus
+    finally:
+        bus.close()
+        if bus.drive is not None:
+            with suppress(BenchError):
+                bus.devices[bus.drive.name].command("coast")

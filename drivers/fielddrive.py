@@ -1,0 +1,176 @@
+"""The drive on registers: what a rig file's target_speed, actual_speed and fault, and its commands, make of a device."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
+from typing import Any, Protocol
+
+from bench import units
+from bench.envelope import Envelope
+from bench.errors import BenchError, ConfigError, DeviceFault, InterlockError, LinkError
+from drivers.registerdevice import RegisterDevice
+
+TAKEN_S = 1.0  # for a drive to do what it was told
+STANDSTILL_RAD_S, STOP_S, REACH_S = 0.5, 90.0, 60.0
+NEEDED = ("target_speed", "actual_speed", "fault")
+COMMANDS = ("run", "coast", "stop")
+
+
+class Surroundings(Protocol):
+    """What the drive needs of the bus that it is on."""
+
+    def latest(self, device: str) -> Mapping[str, float]: ...
+    def refresh(self, device: str) -> Mapping[str, float]: ...
+    def wait(self, done: Callable[[], bool], timeout_s: float, what: str) -> None: ...
+    def record(self, kind: str, **data: Any) -> None: ...
+    def unguarded(self) -> AbstractContextManager[None]: ...
+
+
+class FieldDrive:
+    """A `bench.roles.Drive`. Registers: target_speed, actual_speed, fault; running where the drive has it. Commands: run,
+    coast, stop; reset where it has one. `may_run` raises when the shaft must not be driven now."""
+
+    def __init__(self, bus: Surroundings, device: RegisterDevice, envelope: Envelope) -> None:
+        """Raises ConfigError: the rig file does not state what a drive cannot do without."""
+        self._bus, self._device, self._envelope = bus, device, envelope
+        self.name = device.name
+        device.require(*NEEDED)
+        missing = [c for c in COMMANDS if c not in device.spec.commands]
+        if missing:
+            found = ", ".join(device.spec.commands) or "none"
+            raise ConfigError(f"devices.{self.name}.commands: found {found}; expected {', '.join(missing)} as well")
+        device.check_commands()
+        unit = device.spec.registers["target_speed"].unit
+        if units.unit(unit).si != "rad/s":
+            raise ConfigError(f"devices.{self.name}.registers.target_speed.unit: found {unit}; expected r/min or rad/s")
+        self.may_run: Callable[[], None] = lambda: None
+
+    @property
+    def speed_rad_s(self) -> float:
+        """Speed as the drive measures it, at the last poll."""
+        return self._bus.latest(self.name)["actual_speed"]
+
+    @property
+    def fault(self) -> str:
+        """Name of the latched fault, "" without one, at the last poll."""
+        return self.fault_of(self._bus.latest(self.name))
+
+    @property
+    def running(self) -> bool:
+        """Whether it gives torque, as far as it tells."""
+        return bool(self._bus.latest(self.name).get("running", 1.0))
+
+    def fault_of(self, values: Mapping[str, float]) -> str:
+        """The fault that a reading tells of."""
+        code = round(values["fault"])
+        return self._device.spec.faults.get(str(code), f"fault {code}") if code else ""
+
+    def set_speed(self, rad_s: float) -> None:
+        """Set the speed that it holds while it runs; read back.
+
+        Raises:
+            InterlockError: beyond the envelope; nothing was sent.
+            LinkError: the drive does not answer, or refuses.
+            BenchError: it reads back something else.
+        """
+        limit = self._envelope.rig.envelope.max_speed_rad_s
+        if not abs(rad_s) <= limit:  # NaN is refused too
+            raise InterlockError(
+                f"drive speed: found {rad_s:g} rad/s; the envelope allows {limit:g} rad/s; nothing was sent"
+            )
+        self._bus.record("drive-speed", device=self.name, rad_s=rad_s)
+        self._device.write("target_speed", rad_s)
+        r = self._device.spec.registers["target_speed"]
+        back, step = self._bus.refresh(self.name)["target_speed"], abs(r.scale * units.unit(r.unit).factor)
+        near = 1e-6 * abs(rad_s) if r.type == "f32" else step
+        if not math.isclose(back, rad_s, rel_tol=0, abs_tol=max(near, 1e-12)):
+            raise BenchError(f"drive {self.name}: wrote a speed of {rad_s:g} rad/s, it reads back {back:g} rad/s")
+
+    def run(self) -> None:
+        """Let it give torque.
+
+        Raises:
+            DeviceFault: it is in fault, or goes into it.
+            LinkError: it does not answer, refuses, or does not start.
+        """
+        self.may_run()
+        fault = self.fault_of(self._bus.refresh(self.name))
+        if fault:
+            raise DeviceFault(f"the drive reports {fault}; it was not started")
+        self._command("run")
+        self._until_running(True)
+
+    def reach(self, rad_s: float) -> None:
+        """Run at a speed and return when the shaft has it, within 1 % or 0.5 rad/s.
+
+        Raises:
+            InterlockError: beyond the envelope; nothing was sent.
+            DeviceFault: the drive is or goes into fault.
+            LinkError: it does not answer, or the shaft does not get there in a minute.
+        """
+        self.set_speed(rad_s)
+        self.run()
+        near = max(STANDSTILL_RAD_S, 0.01 * abs(rad_s))
+        try:
+            self._bus.wait(lambda: abs(self.speed_rad_s - rad_s) <= near, REACH_S, f"a speed of {rad_s:g} rad/s")
+        except LinkError as error:
+            raise LinkError(
+                f"{error}; the shaft turns at {self.speed_rad_s:.1f} rad/s. Does something else hold it?"
+            ) from error
+
+    def coast(self) -> None:
+        """Take the torque away.
+
+        Raises:
+            LinkError: the drive does not answer, refuses, or goes on.
+        """
+        self._command("coast")
+        self._until_running(False)
+
+    def stop(self) -> None:
+        """Brake, and return when the shaft stands.
+
+        Raises:
+            LinkError: the drive does not answer, refuses, or the shaft goes on turning.
+        """
+        self._command("stop")
+        self._bus.wait(lambda: abs(self.speed_rad_s) < STANDSTILL_RAD_S, STOP_S, "the drive to stop the shaft")
+
+    def reset(self) -> None:
+        """Clear a latched fault.
+
+        Raises:
+            DeviceFault: it stays, or the rig file states no command for it.
+            LinkError: the drive does not answer, or refuses.
+        """
+        fault = self.fault_of(self._bus.refresh(self.name))
+        if not fault:
+            return
+        if "reset" not in self._device.spec.commands:
+            raise DeviceFault(f"the drive reports {fault}; the rig file states no command to reset it")
+        with self._bus.unguarded():
+            self._command("reset")
+            try:
+                self._bus.wait(lambda: not self.fault_of(self._bus.refresh(self.name)), TAKEN_S, "the reset")
+            except LinkError as error:
+                raise DeviceFault(f"the drive reports {fault}, and its reset did not clear it") from error
+
+    def _command(self, name: str) -> None:
+        self._bus.record("drive", device=self.name, command=name)
+        self._device.command(name)
+
+    def _until_running(self, running: bool) -> None:
+        if "running" not in self._device.spec.registers:
+            return
+        what = f"the drive to {'run' if running else 'coast'}"
+
+        def done() -> bool:
+            values = self._bus.refresh(self.name)
+            fault = self.fault_of(values)
+            if running and fault:
+                raise DeviceFault(f"the drive reports {fault}; it did not start")
+            return bool(values["running"]) == running
+
+        self._bus.wait(done, TAKEN_S, what)

@@ -1,0 +1,194 @@
+"""Wires: open transports, all with the same face. `open_wire` picks one by the scheme of a link's URL."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from bench import linkurl
+from bench.clock import WallClock
+from bench.errors import ConfigError, LinkError
+from bench.frames import FrameBatch
+from bench.link import LinkStats
+from bench.rigfile import LinkSpec
+from bench.wire.packetstream import PacketStream, encode
+from drivers.beat import WriterSpec
+from drivers.byteport import BytePort
+from drivers.canbus import CanBus, open_bus
+
+IN_PROCESS = ("virtual",)  # CAN interfaces that another process cannot reach
+
+
+class Wire(Protocol):
+    """An open transport: what `LiveLink` needs of it. One thread reads; writes come from any."""
+
+    @property
+    def stats(self) -> LinkStats:
+        """Counts since it was opened."""
+        ...
+
+    def read(self, timeout_s: float) -> FrameBatch:
+        """Frames that came, after waiting no longer than that; empty without.
+
+        Raises:
+            LinkError: lost, or the bus is off.
+        """
+        ...
+
+    def write(self, batch: FrameBatch) -> None:
+        """Send frames, in order.
+
+        Raises:
+            LinkError: lost, or it takes nothing.
+        """
+        ...
+
+    def writer(self) -> WriterSpec:
+        """How another process sends on it; format `none` where none can."""
+        ...
+
+    def written_by(self, send_bytes: Callable[[bytes], None]) -> None:
+        """Another process is the one writer of the port from now on: what the wire itself has to say goes through
+        `send_bytes`, as whole lines."""
+        ...
+
+    def cancel(self) -> None:
+        """Make a read that waits return."""
+        ...
+
+    def close(self) -> None:
+        """Release it. Twice is harmless."""
+        ...
+
+
+class PacketWire:
+    """Messages in COBS packets on a byte stream."""
+
+    def __init__(self, port: BytePort, now_ns: Callable[[], int]) -> None:
+        self._port, self._now_ns = port, now_ns
+        self._stream = PacketStream(joining=True)
+        self._sequence = 0
+        self._writing = threading.Lock()
+        self.stats = LinkStats()
+
+    def read(self, timeout_s: float) -> FrameBatch:
+        """As Wire says."""
+        data = self._port.read(timeout_s)
+        batch = self._stream.feed(data, self._now_ns())
+        s = self._stream
+        self.stats.received += len(batch)
+        self.stats.crc_errors, self.stats.malformed, self.stats.packets_lost = s.crc_errors, s.malformed, s.packets_lost
+        return batch
+
+    def write(self, batch: FrameBatch) -> None:
+        """As Wire says; a frame that no packet can hold is a LinkError too."""
+        with self._writing:
+            try:
+                data, self._sequence = encode(batch, self._sequence)
+            except ValueError as error:
+                raise LinkError(f"port {self._port.where}: {error}") from error
+            self._port.write(data)
+            self.stats.sent += len(batch)
+
+    def writer(self) -> WriterSpec:
+        """As Wire says."""
+        number = self._port.fileno()
+        return WriterSpec("none") if number is None else WriterSpec("packet", number)
+
+    def written_by(self, send_bytes: Callable[[bytes], None]) -> None:
+        """As Wire says; it says nothing by itself."""
+
+    def cancel(self) -> None:
+        """As Wire says."""
+        self._port.cancel()
+
+    def close(self) -> None:
+        """As Wire says."""
+        with self._writing:
+            self._port.close()
+
+
+class CanWire:
+    """A CAN bus."""
+
+    def __init__(self, can: CanBus) -> None:
+        self._can = can
+        self._writing = threading.Lock()
+
+    @property
+    def stats(self) -> LinkStats:
+        """As Wire says."""
+        return self._can.stats
+
+    def read(self, timeout_s: float) -> FrameBatch:
+        """As Wire says."""
+        return self._can.read(timeout_s)
+
+    def write(self, batch: FrameBatch) -> None:
+        """As Wire says."""
+        with self._writing:
+            self._can.write(batch)
+
+    def writer(self) -> WriterSpec:
+        """As Wire says."""
+        if (slcan := self._can.slcan) is not None:
+            number = slcan.port.fileno()
+            return WriterSpec("none") if number is None else WriterSpec("slcan", number, self._can.brs)
+        if self._can.arguments["interface"] in IN_PROCESS:
+            return WriterSpec("none")
+        return WriterSpec("python-can", brs=self._can.brs, arguments={**self._can.arguments, "ignore_config": True})
+
+    def written_by(self, send_bytes: Callable[[bytes], None]) -> None:
+        """As Wire says: SLCAN adapters are asked for their status now and then."""
+        if (bus := self._can.slcan) is not None:
+            bus.ask_through(send_bytes)
+
+    def cancel(self) -> None:
+        """As Wire says."""
+        self._can.cancel()
+
+    def close(self) -> None:
+        """As Wire says."""
+        with self._writing:
+            self._can.close()
+
+
+def open_wire(
+    spec: LinkSpec, name: str, identifiers: Sequence[int] = (), now_ns: Callable[[], int] | None = None
+) -> Wire:
+    """Open the transport of a link.
+
+    Args:
+        spec: of the link, from the rig file.
+        name: of the link.
+        identifiers: of the messages that the other end sends: what a CAN interface's filters let pass.
+        now_ns: host clock of the rig, UNIX ns; it stamps frames.
+
+    Raises:
+        ConfigError: the URL is none of a controller's link, or the port or interface cannot be opened.
+    """
+    clock = now_ns or WallClock().now_ns
+    url = linkurl.parse(spec.url)
+    if url.scheme in ("slcan", "can"):
+        return CanWire(open_bus(spec, name, identifiers, clock))
+    if url.scheme == "serial":
+        return PacketWire(_port(name, url), clock)
+    raise ConfigError(f"link {name}: found {spec.url!r}; expected a URL that starts with slcan:, can: or serial:")
+
+
+def _port(name: str, url: linkurl.LinkUrl) -> BytePort:
+    baudrate = _baudrate(name, url.query)
+    try:
+        return BytePort.open(url.rest, baudrate=baudrate)
+    except ConfigError as error:
+        raise ConfigError(f"link {name}: {error}") from error
+
+
+def _baudrate(name: str, query: dict[str, str]) -> int | None:
+    text = query.get("baudrate", "")
+    if unknown := sorted(set(query) - {"baudrate"}):
+        raise ConfigError(f"link {name}: found {', '.join(unknown)} in the URL; expected at most baudrate=N")
+    if text and not (text.isascii() and text.isdigit() and int(text)):
+        raise ConfigError(f"link {name}: found baudrate={text}; expected a whole number of Bd, such as 3000000")
+    return int(text) if text else None

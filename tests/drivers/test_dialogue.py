@@ -1,0 +1,197 @@
+"""Requests and replies: each has its own token, what is late or for others is not taken, held values stay."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bench.codec import Decoder, encode
+from bench.errors import ConfigError, LinkError
+from bench.frames import FD, SENT, FrameBatch, empty_batch, frame, payload
+from bench.link import LinkStats
+from bench.rigfile import RigFile, load_rig
+from bench.session import Session
+from drivers import handshake
+from drivers.dialogue import KEPT, Dialogue, commanded, status_of
+
+ROOT = Path(__file__).resolve().parents[2]
+NATIVE: RigFile = load_rig("tsbs12")
+OWN: RigFile = load_rig(str(ROOT / "examples" / "own-controller" / "plainamb.toml"))
+ME, OTHER = Session(0x1234501, 1_767_225_600, "me@here"), Session(0x55502, 1_767_225_500, "ann@lab process 7")
+MESSAGES = NATIVE.messages
+Answer = Callable[[str, dict[str, float]], list[FrameBatch]]
+
+
+def message(name: str, **values: float) -> FrameBatch:
+    return frame(MESSAGES[name].identifier, encode(MESSAGES[name], values), flags=FD)
+
+
+class Conversation:
+    """A dialogue whose other end is a function of what was asked. Its clock moves while the dialogue waits."""
+
+    def __init__(self, answer: Answer, rig: RigFile = NATIVE) -> None:
+        self._rig, self._answer = rig, answer
+        self.name, self.stats, self.now = "controller", LinkStats(), 0
+        self.sent: list[FrameBatch] = []
+        self._coming: list[FrameBatch] = []
+        self.dialogue = Dialogue(rig, self, self.now_ns)
+
+    def now_ns(self) -> int:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.now += round(seconds * 1e9)
+
+    def send(self, batch: FrameBatch) -> None:
+        self.sent.append(batch)
+        for name, m in self._rig.messages.messages.items():
+            values, _ = Decoder(m).decode(batch)
+            if len(next(iter(values.values()))):
+                self._coming += self._answer(name, {k: float(v[0]) for k, v in values.items()})
+
+    def receive(self) -> FrameBatch:
+        batch, self._coming = np.concatenate([empty_batch(), *self._coming]), []
+        return batch
+
+    def renew_lease(self) -> None:
+        """Nothing beats here."""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+    def wait(self, done: Callable[[], bool], timeout_s: float, what: str) -> None:
+        end = self.now + round(timeout_s * 1e9)
+        while not done():
+            if self.now >= end:
+                raise LinkError(f"waited for {what}")
+            self.sleep(0.01)
+            self.dialogue.take(self.receive())
+
+    def set(self, value: float) -> dict[str, float]:
+        return self.dialogue.ask("ParamSet", {"index": 1, "value": value}, "ParamReply", "the reply", self.wait)
+
+
+def test_the_reply_is_the_one_with_the_token() -> None:
+    def answer(name: str, v: dict[str, float]) -> list[FrameBatch]:
+        late = message("ParamReply", index=1, token=(int(v["token"]) - 1) % 256, value=-1.0)
+        return [late, message("ParamReply", index=1, token=v["token"], value=v["value"])]
+
+    talk = Conversation(answer)
+    assert [talk.set(float(k))["value"] for k in range(300)] == [float(k) for k in range(300)]
+    assert payload(talk.sent[0][0]) == bytes.fromhex("0100 00000000 01 00")
+    assert payload(talk.sent[255][0])[6] == 0  # tokens come round
+    assert talk.sent[0]["flags"][0] == FD | SENT
+
+
+@pytest.mark.parametrize("wrong", ["nothing", "token", "kind", "length"])
+def test_without_its_reply_a_request_ends_after_half_a_second(wrong: str) -> None:
+    def answer(name: str, v: dict[str, float]) -> list[FrameBatch]:
+        reply = message("ParamReply", index=1, token=(int(v["token"]) + (wrong == "token")) % 256)
+        if wrong == "length":
+            reply["length"] = 7
+        return {"nothing": [], "kind": [message("CommandReply", token=v["token"])]}.get(wrong, [reply])
+
+    talk = Conversation(answer)
+    with pytest.raises(LinkError, match="the reply"):
+        talk.set(1.0)
+    assert talk.now == pytest.approx(0.5e9, abs=2e7)
+
+
+def test_replies_to_others_do_not_pile_up() -> None:
+    talk = Conversation(lambda name, v: [message("ParamReply", index=1, token=v["token"], value=2.0)])
+    talk.dialogue.take(np.concatenate([message("ParamReply", token=k % 256, value=9.0) for k in range(4 * KEPT)]))
+    assert len(talk.dialogue._answers) == KEPT
+    assert talk.set(2.0)["value"] == 2.0
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    st.lists(
+        st.tuples(st.sampled_from([m.identifier for m in MESSAGES.messages.values()]), st.binary(max_size=64)),
+        max_size=20,
+    )
+)
+def test_arbitrary_bytes_never_crash(frames: list[tuple[int, bytes]]) -> None:
+    talk = Conversation(lambda name, v: [])
+    talk.dialogue.take(np.concatenate([empty_batch(), *(frame(i, d) for i, d in frames)]))
+    with pytest.raises(LinkError):
+        talk.set(1.0)
+
+
+def test_held_values_stay_and_one_that_does_not_fit_is_not_kept() -> None:
+    talk = Conversation(lambda name, v: [], OWN)
+    talk.dialogue.hold("HostControl", "SpeedDemand", 3.0)
+    talk.dialogue.hold("HostControl", "SpeedDemand", 9.0)  # it has been given
+    talk.dialogue.send_held("HostControl", {"Demand": 2})
+    talk.dialogue.send_held("HostControl", {"AngleDemand": -0.02})
+    with pytest.raises(ConfigError, match="does not fit"):
+        talk.dialogue.send_held("HostControl", {"SpeedDemand": 1e6})
+    talk.dialogue.send_held("HostControl", {"Demand": 6})
+    sent = [payload(b[0]).hex() for b in talk.sent]
+    assert sent == ["021e000000000000", "021e00feffffff00", "061e00feffffff00"]
+    assert talk.sent[0]["flags"][0] == SENT  # classic CAN
+
+
+def test_commands_by_name_and_by_number() -> None:
+    assert commanded(NATIVE, "LEVITATE") == {"Command": {"code": 2.0}}
+    assert commanded(OWN, "LEVITATE") == {"HostControl": {"Demand": 2.0}}
+
+
+def test_a_status_has_its_name_or_its_number() -> None:
+    m = MESSAGES["CommandReply"]
+    assert [status_of(m, {"status": k}) for k in (0.0, 4.0, 77.0)] == ["OK", "WRONG_SESSION", "status 77"]
+
+
+def owner(who: Session) -> FrameBatch:
+    return message("Owner", **who.fields())
+
+
+def test_a_free_controller_is_claimed() -> None:
+    talk = Conversation(lambda name, v: [owner(ME)])
+    handshake.claim(talk.dialogue, NATIVE, ME, talk, talk.wait)
+    assert len(talk.sent) == 1
+    assert (
+        payload(talk.sent[0][0])[:15] == ME.number.to_bytes(4, "little") + ME.since.to_bytes(4, "little") + b"me@here"
+    )
+
+
+def test_an_owner_that_has_gone_is_outwaited() -> None:
+    talk = Conversation(lambda name, v: [owner(OTHER if talk.now < 1e9 else ME)])
+    handshake.claim(talk.dialogue, NATIVE, ME, talk, talk.wait)
+    assert 1e9 <= talk.now < 1.3e9
+
+
+def test_an_owner_that_stays_is_named() -> None:
+    talk = Conversation(lambda name, v: [owner(OTHER)])
+    with pytest.raises(ConfigError, match=r"ann@lab process 7, session 0x00055502, since 2025-12-31 23:58:20 UTC"):
+        handshake.claim(talk.dialogue, NATIVE, ME, talk, talk.wait)
+
+
+def identity(protocol: int, map_version: int) -> Answer:
+    return lambda name, v: [message("Identity", protocol=protocol, map_version=map_version, serial=1),
+                            message("CommandReply", code=8, token=v["token"])]  # fmt: skip
+
+
+def test_the_controller_that_the_rig_file_means() -> None:
+    talk = Conversation(identity(1, 2))
+    handshake.identify(talk.dialogue, NATIVE, ME, talk.wait)
+    assert payload(talk.sent[0][0]) == ME.number.to_bytes(4, "little") + bytes([8, 0, 0, 0])
+
+
+@pytest.mark.parametrize(("found", "says"), [((2, 2), "protocol 2"), ((1, 7), "map_version 7")])
+def test_another_firmware_is_refused(found: tuple[int, int], says: str) -> None:
+    talk = Conversation(identity(*found))
+    with pytest.raises(ConfigError, match=f"{says}.*tsbs12.toml.*update the firmware"):
+        handshake.identify(talk.dialogue, NATIVE, ME, talk.wait)
+
+
+def test_a_controller_that_knows_neither_is_asked_nothing() -> None:
+    talk = Conversation(lambda name, v: [], OWN)
+    handshake.claim(talk.dialogue, OWN, ME, talk, talk.wait)
+    handshake.identify(talk.dialogue, OWN, ME, talk.wait)
+    assert talk.sent == []

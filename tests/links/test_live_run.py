@@ -1,0 +1,31 @@
+"""One small procedure over one link, and who may use the rig when: a served rig and a bench as processes of their own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import processes
+import pytest
+
+from bench.recording import Recording
+
+
+@pytest.mark.timeout(120)
+def test_a_live_run_loses_nothing_and_frees_the_rig(tmp_path: Path) -> None:
+    with processes.served(tmp_path) as rig:
+        for _ in range(2):  # the second one finds the rig free although the first has just ended
+            status, record = processes.run(tmp_path, rig, "slcan:socket", "tiny-levitated", "--no-report")
+            assert (status, record["outcome"]) == (0, "PASS"), record["findings"]
+    assert record["findings"] == []
+    assert record["link"]["gaps"] == 0
+    assert record["link"]["errors"] == 0
+    counts = record["link"]["counts"]
+    assert counts["heartbeats"] > 50
+    (first, _) = sorted((tmp_path / "runs").glob("*/recording.mcap"))
+    recording: Recording[object] = Recording.open(first)
+    seen = recording.channel("supply")
+    assert (np.diff(seen["index"]) == 1).all()
+    assert len(seen["index"]) > 1500
+    states = rig.state_lines()
+    assert states[-1].endswith("-> OFF")

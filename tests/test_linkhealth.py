@@ -1,0 +1,66 @@
+"""What a run says about its link: nothing on a clean one, and one finding with its count for each kind of trouble."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import pytest
+
+from bench.findings import Effect
+from bench.hosttime import Drift
+from bench.link import LinkStats
+from bench.linkhealth import Health
+from bench.telemetry import Counters
+
+CLEAN = LinkStats(received=100_000, sent=5_000, heartbeats=4_000, longest_heartbeat_gap_ns=21_000_000)
+TROUBLES = [f.name for f in fields(Counters) if f.name != "gaps"]
+TROUBLES += [f.name for f in fields(LinkStats) if f.name not in
+             ("received", "sent", "heartbeats", "longest_heartbeat_gap_ns")]  # fmt: skip
+STOPPING = {"wrong_length": Effect.INDETERMINATE, "reboots": Effect.ERROR, "overflows": Effect.ERROR,
+            "bus_off": Effect.ERROR, "reconnects": Effect.INDETERMINATE}  # fmt: skip
+
+
+def test_a_clean_link_has_no_findings() -> None:
+    health = Health(Counters(), CLEAN, None, 5_000_000)
+    assert list(health.findings()) == []
+    counts = health.counts(105_000)
+    assert (counts.frames, counts.gaps, counts.errors) == (105_000, 0, 0)
+    assert (counts.drift_ppm, counts.drift_expanded_ppm, counts.latest_ms) == (None, None, 5.0)
+    assert counts.counts["heartbeats"] == 4_000
+
+
+@pytest.mark.parametrize("trouble", TROUBLES)
+def test_each_trouble_is_counted_and_named(trouble: str) -> None:
+    counters, stats = Counters(), LinkStats()
+    setattr(counters if hasattr(counters, trouble) else stats, trouble, 37)
+    health = Health(counters, stats, None, 0)
+    (finding,) = health.findings()
+    assert "37" in finding.text
+    assert finding.where == "link"
+    assert finding.effect is STOPPING.get(trouble, Effect.NOTE)
+    counts = health.counts(0)
+    assert counts.counts[trouble] == 37
+    assert counts.errors == (0 if trouble == "lost" else 37)  # samples that are missing are counted as gaps
+
+
+def test_every_finding_has_a_code_of_its_own() -> None:
+    counters = Counters(**{f.name: 1 for f in fields(Counters)})
+    stats = LinkStats(**{f.name: 10**9 for f in fields(LinkStats)})
+    codes = [f.code for f in Health(counters, stats, Drift(1.0, 2.0, 9), 10**9).findings()]
+    assert len(set(codes)) == len(codes) == len(TROUBLES) + 2
+
+
+@pytest.mark.parametrize(("latest_ns", "count"), [(99_000_000, 0), (101_000_000, 1)])
+def test_late_telemetry_is_named(latest_ns: int, count: int) -> None:
+    assert [f.code for f in Health(Counters(), CLEAN, None, latest_ns).findings()] == ["telemetry-late"] * count
+
+
+@pytest.mark.parametrize(("gap_ns", "count"), [(59_000_000, 0), (61_000_000, 1)])
+def test_a_heartbeat_gap_near_the_watchdog_is_named(gap_ns: int, count: int) -> None:
+    stats = LinkStats(longest_heartbeat_gap_ns=gap_ns)
+    assert [f.code for f in Health(Counters(), stats, None, 0).findings()] == ["heartbeat-late"] * count
+
+
+def test_drift_is_in_the_counts() -> None:
+    counts = Health(Counters(), CLEAN, Drift(12.5, 3.0, 60), 0).counts(1)
+    assert (counts.drift_ppm, counts.drift_expanded_ppm) == (12.5, 3.0)
