@@ -12,7 +12,7 @@ demo: setup
 	$(BIN)/bench run amb-calibration --rig tsbs12 --seed 1
 
 test: setup
-	$(BIN)/python -m pytest -q -m "not long"
+	$(BIN)/python -m pytest -q -m "not long" -n 2 --dist loadgroup
 
 check: setup
 	$(BIN)/ruff format --check .

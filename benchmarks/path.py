@@ -11,9 +11,9 @@ import tempfile
 import time
 from pathlib import Path
 
+from bench.cli.opening import SIMULATED
 from bench.recorder import Recorder, RunHeader
 from bench.rigfile import load_rig
-from bench.cli.opening import SIMULATED
 from drivers.controller import Controller
 from sim_backend.endpoint import SimulatedRig
 from sim_backend.truth import draw

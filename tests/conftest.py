@@ -9,7 +9,17 @@ from pathlib import Path
 
 import pytest
 
+REAL_TIME = ("tests/links", "tests/firmware", "tests/cli/test_serve", "tests/drivers/test_heartbeat",
+             "tests/drivers/test_live_link", "tests/drivers/test_fieldbus_live", "serve-a-rig", "connect-a-rig")  # fmt: skip
 GRACE_S = 2.0  # for a thread that was told to end and is on its way
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests whose processes keep up with wall time run one after the other, on one of the workers (`make test`)."""
+    for item in items:
+        if any(part in item.nodeid for part in REAL_TIME):
+            item.add_marker(pytest.mark.xdist_group("real-time"))
 
 
 @pytest.fixture(autouse=True)

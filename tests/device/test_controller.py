@@ -186,7 +186,9 @@ def owner(host: Host, session: int, name: str) -> Session:
 
 def test_a_claim_is_answered_with_who_owns_the_controller_and_since_when() -> None:
     host = Host()
-    assert str(owner(host, 7, "ärger@lab pid 1")) == "ärger@lab pid 1, session 0x00000007, since 2026-01-01 00:00:00 UTC"
+    assert (
+        str(owner(host, 7, "ärger@lab pid 1")) == "ärger@lab pid 1, session 0x00000007, since 2026-01-01 00:00:00 UTC"
+    )
     assert owner(host, 8, "second").name == "ärger@lab pid 1"
     host.beating = False
     host.run(0.9)

@@ -13,6 +13,7 @@ import sys
 import termios
 import threading
 from collections.abc import Iterator
+from contextlib import suppress
 
 import pytest
 import serial
@@ -239,9 +240,10 @@ class Rfc2217Server:
         self.client, _ = self._listener.accept()
         echo = serial.serial_for_url("loop://", timeout=0)
         manager = serial.rfc2217.PortManager(echo, self)
-        while data := self.client.recv(4096):
-            if plain := b"".join(manager.filter(data)):
-                self.write(b"".join(manager.escape(plain)))
+        with suppress(ConnectionResetError):  # the client may close before it has read everything
+            while data := self.client.recv(4096):
+                if plain := b"".join(manager.filter(data)):
+                    self.write(b"".join(manager.escape(plain)))
         self.client.close()
 
     def hang_up(self) -> None:

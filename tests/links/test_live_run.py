@@ -17,7 +17,7 @@ def test_a_live_run_loses_nothing_and_frees_the_rig(tmp_path: Path) -> None:
         for _ in range(2):  # the second one finds the rig free although the first has just ended
             status, record = processes.run(tmp_path, rig, "slcan:socket", "tiny-levitated", "--no-report")
             assert (status, record["outcome"]) == (0, "PASS"), record["findings"]
-    assert record["findings"] == []
+    assert [f for f in record["findings"] if f["code"] not in processes.HOST_STALLS] == []
     assert record["link"]["gaps"] == 0
     assert record["link"]["errors"] == 0
     counts = record["link"]["counts"]
