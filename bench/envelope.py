@@ -83,8 +83,8 @@ class Envelope:
 
     @staticmethod
     def _trip(block: SampleBlock, name: str, x: np.ndarray, limit: float, unit: str) -> None:
-        if x.max(initial=0.0) > limit:
-            k = int(np.argmax(x > limit))
+        if not (x <= limit).all():  # NaN has left its range too
+            k = int(np.argmax(~(x <= limit)))
             raise InterlockError(
                 f"interlock: {name} reached {x[k]:.4g} {unit} at tick {int(block.ticks[k])}; the envelope allows "
                 f"{limit:g} {unit}"

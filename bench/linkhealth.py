@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field
 
 from bench.findings import Effect, Finding
 from bench.hosttime import Drift
@@ -11,7 +11,7 @@ from bench.link import LinkStats
 from bench.records import LinkCounts
 from bench.telemetry import Counters
 
-LATE_S = 0.1  # telemetry that comes later than this is worth a word
+LATE_S = 0.04  # telemetry that comes later than this is worth a word
 PERIODS, PERIOD_S = 3, 0.02  # of a heartbeat; a longer gap comes near the watchdog
 
 
@@ -23,6 +23,9 @@ class Health:
     stats: LinkStats
     drift: Drift | None
     latest_ns: int
+    host_age_s: float = 0.0  # the controller heard no heartbeat for so long
+    round_trip_ns: int | None = None  # least time from a request to its answer
+    others: Mapping[str, LinkStats] = field(default_factory=dict)  # of the rig's further links
 
     def counts(self, frames: int) -> LinkCounts:
         """As the record has it; `frames` is how many were recorded, in both directions."""
@@ -32,7 +35,8 @@ class Health:
         errors += s.malformed + s.packets_lost + s.error_frames + s.refused + s.overflows + s.bus_off + s.reconnects
         drift = self.drift
         return LinkCounts(frames, c.gaps, errors, named, drift.ppm if drift else None,
-                          drift.expanded_ppm if drift else None, self.latest_ns * 1e-6)  # fmt: skip
+                          drift.expanded_ppm if drift else None, self.latest_ns * 1e-6,
+                          None if self.round_trip_ns is None else self.round_trip_ns * 1e-6)  # fmt: skip
 
     def findings(self) -> Iterator[Finding]:
         """One for each kind of trouble, with its count and what it means for the data."""
@@ -59,10 +63,17 @@ class Health:
              Effect.INDETERMINATE),
         )  # fmt: skip
         yield from (Finding(code, text, "link", effect) for count, code, text, effect in told if count)
-        if s.longest_heartbeat_gap_ns > PERIODS * PERIOD_S * 1e9:
-            gap = s.longest_heartbeat_gap_ns * 1e-6
-            yield Finding("heartbeat-late", f"two heartbeats were {gap:.0f} ms apart; the watchdog ends a run at 80 ms "
-                          "by default. Was the host busy?", "link")  # fmt: skip
+        gap = max(s.longest_heartbeat_gap_ns * 1e-9, self.host_age_s)
+        if gap > PERIODS * PERIOD_S:
+            yield Finding("heartbeat-late", f"two heartbeats were {gap * 1e3:.0f} ms apart; the watchdog ends a run at "
+                          "80 ms by default. Was the host busy?", "link")  # fmt: skip
+        if (self.round_trip_ns or 0) > LATE_S * 1e9:
+            yield Finding("link-slow", f"answers take at least {(self.round_trip_ns or 0) * 1e-6:.0f} ms: telemetry may "
+                          "be that much older than it looks", "link")  # fmt: skip
+        for name, other in self.others.items():
+            if other.reconnects:
+                text = f"link {name} was lost and came back {other.reconnects} times"
+                yield Finding("link-reconnected", text, name)
         if self.latest_ns > LATE_S * 1e9:
             text = f"telemetry came up to {self.latest_ns * 1e-9:.2f} s late; samples carry the device's own time"
             yield Finding("telemetry-late", text, "link")

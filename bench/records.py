@@ -108,7 +108,8 @@ class LinkCounts:
     """What the controller's link delivered: frames, gaps in the telemetry, everything that a clean link does not do.
 
     `counts` has it all by name (docs/reference/record.md). `drift_ppm` is host clock against device clock with its
-    expanded uncertainty; `latest_ms` the greatest lateness of a sample; None where it was not measured.
+    expanded uncertainty; `latest_ms` the greatest lateness of a sample, `round_trip_ms` the least time from a
+    request to its answer; None where it was not measured.
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = _STRICT
@@ -119,6 +120,7 @@ class LinkCounts:
     drift_ppm: float | None = None
     drift_expanded_ppm: float | None = None
     latest_ms: float | None = None
+    round_trip_ms: float | None = None
 
 
 @dataclass(frozen=True)

@@ -230,17 +230,21 @@ def read_rig(rig: str) -> RigText:
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"rig file {path}: cannot be read: {error}") from error
     data = _toml(text, str(path))
-    links = data.get("links", {})
-    dbc, encoding = "", "utf-8"
-    for link in links.values() if isinstance(links, dict) else ():
-        if isinstance(link, dict) and isinstance(link.get("dbc"), str):
-            dbc, encoding = link["dbc"], str(link.get("encoding", "utf-8"))
-    if not dbc:
+    links = _table(data, "links")
+    used = str(_table(_table(data, "devices"), "controller").get("link", ""))
+    mapped = [n for n in (used, *links) if _table(links, n).get("dbc")]  # another's, if the controller's has none
+    if not mapped:
         raise ConfigError(f'rig file {path}: links: found no dbc; expected [links.NAME] with dbc = "FILE.dbc"')
+    dbc, encoding = str(links[mapped[0]]["dbc"]), str(links[mapped[0]].get("encoding", "utf-8"))
     try:
         return RigText(path, text, (path.parent / dbc).read_text(encoding=encoding))
     except (OSError, UnicodeDecodeError, LookupError) as error:
         raise ConfigError(f"rig file {path}: dbc: cannot read {path.parent / dbc}: {error}") from error
+
+
+def _table(data: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+    found = data.get(key)
+    return found if isinstance(found, dict) else {}
 
 
 def load_rig(rig: str) -> RigFile:

@@ -18,6 +18,7 @@ STREAM = "telemetry"
 CODES = ("state", "fault", "flags")
 REMEMBERED = 2000
 REBOOT_S = 1.0  # a tick so far in the past is a restart, not a late frame
+STALE = 100  # old samples in a row that are no repetition any more
 
 
 @dataclass
@@ -59,6 +60,7 @@ class TelemetryDecoder:
         self._known = np.array(sorted(m.identifier for m in self.rig.messages.messages.values()))
         self._segment: _Segment | None = None
         self._index = 0
+        self._stale, self._stale_tick = 0, 0  # samples in a row that were old, and the tick of the last
         self._missing: set[int] = set()  # sequence numbers that may still come late
 
     @property
@@ -107,11 +109,28 @@ class TelemetryDecoder:
         self.counters.duplicates += len(sequence) - int(fresh.sum()) - len(late)
         keep = first[fresh]
         if not len(keep):
-            return []
+            return self._all_old(rows)
+        self._stale = 0
         columns = {name: x[keep] for name, x in rows.columns.items()}
         self.latest = {name: float(x[-1]) for name, x in columns.items()}
         self.host.take(s.offset_ns + ticks[keep] * self._tick_ns, rows.arrived[keep])
         return self._split(sequence[keep], ticks[keep], columns, int(rows.arrived.max()))
+
+    def _all_old(self, rows: Rows) -> list[SampleBlock]:
+        """Nothing but samples that are there already. Once or twice that is a repetition; time and again, with rising
+        ticks, it is a controller that restarted so soon after power-on that its tick did not fall far enough to tell."""
+        self._stale = self._stale + len(rows) if int(rows.tick[-1]) > self._stale_tick else 0
+        self._stale_tick = int(rows.tick[-1])
+        if self._stale < STALE:
+            return []
+        self.counters.duplicates = max(0, self.counters.duplicates - self._stale)
+        self._new_segment()
+        return self._ordered(rows)
+
+    def _new_segment(self) -> None:
+        self.counters.reboots += 1
+        self._segment, self._stale = None, 0
+        self.host = HostMap(self.host.latest_ns)
 
     def _restart(self, rows: Rows) -> int:
         """Index of the first row after a restart of the controller, 0 if there is none (or it is the first row, which
@@ -124,9 +143,7 @@ class TelemetryDecoder:
         if not len(back):
             return 0
         if back[0] == 0:
-            self.counters.reboots += 1
-            self._segment = None
-            self.host = HostMap(self.host.latest_ns)
+            self._new_segment()
         return int(back[0])
 
     def _split(

@@ -3,27 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
-import numpy as np
-
-from bench import units
 from bench.clock import Clock, PumpedClock
 from bench.envelope import Envelope
-from bench.errors import BenchError, DeviceFault, InterlockError, LinkError
+from bench.errors import DeviceFault, InterlockError, LinkError
 from bench.link import Link
 from bench.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.roles import RigState
+from bench.samples import SampleBlock
 from bench.session import Session
 from bench.telemetry import TelemetryDecoder
 from drivers import handshake
-from drivers.dialogue import Dialogue, commanded, no_reply, status_of
+from drivers.dialogue import Dialogue, no_reply
+from drivers.orders import Orders
 
 SILENCE_S, WAIT_SLICE_S = 0.5, 0.01
 SPIN_S = 60.0
 SLOWEST_SLEW = 0.2  # rad/s, of a controller that does not say how fast it turns to an angle
-STANDING = {"OFF": "DISABLE", "READY": "ENABLE"}
+HOST_AGE = "host_age"
 FIRST_S = 1.5  # for the first telemetry, and for the last owner to be gone
 STATES = {"OFF": RigState.OFF, "READY": RigState.READY, "LIFTING": RigState.READY, "LEVITATED": RigState.LEVITATED,
           "SPINNING": RigState.SPINNING, "LANDING": RigState.LEVITATED, "COASTING": RigState.SPINNING,
@@ -59,12 +58,9 @@ class Controller:
         self._angle = 0.0
         self._reboots = 0
         self.cleared = ""
+        self.host_age_s = 0.0  # the greatest while the machine was on
         self.companions: list[Callable[[], None]] = []  # polled with it: other devices of the rig
-        self._commanded: set[str] = set()  # messages that a command was sent by
-        for p in rig.parameters.values():
-            if p.signal:
-                message, _, signal = p.signal.partition(".")
-                self._dialogue.hold(message, signal, self._raw(p.signal, p.default))
+        self._orders = Orders(rig, self._dialogue, session, self.envelope, lambda: self.mode, self._wait)
 
     @property
     def recorder(self) -> Recorder | None:
@@ -73,7 +69,7 @@ class Controller:
 
     @recorder.setter
     def recorder(self, recorder: Recorder | None) -> None:
-        self._recorder = self._dialogue.recorder = recorder
+        self._recorder = self._dialogue.recorder = self._orders.recorder = recorder
         if recorder is not None:
             self.telemetry.start_counting()
 
@@ -102,7 +98,7 @@ class Controller:
     def release(self) -> None:
         """Let another bench have the controller, which must be at rest."""
         if self._dialogue.has("Claim"):
-            self._send_command("RELEASE")
+            self._orders.command("RELEASE")
 
     def poll(self) -> None:
         """Read the link, record, decode, and look after the machine.
@@ -126,6 +122,7 @@ class Controller:
             self.link.renew_lease()
             for block in blocks:
                 self.envelope.check_block(block)
+            self._look_at_heartbeat(blocks)
             self._check()
         for pump in self.companions:
             pump()
@@ -139,8 +136,14 @@ class Controller:
         if self.mode not in ("LEVITATED", "SPINNING"):
             raise InterlockError(f"the shaft must not be driven in state {self.mode}: nothing holds it")
 
+    def _look_at_heartbeat(self, blocks: Sequence[SampleBlock]) -> None:
+        """How old the last heartbeat got in the controller's eyes, where it tells and watches."""
+        if self._recorder is not None and self.mode not in ("OFF", "FAULT"):
+            ages = [float(b.columns[HOST_AGE].max()) for b in blocks if HOST_AGE in b.columns]
+            self.host_age_s = max([self.host_age_s, *ages])
+
     def _check(self) -> None:
-        if self.silent_s > SILENCE_S:
+        if self.silent_s > SILENCE_S + self.rig.link.reconnect_s:
             text = f"no telemetry for {self.silent_s:.2f} s; the link or the controller is lost"
             raise LinkError(f"link {self.link.name}: {text}")
         if self.telemetry.counters.reboots > self._reboots:
@@ -153,6 +156,11 @@ class Controller:
             code = int(self.telemetry.latest.get("state", 0))
             name = self._states.get(code, f"{code}, which its DBC does not name")
             raise DeviceFault(f"the controller reports no fault, but its state is {name}: see its documentation")
+
+    @property
+    def round_trip_ns(self) -> int | None:
+        """The least time from a request to its answer."""
+        return self._dialogue.round_trip_ns
 
     @property
     def silent_s(self) -> float:
@@ -198,7 +206,7 @@ class Controller:
 
     def make_safe(self) -> None:
         """Ask the controller to coast, land and switch off by itself."""
-        self._send_command("MAKE_SAFE")
+        self._orders.command("MAKE_SAFE")
 
     @property
     def _lift_s(self) -> float:
@@ -245,7 +253,7 @@ class Controller:
             LinkError: it does not get there in time.
         """
         self.set("speed_ref", rad_s)
-        self._send_command("SPIN")
+        self._orders.command("SPIN")
         tolerance, steady = max(0.02 * abs(rad_s), 0.3), 0
         deadline = self._base.now_ns() + round(SPIN_S * 1e9)
         while steady < 5:
@@ -257,112 +265,21 @@ class Controller:
 
     def stop(self) -> None:
         """Brake to a stop, and wait until the rotor is below the landing speed."""
-        self._send_command("STOP")
+        self._orders.command("STOP")
         limit = self.landing_speed
         self._wait(lambda: abs(self.speed_rad_s) < limit, 60.0, f"speed below {limit:g} rad/s")
 
     def set(self, parameter: str, value: float) -> None:
-        """Write a parameter (SI) and check what the controller reads back.
-
-        Raises:
-            InterlockError: the envelope refuses; nothing was sent.
-            BenchError: the controller refuses, or reads back something else.
-        """
-        self.envelope.check_parameter(parameter, value)
-        p = self.rig.parameters[parameter]
-        if self._recorder is not None:
-            self._recorder.event("parameter", name=parameter, value=value)
-        if p.signal:
-            if p.when == "resting" and self.mode not in STANDING:  # nobody answers: the refusal must be ours
-                raise BenchError(f"parameter {parameter} can be written at rest only; the controller is {self.mode}")
-            message, _, signal = p.signal.partition(".")
-            self._send_held(message, {**self._standing(message), signal: self._raw(p.signal, value)})
-            return
-        values = {"index": float(p.index or 0), "value": value}
-        if any(s.name == "session8" for s in self.rig.messages["ParamSet"].signals):
-            values["session8"] = self._session.low_byte
-        reply = self._dialogue.ask("ParamSet", values, "ParamReply", f"the reply to {parameter}", self._wait)
-        status = status_of(self.rig.messages["ParamReply"], reply)
-        if status != "OK":
-            raise BenchError(
-                f"the controller refuses {parameter} = {value:g} {p.unit}: {status} in state {self.mode}; in force is "
-                f"{reply['value']:g} {p.unit}"
-            )
-        if not np.isclose(reply["value"], value, rtol=1e-6, atol=1e-12):
-            raise BenchError(f"{parameter}: wrote {value!r}, the controller reads back {reply['value']!r}")
+        """Write a parameter (SI) and check what the controller reads back; `drivers.orders.Orders.set` has the errors."""
+        self._orders.set(parameter, value)
 
     def get(self, parameter: str) -> float:
-        """Read a parameter, SI.
-
-        Raises:
-            BenchError: the controller does not know it, or it is one that can only be written.
-        """
-        p = self.rig.parameters[parameter]
-        if p.index is None:
-            raise BenchError(
-                f"parameter {parameter} is a signal that the host sends; the controller cannot be asked for it"
-            )
-        reply = self._dialogue.ask(
-            "ParamGet", {"index": p.index}, "ParamReply", f"the value of {parameter}", self._wait
-        )
-        if status_of(self.rig.messages["ParamReply"], reply) != "OK":
-            raise BenchError(f"the controller does not know parameter {parameter} (index {p.index})")
-        return reply["value"]
-
-    def _raw(self, path: str, value: float) -> float:
-        """A value in SI in the unit of its signal."""
-        message, _, signal = path.partition(".")
-        unit = units.UNITS[self.rig.messages[message].signal(signal).unit]
-        return (value - unit.offset) / unit.factor
+        """Read a parameter, SI; `drivers.orders.Orders.get` has the errors."""
+        return self._orders.get(parameter)
 
     def _command(self, name: str, goal: str, timeout_s: float) -> None:
-        self._send_command(name)
+        self._orders.command(name)
         self._wait(lambda: self.mode == goal, timeout_s, f"state {goal} after {name}")
-
-    def _send_command(self, name: str) -> None:
-        messages = self.rig.messages
-        if not self.rig.binding.knows(name, messages):
-            raise BenchError(
-                f"the controller has no command {name}: {self.rig.path} names none under devices.controller.binding.commands. "
-                "Next: name it there, or do by hand what it asks for"
-            )
-        if self._recorder is not None:
-            self._recorder.event("command", name=name)
-        for message, values in commanded(self.rig, name).items():
-            self._commanded.add(message)
-            if message != "Command" or not self._dialogue.has("CommandReply"):
-                self._send_held(message, values)
-                continue
-            if any(s.name == "session" for s in messages[message].signals):
-                values["session"] = self._session.number
-            reply = self._dialogue.ask(message, values, "CommandReply", f"the reply to {name}", self._wait)
-            status = status_of(messages["CommandReply"], reply)
-            if status == "WRONG_SESSION":
-                raise BenchError(f"the controller refuses {name}: another host owns it")
-            if status != "OK":
-                raise BenchError(f"the controller refuses {name}: {status} in state {self.mode}")
-
-    def _send_held(self, message: str, values: dict[str, float]) -> None:
-        owned = any(s.name == "session" for s in self.rig.messages[message].signals)
-        self._dialogue.send_held(message, {**values, "session": self._session.number} if owned else values)
-
-    def _standing(self, message: str) -> dict[str, float]:
-        """A parameter may share its message with commands. Before the first command the message must ask for the state
-        that the controller is in, or it would ask for whatever zero means.
-
-        Raises:
-            BenchError: the controller is in a state that no command of ours keeps; nothing was sent.
-        """
-        commands = self.rig.binding.commands
-        shared = any(path.partition(".")[0] == message for c in commands for path in commands[c])
-        if message in self._commanded or not shared:
-            return {}
-        if self.mode not in STANDING:
-            raise BenchError(
-                f"message {message} carries commands too, and the controller is {self.mode}: what to command with the "
-                "parameter is unknown; nothing was sent. Next: land the rotor, then write parameters"
-            )
-        return commanded(self.rig, STANDING[self.mode]).get(message, {})
 
     def _wait(self, done: Callable[[], bool], timeout_s: float, what: str) -> None:
         self.wait(done, timeout_s, no_reply(self.link.name, what, timeout_s))

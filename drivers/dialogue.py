@@ -24,10 +24,11 @@ class Dialogue:
     def __init__(self, rig: RigFile, link: Link, now_ns: Callable[[], int]) -> None:
         self._rig, self._link, self._now_ns = rig, link, now_ns
         self._decoders = {n: Decoder(m) for n, m in rig.messages.messages.items() if n in REPLIES}
-        self._answers: deque[tuple[str, dict[str, float]]] = deque(maxlen=KEPT)
+        self._answers: deque[tuple[str, dict[str, float], int]] = deque(maxlen=KEPT)
         self._held: dict[str, dict[str, float]] = {}
         self._token = 0
         self.recorder: Recorder | None = None
+        self.round_trip_ns: int | None = None  # the least so far
 
     def has(self, message: str) -> bool:
         """Whether the controller's DBC knows a message."""
@@ -37,8 +38,9 @@ class Dialogue:
         """Keep the replies in a batch for who waits for them."""
         for name, decoder in self._decoders.items():
             values, _ = decoder.decode(batch)
-            for k in range(len(next(iter(values.values()), ()))):
-                self._answers.append((name, {s: float(v[k]) for s, v in values.items()}))
+            mine = (batch["id"] == decoder.message.identifier) & (batch["length"] == decoder.message.length)
+            for k, t_ns in enumerate(batch["t_ns"][mine].tolist()):
+                self._answers.append((name, {s: float(v[k]) for s, v in values.items()}, t_ns))
 
     def ask(
         self, message: str, values: Mapping[str, float], reply: str, what: str, wait: Callable[..., None]
@@ -52,15 +54,21 @@ class Dialogue:
         self._answers.clear()
         request, answer = self._rig.messages[message], self._rig.messages[reply]
         tokens = _has(request, "token") and _has(answer, "token")
+        sent_ns = self._now_ns()
         self.send(message, {**values, "token": self._token} if tokens else values)
-        found: list[dict[str, float]] = []
+        found: list[tuple[dict[str, float], int]] = []
 
         def arrived() -> bool:
-            found.extend(v for n, v in self._answers if n == reply and (not tokens or v["token"] == self._token))
+            found.extend(
+                (v, t) for n, v, t in self._answers if n == reply and (not tokens or v["token"] == self._token)
+            )
             return bool(found)
 
         wait(arrived, REPLY_S, what)
-        return found[0]
+        values, t_ns = found[0]
+        took = max(t_ns - sent_ns, 0)
+        self.round_trip_ns = took if self.round_trip_ns is None else min(self.round_trip_ns, took)
+        return values
 
     def send(self, message: str, values: Mapping[str, float]) -> None:
         """Send a message as it is."""

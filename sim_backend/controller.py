@@ -25,6 +25,7 @@ MAP_VERSION = 2
 REST_TICKS = 5000  # it has been on for half a second when the host connects: the rotor lies still on its rings
 RESTING = ("OFF", "READY")
 AT_REST = (*RESTING, "FAULT")
+WITHOUT_CURRENT = ("OFF", "FAULT")
 TURNING = ("LEVITATED", "SPINNING", "COASTING")
 
 
@@ -50,7 +51,7 @@ class SimulatedController:
         self.faults = DeviceFaults(rig, faults) if faults else None
         self.restart()
         self._owner = Ownership()
-        self._encoder = TelemetryEncoder(self._map, truth)
+        self._encoder = TelemetryEncoder(self._map, truth, self.plant.tick)
         self._out: list[FrameBatch] = []
         self._spans: list[Span] = []
 
@@ -81,6 +82,7 @@ class SimulatedController:
         """As after power-on: OFF, nobody's, default parameters. The machine goes on as it is, without currents."""
         self.state, self.fault = "OFF", "NONE"
         self._since, self._steady = self.plant.tick, 0
+        self._leaving = False  # MAKE_SAFE: OFF when the rotor has landed
         self._owner = Ownership(heartbeat=self.plant.tick)
         self.plant.mode = core.OFF
         self.plant.clear_trips()
@@ -122,12 +124,13 @@ class SimulatedController:
             elif elapsed > LIFT_TIMEOUT_S + self._own["lift_time_s"]:
                 self._fail("LIFT_TIMEOUT")
         elif self.state == "LANDING" and plant.moved:
-            if self.fault == "NONE":
+            if self.fault != "NONE":
+                self._switch_off("FAULT")
+            elif self._leaving:
+                self._switch_off("OFF")
+            else:
                 plant.mode = core.READY
                 self._enter("READY")
-            else:
-                plant.mode = core.OFF
-                self._enter("FAULT")
         elif self.state == "COASTING" and abs(plant.speed) < self._own["landing_speed"]:
             self._land()
         elif self.state in ("LEVITATED", "SPINNING"):
@@ -145,8 +148,7 @@ class SimulatedController:
         if fault in ("OVERCURRENT", "OVERSPEED", "SENSOR") and self.state in TURNING:
             self._safe()
         else:
-            self.plant.mode = core.OFF
-            self._enter("FAULT")
+            self._switch_off("FAULT")
 
     def _lose_host(self) -> None:
         self.fault = "HEARTBEAT_LOST" if self.fault == "NONE" else self.fault
@@ -165,8 +167,12 @@ class SimulatedController:
         elif self.state == "LIFTING":
             self._land()
         elif self.state in RESTING:
-            self.plant.mode = core.OFF
-            self._enter("OFF" if self.fault == "NONE" else "FAULT")
+            self._switch_off("OFF" if self.fault == "NONE" else "FAULT")
+
+    def _switch_off(self, state: str) -> None:
+        self.plant.mode = core.OFF
+        self._owner.armed = False
+        self._enter(state)
 
     def _land(self) -> None:
         self.plant.mode = core.LAND
@@ -181,13 +187,13 @@ class SimulatedController:
             return
         columns = decoder.decode_payloads(one["data"][None, :])
         values = {k: float(v[0]) for k, v in columns.items()}
-        if not all(np.isfinite(list(values.values()))):
+        if not all(np.isfinite(list(values.values()))) and decoder.message.name != "ParamSet":
             return
         {"Heartbeat": self._heartbeat, "Command": self._command, "ParamSet": self._set, "ParamGet": self._get,
          "Claim": self._claim}[decoder.message.name](values, clock)  # fmt: skip
 
     def _heartbeat(self, v: dict[str, float], _: tuple[int, int]) -> None:
-        self._owner.beat(v, self.plant.tick, self.state in AT_REST)
+        self._owner.beat(v, self.plant.tick)
 
     def _claim(self, v: dict[str, float], clock: tuple[int, int]) -> None:
         self._send("Owner", self._owner.claim(v, self.plant.tick, self.state in AT_REST), clock)
@@ -204,7 +210,7 @@ class SimulatedController:
             status = "OK" if self._obey(name) else "WRONG_STATE"
         if name == "IDENTIFY" and status == "OK":
             self._send("Identity", {"protocol": 1, "map_version": MAP_VERSION, "serial": 1}, clock)
-        reply = {"code": code if name else 8, "token": v["token"], "status": self._status(status),
+        reply = {"code": code, "token": v["token"], "status": self._status(status),
                  "state": self._map.code("CommandReply", "state", self.state)}  # fmt: skip
         self._send("CommandReply", reply, clock)
 
@@ -214,22 +220,22 @@ class SimulatedController:
         if name == "IDENTIFY":
             return True
         if name == "MAKE_SAFE":
+            self._leaving = True
             self._safe()
             return True
-        if name == "RELEASE" and state in AT_REST:
+        if name == "RELEASE" and state in WITHOUT_CURRENT:
             self._owner.release()
         elif name == "CLEAR_FAULT" and state == "FAULT":
             self.fault = "NONE"
             plant.clear_trips()
             self._enter("OFF")
         elif name == "ENABLE" and state == "OFF":
+            self._leaving = False
             self._owner.arm(plant.tick)
             plant.mode = core.READY
             self._enter("READY")
         elif name == "DISABLE" and state in RESTING:
-            plant.mode = core.OFF
-            self._owner.armed = False
-            self._enter("OFF")
+            self._switch_off("OFF")
         elif name == "LEVITATE" and state == "READY":
             plant.set("torque_on", 1.0)
             plant.mode = core.LIFT
@@ -252,7 +258,9 @@ class SimulatedController:
         name, p = self._parameters[index]
         if not self._owner.may_write(int(v["session8"])):
             status = "WRONG_SESSION"
-        elif not p.low <= round(value, 12) <= p.high and not np.isclose(value, (p.low, p.high), rtol=1e-6).any():
+        elif not np.isfinite(value) or (
+            not p.low <= round(value, 12) <= p.high and not np.isclose(value, (p.low, p.high), rtol=1e-6).any()
+        ):
             status = "OUT_OF_RANGE"
         elif p.when == "resting" and self.state not in RESTING:
             status = "WRONG_STATE"

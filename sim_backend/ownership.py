@@ -40,9 +40,9 @@ class Ownership:
             self.name = {part: values[part] for part in NAME_PARTS}
         return {"session": self.session, "since": self.since, **self.name}
 
-    def beat(self, values: Mapping[str, float], tick: int, resting: bool) -> None:
-        """Take a heartbeat; one whose counter stands still shows no life."""
-        if self.takes(int(values["session"]), tick, resting) and int(values["counter"]) != self.counter:
+    def beat(self, values: Mapping[str, float], tick: int) -> None:
+        """Take the owner's heartbeat; one whose counter stands still shows no life, and nobody becomes owner by one."""
+        if self.session and int(values["session"]) == self.session and int(values["counter"]) != self.counter:
             self.heartbeat, self.counter = tick, int(values["counter"])
 
     def arm(self, tick: int) -> None:

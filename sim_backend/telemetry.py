@@ -34,7 +34,8 @@ class Span:
 class TelemetryEncoder:
     """Makes one 64-byte message per row: sequence, tick, then 29 sixteen-bit numbers (see the DBC)."""
 
-    def __init__(self, messages: MessageMap, truth: Truth) -> None:
+    def __init__(self, messages: MessageMap, truth: Truth, first_tick: int = 0) -> None:
+        """`first_tick`: what ran before it was sent too, to nobody."""
         self._message = messages["Telemetry"]
         self._codes = {
             kind: {name: number for number, name in self._message.signal(kind).choices.items()}
@@ -48,7 +49,7 @@ class TelemetryEncoder:
         self._offset = np.array([s.offset for s in signals])
         self._low = np.array([-32768 if s.signed else 0 for s in signals])
         self._high = np.array([32767 if s.signed else 65535 for s in signals])
-        self._sequence = 0
+        self._sequence = first_tick // PERIOD_TICKS
         self._truth = truth
 
     def encode(self, spans: list[Span], clock: tuple[int, int]) -> FrameBatch:

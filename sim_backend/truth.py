@@ -93,8 +93,12 @@ def draw(
     the controller parameters that a procedure will write: the measurands hold for the bias among them.
 
     Raises:
-        ConfigError: an override names nothing.
+        ConfigError: an override names nothing, or the rig file has nothing to simulate.
     """
+    if not rig.simulation:
+        raise ConfigError(
+            f"rig {rig.name}: found no [simulation] table, so that there is nothing to simulate; expected --backend live"
+        )
     stated = _stated(rig)
     values = {name: draw_one(t, seed, name) for name, t in stated.items()}
     values |= {k: float(v) for k, v in rig.simulation.items() if isinstance(v, int | float)}

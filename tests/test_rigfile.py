@@ -80,7 +80,7 @@ def test_a_rig_file_is_frozen() -> None:
         ('serial = "SIM-0001"', "", "uut.serial", "a value"),
         ("latitude_deg = 53.527", "latitude_deg = 153.527", "site.latitude_deg", "less than or equal to 90"),
         ('unit = "A", default = 3, low = 0', 'unit = "Amp", default = 3, low = 0', "parameters.bias_i.unit", "known unit"),
-        ('signal = "Telemetry.speed", unit = "rad/s"', 'signal = "Telemetry.speed", unit = "rpm"', "channels.speed.unit",
+        ('signal = "Telemetry.speed", unit = "rad/s"', 'signal = "Telemetry.speed", unit = "rpn"', "channels.speed.unit",
          "known unit"),
         ('signal = "Telemetry.speed", unit = "rad/s"', 'signal = "Telemetry.speed", unit = "A"', "channels.speed.unit",
          "the kind of rad/s"),

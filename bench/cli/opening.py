@@ -6,6 +6,7 @@ import logging
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from bench import faults, linkurl
@@ -28,6 +29,7 @@ from bench.supervisor import Supervisor
 if TYPE_CHECKING:
     from drivers.controller import Controller
     from drivers.fieldbus import Fieldbus
+    from drivers.modbus import ModbusLine
     from drivers.operator import LineOperator
 
 logger = logging.getLogger("bench.opening")
@@ -132,7 +134,9 @@ def live(rig: RigFile, operator: str, injected: Sequence[Fault] = ()) -> Connect
                 return lines[rig.devices[device].link].port(rig.devices[device].unit)
 
             bus = stack.enter_context(open_devices(rig, port_of, controller.clock, controller.envelope, threaded=True))
-            yield _opened(controller, base, bus, _operators(operator, hands, controller, supervisor), None, injected)
+            yield _opened(
+                controller, base, bus, _operators(operator, hands, controller, supervisor), None, injected, lines
+            )
 
     return connect
 
@@ -178,7 +182,7 @@ def _operators(kind: str, line: LineOperator | None, controller: Controller, sup
 
 def _opened(
     controller: Controller, base: WatchedClock, bus: Fieldbus, operators: Sequence[Any], truth: Mapping[str, Any] | None,
-    injected: Sequence[Fault],
+    injected: Sequence[Fault], lines: Mapping[str, ModbusLine] = MappingProxyType({}),
 ) -> OpenRig:  # fmt: skip
     recording: list[Any] = [controller, bus, *operators]
     controller.companions.append(bus.pump)
@@ -194,7 +198,9 @@ def _opened(
 
     def health() -> Health:
         telemetry = controller.telemetry
-        return Health(telemetry.counters, controller.link.stats, telemetry.host.drift(), telemetry.host.latest_ns)
+        others = {name: line.stats for name, line in lines.items()}
+        return Health(telemetry.counters, controller.link.stats, telemetry.host.drift(), telemetry.host.latest_ns,
+                      controller.host_age_s, controller.round_trip_ns, others)  # fmt: skip
 
     rig = Rig(controller.rig, controller.clock, controller, controller, operators[0], controller.telemetry.counters,
               health, controller.link.close, bus.drive, bus.supply, bus.thermal)  # fmt: skip

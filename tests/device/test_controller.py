@@ -91,7 +91,7 @@ def test_lift_hold_land_and_switch_off() -> None:
 
 ALLOWED = {
     "OFF": {"ENABLE", "DISABLE", "MAKE_SAFE", "IDENTIFY", "RELEASE"},
-    "READY": {"DISABLE", "LEVITATE", "MAKE_SAFE", "IDENTIFY", "RELEASE"},
+    "READY": {"DISABLE", "LEVITATE", "MAKE_SAFE", "IDENTIFY"},
     "LIFTING": {"MAKE_SAFE", "IDENTIFY"},
     "LEVITATED": {"LAND", "SPIN", "STOP", "MAKE_SAFE", "IDENTIFY"},
     "LANDING": {"MAKE_SAFE", "IDENTIFY"},
@@ -111,10 +111,24 @@ def test_every_command_in_every_state(state: str, command: str) -> None:
     assert host.command(command) == ("OK" if command in ALLOWED[state] else "WRONG_STATE")
 
 
+def test_make_safe_lands_and_switches_off() -> None:
+    host = Host()
+    host.levitate()
+    assert host.command("MAKE_SAFE") == "OK"
+    host.run(2.5)
+    assert host.device.state == "OFF"
+    assert not (host.telemetry()["flags"].astype(int) & 16).any()  # the watchdog is disarmed
+    host.levitate()
+    assert host.command("LAND") == "OK"
+    host.run(1.5)
+    assert host.device.state == "READY"
+
+
 def test_an_unknown_command_and_a_zero_session_are_refused() -> None:
     host = Host()
     batch = host.run(0.02, host.message("Command", session=7, code=200, token=1))
     assert status(batch, "CommandReply") == "UNKNOWN"
+    assert Decoder(MESSAGES["CommandReply"]).decode(batch)[0]["code"] == 200
     host.beating = False
     other = Host()
     other.beating = False
@@ -124,8 +138,10 @@ def test_an_unknown_command_and_a_zero_session_are_refused() -> None:
 
 def test_parameters_are_range_checked_read_back_and_guarded() -> None:
     host = Host()
+    host.command("IDENTIFY")  # which takes the controller; heartbeats alone do not
     assert host.set("bias_i", 2.5) == ("OK", 2.5)
     assert host.set("bias_i", 9.0) == ("OUT_OF_RANGE", 2.5)
+    assert host.set("bias_i", float("nan")) == ("OUT_OF_RANGE", 2.5)
     batch = host.run(0.02, host.message("ParamSet", index=999, value=1.0, token=3))
     assert status(batch, "ParamReply") == "UNKNOWN"
     assert host.set("bias_i", 3.0) == ("OK", 3.0)

@@ -86,14 +86,16 @@ def test_a_reboot_begins_anew_from_sequence_0_and_leaves_the_rotor_lying() -> No
 
 def test_a_controller_that_reboots_is_deaf_first_and_then_knows_nobody() -> None:
     host = Host("reboot@0.5+0.1")
-    host.run(0.48)
+    host.command("IDENTIFY")
+    host.run(0.46)
     assert host.device._owner.session == SESSION
     host.run(0.02)
     assert len(host.command("ENABLE")) == 0
     assert (host.device.state, host.device._owner.session) == ("OFF", 0)
     host.run(0.18)
-    assert host.device._owner.session == SESSION  # taken by the first beat that it heard
-    assert host.device.state == "OFF"
+    assert host.device._owner.session == 0  # heartbeats take nothing
+    assert len(host.command("ENABLE")) > 0
+    assert (host.device.state, host.device._owner.session) == ("READY", SESSION)
 
 
 def test_the_reboot_comes_at_its_time_however_time_is_sliced() -> None:

@@ -17,8 +17,8 @@ def claim(owner: Ownership, who: Session, tick: int, resting: bool = True) -> Se
     return Session.of(owner.claim({k: float(v) for k, v in who.fields().items()}, tick, resting))
 
 
-def beat(owner: Ownership, session: int, counter: int, tick: int, resting: bool = True) -> None:
-    owner.beat({"session": session, "counter": counter}, tick, resting)
+def beat(owner: Ownership, session: int, counter: int, tick: int) -> None:
+    owner.beat({"session": session, "counter": counter}, tick)
 
 
 def test_the_first_that_asks_has_it_and_the_second_is_told_who() -> None:
@@ -70,10 +70,19 @@ def test_heartbeats_keep_it_and_a_counter_that_stands_still_does_not() -> None:
     assert owner.heartbeat == 500
 
 
-def test_a_heartbeat_takes_a_free_controller_without_a_name() -> None:
+def test_a_heartbeat_takes_nothing() -> None:
     owner = Ownership()
     beat(owner, ANN.number, 0, 50)
-    assert (owner.session, owner.heartbeat) == (ANN.number, 50)
+    assert (owner.session, owner.heartbeat) == (0, 0)
+    claim(owner, ANN, 60)
+    owner.release()
+    beat(owner, ANN.number, 1, 70)  # the last one of a host that leaves
+    assert claim(owner, BOB, 80) == BOB
+
+
+def test_a_command_takes_a_free_controller_without_a_name() -> None:
+    owner = Ownership()
+    assert owner.takes(ANN.number, 50, True)
     assert owner.claim({**{k: float(v) for k, v in BOB.fields().items()}}, 60, True) == {
         "session": ANN.number,
         "since": 0,
@@ -82,8 +91,10 @@ def test_a_heartbeat_takes_a_free_controller_without_a_name() -> None:
 
 def test_a_new_owners_first_heartbeat_counts_whatever_the_last_ones_counter_was() -> None:
     owner = Ownership()
+    claim(owner, ANN, 0)
     beat(owner, ANN.number, 9, 0)
     owner.release()
+    claim(owner, BOB, 30)
     beat(owner, BOB.number, 9, 40)
     assert owner.heartbeat == 40
     assert owner.counter == 9
@@ -114,7 +125,7 @@ def test_nobody_loses_it_while_turning_or_alive(actions: list[tuple[str, int, in
             assert answer["session"] == owner.session
             assert set(answer) <= {"session", "since", *NAME_PARTS}
         elif kind == "beat":
-            beat(owner, session, counter, tick, resting)
+            beat(owner, session, counter, tick)
         else:
             assert owner.takes(session, tick, resting) == (owner.session == session != 0)
         if before and owner.session != before:

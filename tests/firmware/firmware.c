@@ -38,7 +38,7 @@ enum { PARAMETERS = sizeof parameters / sizeof *parameters };
 
 static int port, packets;          /* the descriptor; packets rather than SLCAN */
 static int64_t now, sign_of_life;  /* ticks of 100 us */
-static int state, fault, armed, moving_ms;
+static int state, fault, armed, leaving, moving_ms; /* leaving: OFF when landed */
 static uint32_t owner;
 static uint8_t claimed[60];        /* since, name and spare of the owner's last Claim */
 static int counter = -1;           /* of the owner's last heartbeat; -1: none yet */
@@ -67,7 +67,7 @@ static float *parameter(int index) {
 
 static int at_rest(void) { return state == OFF || state == READY || state == FAULT; }
 
-static void enter(int next) { state = next; moving_ms = 0; }
+static void enter(int next) { state = next; moving_ms = 0; if (next == OFF || next == FAULT) armed = 0; }
 
 static void set_down(void) {
     if (state == LEVITATED || state == SPINNING) enter(fabs(speed) > *parameter(51) ? COASTING : LANDING);
@@ -87,15 +87,15 @@ static int takes(uint32_t session) { /* whether a session owns the controller; t
 static int obey(int code) {
     int levitated = state == LEVITATED || state == SPINNING;
     switch (code) {
-    case DISABLE: if (state != OFF && state != READY) return WRONG_STATE; armed = 0; enter(OFF); return OK;
-    case ENABLE: if (state != OFF) return WRONG_STATE; armed = 1; sign_of_life = now; enter(READY); return OK;
+    case DISABLE: if (state != OFF && state != READY) return WRONG_STATE; enter(OFF); return OK;
+    case ENABLE: if (state != OFF) return WRONG_STATE; armed = 1; leaving = 0; sign_of_life = now; enter(READY); return OK;
     case LEVITATE: if (state != READY) return WRONG_STATE; enter(LIFTING); return OK;
     case LAND: if (state != LEVITATED) return WRONG_STATE; enter(LANDING); return OK;
     case SPIN: if (!levitated) return WRONG_STATE; speed_target = *parameter(35); return OK;
     case STOP: if (!levitated) return WRONG_STATE; speed_target = 0; return OK;
     case CLEAR_FAULT: if (state != FAULT) return WRONG_STATE; fault = NO_FAULT; enter(OFF); return OK;
-    case MAKE_SAFE: set_down(); return OK;
-    case RELEASE: if (!at_rest()) return WRONG_STATE; release(); return OK;
+    case MAKE_SAFE: leaving = 1; set_down(); return OK;
+    case RELEASE: if (state != OFF && state != FAULT) return WRONG_STATE; release(); return OK;
     default: return OK; /* IDENTIFY */
     }
 }
@@ -117,7 +117,7 @@ static void claim(const uint8_t *m) {
 }
 
 static void heartbeat(const uint8_t *m) {
-    if (!takes(get(m, 4)) || (int)get(m + 4, 2) == counter) return;
+    if (!owner || get(m, 4) != owner || (int)get(m + 4, 2) == counter) return;
     counter = (int)get(m + 4, 2);
     sign_of_life = now;
 }
@@ -171,7 +171,7 @@ static void millisecond(int64_t tick) {
     }
     if (state == LIFTING && moving_ms >= LIFT_MS) enter(LEVITATED);
     if (state == COASTING && fabs(speed) < *parameter(51)) enter(LANDING);
-    if (state == LANDING && moving_ms >= LIFT_MS) enter(fault ? FAULT : READY);
+    if (state == LANDING && moving_ms >= LIFT_MS) enter(fault ? FAULT : leaving ? OFF : READY);
     angle = remainder(angle + speed * 1e-3, 6.283185307179586);
 }
 

@@ -13,7 +13,8 @@ import numpy.typing as npt
 from bench.frames import FD, FRAME, SENT, FrameBatch, empty_batch, frame, payload
 from bench.link import Link, LinkStats
 
-TELEMETRY, HEARTBEAT, COMMAND, PARAM_SET, COMMAND_REPLY, PARAM_REPLY = 0x100, 0x010, 0x011, 0x012, 0x021, 0x022
+TELEMETRY, HEARTBEAT, COMMAND, PARAM_SET, CLAIM = 0x100, 0x010, 0x011, 0x012, 0x014
+COMMAND_REPLY, PARAM_REPLY = 0x021, 0x022
 HOST_CONTROL, HOST_TUNING = 32, 33
 SYNC, DATA = 128, (144, 145, 146, 147)
 DEMANDS = {0: 0, 1: 1, 2: 2, 3: 3, 4: 4, 5: 5, 6: 7, 7: 6}  # Demand to Command.code
@@ -30,6 +31,7 @@ class PlainAmb:
         self._native, self._heard = native, heard
         self.name = native.name
         self._tuned: dict[int, int] = {}
+        self._say(CLAIM, struct.pack("<I60x", SESSION))  # it obeys this one host, whoever that is
         self.demands: list[int] = []
         self.refused: list[bytes] = []
 

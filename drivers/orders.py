@@ -1,0 +1,140 @@
+"""What is asked of a controller: commands and parameters, by the messages of the rig file, recorded, read back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from bench import units
+from bench.envelope import Envelope
+from bench.errors import BenchError
+from bench.recorder import Recorder
+from bench.rigfile import RigFile
+from bench.session import Session
+from drivers.dialogue import Dialogue, commanded, status_of
+
+STANDING = {"OFF": "DISABLE", "READY": "ENABLE"}
+"""Commands that keep a state as it is."""
+
+
+class Orders:
+    """Commands and parameters. `mode` tells the controller's, `wait` lets the clock run until something is true."""
+
+    def __init__(
+        self, rig: RigFile, dialogue: Dialogue, session: Session, envelope: Envelope, mode: Callable[[], str],
+        wait: Callable[..., None],
+    ) -> None:  # fmt: skip
+        self.rig, self._dialogue, self._session, self._envelope = rig, dialogue, session, envelope
+        self._mode, self._wait = mode, wait
+        self._commanded: set[str] = set()  # messages that a command was sent by
+        self.recorder: Recorder | None = None
+        for p in rig.parameters.values():
+            if p.signal:
+                message, _, signal = p.signal.partition(".")
+                dialogue.hold(message, signal, self._raw(p.signal, p.default))
+
+    def set(self, parameter: str, value: float) -> None:
+        """Write a parameter (SI) and check what the controller reads back.
+
+        Raises:
+            InterlockError: the envelope refuses; nothing was sent.
+            BenchError: the controller refuses, or reads back something else.
+        """
+        self._envelope.check_parameter(parameter, value)
+        p = self.rig.parameters[parameter]
+        if self.recorder is not None:
+            self.recorder.event("parameter", name=parameter, value=value)
+        if p.signal:
+            if p.when == "resting" and self._mode() not in STANDING:  # nobody answers: the refusal must be ours
+                raise BenchError(f"parameter {parameter} can be written at rest only; the controller is {self._mode()}")
+            message, _, signal = p.signal.partition(".")
+            self._send_held(message, {**self._standing(message), signal: self._raw(p.signal, value)})
+            return
+        values = {"index": float(p.index or 0), "value": value}
+        if any(s.name == "session8" for s in self.rig.messages["ParamSet"].signals):
+            values["session8"] = self._session.low_byte
+        reply = self._dialogue.ask("ParamSet", values, "ParamReply", f"the reply to {parameter}", self._wait)
+        status = status_of(self.rig.messages["ParamReply"], reply)
+        if status != "OK":
+            raise BenchError(
+                f"the controller refuses {parameter} = {value:g} {p.unit}: {status} in state {self._mode()}; in force is "
+                f"{reply['value']:g} {p.unit}"
+            )
+        if not np.isclose(reply["value"], value, rtol=1e-6, atol=1e-12):
+            raise BenchError(f"{parameter}: wrote {value!r}, the controller reads back {reply['value']!r}")
+
+    def get(self, parameter: str) -> float:
+        """Read a parameter, SI.
+
+        Raises:
+            BenchError: the controller does not know it, or it is one that can only be written.
+        """
+        p = self.rig.parameters[parameter]
+        if p.index is None:
+            raise BenchError(
+                f"parameter {parameter} is a signal that the host sends; the controller cannot be asked for it"
+            )
+        reply = self._dialogue.ask(
+            "ParamGet", {"index": p.index}, "ParamReply", f"the value of {parameter}", self._wait
+        )
+        if status_of(self.rig.messages["ParamReply"], reply) != "OK":
+            raise BenchError(f"the controller does not know parameter {parameter} (index {p.index})")
+        return reply["value"]
+
+    def _raw(self, path: str, value: float) -> float:
+        """A value in SI in the unit of its signal."""
+        message, _, signal = path.partition(".")
+        unit = units.UNITS[self.rig.messages[message].signal(signal).unit]
+        return (value - unit.offset) / unit.factor
+
+    def command(self, name: str) -> None:
+        """Ask for a command.
+
+        Raises:
+            BenchError: the controller has none of that name, or refuses.
+            LinkError: no reply.
+        """
+        messages = self.rig.messages
+        if not self.rig.binding.knows(name, messages):
+            raise BenchError(
+                f"the controller has no command {name}: {self.rig.path} names none under devices.controller.binding.commands. "
+                "Next: name it there, or do by hand what it asks for"
+            )
+        if self.recorder is not None:
+            self.recorder.event("command", name=name)
+        for message, values in commanded(self.rig, name).items():
+            self._commanded.add(message)
+            if message != "Command" or not self._dialogue.has("CommandReply"):
+                self._send_held(message, values)
+                continue
+            if any(s.name == "session" for s in messages[message].signals):
+                values["session"] = self._session.number
+            reply = self._dialogue.ask(message, values, "CommandReply", f"the reply to {name}", self._wait)
+            status = status_of(messages["CommandReply"], reply)
+            if status == "WRONG_SESSION":
+                raise BenchError(f"the controller refuses {name}: another host owns it")
+            if status != "OK":
+                raise BenchError(f"the controller refuses {name}: {status} in state {self._mode()}")
+
+    def _send_held(self, message: str, values: dict[str, float]) -> None:
+        owned = any(s.name == "session" for s in self.rig.messages[message].signals)
+        self._dialogue.send_held(message, {**values, "session": self._session.number} if owned else values)
+
+    def _standing(self, message: str) -> dict[str, float]:
+        """A parameter may share its message with commands. Before the first command the message must ask for the state
+        that the controller is in, or it would ask for whatever zero means.
+
+        Raises:
+            BenchError: the controller is in a state that no command of ours keeps; nothing was sent.
+        """
+        commands = self.rig.binding.commands
+        shared = any(path.partition(".")[0] == message for c in commands for path in commands[c])
+        if message in self._commanded or not shared:
+            return {}
+        if self._mode() not in STANDING:
+            raise BenchError(
+                f"message {message} carries commands too, and the controller is {self._mode()}: what to command with the "
+                "parameter is unknown; nothing was sent. Next: land the rotor, then write parameters"
+            )
+        return commanded(self.rig, STANDING[self._mode()]).get(message, {})
