@@ -9,6 +9,7 @@ from typing import Any
 
 from reports import tables, text
 from reports.figures import Drawn
+from reports.linktable import clean, link_table
 from reports.view import (
     ABOUT_UNCERTAINTY,
     DECISION_RULE,
@@ -86,7 +87,7 @@ def view_of(record: Content, around: Surroundings, figures: Iterable[Drawn] = ()
         traceability=tables.traceability(around.rig),
         calibrations=_calibrations(record.get("calibrations")),
         link=_link(record.get("link"), around),
-        link_note=_link_note(around),
+        link_note=f"{_link_note(around)} {clean(_mapping(record.get('link')))}".strip(),
         correlations=tables.correlations(record),
         plan=tuple(tables.facts(record.get("plan") or {})),
         versions=tuple(tables.facts(record.get("versions") or {})),
@@ -233,8 +234,13 @@ def _calibrations(found: Any) -> tuple[Fact, ...]:
     return tuple(tables.facts(found if isinstance(found, Mapping) else {"calibration": found}))
 
 
+def _mapping(found: Any) -> Content:
+    return found if isinstance(found, Mapping) else {}
+
+
 def _link(link: Any, around: Surroundings) -> tuple[Table, ...]:
-    made = [*counts("Link", link), *counts("Recording", around.integrity)]
+    made = [link_table(link)] if _mapping(link) else []
+    made += counts("Recording", around.integrity)
     kinds = Counter(str(e.get("kind") if isinstance(e, Mapping) else getattr(e, "kind", "")) for e in around.events)
     if kinds:
         rows = tuple((kind, text.plain(n)) for kind, n in sorted(kinds.items()))

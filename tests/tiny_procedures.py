@@ -21,7 +21,7 @@ SUPPLY = Quantity("supply", "V", "mean supply voltage")
 class Plan(BenchPlan):
     """`act` is what happens in the middle of acquire, `then` what analyse does."""
 
-    act: Literal["measure", "raise", "refuse", "stop", "count", "spin"] = "measure"
+    act: Literal["measure", "raise", "refuse", "stop", "count", "spin", "drive"] = "measure"
     then: Literal["yield", "nothing", "doubt", "raise"] = "yield"
     seconds: float = 0.5
     bias_A: float = 3.0
@@ -46,10 +46,27 @@ def _act(rig: Rig, plan: Plan) -> None:
         raise OperatorAbort("the operator said stop")
     if plan.act == "spin":
         rig.rotation.spin(30.0)
+    if plan.act == "drive":
+        _driven(rig)
     while plan.act in ("count", "spin"):  # until a signal ends it; each second of bench time is a line
         sys.stderr.write(f"at {rig.clock.now_ns()}\n")
         sys.stderr.flush()
         rig.clock.sleep(1.0)
+
+
+def _driven(rig: Rig) -> None:
+    """Turn the shaft by its external drive, with the motor's control of the angle released, and let it coast."""
+    assert rig.drive is not None
+    gains = {name: rig.levitation.get(name) for name in ("kp_theta", "ki_theta", "kd_theta")}
+    for name in gains:
+        rig.levitation.set(name, 0.0)
+    rig.drive.reach(20.0)
+    rig.clock.sleep(1.0)
+    rig.drive.coast()
+    while abs(rig.rotation.speed_rad_s) > 0.2:
+        rig.clock.sleep(0.1)
+    for name, value in gains.items():
+        rig.levitation.set(name, value)
 
 
 def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:

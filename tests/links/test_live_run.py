@@ -29,3 +29,23 @@ def test_a_live_run_loses_nothing_and_frees_the_rig(tmp_path: Path) -> None:
     assert len(seen["index"]) > 1500
     states = rig.state_lines()
     assert states[-1].endswith("-> OFF")
+
+
+@pytest.mark.timeout(120)
+def test_the_drive_turns_the_shaft_and_lets_it_coast(tmp_path: Path) -> None:
+    plan = ("--plan", 'act="drive"', "--no-report")
+    with processes.served(tmp_path) as rig:
+        status, record = processes.run(tmp_path, rig, "serial:socket", "tiny-levitated", *plan)
+    assert (status, record["outcome"]) == (0, "PASS"), record["findings"]
+    assert not [f for f in record["findings"] if f["code"] not in processes.HOST_STALLS]
+    (path,) = (tmp_path / "runs").glob("*/recording.mcap")
+    recording: Recording[object] = Recording.open(path)
+    assert {"telemetry", "drive", "supply", "thermal"} <= set(recording.streams)
+    drive, shaft = recording.channel("drive_actual_speed"), recording.channel("speed")
+    assert (np.diff(drive["index"]) == 1).all()
+    ours = np.interp(drive["t_ns"], shaft["t_ns"], shaft["speed"])
+    level = np.abs(drive["drive_actual_speed"] - 20.0) < 0.3
+    assert level.sum() >= 8
+    assert np.abs(ours - drive["drive_actual_speed"])[level].max() < 0.5
+    assert np.abs(shaft["speed"][-200:]).max() < 0.5
+    assert [e["command"] for e in recording.events("drive")][:2] == ["run", "coast"]

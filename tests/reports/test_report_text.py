@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from reports import text
+from reports.linktable import clean, link_table
 
 N = text.NARROW
 
@@ -69,3 +70,16 @@ def test_plain_keeps_what_was_written() -> None:
         "yes",
         f"872{N}341",
     ]
+
+
+def test_the_links_table_says_what_happened_and_the_note_what_did_not() -> None:
+    link = {"frames": 1234, "gaps": 2, "errors": 0, "counts": {"gaps": 2, "lost": 7, "crc_errors": 0, "sent": 50,
+            "longest_heartbeat_gap_ns": 21_340_000}, "drift_ppm": 12.34, "drift_expanded_ppm": 0.56,
+            "latest_ms": 3.21, "round_trip_ms": None}  # fmt: skip
+    rows = dict(link_table(link).rows)
+    assert rows["Frames recorded"] == "1234"
+    assert rows["Samples lost"] == "7"
+    assert rows["Longest time between heartbeats"] == f"21.3{N}ms"
+    assert rows["Host clock against the controller's, parts per million"] == "12.34 ± 0.56"
+    assert rows["Greatest lateness of a sample"] == f"3.21{N}ms"
+    assert clean(link) == "Watched for and not seen: packets with a wrong CRC."
