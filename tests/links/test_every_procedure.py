@@ -56,7 +56,9 @@ def test_equal_results(procedure: str, link: str, tmp_path: Path, in_one_process
             record = processes.record_in(tmp_path, child)
     assert [f for f in record["findings"] if f["code"] not in processes.HOST_STALLS] == []
     assert record["link"]["errors"] == record["link"]["counts"]["lost"] == 0
+    shown = 0
     for ours, theirs in zip(record["measurements"], in_one_process[procedure]["measurements"], strict=True):
         bound = SIGMAS * math.hypot(type_a(ours), type_a(theirs))
         assert abs(ours["value"] - theirs["value"]) <= bound, ours["name"]
-        assert bound < theirs["expanded_uncertainty"], "a bound that shows nothing"
+        shown += bound < theirs["expanded_uncertainty"] / 2
+    assert shown >= 2  # for at least two constants the bound is far narrower than their own uncertainty
