@@ -34,6 +34,11 @@ bench: setup
 	$(BIN)/python benchmarks/path.py
 	$(BIN)/python benchmarks/recorder.py
 	$(BIN)/python benchmarks/startup.py
+	$(BIN)/python benchmarks/slcan.py --seconds 10
+	$(BIN)/python benchmarks/serial_link.py --seconds 10
+	$(BIN)/python benchmarks/recorder_fast.py --seconds 10
+	$(BIN)/python benchmarks/roundtrip.py
+	$(BIN)/python benchmarks/dead_host.py --runs 3
 
 format: setup
 	$(BIN)/ruff format .

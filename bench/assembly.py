@@ -4,8 +4,10 @@ On classic CAN the first message (SYNC) carries sequence and tick, each other on
 to. A sample is complete when all its messages came; one that stays incomplete is lost and shows as a gap.
 
 Low bits alone do not say which sample a message belongs to: after a loss of 16 samples a count of 4 bits is the same
-again. So messages wait for the next SYNC, which says how far the sequence went on meanwhile; where it went too far for
-the count to tell, what waited is left out. A row is never made of parts of different samples.
+again. So messages wait for the next SYNC, which says how far the sequence went on meanwhile. A count is then read as the
+sample of that SYNC or one of a few before it, never one that is yet to come; the counts between are left out and
+counted. So a row is never made of parts of different samples, as long as no message comes later than its count goes
+round, less the sample that is due: 14 samples with 4 bits. What is later than that, no reader can tell from the count.
 """
 
 from __future__ import annotations
@@ -74,7 +76,7 @@ class _Frames:
 
 
 class Assembler:
-    """Takes the telemetry of one rig apart; `wrong_length` counts frames that were left out."""
+    """Takes the telemetry of one rig apart; `wrong_length` and `misplaced` count frames that were left out."""
 
     def __init__(self, rig: RigFile) -> None:
         b = rig.binding
@@ -85,6 +87,11 @@ class Assembler:
         self.sequence_bits = sync.signal(b.sequence).length
         self.tick_bits = sync.signal(b.tick).length
         self._joiner = Joiner(self.sequence_bits, [p.message.signal(b.counter).length for p in self._parts[1:]])
+
+    @property
+    def misplaced(self) -> int:
+        """Messages too late or too early to tell their samples."""
+        return self._joiner.misplaced
 
     def take(self, batch: FrameBatch) -> Rows:
         """The samples that a batch completes."""
@@ -148,6 +155,7 @@ class Joiner:
 
     sequence_bits: int
     count_bits: Sequence[int]
+    misplaced: int = 0
     _newest: int | None = None
     _pending: list[tuple[int, int, Values]] = field(default_factory=list)  # part, count, values since the newest SYNC
     _waiting: dict[int, _Sample] = field(default_factory=dict)
@@ -180,15 +188,20 @@ class Joiner:
         return self._complete()
 
     def _settle(self, ahead: int) -> None:
-        """Give what waited its sequence numbers: those within reach of the newest SYNC and the one that came now."""
+        """Give what waited its sequence numbers: up to that of the SYNC that came now, down to a few before."""
         assert self._newest is not None
+        due = self._newest + ahead
         for part, count, values in self._pending:
             size = 1 << self.count_bits[part - 1]
-            slack = (size - 1 - ahead) // 2  # samples that a message may be early or late
+            slack = (size - 1 - ahead) // 2  # samples that a message may be late; as many are left between
             if slack < max(1, size // 8):
-                continue  # too much is missing to tell which sample this belongs to
+                self.misplaced += 1  # too much is missing to tell which sample this belongs to
+                continue
             low = self._newest - slack
             number = low + (count - low) % size
+            if not due - KEPT <= number <= due:
+                self.misplaced += 1
+                continue
             sample = self._waiting.setdefault(number, _Sample([None] * (len(self.count_bits) + 1)))
             sample.values[part] = values
         self._pending.clear()

@@ -38,6 +38,7 @@ class HostMap:
         self._least: tuple[int, int] | None = None
         self.latest_ns = latest_ns  # greatest lateness beyond drift
         self.lag_ns = 0  # host time less this is sample time
+        self._beyond, self.longest_beyond = 0, 0  # windows in a row whose least lateness is more than drift can make
 
     def take(self, samples_ns: npt.NDArray[np.int64], hosts_ns: npt.NDArray[np.int64]) -> None:
         """One batch: sample times and when each arrived."""
@@ -48,14 +49,22 @@ class HostMap:
             self._first_ns = sample_ns
         window = (sample_ns - self._first_ns) // WINDOW_NS
         if window != self._window and self._least is not None:
-            self._minima.append(self._least)
+            self._finish(self._least)
             self._window, self._least = window, None
         if self._least is None or late < self._least[1]:
             self._least = (sample_ns, late)
         # Earlier than ever is a proof that the first sample itself was late; later than any drift is latency.
-        bound = JITTER_NS + round(MAX_DRIFT * (sample_ns - self._first_ns))
-        self.lag_ns = min(bound, *(x for _, x in [*self._minima[-2:], self._least]))
+        self.lag_ns = min(self._bound(sample_ns), *(x for _, x in [*self._minima[-2:], self._least]))
         self.latest_ns = max(self.latest_ns, int(lateness.max()) - self.lag_ns)
+
+    def _bound(self, sample_ns: int) -> int:
+        assert self._first_ns is not None
+        return JITTER_NS + round(MAX_DRIFT * (sample_ns - self._first_ns))
+
+    def _finish(self, least: tuple[int, int]) -> None:
+        self._minima.append(least)
+        self._beyond = self._beyond + 1 if least[1] > self._bound(least[0]) else 0
+        self.longest_beyond = max(self.longest_beyond, self._beyond)
 
     def drift(self) -> Drift | None:
         """Slope of the windows' minima (Theil and Sen: no latency of a few windows moves it); None with too few

@@ -19,6 +19,7 @@ class LinkStats:
     packets_lost: int = 0  # by the packets' own sequence numbers
     error_frames: int = 0  # destroyed frames that the interface reports
     refused: int = 0  # frames or commands that the interface refuses to send
+    adapter_overruns: int = 0  # times that the adapter told of frames it lost itself
     overflows: int = 0  # frames dropped because nobody took them from the buffer
     bus_off: int = 0
     reconnects: int = 0
@@ -37,6 +38,11 @@ class Link(Protocol):
     @property
     def stats(self) -> LinkStats:
         """Counts since the link was opened."""
+        ...
+
+    @property
+    def reopening(self) -> bool:
+        """Whether the transport is lost and being opened again."""
         ...
 
     def send(self, batch: FrameBatch) -> None:

@@ -12,6 +12,8 @@ from bench.records import LinkCounts
 from bench.telemetry import Counters
 
 LATE_S = 0.04  # telemetry that comes later than this is worth a word
+DRIFT_PPM, WRONG_PPM = 200.0, 1000.0  # bench.hosttime follows no more; no crystal is as wrong as that
+BEYOND = 5  # windows of a second in a row; a stall is shorter
 PERIODS, PERIOD_S = 3, 0.02  # of a heartbeat; a longer gap comes near the watchdog
 
 
@@ -26,13 +28,21 @@ class Health:
     host_age_s: float = 0.0  # the controller heard no heartbeat for so long
     round_trip_ns: int | None = None  # least time from a request to its answer
     others: Mapping[str, LinkStats] = field(default_factory=dict)  # of the rig's further links
+    beyond_drift: int = 0  # windows in a row in which telemetry fell behind faster than drift (HostMap.longest_beyond)
+    replies_wrong_length: int = 0  # frames of a wrong length that are no telemetry (Dialogue.wrong_length)
+
+    @property
+    def wrong_length(self) -> int:
+        """Telemetry and replies whose length is not that of the DBC."""
+        return self.counters.wrong_length + self.replies_wrong_length
 
     def counts(self, frames: int) -> LinkCounts:
         """As the record has it; `frames` is how many were recorded, in both directions."""
         c, s = self.counters, self.stats
-        named = {**asdict(c), **asdict(s)}
-        errors = c.wrong_length + c.duplicates + c.reordered + c.late + c.unknown + c.reboots + s.crc_errors
-        errors += s.malformed + s.packets_lost + s.error_frames + s.refused + s.overflows + s.bus_off + s.reconnects
+        named = {**asdict(c), **asdict(s), "wrong_length": self.wrong_length}
+        errors = self.wrong_length + c.lost + c.late + c.misplaced + c.duplicates + c.reordered + c.unknown + c.reboots
+        errors += s.crc_errors + s.malformed + s.packets_lost + s.error_frames + s.refused + s.adapter_overruns
+        errors += s.overflows + s.bus_off + s.reconnects
         drift = self.drift
         return LinkCounts(frames, c.gaps, errors, named, drift.ppm if drift else None,
                           drift.expanded_ppm if drift else None, self.latest_ns * 1e-6,
@@ -46,8 +56,10 @@ class Health:
             (c.late, "samples-late", f"{c.late} samples came after their successors and stay lost", Effect.NOTE),
             (c.duplicates, "frames-duplicated", f"{c.duplicates} samples came twice; one of each was kept", Effect.NOTE),
             (c.reordered, "frames-reordered", f"{c.reordered} samples came out of order and were put back", Effect.NOTE),
-            (c.wrong_length, "wrong-length", f"{c.wrong_length} frames do not have the length of the DBC; they were left "
-             "out. Does the firmware's message map match the rig file's?", Effect.INDETERMINATE),
+            (c.misplaced, "messages-misplaced", f"{c.misplaced} telemetry messages came too late or too early to tell "
+             "their samples and were left out. Does the controller send those of a sample together?", Effect.NOTE),
+            (self.wrong_length, "wrong-length", f"{self.wrong_length} frames do not have the length of the DBC; they were "
+             "left out. Does the firmware's message map match the rig file's?", Effect.INDETERMINATE),
             (c.unknown, "unknown-frames", f"{c.unknown} frames have identifiers that the DBC does not know", Effect.NOTE),
             (c.reboots, "controller-restarted", f"the controller restarted {c.reboots} times", Effect.ERROR),
             (s.crc_errors, "packets-corrupt", f"{s.crc_errors} packets failed their CRC and were dropped", Effect.NOTE),
@@ -56,6 +68,8 @@ class Health:
             (s.packets_lost, "packets-lost", f"{s.packets_lost} packets are missing by their own numbers", Effect.NOTE),
             (s.error_frames, "error-frames", f"the interface reported {s.error_frames} destroyed frames", Effect.NOTE),
             (s.refused, "frames-refused", f"the interface refused {s.refused} frames or commands", Effect.NOTE),
+            (s.adapter_overruns, "adapter-overrun", f"the adapter told {s.adapter_overruns} times of frames that it lost",
+             Effect.NOTE),
             (s.overflows, "buffer-overflow", f"{s.overflows} frames were dropped: the bench did not keep up",
              Effect.ERROR),
             (s.bus_off, "bus-off", f"the bus went off {s.bus_off} times", Effect.ERROR),
@@ -67,6 +81,7 @@ class Health:
         if gap > PERIODS * PERIOD_S:
             yield Finding("heartbeat-late", f"two heartbeats were {gap * 1e3:.0f} ms apart; the watchdog ends a run at "
                           "80 ms by default. Was the host busy?", "link")  # fmt: skip
+        yield from self._clock()
         if (self.round_trip_ns or 0) > LATE_S * 1e9:
             yield Finding("link-slow", f"answers take at least {(self.round_trip_ns or 0) * 1e-6:.0f} ms: telemetry may "
                           "be that much older than it looks", "link")  # fmt: skip
@@ -77,3 +92,17 @@ class Health:
         if self.latest_ns > LATE_S * 1e9:
             text = f"telemetry came up to {self.latest_ns * 1e-9:.2f} s late; samples carry the device's own time"
             yield Finding("telemetry-late", text, "link")
+
+    def _clock(self) -> Iterator[Finding]:
+        """Host times follow the samples up to 200 ppm; beyond that steps and events slide along the samples."""
+        check = "Steps and samples drift apart. Check tick_s in the rig file and the controller's crystal"
+        d = self.drift
+        if d is not None and abs(d.ppm) - d.expanded_ppm > DRIFT_PPM:
+            effect = Effect.ERROR if abs(d.ppm) - d.expanded_ppm > WRONG_PPM else Effect.INDETERMINATE
+            way = "slow" if d.ppm > 0 else "fast"
+            text = f"the controller's clock runs {abs(d.ppm):.0f} ppm {way} against the host's"
+            yield Finding("clock-drift", f"{text} (U = {d.expanded_ppm:.1f} ppm); up to {DRIFT_PPM:.0f} ppm is right. "
+                          f"{check}", "link", effect)  # fmt: skip
+        elif d is None and self.beyond_drift >= BEYOND:
+            text = f"telemetry fell behind the host's clock by more than {DRIFT_PPM:.0f} ppm for {self.beyond_drift} s"
+            yield Finding("clock-drift", f"{text}. {check}", "link", Effect.INDETERMINATE)

@@ -66,6 +66,7 @@ def parse(url: str) -> LinkUrl:
         ConfigError: an unknown scheme, or nothing after it.
     """
     scheme, colon, rest = url.partition(":")
+    scheme = scheme.lower()
     if not colon or scheme not in EXAMPLES:
         close = difflib.get_close_matches(scheme, EXAMPLES, 1)
         known = f"did you mean {EXAMPLES[close[0]]!r}?" if close else f"expected one of {', '.join(EXAMPLES)}"

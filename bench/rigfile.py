@@ -50,7 +50,7 @@ class LinkSpec(Part):
     dbc: str = ""
     encoding: str = "utf-8"
     options: Mapping[str, str | int | float | bool] = {}  # passed on to the interface's library as they are
-    reconnect_s: float = Field(0.0, ge=0)  # how long to try again after the link was lost; 0: not at all
+    reconnect_s: float = Field(0.0, ge=0, le=30)  # how long to try again after the link was lost; 0: not at all
     heartbeat: Literal["process", "thread"] = "process"
 
 

@@ -66,6 +66,8 @@ class Drive(Protocol):
     def fault(self) -> str: ...  # its name, "" without one
     @property
     def running(self) -> bool: ...  # it gives torque
+    def confirm_off(self) -> bool: ...  # a reading made now says: no torque; raises nothing
+    def let_go(self) -> None: ...  # sends coast, waits for nothing and raises nothing
     def set_speed(self, rad_s: float) -> None: ...  # passes the envelope; takes effect while it runs
     def run(self) -> None: ...  # it gives torque; the speed follows
     def reach(self, rad_s: float) -> None: ...  # set_speed, run; returns at that speed

@@ -14,11 +14,14 @@ from bench.hosttime import HostMap
 from bench.rigfile import RigFile
 from bench.samples import ChannelInfo, SampleBlock, StreamLayout
 
+Integers = npt.NDArray[np.int64]
 STREAM = "telemetry"
 CODES = ("state", "fault", "flags")
 REMEMBERED = 2000
 REBOOT_S = 1.0  # a tick so far in the past is a restart, not a late frame
 STALE = 100  # old samples in a row that are no repetition any more
+SLACK, SHARE = 2, 0.02  # samples, and share of an advance, by which sequence and tick may differ
+FAR = 4  # a sequence that went so many times as far as its tick began anew
 
 
 @dataclass
@@ -33,15 +36,18 @@ class Counters:
     wrong_length: int = 0
     unknown: int = 0  # frames whose identifier is not in the DBC
     reboots: int = 0
+    misplaced: int = 0  # messages on classic CAN too late or too early to tell their sample
 
 
 @dataclass
 class _Segment:
-    """Since the controller started: offset of the sample clock, and the last sequence number and tick, unwrapped."""
+    """Since the controller started: offset of the sample clock, and the last sequence number and tick, unwrapped, and
+    that sequence number as it came."""
 
     offset_ns: int
     sequence: int
     tick: int
+    raw: int
 
 
 @dataclass
@@ -57,6 +63,7 @@ class TelemetryDecoder:
         self._assembler = Assembler(self.rig)
         self._first = self.rig.messages[self.rig.binding.telemetry[0]]
         self._tick_ns = round(self.rig.devices["controller"].tick_s * 1e9)
+        self._ticks = self._first.period_s * 1e9 / self._tick_ns  # of a sample
         self._known = np.array(sorted(m.identifier for m in self.rig.messages.messages.values()))
         self._segment: _Segment | None = None
         self._index = 0
@@ -86,6 +93,7 @@ class TelemetryDecoder:
         self.counters.unknown += int((~np.isin(good["id"], self._known)).sum())
         rows = self._assembler.take(good)
         self.counters.wrong_length = self._assembler.wrong_length
+        self.counters.misplaced = self._assembler.misplaced
         return self._ordered(rows) if len(rows) else []
 
     def _ordered(self, rows: Rows) -> list[SampleBlock]:
@@ -96,13 +104,17 @@ class TelemetryDecoder:
             return before + self._ordered(_part(rows, slice(restart, None)))
         s = self._segment
         if s is None:
-            offset = int(rows.arrived[0]) - int(rows.tick[0]) * self._tick_ns
-            s = self._segment = _Segment(offset, int(rows.sequence[0]) - 1, int(rows.tick[0]) - 1)
-        ticks = s.tick + _signed(rows.tick - s.tick, self._assembler.tick_bits)
-        sequence = s.sequence + _signed(rows.sequence - s.sequence, self._assembler.sequence_bits)
+            raw, tick = int(rows.sequence[0]), int(rows.tick[0])
+            offset = int(rows.arrived[0]) - tick * self._tick_ns
+            s = self._segment = _Segment(offset, raw, tick, raw)
+            last = raw - 1
+        else:
+            last = s.sequence
+        steps, went = self._advance(rows.sequence - s.raw, rows.tick - s.tick)
+        sequence, ticks = s.sequence + steps, s.tick + went
         self.counters.reordered += int((np.diff(sequence) < 0).sum())
         unique, first = np.unique(sequence, return_index=True)
-        fresh = unique > s.sequence
+        fresh = unique > last
         late = [int(n) for n in unique[~fresh] if int(n) in self._missing]
         self._missing.difference_update(late)
         self.counters.late += len(late)
@@ -114,7 +126,30 @@ class TelemetryDecoder:
         columns = {name: x[keep] for name, x in rows.columns.items()}
         self.latest = {name: float(x[-1]) for name, x in columns.items()}
         self.host.take(s.offset_ns + ticks[keep] * self._tick_ns, rows.arrived[keep])
-        return self._split(sequence[keep], ticks[keep], columns, int(rows.arrived.max()))
+        s.raw, s.sequence, s.tick = int(rows.sequence[keep[-1]]), int(sequence[keep[-1]]), int(ticks[keep[-1]])
+        return self._split(sequence[keep], last, ticks[keep], columns, int(rows.arrived.max()))
+
+    def _advance(self, sequence: Integers, tick: Integers) -> tuple[Integers, Integers]:
+        """By how many samples and ticks rows went on, from differences of counters that come round.
+
+        The sequence alone does not tell a gap from one that is longer by a whole round; the tick does, and the other way
+        about for a tick of few bits. Where the two do not agree, the sequence counts, unless it began anew by its tick.
+        """
+        bits = self._assembler.sequence_bits
+        steps, went = self._shortest(sequence, tick)
+        told = np.round(went / self._ticks).astype(np.int64)
+        whole = told + _signed(steps - told, bits)
+        agree = np.abs(whole - told) <= SLACK + SHARE * np.abs(told)
+        anew = (told > 0) & ((steps <= 0) | (steps > FAR * told + SLACK))
+        return np.where(agree, whole, np.where(anew, told, steps)), went
+
+    def _shortest(self, sequence: Integers, tick: Integers) -> tuple[Integers, Integers]:
+        """Both the short way round, but the tick as far as the sequence went where its bits allow that."""
+        steps = _signed(sequence, self._assembler.sequence_bits)
+        due = np.round(steps * self._ticks).astype(np.int64)
+        off = _signed(tick - due, self._assembler.tick_bits)
+        fits = np.abs(off) <= (SLACK + SHARE * np.abs(steps)) * self._ticks
+        return steps, np.where(fits, due + off, _signed(tick, self._assembler.tick_bits))
 
     def _all_old(self, rows: Rows) -> list[SampleBlock]:
         """Nothing but samples that are there already. Once or twice that is a repetition; time and again, with rising
@@ -135,11 +170,11 @@ class TelemetryDecoder:
     def _restart(self, rows: Rows) -> int:
         """Index of the first row after a restart of the controller, 0 if there is none (or it is the first row, which
         then starts a segment)."""
-        if self._segment is None:
+        s = self._segment
+        if s is None:
             return 0
-        steps = _signed(np.diff(rows.tick, prepend=self._segment.tick & _mask(self._assembler.tick_bits)),
-                        self._assembler.tick_bits)  # fmt: skip
-        back = np.flatnonzero(steps * self._tick_ns < -REBOOT_S * 1e9)
+        _, went = self._shortest(np.diff(rows.sequence, prepend=s.raw), np.diff(rows.tick, prepend=s.tick))
+        back = np.flatnonzero(went * self._tick_ns < -REBOOT_S * 1e9)
         if not len(back):
             return 0
         if back[0] == 0:
@@ -148,13 +183,14 @@ class TelemetryDecoder:
 
     def _split(
         self,
-        sequence: npt.NDArray[np.int64],
-        ticks: npt.NDArray[np.int64],
+        sequence: Integers,
+        last: int,
+        ticks: Integers,
         columns: dict[str, npt.NDArray[np.float64]],
         host_ns: int,
     ) -> list[SampleBlock]:
         assert self._segment is not None
-        before = np.diff(sequence, prepend=self._segment.sequence) - 1
+        before = np.diff(sequence, prepend=last) - 1
         starts = np.flatnonzero(np.concatenate([[True], before[1:] > 0]))
         out = []
         for a, b in zip(starts, [*starts[1:], len(sequence)], strict=True):
@@ -178,19 +214,14 @@ class TelemetryDecoder:
                 )
             )
             self._index += int(b - a)
-        self._segment.sequence, self._segment.tick = int(sequence[-1]), int(ticks[-1])
         return out
 
 
-def _signed(difference: npt.NDArray[np.int64], bits: int) -> npt.NDArray[np.int64]:
+def _signed(difference: Integers, bits: int) -> Integers:
     """A difference of counters of so many bits, taken the short way round."""
     half = np.int64(1) << (bits - 1)
-    out: npt.NDArray[np.int64] = ((difference + half) & ((np.int64(1) << bits) - 1)) - half
+    out: Integers = ((difference + half) & ((np.int64(1) << bits) - 1)) - half
     return out
-
-
-def _mask(bits: int) -> int:
-    return (1 << bits) - 1
 
 
 def _part(rows: Rows, part: slice) -> Rows:

@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from bench.clock import Clock, PumpedClock
 from bench.envelope import Envelope
 from bench.errors import DeviceFault, InterlockError, LinkError
+from bench.frames import SENT, FrameBatch
 from bench.link import Link
 from bench.recorder import Recorder
 from bench.rigfile import RigFile
@@ -15,7 +18,7 @@ from bench.roles import RigState
 from bench.samples import SampleBlock
 from bench.session import Session
 from bench.telemetry import TelemetryDecoder
-from drivers import handshake
+from drivers import advice, handshake
 from drivers.dialogue import Dialogue, no_reply
 from drivers.orders import Orders
 
@@ -26,17 +29,7 @@ HOST_AGE = "host_age"
 FIRST_S = 1.5  # for the first telemetry, and for the last owner to be gone
 STATES = {"OFF": RigState.OFF, "READY": RigState.READY, "LIFTING": RigState.READY, "LEVITATED": RigState.LEVITATED,
           "SPINNING": RigState.SPINNING, "LANDING": RigState.LEVITATED, "COASTING": RigState.SPINNING,
-          "FAULT": RigState.OFF}  # fmt: skip
-ADVICE = {
-    "CONTACT": "the rotor touched a touchdown bearing; inspect it before levitating again",
-    "OVERCURRENT": "look for a short or a load beyond the envelope",
-    "OVERSPEED": "check the drive and the speed limit",
-    "HEARTBEAT_LOST": "the host or the link stalled; the controller landed the rotor by itself",
-    "LEVITATION_LOST": "check sensor signs and wiring, amplifier limits and the load",
-    "LIFT_TIMEOUT": "the rotor did not reach its place; check sensors, amplifiers and gains",
-    "OVERTEMPERATURE": "let the windings cool",
-    "SENSOR": "check the position sensors",
-}
+          "FAULT": RigState.OFF, "UNKNOWN": RigState.SPINNING}  # fmt: skip
 
 
 class Controller:
@@ -58,6 +51,9 @@ class Controller:
         self._angle = 0.0
         self._reboots = 0
         self.cleared = ""
+        self.restored: tuple[str, ...] = ()
+        self._host_ids = {rig.messages[name].identifier: name for name in handshake.host_messages(rig)}
+        self._others: set[str] = set()  # host messages that came in
         self.host_age_s = 0.0  # the greatest while the machine was on
         self.companions: list[Callable[[], None]] = []  # polled with it: other devices of the rig
         self._orders = Orders(rig, self._dialogue, session, self.envelope, lambda: self.mode, self._wait)
@@ -73,15 +69,23 @@ class Controller:
         if recorder is not None:
             self.telemetry.start_counting()
 
-    def connect(self) -> None:
-        """See that the controller talks, that nobody else owns it, and that it is the one the rig file means. A fault
-        that an earlier run left is cleared; `cleared` then names it.
+    def connect(self, clear_fault: bool = False) -> None:
+        """See that the controller talks, that nobody else owns it, and that it is the one the rig file means; set its
+        parameters to the rig file's. `cleared` names a fault that an earlier run left, `restored` parameters that were
+        other.
+
+        Args:
+            clear_fault: clear whatever fault there is; else only HEARTBEAT_LOST, which says nothing of the machine.
 
         Raises:
             LinkError: no telemetry, or no answer.
-            ConfigError: another host owns it, or its protocol or message map is another one.
+            ConfigError: another host owns it or talks to it, its protocol or message map is another one, or it has a
+                fault that somebody should look at.
         """
         self.guarded = False
+        if not self._dialogue.has("Claim"):
+            self.clock.sleep(handshake.LISTEN_S)
+            handshake.alone(self._others, self.link.name)
         self.link.renew_lease()
         silent = (
             f"no telemetry within {FIRST_S:g} s. Is the controller on, the port right, the bit rate that of the bus?"
@@ -90,8 +94,10 @@ class Controller:
         handshake.claim(self._dialogue, self.rig, self._session, self.clock, self._wait)
         handshake.identify(self._dialogue, self.rig, self._session, self._wait)
         if self.mode == "FAULT":
+            handshake.may_clear(self.fault, clear_fault)
             self.cleared = self.fault
             self._command("CLEAR_FAULT", "OFF", 1.0)
+        self.restored = self._orders.restore()
         self._last_ns = self._base.now_ns()
         self.guarded = True
 
@@ -108,7 +114,7 @@ class Controller:
             InterlockError: the envelope tripped.
             DeviceFault: the controller reports a fault, or has restarted.
         """
-        batch = self.link.receive()
+        batch = self._marked(self.link.receive())
         if self._recorder is not None:
             self._recorder.frames(self.link.name, batch, lag_ns=self.telemetry.host.lag_ns)
         self._dialogue.take(batch)
@@ -127,6 +133,15 @@ class Controller:
         for pump in self.companions:
             pump()
 
+    def _marked(self, batch: FrameBatch) -> FrameBatch:
+        """Frames that a host sent are marked so: another host's, or our own heartbeats that the bus brings back."""
+        theirs = np.isin(batch["id"], list(self._host_ids))
+        if theirs.any():
+            batch = batch.copy()
+            batch["flags"][theirs] |= SENT
+            self._others |= {self._host_ids[int(i)] for i in batch["id"][theirs]}
+        return batch
+
     def require_levitated(self) -> None:
         """Raise unless the rotor is held.
 
@@ -143,7 +158,7 @@ class Controller:
             self.host_age_s = max([self.host_age_s, *ages])
 
     def _check(self) -> None:
-        if self.silent_s > SILENCE_S + self.rig.link.reconnect_s:
+        if self.silent_s > SILENCE_S + (self.rig.link.reconnect_s if self.link.reopening else 0.0):
             text = f"no telemetry for {self.silent_s:.2f} s; the link or the controller is lost"
             raise LinkError(f"link {self.link.name}: {text}")
         if self.telemetry.counters.reboots > self._reboots:
@@ -151,8 +166,8 @@ class Controller:
             raise DeviceFault("the controller restarted during the run: its tick began anew; look at its supply")
         fault = self.fault
         if fault != "NONE":
-            raise DeviceFault(f"the controller reports {fault}: {ADVICE.get(fault, 'see its documentation')}")
-        if self.mode == "FAULT":
+            raise DeviceFault(f"the controller reports {fault}: {advice.ADVICE.get(fault, 'see its documentation')}")
+        if self.mode in ("FAULT", "UNKNOWN"):
             code = int(self.telemetry.latest.get("state", 0))
             name = self._states.get(code, f"{code}, which its DBC does not name")
             raise DeviceFault(f"the controller reports no fault, but its state is {name}: see its documentation")
@@ -163,18 +178,23 @@ class Controller:
         return self._dialogue.round_trip_ns
 
     @property
+    def replies_wrong_length(self) -> int:
+        """Replies that do not have the length of the DBC."""
+        return self._dialogue.wrong_length
+
+    @property
     def silent_s(self) -> float:
         """How long no telemetry has come."""
         return (self._base.now_ns() - self._last_ns) * 1e-9
 
     @property
     def mode(self) -> str:
-        """What the controller's state amounts to: one of bench.binding.MODES. A state without a name is FAULT: nobody
-        knows what the machine does in it."""
+        """What the controller's state amounts to: one of bench.binding.MODES, or UNKNOWN for a state without a name:
+        nobody knows what the machine does in it."""
         if not self.telemetry.latest:
             return "OFF"
         name = self._states.get(int(self.telemetry.latest.get("state", 0)))
-        return (self.rig.binding.mode(name) if name is not None else None) or "FAULT"
+        return (self.rig.binding.mode(name) if name is not None else None) or "UNKNOWN"
 
     @property
     def fault(self) -> str:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from bench.codec import Decoder, encode
 from bench.errors import LinkError
-from bench.frames import FD, SENT, FrameBatch, frame
+from bench.frames import ERROR, FD, SENT, FrameBatch, frame
 from bench.link import Link
 from bench.messages import Message
 from bench.recorder import Recorder
@@ -27,6 +27,8 @@ class Dialogue:
         self._answers: deque[tuple[str, dict[str, float], int]] = deque(maxlen=KEPT)
         self._held: dict[str, dict[str, float]] = {}
         self._token = 0
+        self._misfit: dict[str, int] = {}  # length of replies that do not fit, since the last request
+        self.wrong_length = 0  # replies that do not have the length of the DBC
         self.recorder: Recorder | None = None
         self.round_trip_ns: int | None = None  # the least so far
 
@@ -35,11 +37,18 @@ class Dialogue:
         return message in self._rig.messages.messages
 
     def take(self, batch: FrameBatch) -> None:
-        """Keep the replies in a batch for who waits for them."""
+        """Keep the replies in a batch for who waits for them. Destroyed frames are none; those of a wrong length are
+        counted and left out."""
+        destroyed = (batch["flags"] & ERROR) != 0
+        good = batch[~destroyed] if destroyed.any() else batch
         for name, decoder in self._decoders.items():
-            values, _ = decoder.decode(batch)
-            mine = (batch["id"] == decoder.message.identifier) & (batch["length"] == decoder.message.length)
-            for k, t_ns in enumerate(batch["t_ns"][mine].tolist()):
+            values, wrong = decoder.decode(good)
+            mine = good["id"] == decoder.message.identifier
+            fits = good["length"] == decoder.message.length
+            if wrong:
+                self.wrong_length += wrong
+                self._misfit[name] = int(good["length"][mine & ~fits][-1])
+            for k, t_ns in enumerate(good["t_ns"][mine & fits].tolist()):
                 self._answers.append((name, {s: float(v[k]) for s, v in values.items()}, t_ns))
 
     def ask(
@@ -51,7 +60,7 @@ class Dialogue:
             LinkError: no reply within half a second.
         """
         self._token = (self._token + 1) & 0xFF
-        self._answers.clear()
+        self._forget()
         request, answer = self._rig.messages[message], self._rig.messages[reply]
         tokens = _has(request, "token") and _has(answer, "token")
         sent_ns = self._now_ns()
@@ -64,11 +73,48 @@ class Dialogue:
             )
             return bool(found)
 
-        wait(arrived, REPLY_S, what)
+        self._waited(wait, arrived, reply, what)
         values, t_ns = found[0]
         took = max(t_ns - sent_ns, 0)
         self.round_trip_ns = took if self.round_trip_ns is None else min(self.round_trip_ns, took)
         return values
+
+    def ask_all(
+        self, message: str, requests: Sequence[Mapping[str, float]], reply: str, key: str, wait: Callable[..., None]
+    ) -> dict[float, dict[str, float]]:
+        """Send many requests at once and wait for their replies; by the value of their signal `key`.
+
+        Raises:
+            LinkError: one does not come within half a second.
+        """
+        self._forget()
+        for values in requests:
+            self.send(message, values)
+        found: dict[float, dict[str, float]] = {}
+
+        def arrived() -> bool:
+            found.update({v[key]: v for n, v, *_ in self._answers if n == reply})
+            return all(values[key] in found for values in requests)
+
+        self._waited(wait, arrived, reply, f"the replies to {message}")
+        return found
+
+    def _forget(self) -> None:
+        self._answers.clear()
+        self._misfit.clear()
+
+    def _waited(self, wait: Callable[..., None], arrived: Callable[[], bool], reply: str, what: str) -> None:
+        """Wait for a reply. Where it came but did not fit, the error says so."""
+        try:
+            wait(arrived, REPLY_S, what)
+        except LinkError as error:
+            if reply not in self._misfit:
+                raise
+            stated = self._rig.messages[reply].length
+            raise LinkError(
+                f"{error}. A {reply} of {self._misfit[reply]} bytes came, the DBC says {stated}: does the firmware's "
+                "message map match the rig file's?"
+            ) from error
 
     def send(self, message: str, values: Mapping[str, float]) -> None:
         """Send a message as it is."""

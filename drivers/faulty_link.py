@@ -58,6 +58,13 @@ class FaultyLink:
         counted = self._frames.counted(self._link.stats, self._clock.now_ns())
         return replace(counted, received=self._received, error_frames=counted.error_frames + self._error_frames)
 
+    @property
+    def reopening(self) -> bool:
+        """The wrapped link's, or a disconnect that it would mend."""
+        return self._link.reopening or (
+            bool(self._reconnect_s) and self._frames.active("disconnect", self._clock.now_ns())
+        )
+
     def send(self, batch: FrameBatch) -> None:
         """Pass frames on, or keep them while the link is stalled.
 

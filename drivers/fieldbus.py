@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Future
 from contextlib import contextmanager, suppress
-from typing import Any
+from typing import Any, TypeVar
 
 from bench.clock import Clock
 from bench.envelope import Envelope
@@ -22,16 +24,20 @@ from bench.recorder import Recorder
 from bench.registers import RegisterPort, RegisterRefused
 from bench.rigfile import RigFile
 from bench.samples import StreamLayout
+from drivers.background import Background
 from drivers.fielddrive import FieldDrive
 from drivers.monitors import FieldSupply, FieldThermal
 from drivers.polling import Poll, PolledStream, Reading
 from drivers.registerdevice import RegisterDevice
 
 logger = logging.getLogger("drivers.fieldbus")
+T = TypeVar("T")
 ROLES = ("drive", "supply", "thermal")
 WAIT_SLICE_S = 0.05
 PUMP_S = 0.1  # without a thread nothing is polled faster: a clock calls `pump` that often
 SILENT_POLLS, SILENT_S = 3, 1.0
+LEASE_S = 1.0  # a bench that has not pumped for so long hangs; polls would keep the drive's own watchdog fed
+END_S = 2.0  # for the last coast, and for what polls to end
 
 
 class Fieldbus:
@@ -72,6 +78,8 @@ class Fieldbus:
         self._arrived: deque[Reading] = deque(maxlen=10_000)
         self._ended = threading.Event()
         self._threads: list[threading.Thread] = []
+        self._pumped_s = time.monotonic()
+        self._hands = Background(clock, "requests to register devices") if threaded else None
         role = _by_role(self.devices)
         self.drive = FieldDrive(self, role["drive"], envelope) if "drive" in role else None
         self.supply = FieldSupply(role["supply"], self.latest) if "supply" in role else None
@@ -103,11 +111,12 @@ class Fieldbus:
             DeviceFault: the drive's fault stays.
         """
         for name, device in self.devices.items():
-            self._latest[name] = device.check()
+            self._latest[name] = self.ask(device.check)
             self._answered[name] = self._refreshed[name] = self._clock.now_ns()
         if self.drive is not None and self.drive.fault:
             self.cleared = self.drive.fault
             self.drive.reset()
+        self._pumped_s = time.monotonic()
         links: dict[str, list[Poll]] = {}
         for name, poll in self._polls.items():
             poll.start()
@@ -119,11 +128,29 @@ class Fieldbus:
                 thread.start()
 
     def close(self) -> None:
-        """End polling. Calling it twice is harmless."""
+        """End polling; what is stuck on a dead line is left behind. Calling it twice is harmless."""
         self._ended.set()
+        deadline = time.monotonic() + END_S
         for thread in self._threads:
-            thread.join()
+            thread.join(max(0.0, deadline - time.monotonic()))
         self._threads.clear()
+        if self._hands is not None:
+            self._hands.close(max(0.0, deadline - time.monotonic()))
+
+    def ask(self, request: Callable[..., T], *args: Any) -> T:
+        """Make a request of a device. On a live rig the clock runs meanwhile."""
+        return request(*args) if self._hands is None else self._hands.call(request, *args)
+
+    def send(self, request: Callable[..., object], *args: Any) -> Future[object] | None:
+        """Make a request without waiting for it; in simulation it is made at once, and there is nothing to wait for.
+
+        Raises:
+            BenchError: in simulation what it raises; else it is closed.
+        """
+        if self._hands is not None:
+            return self._hands.submit(request, *args)
+        request(*args)
+        return None
 
     def latest(self, device: str) -> Mapping[str, float]:
         """The newest values of a device, SI by register."""
@@ -135,7 +162,7 @@ class Fieldbus:
         Raises:
             LinkError: the device does not answer, or refuses.
         """
-        values = self.devices[device].read()
+        values = self.ask(self.devices[device].read)
         self._latest[device] = values
         self._answered[device] = self._refreshed[device] = self._clock.now_ns()
         return values
@@ -147,6 +174,7 @@ class Fieldbus:
             LinkError: a device is lost, or refuses (while guarded).
             DeviceFault: the drive reports a fault (while guarded).
         """
+        self._pumped_s = time.monotonic()
         if not self._threaded:
             self._poll(self._polls.values())
         while self._arrived:
@@ -190,7 +218,15 @@ class Fieldbus:
     def _keep_polling(self, polls: Sequence[Poll]) -> None:
         """One link's devices. Goes on after an error, so that make-safe finds them when they are there again."""
         while not self._ended.wait(max(0.001, (min(p.due_ns for p in polls) - self._clock.now_ns()) * 1e-9)):
-            self._poll(polls)
+            if not self._poll_leased(polls):
+                self._ended.wait(WAIT_SLICE_S)
+
+    def _poll_leased(self, polls: Iterable[Poll]) -> bool:
+        """Poll, but not for a bench that hangs: then nothing but the drive's own time-out stops the drive."""
+        if time.monotonic() - self._pumped_s > LEASE_S:
+            return False
+        self._poll(polls)
+        return True
 
     def _take(self, reading: Reading) -> None:
         name = reading.device
@@ -253,11 +289,19 @@ def open_devices(
         DeviceFault: the drive has a fault that stays.
     """
     bus = Fieldbus(rig, port_of, clock, envelope, threaded=threaded)
-    bus.connect()  # where that fails nothing may be written to a device that is not the one of the rig file
+    try:
+        bus.connect()  # where that fails nothing may be written to a device that is not the one of the rig file
+    except BaseException:
+        bus.close()
+        raise
     try:
         yield bus
     finally:
-        bus.close()
-        if bus.drive is not None:
-            with suppress(BenchError):
-                bus.devices[bus.drive.name].command("coast")
+        try:
+            if bus.drive is not None:  # before the end of polling is awaited: that may take a lost line's whole time
+                with suppress(BenchError, TimeoutError):
+                    coasting = bus.send(bus.devices[bus.drive.name].command, "coast")
+                    if coasting is not None:
+                        coasting.result(END_S)
+        finally:
+            bus.close()

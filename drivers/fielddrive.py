@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
-from typing import Any, Protocol
+from contextlib import AbstractContextManager, suppress
+from typing import Any, Protocol, TypeVar
 
 from bench import units
 from bench.envelope import Envelope
 from bench.errors import BenchError, ConfigError, DeviceFault, InterlockError, LinkError
 from drivers.registerdevice import RegisterDevice
 
+T = TypeVar("T")
 TAKEN_S = 1.0  # for a drive to do what it was told
 STANDSTILL_RAD_S, STOP_S, REACH_S = 0.5, 90.0, 60.0
 NEEDED = ("target_speed", "actual_speed", "fault")
@@ -23,6 +24,8 @@ class Surroundings(Protocol):
 
     def latest(self, device: str) -> Mapping[str, float]: ...
     def refresh(self, device: str) -> Mapping[str, float]: ...
+    def ask(self, request: Callable[..., T], *args: Any) -> T: ...
+    def send(self, request: Callable[..., object], *args: Any) -> object: ...
     def wait(self, done: Callable[[], bool], timeout_s: float, what: str) -> None: ...
     def record(self, kind: str, **data: Any) -> None: ...
     def unguarded(self) -> AbstractContextManager[None]: ...
@@ -62,6 +65,19 @@ class FieldDrive:
         """Whether it gives torque, as far as it tells."""
         return bool(self._bus.latest(self.name).get("running", 1.0))
 
+    def confirm_off(self) -> bool:
+        """Whether a reading made now says that it gives no torque; False where it cannot be read or cannot tell."""
+        try:
+            return not self._bus.refresh(self.name).get("running", 1.0)
+        except BenchError:
+            return False
+
+    def let_go(self) -> None:
+        """Send coast once more without waiting for what comes of it, on a line that may be lost."""
+        self._bus.record("drive", device=self.name, command="coast")
+        with suppress(BenchError):
+            self._bus.send(self._device.command, "coast")
+
     def fault_of(self, values: Mapping[str, float]) -> str:
         """The fault that a reading tells of."""
         code = round(values["fault"])
@@ -81,7 +97,7 @@ class FieldDrive:
                 f"drive speed: found {rad_s:g} rad/s; the envelope allows {limit:g} rad/s; nothing was sent"
             )
         self._bus.record("drive-speed", device=self.name, rad_s=rad_s)
-        self._device.write("target_speed", rad_s)
+        self._bus.ask(self._device.write, "target_speed", rad_s)
         r = self._device.spec.registers["target_speed"]
         back, step = self._bus.refresh(self.name)["target_speed"], abs(r.scale * units.unit(r.unit).factor)
         near = 1e-6 * abs(rad_s) if r.type == "f32" else step
@@ -159,7 +175,7 @@ class FieldDrive:
 
     def _command(self, name: str) -> None:
         self._bus.record("drive", device=self.name, command=name)
-        self._device.command(name)
+        self._bus.ask(self._device.command, name)
 
     def _until_running(self, running: bool) -> None:
         if "running" not in self._device.spec.registers:

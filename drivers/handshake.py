@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
+from bench.binding import COMMANDS
 from bench.clock import Clock
 from bench.errors import ConfigError
 from bench.rigfile import RigFile
 from bench.session import Session
+from drivers.advice import ADVICE, HARMLESS
 from drivers.dialogue import Dialogue
 
+LISTEN_S = 0.15  # for another host, before the first heartbeat
 TAKEOVER_S = 1.5  # an owner that has gone is forgotten a second after its last heartbeat
 Wait = Callable[[Callable[[], bool], float, str], None]
 
@@ -56,3 +59,38 @@ def identify(dialogue: Dialogue, rig: RigFile, session: Session, wait: Wait) -> 
                 f"the controller says {key} {found[key]:g}; rig file {rig.path}: devices.controller.{key}: expected "
                 f"{expected}. Next: use the DBC and rig file of this firmware, or update the firmware"
             )
+
+
+def alone(others: Collection[str], link: str) -> None:
+    """Refuse a controller without owners to which another host talks: it would obey both.
+
+    Raises:
+        ConfigError: messages of a host have come in.
+    """
+    if others:
+        raise ConfigError(
+            f"link {link}: another host talks to this controller ({', '.join(sorted(others))}); expected one bench per "
+            "rig. Next: end that one"
+        )
+
+
+def may_clear(fault: str, asked: bool) -> None:
+    """Whether a fault that an earlier run left may be cleared: one that says nothing of the machine, or on request.
+
+    Raises:
+        ConfigError: somebody should look at the machine first.
+    """
+    if fault not in HARMLESS and not asked:
+        what = ADVICE.get(fault, "look at the machine")
+        raise ConfigError(
+            f"the controller has the fault {fault} of an earlier run: {what}. Next: then run again with --clear-fault"
+        )
+
+
+def host_messages(rig: RigFile) -> set[str]:
+    """Names of the messages that a host sends."""
+    b = rig.binding
+    paths = [path for name in COMMANDS for path in b.command(name)]
+    paths += [p.signal for p in rig.parameters.values() if p.signal]
+    named = {b.heartbeat, "Claim", "ParamSet", "ParamGet", *(path.partition(".")[0] for path in paths)}
+    return named & set(rig.messages.messages)

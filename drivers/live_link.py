@@ -90,6 +90,11 @@ class LiveLink:
         total.sent = heartbeats + (frames if self._heartbeat.owns_port else total.sent)
         return total
 
+    @property
+    def reopening(self) -> bool:
+        """As bench.link.Link says."""
+        return self._down
+
     def send(self, batch: FrameBatch) -> None:
         """As bench.link.Link says."""
         if self._error is not None:

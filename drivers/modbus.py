@@ -43,6 +43,7 @@ class ModbusLine:
         self._url, self._reconnect_s = spec.url, spec.reconnect_s
         self._client = _client(name, linkurl.parse(spec.url), _timeout_s(name, spec.options))
         self._lock, self._closed = threading.Lock(), threading.Event()
+        self._lost = False  # since the last answer
 
     def open(self) -> None:
         """Connect.
@@ -68,8 +69,9 @@ class ModbusLine:
         """One device on this line."""
         return ModbusPort(self, unit)
 
-    def request(self, where: str, call: Callable[[Client], Any]) -> Any:
+    def request(self, where: str, call: Callable[[Client], Any], *, reopens: bool = False) -> Any:
         """Make a request; where `reconnect_s` is set, a lost connection is opened anew and the request made again.
+        Where it is 0, only a request that `reopens` opens it: a write, so that make-safe can still stop a drive.
 
         Raises:
             RegisterRefused: the device answers with an exception.
@@ -79,17 +81,18 @@ class ModbusLine:
         while True:
             try:
                 with self._lock:  # for one attempt: what is urgent need not wait until another request gives up
-                    return self._once(where, call)
+                    return self._once(where, call, reopens)
             except RegisterRefused:
                 raise
             except LinkError:
                 if time.monotonic() >= deadline or self._closed.wait(AGAIN_S):
                     raise
-                self.stats.reconnects += 1
 
-    def _once(self, where: str, call: Callable[[Client], Any]) -> Any:
+    def _once(self, where: str, call: Callable[[Client], Any], reopens: bool) -> Any:
         if self._closed.is_set():
             raise LinkError(f"link {self.name}: closed")
+        if self._lost and not self._reconnect_s and not reopens:
+            raise LinkError(f"link {self.name}: {self._url}: lost, and reconnect_s is 0 ({where})")
         self.stats.sent += 1
         try:
             answer = call(self._client)
@@ -104,11 +107,15 @@ class ModbusLine:
             self.stats.malformed += 1
             raise LinkError(f"link {self.name}: {self._url}: the answer is not Modbus ({where}): {error!r}") from error
         self.stats.received += 1
+        if self._lost:  # an outage counts once, when it is over
+            self._lost = False
+            self.stats.reconnects += 1
         if answer.isError():
             raise RegisterRefused(int(answer.exception_code), f"link {self.name}: {where}")
         return answer
 
     def _hang_up(self) -> None:
+        self._lost = True
         self._client.close()  # type: ignore[no-untyped-call]
 
     def odd(self, where: str, found: str) -> LinkError:
@@ -171,7 +178,9 @@ class ModbusPort:
             LinkError: no answer, or an echo of something else.
         """
         where = f"unit {self.unit}, holding registers {address} to {address + len(words) - 1}"
-        echo = self.line.request(where, lambda c: c.write_registers(address, list(words), device_id=self.unit))
+        echo = self.line.request(
+            where, lambda c: c.write_registers(address, list(words), device_id=self.unit), reopens=True
+        )
         if (echo.address, echo.count) != (address, len(words)):
             raise self.line.odd(where, f"an echo of {echo.count} registers at {echo.address}")
 

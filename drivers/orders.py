@@ -64,6 +64,29 @@ class Orders:
         if not np.isclose(reply["value"], value, rtol=1e-6, atol=1e-12):
             raise BenchError(f"{parameter}: wrote {value!r}, the controller reads back {reply['value']!r}")
 
+    def restore(self) -> tuple[str, ...]:
+        """Set every parameter that another host left elsewhere to the rig file's value, at rest; the names of those.
+        A controller that cannot be asked is taken at its word.
+
+        Raises:
+            LinkError: it does not answer.
+            BenchError: it refuses.
+        """
+        if not self._dialogue.has("ParamGet") or self._mode() not in STANDING:
+            return ()
+        asked = {p.index: (name, p) for name, p in self.rig.parameters.items() if p.index is not None}
+        found = self._dialogue.ask_all(
+            "ParamGet", [{"index": float(i)} for i in asked], "ParamReply", "index", self._wait
+        )
+        other = []
+        for index, (name, p) in asked.items():
+            reply = found[float(index)]
+            known = status_of(self.rig.messages["ParamReply"], reply) == "OK"
+            if known and not np.isclose(reply["value"], p.default, rtol=1e-6, atol=1e-12):
+                self.set(name, p.default)
+                other.append(f"{name} {reply['value']:g}")
+        return tuple(other)
+
     def get(self, parameter: str) -> float:
         """Read a parameter, SI.
 

@@ -17,7 +17,8 @@ from drivers.beat import WriterSpec
 from drivers.byteport import BytePort
 from drivers.canbus import CanBus, open_bus
 
-IN_PROCESS = ("virtual",)  # CAN interfaces that another process cannot reach
+IN_PROCESS = ("virtual", "serial", "slcan", "seeedstudio", "robotell")
+"""CAN interfaces of python-can that another process cannot reach, or that two readers would take bytes from."""
 
 
 class Wire(Protocol):

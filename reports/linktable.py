@@ -15,6 +15,7 @@ COUNTS = {
     "reboots": "Restarts of the controller", "received": "Frames received", "sent": "Frames sent, heartbeats included",
     "crc_errors": "Packets with a wrong CRC", "malformed": "Malformed packets or lines", "packets_lost": "Packets lost",
     "error_frames": "Error frames", "refused": "Frames refused by the interface", "overflows": "Frames dropped, buffer full",
+    "misplaced": "Messages too late to tell their sample", "adapter_overruns": "Times that the adapter lost frames",
     "bus_off": "Times bus-off", "reconnects": "Times reconnected", "heartbeats": "Heartbeats sent",
     "longest_heartbeat_gap_ns": "Longest time between heartbeats",
 }  # fmt: skip

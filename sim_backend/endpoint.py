@@ -84,6 +84,11 @@ class InProcessLink:
     def _dead(self) -> bool:
         return bool(self._dead_after) and self._clock.now_ns() - EPOCH_NS > self._dead_after * 1e9
 
+    @property
+    def reopening(self) -> bool:
+        """Whether a disconnect is at work that the link would mend."""
+        return bool(self._reconnect_s) and self._inward.active("disconnect", self._clock.now_ns())
+
     def send(self, batch: FrameBatch) -> None:
         """Queue frames for the next slice, due now.
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bench.assembly import Assembler, Joiner, Rows
+from bench.assembly import KEPT, Assembler, Joiner, Rows, _Sample
 from bench.codec import encode
 from bench.frames import FrameBatch, empty_batch, frame
 from bench.rigfile import load_rig
@@ -161,6 +161,51 @@ def test_no_row_is_made_of_parts_of_different_samples(
     for s in done:
         assert {float(v[0]) for v in s.values if v is not None} == {float(s.arrived)}
         assert (s.sequence, s.tick) == (s.arrived & 0xFFFF, 10 * s.arrived)
+
+
+def delayed(bits: int, start: int, lateness: list[int]) -> tuple[Joiner, list[_Sample]]:
+    """A SYNC for each lateness; part 1 of a sample comes so many samples after its SYNC, part 2 with it."""
+    joiner, done = Joiner(16, [bits] * 2), []
+    due = sorted((k + late, k) for k, late in enumerate(lateness))
+    for n in range(len(lateness)):
+        done += joiner.sync((start + n) & 0xFFFF, n * 10, n, np.array([float(n)]))
+        joiner.data(2, (start + n) % (1 << bits), np.array([float(n)]))
+        for when, k in due:
+            if when == n:
+                joiner.data(1, (start + k) % (1 << bits), np.array([float(k)]))
+    return joiner, done
+
+
+@pytest.mark.parametrize("bits", [4, 5, 8])
+@pytest.mark.parametrize("late", range(15))
+def test_messages_that_are_always_late_are_joined_or_left_out_and_counted(bits: int, late: int) -> None:
+    joiner, done = delayed(bits, 65_500, [late] * 200)
+    assert {float(v[0]) - s.arrived for s in done for v in s.values if v is not None} <= {0.0}
+    if late <= KEPT - 1:
+        assert (len(done), joiner.misplaced) == (199 - late, 0)
+    else:
+        assert (len(done), joiner.misplaced) == (0, 199 - late)
+
+
+@settings(deadline=None, max_examples=200)
+@given(
+    start=st.integers(0, 65535),
+    bits=st.sampled_from([4, 5, 8]),
+    runs=st.lists(st.tuples(st.integers(0, 14), st.integers(1, 30)), min_size=1, max_size=12),
+)
+def test_no_lateness_below_a_round_of_the_count_mixes_samples(
+    start: int, bits: int, runs: list[tuple[int, int]]
+) -> None:
+    _, done = delayed(bits, start, [late for late, n in runs for _ in range(n)])
+    for s in done:
+        assert {float(v[0]) for v in s.values if v is not None} == {float(s.arrived)}
+
+
+def test_messages_left_out_reach_the_counters() -> None:
+    decoder = TelemetryDecoder(PLAIN)
+    frames = [f for n in range(40) for f in (*sample(n, "AmbRest"), *([part("AmbRest", n - 9)] if n >= 9 else []))]
+    assert decoder.decode(joined(*frames)) == []
+    assert decoder.counters.misplaced == 30
 
 
 @settings(deadline=None, max_examples=100)

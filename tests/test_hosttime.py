@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bench.hosttime import HostMap
+from bench.linkhealth import BEYOND
 
 MS = 1_000_000
 
@@ -54,6 +55,21 @@ def test_nothing_varies_in_simulation() -> None:
         host.take(np.array([k * 100 * MS]), np.array([k * 100 * MS]))
     assert host.drift() is None
     assert host.lag_ns == host.latest_ns == 0
+
+
+@pytest.mark.parametrize(("ppm", "beyond"), [(150.0, False), (-20_000.0, False), (3000.0, True), (10_000.0, True)])
+def test_windows_that_drift_cannot_explain_are_counted(ppm: float, beyond: bool) -> None:
+    host = fed(ppm, 4, seconds=8)
+    assert host.drift() is None
+    assert (host.longest_beyond >= BEYOND) is beyond
+
+
+def test_a_stall_is_beyond_drift_for_no_longer_than_it_lasts() -> None:
+    assert 1 <= fed(0.0, 5, stall=True).longest_beyond <= 2
+    host = HostMap()
+    for k in range(400):  # one second in two is a stall
+        host.take(np.array([k * 50 * MS]), np.array([k * 50 * MS + 300 * MS * (k // 20 % 2)]))
+    assert host.longest_beyond == 1
 
 
 def test_the_oldest_of_a_burst_tells_how_late_it_was() -> None:

@@ -9,7 +9,7 @@ import pytest
 from bench.findings import Effect
 from bench.hosttime import Drift
 from bench.link import LinkStats
-from bench.linkhealth import Health
+from bench.linkhealth import BEYOND, Health
 from bench.telemetry import Counters
 
 CLEAN = LinkStats(received=100_000, sent=5_000, heartbeats=4_000, longest_heartbeat_gap_ns=21_000_000)
@@ -40,7 +40,7 @@ def test_each_trouble_is_counted_and_named(trouble: str) -> None:
     assert finding.effect is STOPPING.get(trouble, Effect.NOTE)
     counts = health.counts(0)
     assert counts.counts[trouble] == 37
-    assert counts.errors == (0 if trouble == "lost" else 37)  # samples that are missing are counted as gaps
+    assert counts.errors == 37
 
 
 def test_every_finding_has_a_code_of_its_own() -> None:
@@ -63,6 +63,37 @@ def test_a_heartbeat_gap_near_the_watchdog_is_named(gap_ns: int, count: int) -> 
     assert [f.code for f in slow.findings()] == ["link-slow"] * count
     stats = LinkStats(longest_heartbeat_gap_ns=gap_ns)
     assert [f.code for f in Health(Counters(), stats, None, 0).findings()] == ["heartbeat-late"] * count
+
+
+@pytest.mark.parametrize(
+    ("ppm", "expanded", "effect"),
+    [(190.0, 1.0, None), (260.0, 70.0, None), (260.0, 50.0, Effect.INDETERMINATE), (-260.0, 50.0, Effect.INDETERMINATE),
+     (1040.0, 50.0, Effect.INDETERMINATE), (1060.0, 50.0, Effect.ERROR), (-3009.0, 0.1, Effect.ERROR)],
+)  # fmt: skip
+def test_a_clock_that_no_crystal_has_is_judged(ppm: float, expanded: float, effect: Effect | None) -> None:
+    found = list(Health(Counters(), CLEAN, Drift(ppm, expanded, 60), 0).findings())
+    assert [(f.code, f.effect) for f in found] == ([("clock-drift", effect)] if effect else [])
+    for f in found:
+        assert f"{abs(ppm):.0f} ppm {'slow' if ppm > 0 else 'fast'}" in f.text
+        assert "tick_s in the rig file" in f.text
+
+
+def test_a_clock_is_judged_before_its_drift_is_known() -> None:
+    def effects(windows: int, drift: Drift | None = None) -> list[tuple[str, Effect]]:
+        health = Health(Counters(), CLEAN, drift, 0, beyond_drift=windows)
+        return [(f.code, f.effect) for f in health.findings()]
+
+    assert effects(BEYOND - 1) == []
+    assert effects(BEYOND) == [("clock-drift", Effect.INDETERMINATE)]
+    assert effects(BEYOND, Drift(3.0, 5.0, 9)) == []  # it is latency
+
+
+def test_replies_of_a_wrong_length_count_with_the_telemetry_of_one() -> None:
+    health = Health(Counters(wrong_length=2), CLEAN, None, 0, replies_wrong_length=3)
+    (finding,) = health.findings()
+    assert (finding.code, finding.effect) == ("wrong-length", Effect.INDETERMINATE)
+    assert finding.text.startswith("5 frames")
+    assert (health.counts(0).errors, health.counts(0).counts["wrong_length"]) == (5, 5)
 
 
 def test_drift_is_in_the_counts() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -61,6 +63,58 @@ def test_a_reboot_starts_over() -> None:
     blocks = decoder.decode(np.concatenate([one(6000 + k, 10 * k + 10) for k in range(3)]))
     assert decoder.counters.reboots == 1
     assert sum(len(b) for b in blocks) == 3
+
+
+@pytest.mark.parametrize("gap", [0, 1, 100, 30_000, 32_767, 40_000, 65_535, 65_536, 70_000, 200_000])
+@pytest.mark.parametrize("stretch", [1.0, 0.985, 1.015])
+def test_a_gap_of_any_length_is_counted_by_the_tick(gap: int, stretch: float) -> None:
+    """Longer than the sequence goes, or half of it; the tick need not have quite the length that the rig file says."""
+    decoder = TelemetryDecoder(RIG)
+    numbers = [*range(5000, 5100), *(5100 + gap + k for k in range(300))]
+    frames = [one(n, round(n * 10 * stretch)) for n in numbers]
+    blocks = [b for k in range(0, 400, 50) for b in decoder.decode(np.concatenate(frames[k : k + 50]))]
+    assert sum(len(b) for b in blocks) == 400
+    assert counted(decoder) == ({"lost": gap, "gaps": 1} if gap else {})
+    assert blocks[-1].first_index + len(blocks[-1]) == 400 + gap
+    assert blocks[-1].ticks[-1] == round(numbers[-1] * 10 * stretch)
+
+
+def counted(decoder: TelemetryDecoder) -> dict[str, int]:
+    return {name: n for name, n in vars(decoder.counters).items() if n}
+
+
+MISMATCHES: dict[str, Callable[[int], tuple[int, int]]] = {
+    "tick stands": lambda k: (k, 0),
+    "tick of double length": lambda k: (k, 5 * k),
+    "tick of half length": lambda k: (k, 20 * k),
+    "tick jumps on by 40 s": lambda k: (k, 10 * k + (400_000 if k >= 150 else 0)),
+    "tick jumps back by half a second": lambda k: (k + 1000, 10 * k + 10_000 - (5_000 if k >= 150 else 0)),
+    "sequence begins anew": lambda k: (k if k >= 150 else k + 5_000, 10 * k),
+    "sequence begins anew near its end": lambda k: (k if k >= 150 else k + 60_000, 10 * k),
+}
+
+
+@pytest.mark.parametrize("size", [1, 20, 300])
+@pytest.mark.parametrize("kind", list(MISMATCHES))
+def test_sequence_and_tick_that_do_not_fit_count_nothing_that_is_not_missing(kind: str, size: int) -> None:
+    decoder = TelemetryDecoder(RIG)
+    frames = [one(*MISMATCHES[kind](k)) for k in range(300)]
+    blocks = [b for k in range(0, 300, size) for b in decoder.decode(np.concatenate(frames[k : k + size]))]
+    assert counted(decoder) == {}
+    assert sum(len(b) for b in blocks) == 300
+
+
+def test_a_tick_of_few_bits_does_not_make_a_restart_of_a_gap() -> None:
+    """16 bits of 100 us come round in 6.6 s; after 5 s the short way round is 1.6 s back."""
+    decoder = TelemetryDecoder(RIG)
+    decoder._assembler.tick_bits = 16
+    first = np.concatenate([one(n, n * 10 & 0xFFFF) for n in range(100)])
+    again = np.concatenate([one(n, n * 10 & 0xFFFF) for n in range(5100, 5200)])
+    blocks = [*decoder.decode(first), *decoder.decode(again)]
+    assert counted(decoder) == {"lost": 5000, "gaps": 1}
+    assert blocks[-1].t_ns[-1] - blocks[0].t_ns[0] == 5199 * 1_000_000
+    decoder.decode(np.concatenate([one(n, n * 10) for n in range(10)]))
+    assert decoder.counters.reboots == 1
 
 
 def test_wrong_lengths_are_counted_and_never_read() -> None:

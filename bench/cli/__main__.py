@@ -89,6 +89,9 @@ def run(
     fault: Annotated[
         list[str] | None, typer.Option("--fault", metavar="FAULT", help="A fault to inject; repeatable.")
     ] = None,
+    clear_fault: Annotated[
+        bool, typer.Option("--clear-fault", help="Clear a fault that an earlier run left (live only).")
+    ] = False,
     out: Out = Path("runs"),
     operator: Annotated[
         OperatorKind | None, typer.Option(help="Default: auto in simulation, console on a terminal.")
@@ -110,6 +113,7 @@ def run(
             truth=tuple(truth or ()),
             links=tuple(link or ()),
             faults=tuple(fault or ()),
+            clear_fault=clear_fault,
             out=out,
             operator=operator.value if operator else None,
             report=not no_report,

@@ -37,6 +37,7 @@ class Request:
     truth: tuple[str, ...] = ()
     links: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()
+    clear_fault: bool = False
     out: Path = Path("runs")
     operator: str | None = None
     report: bool = True
@@ -70,9 +71,8 @@ def prepare(request: Request) -> tuple[Job, Connect]:
     injected = [faults.parse(text) for text in request.faults]
     if request.backend == "live":
         kind = request.operator or ("console" if sys.stdin.isatty() else "auto")
-        addresses = " ".join(link.url for link in rig.links.values())
-        job = Job(procedure, rig, plan, limits, "live", None, rig_lock(f"{rig.name} {addresses}"))
-        return job, live(rig, kind, injected)
+        job = Job(procedure, rig, plan, limits, "live", None, rig_lock(rig.link.url.partition("?")[0]))
+        return job, live(rig, kind, injected, request.clear_fault)
     seed = 0 if request.seed is None else request.seed
     overrides = dict(plans.assignment(text) for text in request.truth)
     _refuse_words(overrides)
@@ -102,7 +102,12 @@ def with_links(rig: RigFile, assignments: Sequence[str]) -> RigFile:
         name, equals, url = text.partition("=")
         if not equals or name not in links:
             raise ConfigError(f"--link {text}: expected NAME=URL with NAME one of {', '.join(links)}")
-        linkurl.parse(url)
+        try:
+            parsed = linkurl.parse(url)
+            if parsed.scheme in linkurl.TCP_SCHEMES:
+                parsed.address  # noqa: B018 (raises when it is none)
+        except ConfigError as error:
+            raise ConfigError(f"--link {text}: {error}") from error
         links[name] = links[name].model_copy(update={"url": url})
     return rig.model_copy(update={"links": links})
 

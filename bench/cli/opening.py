@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import logging
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from bench import faults, linkurl
+from bench.cli import console
 from bench.cli.safety import safe_steps
-from bench.clock import WallClock
-from bench.errors import BenchError, ConfigError, OperatorAbort
+from bench.clock import Clock, WallClock
+from bench.errors import BenchError, ConfigError
 from bench.faults import Fault
 from bench.findings import Finding
 from bench.link import Link
@@ -74,7 +74,7 @@ def simulated(
         try:
             controller.connect()
             with open_devices(rig, bank.port, controller.clock, controller.envelope) as bus:
-                hands = _operators(operator, line, controller, supervisor)
+                hands = _operators(operator, line, controller, lambda _: console.blocking(supervisor))
                 yield _opened(controller, base, bus, hands, facts, injected)
         finally:
             machine.link.close()
@@ -82,7 +82,7 @@ def simulated(
     return connect
 
 
-def live(rig: RigFile, operator: str, injected: Sequence[Fault] = ()) -> Connect:
+def live(rig: RigFile, operator: str, injected: Sequence[Fault] = (), clear_fault: bool = False) -> Connect:
     """How to open a live rig: its controller's link with its heartbeat, its other devices, and the operator.
 
     Raises:
@@ -98,6 +98,7 @@ def live(rig: RigFile, operator: str, injected: Sequence[Fault] = ()) -> Connect
 
     @contextmanager
     def connect(supervisor: Supervisor) -> Iterator[OpenRig]:
+        from drivers.background import Background
         from drivers.controller import Controller
         from drivers.faulty_link import FaultyLink
         from drivers.fieldbus import open_devices
@@ -111,9 +112,9 @@ def live(rig: RigFile, operator: str, injected: Sequence[Fault] = ()) -> Connect
         identifiers = [m.identifier for m in rig.messages.messages.values()]
         with ExitStack() as stack:
             stack.enter_context(supervisor.finishing())
-            real = LiveLink(name, lambda: open_wire(spec, name, identifiers), beat_of(rig, session),
-                            heartbeat=spec.heartbeat, reconnect_s=spec.reconnect_s)  # fmt: skip
             wall = WallClock()
+            real = LiveLink(name, lambda: open_wire(spec, name, identifiers, wall.now_ns), beat_of(rig, session),
+                            heartbeat=spec.heartbeat, reconnect_s=spec.reconnect_s)  # fmt: skip
             telemetry = [rig.messages[m].identifier for m in rig.binding.telemetry]
             link: Link = real
             if injected:
@@ -122,21 +123,24 @@ def live(rig: RigFile, operator: str, injected: Sequence[Fault] = ()) -> Connect
             stack.callback(link.close)
             base = WatchedClock(wall, link.renew_lease, supervisor.check)
             controller = Controller(rig, link, base, session, LIVE_SLICE_S)
-            controller.connect()
+            controller.connect(clear_fault)
             stack.callback(_released, controller)
             line = None
             if "operator" in rig.devices and operator != "console":
                 line = stack.enter_context(OperatorLine.open(rig.links[rig.devices["operator"].link].url))
-            hands = None if line is None else LineOperator(line.request, controller.clock, controller.envelope)
+            hands = None
+            if line is not None:
+                asking = Background(controller.clock, "requests to the operator")
+                stack.callback(asking.close)
+                hands = LineOperator(asking.of(line.request), controller.clock, controller.envelope)
             lines = stack.enter_context(open_lines(rig))
 
             def port_of(device: str) -> RegisterPort:
                 return lines[rig.devices[device].link].port(rig.devices[device].unit)
 
             bus = stack.enter_context(open_devices(rig, port_of, controller.clock, controller.envelope, threaded=True))
-            yield _opened(
-                controller, base, bus, _operators(operator, hands, controller, supervisor), None, injected, lines
-            )
+            people = _operators(operator, hands, controller, console.attentive)
+            yield _opened(controller, base, bus, people, None, injected, lines)
 
     return connect
 
@@ -170,12 +174,14 @@ def _released(controller: Controller) -> None:
         controller.release()
 
 
-def _operators(kind: str, line: LineOperator | None, controller: Controller, supervisor: Supervisor) -> list[Operator]:
-    """The operator, and whoever else records what is done by hand."""
+def _operators(
+    kind: str, line: LineOperator | None, controller: Controller, prompt: Callable[[Clock], Callable[[str], str]]
+) -> list[Operator]:
+    """The operator, and whoever else records what is done by hand. `prompt` makes what asks a person."""
     from drivers.operator import ConsoleOperator
 
     if kind == "console" or line is None:
-        person = ConsoleOperator(_prompt(supervisor), controller.clock, controller.envelope, line)
+        person = ConsoleOperator(prompt(controller.clock), controller.clock, controller.envelope, line)
         return [person, line] if line is not None else [person]
     return [line]
 
@@ -200,7 +206,9 @@ def _opened(
         telemetry = controller.telemetry
         others = {name: line.stats for name, line in lines.items()}
         return Health(telemetry.counters, controller.link.stats, telemetry.host.drift(), telemetry.host.latest_ns,
-                      controller.host_age_s, controller.round_trip_ns, others)  # fmt: skip
+                      controller.host_age_s, controller.round_trip_ns, others,
+                      beyond_drift=telemetry.host.longest_beyond,
+                      replies_wrong_length=controller.replies_wrong_length)  # fmt: skip
 
     rig = Rig(controller.rig, controller.clock, controller, controller, operators[0], controller.telemetry.counters,
               health, controller.link.close, bus.drive, bus.supply, bus.thermal)  # fmt: skip
@@ -209,22 +217,10 @@ def _opened(
         found.append(
             Finding("fault-cleared", f"fault {controller.cleared} of an earlier run was cleared", "controller")
         )
+    if controller.restored:
+        text = f"parameters that an earlier host left were set to the rig file's: {', '.join(controller.restored)}"
+        found.append(Finding("parameters-restored", text, "controller"))
     if bus.cleared:
         found.append(Finding("fault-cleared", f"fault {bus.cleared} of an earlier run was cleared", "drive"))
     streams = [controller.telemetry.layout, *bus.layouts]
     return OpenRig(rig, streams, attach, unguard, safe_steps(controller, base, bus.drive), truth, found)
-
-
-def _prompt(supervisor: Supervisor) -> Callable[[str], str]:
-    """Asks on standard error (standard output belongs to the run directory); a signal ends the waiting at once."""
-
-    def ask(question: str) -> str:
-        sys.stderr.write(question)
-        sys.stderr.flush()
-        with supervisor.interruptible():
-            answer = sys.stdin.readline()
-        if not answer:
-            raise OperatorAbort("standard input is closed: nobody can answer")
-        return answer
-
-    return ask

@@ -27,16 +27,31 @@ BLIND_S = 5.0  # the heartbeat's lease, the watchdog and a landing take less
 def safe_steps(controller: Controller, base: WatchedClock, drive: Drive | None = None) -> tuple[SafeStep, ...]:
     """The steps for a controller whose heartbeat `base` renews, and an external drive on its shaft."""
 
+    off = False
+
     def look() -> None:
         controller.clock.sleep(0.02)  # a command may have been sent whose effect nobody has seen yet
 
     def brake() -> None:
-        if drive is None or not drive.running:
+        nonlocal off
+        if drive is None or drive.confirm_off():  # the last poll may be from before a run command
+            off = True
             return
         try:
             drive.stop()
         finally:
             drive.coast()
+        off = drive.confirm_off()
+
+    def then(do: Callable[[], None]) -> Callable[[], None]:
+        """A later step. A drive that nobody saw off is told again: its line may be there again."""
+
+        def step() -> None:
+            if drive is not None and not off:
+                drive.let_go()
+            do()
+
+        return step
 
     def stop() -> None:
         if controller.mode == "SPINNING":
@@ -71,11 +86,11 @@ def safe_steps(controller: Controller, base: WatchedClock, drive: Drive | None =
     return (
         SafeStep("see where the machine stands", look, COMMAND_S),
         *([SafeStep("stop the drive", brake, STOP_S)] if drive is not None else []),
-        SafeStep("stop the rotor", stop, STOP_S),
-        SafeStep("land the rotor", land, LAND_S),
-        SafeStep("switch the amplifiers off", disable, COMMAND_S),
-        SafeStep("the controller's own make-safe", own, STOP_S + LAND_S),
-        SafeStep("the controller's watchdog", watchdog, STOP_S + LAND_S),
+        SafeStep("stop the rotor", then(stop), STOP_S),
+        SafeStep("land the rotor", then(land), LAND_S),
+        SafeStep("switch the amplifiers off", then(disable), COMMAND_S),
+        SafeStep("the controller's own make-safe", then(own), STOP_S + LAND_S),
+        SafeStep("the controller's watchdog", then(watchdog), STOP_S + LAND_S),
     )
 
 

@@ -48,6 +48,7 @@ SERIAL: Final = b"N\r"
 FIFO_FULL_IN, FIFO_FULL_OUT, WARNING, OVERRUN = 0x01, 0x02, 0x04, 0x08
 PASSIVE, ARBITRATION_LOST, BUS_ERROR = 0x20, 0x40, 0x80
 """Bits of the answer to F (Lawicel manual; 0x10 is not used)."""
+LOSSES: Final = FIFO_FULL_IN | FIFO_FULL_OUT | OVERRUN
 
 FRAME_LETTERS: Final = frozenset(b"tTrRdDbB")
 _DLC: Final = {length: code for code, length in enumerate(LENGTHS)}

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from bench.frames import ERROR, FD, FRAME, FrameBatch, empty_batch
-from bench.wire.slcan import BEL, CR, FRAME_LETTERS, LENGTHS, LONGEST_LINE, WRAP_MS, head, parse
+from bench.wire.slcan import BEL, CR, FRAME_LETTERS, LENGTHS, LONGEST_LINE, LOSSES, WRAP_MS, head, parse
 
 REPLIES: Final = 256
 """Lines kept for the caller; older ones are dropped."""
@@ -72,6 +72,8 @@ class SlcanStream:
         """Remote frames."""
         self.status: int | None = None
         """The last answer to F: bits as in bench.wire.slcan."""
+        self.overruns = 0
+        """Answers to F that tell of frames the adapter lost: a full queue, in or out, or an overrun."""
         self.replies: list[bytes] = []
         """Other lines, oldest first, at most REPLIES of them; the caller may clear it."""
         self._timestamp = timestamp
@@ -117,6 +119,7 @@ class SlcanStream:
             self.remote += 1
         elif found := _STATUS.fullmatch(text):
             self.status = int(found[1], 16)
+            self.overruns += bool(self.status & LOSSES)
         elif text[0] not in FRAME_LETTERS and _REPLY.fullmatch(text):
             self.replies.append(text)
             del self.replies[:-REPLIES]

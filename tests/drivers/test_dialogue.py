@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from bench.codec import Decoder, encode
 from bench.errors import ConfigError, LinkError
-from bench.frames import FD, SENT, FrameBatch, empty_batch, frame, payload
+from bench.frames import ERROR, FD, SENT, FrameBatch, empty_batch, frame, payload
 from bench.link import LinkStats
 from bench.rigfile import RigFile, load_rig
 from bench.session import Session
@@ -37,6 +37,7 @@ class Conversation:
     def __init__(self, answer: Answer, rig: RigFile = NATIVE) -> None:
         self._rig, self._answer = rig, answer
         self.name, self.stats, self.now = "controller", LinkStats(), 0
+        self.reopening = False
         self.sent: list[FrameBatch] = []
         self._coming: list[FrameBatch] = []
         self.dialogue = Dialogue(rig, self, self.now_ns)
@@ -100,6 +101,57 @@ def test_without_its_reply_a_request_ends_after_half_a_second(wrong: str) -> Non
     with pytest.raises(LinkError, match="the reply"):
         talk.set(1.0)
     assert talk.now == pytest.approx(0.5e9, abs=2e7)
+
+
+@pytest.mark.parametrize("length", [3, 5])
+def test_a_reply_of_a_wrong_length_is_counted_and_named(length: int) -> None:
+    def answer(name: str, v: dict[str, float]) -> list[FrameBatch]:
+        reply = message("CommandReply", token=v["token"])
+        reply["length"] = length
+        return [reply]
+
+    talk = Conversation(answer)
+    says = f"waited for the reply to ENABLE. A CommandReply of {length} bytes came, the DBC says 4: .*message map"
+    with pytest.raises(LinkError, match=says):
+        talk.dialogue.ask("Command", {"code": 1}, "CommandReply", "the reply to ENABLE", talk.wait)
+    assert talk.dialogue.wrong_length == 1
+    with pytest.raises(LinkError, match=r"the reply$"):  # of another kind: it does not explain this one
+        talk.set(1.0)
+    assert talk.dialogue.wrong_length == 2
+
+
+def test_a_wrong_length_of_an_earlier_request_is_not_named() -> None:
+    talk = Conversation(lambda name, v: [])
+    short = message("ParamReply", index=1)
+    short["length"] = 7
+    talk.dialogue.take(np.concatenate([short, short]))
+    with pytest.raises(LinkError, match=r"the reply$"):
+        talk.set(1.0)
+    assert talk.dialogue.wrong_length == 2
+
+
+def test_a_wrong_length_before_the_right_one_does_no_harm() -> None:
+    def answer(name: str, v: dict[str, float]) -> list[FrameBatch]:
+        short = message("ParamReply", index=1, token=v["token"], value=9.0)
+        short["length"] = 7
+        return [short, message("ParamReply", index=1, token=v["token"], value=v["value"])]
+
+    talk = Conversation(answer)
+    assert talk.set(2.0)["value"] == 2.0
+    assert talk.dialogue.wrong_length == 1
+
+
+def test_a_destroyed_frame_is_no_reply() -> None:
+    def answer(name: str, v: dict[str, float]) -> list[FrameBatch]:
+        bad = [message("ParamReply", index=1, token=v["token"], value=9.0) for _ in range(2)]
+        for reply in bad:
+            reply["flags"] |= ERROR
+        bad[1]["length"] = 3
+        return [*bad, message("ParamReply", index=1, token=v["token"], value=v["value"])]
+
+    talk = Conversation(answer)
+    assert talk.set(2.0)["value"] == 2.0
+    assert talk.dialogue.wrong_length == 0
 
 
 def test_replies_to_others_do_not_pile_up() -> None:

@@ -19,6 +19,7 @@ class Cable:
         self._far = socket.create_connection((host, int(port)))
         self._near, slave = os.openpty()
         tty.setraw(slave)
+        os.set_blocking(self._near, False)
         self.path = os.ttyname(slave)
         self._slave = slave  # stays open until the bench has opened it, or else the pty would hang up
         self.used = threading.Event()  # the bench has sent something
@@ -40,8 +41,13 @@ class Cable:
                         data = self._far.recv(65536)
                         if not data:
                             return
-                        while data:
-                            data = data[os.write(self._near, data) :]
+                        self._pass_on(data)
+
+    def _pass_on(self, data: bytes) -> None:
+        """To the bench; what it does not take in a second is lost, as it is once it has died."""
+        while data and select.select([], [self._near], [], 1.0)[1]:
+            with suppress(BlockingIOError):
+                data = data[os.write(self._near, data) :]
 
     def pull(self) -> None:
         """Unplug it. Twice is harmless."""

@@ -39,6 +39,10 @@ class PlainAmb:
     def stats(self) -> LinkStats:
         return self._native.stats
 
+    @property
+    def reopening(self) -> bool:
+        return self._native.reopening
+
     def renew_lease(self) -> None:
         self._native.renew_lease()
 

@@ -82,9 +82,9 @@ def _environment() -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in paths if p)}
 
 
-def _start(folder: Path, *arguments: str) -> Child:
+def _start(folder: Path, *arguments: str, stdin: int = subprocess.DEVNULL) -> Child:
     return Child(subprocess.Popen(
-        [sys.executable, *arguments], cwd=folder, env=_environment(), text=True, stdin=subprocess.DEVNULL,
+        [sys.executable, *arguments], cwd=folder, env=_environment(), text=True, stdin=stdin,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     ))  # fmt: skip
 
@@ -153,9 +153,9 @@ def real_bench(folder: Path, *arguments: str) -> Iterator[Child]:
 
 
 @contextmanager
-def bench(folder: Path, *arguments: str) -> Iterator[Child]:
+def bench(folder: Path, *arguments: str, stdin: int = subprocess.DEVNULL) -> Iterator[Child]:
     """`bench` with the tests' small procedures in its catalogue, for the block."""
-    child = _start(folder, "-m", "tiny_catalogue", *arguments)
+    child = _start(folder, "-m", "tiny_catalogue", *arguments, stdin=stdin)
     try:
         yield child
     finally:

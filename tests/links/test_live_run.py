@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import subprocess
 from pathlib import Path
 
 import numpy as np
 import processes
 import pytest
+from listener import Listener
 
 from bench.recording import Recording
 
@@ -49,3 +51,20 @@ def test_the_drive_turns_the_shaft_and_lets_it_coast(tmp_path: Path) -> None:
     assert np.abs(ours - drive["drive_actual_speed"])[level].max() < 0.5
     assert np.abs(shaft["speed"][-200:]).max() < 0.5
     assert [e["command"] for e in recording.events("drive")][:2] == ["run", "coast"]
+
+
+@pytest.mark.timeout(120)
+def test_a_person_may_take_longer_than_the_watchdog(tmp_path: Path) -> None:
+    with processes.served(tmp_path) as rig, Listener(rig.endpoints["slcan:socket"]) as bus:
+        arguments = processes.live(rig, "slcan:socket", "tiny-levitated", "--no-report", "--operator", "console")
+        with processes.bench(tmp_path, *arguments, stdin=subprocess.PIPE) as child:
+            up = bus.wait_for(lambda h: h.state == "LEVITATED")
+            still = bus.wait_for(
+                lambda h: h.tick > up.tick + 35_000
+            )  # 3.5 s of the controller's time without an answer
+            assert still.state == "LEVITATED"
+            assert child.process.stdin is not None
+            child.process.stdin.write("\n\n")
+            child.process.stdin.close()
+            assert child.end() == 0, child.err
+    assert sum(x.count("Take every mass off") for x in child.err) == 2

@@ -14,7 +14,7 @@ import plainamb
 import pytest
 
 from bench.cli.opening import SIMULATED, beat_of
-from bench.errors import BenchError, DeviceFault, InterlockError
+from bench.errors import BenchError, ConfigError, DeviceFault, InterlockError
 from bench.faults import FrameFaults, parse
 from bench.findings import Finding
 from bench.frames import FrameBatch
@@ -168,7 +168,9 @@ def test_a_fault_has_the_controllers_own_name() -> None:
         bench.controller.clock.sleep(2.0)
     assert bench.controller.mode == "FAULT"
     again = Controller(PLAIN, bench.link, bench.machine, SIMULATED)
-    again.connect()
+    with pytest.raises(ConfigError, match=r"SensorBad of an earlier run.*--clear-fault"):
+        again.connect()
+    again.connect(clear_fault=True)
     assert (again.cleared, bench.link.demands) == ("SensorBad", [7])
 
 

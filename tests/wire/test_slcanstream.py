@@ -167,3 +167,10 @@ def test_adapter_time_is_unwrapped_over_minutes() -> None:
     since = [(t - taken[0]) // 1_000_000 for t in taken]
     assert since == [0, 20, 21, 30_010, 210_011, 210_010]
     assert min(taken) > 0
+
+
+def test_frames_that_the_adapter_lost_itself_are_counted() -> None:
+    stream = SlcanStream()
+    for answer in (b"F00\r", b"F04\r", b"F08\r", b"F00\r", b"F02\r", b"F81\r"):
+        stream.feed(answer, 0)
+    assert stream.overruns == 3

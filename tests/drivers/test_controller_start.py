@@ -1,0 +1,119 @@
+"""What a bench finds when it opens a controller, and what it does about it; a controller that reports nonsense."""
+
+from __future__ import annotations
+
+import pytest
+
+from bench.cli.safety import safe_steps
+from bench.errors import ConfigError, DeviceFault
+from bench.frames import SENT, FrameBatch, frame
+from bench.link import Link, LinkStats
+from bench.opened import WatchedClock
+from bench.rigfile import load_rig
+from bench.session import Session
+from bench.supervisor import Supervisor
+from drivers.controller import Controller
+from sim_backend.endpoint import SimulatedRig
+from sim_backend.truth import draw
+
+RIG = load_rig("tsbs12")
+STATE_AT = 56  # byte of Telemetry
+
+
+class Altered:
+    """A link that replaces the state in the telemetry once `state` is set, and brings another host's frames."""
+
+    def __init__(self, link: Link) -> None:
+        self._link, self.name = link, link.name
+        self.state: int | None = None
+        self.reopening = False
+
+    @property
+    def stats(self) -> LinkStats:
+        return self._link.stats
+
+    def send(self, batch: FrameBatch) -> None:
+        self._link.send(batch)
+
+    def receive(self) -> FrameBatch:
+        batch = self._link.receive().copy()
+        if self.state is not None:
+            batch["data"][batch["id"] == 0x100, STATE_AT] = self.state
+        return batch
+
+    def renew_lease(self) -> None:
+        self._link.renew_lease()
+
+    def close(self) -> None:
+        self._link.close()
+
+
+class Bench:
+    """A simulated machine and who talks to it."""
+
+    def __init__(self, **truth: float) -> None:
+        self.machine = SimulatedRig(RIG, draw(RIG, 2, truth), 1)
+        self.link = Altered(self.machine.link)
+        self.supervisor = Supervisor()
+        self.base = WatchedClock(self.machine, self.link.renew_lease, self.supervisor.check)
+        self.controller = Controller(RIG, self.link, self.base, Session(1, 1_767_225_600, "test"))
+
+
+def test_a_state_that_nobody_knows_is_not_taken_for_safe() -> None:
+    bench = Bench()
+    bench.controller.connect()
+    bench.controller.enable()
+    bench.controller.levitate()
+    bench.link.state = 99
+    with pytest.raises(DeviceFault, match="its state is 99, which its DBC does not name"):
+        bench.controller.clock.sleep(0.5)
+    bench.controller.guarded = False
+    assert bench.machine.device.state == "LEVITATED"
+    found = bench.supervisor.make_safe(safe_steps(bench.controller, bench.base), bench.machine.now_ns)
+    assert bench.machine.device.state == "OFF"
+    assert found  # it landed, but nobody could see it
+
+
+def test_parameters_that_another_host_left_are_set_back_and_named() -> None:
+    bench = Bench()
+    bench.controller.connect()
+    assert bench.controller.restored == ()
+    bench.controller.set("kp_theta", 0.0)
+    bench.controller.set("watchdog_s", 0.5)
+    bench.controller.release()
+    again = Controller(RIG, bench.link, bench.base, Session(2, 1_767_225_700, "next"))
+    again.connect()
+    assert again.restored == ("kp_theta 0", "watchdog_s 0.5")
+    assert (again.get("kp_theta"), again.get("watchdog_s")) == (50.0, pytest.approx(0.08))
+
+
+def test_a_fault_of_the_machine_is_looked_at_before_it_is_cleared() -> None:
+    bench = Bench()
+    bench.machine.device.state, bench.machine.device.fault = "FAULT", "LEVITATION_LOST"
+    with pytest.raises(ConfigError, match=r"the fault LEVITATION_LOST of an earlier run: check sensor.*--clear-fault"):
+        bench.controller.connect()
+    assert bench.machine.device.state == "FAULT"
+    bench.controller.connect(clear_fault=True)
+    assert bench.controller.cleared == "LEVITATION_LOST"
+    assert bench.machine.device.state == "OFF"
+    bench.machine.device.state, bench.machine.device.fault = "FAULT", "HEARTBEAT_LOST"
+    bench.controller.connect()
+    assert bench.controller.cleared == "HEARTBEAT_LOST"
+
+
+def test_frames_of_a_host_that_come_in_are_marked_as_such() -> None:
+    bench = Bench()
+    bench.controller.connect()
+    heartbeat = frame(0x010, bytes(8))
+    bench.machine.link._arrived.append(heartbeat)
+    seen: list[FrameBatch] = []
+
+    class Listening:
+        def frames(self, link: str, batch: FrameBatch, **_: int) -> None:
+            seen.append(batch)
+
+        def samples(self, block: object) -> None: ...
+
+    bench.controller._recorder = Listening()  # type: ignore[assignment]
+    bench.controller.poll()
+    assert [int(f["flags"]) & SENT for b in seen for f in b if f["id"] == 0x010] == [SENT]
