@@ -25,7 +25,7 @@ from bench.registers import RegisterPort, RegisterRefused
 from bench.rigfile import RigFile
 from bench.samples import StreamLayout
 from drivers.background import Background
-from drivers.fielddrive import FieldDrive
+from drivers.fielddrive import FieldDrive, may_clear
 from drivers.monitors import FieldSupply, FieldThermal
 from drivers.polling import Poll, PolledStream, Reading
 from drivers.registerdevice import RegisterDevice
@@ -102,11 +102,12 @@ class Fieldbus:
             for stream in self._streams.values():
                 stream.start_counting()
 
-    def connect(self) -> None:
-        """See that every device has the registers of its map, clear a fault that an earlier run left, and begin to poll.
+    def connect(self, clear_fault: bool = False) -> None:
+        """See that every device has the registers of its map, clear a fault that an earlier run left (only a lost
+        connection's, unless `clear_fault`), and begin to poll.
 
         Raises:
-            ConfigError: a register that a device does not have.
+            ConfigError: a register that a device does not have, or a drive with a fault that somebody should look at.
             LinkError: a device does not answer.
             DeviceFault: the drive's fault stays.
         """
@@ -114,6 +115,7 @@ class Fieldbus:
             self._latest[name] = self.ask(device.check)
             self._answered[name] = self._refreshed[name] = self._clock.now_ns()
         if self.drive is not None and self.drive.fault:
+            may_clear(self.drive.fault, clear_fault)
             self.cleared = self.drive.fault
             self.drive.reset()
         self._pumped_s = time.monotonic()
@@ -278,8 +280,9 @@ def _by_role(devices: Mapping[str, RegisterDevice]) -> dict[str, RegisterDevice]
 
 @contextmanager
 def open_devices(
-    rig: RigFile, port_of: Callable[[str], RegisterPort], clock: Clock, envelope: Envelope, *, threaded: bool = False
-) -> Iterator[Fieldbus]:
+    rig: RigFile, port_of: Callable[[str], RegisterPort], clock: Clock, envelope: Envelope, *, threaded: bool = False,
+    clear_fault: bool = False,
+) -> Iterator[Fieldbus]:  # fmt: skip
     """The rig's register devices, probed and polled for the block; nothing where it has none. However the block ends, a
     drive is told to coast.
 
@@ -290,7 +293,9 @@ def open_devices(
     """
     bus = Fieldbus(rig, port_of, clock, envelope, threaded=threaded)
     try:
-        bus.connect()  # where that fails nothing may be written to a device that is not the one of the rig file
+        bus.connect(
+            clear_fault
+        )  # where that fails nothing may be written to a device that is not the one of the rig file
     except BaseException:
         bus.close()
         raise

@@ -138,7 +138,11 @@ def live(rig: RigFile, operator: str, injected: Sequence[Fault] = (), clear_faul
             def port_of(device: str) -> RegisterPort:
                 return lines[rig.devices[device].link].port(rig.devices[device].unit)
 
-            bus = stack.enter_context(open_devices(rig, port_of, controller.clock, controller.envelope, threaded=True))
+            bus = stack.enter_context(
+                open_devices(
+                    rig, port_of, controller.clock, controller.envelope, threaded=True, clear_fault=clear_fault
+                )
+            )
             people = _operators(operator, hands, controller, console.attentive)
             yield _opened(controller, base, bus, people, None, injected, lines)
 

@@ -25,7 +25,7 @@ def test_a_fault_that_cannot_be_reset_is_named() -> None:
     bench.bank.drives["drive"].fault = "EXTERNAL"
     with (
         pytest.raises(DeviceFault, match="the drive reports EXTERNAL; the rig file states no command to reset it"),
-        open_devices(file, bench.lines.__getitem__, bench.clock, bench.controller.envelope),
+        open_devices(file, bench.lines.__getitem__, bench.clock, bench.controller.envelope, clear_fault=True),
     ):
         pytest.fail("opened")
     assert bench.lines["drive"].writes == []
@@ -37,7 +37,7 @@ def test_a_fault_that_stays_is_named() -> None:
     line.changed = lambda table, address, words: (0, 2, *words[2:]) if table == "input" else words
     with (
         pytest.raises(DeviceFault, match="the drive reports OVERLOAD, and its reset did not clear it"),
-        open_devices(rig(), bench.lines.__getitem__, bench.clock, bench.controller.envelope),
+        open_devices(rig(), bench.lines.__getitem__, bench.clock, bench.controller.envelope, clear_fault=True),
     ):
         pytest.fail("opened")
 
@@ -98,3 +98,14 @@ def test_a_rig_without_register_devices_has_none() -> None:
     with open_devices(file, bench.lines.__getitem__, bench.clock, bench.controller.envelope) as bus:
         assert (bus.drive, bus.supply, bus.thermal, bus.layouts) == (None, None, None, ())
         bus.pump()
+
+
+def test_a_fault_of_the_drive_itself_is_looked_at_first() -> None:
+    bench = Bench(rig(), {})
+    bench.bank.drives["drive"].fault = "EXTERNAL"
+    with (
+        pytest.raises(ConfigError, match=r"the drive has the fault EXTERNAL of an earlier run.*--clear-fault"),
+        open_devices(rig(), bench.lines.__getitem__, bench.clock, bench.controller.envelope),
+    ):
+        pytest.fail("opened")
+    assert bench.lines["drive"].writes == []
