@@ -23,6 +23,7 @@ from drivers.dialogue import Dialogue, no_reply
 from drivers.orders import Orders
 
 SILENCE_S, WAIT_SLICE_S = 0.5, 0.01
+STALL_NS = 200_000_000  # between two polls, which come every 0.1 s at most
 SPIN_S = 60.0
 SLOWEST_SLEW = 0.2  # rad/s, of a controller that does not say how fast it turns to an angle
 HOST_AGE = "host_age"
@@ -47,7 +48,7 @@ class Controller:
         self.clock = PumpedClock(base, self.poll, slice_s, lambda: self.telemetry.host.lag_ns)
         self.guarded = True
         self._states, self._faults = rig.choices("state"), rig.choices("fault")
-        self._last_ns = base.now_ns()
+        self._last_ns = self._polled_ns = base.now_ns()
         self._angle = 0.0
         self._reboots = 0
         self.cleared = ""
@@ -114,6 +115,10 @@ class Controller:
             InterlockError: the envelope tripped.
             DeviceFault: the controller reports a fault, or has restarted.
         """
+        now = self._base.now_ns()
+        if now - self._polled_ns > STALL_NS:  # it was the bench that stood still: the link has had no chance to be heard
+            self._last_ns += now - self._polled_ns
+        self._polled_ns = now
         batch = self._marked(self.link.receive())
         if self._recorder is not None:
             self._recorder.frames(self.link.name, batch, lag_ns=self.telemetry.host.lag_ns)
