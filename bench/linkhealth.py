@@ -11,6 +11,7 @@ from bench.link import LinkStats
 from bench.records import LinkCounts
 from bench.telemetry import Counters
 
+LOST_S = 0.5  # telemetry that comes later than this may belong to another step than it looks
 LATE_S = 0.04  # telemetry that comes later than this is worth a word
 DRIFT_PPM, WRONG_PPM = 200.0, 1000.0  # bench.hosttime follows no more; no crystal is as wrong as that
 BEYOND = 5  # windows of a second in a row; a stall is shorter
@@ -91,7 +92,9 @@ class Health:
                 yield Finding("link-reconnected", text, name)
         if self.latest_ns > LATE_S * 1e9:
             text = f"telemetry came up to {self.latest_ns * 1e-9:.2f} s late; samples carry the device's own time"
-            yield Finding("telemetry-late", text, "link")
+            yield Finding(
+                "telemetry-late", text, "link", Effect.INDETERMINATE if self.latest_ns > LOST_S * 1e9 else Effect.NOTE
+            )
 
     def _clock(self) -> Iterator[Finding]:
         """Host times follow the samples up to 200 ppm; beyond that steps and events slide along the samples."""

@@ -53,6 +53,7 @@ class Controller:
         self._reboots = 0
         self.cleared = ""
         self.restored: tuple[str, ...] = ()
+        self.serial: int | None = None
         self._host_ids = {rig.messages[name].identifier: name for name in handshake.host_messages(rig)}
         self._others: set[str] = set()  # host messages that came in
         self.host_age_s = 0.0  # the greatest while the machine was on
@@ -93,7 +94,7 @@ class Controller:
         )
         self.wait(lambda: bool(self.telemetry.latest), FIRST_S, LinkError(f"link {self.link.name}: {silent}"))
         handshake.claim(self._dialogue, self.rig, self._session, self.clock, self._wait)
-        handshake.identify(self._dialogue, self.rig, self._session, self._wait)
+        self.serial = handshake.identify(self._dialogue, self.rig, self._session, self._wait)
         if self.mode == "FAULT":
             handshake.may_clear(self.fault, clear_fault)
             self.cleared = self.fault
@@ -116,7 +117,9 @@ class Controller:
             DeviceFault: the controller reports a fault, or has restarted.
         """
         now = self._base.now_ns()
-        if now - self._polled_ns > STALL_NS:  # it was the bench that stood still: the link has had no chance to be heard
+        if (
+            now - self._polled_ns > STALL_NS
+        ):  # it was the bench that stood still: the link has had no chance to be heard
             self._last_ns += now - self._polled_ns
         self._polled_ns = now
         batch = self._marked(self.link.receive())

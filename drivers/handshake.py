@@ -40,8 +40,11 @@ def claim(dialogue: Dialogue, rig: RigFile, session: Session, clock: Clock, wait
         clock.sleep(0.1)
 
 
-def identify(dialogue: Dialogue, rig: RigFile, session: Session, wait: Wait) -> None:
+def identify(dialogue: Dialogue, rig: RigFile, session: Session, wait: Wait) -> int | None:
     """Compare the controller's protocol and message map with the rig file's.
+
+    Returns:
+        Its serial number, 0 of a simulated controller; None of one that is not asked.
 
     Raises:
         ConfigError: they differ.
@@ -50,7 +53,7 @@ def identify(dialogue: Dialogue, rig: RigFile, session: Session, wait: Wait) -> 
     device = rig.devices["controller"]
     stated = {"protocol": device.protocol, "map_version": device.map_version}
     if not dialogue.has("Identity") or stated == {"protocol": None, "map_version": None}:
-        return
+        return None
     values = {"session": session.number, "code": rig.messages.code("Command", "code", "IDENTIFY")}
     found = dialogue.ask("Command", values, "Identity", "the controller's Identity", wait)
     for key, expected in stated.items():
@@ -59,6 +62,7 @@ def identify(dialogue: Dialogue, rig: RigFile, session: Session, wait: Wait) -> 
                 f"the controller says {key} {found[key]:g}; rig file {rig.path}: devices.controller.{key}: expected "
                 f"{expected}. Next: use the DBC and rig file of this firmware, or update the firmware"
             )
+    return int(found["serial"]) if "serial" in found else None
 
 
 def alone(others: Collection[str], link: str) -> None:

@@ -70,7 +70,7 @@ def view_of(record: Content, around: Surroundings, figures: Iterable[Drawn] = ()
         rig=rig_name,
         uut=_uut(record.get("uut")),
         date=text.moment(record.get("started"))[:10],
-        simulated=SIMULATED if record.get("seed") is not None else "",
+        simulated=SIMULATED if _simulated(record) else "",
         outcome=outcome,
         tone=_TONES.get(outcome.lower(), "none"),
         outcome_text=_outcome_text(outcome, rows, findings),
@@ -232,6 +232,13 @@ def _calibrations(found: Any) -> tuple[Fact, ...]:
     if not found:
         return (Fact("Earlier calibrations used", "none"),)
     return tuple(tables.facts(found if isinstance(found, Mapping) else {"calibration": found}))
+
+
+def _simulated(record: Content) -> bool:
+    """In this process, which has a seed, or served: then the controller said so."""
+    findings = record.get("findings")
+    told = [f for f in findings if isinstance(f, Mapping)] if isinstance(findings, list | tuple) else []
+    return record.get("seed") is not None or any(f.get("code") == "simulated-controller" for f in told)
 
 
 def _mapping(found: Any) -> Content:

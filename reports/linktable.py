@@ -10,7 +10,7 @@ from reports.view import Table
 
 Content = Mapping[str, Any]
 COUNTS = {
-    "gaps": "Gaps in the telemetry", "lost": "Samples lost", "late": "Samples too late", "duplicates": "Samples repeated",
+    "gaps": "Gaps in telemetry", "lost": "Samples lost", "late": "Samples past their gap", "duplicates": "Samples repeated",
     "reordered": "Samples out of order", "wrong_length": "Frames of wrong length", "unknown": "Frames unknown to the DBC",
     "reboots": "Restarts of the controller", "received": "Frames received", "sent": "Frames sent, heartbeats included",
     "crc_errors": "Packets with a wrong CRC", "malformed": "Malformed packets or lines", "packets_lost": "Packets lost",

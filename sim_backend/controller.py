@@ -209,7 +209,7 @@ class SimulatedController:
         else:
             status = "OK" if self._obey(name) else "WRONG_STATE"
         if name == "IDENTIFY" and status == "OK":
-            self._send("Identity", {"protocol": 1, "map_version": MAP_VERSION, "serial": 1}, clock)
+            self._send("Identity", {"protocol": 1, "map_version": MAP_VERSION, "serial": 0}, clock)
         reply = {"code": code, "token": v["token"], "status": self._status(status),
                  "state": self._map.code("CommandReply", "state", self.state)}  # fmt: skip
         self._send("CommandReply", reply, clock)

@@ -221,6 +221,9 @@ def _opened(
         found.append(
             Finding("fault-cleared", f"fault {controller.cleared} of an earlier run was cleared", "controller")
         )
+    if truth is None and controller.serial == 0:
+        text = "the controller says that it is a simulated one: no machine was measured"
+        found.append(Finding("simulated-controller", text, "controller"))
     if controller.restored:
         text = f"parameters that an earlier host left were set to the rig file's: {', '.join(controller.restored)}"
         found.append(Finding("parameters-restored", text, "controller"))

@@ -30,7 +30,7 @@ FREE = (
     "--link", "operator=line:127.0.0.1:0",
 )  # fmt: skip
 PATIENCE_S = 30.0  # before a test gives up waiting
-IDENTITY = bytes.fromhex("0100 0200 01000000")  # protocol 1, map version 2, serial 1
+IDENTITY = bytes.fromhex("0100 0200 00000000")  # protocol 1, map version 2, serial 0: simulated
 
 
 @dataclass

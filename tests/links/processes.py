@@ -20,8 +20,8 @@ ANY_PORT = ("--link", "controller=slcan:socket://127.0.0.1:0", "--link", "operat
             "--link", "fieldbus=modbus-tcp:127.0.0.1:0")  # fmt: skip
 LINE_S = 60.0
 PATIENCE_S = 1.0
-HOST_STALLS = ("telemetry-late", "heartbeat-late")
-"""Findings about the machine that the test runs on."""
+EXPECTED = ("simulated-controller", "telemetry-late", "heartbeat-late")
+"""Findings of every served rig, and those about the machine that the test runs on."""
 
 
 @dataclass

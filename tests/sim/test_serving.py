@@ -130,7 +130,7 @@ def test_a_request_is_answered_at_once(served: Served, endpoint: str) -> None:
     bus = served()
     client = bus.client(getattr(bus, endpoint))
     client.command(8)
-    assert client.of(0x023) == [bytes.fromhex("0100 0200 01000000")]
+    assert client.of(0x023) == [bytes.fromhex("0100 0200 00000000")]
     assert client.of(0x021) == [bytes((8, 8, 0, 0))]
     assert bus.clock.now == T0
 
