@@ -25,7 +25,7 @@ from bench.roles import NOTHING, Load, RigState
 from bench.uncertainty import Estimate, Influence, propagate
 from procedures import amb_calibration_figures as drawn
 from procedures.estimators import consistency, mass_hanging
-from procedures.estimators.hanging_data import HangingData, read_hangings
+from procedures.estimators.hanging_data import CHANNELS, COILS, HangingData, read_hangings
 from procedures.estimators.inputs import certified
 from procedures.estimators.mass_hanging import Fit
 from procedures.estimators.repeatability import OUTPUTS, Scatter, covariance_over_a_turn, scatter
@@ -215,6 +215,11 @@ def masses_u(recording: Recording[Plan]) -> np.ndarray:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
+    needed = (("sensors", [c for c in COILS if c.startswith("i_y")], rig.sensors), ("channels", CHANNELS, rig.channels),
+              ("parameters", ("bias_i", "bias_o", "angle_ref"), rig.parameters))  # fmt: skip
+    for table, names, found in needed:
+        if missing := [n for n in names if n not in found]:
+            yield f"{table}: found no {', '.join(missing)}; the calibration needs {'it' if len(missing) == 1 else 'them'}"
     unknown = [m for m in plan.masses if m not in rig.masses]
     if unknown:
         yield f"masses: found {', '.join(unknown)}; the rig file certifies {', '.join(rig.masses)}"

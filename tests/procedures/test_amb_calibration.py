@@ -15,6 +15,7 @@ from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import interval
+from procedures.amb_calibration import Plan, check
 from sim_backend.truth import draw
 
 QUICK = {"settle_s": 0.5, "average_s": 0.3}
@@ -94,3 +95,13 @@ def test_a_rotor_that_cannot_levitate_stops_the_run(tmp_path: Path, defect: dict
     with pytest.raises((DeviceFault, InterlockError)) as stopped:
         calibrate(tmp_path, 3, defect)
     assert "check" in str(stopped.value) or "envelope" in str(stopped.value)
+
+
+@pytest.mark.parametrize("kind", ["sensors", "channels", "parameters"])
+def test_what_the_rig_file_lacks_is_told_before_anything_starts(kind: str) -> None:
+    rig = load_rig("tsbs12")
+    name = {"sensors": "i_yi_p", "channels": "flags", "parameters": "angle_ref"}[kind]
+    table = {k: v for k, v in getattr(rig, kind).items() if k != name}
+    found = list(check(rig.model_copy(update={kind: table}), Plan()))
+    assert found == [f"{kind}: found no {name}; the calibration needs it"]
+    assert list(check(rig, Plan())) == []
