@@ -1,6 +1,8 @@
-"""What to look at when a controller reports a fault (names of docs/reference/protocol.md)."""
+"""What to look at when a device reports a fault (names of docs/reference/protocol.md), and which may be cleared unseen."""
 
 from __future__ import annotations
+
+from bench.errors import ConfigError
 
 ADVICE = {
     "CONTACT": "the rotor touched a touchdown bearing; inspect it before levitating again",
@@ -12,5 +14,18 @@ ADVICE = {
     "OVERTEMPERATURE": "let the windings cool",
     "SENSOR": "check the position sensors",
 }
-HARMLESS = ("HEARTBEAT_LOST",)
-"""Faults that say nothing of the machine: the next run may clear them by itself."""
+HARMLESS = ("HEARTBEAT_LOST", "COMMUNICATION")
+"""Faults of a lost host, which say nothing of the machine: the next run may clear them by itself."""
+
+
+def may_clear(device: str, fault: str, asked: bool) -> None:
+    """Whether a fault that an earlier run left may be cleared: that of a lost host, or any on request.
+
+    Raises:
+        ConfigError: somebody should look at the machine first.
+    """
+    if fault not in HARMLESS and not asked:
+        what = ADVICE.get(fault, "look at it")
+        raise ConfigError(
+            f"the {device} has the fault {fault} of an earlier run: {what}. Next: then run again with --clear-fault"
+        )

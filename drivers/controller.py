@@ -96,7 +96,7 @@ class Controller:
         handshake.claim(self._dialogue, self.rig, self._session, self.clock, self._wait)
         self.serial = handshake.identify(self._dialogue, self.rig, self._session, self._wait)
         if self.mode == "FAULT":
-            handshake.may_clear(self.fault, clear_fault)
+            advice.may_clear("controller", self.fault, clear_fault)
             self.cleared = self.fault
             self._command("CLEAR_FAULT", "OFF", 1.0)
         self.restored = self._orders.restore()

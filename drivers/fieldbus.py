@@ -24,8 +24,9 @@ from bench.recorder import Recorder
 from bench.registers import RegisterPort, RegisterRefused
 from bench.rigfile import RigFile
 from bench.samples import StreamLayout
+from drivers import advice
 from drivers.background import Background
-from drivers.fielddrive import FieldDrive, may_clear
+from drivers.fielddrive import FieldDrive
 from drivers.monitors import FieldSupply, FieldThermal
 from drivers.polling import Poll, PolledStream, Reading
 from drivers.registerdevice import RegisterDevice
@@ -115,7 +116,7 @@ class Fieldbus:
             self._latest[name] = self.ask(device.check)
             self._answered[name] = self._refreshed[name] = self._clock.now_ns()
         if self.drive is not None and self.drive.fault:
-            may_clear(self.drive.fault, clear_fault)
+            advice.may_clear("drive", self.drive.fault, clear_fault)
             self.cleared = self.drive.fault
             self.drive.reset()
         self._pumped_s = time.monotonic()

@@ -17,19 +17,6 @@ TAKEN_S = 1.0  # for a drive to do what it was told
 STANDSTILL_RAD_S, STOP_S, REACH_S = 0.5, 90.0, 60.0
 NEEDED = ("target_speed", "actual_speed", "fault")
 COMMANDS = ("run", "coast", "stop")
-HARMLESS = ("COMMUNICATION",)  # faults that say nothing of the drive
-
-
-def may_clear(fault: str, asked: bool) -> None:
-    """Whether a fault that an earlier run left may be cleared: that of a lost connection, or on request.
-
-    Raises:
-        ConfigError: somebody should look at the drive first.
-    """
-    if fault not in HARMLESS and not asked:
-        raise ConfigError(
-            f"the drive has the fault {fault} of an earlier run: look at it. Next: then run again with --clear-fault"
-        )
 
 
 class Surroundings(Protocol):

@@ -9,7 +9,6 @@ from bench.clock import Clock
 from bench.errors import ConfigError
 from bench.rigfile import RigFile
 from bench.session import Session
-from drivers.advice import ADVICE, HARMLESS
 from drivers.dialogue import Dialogue
 
 LISTEN_S = 0.15  # for another host, before the first heartbeat
@@ -75,19 +74,6 @@ def alone(others: Collection[str], link: str) -> None:
         raise ConfigError(
             f"link {link}: another host talks to this controller ({', '.join(sorted(others))}); expected one bench per "
             "rig. Next: end that one"
-        )
-
-
-def may_clear(fault: str, asked: bool) -> None:
-    """Whether a fault that an earlier run left may be cleared: one that says nothing of the machine, or on request.
-
-    Raises:
-        ConfigError: somebody should look at the machine first.
-    """
-    if fault not in HARMLESS and not asked:
-        what = ADVICE.get(fault, "look at the machine")
-        raise ConfigError(
-            f"the controller has the fault {fault} of an earlier run: {what}. Next: then run again with --clear-fault"
         )
 
 
