@@ -30,12 +30,6 @@ KINDS = pytest.mark.parametrize("end", [False, True], indirect=True, ids=["pty",
 
 
 @pytest.fixture
-def end(request: pytest.FixtureRequest) -> Iterator[FarEnd]:
-    with far_end(getattr(request, "param", False)) as far:
-        yield far
-
-
-@pytest.fixture
 def port(end: FarEnd) -> Iterator[BytePort]:
     port = BytePort.open(end.where)
     if end.where.startswith("socket"):

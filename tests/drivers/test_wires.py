@@ -19,12 +19,6 @@ KINDS = pytest.mark.parametrize("end", [False, True], indirect=True, ids=["pty",
 
 
 @pytest.fixture
-def end(request: pytest.FixtureRequest) -> Iterator[FarEnd]:
-    with far_end(getattr(request, "param", False)) as far:
-        yield far
-
-
-@pytest.fixture
 def wire(end: FarEnd) -> Iterator[Wire]:
     wire = open_wire(LinkSpec(url=f"serial:{end.where}"), "serial0", now_ns=lambda: 77)
     if end.where.startswith("socket"):

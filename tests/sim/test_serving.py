@@ -79,20 +79,6 @@ def test_the_next_slice_starts_two_milliseconds_after_the_last() -> None:
     assert pacer.due(T0 - SECOND) == 0  # a clock that went back moves nothing
 
 
-@pytest.fixture
-def selector() -> Iterator[selectors.BaseSelector]:
-    with selectors.DefaultSelector() as made:
-        yield made
-
-
-@pytest.fixture
-def opened() -> Iterator[list[Port]]:
-    ports: list[Port] = []
-    yield ports
-    for port in ports:
-        port.close()
-
-
 Served = Callable[..., Bus]
 
 

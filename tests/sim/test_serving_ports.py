@@ -19,20 +19,6 @@ from sim_backend.serving.ports import CLIENTS, Port, PtyPort, TcpPort
 needs_ptys = pytest.mark.skipif(not ptys.AVAILABLE, reason="no ptys here")
 
 
-@pytest.fixture
-def selector() -> Iterator[selectors.BaseSelector]:
-    with selectors.DefaultSelector() as made:
-        yield made
-
-
-@pytest.fixture
-def opened() -> Iterator[list[Port]]:
-    ports: list[Port] = []
-    yield ports
-    for port in ports:
-        port.close()
-
-
 def tcp(selector: selectors.BaseSelector, opened: list[Port], address: tuple[str, int] = LOOPBACK) -> TcpPort:
     port = TcpPort("controller slcan:socket://{}", address, adapter, selector)
     opened.append(port)
