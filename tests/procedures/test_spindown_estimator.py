@@ -1,0 +1,105 @@
+"""The run-down: analytic forms against an integrator, fits recover what made the data, and what T (6.16) leaves out."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from bench.errors import AnalysisError
+from procedures.estimators import spindown
+
+RPM = math.pi / 30
+J, B, T_C = 0.033, 0.081, 0.1
+
+
+@given(st.floats(0, 5), st.floats(0, 10), st.floats(5, 80))
+def test_the_forms_solve_the_equation(b: float, c: float, start: float) -> None:
+    until = 0.9 * min(spindown.stopping_time(b, c, start), 3.0)
+    t = np.linspace(0, until, 40)
+    exact = solve_ivp(lambda _, y: [y[1], -b * y[1] - c], (0, until), [0.0, start], t_eval=t, rtol=1e-11, atol=1e-12).y
+    np.testing.assert_allclose(spindown.angle(t, b, c, start), exact[0], rtol=1e-7, atol=1e-7)
+    np.testing.assert_allclose(spindown.speed(t, b, c, start), exact[1], rtol=1e-7, atol=1e-7)
+
+
+@given(st.floats(0.01, 5), st.floats(0.01, 10), st.floats(1, 80))
+def test_it_stops_when_it_says(b: float, c: float, start: float) -> None:
+    t = spindown.stopping_time(b, c, start)
+    assert spindown.speed(np.array([t]), b, c, start)[0] == pytest.approx(0, abs=1e-8 * start)
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.floats(1.5, 4), st.floats(0.3, 6), st.floats(30, 75))
+def test_both_fits_give_back_what_made_the_data(b: float, c: float, start: float) -> None:
+    t = np.arange(0, 0.8 * spindown.stopping_time(b, c, start), 1e-3)
+    for coast in (
+        spindown.of_speed(t, spindown.speed(t, b, c, start), 20),
+        spindown.of_angle(t, 0.3 + spindown.angle(t, b, c, start), 20),
+    ):
+        assert coast.b == pytest.approx(b, rel=1e-5)
+        assert coast.c == pytest.approx(c, rel=1e-4)
+        assert coast.speed == pytest.approx(start, rel=1e-5)
+
+
+def test_a_filter_on_the_speed_changes_the_start_alone() -> None:
+    b, c, start, keep = B / J, T_C / J, 60.0, math.exp(-2 * math.pi * 20 * 1e-4)
+    t = np.arange(0, 1.2, 1e-4)
+    w = spindown.speed(t, b, c, start)
+    seen = np.empty_like(w)
+    seen[0] = start
+    for k in range(1, len(t)):
+        seen[k] = keep * seen[k - 1] + (1 - keep) * w[k]
+    later = t > 10 / (2 * math.pi * 20)
+    coast = spindown.of_speed(t[later] - t[later][0], seen[later], 10)
+    assert coast.b == pytest.approx(b, rel=1e-3)
+    assert coast.c == pytest.approx(c, rel=1e-2)
+    early = spindown.of_speed(t, seen, 10)
+    assert abs(early.b / b - 1) > 3 * abs(coast.b / b - 1)
+
+
+@pytest.mark.parametrize(("rpm", "bias"), [(100, 0.33), (200, 0.18), (403, 0.10), (601, 0.07)])
+def test_without_coulomb_the_printed_model_is_far_off(rpm: float, bias: float) -> None:
+    """Errata of T (6.16): T_c = 0.1 N m; speed sampled evenly from the stated speed to standstill."""
+    b, c, start = B / J, T_C / J, rpm * RPM
+    t = np.linspace(0, spindown.stopping_time(b, c, start), 20_001)
+    w = spindown.speed(t, b, c, start)
+    assert spindown.viscous_only(t, w) / b - 1 == pytest.approx(bias, abs=0.006)
+    assert spindown.of_speed(t, w, 10).b == pytest.approx(b, rel=1e-6)
+
+
+def test_the_transverse_inertia_is_not_the_polar_one() -> None:
+    """Errata of T (6.16): with J = 0.116 kg m^2 as printed B would be 0.285, not 0.081 N m s/rad."""
+    t = np.arange(0, 1.0, 1e-3)
+    b = spindown.of_speed(t, spindown.speed(t, B / J, 0.05 / J, 60.0), 10).b
+    assert b * J == pytest.approx(0.081, rel=1e-5)
+    assert b * 0.116 == pytest.approx(0.285, abs=0.001)
+
+
+def test_the_scatter_is_what_the_covariance_says() -> None:
+    """Counts of an encoder and correlated noise: the stated u is that of repeated fits, within a third."""
+    rng = np.random.default_rng(4)
+    t = np.arange(0, 1.2, 1e-3)
+    b, u = [], []
+    for _ in range(60):
+        start = rng.uniform(58, 62)
+        noise = np.convolve(rng.normal(size=len(t) + 20), np.ones(21) / 21, "valid")
+        coast = spindown.of_speed(t, spindown.speed(t, 2.45, 1.5, start) + 0.2 * noise, 80)
+        b.append(coast.b)
+        u.append(math.sqrt(coast.covariance[0, 0]))
+    assert np.mean(u) == pytest.approx(np.std(b), rel=0.34)
+
+
+def test_a_ring_of_known_inertia_gives_the_inertia() -> None:
+    assert spindown.inertia_from_ring(B / J, B / (J + 0.02), 0.02) == pytest.approx(J, rel=1e-12)
+    with pytest.raises(AnalysisError):
+        spindown.inertia_from_ring(1.0, 2.0, 0.02)
+
+
+@pytest.mark.parametrize("w", [np.linspace(1, 60, 500), np.full(500, -3.0), np.full(4, 5.0)])
+def test_what_is_no_run_down_is_told(w: np.ndarray) -> None:
+    with pytest.raises(AnalysisError):
+        spindown.of_speed(np.arange(len(w)) * 1e-3, w, 10)
