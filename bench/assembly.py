@@ -44,15 +44,23 @@ class Rows:
 
 @dataclass(frozen=True)
 class _Part:
-    """One telemetry message: its decoder, and its channels with signal, factor and offset to SI."""
+    """One telemetry message: its decoder, and its channels with factors and offsets to SI (channels, 1)."""
 
     message: Message
     decoder: Decoder
-    channels: dict[str, tuple[str, float, float]]
+    channels: tuple[str, ...]
+    rows: list[int]  # of the channels' signals in the decoder's table
+    factors: Values
+    offsets: Values
 
-    def si(self, values: dict[str, Values]) -> dict[str, Values]:
-        """Values in SI by channel."""
-        return {n: values[signal] * factor + offset for n, (signal, factor, offset) in self.channels.items()}
+    def si(self, table: Values) -> Values:
+        """Values (channels, n) in SI of a table of the decoder."""
+        return table[self.rows] * self.factors + self.offsets
+
+    def integers(self, table: Values, signal: str) -> Integers:
+        """A signal as it came."""
+        out: Integers = table[self.decoder.names.index(signal)].astype(np.int64)
+        return out
 
 
 @dataclass
@@ -101,21 +109,20 @@ class Assembler:
 
     def _single(self, batch: FrameBatch) -> Rows:
         part, b = self._parts[0], self._binding
-        values, wrong = part.decoder.decode(batch)
+        frames, wrong = part.decoder.chosen(batch)
         self.wrong_length += wrong
-        mine = (batch["id"] == part.message.identifier) & (batch["length"] == part.message.length)
-        sequence, tick = (values[name].astype(np.int64) for name in (b.sequence, b.tick))
-        return Rows(sequence, tick, batch["t_ns"][mine], part.si(values))
+        table = part.decoder.table(frames["data"])
+        sequence, tick = (part.integers(table, name) for name in (b.sequence, b.tick))
+        return Rows(sequence, tick, frames["t_ns"], dict(zip(part.channels, part.si(table), strict=True)))
 
     def _several(self, batch: FrameBatch) -> Rows:
         kind = np.full(len(batch), -1)
         frames = []
         for k, part in enumerate(self._parts):
-            values, wrong = part.decoder.decode(batch)
+            mine, wrong = part.decoder.chosen(batch)
             self.wrong_length += wrong
-            mine = (batch["id"] == part.message.identifier) & (batch["length"] == part.message.length)
-            kind[mine] = k
-            frames.append(self._frames(part, values, batch["t_ns"][mine]))
+            kind[(batch["id"] == part.message.identifier) & (batch["length"] == part.message.length)] = k
+            frames.append(self._frames(part, mine))
         done: list[_Sample] = []
         place = [0] * len(frames)
         for k in kind[kind >= 0].tolist():
@@ -127,13 +134,12 @@ class Assembler:
                 self._joiner.data(k, f.count[j], f.values[j])
         return self._rows(done)
 
-    def _frames(self, part: _Part, values: dict[str, Values], arrived: Integers) -> _Frames:
+    def _frames(self, part: _Part, mine: FrameBatch) -> _Frames:
         b, first = self._binding, part is self._parts[0]
-        counts = values[b.sequence if first else b.counter].astype(np.int64).tolist()
-        ticks = values[b.tick].astype(np.int64).tolist() if first else []
-        si = list(part.si(values).values())
-        table = np.stack(si, axis=1) if si else np.empty((len(counts), 0))
-        return _Frames(counts, ticks, table, arrived.tolist())
+        table = part.decoder.table(mine["data"])
+        counts = part.integers(table, b.sequence if first else b.counter).tolist()
+        ticks = part.integers(table, b.tick).tolist() if first else []
+        return _Frames(counts, ticks, np.ascontiguousarray(part.si(table).T), mine["t_ns"].tolist())
 
     def _rows(self, done: list[_Sample]) -> Rows:
         names = [n for p in self._parts for n in p.channels]
@@ -216,10 +222,10 @@ class Joiner:
 
 
 def _part(rig: RigFile, message: Message) -> _Part:
-    channels = {}
-    for name, channel in rig.channels.items():
-        owner, _, signal = channel.signal.partition(".")
-        if owner == message.name:
-            unit = units.UNITS[message.signal(signal).unit]
-            channels[name] = (signal, unit.factor, unit.offset)
-    return _Part(message, Decoder(message), channels)
+    decoder = Decoder(message)
+    paths = {name: channel.signal.split(".") for name, channel in rig.channels.items()}
+    signals = {name: signal for name, (owner, signal) in paths.items() if owner == message.name}
+    si = [units.UNITS[message.signal(s).unit] for s in signals.values()]
+    rows = [decoder.names.index(s) for s in signals.values()]
+    factors, offsets = np.array([(u.factor, u.offset) for u in si]).reshape(len(si), 2).T[:, :, None]
+    return _Part(message, decoder, tuple(signals), rows, factors, offsets)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Mapping
 from itertools import groupby
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -19,16 +20,23 @@ from bench.messages import Message, Signal
 
 Array = npt.NDArray[np.float64]
 Payloads = npt.NDArray[np.uint8]
-Extractor = Callable[[Payloads], list[Array]]
+Raw = npt.NDArray[Any]
+Extractor = Callable[[Payloads], Raw]
+_FLOATS: Final = {16: "<e", 32: "<f", 64: "<d"}
 
 
 class Decoder:
-    """Decodes frames of one message."""
+    """Decodes frames of one message. `names` are its signals in the order of the rows of a table."""
 
     def __init__(self, message: Message) -> None:
         self.message = message
-        self._names = [s.name for group in _groups(message) for s in group]
-        self._extractors = [_extractor(group) for group in _groups(message)]
+        groups = _groups(message)
+        self._extractors = [_extractor(group) for group in groups]
+        self._signals = [s for group in groups for s in group]
+        self.names = tuple(s.name for s in self._signals)
+        self._scales = np.array([s.scale for s in self._signals])[:, None]
+        self._offsets = np.array([s.offset for s in self._signals])[:, None]
+        self._places = [_shift(s, message.length) for s in self._signals]
 
     def decode(self, batch: FrameBatch) -> tuple[dict[str, Array], int]:
         """Values of every frame of this message in a batch.
@@ -37,17 +45,39 @@ class Decoder:
             float64 arrays by signal, in order of arrival, and the number of frames of this identifier whose length is
             wrong; those are left out, never read.
         """
+        frames, wrong = self.chosen(batch)
+        return self.decode_payloads(frames["data"]), wrong
+
+    def decode_payloads(self, payloads: Payloads) -> dict[str, Array]:
+        """Values of payloads (n, at least message.length), one row a frame, by signal."""
+        return dict(zip(self.names, self.table(payloads), strict=True))
+
+    def chosen(self, batch: FrameBatch) -> tuple[FrameBatch, int]:
+        """The frames of this message in a batch, and how many more have its identifier but another length."""
         mine = batch["id"] == self.message.identifier
         right = mine & (batch["length"] == self.message.length)
         count = int(np.count_nonzero(right))
-        data = batch["data"][:, : self.message.length]
-        payloads = np.ascontiguousarray(data if count == len(batch) else data[right])  # whole records are not copied
-        return self.decode_payloads(payloads), int(np.count_nonzero(mine)) - count
+        frames = batch if count == len(batch) else batch[right]  # whole batches are not copied
+        return frames, int(np.count_nonzero(mine)) - count
 
-    def decode_payloads(self, payloads: Payloads) -> dict[str, Array]:
-        """Values of payloads (n, at least message.length), one row a frame."""
-        columns = [column for extract in self._extractors for column in extract(payloads)]
-        return dict(zip(self._names, columns, strict=True))
+    def table(self, payloads: Payloads) -> Array:
+        """Values (signals, n) of such payloads."""
+        out = np.empty((len(self.names), len(payloads)))
+        row = 0
+        for count, extract in self._extractors:
+            out[row : row + count] = extract(payloads)
+            row += count
+        out *= self._scales
+        out += self._offsets
+        return out
+
+    def decode_one(self, payload: bytes) -> dict[str, float]:
+        """Values of a single payload of message.length bytes, the same as those of a batch, without its overhead."""
+        words = int.from_bytes(payload, "big"), int.from_bytes(payload, "little")
+        return {
+            s.name: _number(s, words[s.little_endian] >> shift) * s.scale + s.offset
+            for s, shift in zip(self._signals, self._places, strict=True)
+        }
 
 
 def _fast(s: Signal) -> str:
@@ -65,23 +95,16 @@ def _groups(message: Message) -> list[list[Signal]]:
     return [list(g) for _, g in groupby(ordered, key=lambda s: (_fast(s) or s.name, place[s.name] if _fast(s) else 0))]
 
 
-def _extractor(group: list[Signal]) -> Extractor:
+def _extractor(group: list[Signal]) -> tuple[int, Extractor]:
+    """How many signals are read together, and what reads their raw values."""
     first, kind = group[0], _fast(group[0])
     if not kind:
-        return lambda payloads: [_bits(payloads, first)]
+        return 1, lambda payloads: _bits(payloads, first)
     low, high = first.start // 8, (group[-1].start + group[-1].length) // 8
-    scales = np.array([s.scale for s in group])[:, None]
-    offsets = np.array([s.offset for s in group])[:, None]
-    plain = bool((scales == 1).all() and (offsets == 0).all())
-
-    def view(payloads: Payloads) -> list[Array]:
-        raw = np.ascontiguousarray(payloads[:, low:high]).view(kind).T.astype(np.float64)
-        return list(raw if plain else raw * scales + offsets)
-
-    return view
+    return len(group), lambda payloads: payloads[:, low:high].view(kind).T
 
 
-def _bits(payloads: Payloads, s: Signal) -> Array:
+def _bits(payloads: Payloads, s: Signal) -> Raw:
     """A signal at any place: its bytes are gathered into a 64-bit word (and a ninth byte where it straddles)."""
     first_bit, order = _layout(s)
     word = np.zeros(len(payloads), np.uint64)
@@ -93,20 +116,35 @@ def _bits(payloads: Payloads, s: Signal) -> Array:
         word &= np.uint64((1 << s.length) - 1)
     if s.is_float:
         kind = {16: np.float16, 32: np.float32, 64: np.float64}[s.length]
-        raw = word.astype(f"<u{s.length // 8}").view(kind).astype(np.float64)
-    elif s.signed:
+        return word.astype(f"<u{s.length // 8}").view(kind)
+    if s.signed:
         up = np.uint64(64 - s.length)
-        raw = ((word << up).view(np.int64) >> np.int64(up)).astype(np.float64)
-    else:
-        raw = word.astype(np.float64)
-    return raw * s.scale + s.offset
+        return (word << up).view(np.int64) >> np.int64(up)
+    return word
+
+
+def _shift(s: Signal, length: int) -> int:
+    """How far a signal's least significant bit lies above that of a whole payload, read in the signal's byte order."""
+    if s.little_endian:
+        return s.start
+    top = 8 * (s.start // 8) + 7 - s.start % 8  # position counted from the first byte's most significant bit
+    return 8 * length - top - s.length
+
+
+def _number(s: Signal, word: int) -> float:
+    """The raw value in the low bits of a word."""
+    raw = word & ((1 << s.length) - 1)
+    if s.is_float:
+        value: float = struct.unpack(_FLOATS[s.length], raw.to_bytes(s.length // 8, "little"))[0]
+        return value
+    return float(raw - (1 << s.length) if s.signed and raw >> (s.length - 1) else raw)
 
 
 def _layout(s: Signal) -> tuple[int, list[int]]:
     """Bit of the first byte where the signal's least significant bit lies, and its bytes, least significant first."""
     if s.little_endian:
         return s.start % 8, list(range(s.start // 8, (s.start + s.length - 1) // 8 + 1))
-    top = 8 * (s.start // 8) + 7 - s.start % 8  # position counted from the first byte's most significant bit
+    top = 8 * (s.start // 8) + 7 - s.start % 8
     last = top + s.length - 1
     return 7 - last % 8, list(range(last // 8, top // 8 - 1, -1))
 
@@ -117,26 +155,23 @@ def encode(message: Message, values: Mapping[str, float]) -> bytes:
     Raises:
         ConfigError: an unknown signal, or a value that its bits cannot hold.
     """
-    out = 0
+    words = [0, 0]  # of the big-endian signals, and of the others
     for name, value in values.items():
         try:
             s = message.signal(name)
         except KeyError:
             known = ", ".join(x.name for x in message.signals)
             raise ConfigError(f"{message.name}: no signal {name!r}; expected one of {known}") from None
-        raw = _raw(message, s, value)
-        first_bit, order = _layout(s)
-        shifted = raw << first_bit
-        for k, byte in enumerate(order):
-            out |= (shifted >> (8 * k) & 0xFF) << (8 * byte)
-    return out.to_bytes(message.length, "little")
+        words[s.little_endian] |= _raw(message, s, value) << _shift(s, message.length)
+    swapped = int.from_bytes(words[0].to_bytes(message.length, "big"), "little")
+    return (swapped | words[1]).to_bytes(message.length, "little")
 
 
 def _raw(message: Message, s: Signal, value: float) -> int:
     scaled = (value - s.offset) / s.scale
     if s.is_float:
         try:
-            packed = struct.pack({16: "<e", 32: "<f", 64: "<d"}[s.length], scaled)
+            packed = struct.pack(_FLOATS[s.length], scaled)
         except OverflowError:
             raise ConfigError(f"{message.name}.{s.name}: {value:g} {s.unit} is too large for its float") from None
         return int.from_bytes(packed, "little")

@@ -7,11 +7,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
+from bench import units
 from bench.errors import InterlockError
 from bench.rigfile import RigFile
 from bench.samples import SampleBlock
 
+Values = npt.NDArray[np.float64]
 POSITIONS = ("pos_xi", "pos_yi", "pos_xo", "pos_yo")
 HELD = ("LEVITATED", "SPINNING")
 
@@ -27,6 +30,19 @@ class Envelope:
         """Codes of the controller's states in which the rotor is held."""
         choices = self.rig.choices("state")
         return [code for code, name in choices.items() if self.rig.binding.mode(name) in HELD]
+
+    @cached_property
+    def _limits(self) -> tuple[list[str], Values, Values, int]:
+        """Protected channels with what they may be at least and at most (channels, 1), and where the positions begin,
+        which come last."""
+        e, known = self.rig.envelope, self.rig.channels
+        limits = {n: (-e.max_current_A, e.max_current_A) for n in known if n.startswith("i_")}
+        limits |= {n: (-np.inf, e.max_temperature_K) for n in known if n.startswith("temp_")}
+        limits["speed"] = (-e.max_speed_rad_s, e.max_speed_rad_s)
+        first = len(limits)
+        limits |= {n: (-e.max_levitated_position_m, e.max_levitated_position_m) for n in POSITIONS if n in known}
+        low, high = np.array(list(limits.values())).T[:, :, None]
+        return list(limits), low, high, first
 
     def check_parameter(self, name: str, value: float) -> None:
         """Refuse a parameter write out of its range.
@@ -69,23 +85,16 @@ class Envelope:
         Raises:
             InterlockError: a channel has left its range; the text names it, its value and the time.
         """
-        e = self.rig.envelope
-        c = block.columns
-        for name, x in c.items():
-            if name.startswith("i_"):
-                self._trip(block, name, np.abs(x), e.max_current_A, "A")
-            elif name.startswith("temp_"):
-                self._trip(block, name, x, e.max_temperature_K, "K")
-        self._trip(block, "speed", np.abs(c["speed"]), e.max_speed_rad_s, "rad/s")
-        held = np.isin(c["state"], self._held)
-        for name in (n for n in POSITIONS if n in c):
-            self._trip(block, name, np.where(held, np.abs(c[name]), 0.0), e.max_levitated_position_m, "m")
-
-    @staticmethod
-    def _trip(block: SampleBlock, name: str, x: np.ndarray, limit: float, unit: str) -> None:
-        if not (x <= limit).all():  # NaN has left its range too
-            k = int(np.argmax(~(x <= limit)))
+        names, low, high, positions = self._limits
+        x = np.array([block.columns[name] for name in names])
+        inside = (low <= x) & (x <= high)  # NaN has left its range too
+        if not inside.all():  # a rotor that is not held may lie anywhere
+            inside[positions:] |= ~np.isin(block.columns["state"], self._held)
+        if not inside.all():
+            row = int(np.argmin(inside.all(axis=1)))
+            k, name = int(np.argmin(inside[row])), names[row]
+            unit = units.UNITS[self.rig.channels[name].unit].si
             raise InterlockError(
-                f"interlock: {name} reached {x[k]:.4g} {unit} at tick {int(block.ticks[k])}; the envelope allows "
-                f"{limit:g} {unit}"
+                f"interlock: {name} reached {abs(x[row, k]):.4g} {unit} at tick {int(block.ticks[k])}; the envelope "
+                f"allows {high[row, 0]:g} {unit}"
             )

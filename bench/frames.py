@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -44,6 +45,14 @@ def frame(identifier: int, payload: bytes, *, t_ns: int = 0, flags: int = 0) -> 
     batch["t_ns"], batch["id"], batch["flags"], batch["length"] = t_ns, identifier, flags, len(payload)
     batch["data"][0, : len(payload)] = np.frombuffer(payload, np.uint8)
     return batch
+
+
+def joined(batches: Sequence[FrameBatch]) -> FrameBatch:
+    """Batches one after the other, as one. As plain bytes: numpy takes ten times as long to compare their fields."""
+    if len(batches) == 1:
+        return batches[0]
+    plain = np.dtype((np.void, FRAME.itemsize))
+    return np.concatenate([np.empty(0, plain), *(b.view(plain) for b in batches)]).view(FRAME)
 
 
 def frames_of(records: bytes, version: int) -> FrameBatch:

@@ -143,8 +143,8 @@ class Controller:
 
     def _marked(self, batch: FrameBatch) -> FrameBatch:
         """Frames that a host sent are marked so: another host's, or our own heartbeats that the bus brings back."""
-        theirs = np.isin(batch["id"], list(self._host_ids))
-        if theirs.any():
+        if not self._host_ids.keys().isdisjoint(batch["id"].tolist()):
+            theirs = np.isin(batch["id"], list(self._host_ids))
             batch = batch.copy()
             batch["flags"][theirs] |= SENT
             self._others |= {self._host_ids[int(i)] for i in batch["id"][theirs]}

@@ -23,7 +23,7 @@ class Dialogue:
 
     def __init__(self, rig: RigFile, link: Link, now_ns: Callable[[], int]) -> None:
         self._rig, self._link, self._now_ns = rig, link, now_ns
-        self._decoders = {n: Decoder(m) for n, m in rig.messages.messages.items() if n in REPLIES}
+        self._decoders = {m.identifier: Decoder(m) for n, m in rig.messages.messages.items() if n in REPLIES}
         self._answers: deque[tuple[str, dict[str, float], int]] = deque(maxlen=KEPT)
         self._held: dict[str, dict[str, float]] = {}
         self._token = 0
@@ -39,17 +39,17 @@ class Dialogue:
     def take(self, batch: FrameBatch) -> None:
         """Keep the replies in a batch for who waits for them. Destroyed frames are none; those of a wrong length are
         counted and left out."""
-        destroyed = (batch["flags"] & ERROR) != 0
-        good = batch[~destroyed] if destroyed.any() else batch
-        for name, decoder in self._decoders.items():
-            values, wrong = decoder.decode(good)
-            mine = good["id"] == decoder.message.identifier
-            fits = good["length"] == decoder.message.length
-            if wrong:
-                self.wrong_length += wrong
-                self._misfit[name] = int(good["length"][mine & ~fits][-1])
-            for k, t_ns in enumerate(good["t_ns"][mine & fits].tolist()):
-                self._answers.append((name, {s: float(v[k]) for s, v in values.items()}, t_ns))
+        for k, identifier in enumerate(batch["id"].tolist()):
+            decoder = self._decoders.get(identifier)
+            if decoder is None or batch["flags"][k] & ERROR:
+                continue
+            name, length = decoder.message.name, int(batch["length"][k])
+            if length != decoder.message.length:
+                self.wrong_length += 1
+                self._misfit[name] = length
+                continue
+            values = decoder.decode_one(batch["data"][k, :length].tobytes())
+            self._answers.append((name, values, int(batch["t_ns"][k])))
 
     def ask(
         self, message: str, values: Mapping[str, float], reply: str, what: str, wait: Callable[..., None]

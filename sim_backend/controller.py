@@ -3,13 +3,14 @@ the plant. It has its own copy of the message map and shares no object with the 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from bench.codec import Decoder, encode
 from bench.faults import Fault
-from bench.frames import FD, FrameBatch, frame
+from bench.frames import FD, FrameBatch, frame, joined, payload
 from bench.messages import load_messages
 from bench.rigfile import RigFile
 from sim_backend import core
@@ -70,12 +71,11 @@ class SimulatedController:
         start = self.plant.tick
         self._out, self._spans = [], []
         clock = (t0_ns, start)
-        due = np.clip((incoming["t_ns"] - t0_ns) // 100_000, 0, ticks) + start
-        for at, one in zip(due.tolist(), incoming, strict=True):
-            self._run_to(int(at))
-            self._receive(one, clock)
+        for k, t_ns in enumerate(incoming["t_ns"].tolist()):
+            self._run_to(start + min(max((t_ns - t0_ns) // 100_000, 0), ticks))
+            self._receive(incoming[k], clock)
         self._run_to(start + ticks)
-        sent = np.concatenate([self._encoder.encode(self._spans, clock), *self._out])
+        sent = joined([self._encoder.encode(self._spans, clock), *self._out])
         return sent[np.argsort(sent["t_ns"], kind="stable")] if self._out else sent
 
     def restart(self) -> None:
@@ -185,9 +185,8 @@ class SimulatedController:
         decoder = self._decoders.get(int(one["id"]))
         if decoder is None or int(one["length"]) != decoder.message.length:
             return
-        columns = decoder.decode_payloads(one["data"][None, :])
-        values = {k: float(v[0]) for k, v in columns.items()}
-        if not all(np.isfinite(list(values.values()))) and decoder.message.name != "ParamSet":
+        values = decoder.decode_one(payload(one))
+        if not all(map(math.isfinite, values.values())) and decoder.message.name != "ParamSet":
             return
         {"Heartbeat": self._heartbeat, "Command": self._command, "ParamSet": self._set, "ParamGet": self._get,
          "Claim": self._claim}[decoder.message.name](values, clock)  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 from bench.codec import encode
 from bench.errors import LinkError
 from bench.faults import CUTS, Fault, FrameFaults, divided, lost
-from bench.frames import ERROR, FD, FRAME, SENT, FrameBatch, empty_batch, frame
+from bench.frames import ERROR, FD, SENT, FrameBatch, empty_batch, frame, joined
 from bench.link import LinkStats
 from bench.messages import load_messages
 from bench.rigfile import RigFile
@@ -111,13 +111,13 @@ class InProcessLink:
         Raises:
             LinkError: cut by a fault; what arrived before comes first.
         """
-        batch = empty_batch() if self._dead else np.concatenate([empty_batch(), *self._arrived])
+        batch = empty_batch() if self._dead else joined(self._arrived)
         batch, later, cut = self._inward.up_to_cut(batch, self._clock.now_ns(), self._reconnect_s)
         self._arrived = [later]
         if cut is not None:
             raise lost(self.name, cut)
         self._counts.received += len(batch)
-        self._counts.error_frames += int((batch["flags"] & ERROR != 0).sum())
+        self._counts.error_frames += int(np.count_nonzero(batch["flags"] & ERROR))
         return batch
 
     def renew_lease(self) -> None:
@@ -131,20 +131,26 @@ class InProcessLink:
     def exchange(self, device: SimulatedController, ticks: int, now_ns: int) -> None:
         """One slice: queued frames and heartbeats to the device, what it sends back."""
         end = now_ns + ticks * TICK_NS
-        beats = []
-        while self._next_beat < end:
-            if now_ns <= self._next_beat <= self._lease_until and not self._dead:
-                self._counter = (self._counter + 1) & 0xFFFF
-                payload = encode(self._heartbeat, {"session": self._session, "counter": self._counter})
-                beats.append(frame(self._heartbeat.identifier, payload, t_ns=self._next_beat, flags=FD | SENT))
-            self._next_beat += HEARTBEAT_NS
-        incoming = np.concatenate([np.empty(0, FRAME), *self._queued, *beats])
-        self._queued = []
+        beats = self._beats(now_ns, end)
         self._counts.heartbeats += len(beats)
         self._counts.sent += len(beats)
-        incoming = incoming[np.argsort(incoming["t_ns"], kind="stable")]
+        incoming = joined([*self._queued, *beats])
+        if self._queued:
+            incoming = incoming[np.argsort(incoming["t_ns"], kind="stable")]
+        self._queued = []
         if len(incoming):
             self._inward.start(int(incoming["t_ns"][0]))
             self._outward.start(int(incoming["t_ns"][0]))
         heard = self._outward.apply(incoming, end - 1)
         self._arrived.append(self._inward.apply(device.advance(ticks, heard, now_ns), end))
+
+    def _beats(self, begin_ns: int, end_ns: int) -> list[FrameBatch]:
+        """The heartbeats of a slice, while the lease lasts."""
+        beats = []
+        while self._next_beat < end_ns:
+            if begin_ns <= self._next_beat <= self._lease_until and not self._dead:
+                self._counter = (self._counter + 1) & 0xFFFF
+                payload = encode(self._heartbeat, {"session": self._session, "counter": self._counter})
+                beats.append(frame(self._heartbeat.identifier, payload, t_ns=self._next_beat, flags=FD | SENT))
+            self._next_beat += HEARTBEAT_NS
+        return beats

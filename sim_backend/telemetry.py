@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +17,6 @@ from sim_backend.truth import Truth, uniform
 SUPPLY_V = 148.0
 AMBIENT_K, RISE_K, WARM_S = 295.0, 12.0, 600.0
 WATCHDOG_ARMED = 16
-_DEFECT_COLUMNS = {name: k for k, name in enumerate(CHANNELS)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class TelemetryEncoder:
         signals = self._message.signals[2:]
         self._names = [s.name for s in signals]
         self._place = {name: k for k, name in enumerate(self._names)}
-        self._columns = [self._place[name] for name in CHANNELS]
+        self._columns = _places(truth.defects, self._place)
         self._scale = np.array([s.scale for s in signals])
         self._offset = np.array([s.offset for s in signals])
         self._low = np.array([-32768 if s.signed else 0 for s in signals])
@@ -55,23 +55,10 @@ class TelemetryEncoder:
     def encode(self, spans: list[Span], clock: tuple[int, int]) -> FrameBatch:
         """Frames for what ran, in order; `clock` is a time in ns and the tick it belongs to. Frames that a planted loss
         takes are left out, their sequence numbers are used up."""
-        spans = [s for s in spans if len(s.rows)]
-        if not spans:
+        n = sum(len(s.rows) for s in spans)
+        if not n:
             return empty_batch()
-        counts = [len(s.rows) for s in spans]
-        ticks = np.concatenate(
-            [(s.first_tick // PERIOD_TICKS + 1 + np.arange(len(s.rows))) * PERIOD_TICKS for s in spans]
-        )
-        n = len(ticks)
-        values = self._values(np.concatenate([s.rows for s in spans]), ticks)
-        for name, column in (
-            ("state", [self._codes["state"][s.state] for s in spans]),
-            ("fault", [self._codes["fault"][s.fault] for s in spans]),
-        ):
-            values[:, self._place[name]] = np.repeat(np.array(column, float), counts)
-        values[:, self._place["flags"]] += np.repeat([WATCHDOG_ARMED if s.armed else 0 for s in spans], counts)
-        beats = np.repeat([s.heartbeat_tick for s in spans], counts)
-        values[:, self._place["host_age"]] = np.maximum(ticks - beats, 0) * TICK_S
+        ticks, values = self._values(spans, n)
         raw = np.rint((values - self._offset) / self._scale)
         words = np.clip(raw, self._low, self._high).astype(np.int64).astype("<u2")
         batch = np.zeros(n, FRAME)
@@ -88,38 +75,45 @@ class TelemetryEncoder:
             batch = batch[np.array(keep, dtype=bool)]
         return batch
 
-    def _values(self, rows: npt.NDArray[np.float64], ticks: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
-        rows = self._wired(rows)
-        values = np.zeros((len(rows), len(self._names)))
-        values[:, self._columns] = rows
-        angle = self._place["angle"]
-        values[:, angle] = (values[:, angle] + math.pi) % (2 * math.pi) - math.pi
+    def _values(self, spans: list[Span], n: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]:
+        """Ticks (n,) of the samples, and what their signals say (n, signals)."""
+        at = self._place
+        ticks, beats, values, end = np.empty(n, np.int64), np.empty(n, np.int64), np.zeros((n, len(at))), 0
+        for span in spans:
+            part = slice(end, end := end + len(span.rows))
+            first = span.first_tick // PERIOD_TICKS + 1
+            ticks[part] = np.arange(first, first + len(span.rows)) * PERIOD_TICKS
+            beats[part] = span.heartbeat_tick
+            values[part, self._columns] = span.rows
+            values[part, at["flags"]] += WATCHDOG_ARMED if span.armed else 0
+            values[part, at["state"]] = self._codes["state"][span.state]
+            values[part, at["fault"]] = self._codes["fault"][span.fault]
+        if self._truth.defects["stuck_current_yo_p"]:
+            values[:, at["i_yo_p"]] = 4.0
+        values[:, at["angle"]] = (values[:, at["angle"]] + math.pi) % (2 * math.pi) - math.pi
+        values[:, at["supply"]] = SUPPLY_V
         warm = AMBIENT_K + RISE_K * (1 - np.exp(-ticks * TICK_S / WARM_S))
-        values[:, self._place["supply"]] = SUPPLY_V
         for name, above in (("temp_i", 0.0), ("temp_o", 2.0), ("temp_m", -3.0)):
-            values[:, self._place[name]] = warm + above
-        return values
+            values[:, at[name]] = warm + above
+        values[:, at["host_age"]] = np.maximum(ticks - beats, 0) * TICK_S
+        return ticks, values
 
-    def _wired(self, rows: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """Planted wiring defects of the current telemetry."""
-        d, at = self._truth.defects, _DEFECT_COLUMNS
-        order = list(range(len(CHANNELS)))
-        sides = "pn"
-        if d["exchange_current_axes"]:
-            for b in "io":
-                for c in sides:
-                    x, y = at[f"i_x{b}_{c}"], at[f"i_y{b}_{c}"]
-                    order[x], order[y] = order[y], order[x]
-        if d["exchange_current_bearings"]:
-            for a in "xy":
-                for c in sides:
-                    i, o = at[f"i_{a}i_{c}"], at[f"i_{a}o_{c}"]
-                    order[i], order[o] = order[o], order[i]
-        for b in "io":
-            if d[f"current_sign_{b}"] < 0:  # the sensors of both coils exchanged: the control current changes sign
-                p, n = at[f"i_y{b}_p"], at[f"i_y{b}_n"]
-                order[p], order[n] = order[n], order[p]
-        rows = rows[:, order]
-        if d["stuck_current_yo_p"]:
-            rows[:, at["i_yo_p"]] = 4.0
-        return rows
+
+def _places(defects: Mapping[str, float], at: Mapping[str, int]) -> list[int]:
+    """Where each channel of the core goes among the signals, with planted wiring defects of the current telemetry."""
+    goes = {name: at[name] for name in CHANNELS}
+
+    def exchange(a: str, b: str) -> None:
+        goes[a], goes[b] = goes[b], goes[a]
+
+    for b in "io":
+        if defects[f"current_sign_{b}"] < 0:  # the sensors of both coils exchanged: the control current changes sign
+            exchange(f"i_y{b}_p", f"i_y{b}_n")
+    for side in "pn":
+        if defects["exchange_current_bearings"]:
+            exchange(f"i_xi_{side}", f"i_xo_{side}")
+            exchange(f"i_yi_{side}", f"i_yo_{side}")
+        if defects["exchange_current_axes"]:
+            exchange(f"i_xi_{side}", f"i_yi_{side}")
+            exchange(f"i_xo_{side}", f"i_yo_{side}")
+    return list(goes.values())

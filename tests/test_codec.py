@@ -112,6 +112,20 @@ def test_decoding_equals_cantools_to_one_ulp(case: tuple[str, list[bytes]]) -> N
 
 
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(cases())
+def test_a_payload_by_itself_has_the_values_it_has_in_a_batch(case: tuple[str, list[bytes]]) -> None:
+    dbc, payloads = case
+    message, _ = both(dbc)
+    decoder = Decoder(message)
+    with np.errstate(all="ignore"):
+        values, _ = decoder.decode(np.concatenate([frame(291, p, flags=FD) for p in payloads]))
+    for k, payload in enumerate(payloads):
+        one = decoder.decode_one(payload)
+        assert list(one) == list(values)
+        assert np.array_equal([*one.values()], [v[k] for v in values.values()], equal_nan=True)
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.sampled_from(LENGTHS).flatmap(lambda n: st.tuples(st.just(n), placed_signals(n))), st.data())
 def test_encoding_gives_the_bytes_of_cantools(placed: tuple[int, list[Placed]], data: st.DataObject) -> None:
     size, signals = placed
