@@ -19,8 +19,9 @@ class Unit:
 
 UNITS: dict[str, Unit] = {
     "1": Unit("1"), "": Unit("1"), "%": Unit("1", 1e-2),
-    "m": Unit("m"), "mm": Unit("m", 1e-3), "um": Unit("m", 1e-6), "µm": Unit("m", 1e-6),
+    "m": Unit("m"), "mm": Unit("m", 1e-3), "um": Unit("m", 1e-6), "µm": Unit("m", 1e-6), "mil": Unit("m", 25.4e-6),
     "s": Unit("s"), "ms": Unit("s", 1e-3), "us": Unit("s", 1e-6), "Hz": Unit("Hz"), "kHz": Unit("Hz", 1e3),
+    "1/s": Unit("1/s"), "N/(A m)": Unit("N/(A m)"),
     "kg": Unit("kg"), "g": Unit("kg", 1e-3), "mg": Unit("kg", 1e-6), "N": Unit("N"),
     "A": Unit("A"), "mA": Unit("A", 1e-3), "V": Unit("V"), "mV": Unit("V", 1e-3),
     "K": Unit("K"), "degC": Unit("K", 1.0, 273.15), "°C": Unit("K", 1.0, 273.15),

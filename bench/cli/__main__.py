@@ -52,6 +52,14 @@ class Table(StrEnum):
     MCAP = "mcap"
 
 
+class Keep(StrEnum):
+    """Which recordings of a campaign over many rigs stay."""
+
+    ALL = "all"
+    MISSED = "missed"
+    NONE = "none"
+
+
 Out = Annotated[Path, typer.Option("--out", help="Folder of the run directories.")]
 RunArgument = Annotated[Path, typer.Argument(metavar="RUN", help="A run directory.")]
 
@@ -117,6 +125,51 @@ def run(
             out=out,
             operator=operator.value if operator else None,
             report=not no_report,
+        )
+    )
+
+
+@app.command()
+def campaign(
+    file: Annotated[str, typer.Argument(metavar="FILE", help="A campaign file, or its name in campaigns/.")],
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes for many rigs; default: one per core.")] = None,
+    out: Annotated[Path, typer.Option("--out", help="Folder of the campaign directories.")] = Path("runs"),
+    rig: Annotated[str | None, typer.Option("--rig", metavar="RIG", help="Another rig than the file's.")] = None,
+    backend: Annotated[Backend | None, typer.Option(help="The simulated rig, or the real one.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="One virtual rig: which.")] = None,
+    count: Annotated[int | None, typer.Option(min=1, help="Many virtual rigs: how many.")] = None,
+    first_seed: Annotated[int | None, typer.Option("--first-seed", min=0, help="Many: the first seed.")] = None,
+    link: Annotated[
+        list[str] | None, typer.Option("--link", metavar="NAME=URL", help="Another address for a link; repeatable.")
+    ] = None,
+    operator: Annotated[OperatorKind | None, typer.Option(help="One rig: as for `run`.")] = None,
+    no_report: Annotated[bool, typer.Option("--no-report", help="Leave reports and summary out.")] = False,
+    keep: Annotated[Keep, typer.Option(help="Many: which rigs' recordings stay.")] = Keep.MISSED,
+    go_on: Annotated[bool, typer.Option("--go-on", help="One rig: go on after a step that is not PASS.")] = False,
+    new: Annotated[bool, typer.Option("--new", help="Start anew, whatever is unfinished.")] = False,
+) -> int:
+    """Run a list of procedures on a rig, or on many virtual ones; goes on where it was stopped.
+
+    The last line on standard output is the campaign's directory.
+    """
+    from bench.cli.campaign import CampaignRequest, campaign_command
+
+    return campaign_command(
+        CampaignRequest(
+            campaign=file,
+            jobs=jobs,
+            out=out,
+            rig=rig,
+            backend=backend.value if backend else None,
+            seed=seed,
+            count=count,
+            first_seed=first_seed,
+            links=tuple(link or ()),
+            operator=operator.value if operator else None,
+            report=not no_report,
+            keep=keep.value,
+            go_on=go_on,
+            new=new,
         )
     )
 
@@ -194,6 +247,21 @@ def serve(
             faults=tuple(fault or ()),
         )
     )
+
+
+@app.command("map")
+def map_(
+    table: Annotated[str, typer.Argument(metavar="TABLE", help="A CSV file, or the name of an installed table.")],
+    poles: Annotated[int, typer.Option(min=2, help="Poles of the motor.")] = 16,
+    against: Annotated[
+        str, typer.Option("--against", metavar="MODEL", help="Also say how well a model's constants predict the table.")
+    ] = "",
+    out: Annotated[Path | None, typer.Option("--out", help="Folder of the results; default maps/TABLE.")] = None,
+) -> int:
+    """Identify the force map of a motor from a table of operating points. Needs no rig."""
+    from bench.cli.force_map import Request, map_command
+
+    return map_command(Request(table=table, poles=poles, against=against, out=out))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
