@@ -13,6 +13,7 @@ from bench.findings import Finding
 from bench.roles import RigState
 
 if TYPE_CHECKING:
+    from bench.calibration import Need
     from bench.recorder import Recorder
     from bench.recording import Recording
     from bench.rig import Rig
@@ -64,6 +65,15 @@ def _unknown_count(_: Any) -> int:
     return 0
 
 
+def _no_needs(_: Any) -> tuple[Need, ...]:
+    return ()
+
+
+def _numbers_of(plan: BenchPlan) -> Mapping[str, float]:
+    numbers = {name: getattr(plan, name) for name in type(plan).model_fields}
+    return {k: float(v) for k, v in numbers.items() if isinstance(v, int | float) and not isinstance(v, bool)}
+
+
 @dataclass(frozen=True)
 class Procedure:
     """A procedure. `acquire` moves the machine, `analyse` is pure and sees only the closed file.
@@ -72,6 +82,10 @@ class Procedure:
     controller parameters (SI) that the runner writes in READY, before it levitates. `step_count` is how many steps
     `acquire` will record, for the progress display; 0 is unknown.
     `analyse` yields what it measured and what it found, in the order of the report.
+
+    `needs` are the calibrations that a run with that plan uses; it reads them with `Recording.calibration`. `facts` is
+    what `bench adopt` keeps of a run: values by name, None for what `analyse` yields. `holds_for` are the settings that these
+    facts hold for, by default the plan's numbers; a setting that a need names must be equal in it.
     """
 
     name: str
@@ -85,4 +99,7 @@ class Procedure:
     check: Callable[[RigFile, Any], Iterable[str]] = field(default=_no_problems)
     settings: Callable[[Any], Mapping[str, float]] = field(default=_no_settings)
     step_count: Callable[[Any], int] = field(default=_unknown_count)
+    needs: Callable[[Any], tuple[Need, ...]] = field(default=_no_needs)
+    facts: Callable[[Recording[Any]], Mapping[str, Estimate]] | None = None
+    holds_for: Callable[[Any], Mapping[str, float]] = field(default=_numbers_of)
     method: str = ""  # the report's method section: plain paragraphs, blank-line separated

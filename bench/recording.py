@@ -17,7 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from bench import layout
-from bench.errors import AnalysisError, RecordingError
+from bench.calibration import Calibration
+from bench.calibrationfile import attached
+from bench.errors import AnalysisError, ConfigError, RecordingError
 from bench.frames import FrameBatch, frames_of
 from bench.layout import DecodedBlock
 from bench.mcapfile import McapFile, index
@@ -94,10 +96,29 @@ class Recording(Generic[P]):
         """The acceptance limits that the run was made with, by quantity."""
         return self._json("spec.json", dict)
 
-    @property
-    def calibrations(self) -> list[Any]:
-        """The calibrations that the run used."""
-        return self._json("calibrations.json", list)
+    @cached_property
+    def calibrations(self) -> tuple[Calibration, ...]:
+        """The calibrations that the run used, whole, as they were then.
+
+        Raises:
+            RecordingError: they cannot be understood.
+        """
+        try:
+            return attached(self.attachment("calibrations.json"), f"recording {self.path}")
+        except ConfigError as error:
+            raise RecordingError(str(error)) from error
+
+    def calibration(self, procedure: str) -> Calibration:
+        """The calibration by a procedure that the run used.
+
+        Raises:
+            AnalysisError: it used none; the procedure that runs must name it in its `needs`.
+        """
+        for found in self.calibrations:
+            if found.procedure == procedure:
+                return found
+        used = ", ".join(c.procedure for c in self.calibrations) or "none"
+        raise AnalysisError(f"{self.path.name}: found calibrations by {used}; expected one by {procedure}")
 
     def _json(self, name: str, kind: type[J]) -> J:
         try:

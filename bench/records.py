@@ -5,8 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import os
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -20,6 +18,7 @@ from bench.findings import Effect, Finding
 from bench.limits import Limit, Verdict, judge
 from bench.procedure import Measured, Quantity
 from bench.uncertainty import PROBABILITY, budget, correlation_matrix, interval
+from bench.wholefile import write_whole
 
 SCHEMA = 1
 SCHEMA_FILE = Path(__file__).with_name("record.schema.json")
@@ -205,23 +204,7 @@ def write_record(path: Path, record: Record) -> None:
     Raises:
         OSError, ValueError, TypeError: nothing was replaced.
     """
-    text = to_json(record)
-    descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
-    try:
-        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fchmod(file.fileno(), 0o644)  # mkstemp makes it private
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)  # the rename itself
-    finally:
-        os.close(folder)
+    write_whole(path, to_json(record))
 
 
 def read_record(path: Path) -> Record:

@@ -95,7 +95,7 @@ def test_the_plan_as_a_type(tmp_path: Path) -> None:
 def test_limits_and_calibrations(tmp_path: Path) -> None:
     recording = opened(tmp_path / "a.mcap", {"spec.json": b'{"K_i": {"low": 1.0}}', "calibrations.json": b"[]"})
     assert recording.spec == {"K_i": {"low": 1.0}}
-    assert recording.calibrations == []
+    assert recording.calibrations == ()
 
 
 def test_a_damaged_attachment_is_found_even_where_the_file_was_cut_off_too(tmp_path: Path) -> None:

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from bench import catalogue
+from bench.adoption import calibration_of
+from bench.calibration import Calibration, Need, facts_of, settings_differ
+from bench.calibrationfile import attachment
 from bench.cli.opening import SIMULATED
+from bench.errors import ConfigError
 from bench.findings import Finding
 from bench.linkhealth import Health
 from bench.procedure import Measured, Procedure
@@ -24,6 +29,24 @@ from sim_backend.endpoint import SimulatedRig
 from sim_backend.truth import draw
 
 
+@dataclass(frozen=True)
+class Simulated:
+    """One finished run on one virtual rig: the true quantities, and what `analyse` yields."""
+
+    procedure: Procedure
+    recording: Recording[Any]
+    seed: int
+    truth: Mapping[str, float]
+    results: list[Measured | Finding]
+
+    def calibration(self) -> Calibration:
+        """What `bench adopt` would make of this run; its run id and its date follow from the seed, so that a chain of
+        such runs gives the same numbers each time. The file's digest is left out."""
+        facts = facts_of(self.procedure, self.recording, self.results)
+        run_id = f"{self.procedure.name}-sim-{self.seed}"
+        return calibration_of(self.procedure, self.recording, facts, run_id=run_id)
+
+
 def simulate(
     procedure: str,
     rig: str,
@@ -31,15 +54,35 @@ def simulate(
     plan: Mapping[str, Any],
     path: Path,
     truth: Mapping[str, float] | None = None,
+    calibrations: Mapping[str, Calibration] | None = None,
 ) -> tuple[Mapping[str, float], list[Measured | Finding]]:
     """Draw a rig, run a procedure on it into `path`, analyse the closed file.
 
     Returns:
         The true quantities, and what `analyse` yields.
     """
+    done = simulated_run(procedure, rig, seed, plan, path, truth, calibrations)
+    return done.truth, done.results
+
+
+def simulated_run(
+    procedure: str,
+    rig: str,
+    seed: int,
+    plan: Mapping[str, Any],
+    path: Path,
+    truth: Mapping[str, float] | None = None,
+    calibrations: Mapping[str, Calibration] | None = None,
+) -> Simulated:
+    """As `simulate`; the result can also be adopted. `calibrations` are by procedure; those that are needed are used.
+
+    Raises:
+        ConfigError: one that is needed is not given, or was made at other settings.
+    """
     chosen: Procedure = importlib.import_module(catalogue.entry(procedure).module).procedure
     file = load_rig(rig)
     settings = chosen.plan.model_validate({**file.plans.get(procedure, {}), **plan})
+    used = given(chosen.needs(settings), calibrations or {})
     drawn = draw(file, seed, truth, chosen.settings(settings))
     simulated = SimulatedRig(file, drawn)
     controller = Controller(file, simulated.link, simulated, SIMULATED)
@@ -48,11 +91,12 @@ def simulate(
     live = Rig(file, controller.clock, controller, controller, operator, counters,
                lambda: Health(counters, simulated.link.stats, None, 0), simulated.link.close)  # fmt: skip
     header = RunHeader(
-        {"run": {"procedure": procedure, "seed": str(seed)}, "versions": {}},
+        {"run": {"procedure": procedure, "seed": str(seed), "backend": "sim"}, "versions": {}},
         {
             "rig.toml": file.toml_text.encode(),
             "rig.dbc": file.dbc_text.encode(),
             "plan.json": settings.model_dump_json().encode(),
+            "calibrations.json": attachment(used).encode(),
         },
     )
     layout = controller.telemetry.layout
@@ -65,4 +109,20 @@ def simulate(
         transition(live, chosen.state)
         chosen.acquire(live, settings, recorder)
         transition(live, RigState.OFF)
-    return drawn.quantities, list(chosen.analyse(Recording.open(path, chosen.plan)))
+    recording: Recording[Any] = Recording.open(path, chosen.plan)
+    return Simulated(chosen, recording, seed, drawn.quantities, list(chosen.analyse(recording)))
+
+
+def given(needs: Sequence[Need], calibrations: Mapping[str, Calibration]) -> list[Calibration]:
+    """The calibrations that a run needs, out of those at hand.
+
+    Raises:
+        ConfigError: one is missing, or was made at other settings.
+    """
+    for need in needs:
+        if need.procedure not in calibrations:
+            raise ConfigError(f"calibrations: found no {need.procedure}; expected one among `calibrations`")
+        differ = settings_differ(calibrations[need.procedure].settings, need.settings)
+        if differ:
+            raise ConfigError(f"calibration {need.procedure}: {'; '.join(differ)}")
+    return [calibrations[need.procedure] for need in needs]
