@@ -1,4 +1,4 @@
-"""What can be run, and on what: a literal table of procedures, and the rig files that lie in `rigs/`.
+"""What can be run, and on what: a literal table of procedures, the rig files in `rigs/`, the campaigns in `campaigns/`.
 
 Nothing heavy is imported: `bench --help` and `bench list` read this. A test holds the table against the modules.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import difflib
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,7 +30,7 @@ PROCEDURES = (
 
 @dataclass(frozen=True, slots=True)
 class RigEntry:
-    """A rig file that was found: its name is the file's stem."""
+    """A rig file or campaign file that was found: its name is the file's stem."""
 
     name: str
     path: Path
@@ -38,6 +38,7 @@ class RigEntry:
 
 
 INSTALLED = Path(__file__).resolve().parent.parent / "rigs"
+INSTALLED_CAMPAIGNS = INSTALLED.with_name("campaigns")
 
 
 def entry(name: str) -> Entry:
@@ -54,8 +55,17 @@ def entry(name: str) -> Entry:
 
 def rigs() -> Iterator[RigEntry]:
     """The rig files in `./rigs`, then those installed; a name in `./rigs` hides the installed one."""
+    yield from _found(Path("rigs"), INSTALLED)
+
+
+def campaigns() -> Iterator[RigEntry]:
+    """The campaign files in `./campaigns`, then those installed; a name in `./campaigns` hides the installed one."""
+    yield from _found(Path("campaigns"), INSTALLED_CAMPAIGNS)
+
+
+def _found(*folders: Path) -> Iterator[RigEntry]:
     seen: set[str] = set()
-    for folder in (Path("rigs"), INSTALLED):
+    for folder in folders:
         for path in sorted(folder.glob("*.toml")):
             if path.stem not in seen:
                 seen.add(path.stem)
@@ -68,14 +78,27 @@ def rig_path(rig: str) -> Path:
     Raises:
         ConfigError: there is no such file.
     """
-    if Path(rig).is_file():
-        return Path(rig)
-    for folder in (Path("rigs"), INSTALLED):
-        path = folder / f"{rig.removesuffix('.toml')}.toml"
+    return _path("rig", rig, (Path("rigs"), INSTALLED), rigs)
+
+
+def campaign_path(campaign: str) -> Path:
+    """The file of a campaign, found as rigs are, in `campaigns/`.
+
+    Raises:
+        ConfigError: there is no such file.
+    """
+    return _path("campaign", campaign, (Path("campaigns"), INSTALLED_CAMPAIGNS), campaigns)
+
+
+def _path(kind: str, name: str, folders: tuple[Path, Path], known: Callable[[], Iterator[RigEntry]]) -> Path:
+    if Path(name).is_file():
+        return Path(name)
+    for folder in folders:
+        path = folder / f"{name.removesuffix('.toml')}.toml"
         if path.is_file():
             return path
-    looked = f"(looked for a path, in ./rigs and in {INSTALLED})"
-    raise ConfigError(f"{_unknown('rig', rig, [r.name for r in rigs()])} {looked}")
+    looked = f"(looked for a path, in ./{folders[0]} and in {folders[1]})"
+    raise ConfigError(f"{_unknown(kind, name, [r.name for r in known()])} {looked}")
 
 
 def _unknown(kind: str, name: str, known: list[str]) -> str:

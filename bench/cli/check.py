@@ -14,10 +14,12 @@ PASS, USAGE = 0, 2
 
 
 def show_list() -> int:
-    """Procedures and rigs, one a line. Imports nothing heavy."""
+    """Procedures, rigs and campaigns, one a line. Imports nothing heavy."""
     found = [(r.name, r.title) for r in catalogue.rigs()]
+    campaigns = [(c.name, c.title) for c in catalogue.campaigns()]
     _table("procedures", [(p.name, p.about) for p in catalogue.PROCEDURES])
     _table("rigs", found or [("(none found)", "")])
+    _table("campaigns", campaigns or [("(none found)", "")])
     return PASS
 
 

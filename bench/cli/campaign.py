@@ -1,0 +1,170 @@
+"""`bench campaign`: what was asked for, the directory it goes on in, and the exit status."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from bench import campaign as campaign_file
+from bench import runlog
+from bench.campaign import Campaign, Virtual
+from bench.campaign_directory import CampaignDirectory, opened
+from bench.cli.campaign_job import Keep, RigTask, StepTask
+from bench.cli.campaign_steps import Planned, planned
+from bench.cli.compose import with_links
+from bench.cli.run import STATUS
+from bench.errors import ConfigError
+from bench.limits import Verdict
+from bench.progress import Progress, shown_on
+from bench.records import Outcome
+from bench.rigfile import RigFile, load_rig
+
+ABORTED = STATUS[Outcome.ABORTED]
+OF_VERDICT = {Verdict.PASS: 0, Verdict.FAIL: 1, Verdict.INDETERMINATE: 5}
+
+
+@dataclass(frozen=True)
+class CampaignRequest:
+    """A campaign as it was asked for; None leaves what the file says."""
+
+    campaign: str
+    jobs: int | None = None
+    out: Path = Path("runs")
+    rig: str | None = None
+    backend: str | None = None
+    seed: int | None = None
+    count: int | None = None
+    first_seed: int | None = None
+    links: tuple[str, ...] = ()
+    operator: str | None = None
+    report: bool = True
+    keep: Keep = "missed"
+    go_on: bool = False
+    new: bool = False
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A campaign that can be run."""
+
+    request: CampaignRequest
+    campaign: Campaign
+    rig: RigFile
+    steps: tuple[Planned, ...]
+
+
+def campaign_command(request: CampaignRequest) -> int:
+    """Run or go on; the summary's directory is the last line on standard output.
+
+    Raises:
+        ConfigError: nothing was started.
+    """
+    asked = asked_for(request)
+    directory, resumed = opened(request.out, asked.campaign.name, identity(asked), request.new)
+    with directory.locked(), shown_on(sys.stderr) as progress, runlog.to_lines(progress.line):
+        progress.stage(f"{'going on with' if resumed else 'campaign'} {directory.path}")
+        directory.journal.repair()
+        status = (_one if asked.campaign.virtual is None else _many)(asked, directory, progress)
+    sys.stdout.write(f"{directory.path}\n")
+    return status
+
+
+def asked_for(request: CampaignRequest) -> Asked:
+    """The campaign file with the options over it, checked in full.
+
+    Raises:
+        ConfigError: with every problem of the first of file, options, rig file and plans that has one.
+    """
+    campaign, path = campaign_file.load(request.campaign)
+    campaign = _with_options(campaign, request)
+    rig = with_links(load_rig(campaign.rig), request.links)
+    return Asked(request, campaign, rig, planned(campaign, str(path), rig, campaign.virtual is not None))
+
+
+def _with_options(c: Campaign, r: CampaignRequest) -> Campaign:
+    many = r.count is not None or r.first_seed is not None
+    if many and r.seed is not None:
+        raise ConfigError("--seed: one virtual rig; --count and --first-seed: many. Expected one or the other")
+    changes: dict[str, Any] = {}
+    if many:
+        count = r.count if r.count is not None else c.virtual.count if c.virtual else None
+        first = r.first_seed if r.first_seed is not None else c.virtual.first_seed if c.virtual else 0
+        if count is None:
+            raise ConfigError("--first-seed: found no number of rigs; expected --count too, or [virtual] in the file")
+        changes |= {"virtual": Virtual(first_seed=first, count=count), "seed": None}
+    if r.seed is not None:
+        changes |= {"virtual": None, "seed": r.seed}
+    if r.backend == "live":
+        if many or r.seed is not None or c.truth:
+            raise ConfigError("--backend live: a real rig has no seed and no truth to set; leave these out")
+        changes |= {"backend": "live", "seed": None, "virtual": None}
+    if r.backend == "sim":
+        changes["backend"] = "sim"
+    if r.rig is not None:
+        changes["rig"] = r.rig
+    made = c.model_copy(update=changes)
+    if many and made.backend == "live":
+        raise ConfigError("--count: a real rig is one; expected --backend sim, or leave it out")
+    if r.links and made.backend != "live":
+        raise ConfigError("--link: simulated rigs run in this process; expected --backend live, or leave it out")
+    return made
+
+
+def identity(asked: Asked) -> dict[str, Any]:
+    """What a campaign must be gone on with: all that decides its numbers. How many rigs may grow."""
+    c = asked.campaign
+    which: Mapping[str, Any] = {"seed": c.seed or 0} if c.backend == "sim" else {"links": list(asked.request.links)}
+    return {
+        "schema": 1, "name": c.name, "rig": {"name": asked.rig.name, "sha256": asked.rig.digest},
+        "backend": c.backend, **({"first_seed": c.virtual.first_seed} if c.virtual else which), "truth": dict(c.truth),
+        "steps": [
+            {"procedure": s.procedure.name, "plan": s.plan.model_dump(mode="json"), "adopt": s.adopt,
+             "judged": list(s.judged)}
+            for s in asked.steps
+        ],
+    }  # fmt: skip
+
+
+def _many(asked: Asked, directory: CampaignDirectory, progress: Progress) -> int:
+    from bench.cli import campaign_coverage
+    from bench.cli.campaign_fleet import cores, pool, run_fleet, task_folder
+
+    virtual = asked.campaign.virtual
+    assert virtual is not None
+    seeds = list(range(virtual.first_seed, virtual.first_seed + virtual.count))
+    task = RigTask(
+        rig=str(Path(asked.rig.path).resolve()), steps=step_tasks(asked.steps), truth=dict(asked.campaign.truth),
+        keep=asked.request.keep, folder=str(task_folder(directory)),
+    )  # fmt: skip
+    jobs = asked.request.jobs or cores()
+    with pool(jobs) as executor:
+        stopped = run_fleet(directory, task, seeds, jobs, executor, progress)
+    entries = [e for e in directory.journal.entries() if e["kind"] == "rig" and e["seed"] in set(seeds)]
+    result = campaign_coverage.judged(asked.campaign, asked.steps, entries)
+    progress.stage("summary")
+    campaign_coverage.write(directory, asked, result, asked.request.report)
+    sys.stderr.write(result.text())
+    if stopped:
+        return ABORTED
+    directory.journal.append({"kind": "done"})
+    return OF_VERDICT[result.verdict]
+
+
+def step_tasks(steps: Sequence[Planned]) -> tuple[StepTask, ...]:
+    """The steps as plain data, for other processes."""
+    return tuple(StepTask(s.procedure.name, s.plan.model_dump(), s.judged, s.adopt) for s in steps)
+
+
+def _one(asked: Asked, directory: CampaignDirectory, progress: Progress) -> int:
+    from bench.cli import campaign_chain, campaign_model
+
+    done = campaign_chain.run_chain(asked, directory, progress)
+    progress.stage("summary")
+    campaign_model.write(directory, asked, done, asked.request.report)
+    sys.stderr.write(campaign_chain.text(done))
+    if all(d.outcome is Outcome.PASS for d in done):
+        directory.journal.append({"kind": "done"})
+    return STATUS[campaign_chain.outcome_of(done)]
