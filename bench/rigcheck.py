@@ -29,6 +29,13 @@ GEOMETRY = {
     "clearance": "clearance of the touchdown bearings",
     "motor_stiffness": "negative stiffness of the motor",
 }
+SOME_GEOMETRY = {
+    "motor_to_outboard_amb": "motor plane to outboard AMB plane",
+    "lever_left": "shaft axis to the left end of the lever",
+    "lever_right": "shaft axis to the right end of the lever",
+}
+"""Lengths that a rig may have; the procedures that need one say so."""
+MACHINE = {"pole_pairs": "1", "polar_inertia": "kg m^2", "ring_inertia": "kg m^2", "amb_asymmetry": "1"}
 FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 
 
@@ -133,6 +140,7 @@ def _units(rig: RigFile) -> Iterator[Problem]:
             yield Problem(rig.path, key, repr(symbol), f"a known unit{f', such as {close[0]!r}' if close else ''}")
     kinds = {f"geometry.{n}": (g, "N/m" if n == "motor_stiffness" else "m") for n, g in rig.geometry.items()}
     kinds |= {f"masses.{n}": (m, "kg") for n, m in rig.masses.items()}
+    kinds |= {f"machine.{n}": (m, MACHINE[n]) for n, m in rig.machine.items() if n in MACHINE}
     kinds |= {"hanger": (rig.hanger, "kg"), "mass_density": (rig.mass_density, "kg/m^3"),
               "site.gravity": (rig.site.gravity, "m/s^2"), "site.air_density": (rig.site.air_density, "kg/m^3")}  # fmt: skip
     for key, (toleranced, si) in kinds.items():
@@ -148,8 +156,11 @@ def _geometry(rig: RigFile) -> Iterator[Problem]:
     g = rig.geometry
     for key in sorted(GEOMETRY.keys() - g.keys()):
         yield Problem(rig.path, f"geometry.{key}", "nothing", f"{GEOMETRY[key]}, with its certificate")
-    for key in sorted(g.keys() - GEOMETRY.keys()):
-        close = difflib.get_close_matches(key, GEOMETRY, 1)
+    for key in sorted(rig.machine.keys() - MACHINE.keys()):
+        yield Problem(rig.path, f"machine.{key}", "a number nobody asks for", f"one of {', '.join(MACHINE)}")
+    known = GEOMETRY | SOME_GEOMETRY
+    for key in sorted(g.keys() - known.keys()):
+        close = difflib.get_close_matches(key, known, 1)
         yield Problem(rig.path, f"geometry.{key}", "a length nobody asks for",
                       f"did you mean {close[0]}?" if close else "no such key")  # fmt: skip
     for key, length in g.items():

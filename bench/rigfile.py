@@ -109,6 +109,12 @@ class Envelope(Part):
     max_levitated_position_m: float = Field(gt=0)
 
 
+class CalibrationTable(Part):
+    """For how many days a calibration by each procedure holds."""
+
+    interval_days: Mapping[str, int] = {}
+
+
 class RigFile(Part):
     """A whole rig file. Lengths of `geometry` are distances, all positive."""
 
@@ -128,6 +134,8 @@ class RigFile(Part):
     hanger: Toleranced
     hook_seat: Toleranced
     sensors: Mapping[str, Sensor]
+    machine: Mapping[str, Toleranced] = {}
+    calibration: CalibrationTable = CalibrationTable()
     envelope: Envelope
     plans: Mapping[str, Mapping[str, Any]] = {}
     simulation: Annotated[Mapping[str, Any], BeforeValidator(simulated)] = {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol
+from typing import Literal, Protocol
 
 
 class RigState(StrEnum):
@@ -19,12 +19,14 @@ class RigState(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """What hangs on the hook besides the hanger: a label of the rig file's `masses` table, or nothing."""
+    """What hangs on the hook besides the hanger, or on the lever: a label of the rig file's `masses` table, or nothing."""
 
     label: str  # "" is nothing
 
 
 NOTHING = Load("")
+Side = Literal["left", "right"]
+"""An end of the lever, seen from its outboard end: a weight on the left turns the shaft forward."""
 
 
 class Levitation(Protocol):
@@ -54,6 +56,8 @@ class Operator(Protocol):
     """A person, or what stands in for one."""
 
     def hang(self, load: Load) -> None: ...  # the hanger stays on; returns when done
+    def lever(self, side: Side, load: Load) -> None: ...  # a mass on an end of the level lever, the other end empty
+    def mount(self, part: str) -> None: ...  # "ring" on the shaft; "" takes it off
     def ask(self, question: str) -> str: ...
 
 

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from bench.clock import Clock
 from bench.envelope import Envelope
 from bench.errors import BenchError, OperatorAbort
 from bench.recorder import Recorder
-from bench.roles import Load
+from bench.roles import Load, Side
 
 
 class LineOperator:
-    """An operator that answers lines: `hang M2`, `hang -`, `ask TEXT` (see the simulated backend's endpoint)."""
+    """An operator that answers lines: `hang M2`, `hang -`, `lever left M2`, `lever left -`, `mount ring`, `mount -`,
+    `ask TEXT` (see the simulated backend's operator)."""
 
     def __init__(self, request: Callable[[str], str], clock: Clock, envelope: Envelope) -> None:
         self._request, self._clock, self._envelope = request, clock, envelope
@@ -26,18 +28,43 @@ class LineOperator:
             BenchError: the other end cannot do it.
         """
         self._envelope.check_load(load.label)
-        answer = self._request(f"hang {load.label or '-'}").split()
+        self._do(f"hang {load.label or '-'}", f"hang {load.label or 'nothing'}")
+        self._note(action="hang", load=load.label)
+
+    def lever(self, side: Side, load: Load) -> None:
+        """Have a mass hung on an end of the lever in place of what hangs on it, and wait until it does.
+
+        Raises:
+            InterlockError: the mass is beyond the envelope.
+            BenchError: the other end cannot do it.
+        """
+        self._envelope.check_load(load.label)
+        self._do(f"lever {side} {load.label or '-'}", f"hang {load.label or 'nothing'} on the lever's {side}")
+        self._note(action="lever", side=side, load=load.label)
+
+    def mount(self, part: str) -> None:
+        """Have a part put on the shaft, or with "" what is on it taken off.
+
+        Raises:
+            BenchError: the other end cannot do it.
+        """
+        self._do(f"mount {part or '-'}", f"mount {part or 'nothing'}")
+        self._note(action="mount", part=part)
+
+    def _do(self, line: str, what: str) -> None:
+        answer = self._request(line).split()
         if not answer or answer[0] != "ok":
-            raise BenchError(f"the operator cannot hang {load.label or 'nothing'}: {' '.join(answer)}")
+            raise BenchError(f"the operator cannot {what}: {' '.join(answer)}")
         self._clock.sleep(float(answer[1]) if len(answer) > 1 else 0.0)
+
+    def _note(self, **fields: Any) -> None:
         if self.recorder is not None:
-            self.recorder.event("operator", action="hang", load=load.label)
+            self.recorder.event("operator", **fields)
 
     def ask(self, question: str) -> str:
         """The answer to a question."""
         answer = self._request(f"ask {question}")
-        if self.recorder is not None:
-            self.recorder.event("operator", action="ask", question=question, answer=answer)
+        self._note(action="ask", question=question, answer=answer)
         return answer
 
 
@@ -61,6 +88,30 @@ class ConsoleOperator:
         self.ask(f"{what}. Press Enter when it hangs still, or type stop: ")
         if self._then is not None:
             self._then.hang(load)
+
+    def lever(self, side: Side, load: Load) -> None:
+        """Ask for a mass on an end of the lever, seen from the outboard end; the other end stays empty.
+
+        Raises:
+            OperatorAbort: the person answered stop.
+        """
+        self._envelope.check_load(load.label)
+        what = f"Set the lever level and hang {load.label} on its {side} end (seen from outboard), nothing on the other"
+        what = what if load.label else "Take every mass off the lever"
+        self.ask(f"{what}. Press Enter when it hangs still, or type stop: ")
+        if self._then is not None:
+            self._then.lever(side, load)
+
+    def mount(self, part: str) -> None:
+        """Ask for a part on the shaft, or for everything to be taken off.
+
+        Raises:
+            OperatorAbort: the person answered stop.
+        """
+        what = f"Mount the {part} on the shaft" if part else "Take the ring off the shaft"
+        self.ask(f"{what}. Press Enter when it sits, or type stop: ")
+        if self._then is not None:
+            self._then.mount(part)
 
     def ask(self, question: str) -> str:
         """The person's answer.

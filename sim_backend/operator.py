@@ -16,16 +16,28 @@ class SimulatedOperator:
         self._hangings = 0
 
     def request(self, line: str) -> str:
-        """One line: `hang M2`, `hang -`, `ask TEXT`. Answers `ok SECONDS` (when it will be done), `yes`
-        or `error TEXT`."""
-        verb, _, rest = line.strip().partition(" ")
-        if verb == "ask":
-            return "yes"
-        label = "" if rest == "-" else rest
-        if verb != "hang" or (label and f"masses.{label}" not in self._truth.values):
-            return f"error cannot {line.strip()!r}"
+        """One line: `hang M2`, `hang -`, `lever left M2`, `lever left -`, `mount ring`, `mount -`, `ask TEXT`. Answers
+        `ok SECONDS` (when it will be done), `yes` or `error TEXT`."""
+        words = line.split()
+        match [*words[:-1], "" if words[-1:] == ["-"] else "".join(words[-1:])]:
+            case ["ask", *_]:
+                return "yes"
+            case ["hang", label] if self._knows(label):
+                self._hang(label)
+            case ["lever", "left" | "right" as side, label] if self._knows(label, f"geometry.lever_{side}"):
+                self._plant.lever(*self._truth.on_lever(side, label), HAND_OVER_S)
+            case ["mount", "ring" | "" as part] if "ring_inertia" in self._truth.values:
+                self._plant.mount(self._truth.values["ring_inertia"] if part else 0.0)
+            case _:
+                return f"error cannot {line.strip()!r}"
+        return f"ok {HAND_OVER_S}"
+
+    def _knows(self, label: str, *needed: str) -> bool:
+        masses = [f"masses.{label}"] if label else []
+        return all(name in self._truth.values for name in (*masses, *needed))
+
+    def _hang(self, label: str) -> None:
         kg, newtons = self._truth.load(label)
         self._hangings += 1
         seat = self._seat_m * (2 * uniform(self._truth.seed, f"seat:{self._hangings}") - 1)
         self._plant.load(kg, newtons, HAND_OVER_S, seat_m=seat)
-        return f"ok {HAND_OVER_S}"

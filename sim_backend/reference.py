@@ -29,10 +29,25 @@ def amb_force(beta: float, gap: float, xi: float, positive: float, negative: flo
     return beta * (positive**2 / max(gap - xi, 2e-4) ** 2 - negative**2 / max(gap + xi, 2e-4) ** 2)
 
 
+@dataclass(frozen=True)
+class Lever:
+    """What hangs on the lever at one instant: its weight N, the moment of that about the shaft N m (positive: the left end
+    is pulled down), how far the lever has slipped rad; and the inertia kg m^2 that it and a ring add to the shaft's."""
+
+    weight: float = 0.0
+    moment: float = 0.0
+    slip: float = 0.0
+    inertia: float = 0.0
+
+
+EMPTY = Lever()
+
+
 @dataclass
 class Loads:
     """What acts on the mechanics besides its state: true currents (10,), (4,), hysteresis lag (4,), phase angle gamma,
-    hung mass kg and its weight N, and the external drive."""
+    hung mass kg and its weight N, the external drive and the lever; `held` are the coil currents (10,) at the start of the
+    tick, by which the drag goes."""
 
     coil: Array
     segment: Array
@@ -41,6 +56,8 @@ class Loads:
     hung_mass: float = 0.0
     weight: float = 0.0
     drive: Drive | None = None
+    lever: Lever = EMPTY
+    held: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -56,6 +73,37 @@ class Drive:
         return min(max(self.gain * (self.speed - spin), -self.limit), self.limit)
 
 
+def motor(p: PlantParams, x: float, y: float, theta: float, gamma: float, segment: Array) -> tuple[float, float, float]:
+    """Forces N and torque N m of the motor, displaced by x and y from its magnetic centre: T (5.25) at any gamma.
+
+    For gamma = 0 this is T (5.25) less its terms 7 to 9, with beta_4 of the text below; without ripple and displacement it
+    is T (6.5). Under the integral of T (6.1) stands sin u sin(u - M gamma) with u = M (Phi - theta), which is
+    [cos(M gamma) - cos(P Phi - (P theta + M gamma))] / 2: the ripple goes with P theta + M gamma.
+    """
+    wired = segment[[1, 0, 2, 3]] if p.exchange_segments else segment
+    current = wired * np.array(p.segment_gain)
+    ix, iy, turn = (current[3] - current[1]) / 2, (current[0] - current[2]) / 2, current.mean()
+    shift = p.pole_pairs * (gamma - p.gamma_zero)
+    poles = 2 * p.pole_pairs
+    b = poles * theta + shift
+    direct = p.alpha_d * math.cos(shift) - p.alpha_2 * math.cos(b)
+    cross = p.alpha_c * math.sin(shift) + p.alpha_3 * math.sin(b)
+    fx = direct * ix - cross * iy - p.alpha_4 * y * turn + p.alpha_x * x + p.alpha_6 * iy * turn
+    fy = direct * iy + cross * ix + p.alpha_4 * x * turn + p.alpha_x * y - p.alpha_6 * ix * turn
+    torque = (p.alpha_tau * math.cos(shift) + p.beta_4 * math.cos(3 * poles * theta + shift)) * turn
+    return fx, fy, torque + p.beta_2 * (x * iy - y * ix)
+
+
+def friction(p: PlantParams, spin: float, u: Loads) -> float:
+    """Torque N m against the spin: a drag of which a share goes with the square of the flux of each radial axis (eddy
+    currents; `viscous` is for 3 A), smoothed Coulomb friction, and a brake that works while no drive drives."""
+    held = u.coil if u.held is None else u.held
+    square = float(np.mean([((held[2 * a] + held[2 * a + 1]) / 2) ** 2 for a in range(4)]))
+    dry = p.coulomb + (0.0 if u.drive else p.brake)
+    slow = spin / p.coulomb_speed
+    return p.viscous * (1 - p.drag_share + p.drag_share * square / 9) * spin + dry * slow / math.sqrt(1 + slow**2)
+
+
 def derivative(p: PlantParams, s: Array, u: Loads) -> Array:
     """Rates of s = (x, y, z, phi, psi, theta, their rates, height and speed of the hung mass), (14,)."""
     x, y, z, phi, psi, theta, vx, vy, vz, wphi, wpsi, spin, hung, hung_rate = s
@@ -67,22 +115,20 @@ def derivative(p: PlantParams, s: Array, u: Loads) -> Array:
         i, lag = u.coil[4 * b : 4 * b + 4], u.play[2 * b : 2 * b + 2]
         xi, eta = x + plane * psi + p.offset_x[b] + rx, y - plane * phi + p.offset_y[b] + ry  # T (6.7)
         forces.append((plane,
-                       amb_force(p.beta[b], p.gap[b], xi, i[0] - lag[0], i[1] + lag[0]),
+                       amb_force(p.beta[b] * (1 + p.asymmetry[b]), p.gap[b], xi, i[0] - lag[0], i[1] + lag[0]),
                        amb_force(p.beta[b], p.gap[b], eta, i[2] - lag[1], i[3] + lag[1])))  # fmt: skip
         contact, drag = touchdown(p, b, s)
         forces.append(contact)
         torque += drag
-    current = u.segment * np.array(p.segment_gain)
-    ix, iy, mean = (current[3] - current[1]) / 2, (current[0] - current[2]) / 2, current.mean()
-    c, q = math.cos(p.pole_pairs * (u.gamma - p.gamma_zero)), math.sin(p.pole_pairs * (u.gamma - p.gamma_zero))
     mx, my = x + p.z_motor * psi + p.motor_x, y - p.z_motor * phi + p.motor_y
-    forces.append((p.z_motor, p.alpha_d * c * ix - p.alpha_c * q * iy + p.alpha_x * mx,  # T (6.5a)
-                   p.alpha_d * c * iy + p.alpha_c * q * ix + p.alpha_x * my))  # T (6.5b)  # fmt: skip
-    slow = spin / p.coulomb_speed
-    torque += p.alpha_tau * c * mean - p.viscous * spin  # T (6.5c), (6.6f)
-    torque -= p.coulomb * slow / math.sqrt(1 + slow**2) + p.detent * math.sin(16 * theta + p.detent_phase)
+    *pushed, turned = motor(p, mx, my, theta, u.gamma, u.segment)
+    forces.append((p.z_motor, pushed[0], pushed[1]))
+    torque += turned - friction(p, spin, u) - p.detent * math.sin(16 * theta + p.detent_phase)
     torque += u.drive.torque(spin) if u.drive else 0.0
     down = np.array([math.sin(p.tilt), -math.cos(p.tilt)])
+    torque += u.lever.moment * math.cos(theta + u.lever.slip)
+    forces.append((p.z_lever, u.lever.weight * down[0], u.lever.weight * down[1]))
+    polar = p.polar_inertia + u.lever.inertia
     rate = 0.0
     if u.hung_mass > 0:
         stretch, stretch_rate = y - p.z_hook * phi - hung, vy - p.z_hook * wphi - hung_rate
@@ -98,9 +144,9 @@ def derivative(p: PlantParams, s: Array, u: Loads) -> Array:
     m_psi = sum(f[0] * f[1] for f in forces)  # T (6.6e)
     return np.array([vx, vy, vz, wphi, wpsi, spin,
                      fx / p.mass + p.gravity * down[0], fy / p.mass + p.gravity * down[1], fz / p.mass,
-                     (m_phi - p.polar_inertia * spin * wpsi) / p.inertia,
-                     (m_psi + p.polar_inertia * spin * wphi) / p.inertia,
-                     torque / p.polar_inertia,
+                     (m_phi - polar * spin * wpsi) / p.inertia,
+                     (m_psi + polar * spin * wphi) / p.inertia,
+                     torque / polar,
                      hung_rate if u.hung_mass > 0 else 0.0, rate])  # fmt: skip
 
 

@@ -6,6 +6,7 @@ times real time, so it serves windows of a few tenths of a second.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -14,7 +15,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from sim_backend.core.params import ControlParams, PlantParams
-from sim_backend.reference import TICK_S, Array, Drive, Loads, derivative, harmonics
+from sim_backend.reference import EMPTY, TICK_S, Array, Drive, Lever, Loads, derivative, harmonics
 
 RADIAL = 4  # axes xi, yi, xo, yo; the fifth is z
 
@@ -66,6 +67,11 @@ class Law:
     angle_slope: float = 0.0
     i_x: float = 0.0
     i_y: float = 0.0
+    goal_previous: float | None = None
+    goal_slope: float = 0.0
+    phase: float = 0.0
+    share: float = 0.0
+    carrier: Carrier = field(default_factory=lambda: Carrier())
 
     def planes(self, y: Sequence[float]) -> list[float]:
         """Displacement at the actuators from the sensors, T (6.7) with the controller's geometry."""
@@ -81,20 +87,23 @@ class Law:
         end = ("i", "i", "o", "o", "z")
         goals = (c.ref_xi, c.ref_yi, c.ref_xo, c.ref_yo, c.ref_z)
         out: list[float] = []
+        self.share = toward(self.share, c.motor_share, c.share_slew * TICK_S)
         for a in range(5):
+            fade, waits = (1 - self.share, self.share > 0) if a in (2, 3) else (1.0, False)  # the outboard AMB
             kp, kd, ki, bias = (float(getattr(c, f"{k}_{end[a]}")) for k in ("kp", "kd", "ki", "bias"))
             error, k, room = goals[a] - y[a], keep(c.derivative_hz), c.current_limit - bias
             self.slope[a] = k * self.slope[a] + (1 - k) * (y[a] - before[a]) / TICK_S
             control = kp * error + self.integral[a] - kd * self.slope[a]
-            if abs(control) < room or control * error < 0:  # the integrator waits while the amplifier is at its limit
+            # the integrator waits while the amplifier is at its limit, and while the motor carries
+            if not waits and (abs(control) < room or control * error < 0):
                 self.integral[a] += ki * error * TICK_S
             control = clip(control, -room, room)
-            out += [clip(bias + control, 0, c.current_limit), clip(bias - control, 0, c.current_limit)]
+            out += [fade * clip(bias + control, 0, c.current_limit), fade * clip(bias - control, 0, c.current_limit)]
         self.previous = y
         return out
 
-    def rotation(self, angle: float) -> list[float]:
-        """Segment references in A."""
+    def rotation(self, angle: float, outboard: Sequence[float]) -> list[float]:
+        """Segment references in A, from the angle and the outboard sensors' readings."""
         c, k = self.c, keep(self.c.angle_hz)
         before = angle if self.angle_previous is None else self.angle_previous
         self.angle_slope = k * self.angle_slope + (1 - k) * (angle - before) / TICK_S
@@ -107,13 +116,57 @@ class Law:
             self.angle_target += self.speed_target * TICK_S
         else:
             self.angle_target = toward(self.angle_target, c.angle_ref, c.angle_slew * TICK_S)
-        error = self.angle_target - angle
+        swings = not released and not c.speed_ref and not self.speed_target and c.sine_amplitude
+        self.phase = self.phase + 2 * math.pi * c.sine_hz * TICK_S if swings else 0.0
+        goal = self.angle_target + c.sine_amplitude * math.sin(self.phase)
+        error = goal - angle
+        goal_before = angle if self.goal_previous is None else self.goal_previous
+        self.goal_slope = k * self.goal_slope + (1 - k) * (goal - goal_before) / TICK_S
+        self.goal_previous = goal
         beyond = error - clip(error, -1.6e-3, 1.6e-3)  # one encoder count is no error
         self.angle_integral = clip(self.angle_integral + c.ki_theta * beyond * TICK_S, -2, 2)
-        damping = c.kd_theta * (self.speed_target - self.angle_slope)
-        i = clip(c.kp_theta * error + self.angle_integral + damping, -10, 10) if not released else 0.0
-        self.i_x, self.i_y = (toward(a, b, c.ramp_A_s * TICK_S) for a, b in ((self.i_x, c.i_x), (self.i_y, c.i_y)))
-        return [i + self.i_y, i - self.i_x, i - self.i_y, i + self.i_x]
+        damping = c.kd_theta * ((self.goal_slope if c.derivative_on_error else self.speed_target) - self.angle_slope)
+        i = c.kp_theta * error + self.angle_integral + damping if not released else 0.0
+        self.i_x, self.i_y = (toward(a, b, c.i_ramp * TICK_S) for a, b in ((self.i_x, c.i_x), (self.i_y, c.i_y)))
+        carried = self.carrier.currents(c, self.share, outboard)
+        return allocate(c, self.i_x + carried[0], self.i_y + carried[1], i)
+
+
+@dataclass
+class Carrier:
+    """The motor in place of the outboard AMB: PID on the outboard sensors."""
+
+    integral: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    slope: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    previous: list[float] | None = None
+
+    def currents(self, c: ControlParams, share: float, y: Sequence[float]) -> list[float]:
+        """Its share of i_x and i_y in A."""
+        before, self.previous = self.previous or list(y), list(y)
+        if share == 0:
+            self.integral, self.slope = [0.0, 0.0], [0.0, 0.0]
+            return [0.0, 0.0]
+        out, k = [], keep(c.derivative_hz)
+        for a, goal in enumerate((c.ref_xm, c.ref_ym)):
+            error = goal - y[a]
+            self.slope[a] = k * self.slope[a] + (1 - k) * (y[a] - before[a]) / TICK_S
+            i = c.kp_m * error + self.integral[a] - c.kd_m * self.slope[a]
+            if abs(i) < c.segment_max or i * error < 0:
+                self.integral[a] += c.ki_m * error * TICK_S
+            out.append(share * i)
+        return out
+
+
+def allocate(c: ControlParams, ix: float, iy: float, turn: float) -> list[float]:
+    """Segment currents in A from the currents for force and torque: T (6.9), or T (6.19) with (6.24), force first."""
+    if not c.allocation:
+        return [turn + iy, turn - ix, turn - iy, turn + ix]
+    limit = c.segment_max
+    ix, iy = clip(ix, -limit, limit), clip(iy, -limit, limit)
+    room = 2 * limit - abs(ix) - abs(iy)
+    part = (limit - abs(iy)) / room if room > 0 else 0.5  # lambda, T (6.24a)
+    turn = clip(turn, -room / 2, room / 2)  # T (6.24b)
+    return [2 * part * turn + iy, 2 * (1 - part) * turn - ix, 2 * part * turn - iy, 2 * (1 - part) * turn + ix]
 
 
 @dataclass(frozen=True)
@@ -143,6 +196,19 @@ class Driving:
 
 
 @dataclass(frozen=True)
+class Levering:
+    """From the start of tick `tick` on a mass hangs on the lever, or none; `arm_m` is positive on the left. `ring` is the
+    inertia of what else is mounted on the shaft, kg m^2."""
+
+    tick: int
+    mass_kg: float
+    weight_N: float
+    arm_m: float
+    ramp_s: float
+    ring: float = 0.0
+
+
+@dataclass(frozen=True)
 class Trace:
     """States before the first and after every tick, (n + 1, 14); currents likewise: ten coils, then four segments."""
 
@@ -163,12 +229,16 @@ class Interval:
     hanging: Hanging
     weight_before: float
     drive: Drive | None
+    lever: Lever = EMPTY
 
     def loads(self, part: float) -> Loads:
         """What acts after the share `part` of the tick."""
         i = np.array(amplifier(self.p, self.currents, self.target, part * TICK_S))
         weight = self.hanging.weight(self.weight_before, self.tick + part)
-        return Loads(i[:10], i[10:], np.array(self.lag), self.gamma, self.hanging.mass_kg, weight, self.drive)
+        held = np.array(self.currents[:10])
+        return Loads(
+            i[:10], i[10:], np.array(self.lag), self.gamma, self.hanging.mass_kg, weight, self.drive, self.lever, held
+        )
 
 
 def runge_kutta(interval: Interval, s: Sequence[float], substeps: int) -> list[float]:
@@ -207,6 +277,7 @@ def simulate(
     *,
     hangings: Sequence[Hanging] = (),
     drivings: Sequence[Driving] = (),
+    leverings: Sequence[Levering] = (),
     advance: Callable[[Interval, Sequence[float]], list[float]] | None = None,
 ) -> Trace:
     """Closed loop from the state `start`, currents at zero, the law levitating from tick 0.
@@ -220,6 +291,7 @@ def simulate(
     currents, reference, gamma, follow = [0.0] * 14, [0.0] * 14, 0.0, [0.0] * RADIAL
     hanging, before, weight = Hanging(0, 0.0, 0.0, 0.0), 0.0, 0.0
     driving, drive = Driving(0, 0.0, 0.0, 0.0, 0.0), None
+    levering, lever, from_lever = Levering(0, 0.0, 0.0, 0.0, 0.0), EMPTY, EMPTY
     states, flows = [s], [currents]
     for tick in range(ticks):
         for new in (h for h in hangings if h.tick == tick):
@@ -228,10 +300,14 @@ def simulate(
             hanging, before = new, weight
         driving = next((d for d in drivings if d.tick == tick), driving)
         drive = driven(driving, drive, s[11])
+        if begun := [x for x in leverings if x.tick == tick]:
+            levering, from_lever, lever = begun[-1], lever, dataclasses.replace(lever, slip=0.0)
+        lever = levered(p, levering, from_lever, lever, tick, s[5])
         target = settled_currents(p, reference, tick * TICK_S)  # of the sample before: one sample of delay
-        interval = Interval(p, tick, currents, target, hysteresis(p, currents, follow), gamma, hanging, before, drive)
-        angle = p.encoder_sign * (s[5] + p.encoder_offset)
-        reference, gamma = [*law.radial(read_positions(p, s)), *law.rotation(angle)], c.gamma
+        lag, commutated = hysteresis(p, currents, follow), gamma - 2 * s[5] if p.encoder_sign < 0 else gamma
+        interval = Interval(p, tick, currents, target, lag, commutated, hanging, before, drive, lever)
+        angle, y = p.encoder_sign * (s[5] + p.encoder_offset), read_positions(p, s)
+        reference, gamma = [*law.radial(y), *law.rotation(angle, y[2:4])], c.gamma
         s = advance(interval, s)
         currents, weight = amplifier(p, currents, target, TICK_S), hanging.weight(before, tick + 1)
         states.append(s)
@@ -247,15 +323,30 @@ def driven(driving: Driving, before: Drive | None, spin: float) -> Drive | None:
     return Drive(toward(speed, driving.target, driving.ramp * TICK_S), driving.gain, driving.limit)
 
 
+def levered(p: PlantParams, to: Levering, before: Lever, now: Lever, tick: int, theta: float) -> Lever:
+    """The lever over one tick: weight and moment go evenly from what they were; it slips at a rate that goes with the
+    torque that it passes on."""
+    part = clip((tick - to.tick + 1) * TICK_S / max(to.ramp_s, TICK_S), 0, 1)
+    weight = before.weight + part * (to.weight_N - before.weight)
+    moment = before.moment + part * (to.weight_N * to.arm_m - before.moment)
+    slip = now.slip + p.lever_slip * moment * math.cos(theta + now.slip) * TICK_S
+    return Lever(weight, moment, slip, to.mass_kg * to.arm_m**2 + to.ring)
+
+
 def settled_currents(p: PlantParams, reference: Sequence[float], now_s: float) -> list[float]:
-    """Currents that the amplifiers tend to, (14,) A. A coil's loop closes on its own sensor, errors included."""
+    """Currents that the amplifiers tend to, (14,) A. Each loop closes on its own sensor, errors included."""
     coil = [
         max((clip(r, 0, limit) - offset - drift * now_s) / gain, 0)
         for r, limit, offset, drift, gain in zip(
             reference[:10], p.coil_limit, p.current_offset, p.current_drift, p.current_gain, strict=True
         )
     ]
-    return coil + [clip(r, -p.segment_limit, p.segment_limit) for r in reference[10:]]
+    return coil + [
+        (clip(r, -p.segment_limit, p.segment_limit) - offset - drift * now_s) / gain
+        for r, offset, drift, gain in zip(
+            reference[10:], p.segment_offset, p.segment_drift, p.segment_sense, strict=True
+        )
+    ]
 
 
 def amplifier(p: PlantParams, now: Sequence[float], to: Sequence[float], after_s: float) -> list[float]:

@@ -88,6 +88,7 @@ class TelemetryEncoder:
             values[part, at["flags"]] += WATCHDOG_ARMED if span.armed else 0
             values[part, at["state"]] = self._codes["state"][span.state]
             values[part, at["fault"]] = self._codes["fault"][span.fault]
+        values[:, at["i_m1"]] *= self._truth.defects["segment_sign_1"]
         if self._truth.defects["stuck_current_yo_p"]:
             values[:, at["i_yo_p"]] = 4.0
         values[:, at["angle"]] = (values[:, at["angle"]] + math.pi) % (2 * math.pi) - math.pi

@@ -29,9 +29,12 @@ DEFECTS = {
     "position_sign_yi": 1.0, "position_sign_yo": 1.0, "exchange_position_axes_o": 0.0, "stuck_position_yo": 0.0,
     "stuck_current_yo_p": 0.0, "coil_limit_yo_p": 0.0, "mass_error_M1": 0.0, "mass_error_M2": 0.0, "mass_error_M3": 0.0,
     "mass_error_M4": 0.0, "hanger_off_at_zero": 0.0, "drop_fraction": 0.0, "integrator_factor": 1.0, "dead_after_s": 0.0,
-    "fault_after_s": 0.0, "drive_fault_after_s": 0.0,
+    "fault_after_s": 0.0, "drive_fault_after_s": 0.0, "exchange_segments": 0.0, "segment_sign_1": 1.0,
+    "encoder_sign": 1.0, "lever_slip": 0.0, "drive_brakes": 0.0,
 }  # fmt: skip
 """Planted defects and their harmless values. Mass errors are relative."""
+SEGMENTS = tuple(f"i_m{k}" for k in range(1, 5))
+HIGH_BIAS_A = 4.0  # of the second bias at which the drag is measured
 
 
 def uniform(seed: int, name: str) -> float:
@@ -75,6 +78,18 @@ class Truth:
         if label or not self.defects["hanger_off_at_zero"]:
             kg += self.values["hanger"]
         return kg, _weight(kg, self.values)
+
+    def on_lever(self, side: str, label: str) -> tuple[float, float, float]:
+        """Mass in kg on the lever, its weight in air in N, and its arm in m, positive on the left.
+
+        Raises:
+            KeyError: the rig has no such mass, or no lever.
+        """
+        arm = self.values[f"geometry.lever_{side}"] * {"left": 1, "right": -1}[side]
+        if not label:
+            return 0.0, 0.0, arm
+        kg = self.values[f"masses.{label}"] * (1 + self.defects.get(f"mass_error_{label}", 0.0))
+        return kg, _weight(kg, self.values), arm
 
 
 def _weight(kg: float, v: Mapping[str, float]) -> float:
@@ -129,19 +144,28 @@ def _stated(rig: RigFile) -> dict[str, Toleranced]:
             "site.air_density": rig.site.air_density}  # fmt: skip
     for b in "io":
         out[f"amb_gap_{b}"] = rig.geometry["amb_gap"]
-    for k, coil in enumerate(COILS):
-        sensor = rig.sensors.get(coil) or next(iter(rig.sensors.values()))
+        if "amb_asymmetry" in rig.machine:
+            out[f"asymmetry_{b}"] = rig.machine["amb_asymmetry"]
+    currents = [s for name, s in rig.sensors.items() if name.startswith("i_")]
+    for coil in (*COILS, *SEGMENTS):
+        sensor = rig.sensors.get(coil, currents[0])
         out |= {f"{coil}.gain": sensor.gain, f"{coil}.offset": sensor.offset}
-        out[f"drift_{k}"] = rig.simulation["drift"]
+    out |= {f"drift_{k}": rig.simulation["drift"] for k in range(len(COILS))}
     for axis in AXES:
-        out |= {f"position_gain_{axis}": rig.simulation["position_gain"],
-                f"position_offset_{axis}": rig.simulation["position_offset"]}  # fmt: skip
+        certified = rig.sensors.get(f"pos_{axis}")
+        out[f"position_gain_{axis}"] = certified.gain if certified else rig.simulation["position_gain"]
+        out[f"position_offset_{axis}"] = certified.offset if certified else rig.simulation["position_offset"]
     for k in range(4):
-        out[f"segment_gain_{k}"] = rig.simulation["segment_gain"]
+        out |= {f"segment_gain_{k}": rig.simulation["segment_gain"], f"segment_drift_{k}": rig.simulation["drift"]}
+    out |= {name: t for name, t in rig.machine.items() if name != "amb_asymmetry"}
     for axis in "xy":
         out[f"motor_offset_{axis}"] = rig.simulation["motor_offset"]
     shared = {"drift", "position_gain", "position_offset", "segment_gain", "motor_offset"}
     return out | {k: t for k, t in rig.simulation.items() if isinstance(t, Toleranced) and k not in shared}
+
+
+def _four(v: Mapping[str, float], a: str, b: str, c: str, d: str) -> tuple[float, float, float, float]:
+    return v[a], v[b], v[c], v[d]
 
 
 def _plant(v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
@@ -156,9 +180,13 @@ def _plant(v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
         eccentricity=v["eccentricity"],
         z_amb=(outboard - v["geometry.amb_span"], outboard),
         z_sensor=(-v["geometry.com_to_inboard_sensor"], v["geometry.com_to_outboard_sensor"]),
-        z_motor=v["geometry.com_to_motor"],
+        z_motor=outboard + v["geometry.motor_to_outboard_amb"],
         z_hook=outboard + v["geometry.hook_to_outboard"],
+        z_lever=outboard + v["geometry.hook_to_outboard"],
+        polar_inertia=v["polar_inertia"],
+        pole_pairs=v["pole_pairs"],
         beta=(beta_of(v["slope_i"], v["amb_gap_i"]), beta_of(v["slope_o"], v["amb_gap_o"])),
+        asymmetry=(v["asymmetry_i"], v["asymmetry_o"]),
         gap=(v["amb_gap_i"], v["amb_gap_o"]),
         offset_x=(v["offset_xi"], v["offset_xo"]),
         offset_y=(v["offset_yi"], v["offset_yo"]),
@@ -171,12 +199,22 @@ def _plant(v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
         alpha_c=v["alpha_c"],
         alpha_x=v["geometry.motor_stiffness"],
         alpha_tau=v["alpha_tau"],
+        alpha_2=v["alpha_2"],
+        alpha_3=v["alpha_3"],
+        alpha_4=v["alpha_4"],
+        alpha_6=v["alpha_6"],
+        beta_2=v["beta_2"],
+        beta_4=v["beta_4"],
         motor_x=v["motor_offset_x"],
         motor_y=v["motor_offset_y"],
         gamma_zero=v["gamma_zero"],
-        segment_gain=(v["segment_gain_0"], v["segment_gain_1"], v["segment_gain_2"], v["segment_gain_3"]),
+        segment_gain=_four(v, *(f"segment_gain_{k}" for k in range(4))),
+        exchange_segments=d["exchange_segments"],
         viscous=v["viscous"],
+        drag_share=v["drag_share"],
         coulomb=v["coulomb"],
+        brake=d["drive_brakes"],
+        lever_slip=d["lever_slip"],
         detent=v["detent"],
         detent_phase=v["detent_phase"],
         clearance=v["geometry.clearance"],
@@ -185,6 +223,10 @@ def _plant(v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
         current_offset=tuple(v[f"{c}.offset"] for c in COILS),
         current_drift=tuple(v[f"drift_{k}"] for k in range(10)),
         current_noise=v["current_noise"],
+        segment_sense=_four(v, *(f"{c}.gain" for c in SEGMENTS)),
+        segment_offset=_four(v, *(f"{c}.offset" for c in SEGMENTS)),
+        segment_drift=_four(v, *(f"segment_drift_{k}" for k in range(4))),
+        encoder_sign=d["encoder_sign"],
         position_gain=tuple(v[f"position_gain_{a}"] for a in AXES),
         position_offset=tuple(v[f"position_offset_{a}"] for a in AXES),
         position_sign=(1.0, d["position_sign_yi"], 1.0, d["position_sign_yo"], 1.0),
@@ -234,7 +276,33 @@ def _quantities(p: PlantParams, bias_A: tuple[float, ...]) -> dict[str, float]:
             f"K2_{name}": float(k2[b].mean()),
             f"Kw_{name}": float(slope[b].mean()),
         }
-    return out
+    return out | motor_quantities(p, bias_A)
+
+
+def motor_quantities(p: PlantParams, bias_A: tuple[float, ...]) -> dict[str, float]:
+    """The motor's and the shaft's constants by their measurands' definitions: per true ampere of the segments, at gamma = 0
+    as commutated (alpha_d, mean over a turn, where the ripple vanishes) or at the home angle (the others)."""
+    g, span = p.segment_gain, p.z_sensor[1] - p.z_sensor[0]
+    vertical, direct = (g[0] + g[2]) / 2, p.alpha_d * math.cos(p.pole_pairs * p.gamma_zero)
+    stiffness = p.alpha_x * (p.z_motor - p.z_sensor[0]) / span  # referred to the outboard sensors, T below (6.8)
+    d, c = p.alpha_d - p.alpha_2, p.alpha_c + p.alpha_3
+
+    def drag(*bias: float) -> float:
+        return p.viscous * (1 - p.drag_share + p.drag_share * sum(b**2 for b in bias) / len(bias) / 9)
+
+    return {
+        "alpha_d": direct * vertical,
+        "alpha_dx": direct * (g[1] + g[3]) / 2,
+        "alpha_x_prime": stiffness,
+        "alpha_x_prime_amb": stiffness,
+        "alpha_ratio": d / c,
+        "alpha_c": c * vertical,
+        "gamma_0": p.gamma_zero,
+        "alpha_tau": (p.alpha_tau + p.beta_4) * sum(g) / 4,
+        "B": drag(*bias_A),
+        "B_high": drag(HIGH_BIAS_A),
+        "T_c": p.coulomb,
+    }
 
 
 def _own_weight(p: PlantParams, angles: Array) -> Array:

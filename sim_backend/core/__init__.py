@@ -161,6 +161,18 @@ class Plant:
             s.drive_speed = s.s[11]
         s.drive_gain, s.drive_limit, s.drive_ramp, s.drive_target = law.gain, law.limit, law.ramp, target_rad_s
 
+    def lever(self, mass_kg: float, weight_N: float, arm_m: float, ramp_s: float) -> None:
+        """Hang `mass_kg` on the lever in place of what hangs there, its weight handed over in `ramp_s`. `arm_m` is positive
+        on the left (-x), where the weight turns the shaft forward; the lever starts level with the rotor's home."""
+        s, ramp, moment = self._s, max(ramp_s, TICK_S), weight_N * arm_m
+        s.lever_weight_to, s.lever_weight_rate = weight_N, abs(weight_N - s.lever_weight) / ramp
+        s.lever_moment_to, s.lever_moment_rate = moment, abs(moment - s.lever_moment) / ramp
+        s.lever_inertia, s.slip = mass_kg * arm_m**2, 0.0
+
+    def mount(self, inertia: float) -> None:
+        """Put a ring of `inertia` kg m^2 on the shaft in place of the one that is there; 0 takes it off."""
+        self._s.ring_inertia = inertia
+
     @property
     def shaft_speed(self) -> float:
         """True speed of the shaft, rad/s."""
@@ -224,8 +236,10 @@ def derivative(
     gamma: float = 0.0,
     hung_mass: float = 0.0,
     weight: float = 0.0,
+    lever: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
 ) -> Array:
-    """Right-hand side of the mechanics, (14,), for tests against the reference."""
+    """Right-hand side of the mechanics, (14,), for tests against the reference. `lever`: weight N, moment N m, how far it
+    has slipped rad, inertia added to the shaft's kg m^2."""
     p = _ffi.new("tsbs_params *")
     _fill(p, vars(params))
 
@@ -234,7 +248,7 @@ def derivative(
 
     out = _ffi.new("double[14]")
     _lib.tsbs_derivative(p, c(s), c(coil), c(segment), c(np.zeros(4) if play is None else play), gamma, hung_mass,
-                         weight, out)  # fmt: skip
+                         weight, c(np.array(lever)), out)  # fmt: skip
     return np.array(list(out))
 
 

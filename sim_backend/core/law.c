@@ -31,20 +31,75 @@ static void radial(const tsbs_control *c, tsbs_law_state *l, const double *plane
     const double bias[] = {c->bias_i, c->bias_i, c->bias_o, c->bias_o, c->bias_z};
     const double set[] = {c->ref_xi, c->ref_yi, c->ref_xo, c->ref_yo, c->ref_z};
     double up = lifted(c, l), keep = KEEP(c->derivative_hz);
+    l->share = toward(l->share, l->mode == LEVITATE ? c->motor_share : 0, c->share_slew * TICK);
     for (int a = 0; a < 5; a++) {
         double error = l->rest[a] + up * (set[a] - l->rest[a]) - plane[a];
         l->filtered[a] = keep * l->filtered[a] + (1 - keep) * (plane[a] - l->previous[a]) / TICK;
         l->previous[a] = plane[a];
         double control = kp[a] * error + l->integral[a] - kd[a] * l->filtered[a], room = c->current_limit - bias[a];
-        if (fabs(control) < room || control * error < 0) l->integral[a] += ki[a] * error * TICK;
+        int waits = l->share > 0 && (a == 2 || a == 3); /* the outboard AMB takes up again what it carried */
+        if (!waits && (fabs(control) < room || control * error < 0)) l->integral[a] += ki[a] * error * TICK;
         control = clip(control, -room, room);
         out->coil[2 * a] = clip(bias[a] + control, 0, c->current_limit);
         out->coil[2 * a + 1] = clip(bias[a] - control, 0, c->current_limit);
     }
+    if (l->share > 0)
+        for (int k = 4; k < 8; k++) out->coil[k] *= 1 - l->share;
 }
 
-static void rotation(const tsbs_control *c, tsbs_law_state *l, double angle, tsbs_reference *out) {
-    double keep = KEEP(c->angle_hz);
+/* The motor holds the outboard end: PID on the outboard sensors. Adds the share of its currents to those of i_x, i_y. */
+static void carry(const tsbs_control *c, tsbs_law_state *l, const double *y, double *current) {
+    const double set[] = {c->ref_xm, c->ref_ym};
+    double keep = KEEP(c->derivative_hz);
+    for (int a = 0; a < 2; a++) {
+        double error = set[a] - y[a];
+        if (l->share == 0) {
+            l->motor_previous[a] = y[a];
+            l->motor_integral[a] = l->motor_filtered[a] = 0;
+            continue;
+        }
+        l->motor_filtered[a] = keep * l->motor_filtered[a] + (1 - keep) * (y[a] - l->motor_previous[a]) / TICK;
+        l->motor_previous[a] = y[a];
+        double i = c->kp_m * error + l->motor_integral[a] - c->kd_m * l->motor_filtered[a];
+        if (fabs(i) < c->segment_max || i * error < 0) l->motor_integral[a] += c->ki_m * error * TICK;
+        current[a] += l->share * i;
+    }
+}
+
+/* Segment currents from the three demands. 0: T (6.9), the amplifiers cut what is too much, force with torque.
+ * 1: T (6.19) with (6.24), force first; what it leaves of segment_max is shared so that the torque is largest. */
+static void allocate(const tsbs_control *c, double ix, double iy, double turn, double *i) {
+    double share_x = 1, share_y = 1; /* 2 (1 - lambda), 2 lambda */
+    if (c->allocation != 0) {
+        double most = c->segment_max;
+        ix = clip(ix, -most, most);
+        iy = clip(iy, -most, most);
+        double left_x = most - fabs(ix), left_y = most - fabs(iy), left = left_x + left_y;
+        turn = clip(turn, -left / 2, left / 2);
+        if (left > 0) {
+            share_x = 2 * left_x / left;
+            share_y = 2 * left_y / left;
+        }
+    }
+    i[0] = share_y * turn + iy;
+    i[1] = share_x * turn - ix;
+    i[2] = share_y * turn - iy;
+    i[3] = share_x * turn + ix;
+}
+
+/* what is added to the angle's reference: a sine that starts at nothing */
+static double sine(const tsbs_control *c, tsbs_law_state *l) {
+    if (c->sine_amplitude == 0) {
+        l->sine_phase = 0;
+        return 0;
+    }
+    l->sine_phase += TWO_PI * c->sine_hz * TICK;
+    if (l->sine_phase > TWO_PI) l->sine_phase -= TWO_PI;
+    return c->sine_amplitude * sin(l->sine_phase);
+}
+
+static void rotation(const tsbs_control *c, tsbs_law_state *l, const tsbs_reading *r, tsbs_reference *out) {
+    double keep = KEEP(c->angle_hz), angle = r->angle, swing = 0;
     l->angle_filtered = keep * l->angle_filtered + (1 - keep) * (angle - l->angle_previous) / TICK;
     l->angle_previous = angle;
     /* without torque (coasting, or no gains because something else turns the shaft) stand ready to take over where it is */
@@ -60,19 +115,21 @@ static void rotation(const tsbs_control *c, tsbs_law_state *l, double angle, tsb
         l->turns = whole_turns(l->angle_target - c->angle_ref);
     } else {
         l->angle_target = toward(l->angle_target, c->angle_ref + l->turns, c->angle_slew * TICK);
+        swing = sine(c, l);
     }
-    double error = l->angle_target - angle;
+    double goal = l->angle_target + swing, error = goal - angle;
+    l->goal_filtered = keep * l->goal_filtered + (1 - keep) * (goal - l->goal_previous) / TICK;
+    l->goal_previous = goal;
     /* one encoder count is no error: an integrator that believed it would hunt against the Coulomb friction */
     double beyond = error - clip(error, -1.6e-3, 1.6e-3);
     l->angle_integral = clip(l->angle_integral + c->ki_theta * beyond * TICK, -2, 2);
-    double i = c->kp_theta * error + l->angle_integral + c->kd_theta * (l->speed_target - l->angle_filtered);
-    i = released ? 0 : clip(i, -10, 10);
-    l->i_x = toward(l->i_x, c->i_x, c->ramp_A_s * TICK);
-    l->i_y = toward(l->i_y, c->i_y, c->ramp_A_s * TICK);
-    out->segment[0] = i + l->i_y; /* T (6.9) */
-    out->segment[1] = i - l->i_x;
-    out->segment[2] = i - l->i_y;
-    out->segment[3] = i + l->i_x;
+    double rate = (c->derivative_on_error != 0 ? l->goal_filtered : l->speed_target) - l->angle_filtered;
+    double i = released ? 0 : c->kp_theta * error + l->angle_integral + c->kd_theta * rate;
+    l->i_x = toward(l->i_x, c->i_x, c->i_ramp * TICK);
+    l->i_y = toward(l->i_y, c->i_y, c->i_ramp * TICK);
+    double current[] = {l->i_x, l->i_y};
+    carry(c, l, r->position + 2, current);
+    allocate(c, current[0], current[1], i, out->segment);
     out->gamma = c->gamma;
 }
 
@@ -87,13 +144,14 @@ void tsbs_law(const tsbs_control *c, tsbs_law_state *l, const tsbs_reading *r, t
     memset(out, 0, sizeof *out);
     if (l->fresh) { /* first tick after a change from rest: no derivative kick, references start where the rotor lies */
         memcpy(l->previous, plane, sizeof plane);
-        l->angle_previous = r->angle;
+        l->angle_previous = l->goal_previous = r->angle;
         if (l->mode == LIFT) {
             memcpy(l->rest, plane, sizeof plane);
             memset(l->integral, 0, sizeof l->integral);
             memset(l->filtered, 0, sizeof l->filtered);
             l->angle_target = r->angle;
-            l->speed_target = l->angle_integral = l->angle_filtered = l->i_x = l->i_y = 0;
+            l->speed_target = l->angle_integral = l->angle_filtered = l->goal_filtered = l->i_x = l->i_y = 0;
+            l->share = l->sine_phase = 0;
             l->turns = whole_turns(r->angle - c->angle_ref);
         }
         l->fresh = 0;
@@ -102,11 +160,11 @@ void tsbs_law(const tsbs_control *c, tsbs_law_state *l, const tsbs_reading *r, t
         memcpy(l->previous, plane, sizeof plane);
         double keep = KEEP(c->angle_hz);
         l->angle_filtered = keep * l->angle_filtered + (1 - keep) * (r->angle - l->angle_previous) / TICK;
-        l->angle_previous = r->angle;
+        l->angle_previous = l->goal_previous = r->angle;
         l->angle_target = r->angle;
         return;
     }
     radial(c, l, plane, out);
-    rotation(c, l, r->angle, out);
+    rotation(c, l, r, out);
     if (l->mode == LAND && l->lift_clock >= c->lift_time_s) memset(out, 0, sizeof *out);
 }

@@ -42,7 +42,8 @@ void tsbs_sense(const tsbs_params *p, tsbs_derived *d, tsbs_state *st, tsbs_read
     }
     for (int k = 0; k < 4; k++) {
         double noise = p->current_noise > 0 ? p->current_noise * tsbs_normal(&st->noise) : 0;
-        segment[k] = quantise(st->segment[k] + noise, p->current_lsb, d->per_current_lsb);
+        double i = p->segment_sense[k] * st->segment[k] + p->segment_offset[k] + p->segment_drift[k] * now + noise;
+        segment[k] = quantise(i, p->current_lsb, d->per_current_lsb);
     }
     double angle = p->encoder_sign * (s[5] + p->encoder_offset);
     r->angle = p->encoder_counts > 0 ? floor(angle * p->encoder_counts / 6.283185307179586 + 0.5) *
@@ -57,8 +58,10 @@ static void amplifiers(const tsbs_params *p, const tsbs_derived *d, const tsbs_s
         double ref = enabled ? least(most(st->applied.coil[k], 0), p->coil_limit[k]) : 0;
         coil[k] = enabled ? most((ref - p->current_offset[k] - p->current_drift[k] * now) * d->per_gain[k], 0) : 0;
     }
-    for (int k = 0; k < 4; k++)
-        segment[k] = enabled ? least(most(st->applied.segment[k], -p->segment_limit), p->segment_limit) : 0;
+    for (int k = 0; k < 4; k++) {
+        double ref = least(most(st->applied.segment[k], -p->segment_limit), p->segment_limit);
+        segment[k] = enabled ? (ref - p->segment_offset[k] - p->segment_drift[k] * now) * d->per_sense[k] : 0;
+    }
 }
 
 static void approach(const double *from, const double *to, int n, double keep, double *out) {
@@ -108,6 +111,17 @@ static void drive(tsbs_state *st, tsbs_derived *d) {
     d->drive_gain = st->drive_gain;
     d->drive_limit = st->drive_limit;
     d->drive_speed = st->drive_speed;
+}
+
+static double near_to(double x, double goal, double step) { return x + least(most(goal - x, -step), step); }
+
+/* what holds over the tick: the lever's weight is handed over gradually, and it may slip */
+static void hold(const tsbs_params *p, tsbs_state *st, tsbs_derived *d) {
+    st->lever_weight = near_to(st->lever_weight, st->lever_weight_to, st->lever_weight_rate * TICK);
+    st->lever_moment = near_to(st->lever_moment, st->lever_moment_to, st->lever_moment_rate * TICK);
+    if (p->lever_slip != 0) st->slip += p->lever_slip * st->lever_moment * cos(st->s[5] + st->slip) * TICK;
+    double lever[4] = {st->lever_weight, st->lever_moment, st->slip, st->lever_inertia + st->ring_inertia};
+    tsbs_hold(p, st->coil, lever, d);
 }
 
 static void watch(const tsbs_params *p, tsbs_state *st, const double *coil, double speed) {
@@ -164,7 +178,9 @@ int64_t tsbs_run(const tsbs_params *p, const tsbs_control *c, tsbs_state *st, in
         double coil[10], segment[4], coil_to[10], segment_to[4];
         tsbs_sense(p, &d, st, &r, coil, segment);
         st->applied = st->next; /* one sample of delay */
-        if (st->applied.gamma != gamma) tsbs_commutate(p, gamma = st->applied.gamma, &d);
+        /* commutation goes by the encoder: one that counts backwards puts the currents at minus the rotor's angle */
+        double at = p->encoder_sign < 0 ? st->applied.gamma - 2 * st->s[5] : st->applied.gamma;
+        if (at != gamma) tsbs_commutate(p, gamma = at, &d);
         tsbs_law(c, &st->law, &r, &st->next);
         st->speed = d.speed_keep * st->speed + (1 - d.speed_keep) * (r.angle - st->angle_before) / TICK;
         st->angle_before = r.angle;
@@ -177,6 +193,7 @@ int64_t tsbs_run(const tsbs_params *p, const tsbs_control *c, tsbs_state *st, in
         amplifiers(p, &d, st, coil_to, segment_to);
         hysteresis(p, st);
         drive(st, &d);
+        hold(p, st, &d);
         for (int k = 0; k < st->substeps; k++) step(p, &d, st, coil_to, segment_to, TICK / st->substeps);
         st->tick++;
         done++;

@@ -41,8 +41,36 @@ double tsbs_harmonics(const double *c, const double *s, const double *tc, const 
 
 void tsbs_commutate(const tsbs_params *p, double gamma, tsbs_derived *d) {
     double turn = p->pole_pairs * (gamma - p->gamma_zero);
-    d->motor_c = cos(turn);
-    d->motor_s = sin(turn);
+    double c = cos(turn), q = sin(turn);
+    d->direct = p->alpha_d * c;
+    d->cross = p->alpha_c * q;
+    d->turning = p->alpha_tau * c;
+    d->ripple_dc = p->alpha_2 * c; /* alpha_2 cos(b) and alpha_3 sin(b), b = P theta + turn, by the cos and sin of P theta */
+    d->ripple_ds = p->alpha_2 * q;
+    d->ripple_qc = p->alpha_3 * q;
+    d->ripple_qs = p->alpha_3 * c;
+    d->ripple_tc = p->beta_4 * c; /* beta_4 cos(3 P theta + turn) */
+    d->ripple_ts = p->beta_4 * q;
+}
+
+/* What holds over a tick. Lever: its weight, its moment, how far it has slipped, and the inertia added to the shaft's.
+ * The bearings' share of the drag is eddy currents: it goes with the square of each axis' flux. */
+void tsbs_hold(const tsbs_params *p, const double *coil, const double *lever, tsbs_derived *d) {
+    double square = 0;
+    for (int a = 0; a < 4; a++) square += (coil[2 * a] + coil[2 * a + 1]) * (coil[2 * a] + coil[2 * a + 1]);
+    d->viscous = p->viscous * (1 - p->drag_share + p->drag_share * square / (4 * 4 * 9));
+    d->coulomb = p->coulomb + (d->drive_gain > 0 ? 0 : p->brake);
+    d->lever_weight = lever[0];
+    if (lever[1] != 0) {
+        d->lever_c = lever[1] * cos(lever[2]);
+        d->lever_s = lever[1] * sin(lever[2]);
+    } else {
+        d->lever_c = d->lever_s = 0;
+    }
+    if (p->polar_inertia + lever[3] != d->polar_inertia) {
+        d->polar_inertia = p->polar_inertia + lever[3];
+        d->per_polar = 1 / d->polar_inertia;
+    }
 }
 
 void tsbs_derive(const tsbs_params *p, double step, tsbs_derived *d) {
@@ -52,6 +80,11 @@ void tsbs_derive(const tsbs_params *p, double step, tsbs_derived *d) {
         d->target_c[n] = p->target[n] * cos(p->target_phase[n]);
         d->target_s[n] = p->target[n] * sin(p->target_phase[n]);
     }
+    for (int b = 0; b < 2; b++) d->beta_x[b] = p->beta[b] * (1 + p->asymmetry[b]);
+    d->per_mass = 1 / p->mass;
+    d->per_inertia = 1 / p->inertia;
+    d->per_coulomb_speed = 1 / p->coulomb_speed;
+    d->polar_inertia = d->per_polar = 0;
     d->detent_c = cos(p->detent_phase);
     d->detent_s = sin(p->detent_phase);
     d->angle = 0;
@@ -60,6 +93,7 @@ void tsbs_derive(const tsbs_params *p, double step, tsbs_derived *d) {
     d->per_position_lsb = p->position_lsb > 0 ? 1 / p->position_lsb : 0;
     d->per_current_lsb = p->current_lsb > 0 ? 1 / p->current_lsb : 0;
     for (int k = 0; k < 10; k++) d->per_gain[k] = 1 / p->current_gain[k];
+    for (int k = 0; k < 4; k++) d->per_sense[k] = 1 / p->segment_sense[k];
     d->tilt_c = cos(p->tilt);
     d->tilt_s = sin(p->tilt);
     d->unbalance_c = cos(p->eccentricity_phase);
@@ -104,19 +138,29 @@ static void touchdown(const tsbs_params *p, const double *s, int b, wrench *w) {
     w->torque -= drag * p->ring_radius;
 }
 
-/* Coulomb friction is smoothed by x / sqrt(1 + x^2) about standstill */
+/* T (6.5), and from T (5.25) the ripple with P theta, the pull by the torque current and the side pull. That the ripple
+ * goes with P theta + M gamma follows from T (6.1): with u = M (Phi - theta), sin(u) sin(u - M gamma) is half of
+ * cos(M gamma) - cos(P Phi - (P theta + M gamma)). Coulomb friction is smoothed by x / sqrt(1 + x^2) about standstill. */
 static void motor(const tsbs_params *p, const tsbs_derived *d, const double *s, const double *i,
                   const double *tc, const double *ts, wrench *w) {
     double e[4];
-    for (int k = 0; k < 4; k++) e[k] = i[k] * p->segment_gain[k];
+    int first = p->exchange_segments != 0;
+    e[0] = i[first] * p->segment_gain[0];
+    e[1] = i[!first] * p->segment_gain[1];
+    e[2] = i[2] * p->segment_gain[2];
+    e[3] = i[3] * p->segment_gain[3];
     double ix = (e[3] - e[1]) / 2, iy = (e[0] - e[2]) / 2, mean = (e[0] + e[1] + e[2] + e[3]) / 4;
     double c8 = 2 * tc[3] * tc[3] - 1, s8 = 2 * tc[3] * ts[3], c16 = 2 * c8 * c8 - 1, s16 = 2 * c8 * s8;
-    double c = d->motor_c, q = d->motor_s, slow = s[11] / p->coulomb_speed;
+    double c48 = c16 * (4 * c16 * c16 - 3), s48 = s16 * (3 - 4 * s16 * s16), slow = s[11] * d->per_coulomb_speed;
+    double direct = d->direct - d->ripple_dc * c16 + d->ripple_ds * s16;
+    double cross = d->cross + d->ripple_qs * s16 + d->ripple_qc * c16;
+    double turning = d->turning + d->ripple_tc * c48 - d->ripple_ts * s48;
     double x = s[0] + p->z_motor * s[4] + p->motor_x, y = s[1] - p->z_motor * s[3] + p->motor_y;
-    add(w, p->z_motor, p->alpha_d * c * ix - p->alpha_c * q * iy + p->alpha_x * x,
-        p->alpha_d * c * iy + p->alpha_c * q * ix + p->alpha_x * y);
-    w->torque += p->alpha_tau * c * mean - p->viscous * s[11] - p->coulomb * slow / sqrt(1 + slow * slow) -
-                 p->detent * (s16 * d->detent_c + c16 * d->detent_s);
+    double across = p->alpha_4 * mean, pull = p->alpha_6 * mean;
+    add(w, p->z_motor, direct * ix - cross * iy - across * y + p->alpha_x * x + pull * iy,
+        direct * iy + cross * ix + across * x + p->alpha_x * y - pull * ix);
+    w->torque += turning * mean + p->beta_2 * (x * iy - y * ix) - d->viscous * s[11] -
+                 d->coulomb * slow / sqrt(1 + slow * slow) - p->detent * (s16 * d->detent_c + c16 * d->detent_s);
 }
 
 void tsbs_rates(const tsbs_params *p, const tsbs_derived *d, const double *s, const double *coil,
@@ -128,7 +172,7 @@ void tsbs_rates(const tsbs_params *p, const tsbs_derived *d, const double *s, co
         double z = p->z_amb[b], ry, rx = tsbs_harmonics(d->runout_c + 4 * b, d->runout_s + 4 * b, tc, ts, &ry);
         const double *i = coil + 4 * b, *h = play + 2 * b;
         double xi = s[0] + z * s[4] + p->offset_x[b] + rx, eta = s[1] - z * s[3] + p->offset_y[b] + ry;
-        add(&w, z, tsbs_amb_force(p->beta[b], p->gap[b], xi, i[0] - h[0], i[1] + h[0]),
+        add(&w, z, tsbs_amb_force(d->beta_x[b], p->gap[b], xi, i[0] - h[0], i[1] + h[0]),
             tsbs_amb_force(p->beta[b], p->gap[b], eta, i[2] - h[1], i[3] + h[1]));
         touchdown(p, s, b, &w);
     }
@@ -140,6 +184,10 @@ void tsbs_rates(const tsbs_params *p, const tsbs_derived *d, const double *s, co
     }
     double sx = d->tilt_s, sy = -d->tilt_c;
     double rate = 0;
+    if (d->lever_weight != 0) {
+        add(&w, p->z_lever, d->lever_weight * sx, d->lever_weight * sy);
+        w.torque += d->lever_c * tc[0] - d->lever_s * ts[0];
+    }
     if (hung_mass > 0) { /* strap: one vertical degree of freedom */
         double hook = s[1] - p->z_hook * s[3], hook_rate = s[7] - p->z_hook * s[9];
         /* s[12] is the height of the mass plus the strap's length: below the hook it stretches the strap */
@@ -151,20 +199,21 @@ void tsbs_rates(const tsbs_params *p, const tsbs_derived *d, const double *s, co
     double spin = s[11], unbalance = p->mass * p->eccentricity * spin * spin;
     double ec = d->unbalance_c, es = d->unbalance_s;
     memcpy(ds, s + 6, 6 * sizeof *ds);
-    ds[6] = (w.fx + unbalance * (tc[0] * ec - ts[0] * es)) / p->mass + p->gravity * sx;
-    ds[7] = (w.fy + unbalance * (ts[0] * ec + tc[0] * es)) / p->mass + p->gravity * sy;
-    ds[8] = w.fz / p->mass;
-    ds[9] = (w.mphi - p->polar_inertia * spin * s[10]) / p->inertia;
-    ds[10] = (w.mpsi + p->polar_inertia * spin * s[9]) / p->inertia;
-    ds[11] = w.torque / p->polar_inertia;
+    ds[6] = (w.fx + unbalance * (tc[0] * ec - ts[0] * es)) * d->per_mass + p->gravity * sx;
+    ds[7] = (w.fy + unbalance * (ts[0] * ec + tc[0] * es)) * d->per_mass + p->gravity * sy;
+    ds[8] = w.fz * d->per_mass;
+    ds[9] = (w.mphi - d->polar_inertia * spin * s[10]) * d->per_inertia;
+    ds[10] = (w.mpsi + d->polar_inertia * spin * s[9]) * d->per_inertia;
+    ds[11] = w.torque * d->per_polar;
     ds[12] = hung_mass > 0 ? s[13] : 0;
     ds[13] = rate;
 }
 
 void tsbs_derivative(const tsbs_params *p, const double *s, const double *coil, const double *segment,
-                     const double *play, double gamma, double hung_mass, double weight, double *ds) {
+                     const double *play, double gamma, double hung_mass, double weight, const double *lever, double *ds) {
     tsbs_derived d;
     tsbs_derive(p, TICK, &d);
     tsbs_commutate(p, gamma, &d);
+    tsbs_hold(p, coil, lever, &d);
     tsbs_rates(p, &d, s, coil, segment, play, hung_mass, weight, ds);
 }

@@ -9,19 +9,23 @@
 typedef struct {
     /* shaft (T 6.6, Table 6.1); planes are signed distances from the centre of mass, outboard positive */
     double mass, inertia, polar_inertia, gravity, tilt, eccentricity, eccentricity_phase;
-    double z_amb[2], z_sensor[2], z_motor, z_hook;
+    double z_amb[2], z_sensor[2], z_motor, z_hook, z_lever;
     /* radial AMBs (T 2.4): force constant, gap, magnetic offset, runout harmonics 1..4 of the journal, hysteresis */
-    double beta[2], gap[2], offset_x[2], offset_y[2], runout[8], runout_phase[8], hysteresis;
+    double beta[2], asymmetry[2], gap[2], offset_x[2], offset_y[2], runout[8], runout_phase[8], hysteresis;
     double beta_z, gap_z;
-    /* motor (T 6.5) */
+    /* motor: T (6.5) for any gamma, with the ripple, the side pull and the displacement terms of T (5.25) */
     double alpha_d, alpha_c, alpha_x, alpha_tau, motor_x, motor_y, gamma_zero, segment_gain[4], pole_pairs;
-    double viscous, coulomb, coulomb_speed, detent, detent_phase;
+    double alpha_2, alpha_3, alpha_4, alpha_6, beta_2, beta_4, exchange_segments;
+    /* drag: drag_share of `viscous` (at 3 A) goes with the square of the AMBs' currents; brake: while no drive drives */
+    double viscous, drag_share, coulomb, coulomb_speed, brake, detent, detent_phase;
+    double lever_slip;
     /* touchdown rings at the sensor planes, strap of the hanger */
     double clearance, ring_stiffness, ring_damping, ring_friction, ring_radius, ring_x[2], ring_y[2];
     double strap_stiffness, strap_damping;
     /* amplifiers and current sensors, per coil and per segment */
     double amplifier_rate, segment_rate, segment_limit, coil_limit[10];
     double current_gain[10], current_offset[10], current_drift[10], current_noise, current_lsb;
+    double segment_sense[4], segment_offset[4], segment_drift[4];
     /* position sensors xi yi xo yo z; a stuck sensor reads stuck_value; runout of the sensor targets */
     double position_gain[5], position_offset[5], position_sign[5], position_noise, position_lsb;
     double stuck[5], stuck_value, target[8], target_phase[8], exchange_axes[2];
@@ -37,7 +41,10 @@ typedef struct {
     double angle_ref, angle_slew, kp_theta, kd_theta, ki_theta, speed_ref;
     double i_x, i_y, gamma;
     double lift_time_s, current_limit;
-    double torque_on, derivative_hz, angle_hz, ramp_A_s, acceleration;
+    double torque_on, derivative_hz, angle_hz, i_ramp, acceleration;
+    /* the motor instead of the outboard AMB; how the segments share force and torque (0: T 6.9, 1: T 6.19 with 6.24) */
+    double motor_share, share_slew, kp_m, kd_m, ki_m, ref_xm, ref_ym, allocation, segment_max;
+    double derivative_on_error, sine_amplitude, sine_hz;
     /* the controller's own idea of the planes: plane = share * outboard reading + (1 - share) * inboard reading */
     double share_i, share_o;
 } tsbs_control;
@@ -45,6 +52,7 @@ typedef struct {
 typedef struct {
     double integral[5], filtered[5], previous[5], rest[5];
     double angle_target, speed_target, angle_integral, angle_filtered, angle_previous, i_x, i_y;
+    double goal_filtered, goal_previous, sine_phase, share, motor_integral[2], motor_filtered[2], motor_previous[2];
     double lift_clock, turns;
     int32_t mode, fresh;
 } tsbs_law_state;
@@ -67,6 +75,10 @@ typedef struct {
     double hung_mass, weight, weight_to, weight_rate;
     /* external drive: torque = gain * (speed - the shaft's), at most limit; speed goes to its target by the ramp; gain 0: off */
     double drive_gain, drive_limit, drive_ramp, drive_target, drive_speed;
+    /* lever: weight on it, its moment about the shaft (left end down positive), how far it has slipped; what it and a
+     * ring add to the polar inertia */
+    double lever_weight, lever_weight_to, lever_weight_rate, lever_moment, lever_moment_to, lever_moment_rate, slip;
+    double lever_inertia, ring_inertia;
     tsbs_reference applied, next;
     tsbs_law_state law;
     tsbs_noise noise;
@@ -78,7 +90,7 @@ typedef struct {
 void tsbs_start(const tsbs_params *, const tsbs_control *, tsbs_state *, uint64_t seed);
 int64_t tsbs_run(const tsbs_params *, const tsbs_control *, tsbs_state *, int64_t ticks, double *rows, int64_t row_limit);
 void tsbs_derivative(const tsbs_params *, const double *s, const double *coil, const double *segment,
-                     const double *play, double gamma, double hung_mass, double weight, double *ds);
+                     const double *play, double gamma, double hung_mass, double weight, const double *lever, double *ds);
 void tsbs_law(const tsbs_control *, tsbs_law_state *, const tsbs_reading *, tsbs_reference *);
 double tsbs_amb_force(double beta, double gap, double xi, double coil_p, double coil_n);
 void tsbs_normals(uint64_t seed, uint64_t stream, double *out, int64_t count);
@@ -96,12 +108,17 @@ double tsbs_normal(tsbs_noise *);
 /* what does not change inside a run or a tick: harmonic coefficients a cos p and a sin p, sines, decays */
 typedef struct {
     double runout_c[8], runout_s[8], target_c[8], target_s[8], tilt_c, tilt_s, motor_c, motor_s;
-    double per_position_lsb, per_current_lsb, per_gain[10];
+    double per_position_lsb, per_current_lsb, per_gain[10], per_sense[4], per_mass, per_inertia, per_coulomb_speed;
     double angle, turn_c, turn_s, detent_c, detent_s, unbalance_c, unbalance_s, coil_keep, segment_keep, speed_keep;
-    double drive_gain, drive_limit, drive_speed; /* of this tick */
+    double beta_x[2];
+    /* of this tick: the motor's constants at its gamma, the drive, the drag, the lever, the inertia */
+    double direct, cross, turning, ripple_dc, ripple_ds, ripple_qc, ripple_qs, ripple_tc, ripple_ts;
+    double drive_gain, drive_limit, drive_speed, viscous, coulomb;
+    double lever_weight, lever_c, lever_s, polar_inertia, per_polar;
 } tsbs_derived;
 void tsbs_derive(const tsbs_params *, double step, tsbs_derived *);
 void tsbs_commutate(const tsbs_params *, double gamma, tsbs_derived *);
+void tsbs_hold(const tsbs_params *, const double *coil, const double *lever, tsbs_derived *);
 void tsbs_turn(double angle, double *c, double *s);
 double tsbs_harmonics(const double *c, const double *s, const double *turn_c, const double *turn_s, double *quadrature);
 void tsbs_rates(const tsbs_params *, const tsbs_derived *, const double *s, const double *coil, const double *segment,

@@ -133,7 +133,7 @@ def test_unbalance_points_outward_and_turns_with_the_shaft() -> None:
 
 
 def test_drag_and_detent() -> None:
-    assert rates(floating(viscous=0.08), spin=10.0)[THETA] * 0.033 == pytest.approx(-0.8, rel=1e-12)
+    assert rates(floating(viscous=0.08, drag_share=0.0), spin=10.0)[THETA] * 0.033 == pytest.approx(-0.8, rel=1e-12)
     assert rates(floating(coulomb=0.05), spin=30.0)[THETA] * 0.033 == pytest.approx(-0.05, rel=1e-5)
     assert rates(floating(coulomb=0.05), spin=-30.0)[THETA] * 0.033 == pytest.approx(0.05, rel=1e-5)
     held = rates(floating(detent=0.01, detent_phase=0.4), theta=0.02)
