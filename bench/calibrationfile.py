@@ -1,4 +1,4 @@
-"""Calibrations as JSON: the file beside the rig, and the attachment of a recording. Read strictly, written whole or not at all."""
+"""Calibrations as JSON: the file beside the rig, and the attachment of a recording. Read strictly, written whole."""
 
 from __future__ import annotations
 

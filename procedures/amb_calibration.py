@@ -8,8 +8,9 @@ tangent at the current that carries the rotor's own weight. Horizontal constants
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from pydantic import Field
@@ -24,11 +25,11 @@ from bench.rigfile import RigFile
 from bench.roles import NOTHING, Load, RigState
 from bench.uncertainty import Estimate, Influence, propagate
 from procedures import amb_calibration_figures as drawn
-from procedures.estimators import consistency, mass_hanging
+from procedures.estimators import angle_facts, consistency, mass_hanging
 from procedures.estimators.hanging_data import CHANNELS, COILS, HangingData, read_hangings
 from procedures.estimators.inputs import certified
 from procedures.estimators.mass_hanging import Fit
-from procedures.estimators.repeatability import OUTPUTS, Scatter, covariance_over_a_turn, scatter
+from procedures.estimators.repeatability import OUTPUTS, Scatter, covariance_by_angle, covariance_over_a_turn, scatter
 
 K_I = Quantity("K_i", "N/A", "inboard AMB: dF/di at zero control current, mean over a turn")
 K_O = Quantity("K_o", "N/A", "outboard AMB: dF/di at zero control current, mean over a turn")
@@ -36,6 +37,7 @@ K2_I = Quantity("K2_i", "N/A^2", "inboard AMB: (d²F/di²)/2, mean over a turn")
 K2_O = Quantity("K2_o", "N/A^2", "outboard AMB: (d²F/di²)/2, mean over a turn")
 KW_I = Quantity("Kw_i", "N/A", "inboard AMB: dF/di at the current that carries the rotor's own weight")
 KW_O = Quantity("Kw_o", "N/A", "outboard AMB: dF/di at the current that carries the rotor's own weight")
+BEARINGS = {"i": "inboard", "o": "outboard"}
 MEASURES = (K_I, K_O, K2_I, K2_O, KW_I, KW_O)
 
 
@@ -89,12 +91,16 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 
 @dataclass(frozen=True)
 class Analysis:
-    """Everything the measurements, findings and figures are made of."""
+    """Everything the measurements, findings, facts and figures are made of.
+
+    `estimates` are without Type A, means over a turn and values by angle; `spread` (A, 6, 6) is the Type A covariance at
+    each angle."""
 
     data: HangingData
     inputs: dict[str, Estimate]
     fit: Fit
     scatter: Scatter
+    spread: np.ndarray
     estimates: dict[str, Estimate]
 
 
@@ -105,36 +111,48 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     yield from findings
     if any(f.code in consistency.FATAL for f in findings):
         return
-    result = evaluate(recording, data)
+    result = evaluate(recording)
     values = {name: e.value for name, e in result.inputs.items()}
     yield from consistency.of_fit(data, result.fit, result.scatter, values, recording.plan, masses_u(recording))
+    scattered = angle_facts.scatter_terms("scatter", covariance_over_a_turn(result.spread), result.scatter.dof)
     for quantity in MEASURES:
-        yield quantity.measured(result.estimates[quantity.name])
+        yield quantity.measured(result.estimates[quantity.name] + scattered[quantity.name])
 
 
-def evaluate(recording: Recording[Plan], data: HangingData) -> Analysis:
-    """Fit, scatter and the six estimates with their influences."""
+def facts(recording: Recording[Plan]) -> dict[str, Estimate]:
+    """The six quantities, and K and K2 of each bearing at each angle, all with one scatter for each angle: what a later
+    procedure takes at one angle and what it takes over a turn then stay correlated as they are."""
+    result = evaluate(recording)
+    found = angle_facts.with_scatter(result.estimates, result.spread, result.scatter.dof)
+    units = {q.name: q.unit for q in MEASURES}
+    return {name: replace(e, unit=units[name.partition("@")[0]]) for name, e in found.items()}
+
+
+@lru_cache(maxsize=1)
+def evaluate(recording: Recording[Plan]) -> Analysis:
+    """Fit, scatter and estimates with their influences. Kept, because measurements, facts and figures all need it."""
+    data = read_hangings(recording, recording.plan.masses)
     plan = recording.plan
     inputs = fit_inputs(recording.rig, plan)
     count = len(plan.masses)
 
-    def model(p: dict[str, float]) -> dict[str, float]:
-        return mass_hanging.over_a_turn(mass_hanging.fit(data.hangings, p, plan.bias_A, count), p)
+    def model(p: Mapping[str, float], top_branch: float = 1.0) -> dict[str, float]:
+        fitted = mass_hanging.fit(data.hangings, p, plan.bias_A, count, top_branch=top_branch)
+        return mass_hanging.over_a_turn(fitted, p) | mass_hanging.by_angle(fitted)
 
     values = {name: e.value for name, e in inputs.items()}
     fitted = mass_hanging.fit(data.hangings, values, plan.bias_A, count)
     spread = scatter(fitted, data.hangings, count)
     share = np.array(mass_hanging.hung_shares(values["hook_to_outboard"], values["amb_span"]))
     hanger = mass_hanging.weight(values["hanger"], values["gravity"], values["air_density"], values["mass_density"])
-    covariance = covariance_over_a_turn(fitted, spread, -share * float(hanger))
+    covariance = covariance_by_angle(fitted, spread, -share * float(hanger))
     estimates = propagate(model, inputs)
-    half_branch = mass_hanging.over_a_turn(
-        mass_hanging.fit(data.hangings, values, plan.bias_A, count, top_branch=0.0), values
-    )
-    for name, extra in _scatter_terms(covariance, spread.dof).items():
-        turning = _turning_point(name, half_branch[name] - estimates[name].value)
-        estimates[name] = estimates[name] + extra + turning + _unresolved_angles(name, fitted, plan, values)
-    return Analysis(data, inputs, fitted, spread, estimates)
+    half_branch = model(values, top_branch=0.0)
+    for name, estimate in estimates.items():
+        estimates[name] = estimate + _turning_point(name, half_branch[name] - estimate.value)
+        if name in OUTPUTS:
+            estimates[name] += _unresolved_angles(name, fitted, plan, values)
+    return Analysis(data, inputs, fitted, spread, covariance, estimates)
 
 
 def fit_inputs(rig: RigFile, plan: Plan) -> dict[str, Estimate]:
@@ -166,27 +184,14 @@ def fit_inputs(rig: RigFile, plan: Plan) -> dict[str, Estimate]:
     return inputs
 
 
-def _scatter_terms(covariance: np.ndarray, dof: int) -> dict[str, Estimate]:
-    """Type A estimates of value zero that carry `covariance` between the outputs, through independent influences."""
-    root = np.linalg.cholesky(covariance + 1e-15 * np.diag(np.diag(covariance)))
-    parts = [
-        Influence(id=f"scatter/{k + 1}", name=f"scatter of the hangings ({k + 1})", u=1.0, unit="1", kind="A",
-                  distribution="normal", dof=float(dof), source="residuals of the fits")
-        for k in range(len(root))
-    ]  # fmt: skip
-    return {
-        name: sum((Estimate.of(0.0, part) * float(root[row, k]) for k, part in enumerate(parts[: row + 1])),
-                  Estimate.exact(0.0))
-        for row, name in enumerate(OUTPUTS)
-    }  # fmt: skip
-
-
 def _turning_point(name: str, shift: float) -> Estimate:
-    """The heaviest load is where loading turns: it counts as loading, and at most half of that could be wrong."""
-    u = abs(shift) / math.sqrt(3)
-    influence = Influence(id=f"hysteresis/{name}", name="hysteresis at the turning point", u=u, unit="1", kind="B",
-                          distribution="rectangular", source="branch of the heaviest load set to zero")  # fmt: skip
-    return Estimate.of(0.0, influence) if u > 0 else Estimate.exact(0.0)
+    """The heaviest load is where loading turns: it counts as loading, and at most half of that could be wrong, at all
+    angles alike."""
+    bearing = name.partition("@")[0][-1]
+    influence = Influence(id=f"hysteresis/{bearing}", name=f"hysteresis at the turning point, {BEARINGS[bearing]} AMB",
+                          u=1 / math.sqrt(3), unit="1", kind="B", distribution="rectangular",
+                          source="branch of the heaviest load set to zero")  # fmt: skip
+    return Estimate.of(0.0, influence) * shift
 
 
 def _unresolved_angles(name: str, f: Fit, plan: Plan, p: dict[str, float]) -> Estimate:
@@ -234,7 +239,7 @@ def figures(recording: Recording[Plan]) -> Iterable[Figure]:
     data = read_hangings(recording, recording.plan.masses)
     if any(f.code in consistency.FATAL for f in consistency.of_signals(data, recording.plan)):
         return ()
-    result = evaluate(recording, data)
+    result = evaluate(recording)
     values = {name: e.value for name, e in result.inputs.items()}
     return drawn.all_figures(recording, data, result.fit, values)
 
@@ -266,5 +271,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    facts=facts,
+    holds_for=lambda plan: {"bias_A": plan.bias_A, "angles": plan.angles},
     method=METHOD,
 )

@@ -149,3 +149,13 @@ def over_a_turn(f: Fit, p: Mapping[str, float]) -> dict[str, float]:
     for b, bearing in enumerate("io"):
         out |= {f"K_{bearing}": mean[b, 1], f"K2_{bearing}": mean[b, 2], f"Kw_{bearing}": float(slope[b].mean())}
     return {name: float(x) for name, x in out.items()}
+
+
+def by_angle(f: Fit) -> dict[str, float]:
+    """K in N/A and K2 in N/A^2 of each bearing at each angle k: `K_i@k`, `K2_i@k`, `K_o@k`, `K2_o@k`."""
+    return {
+        f"{name}_{bearing}@{k}": float(f.terms[b, k, term])
+        for b, bearing in enumerate("io")
+        for name, term in (("K", 1), ("K2", 2))
+        for k in range(f.terms.shape[1])
+    }

@@ -68,16 +68,20 @@ def _residual_maker(f: Fit, b: int) -> Array:
     return out
 
 
-def covariance_over_a_turn(f: Fit, s: Scatter, own_load: Array) -> Array:
-    """Type A covariance (6, 6) of the means over a turn, in the order of OUTPUTS.
+def covariance_by_angle(f: Fit, s: Scatter, own_load: Array) -> Array:
+    """Type A covariance (A, 6, 6) of the terms at each angle, in the order of OUTPUTS.
 
     `own_load` (2,) N is the force at own weight in the fit's frame (see `mass_hanging.tangents`). Hangings are
     independent of each other; the two bearings of one hanging are not (a load that seats badly moves both).
     """
-    angles = f.terms.shape[1]
     maps = np.stack([_term_gradients(f.terms[b], own_load[b]) @ f.solvers[b] for b in (0, 1)])  # (2, A, 3, P)
-    blocks = np.einsum("bamp,canp,bcap->bmcn", maps, maps, s.covariance)
-    covariance: Array = blocks.reshape(6, 6) / angles**2
+    blocks: Array = np.einsum("bamp,canp,bcap->abmcn", maps, maps, s.covariance)
+    return blocks.reshape(-1, 6, 6)
+
+
+def covariance_over_a_turn(by_angle: Array) -> Array:
+    """Type A covariance (6, 6) of the means over a turn; angles share no hanging."""
+    covariance: Array = by_angle.sum(axis=0) / len(by_angle) ** 2
     return covariance
 
 

@@ -1,0 +1,45 @@
+"""Values by rotor angle with their scatter: what a calibration over angles hands on to later procedures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.uncertainty import Estimate, Influence
+from procedures.estimators.repeatability import OUTPUTS
+
+Array = npt.NDArray[np.float64]
+
+
+def scatter_terms(identity: str, covariance: Array, dof: int, where: str = "") -> dict[str, Estimate]:
+    """Type A estimates of value zero for each of OUTPUTS that carry `covariance` (6, 6) between them, through independent
+    influences `<identity>/1`, `<identity>/2` ... with common degrees of freedom; `where` stands in their names."""
+    root = np.linalg.cholesky(covariance + 1e-15 * np.diag(np.diag(covariance)))
+    parts = [
+        Influence(id=f"{identity}/{k + 1}", name=f"scatter of the hangings{where} ({k + 1})", u=1.0, unit="1", kind="A",
+                  distribution="normal", dof=float(dof), source="residuals of the fits")
+        for k in range(len(root))
+    ]  # fmt: skip
+    return {
+        name: Estimate(0.0, "", {part: float(root[row, k]) for k, part in enumerate(parts[: row + 1])})
+        for row, name in enumerate(OUTPUTS)
+    }
+
+
+def with_scatter(estimates: Mapping[str, Estimate], spread: Array, dof: int) -> dict[str, Estimate]:
+    """Values by angle (`name@k`) with the scatter of their angle, means over a turn with the mean of all.
+
+    `spread` (A, 6, 6) is the covariance at each angle, in the order of OUTPUTS.
+    """
+    turn = len(spread)
+    terms = [scatter_terms(f"scatter/{k}", spread[k], dof, f" at {360 * k / turn:.0f}°") for k in range(turn)]
+    out: dict[str, Estimate] = {}
+    for name, estimate in estimates.items():
+        quantity, at, angle = name.partition("@")
+        if at:
+            out[name] = estimate + terms[int(angle)][quantity]
+        else:
+            out[name] = sum((term[quantity] * (1 / turn) for term in terms), estimate)
+    return out
