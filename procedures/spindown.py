@@ -1,0 +1,271 @@
+"""Drag of the levitated rotor by letting it coast (thesis 6.6.4, (6.16) with the polar inertia and Coulomb friction).
+
+Measurand: the viscous drag coefficient B at two bias currents of the radial AMBs, and the Coulomb torque T_c, of the released
+rotor, mean over both directions of turning: J_z w' = -B w - T_c sgn(w).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from pydantic import Field
+
+from bench.errors import LinkError
+from bench.figures import Figure
+from bench.findings import Effect, Finding
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.rig import Rig
+from bench.rigfile import RigFile
+from bench.roles import RigState
+from bench.states import transition
+from bench.uncertainty import Estimate
+from procedures import rotor
+from procedures import spindown_figures as drawn
+from procedures.estimators import drag, spindown_checks
+from procedures.estimators.drag import Drag
+from procedures.estimators.spindown_data import CHANNELS, COILS, RunDown, read_run_downs
+
+B = Quantity("B", "N m s/rad", "viscous drag at the bias of the plan, mean over both directions")
+B_HIGH = Quantity("B_high", "N m s/rad", "viscous drag at the higher bias, mean over both directions")
+T_C = Quantity("T_c", "N m", "Coulomb torque at the bias of the plan, mean over both directions")
+J_Z = Quantity("J_z", "kg m^2", "polar inertia: by the ring where one was mounted, else the rig file's as used")
+MEASURES = (B, B_HIGH, T_C, J_Z)
+REACHED = 0.95
+
+
+class Plan(BenchPlan):
+    """Settings of the spindown, SI."""
+
+    speed_rad_s: float = Field(60.0, gt=5)  # where a run-down starts
+    end_speed_rad_s: float = Field(3.0, gt=0.5)  # and where its fit ends
+    repeats: int = Field(3, ge=2)  # each way, at each bias
+    bias_A: float = Field(3.0, gt=0)
+    bias_high_A: float = Field(4.0, gt=0)
+    added_inertia: bool = False  # mount the ring and take the inertia from it
+    run_up: Literal["auto", "drive", "motor"] = "auto"  # auto: the drive if the rig has one
+    steady_s: float = Field(0.5, ge=0.1)  # at speed before it is let go
+    start_delay_s: float = Field(0.1, ge=0)  # for the transient of the speed's filter
+    coast_s: float = Field(15.0, gt=0)  # at most
+    speed_filter_hz: float = Field(20.0, gt=0)  # of the controller's speed channel
+    max_coulomb_N_m: float = Field(0.12, gt=0)  # a levitated rotor has no more
+    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
+
+
+def settings(plan: Plan) -> dict[str, float]:
+    """Lifted at the first bias and with the angle released: no loop is closed before the encoder's direction is known."""
+    return {"bias_i": plan.bias_A, "bias_o": plan.bias_A, **rotor.RELEASED}
+
+
+def groups(plan: Plan) -> tuple[tuple[str, float], ...]:
+    """What is run down in which order: name and bias."""
+    ring = (("ring", plan.bias_A),) if plan.added_inertia else ()
+    return (("low", plan.bias_A), ("high", plan.bias_high_A), *ring)
+
+
+def step_count(plan: Plan) -> int:
+    """How many steps `acquire` records, for the progress display."""
+    return 1 + 4 * plan.repeats * len(groups(plan))
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Run down in both directions at both biases, and with the ring; the angle is held again in the end."""
+    rotor.probe(rig, record)
+    by = "drive" if plan.run_up == "drive" or (plan.run_up == "auto" and rig.drive is not None) else "motor"
+    for group, bias in groups(plan):
+        if group != "low":
+            _at_rest(rig, bias, "ring" if group == "ring" else "")
+        for repeat in range(plan.repeats):
+            for direction in (1, -1):
+                labels = {"group": group, "bias_A": bias, "direction": direction, "repeat": repeat, "by": by}
+                if not _run_down(rig, plan, record, labels):
+                    return
+    if plan.added_inertia:
+        transition(rig, RigState.READY)
+        rig.operator.mount("")
+        transition(rig, RigState.LEVITATED)
+    rotor.hold(rig)
+
+
+def _at_rest(rig: Rig, bias: float, part: str) -> None:
+    """Land, write the bias and have the part mounted, lift again: both are done at rest only."""
+    transition(rig, RigState.READY)
+    for name in ("bias_i", "bias_o"):
+        rig.levitation.set(name, bias)
+    if part:
+        rig.operator.mount(part)
+    transition(rig, RigState.LEVITATED)
+
+
+def _run_down(rig: Rig, plan: Plan, record: Recorder, labels: Mapping[str, object]) -> bool:
+    """Run up, hold the speed, let go and wait for the end speed; False if the speed is not reached."""
+    direction = 1 if labels["direction"] == 1 else -1
+    wanted = direction * plan.speed_rad_s
+    if not _run_up(rig, wanted, str(labels["by"])):
+        record.event("not-reached", wanted=wanted, reached=rig.rotation.speed_rad_s, by=labels["by"])
+        _let_go(rig, str(labels["by"]))
+        rig.rotation.stop()
+        return False
+    with record.step("spin", speed_rad_s=wanted, **labels):
+        rig.clock.sleep(plan.steady_s)
+    _let_go(rig, str(labels["by"]))
+    with record.step("coast", ring=labels["group"] == "ring", **labels):
+        begun = rig.clock.now_ns()
+        rig.clock.sleep(plan.start_delay_s + 0.5)
+        while direction * rig.rotation.speed_rad_s > plan.end_speed_rad_s:
+            if rig.clock.now_ns() - begun > plan.coast_s * 1e9:
+                break
+            rig.clock.sleep(0.05)
+    rig.rotation.stop()  # the speed reference that SPIN set is gone before the gains come back
+    return True
+
+
+def _run_up(rig: Rig, wanted: float, by: str) -> bool:
+    """To a speed, by the drive with the motor released or by the motor; False if the shaft does not get there."""
+    try:
+        if by == "drive":
+            assert rig.drive is not None
+            rig.drive.reach(wanted)
+        else:
+            rotor.hold(rig)
+            rig.rotation.spin(wanted)
+    except LinkError:
+        rig.clock.sleep(0.1)  # a link that is lost says so again by itself
+        return False
+    return True
+
+
+def _let_go(rig: Rig, by: str) -> None:
+    if by == "drive":
+        assert rig.drive is not None
+        rig.drive.coast()
+    else:
+        rotor.release(rig)
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Everything the measurements, findings and figures are made of."""
+
+    runs: list[RunDown]
+    angle: Drag
+    speed: Drag
+
+
+def evaluate(recording: Recording[Plan]) -> Analysis:
+    """Read the run-downs and evaluate them by the angle and by the speed."""
+    plan, runs = recording.plan, read_run_downs(recording)
+    by = {m: drag.evaluate(runs, recording.rig, m, plan.bias_A, plan.bias_high_A) for m in drag.METHODS}
+    return Analysis(runs, by["angle"], by["speed"])
+
+
+def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
+    """Findings first; then B and T_c by the speed, and all quantities by the angle, which are the results."""
+    early = list(spindown_checks.before_fits(recording))
+    yield from early
+    if any(f.effect is Effect.ERROR for f in early):
+        return
+    plan, a = recording.plan, evaluate(recording)
+    yield from spindown_checks.of_runs(a.runs, plan)
+    yield from spindown_checks.of_result(a.runs, a.angle, a.speed, plan)
+    yield from spindown_checks.of_drive(recording, _expected_torques(a.angle, plan))
+    estimates = {**a.angle.estimates, "J_z": _inertia(a.angle, recording.rig)}
+    if not plan.added_inertia:
+        text = "J_z is the rig file's value, not measured here; B and T_c carry its tolerance. The ring measures it"
+        yield Finding("inertia-as-stated", text, "J_z")
+    yield drawn.stopping(a.runs, a.angle, plan.speed_rad_s)
+    for quantity in (B, T_C):
+        yield quantity.measured(a.speed.estimates[quantity.name], "by the speed channel")
+    for quantity in MEASURES:
+        yield quantity.measured(estimates[quantity.name])
+
+
+def _inertia(result: Drag, rig: RigFile) -> Estimate:
+    return result.estimates.get("J_z") or drag.stated_inertia(rig)
+
+
+def _expected_torques(result: Drag, plan: Plan) -> dict[str, tuple[float, float]]:
+    """Drag torque in N m and its u at the speed that was held, by group."""
+    friction = result.estimates["T_c"]
+    out = {}
+    for group, name in (("low", "B"), ("high", "B_high")):
+        total = result.estimates[name] * plan.speed_rad_s + friction
+        out[group] = (total.value, total.u)
+    return out
+
+
+def facts(recording: Recording[Plan]) -> dict[str, Estimate]:
+    """What a calibration of this rig holds: the results by the angle."""
+    a = evaluate(recording)
+    return {**a.angle.estimates, "J_z": _inertia(a.angle, recording.rig)}
+
+
+def holds_for(plan: Plan) -> dict[str, float]:
+    """B depends on the bias."""
+    return {"bias_A": plan.bias_A, "bias_high_A": plan.bias_high_A}
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts."""
+    yield from rotor.missing(rig, CHANNELS, ("bias_i", "bias_o", "speed_ref"), COILS)
+    needed = ["ring_inertia"] if plan.added_inertia else ["polar_inertia"]
+    for name in needed:
+        if name not in rig.machine:
+            yield f"machine: found no {name}; B is the decay rate times the inertia"
+    if not plan.speed_rad_s < rig.envelope.max_speed_rad_s:
+        yield (f"speed_rad_s: found {plan.speed_rad_s:g} rad/s; expected less than the envelope's "
+               f"{rig.envelope.max_speed_rad_s:g} rad/s")  # fmt: skip
+    if plan.end_speed_rad_s > plan.speed_rad_s / 4:
+        yield (f"end_speed_rad_s: found {plan.end_speed_rad_s:g} rad/s; expected a quarter of {plan.speed_rad_s:g} rad/s or "
+               "less, or viscous and constant drag cannot be told apart")  # fmt: skip
+    if abs(plan.bias_high_A / plan.bias_A - 1) < 0.1:
+        yield f"bias_high_A: found {plan.bias_high_A:g} A; expected at least a tenth off {plan.bias_A:g} A"
+    if plan.run_up == "drive" and not any("drive" in d.roles for d in rig.devices.values()):
+        yield "run_up: found drive; the rig file has no device in that role"
+
+
+def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+    """Speed over time with fit and residuals, deceleration and loss power over speed; empty when there is no fit."""
+    if any(f.effect is Effect.ERROR for f in spindown_checks.before_fits(recording)):
+        return ()
+    a = evaluate(recording)
+    return drawn.all_figures(a.runs, a.angle, recording.plan.speed_rad_s)
+
+
+METHOD = """\
+The shaft is levitated by both radial AMBs and spun up, by the external drive with the motor released or by the motor
+itself, which is then released. While it coasts, J w' = -B w - T_c sgn(w): the decay rate b = B/J and the constant
+deceleration c = T_c/J are fitted to each run-down, once to the unwrapped encoder angle (the result) and once to the
+controller's filtered speed, from the end of the filter's transient down to the end speed. Run-downs are repeated in both
+directions at two bias currents; a constant torque of the released motor drops out of the mean over the directions.
+
+The eddy currents' part of B goes with the square of the bearings' mean current. The coil currents, freed of their sensors'
+gain and offset as far as the certificates state them, say what the mean square was; the straight line through both biases
+gives B at exactly the nominal ones.
+
+b and c become B and T_c through the polar inertia, whose tolerance in the rig file dominates both. With a ring of known
+inertia on the shaft the decay is slower, and J = J_ring b_ring / (b - b_ring) is measured instead.
+
+What no data can show: a constant torque that acts against either direction alike, such as a seal or a brake that drags, is
+Coulomb friction as far as a run-down can tell. An error of the inertia scales B and T_c by itself.
+"""
+
+procedure = Procedure(
+    name="spindown",
+    title="Drag of the levitated rotor by spindown",
+    measures=MEASURES,
+    state=RigState.LEVITATED,
+    plan=Plan,
+    acquire=acquire,
+    analyse=analyse,
+    figures=figures,
+    check=check,
+    settings=settings,
+    step_count=step_count,
+    facts=facts,
+    holds_for=holds_for,
+    method=METHOD,
+)
