@@ -162,7 +162,7 @@ def _directions(drag: Drag) -> Iterator[Finding]:
     torque = drag.torque
     if abs(torque.value) > 3e-3:
         effect = Effect.INDETERMINATE if abs(torque.value) > 0.05 else Effect.NOTE
-        text = f"{torque.value * 1e3:+.1f} mN m drives the released rotor forward; it drops out of the mean over both directions."
+        text = f"{torque.value * 1e3:+.1f} mN m drives the released rotor forward; the mean over both directions is free of it."
         yield Finding("constant-torque", text, "both directions", effect)
 
 
