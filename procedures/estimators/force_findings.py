@@ -1,0 +1,207 @@
+"""What can be wrong with a force-constant run, and what its data can say about it. Each check names its suspect.
+
+Thresholds are chosen so that a sound rig trips one in fewer than one run in a thousand; each is stated where it stands.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from bench.findings import Effect, Finding
+from procedures.estimators.force_rows import CROSS, DIRECT, FORCE, SEGMENTS
+from procedures.estimators.ramp_data import COILS, POSITIONS, RampData
+from procedures.estimators.ramp_data import SEGMENTS as SEGMENT_CHANNELS
+
+Array = npt.NDArray[np.float64]
+
+FATAL = ("stuck-channel", "segment-sign", "segment-current")
+"""Findings after which a fit means nothing and is not attempted."""
+FLAGS = ((1, "saturated", "an AMB amplifier was at its limit"),
+         (2, "saturated", "an amplifier of the motor was at its limit"),
+         (4, "contact", "the rotor touched the inboard touchdown bearing"),
+         (8, "contact", "the rotor touched the outboard touchdown bearing"))  # fmt: skip
+"""Bits of the telemetry signal `flags`."""
+FOLLOWS = 0.05  # A per A, share of a level that a segment's current may be off: sensors and amplifiers are within 0.5 %
+EXCHANGED = 0.3  # cross over direct force: 8 % by half a degree of encoder zero, a few per cent by ripple
+CHANCE = 1e-6  # false alarm rate of the tests of the fit
+
+
+class Tolerances(Protocol):
+    """The part of a plan that these checks need."""
+
+    @property
+    def max_position_m(self) -> float: ...
+    @property
+    def max_drift_A(self) -> float: ...
+    @property
+    def max_lost(self) -> float: ...
+    @property
+    def max_wander_N(self) -> float: ...
+
+
+def of_signals(data: RampData, plan: Tolerances) -> Iterator[Finding]:
+    """Checks that need no fit: losses, stuck channels, saturation, contact, settling, segments that do as commanded."""
+    yield from _lost(data, plan)
+    yield from _stuck(data)
+    for bit, code, text in FLAGS:
+        hit = (data.flags & bit) != 0
+        if hit.any():
+            where = _worst(data, hit.astype(float))
+            yield Finding(code, f"{text} in {int(hit.sum())} of {hit.size} steps", where, Effect.INDETERMINATE)
+    yield from _settled(data, plan)
+    yield from _segments(data)
+
+
+def _worst(data: RampData, values: Array) -> str:
+    turn, point = np.unravel_index(int(np.argmax(values)), values.shape)
+    return data.where(int(turn), int(point))
+
+
+def _lost(data: RampData, plan: Tolerances) -> Iterator[Finding]:
+    share = data.lost / np.maximum(data.expected, 1)
+    if share.max() > plan.max_lost:
+        yield Finding(
+            "missing-samples",
+            f"{data.lost.sum() / data.expected.sum():.2%} of the samples inside steps are missing ({share.max():.2%} in "
+            f"the worst step; {plan.max_lost:.2%} is allowed). Look at the link: load, cable, gateway.",
+            _worst(data, share),
+            Effect.INDETERMINATE,
+        )
+
+
+def _stuck(data: RampData) -> Iterator[Finding]:
+    for channel in (*COILS, *SEGMENT_CHANNELS, *POSITIONS):
+        still = data.spread[channel] == 0
+        if still.any():
+            text = (
+                f"{channel} does not move at all in {int(still.sum())} of {still.size} steps; a live sensor has noise."
+            )
+            yield Finding("stuck-channel", text, channel, Effect.ERROR)
+
+
+def _settled(data: RampData, plan: Tolerances) -> Iterator[Finding]:
+    """At the sensors' zero and standing still; the noise of a difference of half means is twice that of the mean."""
+    position = np.max([np.abs(data.mean[c]) for c in POSITIONS], axis=0)
+    moving = np.max([np.abs(data.drift[c]) for c in POSITIONS], axis=0)
+    pairs = [f"i_{a}{b}" for a in "xy" for b in "io"]
+    current = np.max([np.abs(data.drift[f"{c}_p"] - data.drift[f"{c}_n"]) / 2 for c in pairs], axis=0)
+    for values, limit, what, unit, scale in (
+        (position, plan.max_position_m, "mean position", "µm", 1e6),
+        (moving, 2 * plan.max_position_m, "drift of the position", "µm", 1e6),
+        (current, plan.max_drift_A, "drift of an AMB's control current", "mA", 1e3),
+    ):
+        bad = values > limit
+        if bad.any():
+            yield Finding(
+                "unsettled",
+                f"{what} within a step: {values.max() * scale:.3g} {unit} at worst, {limit * scale:.3g} {unit} allowed; "
+                f"{int(bad.sum())} of {bad.size} steps. Settle longer, or look at the integrator.",
+                _worst(data, values),
+                Effect.INDETERMINATE,
+            )
+
+
+def _segments(data: RampData) -> Iterator[Finding]:
+    """Each segment's current follows its command (T 6.9), and no level asks the angle control for torque."""
+    design = np.stack([np.ones_like(data.level_y), data.level_y, data.level_x], axis=-1).reshape(-1, 3)
+    solver = np.linalg.pinv(design)[1:]
+    answer = np.array([solver @ data.mean[c].reshape(-1) for c in SEGMENT_CHANNELS])  # (4, 2): per i_y, per i_x
+    torque = answer.mean(axis=0)
+    for axis, name in ((0, "i_y"), (1, "i_x")):
+        if abs(torque[axis]) > 2 * FOLLOWS:
+            suspect = int(np.argmax(np.abs(answer[:, axis]))) + 1
+            yield Finding(
+                "segment-sign",
+                f"holding the angle takes {torque[axis]:+.2f} A in every segment per A of {name}, where a pure force takes "
+                f"none: a segment pushes the wrong way. Segment {suspect} carries {answer[suspect - 1, axis]:+.2f} A per A "
+                "by its own sensor; check the sign of its sensor and its wires.",
+                f"i_m{suspect}",
+                Effect.ERROR,
+            )
+            return
+    expected = np.array([[1.0, 0.0], [0.0, -1.0], [-1.0, 0.0], [0.0, 1.0]])
+    off = np.abs(answer - torque - expected).max(axis=1)
+    if off.max() > FOLLOWS:
+        k = int(np.argmax(off))
+        yield Finding(
+            "segment-current",
+            f"segment {k + 1} reads {answer[k, 0]:+.2f} A per A of i_y and {answer[k, 1]:+.2f} A per A of i_x; by (6.9) it "
+            f"should be {expected[k, 0]:+.0f} and {expected[k, 1]:+.0f}. Check its sensor and its amplifier.",
+            f"i_m{k + 1}",
+            Effect.ERROR,
+        )
+
+
+def exchanged(axis: str, terms: Array) -> Iterator[Finding]:
+    """Segments whose wires are exchanged: the other axis' current gives force, or the own one the wrong way round.
+
+    `terms` (2, A, 5) of the fit. With 1 and 2 exchanged the motor sees (i_y - i_x)/2 in both axes, with 1 and 4
+    (i_y + i_x)/2, with 1 and 3 it sees -i_y.
+    """
+    direct, cross = (float(terms[FORCE, :, k].mean()) for k in (DIRECT, CROSS))
+    own = SEGMENTS[axis][0]
+    if abs(cross) > EXCHANGED * abs(direct):
+        pairs = "1 and 2, or 3 and 4" if direct * cross < 0 else "1 and 4, or 2 and 3"
+        text = (f"along {axis} the other axis' current gives {cross / direct:+.0%} of the force that i_{axis} gives: "
+                f"segments {pairs} look exchanged (a wrong encoder zero gives 8 % for half a degree).")  # fmt: skip
+        yield Finding("segments-exchanged", text, axis, Effect.ERROR)
+    elif direct < 0:
+        text = (f"i_{axis} gives {direct:+.2f} N/A along {axis}: segments {own[0]} and {own[1]} look exchanged, or both "
+                "are connected the wrong way round.")  # fmt: skip
+        yield Finding("segments-exchanged", text, axis, Effect.ERROR)
+
+
+def rows_disagree(axis: str, force: float, moment: float, chi2: float, dof: int, suspect: str) -> Iterator[Finding]:
+    """Force row and moment row at each angle, by the full covariance of their differences."""
+    if chi2 > stats.chi2.ppf(1 - CHANCE, dof):
+        hint = suspect or (
+            "an AMB's constants do not belong to this rig as it stands" if axis == "y" else
+            "K_x of an AMB is further from K_y than machine.amb_asymmetry says"
+        )  # fmt: skip
+        yield Finding(
+            "rows-disagree",
+            f"along {axis} forces give {force:.3f} N/A and moments {moment:.3f} N/A, further apart than their uncertainties "
+            f"allow (chi-squared {chi2:.0f}, {dof} degrees of freedom): {hint}.",
+            axis,
+            Effect.ERROR,
+        )
+
+
+def lack_of_fit(axis: str, chi2: float, dof: int, worst_N: float, suspect: str) -> Iterator[Finding]:
+    """Square and cube of the current in the forces, by their full covariance."""
+    if chi2 > stats.chi2.ppf(1 - CHANCE, dof):
+        hint = (
+            suspect or "a coil or a segment saturates, or the calibration is of another angle, bias or rotor position"
+        )
+        yield Finding(
+            "lack-of-fit",
+            f"the force along {axis} is not proportional to the current: {worst_N:.2f} N at the extreme levels, more than "
+            f"the calibration and the scatter allow (chi-squared {chi2:.0f}, {dof} degrees of freedom): {hint}.",
+            axis,
+            Effect.INDETERMINATE,
+        )
+
+
+def wander(axis: str, drift: Array, u: Array, data: RampData, plan: Tolerances) -> Iterator[Finding]:
+    """Drift of the motor's force by both rows, (2,) N/s with u, over the run: five u and the plan's limit."""
+    total = drift * data.duration_s
+    significant = (np.abs(total) > plan.max_wander_N) & (np.abs(drift) > 5 * u)
+    if not significant.any():
+        return
+    both = bool(abs(drift[0] - drift[1]) < 5 * math.hypot(*u) + 0.1 * np.abs(drift).max())
+    pair = SEGMENTS[axis][0]
+    what = (f"both rows agree, so the motor's force itself drifts: the current sensor of segment {pair[0]} or {pair[1]}"
+            if both else f"the rows do not agree, so it is an AMB: a coil current sensor of axis {axis}")  # fmt: skip
+    yield Finding(
+        "drifting-sensor",
+        f"at a constant level the force along {axis} drifts by {total[0]:+.2f} N (force row) and {total[1]:+.2f} N (moment "
+        f"row) over the {data.duration_s:.0f} s of the run, {plan.max_wander_N:g} N allowed; {what}.",
+        axis,
+        Effect.INDETERMINATE,
+    )

@@ -1,0 +1,286 @@
+"""The motor's direct force constant, with the calibrated AMBs as load cells (thesis 6.6.2; 6.14a with the corrected sign).
+
+Measurand: change of the motor's force along an axis with that axis' current, as commutated at gamma = 0, mean over a full
+turn, rotor at rest at the sensors' zero: alpha_d vertically (dF_y/di_y) and alpha_dx horizontally (dF_x/di_x). The AMBs'
+forces come from the calibration's F(i) at the same rotor angles. The horizontal one rests on K_x = K_y within a stated
+asymmetry.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field
+
+from bench.calibration import Need
+from bench.figures import Figure
+from bench.findings import Effect, Finding
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.rig import Rig
+from bench.rigfile import RigFile
+from bench.roles import RigState
+from bench.uncertainty import Estimate
+from procedures import force_constant_figures as drawn
+from procedures.estimators import force_estimates, force_findings, force_rows
+from procedures.estimators.force_estimates import AxisResult
+from procedures.estimators.force_rows import TIME
+from procedures.estimators.ramp_data import STEP, RampData, read_ramps
+from procedures.force_constant_check import check
+
+Array = npt.NDArray[np.float64]
+
+CALIBRATION = "amb-calibration"
+ALPHA_D = Quantity("alpha_d", "N/A", "motor: dF_y/di_y at gamma = 0, mean over a turn")
+ALPHA_DX = Quantity("alpha_dx", "N/A", "motor: dF_x/di_x at gamma = 0, mean over a turn, with K_x = K_y of the AMBs")
+MEASURES = (ALPHA_D, ALPHA_DX)
+
+
+class Plan(BenchPlan):
+    """Settings of the measurement, SI."""
+
+    levels_A: tuple[float, ...] = (-3.0, -1.5, 0.0, 1.5, 3.0)  # of i_y and i_x, ascending, of both signs
+    angles: int = Field(9, ge=3)  # equally spaced over a turn; those of the calibration
+    bias_A: float = Field(3.0, gt=0)  # that of the calibration
+    ramp_A_s: float = Field(2.0, gt=0)
+    settle_s: float = Field(2.0, gt=0)  # after each ramp
+    average_s: float = Field(1.0, ge=0.1)
+    max_position_m: float = Field(5e-8, gt=0)  # settled: |mean position| and its drift within a step
+    max_drift_A: float = Field(5e-3, gt=0)  # settled: drift of a control current within a step
+    max_wander_N: float = Field(0.3, gt=0)  # drift of the force at constant current over the whole run
+    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
+
+
+def settings(plan: Plan) -> dict[str, float]:
+    """Controller parameters that the runner writes before levitation."""
+    return {"bias_i": plan.bias_A, "bias_o": plan.bias_A, "i_ramp": plan.ramp_A_s}
+
+
+def needs(plan: Plan) -> tuple[Need, ...]:
+    """The AMBs' calibration at this bias and at these angles."""
+    return (Need(CALIBRATION, {"bias_A": plan.bias_A, "angles": float(plan.angles)}),)
+
+
+@dataclass(frozen=True)
+class Level:
+    """Both currents of a step in A, and whether each was reached by raising it (+1) or lowering it (-1)."""
+
+    i_y: float
+    i_x: float
+    branch_y: int
+    branch_x: int
+
+
+def sequence(plan: Plan) -> list[Level]:
+    """The levels at one angle: i_y from its least to its greatest and back, i_x a quarter of that period ahead.
+
+    i_y is mirrored in time, so that linear drift does not touch it, and i_x goes through all its levels between, so that
+    the two are orthogonal and one sequence gives both.
+    """
+    up = list(plan.levels_A)
+    triangle = up + up[-2:0:-1]
+    period, lead = len(triangle), (len(up) - 1) // 2
+
+    def step(k: int) -> tuple[float, int]:
+        now, before = triangle[k % period], triangle[(k - 1) % period]
+        return now, 1 if now > before else -1
+
+    return [Level(y, x, by, bx) for k in range(period + 1) for (y, by), (x, bx) in [(step(k), step(k + lead))]]
+
+
+def step_count(plan: Plan) -> int:
+    """How many steps `acquire` records, for the progress display."""
+    return plan.angles * len(sequence(plan))
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Ramp both currents through their levels at each angle; between the angles the motor gives no force."""
+    now = {"i_x": 0.0, "i_y": 0.0}
+
+    def ramp(**currents: float) -> None:
+        way = max(abs(value - now[name]) for name, value in currents.items())
+        for name, value in currents.items():
+            rig.levitation.set(name, value)
+        now.update(currents)
+        rig.clock.sleep(way / plan.ramp_A_s)
+
+    for turn in range(plan.angles):
+        angle = 2 * math.pi * turn / plan.angles
+        rig.rotation.point(angle)
+        for level in sequence(plan):
+            ramp(i_y=level.i_y, i_x=level.i_x)
+            rig.clock.sleep(plan.settle_s)
+            with record.step(STEP, angle_rad=angle, i_y_A=level.i_y, i_x_A=level.i_x,
+                             branch_y=level.branch_y, branch_x=level.branch_x):  # fmt: skip
+                rig.clock.sleep(plan.average_s)
+        ramp(i_y=0.0, i_x=0.0)
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Everything the measurements, findings and figures are made of. `alone`: the vertical result as if the calibration
+    had passed on nothing but values and uncertainties."""
+
+    data: RampData
+    inputs: Mapping[str, Estimate]
+    y: AxisResult
+    x: AxisResult
+    alone: AxisResult
+
+
+def evaluate(recording: Recording[Plan], data: RampData) -> Analysis:
+    """Both axes with their influences."""
+    plan, rig = recording.plan, recording.rig
+    facts = recording.calibration(CALIBRATION).values
+    count = len(data.vertical.angles)
+    shared = force_estimates.fact_inputs(facts, count)
+    y_inputs = {**force_estimates.rig_inputs(rig, "y"), **shared}
+    x_inputs = {**force_estimates.rig_inputs(rig, "x"), **shared}
+    y = force_estimates.axis_result(data.vertical, y_inputs, plan.bias_A)
+    x = force_estimates.axis_result(data.horizontal, x_inputs, plan.bias_A)
+    unshared = {**y_inputs, **force_estimates.taken_alone(facts, count)}
+    return Analysis(data, y_inputs, y, x, force_estimates.axis_result(data.vertical, unshared, plan.bias_A))
+
+
+def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
+    """Findings first (they decide what the numbers are worth), then both constants."""
+    data = read_ramps(recording)
+    found = list(force_findings.of_signals(data, recording.plan))
+    yield from found
+    if any(f.code in force_findings.FATAL for f in found):
+        return
+    a = evaluate(recording, data)
+    yield from findings(recording, a)
+    yield ALPHA_D.measured(a.y.mean)
+    yield ALPHA_DX.measured(a.x.mean)
+
+
+def findings(recording: Recording[Plan], a: Analysis) -> Iterator[Finding]:
+    """Checks of the fits, then what the report must say besides."""
+    plan = recording.plan
+    for axis, result in (("y", a.y), ("x", a.x)):
+        wrong = list(force_findings.exchanged(axis, result.fit.terms))
+        yield from wrong or _contradictions(axis, result, a, plan)
+        yield from force_findings.wander(axis, *_drift(result), a.data, plan)
+    yield from _axes(a)
+    yield from _ripple(recording.rig, plan)
+    yield from _notes(recording.rig, a)
+
+
+def _contradictions(axis: str, result: AxisResult, a: Analysis, plan: Plan) -> Iterator[Finding]:
+    force, moment = (e.value for e in result.row_means)
+    parts = force_estimates.differences(result)
+    hint = force_estimates.suspect(a.data.vertical, a.inputs, plan.bias_A, result) if axis == "y" else ""
+    apart = force_estimates.chi_squared(parts)
+    yield from force_findings.rows_disagree(axis, force, moment, apart, len(parts), hint)
+    bent, worst = force_estimates.chi_squared(result.bends), max(abs(e.value) for e in result.bends)
+    yield from force_findings.lack_of_fit(axis, bent, len(result.bends), worst, hint)
+
+
+def _drift(result: AxisResult) -> tuple[Array, Array]:
+    """Drift of both rows in N/s, mean over the angles, with its standard uncertainty."""
+    steps, _ = force_rows.scatter(result.fit)
+    spread = np.sqrt((result.fit.solvers[:, TIME] ** 2).sum()) / len(result.fit.solvers)
+    return result.fit.terms[:, :, TIME].mean(axis=1), np.sqrt(np.diag(steps)) * spread
+
+
+def _axes(a: Analysis) -> Iterator[Finding]:
+    """alpha_d and alpha_dx differ by the segments' gains in the machine only: 3 % and five standard uncertainties."""
+    apart = a.y.mean - a.x.mean
+    allowed = 5 * apart.u + 0.03 * abs(a.y.mean.value)
+    if abs(apart.value) > allowed:
+        yield Finding(
+            "axes-disagree",
+            f"alpha_d is {a.y.mean.value:.3f} N/A vertically and {a.x.mean.value:.3f} N/A horizontally; {allowed:.2f} N/A of "
+            "difference is allowed. Is a winding or an AMB of one axis different?",
+            "alpha_dx",
+            Effect.INDETERMINATE,
+        )
+
+
+def _ripple(rig: RigFile, plan: Plan) -> Iterator[Finding]:
+    pairs = round(rig.machine["pole_pairs"].value)
+    if force_rows.aliased(plan.angles, pairs):
+        yield Finding(
+            "ripple-unresolved",
+            f"{plan.angles} equally spaced angles all stand at one electrical phase of the force ripple (order {2 * pairs}): "
+            "what was measured is alpha_d at that phase, not its mean over a turn, and no data of this run says how far "
+            "apart they are. Calibrate and measure at nine angles.",
+            "alpha_d",
+            Effect.INDETERMINATE,
+        )
+
+
+def _notes(rig: RigFile, a: Analysis) -> Iterator[Finding]:
+    with_, without = a.y.mean, a.alone.mean
+    yield Finding(
+        "shared-influences",
+        f"u(alpha_d) is {with_.u:.4f} N/A ({with_.u / with_.value:.3%}); had the calibration passed on its values and "
+        f"uncertainties alone, it would be {without.u:.4f} N/A ({without.u / without.value:.3%}). What both runs share "
+        "(current sensors, spans, masses, gravity) largely cancels.",
+        "alpha_d",
+    )
+    stated = rig.machine["amb_asymmetry"]
+    yield Finding(
+        "horizontal-assumed",
+        f"the AMBs' horizontal constants were not measured: K_x = K_y, with {stated.standard_uncertainty:.2%} of standard "
+        f"uncertainty for each AMB ({stated.source}).",
+        "alpha_dx",
+    )
+
+
+def facts(recording: Recording[Plan]) -> dict[str, Estimate]:
+    """What later procedures use: both constants, and the vertical one at each angle (home is 0)."""
+    a = evaluate(recording, read_ramps(recording))
+    return {"alpha_d": a.y.mean, "alpha_dx": a.x.mean, **{f"alpha_d@{k}": e for k, e in enumerate(a.y.angles)}}
+
+
+def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+    """Forces, residuals, constants over the angle, and the budgets; empty when the data carry no fit."""
+    data = read_ramps(recording)
+    if any(f.code in force_findings.FATAL for f in force_findings.of_signals(data, recording.plan)):
+        return ()
+    a = evaluate(recording, data)
+    return drawn.all_figures(a.data, a.y, a.x, a.alone)
+
+
+METHOD = """\
+The shaft is levitated by both radial AMBs at the bias of their calibration, and the motor is driven with open-loop currents
+i_y and i_x, ramped through levels of both signs at each of the calibration's rotor angles. i_y goes up and down, mirrored in
+time; i_x follows the same levels a quarter of the period ahead, so that one sequence gives both axes.
+
+The AMBs are the load cells: each one's force follows from its two coil currents by the calibration's own F(i) at that angle,
+referred to the sensors' zero by the residual displacement. Forces give the motor's force as F_m = -(F_i + F_o), moments about
+the outboard AMB as F_m = F_i s/e, with s from AMB to AMB and e from the outboard AMB to the motor. At each angle and for each
+row F_m = constant + alpha i + alpha' i' + branch + drift t is fitted by least squares, i' being the other axis' current. The
+rows are combined with the weights that give the least uncertainty by their full covariance, and the mean is taken over the
+angles, which averages the ripple of the motor's force.
+
+The calibration and this run share current sensors, spans, masses and gravity. Each is one influence in both, so that what
+cancels in the physics cancels in the budget. The report states the uncertainty with and without that.
+
+The AMBs' horizontal constants are not measured; no weight pulls sideways. They are taken as the vertical ones within a stated
+asymmetry, corrected for where the journal stands in the bearing, and alpha_dx carries that in its budget.
+"""
+
+procedure = Procedure(
+    name="force-constant",
+    title="Direct force constant of the motor, by the AMBs as load cells",
+    measures=MEASURES,
+    state=RigState.LEVITATED,
+    plan=Plan,
+    acquire=acquire,
+    analyse=analyse,
+    figures=figures,
+    check=check,
+    settings=settings,
+    step_count=step_count,
+    method=METHOD,
+    needs=needs,
+    facts=facts,
+)
