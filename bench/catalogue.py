@@ -25,6 +25,7 @@ class Entry:
 
 PROCEDURES = (
     Entry("amb-calibration", "procedures.amb_calibration", "AMB force-current constants by hanging known masses"),
+    Entry("force-constant", "procedures.force_constant", "Direct force constant of the motor, by the AMBs as load cells"),
     Entry("spindown", "procedures.spindown", "Drag of the levitated rotor by spindown"),
 )
 
