@@ -100,9 +100,9 @@ def _passed(asked: Asked, directory: CampaignDirectory) -> dict[int, Done]:
 
 def _blocked(step: Planned, before: Sequence[Done]) -> Done | None:
     """The step left out, if one that it needs did not pass."""
-    bad = [
-        d.step.procedure.name for d in before if d.outcome is not Outcome.PASS and d.step.procedure.name in step.needs
-    ]
+    needed = {need.procedure for need in step.needs}
+    bad = [d.step.procedure.name for d in before if d.outcome is not Outcome.PASS]
+    bad = [name for name in bad if name in needed]
     return Done(step, None, reason=f"left out: needs {', '.join(bad)}, which did not pass") if bad else None
 
 

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from bench import provenance
 from bench.campaign import Campaign
 from bench.campaign_bands import Coverage, Sample, coverage
 from bench.campaign_directory import CampaignDirectory
@@ -169,6 +170,34 @@ def write(directory: CampaignDirectory, asked: Asked, result: Result, report: bo
     }  # fmt: skip
     text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     directory.coverage.write_text(text, encoding="utf-8")
+    if report:
+        _summary(directory, asked, result)
+
+
+def _summary(directory: CampaignDirectory, asked: Asked, result: Result) -> None:
+    from reports import campaign as summary
+    from reports import campaign_coverage as page
+
+    now = provenance.now()
+    numbered = [
+        (s, next((v for k, v in result.step_s.items() if k.startswith(f"{s.number} ")), 0.0)) for s in asked.steps
+    ]
+    content = page.CoverageContent(
+        campaign=directory.path.name, title=asked.campaign.title or asked.campaign.name, rig=asked.rig.name,
+        rigs=result.rigs, first_seed=result.first_seed, date=now, verdict=result.verdict.value,
+        quantities=tuple(page.Quantity(**_fields(row)) for row in result.rows),
+        failures=tuple(page.Failure(f.procedure, f.code, f.effect, f.rigs, f.example, f.text) for f in result.failures),
+        steps=tuple((s.procedure.name, _plan(s), wall) for s, wall in numbered), rig_s=result.rig_s, speed=result.speed,
+    )  # fmt: skip
+    summary.build(directory.path, page.view_of(content), now)
+
+
+def _fields(row: Row) -> dict[str, Any]:
+    return {f.name: getattr(row, f.name) for f in dataclasses.fields(row)}
+
+
+def _plan(step: Planned) -> str:
+    return ", ".join(f"{key} = {value}" for key, value in step.plan.model_dump(mode="json").items())
 
 
 def _entry(row: Row) -> dict[str, Any]:

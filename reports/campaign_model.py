@@ -1,0 +1,189 @@
+"""The summary of a campaign on one rig: the model of the machine, what limits it, and how it was come by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from bench.campaign_model import Constant, Given, Model
+from bench.figures import Figure
+from reports import campaign_figures, figures, tables, text
+from reports.campaign_view import Cell, Grid, Picture, Section, SummaryView
+from reports.compose import _TONES
+from reports.figures import Drawn
+from reports.view import SIMULATED, Fact, FigureEntry, Tone
+
+NAMED = 3  # largest influences that a row of the table names
+
+
+@dataclass(frozen=True)
+class StepLine:
+    """One step of the chain as the journal has it; no outcome: it was left out."""
+
+    number: int
+    procedure: str
+    title: str
+    outcome: str | None
+    run: str
+    started: str
+    wall_s: float
+    uses: tuple[str, ...]
+    adopted: bool
+    reason: str
+    findings: tuple[tuple[str, str, str], ...]  # effect, code, text
+    figures: tuple[Figure, ...]
+
+
+@dataclass(frozen=True)
+class ChainContent:
+    """What the summary is made of."""
+
+    campaign: str  # the directory's name
+    file: str
+    model: Model
+    outcome: str
+    steps: tuple[StepLine, ...]
+    shares: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # constant -> share of variance by kind
+    versions: Mapping[str, str] = field(default_factory=dict)
+
+
+def view_of(c: ChainContent) -> SummaryView:
+    """The summary as text. Equal contents give equal views."""
+    model = c.model
+    uut = ", ".join(str(v) for v in model.uut.values()) or text.DASH
+    identification = [Fact("Item under test", uut), Fact("Rig", model.rig), Fact("Made", text.moment(model.created))]
+    if model.seed is not None:
+        identification.append(Fact("Virtual rig", f"seed {model.seed}"))
+    numbered = _Numbers()
+    return SummaryView(
+        title=model.title or model.name, campaign=c.campaign, simulated=SIMULATED if model.simulated else "",
+        outcome=c.outcome, tone=_tone(c.outcome), outcome_text=_said(c), identification=tuple(identification),
+        sections=tuple(_sections(c, numbered)), end=f"End of summary {c.campaign}",
+    )  # fmt: skip
+
+
+class _Numbers:
+    """Figures are numbered through the page."""
+
+    def __init__(self) -> None:
+        self._last = 0
+
+    def picture(self, drawn: Drawn, wide: bool) -> Picture:
+        self._last += 1
+        return Picture(
+            FigureEntry(self._last, f"{self._last}-{drawn.key}", drawn.title, drawn.caption, drawn.svg), wide
+        )
+
+
+def _tone(outcome: str) -> Tone:
+    return _TONES.get(outcome.lower(), "none")
+
+
+def _said(c: ChainContent) -> str:
+    done = sum(s.outcome == "PASS" for s in c.steps)
+    if c.model.complete:
+        return f"All {done} steps passed; {len(c.model.constants)} constants."
+    bad = next((s for s in c.steps if s.outcome != "PASS"), None)
+    return "" if bad is None else f"{bad.procedure}: {bad.reason or 'not run'}"
+
+
+def _sections(c: ChainContent, numbers: _Numbers) -> Iterator[Section]:
+    if c.model.constants:
+        yield Section(
+            "The model of the machine", grid=_constants(c.model.constants),
+            note="The number after ± is the expanded uncertainty for a coverage probability of 95 %. Influences are named "
+            "with their share of the variance. All of this is in model.json, with the correlations.",
+        )  # fmt: skip
+        made = [
+            campaign_figures.Made(k.name, k.expanded_uncertainty / abs(k.value), c.shares.get(k.name, {}))
+            for k in c.model.constants
+            if k.value != 0
+        ]
+        drawn = campaign_figures.uncertainties(made)
+        yield Section("What is known, and what limits it", pictures=(numbers.picture(drawn, True),))
+    if len(c.model.correlations.names) > 1:
+        drawn = campaign_figures.correlations(c.model.correlations.names, c.model.correlations.matrix)
+        yield Section("Correlations", pictures=(numbers.picture(drawn, len(c.model.correlations.names) > 7),))
+    yield Section("The steps", grid=_steps(c.steps))
+    pictures = [numbers.picture(_of_run(figures.draw(f), s), False) for s in c.steps for f in s.figures]
+    if pictures:
+        yield Section("What was measured", pictures=tuple(pictures), note="Error bars are 95 % intervals.")
+    found = [(s, f) for s in c.steps for f in s.findings]
+    if found:
+        yield Section("Findings", grid=_findings(found))
+    if any(k.equation for k in c.model.constants):
+        yield Section("Equations", grid=_equations(c.model.constants))
+    if c.model.given:
+        yield Section("Numbers that no step measured", grid=_given(c.model.given))
+    yield Section("Files", facts=(
+        Fact("Campaign file", c.file), Fact("Model", "model.json (model.schema.json describes it)"),
+        Fact("Rig file, SHA-256", c.model.rig_sha256), Fact("Versions", ", ".join(f"{k} {v}" for k, v in c.versions.items())),
+    ))  # fmt: skip
+
+
+def _of_run(drawn: Drawn, step: StepLine) -> Drawn:
+    return Drawn(f"{step.number}-{drawn.key}", f"{step.procedure}: {drawn.title}", drawn.caption, drawn.svg)
+
+
+def _constants(constants: Sequence[Constant]) -> Grid:
+    rows = []
+    for k in constants:
+        interval = ""
+        if k.method == "monte-carlo":
+            low, high = k.interval
+            interval = "95 % interval " + text.interval(low, high, k.expanded_uncertainty, k.unit)
+        largest = "; ".join(f"{_short(t.name)} {100 * t.share:.0f}{text.NARROW}%" for t in k.terms[:NAMED])
+        method = "Monte Carlo" if k.method == "monte-carlo" else f"ν {text.degrees_of_freedom(k.dof)}"
+        rows.append((
+            Cell(symbol=tables.symbol_of(k.name), small=k.about),
+            Cell(text.result(k.value, k.expanded_uncertainty, k.unit), interval, strong=True),
+            Cell(f"{k.coverage_factor:.2f}", method),
+            Cell(largest),
+            Cell(k.date[:10], k.procedure),
+        ))  # fmt: skip
+    return Grid(("Constant", "Value", "k", "Largest influences", "Date, step"), (2.7, 2.3, 0.85, 2.6, 1.3), tuple(rows))
+
+
+def _short(name: str) -> str:
+    return name.partition(" [")[0]  # whose run it was stands in the budget
+
+
+def _steps(steps: Sequence[StepLine]) -> Grid:
+    rows = []
+    for s in steps:
+        uses = f"uses {', '.join(s.uses)}" if s.uses else ""
+        said = s.reason or "; ".join(x for x in (uses, "adopted" if s.adopted else "") if x)
+        outcome = s.outcome or "left out"
+        rows.append((
+            Cell(str(s.number)), Cell(s.procedure, s.title), Cell(outcome, tone=_tone(outcome)),
+            Cell(text.moment(s.started) if s.started else text.DASH, s.run), Cell(f"{s.wall_s:.1f}{text.NARROW}s"),
+            Cell(said),
+        ))  # fmt: skip
+    return Grid(
+        ("", "Procedure", "Outcome", "Started, run", "Took", ""), (0.3, 2.6, 1.2, 2.2, 0.8, 2.0), tuple(rows), (4,)
+    )
+
+
+def _findings(found: Sequence[tuple[StepLine, tuple[str, str, str]]]) -> Grid:
+    rows = tuple((Cell(s.procedure), Cell(code, effect), Cell(said)) for s, (effect, code, said) in found)
+    return Grid(("Step", "Finding", ""), (1.2, 1.4, 4), rows)
+
+
+def _equations(constants: Sequence[Constant]) -> Grid:
+    rows = []
+    for k in constants:
+        if k.equation is not None:
+            holds = ", ".join(f"{name} = {text.plain(value)}" for name, value in k.holds_for.items())
+            rows.append(
+                (Cell(symbol=tables.symbol_of(k.name)), Cell(k.equation.text), Cell(k.equation.source), Cell("", holds))
+            )
+    return Grid(("Constant", "Equation", "Source", "Measured at"), (0.8, 3.2, 1.4, 2.4), tuple(rows))
+
+
+def _given(given: Sequence[Given]) -> Grid:
+    rows = tuple(
+        (Cell(g.name), Cell(text.result(g.value, 2 * g.standard_uncertainty or None, g.unit)), Cell(g.distribution),
+         Cell("", g.source))
+        for g in given
+    )  # fmt: skip
+    return Grid(("Number", "Value ± 2u", "Distribution", "Source"), (2.4, 1.9, 1, 3), rows)
