@@ -9,7 +9,7 @@ import numpy as np
 
 from bench.clock import Clock, PumpedClock
 from bench.envelope import Envelope
-from bench.errors import DeviceFault, InterlockError, LinkError
+from bench.errors import BenchError, DeviceFault, InterlockError, LinkError
 from bench.frames import SENT, FrameBatch
 from bench.link import Link
 from bench.recorder import Recorder
@@ -304,6 +304,17 @@ class Controller:
     def get(self, parameter: str) -> float:
         """Read a parameter, SI; `drivers.orders.Orders.get` has the errors."""
         return self._orders.get(parameter)
+
+    def reading(self, channel: str) -> float:
+        """The newest sample of a channel, SI.
+
+        Raises:
+            BenchError: the telemetry has no such channel.
+        """
+        try:
+            return self.telemetry.latest[channel]
+        except KeyError:
+            raise BenchError(f"the telemetry has no channel {channel}") from None
 
     def _command(self, name: str, goal: str, timeout_s: float) -> None:
         self._orders.command(name)
