@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Sequence
 from typing import Final
 
@@ -18,6 +19,7 @@ FRAME: Final = np.dtype(
         ("data", "u1", (64,)),
     ]
 )
+_RECORD: Final = struct.Struct("<qqIBB64s")
 SENT: Final = 1
 FD: Final = 2
 ERROR: Final = 4
@@ -41,10 +43,7 @@ def frame(identifier: int, payload: bytes, *, t_ns: int = 0, flags: int = 0) -> 
     """
     if len(payload) > 64:
         raise ValueError(f"payload of {len(payload)} bytes; a CAN FD frame holds at most 64")
-    batch = np.zeros(1, FRAME)
-    batch["t_ns"], batch["id"], batch["flags"], batch["length"] = t_ns, identifier, flags, len(payload)
-    batch["data"][0, : len(payload)] = np.frombuffer(payload, np.uint8)
-    return batch
+    return np.frombuffer(bytearray(_RECORD.pack(t_ns, 0, identifier, flags, len(payload), payload)), FRAME)
 
 
 def joined(batches: Sequence[FrameBatch]) -> FrameBatch:
@@ -68,4 +67,5 @@ def frames_of(records: bytes, version: int) -> FrameBatch:
 
 def payload(record: np.void) -> bytes:
     """The payload bytes of one frame of a batch."""
-    return bytes(record["data"][: int(record["length"])].tobytes())
+    out: bytes = record["data"][: int(record["length"])].tobytes()
+    return out

@@ -135,12 +135,13 @@ class TelemetryDecoder:
     def _regular(self, rows: Rows) -> bool:
         """Whether rows are nothing but the successors of the last sample, each by one sample and its ticks: so it is
         nearly always, and then there is nothing to sort out."""
-        s, a, count = self._segment, self._assembler, np.arange(1, len(rows) + 1)
+        s, a = self._segment, self._assembler
         if s is None or 2 * len(rows) * max(1, self._ticks) >= 1 << min(a.sequence_bits, a.tick_bits):
             return False
-        steps = (rows.sequence - s.raw - count) & ((1 << a.sequence_bits) - 1)
-        went = (rows.tick - s.tick - count * round(self._ticks)) & ((1 << a.tick_bits) - 1)
-        return not steps.any() and not went.any() and self._ticks.is_integer()
+        count = np.arange(1, len(rows) + 1)
+        steps = (rows.sequence - s.raw) & ((1 << a.sequence_bits) - 1)
+        went = (rows.tick - s.tick) & ((1 << a.tick_bits) - 1)
+        return bool((steps == count).all() and (went == count * self._ticks).all())
 
     def _next(self, rows: Rows) -> SampleBlock:
         """The block of such rows."""

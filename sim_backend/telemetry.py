@@ -17,11 +17,13 @@ from sim_backend.truth import Truth, uniform
 SUPPLY_V = 148.0
 AMBIENT_K, RISE_K, WARM_S = 295.0, 12.0, 600.0
 WATCHDOG_ARMED = 16
+PAYLOAD = np.dtype([("sequence", "<u2"), ("tick", "<u4"), ("words", "<u2", (29,))])
 
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """Rows of the core whose first completes a period after `first_tick`, and the controller's state over them."""
+    """Rows of the core whose first completes a period after `first_tick`, and the controller's state over them. The
+    next span begins where they end."""
 
     rows: npt.NDArray[np.float64]
     first_tick: int
@@ -47,8 +49,8 @@ class TelemetryEncoder:
         self._columns = _places(truth.defects, self._place)
         self._scale = np.array([s.scale for s in signals])
         self._offset = np.array([s.offset for s in signals])
-        self._low = np.array([-32768 if s.signed else 0 for s in signals])
-        self._high = np.array([32767 if s.signed else 65535 for s in signals])
+        self._low = np.array([-32768.0 if s.signed else 0.0 for s in signals])
+        self._high = np.array([32767.0 if s.signed else 65535.0 for s in signals])
         self._sequence = first_tick // PERIOD_TICKS
         self._truth = truth
 
@@ -60,15 +62,15 @@ class TelemetryEncoder:
             return empty_batch()
         ticks, values = self._values(spans, n)
         raw = np.rint((values - self._offset) / self._scale)
-        words = np.clip(raw, self._low, self._high).astype(np.int64).astype("<u2")
+        raw = np.minimum(np.maximum(raw, self._low), self._high)
         batch = np.zeros(n, FRAME)
         batch["t_ns"] = clock[0] + (ticks - clock[1]) * 100_000
         batch["id"], batch["flags"], batch["length"] = self._message.identifier, FD, 64
-        sequence = (self._sequence + np.arange(n)) & 0xFFFF
-        batch["data"][:, 0:2] = sequence.astype("<u2").view(np.uint8).reshape(n, 2)
-        batch["data"][:, 2:6] = (ticks & 0xFFFFFFFF).astype("<u4").view(np.uint8).reshape(n, 4)
-        batch["data"][:, 6:64] = words.view(np.uint8).reshape(n, 58)
         start, self._sequence = self._sequence, self._sequence + n
+        payloads = batch["data"].view(PAYLOAD)[:, 0]
+        payloads["sequence"] = np.arange(start, start + n) & 0xFFFF
+        payloads["tick"] = ticks & 0xFFFFFFFF
+        payloads["words"] = raw.astype(np.int64)  # two's complement where negative
         dropped = self._truth.defects["drop_fraction"]
         if dropped:
             keep = [uniform(self._truth.seed, f"drop:{start + k}") >= dropped for k in range(n)]
@@ -78,16 +80,15 @@ class TelemetryEncoder:
     def _values(self, spans: list[Span], n: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]:
         """Ticks (n,) of the samples, and what their signals say (n, signals)."""
         at = self._place
-        ticks, beats, values, end = np.empty(n, np.int64), np.empty(n, np.int64), np.zeros((n, len(at))), 0
-        for span in spans:
-            part = slice(end, end := end + len(span.rows))
-            first = span.first_tick // PERIOD_TICKS + 1
-            ticks[part] = np.arange(first, first + len(span.rows)) * PERIOD_TICKS
-            beats[part] = span.heartbeat_tick
-            values[part, self._columns] = span.rows
-            values[part, at["flags"]] += WATCHDOG_ARMED if span.armed else 0
-            values[part, at["state"]] = self._codes["state"][span.state]
-            values[part, at["fault"]] = self._codes["fault"][span.fault]
+        values = np.zeros((n, len(at)))
+        values[:, self._columns] = np.concatenate([s.rows for s in spans])
+        ticks = (spans[0].first_tick // PERIOD_TICKS + np.arange(1, n + 1)) * PERIOD_TICKS
+        states, faults = self._codes["state"], self._codes["fault"]
+        told = [(states[s.state], faults[s.fault], WATCHDOG_ARMED * s.armed, s.heartbeat_tick) for s in spans]
+        state, fault, armed, beats = np.repeat(told, [len(s.rows) for s in spans], axis=0).T
+        values[:, at["state"]], values[:, at["fault"]] = state, fault
+        values[:, at["flags"]] += armed
+        values[:, at["host_age"]] = np.maximum(ticks - beats, 0) * TICK_S
         values[:, at["i_m1"]] *= self._truth.defects["segment_sign_1"]
         if self._truth.defects["stuck_current_yo_p"]:
             values[:, at["i_yo_p"]] = 4.0
@@ -96,7 +97,6 @@ class TelemetryEncoder:
         warm = AMBIENT_K + RISE_K * (1 - np.exp(-ticks * TICK_S / WARM_S))
         for name, above in (("temp_i", 0.0), ("temp_o", 2.0), ("temp_m", -3.0)):
             values[:, at[name]] = warm + above
-        values[:, at["host_age"]] = np.maximum(ticks - beats, 0) * TICK_S
         return ticks, values
 
 
