@@ -50,14 +50,15 @@ static void radial(const tsbs_control *c, tsbs_law_state *l, const double *plane
 /* The motor holds the outboard end: PID on the outboard sensors. Adds the share of its currents to those of i_x, i_y. */
 static void carry(const tsbs_control *c, tsbs_law_state *l, const double *y, double *current) {
     const double set[] = {c->ref_xm, c->ref_ym};
+    if (l->share == 0) {
+        memcpy(l->motor_previous, y, sizeof l->motor_previous);
+        memset(l->motor_integral, 0, sizeof l->motor_integral);
+        memset(l->motor_filtered, 0, sizeof l->motor_filtered);
+        return;
+    }
     double keep = KEEP(c->derivative_hz);
     for (int a = 0; a < 2; a++) {
         double error = set[a] - y[a];
-        if (l->share == 0) {
-            l->motor_previous[a] = y[a];
-            l->motor_integral[a] = l->motor_filtered[a] = 0;
-            continue;
-        }
         l->motor_filtered[a] = keep * l->motor_filtered[a] + (1 - keep) * (y[a] - l->motor_previous[a]) / TICK;
         l->motor_previous[a] = y[a];
         double i = c->kp_m * error + l->motor_integral[a] - c->kd_m * l->motor_filtered[a];
@@ -69,9 +70,8 @@ static void carry(const tsbs_control *c, tsbs_law_state *l, const double *y, dou
 /* Segment currents from the three demands. 0: T (6.9), the amplifiers cut what is too much, force with torque.
  * 1: T (6.19) with (6.24), force first; what it leaves of segment_max is shared so that the torque is largest. */
 static void allocate(const tsbs_control *c, double ix, double iy, double turn, double *i) {
-    double share_x = 1, share_y = 1; /* 2 (1 - lambda), 2 lambda */
+    double share_x = 1, share_y = 1, most = c->segment_max; /* shares: 2 (1 - lambda), 2 lambda */
     if (c->allocation != 0) {
-        double most = c->segment_max;
         ix = clip(ix, -most, most);
         iy = clip(iy, -most, most);
         double left_x = most - fabs(ix), left_y = most - fabs(iy), left = left_x + left_y;
@@ -85,6 +85,8 @@ static void allocate(const tsbs_control *c, double ix, double iy, double turn, d
     i[1] = share_x * turn - ix;
     i[2] = share_y * turn - iy;
     i[3] = share_x * turn + ix;
+    if (c->allocation != 0)
+        for (int k = 0; k < 4; k++) i[k] = clip(i[k], -most, most); /* no more than a rounding error */
 }
 
 /* what is added to the angle's reference: a sine that starts at nothing */

@@ -18,10 +18,7 @@ static double plane(const double *s, double z, int axis) { return axis ? s[1] - 
 void tsbs_sense(const tsbs_params *p, tsbs_derived *d, tsbs_state *st, tsbs_reading *r, double *coil, double *segment) {
     const double *s = st->s;
     double raw[5], tc[4], ts[4];
-    tsbs_turn(s[5], tc, ts);
-    d->angle = s[5];
-    d->turn_c = tc[0];
-    d->turn_s = ts[0];
+    tsbs_at(d, s[5], tc, ts);
     for (int b = 0; b < 2; b++) {
         double qy, qx = tsbs_harmonics(d->target_c + 4 * b, d->target_s + 4 * b, tc, ts, &qy);
         int swap = p->exchange_axes[b] != 0;
@@ -69,7 +66,7 @@ static void approach(const double *from, const double *to, int n, double keep, d
 }
 
 static void step(const tsbs_params *p, const tsbs_derived *d, tsbs_state *st, const double *coil_to, const double *segment_to, double h) {
-    double c1[10], c2[10], g1[4], g2[4], k1[14], k2[14], k3[14], k4[14], at[14];
+    double c1[10], c2[10], g0[3], g1[3], g2[3], to[3], k1[14], k2[14], k3[14], k4[14], at[14];
     double w0 = st->weight, w1 = w0, w2 = w0;
     if (st->weight_rate > 0) {
         double left = st->weight_to - w0, step = st->weight_rate * h;
@@ -79,10 +76,12 @@ static void step(const tsbs_params *p, const tsbs_derived *d, tsbs_state *st, co
     double half = d->coil_keep, seg = d->segment_keep;
     approach(st->coil, coil_to, 10, half, c1);
     approach(c1, coil_to, 10, half, c2);
-    approach(st->segment, segment_to, 4, seg, g1);
-    approach(g1, segment_to, 4, seg, g2);
+    tsbs_mix(p, st->segment, g0); /* one rate for all segments: what acts of them goes by it too */
+    tsbs_mix(p, segment_to, to);
+    approach(g0, to, 3, seg, g1);
+    approach(g1, to, 3, seg, g2);
     double *s = st->s, m = st->hung_mass;
-    tsbs_rates(p, d, s, st->coil, st->segment, st->play, m, w0, k1);
+    tsbs_rates(p, d, s, st->coil, g0, st->play, m, w0, k1);
     for (int k = 0; k < 14; k++) at[k] = s[k] + h / 2 * k1[k];
     tsbs_rates(p, d, at, c1, g1, st->play, m, w1, k2);
     for (int k = 0; k < 14; k++) at[k] = s[k] + h / 2 * k2[k];
@@ -91,7 +90,7 @@ static void step(const tsbs_params *p, const tsbs_derived *d, tsbs_state *st, co
     tsbs_rates(p, d, at, c2, g2, st->play, m, w2, k4);
     for (int k = 0; k < 14; k++) s[k] += h / 6 * (k1[k] + 2 * k2[k] + 2 * k3[k] + k4[k]);
     memcpy(st->coil, c2, sizeof c2);
-    memcpy(st->segment, g2, sizeof g2);
+    approach(st->segment, segment_to, 4, seg * seg, st->segment);
     st->weight = w2;
 }
 
@@ -122,6 +121,13 @@ static void hold(const tsbs_params *p, tsbs_state *st, tsbs_derived *d) {
     if (p->lever_slip != 0) st->slip += p->lever_slip * st->lever_moment * cos(st->s[5] + st->slip) * TICK;
     double lever[4] = {st->lever_weight, st->lever_moment, st->slip, st->lever_inertia + st->ring_inertia};
     tsbs_hold(p, st->coil, lever, d);
+    d->near = 0; /* a free rotor gains less than 0.1 m/s in a tick */
+    for (int b = 0; b < 2; b++) {
+        double z = p->z_sensor[b], x = plane(st->s, z, 0) - p->ring_x[b], y = plane(st->s, z, 1) - p->ring_y[b];
+        double vx = st->s[6] + z * st->s[10], vy = st->s[7] - z * st->s[9];
+        double inside = p->clearance - 2e-5;
+        if (x * x + y * y > inside * inside || vx * vx + vy * vy > 0.01) d->near = 1;
+    }
 }
 
 static void watch(const tsbs_params *p, tsbs_state *st, const double *coil, double speed) {

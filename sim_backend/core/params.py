@@ -152,7 +152,7 @@ class ControlParams:
     share_slew: float = 2.0
     kp_m: float = 1e5
     kd_m: float = 300.0
-    ki_m: float = 2e5
+    ki_m: float = 1e6
     ref_xm: float = 0.0
     ref_ym: float = 0.0
     allocation: float = 0.0

@@ -110,7 +110,8 @@ typedef struct {
     double runout_c[8], runout_s[8], target_c[8], target_s[8], tilt_c, tilt_s, motor_c, motor_s;
     double per_position_lsb, per_current_lsb, per_gain[10], per_sense[4], per_mass, per_inertia, per_coulomb_speed;
     double angle, turn_c, turn_s, detent_c, detent_s, unbalance_c, unbalance_s, coil_keep, segment_keep, speed_keep;
-    double beta_x[2];
+    int near; /* a ring may be touched within this tick */
+    double beta_x[2], runout_x[2][4], runout_y[2][4];
     /* of this tick: the motor's constants at its gamma, the drive, the drag, the lever, the inertia */
     double direct, cross, turning, ripple_dc, ripple_ds, ripple_qc, ripple_qs, ripple_tc, ripple_ts;
     double drive_gain, drive_limit, drive_speed, viscous, coulomb;
@@ -120,8 +121,10 @@ void tsbs_derive(const tsbs_params *, double step, tsbs_derived *);
 void tsbs_commutate(const tsbs_params *, double gamma, tsbs_derived *);
 void tsbs_hold(const tsbs_params *, const double *coil, const double *lever, tsbs_derived *);
 void tsbs_turn(double angle, double *c, double *s);
+void tsbs_at(tsbs_derived *, double angle, double *c, double *s);
 double tsbs_harmonics(const double *c, const double *s, const double *turn_c, const double *turn_s, double *quadrature);
-void tsbs_rates(const tsbs_params *, const tsbs_derived *, const double *s, const double *coil, const double *segment,
+void tsbs_rates(const tsbs_params *, const tsbs_derived *, const double *s, const double *coil, const double *mixed,
                 const double *play, double hung_mass, double weight, double *ds);
+void tsbs_mix(const tsbs_params *, const double *segment, double *mixed);
 void tsbs_sense(const tsbs_params *, tsbs_derived *, tsbs_state *, tsbs_reading *, double *coil, double *segment);
 #endif
