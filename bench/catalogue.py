@@ -26,6 +26,9 @@ class Entry:
 PROCEDURES = (
     Entry("amb-calibration", "procedures.amb_calibration", "AMB force-current constants by hanging known masses"),
     Entry("force-constant", "procedures.force_constant", "Direct force constant of the motor, by the AMBs as load cells"),
+    Entry("negative-stiffness", "procedures.negative_stiffness", "Negative stiffness of the motor by eccentric positioning"),
+    Entry("force-coupling", "procedures.force_coupling", "Force coupling of the motor over the phase angle"),
+    Entry("torque-constant", "procedures.torque_constant", "Torque constant of the motor by weights on a lever"),
     Entry("spindown", "procedures.spindown", "Drag of the levitated rotor by spindown"),
 )
 

@@ -58,9 +58,10 @@ class ByAmbs:
 @dataclass(frozen=True)
 class MotorFit:
     """`fit` of the two force equations, terms [alpha_x, F_y, D_y, s, F_x, D_x] in N/m, N, N (over the sequence), N/A, N, N;
-    `force` (N,) N that the vertical current gives, `y_m` (N,) m; `stiffness` alpha_x' N/m."""
+    `i_y` (N,) A and the `force` (N,) N it gives, `y_m` (N,) m; `stiffness` alpha_x' N/m."""
 
     fit: Fit
+    i_y: Array
     force: Array
     y_m: Array
     stiffness: float
@@ -120,7 +121,7 @@ def by_motor(d: ByMotor, p: Mapping[str, float]) -> MotorFit:
     force = p["alpha_d"] * i_y
     fit = leastsquares.linear(design, np.concatenate([force, p["alpha_d"] * p["chi"] * i_x]))
     share = sensor_share(zm, p)
-    return MotorFit(fit, force, y_m, float(fit.terms[0]) * share)
+    return MotorFit(fit, i_y, force, y_m, float(fit.terms[0]) * share)
 
 
 def ring(k: float, k2: float, bias_A: float) -> tuple[float, float, float]:

@@ -1,0 +1,59 @@
+"""What procedures do so that the motor carries the outboard end of the shaft in place of the outboard AMB, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from bench.rig import Rig
+from bench.rigfile import RigFile
+
+PARAMETERS = ("motor_share", "share_slew", "ki_m", "ref_xm", "ref_ym", "ref_yi", "angle_ref")
+SHAFT_N = 10.2 * 9.81  # T Table 6.1; for predictions before a run, and for nothing that is measured
+ALPHA_D = 12.1  # N/A, T Table 6.2; likewise
+MARGIN = (
+    0.8  # share of a current's limit that a prediction may use: force constants are within 10 %, the rest is control
+)
+
+
+def carry(rig: Rig, settle_s: float) -> None:
+    """Hand the outboard end from the AMB to the motor, and wait until that has settled."""
+    _hand_over(rig, 1.0, settle_s)
+
+
+def give_back(rig: Rig, settle_s: float) -> None:
+    """Hand the outboard end back to the AMB."""
+    _hand_over(rig, 0.0, settle_s)
+
+
+def _hand_over(rig: Rig, share: float, settle_s: float) -> None:
+    rig.levitation.set("motor_share", share)
+    rig.clock.sleep(1 / rig.file.parameters["share_slew"].default + settle_s)
+
+
+def mirrored(levels: Sequence[float]) -> Iterator[tuple[float, int]]:
+    """Levels up and down with their branch (+1 reached from below): drift that is linear in time cancels."""
+    yield levels[0], -1
+    yield from ((x, 1) for x in levels[1:])
+    yield from ((x, -1) for x in reversed(levels[:-1]))
+
+
+def approach(levels: Sequence[float]) -> list[float]:
+    """Where to go first, unrecorded, from zero to the lowest level, so that it is reached from above like in the end."""
+    return sorted((x for x in levels if x < 0), reverse=True)[:-1]
+
+
+def missing(rig: RigFile, sensors: Iterable[str], channels: Iterable[str], parameters: Iterable[str],
+            geometry: Iterable[str]) -> Iterator[str]:  # fmt: skip
+    """What a procedure needs and the rig file has not, one line a table."""
+    needed = (("sensors", sensors, rig.sensors), ("channels", channels, rig.channels),
+              ("parameters", parameters, rig.parameters), ("geometry", geometry, rig.geometry),
+              ("machine", ("pole_pairs",), rig.machine))  # fmt: skip
+    for table, names, found in needed:
+        if lacking := [n for n in names if n not in found]:
+            yield f"{table}: found no {', '.join(lacking)}; needed {'it is' if len(lacking) == 1 else 'they are'}"
+
+
+def gravity_share_N(rig: RigFile) -> float:
+    """What the motor carries, N: moments about the inboard AMB."""
+    arm = rig.geometry["com_to_inboard_amb"].value
+    return SHAFT_N * arm / (arm + rig.geometry["com_to_motor"].value)

@@ -1,0 +1,128 @@
+"""What can be wrong with steps in which the motor or the AMBs hold a displaced shaft. Each check names its suspect.
+
+Thresholds are chosen so that a sound rig trips one in fewer than one run in a thousand; each is stated where it stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.findings import Effect, Finding
+from procedures.estimators.carried_data import StepMeans
+
+Array = npt.NDArray[np.float64]
+
+FATAL = ("stuck-channel",)
+"""Findings after which a fit means nothing and is not attempted."""
+FLAGS = (
+    (1, "saturated", "an AMB amplifier was at its limit"),
+    (2, "saturated", "a motor segment was at its limit"),
+    (4, "contact", "the rotor touched the inboard touchdown bearing"),
+    (8, "contact", "the rotor touched the outboard touchdown bearing"),
+)  # bits of the telemetry signal `flags`
+
+
+class Tolerances(Protocol):
+    """The part of a plan that these checks need."""
+
+    @property
+    def max_position_m(self) -> float: ...
+    @property
+    def max_drift_A(self) -> float: ...
+    @property
+    def max_creep_A(self) -> float: ...
+    @property
+    def max_misfit(self) -> float: ...
+    @property
+    def max_lost(self) -> float: ...
+
+
+def of_signals(data: StepMeans, channels: Sequence[str], plan: Tolerances) -> Iterator[Finding]:
+    """Lost samples, stuck channels, saturation and contact."""
+    share = data.lost / np.maximum(data.expected, 1)
+    if share.max() > plan.max_lost:
+        total = data.lost.sum() / data.expected.sum()
+        yield Finding(
+            "missing-samples",
+            f"{total:.2%} of the samples inside steps are missing ({share.max():.2%} in the worst step; "
+            f"{plan.max_lost:.2%} is allowed). Look at the link: load, cable, gateway.",
+            data.where(share),
+            Effect.INDETERMINATE,
+        )
+    for channel in channels:
+        still = data.spread[channel] == 0
+        if still.any():
+            yield Finding(
+                "stuck-channel",
+                f"{channel} does not move at all in {int(still.sum())} of {still.size} steps; a live sensor has noise.",
+                channel,
+                Effect.ERROR,
+            )
+    for bit, code, text in FLAGS:
+        hit = (data.flags & bit) != 0
+        if hit.any():
+            where = data.where(hit.astype(float))
+            yield Finding(code, f"{text} in {int(hit.sum())} of {hit.size} steps", where, Effect.INDETERMINATE)
+
+
+def settled(
+    data: StepMeans, offsets: Mapping[str, Array], drifts: Mapping[str, Array], plan: Tolerances
+) -> Iterator[Finding]:
+    """Settled means where the reference is and standing still. `offsets` (N,) m are mean positions less their
+    references, `drifts` (N,) A the drift of each control current within the step, by name.
+
+    The drift allowed in position is twice the offset allowed, because the noise of a difference of half means is twice
+    that of the mean.
+    """
+    moving = {c: np.abs(data.drift[c]) for c in offsets}
+    for values, limit, what, unit, scale in (
+        (offsets, plan.max_position_m, "mean position off its reference", "µm", 1e6),
+        (moving, 2 * plan.max_position_m, "drift of the position", "µm", 1e6),
+        (drifts, plan.max_drift_A, "drift of the current", "mA", 1e3),
+    ):
+        name = max(values, key=lambda c, v=values: float(np.abs(v[c]).max()))
+        worst = np.abs(values[name])
+        if worst.max() > limit:
+            yield Finding(
+                "not-settled",
+                f"{what} within a step: {worst.max() * scale:.3g} {unit} ({name}) at worst, {limit * scale:.3g} {unit} "
+                f"allowed; {int((worst > limit).sum())} of {worst.size} steps. Settle longer, or look at the integrator.",
+                data.where(worst),
+                Effect.INDETERMINATE,
+            )
+
+
+def creeping(drift_A: Mapping[str, float], u_A: Mapping[str, float], plan: Tolerances) -> Iterator[Finding]:
+    """Currents that change over the sequence at equal positions: more than `max_creep_A` and five standard uncertainties.
+
+    `drift_A` holds i_x and i_y from the first step to the last. The amplifiers close their loops on their own sensors, so a
+    sensor that drifts shows as a demand that drifts.
+    """
+    pairs = {"i_x": "segments 2 and 4", "i_y": "segments 1 and 3"}
+    for name, change in drift_A.items():
+        if abs(change) > max(plan.max_creep_A, 5 * u_A[name]):
+            yield Finding(
+                "drifting-current",
+                f"{name} changes by {change * 1e3:+.2f} mA over the sequence with the shaft where it was "
+                f"({plan.max_creep_A * 1e3:.2f} mA allowed): a current sensor of {pairs[name]} drifts, or the load does. "
+                "The sequence is mirrored, so that a steady drift does not reach the result; an unsteady one does.",
+                name,
+                Effect.INDETERMINATE,
+            )
+
+
+def misfit(data: StepMeans, residuals: Array, span: float, what: str, plan: Tolerances) -> Iterator[Finding]:
+    """Residuals (N,) beyond `max_misfit` of the range `span`, both in one unit: the model does not describe the machine."""
+    worst = np.abs(residuals)
+    if worst.max() > plan.max_misfit * span:
+        yield Finding(
+            "misfit",
+            f"{what}: one step is {worst.max() / span:.2%} of the range off the model ({plan.max_misfit:.2%} allowed). "
+            "A reading that is not proportional, a step that was disturbed, or a machine that the model does not describe.",
+            data.where(worst),
+            Effect.INDETERMINATE,
+        )

@@ -1,0 +1,120 @@
+"""Ratio, coupled constant and zero of the commutation with their influences, from step means and the calibrated alpha_d."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bench.recording import Recording
+from bench.rigfile import RigFile
+from bench.uncertainty import Estimate, Influence, propagate
+from procedures.estimators import coupling
+from procedures.estimators.carried_data import SEGMENTS, StepMeans
+from procedures.estimators.coupling import CouplingFit, Sweep
+from procedures.estimators.inputs import certified
+from procedures.estimators.typea import scatter
+
+RIPPLE = 1.5 / 19.36  # alpha_2/alpha_1 of T Table 5.3 (finite elements); alpha_3/alpha_1 is 0.067
+ENCODER_RAD = 2 * math.pi / 4096 / 2  # half a count: what the rotor's angle is not known better than
+PULSES_PER_POLE_PAIR = 2.0  # the ripple goes with P theta, P = 2 M poles
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Everything the measurements, findings and figures are made of. `printed` is r as T (6.15) means it, `successive` the
+    same from step to step."""
+
+    fit: CouplingFit
+    estimates: dict[str, Estimate]
+    printed: float
+    successive: float
+
+
+def evaluate(recording: Recording[Any], data: StepMeans) -> Analysis:
+    """Fit, and the three estimates by name (with `winding`, the x winding's constant over the y winding's)."""
+    inputs = fit_inputs(recording)
+    sweep = Sweep(data.stack(SEGMENTS), data.stack(("pos_yi", "pos_yo")), data.stack(("pos_xi", "pos_xo")),
+                  data.labels["gamma_rad"], data.time_s)  # fmt: skip
+
+    def model(p: dict[str, float]) -> dict[str, float]:
+        return outputs(coupling.fit_sweep(sweep, p), p)
+
+    values = {name: e.value for name, e in inputs.items()}
+    fit = coupling.fit_sweep(sweep, values)
+    estimates = propagate(model, inputs)
+    extra = scatter(fit.fit, _gradients(fit, values), "currents", "scatter of the steps")
+    off_home = abs(float(data.mean["angle"].mean())) + ENCODER_RAD
+    for name, e in estimates.items():
+        whole = e + extra[name] if name in extra else e
+        estimates[name] = whole + _ripple(off_home, fit, values["pole_pairs"]) if name == "gamma_0" else whole
+    once = slice(0, (len(data) + 1) // 2)
+    ratios = [
+        coupling.as_printed(sweep.gamma[once], fit.i_x[once], fit.i_y[once], values["pole_pairs"], successive=way)
+        for way in (False, True)
+    ]
+    return Analysis(fit, estimates, *ratios)
+
+
+def outputs(fit: CouplingFit, p: dict[str, float]) -> dict[str, float]:
+    """The reported values of a fit; alpha_c N/A, gamma_0 rad."""
+    zero = fit.term("gamma_0")
+    return {
+        "alpha_ratio": fit.term("r"),
+        "alpha_c": p["alpha_d"] * fit.term("w") / math.cos(p["pole_pairs"] * zero),
+        "gamma_0": zero,
+        "winding": fit.term("a"),
+    }
+
+
+def _gradients(fit: CouplingFit, p: dict[str, float]) -> dict[str, np.ndarray]:
+    """d output / d terms of the fit, in the order of `coupling.TERMS`."""
+    w, turn, unit = fit.term("w"), p["pole_pairs"] * fit.term("gamma_0"), np.eye(len(coupling.TERMS))
+    alpha_c = p["alpha_d"] / math.cos(turn)
+    return {
+        "gamma_0": unit[2],
+        "alpha_ratio": -unit[0] / w**2,
+        "alpha_c": alpha_c * unit[0] + alpha_c * w * math.tan(turn) * p["pole_pairs"] * unit[2],
+        "winding": unit[1],
+    }
+
+
+def _ripple(off_home_rad: float, fit: CouplingFit, pole_pairs: float) -> Estimate:
+    """Off the home angle the ripple turns the force a little: by alpha_2 P theta / alpha_d of M gamma_0, at most.
+
+    The rotor's angle is known to half a count of the encoder besides what it reads; how large the ripple is, the run does
+    not show, and the finite elements of T bound it.
+    """
+    turn = RIPPLE * PULSES_PER_POLE_PAIR * pole_pairs * off_home_rad
+    influence = Influence(id="angle/gamma_0", name="ripple off the home angle", u=turn / pole_pairs / math.sqrt(3), unit="rad",
+                          kind="B", distribution="rectangular", source="T Table 5.3; half a count")  # fmt: skip
+    return Estimate.of(0.0, influence)
+
+
+def fit_inputs(recording: Recording[Any]) -> dict[str, Estimate]:
+    """What the fit needs besides the steps: alpha_d, and certificates of the rig file as influences by identity."""
+    rig, alpha_d = recording.rig, recording.calibration("force-constant").values["alpha_d@0"]
+    g = rig.geometry
+    inputs = {
+        "alpha_d": alpha_d,
+        "pole_pairs": Estimate.exact(rig.machine["pole_pairs"].value),
+        "l_is": Estimate.exact(g["com_to_inboard_sensor"].value),
+        "l_os": Estimate.exact(g["com_to_outboard_sensor"].value),
+        "z_m": Estimate.exact(g["com_to_motor"].value),
+        # Refers currents to the sensors' zero, a matter of nanometres: its tolerance does not show.
+        "per_metre": Estimate.exact(g["motor_stiffness"].value / alpha_d.value),
+    }
+    return inputs | segment_sensors(rig)
+
+
+def segment_sensors(rig: RigFile) -> dict[str, Estimate]:
+    """Gains and offsets of the segments' current sensors."""
+    out = {}
+    for k in range(1, 5):
+        channel = f"i_m{k}"
+        sensor = rig.sensors[channel]
+        out[f"gain_m{k}"] = certified(f"sensors/{channel}/gain", sensor.gain, f"gain of {channel}")
+        out[f"offset_m{k}"] = certified(f"sensors/{channel}/offset", sensor.offset, f"offset of {channel}")
+    return out

@@ -1,0 +1,65 @@
+"""What a sweep of the phase angle says of the machine besides its numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from bench.findings import Effect, Finding
+from procedures.estimators import carried_checks
+from procedures.estimators.carried_data import StepMeans
+from procedures.estimators.coupling import CouplingFit
+from procedures.estimators.coupling_estimates import Analysis
+
+ZERO_RAD = math.radians(2.0)  # four times what a commutation set with care is off
+WINDING = 0.1  # segments differ by 1 %
+
+
+def of_fit(data: StepMeans, f: CouplingFit, plan: carried_checks.Tolerances) -> Iterator[Finding]:
+    """Drift over the sequence and steps off the model."""
+    n, terms, u = len(data), f.fit.terms, f.fit.u
+    yield from carried_checks.creeping(
+        {"i_x": float(terms[5]), "i_y": float(terms[6])}, {"i_x": float(u[5]), "i_y": float(u[6])}, plan
+    )
+    residuals = np.hypot(f.fit.residuals[:n], f.fit.residuals[n:])
+    span = float(np.hypot(np.ptp(f.i_x), np.ptp(f.i_y)))
+    yield from carried_checks.misfit(data, residuals, span, "currents over gamma", plan)
+
+
+def of_results(a: Analysis, pole_pairs: float) -> Iterator[Finding]:
+    """Signs, a zero far off, unequal windings; and T's own way beside ours."""
+    ratio, zero, winding = a.fit.term("r"), a.fit.term("gamma_0"), a.fit.term("a")
+    if ratio <= 0 or winding <= 0 or a.estimates["alpha_c"].value <= 0:
+        yield Finding(
+            "wrong-sign",
+            f"alpha_d/alpha_c comes out as {ratio:+.3f}, alpha_c as {a.estimates['alpha_c'].value:+.2f} N/A, the x winding as "
+            f"{winding:+.3f} of the y winding: gamma turns the force the wrong way, a segment's current is counted with the "
+            "wrong sign, or the force constant is.",
+            "gamma",
+            Effect.ERROR,
+        )
+    if abs(zero) > ZERO_RAD:
+        yield Finding(
+            "commutation-off",
+            f"direct and coupled force are apart at gamma = {math.degrees(zero):+.2f}° (expected: within "
+            f"{math.degrees(ZERO_RAD):g}°): the encoder's zero is off, its direction is wrong, or segments are exchanged.",
+            "gamma_0",
+            Effect.ERROR,
+        )
+    if abs(winding - 1) > WINDING:
+        yield Finding(
+            "windings-differ",
+            f"the x winding gives {winding:.3f} of the y winding's force (within {WINDING:.0%} is expected): a segment "
+            "gives no current or counts it wrongly, or segments are exchanged.",
+            "i_m2, i_m4",
+            Effect.ERROR,
+        )
+    yield Finding(
+        "as-printed",
+        f"the linear fit of T (6.15), gamma_0 = 0 and every step's difference from the mean, gives {a.printed:.4f}; from step "
+        f"to step {a.successive:.4f}; here {ratio:.4f} with gamma_0 = {math.degrees(zero):+.3f}° and the x winding "
+        f"{winding:.4f} of the y winding ({pole_pairs:g} pole pairs)",
+        "alpha_ratio",
+    )

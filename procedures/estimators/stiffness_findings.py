@@ -1,0 +1,92 @@
+"""What the two ways to the negative stiffness say of each other and of the machine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from bench.findings import Effect, Finding
+from bench.toleranced import Toleranced
+from bench.uncertainty import Estimate, interval
+from procedures.estimators import carried_checks
+from procedures.estimators.carried_data import StepMeans
+from procedures.estimators.stiffness import AmbFit, MotorFit
+
+ONE_IN_A_THOUSAND = 1.7  # times the 95 % expanded uncertainty
+COUPLED = 0.25  # cross force over direct force: an encoder zero 0.5 deg off makes 0.08
+
+
+def of_fits(
+    motor: StepMeans, ambs: StepMeans, by_motor: MotorFit, by_ambs: AmbFit, plan: carried_checks.Tolerances
+) -> Iterator[Finding]:
+    """Drift, misfit, and an axis that answers the other's displacement."""
+    n = len(motor)
+    alpha_d = float(by_motor.force[0]) / float(by_motor.i_y[0])
+    terms, u = by_motor.fit.terms, by_motor.fit.u
+    drift = {"i_y": float(terms[2]) / alpha_d, "i_x": float(terms[5]) / alpha_d}
+    yield from carried_checks.creeping(drift, {"i_y": float(u[2]) / alpha_d, "i_x": float(u[5]) / alpha_d}, plan)
+    residuals = np.hypot(by_motor.fit.residuals[:n], by_motor.fit.residuals[n:])
+    yield from carried_checks.misfit(motor, residuals, float(np.ptp(by_motor.force)), "force of the motor", plan)
+    total = float(np.ptp(by_ambs.force))
+    yield from carried_checks.misfit(ambs, by_ambs.fit.residuals, total, "force of the outboard AMB", plan)
+    coupling = float(terms[3]) / alpha_d
+    if abs(coupling) > COUPLED:
+        yield Finding(
+            "axes-coupled",
+            f"the horizontal current follows the vertical one by {coupling:+.2f} A/A: the commutation is turned, or segments "
+            "are exchanged. Look at the encoder's zero and the wiring of the segments.",
+            "i_x",
+            Effect.ERROR,
+        )
+
+
+def of_results(estimates: Mapping[str, Estimate], gap: Toleranced) -> Iterator[Finding]:
+    """Signs, the AMB's gap against its drawing, and the two values against each other."""
+    for name, way in (("motor", "motor's current"), ("ambs", "AMBs' currents")):
+        if estimates[name].value <= 0:
+            yield Finding(
+                "wrong-sign",
+                f"alpha_x' from the {way} is {estimates[name].value * 1e-3:+.1f} N/mm: a motor whose magnets push the rotor "
+                "back to the centre. Check the sign of the force constant and of the position sensors.",
+                way,
+                Effect.ERROR,
+            )
+    yield from _gap(estimates["gap"], gap)
+    yield from _disagreement(estimates)
+
+
+def _gap(found: Estimate, drawing: Toleranced) -> Iterator[Finding]:
+    off = found.value - drawing.value
+    allowed = (drawing.half_width or 3.3 * drawing.standard_uncertainty) + ONE_IN_A_THOUSAND * interval(found).U
+    if abs(off) > allowed:
+        yield Finding(
+            "gap-inconsistent",
+            f"the outboard AMB behaves as if its gap were {found.value * 1e3:.3f} mm; the drawing has "
+            f"{drawing.value * 1e3:.3f} mm ± {allowed * 1e3:.3f} mm with this run's uncertainty. Most likely pos_yo "
+            f"reads {found.value / drawing.value - 1:+.0%} off: then alpha_x' is wrong by as much, in both ways.",
+            "pos_yo",
+            Effect.INDETERMINATE,
+        )
+
+
+def _disagreement(estimates: Mapping[str, Estimate]) -> Iterator[Finding]:
+    """The difference has its own uncertainty: what both share cancels in it."""
+    d = estimates["difference"]
+    bound = interval(d)
+    text = (
+        f"by the motor's current {estimates['motor'].value * 1e-3:.1f} N/mm, by the AMBs' currents at two biases "
+        f"{estimates['ambs'].value * 1e-3:.1f} N/mm: difference {d.value * 1e-3:+.2f} N/mm, U of the difference "
+        f"{bound.U * 1e-3:.2f} N/mm (what both share cancels)"
+    )
+    if abs(d.value) <= bound.U:
+        yield Finding("methods-agree", text, "alpha_x_prime, alpha_x_prime_amb")
+    elif abs(d.value) <= ONE_IN_A_THOUSAND * bound.U:
+        why = "; more than U, which one sound rig in twenty exceeds"
+        yield Finding("methods-differ", text + why, "alpha_x_prime, alpha_x_prime_amb")
+    else:
+        why = (
+            "; beyond what one sound rig in a thousand shows. Suspect the force constants: the motor's acts on the first "
+            "value alone, the outboard AMB's on the second alone."
+        )
+        yield Finding("methods-disagree", text + why, "alpha_x_prime, alpha_x_prime_amb", Effect.INDETERMINATE)
