@@ -53,7 +53,7 @@ def acquired(
 ) -> Acquired:
     """Open the recording, move, make safe, close it. Raises nothing: what went wrong is in the ending."""
     ending: Ending | None = None
-    wall = provenance.wall(directory, started)
+    wall = provenance.wall(directory, started, job.rig.path)
     try:
         recorder = Recorder(
             directory.recording, clock=live.rig.clock, streams=live.streams, header=provenance.header(job),
@@ -63,7 +63,7 @@ def acquired(
             live.attach(recorder)
             cause, findings = _moved(job, live, recorder, supervisor, progress)
             ending = _ending(cause, findings, live, recorder)
-            wall = provenance.wall(directory, started)
+            wall = provenance.wall(directory, started, job.rig.path)
             recorder.wall |= wall
             with suppress(RecordingError):  # closing raises the same failure again
                 ending.write(recorder)

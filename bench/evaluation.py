@@ -6,7 +6,7 @@ The runner and `bench analyse` both come here, and neither hands over anything b
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -103,7 +103,7 @@ def evaluate(
     if stopped:
         return Evaluation(_in_order(procedure, {}, limits), Correlations((), ()), ())
     measured: dict[tuple[str, str], Measured] = {}
-    findings = list(incomplete_steps(recording))
+    findings = [*_expired(recording), *incomplete_steps(recording)]
     entries: dict[tuple[str, str], Measurement] = {}
     correlations = Correlations((), ())
     try:
@@ -121,6 +121,14 @@ def evaluate(
         findings.append(_failed(error))
         entries, correlations = {}, Correlations((), ())
     return Evaluation(_in_order(procedure, entries, limits), correlations, tuple(findings))
+
+
+def _expired(recording: Recording[Any]) -> Iterator[Finding]:
+    """Calibrations that were overdue when the run used them; only --allow-expired lets one do so."""
+    for c in recording.calibrations:
+        if c.expired:
+            text = f"the calibration {c.procedure} of {c.date[:10]} was used though it had expired on {c.due}"
+            yield Finding("calibration-expired", text, c.run_id)
 
 
 def _accept(procedure: Procedure, item: Measured, measured: dict[tuple[str, str], Measured]) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+SIMULATED_CONTROLLER = "simulated-controller"  # a live run whose controller says that it is a simulated one
+
 
 class Effect(StrEnum):
     """What a finding does to the outcome of its run. PASS is only possible when every finding is a NOTE."""

@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Any
 
+from bench.calibration import Calibration
 from bench.clock import Clock
 from bench.findings import Finding
 from bench.limits import Limit
@@ -20,7 +21,8 @@ from bench.supervisor import SafeStep, Supervisor
 
 @dataclass(frozen=True)
 class Job:
-    """What is to be run. `seed` is None on a real rig; `lock` is what others must not share, None in simulation."""
+    """What is to be run. `seed` is None on a real rig; `lock` is what others must not share, None in simulation;
+    `calibrations` are those that the procedure needs, looked up and found fit."""
 
     procedure: Procedure
     rig: RigFile
@@ -29,6 +31,7 @@ class Job:
     backend: str
     seed: int | None = None
     lock: AbstractContextManager[Any] | None = None
+    calibrations: tuple[Calibration, ...] = ()
 
 
 @dataclass(frozen=True)

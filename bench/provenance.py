@@ -8,7 +8,9 @@ import socket
 from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 
+from bench.calibrationfile import attachment
 from bench.opened import Job
 from bench.recorder import RunHeader
 from bench.rundir import RunDirectory
@@ -41,7 +43,7 @@ def header(job: Job) -> RunHeader:
             "rig.dbc": job.rig.dbc_text.encode(),
             "plan.json": job.plan.model_dump_json().encode(),
             "spec.json": json.dumps(limits, sort_keys=True).encode(),
-            "calibrations.json": b"[]",
+            "calibrations.json": attachment(job.calibrations).encode(),
         },
     )
 
@@ -51,10 +53,10 @@ def now() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
-def wall(directory: RunDirectory, started: datetime) -> dict[str, str]:
-    """What differs between two runs of one seed: dates, names, durations."""
+def wall(directory: RunDirectory, started: datetime, rig_file: str) -> dict[str, str]:
+    """What differs between two runs of one seed: dates, names, durations, where the rig file lay."""
     took = (datetime.now(UTC) - started).total_seconds()
     return {
         "run_id": directory.run_id, "host": socket.gethostname(), "started": started.isoformat(timespec="seconds"),
-        "ended": now(), "duration_s": f"{took:.3f}",
+        "ended": now(), "duration_s": f"{took:.3f}", "rig_file": str(Path(rig_file).resolve()),
     }  # fmt: skip

@@ -44,7 +44,7 @@ def analyse(path: Path, load_procedure: Callable[[str], Procedure]) -> RunResult
         run_id=run.run_id, procedure=procedure.name, rig=recording.rig.name, uut=recording.rig.uut.model_dump(),
         started=wall.get("started") or (original.started if original else ""), seed=recording.seed,
         plan=recording.plan_dict, versions=versions(),
-        calibrations=json.loads(recording.attachment("calibrations.json")),
+        calibrations=recording.calibrations,
     )  # fmt: skip
     ended = wall.get("ended") or (original.ended if original else None) or record.started
     file = RecordingFile(run.recording.name, recording.digest())

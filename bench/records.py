@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
+from bench.calibration import Calibration, Used
 from bench.errors import ConfigError
 from bench.findings import Effect, Finding
 from bench.limits import Limit, Verdict, judge
@@ -146,7 +147,7 @@ class Record:
     ended: str | None
     seed: int | None
     plan: Mapping[str, Any]
-    calibrations: tuple[Mapping[str, Any], ...]
+    calibrations: tuple[Used, ...]
     versions: Mapping[str, str]
     recording: RecordingFile | None
     link: LinkCounts
@@ -222,14 +223,14 @@ def read_record(path: Path) -> Record:
 
 def unfinished(
     *, run_id: str, procedure: str, rig: str, uut: Mapping[str, Any], started: str, seed: int | None,
-    plan: Mapping[str, Any], versions: Mapping[str, str], calibrations: Sequence[Mapping[str, Any]] = (),
+    plan: Mapping[str, Any], versions: Mapping[str, str], calibrations: Sequence[Calibration] = (),
 ) -> Record:  # fmt: skip
     """What is written before anything moves: if the run dies, this is what it says."""
     said = Finding("unfinished", "The run did not end: its process was killed or lost power.", "", Effect.ERROR)
     return Record(
         schema=1, run_id=run_id, procedure=procedure, rig=rig, uut=uut, outcome=Outcome.ERROR, started=started,
-        ended=None, seed=seed, plan=plan, calibrations=tuple(calibrations), versions=versions, recording=None,
-        link=LinkCounts(), findings=findings_of([said]), measurements=(), correlations=Correlations((), ()),
+        ended=None, seed=seed, plan=plan, calibrations=tuple(c.summary for c in calibrations), versions=versions,
+        recording=None, link=LinkCounts(), findings=findings_of([said]), measurements=(), correlations=Correlations((), ()),
     )  # fmt: skip
 
 

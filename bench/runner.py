@@ -18,10 +18,10 @@ from typing import Any, cast
 
 from bench import index, provenance, rundir, runlog
 from bench.acquisition import Acquired, acquired, cause_of
-from bench.errors import RecordingError, SignalAbort
+from bench.errors import ConfigError, RecordingError, SignalAbort
 from bench.evaluation import Ending, Evaluation, evaluate
-from bench.findings import Effect, Finding
-from bench.opened import Connect, Job
+from bench.findings import SIMULATED_CONTROLLER, Effect, Finding
+from bench.opened import Connect, Job, OpenRig
 from bench.procedure import Procedure
 from bench.progress import Progress
 from bench.recording import Recording
@@ -74,6 +74,7 @@ def run(
         stack.enter_context(job.lock or nullcontext())
         stack.enter_context(supervisor.finishing())  # from here on a signal ends in the record, not in a traceback
         with connect(supervisor) as live:  # what is wrong with a link is said before anything exists
+            _same_kind(job, live)
             directory = rundir.create(out, job.procedure.name, started)
             record = _unfinished(job, directory, started)
             write_record(directory.record, record)
@@ -92,11 +93,27 @@ def run(
     return result
 
 
+def _same_kind(job: Job, live: OpenRig) -> None:
+    """Only when it is connected does a live controller tell that it is a simulated one.
+
+    Raises:
+        ConfigError: a calibration of a real machine would be used for a simulated one, or the other way round.
+    """
+    served = any(f.code == SIMULATED_CONTROLLER for f in live.findings)
+    for c in job.calibrations:
+        if (c.backend == "served") != (served and job.backend == "live"):
+            made, here = ("simulated", "real") if c.backend == "served" else ("real", "simulated")
+            raise ConfigError(
+                f"calibration {c.procedure} ({c.run_id}): made on a {made} controller, this is a {here} one; nothing was "
+                f"started. Next: calibrate this one, with --calibrations DIR to keep the two apart"
+            )
+
+
 def _unfinished(job: Job, directory: RunDirectory, started: datetime) -> Record:
     return unfinished(
         run_id=directory.run_id, procedure=job.procedure.name, rig=job.rig.name, uut=job.rig.uut.model_dump(),
         started=started.isoformat(timespec="seconds"), seed=job.seed, plan=job.plan.model_dump(mode="json"),
-        versions=provenance.versions(),
+        versions=provenance.versions(), calibrations=job.calibrations,
     )  # fmt: skip
 
 

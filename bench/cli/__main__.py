@@ -61,6 +61,10 @@ class Keep(StrEnum):
 
 
 Out = Annotated[Path, typer.Option("--out", help="Folder of the run directories.")]
+Calibrations = Annotated[
+    Path | None,
+    typer.Option("--calibrations", metavar="DIR", help="Folder of calibrations; default beside the rig file."),
+]
 RunArgument = Annotated[Path, typer.Argument(metavar="RUN", help="A run directory.")]
 
 
@@ -105,6 +109,10 @@ def run(
         OperatorKind | None, typer.Option(help="Default: auto in simulation, console on a terminal.")
     ] = None,
     no_report: Annotated[bool, typer.Option("--no-report", help="Leave the report out.")] = False,
+    calibrations: Calibrations = None,
+    allow_expired: Annotated[
+        bool, typer.Option("--allow-expired", help="Use calibrations that are overdue; the report says so.")
+    ] = False,
 ) -> int:
     """Run a procedure on a rig. The last line on standard output is the run directory."""
     from bench.cli.compose import Request
@@ -125,6 +133,8 @@ def run(
             out=out,
             operator=operator.value if operator else None,
             report=not no_report,
+            calibrations=calibrations,
+            allow_expired=allow_expired,
         )
     )
 
@@ -172,6 +182,33 @@ def campaign(
             new=new,
         )
     )
+
+
+@app.command()
+def adopt(
+    run: RunArgument,
+    rig: Annotated[str, typer.Option("--rig", metavar="RIG", help="Default: the rig file the run was made with.")] = "",
+    calibrations: Calibrations = None,
+    anyway: Annotated[bool, typer.Option("--anyway", help="Also a run that did not PASS; the file says so.")] = False,
+) -> int:
+    """Make a run's results the rig's current calibration.
+
+    The last line on standard output is its file.
+    """
+    from bench.cli.adopt import adopt_command
+
+    return adopt_command(run, rig, calibrations, anyway)
+
+
+@app.command("calibrations")
+def calibrations_(
+    rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig file, or its name in rigs/.")],
+    calibrations: Calibrations = None,
+) -> int:
+    """List a rig's calibrations with their age and state."""
+    from bench.cli.calibrations import calibrations_command
+
+    return calibrations_command(rig, calibrations)
 
 
 @app.command()

@@ -7,17 +7,23 @@ stored runs are analysed without it.
 from __future__ import annotations
 
 import importlib
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from bench import catalogue, faults, linkurl, plans
+from bench.calibration import Need, number
+from bench.calibrationstore import Store
 from bench.cli.opening import live, simulated
 from bench.envelope import Envelope
 from bench.errors import ConfigError
 from bench.lock import rig_lock
+from bench.needs import Lookup
 from bench.opened import Connect, Job
 from bench.procedure import Procedure
 from bench.rigfile import RigFile, load_rig
@@ -41,6 +47,8 @@ class Request:
     out: Path = Path("runs")
     operator: str | None = None
     report: bool = True
+    calibrations: Path | None = None
+    allow_expired: bool = False
 
 
 def load_procedure(name: str) -> Procedure:
@@ -68,16 +76,40 @@ def prepare(request: Request) -> tuple[Job, Connect]:
     if problems:
         raise ConfigError("\n  ".join(["the plan does not fit the rig; nothing was started:", *problems]))
     limits = load_spec(rig.name, procedure.name, [q.name for q in procedure.measures])
+    seed = None if request.backend == "live" else request.seed or 0
+    lookup = Lookup(
+        Store.of(rig, seed, request.calibrations),
+        rig,
+        datetime.now(UTC),
+        partial(remedy, request),
+        request.allow_expired,
+    )
+    used = lookup.found(procedure.name, procedure.needs(plan))
     injected = [faults.parse(text) for text in request.faults]
-    if request.backend == "live":
+    if seed is None:
         kind = request.operator or ("console" if sys.stdin.isatty() else "auto")
-        job = Job(procedure, rig, plan, limits, "live", None, rig_lock(rig.link.url.partition("?")[0]))
+        job = Job(procedure, rig, plan, limits, "live", None, rig_lock(rig.link.url.partition("?")[0]), used)
         return job, live(rig, kind, injected, request.clear_fault)
-    seed = 0 if request.seed is None else request.seed
     overrides = dict(plans.assignment(text) for text in request.truth)
     _refuse_words(overrides)
     connect = simulated(rig, seed, overrides, request.operator or "auto", procedure.settings(plan), injected)
-    return Job(procedure, rig, plan, limits, request.backend, seed), connect
+    return Job(procedure, rig, plan, limits, request.backend, seed, calibrations=used), connect
+
+
+def remedy(request: Request, need: Need) -> str:
+    """The command lines that make the calibration that a run lacks."""
+    fields = load_procedure(need.procedure).plan.model_fields
+    settings = [f"{name}={number(value)}" for name, value in need.settings.items() if name in fields]
+    words = ["bench", "run", need.procedure, "--rig", request.rig]
+    if request.backend == "live":
+        words += ["--backend", "live"]
+    elif request.seed is not None:
+        words += ["--seed", str(request.seed)]
+    given = (("--link", request.links), ("--truth", request.truth), ("--plan", settings))
+    words += [word for option, values in given for value in values for word in (option, value)]
+    where = [] if request.calibrations is None else ["--calibrations", str(request.calibrations)]
+    run, adopt = shlex.join([*words, *where]), shlex.join(["bench", "adopt", "RUN", *where])
+    return f"`{run}`, then `{adopt}` with the folder that it prints"
 
 
 def _refuse_mixed_backends(request: Request) -> None:

@@ -14,7 +14,7 @@ from bench.cli.safety import safe_steps
 from bench.clock import Clock, WallClock
 from bench.errors import BenchError, ConfigError
 from bench.faults import Fault
-from bench.findings import Finding
+from bench.findings import SIMULATED_CONTROLLER, Finding
 from bench.link import Link
 from bench.linkhealth import Health
 from bench.opened import Connect, OpenRig, WatchedClock
@@ -223,7 +223,7 @@ def _opened(
         )
     if truth is None and controller.serial == 0:
         text = "the controller says that it is a simulated one: no machine was measured"
-        found.append(Finding("simulated-controller", text, "controller"))
+        found.append(Finding(SIMULATED_CONTROLLER, text, "controller"))
     if controller.restored:
         text = f"parameters that an earlier host left were set to the rig file's: {', '.join(controller.restored)}"
         found.append(Finding("parameters-restored", text, "controller"))
