@@ -103,7 +103,7 @@ def evaluate(
     if stopped:
         return Evaluation(_in_order(procedure, {}, limits), Correlations((), ()), ())
     measured: dict[tuple[str, str], Measured] = {}
-    findings = [*_expired(recording), *incomplete_steps(recording)]
+    findings = [*_calibrations(recording), *incomplete_steps(recording)]
     entries: dict[tuple[str, str], Measurement] = {}
     correlations = Correlations((), ())
     try:
@@ -123,12 +123,21 @@ def evaluate(
     return Evaluation(_in_order(procedure, entries, limits), correlations, tuple(findings))
 
 
-def _expired(recording: Recording[Any]) -> Iterator[Finding]:
-    """Calibrations that were overdue when the run used them; only --allow-expired lets one do so."""
+def _calibrations(recording: Recording[Any]) -> Iterator[Finding]:
+    """Calibrations that the run used though they were overdue (only --allow-expired lets it), that rest on such, or that were
+    adopted although their run did not pass."""
     for c in recording.calibrations:
+        name = f"the calibration {c.procedure} of {c.date[:10]}"
         if c.expired:
-            text = f"the calibration {c.procedure} of {c.date[:10]} was used though it had expired on {c.due}"
-            yield Finding("calibration-expired", text, c.run_id)
+            yield Finding("calibration-expired", f"{name} was used though it had expired on {c.due}", c.run_id)
+        for used in c.used:
+            if used.state == "expired":
+                text = f"{name} rests on {used.procedure} of {used.date[:10]}, which had expired on {used.due}"
+                yield Finding("calibration-expired", text, c.run_id)
+        if c.outcome != Outcome.PASS:
+            yield Finding(
+                "calibration-not-passed", f"{name} was adopted although its outcome was {c.outcome}", c.run_id
+            )
 
 
 def _accept(procedure: Procedure, item: Measured, measured: dict[tuple[str, str], Measured]) -> None:

@@ -12,7 +12,10 @@ from reports.figures import Drawn
 from reports.linktable import clean, link_table
 from reports.view import (
     ABOUT_UNCERTAINTY,
+    CALIBRATIONS,
     DECISION_RULE,
+    EXPIRED,
+    NO_CALIBRATIONS,
     NO_RESULTS,
     SIMULATED,
     STATEMENTS,
@@ -71,6 +74,7 @@ def view_of(record: Content, around: Surroundings, figures: Iterable[Drawn] = ()
         uut=_uut(record.get("uut")),
         date=text.moment(record.get("started"))[:10],
         simulated=SIMULATED if _simulated(record) else "",
+        expired=EXPIRED if _expired(record) else "",
         outcome=outcome,
         tone=_TONES.get(outcome.lower(), "none"),
         outcome_text=_outcome_text(outcome, rows, findings),
@@ -85,7 +89,8 @@ def view_of(record: Content, around: Surroundings, figures: Iterable[Drawn] = ()
         figures=tuple(FigureEntry(n, f.key, f.title, f.caption, f.svg) for n, f in enumerate(figures, 1)),
         conditions=_conditions(around),
         traceability=tables.traceability(around.rig),
-        calibrations=_calibrations(record.get("calibrations")),
+        calibrations=tables.calibrations(record.get("calibrations")),
+        about_calibrations=CALIBRATIONS if record.get("calibrations") else NO_CALIBRATIONS,
         link=_link(record.get("link"), around),
         link_note=f"{_link_note(around)} {clean(_mapping(record.get('link')))}".strip(),
         correlations=tables.correlations(record),
@@ -228,17 +233,20 @@ def _words(key: str) -> str:
     return words[:1].upper() + words[1:] + unit
 
 
-def _calibrations(found: Any) -> tuple[Fact, ...]:
-    if not found:
-        return (Fact("Earlier calibrations used", "none"),)
-    return tuple(tables.facts(found if isinstance(found, Mapping) else {"calibration": found}))
-
-
 def _simulated(record: Content) -> bool:
     """In this process, which has a seed, or served: then the controller said so."""
+    return record.get("seed") is not None or _has_finding(record, "simulated-controller")
+
+
+def _expired(record: Content) -> bool:
+    used = [c for c in record.get("calibrations") or () if isinstance(c, Mapping)]
+    return any(c.get("state") == "expired" for c in used) or _has_finding(record, "calibration-expired")
+
+
+def _has_finding(record: Content, code: str) -> bool:
     findings = record.get("findings")
     told = [f for f in findings if isinstance(f, Mapping)] if isinstance(findings, list | tuple) else []
-    return record.get("seed") is not None or any(f.get("code") == "simulated-controller" for f in told)
+    return any(f.get("code") == code for f in told)
 
 
 def _mapping(found: Any) -> Content:

@@ -112,6 +112,19 @@ def _group_name(paths: Sequence[tuple[str, ...]]) -> str:
     return f"{paths[0][0]}: {paths[0][-1]} of {members}"
 
 
+def calibrations(found: Any) -> Table:
+    """The earlier calibrations that a run used; no rows where it used none."""
+    entries = [c for c in found or () if isinstance(c, Mapping)] if isinstance(found, list | tuple) else []
+    rows = tuple(
+        tuple(str(cell or text.DASH) for cell in (
+            c.get("procedure"), c.get("run_id"), text.moment(c.get("date"))[:10], c.get("due"), c.get("state"),
+            c.get("sha256"),
+        ))
+        for c in entries
+    )  # fmt: skip
+    return Table("", ("Procedure", "Run", "Date", "Due", "State", "SHA-256 of its recording"), rows)
+
+
 def correlations(record: Content) -> Correlations | None:
     """The matrix over the measurements; None for fewer than two.
 

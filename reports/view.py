@@ -12,6 +12,12 @@ from typing import Literal
 Tone = Literal["pass", "fail", "indeterminate", "error", "none"]
 
 SIMULATED = "Simulated rig – not a calibration certificate"
+EXPIRED = "Made with an expired calibration"
+CALIBRATIONS = (
+    "Earlier calibrations of the same machine that the results rest on. Their influences stand in the budgets: those of the "
+    "rig file under its names, those of a calibration's own run with that run in brackets."
+)
+NO_CALIBRATIONS = "The results rest on no earlier calibration."
 DECISION_RULE = (
     "Decision rule (JCGM 106:2012, guarded by the expanded uncertainty): a result passes if its whole 95 % coverage "
     "interval lies inside the limits, fails if the whole interval lies outside them, and is indeterminate otherwise. "
@@ -144,6 +150,7 @@ class ReportView:
     uut: str  # 7.8.2.1 g: unambiguous identification of the item
     date: str
     simulated: str  # the banner, empty for a real rig
+    expired: str  # another banner, empty where every calibration was in date
     outcome: str
     tone: Tone
     outcome_text: str
@@ -158,7 +165,8 @@ class ReportView:
     figures: tuple[FigureEntry, ...]
     conditions: tuple[Fact, ...]  # 7.8.4.1 b
     traceability: Table  # 7.8.4.1 c
-    calibrations: tuple[Fact, ...]  # 7.8.4.1 c, d: earlier results this run used
+    calibrations: Table  # 7.8.4.1 c, d: earlier results this run used
+    about_calibrations: str
     link: tuple[Table, ...]
     link_note: str
     correlations: Correlations | None

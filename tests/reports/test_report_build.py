@@ -248,7 +248,7 @@ def test_the_pdf_has_the_sections_of_the_page_in_the_same_order() -> None:
     asked = typst.query(pdf.sources(made), "heading.where(level: 1)", field="body", ignore_system_fonts=True)
     in_pdf = [heading["text"] for heading in json.loads(asked)]
     assert in_pdf == in_page
-    assert len(in_pdf) == 12
+    assert len(in_pdf) == 13
 
 
 def test_the_page_fetches_nothing() -> None:
