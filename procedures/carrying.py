@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from bench.rig import Rig
 from bench.rigfile import RigFile
 
-PARAMETERS = ("motor_share", "share_slew", "ki_m", "ref_xm", "ref_ym", "ref_yi", "angle_ref")
+PARAMETERS = ("motor_share", "share_slew", "ref_xm", "ref_ym", "ref_yi", "angle_ref")
 SHAFT_N = 10.2 * 9.81  # T Table 6.1; for predictions before a run, and for nothing that is measured
 ALPHA_D = 12.1  # N/A, T Table 6.2; likewise
 MARGIN = (

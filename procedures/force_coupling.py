@@ -46,17 +46,11 @@ class Plan(BenchPlan):
     gamma_rad: tuple[float, ...] = Field(tuple(round(math.radians(d / 2), 9) for d in range(-5, 8)), min_length=5)
     settle_s: float = Field(2.0, gt=0)
     average_s: float = Field(1.0, ge=0.1)
-    ki_m: float = Field(1e6, gt=0)  # A/(m s), integral gain of the motor while it carries: settles within 0.1 s
     max_position_m: float = Field(5e-8, gt=0)  # settled: |mean position|; its drift may be twice that
     max_drift_A: float = Field(2e-3, gt=0)  # settled: drift of a current within a step
     max_creep_A: float = Field(5e-3, gt=0)  # drift of i_x, i_y over the sequence
     max_misfit: float = Field(5e-3, gt=0)  # residual over range
     max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
-
-
-def settings(plan: Plan) -> dict[str, float]:
-    """Controller parameters that the runner writes before levitation."""
-    return {"ki_m": plan.ki_m}
 
 
 def needs(_: Plan) -> tuple[Need, ...]:
@@ -185,7 +179,6 @@ procedure = Procedure(
     analyse=analyse,
     figures=figures,
     check=check,
-    settings=settings,
     step_count=step_count,
     needs=needs,
     method=METHOD,

@@ -47,7 +47,6 @@ class Plan(BenchPlan):
     bias_high_A: float = Field(4.0, gt=0)
     settle_s: float = Field(2.0, gt=0)
     average_s: float = Field(1.0, ge=0.1)
-    ki_m: float = Field(1e6, gt=0)  # A/(m s), integral gain of the motor while it carries: settles within 0.1 s
     max_position_m: float = Field(5e-8, gt=0)  # settled: |mean position - reference|; its drift may be twice that
     max_drift_A: float = Field(2e-3, gt=0)  # settled: drift of a current within a step
     max_creep_A: float = Field(5e-3, gt=0)  # drift of i_x, i_y over the sequence
@@ -57,7 +56,7 @@ class Plan(BenchPlan):
 
 def settings(plan: Plan) -> dict[str, float]:
     """Controller parameters that the runner writes before levitation."""
-    return {"bias_i": plan.bias_A, "bias_o": plan.bias_A, "ki_m": plan.ki_m}
+    return {"bias_i": plan.bias_A, "bias_o": plan.bias_A}
 
 
 def needs(plan: Plan) -> tuple[Need, ...]:

@@ -10,9 +10,10 @@ import numpy as np
 
 from bench.recording import Recording
 from bench.rigfile import RigFile
-from bench.uncertainty import Estimate, Influence, propagate
+from bench.uncertainty import Estimate, Influence
 from procedures.estimators import coupling
 from procedures.estimators.carried_data import SEGMENTS, StepMeans
+from procedures.estimators.chainrule import by_inputs
 from procedures.estimators.coupling import CouplingFit, Sweep
 from procedures.estimators.inputs import certified
 from procedures.estimators.typea import scatter
@@ -44,7 +45,7 @@ def evaluate(recording: Recording[Any], data: StepMeans) -> Analysis:
 
     values = {name: e.value for name, e in inputs.items()}
     fit = coupling.fit_sweep(sweep, values)
-    estimates = propagate(model, inputs)
+    estimates = by_inputs(model, inputs)
     extra = scatter(fit.fit, _gradients(fit, values), "currents", "scatter of the steps")
     off_home = abs(float(data.mean["angle"].mean())) + ENCODER_RAD
     for name, e in estimates.items():

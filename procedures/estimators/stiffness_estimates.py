@@ -9,9 +9,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from bench.recording import Recording
-from bench.uncertainty import Estimate, Influence, propagate
+from bench.uncertainty import Estimate, Influence
 from procedures.estimators import stiffness
 from procedures.estimators.carried_data import SEGMENTS, StepMeans
+from procedures.estimators.chainrule import by_inputs
 from procedures.estimators.inputs import certified
 from procedures.estimators.stiffness import AmbFit, ByAmbs, ByMotor, MotorFit
 from procedures.estimators.typea import scatter
@@ -50,7 +51,7 @@ def evaluate(recording: Recording[Any], motor: StepMeans, ambs: StepMeans) -> An
 
     values = {name: e.value for name, e in inputs.items()}
     by_motor, by_ambs = stiffness.by_motor(one, values), stiffness.by_ambs(two, values)
-    estimates = propagate(model, inputs)
+    estimates = by_inputs(model, inputs)
     share = by_motor.stiffness / float(by_motor.fit.terms[0])
     extra = scatter(by_motor.fit, {"motor": [share, 0, 0, 0, 0, 0]}, "motor", "scatter of the steps, motor")
     gradients = {"ambs": [share, 0, 0, 0, 0, 0], "gap": [0, -(by_ambs.gap_m**2), 0, 0, 0, 0]}

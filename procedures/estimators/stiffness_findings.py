@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.findings import Effect, Finding
 from bench.toleranced import Toleranced
-from bench.uncertainty import Estimate, interval
+from bench.uncertainty import Estimate, coverage_factor, welch_satterthwaite
 from procedures.estimators import carried_checks
 from procedures.estimators.carried_data import StepMeans
 from procedures.estimators.stiffness import AmbFit, MotorFit
@@ -56,9 +56,14 @@ def of_results(estimates: Mapping[str, Estimate], gap: Toleranced) -> Iterator[F
     yield from _disagreement(estimates)
 
 
+def _expanded(e: Estimate) -> float:
+    """k u for 95 %; for a judgement the shape of the distribution is not worth a Monte Carlo."""
+    return coverage_factor(welch_satterthwaite(e)) * e.u
+
+
 def _gap(found: Estimate, drawing: Toleranced) -> Iterator[Finding]:
     off = found.value - drawing.value
-    allowed = (drawing.half_width or 3.3 * drawing.standard_uncertainty) + ONE_IN_A_THOUSAND * interval(found).U
+    allowed = (drawing.half_width or 3.3 * drawing.standard_uncertainty) + ONE_IN_A_THOUSAND * _expanded(found)
     if abs(off) > allowed:
         yield Finding(
             "gap-inconsistent",
@@ -73,15 +78,15 @@ def _gap(found: Estimate, drawing: Toleranced) -> Iterator[Finding]:
 def _disagreement(estimates: Mapping[str, Estimate]) -> Iterator[Finding]:
     """The difference has its own uncertainty: what both share cancels in it."""
     d = estimates["difference"]
-    bound = interval(d)
+    U = _expanded(d)
     text = (
         f"by the motor's current {estimates['motor'].value * 1e-3:.1f} N/mm, by the AMBs' currents at two biases "
         f"{estimates['ambs'].value * 1e-3:.1f} N/mm: difference {d.value * 1e-3:+.2f} N/mm, U of the difference "
-        f"{bound.U * 1e-3:.2f} N/mm (what both share cancels)"
+        f"{U * 1e-3:.2f} N/mm (what both share cancels)"
     )
-    if abs(d.value) <= bound.U:
+    if abs(d.value) <= U:
         yield Finding("methods-agree", text, "alpha_x_prime, alpha_x_prime_amb")
-    elif abs(d.value) <= ONE_IN_A_THOUSAND * bound.U:
+    elif abs(d.value) <= ONE_IN_A_THOUSAND * U:
         why = "; more than U, which one sound rig in twenty exceeds"
         yield Finding("methods-differ", text + why, "alpha_x_prime, alpha_x_prime_amb")
     else:
