@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import Any, Final
 
 import numpy as np
@@ -187,13 +188,20 @@ class ViewWindows:
 
 def encode_scalars(values: Sequence[npt.NDArray[Any]]) -> list[bytes]:
     """Messages of float fields numbered from 1: one message a row, one field for each of `values`, as float32."""
-    tags = [list(varint(k << 3 | 5)) for k in range(1, len(values) + 1)]
-    rows = np.empty(len(values[0]), [(f"f{k}", [("tag", "u1", (len(t),)), ("v", "<f4")]) for k, t in enumerate(tags)])
-    for k, (tag, x) in enumerate(zip(tags, values, strict=True)):
-        rows[f"f{k}"]["tag"] = tag
-        rows[f"f{k}"]["v"] = x
-    data, size = rows.tobytes(), rows.itemsize
+    row, places = _scalar_row(len(values))
+    rows = np.tile(row, (len(values[0]), 1))
+    rows[:, places] = np.ascontiguousarray(np.array(values, "<f4").T).view(np.uint8)
+    data, size = rows.tobytes(), len(row)
     return [data[at : at + size] for at in range(0, len(data), size)]
+
+
+@cache
+def _scalar_row(count: int) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.intp]]:
+    """The bytes of such a message with zeros for values, and the places of the bytes of these."""
+    tags = [varint(k << 3 | 5) for k in range(1, count + 1)]
+    ends = np.cumsum([len(tag) + 4 for tag in tags])
+    row = np.frombuffer(b"".join(tag + bytes(4) for tag in tags), np.uint8)
+    return row, (ends[:, None] + np.arange(-4, 0)).ravel()
 
 
 class DecodedBlock:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import cantools
@@ -73,10 +74,16 @@ def load_messages(dbc: str, name: str = "dbc") -> MessageMap:
         ConfigError: it is not a DBC, or signals overlap or do not fit.
     """
     try:
-        database: Any = cantools.database.load_string(dbc, database_format="dbc", strict=True)
+        database = _database(dbc)
     except Exception as error:  # cantools raises a dozen kinds, all meaning this
         raise ConfigError(f"{name}: not a usable DBC: {error}") from error
     return MessageMap({m.name: _message(m) for m in database.messages})
+
+
+@lru_cache(maxsize=8)
+def _database(dbc: str) -> Any:
+    """Parsing takes longer than all else that opening a rig does, and a run does it at both ends of the link."""
+    return cantools.database.load_string(dbc, database_format="dbc", strict=True)
 
 
 def _message(m: Any) -> Message:
