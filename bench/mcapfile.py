@@ -23,7 +23,7 @@ from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Me
 from bench.errors import RecordingError
 
 MAX_CHUNK = 64 << 20
-KEPT = 32 << 20  # bytes of decoded chunks: steps are read again and again
+KEPT = 8  # decoded chunks; a chunk holds half a second
 MAGIC = b"\x89MCAP0\r\n"
 DAMAGED = "the file was damaged after it was written"
 RECORDS: dict[int, Any] = {
@@ -59,7 +59,6 @@ class McapFile:
     profile: str = ""
     truncated: bool = True
     _cache: OrderedDict[int, list[tuple[str, int, bytes]]] = field(default_factory=OrderedDict)
-    _cached: int = 0  # bytes
 
     def messages(self, topic: str, start_ns: int = 0, end_ns: int = 1 << 63) -> Iterator[tuple[int, bytes]]:
         """Log time and data of a topic's messages with start <= log time < end, in file order."""
@@ -82,9 +81,8 @@ class McapFile:
             if channel in self.topics:
                 out.append((self.topics[channel][0], t_ns, data))
         self._cache[number] = out
-        self._cached += place.size
-        while self._cached > KEPT and len(self._cache) > 1:
-            self._cached -= self.chunks[self._cache.popitem(last=False)[0]].size
+        if len(self._cache) > KEPT:
+            self._cache.popitem(last=False)
         return out
 
     def _parse(self, records: bytes) -> Iterator[tuple[int, int, bytes]]:
@@ -110,7 +108,6 @@ class McapFile:
         for number in range(len(self.chunks)):
             self._decoded(number)
         self._cache.clear()
-        self._cached = 0
 
 
 def _decompressed(path: Path, place: ChunkPlace, data: bytes) -> bytes:
