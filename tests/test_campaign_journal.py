@@ -13,6 +13,8 @@ from bench.campaign_directory import newest, opened
 from bench.campaign_journal import Journal
 from bench.errors import ConfigError
 
+ENTRIES = st.dictionaries(st.text(max_size=3), st.text(max_size=5) | st.integers() | st.none())
+
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
@@ -39,7 +41,7 @@ def test_a_journal_cut_anywhere_has_every_whole_line(
 def test_a_broken_line_in_the_middle_is_named(tmp_path: Path) -> None:
     journal = Journal(tmp_path / "journal.jsonl")
     journal.path.write_text('{"a": 1}\n{"a": \n{"a": 3}\n')
-    with pytest.raises(ConfigError, match="line 2: .* delete that line"):
+    with pytest.raises(ConfigError, match=r"line 2: .* delete that line"):
         list(journal.entries())
 
 

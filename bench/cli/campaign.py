@@ -155,7 +155,12 @@ def _many(asked: Asked, directory: CampaignDirectory, progress: Progress) -> int
 
 def step_tasks(steps: Sequence[Planned]) -> tuple[StepTask, ...]:
     """The steps as plain data, for other processes."""
-    return tuple(StepTask(s.procedure.name, s.plan.model_dump(), s.judged, s.adopt) for s in steps)
+    return tuple(
+        StepTask(
+            s.procedure.name, s.plan.model_dump(), s.judged, s.adopt, tuple(dict.fromkeys(n.procedure for n in s.needs))
+        )
+        for s in steps
+    )  # fmt: skip
 
 
 def _one(asked: Asked, directory: CampaignDirectory, progress: Progress) -> int:

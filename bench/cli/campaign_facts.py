@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from bench.calibration import Calibration
 from bench.campaign_directory import CampaignDirectory
+from bench.cli.adopt import adopt as adopted_run
 from bench.cli.campaign_job import RigTask, StepTask
 from bench.cli.compose import Request
 from bench.cli.virtual import simulated_run
@@ -34,7 +35,7 @@ def request_of(asked: Asked, directory: CampaignDirectory, step: Planned) -> Req
     return Request(
         procedure=step.procedure.name, rig=asked.rig.path, backend=c.backend, seed=None if live else c.seed or 0,
         plan=step.assignments, truth=tuple(f"{key}={value!r}" for key, value in c.truth.items()), links=r.links,
-        out=directory.runs, operator=r.operator, report=r.report,
+        out=directory.runs, operator=r.operator, report=r.report, calibrations=directory.calibrations,
     )  # fmt: skip
 
 
@@ -44,3 +45,4 @@ def adopt(asked: Asked, directory: CampaignDirectory, run: Path) -> None:
     Raises:
         BenchError: it cannot be adopted.
     """
+    adopted_run(run, asked.rig.path, directory.calibrations)

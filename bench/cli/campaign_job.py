@@ -22,12 +22,14 @@ Keep = Literal["all", "missed", "none"]
 
 @dataclass(frozen=True)
 class StepTask:
-    """One step: the procedure's name, its whole plan (SI), which quantities are judged, whether it is adopted."""
+    """One step: the procedure's name, its whole plan (SI), which quantities are judged, whether it is adopted, and the
+    procedures whose calibrations it needs."""
 
     procedure: str
     plan: Mapping[str, Any]
     judged: tuple[str, ...]
     adopt: bool
+    needs: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,8 @@ def _end_with(parent: Any) -> None:
 
 
 def run_rig(task: RigTask, seed: int) -> dict[str, Any]:
-    """Draw the rig of that seed and take it through every step; a step that cannot be relied on is the last one."""
+    """Draw the rig of that seed and take it through every step; one that cannot be relied on is not adopted, and the
+    steps that need it are left out."""
     line = _Line(seed, time.time())
     cpu = time.process_time()
     work = Path(task.folder) / "work" / str(seed)
@@ -86,8 +89,8 @@ def run_rig(task: RigTask, seed: int) -> dict[str, Any]:
     known: dict[str, Any] = {}
     try:
         for number, step in enumerate(task.steps, 1):
-            if not _run_step(task, step, number, work, known, line):
-                break
+            if all(need in known for need in step.needs):
+                _run_step(task, step, number, work, known, line)
         _keep(task, work, line)
     finally:
         shutil.rmtree(work, ignore_errors=True)
@@ -97,8 +100,8 @@ def run_rig(task: RigTask, seed: int) -> dict[str, Any]:
 
 def _run_step(
     task: RigTask, step: StepTask, number: int, work: Path, known: dict[str, Any], line: _Line
-) -> bool:  # fmt: skip
-    """One step into `line`; its facts into `known`. False if the rig's later steps cannot be done."""
+) -> None:  # fmt: skip
+    """One step into `line`; its facts into `known` if they can be relied on."""
     from bench.cli.campaign_facts import simulated_step
     from bench.errors import BenchError
     from bench.findings import Effect, Finding
@@ -109,6 +112,8 @@ def _run_step(
         truth, results, calibration = simulated_step(task, step, line.seed, path, known)
         findings = [r for r in results if isinstance(r, Finding)]
         line.values += _values(number, [r for r in results if not isinstance(r, Finding)], truth, line.seed)
+        if step.adopt and all(f.effect is Effect.NOTE for f in findings):
+            known[step.procedure] = calibration()
     except BenchError as error:
         findings = [Finding(_code(error), str(error), "", Effect.ERROR)]
     except Exception as error:  # a mistake of ours on one rig is that rig's result, not the campaign's end
@@ -117,11 +122,7 @@ def _run_step(
     line.findings += [{"step": number, "code": f.code, "effect": f.effect.value, "text": f.text} for f in findings]
     bad = [f.code for f in findings if f.effect is not Effect.NOTE]
     if bad:
-        line.stopped = f"{step.procedure}: {bad[0]}"
-        return False
-    if step.adopt:
-        known[step.procedure] = calibration()
-    return True
+        line.stopped = line.stopped or f"{step.procedure}: {bad[0]}"
 
 
 def _code(error: Exception) -> str:
