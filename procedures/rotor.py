@@ -25,10 +25,12 @@ def release(rig: Rig) -> None:
         rig.levitation.set(name, 0.0)
 
 
-def hold(rig: Rig) -> None:
+def hold(rig: Rig, ki_theta: float | None = None) -> None:
     """The controller takes the angle up again, with the rig file's gains; damping first, so that it never swings."""
     for name in ("kd_theta", "kp_theta", "ki_theta"):
         rig.levitation.set(name, rig.file.parameters[name].default)
+    if ki_theta is not None:
+        rig.levitation.set("ki_theta", ki_theta)
 
 
 def probe(rig: Rig, record: Recorder) -> None:

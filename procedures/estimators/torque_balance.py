@@ -1,0 +1,220 @@
+"""Torque constant of the motor from known weights on a lever, over the phase angle gamma (T 6.6.4, with gravity).
+
+The motor holds the rotor at its home angle. A weight W at the arm l turns it forward on the left end and backward on the
+right end; with gamma_0 the error of the encoder's zero and M pole pairs
+
+    alpha_tau cos(M (gamma - gamma_0)) (i - i_base) = -W l_left    (left)    = +W l_right    (right)
+
+T prints m l = alpha_tau cos(M gamma) i: gravity is missing, and the current without load too, which holds detent, the
+sensors' offsets and any constant torque. At each gamma i_base is a straight line in time through the loads' own steps and
+those without load, fitted together with alpha_tau and gamma_0, so that linear drift drops out as well.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from bench.errors import AnalysisError
+from procedures.estimators.leastsquares import Fit, linear, nonlinear
+from procedures.estimators.mass_hanging import weight
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Step means in time order, (n,) each but `segments` (n, 4).
+
+    segments: A, as the current sensors read; angle: rad, mean encoder reading; gamma: rad; time: s, middle of the step
+    side: +1 left, -1 right, 0 no load; load: index into the masses, -1 for nothing
+    """
+
+    segments: Array
+    angle: Array
+    gamma: Array
+    time: Array
+    side: Ints
+    load: Ints
+
+
+@dataclass(frozen=True)
+class Detent:
+    """Current in A that holds the released load-free rotor over the angle: constant + cosine and sine of its order."""
+
+    constant: float
+    cosine: float
+    sine: float
+    order: float
+
+    @property
+    def amplitude(self) -> float:
+        """A, 0 to peak."""
+        return math.hypot(self.cosine, self.sine)
+
+    def off_home(self, angle: Array) -> Array:
+        """Current at an angle less that at home, A."""
+        turn = self.order * angle
+        out: Array = self.cosine * (np.cos(turn) - 1) + self.sine * np.sin(turn)
+        return out
+
+
+NO_DETENT = Detent(0.0, 0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Balance:
+    """`alpha` N m/A, `gamma_0` rad, their `covariance` (2, 2) from the residuals; `current` (n,) A the torque current freed of
+    sensors and detent, `base` (n,) A without load, `torque` (n,) N m of the loads; `fit` has residuals (n,) A."""
+
+    alpha: float
+    gamma_0: float
+    covariance: Array
+    current: Array
+    base: Array
+    torque: Array
+    fit: Fit
+
+
+def detent(angle: Array, current: Array, order: float) -> Detent:
+    """Fit of the holding current (n,) A over angles (n,) rad within a period of the detent.
+
+    Raises:
+        AnalysisError: the angles do not determine it.
+    """
+    turn = order * angle
+    design = np.column_stack([np.ones_like(turn), np.cos(turn), np.sin(turn)])
+    constant, cosine, sine = linear(design, current, np.ones_like(current)).terms
+    return Detent(float(constant), float(cosine), float(sine), order)
+
+
+def torque_current(segments: Array, p: Mapping[str, float]) -> Array:
+    """Mean of the four segments' currents, freed of the gains of their sensors. Offsets are the same at every step: they go
+    into the current without load."""
+    gains = np.array([p[f"gain_{k}"] for k in range(1, 5)])
+    out: Array = (segments / gains).mean(axis=1)
+    return out
+
+
+def load_torque(s: Steps, p: Mapping[str, float], masses: int) -> Array:
+    """Torque in N m by which the loads turn the rotor forward, (n,)."""
+    kg = np.array([p[f"mass_{k}"] for k in range(masses)] + [0.0])  # index -1 is nothing
+    newtons = np.asarray(weight(kg[s.load], p["gravity"], p["air_density"], p["mass_density"]))
+    arm = np.where(s.side > 0, p["lever_left"], p["lever_right"])
+    out: Array = s.side * newtons * arm
+    return out
+
+
+def balance(s: Steps, p: Mapping[str, float], masses: int, pole_pairs: float, held: Detent = NO_DETENT) -> Balance:
+    """Fit alpha_tau, gamma_0 and the current without load to all steps.
+
+    Raises:
+        AnalysisError: a phase angle lacks loads or steps without load, or the fit does not converge.
+    """
+    torque = load_torque(s, p, masses)
+    current = torque_current(s.segments, p) - held.off_home(s.angle) / np.cos(pole_pairs * s.gamma)
+    angles, index = np.unique(s.gamma, return_inverse=True)
+    if len(angles) < 3:
+        raise AnalysisError(f"found {len(angles)} phase angles; expected three or more (was the run stopped early?)")
+    lines = np.zeros((len(current), 2 * len(angles)))
+    for k in range(len(angles)):
+        mine = index == k
+        if (s.side[mine] == 0).sum() < 2 or not {1, -1} <= set(s.side[mine].tolist()):
+            raise AnalysisError(
+                f"phase angle {angles[k]:.4f} rad: found {int(mine.sum())} steps; expected loads on both sides and two steps "
+                "without load (was the run stopped early?)"
+            )
+        lines[mine, 2 * k] = 1
+        lines[mine, 2 * k + 1] = s.time[mine] - s.time[mine].mean()
+
+    def model(q: Array) -> Array:
+        out: Array = -torque / (q[0] * np.cos(pole_pairs * (s.gamma - q[1]))) + lines @ q[2:]
+        return out
+
+    def slopes(q: Array) -> Array:
+        turn = pole_pairs * (s.gamma - q[1])
+        part = -torque / (q[0] * np.cos(turn))
+        return np.column_stack([-part / q[0], -part * pole_pairs * np.tan(turn), lines])
+
+    start = linear(np.column_stack([-torque / np.cos(pole_pairs * s.gamma), lines]), current).terms
+    fit = nonlinear(model, current, np.concatenate([[1 / start[0], 0.0], start[1:]]), jacobian=slopes)
+    alpha, gamma_0 = (float(x) for x in fit.terms[:2])
+    return Balance(alpha, gamma_0, fit.covariance[:2, :2], current, lines @ fit.terms[2:], torque, fit)
+
+
+@dataclass(frozen=True)
+class Extra:
+    """What one more term would explain: its `value`, standard uncertainty `u` (from the residuals), and t = value / u."""
+
+    value: float
+    u: float
+
+    @property
+    def t(self) -> float:
+        return self.value / self.u if self.u > 0 else 0.0
+
+
+def extra(b: Balance, column: Array) -> Extra:
+    """Value of one more linear term with `column` (n,) A per unit, all other terms fitted along (a score test)."""
+    apart = column - b.fit.jacobian @ np.linalg.lstsq(b.fit.jacobian, column, rcond=None)[0]
+    size = float(apart @ apart)
+    if size <= 1e-12 * float(column @ column):
+        return Extra(0.0, math.inf)
+    value = float(apart @ b.fit.residuals) / size
+    dof = max(b.fit.dof - 1, 1)
+    rest = float(((b.fit.residuals - value * apart) ** 2).sum()) / dof
+    return Extra(value, math.sqrt(rest / size))
+
+
+def loaded(b: Balance) -> Array:
+    """Part of the fitted current that carries the loads, (n,) A."""
+    out: Array = b.current - b.fit.residuals - b.base
+    return out
+
+
+def ratio_of_sides(b: Balance, s: Steps) -> Extra:
+    """Relative excess of the torque on the left over that on the right that the data see beside the certificates."""
+    found = extra(b, loaded(b) * s.side)
+    return Extra(2 * found.value, 2 * found.u)
+
+
+def of_load(b: Balance, s: Steps, load: int) -> Extra:
+    """Relative excess of one load that would make it agree with the others."""
+    return extra(b, loaded(b) * (s.load == load))
+
+
+def shape_over_gamma(b: Balance, s: Steps) -> tuple[float, float]:
+    """Whether the torque follows the cosine: probability of the misfit by chance (F test of free slopes at every gamma),
+    and the largest relative deviation of a slope."""
+    angles, index = np.unique(s.gamma, return_inverse=True)
+    columns = np.column_stack([loaded(b) * (index == k) for k in range(len(angles))])
+    apart = columns - b.fit.jacobian @ np.linalg.lstsq(b.fit.jacobian, columns, rcond=None)[0]
+    terms = np.linalg.lstsq(apart, b.fit.residuals, rcond=1e-8)[0]
+    total = float((b.fit.residuals**2).sum())
+    rest = float(((b.fit.residuals - apart @ terms) ** 2).sum())
+    more = len(angles) - 2
+    dof = b.fit.dof - more
+    if dof < 1 or rest <= 0:
+        return 1.0, 0.0
+    return float(stats.f.sf((total - rest) / more / (rest / dof), more, dof)), float(np.abs(terms).max())
+
+
+def slopes_over_gamma(b: Balance, s: Steps, side: int) -> tuple[Array, Array, Array]:
+    """Phase angles (k,) rad, torque per current N m/A of one side's loads at each, and its u from the residuals."""
+    scatter = math.sqrt(b.fit.chi2 / b.fit.dof)
+    angles = np.unique(s.gamma)
+    slopes, u = [], []
+    for gamma in angles:
+        mine = (s.gamma == gamma) & (s.side == side)
+        torque, current = b.torque[mine], (b.current - b.base)[mine]
+        size = float(torque @ torque)
+        slope = -float(torque @ current) / size  # A per N m
+        slopes.append(1 / slope)
+        u.append(scatter / math.sqrt(size) / slope**2)
+    return angles, np.array(slopes), np.array(u)

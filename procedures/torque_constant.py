@@ -1,0 +1,295 @@
+"""Torque constant of the motor over the phase angle, by known weights on a lever (thesis 6.6.4, gravity added).
+
+Measurand: alpha_tau, torque per mean true current of the four segments at the home angle, peak over the phase angle gamma;
+with it gamma_0t, where over gamma that peak lies.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import Field
+
+from bench.errors import LinkError
+from bench.figures import Figure
+from bench.findings import Effect, Finding
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.rig import Rig
+from bench.rigfile import RigFile
+from bench.roles import NOTHING, Load, RigState
+from bench.uncertainty import Estimate, Influence, propagate
+from procedures import rotor
+from procedures import torque_constant_figures as drawn
+from procedures.estimators import torque_balance, torque_checks
+from procedures.estimators.direction import SEGMENTS, of_probe
+from procedures.estimators.inputs import certified
+from procedures.estimators.torque_balance import NO_DETENT, Balance, Detent
+from procedures.estimators.torque_data import CHANNELS, TorqueData, read_torques
+
+ALPHA_TAU = Quantity("alpha_tau", "N m/A", "torque per mean true segment current at the home angle, peak over gamma")
+GAMMA_0T = Quantity("gamma_0t", "rad", "phase angle at which the torque per current is largest")
+MEASURES = (ALPHA_TAU, GAMMA_0T)
+SIDES = ("left", "right")
+
+
+class Plan(BenchPlan):
+    """Settings of the calibration, SI."""
+
+    masses: tuple[str, ...] = Field(("M1", "M2", "M3"), min_length=2)  # labels of the rig's masses, ascending
+    gamma_max_rad: float = Field(0.0873, gt=0.01)  # phase angles from minus to plus this
+    gammas: int = Field(5, ge=5)  # equally spaced
+    bias_A: float = Field(3.0, gt=0)
+    settle_s: float = Field(2.0, gt=0)
+    average_s: float = Field(1.0, ge=0.1)
+    ki_theta: float = Field(300.0, gt=0)  # A/(rad s) of the angle's integrator while loads hang
+    detent_angles: int = Field(4, ge=4)  # over one period of the detent, without load
+    wiring_A: float = Field(1.5, gt=0)  # of i_x and i_y, to see which segment is which
+    max_angle_rad: float = Field(5e-3, gt=0)  # held: mean angle off home
+    max_drift_A: float = Field(0.03, gt=0)  # settled: drift of the torque current within a step
+    max_baseline_drift_A_s: float = Field(5e-5, gt=0)  # of the current without load, over the run
+    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
+
+
+def settings(plan: Plan) -> dict[str, float]:
+    """Lifted with the angle released: no loop is closed before the encoder's direction is known."""
+    return {"bias_i": plan.bias_A, "bias_o": plan.bias_A, **rotor.RELEASED}
+
+
+def phase_angles(plan: Plan) -> list[float]:
+    """The phase angles in rad, ascending."""
+    return [float(g) for g in np.linspace(-plan.gamma_max_rad, plan.gamma_max_rad, plan.gammas)]
+
+
+def sequence(plan: Plan) -> list[tuple[str, Load]]:
+    """Side and load of the steps at one phase angle: up on the left, down on the right, nothing before, between and after."""
+    up = [Load(label) for label in plan.masses]
+    nothing = ("", NOTHING)
+    return [nothing, *(("left", x) for x in up), nothing, *(("right", x) for x in reversed(up)), nothing]
+
+
+def step_count(plan: Plan) -> int:
+    """How many steps `acquire` records, for the progress display."""
+    return 1 + 4 + plan.detent_angles + plan.gammas * len(sequence(plan))
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Look at the wiring and the detent without load, then hang every mass on both ends at every phase angle."""
+    rotor.probe(rig, record)
+    rotor.hold(rig, plan.ki_theta)
+    if not _at_home(rig, record, 0.0):
+        return
+    _wiring(rig, plan, record)
+    for k in range(plan.detent_angles):
+        angle = 2 * math.pi / detent_order(rig.file) * k / plan.detent_angles
+        if not _at_home(rig, record, angle):
+            return
+        rig.clock.sleep(plan.settle_s)
+        with record.step("detent", angle_rad=angle):
+            rig.clock.sleep(plan.average_s)
+    if not _at_home(rig, record, 0.0):
+        return
+    for gamma in phase_angles(plan):
+        rig.levitation.set("gamma", gamma)
+        _loads(rig, plan, record, gamma)
+    rig.levitation.set("gamma", 0.0)
+    rotor.hold(rig)
+
+
+def _at_home(rig: Rig, record: Recorder, angle: float) -> bool:
+    """Turn to an angle and wait until the rotor stands there; a rotor that does not is told in the recording."""
+    try:
+        rig.rotation.point(angle)
+    except LinkError as error:
+        rig.clock.sleep(0.1)  # a link that is lost says so again by itself
+        record.event("not-held", angle=angle, text=str(error))
+        rotor.release(rig)
+        return False
+    return True
+
+
+def _wiring(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Sideways currents of both signs, to see in the outboard AMB's currents which segment is which."""
+    ramp = rig.file.parameters["i_ramp"].default
+    for name, other in (("i_x", "i_y"), ("i_y", "i_x")):
+        for value in (plan.wiring_A, -plan.wiring_A):
+            rig.levitation.set(name, value)
+            rig.clock.sleep(2 * plan.wiring_A / ramp + min(plan.settle_s, 0.5))
+            with record.step("wiring", **{name: value, other: 0.0}):
+                rig.clock.sleep(0.2)
+        rig.levitation.set(name, 0.0)
+    rig.clock.sleep(plan.wiring_A / ramp + min(plan.settle_s, 0.5))
+
+
+def _loads(rig: Rig, plan: Plan, record: Recorder, gamma: float) -> None:
+    hanging = ""
+    for side, load in sequence(plan):
+        if hanging and hanging != side:
+            rig.operator.lever("left" if hanging == "left" else "right", NOTHING)
+        if side:
+            rig.operator.lever("left" if side == "left" else "right", load)
+        hanging = side
+        rig.clock.sleep(plan.settle_s)
+        with record.step("lever", gamma_rad=gamma, side=side, load=load.label):
+            rig.clock.sleep(plan.average_s)
+
+
+def detent_order(rig: RigFile) -> float:
+    """Periods of the detent in a turn: the poles."""
+    return 2 * rig.machine["pole_pairs"].value
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Everything the measurements, findings and figures are made of."""
+
+    data: TorqueData
+    inputs: dict[str, Estimate]
+    detent: Detent
+    balance: Balance
+    estimates: dict[str, Estimate]
+
+
+def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
+    """Findings first (they decide what the numbers are worth), then both quantities."""
+    early = [*of_probe(recording), *torque_checks.of_events(recording)]
+    yield from early
+    if early:
+        return
+    data = read_torques(recording, recording.plan.masses)
+    wrong = list(torque_checks.of_signals(data, recording.plan))
+    yield from wrong
+    if any(f.effect is Effect.ERROR for f in wrong):
+        return
+    a = evaluate(recording, data)
+    values = {name: e.value for name, e in a.inputs.items()}
+    yield from torque_checks.of_fit(
+        data, a.balance, a.detent, values, masses_u(recording), arms_u(recording.rig), recording.plan
+    )
+    for quantity in MEASURES:
+        yield quantity.measured(a.estimates[quantity.name])
+
+
+def evaluate(recording: Recording[Plan], data: TorqueData) -> Analysis:
+    """Fit and estimates with their influences."""
+    plan, rig = recording.plan, recording.rig
+    inputs, pairs, count = fit_inputs(rig, plan), rig.machine["pole_pairs"].value, len(plan.masses)
+    held = NO_DETENT
+    if len(data.detent_angle):
+        held = torque_balance.detent(data.detent_angle, data.detent_current, detent_order(rig))
+
+    def model(p: dict[str, float]) -> dict[str, float]:
+        fitted = torque_balance.balance(data.steps, p, count, pairs, held)
+        return {"alpha_tau": fitted.alpha, "gamma_0t": fitted.gamma_0}
+
+    found = torque_balance.balance(data.steps, {n: e.value for n, e in inputs.items()}, count, pairs, held)
+    estimates = propagate(model, inputs)
+    root = np.linalg.cholesky(found.covariance)
+    parts = [
+        Influence(id=f"scatter/{k + 1}", name=f"scatter of the steps ({k + 1})", u=1.0, unit="1", kind="A",
+                  distribution="normal", dof=float(found.fit.dof), source="residuals of the fit")
+        for k in range(2)
+    ]  # fmt: skip
+    for row, name in enumerate(("alpha_tau", "gamma_0t")):
+        for k in range(row + 1):
+            estimates[name] = estimates[name] + Estimate.of(0.0, parts[k]) * float(root[row, k])
+    return Analysis(data, inputs, held, found, estimates)
+
+
+def fit_inputs(rig: RigFile, plan: Plan) -> dict[str, Estimate]:
+    """What the fit needs besides the recording: certificates of the rig file, each as an influence by identity."""
+    inputs = {
+        "gravity": certified("site/gravity", rig.site.gravity, "local gravity"),
+        "air_density": certified("site/air_density", rig.site.air_density, "air density (buoyancy)"),
+        "mass_density": certified("masses/density", rig.mass_density, "density of the masses (buoyancy)"),
+    }
+    for side in SIDES:
+        name = f"lever_{side}"
+        inputs[name] = certified(f"geometry/{name}", rig.geometry[name], f"arm of the lever, {side}")
+    for k, label in enumerate(plan.masses):
+        inputs[f"mass_{k}"] = certified(f"masses/{label}", rig.masses[label], f"mass {label}")
+    for k, channel in enumerate(SEGMENTS, 1):
+        inputs[f"gain_{k}"] = certified(f"sensors/{channel}/gain", rig.sensors[channel].gain, f"gain of {channel}")
+    return inputs
+
+
+def masses_u(recording: Recording[Plan]) -> list[float]:
+    """Relative standard uncertainty of each mass."""
+    masses = [recording.rig.masses[m] for m in recording.plan.masses]
+    return [m.standard_uncertainty / m.value for m in masses]
+
+
+def arms_u(rig: RigFile) -> float:
+    """Relative standard uncertainty of the ratio of the arms."""
+    arms = [rig.geometry[f"lever_{side}"] for side in SIDES]
+    return math.hypot(*(a.standard_uncertainty / a.value for a in arms))
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts."""
+    yield from rotor.missing(rig, CHANNELS, ("gamma", "i_x", "i_y", "i_ramp", "bias_i", "bias_o"), SEGMENTS)
+    for table, names, found in (
+        ("geometry", [f"lever_{s}" for s in SIDES], rig.geometry),
+        ("machine", ["pole_pairs"], rig.machine),
+    ):
+        if lacking := [n for n in names if n not in found]:
+            yield f"{table}: found no {', '.join(lacking)}; the torque of the loads needs it"
+            return
+    unknown = [m for m in plan.masses if m not in rig.masses]
+    if unknown:
+        yield f"masses: found {', '.join(unknown)}; the rig file certifies {', '.join(rig.masses)}"
+        return
+    kg = [rig.masses[m].value for m in plan.masses]
+    if kg != sorted(kg) or len(set(kg)) != len(kg):
+        yield f"masses: found {kg} kg; expected different masses in ascending order"
+    turn = plan.gamma_max_rad * rig.machine["pole_pairs"].value
+    if turn > math.pi / 3:
+        yield (f"gamma_max_rad: found {plan.gamma_max_rad:g} rad, {math.degrees(turn):.0f} deg of the electrical turn; "
+               "expected 60 deg or less, where the motor still has half of its torque")  # fmt: skip
+
+
+def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+    """Torque over current per side, the constant over gamma with residuals, detent, one step; empty without a fit."""
+    if [*of_probe(recording), *torque_checks.of_events(recording)]:
+        return ()
+    data = read_torques(recording, recording.plan.masses)
+    if any(f.effect is Effect.ERROR for f in torque_checks.of_signals(data, recording.plan)):
+        return ()
+    a = evaluate(recording, data)
+    return drawn.all_figures(recording, data, a.balance, a.detent, recording.rig.machine["pole_pairs"].value)
+
+
+METHOD = """\
+Both radial AMBs levitate the shaft and the motor holds it at its home angle. Known masses hang from the left and from the
+right end of a lever on the shaft, with nothing before, between and after, at phase angles gamma on both sides of zero. The
+torque current i is the mean of the four segments' currents, freed of the gains of their sensors.
+
+At all phase angles together, alpha_tau cos(M (gamma - gamma_0)) (i - i_base) = -W l (left), +W l (right) is fitted by least
+squares on the current. W is the conventional mass times local gravity, corrected for buoyancy; i_base is a straight line in
+time at each gamma. Detent, offsets of the sensors and any other constant torque are in i_base; the small difference that
+detent makes where the rotor stands a count of the encoder off home is taken off by the detent measured before.
+
+Sideways currents and the outboard AMB's answer show that the segments are wired as they are called.
+
+What no data can show: an error common to all masses, to gravity or to both arms scales alpha_tau by itself, and so does a
+common gain error of the four current sensors. A lever that is not level by 1 deg takes 0.015 % off every torque.
+"""
+
+procedure = Procedure(
+    name="torque-constant",
+    title="Torque constant of the motor over the phase angle by weights on a lever",
+    measures=MEASURES,
+    state=RigState.LEVITATED,
+    plan=Plan,
+    acquire=acquire,
+    analyse=analyse,
+    figures=figures,
+    check=check,
+    settings=settings,
+    step_count=step_count,
+    method=METHOD,
+)

@@ -1,0 +1,88 @@
+"""What the torque calibration draws: torque over current, the constant over gamma, residuals, detent, and one step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.figures import Figure, Series
+from bench.recording import Recording
+from procedures.estimators import torque_balance
+from procedures.estimators.direction import SEGMENTS
+from procedures.estimators.torque_balance import Balance, Detent
+from procedures.estimators.torque_data import TorqueData
+
+Array = npt.NDArray[np.float64]
+SIDES = ((1, "left"), (-1, "right"))
+
+
+def all_figures(recording: Recording[Any], data: TorqueData, b: Balance, held: Detent, pairs: float) -> list[Figure]:
+    """In the order of the report."""
+    return [_torque(data, b, pairs), _over_gamma(data, b, pairs), _residuals(data, b), _detent(data, b, held),
+            *_one_step(recording)]  # fmt: skip
+
+
+def _torque(data: TorqueData, b: Balance, pairs: float) -> Figure:
+    s, series = data.steps, []
+    angles = np.unique(s.gamma)
+    for gamma in (angles[len(angles) // 2], angles[-1]):
+        slope = b.alpha * math.cos(pairs * (gamma - b.gamma_0))
+        name = f"{math.degrees(gamma):+.1f}°"
+        for side, label in SIDES:
+            mine = (s.gamma == gamma) & (s.side == side)
+            series.append(Series(f"{name}, {label}", (b.current - b.base)[mine], b.torque[mine], "points"))
+        reach = float(np.abs((b.current - b.base)[s.gamma == gamma]).max())
+        series.append(Series(f"{name}, fit", np.array([-reach, reach]), -slope * np.array([-reach, reach])))
+    return Figure("torque", "Torque of the loads over the torque current", "Loads on the left turn the rotor forward and take "
+                  "negative current. Current without load is taken off.", "torque current (A)", "torque (N m)",
+                  tuple(series))  # fmt: skip
+
+
+def _over_gamma(data: TorqueData, b: Balance, pairs: float) -> Figure:
+    series = []
+    for side, label in SIDES:
+        angles, slopes, u = torque_balance.slopes_over_gamma(b, data.steps, side)
+        series.append(Series(label, np.degrees(angles), slopes, "points", 2 * u))
+    grid = np.linspace(data.steps.gamma.min(), data.steps.gamma.max(), 120)
+    series.append(Series("fit", np.degrees(grid), b.alpha * np.cos(pairs * (grid - b.gamma_0))))
+    return Figure("constant", "Torque per current over the phase angle", "One slope at each phase angle and side with its 95 % "
+                  "interval by the scatter, and the fitted cosine, whose peak is the torque constant.", "phase angle (deg)",
+                  "torque per current (N m/A)", tuple(series))  # fmt: skip
+
+
+def _residuals(data: TorqueData, b: Balance) -> Figure:
+    s, series = data.steps, []
+    for side, label in (*SIDES, (0, "no load")):
+        mine = s.side == side
+        series.append(Series(label, np.degrees(s.gamma[mine]), 1e3 * b.fit.residuals[mine], "points"))
+    return Figure("residuals", "Residuals of the fit", "Torque current less the fit, every step; a pattern over the phase "
+                  "angle would be no cosine, one by side an arm.", "phase angle (deg)", "residual (mA)", tuple(series),
+                  lines=(("zero", 0.0),))  # fmt: skip
+
+
+def _detent(data: TorqueData, b: Balance, held: Detent) -> Figure:
+    grid = np.linspace(0, 2 * math.pi / held.order, 100)
+    curve = held.constant + held.cosine * np.cos(held.order * grid) + held.sine * np.sin(held.order * grid)
+    return Figure("detent", "Torque that holds the rotor without load", "Over one period of the detent; the constant part also "
+                  "has the offsets of the current sensors.", "rotor angle (deg)", "torque (mN m)",
+                  (Series("held", np.degrees(data.detent_angle), 1e3 * b.alpha * data.detent_current, "points"),
+                   Series("fit", np.degrees(grid), 1e3 * b.alpha * curve)))  # fmt: skip
+
+
+def _one_step(recording: Recording[Any]) -> Iterator[Figure]:
+    heaviest = recording.plan.masses[-1]
+    step = next(s for s in recording.steps("lever") if s.labels["load"] == heaviest)
+    before = round(1.5e9)
+    data = recording.read(("angle", *SEGMENTS), step.start_ns - before, step.end_ns)
+    t = (data["t_ns"] - step.start_ns).astype(np.float64) * 1e-9
+    current = np.mean([data[c] for c in SEGMENTS], axis=0)
+    smooth = np.convolve(current, np.ones(20) / 20, "same")[10:-10]
+    yield Figure("step-current", f"Torque current about one step ({heaviest})", "Running mean over 20 ms; the step begins at "
+                 "zero. The current steps between two counts of the encoder until the rotor rests on one.", "time (s)",
+                 "torque current (A)", (Series("mean of the segments", t[10:-10], smooth),))  # fmt: skip
+    yield Figure("step-angle", f"Angle about one step ({heaviest})", "The encoder's counts in the same span.", "time (s)",
+                 "angle (mrad)", (Series("angle", t, 1e3 * data["angle"]),), lines=(("home", 0.0),))  # fmt: skip
