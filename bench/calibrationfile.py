@@ -203,6 +203,8 @@ def attached(text: str, name: str) -> tuple[Calibration, ...]:
     """
     try:
         entries = json.loads(text)
+        if not isinstance(entries, list):
+            raise TypeError(f"found a {type(entries).__name__}; expected a list")
         parts = [(e["state"], json.dumps(e["calibration"])) for e in entries]
     except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise ConfigError(f"{name}: calibrations.json cannot be understood: {error!r}") from error
