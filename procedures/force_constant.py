@@ -155,24 +155,29 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     if any(f.code in force_findings.FATAL for f in found):
         return
     a = evaluate(recording, data)
-    yield from findings(recording, a)
+    if not any(f.code == "unsettled" for f in found):  # or the fit would be blamed for what moves
+        yield from contradictions(recording, a)
+    yield from _ripple(recording.rig, recording.plan)
+    yield from _notes(recording.rig, a)
     yield ALPHA_D.measured(a.y.mean)
     yield ALPHA_DX.measured(a.x.mean)
 
 
-def findings(recording: Recording[Plan], a: Analysis) -> Iterator[Finding]:
-    """Checks of the fits, then what the report must say besides."""
+def contradictions(recording: Recording[Plan], a: Analysis) -> Iterator[Finding]:
+    """Checks of the fits: wires, rows, levels, drift, axes."""
     plan = recording.plan
+    vertical: list[Finding] = []
     for axis, result in (("y", a.y), ("x", a.x)):
-        wrong = list(force_findings.exchanged(axis, result.fit.terms))
-        yield from wrong or _contradictions(axis, result, a, plan)
-        yield from force_findings.wander(axis, *_drift(result), a.data, plan)
+        wrong = list(force_findings.exchanged(axis, result.fit.terms)) or list(_fits(axis, result, a, plan))
+        drift = list(force_findings.wander(axis, *_drift(result), a.data, plan))
+        yield from drift
+        if axis == "y" or not vertical:  # the horizontal constants rest on the vertical ones
+            yield from wrong
+        vertical = vertical or wrong
     yield from _axes(a)
-    yield from _ripple(recording.rig, plan)
-    yield from _notes(recording.rig, a)
 
 
-def _contradictions(axis: str, result: AxisResult, a: Analysis, plan: Plan) -> Iterator[Finding]:
+def _fits(axis: str, result: AxisResult, a: Analysis, plan: Plan) -> Iterator[Finding]:
     force, moment = (e.value for e in result.row_means)
     parts = force_estimates.differences(result)
     hint = force_estimates.suspect(a.data.vertical, a.inputs, plan.bias_A, result) if axis == "y" else ""

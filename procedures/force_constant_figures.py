@@ -10,7 +10,7 @@ import numpy.typing as npt
 from bench.figures import Figure, Series
 from bench.uncertainty import Estimate
 from procedures.estimators.force_estimates import AxisResult
-from procedures.estimators.force_rows import FORCE, MOMENT
+from procedures.estimators.force_rows import DIRECT, FORCE, MOMENT
 from procedures.estimators.ramp_data import RampData
 
 Array = npt.NDArray[np.float64]
@@ -27,18 +27,17 @@ def all_figures(data: RampData, y: AxisResult, x: AxisResult, alone: AxisResult)
 
 
 def _forces(axis: str, r: AxisResult) -> Figure:
-    """Every angle's steps without that angle's constant."""
+    """Every angle's steps without what its fit has besides the axis' own current."""
     f = r.fit
-    series = [
-        Series(name, f.current.reshape(-1), (f.rows[row] - f.terms[row, :, :1]).reshape(-1), "points")
-        for row, name in ROWS
-    ]
-    grid = np.linspace(f.current.min(), f.current.max(), 2)
-    series.append(Series("mean fit", grid, r.mean.value * grid))
+    i = f.current.reshape(-1)
+    own = f.terms[:, :, [DIRECT]] * f.current + f.residuals
+    series = [Series(name, i, own[row].reshape(-1), "points") for row, name in ROWS]
+    ends = np.array([i.min(), i.max()])
+    series.append(Series("mean over a turn", ends, r.mean.value * ends))
     return Figure(f"force-{axis}", f"{NAMES[axis].capitalize()} force of the motor over its current",
-                  f"Force from the AMBs by the force row and by the moment row against i_{axis}, all angles; each angle's "
-                  "constant part is taken off. What scatters about the line at one current is the ripple over the angle and "
-                  "the other axis' current; residuals are drawn apart.",
+                  f"Force from the AMBs by the force row and by the moment row against i_{axis}, all angles, freed of each "
+                  "angle's constant, of the other axis' current, of branch and drift. What scatters at one current is the "
+                  "ripple over the angle; residuals are drawn apart.",
                   f"i_{axis} (A)", "force (N)", tuple(series))  # fmt: skip
 
 

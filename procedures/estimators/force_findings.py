@@ -112,6 +112,13 @@ def _segments(data: RampData) -> Iterator[Finding]:
     design = np.stack([np.ones_like(data.level_y), data.level_y, data.level_x], axis=-1).reshape(-1, 3)
     solver = np.linalg.pinv(design)[1:]
     answer = np.array([solver @ data.mean[c].reshape(-1) for c in SEGMENT_CHANNELS])  # (4, 2): per i_y, per i_x
+    expected = np.array([[1.0, 0.0], [0.0, -1.0], [-1.0, 0.0], [0.0, 1.0]])
+    reversed_ = (answer * expected).sum(axis=1) < -0.5
+    if reversed_.sum() == 1:
+        k = int(np.argmax(reversed_))
+        text = f"the current of segment {k + 1} reads with the opposite sign: check the sign of its sensor."
+        yield Finding("segment-sign", text, f"i_m{k + 1}", Effect.ERROR)
+        return
     torque = answer.mean(axis=0)
     for axis, name in ((0, "i_y"), (1, "i_x")):
         if abs(torque[axis]) > 2 * FOLLOWS:
@@ -125,7 +132,6 @@ def _segments(data: RampData) -> Iterator[Finding]:
                 Effect.ERROR,
             )
             return
-    expected = np.array([[1.0, 0.0], [0.0, -1.0], [-1.0, 0.0], [0.0, 1.0]])
     off = np.abs(answer - torque - expected).max(axis=1)
     if off.max() > FOLLOWS:
         k = int(np.argmax(off))
@@ -196,8 +202,9 @@ def wander(axis: str, drift: Array, u: Array, data: RampData, plan: Tolerances) 
         return
     both = bool(abs(drift[0] - drift[1]) < 5 * math.hypot(*u) + 0.1 * np.abs(drift).max())
     pair = SEGMENTS[axis][0]
+    bearing = "outboard" if abs(drift[1]) < 0.2 * abs(drift[0]) else "inboard"
     what = (f"both rows agree, so the motor's force itself drifts: the current sensor of segment {pair[0]} or {pair[1]}"
-            if both else f"the rows do not agree, so it is an AMB: a coil current sensor of axis {axis}")  # fmt: skip
+            if both else f"the rows do not agree, so it is a coil sensor of the {bearing} AMB, axis {axis}")  # fmt: skip
     yield Finding(
         "drifting-sensor",
         f"at a constant level the force along {axis} drifts by {total[0]:+.2f} N (force row) and {total[1]:+.2f} N (moment "
