@@ -216,10 +216,13 @@ def _drifting(data: TorqueData, zero: npt.NDArray[np.bool_], t: Array, drift: fl
     """The segment whose drift explains the pull to the side: one whose sensor drifts by d lowers its true current by d, which
     is a drift of i_x or i_y by d/2; the phase angle turns the pull by M gamma, as nearly as both force constants are alike."""
     turn = pairs * data.steps.gamma[zero]
-    c, q, nothing, one = np.cos(turn) * t, np.sin(turn) * t, np.zeros_like(t), np.ones_like(t)
-    pull_x = data.wiring @ np.array([[c, -q], [q, c]]).reshape(2, -1)
-    answer_x, answer_y = pull_x[0].reshape(2, -1), pull_x[1].reshape(2, -1)
-    design = np.vstack([np.column_stack([*answer_x, one, nothing]), np.column_stack([*answer_y, nothing, one])])
+    c, q = np.cos(turn), np.sin(turn)
+    rows = []
+    for to_x, to_y in data.wiring:  # control current over the true i_x and i_y at this phase angle
+        pull = np.column_stack([to_x * c + to_y * q, to_y * c - to_x * q])
+        rows.append(np.column_stack([pull * t[:, None], pull]))
+    nothing, one = np.zeros_like(t), np.ones_like(t)
+    design = np.vstack([np.column_stack([rows[0], one, nothing]), np.column_stack([rows[1], nothing, one])])
     seen = np.concatenate([data.side_x[zero], data.side_y[zero]])
     found = np.linalg.lstsq(design, seen, rcond=None)[0][:2]  # A/s of i_x, i_y
     expected = np.array([[0.0, -drift / 2], [drift / 2, 0.0], [0.0, drift / 2], [-drift / 2, 0.0]])
