@@ -174,6 +174,11 @@ class Plant:
         self._s.ring_inertia = inertia
 
     @property
+    def slip(self) -> float:
+        """How far the lever has slipped since a mass was hung on it, rad, for tests."""
+        return float(self._s.slip)
+
+    @property
     def shaft_speed(self) -> float:
         """True speed of the shaft, rad/s."""
         return float(self._s.s[11])

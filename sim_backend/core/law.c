@@ -146,6 +146,7 @@ void tsbs_law(const tsbs_control *c, tsbs_law_state *l, const tsbs_reading *r, t
     memset(out, 0, sizeof *out);
     if (l->fresh) { /* first tick after a change from rest: no derivative kick, references start where the rotor lies */
         memcpy(l->previous, plane, sizeof plane);
+        memcpy(l->motor_previous, y + 2, sizeof l->motor_previous);
         l->angle_previous = l->goal_previous = r->angle;
         if (l->mode == LIFT) {
             memcpy(l->rest, plane, sizeof plane);
