@@ -30,6 +30,7 @@ PROCEDURES = (
     Entry("force-coupling", "procedures.force_coupling", "Force coupling of the motor over the phase angle"),
     Entry("torque-constant", "procedures.torque_constant", "Torque constant of the motor by weights on a lever"),
     Entry("spindown", "procedures.spindown", "Drag of the levitated rotor by spindown"),
+    Entry("angle-step", "procedures.angle_step", "Angle step while the motor carries: static against priority currents"),
 )
 
 

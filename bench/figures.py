@@ -24,7 +24,8 @@ class Series:
 
 @dataclass(frozen=True)
 class Figure:
-    """One figure: `kind` "xy", or "polar" with x an angle in rad. Values are in the units that the labels name."""
+    """One figure: `kind` "xy", "plane" (xy with equal scales), or "polar" with x an angle in rad. Values are in the units
+    that the labels name."""
 
     key: str  # file-safe, unique in a report
     title: str
@@ -32,5 +33,5 @@ class Figure:
     x_label: str
     y_label: str
     series: tuple[Series, ...]
-    kind: Literal["xy", "polar"] = "xy"
+    kind: Literal["xy", "plane", "polar"] = "xy"
     lines: tuple[tuple[str, float], ...] = field(default=())  # horizontal lines: label, y

@@ -193,6 +193,8 @@ def _plain_axes(axes: Axes, figure: Figure) -> list[Artist]:
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
     axes.margins(x=0.04, y=0.08)
+    if figure.kind == "plane":
+        axes.set_aspect("equal", adjustable="datalim")
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 2.5, 5, 10]))
         axis.set_major_formatter(_tick_text())

@@ -1,0 +1,80 @@
+"""Whether the motor's segments are wired as they should be, from small pushes against the AMBs (`procedures.wiring`)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.findings import Effect, Finding
+from bench.recording import Recording
+
+Array = npt.NDArray[np.float64]
+SEGMENTS = ("i_m1", "i_m2", "i_m3", "i_m4")
+OUTBOARD = ("i_xo_p", "i_xo_n", "i_yo_p", "i_yo_n")
+FATAL = ("segments-exchanged", "segment-sign", "no-push")
+"""Findings after which nothing else is measured."""
+EXPECTED = {"i_y": np.array([1.0, 0.0, -1.0, 0.0]), "i_x": np.array([0.0, -1.0, 0.0, 1.0])}  # (6.9), per A
+OFF = 0.15  # A per A, share of a segment's current that certificates and amplifiers cannot explain
+LEAST, CROSS = 0.05, 0.3  # A of the outboard AMB per A; cross over own: half a degree of encoder zero makes 8 %
+
+
+def of_nudges(recording: Recording[Any]) -> Iterator[Finding]:
+    """Segment by segment by their own sensors, then by the force that the outboard AMB feels."""
+    means = {}
+    for step in recording.steps("nudge"):
+        data = step.read(*SEGMENTS, *OUTBOARD)
+        i_x, i_y = float(step.labels["i_x_A"]), float(step.labels["i_y_A"])
+        means[(bool(i_x), bool(i_y))] = (max(i_x, i_y), np.array([data[c].mean() for c in (*SEGMENTS, *OUTBOARD)]))
+    if len(means) < 3:
+        return
+    rest = means[(False, False)][1]
+    answers = {name: (means[key][1] - rest) / means[key][0]
+               for name, key in (("i_y", (False, True)), ("i_x", (True, False)))}  # fmt: skip
+    found = list(_segments(answers))
+    yield from found or _pushes(answers)
+
+
+def _segments(answers: dict[str, Array]) -> Iterator[Finding]:
+    for name, answer in answers.items():
+        error = answer[:4] - EXPECTED[name]
+        if np.abs(error).max() <= OFF:
+            continue
+        k = int(np.argmax(np.abs(error)))
+        yield Finding(
+            "segment-sign",
+            f"with 1 A of {name}, segment {k + 1} reads {answer[k]:+.2f} A where (6.9) gives {EXPECTED[name][k]:+.0f} A: its "
+            "current sensor is connected the wrong way round or to another segment, or a force of this axis gives torque "
+            "that the angle's control works against.",
+            SEGMENTS[k], Effect.ERROR,
+        )  # fmt: skip
+        return
+
+
+def _pushes(answers: dict[str, Array]) -> Iterator[Finding]:
+    for name, own_axis in (("i_y", 1), ("i_x", 0)):
+        answer = answers[name][4:]
+        push = np.array([answer[0] - answer[1], answer[2] - answer[3]]) / 2  # outboard AMB, x and y, A per A
+        own, across = float(push[own_axis]), float(push[1 - own_axis])
+        if abs(across) > CROSS * abs(own) and abs(across) > LEAST:
+            yield Finding(
+                "segments-exchanged",
+                f"1 A of {name} changes the outboard AMB's control current by {own:+.3f} A along its own axis and by "
+                f"{across:+.3f} A across: two neighbouring segments are exchanged, or the commutation is far off.",
+                name, Effect.ERROR,
+            )  # fmt: skip
+        elif own > LEAST:
+            yield Finding(
+                "segments-exchanged",
+                f"1 A of {name} burdens the outboard AMB by {own:+.3f} A where it should relieve it: two opposite segments "
+                "are exchanged, or a sign of the current sensors is wrong.",
+                name, Effect.ERROR,
+            )  # fmt: skip
+        elif abs(own) < LEAST:
+            yield Finding(
+                "no-push",
+                f"1 A of {name} changes the outboard AMB's control current by {own:+.3f} A only: the motor hardly pushes.",
+                name, Effect.ERROR,
+            )  # fmt: skip
