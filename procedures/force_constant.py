@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -133,9 +134,16 @@ class Analysis:
     alone: AxisResult
 
 
-def evaluate(recording: Recording[Plan], data: RampData) -> Analysis:
-    """Both axes with their influences."""
-    plan, rig = recording.plan, recording.rig
+@lru_cache(maxsize=1)
+def ramps_of(recording: Recording[Plan]) -> RampData:
+    """The steps of a recording. Kept, because findings and fits both need them."""
+    return read_ramps(recording)
+
+
+@lru_cache(maxsize=1)
+def evaluate(recording: Recording[Plan]) -> Analysis:
+    """Both axes with their influences. Kept, because measurements, facts and figures all need it."""
+    plan, rig, data = recording.plan, recording.rig, ramps_of(recording)
     facts = recording.calibration(CALIBRATION).values
     count = len(data.vertical.angles)
     shared = force_estimates.fact_inputs(facts, count)
@@ -149,12 +157,12 @@ def evaluate(recording: Recording[Plan], data: RampData) -> Analysis:
 
 def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     """Findings first (they decide what the numbers are worth), then both constants."""
-    data = read_ramps(recording)
+    data = ramps_of(recording)
     found = list(force_findings.of_signals(data, recording.plan))
     yield from found
     if any(f.code in force_findings.FATAL for f in found):
         return
-    a = evaluate(recording, data)
+    a = evaluate(recording)
     if not any(f.code == "unsettled" for f in found):  # or the fit would be blamed for what moves
         yield from contradictions(recording, a)
     yield from _ripple(recording.rig, recording.plan)
@@ -241,16 +249,17 @@ def _notes(rig: RigFile, a: Analysis) -> Iterator[Finding]:
 
 def facts(recording: Recording[Plan]) -> dict[str, Estimate]:
     """What later procedures use: both constants, and the vertical one at each angle (home is 0)."""
-    a = evaluate(recording, read_ramps(recording))
-    return {"alpha_d": a.y.mean, "alpha_dx": a.x.mean, **{f"alpha_d@{k}": e for k, e in enumerate(a.y.angles)}}
+    a = evaluate(recording)
+    found = {"alpha_d": a.y.mean, "alpha_dx": a.x.mean, **{f"alpha_d@{k}": e for k, e in enumerate(a.y.angles)}}
+    return {name: replace(e, unit=ALPHA_D.unit) for name, e in found.items()}
 
 
 def figures(recording: Recording[Plan]) -> Iterable[Figure]:
     """Forces, residuals, constants over the angle, and the budgets; empty when the data carry no fit."""
-    data = read_ramps(recording)
+    data = ramps_of(recording)
     if any(f.code in force_findings.FATAL for f in force_findings.of_signals(data, recording.plan)):
         return ()
-    a = evaluate(recording, data)
+    a = evaluate(recording)
     return drawn.all_figures(a.data, a.y, a.x, a.alone)
 
 

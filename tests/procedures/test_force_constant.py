@@ -73,7 +73,7 @@ def test_a_sound_rig_is_recovered_within_its_intervals(sound: Simulated) -> None
 def test_what_the_calibration_shares_is_in_the_report(sound: Simulated) -> None:
     """Without the sensors of this run alone the AMBs give alpha_d to a few hundredths of a per cent; taken alone the
     calibration would leave 0.3 % and more."""
-    a = evaluate(sound.recording, read_ramps(sound.recording))
+    a = evaluate(sound.recording)
     by_ambs = [v for k, v in a.y.mean.contributions.items() if not k.startswith("sensors/i_m")]
     assert sum(v**2 for v in by_ambs) ** 0.5 < 6e-4 * a.y.mean.value
     assert a.alone.mean.u > 2 * a.y.mean.u
