@@ -16,6 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, Template, Templa
 from markupsafe import Markup
 
 from bench.errors import BenchError
+from reports.campaign_symbols import with_subscripts
 from reports.campaign_view import SummaryView
 from reports.pdf import _FIRST_WIDE, _seconds
 
@@ -37,6 +38,7 @@ def _template() -> Template:
         loader=PackageLoader("reports", "templates"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
+    environment.filters["subscripts"] = with_subscripts
     return environment.get_template("campaign.html.j2")
 
 

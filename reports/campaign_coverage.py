@@ -9,8 +9,9 @@ import numpy as np
 
 from bench.campaign_bands import Coverage, Sample
 from bench.campaign_speed import Speed
-from reports import campaign_figures, tables, text
+from reports import campaign_figures, text
 from reports.campaign_model import _Numbers
+from reports.campaign_symbols import symbol
 from reports.campaign_view import Cell, Grid, Section, SummaryView
 from reports.compose import _TONES
 from reports.view import Fact
@@ -132,7 +133,7 @@ def _table(quantities: Sequence[Quantity]) -> Grid:
             reach = f"{c.width_range[0]:.2f} to {high}"
         verdict = c.verdict.value
         rows.append((
-            Cell(symbol=tables.symbol_of(q.name), small=q.about),
+            Cell(symbol=symbol(q.name), small=_about(q)),
             Cell(f"{c.coverage:.4f}", f"{c.hits} of {c.rigs}", strong=True),
             Cell("–" if c.width is None else f"{c.width:.3f}", reach, strong=True),
             Cell(text.with_unit(text.significant(c.mean_U), q.unit)),
@@ -141,6 +142,11 @@ def _table(quantities: Sequence[Quantity]) -> Grid:
         ))  # fmt: skip
     header = ("Quantity", "Coverage", "Width", "Mean U", "Mean error / s.d.", "")
     return Grid(header, (3.2, 1.3, 1.4, 1.4, 1.2, 1.6), tuple(rows), (1, 2, 3, 4))
+
+
+def _about(q: Quantity) -> str:
+    place = q.name.partition("@")[2]
+    return f"({place}) {q.about}" if place else q.about
 
 
 def _judged(q: Quantity) -> campaign_figures.Judged:

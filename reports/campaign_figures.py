@@ -15,8 +15,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure as Canvas
 
+from reports.campaign_symbols import axis_label as label
 from reports.figures import GRID, INK, PALETTE, STYLE, Drawn, _with_own_ids
-from reports.text import symbol
 
 Array = npt.NDArray[np.float64]
 WIDE_IN = 6.85  # 174 mm: the A4 text block
@@ -55,12 +55,6 @@ class Judged:
     seeds: Array
     ratios: Array
     holds: npt.NDArray[np.bool_]
-
-
-def label(name: str) -> str:
-    """A quantity's name on an axis: `K_i` as K with its subscript, set by matplotlib's own maths."""
-    letter, subscript = symbol(name)
-    return f"${letter}_{{\\mathrm{{{subscript}}}}}$" if subscript else name.replace("$", "")
 
 
 def uncertainties(constants: Sequence[Made]) -> Drawn:
@@ -130,12 +124,11 @@ def correlations(names: Sequence[str], matrix: Sequence[Sequence[float]]) -> Dra
                               va="center", fontsize=6.2 if n <= 14 else 5.0,
                               color="white" if abs(value) > 0.6 else INK)  # fmt: skip
 
-    side = min(WIDE_IN, 1.3 + 0.34 * n)
     return _drawn(
         "correlations", "Correlations along the chain",
         "Correlation coefficients between the constants, from the influences that they share; below 0.005 left empty. "
         "A model that uses several constants needs these: the full matrix is in model.json.",
-        (side, side), paint,
+        (WIDE_IN, min(WIDE_IN, 1.0 + 0.27 * n)), paint,
     )  # fmt: skip
 
 

@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from bench.campaign_model import Constant, Given, Model
+from bench.campaign_model import Constant, Given, Matrix, Model
 from bench.figures import Figure
-from reports import campaign_figures, figures, tables, text
+from reports import campaign_figures, figures, text
+from reports.campaign_symbols import place, symbol
 from reports.campaign_view import Cell, Grid, Picture, Section, SummaryView
 from reports.compose import _TONES
 from reports.figures import Drawn
 from reports.view import SIMULATED, Fact, FigureEntry, Tone
 
-NAMED = 3  # largest influences that a row of the table names
+NAMED, LEAST = 3, 0.005  # largest influences that a row of the table names, and the least share worth naming
+ASIDE = ("max_", "settle_", "average_")  # settings of a plan that a constant does not depend on
 
 
 @dataclass(frozen=True)
@@ -97,13 +99,13 @@ def _sections(c: ChainContent, numbers: _Numbers) -> Iterator[Section]:
         made = [
             campaign_figures.Made(k.name, k.expanded_uncertainty / abs(k.value), c.shares.get(k.name, {}))
             for k in c.model.constants
-            if k.value != 0
+            if k.value != 0 and not place(k.name)
         ]
         drawn = campaign_figures.uncertainties(made)
-        yield Section("What is known, and what limits it", pictures=(numbers.picture(drawn, True),))
-    if len(c.model.correlations.names) > 1:
-        drawn = campaign_figures.correlations(c.model.correlations.names, c.model.correlations.matrix)
-        yield Section("Correlations", pictures=(numbers.picture(drawn, len(c.model.correlations.names) > 7),))
+        yield Section("Uncertainties", pictures=(numbers.picture(drawn, True),))
+    mapped = _correlations(c.model.correlations)
+    if mapped is not None:
+        yield Section("Correlations", pictures=(numbers.picture(mapped, True),))
     yield Section("The steps", grid=_steps(c.steps))
     pictures = [numbers.picture(_of_run(figures.draw(f), s), False) for s in c.steps for f in s.figures]
     if pictures:
@@ -121,27 +123,37 @@ def _sections(c: ChainContent, numbers: _Numbers) -> Iterator[Section]:
     ))  # fmt: skip
 
 
+def _correlations(found: Matrix) -> Drawn | None:
+    """The map, without the second values of one quantity (`B@by the speed channel`)."""
+    shown = [k for k, name in enumerate(found.names) if not place(name)]
+    if len(shown) < 2:
+        return None
+    rows = [[found.matrix[a][b] for b in shown] for a in shown]
+    return campaign_figures.correlations([found.names[k] for k in shown], rows)
+
+
 def _of_run(drawn: Drawn, step: StepLine) -> Drawn:
     return Drawn(f"{step.number}-{drawn.key}", f"{step.procedure}: {drawn.title}", drawn.caption, drawn.svg)
 
 
 def _constants(constants: Sequence[Constant]) -> Grid:
     rows = []
-    for k in constants:
+    for k in sorted(constants, key=lambda k: bool(place(k.name))):  # second values of a quantity last
         interval = ""
         if k.method == "monte-carlo":
             low, high = k.interval
-            interval = "95 % interval " + text.interval(low, high, k.expanded_uncertainty, k.unit)
-        largest = "; ".join(f"{_short(t.name)} {100 * t.share:.0f}{text.NARROW}%" for t in k.terms[:NAMED])
-        method = "Monte Carlo" if k.method == "monte-carlo" else f"ν {text.degrees_of_freedom(k.dof)}"
+            interval = text.interval(low, high, k.expanded_uncertainty, k.unit) + " (Monte Carlo)"
+        named = [t for t in k.terms[:NAMED] if t.share >= LEAST]
+        largest = "; ".join(f"{_short(t.name)} {100 * t.share:.0f}{text.NARROW}%" for t in named)
+        about = f"({place(k.name)}) {k.about}" if place(k.name) else k.about
         rows.append((
-            Cell(symbol=tables.symbol_of(k.name), small=k.about),
+            Cell(symbol=symbol(k.name), small=about),
             Cell(text.result(k.value, k.expanded_uncertainty, k.unit), interval, strong=True),
-            Cell(f"{k.coverage_factor:.2f}", method),
-            Cell(largest),
-            Cell(k.date[:10], k.procedure),
+            Cell(f"{k.coverage_factor:.2f}", f"ν {text.degrees_of_freedom(k.dof)}" if k.method == "gum" else ""),
+            Cell(largest), Cell(k.date[:10], k.procedure),
         ))  # fmt: skip
-    return Grid(("Constant", "Value", "k", "Largest influences", "Date, step"), (2.7, 2.3, 0.85, 2.6, 1.3), tuple(rows))
+    header = ("Constant", "Value", "k", "Largest influences", "Date, step")
+    return Grid(header, (2.7, 2.75, 0.75, 2.6, 1.35), tuple(rows))
 
 
 def _short(name: str) -> str:
@@ -159,9 +171,8 @@ def _steps(steps: Sequence[StepLine]) -> Grid:
             Cell(text.moment(s.started) if s.started else text.DASH, s.run), Cell(f"{s.wall_s:.1f}{text.NARROW}s"),
             Cell(said),
         ))  # fmt: skip
-    return Grid(
-        ("", "Procedure", "Outcome", "Started, run", "Took", ""), (0.3, 2.6, 1.2, 2.2, 0.8, 2.0), tuple(rows), (4,)
-    )
+    header = ("", "Procedure", "Outcome", "Started, run", "Took", "")
+    return Grid(header, (0.3, 2.4, 0.9, 3.0, 0.7, 1.8), tuple(rows), (4,))
 
 
 def _findings(found: Sequence[tuple[StepLine, tuple[str, str, str]]]) -> Grid:
@@ -172,12 +183,12 @@ def _findings(found: Sequence[tuple[StepLine, tuple[str, str, str]]]) -> Grid:
 def _equations(constants: Sequence[Constant]) -> Grid:
     rows = []
     for k in constants:
-        if k.equation is not None:
-            holds = ", ".join(f"{name} = {text.plain(value)}" for name, value in k.holds_for.items())
-            rows.append(
-                (Cell(symbol=tables.symbol_of(k.name)), Cell(k.equation.text), Cell(k.equation.source), Cell("", holds))
-            )
-    return Grid(("Constant", "Equation", "Source", "Measured at"), (0.8, 3.2, 1.4, 2.4), tuple(rows))
+        if k.equation is not None and not place(k.name):
+            settings = {name: value for name, value in k.holds_for.items() if not name.startswith(ASIDE)}
+            holds = ", ".join(f"{name} = {text.plain(value)}" for name, value in settings.items())
+            name = Cell(symbol=symbol(k.name))
+            rows.append((name, Cell(k.equation.text, equation=True), Cell("", k.equation.source), Cell("", holds)))
+    return Grid(("Constant", "Equation", "Source", "Measured at"), (0.8, 3.9, 2.0, 1.8), tuple(rows))
 
 
 def _given(given: Sequence[Given]) -> Grid:

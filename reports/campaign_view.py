@@ -18,6 +18,7 @@ class Cell:
     small: str = ""
     symbol: Symbol | None = None
     strong: bool = False
+    equation: bool = False  # `_` sets what follows low
     tone: Tone | None = None  # a verdict
 
 

@@ -93,7 +93,7 @@ def judged(campaign: Campaign, steps: Sequence[Planned], entries: Sequence[Entry
     """Put the rigs' lines together; quantities without a truth are left out."""
     rows = tuple(row for step in steps for row in _rows(step, entries))
     verdicts = [row.coverage.verdict for row in rows if row.judged]
-    told = {(row.step, row.name.partition(" ")[0]) for row in rows}
+    told = {(row.step, row.name.partition("@")[0]) for row in rows}
     if any((s.number, name) not in told for s in steps for name in s.judged):
         verdicts.append(Verdict.INDETERMINATE)  # the truth does not hold that quantity
     order = (Verdict.FAIL, Verdict.INDETERMINATE)
@@ -118,7 +118,7 @@ def _rows(step: Planned, entries: Sequence[Entry]) -> list[Row]:
     for e in entries:
         for v in e["values"]:
             if v["step"] == step.number and v["truth"] is not None:
-                label = f"{v['name']} ({v['where']})" if v["where"] else v["name"]
+                label = f"{v['name']}@{v['where']}" if v["where"] else v["name"]
                 found.setdefault(label, []).append((e["seed"], v))
     given = {v["name"] for e in entries for v in e["values"] if v["step"] == step.number}
     for name in step.judged:
@@ -139,7 +139,7 @@ def _rows(step: Planned, entries: Sequence[Entry]) -> list[Row]:
 
 
 def _place(label: str, declared: list[str]) -> int:
-    name = label.partition(" ")[0]
+    name = label.partition("@")[0]
     return declared.index(name) if name in declared else len(declared)
 
 
