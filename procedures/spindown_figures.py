@@ -15,13 +15,14 @@ from procedures.estimators.spindown_data import RunDown
 
 Array = npt.NDArray[np.float64]
 NAMES = {"low": "", "high": "", "ring": ", with the ring"}
-STRETCHES = 24  # a run-down is cut into so many to show its deceleration
+MEAN = 25  # samples of 1 ms
+STRETCHES = 14  # a run-down is cut into so many to show its deceleration
 
 
 def all_figures(runs: Sequence[RunDown], result: Drag, speed_rad_s: float) -> list[Figure]:
     """In the order of the report."""
     firsts = _firsts(runs)
-    return [_speeds(firsts), _residuals(firsts), *_deceleration(runs, result, speed_rad_s)]
+    return [_speeds(firsts), *_residuals(firsts), *_deceleration(runs, result, speed_rad_s)]
 
 
 def _firsts(runs: Sequence[RunDown]) -> dict[str, RunDown]:
@@ -37,21 +38,24 @@ def _speeds(firsts: dict[str, RunDown]) -> Figure:
     series = []
     for name, r in firsts.items():
         c = r.of_speed
-        thin = slice(None, None, max(1, len(r.t) // 60))
+        thin = slice(None, None, max(1, len(r.t) // 18))
         series.append(Series(name, r.t[thin], r.speed[thin], "points"))
         series.append(Series(f"{name}, fit", r.t, spindown.speed(r.t, c.b, c.c, c.speed)))
     return Figure("speed", "Speed after the release", "One run-down at each bias, forward, with the fit of viscous and "
-                  "constant drag; every so many samples are drawn.", "time (s)", "speed (rad/s)", tuple(series))  # fmt: skip
+                  "constant drag; a few samples are drawn.", "time (s)", "speed (rad/s)", tuple(series))  # fmt: skip
 
 
-def _residuals(firsts: dict[str, RunDown]) -> Figure:
-    series = []
-    for name, r in firsts.items():
-        thin = slice(None, None, max(1, len(r.t) // 800))
-        series.append(Series(f"{name}", r.t[thin], 1e3 * r.of_angle.fit.residuals[thin], "points"))
-    return Figure("residuals", "Residuals of the angle", "Unwrapped encoder angle less the fit. A sound run-down leaves the "
-                  "steps of the encoder; slow waves would be drag of another shape.", "time (s)", "residual (mrad)",
-                  tuple(series), lines=(("zero", 0.0),))  # fmt: skip
+def _residuals(firsts: dict[str, RunDown]) -> Iterator[Figure]:
+    for key, what, unit in (("angle", "angle", "mrad"), ("speed", "speed", "mrad/s")):
+        series = []
+        for name, r in firsts.items():
+            rest = (r.of_angle if key == "angle" else r.of_speed).fit.residuals
+            count = len(rest) // MEAN * MEAN
+            t, e = (x[:count].reshape(-1, MEAN).mean(axis=1) for x in (r.t, rest))
+            series.append(Series(name, t, 1e3 * e, "both"))
+        yield Figure(f"residuals-{key}", f"Residuals of the {what}", f"Measured {what} less its fit, mean over {MEAN} ms. A "
+                     "sound run-down leaves the counts of the encoder; a wave over all of it would be drag of another shape.",
+                     "time (s)", f"residual ({unit})", tuple(series), lines=(("zero", 0.0),))  # fmt: skip
 
 
 def deceleration(run: RunDown) -> tuple[Array, Array]:

@@ -22,7 +22,7 @@ SIDES = ((1, "left"), (-1, "right"))
 
 def all_figures(recording: Recording[Any], data: TorqueData, b: Balance, held: Detent, pairs: float) -> list[Figure]:
     """In the order of the report."""
-    return [_torque(data, b, pairs), _over_gamma(data, b, pairs), _residuals(data, b), _detent(data, b, held),
+    return [_torque(data, b, pairs), *_over_gamma(data, b, pairs), _residuals(data, b), _detent(data, b, held),
             *_one_step(recording)]  # fmt: skip
 
 
@@ -42,16 +42,24 @@ def _torque(data: TorqueData, b: Balance, pairs: float) -> Figure:
                   tuple(series))  # fmt: skip
 
 
-def _over_gamma(data: TorqueData, b: Balance, pairs: float) -> Figure:
-    series = []
+def _over_gamma(data: TorqueData, b: Balance, pairs: float) -> Iterator[Figure]:
+    points, apart = [], []
     for side, label in SIDES:
         angles, slopes, u = torque_balance.slopes_over_gamma(b, data.steps, side)
-        series.append(Series(label, np.degrees(angles), slopes, "points", 2 * u))
+        fitted = b.alpha * np.cos(pairs * (angles - b.gamma_0))
+        points.append(Series(label, np.degrees(angles), slopes, "points", 2 * u))
+        apart.append(
+            Series(label, np.degrees(angles) + 0.04 * side, 100 * (slopes / fitted - 1), "points", 200 * u / fitted)
+        )
     grid = np.linspace(data.steps.gamma.min(), data.steps.gamma.max(), 120)
-    series.append(Series("fit", np.degrees(grid), b.alpha * np.cos(pairs * (grid - b.gamma_0))))
-    return Figure("constant", "Torque per current over the phase angle", "One slope at each phase angle and side with its 95 % "
-                  "interval by the scatter, and the fitted cosine, whose peak is the torque constant.", "phase angle (deg)",
-                  "torque per current (N m/A)", tuple(series))  # fmt: skip
+    points.append(Series("fit", np.degrees(grid), b.alpha * np.cos(pairs * (grid - b.gamma_0))))
+    yield Figure("constant", "Torque per current over the phase angle", "One slope at each phase angle and side, and the "
+                 "fitted cosine, whose peak is the torque constant.", "phase angle (deg)", "torque per current (N m/A)",
+                 tuple(points))  # fmt: skip
+    yield Figure("constant-residuals", "Torque per current, departure from the cosine", "The same slopes against the fit, with "
+                 "95 % intervals by the scatter of the steps. One side above the other would be an arm, a bend "
+                 "would be no cosine.",
+                 "phase angle (deg)", "departure (%)", tuple(apart), lines=(("fit", 0.0),))  # fmt: skip
 
 
 def _residuals(data: TorqueData, b: Balance) -> Figure:
