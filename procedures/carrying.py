@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
+from bench.errors import LinkError
 from bench.rig import Rig
 from bench.rigfile import RigFile
 
@@ -13,6 +14,19 @@ ALPHA_D = 12.1  # N/A, T Table 6.2; likewise
 MARGIN = (
     0.8  # share of a current's limit that a prediction may use: force constants are within 10 %, the rest is control
 )
+
+
+def home(rig: Rig) -> None:
+    """Turn the rotor to its home angle.
+
+    Raises:
+        LinkError: it does not arrive; the text names what an angle loop that runs away points to.
+    """
+    try:
+        rig.rotation.point(0.0)
+    except LinkError as error:
+        why = "does the encoder count in the direction of the motor's torque, and is the shaft free?"
+        raise LinkError(f"{error}; {why}") from error
 
 
 def carry(rig: Rig, settle_s: float) -> None:

@@ -48,7 +48,7 @@ class Plan(BenchPlan):
     average_s: float = Field(1.0, ge=0.1)
     max_position_m: float = Field(5e-8, gt=0)  # settled: |mean position|; its drift may be twice that
     max_drift_A: float = Field(2e-3, gt=0)  # settled: drift of a current within a step
-    max_creep_A: float = Field(5e-3, gt=0)  # drift of i_x, i_y over the sequence
+    max_creep_A: float = Field(2e-3, gt=0)  # drift of i_x, i_y over the sequence
     max_misfit: float = Field(5e-3, gt=0)  # residual over range
     max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 
@@ -65,7 +65,7 @@ def step_count(plan: Plan) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Step gamma up and down while the motor carries the outboard end at the sensors' zero."""
-    rig.rotation.point(0.0)
+    carrying.home(rig)
     carrying.carry(rig, plan.settle_s)
     for gamma in carrying.approach(plan.gamma_rad):
         rig.levitation.set("gamma", gamma)
@@ -106,6 +106,7 @@ def read(recording: Recording[Plan]) -> StepMeans:
 
 def _of_signals(data: StepMeans, plan: Plan) -> Iterator[Finding]:
     yield from carried_checks.of_signals(data, (*SEGMENTS, *POSITIONS), plan)
+    yield from carried_checks.segments(data)
     d = data.drift
     currents = {"i_y": (d["i_m1"] - d["i_m3"]) / 2, "i_x": (d["i_m4"] - d["i_m2"]) / 2}
     yield from carried_checks.settled(data, {c: data.mean[c] for c in POSITIONS}, currents, plan)

@@ -49,7 +49,7 @@ class Plan(BenchPlan):
     average_s: float = Field(1.0, ge=0.1)
     max_position_m: float = Field(5e-8, gt=0)  # settled: |mean position - reference|; its drift may be twice that
     max_drift_A: float = Field(2e-3, gt=0)  # settled: drift of a current within a step
-    max_creep_A: float = Field(5e-3, gt=0)  # drift of i_x, i_y over the sequence
+    max_creep_A: float = Field(2e-3, gt=0)  # drift of i_x, i_y over the sequence
     max_misfit: float = Field(5e-3, gt=0)  # residual over range
     max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 
@@ -71,7 +71,7 @@ def step_count(plan: Plan) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Displace the outboard end: by the motor, then by the AMBs at both biases. The bias is written at rest."""
-    rig.rotation.point(0.0)
+    carrying.home(rig)
     inboard = _share(rig.file, -rig.file.geometry["com_to_inboard_amb"].value)
     carrying.carry(rig, plan.settle_s)
     # The inboard AMB's plane goes with the displacement as far as keeps the inboard sensor at zero.
@@ -83,7 +83,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
             rig.levitation.set("bias_i", bias)
             rig.levitation.set("bias_o", bias)
             transition(rig, RigState.LEVITATED)
-            rig.rotation.point(0.0)
+            carrying.home(rig)
             rig.clock.sleep(plan.settle_s)
         _walk(rig, plan, record, "ambs", {"ref_yo": _tilt(rig.file)}, bias)
 
@@ -146,6 +146,7 @@ def _of_signals(recording: Recording[Plan], motor: StepMeans, ambs: StepMeans) -
     plan = recording.plan
     inboard = _share(recording.rig, -recording.rig.geometry["com_to_inboard_amb"].value)
     ways = ((motor, (*SEGMENTS, *POSITIONS), 0.0), (ambs, (*COILS, *POSITIONS), -inboard / (1 - inboard)))
+    yield from carried_checks.segments(motor)
     for data, channels, follow in ways:
         yield from carried_checks.of_signals(data, channels, plan)
         mean, d, level = data.mean, data.drift, data.labels["level_m"]

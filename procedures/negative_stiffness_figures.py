@@ -6,13 +6,10 @@ from collections.abc import Iterator
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from bench.figures import Figure, Series
 from procedures.estimators.carried_data import StepMeans
 from procedures.estimators.stiffness import AmbFit, MotorFit
-
-Array = npt.NDArray[np.float64]
 
 
 class Analysed(Protocol):
@@ -68,13 +65,11 @@ def _ambs(a: Analysed, plan: Biases) -> Iterator[Figure]:
     series, left = [], []
     for bias in (plan.bias_A, plan.bias_high_A):
         use = a.ambs.labels["bias_A"] == bias
-        ends = np.array([y[use].min(), y[use].max()])
-        zero = float(np.interp(0.0, *_ordered(y[use], f.force[use])))
+        order = np.argsort(y[use], kind="stable")
+        zero = float(np.interp(0.0, y[use][order], f.force[use][order]))
         for force, what in ((f.force[use] - zero, "current alone"), (f.total[use] - zero, "in all")):
-            slope, at_zero = np.polyfit(y[use], force, 1)
-            label = f"{bias:g} A, {what}"
-            series.append(Series(label, y[use], force, "points"))
-            series.append(Series(f"{label}: {slope:.3f} N/µm", ends, at_zero + slope * ends, "line"))
+            slope = float(np.polyfit(y[use], force, 1)[0])
+            series.append(Series(f"{bias:g} A, {what}: {slope:.3f} N/µm", y[use][order], force[order], "both"))
         left.append(Series(f"{bias:g} A", y[use], 1e3 * f.fit.residuals[use], "points"))
     yield Figure("two-biases", "Force of the outboard AMB over displacement at two biases",
                  "What the currents give at the centre (current alone) must also make up for the AMB's own position stiffness, "
@@ -83,8 +78,3 @@ def _ambs(a: Analysed, plan: Biases) -> Iterator[Figure]:
     yield Figure("two-biases-residuals", "Residuals of the AMB's forces",
                  f"What the fit leaves of the moments, as force at the outboard AMB. Fitted gap {1e3 * f.gap_m:.4f} mm.",
                  "displacement at the outboard AMB (µm)", "residual (mN)", tuple(left), lines=(("zero", 0.0),))  # fmt: skip
-
-
-def _ordered(x: Array, y: Array) -> tuple[Array, Array]:
-    order = np.argsort(x)
-    return x[order], y[order]

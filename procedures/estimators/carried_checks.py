@@ -16,8 +16,9 @@ from procedures.estimators.carried_data import StepMeans
 
 Array = npt.NDArray[np.float64]
 
-FATAL = ("stuck-channel",)
+FATAL = ("stuck-channel", "segment-sign")
 """Findings after which a fit means nothing and is not attempted."""
+UNBALANCED_A = 0.5  # half the sum of opposite segments is the torque current: at rest within 0.1 A
 FLAGS = (
     (1, "saturated", "an AMB amplifier was at its limit"),
     (2, "saturated", "a motor segment was at its limit"),
@@ -69,6 +70,30 @@ def of_signals(data: StepMeans, channels: Sequence[str], plan: Tolerances) -> It
             yield Finding(code, f"{text} in {int(hit.sum())} of {hit.size} steps", where, Effect.INDETERMINATE)
 
 
+def segments(data: StepMeans) -> Iterator[Finding]:
+    """Signs of the segments' currents while the motor carries: opposite ones carry opposite currents (T 6.9; at rest there is
+    hardly a torque current), and segment 1 a positive one, because it lifts."""
+    one, two, three, four = (float(data.mean[f"i_m{k}"].mean()) for k in range(1, 5))
+    for a, b, name_a, name_b, lifts in ((one, three, "i_m1", "i_m3", True), (four, two, "i_m4", "i_m2", False)):
+        if abs(a + b) / 2 > UNBALANCED_A:
+            suspect = f"{name_a} or {name_b}" if not lifts else name_a if a < 0 else name_b
+            yield Finding(
+                "segment-sign",
+                f"{name_a} reads {a:+.2f} A and {name_b} {b:+.2f} A: opposite segments that hold a shaft at rest carry "
+                f"opposite currents. Look at the sign of {suspect}, and at whether both segments get their currents.",
+                suspect,
+                Effect.ERROR,
+            )
+    if one < 0 < three:
+        yield Finding(
+            "segment-sign",
+            f"i_m1 reads {one:+.2f} A and i_m3 {three:+.2f} A: the motor pushes down while it lifts. Both sensors have the "
+            "wrong sign, or the segments are exchanged.",
+            "i_m1, i_m3",
+            Effect.ERROR,
+        )
+
+
 def settled(
     data: StepMeans, offsets: Mapping[str, Array], drifts: Mapping[str, Array], plan: Tolerances
 ) -> Iterator[Finding]:
@@ -99,8 +124,8 @@ def settled(
 def creeping(drift_A: Mapping[str, float], u_A: Mapping[str, float], plan: Tolerances) -> Iterator[Finding]:
     """Currents that change over the sequence at equal positions: more than `max_creep_A` and five standard uncertainties.
 
-    `drift_A` holds i_x and i_y from the first step to the last. The amplifiers close their loops on their own sensors, so a
-    sensor that drifts shows as a demand that drifts.
+    `drift_A` is what a current, i_x, i_y or that of an AMB, changes by from the first step to the last. The amplifiers
+    close their loops on their own sensors, so a sensor that drifts shows as a demand that drifts.
     """
     pairs = {"i_x": "segments 2 and 4", "i_y": "segments 1 and 3"}
     for name, change in drift_A.items():
@@ -108,8 +133,8 @@ def creeping(drift_A: Mapping[str, float], u_A: Mapping[str, float], plan: Toler
             yield Finding(
                 "drifting-current",
                 f"{name} changes by {change * 1e3:+.2f} mA over the sequence with the shaft where it was "
-                f"({plan.max_creep_A * 1e3:.2f} mA allowed): a current sensor of {pairs[name]} drifts, or the load does. "
-                "The sequence is mirrored, so that a steady drift does not reach the result; an unsteady one does.",
+                f"({plan.max_creep_A * 1e3:.2f} mA allowed): a current sensor of {pairs.get(name, 'that AMB')} drifts, or the "
+                "load does. The sequence is mirrored, so that a steady drift does not reach the result; an unsteady one does.",
                 name,
                 Effect.INDETERMINATE,
             )

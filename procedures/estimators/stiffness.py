@@ -46,12 +46,14 @@ class ByMotor:
 @dataclass(frozen=True)
 class ByAmbs:
     """Step means (N,) while both AMBs carry. `coils` (2, N) A, outboard vertical coils p and n; `y` (2, N) m [inboard,
-    outboard sensor]; `which` (N,) index into `bias_A` (2,); `branch` (N,) +1 reached from below, -1 from above."""
+    outboard sensor]; `which` (N,) index into `bias_A` (2,); `branch` (N,) +1 reached from below, -1 from above; `time_s`
+    (N,)."""
 
     coils: Array
     y: Array
     which: npt.NDArray[np.int64]
     branch: Array
+    time_s: Array
     bias_A: tuple[float, float]
 
 
@@ -69,9 +71,9 @@ class MotorFit:
 
 @dataclass(frozen=True)
 class AmbFit:
-    """`fit` of the moment equation, terms [alpha_x, 1/g, F and H at each bias]; `force` (N,) N of the outboard AMB less what
-    displacement adds at constant current, `total` (N,) N with it, `y_o` and `y_m` (N,) m; `stiffness` alpha_x' N/m,
-    `gap_m`."""
+    """`fit` of the moment equation, terms [alpha_x, 1/g, then F, H, D (branch, drift over the series) N at each bias];
+    `force` (N,) N of the outboard AMB less what displacement adds at constant current, `total` (N,) N with it, `y_o` and
+    `y_m` (N,) m; `stiffness` alpha_x' N/m, `gap_m`."""
 
     fit: Fit
     force: Array
@@ -143,9 +145,7 @@ def by_ambs(d: ByAmbs, p: Mapping[str, float]) -> AmbFit:
     inboard, outboard = d.y[0] / p["gain_yi"], d.y[1] / p["gain_yo"]
     y_o, y_m = _at(p["z_oa"], inboard, outboard, p), _at(motor_plane(p), inboard, outboard, p)
     lever = (p["amb_span"] + p["motor_to_outboard"]) / p["amb_span"]
-    high = (d.which == 1).astype(np.float64)
-    low = 1 - high
-    rest = np.stack([lever * y_m, low, high, low * d.branch, high * d.branch], axis=1)
+    rest = np.column_stack([lever * y_m, *(_series(d, which) for which in (0, 1))])
     pull, push = a * ip**2, b * i_n**2
     up, down = y_o / (1 - offset), y_o / (1 + offset)
 
@@ -166,6 +166,14 @@ def by_ambs(d: ByAmbs, p: Mapping[str, float]) -> AmbFit:
     fit = leastsquares.nonlinear(model, np.zeros_like(ip), np.insert(around, 1, 1 / p["amb_gap"]), jacobian=jacobian)
     share = sensor_share(motor_plane(p), p)
     return AmbFit(fit, pull - push, force(fit.terms[1]), y_o, y_m, float(fit.terms[0]) * share, 1 / float(fit.terms[1]))
+
+
+def _series(d: ByAmbs, which: int) -> Array:
+    """Columns (N, 3) of one bias: constant, branch, time from -1/2 to 1/2; zero at the other."""
+    use = d.which == which
+    t = d.time_s - d.time_s[use].min()
+    t = t / max(float(np.ptp(t[use])), 1e-9) - 0.5
+    return np.stack([np.ones_like(t), d.branch, t], axis=1) * use[:, None]
 
 
 def at_one_bias(d: ByAmbs, p: Mapping[str, float]) -> float:

@@ -54,7 +54,7 @@ def evaluate(recording: Recording[Any], motor: StepMeans, ambs: StepMeans) -> An
     estimates = by_inputs(model, inputs)
     share = by_motor.stiffness / float(by_motor.fit.terms[0])
     extra = scatter(by_motor.fit, {"motor": [share, 0, 0, 0, 0, 0]}, "motor", "scatter of the steps, motor")
-    gradients = {"ambs": [share, 0, 0, 0, 0, 0], "gap": [0, -(by_ambs.gap_m**2), 0, 0, 0, 0]}
+    gradients = {"ambs": [share, 0, *[0] * 6], "gap": [0, -(by_ambs.gap_m**2), *[0] * 6]}
     extra |= scatter(by_ambs.fit, gradients, "ambs", "scatter of the steps, AMBs")
     turned = stiffness.by_ambs(turning_left_open(two), values)
     for name, shift in (("ambs", turned.stiffness - by_ambs.stiffness), ("gap", turned.gap_m - by_ambs.gap_m)):
@@ -68,9 +68,10 @@ def measured(plan: Biases, motor: StepMeans, ambs: StepMeans) -> tuple[ByMotor, 
     """What the estimators get."""
     y = ("pos_yi", "pos_yo")
     which = (ambs.labels["bias_A"] != plan.bias_A).astype(np.int64)
+    biases, branch = (plan.bias_A, plan.bias_high_A), ambs.labels["branch"]
     return (
         ByMotor(motor.stack(SEGMENTS), motor.stack(y), motor.stack(("pos_xi", "pos_xo")), motor.time_s),
-        ByAmbs(ambs.stack(COILS), ambs.stack(y), which, ambs.labels["branch"], (plan.bias_A, plan.bias_high_A)),
+        ByAmbs(ambs.stack(COILS), ambs.stack(y), which, branch, ambs.time_s, biases),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Protocol
 
 import numpy as np
 
@@ -14,11 +15,21 @@ from procedures.estimators.carried_data import StepMeans
 from procedures.estimators.stiffness import AmbFit, MotorFit
 
 ONE_IN_A_THOUSAND = 1.7  # times the 95 % expanded uncertainty
+AMB_N_PER_A = 74.4  # T (6.12); turns a force into a current for a judgement
 COUPLED = 0.25  # cross force over direct force: an encoder zero 0.5 deg off makes 0.08
 
 
+class Tolerances(carried_checks.Tolerances, Protocol):
+    """The part of a plan that these checks need."""
+
+    @property
+    def bias_A(self) -> float: ...
+    @property
+    def bias_high_A(self) -> float: ...
+
+
 def of_fits(
-    motor: StepMeans, ambs: StepMeans, by_motor: MotorFit, by_ambs: AmbFit, plan: carried_checks.Tolerances
+    motor: StepMeans, ambs: StepMeans, by_motor: MotorFit, by_ambs: AmbFit, plan: Tolerances
 ) -> Iterator[Finding]:
     """Drift, misfit, and an axis that answers the other's displacement."""
     n = len(motor)
@@ -30,6 +41,18 @@ def of_fits(
     yield from carried_checks.misfit(motor, residuals, float(np.ptp(by_motor.force)), "force of the motor", plan)
     total = float(np.ptp(by_ambs.force))
     yield from carried_checks.misfit(ambs, by_ambs.fit.residuals, total, "force of the outboard AMB", plan)
+    for k, bias in enumerate((plan.bias_A, plan.bias_high_A)):
+        newton_per_A = AMB_N_PER_A * bias / plan.bias_A
+        _, branch, creep = (float(x) / newton_per_A for x in by_ambs.fit.terms[2 + 3 * k : 5 + 3 * k])
+        u_A = float(by_ambs.fit.u[4 + 3 * k]) / newton_per_A
+        yield from carried_checks.creeping({f"i_yo at {bias:g} A": creep}, {f"i_yo at {bias:g} A": u_A}, plan)
+        if abs(branch) > plan.max_creep_A:
+            yield Finding(
+                "hysteresis",
+                f"at {bias:g} A the outboard AMB's current differs by {2e3 * branch:+.1f} mA between going up and going down; it "
+                "is taken out of the result by the branch term.",
+                "i_yo",
+            )
     coupling = float(terms[3]) / alpha_d
     if abs(coupling) > COUPLED:
         yield Finding(
@@ -92,6 +115,6 @@ def _disagreement(estimates: Mapping[str, Estimate]) -> Iterator[Finding]:
     else:
         why = (
             "; beyond what one sound rig in a thousand shows. Suspect the force constants: the motor's acts on the first "
-            "value alone, the outboard AMB's on the second alone."
+            "value alone, the outboard AMB's on the second alone. The gain of a position sensor cancels in part."
         )
         yield Finding("methods-disagree", text + why, "alpha_x_prime, alpha_x_prime_amb", Effect.INDETERMINATE)

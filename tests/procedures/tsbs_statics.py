@@ -114,7 +114,7 @@ def amb_data(s: Shaft, levels: tuple[float, ...], biases: tuple[float, float], p
             coils.append((bias + i, bias - i))
             which.append(k)
     both = np.array([np.tile(inboard, 2), np.tile(y, 2)])
-    return ByAmbs(np.array(coils).T, both, np.array(which), np.tile(branch, 2), biases)
+    return ByAmbs(np.array(coils).T, both, np.array(which), np.tile(branch, 2), np.arange(len(coils)) * 1.0, biases)
 
 
 def sweep_data(s: Shaft, degrees: Array) -> Sweep:
