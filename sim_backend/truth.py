@@ -114,8 +114,8 @@ def draw(
         raise ConfigError(
             f"rig {rig.name}: found no [simulation] table, so that there is nothing to simulate; expected --backend live"
         )
-    stated = _stated(rig)
-    values = {name: draw_one(t, seed, name) for name, t in stated.items()}
+    tolerances = stated(rig)
+    values = {name: draw_one(t, seed, name) for name, t in tolerances.items()}
     values |= {k: float(v) for k, v in rig.simulation.items() if isinstance(v, int | float)}
     defects = dict(DEFECTS)
     wanted = dict(overrides or {})
@@ -124,7 +124,7 @@ def draw(
     for name, value in wanted.items():
         table = defects if name in defects else values
         if name not in table:
-            known = [*stated, *defects, "K_i", "K_o"]
+            known = [*tolerances, *defects, "K_i", "K_o"]
             close = difflib.get_close_matches(name, known, 3)
             raise ConfigError(
                 f"--truth {name}: no such value; {'did you mean' if close else 'expected one of'} {', '.join(close or known)}"
@@ -137,7 +137,7 @@ def draw(
     return Truth(seed, values, defects, plant, _quantities(plant, bias))
 
 
-def _stated(rig: RigFile) -> dict[str, Toleranced]:
+def stated(rig: RigFile) -> dict[str, Toleranced]:
     """Every toleranced number of a rig file by its name; one that holds for several sensors once for each."""
     out = {f"geometry.{k}": t for k, t in rig.geometry.items()} | {f"masses.{k}": t for k, t in rig.masses.items()}
     out |= {"hanger": rig.hanger, "mass_density": rig.mass_density, "site.gravity": rig.site.gravity,

@@ -1,0 +1,98 @@
+"""The operator's verbs from the role through the line to the simulated shaft, and through a person."""
+
+from __future__ import annotations
+
+import pytest
+
+from bench.envelope import Envelope
+from bench.errors import BenchError, InterlockError, OperatorAbort
+from bench.rigfile import load_rig
+from bench.roles import NOTHING, Load
+from drivers.operator import ConsoleOperator, LineOperator
+from sim_backend.endpoint import SimulatedRig
+from sim_backend.truth import draw
+
+RIG = load_rig("tsbs12")
+
+
+@pytest.fixture
+def machine() -> SimulatedRig:
+    return SimulatedRig(RIG, draw(RIG, 1))
+
+
+@pytest.fixture
+def hands(machine: SimulatedRig) -> LineOperator:
+    return LineOperator(machine.request, machine, Envelope(RIG))
+
+
+def test_a_mass_on_the_lever_turns_the_shaft(machine: SimulatedRig, hands: LineOperator) -> None:
+    state, truth = machine.device.plant._s, machine.truth
+    for side, load, sign in (("left", "M2", 1), ("right", "M3", -1), ("right", "", 0)):
+        before = machine.now_ns()
+        hands.lever(side, Load(load))  # type: ignore[arg-type]
+        assert machine.now_ns() - before == pytest.approx(0.3e9)
+        kg, newtons, arm = truth.on_lever(side, load)
+        assert state.lever_moment == pytest.approx(newtons * arm, rel=1e-9)
+        assert state.lever_weight == pytest.approx(newtons, rel=1e-9)
+        assert state.lever_inertia == pytest.approx(kg * arm**2, rel=1e-12)
+        assert (state.lever_moment > 0) - (state.lever_moment < 0) == sign
+    assert state.weight == 0  # the hook is another matter
+
+
+def test_the_ring_is_put_on_and_taken_off(machine: SimulatedRig, hands: LineOperator) -> None:
+    state = machine.device.plant._s
+    hands.mount("ring")
+    assert state.ring_inertia == machine.truth.values["ring_inertia"]
+    hands.mount("")
+    assert state.ring_inertia == 0
+
+
+@pytest.mark.parametrize(
+    "line", ["lever up M2", "lever left M9", "lever left", "mount wheel", "hang M9", "hang", "", "dance"]
+)
+def test_what_cannot_be_done_is_said(machine: SimulatedRig, line: str) -> None:
+    assert machine.request(line) == f"error cannot {line!r}"
+
+
+def test_answers(machine: SimulatedRig) -> None:
+    assert machine.request("lever left M1") == "ok 0.3"
+    assert machine.request("lever left -") == "ok 0.3"
+    assert machine.request("hang -") == "ok 0.3"
+    assert machine.request("mount -") == "ok 0.3"
+    assert machine.request("ask is it there?") == "yes"
+
+
+def test_a_mass_beyond_the_envelope_is_not_asked_for() -> None:
+    asked: list[str] = []
+    low = RIG.model_copy(update={"envelope": RIG.envelope.model_copy(update={"max_hung_kg": 1.5})})
+    hands = LineOperator(lambda line: asked.append(line) or "ok", None, Envelope(low))  # type: ignore[arg-type, func-returns-value]
+    with pytest.raises(InterlockError, match="2 kg"):
+        hands.lever("left", Load("M3"))
+    assert asked == []
+
+
+def test_a_refusal_says_what_was_asked() -> None:
+    hands = LineOperator(lambda _: "error no lever", None, Envelope(RIG))  # type: ignore[arg-type]
+    with pytest.raises(BenchError, match="cannot hang M2 on the lever's left: error no lever"):
+        hands.lever("left", Load("M2"))
+    with pytest.raises(BenchError, match="cannot mount nothing"):
+        hands.mount("")
+
+
+def test_a_person_is_asked_and_the_simulated_rig_follows(machine: SimulatedRig, hands: LineOperator) -> None:
+    asked: list[str] = []
+
+    def prompt(question: str) -> str:
+        asked.append(question)
+        return "" if len(asked) < 5 else "stop"
+
+    person = ConsoleOperator(prompt, machine, Envelope(RIG), hands)
+    person.lever("left", Load("M1"))
+    person.lever("left", NOTHING)
+    person.mount("ring")
+    person.mount("")
+    assert "level and hang M1 on its left end (seen from outboard)" in asked[0]
+    assert ["every mass off" in asked[1], "Mount the ring" in asked[2], "ring off" in asked[3]] == [True] * 3
+    assert machine.device.plant._s.ring_inertia == 0
+    with pytest.raises(OperatorAbort):
+        person.mount("ring")
