@@ -173,7 +173,8 @@ def _series(d: ByAmbs, which: int) -> Array:
     use = d.which == which
     t = d.time_s - d.time_s[use].min()
     t = t / max(float(np.ptp(t[use])), 1e-9) - 0.5
-    return np.stack([np.ones_like(t), d.branch, t], axis=1) * use[:, None]
+    out: Array = np.stack([np.ones_like(t), d.branch, t], axis=1) * use[:, None]
+    return out
 
 
 def at_one_bias(d: ByAmbs, p: Mapping[str, float]) -> float:

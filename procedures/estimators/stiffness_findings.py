@@ -49,8 +49,8 @@ def of_fits(
         if abs(branch) > plan.max_creep_A:
             yield Finding(
                 "hysteresis",
-                f"at {bias:g} A the outboard AMB's current differs by {2e3 * branch:+.1f} mA between going up and going down; it "
-                "is taken out of the result by the branch term.",
+                f"at {bias:g} A the outboard AMB's current differs by {2e3 * branch:+.1f} mA between going up and going "
+                "down; it is taken out of the result by the branch term.",
                 "i_yo",
             )
     coupling = float(terms[3]) / alpha_d
