@@ -59,6 +59,17 @@ def test_the_shipped_rig_has_no_problem_and_is_si() -> None:
     assert rig.mass_density.standard_uncertainty == pytest.approx(140 / 3**0.5, rel=1e-14)
 
 
+def test_a_rig_may_have_no_lever_and_no_intervals(tmp_path: Path) -> None:
+    """What only some procedures need is theirs to ask for; calibrations hold for a time that a table may state."""
+    plain = "\n".join(line for line in TOML.splitlines() if not line.startswith(("lever_", "motor_to_")))
+    assert check_rig(written(tmp_path, plain))[0] == ()
+    rig = RigFile.parse(TOML, DBC)
+    assert rig.calibration.interval_days.get("amb-calibration", 365) == 365
+    assert rig.machine["ring_inertia"].standard_uncertainty == pytest.approx(1e-5)
+    rig = RigFile.parse(TOML + "\n[calibration]\ninterval_days = { force-constant = 90 }\n", DBC)
+    assert rig.calibration.interval_days == {"force-constant": 90}
+
+
 def test_the_digest_is_of_both_texts() -> None:
     one = RigFile.parse(TOML, DBC).digest
     assert one == RigFile.parse(TOML, DBC).digest
@@ -110,6 +121,11 @@ def test_a_rig_file_is_frozen() -> None:
         ("data_bitrate = 5_000_000", "", "links.controller", "Telemetry takes 71%"),
         ("bitrate = 1_000_000", "bitrate = 0", "links.controller.bitrate", "greater than 0"),
         ("max_hung_kg = 3.5", "", "envelope.max_hung_kg", "a value"),
+        ("ring_inertia =", "wheel_inertia =", "machine.wheel_inertia", "one of pole_pairs, polar_inertia"),
+        ('value = 0.02, unit = "kg m^2"', 'value = 0.02, unit = "kg"', "machine.ring_inertia.unit", "the kind of kg m^2"),
+        ("lever_left = { value = 230", "lever_left = { value = -230", "geometry.lever_left.value", "a positive number"),
+        ("lever_left =", "lever_lift =", "geometry.lever_lift", "did you mean lever_left?"),
+        ("[machine]", "[calibration]\ninterval = 3\n[machine]", "calibration.interval", "no such key"),
     ],
 )  # fmt: skip
 def test_one_mistake_is_named_with_its_key(tmp_path: Path, old: str, new: str, key: str, expected: str) -> None:
