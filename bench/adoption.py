@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -45,7 +45,9 @@ def calibration_of(
     rig, seed = recording.rig, recording.seed
     backend: Backend = "sim" if seed is not None else "served" if served else "live"
     known = {identity for c in recording.calibrations for identity in c.influences}
-    values = adopted(facts, run_id, known)
+    units = {q.name: q.unit for q in procedure.measures}  # propagation through a function leaves them empty
+    named = {name: replace(e, unit=e.unit or units.get(name.partition("@")[0], "")) for name, e in facts.items()}
+    values = adopted(named, run_id, known)
     identities = {i.id for e in values.values() for i in e.sensitivities}
     date = began.astimezone(UTC)
     return Calibration(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -123,9 +123,7 @@ def facts(recording: Recording[Plan]) -> dict[str, Estimate]:
     """The six quantities, and K and K2 of each bearing at each angle, all with one scatter for each angle: what a later
     procedure takes at one angle and what it takes over a turn then stay correlated as they are."""
     result = evaluate(recording)
-    found = angle_facts.with_scatter(result.estimates, result.spread, result.scatter.dof)
-    units = {q.name: q.unit for q in MEASURES}
-    return {name: replace(e, unit=units[name.partition("@")[0]]) for name, e in found.items()}
+    return angle_facts.with_scatter(result.estimates, result.spread, result.scatter.dof)
 
 
 @lru_cache(maxsize=1)

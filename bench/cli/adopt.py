@@ -58,6 +58,7 @@ def values(c: Calibration) -> list[str]:
     lines = []
     for name, e in whole.items():
         value, expanded = round_to_uncertainty(e.value, interval(e).U)
-        lines.append(f"{name:8} {value} ± {expanded} {e.unit}".rstrip())
+        unit = "" if e.unit == "1" else e.unit
+        lines.append(f"{name:8} {value} ± {expanded} {unit}".rstrip())
     rest = len(c.values) - len(whole)
     return [*lines, f"and {rest} values by angle"] if rest else lines
