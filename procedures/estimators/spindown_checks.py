@@ -6,21 +6,27 @@ Thresholds are chosen so that a sound rig trips one in fewer than one run in a t
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Protocol
 
 import numpy as np
+import numpy.typing as npt
 from scipy import stats
 
 from bench.findings import Effect, Finding
 from bench.recording import Recording
+from bench.uncertainty import Estimate
 from procedures.estimators.direction import SEGMENTS, of_probe
 from procedures.estimators.drag import Drag
+from procedures.estimators.leastsquares import linear
 from procedures.estimators.spindown_data import RunDown
 
+Array = npt.NDArray[np.float64]
 SATURATED, CONTACT = 1, 12  # bits of the telemetry signal `flags`
 RELEASED_A = 0.02  # the certificates allow 4 mA of offset each, noise averages out
 SAME_SPEED = 5e-3
+LARGEST_OFFSET_N_m = 0.02  # 4 mA of every segment's sensor are a little over 11 mN m
+LARGEST_WAVE_RAD = 1.5e-3  # a sound run-down leaves 0.45 mrad rms, the counts of the encoder
 TICK_S = 0.45e-3  # the speed is a mean over a sample, the angle its last value
 
 
@@ -161,7 +167,7 @@ def _directions(drag: Drag) -> Iterator[Finding]:
             yield Finding("direction-dependent", text, name, Effect.INDETERMINATE)
     torque = drag.torque
     if abs(torque.value) > 3e-3:
-        effect = Effect.INDETERMINATE if abs(torque.value) > 0.05 else Effect.NOTE
+        effect = Effect.INDETERMINATE if abs(torque.value) > LARGEST_OFFSET_N_m else Effect.NOTE
         text = f"{torque.value * 1e3:+.1f} mN m drives the released rotor forward; the mean over both directions is free of it."
         yield Finding("constant-torque", text, "both directions", effect)
 
@@ -170,39 +176,47 @@ def _shape(runs: Sequence[RunDown]) -> Iterator[Finding]:
     """The residuals of the angle are counts of the encoder; a model that does not fit leaves waves much larger."""
     rms = [float(np.sqrt(np.mean(r.of_angle.fit.residuals**2))) for r in runs]
     worst = int(np.argmax(rms))
-    if rms[worst] > 5e-3:
+    if rms[worst] > LARGEST_WAVE_RAD:
         yield Finding(
             "drag-not-linear",
-            f"viscous and constant drag leave residuals of {rms[worst] * 1e3:.1f} mrad rms in the angle (5 mrad allowed): "
+            f"viscous and constant drag leave residuals of {rms[worst] * 1e3:.1f} mrad rms in the angle "
+            f"({LARGEST_WAVE_RAD * 1e3:g} mrad allowed): "
             "the drag has another shape, or changes during the run-down.", runs[worst].where, Effect.INDETERMINATE,
         )  # fmt: skip
 
 
-def of_drive(recording: Recording[Any], torque_by_group: Mapping[str, tuple[float, float]]) -> Iterator[Finding]:
-    """What the drive's own stream says: off while coasting, and as much torque at speed as the run-down finds.
-
-    `torque_by_group`: N m of drag at the speed of the "spin" steps and its u, by bias label.
-    """
+def of_drive(recording: Recording[Any], friction: Estimate) -> Iterator[Finding]:
+    """What the drive's own stream says: off while coasting, and as much constant torque at two held speeds as the run-downs
+    find. The inertia is not in the drive's torque, and the viscous part drops out: T_d = (T_1 w_2 - T_2 w_1)/(w_2 - w_1)."""
     name = next((n for n, d in recording.rig.devices.items() if "drive" in d.roles), "")
     if name not in recording.streams:
         return
     names = {c.name for c in recording.streams[name].channels}
     yield from _drive_off(recording, names)
-    torque = next((n for n in names if n.endswith("torque")), None)
+    torque = next((n for n in sorted(names) if n.endswith("torque")), None)
     if torque is None:
         return
-    for group, (expected, u) in torque_by_group.items():
-        held = [abs(x) for s in recording.steps("spin") if s.labels["by"] == "drive" and s.labels["group"] == group
-                for x in s.read(torque)[torque]]  # fmt: skip
-        if len(held) < 2:
-            continue
-        found = float(np.mean(held))
-        if abs(expected - found) > 5 * math.hypot(u, 0.01) + 0.02 * found:
-            yield Finding(
-                "drive-brakes",
-                f"the drive gave {found:.2f} N m to hold the speed, the run-down from it is slowed by {expected:.2f} N m: "
-                f"{expected - found:+.2f} N m act only while it coasts.", group, Effect.INDETERMINATE,
-            )  # fmt: skip
+    steps = [s for s in recording.steps("spin") if s.labels["by"] == "drive" and s.labels["group"] == "low"]
+    held = [(abs(float(s.labels["speed_rad_s"])), np.abs(s.read(torque)[torque])) for s in steps]
+    points = [(w, float(x.mean())) for w, x in held if len(x) >= 2]
+    if len({w for w, _ in points}) < 2:
+        return
+    w, t = np.array(points).T
+    constant, u = _constant_part(w, t)
+    apart = friction.value - constant
+    if abs(apart) > 5 * math.hypot(friction.u, u):
+        yield Finding(
+            "drive-brakes",
+            f"the drive needs {constant:.3f} N m of constant torque to hold the rotor at two speeds, the run-downs from it "
+            f"show {friction.value:.3f} N m: {apart:+.3f} N m act only while it coasts.", name, Effect.INDETERMINATE,
+        )  # fmt: skip
+
+
+def _constant_part(w: Array, t: Array) -> tuple[float, float]:
+    """Torque at no speed on the line through held speeds, and its u with no less than half a count of 0.01 N m each."""
+    fit = linear(np.column_stack([np.ones_like(w), w]), t, np.full(len(t), 0.005**2))
+    scatter = math.sqrt(max(fit.chi2 / max(fit.dof, 1), 1.0))
+    return float(fit.terms[0]), float(fit.u[0]) * scatter
 
 
 def _drive_off(recording: Recording[Any], names: set[str]) -> Iterator[Finding]:
