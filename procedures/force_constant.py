@@ -186,13 +186,13 @@ def contradictions(recording: Recording[Plan], a: Analysis) -> Iterator[Finding]
 
 
 def _fits(axis: str, result: AxisResult, a: Analysis, plan: Plan) -> Iterator[Finding]:
-    force, moment = (e.value for e in result.row_means)
-    parts = force_estimates.differences(result)
+    parts, dof = force_estimates.differences(result), force_rows.scatter(result.fit)[1]
     hint = force_estimates.suspect(a.data.vertical, a.inputs, plan.bias_A, result) if axis == "y" else ""
-    apart = force_estimates.chi_squared(parts)
-    yield from force_findings.rows_disagree(axis, force, moment, apart, len(parts), hint)
-    bent, worst = force_estimates.chi_squared(result.bends), max(abs(e.value) for e in result.bends)
-    yield from force_findings.lack_of_fit(axis, bent, len(result.bends), worst, hint)
+    mean, rows = force_estimates.mean_of(parts), tuple(e.value for e in result.row_means)
+    apart = force_findings.beyond(force_estimates.chi_squared(parts), len(parts), dof)
+    yield from force_findings.rows_disagree(axis, (rows[0], rows[1]), mean.value / mean.u, apart, hint)
+    bent = force_findings.beyond(force_estimates.chi_squared(result.bends), len(result.bends), dof)
+    yield from force_findings.lack_of_fit(axis, bent, max(abs(e.value) for e in result.bends), hint)
 
 
 def _drift(result: AxisResult) -> tuple[Array, Array]:

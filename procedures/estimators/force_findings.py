@@ -163,32 +163,40 @@ def exchanged(axis: str, terms: Array) -> Iterator[Finding]:
         yield Finding("segments-exchanged", text, axis, Effect.ERROR)
 
 
-def rows_disagree(axis: str, force: float, moment: float, chi2: float, dof: int, suspect: str) -> Iterator[Finding]:
-    """Force row and moment row at each angle, by the full covariance of their differences."""
-    if chi2 > stats.chi2.ppf(1 - CHANCE, dof):
+def beyond(chi2: float, parts: int, dof: int) -> bool:
+    """Whether a chi-squared of that many parts is none by chance, its scatter being known with `dof` (F test)."""
+    return bool(chi2 / parts > stats.f.ppf(1 - CHANCE, parts, dof))
+
+
+def rows_disagree(axis: str, rows: tuple[float, float], z: float, apart: bool, suspect: str) -> Iterator[Finding]:
+    """Force row and moment row, by the full covariance of their differences: the mean difference `z` in its standard
+    uncertainty (five allowed), or `apart` at the single angles."""
+    if abs(z) > 5 or apart:
         hint = suspect or (
             "an AMB's constants do not belong to this rig as it stands" if axis == "y" else
             "K_x of an AMB is further from K_y than machine.amb_asymmetry says"
         )  # fmt: skip
+        where = (
+            f"by {abs(z):.1f} standard uncertainties" if abs(z) > 5 else "from angle to angle, more than their scatter"
+        )
         yield Finding(
             "rows-disagree",
-            f"along {axis} forces give {force:.3f} N/A and moments {moment:.3f} N/A, further apart than their uncertainties "
-            f"allow (chi-squared {chi2:.0f}, {dof} degrees of freedom): {hint}.",
+            f"along {axis} forces give {rows[0]:.3f} N/A and moments {rows[1]:.3f} N/A; they differ {where}: {hint}.",
             axis,
             Effect.ERROR,
         )
 
 
-def lack_of_fit(axis: str, chi2: float, dof: int, worst_N: float, suspect: str) -> Iterator[Finding]:
-    """Square and cube of the current in the forces, by their full covariance."""
-    if chi2 > stats.chi2.ppf(1 - CHANCE, dof):
+def lack_of_fit(axis: str, bent: bool, worst_N: float, suspect: str) -> Iterator[Finding]:
+    """Square and cube of the current in the forces, `bent` by their full covariance."""
+    if bent:
         hint = (
             suspect or "a coil or a segment saturates, or the calibration is of another angle, bias or rotor position"
         )
         yield Finding(
             "lack-of-fit",
             f"the force along {axis} is not proportional to the current: {worst_N:.2f} N at the extreme levels, more than "
-            f"the calibration and the scatter allow (chi-squared {chi2:.0f}, {dof} degrees of freedom): {hint}.",
+            f"the calibration and the scatter allow: {hint}.",
             axis,
             Effect.INDETERMINATE,
         )
