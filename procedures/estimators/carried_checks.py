@@ -113,7 +113,7 @@ def settled(
         worst = np.abs(values[name])
         if worst.max() > limit:
             yield Finding(
-                "not-settled",
+                "unsettled",
                 f"{what} within a step: {worst.max() * scale:.3g} {unit} ({name}) at worst, {limit * scale:.3g} {unit} "
                 f"allowed; {int((worst > limit).sum())} of {worst.size} steps. Settle longer, or look at the integrator.",
                 data.where(worst),
@@ -131,7 +131,7 @@ def creeping(drift_A: Mapping[str, float], u_A: Mapping[str, float], plan: Toler
     for name, change in drift_A.items():
         if abs(change) > max(plan.max_creep_A, 5 * u_A[name]):
             yield Finding(
-                "drifting-current",
+                "drifting-sensor",
                 f"{name} changes by {change * 1e3:+.2f} mA over the sequence with the shaft where it was "
                 f"({plan.max_creep_A * 1e3:.2f} mA allowed): a current sensor of {pairs.get(name, 'that AMB')} drifts, or the "
                 "load does. The sequence is mirrored, so that a steady drift does not reach the result; an unsteady one does.",
