@@ -36,7 +36,7 @@ class Lookup:
             if calibration is not None:
                 found.append(calibration.used_at(self.now))
         if problems:
-            title = f"{procedure} on {self.rig.name} needs calibrations that are not there; nothing was started:"
+            title = f"{procedure} on {self.rig.name} needs calibrations that are missing or do not fit; nothing was started:"
             raise ConfigError("\n  ".join([title, *problems]))
         return tuple(found)
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import takewhile
 from textwrap import shorten
 from typing import Any
 
@@ -23,7 +25,7 @@ def symbol_of(name: str) -> Symbol:
 def budget_table(measurement: Content) -> BudgetTable:
     """The budget of one measurement of record.json, largest share first."""
     unit = str(measurement.get("unit") or "")
-    entries = sorted(measurement.get("budget") or (), key=lambda e: -abs(float(e.get("contribution") or 0.0)))
+    entries = sorted(grouped(measurement.get("budget") or ()), key=lambda e: -abs(float(e.get("contribution") or 0.0)))
     variance = math.fsum(float(e.get("contribution") or 0.0) ** 2 for e in entries)
     shares = [float(e.get("contribution") or 0.0) ** 2 / variance if variance > 0 else 0.0 for e in entries]
     shown = [i for i, share in enumerate(shares) if share >= SMALL_SHARE]
@@ -41,13 +43,40 @@ def budget_table(measurement: Content) -> BudgetTable:
     )
 
 
+def grouped(entries: Sequence[Content]) -> list[Content]:
+    """The entries of a budget with the parts of one scatter as one entry: those of Type A whose identities differ in
+    numbers only (`RUN/scatter/0/1`, `RUN/scatter/0/2`). The record keeps them apart, because correlations need that."""
+    groups: dict[str, list[Content]] = {}
+    for number, entry in enumerate(entries):
+        first, *rest = str(entry.get("influence") or number).split("/")
+        stem = "/".join([first, *filter(None, (part.rstrip("0123456789") for part in rest))])
+        groups.setdefault(stem if entry.get("type") == "A" else f"{number}:", []).append(entry)
+    return [members[0] if len(members) == 1 else _together(members) for members in groups.values()]
+
+
+def _together(members: Sequence[Content]) -> Content:
+    dofs = {m.get("dof") for m in members}
+    names = [re.sub(r" at \S+°| \(\d+\)", "", str(m.get("name") or "")) for m in members]
+    bare, bracket, run = names[0].partition(" [")
+    if len(set(names)) > 1:
+        same = takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
+        bare = "".join(letters[0] for letters in same).partition(" [")[0].rstrip(" ,;(")
+    return {
+        **members[0],
+        "name": f"{bare}, {len(members)} parts{bracket}{run}",
+        "contribution": math.hypot(*(float(m.get("contribution") or 0.0) for m in members)),
+        "sensitivity": None,
+        "dof": members[0].get("dof") if len(dofs) == 1 else "",
+    }
+
+
 def _budget_row(entry: Content, share: float) -> BudgetRow:
     sensitivity = entry.get("sensitivity")
     return BudgetRow(
         name=str(entry.get("name", "")),
         kind=str(entry.get("type") or text.DASH),
         distribution=str(entry.get("distribution") or text.DASH),
-        dof=text.degrees_of_freedom(entry.get("dof")),
+        dof=text.DASH if entry.get("dof") == "" else text.degrees_of_freedom(entry.get("dof")),
         sensitivity=text.significant(sensitivity, 3),
         contribution=text.significant(abs(float(entry.get("contribution") or 0.0))),
         share=f"{100 * share:.1f}{text.NARROW}%",

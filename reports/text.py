@@ -16,6 +16,7 @@ MINUS = "\u2212"
 TIMES = "\u00d7"
 DASH = "\u2013"
 _SUPERSCRIPTS = str.maketrans("0123456789-+", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺")
+_GREEK = {"alpha": "α", "beta": "β", "gamma": "γ", "tau": "τ"}
 _UNIT_WORDS = {"um": "µm", "us": "µs", "uA": "µA", "deg": "°", "degC": "°C", "ohm": "Ω", "Ohm": "Ω", "percent": "%"}
 
 
@@ -158,7 +159,11 @@ def moment(text: str | None) -> str:
 
 
 def symbol(name: str) -> tuple[str, str]:
-    """A quantity's name as (letter, subscript): `K_i` -> K, i; `K2_o` -> K, 2,o; a word stays whole, no subscript."""
+    """A quantity's name as (letter, subscript): `K_i` -> K, i; `K2_o` -> K, 2,o; `alpha_d` -> α, d; a word stays whole, no
+    subscript."""
+    greek, _, below = name.partition("_")
+    if greek in _GREEK and re.fullmatch(r"[A-Za-z0-9]{1,3}", below):
+        return _GREEK[greek], _GREEK.get(below, below)
     # A letter behind a capital is a subscript too: `Kw_i` -> K, w,i.
     match = re.fullmatch(r"([A-Za-z])(\d*)(?:_([A-Za-z0-9]{1,6}))?", name) or re.fullmatch(
         r"([A-Z])([a-z])_([A-Za-z0-9]{1,6})", name

@@ -27,7 +27,7 @@ from report_samples import (
 import reports
 from bench.errors import BenchError
 from bench.procedure import Quantity
-from reports import compose, html, pdf
+from reports import compose, html, pdf, tables
 from reports.figures import draw
 from reports.view import SIMULATED, ReportView
 
@@ -274,3 +274,41 @@ def test_an_unwritable_run_directory_is_our_error(tmp_path: Path) -> None:
     in_the_way.write_text("x")
     with pytest.raises(BenchError, match="cannot be written"):
         reports.build(in_the_way, None, record(), title=TITLE)
+
+
+def test_the_parts_of_one_scatter_are_one_row() -> None:
+    """Those of Type A whose identities differ in numbers only; masses differ in a number too and are not of Type A."""
+
+    def entry(influence: str, name: str, contribution: float, kind: str = "A", dof: int = 43) -> dict[str, Any]:
+        return {"influence": influence, "name": name, "contribution": contribution, "sensitivity": 1.0, "type": kind,
+                "distribution": "normal", "dof": dof}  # fmt: skip
+
+    entries = [
+        entry("run-1/scatter/0/1", "scatter at 0° (1) [run-1]", 0.3),
+        entry("run-1/scatter/1/2", "scatter at 40° (2) [run-1]", 0.4),
+        entry("scatter/1", "scatter (1)", 0.2, dof=7),
+        entry("run-2/scatter/1", "scatter (1) [run-2]", 0.1),
+        entry("masses/M1", "mass M1", 0.1, "B"),
+        entry("masses/M2", "mass M2", 0.1, "B"),
+    ]
+    table = tables.budget_table(measurement(budget=entries))
+    assert [(r.name, r.contribution, r.dof) for r in table.rows] == [
+        ("scatter, 2 parts [run-1]", "0.50", "43"), ("scatter (1)", "0.20", "7"), ("scatter (1) [run-2]", "0.10", "43"),
+        ("mass M1", "0.10", "43"), ("mass M2", "0.10", "43"),
+    ]  # fmt: skip
+
+
+def test_the_calibrations_used_are_named_and_an_expired_one_stands_on_every_page() -> None:
+    used = {"procedure": "amb-calibration", "run_id": "amb-calibration-1", "date": "2026-11-21T10:15:00+00:00",
+            "due": "2027-11-21", "sha256": "ab" * 32, "state": "current"}  # fmt: skip
+    made = compose.view_of(record(calibrations=[used]), around())
+    assert made.calibrations.rows == (
+        ("amb-calibration", "amb-calibration-1", "2026-11-21", "2027-11-21", "current", "ab" * 32),
+    )
+    assert made.expired == ""
+    assert view().about_calibrations == "The results rest on no earlier calibration."
+    made = compose.view_of(record(calibrations=[used | {"state": "expired"}], seed=None), around())
+    assert made.expired == "Made with an expired calibration"
+    assert html.render(made).count(made.expired) == 2  # at the top, and where the page ends
+    pages = pdf.render(made, None)
+    assert pages.startswith(b"%PDF")

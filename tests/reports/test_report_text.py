@@ -39,6 +39,10 @@ def test_result_has_two_digits_of_the_uncertainty(value: float, expanded: float,
         ("s^-1", "s⁻¹"),
         ("1", ""),
         ("N*m", "N·m"),
+        ("alpha_d", ("α", "d")),
+        ("gamma_0t", ("γ", "0t")),
+        ("alpha_tau", ("α", "τ")),
+        ("alpha_x_prime", ("alpha_x_prime", "")),
     ],
 )
 def test_units_are_typeset(unit: str, expected: str) -> None:
