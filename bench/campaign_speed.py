@@ -3,7 +3,8 @@
 Efficiency is T1 n / (jobs T): n rigs took the wall time T on `jobs` processes, and T1 is what one rig takes while it
 is alone on the machine, the mean over the first rigs of the same session (the very first, which pays for imports, left
 out). 100 % is n rigs on `jobs` cores in 1/jobs of the time that one core takes. `busy` is the share of jobs x T that the
-processes spent in rigs, `cpu` the share that they spent computing: other programs on the machine lower it.
+processes spent in rigs, `cpu` the share that they spent computing: other programs on the machine lower it. `own` is what
+the efficiency is without them: `busy` times the processor time of a rig alone over that of a rig among others.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ class Speed:
     efficiency: float
     busy: float
     cpu: float
+    own: float
 
 
 def speed(entries: Iterable[Mapping[str, Any]]) -> Speed | None:
@@ -40,7 +42,7 @@ def speed(entries: Iterable[Mapping[str, Any]]) -> Speed | None:
     return Speed(
         n, max(p.jobs for p in parts), sum(p.wall_s for p in parts), sum(p.alone_s * p.rigs for p in parts) / n,
         sum(p.alone_s * p.rigs for p in parts) / room, sum(p.busy * p.jobs * p.wall_s for p in parts) / room,
-        sum(p.cpu * p.jobs * p.wall_s for p in parts) / room,
+        sum(p.cpu * p.jobs * p.wall_s for p in parts) / room, sum(p.own * p.rigs for p in parts) / n,
     )  # fmt: skip
 
 
@@ -56,6 +58,7 @@ def _of_session(rigs: Sequence[Mapping[str, Any]]) -> Speed | None:
         return None
     room = jobs * wall
     busy = sum(r["ended"] - r["began"] for r in together) / room
-    return Speed(
-        len(together), jobs, wall, t1, t1 * len(together) / room, busy, sum(r["cpu_s"] for r in together) / room
-    )
+    cpu = sum(r["cpu_s"] for r in together)
+    cpu_alone = sum(r["cpu_s"] for r in alone) / len(alone)
+    own = busy * cpu_alone * len(together) / cpu if cpu > 0 else 0.0
+    return Speed(len(together), jobs, wall, t1, t1 * len(together) / room, busy, cpu / room, own)

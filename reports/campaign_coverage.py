@@ -28,7 +28,8 @@ READING = (
 EFFICIENCY = (
     "Parallel efficiency is T₁ n/(processes × T): n rigs took the wall time T, and one rig takes T₁ while it is alone on "
     "the machine, measured on the first rigs of the same campaign. Busy and computing are the shares of processes × T "
-    "spent in rigs and on a processor: other programs lower the last."
+    "spent in rigs and on a processor: other programs lower the last. Without other programs: busy times the processor "
+    "time of a rig alone over that of a rig among others."
 )
 
 
@@ -173,8 +174,11 @@ def _time(c: CoverageContent) -> Iterator[Fact]:
     if c.speed is not None:
         s = c.speed
         yield Fact("Together", f"{s.rigs} rigs in {s.wall_s / 60:.1f}{text.NARROW}min on {s.jobs} processes")
-        yield Fact(
-            "Parallel efficiency",
-            f"{100 * s.efficiency:.0f}{text.NARROW}% (one rig alone: {s.alone_s:.2f}{text.NARROW}s)",
-        )
-        yield Fact("Busy, computing", f"{100 * s.busy:.0f}{text.NARROW}%, {100 * s.cpu:.0f}{text.NARROW}%")
+        alone = f"one rig alone: {s.alone_s:.2f}{text.NARROW}s"
+        yield Fact("Parallel efficiency", f"{_percent(s.efficiency)} ({alone})")
+        yield Fact("Without other programs", _percent(s.own))
+        yield Fact("Busy, computing", f"{_percent(s.busy)}, {_percent(s.cpu)}")
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f}{text.NARROW}%"

@@ -163,8 +163,8 @@ def bands(rows: Sequence[Judged], rigs: int) -> Drawn:
             axes.set_ylim(-0.7, len(rows) - 0.3)
 
     return _drawn(
-        "bands", "Do the intervals hold the truth, and are they padded?",
-        f"Left: coverage over {rigs} virtual rigs; the band is 0.95 \u2213 3.3 \u221a(0.95 \u00b7 0.05/N). Right: width of the "
+        "bands", "Coverage and width against their bands",
+        f"Left: coverage over {rigs} virtual rigs; the band is 0.95 ± 3.3 \u221a(0.95 \u00b7 0.05/N). Right: width of the "
         "intervals, with the 95 % range that so many rigs allow. Hollow: measured, but not judged.",
         (WIDE_IN, 0.8 + 0.21 * len(rows)), paint,
     )  # fmt: skip
@@ -174,7 +174,8 @@ def histograms(rows: Sequence[Judged]) -> Drawn:
     """Error over U of each quantity."""
 
     def paint(canvas: Canvas, panels: Sequence[Axes]) -> None:
-        edges = [k / 10 for k in range(-20, 21)]
+        bins = 40 if len(rows[0].ratios) >= 200 else 20
+        edges = [4 * k / bins - 2 for k in range(bins + 1)]
         middle = np.linspace(-2, 2, 201)
         for axes, row in zip(panels, rows, strict=False):
             shown = np.clip(row.ratios, -1.999, 1.999)

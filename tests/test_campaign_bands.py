@@ -97,6 +97,7 @@ def test_efficiency_by_its_definition() -> None:
     assert found.efficiency == pytest.approx(0.8)
     assert found.busy == pytest.approx(1.0)
     assert found.cpu == pytest.approx(0.4)
+    assert found.own == pytest.approx(1.0)
 
 
 def test_time_between_two_sessions_does_not_count() -> None:

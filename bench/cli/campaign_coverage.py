@@ -84,7 +84,8 @@ class Result:
             s = self.speed
             lines.append(
                 f"parallel efficiency {s.efficiency:.0%} on {s.jobs} processes "
-                f"(a rig alone {s.alone_s:.2f} s; busy {s.busy:.0%}, computing {s.cpu:.0%} of the time)"
+                f"(a rig alone {s.alone_s:.2f} s; busy {s.busy:.0%}, computing {s.cpu:.0%} of the time; "
+                f"{s.own:.0%} without other programs)"
             )
         return "\n".join([*lines, f"bands: {self.verdict.value}"]) + "\n"
 
@@ -197,7 +198,7 @@ def _fields(row: Row) -> dict[str, Any]:
 
 
 def _plan(step: Planned) -> str:
-    return ", ".join(f"{key} = {value}" for key, value in step.plan.model_dump(mode="json").items())
+    return ", ".join(f"{key} = {json.dumps(value)}" for key, value in step.plan.model_dump(mode="json").items())
 
 
 def _entry(row: Row) -> dict[str, Any]:
