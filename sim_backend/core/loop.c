@@ -48,9 +48,13 @@ void tsbs_sense(const tsbs_params *p, tsbs_derived *d, tsbs_state *st, tsbs_read
                                      : angle;
 }
 
-static void amplifiers(const tsbs_params *p, const tsbs_derived *d, const tsbs_state *st, double *coil, double *segment) {
+static void amplifiers(const tsbs_params *p, const tsbs_derived *d, tsbs_state *st, double *coil, double *segment) {
     double now = st->tick * TICK;
     int enabled = st->law.mode != OFF;
+    for (int k = 0; k < 10; k++) /* a current that has died away is none: denormal numbers are slow */
+        if (st->coil[k] < 1e-30) st->coil[k] = 0;
+    for (int k = 0; k < 4; k++)
+        if (fabs(st->segment[k]) < 1e-30) st->segment[k] = 0;
     for (int k = 0; k < 10; k++) { /* the inner loop closes on its own sensor */
         double ref = enabled ? least(most(st->applied.coil[k], 0), p->coil_limit[k]) : 0;
         coil[k] = enabled ? most((ref - p->current_offset[k] - p->current_drift[k] * now) * d->per_gain[k], 0) : 0;
