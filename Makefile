@@ -25,8 +25,8 @@ ci-long: setup
 	$(BIN)/python -m pytest -q -m long tests
 
 campaigns: setup
-	$(BIN)/python benchmarks/coverage.py amb-calibration --runs 1000
-	$(BIN)/python benchmarks/coverage.py amb-calibration --runs 1000 --first-seed 1000000
+	$(BIN)/bench campaign tsbs-identification --count 1000 --keep none
+	$(BIN)/bench campaign tsbs-identification --count 1000 --first-seed 1000000 --keep none
 
 bench: setup
 	$(BIN)/python benchmarks/core.py

@@ -157,6 +157,7 @@ def campaign(
     keep: Annotated[Keep, typer.Option(help="Many: which rigs' recordings stay.")] = Keep.MISSED,
     go_on: Annotated[bool, typer.Option("--go-on", help="One rig: go on after a step that is not PASS.")] = False,
     new: Annotated[bool, typer.Option("--new", help="Start anew, whatever is unfinished.")] = False,
+    short: Annotated[bool, typer.Option("--short", help="One virtual rig: with the short plans of many.")] = False,
 ) -> int:
     """Run a list of procedures on a rig, or on many virtual ones; goes on where it was stopped.
 
@@ -180,6 +181,7 @@ def campaign(
             keep=keep.value,
             go_on=go_on,
             new=new,
+            short=short,
         )
     )
 

@@ -44,6 +44,7 @@ class CampaignRequest:
     keep: Keep = "missed"
     go_on: bool = False
     new: bool = False
+    short: bool = False
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,10 @@ def asked_for(request: CampaignRequest) -> Asked:
     campaign, path = campaign_file.load(request.campaign)
     campaign = _with_options(campaign, request)
     rig = with_links(load_rig(campaign.rig), request.links)
-    return Asked(request, campaign, rig, planned(campaign, str(path), rig, campaign.virtual is not None))
+    if request.short and campaign.backend == "live":
+        raise ConfigError("--short: the short plans are for virtual rigs; leave it out with --backend live")
+    short = request.short or campaign.virtual is not None
+    return Asked(request, campaign, rig, planned(campaign, str(path), rig, short))
 
 
 def _with_options(c: Campaign, r: CampaignRequest) -> Campaign:

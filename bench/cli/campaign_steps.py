@@ -30,8 +30,8 @@ class Planned:
     needs: tuple[Need, ...]
 
 
-def planned(campaign: Campaign, path: str, rig: RigFile, many: bool) -> tuple[Planned, ...]:
-    """The steps, ready to run; on `many` virtual rigs with their short plans.
+def planned(campaign: Campaign, path: str, rig: RigFile, short: bool) -> tuple[Planned, ...]:
+    """The steps, ready to run; with their `virtual_plan` if `short`.
 
     Raises:
         ConfigError: with every plan that cannot be used, every quantity and equation that is not there, every need
@@ -42,7 +42,7 @@ def planned(campaign: Campaign, path: str, rig: RigFile, many: bool) -> tuple[Pl
     for number, step in enumerate(campaign.step, 1):
         procedure = load_procedure(step.procedure)
         try:
-            plan, assignments = _plan(procedure, step, rig, many)
+            plan, assignments = _plan(procedure, step, rig, short)
         except ConfigError as error:
             listed = error.problems or (Problem(path, "plan", "a plan", str(error)),)
             problems += [Problem(path, f"step.{number}.{p.key}", p.found, p.expected) for p in listed]
@@ -67,8 +67,8 @@ def planned(campaign: Campaign, path: str, rig: RigFile, many: bool) -> tuple[Pl
     return tuple(_adopting(found, campaign))
 
 
-def _plan(procedure: Procedure, step: Step, rig: RigFile, many: bool) -> tuple[BenchPlan, tuple[str, ...]]:
-    tables = [step.plan, step.virtual_plan] if many else [step.plan]
+def _plan(procedure: Procedure, step: Step, rig: RigFile, short: bool) -> tuple[BenchPlan, tuple[str, ...]]:
+    tables = [step.plan, step.virtual_plan] if short else [step.plan]
     assignments = tuple(f"{key}={_literal(value)}" for table in tables for key, value in table.items())
     defaults = ("the rig file", rig.plans.get(procedure.name, {}))
     return plans.assemble(procedure.plan, defaults, None, assignments), assignments
