@@ -73,7 +73,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     for gamma, branch in carrying.mirrored(plan.gamma_rad):
         rig.levitation.set("gamma", gamma)
         rig.clock.sleep(plan.settle_s)
-        with record.step("gamma", gamma_rad=gamma, branch=branch):
+        with record.step("phase", gamma_rad=gamma, branch=branch):
             rig.clock.sleep(plan.average_s)
     for gamma in (*reversed(carrying.approach(plan.gamma_rad)), 0.0):
         rig.levitation.set("gamma", gamma)
@@ -101,7 +101,7 @@ def read(recording: Recording[Plan]) -> StepMeans:
     def name(labels: dict[str, Any]) -> str:
         return f"gamma {math.degrees(labels['gamma_rad']):+.2f}°"
 
-    return read_steps(recording, "gamma", ("gamma_rad", "branch"), name)
+    return read_steps(recording, "phase", ("gamma_rad", "branch"), name)
 
 
 def _of_signals(data: StepMeans, plan: Plan) -> Iterator[Finding]:
