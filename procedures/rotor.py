@@ -34,17 +34,19 @@ def hold(rig: Rig, ki_theta: float | None = None) -> None:
 
 
 def probe(rig: Rig, record: Recorder) -> None:
-    """Turn the released rotor a little with a weak proportional gain, recorded as the step "probe", and let it go again.
+    """Turn the released rotor a little with a weak proportional gain, to one side and to the other (it may rest at either
+    already), recorded as steps "probe", and let it go again.
 
     A loop closed with full gains on an encoder that counts backwards runs away; this one cannot do harm. What it shows is
     judged in `procedures.estimators.direction`.
     """
-    rig.levitation.set("angle_ref", 0.0)
-    with record.step("probe", reference_rad=PROBE_RAD):
-        rig.levitation.set("kp_theta", PROBE_GAIN)
-        rig.levitation.set("angle_ref", PROBE_RAD)
-        rig.clock.sleep(PROBE_S)
-    release(rig)
+    for reference in (PROBE_RAD, -PROBE_RAD):
+        rig.levitation.set("angle_ref", 0.0)
+        with record.step("probe", reference_rad=reference):
+            rig.levitation.set("kp_theta", PROBE_GAIN)
+            rig.levitation.set("angle_ref", reference)
+            rig.clock.sleep(PROBE_S)
+        release(rig)
     rig.levitation.set("angle_ref", 0.0)
 
 

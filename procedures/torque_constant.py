@@ -49,7 +49,7 @@ class Plan(BenchPlan):
     ki_theta: float = Field(300.0, gt=0)  # A/(rad s) of the angle's integrator while loads hang
     detent_angles: int = Field(4, ge=4)  # over one period of the detent, without load
     wiring_A: float = Field(1.5, gt=0)  # of i_x and i_y, to see which segment is which
-    max_angle_rad: float = Field(5e-3, gt=0)  # held: mean angle off home
+    max_angle_rad: float = Field(1e-2, gt=0)  # held: mean angle off home (beyond 2 A the integrator ends, kp holds)
     max_drift_A: float = Field(0.03, gt=0)  # settled: drift of the torque current within a step
     max_baseline_drift_A_s: float = Field(5e-5, gt=0)  # of the current without load, over the run
     max_lost: float = Field(1e-3, ge=0)  # share of a step's samples

@@ -228,7 +228,7 @@ def _drifting(data: TorqueData, zero: npt.NDArray[np.bool_], t: Array, drift: fl
     expected = np.array([[0.0, -drift / 2], [drift / 2, 0.0], [0.0, drift / 2], [-drift / 2, 0.0]])
     apart = np.linalg.norm(expected - found, axis=1)
     best = int(np.argmin(apart))
-    return SEGMENTS[best] if apart[best] < 0.4 * abs(drift) / 2 else ""
+    return SEGMENTS[best] if apart[best] < 0.3 * abs(drift) else ""
 
 
 def _detent(b: Balance, held: Detent) -> Iterator[Finding]:

@@ -1,0 +1,138 @@
+"""The spindown through the whole path: it recovers the truth, and never passes a defect off as sound."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bench.cli.compose import Request
+from bench.cli.run import execute
+from bench.cli.virtual import Simulated, simulated_run
+from bench.findings import Effect, Finding
+from bench.limits import Verdict, judge
+from bench.procedure import Measured
+from bench.records import Outcome
+from bench.rigfile import load_rig
+from bench.specs import load_spec
+from bench.uncertainty import Estimate, correlation, interval
+from procedures.spindown import Plan, check
+from sim_backend.truth import draw
+
+QUICK = {"repeats": 2, "steady_s": 0.2}
+
+
+def run_down(folder: Path, seed: int, truth: Mapping[str, float] | None = None, **plan: Any) -> Simulated:
+    return simulated_run("spindown", "tsbs12", seed, {**QUICK, **plan}, folder / "recording.mcap", truth)
+
+
+def results(run: Simulated) -> dict[str, Estimate]:
+    """The results by the angle, which come without a place."""
+    return {m.quantity.name: m.estimate for m in run.results if isinstance(m, Measured) and not m.where}
+
+
+def serious(run: Simulated) -> dict[str, Finding]:
+    return {f.code: f for f in run.results if isinstance(f, Finding) and f.effect is not Effect.NOTE}
+
+
+def test_a_sound_rig_is_recovered_within_its_intervals(tmp_path: Path) -> None:
+    """Seed fixed before any tuning; the inertia's tolerance dominates, so that B and T_c go up and down together."""
+    run = run_down(tmp_path, 2026)
+    found = results(run)
+    assert set(found) == {"B", "B_high", "T_c", "J_z"}
+    assert serious(run) == {}
+    for name in ("B", "B_high", "T_c"):
+        assert abs(found[name].value - run.truth[name]) < 3 * found[name].u, name
+        assert interval(found[name]).method == "monte-carlo"
+    assert correlation(found["B"], found["T_c"]) > 0.95
+    limits = load_spec("tsbs12", "spindown")
+    assert judge(interval(found["B"]), limits["B"]) is Verdict.PASS
+    assert judge(interval(found["T_c"]), limits["T_c"]) is Verdict.PASS
+    assert found["J_z"].value == pytest.approx(0.033)
+
+
+def test_speed_and_angle_agree_far_below_the_uncertainty_of_either(tmp_path: Path) -> None:
+    """The inertia cancels in their difference."""
+    run = run_down(tmp_path, 8)
+    by_speed = {m.quantity.name: m.estimate for m in run.results if isinstance(m, Measured) and m.where}
+    for name, u in (("B", 2e-5), ("T_c", 3e-4)):
+        apart = by_speed[name] - results(run)[name]
+        assert abs(apart.value) < 4 * apart.u
+        assert apart.u < u
+
+
+def test_the_ring_measures_the_inertia_and_takes_its_tolerance_out(tmp_path: Path) -> None:
+    run = run_down(tmp_path, 21, added_inertia=True)
+    found, true = results(run), draw(load_rig("tsbs12"), 21).values
+    assert abs(found["J_z"].value - true["polar_inertia"]) < 3 * found["J_z"].u
+    for name in ("B", "B_high", "T_c"):
+        assert abs(found[name].value - run.truth[name]) < 3 * found[name].u, name
+        assert found[name].u < 2e-3 * found[name].value
+        assert "machine/polar_inertia" not in found[name].contributions
+    assert serious(run) == {}
+
+
+def test_the_result_follows_the_truth(tmp_path: Path) -> None:
+    """Printed values are no input: with the drag 20 % off it is 20 % off, and the limit says so."""
+    run = run_down(tmp_path, 11, {"viscous": 1.2 * 0.081})
+    found = results(run)["B"]
+    assert abs(found.value - 0.0972) < 3 * found.u
+    assert judge(interval(found), load_spec("tsbs12", "spindown")["B"]) is Verdict.FAIL
+
+
+@pytest.mark.parametrize(
+    ("defect", "code", "named"),
+    [
+        ({"encoder_sign": -1}, "encoder-direction", "backwards"),
+        ({"encoder_sign": -1}, "speed-not-reached", "did not reach"),
+        ({"drive_brakes": 0.15}, "braked", "brake"),
+        ({"drop_fraction": 0.02}, "missing-samples", "missing"),
+        ({"detent": 3}, "drag-not-linear", "another shape"),
+        ({"segment_drift_1": 0.003}, "constant-torque", "forward"),
+    ],
+)
+def test_a_defect_is_named_and_does_not_pass(tmp_path: Path, defect: dict[str, float], code: str, named: str) -> None:
+    found = serious(run_down(tmp_path, 3, defect))
+    assert code in found, found
+    assert named in found[code].text
+
+
+def test_a_drive_that_brakes_while_coasting_is_named(tmp_path: Path) -> None:
+    """What the drive gives to hold two speeds has no room for a torque that acts only while it coasts."""
+    outcome = {}
+    for brake in (0.0, 0.05):
+        request = Request("spindown", "tsbs12", seed=5, plan=("repeats=2",), truth=(f"drive_brakes={brake}",),
+                          out=tmp_path / str(brake), report=False)  # fmt: skip
+        outcome[brake] = execute(request)
+    assert outcome[0.0].outcome is Outcome.PASS, outcome[0.0].reason
+    assert outcome[0.05].outcome in (Outcome.FAIL, Outcome.INDETERMINATE)
+    assert "drive-brakes" in {f.code for f in outcome[0.05].record.findings}
+
+
+def test_what_is_adopted_holds_for_its_biases(tmp_path: Path) -> None:
+    calibration = run_down(tmp_path, 4).calibration()
+    assert {"B", "B_high", "T_c", "J_z"} <= set(calibration.values)
+    assert calibration.settings == {"bias_A": 3.0, "bias_high_A": 4.0}
+
+
+@pytest.mark.parametrize(
+    ("plan", "named"),
+    [
+        ({"speed_rad_s": 80}, "envelope"),
+        ({"end_speed_rad_s": 30}, "end_speed_rad_s"),
+        ({"bias_high_A": 3.1}, "bias_high_A"),
+    ],
+)
+def test_a_plan_that_cannot_work_is_refused(plan: dict[str, float], named: str) -> None:
+    rig = load_rig("tsbs12")
+    assert any(named in line for line in check(rig, Plan.model_validate(plan)))
+    assert list(check(rig, Plan())) == []
+
+
+def test_what_the_rig_file_lacks_is_told() -> None:
+    rig = load_rig("tsbs12")
+    lean = rig.model_copy(update={"machine": {}, "devices": {k: d for k, d in rig.devices.items() if k != "drive"}})
+    assert any("ring_inertia" in line for line in check(lean, Plan(added_inertia=True)))
+    assert any("role" in line for line in check(lean, Plan(run_up="drive")))

@@ -1,0 +1,115 @@
+"""The torque balance: exact on exact steps, drift and detent drop out, and what T's equation without gravity would give."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bench.errors import AnalysisError
+from procedures.estimators import torque_balance
+from procedures.estimators.torque_balance import NO_DETENT, Steps, balance, detent
+
+KG = np.array([0.5, 1.0, 2.0, 0.0])
+P = {"gravity": 9.81, "air_density": 1.2, "mass_density": 8000.0, "lever_left": 0.23, "lever_right": 0.23,
+     "mass_0": 0.5, "mass_1": 1.0, "mass_2": 2.0, **{f"gain_{k}": 1.0 for k in range(1, 5)}}  # fmt: skip
+SIDES = np.array([0, 1, 1, 1, 0, -1, -1, -1, 0])
+LOADS = np.array([-1, 0, 1, 2, -1, 2, 1, 0, -1])
+
+
+def made(
+    alpha: float, gamma_0: float, base: float = 0.0, drift: float = 0.0, noise: float = 0.0, seed: int = 0
+) -> Steps:
+    """Steps of a machine with constants as given, at five phase angles."""
+    gammas = np.repeat(np.linspace(-0.087, 0.087, 5), len(SIDES))
+    side, load = np.tile(SIDES, 5), np.tile(LOADS, 5)
+    time = np.arange(len(side)) * 1.3
+    torque = side * KG[load] * 9.81 * 0.23 * (1 - 1.2 / 8000)
+    current = -torque / (alpha * np.cos(8 * (gammas - gamma_0))) + base + drift * time
+    current = current + noise * np.random.default_rng(seed).normal(size=len(side))
+    return Steps(np.repeat(current[:, None], 4, axis=1), np.zeros(len(side)), gammas, time, side, load)
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.floats(1, 5), st.floats(-0.02, 0.02), st.floats(-1, 1), st.floats(-1e-3, 1e-3))
+def test_constants_are_found_whatever_is_constant_or_drifts(
+    alpha: float, gamma_0: float, base: float, drift: float
+) -> None:
+    found = balance(made(alpha, gamma_0, base, drift), P, 3, 8.0)
+    assert found.alpha == pytest.approx(alpha, rel=1e-7)
+    assert found.gamma_0 == pytest.approx(gamma_0, abs=1e-8)
+
+
+def test_the_scatter_is_what_the_covariance_says() -> None:
+    fits = [balance(made(2.87, 0.003, noise=1e-3, seed=k), P, 3, 8.0) for k in range(150)]
+    for k, values in enumerate(([f.alpha for f in fits], [f.gamma_0 for f in fits])):
+        assert np.std(values) == pytest.approx(np.mean([math.sqrt(f.covariance[k, k]) for f in fits]), rel=0.2)
+
+
+def test_gains_and_offsets_of_the_sensors() -> None:
+    """A gain of a segment counts a quarter; an offset of any size does nothing."""
+    s = made(2.87, 0.0)
+    wrong = Steps(s.segments * [1.004, 1, 1, 1] + [0.02, -0.01, 0, 0.03], s.angle, s.gamma, s.time, s.side, s.load)
+    assert balance(wrong, P, 3, 8.0).alpha == pytest.approx(2.87 / 1.001, rel=1e-6)
+    assert balance(wrong, {**P, "gain_1": 1.004}, 3, 8.0).alpha == pytest.approx(2.87, rel=1e-6)
+
+
+def test_gravity_is_missing_in_print() -> None:
+    """Errata of T 6.6.4: m l = alpha_tau cos(M gamma) i gives 0.29 instead of 2.87, and is no torque."""
+    s = made(2.87, 0.0)
+    literal = balance(s, {**P, "gravity": 1.0}, 3, 8.0).alpha
+    assert literal == pytest.approx(2.87 / 9.81, rel=1e-6)
+
+
+def test_a_baseline_is_needed_against_detent() -> None:
+    """Errata of T 6.6.4: m g l = alpha_tau cos(M gamma) i, fitted to one side as printed, takes 3 A of offset for load."""
+    s = made(2.87, 0.0, base=0.05)
+    left = s.side > 0
+    torque = torque_balance.load_torque(s, P, 3)[left]
+    current = -s.segments[left, 0] * np.cos(8 * s.gamma[left])
+    literal = float(torque @ torque / (torque @ current))
+    assert abs(literal / 2.87 - 1) > 0.03
+    assert balance(s, P, 3, 8.0).alpha == pytest.approx(2.87, rel=1e-7)
+
+
+def test_five_degrees_cost_about_a_quarter() -> None:
+    """T Fig. 6.6(a): about 23 % less torque per current at 5.03 deg."""
+    gamma = math.radians(5.03)
+    s = made(2.87, 0.0)
+    found = balance(s, P, 3, 8.0)
+    assert found.alpha * math.cos(8 * gamma) / found.alpha == pytest.approx(0.77, abs=0.01)
+
+
+def test_detent_is_found_and_taken_off() -> None:
+    angle = np.arange(4) / 4 * 2 * math.pi / 16
+    held = detent(angle, 0.01 + 0.2 * np.sin(16 * angle + 0.7), 16.0)
+    assert held.amplitude == pytest.approx(0.2, rel=1e-9)
+    s = made(2.87, 0.0)
+    off = np.where(s.side > 0, 1.5e-3, -1.5e-3) * (s.side != 0)
+    shifted = Steps(
+        s.segments + (held.off_home(off) / np.cos(8 * s.gamma))[:, None], off, s.gamma, s.time, s.side, s.load
+    )
+    assert abs(balance(shifted, P, 3, 8.0, NO_DETENT).alpha / 2.87 - 1) > 1e-3
+    assert balance(shifted, P, 3, 8.0, held).alpha == pytest.approx(2.87, rel=1e-6)
+
+
+def test_each_extra_term_finds_its_own() -> None:
+    s = made(2.87, 0.0, noise=5e-4)
+    assert abs(torque_balance.ratio_of_sides(balance(s, P, 3, 8.0), s).t) < 4
+    longer = balance(s, {**P, "lever_left": 0.232}, 3, 8.0)
+    assert torque_balance.ratio_of_sides(longer, s).value == pytest.approx(-0.0087, abs=1e-3)
+    heavier = balance(s, {**P, "mass_1": 0.98}, 3, 8.0)
+    assert torque_balance.of_load(heavier, s, 1).value == pytest.approx(0.02, abs=2e-3)
+    assert torque_balance.shape_over_gamma(balance(s, P, 3, 8.0), s)[0] > 1e-4
+    assert torque_balance.shape_over_gamma(balance(s, P, 3, 6.0), s)[0] < 1e-6
+
+
+def test_a_run_that_was_stopped_early_is_told() -> None:
+    s = made(2.87, 0.0)
+    for keep in (slice(0, 14), slice(0, 40)):
+        part = Steps(*(getattr(s, n)[keep] for n in ("segments", "angle", "gamma", "time", "side", "load")))
+        with pytest.raises(AnalysisError):
+            balance(part, P, 3, 8.0)
