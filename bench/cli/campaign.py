@@ -140,8 +140,8 @@ def _many(asked: Asked, directory: CampaignDirectory, progress: Progress) -> int
     assert virtual is not None
     seeds = list(range(virtual.first_seed, virtual.first_seed + virtual.count))
     task = RigTask(
-        rig=str(Path(asked.rig.path).resolve()), steps=step_tasks(asked.steps), truth=dict(asked.campaign.truth),
-        keep=asked.request.keep, folder=str(task_folder(directory)),
+        rig=str(Path(asked.rig.path).resolve()), rig_sha256=asked.rig.digest, steps=step_tasks(asked.steps),
+        truth=dict(asked.campaign.truth), keep=asked.request.keep, folder=str(task_folder(directory)),
     )  # fmt: skip
     jobs = asked.request.jobs or cores()
     with pool(jobs) as executor:

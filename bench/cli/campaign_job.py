@@ -37,6 +37,7 @@ class RigTask:
     """What every rig of a campaign goes through. `folder` takes recordings while they are needed, and kept ones."""
 
     rig: str
+    rig_sha256: str
     steps: tuple[StepTask, ...]
     truth: Mapping[str, float]
     keep: Keep
@@ -81,7 +82,12 @@ def _end_with(parent: Any) -> None:
 
 def run_rig(task: RigTask, seed: int) -> dict[str, Any]:
     """Draw the rig of that seed and take it through every step; one that cannot be relied on is not adopted, and the
-    steps that need it are left out."""
+    steps that need it are left out.
+
+    Raises:
+        ConfigError: the rig file is not the one that the campaign was started with.
+    """
+    _refuse_another_rig(task)
     line = _Line(seed, time.time())
     cpu = time.process_time()
     work = Path(task.folder) / "work" / str(seed)
@@ -96,6 +102,17 @@ def run_rig(task: RigTask, seed: int) -> dict[str, Any]:
         shutil.rmtree(work, ignore_errors=True)
     line.ended, line.cpu_s = time.time(), time.process_time() - cpu
     return vars(line)
+
+
+def _refuse_another_rig(task: RigTask) -> None:
+    from bench.errors import ConfigError
+    from bench.rigfile import load_rig
+
+    if load_rig(task.rig).digest != task.rig_sha256:
+        raise ConfigError(
+            f"rig file {task.rig}: changed while the campaign ran; what was done before is noted. "
+            "Next: put it back and give the same command, or give --new to start another campaign"
+        )
 
 
 def _run_step(

@@ -17,6 +17,9 @@ from campaign_catalogue import SMALL
 from bench import catalogue
 from bench.campaign_model import SCHEMA_FILE, json_schema
 from bench.cli.__main__ import main
+from bench.cli.campaign_job import RigTask, run_rig
+from bench.errors import ConfigError
+from bench.rigfile import load_rig
 
 ROOT = Path(__file__).resolve().parents[2]
 Bench = Callable[..., tuple[int, str, str]]
@@ -239,3 +242,14 @@ def test_a_rig_that_fails_a_step_is_told_by_its_code(bench_process: Bench, tmp_p
     (first, *_) = (e for e in journal(tmp_path / out.strip()) if e["kind"] == "rig")
     assert [s["step"] for s in first["steps"]] == [1, 3]  # the one that needs it is left out
     assert first["kept"] == []
+
+
+def test_a_rig_file_that_changes_while_a_campaign_runs_ends_it(tmp_path: Path) -> None:
+    rig = tmp_path / "other.toml"
+    rig.write_text((catalogue.INSTALLED / "tsbs12.toml").read_text())
+    (tmp_path / "tsbs12.dbc").write_text((catalogue.INSTALLED / "tsbs12.dbc").read_text())
+    task = RigTask(str(rig), load_rig(str(rig)).digest, (), {}, "none", str(tmp_path))
+    assert run_rig(task, 1)["values"] == []
+    rig.write_text(rig.read_text() + "\n")
+    with pytest.raises(ConfigError, match="changed while the campaign ran"):
+        run_rig(task, 2)
