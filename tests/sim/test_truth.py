@@ -12,7 +12,7 @@ from bench.errors import ConfigError
 from bench.rigfile import RigFile, load_rig
 from sim_backend.core import derivative
 from sim_backend.core.params import PlantParams
-from sim_backend.truth import DEFECTS, Truth, draw, stated
+from sim_backend.truth import DEFECTS, draw, nominal
 
 X, Y, THETA = 6, 7, 11
 
@@ -20,11 +20,6 @@ X, Y, THETA = 6, 7, 11
 @cache
 def rig() -> RigFile:
     return load_rig("tsbs12")
-
-
-def nominal() -> Truth:
-    """The rig with every drawn value at what the rig file states."""
-    return draw(rig(), 0, {name: t.value for name, t in stated(rig()).items()})
 
 
 def force(p: PlantParams, segment: tuple[float, ...], theta: float = 0.0, gamma: float = 0.0) -> np.ndarray:
@@ -37,7 +32,7 @@ def force(p: PlantParams, segment: tuple[float, ...], theta: float = 0.0, gamma:
 
 def test_the_nominal_machine_is_that_of_the_thesis() -> None:
     """T Table 6.2 and (6.12)."""
-    q = nominal().quantities
+    q = draw(rig(), 0, nominal(rig())).quantities
     printed = {
         "K_i": 73.2,
         "K_o": 74.4,
