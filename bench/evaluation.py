@@ -134,6 +134,10 @@ def _calibrations(recording: Recording[Any]) -> Iterator[Finding]:
             if used.state == "expired":
                 text = f"{name} rests on {used.procedure} of {used.date[:10]}, which had expired on {used.due}"
                 yield Finding("calibration-expired", text, c.run_id)
+            here = {other.procedure: other.run_id for other in recording.calibrations}
+            if here.get(used.procedure, used.run_id) != used.run_id:
+                text = f"{name} rests on {used.run_id}; this run uses {here[used.procedure]} beside it"
+                yield Finding("calibrations-of-two-runs", text, c.run_id)
         if c.outcome != Outcome.PASS:
             yield Finding(
                 "calibration-not-passed", f"{name} was adopted although its outcome was {c.outcome}", c.run_id

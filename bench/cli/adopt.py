@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 
 from bench import catalogue
-from bench.adoption import Adoption, refuse_other_rig
+from bench.adoption import Adoption, due, refuse_other_rig
 from bench.calibration import Calibration
 from bench.calibrationstore import Store, named
 from bench.cli.compose import load_procedure
@@ -30,6 +32,7 @@ def adopt(run: Path, rig: str = "", calibrations: Path | None = None, anyway: bo
     file = load_rig(rig or (then if Path(then).is_file() else str(catalogue.rig_path(made.rig))))
     store = Store.of(file, made.seed, calibrations)
     refuse_other_rig(made, file, store)
+    made = replace(made, due=due(file, made.procedure, datetime.fromisoformat(made.date)))  # by today's interval
     return made, store.adopt(made)
 
 
