@@ -1,0 +1,92 @@
+"""What the spindown's checks say of run-downs made on purpose."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bench.findings import Effect
+from bench.rigfile import load_rig
+from procedures.estimators import drag, spindown, spindown_checks
+from procedures.estimators.spindown_data import COILS, LAGS, RunDown
+from procedures.spindown import Plan
+
+J, COUNT = 0.033, 2 * np.pi / 4096
+
+
+def made(
+    bias: float, direction: int, repeat: int, *, b: float = 0.0, extra: float = 0.0, speed_scale: float = 1.0
+) -> RunDown:
+    """A run-down as an encoder of 4096 counts and a filtered speed would show it."""
+    rate, c = b or (0.081 if bias == 3.0 else 0.13) / J, 0.05 / J + extra
+    t = np.arange(0, 1.0, 1e-3)
+    rng = np.random.default_rng([int(10 * bias), direction + 2, repeat])
+    start = 46.0 + rng.uniform(-0.5, 0.5)
+    angle = np.floor((spindown.angle(t, rate, c, start) + rng.uniform(0, COUNT)) / COUNT) * COUNT
+    scale = 1 / (1 - rate / (2 * np.pi * 20))
+    seen = speed_scale * ((spindown.speed(t, rate, c, start) + c / rate) * scale - c / rate) + 0.01 * rng.normal(
+        size=len(t)
+    )
+    return RunDown(
+        bias, direction, repeat, False, t, seen, angle - angle[0], spindown.of_speed(t, seen, LAGS),
+        spindown.of_angle(t, angle - angle[0], LAGS), dict.fromkeys(COILS, bias), np.zeros(4), 0, 1000, 0,
+    )  # fmt: skip
+
+
+def sound() -> list[RunDown]:
+    return [made(bias, d, k) for bias in (3.0, 4.0) for k in (0, 1) for d in (1, -1)]
+
+
+def codes(runs: list[RunDown]) -> set[str]:
+    rig, plan = load_rig("tsbs12"), Plan()
+    angle, speed = (drag.evaluate(runs, rig, m, 3.0, 4.0) for m in ("angle", "speed"))
+    found = [*spindown_checks.of_runs(runs, plan), *spindown_checks.of_result(runs, angle, speed, plan)]
+    return {f.code for f in found if f.effect is not Effect.NOTE}
+
+
+def test_sound_run_downs_are_sound() -> None:
+    assert codes(sound()) == set()
+    found = drag.evaluate(sound(), load_rig("tsbs12"), "angle", 3.0, 4.0).estimates
+    assert found["B"].value == pytest.approx(0.081, rel=1e-3)
+    assert found["B_high"].value == pytest.approx(0.13, rel=1e-3)
+    assert found["T_c"].value == pytest.approx(0.05, rel=0.01)
+
+
+def test_a_speed_of_another_scale_is_told() -> None:
+    runs = [made(r.bias_A, r.direction, r.repeat, speed_scale=1.01) for r in sound()]
+    assert "speed-and-angle-disagree" in codes(runs)
+
+
+def test_a_constant_torque_drops_out_and_is_told() -> None:
+    runs = [made(r.bias_A, r.direction, r.repeat, extra=-r.direction * 0.03 / J) for r in sound()]
+    found = drag.evaluate(runs, load_rig("tsbs12"), "angle", 3.0, 4.0)
+    assert found.estimates["T_c"].value == pytest.approx(0.05, rel=0.02)
+    assert found.torque.value == pytest.approx(0.03, rel=0.02)
+    assert "constant-torque" in codes(runs)
+
+
+def test_a_decay_that_depends_on_the_direction_is_told() -> None:
+    runs = [r if r.direction > 0 else made(r.bias_A, -1, r.repeat, b=1.02 * r.of_angle.b) for r in sound()]
+    assert "direction-dependent" in codes(runs)
+
+
+def test_repeats_that_differ_are_told() -> None:
+    runs = [r if r.repeat == 0 else made(r.bias_A, r.direction, 1, b=1.05 * r.of_angle.b) for r in sound()]
+    assert "not-repeatable" in codes(runs)
+    wide = drag.evaluate(runs, load_rig("tsbs12"), "angle", 3.0, 4.0).estimates["B"]
+    assert wide.u > 1.3 * drag.evaluate(sound(), load_rig("tsbs12"), "angle", 3.0, 4.0).estimates["B"].u
+
+
+def test_current_in_a_released_motor_is_told() -> None:
+    runs = [replace(r, segments=np.array([0.0, 0.1, 0.0, 0.0])) for r in sound()]
+    assert "not-released" in codes(runs)
+
+
+def test_the_bias_is_what_the_currents_say() -> None:
+    """Both sensors of an axis 1 % high: the true bias is lower, and B at exactly 3 A is higher than what coasted."""
+    rig = load_rig("tsbs12")
+    runs = [replace(r, coils={c: i * 1.01 for c, i in r.coils.items()}) for r in sound()]
+    as_read = drag.evaluate(runs, rig, "angle", 3.0, 4.0).estimates["B"].value
+    assert as_read < drag.evaluate(sound(), rig, "angle", 3.0, 4.0).estimates["B"].value
