@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from bench.recording import Recording
 from bench.rigfile import RigFile
@@ -18,9 +19,10 @@ from procedures.estimators.coupling import CouplingFit, Sweep
 from procedures.estimators.inputs import certified
 from procedures.estimators.typea import scatter
 
-RIPPLE = 1.5 / 19.36  # alpha_2/alpha_1 of T Table 5.3 (finite elements); alpha_3/alpha_1 is 0.067
-ENCODER_RAD = 2 * math.pi / 4096 / 2  # half a count: what the rotor's angle is not known better than
-PULSES_PER_POLE_PAIR = 2.0  # the ripple goes with P theta, P = 2 M poles
+Array = npt.NDArray[np.float64]
+
+RIPPLE = 1.5 / 19.36  # alpha_2/alpha_1 of T Table 5.3 (finite elements), where the rig file states no ripple
+HALF_COUNT_RAD = math.pi / 4096  # of the encoder
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ def evaluate(recording: Recording[Any], data: StepMeans) -> Analysis:
     """Fit, and the three estimates by name (with `winding`, the x winding's constant over the y winding's)."""
     inputs = fit_inputs(recording)
     sweep = Sweep(data.stack(SEGMENTS), data.stack(("pos_yi", "pos_yo")), data.stack(("pos_xi", "pos_xo")),
-                  data.labels["gamma_rad"], data.time_s)  # fmt: skip
+                  data.labels["gamma_rad"], rotor_angle(data.mean["angle"]), data.time_s)  # fmt: skip
 
     def model(p: dict[str, float]) -> dict[str, float]:
         return outputs(coupling.fit_sweep(sweep, p), p)
@@ -47,10 +49,7 @@ def evaluate(recording: Recording[Any], data: StepMeans) -> Analysis:
     fit = coupling.fit_sweep(sweep, values)
     estimates = by_inputs(model, inputs)
     extra = scatter(fit.fit, _gradients(fit, values), "currents", "scatter of the steps")
-    off_home = abs(float(data.mean["angle"].mean())) + ENCODER_RAD
-    for name, e in estimates.items():
-        whole = e + extra[name] if name in extra else e
-        estimates[name] = whole + _ripple(off_home, fit, values["pole_pairs"]) if name == "gamma_0" else whole
+    estimates |= {name: estimates[name] + e for name, e in extra.items()}
     once = slice(0, (len(data) + 1) // 2)
     ratios = [
         coupling.as_printed(sweep.gamma[once], fit.i_x[once], fit.i_y[once], values["pole_pairs"], successive=way)
@@ -70,7 +69,7 @@ def outputs(fit: CouplingFit, p: dict[str, float]) -> dict[str, float]:
     }
 
 
-def _gradients(fit: CouplingFit, p: dict[str, float]) -> dict[str, np.ndarray]:
+def _gradients(fit: CouplingFit, p: dict[str, float]) -> dict[str, Array]:
     """d output / d terms of the fit, in the order of `coupling.TERMS`."""
     w, turn, unit = fit.term("w"), p["pole_pairs"] * fit.term("gamma_0"), np.eye(len(coupling.TERMS))
     alpha_c = p["alpha_d"] / math.cos(turn)
@@ -82,16 +81,27 @@ def _gradients(fit: CouplingFit, p: dict[str, float]) -> dict[str, np.ndarray]:
     }
 
 
-def _ripple(off_home_rad: float, fit: CouplingFit, pole_pairs: float) -> Estimate:
-    """Off the home angle the ripple turns the force a little: by alpha_2 P theta / alpha_d of M gamma_0, at most.
+def rotor_angle(mean: Array) -> Array:
+    """Where the rotor stands (N,) rad by the mean reading of its encoder in each step.
 
-    The rotor's angle is known to half a count of the encoder besides what it reads; how large the ripple is, the run does
-    not show, and the finite elements of T bound it.
+    The angle loop leaves a rotor alone that reads zero, and pushes it back once it reads a count: it comes to rest at the
+    edge, where now and then a sample reads the next count. A mean above zero is the upper edge, one below zero the lower.
     """
-    turn = RIPPLE * PULSES_PER_POLE_PAIR * pole_pairs * off_home_rad
-    influence = Influence(id="angle/gamma_0", name="ripple off the home angle", u=turn / pole_pairs / math.sqrt(3), unit="rad",
-                          kind="B", distribution="rectangular", source="T Table 5.3; half a count")  # fmt: skip
-    return Estimate.of(0.0, influence)
+    return np.where(mean == 0.0, 0.0, np.sign(mean) * HALF_COUNT_RAD)
+
+
+def ripples(rig: RigFile, alpha_d: float) -> dict[str, Estimate]:
+    """Ripple of the direct and of the coupled force over alpha_d: value 0, bounded by the rig file, else by T."""
+    stated = rig.machine.get("force_ripple")
+    out = {}
+    for key, name in (("ripple_d", "direct"), ("ripple_c", "coupled")):
+        if stated is not None:
+            out[key] = certified(f"machine/force_ripple/{name}", stated, f"force ripple, {name}") * (1 / alpha_d)
+        else:
+            influence = Influence(id=f"machine/force_ripple/{name}", name=f"force ripple, {name}", u=RIPPLE / math.sqrt(3),
+                                  unit="1", kind="B", distribution="rectangular", source="T Table 5.3")  # fmt: skip
+            out[key] = Estimate.of(0.0, influence)
+    return out
 
 
 def fit_inputs(recording: Recording[Any]) -> dict[str, Estimate]:
@@ -107,7 +117,7 @@ def fit_inputs(recording: Recording[Any]) -> dict[str, Estimate]:
         # Refers currents to the sensors' zero, a matter of nanometres: its tolerance does not show.
         "per_metre": Estimate.exact(g["motor_stiffness"].value / alpha_d.value),
     }
-    return inputs | segment_sensors(rig)
+    return inputs | segment_sensors(rig) | ripples(rig, alpha_d.value)
 
 
 def segment_sensors(rig: RigFile) -> dict[str, Estimate]:

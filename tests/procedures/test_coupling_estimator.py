@@ -84,3 +84,24 @@ def test_erratum_successive_differences_multiply_an_integrator_that_has_not_sett
 def test_a_wrong_sense_of_gamma_comes_out_as_a_negative_ratio() -> None:
     shaft = Shaft(alpha_c=-14.3)
     assert coupling.fit_sweep(sweep_data(shaft, DEGREES), parameters(shaft)).term("r") == pytest.approx(-12.1 / 14.3)
+
+
+def test_ripple_off_home_reaches_the_ratio_when_the_rotor_changes_edges() -> None:
+    """Half a count of an encoder with 4096 is 0.77 mrad; 2.5 % of ripple. Constant, it moves gamma_0; changing sides with
+    gamma, it moves the ratio by 0.05 %. Known, it does neither."""
+    shaft = Shaft()
+    data, p = sweep_data(shaft, DEGREES), parameters(shaft)
+    terms = coupling.fit_sweep(data, p).fit.terms
+    for theta, ratio, zero in (
+        (np.full_like(data.gamma, 7.7e-4), 0.0, 1.1e-4),
+        (7.7e-4 * np.sign(data.gamma - 0.009), 7e-4, 0.0),
+    ):
+        disturbed = coupling.Disturbed(np.zeros((2, len(theta))), theta, (0.0, 0.021))
+        i_x, i_y = coupling.currents(data.gamma, terms, 8.0, disturbed)
+        moved = replace(data, segments=segments(i_x, i_y), theta=theta)
+        blind = coupling.fit_sweep(moved, p)
+        assert abs(blind.term("r") * 14.3 / 12.1 - 1) == pytest.approx(ratio, abs=1e-4)
+        assert abs(blind.term("gamma_0")) == pytest.approx(zero, abs=5e-5)
+        told = coupling.fit_sweep(moved, p | {"ripple_c": 0.021})
+        assert told.term("r") == pytest.approx(12.1 / 14.3, rel=1e-7)
+        assert told.term("gamma_0") == pytest.approx(0.0, abs=1e-8)

@@ -122,7 +122,7 @@ def sweep_data(s: Shaft, degrees: Array) -> Sweep:
     gamma = np.radians(np.concatenate([degrees, degrees[-2::-1]]))
     i = np.array([s.by_motor(0.0, 0.0, g) for g in gamma])
     zero = np.zeros((2, len(gamma)))
-    return Sweep(segments(i[:, 0], i[:, 1], 0.01), zero, zero, gamma, np.arange(len(gamma)) * 1.0)
+    return Sweep(segments(i[:, 0], i[:, 1], 0.01), zero, zero, gamma, 0 * gamma, np.arange(len(gamma)) * 1.0)
 
 
 def parameters(s: Shaft) -> dict[str, float]:
@@ -132,6 +132,7 @@ def parameters(s: Shaft) -> dict[str, float]:
     out = {"alpha_d": alpha_d, "chi": s.winding, "K_o": k, "K2_o": k2, "bias_K": 3.0, "pole_pairs": s.pole_pairs}
     out |= {"l_is": -s.z_is, "l_os": s.z_os, "z_oa": s.z_oa, "z_m": s.z_m, "motor_to_outboard": s.z_m - s.z_oa}
     out |= {"amb_span": s.z_oa - s.z_ia, "amb_gap": 0.51e-3, "per_metre": s.alpha_x / s.alpha_d}
+    out |= {"ripple_d": 0.0, "ripple_c": 0.0}
     for name in ("yi", "yo", "xi", "xo", "m1", "m2", "m3", "m4", "op", "on"):
         out |= {f"gain_{name}": 1.0, f"offset_{name}": 0.0}
     return out
