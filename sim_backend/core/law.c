@@ -31,7 +31,8 @@ static void radial(const tsbs_control *c, tsbs_law_state *l, const double *plane
     const double bias[] = {c->bias_i, c->bias_i, c->bias_o, c->bias_o, c->bias_z};
     const double set[] = {c->ref_xi, c->ref_yi, c->ref_xo, c->ref_yo, c->ref_z};
     double up = lifted(c, l), keep = KEEP(c->derivative_hz);
-    l->share = toward(l->share, l->mode == LEVITATE ? c->motor_share : 0, c->share_slew * TICK);
+    int held = l->mode == LEVITATE; /* a landing is the bearings': the motor hands back within 0.1 s */
+    l->share = toward(l->share, held ? c->motor_share : 0, (held ? c->share_slew : 10) * TICK);
     for (int a = 0; a < 5; a++) {
         double error = l->rest[a] + up * (set[a] - l->rest[a]) - plane[a];
         l->filtered[a] = keep * l->filtered[a] + (1 - keep) * (plane[a] - l->previous[a]) / TICK;

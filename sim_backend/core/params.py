@@ -113,6 +113,7 @@ class ControlParams:
     the motor's 0.24 MN/m by its leverage (0.237/0.125)^2, together 1.3 MN/m, on m' = (J + m 0.115^2)/0.125^2 = 16 kg:
     286 rad/s. K kp = 3.2 MN/m closes at twice to three times that, below the 1 kHz amplifiers and the one-sample delay.
     In the linear model without load the rigid modes have zeta 0.48, and 0.34 at worst with beta and alpha_x off by 25 %.
+    The motor's PID (kp_m, kd_m, ki_m) has T's kp; kd and ki are larger, see docs/explanation/simulator.md.
     """
 
     bias_i: float = 3.0

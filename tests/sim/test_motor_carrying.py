@@ -110,10 +110,12 @@ def test_open_loop_currents_are_added_and_ramped() -> None:
 
 def test_a_landing_gives_the_rotor_back_to_the_bearing() -> None:
     plant = carried(PlantParams())
+    plant.set("share_slew", 0.1)
     plant.mode = LAND
     rows = plant.run(12000)
     flags = rows[:, COLUMN["flags"]].astype(int)
     assert not flags[:300].any()  # still free after 0.3 s
+    assert np.abs(rows[150, SEGMENTS]).max() < 0.5
     assert flags[-1] & CONTACT
     assert plant.trips == 0
 
