@@ -154,10 +154,13 @@ def campaign(
     ] = None,
     operator: Annotated[OperatorKind | None, typer.Option(help="One rig: as for `run`.")] = None,
     no_report: Annotated[bool, typer.Option("--no-report", help="Leave reports and summary out.")] = False,
-    keep: Annotated[Keep, typer.Option(help="Many: which rigs' recordings stay.")] = Keep.MISSED,
+    keep: Annotated[Keep | None, typer.Option(help="Many: whose recordings stay; default missed.")] = None,
     go_on: Annotated[bool, typer.Option("--go-on", help="One rig: go on after a step that is not PASS.")] = False,
     new: Annotated[bool, typer.Option("--new", help="Start anew, whatever is unfinished.")] = False,
     short: Annotated[bool, typer.Option("--short", help="One virtual rig: with the short plans of many.")] = False,
+    scheduler: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="Many: on the workers of a Dask scheduler, as tcp://HOST:8786.")
+    ] = "",
 ) -> int:
     """Run a list of procedures on a rig, or on many virtual ones; goes on where it was stopped.
 
@@ -178,10 +181,11 @@ def campaign(
             links=tuple(link or ()),
             operator=operator.value if operator else None,
             report=not no_report,
-            keep=keep.value,
+            keep=keep.value if keep else None,
             go_on=go_on,
             new=new,
             short=short,
+            scheduler=scheduler,
         )
     )
 

@@ -41,10 +41,11 @@ class CampaignRequest:
     links: tuple[str, ...] = ()
     operator: str | None = None
     report: bool = True
-    keep: Keep = "missed"
+    keep: Keep | None = None
     go_on: bool = False
     new: bool = False
     short: bool = False
+    scheduler: str = ""
 
 
 @dataclass(frozen=True)
@@ -110,11 +111,23 @@ def _with_options(c: Campaign, r: CampaignRequest) -> Campaign:
     if r.rig is not None:
         changes["rig"] = r.rig
     made = c.model_copy(update=changes)
+    _refuse_scheduler(made, r)
     if many and made.backend == "live":
         raise ConfigError("--count: a real rig is one; expected --backend sim, or leave it out")
     if r.links and made.backend != "live":
         raise ConfigError("--link: simulated rigs run in this process; expected --backend live, or leave it out")
     return made
+
+
+def _refuse_scheduler(c: Campaign, r: CampaignRequest) -> None:
+    if not r.scheduler:
+        return
+    if c.virtual is None:
+        raise ConfigError("--scheduler: for many virtual rigs; expected --count, or [virtual] in the file")
+    if r.jobs is not None:
+        raise ConfigError("--jobs: the scheduler's workers are the processes; leave it out with --scheduler")
+    if r.keep not in (None, "none"):
+        raise ConfigError(f"--keep {r.keep}: recordings stay where they are made; expected none with --scheduler")
 
 
 def identity(asked: Asked) -> dict[str, Any]:
@@ -134,6 +147,7 @@ def identity(asked: Asked) -> dict[str, Any]:
 
 def _many(asked: Asked, directory: CampaignDirectory, progress: Progress) -> int:
     from bench.cli import campaign_coverage
+    from bench.cli.campaign_dask import workers_of
     from bench.cli.campaign_fleet import cores, pool, run_fleet, task_folder
 
     virtual = asked.campaign.virtual
@@ -141,10 +155,10 @@ def _many(asked: Asked, directory: CampaignDirectory, progress: Progress) -> int
     seeds = list(range(virtual.first_seed, virtual.first_seed + virtual.count))
     task = RigTask(
         rig=str(Path(asked.rig.path).resolve()), rig_sha256=asked.rig.digest, steps=step_tasks(asked.steps),
-        truth=dict(asked.campaign.truth), keep=asked.request.keep, folder=str(task_folder(directory)),
+        truth=dict(asked.campaign.truth), keep=asked.request.keep or "missed", folder=str(task_folder(directory)),
     )  # fmt: skip
-    jobs = asked.request.jobs or cores()
-    with pool(jobs) as executor:
+    scheduler, wanted = asked.request.scheduler, asked.request.jobs or cores()
+    with workers_of(scheduler, asked.rig) if scheduler else pool(wanted) as (executor, jobs):
         stopped = run_fleet(directory, task, seeds, jobs, executor, progress)
     entries = [e for e in directory.journal.entries() if e["kind"] == "rig" and e["seed"] in set(seeds)]
     result = campaign_coverage.judged(asked.campaign, asked.steps, entries)

@@ -36,14 +36,14 @@ class Stopped:
 
 
 @contextmanager
-def pool(jobs: int) -> Iterator[Executor]:
+def pool(jobs: int) -> Iterator[tuple[Executor, int]]:
     """Processes of their own interpreter each, with library threads limited to one: one process per core."""
     before = {name: os.environ.get(name) for name in THREAD_LIMITS}
     os.environ.update(dict.fromkeys(THREAD_LIMITS, "1"))
     spawned = multiprocessing.get_context("spawn")
     executor = ProcessPoolExecutor(jobs, spawned, settle_in, (catalogue.PROCEDURES,))
     try:
-        yield executor
+        yield executor, jobs
     finally:
         executor.shutdown(cancel_futures=True)
         for name, value in before.items():
