@@ -34,6 +34,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--plan", action="append", default=[], metavar="KEY=VALUE", help="a setting; repeatable")
     group.addoption("--fault", action="append", default=[], metavar="FAULT", help="a fault to inject; repeatable")
     group.addoption("--no-report", action="store_true", help="leave the reports out")
+    group.addoption(
+        "--calibrations", type=Path, metavar="DIR", help="folder of calibrations; default beside the rig file"
+    )
+    group.addoption(
+        "--adopt", action="store_true", help="what passes becomes a calibration for the procedures after it"
+    )
     group.addoption("--out", type=Path, default=Path("runs"), help="folder of the run directories")
 
 
@@ -42,6 +48,14 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> ProcedureF
     if parent.config.getoption("--rig") is None or file_path not in _modules():
         return None
     return ProcedureFile.from_parent(parent, path=file_path)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Procedures in the order of the catalogue, which is that of the chain: later ones need the earlier ones' results."""
+    order = {entry.name: number for number, entry in enumerate(catalogue.PROCEDURES)}
+    places = [n for n, item in enumerate(items) if isinstance(item, ProcedureItem)]
+    for place, item in zip(places, sorted((items[n] for n in places), key=lambda i: order[i.name]), strict=True):
+        items[place] = item
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
@@ -109,6 +123,7 @@ class ProcedureItem(pytest.Item):
             faults=tuple(option("--fault")),
             out=option("--out"),
             report=not option("--no-report"),
+            calibrations=option("--calibrations"),
         )
         with warnings.catch_warnings():
             warnings.simplefilter("default")  # the machine is on trial here, not the software
@@ -118,6 +133,10 @@ class ProcedureItem(pytest.Item):
             self.session.shouldstop = self.result.reason
         if self.result.outcome in (Outcome.ERROR, Outcome.ABORTED):
             raise NotMeasured(self.result)
+        if option("--adopt") and self.result.outcome is Outcome.PASS:
+            from bench.cli.adopt import adopt
+
+            adopt(self.result.directory, option("--rig"), option("--calibrations"))
 
     def runtest(self) -> None:
         from bench.records import Outcome

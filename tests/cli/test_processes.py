@@ -177,6 +177,13 @@ def test_pytest_asks_whether_the_machine_is_right(
     assert "Traceback" not in output
 
 
+def test_pytest_adopts_what_passes(tmp_path: Path) -> None:
+    known = tmp_path / "known"
+    found, output, _ = pytest_on(tmp_path, "--rig", "tsbs12", "--no-report", "--adopt", f"--calibrations={known}")
+    assert found == 0, output
+    assert [p.relative_to(known).as_posix() for p in known.rglob("*.json")] == ["sim-0/tiny-levitated.json"]
+
+
 def test_pytest_collects_no_procedure_without_a_rig(tmp_path: Path) -> None:
     found, output, suite = pytest_on(tmp_path)
     assert found == 5, output
