@@ -103,6 +103,8 @@ def axis_result(r: Ramps, inputs: Facts, bias_A: float) -> AxisResult:
     found = propagate(model, inputs)
     for name, extra in _scatter(fitted, r).items():
         found[name] = found[name] + extra
+    if r.axis == "x":
+        _add_curvature(found, r, values, bias_A, fitted)
     count = len(r.angles)
     force, moment = (tuple(found[f"{row}@{k}"] for k in range(count)) for row in ROWS)
     bends = tuple(found[f"{row}/{power}@{k}"] for row in ROWS for k in range(count) for power in POWERS)
@@ -145,6 +147,25 @@ def _scatter(f: Fit, r: Ramps) -> dict[str, Estimate]:
                 ]
                 out[key] = sum(terms, Estimate.exact(0.0))
     return out
+
+
+def _add_curvature(found: dict[str, Estimate], r: Ramps, p: Mapping[str, float], bias_A: float, fitted: Fit) -> None:
+    """Type A of K2/K, which the horizontal constants are found with at each angle: one influence per AMB and angle."""
+    u = force_rows.curvature(r, p, bias_A)[1]
+    y = force_rows.vertical(p, len(r.angles))
+    dof = float(len(r.angles) * (r.time.shape[1] - force_rows.TERMS - 1))
+    for b, bearing in enumerate("io"):
+        shift = np.where(np.arange(2) == b, u, 0.0)[:, None]
+        moved = force_rows.fit(r, p, force_rows.horizontal(r, p, y, bias_A, shift), bias_A)
+        change, bent = moved.terms[:, :, DIRECT] - fitted.terms[:, :, DIRECT], moved.bends - fitted.bends
+        for k, angle in enumerate(r.angles):
+            part = Estimate.of(0.0, Influence(id=f"scatter/x{k}/curvature_{bearing}", u=1.0, unit="1", kind="A", dof=dof,
+                                              name=f"scatter of K2/K at {math.degrees(angle):.0f}°, x",
+                                              distribution="normal", source="residuals of the fits"))  # fmt: skip
+            for row, name in enumerate(ROWS):
+                found[f"{name}@{k}"] += part * float(change[row, k])
+                for j, power in enumerate(POWERS):
+                    found[f"{name}/{power}@{k}"] += part * float(bent[row, k, j])
 
 
 def _turning_point(axis: str, shift: float) -> Estimate:

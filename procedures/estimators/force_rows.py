@@ -84,20 +84,34 @@ def vertical(p: Values, angles: int) -> Constants:
     return Constants(k, k2)
 
 
-def horizontal(r: Ramps, p: Values, y: Constants, bias_A: float) -> Constants:
+def horizontal(r: Ramps, p: Values, y: Constants, bias_A: float, shift: Array | float = 0.0) -> Constants:
     """The constants of the x axis, which no weight can load: those of the y axis, scaled by `p` "asymmetry_i", "_o".
 
     What differs between the axes of one bearing besides its winding is where the journal stands in it: with e the distance
     from the magnetic centre over the gap, F = A i_p^2 - B i_n^2 gives K ~ (1 + e^2)/(1 - e^2)^2 and K2/K = e/(b (1 + e^2)).
-    K2/K of the x axis is seen in the run itself: the motor's force is proportional to its current, so K u + K2 v is, too.
+    K2/K of the x axis is seen in the run itself (`curvature`); `shift` (2, 1) is added to it.
+    """
+    ratio = curvature(r, p, bias_A)[0] + shift
+    scale = 1 + np.array([[p["asymmetry_i"]], [p["asymmetry_o"]]])
+    k = y.k * scale * _gain_off_centre(ratio, bias_A) / _gain_off_centre(y.k2 / y.k, bias_A)
+    return Constants(k, k * ratio)
+
+
+def curvature(r: Ramps, p: Values, bias_A: float) -> tuple[Array, Array]:
+    """K2/K of each AMB at each angle (2, A) in 1/A, and its standard uncertainty by the residuals (2,) for each AMB.
+
+    The motor's force is proportional to its current, so K u + K2 v is, too: u = constant + c i + ... - (K2/K) v.
     """
     u, v = coil_terms(r, p, bias_A)
     design = _design(r, motor_currents(r, p))
     bent = np.concatenate([np.broadcast_to(design, (2, *design.shape)), v[..., None]], axis=-1)
-    ratio = -np.einsum("bafp,bap->baf", np.linalg.pinv(bent), u)[..., -1]
-    scale = 1 + np.array([[p["asymmetry_i"]], [p["asymmetry_o"]]])
-    k = y.k * scale * _gain_off_centre(ratio, bias_A) / _gain_off_centre(y.k2 / y.k, bias_A)
-    return Constants(k, k * ratio)
+    solvers = np.linalg.pinv(bent)
+    terms = np.einsum("bafp,bap->baf", solvers, u)
+    residuals = u - np.einsum("bapf,baf->bap", bent, terms)
+    angles, points, count = bent.shape[1:]
+    variance = (residuals**2).sum(axis=(1, 2)) / (angles * (points - count))
+    spread = np.sqrt(variance * (solvers[:, :, -1] ** 2).sum(axis=-1).mean(axis=-1))
+    return -terms[..., -1], spread
 
 
 def _gain_off_centre(ratio: Array, bias_A: float) -> Array:
