@@ -16,6 +16,7 @@ from reports.campaign_view import Cell, Grid, Section, SummaryView
 from reports.compose import _TONES
 from reports.view import Fact
 
+NAMED = 6  # quantities in the box with the outcome
 SIMULATED = "Simulated rigs – a test of the method, not of a machine"
 READING = (
     "Each virtual rig is drawn from the tolerances of the rig file, taken through all steps by bytes, recording and "
@@ -83,10 +84,11 @@ def view_of(c: CoverageContent) -> SummaryView:
     """The summary as text."""
     outcome = c.verdict.upper()
     out = [q.name for q in c.quantities if q.judged and q.coverage.verdict.value != "pass"]
+    named = ", ".join(out[:NAMED]) + (f" and {len(out) - NAMED} more" if len(out) > NAMED else "")
     said = {
         "PASS": "Every judged quantity lies within both bands.",
-        "FAIL": f"Outside a band: {', '.join(out)}.",
-        "INDETERMINATE": f"More rigs are needed to decide: {', '.join(out)}." if out else "Nothing could be judged.",
+        "FAIL": f"Outside a band: {named}.",
+        "INDETERMINATE": f"More rigs are needed to decide: {named}." if out else "Nothing could be judged.",
     }[outcome]
     return SummaryView(
         title=c.title, campaign=c.campaign, simulated=SIMULATED, outcome=outcome, tone=_TONES.get(c.verdict, "none"),
@@ -113,11 +115,7 @@ def _sections(c: CoverageContent, numbers: _Numbers) -> Iterator[Section]:
                 numbers.picture(campaign_figures.histograms(shown), True),
                 numbers.picture(campaign_figures.scatters(shown), True),
             ))  # fmt: skip
-    yield (
-        Section("What went wrong", grid=_failures(c))
-        if c.failures
-        else Section("What went wrong", lead="Nothing: no rig gave a finding.")
-    )
+    yield (Section("Findings", grid=_failures(c)) if c.failures else Section("Findings", lead="No rig gave a finding."))
     yield Section("Time", facts=tuple(_time(c)), note=EFFICIENCY if c.speed else "")
     rows = tuple((Cell(str(n)), Cell(name), Cell(plan), Cell(f"{s:.2f}{text.NARROW}s")) for n, (name, plan, s) in
                  enumerate(c.steps, 1))  # fmt: skip

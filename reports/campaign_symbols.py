@@ -27,8 +27,10 @@ def symbol(name: str) -> Symbol:
 
 
 def axis_label(name: str) -> str:
-    """The same for matplotlib's maths."""
-    base = name.partition("@")[0]
+    """The same for matplotlib's maths, with the place that a name has."""
+    base, _, where = name.partition("@")
+    if where:
+        return f"{axis_label(base)} ({where.replace('$', '')})"
     match = _NAME.fullmatch(base)
     if match is None:
         letter, subscript = text.symbol(base)

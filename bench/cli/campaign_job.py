@@ -97,6 +97,7 @@ def run_rig(task: RigTask, seed: int) -> dict[str, Any]:
         for number, step in enumerate(task.steps, 1):
             if all(need in known for need in step.needs):
                 _run_step(task, step, number, work, known, line)
+        _refuse_another_rig(task)
         _keep(task, work, line)
     finally:
         shutil.rmtree(work, ignore_errors=True)

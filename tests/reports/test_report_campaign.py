@@ -98,7 +98,7 @@ def test_nothing_at_all_was_measured() -> None:
     content = dataclasses.replace(many(), quantities=(), failures=(), speed=None, verdict="indeterminate")
     page = campaign.html(campaign_coverage.view_of(content))
     assert "Nothing could be judged" in page
-    assert "no rig gave a finding" in page
+    assert "No rig gave a finding" in page
 
 
 def test_a_width_without_an_upper_end() -> None:
@@ -124,7 +124,7 @@ def test_a_summary_that_cannot_be_written(tmp_path: Path) -> None:
         ("alpha_x_prime", "α′", "x", r"$\alpha'_{\mathrm{x}}$"),
         ("alpha_x_prime_amb", "α′", "x,amb", r"$\alpha'_{\mathrm{x},\mathrm{amb}}$"),
         ("alpha_tau", "α", "τ", r"$\alpha_{\tau}$"),
-        ("gamma_0@upper", "γ", "0", r"$\gamma_{\mathrm{0}}$"),
+        ("gamma_0@upper", "γ", "0", r"$\gamma_{\mathrm{0}}$ (upper)"),
         ("beta", "β", "", r"$\beta$"),
         ("supply", "supply", "", "supply"),
     ],
