@@ -106,7 +106,7 @@ class Analysis:
 
 def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     """Findings first (they decide what the numbers are worth), then the six quantities."""
-    data = read_hangings(recording, recording.plan.masses)
+    data = hangings(recording)
     findings = list(consistency.of_signals(data, recording.plan))
     yield from findings
     if any(f.code in consistency.FATAL for f in findings):
@@ -127,9 +127,15 @@ def facts(recording: Recording[Plan]) -> dict[str, Estimate]:
 
 
 @lru_cache(maxsize=1)
+def hangings(recording: Recording[Plan]) -> HangingData:
+    """What was recorded, step by step. Kept, like what is made of it."""
+    return read_hangings(recording, recording.plan.masses)
+
+
+@lru_cache(maxsize=1)
 def evaluate(recording: Recording[Plan]) -> Analysis:
     """Fit, scatter and estimates with their influences. Kept, because measurements, facts and figures all need it."""
-    data = read_hangings(recording, recording.plan.masses)
+    data = hangings(recording)
     plan = recording.plan
     inputs = fit_inputs(recording.rig, plan)
     count = len(plan.masses)
@@ -234,7 +240,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(recording: Recording[Plan]) -> Iterable[Figure]:
     """Fit, residuals, one step over time, and both polar plots; empty when the data carry no fit."""
-    data = read_hangings(recording, recording.plan.masses)
+    data = hangings(recording)
     if any(f.code in consistency.FATAL for f in consistency.of_signals(data, recording.plan)):
         return ()
     result = evaluate(recording)
