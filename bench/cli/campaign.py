@@ -69,7 +69,8 @@ def campaign_command(request: CampaignRequest) -> int:
     with directory.locked(), shown_on(sys.stderr) as progress, runlog.to_lines(progress.line):
         progress.stage(f"{'going on with' if resumed else 'campaign'} {directory.path}")
         directory.journal.repair()
-        status = (_one if asked.campaign.virtual is None else _many)(asked, directory, progress)
+        said, status = (_one if asked.campaign.virtual is None else _many)(asked, directory, progress)
+    sys.stderr.write(said)
     sys.stdout.write(f"{directory.path}\n")
     return status
 
@@ -145,7 +146,7 @@ def identity(asked: Asked) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _many(asked: Asked, directory: CampaignDirectory, progress: Progress) -> int:
+def _many(asked: Asked, directory: CampaignDirectory, progress: Progress) -> tuple[str, int]:
     from bench.cli import campaign_coverage
     from bench.cli.campaign_dask import workers_of
     from bench.cli.campaign_fleet import cores, pool, run_fleet, task_folder
@@ -164,11 +165,10 @@ def _many(asked: Asked, directory: CampaignDirectory, progress: Progress) -> int
     result = campaign_coverage.judged(asked.campaign, asked.steps, entries)
     progress.stage("summary")
     campaign_coverage.write(directory, asked, result, asked.request.report)
-    sys.stderr.write(result.text())
     if stopped:
-        return ABORTED
+        return result.text(), ABORTED
     directory.journal.append({"kind": "done"})
-    return OF_VERDICT[result.verdict]
+    return result.text(), OF_VERDICT[result.verdict]
 
 
 def step_tasks(steps: Sequence[Planned]) -> tuple[StepTask, ...]:
@@ -181,13 +181,12 @@ def step_tasks(steps: Sequence[Planned]) -> tuple[StepTask, ...]:
     )  # fmt: skip
 
 
-def _one(asked: Asked, directory: CampaignDirectory, progress: Progress) -> int:
+def _one(asked: Asked, directory: CampaignDirectory, progress: Progress) -> tuple[str, int]:
     from bench.cli import campaign_chain, campaign_model
 
     done = campaign_chain.run_chain(asked, directory, progress)
     progress.stage("summary")
     campaign_model.write(directory, asked, done, asked.request.report)
-    sys.stderr.write(campaign_chain.text(done))
     if all(d.outcome is Outcome.PASS for d in done):
         directory.journal.append({"kind": "done"})
-    return STATUS[campaign_chain.outcome_of(done)]
+    return campaign_chain.text(done), STATUS[campaign_chain.outcome_of(done)]

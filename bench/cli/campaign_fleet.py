@@ -68,14 +68,21 @@ def run_fleet(
     shutil.rmtree(directory.path / "work", ignore_errors=True)  # of a campaign that was killed
     done = {e["seed"] for e in journal.entries() if e["kind"] == "rig"}
     left = deque(s for s in seeds if s not in done)
+    wanted = set(seeds)
     progress.total(len(left))
+    if left:
+        progress.step(f"rig {left[0]}")
     session = os.urandom(4).hex()
     count = ALONE + 1 if jobs > 1 and len(left) >= ALONE * WORTH else 0
     kinds = deque(["first", *["measured"] * (count - 1)] if count else [])
 
     def note(line: dict[str, Any], alone: str) -> None:
         journal.append({"kind": "rig", "session": session, "jobs": jobs, "alone": alone, **line})
-        progress.step(f"rig {line['seed']}{': ' + line['stopped'] if line['stopped'] else ''}")
+        done.add(line["seed"])
+        if line["stopped"]:
+            progress.line(f"rig {line['seed']}: {line['stopped']}")
+        if len(done & wanted) < len(wanted):
+            progress.step(f"rig {line['seed']} done")
 
     try:
         with signals.delivered_to(stopped.received):
