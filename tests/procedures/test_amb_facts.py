@@ -13,7 +13,8 @@ from bench.cli.virtual import Simulated, simulated_run
 from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.uncertainty import correlation
-from sim_backend.truth import draw, eccentricity
+from sim_backend.quantities import eccentricity
+from sim_backend.truth import draw
 
 SEED, BIAS_A, ANGLES = 2026, 3.0, 9
 QUICK = {"settle_s": 0.5, "average_s": 0.3, "bias_A": BIAS_A, "angles": ANGLES}
