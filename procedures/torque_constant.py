@@ -182,11 +182,14 @@ def evaluate(recording: Recording[Plan], data: TorqueData) -> Analysis:
     if len(data.detent_angle):
         held = torque_balance.detent(data.detent_angle, data.detent_current, detent_order(rig))
 
+    values = {name: e.value for name, e in inputs.items()}
+    u = torque_balance.uneven(torque_balance.balance(data.steps, values, count, pairs, held), data.steps)
+
     def model(p: dict[str, float]) -> dict[str, float]:
-        fitted = torque_balance.balance(data.steps, p, count, pairs, held)
+        fitted = torque_balance.balance(data.steps, p, count, pairs, held, u)
         return {"alpha_tau": fitted.alpha, "gamma_0t": fitted.gamma_0}
 
-    found = torque_balance.balance(data.steps, {n: e.value for n, e in inputs.items()}, count, pairs, held)
+    found = torque_balance.balance(data.steps, values, count, pairs, held, u)
     estimates = propagate(model, inputs)
     root = np.linalg.cholesky(found.covariance)
     parts = [

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy import optimize, stats
 
 from bench.errors import AnalysisError
 from procedures.estimators.leastsquares import Fit, linear, nonlinear
@@ -34,6 +34,7 @@ class Steps:
 
     segments: A, as the current sensors read; angle: rad, mean encoder reading; gamma: rad; time: s, middle of the step
     side: +1 left, -1 right, 0 no load; load: index into the masses, -1 for nothing
+    spread: A, standard deviation of the torque current's samples: large where the angle jumps between two counts
     """
 
     segments: Array
@@ -42,6 +43,7 @@ class Steps:
     time: Array
     side: Ints
     load: Ints
+    spread: Array
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,8 @@ NO_DETENT = Detent(0.0, 0.0, 0.0, 1.0)
 @dataclass(frozen=True)
 class Balance:
     """`alpha` N m/A, `gamma_0` rad, their `covariance` (2, 2) from the residuals; `current` (n,) A the torque current freed of
-    sensors and detent, `base` (n,) A without load, `torque` (n,) N m of the loads; `fit` has residuals (n,) A."""
+    sensors and detent, `base` (n,) A without load, `torque` (n,) N m of the loads; `fit` has residuals (n,) A; `u` (n,) how
+    far each step may scatter, relative to the others."""
 
     alpha: float
     gamma_0: float
@@ -80,6 +83,12 @@ class Balance:
     base: Array
     torque: Array
     fit: Fit
+    u: Array
+
+    @property
+    def scale(self) -> float:
+        """A per unit of `u`, from the residuals."""
+        return math.sqrt(self.fit.chi2 / self.fit.dof)
 
 
 def detent(angle: Array, current: Array, order: float) -> Detent:
@@ -111,8 +120,23 @@ def load_torque(s: Steps, p: Mapping[str, float], masses: int) -> Array:
     return out
 
 
-def balance(s: Steps, p: Mapping[str, float], masses: int, pole_pairs: float, held: Detent = NO_DETENT) -> Balance:
-    """Fit alpha_tau, gamma_0 and the current without load to all steps.
+def uneven(b: Balance, s: Steps) -> Array:
+    """How far each step may scatter (n,) A: variance a + g spread^2, both from the residuals, g not negative.
+
+    The mean of a current that jumps between the counts of the encoder is worse than that of one that rests.
+    """
+    square = s.spread**2
+    (a, g), _ = optimize.nnls(np.column_stack([np.ones_like(square), square]), b.fit.residuals**2)
+    typical = float((b.fit.residuals**2).mean())
+    out: Array = np.sqrt(np.maximum(a, 0.05 * typical) + g * square)
+    return out
+
+
+def balance(
+    s: Steps, p: Mapping[str, float], masses: int, pole_pairs: float, held: Detent = NO_DETENT, u: Array | None = None
+) -> Balance:
+    """Fit alpha_tau, gamma_0 and the current without load to all steps, weighted by `u` (n,) (all alike without it). The
+    scale of the scatter always comes from the residuals.
 
     Raises:
         AnalysisError: a phase angle lacks loads or steps without load, or the fit does not converge.
@@ -143,9 +167,11 @@ def balance(s: Steps, p: Mapping[str, float], masses: int, pole_pairs: float, he
         return np.column_stack([-part / q[0], -part * pole_pairs * np.tan(turn), lines])
 
     start = linear(np.column_stack([-torque / np.cos(pole_pairs * s.gamma), lines]), current).terms
-    fit = nonlinear(model, current, np.concatenate([[1 / start[0], 0.0], start[1:]]), jacobian=slopes)
+    relative = np.ones_like(current) if u is None else u / np.sqrt(np.mean(u**2))
+    fit = nonlinear(model, current, np.concatenate([[1 / start[0], 0.0], start[1:]]), relative, slopes)
     alpha, gamma_0 = (float(x) for x in fit.terms[:2])
-    return Balance(alpha, gamma_0, fit.covariance[:2, :2], current, lines @ fit.terms[2:], torque, fit)
+    covariance = fit.covariance[:2, :2] * fit.chi2 / fit.dof
+    return Balance(alpha, gamma_0, covariance, current, lines @ fit.terms[2:], torque, fit, relative)
 
 
 @dataclass(frozen=True)
@@ -162,13 +188,13 @@ class Extra:
 
 def extra(b: Balance, column: Array) -> Extra:
     """Value of one more linear term with `column` (n,) A per unit, all other terms fitted along (a score test)."""
-    apart = column - b.fit.jacobian @ np.linalg.lstsq(b.fit.jacobian, column, rcond=None)[0]
+    jacobian, residuals, white = b.fit.jacobian / b.u[:, None], b.fit.residuals / b.u, column / b.u
+    apart = white - jacobian @ np.linalg.lstsq(jacobian, white, rcond=None)[0]
     size = float(apart @ apart)
-    if size <= 1e-12 * float(column @ column):
+    if size <= 1e-12 * float(white @ white):
         return Extra(0.0, math.inf)
-    value = float(apart @ b.fit.residuals) / size
-    dof = max(b.fit.dof - 1, 1)
-    rest = float(((b.fit.residuals - value * apart) ** 2).sum()) / dof
+    value = float(apart @ residuals) / size
+    rest = float(((residuals - value * apart) ** 2).sum()) / max(b.fit.dof - 1, 1)
     return Extra(value, math.sqrt(rest / size))
 
 
@@ -193,11 +219,12 @@ def shape_over_gamma(b: Balance, s: Steps) -> tuple[float, float]:
     """Whether the torque follows the cosine: probability of the misfit by chance (F test of free slopes at every gamma),
     and the largest relative deviation of a slope."""
     angles, index = np.unique(s.gamma, return_inverse=True)
-    columns = np.column_stack([loaded(b) * (index == k) for k in range(len(angles))])
-    apart = columns - b.fit.jacobian @ np.linalg.lstsq(b.fit.jacobian, columns, rcond=None)[0]
-    terms = np.linalg.lstsq(apart, b.fit.residuals, rcond=1e-8)[0]
-    total = float((b.fit.residuals**2).sum())
-    rest = float(((b.fit.residuals - apart @ terms) ** 2).sum())
+    jacobian, residuals = b.fit.jacobian / b.u[:, None], b.fit.residuals / b.u
+    columns = np.column_stack([loaded(b) * (index == k) / b.u for k in range(len(angles))])
+    apart = columns - jacobian @ np.linalg.lstsq(jacobian, columns, rcond=None)[0]
+    terms = np.linalg.lstsq(apart, residuals, rcond=1e-8)[0]
+    total = float((residuals**2).sum())
+    rest = float(((residuals - apart @ terms) ** 2).sum())
     more = len(angles) - 2
     dof = b.fit.dof - more
     if dof < 1 or rest <= 0:
@@ -207,14 +234,13 @@ def shape_over_gamma(b: Balance, s: Steps) -> tuple[float, float]:
 
 def slopes_over_gamma(b: Balance, s: Steps, side: int) -> tuple[Array, Array, Array]:
     """Phase angles (k,) rad, torque per current N m/A of one side's loads at each, and its u from the residuals."""
-    scatter = math.sqrt(b.fit.chi2 / b.fit.dof)
     angles = np.unique(s.gamma)
     slopes, u = [], []
     for gamma in angles:
         mine = (s.gamma == gamma) & (s.side == side)
-        torque, current = b.torque[mine], (b.current - b.base)[mine]
+        torque, current = b.torque[mine] / b.u[mine], (b.current - b.base)[mine] / b.u[mine]
         size = float(torque @ torque)
         slope = -float(torque @ current) / size  # A per N m
         slopes.append(1 / slope)
-        u.append(scatter / math.sqrt(size) / slope**2)
+        u.append(b.scale / math.sqrt(size) / slope**2)
     return angles, np.array(slopes), np.array(u)

@@ -67,6 +67,7 @@ def read_torques(recording: Recording[Any], masses: tuple[str, ...]) -> TorqueDa
         np.array([float(s.labels["gamma_rad"]) for s in found]),
         np.array([(s.start_ns + s.end_ns) / 2 - start for s in found]) * 1e-9,
         np.array([sides[str(s.labels["side"])] for s in found]), np.array([index[str(s.labels["load"])] for s in found]),
+        np.array([r["jumps"] for r in read]),
     )  # fmt: skip
     turned = [_reduce(step) for step in recording.steps("detent")]
     return TorqueData(
@@ -89,7 +90,7 @@ def _reduce(step: Step) -> Mapping[str, Any]:
     current = segments.mean(axis=0)
     return {
         "segments": segments.mean(axis=1), "spread": segments.std(axis=1), "angle": float(np.unwrap(data["angle"]).mean()),
-        "drift": float(current[n // 2 :].mean() - current[: n // 2].mean()),
+        "jumps": float(current.std()), "drift": float(current[n // 2 :].mean() - current[: n // 2].mean()),
         "x": float((data["i_xo_p"] - data["i_xo_n"]).mean() / 2), "y": float((data["i_yo_p"] - data["i_yo_n"]).mean() / 2),
         "flags": int(np.bitwise_or.reduce(data["flags"].astype(np.int64))),
     }  # fmt: skip

@@ -30,7 +30,9 @@ def made(
     torque = side * KG[load] * 9.81 * 0.23 * (1 - 1.2 / 8000)
     current = -torque / (alpha * np.cos(8 * (gammas - gamma_0))) + base + drift * time
     current = current + noise * np.random.default_rng(seed).normal(size=len(side))
-    return Steps(np.repeat(current[:, None], 4, axis=1), np.zeros(len(side)), gammas, time, side, load)
+    return Steps(
+        np.repeat(current[:, None], 4, axis=1), np.zeros(len(side)), gammas, time, side, load, np.zeros(len(side))
+    )
 
 
 @settings(deadline=None, max_examples=40)
@@ -49,10 +51,30 @@ def test_the_scatter_is_what_the_covariance_says() -> None:
         assert np.std(values) == pytest.approx(np.mean([math.sqrt(f.covariance[k, k]) for f in fits]), rel=0.2)
 
 
+def test_steps_that_jump_count_less_and_the_scatter_stays_honest() -> None:
+    """A third of the steps is ten times worse, and their spread tells: u is that of repeated fits, and below the unweighted."""
+    errors, u, plain = [], [], []
+    for seed in range(120):
+        s = made(2.87, 0.003)
+        rng = np.random.default_rng(seed)
+        bad = rng.random(len(s.side)) < 0.33
+        noise = np.where(bad, 2e-3, 2e-4) * rng.normal(size=len(s.side))
+        s = Steps(s.segments + noise[:, None], s.angle, s.gamma, s.time, s.side, s.load, np.where(bad, 0.2, 0.01))
+        first = balance(s, P, 3, 8.0)
+        found = balance(s, P, 3, 8.0, u=torque_balance.uneven(first, s))
+        errors.append(found.gamma_0 - 0.003)
+        u.append(math.sqrt(found.covariance[1, 1]))
+        plain.append(math.sqrt(first.covariance[1, 1]))
+    assert np.mean(u) == pytest.approx(np.std(errors), rel=0.35)
+    assert np.mean(u) < 0.7 * np.mean(plain)
+
+
 def test_gains_and_offsets_of_the_sensors() -> None:
     """A gain of a segment counts a quarter; an offset of any size does nothing."""
     s = made(2.87, 0.0)
-    wrong = Steps(s.segments * [1.004, 1, 1, 1] + [0.02, -0.01, 0, 0.03], s.angle, s.gamma, s.time, s.side, s.load)
+    wrong = Steps(
+        s.segments * [1.004, 1, 1, 1] + [0.02, -0.01, 0, 0.03], s.angle, s.gamma, s.time, s.side, s.load, s.spread
+    )
     assert balance(wrong, P, 3, 8.0).alpha == pytest.approx(2.87 / 1.001, rel=1e-6)
     assert balance(wrong, {**P, "gain_1": 1.004}, 3, 8.0).alpha == pytest.approx(2.87, rel=1e-6)
 
@@ -90,7 +112,7 @@ def test_detent_is_found_and_taken_off() -> None:
     s = made(2.87, 0.0)
     off = np.where(s.side > 0, 1.5e-3, -1.5e-3) * (s.side != 0)
     shifted = Steps(
-        s.segments + (held.off_home(off) / np.cos(8 * s.gamma))[:, None], off, s.gamma, s.time, s.side, s.load
+        s.segments + (held.off_home(off) / np.cos(8 * s.gamma))[:, None], off, s.gamma, s.time, s.side, s.load, s.spread
     )
     assert abs(balance(shifted, P, 3, 8.0, NO_DETENT).alpha / 2.87 - 1) > 1e-3
     assert balance(shifted, P, 3, 8.0, held).alpha == pytest.approx(2.87, rel=1e-6)
@@ -110,6 +132,6 @@ def test_each_extra_term_finds_its_own() -> None:
 def test_a_run_that_was_stopped_early_is_told() -> None:
     s = made(2.87, 0.0)
     for keep in (slice(0, 14), slice(0, 40)):
-        part = Steps(*(getattr(s, n)[keep] for n in ("segments", "angle", "gamma", "time", "side", "load")))
+        part = Steps(*(getattr(s, n)[keep] for n in ("segments", "angle", "gamma", "time", "side", "load", "spread")))
         with pytest.raises(AnalysisError):
             balance(part, P, 3, 8.0)

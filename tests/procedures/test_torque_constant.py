@@ -16,7 +16,7 @@ from bench.specs import load_spec
 from bench.uncertainty import Estimate, interval
 from procedures.torque_constant import Plan, check
 
-QUICK = {"masses": ["M2", "M3"], "settle_s": 0.5, "average_s": 0.3}
+QUICK = {"masses": ["M2", "M3"], "settle_s": 0.7, "average_s": 0.3}
 THREE = {**QUICK, "masses": ["M1", "M2", "M3"]}
 
 
