@@ -87,7 +87,7 @@ def test_gravity_is_missing_in_print() -> None:
 
 
 def test_a_baseline_is_needed_against_detent() -> None:
-    """Errata of T 6.6.4: m g l = alpha_tau cos(M gamma) i, fitted to one side as printed, takes 3 A of offset for load."""
+    """Errata of T 6.6.4: m g l = alpha_tau cos(M gamma) i, fitted to one side as printed, takes 50 mA of offset for load."""
     s = made(2.87, 0.0, base=0.05)
     left = s.side > 0
     torque = torque_balance.load_torque(s, P, 3)[left]
