@@ -35,8 +35,7 @@ SOME_GEOMETRY = {
     "lever_right": "shaft axis to the right end of the lever",
 }
 """Lengths that a rig may have; the procedures that need one say so."""
-MACHINE = {"pole_pairs": "1", "polar_inertia": "kg m^2", "ring_inertia": "kg m^2", "amb_asymmetry": "1",
-           "force_ripple": "N/A"}  # fmt: skip
+MACHINE = {"pole_pairs": "1", "polar_inertia": "kg m^2", "ring_inertia": "kg m^2", "amb_asymmetry": "1"}
 FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 
 

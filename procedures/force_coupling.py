@@ -34,6 +34,7 @@ ALPHA_C = Quantity("alpha_c", "N/A", "coupled force constant at the home angle: 
 GAMMA_0 = Quantity("gamma_0", "rad", "phase angle at which direct and coupled force are apart: zero of the commutation")
 MEASURES = (RATIO, ALPHA_C, GAMMA_0)
 GEOMETRY = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_inboard_amb", "com_to_motor", "motor_stiffness")
+FATAL = (*carried_checks.FATAL, "rotor-off-edge")
 ALPHA_RATIO = 0.85  # T 6.6.3; for predictions before a run, and for nothing that is measured
 STEADY_RAD = (
     0.7  # electrical: beyond it the motor's force is turned so far from the controller's that levitation is lost
@@ -44,6 +45,7 @@ class Plan(BenchPlan):
     """Settings, SI."""
 
     gamma_rad: tuple[float, ...] = Field(tuple(round(math.radians(d / 2), 9) for d in range(-5, 8)), min_length=5)
+    count_rad: float = Field(2 * math.pi / 4096, gt=0)  # one count of the rotor's encoder
     settle_s: float = Field(2.0, gt=0)
     average_s: float = Field(1.0, ge=0.1)
     max_position_m: float = Field(5e-8, gt=0)  # settled: |mean position|; its drift may be twice that
@@ -60,7 +62,7 @@ def needs(_: Plan) -> tuple[Need, ...]:
 
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records, for the progress display."""
-    return 2 * len(plan.gamma_rad) - 1
+    return 2 * len(plan.gamma_rad)
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
@@ -70,11 +72,14 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     for gamma in carrying.approach(plan.gamma_rad):
         rig.levitation.set("gamma", gamma)
         rig.clock.sleep(plan.settle_s)
-    for gamma, branch in carrying.mirrored(plan.gamma_rad):
-        rig.levitation.set("gamma", gamma)
-        rig.clock.sleep(plan.settle_s)
-        with record.step("phase", gamma_rad=gamma, branch=branch):
-            rig.clock.sleep(plan.average_s)
+    for branch, gammas in ((1, plan.gamma_rad), (-1, plan.gamma_rad[::-1])):
+        rig.levitation.set("angle_ref", branch * plan.count_rad / 2)  # an edge of the count that reads zero
+        for gamma in gammas:
+            rig.levitation.set("gamma", gamma)
+            rig.clock.sleep(plan.settle_s)
+            with record.step("phase", gamma_rad=gamma, branch=branch):
+                rig.clock.sleep(plan.average_s)
+    rig.levitation.set("angle_ref", 0.0)
     for gamma in (*reversed(carrying.approach(plan.gamma_rad)), 0.0):
         rig.levitation.set("gamma", gamma)
         rig.clock.sleep(plan.settle_s)
@@ -86,9 +91,9 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     data = read(recording)
     findings = list(_of_signals(data, recording.plan))
     yield from findings
-    if any(f.code in carried_checks.FATAL for f in findings):
+    if any(f.code in FATAL for f in findings):
         return
-    a = evaluate(recording, data)
+    a = evaluate(recording, data, recording.plan.count_rad)
     yield from coupling_findings.of_fit(data, a.fit, recording.plan)
     yield from coupling_findings.of_results(a, recording.rig.machine["pole_pairs"].value)
     for quantity in MEASURES:
@@ -107,6 +112,7 @@ def read(recording: Recording[Plan]) -> StepMeans:
 def _of_signals(data: StepMeans, plan: Plan) -> Iterator[Finding]:
     yield from carried_checks.of_signals(data, (*SEGMENTS, *POSITIONS), plan)
     yield from carried_checks.segments(data)
+    yield from coupling_findings.of_angle(data, plan.count_rad)
     d = data.drift
     currents = {"i_y": (d["i_m1"] - d["i_m3"]) / 2, "i_x": (d["i_m4"] - d["i_m2"]) / 2}
     yield from carried_checks.settled(data, {c: data.mean[c] for c in POSITIONS}, currents, plan)
@@ -147,9 +153,11 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 def figures(recording: Recording[Plan]) -> Iterable[Figure]:
     """Currents over gamma with the model, and residuals; empty when the data carry no fit."""
     data = read(recording)
-    if any(f.code in carried_checks.FATAL for f in _of_signals(data, recording.plan)):
+    if any(f.code in FATAL for f in _of_signals(data, recording.plan)):
         return ()
-    return drawn.all_figures(data, evaluate(recording, data), recording.rig.machine["pole_pairs"].value)
+    return drawn.all_figures(
+        data, evaluate(recording, data, recording.plan.count_rad), recording.rig.machine["pole_pairs"].value
+    )
 
 
 METHOD = """\
@@ -161,6 +169,9 @@ With c = cos M (gamma - gamma_0) and q = sin M (gamma - gamma_0), the equilibriu
 alpha_d/alpha_c, the winding of the x axis against that of the y axis, gamma_0, the two constant forces and a drift of each
 current, by nonlinear least squares on the currents; gamma is a number that the controller is told and carries no error.
 alpha_c is the calibrated alpha_d at the home angle over cos(M gamma_0) and the ratio.
+
+The rotor is kept at one edge of its encoder's count on the way up and at the other on the way down. Where it stands is then
+known, and the ripple of the force over the rotor's angle is fitted too, so that it does not disturb.
 
 The thesis fits differences of the same equations linearly, with gamma_0 = 0 (T 6.15). That value is stated beside ours.
 

@@ -55,4 +55,4 @@ def _as_printed(gamma: Array, a: Analysis, pole_pairs: float) -> Array:
     """Terms of the model as T (6.15) has it: its ratio, the zero at 0, equal windings, forces from the means."""
     c, q = np.cos(pole_pairs * gamma), np.sin(pole_pairs * gamma) / a.printed
     f_x, f_y = -np.mean(c * a.fit.i_x - q * a.fit.i_y), -np.mean(c * a.fit.i_y + q * a.fit.i_x)
-    return np.array([1 / a.printed, 1.0, 0.0, f_x, f_y])
+    return np.array([1 / a.printed, 1.0, 0.0, f_x, f_y, 0.0, 0.0])

@@ -13,9 +13,10 @@ gamma is a number that the controller is told, so it carries no error; the curre
 and least squares on the currents, equal weights, is the maximum likelihood fit with errors in every measured variable. It
 is w that is fitted, because the model is smooth through w = 0: a wrong sign comes out as one.
 
-The rotor is at home within half a count of its encoder. Off home by theta, the ripple (T 5.25, terms 2 and 3) adds
-rho_2 (cos M g - cos(M g + P theta)) to c and rho_3 (sin(M g + P theta) - sin M g) to q, g = gamma - gamma_0, P = 2 M: enough to
-see, because the rotor may change from one edge of the count to the other during the run.
+The rotor cannot be kept at home better than to a count of its encoder. Off home by theta, the ripple (T 5.25, terms 2 and 3)
+adds rho_2 (cos M g - cos(M g + P theta)) to c and rho_3 (sin(M g + P theta) - sin M g) to q, where g = gamma - gamma_0 and
+P = 2 M. So the rotor is kept at a known place off home, one edge of a count on the way up and the other on the way down,
+and rho_2 and rho_3 are fitted too.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from procedures.estimators.leastsquares import Fit
 from procedures.estimators.stiffness import radial_currents, sensor_share
 
 Array = npt.NDArray[np.float64]
-TERMS = ("w", "a", "gamma_0", "f_x", "f_y", "d_x", "d_y")
+TERMS = ("w", "a", "gamma_0", "f_x", "f_y", "rho_2", "rho_3", "d_x", "d_y")
 
 
 @dataclass(frozen=True)
@@ -62,66 +63,60 @@ class CouplingFit:
         return 1 / self.term("w") if name == "r" else float(self.fit.terms[TERMS.index(name)])
 
 
-@dataclass(frozen=True)
-class Disturbed:
-    """What keeps the shaft from being exactly at home: `pull` (2, N) A is added to the forces, what the stiffness makes of a
-    displacement; `theta` (N,) rad the rotor's angle; `ripple` rho_2, rho_3."""
+def currents(
+    gamma: Array, terms: Array, pole_pairs: float, theta: Array | None = None, pull: Array | None = None
+) -> Array:
+    """i_x, i_y (2, N) A that hold the shaft; `terms` starts with w, a, gamma_0, f_x, f_y, rho_2, rho_3.
 
-    pull: Array
-    theta: Array
-    ripple: tuple[float, float]
-
-
-def currents(gamma: Array, terms: Array, pole_pairs: float, d: Disturbed | None = None) -> Array:
-    """i_x, i_y (2, N) A that hold the shaft; `terms` starts with w, a, gamma_0, f_x, f_y."""
-    w, a, zero, fx, fy = terms[:5]
+    `theta` (N,) rad is the rotor's angle; `pull` (2, N) A is added to the forces, what the stiffness makes of a displacement.
+    """
+    w, a, zero, fx, fy, direct, coupled = terms[:7]
     turn = pole_pairs * (gamma - zero)
     c, q = np.cos(turn), np.sin(turn)
-    if d is not None:
-        off = turn + 2 * pole_pairs * d.theta
-        c, q = c + d.ripple[0] * (c - np.cos(off)), q + d.ripple[1] * (np.sin(off) - q)
-        fx, fy = fx + d.pull[0], fy + d.pull[1]
+    if theta is not None:
+        off = turn + 2 * pole_pairs * theta
+        c, q = c + direct * (c - np.cos(off)), q + coupled * (np.sin(off) - q)
+    if pull is not None:
+        fx, fy = fx + pull[0], fy + pull[1]
     q = w * q
     square = c**2 + q**2
     return np.array([-(c * fx + q * fy) / (a * square), -(c * fy - q * fx) / square])
 
 
 def fit_sweep(s: Sweep, p: Mapping[str, float]) -> CouplingFit:
-    """Fit w, a, gamma_0, f_x, f_y and a drift of each current that is linear in time.
+    """Fit w, a, gamma_0, f_x, f_y, rho_2, rho_3 and a drift of each current that is linear in time.
 
-    `p` holds pole_pairs, gain_m1 .. offset_m4, l_is, l_os, z_m, per_metre (A/m, stiffness over alpha_d) for what the shaft is
-    off the sensors' zero, and ripple_d, ripple_c (rho_2, rho_3) for what the rotor is off home.
+    `p` holds pole_pairs, gain_m1 .. offset_m4, l_is, l_os, z_m, and per_metre (A/m, stiffness over alpha_d) for what the shaft
+    is off the sensors' zero.
+
+    Raises:
+        AnalysisError: the data do not determine the terms: gamma or the rotor stayed where they were.
     """
     i_x, i_y = radial_currents(s.segments, p)
     share = sensor_share(p["z_m"], p)
     pull = p["per_metre"] * np.array([v[0] * (1 - share) + v[1] * share for v in (s.x, s.y)])
-    disturbed = Disturbed(pull, s.theta, (p["ripple_d"], p["ripple_c"]))
     t = s.time_s / max(float(np.ptp(s.time_s)), 1e-9) - 0.5
+    none = np.zeros_like(t)
+    drift = np.column_stack([np.concatenate([t, none]), np.concatenate([none, t])])
 
     def model(terms: Array) -> Array:
-        out: Array = (currents(s.gamma, terms, p["pole_pairs"], disturbed) + terms[5:, None] * t).ravel()
+        out: Array = currents(s.gamma, terms, p["pole_pairs"], s.theta, pull).ravel() + drift @ terms[7:]
         return out
 
     def jacobian(terms: Array) -> Array:
-        return _jacobian(s.gamma, terms, p["pole_pairs"], disturbed, t)
+        columns = []
+        for k, step in enumerate((1e-6, 1e-6, 1e-7, 1e-3, 1e-3, 1e-3, 1e-3)):  # central: smooth, of order one
+            ends = [model(np.where(np.arange(9) == k, terms + sign * step, terms)) for sign in (1, -1)]
+            columns.append((ends[0] - ends[1]) / (2 * step))
+        return np.column_stack([*columns, drift])
 
     middle = np.abs(s.gamma) <= np.abs(s.gamma).min() + 1e-9
     first = 1 / as_printed(s.gamma, i_x, i_y, p["pole_pairs"])
-    start = np.array([first, 1.0, 0.0, -float(i_x[middle].mean()), -float(i_y[middle].mean()), 0.0, 0.0])
-    fit = leastsquares.nonlinear(model, np.concatenate([i_x, i_y]), start, jacobian=jacobian)
+    forces = (-float(i_x[middle].mean()), -float(i_y[middle].mean()))
+    fit = leastsquares.nonlinear(
+        model, np.concatenate([i_x, i_y]), np.array([first, 1.0, 0.0, *forces, 0.0, 0.0, 0.0, 0.0]), jacobian=jacobian
+    )
     return CouplingFit(fit, i_x, i_y, model(fit.terms).reshape(2, -1))
-
-
-def _jacobian(gamma: Array, terms: Array, pole_pairs: float, d: Disturbed, t: Array) -> Array:
-    """d currents / d terms (2 N, 7): central differences of smooth functions of terms of order one."""
-    columns = []
-    for k, step in enumerate((1e-6, 1e-6, 1e-7, 1e-3, 1e-3)):
-        ends = [
-            currents(gamma, np.where(np.arange(7) == k, terms + sign * step, terms), pole_pairs, d) for sign in (1, -1)
-        ]
-        columns.append(((ends[0] - ends[1]) / (2 * step)).ravel())
-    none = np.zeros_like(t)
-    return np.column_stack([*columns, np.concatenate([t, none]), np.concatenate([none, t])])
 
 
 def as_printed(gamma: Array, i_x: Array, i_y: Array, pole_pairs: float, *, successive: bool = False) -> float:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from bench.recording import Recording
 from bench.rigfile import RigFile
-from bench.uncertainty import Estimate, Influence
+from bench.uncertainty import Estimate
 from procedures.estimators import coupling
 from procedures.estimators.carried_data import SEGMENTS, StepMeans
 from procedures.estimators.chainrule import by_inputs
@@ -20,9 +20,6 @@ from procedures.estimators.inputs import certified
 from procedures.estimators.typea import scatter
 
 Array = npt.NDArray[np.float64]
-
-RIPPLE = 1.5 / 19.36  # alpha_2/alpha_1 of T Table 5.3 (finite elements), where the rig file states no ripple
-HALF_COUNT_RAD = math.pi / 4096  # of the encoder
 
 
 @dataclass(frozen=True)
@@ -36,11 +33,11 @@ class Analysis:
     successive: float
 
 
-def evaluate(recording: Recording[Any], data: StepMeans) -> Analysis:
+def evaluate(recording: Recording[Any], data: StepMeans, count_rad: float) -> Analysis:
     """Fit, and the three estimates by name (with `winding`, the x winding's constant over the y winding's)."""
     inputs = fit_inputs(recording)
     sweep = Sweep(data.stack(SEGMENTS), data.stack(("pos_yi", "pos_yo")), data.stack(("pos_xi", "pos_xo")),
-                  data.labels["gamma_rad"], rotor_angle(data.mean["angle"]), data.time_s)  # fmt: skip
+                  data.labels["gamma_rad"], rotor_angle(data.mean["angle"], count_rad), data.time_s)  # fmt: skip
 
     def model(p: dict[str, float]) -> dict[str, float]:
         return outputs(coupling.fit_sweep(sweep, p), p)
@@ -50,7 +47,7 @@ def evaluate(recording: Recording[Any], data: StepMeans) -> Analysis:
     estimates = by_inputs(model, inputs)
     extra = scatter(fit.fit, _gradients(fit, values), "currents", "scatter of the steps")
     estimates |= {name: estimates[name] + e for name, e in extra.items()}
-    once = slice(0, (len(data) + 1) // 2)
+    once = slice(0, len(data) // 2)
     ratios = [
         coupling.as_printed(sweep.gamma[once], fit.i_x[once], fit.i_y[once], values["pole_pairs"], successive=way)
         for way in (False, True)
@@ -81,27 +78,15 @@ def _gradients(fit: CouplingFit, p: dict[str, float]) -> dict[str, Array]:
     }
 
 
-def rotor_angle(mean: Array) -> Array:
-    """Where the rotor stands (N,) rad by the mean reading of its encoder in each step.
+def rotor_angle(mean: Array, count_rad: float) -> Array:
+    """Where the rotor stands (N,) rad by the mean reading of its encoder in each step, where a count is `count_rad`.
 
-    The angle loop leaves a rotor alone that reads zero, and pushes it back once it reads a count: it comes to rest at the
-    edge, where now and then a sample reads the next count. A mean above zero is the upper edge, one below zero the lower.
+    Sent to the edge between two counts, it is pushed back from either side and stays there, reading now one and now the
+    other. A mean between them is the edge; one on a count is that count, within half of it.
     """
-    return np.where(mean == 0.0, 0.0, np.sign(mean) * HALF_COUNT_RAD)
-
-
-def ripples(rig: RigFile, alpha_d: float) -> dict[str, Estimate]:
-    """Ripple of the direct and of the coupled force over alpha_d: value 0, bounded by the rig file, else by T."""
-    stated = rig.machine.get("force_ripple")
-    out = {}
-    for key, name in (("ripple_d", "direct"), ("ripple_c", "coupled")):
-        if stated is not None:
-            out[key] = certified(f"machine/force_ripple/{name}", stated, f"force ripple, {name}") * (1 / alpha_d)
-        else:
-            influence = Influence(id=f"machine/force_ripple/{name}", name=f"force ripple, {name}", u=RIPPLE / math.sqrt(3),
-                                  unit="1", kind="B", distribution="rectangular", source="T Table 5.3")  # fmt: skip
-            out[key] = Estimate.of(0.0, influence)
-    return out
+    below = np.floor(mean / count_rad)
+    inside = np.abs(mean / count_rad - np.round(mean / count_rad)) > 0.01
+    return np.where(inside, (below + 0.5) * count_rad, np.round(mean / count_rad) * count_rad)
 
 
 def fit_inputs(recording: Recording[Any]) -> dict[str, Estimate]:
@@ -117,7 +102,7 @@ def fit_inputs(recording: Recording[Any]) -> dict[str, Estimate]:
         # Refers currents to the sensors' zero, a matter of nanometres: its tolerance does not show.
         "per_metre": Estimate.exact(g["motor_stiffness"].value / alpha_d.value),
     }
-    return inputs | segment_sensors(rig) | ripples(rig, alpha_d.value)
+    return inputs | segment_sensors(rig)
 
 
 def segment_sensors(rig: RigFile) -> dict[str, Estimate]:

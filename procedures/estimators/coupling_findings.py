@@ -10,18 +10,38 @@ import numpy as np
 from bench.findings import Effect, Finding
 from procedures.estimators import carried_checks
 from procedures.estimators.carried_data import StepMeans
-from procedures.estimators.coupling import CouplingFit
+from procedures.estimators.coupling import TERMS, CouplingFit
 from procedures.estimators.coupling_estimates import Analysis
 
 ZERO_RAD = math.radians(2.0)  # four times what a commutation set with care is off
 WINDING = 0.1  # segments differ by 1 %
 
 
+def of_angle(data: StepMeans, count_rad: float) -> Iterator[Finding]:
+    """The rotor at the edges it was sent to: its encoder reads now one count and now the other.
+
+    A reading that is 0 or one count c, the latter with probability p, has the mean p c and the variance p (1 - p) c^2: from
+    both follows c.
+    """
+    mean, spread = np.abs(data.mean["angle"]), data.spread["angle"]
+    between = spread > 0.05 * count_rad
+    found = float(np.median((spread**2 + mean**2)[between] / mean[between])) if between.any() else 0.0
+    if between.mean() < 0.8 or abs(found / count_rad - 1) > 0.05:
+        seen = f"two readings {found * 1e3:.3f} mrad apart" if between.any() else "one reading throughout"
+        yield Finding(
+            "rotor-off-edge",
+            f"in {int(between.sum())} of {between.size} steps the rotor stands at an edge of its encoder's count, with {seen}; "
+            f"expected all steps, and {count_rad * 1e3:.3f} mrad. Look at count_rad, and at the friction of the rotor.",
+            data.where(np.where(between, 0.0, 1.0)),
+            Effect.ERROR,
+        )
+
+
 def of_fit(data: StepMeans, f: CouplingFit, plan: carried_checks.Tolerances) -> Iterator[Finding]:
     """Drift over the sequence and steps off the model."""
     n, terms, u = len(data), f.fit.terms, f.fit.u
     yield from carried_checks.creeping(
-        {"i_x": float(terms[5]), "i_y": float(terms[6])}, {"i_x": float(u[5]), "i_y": float(u[6])}, plan
+        {"i_x": float(terms[7]), "i_y": float(terms[8])}, {"i_x": float(u[7]), "i_y": float(u[8])}, plan
     )
     residuals = np.hypot(f.fit.residuals[:n], f.fit.residuals[n:])
     span = float(np.hypot(np.ptp(f.i_x), np.ptp(f.i_y)))
@@ -56,6 +76,16 @@ def of_results(a: Analysis, pole_pairs: float) -> Iterator[Finding]:
             "i_m2, i_m4",
             Effect.ERROR,
         )
+    direct, coupled = (
+        f"{a.fit.term(name):+.2%} ± {2 * float(a.fit.fit.u[TERMS.index(name)]):.2%}" for name in ("rho_2", "rho_3")
+    )
+    yield Finding(
+        "ripple",
+        f"by the two edges of the encoder's count the ripple at home is {direct} of the direct force (alpha_2) and {coupled} "
+        "of the coupled one (alpha_3); it is in both constants: the means over a turn are alpha_d (1 + the former) and alpha_c "
+        "(1 - the latter).",
+        "alpha_ratio",
+    )
     yield Finding(
         "as-printed",
         f"the linear fit of T (6.15), gamma_0 = 0 and every step's difference from the mean, gives {a.printed:.4f}; from step "

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from tsbs_statics import Shaft, parameters, segments, sweep_data
 
+from bench.errors import AnalysisError
 from procedures.estimators import coupling
 from procedures.estimators.stiffness import radial_currents
 
@@ -86,22 +87,17 @@ def test_a_wrong_sense_of_gamma_comes_out_as_a_negative_ratio() -> None:
     assert coupling.fit_sweep(sweep_data(shaft, DEGREES), parameters(shaft)).term("r") == pytest.approx(-12.1 / 14.3)
 
 
-def test_ripple_off_home_reaches_the_ratio_when_the_rotor_changes_edges() -> None:
-    """Half a count of an encoder with 4096 is 0.77 mrad; 2.5 % of ripple. Constant, it moves gamma_0; changing sides with
-    gamma, it moves the ratio by 0.05 %. Known, it does neither."""
-    shaft = Shaft()
-    data, p = sweep_data(shaft, DEGREES), parameters(shaft)
-    terms = coupling.fit_sweep(data, p).fit.terms
-    for theta, ratio, zero in (
-        (np.full_like(data.gamma, 7.7e-4), 0.0, 1.1e-4),
-        (7.7e-4 * np.sign(data.gamma - 0.009), 7e-4, 0.0),
-    ):
-        disturbed = coupling.Disturbed(np.zeros((2, len(theta))), theta, (0.0, 0.021))
-        i_x, i_y = coupling.currents(data.gamma, terms, 8.0, disturbed)
-        moved = replace(data, segments=segments(i_x, i_y), theta=theta)
-        blind = coupling.fit_sweep(moved, p)
-        assert abs(blind.term("r") * 14.3 / 12.1 - 1) == pytest.approx(ratio, abs=1e-4)
-        assert abs(blind.term("gamma_0")) == pytest.approx(zero, abs=5e-5)
-        told = coupling.fit_sweep(moved, p | {"ripple_c": 0.021})
-        assert told.term("r") == pytest.approx(12.1 / 14.3, rel=1e-7)
-        assert told.term("gamma_0") == pytest.approx(0.0, abs=1e-8)
+def test_ripple_is_told_from_the_constants_by_the_two_edges() -> None:
+    """Off home by half a count (0.77 mrad, P theta = 12 mrad) the ripple turns the force; on the way up one way, on the way
+    down the other. What is left is the ripple at home, which is a part of the constants."""
+    fit = coupling.fit_sweep(sweep_data(Shaft(gamma_0=np.radians(0.3)), DEGREES, (0.3, -0.2)), parameters(Shaft()))
+    assert fit.term("r") == pytest.approx((12.1 - 0.3) / (14.3 - 0.2), rel=1e-7)
+    assert fit.term("gamma_0") == pytest.approx(np.radians(0.3), abs=1e-8)
+    assert fit.term("rho_2") == pytest.approx(0.3 / 11.8, rel=1e-4)
+    assert fit.term("rho_3") == pytest.approx(-0.2 / 14.1, rel=1e-4)
+
+
+def test_a_rotor_that_stays_at_one_edge_does_not_tell_the_ripple() -> None:
+    data = sweep_data(Shaft(), DEGREES)
+    with pytest.raises(AnalysisError, match="determine"):
+        coupling.fit_sweep(replace(data, theta=0 * data.theta), parameters(Shaft()))

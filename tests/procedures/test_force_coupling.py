@@ -16,7 +16,9 @@ from bench.limits import Verdict, judge
 from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import interval
-from procedures.force_coupling import Plan, check, figures
+from procedures.estimators.coupling import TERMS
+from procedures.estimators.coupling_estimates import evaluate
+from procedures.force_coupling import Plan, check, figures, read
 
 NAME = "force-coupling"
 QUICK = {"settle_s": 0.5, "average_s": 0.3}
@@ -67,6 +69,23 @@ def test_ripple_at_home_is_what_makes_equal_constants_look_unequal(
     found = estimates(measure(tmp_path, known, truth))["alpha_ratio"]
     assert found.value == pytest.approx((19.36 - 1.50) / (19.36 + 1.29), abs=3 * found.u)
     assert found.value == pytest.approx(0.85, abs=0.02)
+
+
+def test_the_two_edges_of_the_encoders_count_show_the_ripple(known: dict[str, Calibration], tmp_path: Path) -> None:
+    run = measure(tmp_path, known, {"alpha_2": 0.3, "alpha_3": -0.3})
+    fit = evaluate(run.recording, read(run.recording), Plan().count_rad).fit
+    for name, true in (
+        ("rho_2", 0.3 / (run.truth["alpha_ratio"] * run.truth["alpha_c"])),
+        ("rho_3", -0.3 / run.truth["alpha_c"]),
+    ):
+        assert fit.term(name) == pytest.approx(true, abs=max(3 * fit.fit.u[TERMS.index(name)], 0.05 * abs(true)))
+    assert abs(estimates(run)["alpha_ratio"].value - run.truth["alpha_ratio"]) < 3 * estimates(run)["alpha_ratio"].u
+    assert "ripple" in notes(run)
+
+
+def test_a_count_of_the_wrong_size_is_named(known: dict[str, Calibration], tmp_path: Path) -> None:
+    fatal = serious(measure(tmp_path, known, count_rad=0.9e-3))
+    assert "rotor-off-edge" in {f.code for f in fatal}
 
 
 @pytest.mark.parametrize(

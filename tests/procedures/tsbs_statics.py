@@ -71,12 +71,23 @@ class Shaft:
         ]
         return currents[0], currents[1]
 
-    def by_motor(self, y_is: float, y_os: float, gamma: float = 0.0, side: float = 3.0) -> tuple[float, float]:
+    def by_motor(
+        self,
+        y_is: float,
+        y_os: float,
+        gamma: float = 0.0,
+        side: float = 3.0,
+        *,
+        ripple: tuple[float, float] = (0.0, 0.0),
+        theta: float = 0.0,
+    ) -> tuple[float, float]:
         """i_x, i_y with which the motor holds the outboard end; `side` N pulls the motor's plane horizontally."""
         up = self.weight * -self.z_ia / (self.z_m - self.z_ia)
         up -= self.alpha_x * (self.plane(y_is, y_os, self.z_m) + self.motor_y)
         turn = self.pole_pairs * (gamma - self.gamma_0)
-        direct, cross = self.alpha_d * np.cos(turn), self.alpha_c * np.sin(turn)
+        beta = 2 * self.pole_pairs * theta + turn
+        direct = self.alpha_d * np.cos(turn) - ripple[0] * np.cos(beta)
+        cross = self.alpha_c * np.sin(turn) + ripple[1] * np.sin(beta)
         i_x, i_y = np.linalg.solve([[direct * self.winding, -cross], [cross * self.winding, direct]], [-side, up])
         return float(i_x), float(i_y)
 
@@ -117,12 +128,14 @@ def amb_data(s: Shaft, levels: tuple[float, ...], biases: tuple[float, float], p
     return ByAmbs(np.array(coils).T, both, np.array(which), np.tile(branch, 2), np.arange(len(coils)) * 1.0, biases)
 
 
-def sweep_data(s: Shaft, degrees: Array) -> Sweep:
-    """Step means over gamma there and back, ideal sensors."""
-    gamma = np.radians(np.concatenate([degrees, degrees[-2::-1]]))
-    i = np.array([s.by_motor(0.0, 0.0, g) for g in gamma])
+def sweep_data(s: Shaft, degrees: Array, ripple: tuple[float, float] = (0.0, 0.0)) -> Sweep:
+    """Step means over gamma there and back, ideal sensors, the rotor at half a count before and behind home. `ripple` is
+    alpha_2, alpha_3 in N/A, by T (5.25) with a phase angle."""
+    gamma = np.radians(np.concatenate([degrees, degrees[::-1]]))
+    theta = np.pi / 4096 * np.where(np.arange(len(gamma)) < len(degrees), 1.0, -1.0)
+    i = np.array([s.by_motor(0.0, 0.0, g, ripple=ripple, theta=t) for g, t in zip(gamma, theta, strict=True)])
     zero = np.zeros((2, len(gamma)))
-    return Sweep(segments(i[:, 0], i[:, 1], 0.01), zero, zero, gamma, 0 * gamma, np.arange(len(gamma)) * 1.0)
+    return Sweep(segments(i[:, 0], i[:, 1], 0.01), zero, zero, gamma, theta, np.arange(len(gamma)) * 1.0)
 
 
 def parameters(s: Shaft) -> dict[str, float]:
@@ -132,7 +145,6 @@ def parameters(s: Shaft) -> dict[str, float]:
     out = {"alpha_d": alpha_d, "chi": s.winding, "K_o": k, "K2_o": k2, "bias_K": 3.0, "pole_pairs": s.pole_pairs}
     out |= {"l_is": -s.z_is, "l_os": s.z_os, "z_oa": s.z_oa, "z_m": s.z_m, "motor_to_outboard": s.z_m - s.z_oa}
     out |= {"amb_span": s.z_oa - s.z_ia, "amb_gap": 0.51e-3, "per_metre": s.alpha_x / s.alpha_d}
-    out |= {"ripple_d": 0.0, "ripple_c": 0.0}
     for name in ("yi", "yo", "xi", "xo", "m1", "m2", "m3", "m4", "op", "on"):
         out |= {f"gain_{name}": 1.0, f"offset_{name}": 0.0}
     return out
