@@ -31,6 +31,7 @@ PROCEDURES = (
     Entry("torque-constant", "procedures.torque_constant", "Torque constant of the motor by weights on a lever"),
     Entry("spindown", "procedures.spindown", "Drag of the levitated rotor by spindown"),
     Entry("angle-step", "procedures.angle_step", "Angle step while the motor carries: static against priority currents"),
+    Entry("slew", "procedures.slew", "Following a slow sine of the angle, with detent"),
 )
 
 

@@ -15,16 +15,20 @@ from procedures import rotor
 PARAMETERS = ("i_x", "i_y")
 CHANNELS = ("angle", "i_xo_p", "i_xo_n", "i_yo_p", "i_yo_n")
 NUDGE_A, NUDGE_S = 1.0, 0.3
-LEAST_RAD, LEAST_A = 3e-3, 0.05  # two encoder counts; a sixth of what a sound motor does to the outboard AMB
+TURN_RAD, TURN_S = 0.2, 0.12  # a third of a swing at that gain: it is still on its way
+LEAST_RAD, LEAST_A = (
+    0.03,
+    0.05,
+)  # what the analysis calls turned; a sixth of what a sound motor does to the outboard AMB
 STEPS = 4  # that `sound` records
 
 
 def sound(rig: Rig, record: Recorder) -> bool:
     """Turn the released rotor a little, take up its angle, then push it up and sideways against the AMBs."""
-    before = rig.levitation.reading("angle")
-    rotor.probe(rig, record)
-    if math.remainder(rig.levitation.reading("angle") - before, 2 * math.pi) < LEAST_RAD:
+    if _turned(rig, record) < LEAST_RAD:
+        rig.levitation.set("angle_ref", 0.0)
         return False
+    rig.levitation.set("angle_ref", 0.0)
     rotor.hold(rig)
     rig.clock.sleep(1.0)
     rest = _nudged(rig, record, 0.0, 0.0)
@@ -34,6 +38,18 @@ def sound(rig: Rig, record: Recorder) -> bool:
         rig.levitation.set(name, 0.0)
     rig.clock.sleep(_ramp_s(rig) + NUDGE_S)
     return _along(up[1] - rest[1], up[0] - rest[0]) and _along(right[0] - rest[0], right[1] - rest[1])
+
+
+def _turned(rig: Rig, record: Recorder) -> float:
+    """How far a weak proportional gain turns the released rotor towards a reference ahead of it, rad; it is let go again."""
+    before = rig.levitation.reading("angle")
+    with record.step("probe", reference_rad=before + TURN_RAD):
+        rig.levitation.set("angle_ref", before + TURN_RAD)
+        rig.levitation.set("kp_theta", rotor.PROBE_GAIN)
+        rig.clock.sleep(TURN_S)
+        moved = math.remainder(rig.levitation.reading("angle") - before, 2 * math.pi)
+    rotor.release(rig)
+    return moved
 
 
 def _along(own: float, across: float) -> bool:
