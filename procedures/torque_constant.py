@@ -52,6 +52,7 @@ class Plan(BenchPlan):
     max_angle_rad: float = Field(1e-2, gt=0)  # held: mean angle off home (beyond 2 A the integrator ends, kp holds)
     max_drift_A: float = Field(0.03, gt=0)  # settled: drift of the torque current within a step
     max_baseline_drift_A_s: float = Field(5e-5, gt=0)  # of the current without load, over the run
+    count_rad: float = Field(2 * math.pi / 4096, gt=0)  # of the rotor's encoder
     max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 
 
@@ -66,10 +67,10 @@ def phase_angles(plan: Plan) -> list[float]:
 
 
 def sequence(plan: Plan) -> list[tuple[str, Load]]:
-    """Side and load of the steps at one phase angle: up on the left, down on the right, nothing before, between and after."""
+    """Side and load of the steps at one phase angle: up on the left, up on the right, nothing before, between and after."""
     up = [Load(label) for label in plan.masses]
     nothing = ("", NOTHING)
-    return [nothing, *(("left", x) for x in up), nothing, *(("right", x) for x in reversed(up)), nothing]
+    return [nothing, *(("left", x) for x in up), nothing, *(("right", x) for x in up), nothing]
 
 
 def step_count(plan: Plan) -> int:
@@ -160,7 +161,7 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     yield from early
     if early:
         return
-    data = read_torques(recording, recording.plan.masses)
+    data = read_torques(recording, recording.plan.masses, recording.plan.count_rad)
     wrong = list(torque_checks.of_signals(data, recording.plan))
     yield from wrong
     if any(f.effect is Effect.ERROR for f in wrong):
@@ -259,7 +260,7 @@ def figures(recording: Recording[Plan]) -> Iterable[Figure]:
     """Torque over current per side, the constant over gamma with residuals, detent, one step; empty without a fit."""
     if [*of_probe(recording), *torque_checks.of_events(recording)]:
         return ()
-    data = read_torques(recording, recording.plan.masses)
+    data = read_torques(recording, recording.plan.masses, recording.plan.count_rad)
     if any(f.effect is Effect.ERROR for f in torque_checks.of_signals(data, recording.plan)):
         return ()
     a = evaluate(recording, data)

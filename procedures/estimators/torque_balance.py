@@ -8,6 +8,13 @@ right end; with gamma_0 the error of the encoder's zero and M pole pairs
 T prints m l = alpha_tau cos(M gamma) i: gravity is missing, and the current without load too, which holds detent, the
 sensors' offsets and any constant torque. At each gamma i_base is a straight line in time through the loads' own steps and
 those without load, fitted together with alpha_tau and gamma_0, so that linear drift drops out as well.
+
+A loaded rotor comes to rest where its encoder changes between two counts, half a count beside the ones that the integrator
+ignores: theta = +-1.5 counts. There the torque's ripple (T 5.25, third harmonic of the poles) has turned a little:
+
+    cos(M g) becomes cos(M g) + r (cos(M g + 6 M theta) - cos(M g)),   g = gamma - gamma_0
+
+r is fitted along. Both sides are loaded upwards, so that they rest on opposite edges and gamma_0 does not lean on r.
 """
 
 from __future__ import annotations
@@ -32,7 +39,7 @@ Ints = npt.NDArray[np.int64]
 class Steps:
     """Step means in time order, (n,) each but `segments` (n, 4).
 
-    segments: A, as the current sensors read; angle: rad, mean encoder reading; gamma: rad; time: s, middle of the step
+    segments: A, as the current sensors read; angle: rad, of the rotor (`resting`); gamma: rad; time: s, middle of the step
     side: +1 left, -1 right, 0 no load; load: index into the masses, -1 for nothing
     spread: A, standard deviation of the torque current's samples: large where the angle jumps between two counts
     """
@@ -72,12 +79,13 @@ NO_DETENT = Detent(0.0, 0.0, 0.0, 1.0)
 
 @dataclass(frozen=True)
 class Balance:
-    """`alpha` N m/A, `gamma_0` rad, their `covariance` (2, 2) from the residuals; `current` (n,) A the torque current freed of
-    sensors and detent, `base` (n,) A without load, `torque` (n,) N m of the loads; `fit` has residuals (n,) A; `u` (n,) how
-    far each step may scatter, relative to the others."""
+    """`alpha` N m/A, `gamma_0` rad, their `covariance` (2, 2) from the residuals; `ripple` r; `current` (n,) A the torque
+    current freed of sensors and detent, `base` (n,) A without load, `torque` (n,) N m of the loads; `fit` has residuals (n,) A;
+    `u` (n,) how far each step may scatter, relative to the others."""
 
     alpha: float
     gamma_0: float
+    ripple: float
     covariance: Array
     current: Array
     base: Array
@@ -89,6 +97,15 @@ class Balance:
     def scale(self) -> float:
         """A per unit of `u`, from the residuals."""
         return math.sqrt(self.fit.chi2 / self.fit.dof)
+
+
+def resting(reading: Array, count: float) -> Array:
+    """Where the rotor is in rad, from mean readings of an encoder with that count: within a count and a half the angle's loop
+    lets it creep to the edge, beyond it the mean of the counts is where it is."""
+    out: Array = np.where(
+        np.abs(reading) < 0.5 * count, 0.0, np.sign(reading) * np.maximum(np.abs(reading), 1.5 * count)
+    )
+    return out
 
 
 def detent(angle: Array, current: Array, order: float) -> Detent:
@@ -157,21 +174,31 @@ def balance(
         lines[mine, 2 * k] = 1
         lines[mine, 2 * k + 1] = s.time[mine] - s.time[mine].mean()
 
+    off = 6 * pole_pairs * s.angle * (s.side != 0)
+
+    def pull(
+        q: Array,
+    ) -> tuple[Array, Array, Array]:  # torque per current over alpha, and its derivatives by turn and r
+        turn = pole_pairs * (s.gamma - q[1])
+        ripple = np.cos(turn + off) - np.cos(turn)
+        by_turn = -np.sin(turn) - q[2] * (np.sin(turn + off) - np.sin(turn))
+        return np.cos(turn) + q[2] * ripple, by_turn, ripple
+
     def model(q: Array) -> Array:
-        out: Array = -torque / (q[0] * np.cos(pole_pairs * (s.gamma - q[1]))) + lines @ q[2:]
+        out: Array = -torque / (q[0] * pull(q)[0]) + lines @ q[3:]
         return out
 
     def slopes(q: Array) -> Array:
-        turn = pole_pairs * (s.gamma - q[1])
-        part = -torque / (q[0] * np.cos(turn))
-        return np.column_stack([-part / q[0], -part * pole_pairs * np.tan(turn), lines])
+        per, by_turn, ripple = pull(q)
+        part = -torque / (q[0] * per)
+        return np.column_stack([-part / q[0], part * by_turn * pole_pairs / per, -part * ripple / per, lines])
 
     start = linear(np.column_stack([-torque / np.cos(pole_pairs * s.gamma), lines]), current).terms
     relative = np.ones_like(current) if u is None else u / np.sqrt(np.mean(u**2))
-    fit = nonlinear(model, current, np.concatenate([[1 / start[0], 0.0], start[1:]]), relative, slopes)
-    alpha, gamma_0 = (float(x) for x in fit.terms[:2])
+    fit = nonlinear(model, current, np.concatenate([[1 / start[0], 0.0, 0.0], start[1:]]), relative, slopes)
+    alpha, gamma_0, ripple = (float(x) for x in fit.terms[:3])
     covariance = fit.covariance[:2, :2] * fit.chi2 / fit.dof
-    return Balance(alpha, gamma_0, covariance, current, lines @ fit.terms[2:], torque, fit, relative)
+    return Balance(alpha, gamma_0, ripple, covariance, current, lines @ fit.terms[3:], torque, fit, relative)
 
 
 @dataclass(frozen=True)

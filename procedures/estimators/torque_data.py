@@ -12,7 +12,7 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from procedures.estimators.direction import SEGMENTS
-from procedures.estimators.torque_balance import Steps
+from procedures.estimators.torque_balance import Steps, resting
 
 Array = npt.NDArray[np.float64]
 COILS = ("i_xo_p", "i_xo_n", "i_yo_p", "i_yo_n")
@@ -49,7 +49,7 @@ class TorqueData:
         return f"gamma {np.degrees(s.gamma[k]):+.2f} deg, {what}"
 
 
-def read_torques(recording: Recording[Any], masses: tuple[str, ...]) -> TorqueData:
+def read_torques(recording: Recording[Any], masses: tuple[str, ...], count: float) -> TorqueData:
     """Read all steps.
 
     Raises:
@@ -63,7 +63,7 @@ def read_torques(recording: Recording[Any], masses: tuple[str, ...]) -> TorqueDa
     sides = {"left": 1, "right": -1, "": 0}
     start = found[0].start_ns
     steps = Steps(
-        np.array([r["segments"] for r in read]), np.array([r["angle"] for r in read]),
+        np.array([r["segments"] for r in read]), resting(np.array([r["angle"] for r in read]), count),
         np.array([float(s.labels["gamma_rad"]) for s in found]),
         np.array([(s.start_ns + s.end_ns) / 2 - start for s in found]) * 1e-9,
         np.array([sides[str(s.labels["side"])] for s in found]), np.array([index[str(s.labels["load"])] for s in found]),

@@ -17,22 +17,30 @@ KG = np.array([0.5, 1.0, 2.0, 0.0])
 P = {"gravity": 9.81, "air_density": 1.2, "mass_density": 8000.0, "lever_left": 0.23, "lever_right": 0.23,
      "mass_0": 0.5, "mass_1": 1.0, "mass_2": 2.0, **{f"gain_{k}": 1.0 for k in range(1, 5)}}  # fmt: skip
 SIDES = np.array([0, 1, 1, 1, 0, -1, -1, -1, 0])
-LOADS = np.array([-1, 0, 1, 2, -1, 2, 1, 0, -1])
+LOADS = np.array([-1, 0, 1, 2, -1, 0, 1, 2, -1])
+EDGE = 1.5 * 2 * math.pi / 4096
 
 
 def made(
-    alpha: float, gamma_0: float, base: float = 0.0, drift: float = 0.0, noise: float = 0.0, seed: int = 0
+    alpha: float,
+    gamma_0: float,
+    base: float = 0.0,
+    drift: float = 0.0,
+    noise: float = 0.0,
+    seed: int = 0,
+    ripple: float = 0.0,
 ) -> Steps:
-    """Steps of a machine with constants as given, at five phase angles."""
+    """Steps of a machine with constants as given, at five phase angles; loaded it rests on the edge of a count."""
     gammas = np.repeat(np.linspace(-0.087, 0.087, 5), len(SIDES))
     side, load = np.tile(SIDES, 5), np.tile(LOADS, 5)
     time = np.arange(len(side)) * 1.3
     torque = side * KG[load] * 9.81 * 0.23 * (1 - 1.2 / 8000)
-    current = -torque / (alpha * np.cos(8 * (gammas - gamma_0))) + base + drift * time
-    current = current + noise * np.random.default_rng(seed).normal(size=len(side))
-    return Steps(
-        np.repeat(current[:, None], 4, axis=1), np.zeros(len(side)), gammas, time, side, load, np.zeros(len(side))
+    turn, angle = 8 * (gammas - gamma_0), EDGE * side
+    current = (
+        -torque / (alpha * ((1 - ripple) * np.cos(turn) + ripple * np.cos(turn + 48 * angle))) + base + drift * time
     )
+    current = current + noise * np.random.default_rng(seed).normal(size=len(side))
+    return Steps(np.repeat(current[:, None], 4, axis=1), angle, gammas, time, side, load, np.zeros(len(side)))
 
 
 @settings(deadline=None, max_examples=40)
@@ -103,6 +111,20 @@ def test_five_degrees_cost_about_a_quarter() -> None:
     s = made(2.87, 0.0)
     found = balance(s, P, 3, 8.0)
     assert found.alpha * math.cos(8 * gamma) / found.alpha == pytest.approx(0.77, abs=0.01)
+
+
+@pytest.mark.parametrize("ripple", [-0.01, 0.01])
+def test_the_ripple_of_a_rotor_beside_home_is_found(ripple: float) -> None:
+    found = balance(made(2.87, 0.003, ripple=ripple), P, 3, 8.0)
+    assert found.ripple == pytest.approx(ripple, rel=1e-6)
+    assert found.alpha == pytest.approx(2.87, rel=1e-9)
+    assert found.gamma_0 == pytest.approx(0.003, rel=1e-9)
+
+
+def test_where_the_rotor_rests() -> None:
+    count = 1.5e-3
+    seen = torque_balance.resting(np.array([0.0, 0.4, 1.0, -1.1, 2.0, -3.0]) * count, count) / count
+    np.testing.assert_allclose(seen, [0, 0, 1.5, -1.5, 2, -3])
 
 
 def test_detent_is_found_and_taken_off() -> None:
