@@ -162,7 +162,7 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
         out[f"position_offset_{axis}"] = certified.offset if certified else rig.simulation["position_offset"]
     for k in range(4):
         out |= {f"segment_gain_{k}": rig.simulation["segment_gain"], f"segment_drift_{k}": rig.simulation["drift"]}
-    out |= {name: t for name, t in rig.machine.items() if name != "amb_asymmetry"}
+    out |= {name: t for name, t in rig.machine.items() if name in ("pole_pairs", "polar_inertia", "ring_inertia")}
     for axis in "xy":
         out[f"motor_offset_{axis}"] = rig.simulation["motor_offset"]
     shared = {"drift", "position_gain", "position_offset", "segment_gain", "motor_offset"}
