@@ -32,6 +32,7 @@ PROCEDURES = (
     Entry("spindown", "procedures.spindown", "Drag of the levitated rotor by spindown"),
     Entry("angle-step", "procedures.angle_step", "Angle step while the motor carries: static against priority currents"),
     Entry("slew", "procedures.slew", "Following a slow sine of the angle, with detent"),
+    Entry("force-map", "procedures.force_map", "Terms of the motor's force over displacement, currents and load"),
 )
 
 

@@ -7,6 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from bench.figures import Figure, Series
+from bench.uncertainty import coverage_factor
+from procedures.estimators import map_estimates
+from procedures.estimators.map_data import MapData
+from procedures.estimators.map_estimates import Result
 from procedures.estimators.mapping import Part
 
 ROWS = {"force": ("F_x", "F_y"), "torque": ("torque",)}
@@ -50,3 +54,32 @@ def selection(part: Part) -> list[Figure]:
 def _listed(terms: Sequence[str]) -> str:
     kind = terms[0].partition("_")[0]
     return f"{kind} " + ", ".join(t.partition("_")[2] for t in terms)
+
+
+def rig_figures(data: MapData, result: Result) -> list[Figure]:
+    """Residuals by load, the selection, and constants over their uncertainties."""
+    fitted = result.force - result.residuals
+    where = np.array(data.loads)[data.group]
+    clouds = tuple(
+        Series(load or "no load", fitted[where == load], result.residuals[where == load], "points")
+        for load in dict.fromkeys(data.loads)
+    )
+    out = [
+        Figure("residuals", "Residuals of the force map", "Vertical force of the motor, from the inboard AMB, less the model "
+               "with every term that can be told; means of each angle and load taken off.", "force (N)", "residual (N)", clouds,
+               lines=(("zero", 0.0),))
+    ]  # fmt: skip
+    if path := result.selection.path:
+        size, loss = np.array([float(len(c.terms)) for c in path]), np.array([np.log10(c.loss) / 2 for c in path])
+        out.append(Figure("selection", "Terms that the rig shows", "Root mean square error in predicting a point from the "
+                          "others, for the best model of each size.", "number of terms", "log10 of prediction error (N)",
+                          (Series("best of its size", size, loss, "both"),)))  # fmt: skip
+    k = coverage_factor(max(len(result.residuals) - len(result.terms), 1))
+    shown = [n for n in result.terms if n not in map_estimates.QUADRATURE]
+    number = np.array([float(map_estimates.TERMS.index(n) + 1) for n in shown])
+    ratio = [abs(e.value) / max(k * e.u, 1e-300) for e in (result.estimates[n] for n in shown)]
+    out.append(Figure("resolved", "How well each term is told", "Constant over its expanded uncertainty (95 %), as a power of "
+                      "ten; below nought the interval holds zero. 1 to 9 are terms of (5.25), 10 the cross force.", "term",
+                      "log10 of value over U", (Series("terms", number, np.log10(np.maximum(ratio, 1e-2)), "points"),),
+                      lines=(("U", 0.0),)))  # fmt: skip
+    return out
