@@ -15,6 +15,7 @@ from procedures.estimators.sines import known_frequency, unknown_frequency
 amplitudes, phases, offsets = st.floats(0.01, 100), st.floats(-3.1, 3.1), st.floats(-100, 100)
 
 
+@settings(deadline=None)
 @given(amplitudes, phases, offsets, st.floats(0.3, 40))
 def test_a_sine_of_known_frequency_is_found(amplitude: float, phase: float, offset: float, hz: float) -> None:
     t = np.arange(500) * 1e-2 + 17.0

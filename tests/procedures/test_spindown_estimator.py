@@ -17,6 +17,7 @@ RPM = math.pi / 30
 J, B, T_C = 0.033, 0.081, 0.1
 
 
+@settings(deadline=None)
 @given(st.floats(0, 5), st.floats(0, 10), st.floats(5, 80))
 def test_the_forms_solve_the_equation(b: float, c: float, start: float) -> None:
     until = 0.9 * min(spindown.stopping_time(b, c, start), 3.0)
@@ -26,6 +27,7 @@ def test_the_forms_solve_the_equation(b: float, c: float, start: float) -> None:
     np.testing.assert_allclose(spindown.speed(t, b, c, start), exact[1], rtol=1e-7, atol=1e-7)
 
 
+@settings(deadline=None)
 @given(st.floats(0.01, 5), st.floats(0.01, 10), st.floats(1, 80))
 def test_it_stops_when_it_says(b: float, c: float, start: float) -> None:
     t = spindown.stopping_time(b, c, start)
