@@ -25,12 +25,20 @@ class Entry:
 
 PROCEDURES = (
     Entry("amb-calibration", "procedures.amb_calibration", "AMB force-current constants by hanging known masses"),
-    Entry("force-constant", "procedures.force_constant", "Direct force constant of the motor, by the AMBs as load cells"),
-    Entry("negative-stiffness", "procedures.negative_stiffness", "Negative stiffness of the motor by eccentric positioning"),
+    Entry(
+        "force-constant", "procedures.force_constant", "Direct force constant of the motor, by the AMBs as load cells"
+    ),
+    Entry(
+        "negative-stiffness",
+        "procedures.negative_stiffness",
+        "Negative stiffness of the motor by eccentric positioning",
+    ),
     Entry("force-coupling", "procedures.force_coupling", "Force coupling of the motor over the phase angle"),
     Entry("torque-constant", "procedures.torque_constant", "Torque constant of the motor by weights on a lever"),
     Entry("spindown", "procedures.spindown", "Drag of the levitated rotor by spindown"),
-    Entry("angle-step", "procedures.angle_step", "Angle step while the motor carries: static against priority currents"),
+    Entry(
+        "angle-step", "procedures.angle_step", "Angle step while the motor carries: static against priority currents"
+    ),
     Entry("slew", "procedures.slew", "Following a slow sine of the angle, with detent"),
     Entry("force-map", "procedures.force_map", "Terms of the motor's force over displacement, currents and load"),
 )

@@ -40,7 +40,9 @@ class Levitation(Protocol):
     def disable(self) -> None: ...  # READY -> OFF
     def set(self, parameter: str, value: float) -> None: ...  # SI; passes the envelope; read back
     def get(self, parameter: str) -> float: ...  # SI
-    def reading(self, channel: str) -> float: ...  # newest sample, SI: for deciding whether to go on, never for a result
+    def reading(
+        self, channel: str
+    ) -> float: ...  # newest sample, SI: for deciding whether to go on, never for a result
 
 
 class Rotation(Protocol):
