@@ -224,6 +224,7 @@ def test_many_rigs_go_through_the_chain_and_are_noted(bench_process: Bench, tmp_
     assert "Nothing could be judged" in (folder / "summary.html").read_text()
 
 
+@pytest.mark.long
 def test_more_rigs_are_added_to_an_unfinished_campaign(bench_process: Bench, tmp_path: Path) -> None:
     _, out, _ = bench_process(HEAD + TWO, "--count", "1", "--jobs", "1", "--no-report")
     path = tmp_path / out.strip() / "journal.jsonl"

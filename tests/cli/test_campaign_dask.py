@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from test_campaign import HEAD, TWO, environment
 
-pytest.importorskip("distributed")
+pytestmark = pytest.mark.long
 KEYS = ("seed", "values", "findings", "stopped")
 
 

@@ -54,6 +54,7 @@ def alive(group: int) -> list[int]:
     return found
 
 
+@pytest.mark.long
 @pytest.mark.timeout(300)
 def test_many_rigs_killed_and_gone_on_with(tmp_path: Path) -> None:
     """What was noted stays, nothing is done twice, no process is left, and all rigs are there in the end."""
@@ -78,6 +79,7 @@ def test_many_rigs_killed_and_gone_on_with(tmp_path: Path) -> None:
     assert not (folder / "work").exists()
 
 
+@pytest.mark.long
 @pytest.mark.timeout(300)
 def test_many_rigs_interrupted_end_in_order(tmp_path: Path) -> None:
     """Ctrl-C reaches every process of the group; rigs under way are finished and noted."""

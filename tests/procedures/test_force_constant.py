@@ -23,6 +23,8 @@ from procedures.estimators.ramp_data import read_ramps
 from procedures.force_constant import Plan, evaluate, facts, figures
 from procedures.force_constant_check import check, predicted_controls
 
+pytestmark = pytest.mark.xdist_group("force-constant")  # one worker makes the calibrations once
+
 SEED, NAME, CALIBRATION = 2026, "force-constant", "amb-calibration"
 CALIBRATE = {"settle_s": 0.5, "average_s": 0.3, "angles": 9}
 QUICK = {"levels_A": [-2, -1, 0, 1, 2], "ramp_A_s": 5, "settle_s": 0.25, "average_s": 0.2}

@@ -20,6 +20,8 @@ from procedures.force_map import MEASURES, Plan, check, figures, loaded_points, 
 from reports.figures import draw as draw_figure
 from sim_backend.truth import draw
 
+pytestmark = pytest.mark.xdist_group("force-map")  # one worker makes the calibrations once
+
 SEED, CALIBRATION = 2026, "amb-calibration"
 QUICK = {"ramp_A_s": 5.0, "settle_s": 0.5, "average_s": 0.3}
 

@@ -70,7 +70,8 @@ CASES = (
          ("samples-lost", "step-incomplete", "missing-samples", "error-frames")),
     Case("duplicate=0.02@12+2 reorder=0.02@16+2 burst=0.3@20+2", Outcome.PASS,
          ("frames-duplicated", "frames-reordered", "telemetry-late")),
-    Case("disconnect@12+0.05 delay=0.3@20+2", Outcome.INDETERMINATE,
+    # within the step from 12.05 s to 12.15 s, and shorter than the watchdog
+    Case("disconnect@12.07+0.05 delay=0.3@20+2", Outcome.INDETERMINATE,
          ("link-reconnected", "step-incomplete", "telemetry-late"), None, 1.0),
     Case("stall@12+0.2", Outcome.ABORTED, ("controller-fault",), AT_ONCE),
     Case("stall@12", Outcome.ERROR, ("link-lost",), AT_ONCE),
