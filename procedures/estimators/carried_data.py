@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
+from procedures.estimators.stepmeans import reduced
 
 Array = npt.NDArray[np.float64]
 
@@ -87,14 +88,4 @@ def read_steps(
 def _reduce(step: Step) -> dict[str, Any]:
     data = step.read(*CHANNELS)
     data["angle"] = (data["angle"] + np.pi) % (2 * np.pi) - np.pi  # home is angle 0: no mean across the turn's end
-    out: dict[str, Any] = {"mean": {}, "drift": {}, "spread": {}}
-    half = len(data["flags"]) // 2
-    if half == 0:
-        raise AnalysisError(f"step {step.labels}: found {len(data['flags'])} samples; expected at least 2")
-    for channel in CHANNELS:
-        x = data[channel]
-        out["mean"][channel] = x.mean()
-        out["drift"][channel] = x[half:].mean() - x[:half].mean()
-        out["spread"][channel] = x.std()
-    out["flags"] = int(np.bitwise_or.reduce(data["flags"].astype(np.int64)))
-    return out
+    return reduced(data, CHANNELS, step.labels)

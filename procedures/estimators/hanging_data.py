@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.errors import AnalysisError
-from bench.recording import Recording, Step
+from bench.recording import Recording
 from bench.rigfile import RigFile
 from procedures.estimators.mass_hanging import Hangings
+from procedures.estimators.stepmeans import reduced
 
 Array = npt.NDArray[np.float64]
 
@@ -55,7 +56,7 @@ def read_hangings(recording: Recording[Any], masses: tuple[str, ...]) -> Hanging
             f"hangings per angle: found {sorted(counts) or 'none'}; expected the same number at each angle "
             "(was the run stopped early?)"
         )
-    read = [[_reduce(step) for step in steps] for _, steps in groups]
+    read = [[reduced(step.read(*CHANNELS), CHANNELS, step.labels) for step in steps] for _, steps in groups]
 
     def stack(key: str, channel: str) -> Array:
         return np.array([[one[key][channel] for one in row] for row in read])
@@ -80,22 +81,6 @@ def read_hangings(recording: Recording[Any], masses: tuple[str, ...]) -> Hanging
         np.array([[one["flags"] for one in row] for row in read]),
         masses,
     )
-
-
-def _reduce(step: Step) -> dict[str, Any]:
-    data = step.read(*CHANNELS)
-    out: dict[str, Any] = {"mean": {}, "drift": {}, "spread": {}}
-    for channel in CHANNELS:
-        x = data[channel]
-        half = len(x) // 2
-        if half == 0:
-            raise AnalysisError(f"step {step.labels}: found {len(x)} samples of {channel}; expected at least 2")
-        out["mean"][channel] = x.mean()
-        out["drift"][channel] = x[half:].mean() - x[:half].mean()
-        out["spread"][channel] = x.std()
-    out["count"] = len(data["flags"])
-    out["flags"] = int(np.bitwise_or.reduce(data["flags"].astype(np.int64)))
-    return out
 
 
 def _plane_positions(rig: RigFile, y_inboard: Array, y_outboard: Array) -> tuple[Array, Array, Array]:

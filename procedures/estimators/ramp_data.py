@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.errors import AnalysisError
-from bench.recording import Recording, Step
+from bench.recording import Recording
 from bench.rigfile import RigFile
 from procedures.estimators.force_rows import Ramps
+from procedures.estimators.stepmeans import reduced
 
 Array = npt.NDArray[np.float64]
 
@@ -60,7 +61,7 @@ def read_ramps(recording: Recording[Any]) -> RampData:
             "(was the run stopped early?)"
         )
     steps = [row for _, row in groups]
-    read = [[_reduce(step) for step in row] for row in steps]
+    read = [[reduced(step.read(*CHANNELS), CHANNELS, step.labels) for step in row] for row in steps]
 
     def label(name: str) -> Array:
         return np.array([[float(s.labels[name]) for s in row] for row in steps])
@@ -94,21 +95,6 @@ def read_ramps(recording: Recording[Any]) -> RampData:
         np.array([[one["flags"] for one in row] for row in read]),
         (steps[-1][-1].end_ns - steps[0][0].start_ns) * 1e-9,
     )  # fmt: skip
-
-
-def _reduce(step: Step) -> dict[str, Any]:
-    data = step.read(*CHANNELS)
-    out: dict[str, Any] = {"mean": {}, "drift": {}, "spread": {}}
-    for channel in CHANNELS:
-        x = data[channel]
-        half = len(x) // 2
-        if half == 0:
-            raise AnalysisError(f"step {dict(step.labels)}: found {len(x)} samples of {channel}; expected at least 2")
-        out["mean"][channel] = x.mean()
-        out["drift"][channel] = x[half:].mean() - x[:half].mean()
-        out["spread"][channel] = x.std()
-    out["flags"] = int(np.bitwise_or.reduce(data["flags"].astype(np.int64)))
-    return out
 
 
 def _planes(rig: RigFile, inboard: Array, outboard: Array) -> tuple[Array, Array]:
