@@ -15,6 +15,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from bench.calibration import STRICT, Backend, Calibration, Certificate, Used
 from bench.errors import ConfigError
+from bench.schema import require_schema
 from bench.uncertainty import Distribution, Estimate, Influence
 from bench.wholefile import write_whole
 
@@ -106,17 +107,7 @@ def from_json(text: str, name: str = "calibration") -> Calibration:
     Raises:
         ConfigError: not a calibration, a newer one, unknown or missing keys, NaN, numbers that cannot be.
     """
-    try:
-        found = json.loads(text)
-        json.dumps(found, allow_nan=False)  # json.loads takes NaN, Infinity and 1e999
-    except (ValueError, RecursionError) as error:
-        raise ConfigError(f"{name}: not a calibration: {error}; expected JSON without NaN or Infinity") from error
-    schema = found.get("schema") if isinstance(found, dict) else None
-    if type(schema) is not int:
-        raise ConfigError(f"{name}: not a calibration: found no schema number; expected schema = {SCHEMA}")
-    if schema != SCHEMA:
-        newer = " It was written by a newer Levbench." if schema > SCHEMA else ""
-        raise ConfigError(f"{name}: schema: found {schema}; expected {SCHEMA}.{newer}")
+    require_schema(text, name, "calibration", SCHEMA)
     try:
         file = _FILE.validate_json(text)
     except (ValidationError, UnicodeEncodeError) as error:

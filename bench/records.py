@@ -18,6 +18,7 @@ from bench.errors import ConfigError
 from bench.findings import Effect, Finding
 from bench.limits import Limit, Verdict, judge
 from bench.procedure import Measured, Quantity
+from bench.schema import require_schema
 from bench.uncertainty import PROBABILITY, budget, correlation_matrix, interval
 from bench.wholefile import write_whole
 
@@ -181,17 +182,7 @@ def from_json(text: str, name: str = "record") -> Record:
     Raises:
         ConfigError: not a record, a newer one, unknown or missing keys, NaN.
     """
-    try:
-        content = json.loads(text)
-        json.dumps(content, allow_nan=False)  # json.loads takes NaN, Infinity and 1e999
-    except (ValueError, RecursionError) as error:
-        raise ConfigError(f"{name}: not a record: {error}; expected JSON without NaN or Infinity") from error
-    schema = content.get("schema") if isinstance(content, dict) else None
-    if type(schema) is not int:
-        raise ConfigError(f"{name}: not a record: found no schema number; expected schema = {SCHEMA}")
-    if schema != SCHEMA:
-        newer = " It was written by a newer Levbench." if schema > SCHEMA else ""
-        raise ConfigError(f"{name}: schema: found {schema}; expected {SCHEMA}.{newer}")
+    require_schema(text, name, "record", SCHEMA)
     try:
         return _RECORD.validate_json(text)
     except ValidationError as error:
