@@ -7,8 +7,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from bench.errors import LinkError
 from bench.rig import Rig
 from bench.rigfile import RigFile
+from procedures import rotor
 
-PARAMETERS = ("motor_share", "share_slew", "ref_xm", "ref_ym", "ref_yi", "angle_ref")
+PARAMETERS = ("motor_share", "share_slew", "ref_xm", "ref_ym", "ref_yi", *rotor.PARAMETERS)
 SHAFT_N = 10.2 * 9.81  # T Table 6.1; for predictions before a run, and for nothing that is measured
 ALPHA_D = 12.1  # N/A, T Table 6.2; likewise
 MARGIN = (
@@ -42,6 +43,29 @@ def give_back(rig: Rig, settle_s: float) -> None:
 def _hand_over(rig: Rig, share: float, settle_s: float) -> None:
     rig.levitation.set("motor_share", share)
     rig.clock.sleep(1 / rig.file.parameters["share_slew"].default + settle_s)
+
+
+def to_edge(rig: Rig, side: int, count_rad: float) -> None:
+    """Keep the rotor at an edge of the encoder's count that reads zero, the upper (+1) or the lower one (-1).
+
+    The ripple (T 5.25, terms 2 and 3) turns the motor's force with P theta, P = 2 M: against F_x = alpha_3 sin(P theta) i_y
+    the controller sets i_x. With gravity's i_y of 4 A, alpha_3/alpha_d = 2.5 % and a count of 1.5 mrad, a rotor that goes
+    from one count to the next shifts i_x by 16 * 1.5e-3 * 2.5 % * 4 A = 2.5 mA, as much as a sensor that drifts.
+
+    And so it goes at home: the rotor rests at whichever edge suits the torque of unequal segments and what its last move
+    has left in the angle's integrator, and a current that changes takes it to another. Here it is taken up anew, without
+    the integrator: readings of one count and the next give kp_theta times half a count, 38 mA, either way, and the mean
+    between them is the torque current that is needed (up to 25 mA with segments within 1 %), whatever was before.
+    """
+    rotor.release(rig)
+    rig.levitation.set("angle_ref", side * count_rad / 2)
+    rotor.hold(rig, ki_theta=0.0)
+
+
+def leave_edge(rig: Rig) -> None:
+    """Back to the middle of the count, with the integrator."""
+    rig.levitation.set("angle_ref", 0.0)
+    rotor.hold(rig)
 
 
 def mirrored(levels: Sequence[float]) -> Iterator[tuple[float, int]]:

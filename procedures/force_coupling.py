@@ -73,13 +73,13 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         rig.levitation.set("gamma", gamma)
         rig.clock.sleep(plan.settle_s)
     for branch, gammas in ((1, plan.gamma_rad), (-1, plan.gamma_rad[::-1])):
-        rig.levitation.set("angle_ref", branch * plan.count_rad / 2)  # an edge of the count that reads zero
+        carrying.to_edge(rig, branch, plan.count_rad)
         for gamma in gammas:
             rig.levitation.set("gamma", gamma)
             rig.clock.sleep(plan.settle_s)
             with record.step("phase", gamma_rad=gamma, branch=branch):
                 rig.clock.sleep(plan.average_s)
-    rig.levitation.set("angle_ref", 0.0)
+    carrying.leave_edge(rig)
     for gamma in (*reversed(carrying.approach(plan.gamma_rad)), 0.0):
         rig.levitation.set("gamma", gamma)
         rig.clock.sleep(plan.settle_s)
@@ -112,7 +112,7 @@ def read(recording: Recording[Plan]) -> StepMeans:
 def _of_signals(data: StepMeans, plan: Plan) -> Iterator[Finding]:
     yield from carried_checks.of_signals(data, (*SEGMENTS, *POSITIONS), plan)
     yield from carried_checks.segments(data)
-    yield from coupling_findings.of_angle(data, plan.count_rad)
+    yield from carried_checks.at_edge(data, plan.count_rad)
     d = data.drift
     currents = {"i_y": (d["i_m1"] - d["i_m3"]) / 2, "i_x": (d["i_m4"] - d["i_m2"]) / 2}
     yield from carried_checks.settled(data, {c: data.mean[c] for c in POSITIONS}, currents, plan)

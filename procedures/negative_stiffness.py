@@ -7,6 +7,7 @@ way: the AMBs hold, the motor has no current, and the AMB's own stiffness is tol
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
@@ -45,6 +46,7 @@ class Plan(BenchPlan):
     levels_m: tuple[float, ...] = Field(tuple(round(x * 1e-5, 9) for x in range(-4, 5)), min_length=5)
     bias_A: float = Field(3.0, gt=0)  # that of the AMBs' calibration
     bias_high_A: float = Field(4.0, gt=0)
+    count_rad: float = Field(2 * math.pi / 4096, gt=0)  # one count of the rotor's encoder
     settle_s: float = Field(2.0, gt=0)
     average_s: float = Field(1.0, ge=0.1)
     max_position_m: float = Field(5e-8, gt=0)  # settled: |mean position - reference|; its drift may be twice that
@@ -74,8 +76,10 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     carrying.home(rig)
     inboard = _share(rig.file, -rig.file.geometry["com_to_inboard_amb"].value)
     carrying.carry(rig, plan.settle_s)
+    carrying.to_edge(rig, 1, plan.count_rad)
     # The inboard AMB's plane goes with the displacement as far as keeps the inboard sensor at zero.
     _walk(rig, plan, record, "motor", {"ref_ym": 1.0, "ref_yi": inboard}, plan.bias_A)
+    carrying.leave_edge(rig)
     carrying.give_back(rig, plan.settle_s)
     for bias in (plan.bias_A, plan.bias_high_A):
         if bias != plan.bias_A:
@@ -147,6 +151,7 @@ def _of_signals(recording: Recording[Plan], motor: StepMeans, ambs: StepMeans) -
     inboard = _share(recording.rig, -recording.rig.geometry["com_to_inboard_amb"].value)
     ways = ((motor, (*SEGMENTS, *POSITIONS), 0.0), (ambs, (*COILS, *POSITIONS), -inboard / (1 - inboard)))
     yield from carried_checks.segments(motor)
+    yield from carried_checks.at_edge(motor, plan.count_rad)
     for data, channels, follow in ways:
         yield from carried_checks.of_signals(data, channels, plan)
         mean, d, level = data.mean, data.drift, data.labels["level_m"]
@@ -226,6 +231,9 @@ First way (alpha_x_prime): the outboard AMB is off and the motor carries the out
 motor's force is: what its current gives less, its magnets pull more. alpha_x' is the calibrated force constant times the
 change of current per displacement. The horizontal current is fitted with it, because an encoder zero that is off turns part
 of the force.
+
+The rotor is kept at an edge of its encoder's count meanwhile: where it stands decides how the ripple of the force over the
+rotor's angle turns gravity's current, and it must not change between steps.
 
 Second way (alpha_x_prime_amb): both AMBs carry, the motor has no current, and the outboard AMB serves as a force sensor at two
 biases. Its own position stiffness grows with the square of the bias and the motor's does not; so the gap of the AMB and

@@ -27,10 +27,11 @@ def release(rig: Rig) -> None:
 
 def hold(rig: Rig, ki_theta: float | None = None) -> None:
     """The controller takes the angle up again, with the rig file's gains; damping first, so that it never swings."""
-    for name in ("kd_theta", "kp_theta", "ki_theta"):
-        rig.levitation.set(name, rig.file.parameters[name].default)
+    gains = {name: rig.file.parameters[name].default for name in ("kd_theta", "kp_theta", "ki_theta")}
     if ki_theta is not None:
-        rig.levitation.set("ki_theta", ki_theta)
+        gains["ki_theta"] = ki_theta
+    for name, gain in gains.items():
+        rig.levitation.set(name, gain)
 
 
 def probe(rig: Rig, record: Recorder) -> None:

@@ -94,6 +94,26 @@ def segments(data: StepMeans) -> Iterator[Finding]:
         )
 
 
+def at_edge(data: StepMeans, count_rad: float) -> Iterator[Finding]:
+    """The rotor at the edges it was sent to: its encoder reads now one count and now the other.
+
+    A reading that is 0 or one count c, the latter with probability p, has the mean p c and the variance p (1 - p) c^2: from
+    both follows c.
+    """
+    mean, spread = np.abs(data.mean["angle"]), data.spread["angle"]
+    between = spread > 0.05 * count_rad
+    found = float(np.median((spread**2 + mean**2)[between] / mean[between])) if between.any() else 0.0
+    if between.mean() < 0.8 or abs(found / count_rad - 1) > 0.05:
+        seen = f"two readings {found * 1e3:.3f} mrad apart" if between.any() else "one reading throughout"
+        yield Finding(
+            "rotor-off-edge",
+            f"in {int(between.sum())} of {between.size} steps the rotor stands at an edge of its encoder's count, with {seen}; "
+            f"expected all steps, and {count_rad * 1e3:.3f} mrad. Look at count_rad, and at the friction of the rotor.",
+            data.where(np.where(between, 0.0, 1.0)),
+            Effect.ERROR,
+        )
+
+
 def settled(
     data: StepMeans, offsets: Mapping[str, Array], drifts: Mapping[str, Array], plan: Tolerances
 ) -> Iterator[Finding]:

@@ -14,10 +14,11 @@ from bench.calibration import Calibration
 from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import ConfigError, DeviceFault, InterlockError, LinkError
 from bench.limits import Verdict, judge
+from bench.rig import Rig
 from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import interval
-from procedures import negative_stiffness
+from procedures import carrying, negative_stiffness
 from procedures.estimators.stiffness_estimates import evaluate
 from procedures.negative_stiffness import Plan, check, figures, read
 
@@ -73,6 +74,33 @@ def test_the_inboard_amb_drops_out(
     other = measure(tmp_path, known)
     ratio = estimates(other)["alpha_x_prime"].value / estimates(sound)["alpha_x_prime"].value
     assert ratio == pytest.approx(1, abs=5e-4)
+
+
+@pytest.mark.parametrize("swing", [0.1, -0.1])
+def test_where_the_rotor_was_before_does_not_matter(
+    sound: Simulated, known: dict[str, Calibration], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, swing: float
+) -> None:
+    """A move leaves something in the angle's integrator, which at home puts the rotor at another edge of a count. With the
+    edge chosen, every step has the same angle: the lower edge, or one between the steps, is not it."""
+    monkeypatch.setattr(carrying, "home", lambda rig: swung(rig, swing))
+    run = measure(tmp_path, known, {"alpha_3": 0.3})
+    count = Plan().count_rad
+    readings = read(run.recording)[0].mean["angle"] / count
+    assert np.all((readings > 0.05) & (readings < 0.95)), readings
+    assert [f for f in serious(run) if f.code != "methods-disagree"] == []  # alpha_d was calibrated with another ripple
+    at_rest = read(sound.recording)[0].mean["angle"] / count
+    assert np.abs(readings - at_rest).max() < 0.06
+
+
+def swung(rig: Rig, angle: float) -> None:
+    """To an angle and back home at once."""
+    rig.levitation.set("angle_ref", angle)
+    rig.clock.sleep(0.2)
+    rig.rotation.point(0.0)
+
+
+def test_a_count_of_the_wrong_size_is_named(known: dict[str, Calibration], tmp_path: Path) -> None:
+    assert "rotor-off-edge" in {f.code for f in serious(measure(tmp_path, known, count_rad=0.9e-3))}
 
 
 def test_the_result_follows_the_truth(known: dict[str, Calibration], tmp_path: Path) -> None:
