@@ -1,5 +1,5 @@
-"""The first steps of the identification chain over CAN as one campaign, and the first on every other link, with server
-and bench as processes of their own, against the same rig in one process.
+"""The identification chain over CAN as one campaign, and its first step on every other link, with server and bench as
+processes of their own, against the same rig in one process.
 
 The bound: both runs see the same machine, so all that is certified or stated by the rig file is common to them. What
 differs is noise, the seats of the straps at other instants of the drift, and the host's timing; the budgets call it
@@ -22,7 +22,7 @@ from bench import campaign, catalogue
 
 SEED = "3"
 NAME = "tsbs-identification"
-LINKS = {"slcan:socket": 2, "slcan:pty": 1, "serial:socket": 1, "serial:pty": 1}
+LINKS = {"slcan:socket": 6, "slcan:pty": 1, "serial:socket": 1, "serial:pty": 1}
 """How many steps of the chain on each link: it takes as long as the machine takes."""
 SIGMAS = 4.0
 RUN_S = 1200.0
