@@ -35,6 +35,8 @@ class McapWriter:
         metadata: Mapping[str, Mapping[str, str]],
         attachments: Mapping[str, bytes],
         start_ns: int,
+        *,
+        view: bool = True,
     ) -> None:
         self._file, self._streams = file, streams
         self.blocks = dict.fromkeys(streams, 0)
@@ -44,7 +46,7 @@ class McapWriter:
         self._channels: dict[str, int] = {}
         self._sequence: dict[str, int] = {}
         self._pending: dict[str, list[SampleBlock]] = {name: [] for name in streams}
-        self._windows = {name: layout.ViewWindows(stream, VIEW_NS) for name, stream in streams.items()}
+        self._windows = {name: layout.ViewWindows(s, VIEW_NS) for name, s in streams.items() if view}
         self._next_flush = start_ns + FLUSH_NS
         self._mcap.add_metadata("layout", {"version": str(layout.VERSION)})
         for name, values in metadata.items():
@@ -56,9 +58,11 @@ class McapWriter:
                          "channels": [[c.name, c.unit, c.dtype] for c in stream.channels]})}  # fmt: skip
             self._register(layout.block_topic(stream.name), f"levbench.Block_{stream.name}",
                            layout.block_schema(stream), described)  # fmt: skip
-            self._register(layout.view_topic(stream.name), f"levbench.View_{stream.name}", layout.view_schema(stream))
-        schema = self._mcap.register_schema("levbench.Event", "jsonschema", layout.EVENT_SCHEMA)
-        self._channels[layout.EVENTS] = self._mcap.register_channel(layout.EVENTS, "json", schema)
+            if view:
+                schema = layout.view_schema(stream)
+                self._register(layout.view_topic(stream.name), f"levbench.View_{stream.name}", schema)
+        event = self._mcap.register_schema("levbench.Event", "jsonschema", layout.EVENT_SCHEMA)
+        self._channels[layout.EVENTS] = self._mcap.register_channel(layout.EVENTS, "json", event)
         file.flush()
 
     def _register(self, topic: str, name: str, schema: bytes, metadata: Mapping[str, str] | None = None) -> None:
@@ -103,7 +107,8 @@ class McapWriter:
                                        {n: x[part] for n, x in columns.items()})  # fmt: skip
             self._message(layout.block_topic(stream), int(t_ns[start]), data)
             self.blocks[stream] += 1
-        self._write_view(stream, self._windows[stream].take(t_ns, columns))
+        if stream in self._windows:
+            self._write_view(stream, self._windows[stream].take(t_ns, columns))
 
     def _write_view(self, stream: str, view: Iterable[tuple[int, bytes]]) -> None:
         for t_ns, data in view:
@@ -126,7 +131,8 @@ class McapWriter:
         """Write the samples that wait for more; no more may come. `blocks` is final afterwards."""
         for stream in self._pending:
             self._write_blocks(stream)
-            self._write_view(stream, self._windows[stream].rest())
+            if stream in self._windows:
+                self._write_view(stream, self._windows[stream].rest())
         self._mcap.flush()
 
     def finish(self, counts: Mapping[str, str], wall: Mapping[str, str]) -> None:

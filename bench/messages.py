@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import cantools
@@ -29,7 +29,7 @@ class Signal:
     comment: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Message:
     """One message: identifier (bit 31 set when extended), payload bytes, period (0: on demand)."""
 
@@ -44,10 +44,11 @@ class Message:
 
     def signal(self, name: str) -> Signal:
         """The signal of that name (KeyError when there is none)."""
-        for s in self.signals:
-            if s.name == name:
-                return s
-        raise KeyError(name)
+        return self._by_name[name]
+
+    @cached_property
+    def _by_name(self) -> dict[str, Signal]:
+        return {s.name: s for s in self.signals}
 
 
 @dataclass(frozen=True)

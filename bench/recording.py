@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections import OrderedDict
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
@@ -31,6 +32,7 @@ __all__ = ["Recording", "Step", "Steps"]
 P = TypeVar("P", bound=BenchPlan)
 Q = TypeVar("Q", bound=BenchPlan)
 J = TypeVar("J", dict[str, Any], list[Any])
+KEPT = 16  # decoded blocks
 BLOCK_NS = 2_000_000_000  # no block is longer: how far back a block that reaches into an interval can begin
 
 
@@ -39,6 +41,7 @@ class Recording(Generic[P]):
 
     def __init__(self, file: McapFile, plan: type[P] | None) -> None:
         self._file, self._plan_class = file, plan
+        self._kept: OrderedDict[tuple[str, int, int], tuple[bytes, DecodedBlock]] = OrderedDict()
         self.version = int(file.metadata["layout"]["version"])
         self.path = file.path
         self.integrity: Mapping[str, Any] | None = _integrity(file)
@@ -189,10 +192,20 @@ class Recording(Generic[P]):
 
     def blocks(self, stream: str, start_ns: int = 0, end_ns: int = 1 << 63) -> Iterator[DecodedBlock]:
         """Decoded blocks that may hold samples of an interval, in order."""
-        for _, data in self._file.messages(layout.block_topic(stream), max(0, start_ns - BLOCK_NS), end_ns):
-            block = DecodedBlock(self.streams[stream], data)
+        for t_ns, data in self._file.messages(layout.block_topic(stream), max(0, start_ns - BLOCK_NS), end_ns):
+            block = self._decoded(stream, t_ns, data)
             if block.count and block.t_ns[-1] >= start_ns:
                 yield block
+
+    def _decoded(self, stream: str, t_ns: int, data: bytes) -> DecodedBlock:
+        """A block; the last few are kept, for steps are read one after the other and each more than once."""
+        key = (stream, t_ns, id(data))
+        kept = self._kept.get(key)
+        if kept is None or kept[0] is not data:
+            kept = self._kept[key] = (data, DecodedBlock(self.streams[stream], data))
+            if len(self._kept) > KEPT:
+                self._kept.popitem(last=False)
+        return kept[1]
 
     def read(self, channels: tuple[str, ...], start_ns: int, end_ns: int) -> dict[str, npt.NDArray[Any]]:
         """Samples with start <= t < end: float64 by channel, `t_ns`, and `index` (counts lost samples too).

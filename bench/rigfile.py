@@ -9,7 +9,7 @@ import hashlib
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -150,12 +150,7 @@ class RigFile(Part):
         Raises:
             ConfigError: it is not TOML, of a newer schema, or breaks a rule; every problem is in it.
         """
-        data = migrated(_toml(toml_text, path), path)
-        try:
-            return cls.model_validate({**data, "toml_text": toml_text, "dbc_text": dbc_text, "path": path})
-        except ValidationError as error:
-            problems = tuple(_problem(e, path) for e in error.errors(include_url=False))
-            raise ConfigError(f"rig file {path} cannot be used:", problems) from error
+        return _parsed(toml_text, dbc_text, path)
 
     @property
     def digest(self) -> str:
@@ -181,6 +176,17 @@ class RigFile(Part):
     def link(self) -> LinkSpec:
         """The controller's link."""
         return self.links[self.devices["controller"].link]
+
+
+@lru_cache(maxsize=8)
+def _parsed(toml_text: str, dbc_text: str, path: str) -> RigFile:
+    """A rig file is frozen, and a chain of virtual runs reads the same one a dozen times."""
+    data = migrated(_toml(toml_text, path), path)
+    try:
+        return RigFile.model_validate({**data, "toml_text": toml_text, "dbc_text": dbc_text, "path": path})
+    except ValidationError as error:
+        problems = tuple(_problem(e, path) for e in error.errors(include_url=False))
+        raise ConfigError(f"rig file {path} cannot be used:", problems) from error
 
 
 def _toml(text: str, path: str) -> dict[str, Any]:
@@ -261,11 +267,16 @@ def load_rig(rig: str) -> RigFile:
     Raises:
         ConfigError: with every problem that was found.
     """
+    text = read_rig(rig)
+    return _checked(text.toml, text.dbc, str(text.path))
+
+
+@lru_cache(maxsize=8)
+def _checked(toml_text: str, dbc_text: str, path: str) -> RigFile:
     from bench.rigcheck import problems_of
 
-    text = read_rig(rig)
-    loaded = RigFile.parse(text.toml, text.dbc, str(text.path))
+    loaded = RigFile.parse(toml_text, dbc_text, path)
     problems = problems_of(loaded)
     if problems:
-        raise ConfigError(f"rig file {text.path} cannot be used:", tuple(problems))
+        raise ConfigError(f"rig file {path} cannot be used:", tuple(problems))
     return loaded

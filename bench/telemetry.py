@@ -91,7 +91,9 @@ class TelemetryDecoder:
         """Blocks of consecutive samples, in order; a gap starts a new block with `lost_before`."""
         destroyed = batch["flags"] & ERROR
         good = batch[destroyed == 0] if destroyed.any() else batch
-        self.counters.unknown += sum(i not in self._known for i in good["id"].tolist())
+        identifiers = good["id"].tolist()
+        if not self._known.issuperset(identifiers):
+            self.counters.unknown += sum(i not in self._known for i in identifiers)
         rows = self._assembler.take(good)
         self.counters.wrong_length = self._assembler.wrong_length
         self.counters.misplaced = self._assembler.misplaced

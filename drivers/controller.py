@@ -22,7 +22,9 @@ from drivers import advice, handshake
 from drivers.dialogue import Dialogue, no_reply
 from drivers.orders import Orders
 
-SILENCE_S, WAIT_SLICE_S = 0.5, 0.01
+SILENCE_S = 0.5
+WAIT_SLICE_S, LONG_SLICE_S, PATIENCE = 0.01, 0.1, 0.2  # a wait looks again after a fifth of how long it has waited
+KEPT_S, KEPT_SLICE_S = 0.1, 0.02  # what is to stand or to keep its speed is looked at so often for so long
 STALL_NS = 200_000_000  # between two polls, which come every 0.1 s at most
 SPIN_S = 60.0
 SLOWEST_SLEW = 0.2  # rad/s, of a controller that does not say how fast it turns to an angle
@@ -222,11 +224,11 @@ class Controller:
 
     def levitate(self) -> None:
         """READY to LEVITATED."""
-        self._command("LEVITATE", "LEVITATED", self._lift_s + 6.0)
+        self._command("LEVITATE", "LEVITATED", self._lift_s + 6.0, self._default("lift_time_s"))
 
     def land(self) -> None:
         """LEVITATED to READY."""
-        self._command("LAND", "READY", self._lift_s + 3.0)
+        self._command("LAND", "READY", self._lift_s + 3.0, self._default("lift_time_s"))
 
     def disable(self) -> None:
         """READY to OFF."""
@@ -262,17 +264,16 @@ class Controller:
         turn = (angle_rad - here + math.pi) % (2 * math.pi) - math.pi
         self._angle += (angle_rad - self._angle + math.pi) % (2 * math.pi) - math.pi
         self.set("angle_ref", self._angle)
-        p = self.rig.parameters.get("angle_slew")
-        slew = p.default if p and p.default > 0 else SLOWEST_SLEW
-        deadline = self._base.now_ns() + round((abs(turn) / slew + 5.0) * 1e9)
-        steady = 0
-        while steady < 5:
-            self.clock.sleep(0.02)
-            now = self.telemetry.latest
-            error = (now["angle"] - angle_rad + math.pi) % (2 * math.pi) - math.pi
-            steady = steady + 1 if abs(error) < 4e-3 and abs(now["speed"]) < 0.5 else 0
-            if self._base.now_ns() > deadline:
-                raise LinkError(f"the rotor did not reach {angle_rad:.3f} rad: it stands {error:+.4f} rad off")
+        travel_s = abs(turn) / (self._default("angle_slew") or SLOWEST_SLEW)
+
+        def off() -> float:
+            return (self.telemetry.latest["angle"] - angle_rad + math.pi) % (2 * math.pi) - math.pi
+
+        def stands() -> bool:
+            return abs(off()) < 4e-3 and abs(self.speed_rad_s) < 0.5
+
+        self._keep(stands, travel_s, travel_s + 5.0,
+                   lambda: f"the rotor did not reach {angle_rad:.3f} rad: it stands {off():+.4f} rad off")  # fmt: skip
 
     def spin(self, rad_s: float) -> None:
         """Turn the rotor at a speed; returns when it has kept within 2 % or 0.3 rad/s of it for a tenth of a second.
@@ -282,14 +283,36 @@ class Controller:
         """
         self.set("speed_ref", rad_s)
         self._orders.command("SPIN")
-        tolerance, steady = max(0.02 * abs(rad_s), 0.3), 0
-        deadline = self._base.now_ns() + round(SPIN_S * 1e9)
-        while steady < 5:
-            self.clock.sleep(0.02)
-            steady = steady + 1 if abs(self.speed_rad_s - rad_s) < tolerance else 0
-            if self._base.now_ns() > deadline:
-                raise LinkError(f"the rotor did not reach {rad_s:.1f} rad/s within {SPIN_S:g} s: it turns at "
-                                f"{self.speed_rad_s:.1f} rad/s")  # fmt: skip
+        tolerance = max(0.02 * abs(rad_s), 0.3)
+        self._keep(lambda: abs(self.speed_rad_s - rad_s) < tolerance, 0.0, SPIN_S,
+                   lambda: f"the rotor did not reach {rad_s:.1f} rad/s within {SPIN_S:g} s: it turns at "
+                   f"{self.speed_rad_s:.1f} rad/s")  # fmt: skip
+
+    def _default(self, parameter: str) -> float:
+        """What a parameter is set to unless a plan says otherwise; 0 where the rig has none."""
+        p = self.rig.parameters.get(parameter)
+        return p.default if p else 0.0
+
+    def _keep(self, ok: Callable[[], bool], expected_s: float, timeout_s: float, text: Callable[[], str]) -> None:
+        """Let the clock run for the time that it should take, and on until something has been true for a tenth of a
+        second.
+
+        Raises:
+            LinkError: `text`, when time runs out.
+        """
+        begin, since = self._base.now_ns(), None
+        self.clock.sleep(min(expected_s, timeout_s))
+        while True:
+            now = self._base.now_ns()
+            if not ok():
+                since = None
+            elif since is None:
+                since = now
+            elif now - since >= KEPT_S * 1e9:
+                return
+            if now - begin > timeout_s * 1e9:
+                raise LinkError(text())
+            self.clock.sleep(_pause(now - begin) if since is None else KEPT_SLICE_S)
 
     def stop(self) -> None:
         """Brake to a stop, and wait until the rotor is below the landing speed."""
@@ -316,8 +339,9 @@ class Controller:
         except KeyError:
             raise BenchError(f"the telemetry has no channel {channel}") from None
 
-    def _command(self, name: str, goal: str, timeout_s: float) -> None:
+    def _command(self, name: str, goal: str, timeout_s: float, expected_s: float = 0.0) -> None:
         self._orders.command(name)
+        self.clock.sleep(expected_s)
         self._wait(lambda: self.mode == goal, timeout_s, f"state {goal} after {name}")
 
     def _wait(self, done: Callable[[], bool], timeout_s: float, what: str) -> None:
@@ -329,8 +353,14 @@ class Controller:
         Raises:
             LinkError: the given one, when time runs out.
         """
-        deadline = self._base.now_ns() + round(timeout_s * 1e9)
+        begin = self._base.now_ns()
         while not done():
-            if self._base.now_ns() >= deadline:
+            waited = self._base.now_ns() - begin
+            if waited >= timeout_s * 1e9:
                 raise error
-            self.clock.sleep(WAIT_SLICE_S)
+            self.clock.sleep(min(_pause(waited), max(timeout_s - waited * 1e-9, 1e-3)))
+
+
+def _pause(waited_ns: int) -> float:
+    """How long to wait before looking again, s."""
+    return min(max(PATIENCE * waited_ns * 1e-9, WAIT_SLICE_S), LONG_SLICE_S)

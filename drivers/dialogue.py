@@ -39,7 +39,10 @@ class Dialogue:
     def take(self, batch: FrameBatch) -> None:
         """Keep the replies in a batch for who waits for them. Destroyed frames are none; those of a wrong length are
         counted and left out."""
-        for k, identifier in enumerate(batch["id"].tolist()):
+        identifiers = batch["id"].tolist()
+        if self._decoders.keys().isdisjoint(identifiers):
+            return
+        for k, identifier in enumerate(identifiers):
             decoder = self._decoders.get(identifier)
             if decoder is None or batch["flags"][k] & ERROR:
                 continue

@@ -10,7 +10,7 @@ import numpy as np
 
 from bench.codec import Decoder, encode
 from bench.faults import Fault
-from bench.frames import FD, FrameBatch, frame, joined, payload
+from bench.frames import FD, FrameBatch, frame, joined
 from bench.messages import load_messages
 from bench.rigfile import RigFile
 from sim_backend import core
@@ -37,17 +37,18 @@ class SimulatedController:
         rig: its message map and parameters.
         truth: which machine it has.
         faults: that happen inside it (`bench.faults`): reboot, stuck-heartbeat, mute.
+        substeps: integration steps of the plant in a tick.
 
     Raises:
         ConfigError: a fault of another kind.
     """
 
-    def __init__(self, rig: RigFile, truth: Truth, faults: Sequence[Fault] = ()) -> None:
+    def __init__(self, rig: RigFile, truth: Truth, faults: Sequence[Fault] = (), substeps: int = 2) -> None:
         self._map = load_messages(rig.dbc_text)
         self._decoders = {m.identifier: Decoder(m) for m in self._map.messages.values() if m.sender == "Host"}
         self._parameters = {p.index: (name, p) for name, p in rig.parameters.items()}
         self.truth = truth
-        self.plant = Plant(truth.plant, truth.seed)
+        self.plant = Plant(truth.plant, truth.seed, substeps=substeps)
         self.plant.run(REST_TICKS)
         self.faults = DeviceFaults(rig, faults) if faults else None
         self.restart()
@@ -71,9 +72,10 @@ class SimulatedController:
         start = self.plant.tick
         self._out, self._spans = [], []
         clock = (t0_ns, start)
-        for k, t_ns in enumerate(incoming["t_ns"].tolist()):
+        columns = (incoming[name].tolist() for name in ("t_ns", "id", "length"))
+        for t_ns, identifier, length, data in zip(*columns, incoming["data"], strict=True):
             self._run_to(start + min(max((t_ns - t0_ns) // 100_000, 0), ticks))
-            self._receive(incoming[k], clock)
+            self._receive(identifier, data[:length].tobytes(), clock)
         self._run_to(start + ticks)
         sent = joined([self._encoder.encode(self._spans, clock), *self._out])
         return sent[np.argsort(sent["t_ns"], kind="stable")] if self._out else sent
@@ -93,12 +95,11 @@ class SimulatedController:
 
     def _run_to(self, tick: int) -> None:
         """Run the plant in parts no longer than the state machine or the watchdog may wait."""
-        while self.plant.tick < tick:
+        while (before := self.plant.tick) < tick:
             deadline = self._owner.heartbeat + int(self._own["watchdog_s"] / TICK_S) + 1
-            until = min(tick, deadline) if self._watching() and deadline > self.plant.tick else tick
+            until = min(tick, deadline) if self._watching() and deadline > before else tick
             if self.state in ("LIFTING", "LANDING", "COASTING"):
-                until = min(until, self.plant.tick + 10 * PERIOD_TICKS)
-            before = self.plant.tick
+                until = min(until, before + 10 * PERIOD_TICKS)
             rows = self.plant.run(until - before)
             self._spans.append(Span(rows, before, self.state, self.fault, self._owner.heartbeat, self._owner.armed))
             self._progress(rows)
@@ -181,11 +182,11 @@ class SimulatedController:
     def _enter(self, state: str) -> None:
         self.state, self._since, self._steady = state, self.plant.tick, 0
 
-    def _receive(self, one: np.void, clock: tuple[int, int]) -> None:
-        decoder = self._decoders.get(int(one["id"]))
-        if decoder is None or int(one["length"]) != decoder.message.length:
+    def _receive(self, identifier: int, data: bytes, clock: tuple[int, int]) -> None:
+        decoder = self._decoders.get(identifier)
+        if decoder is None or len(data) != decoder.message.length:
             return
-        values = decoder.decode_one(payload(one))
+        values = decoder.decode_one(data)
         if not all(map(math.isfinite, values.values())) and decoder.message.name != "ParamSet":
             return
         {"Heartbeat": self._heartbeat, "Command": self._command, "ParamSet": self._set, "ParamGet": self._get,

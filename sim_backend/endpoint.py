@@ -31,11 +31,14 @@ class SimulatedRig:
         truth: which machine it is.
         session: of its heartbeat.
         faults: of its controller and of its link (`bench.faults`); the truth's seed says which frames they hit.
+        substeps: integration steps of the plant in a tick.
     """
 
-    def __init__(self, rig: RigFile, truth: Truth, session: int = 1, faults: Sequence[Fault] = ()) -> None:
+    def __init__(
+        self, rig: RigFile, truth: Truth, session: int = 1, faults: Sequence[Fault] = (), substeps: int = 2
+    ) -> None:
         on_link, in_device = divided(faults, simulated=True)
-        self.device = SimulatedController(rig, truth, in_device)
+        self.device = SimulatedController(rig, truth, in_device, substeps)
         self.truth = truth
         self.link = InProcessLink(rig, self, session, on_link)
         self._now = EPOCH_NS

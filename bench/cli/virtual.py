@@ -28,6 +28,9 @@ from drivers.operator import LineOperator
 from sim_backend.endpoint import SimulatedRig
 from sim_backend.truth import draw
 
+SUBSTEPS = 1
+SLICE_S = 0.2  # twice the live bench's: each slice costs a round of Python
+
 
 @dataclass(frozen=True)
 class Simulated:
@@ -84,8 +87,8 @@ def simulated_run(
     settings = chosen.plan.model_validate({**file.plans.get(procedure, {}), **plan})
     used = given(chosen.needs(settings), calibrations or {})
     drawn = draw(file, seed, truth, chosen.settings(settings))
-    simulated = SimulatedRig(file, drawn)
-    controller = Controller(file, simulated.link, simulated, SIMULATED)
+    simulated = SimulatedRig(file, drawn, substeps=SUBSTEPS)
+    controller = Controller(file, simulated.link, simulated, SIMULATED, SLICE_S)
     operator = LineOperator(simulated.request, controller.clock, controller.envelope)
     counters = controller.telemetry.counters
     live = Rig(file, controller.clock, controller, controller, operator, counters,
@@ -100,7 +103,7 @@ def simulated_run(
         },
     )
     layout = controller.telemetry.layout
-    with Recorder(path, clock=controller.clock, streams=[layout], header=header) as recorder:
+    with Recorder(path, clock=controller.clock, streams=[layout], header=header, plain=True) as recorder:
         controller.recorder = operator.recorder = recorder
         controller.clock.sleep(0.1)
         transition(live, RigState.READY)

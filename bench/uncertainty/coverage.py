@@ -16,6 +16,7 @@ from bench.uncertainty.estimate import Array, Estimate, Influence
 PROBABILITY = 0.95
 DRAWS = 200_000
 DOMINANT = 0.5  # share of the variance beyond which one non-normal component decides the shape
+MINOR = 0.01  # share of the variance under which a component's own shape does not show
 _HALF_WIDTHS = {"rectangular": math.sqrt(3), "triangular": math.sqrt(6), "arcsine": math.sqrt(2)}  # of u, GUM 4.3
 
 
@@ -69,12 +70,30 @@ def interval(estimate: Estimate, seed: int = 0) -> Interval:
         wide = k * estimate.u
         why = "normal or many comparable components, linear model"
         return Interval(estimate.value - wide, estimate.value + wide, k, wide, dof, "gum", why)
-    deviations = {i.id: draw(i, seed, DRAWS) for i in estimate.sensitivities}
-    low, high = (float(q) for q in np.quantile(estimate.sampled(deviations), [0.025, 0.975]))
+    low, high = (float(q) for q in np.quantile(_sampled(estimate, seed), [0.025, 0.975]))
     if not (math.isfinite(low) and math.isfinite(high)):
         raise AnalysisError("the model does not give finite numbers over the spread of its inputs")
     half = (high - low) / 2
     return Interval(low, high, half / estimate.u if estimate.u > 0 else 0.0, half, dof, "monte-carlo", reason)
+
+
+def _sampled(estimate: Estimate, seed: int) -> Array:
+    """Draws of the output. In a linear model what is normal, and what carries under a hundredth of the variance by
+    itself, is drawn as one normal of their joint variance: one draw in place of some hundred. What that leaves out of
+    the fourth moment is under a hundredth of it, and moves the interval by less than the draws scatter."""
+    if estimate.nonlinear:
+        return estimate.sampled({i.id: draw(i, seed, DRAWS) for i in estimate.sensitivities})
+    small, variance = MINOR * estimate.u**2, 0.0
+    apart: dict[Influence, float] = {}
+    for influence, c in estimate.sensitivities.items():
+        own = (c * influence.u) ** 2
+        if (math.isinf(influence.dof) and influence.distribution == "normal") or (own < small and influence.dof > 4):
+            variance += own if math.isinf(influence.dof) else own * influence.dof / (influence.dof - 2)
+        else:
+            apart[influence] = c
+    if variance > 0:
+        apart[Influence("", "the others", math.sqrt(variance), estimate.unit, "B", "normal")] = 1.0
+    return Estimate(estimate.value, estimate.unit, apart).sampled({i.id: draw(i, seed, DRAWS) for i in apart})
 
 
 def _against_gum(estimate: Estimate) -> str:

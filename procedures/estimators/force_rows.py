@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -30,7 +31,7 @@ SEGMENTS = {"y": ((1, 3), (4, 2)), "x": ((4, 2), (1, 3))}
 """By axis: the two segments whose half difference is the axis' own current, and those of the other axis (T 6.9)."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Ramps:
     """Step means of one axis. A angles, P steps per angle; bearing axis first: 0 inboard, 1 outboard.
 
@@ -153,15 +154,24 @@ def fit(r: Ramps, p: Values, constants: Constants, bias_A: float, *, turning: fl
     )
     pull = p["motor_stiffness"] * r.motor_m
     rows = np.stack([-(inboard + outboard), inboard * p["amb_span"] / p["motor_to_outboard_amb"]]) - pull
-    currents = motor_currents(r, p)
-    design = _design(r, currents, turning)
-    solvers = np.linalg.pinv(design).astype(np.float64)
+    sensors = tuple(p[f"{what}_m{k}"] for k in (1, 2, 3, 4) for what in ("offset", "gain"))
+    current, design, solvers, bent = _solvers(r, sensors, turning)
     terms = np.einsum("afp,rap->raf", solvers, rows)
     residuals = rows - np.einsum("apf,raf->rap", design, terms)
+    bends = np.einsum("afp,rap->raf", bent, rows)
+    return Fit(terms, residuals, rows, current, solvers, bends, bent)
+
+
+@lru_cache(maxsize=4)
+def _solvers(r: Ramps, sensors: tuple[float, ...], turning: float) -> tuple[Array, Array, Array, Array]:
+    """Own current, design, and what maps forces to terms and to square and cube: they only change with the segments'
+    sensors, so a propagation over everything else finds them once."""
+    p = {f"{what}_m{k}": sensors[2 * k - 2 + n] for k in (1, 2, 3, 4) for n, what in enumerate(("offset", "gain"))}
+    currents = motor_currents(r, p)
+    design = _design(r, currents, turning)
     scaled = currents[0] / np.abs(currents[0]).max()
     bent = np.linalg.pinv(np.concatenate([design, (scaled**2)[..., None], (scaled**3)[..., None]], axis=-1))[:, BEND]
-    bends = np.einsum("afp,rap->raf", bent, rows)
-    return Fit(terms, residuals, rows, currents[0], solvers, bends, bent)
+    return currents[0], design, np.linalg.pinv(design).astype(np.float64), bent
 
 
 def _design(r: Ramps, currents: tuple[Array, Array], turning: float = 1.0) -> Array:

@@ -6,11 +6,11 @@
 static double least(double a, double b) { return a < b ? a : b; }
 static double most(double a, double b) { return a > b ? a : b; }
 
-/* nearest multiple of lsb; through an integer, because floor is a library call on plain x86-64 */
+/* Nearest multiple of lsb: at this size a double holds no fractions, so adding it rounds. Without a branch, for the sign
+ * of what is nothing but noise cannot be predicted. */
+#define WHOLE 6755399441055744.0
 static double quantise(double x, double lsb, double per_lsb) {
-    if (lsb <= 0) return x;
-    double counts = x * per_lsb;
-    return lsb * (double)(int64_t)(counts + (counts < 0 ? -0.5 : 0.5));
+    return lsb > 0 ? lsb * (x * per_lsb + WHOLE - WHOLE) : x;
 }
 
 static double plane(const double *s, double z, int axis) { return axis ? s[1] - z * s[3] : s[0] + z * s[4]; }
