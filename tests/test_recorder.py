@@ -57,6 +57,19 @@ def test_blocks_hold_every_sample_and_say_where_samples_are_missing(tmp_path: Pa
     assert [t for m in found for t in m.device_ticks] == [int(t) for b in blocks for t in b.ticks]
 
 
+def test_a_plain_recording_has_the_same_blocks_frames_and_events_without_the_view(tmp_path: Path) -> None:
+    for name, plain in (("a.mcap", False), ("b.mcap", True)):
+        with Recorder(tmp_path / name, clock=SetClock(), streams=[STREAM], header=HEADER, plain=plain) as recorder:
+            for part in gapped():
+                recorder.samples(part)
+                recorder.frames("can", frames_of(part))
+            recorder.event("note", text="here")
+    full, plain_one = messages_of(tmp_path / "a.mcap"), messages_of(tmp_path / "b.mcap")
+    assert full.keys() - plain_one.keys() == {"/telemetry/view"}
+    for topic in plain_one:
+        assert [str(m) for m in full[topic]] == [str(m) for m in plain_one[topic]], topic
+
+
 def test_the_view_is_mean_minimum_maximum_and_last_code_of_ten_milliseconds(tmp_path: Path) -> None:
     record(tmp_path / "a.mcap", [block(n, 125) for n in range(0, 1000, 125)])
     view = messages_of(tmp_path / "a.mcap")["/telemetry/view"]

@@ -68,6 +68,18 @@ def test_monte_carlo_is_seeded_and_independent_of_order() -> None:
     assert interval(r + n, 3) != interval(r + n, 4)
 
 
+@pytest.mark.parametrize("small", [("normal", math.inf), ("normal", 6.0), ("rectangular", math.inf), ("arcsine", math.inf)])
+def test_what_is_small_may_be_drawn_as_one_normal(small: tuple[str, float]) -> None:
+    # Oracle: every influence drawn by itself.
+    parts = [estimate("r", 2.0, 1.0, distribution="rectangular"), estimate("t", 0.0, 0.4, 5)]
+    parts += [estimate(f"s{k}", 0.0, 0.095, small[1], small[0]) for k in range(60)]
+    total = sum(parts, Estimate.exact(0.0))
+    found = interval(total)
+    alone = total.sampled({i.id: draw(i, 7, 400_000) for i in total.sensitivities})
+    assert found.method == "monte-carlo"
+    assert (found.low, found.high) == pytest.approx(tuple(np.quantile(alone, [0.025, 0.975])), abs=0.008 * found.U)
+
+
 def test_a_square_gets_the_interval_of_chi_squared() -> None:
     square = propagate(lambda p: p["x"] ** 2, {"x": estimate("x", 0.0, 1.0)})
     found = interval(square + 1)
