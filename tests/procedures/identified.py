@@ -10,6 +10,7 @@ from bench.calibration import Calibration
 from bench.cli.virtual import Simulated, simulated_run
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
+from bench.rig import Rig
 from bench.uncertainty import Estimate
 
 SEED = 2026
@@ -23,6 +24,13 @@ def identified(folder: Path, seed: int = SEED) -> dict[str, Calibration]:
     known = {"amb-calibration": amb}
     motor = simulated_run("force-constant", "tsbs12", seed, WEIGH, folder / "motor.mcap", None, known).calibration()
     return known | {"force-constant": motor}
+
+
+def swung(rig: Rig, angle: float) -> None:
+    """To an angle and back home at once, which leaves something in the angle's integrator."""
+    rig.levitation.set("angle_ref", angle)
+    rig.clock.sleep(0.2)
+    rig.rotation.point(0.0)
 
 
 def scaled(known: Mapping[str, Calibration], factor: float) -> dict[str, Calibration]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from identified import SEED, estimates, identified, notes, scaled, serious
+from identified import SEED, estimates, identified, notes, scaled, serious, swung
 
 from bench.calibration import Calibration
 from bench.cli.virtual import Simulated, simulated_run
@@ -16,6 +16,7 @@ from bench.limits import Verdict, judge
 from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import interval
+from procedures import carrying
 from procedures.estimators.coupling import TERMS
 from procedures.estimators.coupling_estimates import evaluate
 from procedures.force_coupling import Plan, check, figures, read
@@ -83,6 +84,19 @@ def test_the_two_edges_of_the_encoders_count_show_the_ripple(known: dict[str, Ca
         assert fit.term(name) == pytest.approx(true, abs=max(3 * fit.fit.u[TERMS.index(name)], 0.05 * abs(true)))
     assert abs(estimates(run)["alpha_ratio"].value - run.truth["alpha_ratio"]) < 3 * estimates(run)["alpha_ratio"].u
     assert "ripple" in notes(run)
+
+
+@pytest.mark.parametrize("swing", [0.1, -0.1])
+def test_where_the_rotor_was_before_does_not_matter(
+    known: dict[str, Calibration], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, swing: float
+) -> None:
+    """With what a move leaves in the angle's integrator the rotor would stand at another edge, or between two."""
+    monkeypatch.setattr(carrying, "home", lambda rig: swung(rig, swing))
+    run = measure(tmp_path, known)
+    data = read(run.recording)
+    readings = data.labels["branch"] * data.mean["angle"] / Plan().count_rad
+    assert np.all((readings > 0.05) & (readings < 0.95)), readings
+    assert serious(run) == []
 
 
 def test_a_count_of_the_wrong_size_is_named(known: dict[str, Calibration], tmp_path: Path) -> None:

@@ -8,13 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from identified import SEED, estimates, identified, notes, scaled, serious
+from identified import SEED, estimates, identified, notes, scaled, serious, swung
 
 from bench.calibration import Calibration
 from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import ConfigError, DeviceFault, InterlockError, LinkError
 from bench.limits import Verdict, judge
-from bench.rig import Rig
 from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import interval
@@ -90,13 +89,6 @@ def test_where_the_rotor_was_before_does_not_matter(
     assert [f for f in serious(run) if f.code != "methods-disagree"] == []  # alpha_d was calibrated with another ripple
     at_rest = read(sound.recording)[0].mean["angle"] / count
     assert readings.mean() == pytest.approx(at_rest.mean(), abs=0.04)
-
-
-def swung(rig: Rig, angle: float) -> None:
-    """To an angle and back home at once."""
-    rig.levitation.set("angle_ref", angle)
-    rig.clock.sleep(0.2)
-    rig.rotation.point(0.0)
 
 
 def test_a_count_of_the_wrong_size_is_named(known: dict[str, Calibration], tmp_path: Path) -> None:
