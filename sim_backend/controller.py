@@ -14,7 +14,7 @@ from bench.frames import FD, FrameBatch, frame, joined
 from bench.messages import load_messages
 from bench.rigfile import RigFile
 from sim_backend import core
-from sim_backend.core import PERIOD_TICKS, TICK_S, Plant
+from sim_backend.core import PERIOD_TICKS, TICK_S
 from sim_backend.device_faults import DeviceFaults
 from sim_backend.ownership import Ownership
 from sim_backend.telemetry import Span, TelemetryEncoder
@@ -48,7 +48,8 @@ class SimulatedController:
         self._decoders = {m.identifier: Decoder(m) for m in self._map.messages.values() if m.sender == "Host"}
         self._parameters = {p.index: (name, p) for name, p in rig.parameters.items()}
         self.truth = truth
-        self.plant = Plant(truth.plant, truth.seed, substeps=substeps)
+        self._machine = truth.machine
+        self.plant = self._machine.make(truth.plant, truth.seed, substeps)
         self.plant.run(REST_TICKS)
         self.faults = DeviceFaults(rig, faults) if faults else None
         self.restart()
@@ -88,7 +89,7 @@ class SimulatedController:
         self._owner = Ownership(heartbeat=self.plant.tick)
         self.plant.mode = core.OFF
         self.plant.clear_trips()
-        self.plant.set("speed_ref", 0.0)
+        self._brake()
         self._own = {name: p.default for name, p in self._parameters.values()}
         for name, value in self._own.items():
             self._apply(name, value)
@@ -117,7 +118,7 @@ class SimulatedController:
             self._lose_host()
         elapsed = (plant.tick - self._since) * TICK_S
         if self.state == "LIFTING" and len(rows):
-            still = bool((np.abs(rows[:, :4]) < SETTLED_M).all()) and plant.moved
+            still = bool((np.abs(rows[:, self._machine.radial]) < SETTLED_M).all()) and plant.moved
             self._steady = self._steady + len(rows) if still else 0
             if self._steady * PERIOD_TICKS * TICK_S >= SETTLED_S:
                 plant.mode = core.LEVITATE
@@ -159,8 +160,8 @@ class SimulatedController:
     def _safe(self) -> None:
         """Coast while turning fast, then land; amplifiers off where the rotor rests already."""
         if self.state in TURNING:
-            self.plant.set("torque_on", 0.0)
-            self.plant.set("speed_ref", 0.0)
+            self._torque(0.0)
+            self._brake()
             if abs(self.plant.speed) > self._own["landing_speed"]:
                 self._enter("COASTING")
             else:
@@ -169,6 +170,15 @@ class SimulatedController:
             self._land()
         elif self.state in RESTING:
             self._switch_off("OFF" if self.fault == "NONE" else "FAULT")
+
+    def _brake(self) -> None:
+        """Aim at standstill, where the controller has a motor."""
+        if self._machine.turns:
+            self.plant.set("speed_ref", 0.0)
+
+    def _torque(self, on: float) -> None:
+        if self._machine.turns:
+            self.plant.set("torque_on", on)
 
     def _switch_off(self, state: str) -> None:
         self.plant.mode = core.OFF
@@ -237,15 +247,15 @@ class SimulatedController:
         elif name == "DISABLE" and state in RESTING:
             self._switch_off("OFF")
         elif name == "LEVITATE" and state == "READY":
-            plant.set("torque_on", 1.0)
+            self._torque(1.0)
             plant.mode = core.LIFT
             self._enter("LIFTING")
         elif name == "LAND" and state == "LEVITATED" and abs(plant.speed) <= self._own["landing_speed"]:
             self._land()
-        elif name == "SPIN" and state in ("LEVITATED", "SPINNING"):
+        elif name == "SPIN" and state in ("LEVITATED", "SPINNING") and self._machine.turns:
             plant.set("speed_ref", self._own["speed_ref"])
         elif name == "STOP" and state in ("LEVITATED", "SPINNING"):
-            plant.set("speed_ref", 0.0)
+            self._brake()
         else:
             return False
         return True
@@ -279,7 +289,7 @@ class SimulatedController:
     def _apply(self, name: str, value: float) -> None:
         if name in ("watchdog_s", "landing_speed", "speed_ref"):
             return  # the interface's own; speed_ref acts on SPIN
-        if name.startswith("ki_") and name != "ki_theta":
+        if name in self._machine.integral_gains:
             value *= self.truth.defects["integrator_factor"]
         self.plant.set(name, value)
 

@@ -12,7 +12,8 @@ from bench.errors import ConfigError
 from bench.faults import DEVICE_ONLY, REBOOT_S, Fault
 from bench.frames import FrameBatch, empty_batch
 from bench.rigfile import RigFile
-from sim_backend.core import PERIOD_TICKS, TICK_S, Plant
+from sim_backend.core import PERIOD_TICKS, TICK_S
+from sim_backend.machine import SimulatedPlant
 
 TICK_NS = round(TICK_S * 1e9)
 PERIOD_NS = PERIOD_TICKS * TICK_NS
@@ -22,7 +23,7 @@ class Device(Protocol):
     """The sound controller, as its faults see it."""
 
     @property
-    def plant(self) -> Plant: ...
+    def plant(self) -> SimulatedPlant: ...
     def run(self, ticks: int, incoming: FrameBatch, t0_ns: int) -> FrameBatch: ...  # without faults
     def restart(self) -> None: ...  # as after power-on
 

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 from bench.errors import ConfigError
 from bench.rigfile import Device
-from sim_backend.core import TICK_S, DriveLaw, Plant
+from sim_backend.core import TICK_S, DriveLaw
+from sim_backend.machine import SimulatedPlant
 from sim_backend.truth import Truth
 
 FAULTS = {"OVERSPEED": 1, "OVERLOAD": 2, "COMMUNICATION": 3, "EXTERNAL": 4}  # codes where the rig file names none
@@ -30,7 +31,7 @@ class SimulatedDrive:
         ConfigError: the rig file's simulation table lacks a value of the drive.
     """
 
-    def __init__(self, plant: Plant, spec: Device, truth: Truth, max_speed_rad_s: float) -> None:
+    def __init__(self, plant: SimulatedPlant, spec: Device, truth: Truth, max_speed_rad_s: float) -> None:
         self._plant, self._max = plant, max_speed_rad_s
         missing = [name for name in LAW if name not in truth.values]
         if missing:

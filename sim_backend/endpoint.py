@@ -14,7 +14,6 @@ from bench.link import LinkStats
 from bench.messages import load_messages
 from bench.rigfile import RigFile
 from sim_backend.controller import SimulatedController
-from sim_backend.operator import SimulatedOperator
 from sim_backend.truth import Truth
 
 EPOCH_NS = 1_767_225_600 * 10**9  # 2026-01-01T00:00:00Z
@@ -42,7 +41,7 @@ class SimulatedRig:
         self.truth = truth
         self.link = InProcessLink(rig, self, session, on_link)
         self._now = EPOCH_NS
-        self._operator = SimulatedOperator(self.device.plant, truth, rig.hook_seat.half_width or 0.0)
+        self._operator = truth.machine.operator(rig, self.device.plant, truth)
 
     def now_ns(self) -> int:
         """The present, UNIX ns of the virtual clock."""

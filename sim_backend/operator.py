@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from sim_backend.core import Plant
-from sim_backend.truth import Truth, uniform
+from sim_backend.draws import uniform
+
+if TYPE_CHECKING:
+    from sim_backend.truth import Truth
 
 HAND_OVER_S = 0.3  # how long the operator takes to let a mass go
 
 
 class SimulatedOperator:
-    """The operator of a simulated rig. `seat_m` is the half-width of where a strap seats, each time it is hung."""
+    """The operator of a TSBS. `seat_m` is the half-width of where a strap seats, each time it is hung."""
 
     def __init__(self, plant: Plant, truth: Truth, seat_m: float) -> None:
         self._plant, self._truth, self._seat_m = plant, truth, seat_m

@@ -14,13 +14,14 @@ from bench.clock import Clock
 from bench.errors import ConfigError
 from bench.registers import RANGES, Register, RegisterRefused, Table, Words
 from bench.rigfile import Device, RigFile
-from sim_backend.core import TICK_S, Plant
+from sim_backend.core import TICK_S
 from sim_backend.drive import SimulatedDrive
-from sim_backend.telemetry import AMBIENT_K, RISE_K, SUPPLY_V, WARM_S
+from sim_backend.machine import SimulatedPlant
+from sim_backend.telemetry import AMBIENT_K, RISE_K, WARM_S
 from sim_backend.truth import Truth
 
 ILLEGAL_ADDRESS, ILLEGAL_VALUE = 2, 3
-IDLE_A, COIL_OHM, SEGMENT_OHM = 0.35, 0.6, 0.4  # what the supply feeds: electronics, and the copper of the windings
+IDLE_A = 0.35  # what the supply feeds besides the copper of the windings
 
 Values = Mapping[str, float]
 
@@ -130,7 +131,7 @@ class RegisterBank:
         ConfigError: two devices have one unit of a link.
     """
 
-    def __init__(self, rig: RigFile, truth: Truth, plant: Plant) -> None:
+    def __init__(self, rig: RigFile, truth: Truth, plant: SimulatedPlant) -> None:
         self._plant = plant
         self.drives: dict[str, SimulatedDrive] = {}
         self.devices: dict[str, RegisterBankDevice] = {}
@@ -183,16 +184,15 @@ class RegisterBank:
 
     def _supply(self, name: str, spec: Device, rig: RigFile, truth: Truth) -> RegisterBankDevice:
         def values() -> Values:
-            currents = self._plant.currents
-            copper = COIL_OHM * sum(i * i for i in currents[:10]) + SEGMENT_OHM * sum(i * i for i in currents[10:])
-            return {"voltage": SUPPLY_V, "current": IDLE_A + copper / SUPPLY_V, "state": 1.0}
+            volts = truth.machine.supply_V
+            return {"voltage": volts, "current": IDLE_A + truth.machine.copper_W(self._plant) / volts, "state": 1.0}
 
         return RegisterBankDevice(name, spec, values, lambda _: True, lambda: None)
 
     def _thermal(self, name: str, spec: Device, rig: RigFile, truth: Truth) -> RegisterBankDevice:
         def values() -> Values:  # as the telemetry's temperatures, sim_backend/telemetry.py
             warm = AMBIENT_K + RISE_K * (1 - math.exp(-self._plant.tick * TICK_S / WARM_S))
-            return {"temp_i": warm, "temp_o": warm + 2.0, "temp_m": warm - 3.0, "ambient": AMBIENT_K}
+            return {n: warm + above for n, above in truth.machine.windings.items()} | {"ambient": AMBIENT_K}
 
         return RegisterBankDevice(name, spec, values, lambda _: True, lambda: None)
 

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.frames import FD, FRAME, FrameBatch, empty_batch
 from bench.messages import MessageMap
-from sim_backend.core import CHANNELS, PERIOD_TICKS, TICK_S
-from sim_backend.truth import Truth, uniform
+from sim_backend.core import PERIOD_TICKS, TICK_S
+from sim_backend.draws import uniform
 
-SUPPLY_V = 148.0
+if TYPE_CHECKING:
+    from sim_backend.truth import Truth
+
 AMBIENT_K, RISE_K, WARM_S = 295.0, 12.0, 600.0
 WATCHDOG_ARMED = 16
 PAYLOAD = np.dtype([("sequence", "<u2"), ("tick", "<u4"), ("words", "<u2", (29,))])
@@ -46,7 +47,7 @@ class TelemetryEncoder:
         signals = self._message.signals[2:]
         self._names = [s.name for s in signals]
         self._place = {name: k for k, name in enumerate(self._names)}
-        self._columns = _places(truth.defects, self._place)
+        self._told, self._columns = truth.machine.places(truth.defects, self._place)
         self._scale = np.array([s.scale for s in signals])
         self._offset = np.array([s.offset for s in signals])
         self._low = np.array([-32768.0 if s.signed else 0.0 for s in signals])
@@ -81,7 +82,7 @@ class TelemetryEncoder:
         """Ticks (n,) of the samples, and what their signals say (n, signals)."""
         at = self._place
         values = np.zeros((n, len(at)))
-        values[:, self._columns] = np.concatenate([s.rows for s in spans])
+        values[:, self._columns] = np.concatenate([s.rows for s in spans])[:, self._told]
         ticks = (spans[0].first_tick // PERIOD_TICKS + np.arange(1, n + 1)) * PERIOD_TICKS
         states, faults = self._codes["state"], self._codes["fault"]
         told = [(states[s.state], faults[s.fault], WATCHDOG_ARMED * s.armed, s.heartbeat_tick) for s in spans]
@@ -89,32 +90,10 @@ class TelemetryEncoder:
         values[:, at["state"]], values[:, at["fault"]] = state, fault
         values[:, at["flags"]] += armed
         values[:, at["host_age"]] = np.maximum(ticks - beats, 0) * TICK_S
-        values[:, at["i_m1"]] *= self._truth.defects["segment_sign_1"]
-        if self._truth.defects["stuck_current_yo_p"]:
-            values[:, at["i_yo_p"]] = 4.0
-        values[:, at["angle"]] = (values[:, at["angle"]] + math.pi) % (2 * math.pi) - math.pi
-        values[:, at["supply"]] = SUPPLY_V
+        machine = self._truth.machine
+        machine.spoil(values, at, self._truth.defects)
+        values[:, at["supply"]] = machine.supply_V
         warm = AMBIENT_K + RISE_K * (1 - np.exp(-ticks * TICK_S / WARM_S))
-        for name, above in (("temp_i", 0.0), ("temp_o", 2.0), ("temp_m", -3.0)):
+        for name, above in machine.windings.items():
             values[:, at[name]] = warm + above
         return ticks, values
-
-
-def _places(defects: Mapping[str, float], at: Mapping[str, int]) -> list[int]:
-    """Where each channel of the core goes among the signals, with planted wiring defects of the current telemetry."""
-    goes = {name: at[name] for name in CHANNELS}
-
-    def exchange(a: str, b: str) -> None:
-        goes[a], goes[b] = goes[b], goes[a]
-
-    for b in "io":
-        if defects[f"current_sign_{b}"] < 0:  # the sensors of both coils exchanged: the control current changes sign
-            exchange(f"i_y{b}_p", f"i_y{b}_n")
-    for side in "pn":
-        if defects["exchange_current_bearings"]:
-            exchange(f"i_xi_{side}", f"i_xo_{side}")
-            exchange(f"i_yi_{side}", f"i_yo_{side}")
-        if defects["exchange_current_axes"]:
-            exchange(f"i_xi_{side}", f"i_yi_{side}")
-            exchange(f"i_xo_{side}", f"i_yo_{side}")
-    return list(goes.values())

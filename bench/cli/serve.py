@@ -19,7 +19,7 @@ from bench.rigfile import RigFile, load_rig
 from bench.signals import delivered_to
 
 if TYPE_CHECKING:
-    from sim_backend.core import Plant
+    from sim_backend.machine import SimulatedPlant
     from sim_backend.serving.ports import Port
     from sim_backend.serving.service import Service
     from sim_backend.serving.wirefaults import WireFaults
@@ -93,7 +93,7 @@ def _close(ports: Sequence[Port]) -> None:
 
 
 def open_ports(
-    rig: RigFile, plant: Plant, truth: Truth, bind: str, selector: selectors.BaseSelector, ports: list[Port],
+    rig: RigFile, plant: SimulatedPlant, truth: Truth, bind: str, selector: selectors.BaseSelector, ports: list[Port],
     wire: WireFaults,
 ) -> None:  # fmt: skip
     """Open the endpoints of the controller and the operator, into `ports` one by one.
@@ -101,7 +101,6 @@ def open_ports(
     Raises:
         ConfigError: a port is in use, or `bind` is no address of this host.
     """
-    from sim_backend.operator import SimulatedOperator
     from sim_backend.serving import ptys
     from sim_backend.serving.adapter import SlcanAdapter
     from sim_backend.serving.peers import LinePeer, PacketPeer
@@ -119,7 +118,7 @@ def open_ports(
         address = (bind, _port(spec.url, scheme))
         ports.append(TcpPort(f"{name} {scheme}:{SOCKET}{{}}", address, peer, selector))
     if "operator" in rig.devices:
-        operator = SimulatedOperator(plant, truth, rig.hook_seat.half_width or 0.0)
+        operator = truth.machine.operator(rig, plant, truth)
         name = rig.devices["operator"].link
         address = (bind, _port(rig.links[name].url, "line"))
         ports.append(TcpPort(f"{name} line:{{}}", address, lambda: LinePeer(operator.request), selector))

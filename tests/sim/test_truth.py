@@ -12,7 +12,8 @@ from bench.errors import ConfigError
 from bench.rigfile import RigFile, load_rig
 from sim_backend.core import derivative
 from sim_backend.core.params import PlantParams
-from sim_backend.truth import DEFECTS, draw, nominal
+from sim_backend.truth import draw, nominal
+from sim_backend.tsbs import DEFECTS
 
 X, Y, THETA = 6, 7, 11
 
