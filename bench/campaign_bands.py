@@ -64,6 +64,36 @@ class Coverage:
         return next((v for v in (Verdict.FAIL, Verdict.INDETERMINATE) if v in found), Verdict.PASS)
 
 
+@dataclass(frozen=True)
+class Quantity:
+    """One quantity of a step over the rigs. `judged` ones decide; `samples` are in the order of the rigs that gave a
+    value."""
+
+    step: int
+    procedure: str
+    name: str
+    unit: str
+    about: str
+    judged: bool
+    coverage: Coverage
+    seeds: tuple[int, ...]
+    samples: tuple[Sample, ...]
+    monte_carlo: int
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A finding's code: in which step, its effect, on how many rigs, and one that shows it."""
+
+    step: int
+    procedure: str
+    code: str
+    effect: str
+    rigs: int
+    example: int
+    text: str
+
+
 def band(rigs: int) -> tuple[float, float]:
     """Where the coverage over that many rigs may lie."""
     half = 3.3 * math.sqrt(P * (1 - P) / rigs)

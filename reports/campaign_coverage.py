@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.campaign_bands import Coverage, Sample
+from bench.campaign_bands import Failure, Quantity
 from bench.campaign_speed import Speed
 from reports import campaign_figures, text
 from reports.campaign_model import _Numbers
@@ -32,34 +32,6 @@ EFFICIENCY = (
     "spent in rigs and on a processor: other programs lower the last. Without other programs: busy times the processor "
     "time of a rig alone over that of a rig among others."
 )
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """One quantity over the rigs."""
-
-    step: int
-    procedure: str
-    name: str
-    unit: str
-    about: str
-    judged: bool
-    coverage: Coverage
-    seeds: tuple[int, ...]
-    samples: tuple[Sample, ...]
-    monte_carlo: int
-
-
-@dataclass(frozen=True)
-class Failure:
-    """A finding's code on some rigs."""
-
-    procedure: str
-    code: str
-    effect: str
-    rigs: int
-    example: int
-    text: str
 
 
 @dataclass(frozen=True)

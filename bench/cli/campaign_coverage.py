@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from bench import provenance
 from bench.campaign import Campaign
-from bench.campaign_bands import Coverage, Sample, coverage
+from bench.campaign_bands import Failure, Quantity, Sample, coverage
 from bench.campaign_directory import CampaignDirectory
 from bench.campaign_speed import Speed, speed
 from bench.cli.campaign_steps import Planned
@@ -25,41 +25,12 @@ Entry = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Row:
-    """One quantity over the rigs. `judged` ones decide; `samples` are in the order of the rigs that gave a value."""
-
-    step: int
-    procedure: str
-    name: str
-    unit: str
-    about: str
-    judged: bool
-    coverage: Coverage
-    seeds: tuple[int, ...]
-    samples: tuple[Sample, ...]
-    monte_carlo: int
-
-
-@dataclass(frozen=True)
-class Failure:
-    """A finding's code: in which step, its effect, on how many rigs, and one that shows it."""
-
-    step: int
-    procedure: str
-    code: str
-    effect: str
-    rigs: int
-    example: int
-    text: str
-
-
-@dataclass(frozen=True)
 class Result:
     """All of it."""
 
     rigs: int
     first_seed: int
-    rows: tuple[Row, ...]
+    rows: tuple[Quantity, ...]
     failures: tuple[Failure, ...]
     stopped: Mapping[str, int]
     step_s: Mapping[str, float]  # mean wall time of one rig by step
@@ -113,7 +84,7 @@ def judged(campaign: Campaign, steps: Sequence[Planned], entries: Sequence[Entry
     )  # fmt: skip
 
 
-def _rows(step: Planned, entries: Sequence[Entry]) -> list[Row]:
+def _rows(step: Planned, entries: Sequence[Entry]) -> list[Quantity]:
     found: dict[str, list[tuple[int, dict[str, Any]]]] = {}
     about = {q.name: q for q in step.procedure.measures}
     for e in entries:
@@ -131,7 +102,7 @@ def _rows(step: Planned, entries: Sequence[Entry]) -> list[Row]:
         samples = tuple(
             Sample(v["value"] - v["truth"], v["low"] - v["truth"], v["high"] - v["truth"], v["U"]) for _, v in values
         )
-        rows.append(Row(
+        rows.append(Quantity(
             step=step.number, procedure=step.procedure.name, name=label, unit=about[name].unit, about=about[name].about,
             judged=name in step.judged, coverage=coverage(samples, len(entries)), seeds=tuple(s for s, _ in values),
             samples=samples, monte_carlo=sum(v["method"] == "monte-carlo" for _, v in values),
@@ -186,22 +157,17 @@ def _summary(directory: CampaignDirectory, asked: Asked, result: Result) -> None
     content = page.CoverageContent(
         campaign=directory.path.name, title=asked.campaign.title or asked.campaign.name, rig=asked.rig.name,
         rigs=result.rigs, first_seed=result.first_seed, date=now, verdict=result.verdict.value,
-        quantities=tuple(page.Quantity(**_fields(row)) for row in result.rows),
-        failures=tuple(page.Failure(f.procedure, f.code, f.effect, f.rigs, f.example, f.text) for f in result.failures),
+        quantities=result.rows, failures=result.failures,
         steps=tuple((s.procedure.name, _plan(s), wall) for s, wall in numbered), rig_s=result.rig_s, speed=result.speed,
     )  # fmt: skip
     summary.build(directory.path, page.view_of(content), now)
-
-
-def _fields(row: Row) -> dict[str, Any]:
-    return {f.name: getattr(row, f.name) for f in dataclasses.fields(row)}
 
 
 def _plan(step: Planned) -> str:
     return ", ".join(f"{key} = {json.dumps(value)}" for key, value in step.plan.model_dump(mode="json").items())
 
 
-def _entry(row: Row) -> dict[str, Any]:
+def _entry(row: Quantity) -> dict[str, Any]:
     c = row.coverage
     reach = None if c.width_range is None else [x if math.isfinite(x) else None for x in c.width_range]
     return {

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.campaign_bands import Sample, coverage
+from bench.campaign_bands import Failure, Quantity, Sample, coverage
 from bench.campaign_model import Constant, Given, Matrix, Model, StatedEquation, Term
 from bench.campaign_speed import Speed
 from bench.errors import BenchError
 from reports import campaign, campaign_coverage, campaign_model
-from reports.campaign_coverage import CoverageContent, Failure, Quantity
+from reports.campaign_coverage import CoverageContent
 from reports.campaign_model import ChainContent, StepLine
 from reports.campaign_symbols import axis_label, symbol, with_subscripts
 
@@ -53,7 +53,7 @@ def many(n: int = 100, judged: bool = True) -> CoverageContent:
     quantity = Quantity(1, "p", "K_i", "N/A", NASTY, judged, coverage(samples, n), tuple(range(n)), samples, 3)
     empty = dataclasses.replace(quantity, name="alpha_d", coverage=coverage((), n), seeds=(), samples=())
     return CoverageContent(
-        "c.campaign-x", NASTY, "r", n, 0, DATE, "fail", (quantity, empty), (Failure("p", "code", "error", 2, 7, NASTY),),
+        "c.campaign-x", NASTY, "r", n, 0, DATE, "fail", (quantity, empty), (Failure(1, "p", "code", "error", 2, 7, NASTY),),
         (("p", NASTY, 1.2),), 1.2, Speed(80, 2, 60.0, 1.1, 0.9, 0.97, 0.95, 0.93),
     )  # fmt: skip
 
