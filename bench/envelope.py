@@ -15,7 +15,6 @@ from bench.rigfile import RigFile
 from bench.samples import SampleBlock
 
 Values = npt.NDArray[np.float64]
-POSITIONS = ("pos_xi", "pos_yi", "pos_xo", "pos_yo")
 HELD = ("LEVITATED", "SPINNING")
 
 
@@ -40,7 +39,7 @@ class Envelope:
         limits |= {n: (-np.inf, e.max_temperature_K) for n in known if n.startswith("temp_")}
         limits["speed"] = (-e.max_speed_rad_s, e.max_speed_rad_s)
         first = len(limits)
-        limits |= {n: (-e.max_levitated_position_m, e.max_levitated_position_m) for n in POSITIONS if n in known}
+        limits |= {n: (-e.max_levitated_position_m, e.max_levitated_position_m) for n in e.positions if n in known}
         low, high = np.array(list(limits.values())).T[:, :, None]
         return list(limits), low, high, first
 

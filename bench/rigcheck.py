@@ -18,24 +18,28 @@ from bench.rigfile import RigFile, RigText, migrated, read_rig
 from bench.units import Unit
 
 GEOMETRY = {
-    "hook_to_outboard": "hook plane to outboard AMB plane",
     "amb_span": "AMB plane to AMB plane",
     "com_to_outboard_amb": "centre of mass to outboard AMB",
     "com_to_inboard_amb": "centre of mass to inboard AMB",
-    "com_to_motor": "centre of mass to motor",
     "com_to_outboard_sensor": "centre of mass to outboard sensors",
     "com_to_inboard_sensor": "centre of mass to inboard sensors",
     "amb_gap": "air gap of the radial AMBs",
     "clearance": "clearance of the touchdown bearings",
-    "motor_stiffness": "negative stiffness of the motor",
 }
+HOOK_GEOMETRY = {"hook_to_outboard": "hook plane to outboard AMB plane"}
+MOTOR_GEOMETRY = {"com_to_motor": "centre of mass to motor", "motor_stiffness": "negative stiffness of the motor"}
+"""Of a rig on which masses hang, and of one whose controller turns the rotor."""
 SOME_GEOMETRY = {
     "motor_to_outboard_amb": "motor plane to outboard AMB plane",
     "lever_left": "shaft axis to the left end of the lever",
     "lever_right": "shaft axis to the right end of the lever",
+    "axial_gap": "air gap of the axial AMB",
+    "com_to_coupling": "centre of mass to the coupling of an external motor",
+    "coupling_stiffness": "radial stiffness of that coupling",
 }
 """Lengths that a rig may have; the procedures that need one say so."""
-MACHINE = {"pole_pairs": "1", "polar_inertia": "kg m^2", "ring_inertia": "kg m^2", "amb_asymmetry": "1"}
+MACHINE = {"pole_pairs": "1", "polar_inertia": "kg m^2", "ring_inertia": "kg m^2", "amb_asymmetry": "1",
+           "mass": "kg", "transverse_inertia": "kg m^2"}  # fmt: skip
 FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 
 
@@ -79,7 +83,15 @@ def _behind(text: RigText, problems: tuple[Problem, ...]) -> Iterator[Problem]:
 
 def problems_of(rig: RigFile) -> list[Problem]:
     """What is wrong with a parsed rig file."""
-    found = [*_devices(rig), *_links(rig), *_units(rig), *_geometry(rig), *_masses(rig), *_parameters(rig)]
+    found = [
+        *_devices(rig),
+        *_links(rig),
+        *_units(rig),
+        *_geometry(rig),
+        *_masses(rig),
+        *_envelope(rig),
+        *_parameters(rig),
+    ]
     if not any(p.key.startswith("devices") for p in found):
         try:
             messages = rig.messages
@@ -138,7 +150,7 @@ def _units(rig: RigFile) -> Iterator[Problem]:
         if symbol not in units.UNITS:
             close = difflib.get_close_matches(symbol, units.UNITS, 1)
             yield Problem(rig.path, key, repr(symbol), f"a known unit{f', such as {close[0]!r}' if close else ''}")
-    kinds = {f"geometry.{n}": (g, "N/m" if n == "motor_stiffness" else "m") for n, g in rig.geometry.items()}
+    kinds = {f"geometry.{n}": (g, "N/m" if n.endswith("_stiffness") else "m") for n, g in rig.geometry.items()}
     kinds |= {f"masses.{n}": (m, "kg") for n, m in rig.masses.items()}
     kinds |= {f"machine.{n}": (m, MACHINE[n]) for n, m in rig.machine.items() if n in MACHINE}
     kinds |= {"hanger": (rig.hanger, "kg"), "mass_density": (rig.mass_density, "kg/m^3"),
@@ -153,12 +165,14 @@ def _is_si(unit: Unit) -> bool:
 
 
 def _geometry(rig: RigFile) -> Iterator[Problem]:
-    g = rig.geometry
-    for key in sorted(GEOMETRY.keys() - g.keys()):
-        yield Problem(rig.path, f"geometry.{key}", "nothing", f"{GEOMETRY[key]}, with its certificate")
+    g, needed = rig.geometry, dict(GEOMETRY)
+    needed |= HOOK_GEOMETRY if rig.masses else {}
+    needed |= MOTOR_GEOMETRY if any("rotation" in d.roles for d in rig.devices.values()) else {}
+    for key in sorted(needed.keys() - g.keys()):
+        yield Problem(rig.path, f"geometry.{key}", "nothing", f"{needed[key]}, with its certificate")
     for key in sorted(rig.machine.keys() - MACHINE.keys()):
         yield Problem(rig.path, f"machine.{key}", "a number nobody asks for", f"one of {', '.join(MACHINE)}")
-    known = GEOMETRY | SOME_GEOMETRY
+    known = GEOMETRY | HOOK_GEOMETRY | MOTOR_GEOMETRY | SOME_GEOMETRY
     for key in sorted(g.keys() - known.keys()):
         close = difflib.get_close_matches(key, known, 1)
         yield Problem(rig.path, f"geometry.{key}", "a length nobody asks for",
@@ -177,6 +191,8 @@ def _geometry(rig: RigFile) -> Iterator[Problem]:
 
 
 def _masses(rig: RigFile) -> Iterator[Problem]:
+    if not rig.masses:
+        return
     for name, mass in {**rig.masses, "hanger": rig.hanger}.items():
         key = name if name == "hanger" else f"masses.{name}"
         if mass.value <= 0:
@@ -184,6 +200,14 @@ def _masses(rig: RigFile) -> Iterator[Problem]:
         elif mass.value > rig.envelope.max_hung_kg:
             yield Problem(rig.path, f"{key}.value", f"{mass.value:g} kg",
                           f"at most envelope.max_hung_kg = {rig.envelope.max_hung_kg:g} kg")  # fmt: skip
+
+
+def _envelope(rig: RigFile) -> Iterator[Problem]:
+    """Channels that a rig file puts under protection by name exist; the ones it does not name are protected if they do."""
+    if "positions" in rig.envelope.model_fields_set:
+        for name in rig.envelope.positions:
+            if name not in rig.channels:
+                yield Problem(rig.path, "envelope.positions", name, "a channel of this rig")
 
 
 def _parameters(rig: RigFile) -> Iterator[Problem]:

@@ -13,7 +13,7 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, ValidationError
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from bench import catalogue
 from bench.binding import Binding
@@ -100,13 +100,14 @@ class Sensor(Part):
 
 
 class Envelope(Part):
-    """Protection range. `telemetry` bounds |value| of channels in SI; `levitated` only while the rotor is levitated."""
+    """Protection range. `positions` are the channels that `max_levitated_position_m` bounds while the rotor is held."""
 
-    max_hung_kg: float = Field(gt=0)
+    max_hung_kg: float = Field(ge=0)
     max_current_A: float = Field(gt=0)
     max_speed_rad_s: float = Field(gt=0)
     max_temperature_K: float = Field(gt=0)
     max_levitated_position_m: float = Field(gt=0)
+    positions: tuple[str, ...] = ("pos_xi", "pos_yi", "pos_xo", "pos_yo")
 
 
 class CalibrationTable(Part):
@@ -116,7 +117,8 @@ class CalibrationTable(Part):
 
 
 class RigFile(Part):
-    """A whole rig file. Lengths of `geometry` are distances, all positive."""
+    """A whole rig file. Lengths of `geometry` are distances, all positive. A rig without `masses` may leave out what
+    belongs to them."""
 
     schema_: int = Field(alias="schema")
     name: str
@@ -129,7 +131,7 @@ class RigFile(Part):
     channels: Mapping[str, Channel]
     parameters: Mapping[str, Parameter]
     geometry: Mapping[str, Toleranced]
-    masses: Mapping[str, Toleranced]
+    masses: Mapping[str, Toleranced] = {}
     mass_density: Toleranced
     hanger: Toleranced
     hook_seat: Toleranced
@@ -142,6 +144,19 @@ class RigFile(Part):
     toml_text: str = Field("", exclude=True)
     dbc_text: str = Field("", exclude=True)
     path: str = Field("", exclude=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _nothing_hangs(cls, data: Any) -> Any:
+        if not isinstance(data, dict) or data.get("masses"):
+            return data
+        none = {"value": 0, "half_width": 0, "distribution": "rectangular", "source": "nothing hangs on this rig"}
+        absent = {"mass_density": none | {"unit": "kg/m^3"}, "hanger": none | {"unit": "kg"},
+                  "hook_seat": none | {"unit": "m"}}  # fmt: skip
+        envelope = data.get("envelope")
+        if isinstance(envelope, dict):
+            absent["envelope"] = {"max_hung_kg": 0.0, **envelope}
+        return {**data, **{k: v for k, v in absent.items() if k == "envelope" or k not in data}}
 
     @classmethod
     def parse(cls, toml_text: str, dbc_text: str, path: str = "rig.toml") -> RigFile:

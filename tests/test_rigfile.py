@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bench import rigfile
-from bench.errors import ConfigError, Problem
+from bench.envelope import Envelope
+from bench.errors import ConfigError, InterlockError, Problem
 from bench.rigcheck import check_rig
 from bench.rigfile import RigFile, load_rig
+from bench.samples import SampleBlock
 
 RIGS = Path(__file__).resolve().parent.parent / "rigs"
 TOML = (RIGS / "tsbs12.toml").read_text(encoding="utf-8")
@@ -68,6 +72,46 @@ def test_a_rig_may_have_no_lever_and_no_intervals(tmp_path: Path) -> None:
     assert rig.machine["ring_inertia"].standard_uncertainty == pytest.approx(1e-5)
     rig = RigFile.parse(TOML + "\n[calibration]\ninterval_days = { force-constant = 90 }\n", DBC)
     assert rig.calibration.interval_days == {"force-constant": 90}
+
+
+def test_a_rig_on_which_nothing_hangs_needs_neither_hook_nor_hanger(tmp_path: Path) -> None:
+    hung = (
+        "hanger =",
+        "mass_density =",
+        "hook_seat =",
+        "max_hung_kg =",
+        "hook_to_outboard =",
+        "M1 =",
+        "M2 =",
+        "M3 =",
+        "M4 =",
+    )
+    bare = "\n".join(line for line in TOML.splitlines() if not line.startswith(hung))
+    assert check_rig(written(tmp_path, bare))[0] == ()
+    rig = RigFile.parse(bare, DBC)
+    assert (rig.hanger.value, rig.envelope.max_hung_kg) == (0, 0)
+    with pytest.raises(InterlockError):
+        Envelope(rig).check_load("M1")
+    motorless = changed(bare, ('"levitation", "rotation"', '"levitation"'), ("com_to_motor =", "axial_gap ="))
+    assert check_rig(written(tmp_path, motorless))[0] == ()
+    found = check_rig(written(tmp_path, changed(bare, ("com_to_motor =", "axial_gap ="))))[0]
+    assert [p.key for p in found] == ["geometry.com_to_motor"]
+
+
+def test_protected_positions_are_those_that_the_rig_file_names(tmp_path: Path) -> None:
+    named = changed(
+        TOML, ("max_levitated_position_m = 150e-6", 'max_levitated_position_m = 150e-6\npositions = ["pos_z"]')
+    )
+    assert check_rig(written(tmp_path, named))[0] == ()
+    rig = RigFile.parse(named, DBC)
+    levitated = next(code for code, name in rig.choices("state").items() if name == "LEVITATED")
+    columns = {name: np.zeros(1) for name in rig.channels} | {"state": np.array([float(levitated)])}
+    for name, refused in (("pos_z", True), ("pos_yi", False)):
+        block = SampleBlock("x", 0, np.array([10], np.uint64), np.array([0]), 0, 0, columns | {name: np.array([2e-4])})
+        with pytest.raises(InterlockError, match="pos_z") if refused else nullcontext():
+            Envelope(rig).check_block(block)
+    wrong = check_rig(written(tmp_path, named.replace('["pos_z"]', '["pos_q"]')))[0]
+    assert [(p.key, p.found) for p in wrong] == [("envelope.positions", "pos_q")]
 
 
 def test_the_digest_is_of_both_texts() -> None:

@@ -23,7 +23,7 @@ def test_a_rig_file_that_names_none_is_a_tsbs() -> None:
 
 
 def test_an_unknown_machine_is_refused() -> None:
-    with pytest.raises(ConfigError, match="simulation.machine: found 'tsbs13'; expected one of tsbs"):
+    with pytest.raises(ConfigError, match=r"simulation\.machine: found 'tsbs13'; expected one of tsbs"):
         draw(naming("tsbs13"), 0)
 
 
