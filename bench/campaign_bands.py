@@ -1,10 +1,10 @@
 """Do the intervals hold the truth, and are they padded? Coverage and width over many virtual rigs, against their bands.
 
 Coverage is the share of rigs whose 95 % interval holds the truth; its band is 0.95 -+ 3.3 sqrt(0.95 0.05 / N). A rig
-without a value counts as one that missed. Width is the mean expanded uncertainty over the 95th percentile of |error|;
-its band is 0.8 to 1.25. What the percentile is worth over N rigs follows from order statistics, whatever the
-distribution: with fewer than 59 rigs even the largest error is not beyond the 95th percentile with 95 % confidence
-(1 - 0.95^59 = 0.95), so that nothing is decided.
+without a value counts as one that missed. Width is one over the 95th percentile of |error|/U: by how much the intervals
+could all be divided and still hold 95 % of the truths; its band is 0.8 to 1.25 (decision 0012). What the percentile is
+worth over N rigs follows from order statistics, whatever the distribution: with fewer than 59 rigs even the largest error
+is not beyond the 95th percentile with 95 % confidence (1 - 0.95^59 = 0.95), so that nothing is decided.
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ class Coverage:
     """One quantity over `rigs` rigs, of which `values` gave a value. Numbers are None where there is no value.
 
     `width_range` is what `width` may be, 95 %, as the percentile is known from so many rigs only; an open end is inf.
+    `pooled_width` is the mean U over the 95th percentile of |error|, for information: the same where U is the same for all.
     """
 
     rigs: int
@@ -53,6 +54,7 @@ class Coverage:
     band: tuple[float, float]
     width: float | None
     width_range: tuple[float, float] | None
+    pooled_width: float | None
     mean_U: float | None
     bias: float | None  # mean error over the standard deviation of the errors
     coverage_verdict: Verdict
@@ -108,25 +110,28 @@ def coverage(samples: Sequence[Sample], rigs: int) -> Coverage:
     enough = rigs >= LEAST
     first = (Verdict.PASS if enough else Verdict.INDETERMINATE) if inside else Verdict.FAIL
     if not samples:
-        return Coverage(rigs, 0, 0, share, limits, None, None, None, None, Verdict.FAIL, Verdict.INDETERMINATE)
-    errors = np.array([s.error for s in samples])
-    mean_u = float(np.mean([s.U for s in samples]))
-    width, reach = _width(np.abs(errors), mean_u)
+        return Coverage(rigs, 0, 0, share, limits, None, None, None, None, None, Verdict.FAIL, Verdict.INDETERMINATE)
+    errors, wide = np.array([s.error for s in samples]), np.array([s.U for s in samples])
+    mean_u = float(np.mean(wide))
+    width, reach = _width(np.abs(errors), wide)
+    percentile = float(np.percentile(np.abs(errors), 100 * P))
+    pooled = mean_u / percentile if percentile > 0 else None
     spread = float(errors.std(ddof=1)) if len(errors) > 1 else 0.0
     bias = float(errors.mean()) / spread if spread > 0 else 0.0
     second = _judged(width, reach) if enough and len(samples) >= LEAST else Verdict.INDETERMINATE
-    return Coverage(rigs, len(samples), hits, share, limits, width, reach, mean_u, bias, first, second)
+    return Coverage(rigs, len(samples), hits, share, limits, width, reach, pooled, mean_u, bias, first, second)
 
 
-def _width(magnitudes: Array, mean_u: float) -> tuple[float | None, tuple[float, float] | None]:
-    percentile = float(np.percentile(magnitudes, 100 * P))
+def _width(magnitudes: Array, expanded: Array) -> tuple[float | None, tuple[float, float] | None]:
+    ratios = np.divide(magnitudes, expanded, out=np.where(magnitudes > 0, np.inf, 0.0), where=expanded > 0)
+    n, ordered = len(ratios), np.sort(ratios)
+    percentile = float(np.quantile(ratios, P, method="higher" if np.isinf(ordered[-1]) else "linear"))
     if percentile == 0:
         return None, None
-    n, ordered = len(magnitudes), np.sort(magnitudes)
     low, high = int(binom.ppf(0.025, n, P)), int(binom.ppf(0.975, n, P)) + 1  # ranks from 1
     least = float(ordered[max(low, 1) - 1])
     most = float(ordered[high - 1]) if high <= n else math.inf
-    return mean_u / percentile, (mean_u / most, mean_u / least if least > 0 else math.inf)
+    return 1 / percentile, (1 / most, 1 / least if least > 0 else math.inf)
 
 
 def _judged(width: float | None, reach: tuple[float, float] | None) -> Verdict:

@@ -21,7 +21,7 @@ SIMULATED = "Simulated rigs – a test of the method, not of a machine"
 READING = (
     "Each virtual rig is drawn from the tolerances of the rig file, taken through all steps by bytes, recording and "
     "analysis, and compared with what was drawn. Coverage is the share of rigs whose 95 % interval holds the truth; a rig "
-    "without a value counts as a miss. Width is the mean expanded uncertainty over the 95th percentile of |error|, with the "
+    "without a value counts as a miss. Width is one over the 95th percentile of |error|/U, with the "
     "95 % range that order statistics leave it. A quantity passes if its coverage lies within 0.95 ± 3.3 √(0.95 · 0.05/N) "
     "and its width within 0.8 to 1.25. A width outside whose range reaches inside is indeterminate, and so is everything "
     "below 59 rigs."

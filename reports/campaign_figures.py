@@ -157,7 +157,7 @@ def bands(rows: Sequence[Judged], rigs: int) -> Drawn:
         left.set_xlim(max(-2, 95 - 1.25 * span), min(101.0, 95 + 1.25 * span))
         right.set_xlim(min(0.6, *(r.width for r in rows if r.width is not None), 0.6) - 0.05, most)
         left.set_xlabel("intervals that hold the truth, %")
-        right.set_xlabel("mean U over the 95th percentile of |error|")
+        right.set_xlabel("1 / 95th percentile of |error|/U")
         for axes in (left, right):
             _quiet(axes, "x")
             axes.set_ylim(-0.7, len(rows) - 0.3)

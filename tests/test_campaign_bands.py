@@ -60,6 +60,24 @@ def test_fewer_than_59_rigs_decide_nothing_good() -> None:
     assert coverage(samples(40, shift=5.0), 40).verdict is Verdict.FAIL
 
 
+def test_rigs_of_very_different_size_are_judged_each_by_its_own_interval() -> None:
+    """Honest intervals of machines whose truth, and with it the error, spans a decade: pooled they would look too narrow."""
+    scales = np.random.default_rng(2).uniform(0.1, 1.0, 2000)
+    mixed = [Sample(s.error * k, s.low * k, s.high * k, s.U * k) for s, k in zip(samples(2000), scales, strict=True)]
+    found = coverage(mixed, 2000)
+    assert found.width == pytest.approx(coverage(samples(2000), 2000).width)
+    assert found.pooled_width is not None
+    assert found.pooled_width < 0.8
+    padded = [Sample(s.error, 2 * s.low, 2 * s.high, 2 * s.U) for s in mixed]
+    assert coverage(padded, 2000).width_verdict is Verdict.FAIL
+
+
+def test_intervals_of_no_width_are_too_narrow() -> None:
+    nothing = [Sample(s.error, s.error, s.error, 0.0) for s in samples(100)]
+    assert coverage(nothing, 100).width == 0
+    assert coverage(nothing, 100).verdict is Verdict.FAIL
+
+
 def test_a_rig_without_a_value_missed() -> None:
     found = coverage(samples(900), 1000)
     assert (found.values, found.rigs) == (900, 1000)

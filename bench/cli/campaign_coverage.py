@@ -173,6 +173,6 @@ def _entry(row: Quantity) -> dict[str, Any]:
     return {
         "step": row.step, "procedure": row.procedure, "name": row.name, "unit": row.unit, "judged": row.judged,
         "rigs": c.rigs, "values": c.values, "hits": c.hits, "coverage": c.coverage, "band": list(c.band),
-        "width": c.width, "width_range": reach, "mean_expanded_uncertainty": c.mean_U, "bias": c.bias,
-        "verdict": c.verdict.value, "monte_carlo": row.monte_carlo,
+        "width": c.width, "width_range": reach, "pooled_width": c.pooled_width, "mean_expanded_uncertainty": c.mean_U,
+        "bias": c.bias, "verdict": c.verdict.value, "monte_carlo": row.monte_carlo,
     }  # fmt: skip
