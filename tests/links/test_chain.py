@@ -96,7 +96,7 @@ def test_equal_results(link: str, tmp_path: Path, in_one_process: Records) -> No
 
 def compare(link: str, record: Mapping[str, Any], other: Mapping[str, Any]) -> None:
     """Measurement by measurement; at every step there is one whose bound is narrower than its own uncertainty, so that the
-    comparison says more than the two intervals do (at this seed a hundredth to a half of it)."""
+    comparison says more than the two intervals do."""
     shown = 0
     for ours, theirs in zip(record["measurements"], other["measurements"], strict=True):
         assert ours["name"] == theirs["name"]
