@@ -26,19 +26,24 @@ void tsbs_sense(const tsbs_params *p, tsbs_derived *d, tsbs_state *st, tsbs_read
         raw[2 * b + !swap] = plane(s, p->z_sensor[b], 1) + qy;
     }
     raw[4] = s[2];
+    double normal[19];
+    if (p->position_noise > 0) tsbs_draws(&st->noise, normal, 5);
+    else memset(normal, 0, 5 * sizeof *normal);
+    if (p->current_noise > 0) tsbs_draws(&st->noise, normal + 5, 14);
+    else memset(normal + 5, 0, 14 * sizeof *normal);
     for (int k = 0; k < 5; k++) {
-        double noise = p->position_noise > 0 ? p->position_noise * tsbs_normal(&st->noise) : 0;
+        double noise = p->position_noise * normal[k];
         double y = p->position_sign[k] * (p->position_gain[k] * raw[k] + p->position_offset[k]) + noise;
         r->position[k] = p->stuck[k] != 0 ? p->stuck_value : quantise(y, p->position_lsb, d->per_position_lsb);
     }
     double now = st->tick * TICK;
     for (int k = 0; k < 10; k++) {
-        double noise = p->current_noise > 0 ? p->current_noise * tsbs_normal(&st->noise) : 0;
+        double noise = p->current_noise * normal[5 + k];
         double i = p->current_gain[k] * st->coil[k] + p->current_offset[k] + p->current_drift[k] * now + noise;
         coil[k] = quantise(i, p->current_lsb, d->per_current_lsb);
     }
     for (int k = 0; k < 4; k++) {
-        double noise = p->current_noise > 0 ? p->current_noise * tsbs_normal(&st->noise) : 0;
+        double noise = p->current_noise * normal[15 + k];
         double i = p->segment_sense[k] * st->segment[k] + p->segment_offset[k] + p->segment_drift[k] * now + noise;
         segment[k] = quantise(i, p->current_lsb, d->per_current_lsb);
     }

@@ -37,9 +37,9 @@ void tsbs_noise_seed(tsbs_noise *n, uint64_t seed, uint64_t stream) {
 static uint64_t draw(tsbs_noise *n) { return mix(n->key + ++n->counter * 0x9E3779B97F4A7C15u); }
 static double uniform(tsbs_noise *n) { return ((double)(draw(n) >> 11) + 0.5) * 0x1p-53; }
 
-double tsbs_normal(tsbs_noise *n) {
-    for (;;) {
-        uint64_t bits = draw(n);
+/* the whole method, from a first draw on */
+static double slow(tsbs_noise *n, uint64_t bits) {
+    for (;; bits = draw(n)) {
         int i = bits & (LAYERS - 1);
         double u = 2 * (((double)(bits >> 11) + 0.5) * 0x1p-53) - 1;
         if (fabs(u) < ratio[i]) return u * edge[i];
@@ -55,6 +55,20 @@ double tsbs_normal(tsbs_noise *n) {
         double f0 = exp(-0.5 * (edge[i] * edge[i] - x * x)), f1 = exp(-0.5 * (edge[i + 1] * edge[i + 1] - x * x));
         if (f1 + uniform(n) * (f0 - f1) < 1) return x;
     }
+}
+
+/* 98 of 100 draws fall inside their layer */
+static inline double one(tsbs_noise *n) {
+    uint64_t bits = draw(n);
+    int i = bits & (LAYERS - 1);
+    double u = 2 * (((double)(int64_t)(bits >> 11) + 0.5) * 0x1p-53) - 1;
+    return fabs(u) < ratio[i] ? u * edge[i] : slow(n, bits);
+}
+
+double tsbs_normal(tsbs_noise *n) { return one(n); }
+
+void tsbs_draws(tsbs_noise *n, double *out, int count) {
+    for (int k = 0; k < count; k++) out[k] = one(n);
 }
 
 void tsbs_normals(uint64_t seed, uint64_t stream, double *out, int64_t count) {

@@ -105,6 +105,7 @@ enum { TRIP_LOST = 1, TRIP_CURRENT = 2, TRIP_SPEED = 4 };
 
 void tsbs_noise_seed(tsbs_noise *, uint64_t seed, uint64_t stream);
 double tsbs_normal(tsbs_noise *);
+void tsbs_draws(tsbs_noise *, double *out, int count);
 /* what does not change inside a run or a tick: harmonic coefficients a cos p and a sin p, sines, decays */
 typedef struct {
     double runout_c[8], runout_s[8], target_c[8], target_s[8], tilt_c, tilt_s, motor_c, motor_s;
