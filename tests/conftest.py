@@ -6,20 +6,26 @@ import os
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import groups
 import pytest
 
-REAL_TIME = ("tests/links", "tests/firmware", "tests/cli/test_serve", "tests/drivers/test_heartbeat",
-             "tests/drivers/test_live_link", "tests/drivers/test_fieldbus_live", "serve-a-rig", "connect-a-rig")  # fmt: skip
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+"""Before anything loads numpy, and for every process that a test starts: the threads of a small product only wait."""
 GRACE_S = 2.0  # for a thread that was told to end and is on its way
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests whose processes keep up with wall time run one after the other, on one of the workers (`make test`)."""
-    for item in items:
-        if any(part in item.nodeid for part in REAL_TIME):
-            item.add_marker(pytest.mark.xdist_group("real-time"))
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """For `--dist loadgroup`, which `make test` asks for."""
+    return groups.scheduler(config, log) if config.getvalue("dist") == "loadgroup" else None
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """The longest tests first where there are several workers, so that none is left alone with them at the end."""
+    if hasattr(config, "workerinput"):
+        items.sort(key=lambda item: not item.nodeid.startswith(groups.LONGEST))
 
 
 @pytest.fixture(autouse=True)

@@ -1,32 +1,90 @@
-"""The console blocks of the documentation, executed page by page, in order, in a folder of their own."""
+"""The console blocks of the documentation, executed page by page, in order, in a folder of their own.
+
+Pages of procedures that build on others begin with the same runs and adoptions. What such a sequence of commands leaves in a
+fresh folder is kept for the session: the next page with the same beginning goes on from a copy. Every distinct sequence
+is executed once in every session; under xdist these pages are one group (`groups.py`).
+"""
 
 from __future__ import annotations
 
 import os
 import re
+import shlex
+import shutil
 import subprocess
 import sys
+import tempfile
+from dataclasses import dataclass, field
+from itertools import takewhile
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted(p for p in (ROOT / "docs").rglob("*.md") if "```console" in p.read_text(encoding="utf-8"))
+CHAIN = re.compile(r'RUN=\$\(bench run [^\\]*\| tail -1\)|bench adopt "\$RUN" [^\\]*')
+"""A command on one line that leaves nothing but files and the variable RUN."""
 
 
 def test_there_are_pages_to_execute() -> None:
     assert len(PAGES) >= 4
 
 
-@pytest.mark.timeout(180)
-@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.stem)
-def test_commands_work(page: Path, tmp_path: Path) -> None:
-    blocks = re.findall(r"```console\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+def commands(page: Path) -> tuple[tuple[str, ...], list[str]]:
+    """The lines of its beginning that build up a chain, and the other lines."""
+    text = "\n".join(re.findall(r"```console\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL))
+    lines = text.splitlines()
+    chain = tuple(takewhile(CHAIN.fullmatch, lines))
+    return chain, lines[len(chain) :]
+
+
+def shell(lines: list[str], folder: Path) -> str:
+    """Execute them as one script; standard output."""
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    script = "set -euo pipefail\n" + "\n".join(blocks)
-    done = subprocess.run(["bash", "-c", script], cwd=tmp_path, env={**os.environ, "PATH": path}, capture_output=True,
+    script = "\n".join(["set -euo pipefail", *lines])
+    done = subprocess.run(["bash", "-c", script], cwd=folder, env={**os.environ, "PATH": path}, capture_output=True,
                           text=True, check=False)  # fmt: skip
     assert done.returncode == 0, done.stderr[-2000:]
+    return done.stdout
+
+
+@dataclass
+class Chains:
+    """What sequences of commands left in a fresh folder, and in RUN."""
+
+    root: Path
+    made: dict[tuple[str, ...], tuple[Path, str]] = field(default_factory=dict)
+
+    def after(self, lines: tuple[str, ...]) -> tuple[Path, str]:
+        """The folder, which must stay as it is, and RUN after these lines; a beginning that is known is not executed again."""
+        if lines not in self.made:
+            self.made[lines] = self._executed(lines)
+        return self.made[lines]
+
+    def _executed(self, lines: tuple[str, ...]) -> tuple[Path, str]:
+        folder = Path(tempfile.mkdtemp(dir=self.root))
+        if not lines:
+            return folder, ""
+        before, run = self.after(lines[:-1])
+        shutil.copytree(before, folder, dirs_exist_ok=True)
+        out = shell([f"RUN={shlex.quote(run)}", lines[-1], 'printf "\\n%s" "$RUN"'], folder)
+        return folder, out.rpartition("\n")[2]
+
+
+@pytest.fixture(scope="session")
+def chains(tmp_path_factory: pytest.TempPathFactory) -> Chains:
+    return Chains(tmp_path_factory.mktemp("chains"))
+
+
+@pytest.mark.timeout(180)
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.stem)
+def test_commands_work(page: Path, tmp_path: Path, chains: Chains) -> None:
+    chain, lines = commands(page)
+    if chain:
+        folder, run = chains.after(chain)
+        shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
+        lines = [f"RUN={shlex.quote(run)}", *lines]
+    shell(lines, tmp_path)
 
 
 def test_links_lead_somewhere() -> None:

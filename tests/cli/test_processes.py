@@ -148,7 +148,7 @@ def pytest_on(tmp_path: Path, *arguments: str) -> tuple[int, str, ElementTree.El
     junit = tmp_path / "junit.xml"
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-p", "tiny_catalogue", "tests/tiny_procedures.py", f"--junitxml={junit}",
-         "-p", "no:cacheprovider", f"--out={tmp_path / 'runs'}", *arguments],
+         "-p", "no:cacheprovider", "-p", "no:hypothesispytest", f"--out={tmp_path / 'runs'}", *arguments],
         cwd=ROOT, env=environment(), capture_output=True, text=True, check=False,
     )  # fmt: skip
     suite = ElementTree.parse(junit).getroot().find("testsuite")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bench.calibration import Calibration
@@ -18,12 +18,30 @@ CALIBRATE = {"settle_s": 0.5, "average_s": 0.3, "angles": 9}
 WEIGH = {"levels_A": [-2, -1, 0, 1, 2], "ramp_A_s": 5, "settle_s": 0.25, "average_s": 0.2}
 
 
+@dataclass(frozen=True)
+class Identified:
+    """The last run and the calibrations of both."""
+
+    motor: Simulated
+    known: dict[str, Calibration]
+
+
+_MADE: dict[int, Identified] = {}
+
+
+def identification(folder: Path, seed: int = SEED) -> Identified:
+    """The runs at their short plans; made once for all tests (`groups.py`), by the first that asks, in its folder."""
+    if seed not in _MADE:
+        amb = simulated_run("amb-calibration", "tsbs12", seed, CALIBRATE, folder / "amb.mcap").calibration()
+        known = {"amb-calibration": amb}
+        motor = simulated_run("force-constant", "tsbs12", seed, WEIGH, folder / "motor.mcap", None, known)
+        _MADE[seed] = Identified(motor, known | {"force-constant": motor.calibration()})
+    return _MADE[seed]
+
+
 def identified(folder: Path, seed: int = SEED) -> dict[str, Calibration]:
-    """Both calibrations at their short plans."""
-    amb = simulated_run("amb-calibration", "tsbs12", seed, CALIBRATE, folder / "amb.mcap").calibration()
-    known = {"amb-calibration": amb}
-    motor = simulated_run("force-constant", "tsbs12", seed, WEIGH, folder / "motor.mcap", None, known).calibration()
-    return known | {"force-constant": motor}
+    """Both calibrations."""
+    return dict(identification(folder, seed).known)
 
 
 def swung(rig: Rig, angle: float) -> None:

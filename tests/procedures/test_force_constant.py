@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from identified import CALIBRATE, SEED, WEIGH, estimates, identification, serious
 
 from bench.calibration import Calibration
 from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import ConfigError, DeviceFault
 from bench.findings import Effect, Finding
 from bench.limits import Verdict, judge
-from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import Estimate, interval
@@ -23,11 +23,7 @@ from procedures.estimators.ramp_data import read_ramps
 from procedures.force_constant import Plan, evaluate, facts, figures
 from procedures.force_constant_check import check, predicted_controls
 
-pytestmark = pytest.mark.xdist_group("force-constant")  # one worker makes the calibrations once
-
-SEED, NAME, CALIBRATION = 2026, "force-constant", "amb-calibration"
-CALIBRATE = {"settle_s": 0.5, "average_s": 0.3, "angles": 9}
-QUICK = {"levels_A": [-2, -1, 0, 1, 2], "ramp_A_s": 5, "settle_s": 0.25, "average_s": 0.2}
+NAME, CALIBRATION = "force-constant", "amb-calibration"
 
 
 def calibrated(folder: Path, seed: int, **plan: object) -> Calibration:
@@ -37,27 +33,19 @@ def calibrated(folder: Path, seed: int, **plan: object) -> Calibration:
 @pytest.fixture(scope="module")
 def calibration(tmp_path_factory: pytest.TempPathFactory) -> Calibration:
     """Of the sound rig."""
-    return calibrated(tmp_path_factory.mktemp("calibration"), SEED)
+    return identification(tmp_path_factory.mktemp("identified")).known[CALIBRATION]
 
 
 def measure(
     folder: Path, calibration: Calibration, truth: Mapping[str, float] | None = None, **plan: object
 ) -> Simulated:
-    return simulated_run(NAME, "tsbs12", SEED, {**QUICK, **plan}, folder / "f.mcap", truth, {CALIBRATION: calibration})
+    return simulated_run(NAME, "tsbs12", SEED, {**WEIGH, **plan}, folder / "f.mcap", truth, {CALIBRATION: calibration})
 
 
 @pytest.fixture(scope="module")
-def sound(tmp_path_factory: pytest.TempPathFactory, calibration: Calibration) -> Simulated:
+def sound(tmp_path_factory: pytest.TempPathFactory) -> Simulated:
     """One run on the sound rig."""
-    return measure(tmp_path_factory.mktemp("sound"), calibration)
-
-
-def estimates(run: Simulated) -> dict[str, Estimate]:
-    return {m.quantity.name: m.estimate for m in run.results if isinstance(m, Measured)}
-
-
-def serious(run: Simulated) -> list[Finding]:
-    return [f for f in run.results if isinstance(f, Finding) and f.effect is not Effect.NOTE]
+    return identification(tmp_path_factory.mktemp("identified")).motor
 
 
 def test_a_sound_rig_is_recovered_within_its_intervals(sound: Simulated) -> None:

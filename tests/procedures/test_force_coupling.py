@@ -21,8 +21,6 @@ from procedures.estimators.coupling import TERMS
 from procedures.estimators.coupling_estimates import evaluate
 from procedures.force_coupling import Plan, check, figures, read
 
-pytestmark = pytest.mark.xdist_group("force-coupling")  # one worker makes the calibrations once
-
 NAME = "force-coupling"
 QUICK = {"settle_s": 0.5, "average_s": 0.3}
 

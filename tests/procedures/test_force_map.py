@@ -8,30 +8,25 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from identified import SEED, estimates, identified
 
 from bench.calibration import Calibration
 from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import ConfigError
 from bench.findings import Effect, Finding
-from bench.procedure import Measured
 from bench.rigfile import load_rig
-from bench.uncertainty import Estimate
 from procedures.force_map import MEASURES, Plan, check, figures, loaded_points, points, step_count
 from reports.figures import draw as draw_figure
 from sim_backend.truth import draw
 
-pytestmark = pytest.mark.xdist_group("force-map")  # one worker makes the calibrations once
-
-SEED, CALIBRATION = 2026, "amb-calibration"
+CALIBRATION = "amb-calibration"
 QUICK = {"ramp_A_s": 5.0, "settle_s": 0.5, "average_s": 0.3}
 
 
 @pytest.fixture(scope="module")
 def calibration(tmp_path_factory: pytest.TempPathFactory) -> Calibration:
     """Of the sound rig."""
-    folder = tmp_path_factory.mktemp("calibration")
-    plan = {"settle_s": 0.5, "average_s": 0.3, "angles": 9}
-    return simulated_run(CALIBRATION, "tsbs12", SEED, plan, folder / "c.mcap").calibration()
+    return identified(tmp_path_factory.mktemp("identified"))[CALIBRATION]
 
 
 def mapped(
@@ -39,10 +34,6 @@ def mapped(
 ) -> Simulated:
     used = {CALIBRATION: calibration}
     return simulated_run("force-map", "tsbs12", SEED, {**QUICK, **plan}, folder / "m.mcap", truth, used)
-
-
-def estimates(run: Simulated) -> dict[str, Estimate]:
-    return {m.quantity.name: m.estimate for m in run.results if isinstance(m, Measured)}
 
 
 def findings(run: Simulated) -> list[Finding]:

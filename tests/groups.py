@@ -1,0 +1,40 @@
+"""Which tests run one after the other on one of xdist's workers, by their node ids.
+
+`@pytest.mark.xdist_group` would say the same, but pytest-xdist 3.8 hands a mark over inside the node id, which pytest 9.2 does
+not let it change: the marks are ignored without a word (pytest-xdist issue 1386).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+GROUPS = {
+    # Their processes keep up with wall time.
+    "real-time": ("tests/links/", "tests/firmware/", "tests/cli/test_serve.py", "tests/drivers/test_heartbeat",
+                  "tests/drivers/test_live_link.py", "tests/drivers/test_fieldbus_live.py",
+                  "test_docs.py::test_commands_work[serve-a-rig]", "test_docs.py::test_commands_work[connect-a-rig]"),
+    # They begin with the same calibrations, which are made once.
+    "identified": ("tests/procedures/test_force_constant.py", "tests/procedures/test_force_coupling.py",
+                   "tests/procedures/test_force_map.py", "tests/procedures/test_negative_stiffness.py"),
+    # Their pages begin with the same commands, which are executed once.
+    "chained pages": ("test_docs.py::test_commands_work[force-constant]",
+                      "test_docs.py::test_commands_work[force-coupling]",
+                      "test_docs.py::test_commands_work[negative-stiffness]"),
+}  # fmt: skip
+LONGEST = ("tests/test_docs.py::test_commands_work",)
+
+
+def group_of(nodeid: str) -> str:
+    """The group's name; a test that belongs to none is one by itself."""
+    return next((name for name, parts in GROUPS.items() if any(part in nodeid for part in parts)), nodeid)
+
+
+def scheduler(config: Any, log: Any) -> Any:
+    """Hands out groups whole, those with the most tests first."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class ByGroup(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return group_of(nodeid)
+
+    return ByGroup(config, log)

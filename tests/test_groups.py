@@ -1,0 +1,56 @@
+"""Groups of tests for xdist name tests that there are, and the scheduler keeps a group together."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import groups
+import pytest
+
+ROOT = Path(__file__).parent.parent
+
+
+def test_every_part_names_something() -> None:
+    for part in [part for parts in groups.GROUPS.values() for part in parts]:
+        file, _, page = part.partition("::test_commands_work")
+        if page:
+            assert list((ROOT / "docs").rglob(f"{page.strip('[]')}.md"))
+        else:
+            assert list(ROOT.glob(f"{file}*")), part
+
+
+@pytest.mark.parametrize(
+    ("nodeid", "group"),
+    [
+        ("tests/links/test_killed.py::test_a_killed_rig_is_noticed", "real-time"),
+        ("tests/drivers/test_heartbeat_alone.py::test_x[1]", "real-time"),
+        ("tests/test_docs.py::test_commands_work[connect-a-rig]", "real-time"),
+        ("tests/test_docs.py::test_commands_work[force-coupling]", "chained pages"),
+        ("tests/test_docs.py::test_commands_work[slew]", "tests/test_docs.py::test_commands_work[slew]"),
+    ],
+)
+def test_the_group_of_a_test(nodeid: str, group: str) -> None:
+    assert groups.group_of(nodeid) == group
+
+
+def test_a_group_runs_on_one_worker(tmp_path: Path) -> None:
+    """In a session of its own: the tests of `links` on one worker, in their order, whatever the others do."""
+    (tmp_path / "pyproject.toml").write_text("[tool.pytest.ini_options]\n")
+    (tmp_path / "conftest.py").write_text((ROOT / "tests" / "conftest.py").read_text())
+    (tmp_path / "groups.py").write_text((ROOT / "tests" / "groups.py").read_text())
+    (tmp_path / "tests" / "links").mkdir(parents=True)
+    many = "import pytest\n@pytest.mark.parametrize('k', range(8))\ndef test_{}(k): pass\n"
+    (tmp_path / "tests" / "links" / "test_a.py").write_text(many.format("a"))
+    (tmp_path / "tests" / "test_b.py").write_text(many.format("b"))
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-v", "-n", "2", "--dist", "loadgroup", "-p", "no:cacheprovider",
+         "-p", "no:hypothesispytest"], cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout
+    lines = [line.split() for line in done.stdout.splitlines() if "PASSED" in line]
+    of_links = [words for words in lines if "links" in words[-1]]
+    assert len(lines) == 16
+    assert len({words[0] for words in of_links}) == 1
+    assert [words[-1][-2] for words in of_links] == list("01234567")
