@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -93,7 +93,7 @@ def _moved(
                 transition(rig, procedure.state)
                 progress.stage("acquire")
                 progress.total(procedure.step_count(job.plan))
-                procedure.acquire(rig, job.plan, cast(Recorder, WatchedSteps(recorder, progress)))
+                procedure.acquire(rig, job.plan, cast(Recorder, WatchedSteps(recorder, progress, live.catch_up)))
         except BaseException as error:
             # Whatever it is, also SystemExit: the machine is made safe first.
             cause = error
@@ -126,16 +126,18 @@ def _recording_or_not(step: SafeStep, live: OpenRig) -> SafeStep:
 
 
 class WatchedSteps:
-    """The recorder as `acquire` sees it, with each step told to the progress display."""
+    """The recorder as `acquire` sees it, with each step told to the progress display, and over only when telemetry has
+    reached its end: what `acquire` commands next does not act within it."""
 
-    def __init__(self, recorder: Recorder, progress: Progress) -> None:
-        self._recorder, self._progress = recorder, progress
+    def __init__(self, recorder: Recorder, progress: Progress, catch_up: Callable[[], None]) -> None:
+        self._recorder, self._progress, self._catch_up = recorder, progress, catch_up
 
     @contextmanager
     def step(self, kind: str, **labels: Any) -> Iterator[None]:
         self._progress.step(f"{kind} {described(labels)}")
         with self._recorder.step(kind, **labels):
             yield
+        self._catch_up()
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._recorder, name)

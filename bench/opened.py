@@ -40,7 +40,8 @@ class OpenRig:
 
     `attach` gives the recorder to everything that records (None takes it away), `unguard` ends interlocks and silence
     checks so that make-safe can talk to a machine that has tripped, `safe_steps` are the ordered make-safe. `truth` is
-    what a simulated rig drew, for `truth.json`; `findings` are what was noticed while opening it.
+    what a simulated rig drew, for `truth.json`; `findings` are what was noticed while opening it. `catch_up` lets the
+    clock run until telemetry has reached the present: at the end of each step, before anything else is commanded.
     """
 
     rig: Rig
@@ -50,6 +51,7 @@ class OpenRig:
     safe_steps: Sequence[SafeStep]
     truth: Mapping[str, Any] | None = field(default=None)
     findings: Sequence[Finding] = ()
+    catch_up: Callable[[], None] = lambda: None
 
 
 class WatchedClock:

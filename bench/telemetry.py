@@ -75,12 +75,23 @@ class TelemetryDecoder:
         """The stream as it is recorded."""
         return StreamLayout(
             STREAM,
-            round(self._first.period_s * 1e9),
+            self.period_ns,
             tuple(
                 ChannelInfo(name, units.UNITS[c.unit].si, "u2" if name in CODES else "f4")
                 for name, c in self.rig.channels.items()
             ),
         )
+
+    @property
+    def newest_ns(self) -> int:
+        """Time of the newest sample on the sample clock; 0 before the first."""
+        s = self._segment
+        return s.offset_ns + s.tick * self._tick_ns if s is not None else 0
+
+    @property
+    def period_ns(self) -> int:
+        """From one sample to the next."""
+        return round(self._first.period_s * 1e9)
 
     def start_counting(self) -> None:
         """The next sample is number 0 of the stream, and what was lost before it does not count."""

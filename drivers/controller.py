@@ -105,6 +105,13 @@ class Controller:
         self._last_ns = self._base.now_ns()
         self.guarded = True
 
+    def catch_up(self) -> None:
+        """Let the clock run until telemetry has reached the present, so that what is commanded next cannot act on samples
+        of the time before: a controller whose clock has fallen behind gets there later. Silence ends a run by itself."""
+        due, begin = self.clock.now_ns() - self.telemetry.period_ns, self._base.now_ns()
+        while self.telemetry.newest_ns < due and self._base.now_ns() - begin < SILENCE_S * 1e9:
+            self.clock.sleep(WAIT_SLICE_S)
+
     def release(self) -> None:
         """Let another bench have the controller, which must be at rest."""
         if self._dialogue.has("Claim"):

@@ -230,4 +230,5 @@ def _opened(
     if bus.cleared:
         found.append(Finding("fault-cleared", f"fault {bus.cleared} of an earlier run was cleared", "drive"))
     streams = [controller.telemetry.layout, *bus.layouts]
-    return OpenRig(rig, streams, attach, unguard, safe_steps(controller, base, bus.drive), truth, found)
+    return OpenRig(rig, streams, attach, unguard, safe_steps(controller, base, bus.drive), truth, found,
+                   controller.catch_up)  # fmt: skip
