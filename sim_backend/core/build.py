@@ -37,7 +37,7 @@ def library() -> Path:
     sources = sorted(HERE.glob("*.c"))
     parts = [path.read_bytes() for path in (*sources, *sorted(HERE.glob("*.h")))]
     digest = hashlib.sha256(b"\0".join([*parts, " ".join(FLAGS).encode()])).hexdigest()[:16]
-    target = HERE / f"tsbs-{digest}.so"
+    target = HERE / f"core-{digest}.so"
     if not target.exists():
         _compile(sources, target)
     return target
@@ -57,6 +57,6 @@ def _compile(sources: list[Path], target: Path) -> None:
         if done.returncode != 0:
             raise ConfigError(f"{compiler} could not build the simulator core:\n{done.stderr}")
         os.replace(made, target)
-    for old in HERE.glob("tsbs-*.so"):
+    for old in (*HERE.glob("core-*.so"), *HERE.glob("tsbs-*.so")):
         if old != target:
             old.unlink(missing_ok=True)

@@ -1,0 +1,215 @@
+/* Control laws, each a pure function of the readings, its own state and its parameters, called every 100 us:
+ * decentralised PID (T 2.4.3 with its wiring corrected), flatness (T 2.14-2.16) with CCS (2.25) or CAC (2.22). */
+#include <math.h>
+#include <string.h>
+#include "amb.h"
+
+#define KEEP(hz) (1 / (1 + TWO_PI * (hz) * TICK))
+enum { PID, CCS, CAC };
+enum { YI, ZI, YO, ZO, AXIAL };
+
+static double clip(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
+
+/* T (2.25) without its branch. With D = kappa^2 - xi^2,
+ * di = (F D^2/b - 4 kappa xi ib^2)/(2 [(kappa^2 + xi^2) ib + D sqrt(ib^2 + kappa xi F/b)]),
+ * for forces within -4 b ib^2/(kappa + xi)^2 <= F <= 4 b ib^2/(kappa - xi)^2; what is outside is cut. */
+double amb_ccs(double force, double beta, double gap, double xi, double bias) {
+    double near = gap - xi, far = gap + xi, most = 4 * beta * bias * bias;
+    double f = clip(force, -most / (far * far), most / (near * near)) / beta, d = near * far;
+    double root = sqrt(fmax(bias * bias + gap * xi * f, 0));
+    double over = (gap * gap + xi * xi) * bias + d * root;
+    return clip((f * d * d - 4 * gap * xi * bias * bias) / (2 * over), -bias, bias);
+}
+
+/* T (2.22), (2.23): only the coil on the side of the force carries current, but for |F| < eta */
+void amb_cac(double force, double beta, double gap, double xi, double eta, double *pair) {
+    double y, root = sqrt(beta);
+    if (force >= eta) {
+        y = sqrt(force);
+    } else if (force < -eta) {
+        y = 0;
+    } else {
+        double t = (force + eta) / eta; /* T: P_eta = sqrt(eta) t^3 (15/16 - 13/16 t + 17/64 t^2 - 1/32 t^3) */
+        y = sqrt(eta) * t * t * t * (15.0 / 16 - t * (13.0 / 16 - t * (17.0 / 64 - t / 32)));
+    }
+    pair[0] = (gap - xi) / root * y;
+    pair[1] = (gap + xi) / root * sqrt(fmax(y * y - force, 0));
+}
+
+/* T (2.17) solved for x, y, z, psi, theta; W (y) and V (z) by bearing */
+static void coordinates(const amb_control *c, const double *at, double x, double *q) {
+    double span = c->model_l_is + c->model_l_os;
+    q[X] = at[AXIAL];
+    q[THETA] = (at[YO] - at[YI]) / span;
+    q[PSI] = (at[ZI] - at[ZO]) / span;
+    q[Y] = at[YI] + (c->model_l_is + x) * q[THETA];
+    q[Z] = at[ZO] + (c->model_l_os - x) * q[PSI];
+}
+
+/* T (2.17) at x = 0 */
+static void planes(const amb_control *c, const double *q, double *at) {
+    at[YI] = q[Y] - c->model_l_is * q[THETA];
+    at[ZI] = q[Z] + c->model_l_is * q[PSI];
+    at[YO] = q[Y] + c->model_l_os * q[THETA];
+    at[ZO] = q[Z] - c->model_l_os * q[PSI];
+    at[AXIAL] = q[X];
+}
+
+static void offsets(const amb_control *c, double *offset) {
+    offset[YI] = c->model_offset_yi, offset[ZI] = c->model_offset_zi;
+    offset[YO] = c->model_offset_yo, offset[ZO] = c->model_offset_zo;
+    offset[AXIAL] = 0;
+}
+
+static void betas(const amb_control *c, double *beta) {
+    beta[YI] = c->model_beta_yi, beta[ZI] = c->model_beta_zi;
+    beta[YO] = c->model_beta_yo, beta[ZO] = c->model_beta_zo;
+    beta[AXIAL] = c->model_beta_x;
+}
+
+/* where the shaft is in the AMBs' planes, from their magnetic centres (T, under (2.4)) */
+static void magnetic(const amb_control *c, const double *q, double *xi) {
+    double in = c->model_l_ia + q[X], out = c->model_l_oa - q[X];
+    offsets(c, xi);
+    xi[YI] += q[Y] - in * q[THETA];
+    xi[ZI] += q[Z] + in * q[PSI];
+    xi[YO] += q[Y] + out * q[THETA];
+    xi[ZO] += q[Z] - out * q[PSI];
+    xi[AXIAL] = q[X];
+}
+
+/* the model's forces (2.4) of given coil currents */
+void amb_forces(const amb_control *c, const double *q, const double *coil, double *force) {
+    double xi[5], beta[5];
+    magnetic(c, q, xi);
+    betas(c, beta);
+    for (int k = 0; k < 4; k++) {
+        double near = c->model_gap - xi[k], far = c->model_gap + xi[k], a = coil[2 * k] * far, b = coil[2 * k + 1] * near;
+        force[k] = beta[k] * (a - b) * (a + b) / (near * near * far * far);
+    }
+}
+
+/* T (2.14) with psi about y and theta about z: forces that give the accelerations v, the coupling included */
+static void flat(const amb_control *c, const double *q, const double *rate, const double *v, double speed, double *force) {
+    double in = c->model_l_ia + q[X], out = c->model_l_oa - q[X], span = in + out, gyro = c->model_polar * speed;
+    double cy = -c->model_coupling * (q[Y] - c->model_l_c * q[THETA]);
+    double cz = -c->model_coupling * (q[Z] + c->model_l_c * q[PSI]);
+    double ay = c->model_mass * (v[Y] - c->model_gravity_y) - cy, az = c->model_mass * (v[Z] - c->model_gravity_z) - cz;
+    double my = c->model_inertia * v[THETA] - gyro * rate[PSI] + c->model_l_c * cy; /* out F_o - in F_i */
+    double mz = c->model_inertia * v[PSI] + gyro * rate[THETA] - c->model_l_c * cz; /* in F_i - out F_o */
+    force[YI] = (out * ay - my) / span;
+    force[YO] = (in * ay + my) / span;
+    force[ZI] = (out * az + mz) / span;
+    force[ZO] = (in * az - mz) / span;
+    force[AXIAL] = c->model_mass * v[X];
+}
+
+static void flatness(const amb_control *c, amb_law_state *l, const double *q, const double *rate, const double *against,
+                     const amb_motion *m, double speed, double *coil) {
+    double v[5], force[5], xi[5], beta[5], k2 = l->law == CAC ? c->k2_cac : c->k2_ccs;
+    for (int k = 0; k < 5; k++) { /* T (2.16); the disturbance is an acceleration; a gain that changes leaves the sum alone */
+        double error = q[k] - m->r[k];
+        if (c->integral != 0 || k == X) l->sum[k] += c->k0 * error * TICK;
+        v[k] = m->a[k] - k2 * (rate[k] - m->v[k]) - c->k1 * error - against[k];
+        if (c->integral != 0 || k == X) v[k] -= l->sum[k];
+    }
+    flat(c, q, rate, v, speed, force);
+    magnetic(c, q, xi);
+    betas(c, beta);
+    for (int k = 0; k < 5; k++) {
+        double gap = k == AXIAL ? c->model_gap_x : c->model_gap, pair[2];
+        double at = clip(xi[k], -0.9 * gap, 0.9 * gap);
+        if (l->law == CAC) {
+            amb_cac(force[k], beta[k], gap, at, c->eta, pair);
+        } else {
+            double di = amb_ccs(force[k], beta[k], gap, at, c->bias);
+            pair[0] = c->bias + di, pair[1] = c->bias - di;
+        }
+        coil[2 * k] = pair[0], coil[2 * k + 1] = pair[1];
+    }
+}
+
+/* T 2.4.3: y from W, z from V. The derivative acts on the error; of a set point that jumps there is none. */
+static void pid(const amb_control *c, amb_law_state *l, const double *at, const amb_motion *m, double *coil) {
+    double r[5], v[5];
+    planes(c, m->r, r);
+    planes(c, m->v, v);
+    for (int k = 0; k < 5; k++) {
+        double error = r[k] - at[k], di = c->kp * error + l->pid[k] + c->kd * (v[k] - l->filtered[k]);
+        if (fabs(di) < c->bias || di * error < 0) l->pid[k] += c->ki * error * TICK;
+        di = clip(di, -c->bias, c->bias);
+        coil[2 * k] = c->bias + di, coil[2 * k + 1] = c->bias - di;
+    }
+}
+
+/* The laws' integrators as they are when nothing is amiss: the PID's holds the weight in the magnetic fields at r. */
+static void begin(const amb_control *c, amb_law_state *l, const double *r) {
+    double still[5] = {0}, force[5], xi[5], beta[5];
+    flat(c, r, still, still, 0, force);
+    magnetic(c, r, xi);
+    betas(c, beta);
+    memset(l->sum, 0, sizeof l->sum);
+    for (int k = 0; k < 5; k++)
+        l->pid[k] = amb_ccs(force[k], beta[k], k == AXIAL ? c->model_gap_x : c->model_gap, xi[k], c->bias);
+    l->law = (int)c->law;
+}
+
+static void filter(const amb_control *c, amb_law_state *l, const double *at) {
+    double keep = KEEP(c->derivative_hz);
+    for (int k = 0; k < 5; k++) {
+        l->filtered[k] = keep * l->filtered[k] + (1 - keep) * (at[k] - l->previous[k]) / TICK;
+        l->previous[k] = at[k];
+    }
+}
+
+static void start(const amb_control *c, amb_law_state *l, const double *at) {
+    memcpy(l->previous, at, sizeof l->previous);
+    memset(l->filtered, 0, sizeof l->filtered);
+    memset(&l->observer, 0, sizeof l->observer);
+    memset(l->waiting, 0, sizeof l->waiting);
+    if (l->mode >= LIFT) {
+        double set[5] = {c->ref_x, c->ref_y, c->ref_z, c->ref_psi, c->ref_theta};
+        coordinates(c, at, at[AXIAL], l->rest);
+        memcpy(l->set, set, sizeof set);
+        l->share = l->phase = 0;
+        begin(c, l, set);
+    }
+    l->fresh = 0;
+}
+
+static void inject(const amb_control *c, amb_law_state *l, amb_reference *out) {
+    int axis = c->inject_axis < 0 ? 0 : c->inject_axis > 4 ? 4 : (int)c->inject_axis;
+    double *pair = out->coil + 2 * axis;
+    out->inject = amb_injected(c, &l->tones);
+    out->before = (pair[0] - pair[1]) / 2;
+    pair[0] = clip(pair[0] + out->inject, 0, c->current_limit);
+    pair[1] = clip(pair[1] - out->inject, 0, c->current_limit);
+    out->after = (pair[0] - pair[1]) / 2;
+}
+
+void amb_law(const amb_control *c, amb_law_state *l, const amb_reading *r, amb_reference *out) {
+    double at[5], q[5], rate[5], against[5] = {0};
+    amb_motion m;
+    memcpy(at, r->position, sizeof at);
+    memset(out, 0, sizeof *out);
+    amb_notched(c, &l->notch, at);
+    if (l->fresh) start(c, l, at);
+    filter(c, l, at);
+    if (l->mode < LIFT) return;
+    int landed = l->mode == LAND && l->lift_clock >= c->lift_time_s;
+    if ((int)c->law != l->law) begin(c, l, l->set);
+    amb_refer(c, l, &m);
+    coordinates(c, at, at[AXIAL], q);
+    coordinates(c, l->filtered, 0, rate);
+    if (l->law == PID) {
+        pid(c, l, at, &m, out->coil);
+    } else {
+        if (c->observer != 0) amb_observe(c, l, q, r->speed, rate, against);
+        flatness(c, l, q, rate, against, &m, r->speed, out->coil);
+    }
+    for (int k = 0; k < 10; k++) out->coil[k] = clip(out->coil[k], 0, c->current_limit);
+    inject(c, l, out);
+    if (landed) memset(out, 0, sizeof *out);
+    memcpy(l->sent, l->waiting, sizeof l->sent);
+    memcpy(l->waiting, out->coil, sizeof l->waiting);
+}
