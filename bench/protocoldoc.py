@@ -1,7 +1,7 @@
 """The generated part of docs/reference/protocol.md: message tables, codes and parameters, from a rig file and its DBC.
 
 `python -m bench.protocoldoc [RIG]` prints it, each section between its markers; with `--into PAGE` it replaces the
-sections of a page instead.
+sections of a page instead. `--own` are the sections of a page of one rig: its telemetry and its parameters.
 """
 
 from __future__ import annotations
@@ -30,6 +30,14 @@ def sections(rig: RigFile) -> dict[str, str]:
         "messages": _overview(ordered),
         "layouts": "\n\n".join(_layout(m) for m in ordered),
         "codes": _codes(rig.messages),
+        "parameters": _parameters(rig),
+    }
+
+
+def own_sections(rig: RigFile) -> dict[str, str]:
+    """The generated sections of a page of one rig."""
+    return {
+        "telemetry": "\n\n".join(_layout(rig.messages[name]) for name in rig.binding.telemetry),
         "parameters": _parameters(rig),
     }
 
@@ -105,11 +113,12 @@ def _codes(messages: MessageMap) -> str:
 
 def _parameters(rig: RigFile) -> str:
     known = [(p.index, name, p) for name, p in rig.parameters.items() if p.index is not None]
+    told = any(p.about for _, _, p in known)
     rows = [
-        (str(index), f"`{name}`", p.unit, f"{p.default:g}", f"{p.low:g} to {p.high:g}", p.when)
+        (str(index), f"`{name}`", p.unit, f"{p.default:g}", f"{p.low:g} to {p.high:g}", p.when, *([p.about] * told))
         for index, name, p in sorted(known, key=lambda row: row[0])
     ]
-    return _table(("index", "name", "unit", "default", "range", "when"), rows)
+    return _table(("index", "name", "unit", "default", "range", "when", *(["about"] * told)), rows)
 
 
 def _when(period_s: float) -> str:
@@ -126,9 +135,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m bench.protocoldoc", description=__doc__)
     parser.add_argument("rig", nargs="?", default=RIG, help="rig file (default: %(default)s)")
     parser.add_argument("--into", type=Path, metavar="PAGE", help="replace the generated sections of a page")
+    parser.add_argument("--own", action="store_true", help="telemetry and parameters alone")
     given = parser.parse_args(arguments)
     try:
-        generated = sections(load_rig(given.rig))
+        generated = (own_sections if given.own else sections)(load_rig(given.rig))
         if given.into is None:
             sys.stdout.write("\n\n".join(marked(name, text) for name, text in generated.items()) + "\n")
         else:

@@ -34,6 +34,8 @@ SOME_GEOMETRY = {
     "lever_left": "shaft axis to the left end of the lever",
     "lever_right": "shaft axis to the right end of the lever",
     "axial_gap": "air gap of the axial AMB",
+    "com_to_inboard_balance": "centre of mass to the inboard balancing plane",
+    "com_to_outboard_balance": "centre of mass to the outboard balancing plane",
     "com_to_coupling": "centre of mass to the coupling of an external motor",
     "coupling_stiffness": "radial stiffness of that coupling",
 }

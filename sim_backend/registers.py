@@ -184,7 +184,7 @@ class RegisterBank:
 
     def _supply(self, name: str, spec: Device, rig: RigFile, truth: Truth) -> RegisterBankDevice:
         def values() -> Values:
-            volts = truth.machine.supply_V
+            volts = truth.supply_V
             return {"voltage": volts, "current": IDLE_A + truth.machine.copper_W(self._plant) / volts, "state": 1.0}
 
         return RegisterBankDevice(name, spec, values, lambda _: True, lambda: None)

@@ -83,6 +83,8 @@ class TelemetryEncoder:
         at = self._place
         values = np.zeros((n, len(at)))
         values[:, self._columns] = np.concatenate([s.rows for s in spans])[:, self._told]
+        machine = self._truth.machine
+        machine.spoil(values, at, self._truth.defects)
         ticks = (spans[0].first_tick // PERIOD_TICKS + np.arange(1, n + 1)) * PERIOD_TICKS
         states, faults = self._codes["state"], self._codes["fault"]
         told = [(states[s.state], faults[s.fault], WATCHDOG_ARMED * s.armed, s.heartbeat_tick) for s in spans]
@@ -90,9 +92,7 @@ class TelemetryEncoder:
         values[:, at["state"]], values[:, at["fault"]] = state, fault
         values[:, at["flags"]] += armed
         values[:, at["host_age"]] = np.maximum(ticks - beats, 0) * TICK_S
-        machine = self._truth.machine
-        machine.spoil(values, at, self._truth.defects)
-        values[:, at["supply"]] = machine.supply_V
+        values[:, at["supply"]] = self._truth.supply_V
         warm = AMBIENT_K + RISE_K * (1 - np.exp(-ticks * TICK_S / WARM_S))
         for name, above in machine.windings.items():
             values[:, at[name]] = warm + above

@@ -27,6 +27,11 @@ class Truth:
     quantities: Mapping[str, float]
     machine: Machine
 
+    @property
+    def supply_V(self) -> float:
+        """Of the amplifiers: the machine's, or what the rig file or an override says."""
+        return self.values.get("supply_V", self.machine.supply_V)
+
     def load(self, label: str) -> tuple[float, float]:
         """Hung mass in kg and its weight in air in N for a load's label; the hanger is on, and "" is nothing else.
 

@@ -101,6 +101,21 @@ def test_a_stale_page_is_rewritten_and_one_without_markers_refused(tmp_path: Pat
         protocoldoc.replaced(TEXT.replace("<!-- end of codes -->", ""), protocoldoc.sections(RIG))
 
 
+def test_a_page_of_one_rig_has_its_telemetry_and_its_parameters(tmp_path: Path) -> None:
+    page = tmp_path / "rig.md"
+    page.write_text(
+        "\n".join(protocoldoc.marked(name, "stale text") for name in ("telemetry", "parameters")), encoding="utf-8"
+    )
+    assert protocoldoc.main(["tsbs12", "--own", "--into", str(page)]) == 0
+    text = page.read_text(encoding="utf-8")
+    assert "stale text" not in text
+    assert "| 6–7 | `pos_xi` | i16 | 2e-08 | m |" in text
+    assert "| 1 | `bias_i` | A | 3 | 0 to 5 | resting |\n" in text
+    told = RIG.parameters["bias_i"].model_copy(update={"about": "of the inboard AMB"})
+    one = RIG.model_copy(update={"parameters": {**RIG.parameters, "bias_i": told}})
+    assert "| resting | of the inboard AMB |" in protocoldoc.own_sections(one)["parameters"]
+
+
 def test_every_message_is_worked_byte_by_byte() -> None:
     assert {name for name, _ in FRAMES} == set(MESSAGES.messages)
 

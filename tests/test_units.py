@@ -24,6 +24,8 @@ from bench.units import SUFFIXES, UNITS, split_suffix, to_si, unit
         (180.0, "deg", math.pi, "rad"),
         (30.0, "A/mm", 30000.0, "A/m"),
         (15.0, "%", 0.15, "1"),
+        (2.65, "mH", 2.65e-3, "H"),
+        (3.0, "g mm", 3e-6, "kg m"),
         (7.0, "", 7.0, "1"),
     ],
 )
