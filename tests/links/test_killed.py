@@ -28,6 +28,7 @@ def test_a_killed_bench_leaves_a_rig_that_coasts_down_and_lands_alone(tmp_path: 
     assert landing.tick < end.tick
 
 
+@pytest.mark.long
 def test_a_killed_rig_is_noticed(tmp_path: Path) -> None:
     with processes.served(tmp_path) as rig:
         arguments = processes.live(rig, "slcan:socket", "tiny-levitated", "--no-report", "--plan", 'act="count"')

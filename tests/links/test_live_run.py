@@ -54,6 +54,7 @@ def test_the_drive_turns_the_shaft_and_lets_it_coast(tmp_path: Path) -> None:
     assert [e["command"] for e in recording.events("drive")][:2] == ["run", "coast"]
 
 
+@pytest.mark.long
 @pytest.mark.timeout(120)
 def test_a_person_may_take_longer_than_the_watchdog(tmp_path: Path) -> None:
     with processes.served(tmp_path) as rig, Listener(rig.endpoints["slcan:socket"]) as bus:

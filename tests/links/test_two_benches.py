@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import processes
+import pytest
 
 
+@pytest.mark.long
 def test_the_second_bench_is_refused_by_the_owners_name(tmp_path: Path) -> None:
     with processes.served(tmp_path) as rig:
         first = processes.live(rig, "slcan:socket", "tiny-levitated", "--no-report", "--plan", 'act="count"')
