@@ -25,7 +25,7 @@ from drivers.orders import Orders
 SILENCE_S = 0.5
 WAIT_SLICE_S, LONG_SLICE_S, PATIENCE = 0.01, 0.1, 0.2  # a wait looks again after a fifth of how long it has waited
 KEPT_S, KEPT_SLICE_S = 0.1, 0.02  # what is to stand or to keep its speed is looked at so often for so long
-STALL_NS = 200_000_000  # between two polls, which come every 0.1 s at most
+STALL_NS = 200_000_000  # between two polls, or two slices: they come with every slice
 SPIN_S = 60.0
 SLOWEST_SLEW = 0.2  # rad/s, of a controller that does not say how fast it turns to an angle
 HOST_AGE = "host_age"
@@ -47,6 +47,7 @@ class Controller:
         self.telemetry = TelemetryDecoder(rig)
         self._recorder: Recorder | None = None
         self._dialogue = Dialogue(rig, link, base.now_ns)
+        self._stall_ns = max(STALL_NS, round(2e9 * slice_s))
         self.clock = PumpedClock(base, self.poll, slice_s, lambda: self.telemetry.host.lag_ns)
         self.guarded = True
         self._states, self._faults = rig.choices("state"), rig.choices("fault")
@@ -126,9 +127,7 @@ class Controller:
             DeviceFault: the controller reports a fault, or has restarted.
         """
         now = self._base.now_ns()
-        if (
-            now - self._polled_ns > STALL_NS
-        ):  # it was the bench that stood still: the link has had no chance to be heard
+        if now - self._polled_ns > self._stall_ns:  # the bench stood still: the link has had no chance to be heard
             self._last_ns += now - self._polled_ns
         self._polled_ns = now
         batch = self._marked(self.link.receive())

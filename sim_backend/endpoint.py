@@ -63,8 +63,10 @@ class InProcessLink:
     """A `bench.link.Link` whose other end is in this process."""
 
     def __init__(self, rig: RigFile, clock: SimulatedRig, session: int, faults: Sequence[Fault] = ()) -> None:
-        self._clock, self._session = clock, session
+        self._clock = clock
         self._heartbeat = load_messages(rig.dbc_text)["Heartbeat"]
+        self._beat = encode(self._heartbeat, {"session": session})
+        self._counter_at = self._heartbeat.signal("counter").start // 8  # 16 bits, little endian
         self._queued: list[FrameBatch] = []
         self._arrived: list[FrameBatch] = []
         self._lease_until = 0
@@ -152,7 +154,8 @@ class InProcessLink:
         while self._next_beat < end_ns:
             if begin_ns <= self._next_beat <= self._lease_until and not self._dead:
                 self._counter = (self._counter + 1) & 0xFFFF
-                payload = encode(self._heartbeat, {"session": self._session, "counter": self._counter})
-                beats.append(frame(self._heartbeat.identifier, payload, t_ns=self._next_beat, flags=FD | SENT))
+                payload = bytearray(self._beat)
+                payload[self._counter_at : self._counter_at + 2] = self._counter.to_bytes(2, "little")
+                beats.append(frame(self._heartbeat.identifier, bytes(payload), t_ns=self._next_beat, flags=FD | SENT))
             self._next_beat += HEARTBEAT_NS
         return beats

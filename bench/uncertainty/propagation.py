@@ -13,6 +13,7 @@ from bench.uncertainty.estimate import Array, Deviations, Estimate, Influence, S
 
 NONLINEAR = 0.1  # share of the combined u that a second difference may reach
 Inputs = Mapping[str, Estimate]
+Shares = Mapping[str, tuple[float, Mapping[str, float]]]  # value and contributions by influence
 _ONE = ""  # name of the output of a model that returns one number
 
 
@@ -37,8 +38,9 @@ def propagate(
     influences = [i for i in merged((1.0, e) for e in inputs.values()) if i.u > 0]
     slopes: dict[str, dict[Influence, float]] = {name: {} for name in middle}
     bends: dict[str, float] = dict.fromkeys(middle, 0.0)
+    shares = {name: (e.value, e.contributions) for name, e in inputs.items()}
     for influence in influences:
-        up, down = (_named(f(_shifted(inputs, influence, side))) for side in (1.0, -1.0))
+        up, down = (_named(f(_shifted(shares, influence, side))) for side in (1.0, -1.0))
         for name in middle:
             slopes[name][influence] = (up[name] - down[name]) / (2 * influence.u)
             bends[name] = max(bends[name], abs(up[name] - 2 * middle[name] + down[name]))
@@ -58,8 +60,8 @@ def _named(result: float | dict[str, float]) -> dict[str, float]:
     return named
 
 
-def _shifted(inputs: Inputs, influence: Influence, side: float) -> dict[str, float]:
-    return {name: e.value + side * e.contributions.get(influence.id, 0.0) for name, e in inputs.items()}
+def _shifted(shares: Shares, influence: Influence, side: float) -> dict[str, float]:
+    return {name: value + side * share.get(influence.id, 0.0) for name, (value, share) in shares.items()}
 
 
 def _sampler(
