@@ -242,6 +242,8 @@ def test_an_adapter_that_says_nothing_is_taken_as_it_is(end: FarEnd, monkeypatch
     with closing_bus(opened(end)) as bus:
         assert bus.status() is None
         assert bus.state is can.BusState.ACTIVE
+        bus.send(can.Message(arbitration_id=0x123, is_extended_id=False))
+        until(lambda: end.received.endswith(b"t1230\r"))  # and with it everything before
         asked = end.received.count(b"F\r")
         for _ in range(20):
             bus.recv_batch(0.002)
