@@ -12,7 +12,7 @@ import numpy.typing as npt
 from bench.errors import ConfigError
 from bench.rigfile import RigFile
 from bench.toleranced import Toleranced
-from sim_backend import tsbs
+from sim_backend import amb5dof, amb_quantities, tsbs
 from sim_backend.core import DriveLaw
 
 if TYPE_CHECKING:
@@ -98,7 +98,13 @@ TSBS = Machine(
     supply_V=148.0, windings={"temp_i": 0.0, "temp_o": 2.0, "temp_m": -3.0}, copper_W=tsbs.copper_W,
     operator=tsbs.operator,
 )  # fmt: skip
-MACHINES = {machine.name: machine for machine in (TSBS,)}
+AMB5DOF = Machine(
+    name="amb5dof", stated=amb5dof.stated, defects=amb5dof.DEFECTS, params=amb5dof.params,
+    quantities=amb_quantities.quantities, targets={}, make=amb5dof.make, radial=slice(0, 4),
+    integral_gains=frozenset(("ki", "k0")), turns=False, places=amb5dof.places, spoil=amb5dof.spoil, supply_V=48.0,
+    windings={"temp_i": 0.0, "temp_o": 2.0, "temp_x": -3.0}, copper_W=amb5dof.copper_W, operator=amb5dof.operator,
+)  # fmt: skip
+MACHINES = {machine.name: machine for machine in (TSBS, AMB5DOF)}
 
 
 def machine_of(rig: RigFile) -> Machine:

@@ -116,6 +116,13 @@ def test_a_page_of_one_rig_has_its_telemetry_and_its_parameters(tmp_path: Path) 
     assert "| resting | of the inboard AMB |" in protocoldoc.own_sections(one)["parameters"]
 
 
+def test_the_page_of_the_amb_stand_is_up_to_date() -> None:
+    page = PAGE.with_name("amb5dof.md").read_text(encoding="utf-8")
+    assert protocoldoc.replaced(page, protocoldoc.own_sections(load_rig("amb5dof"))) == page, (
+        "run: python -m bench.protocoldoc amb5dof --own --into docs/reference/amb5dof.md"
+    )
+
+
 def test_every_message_is_worked_byte_by_byte() -> None:
     assert {name for name, _ in FRAMES} == set(MESSAGES.messages)
 

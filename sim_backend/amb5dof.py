@@ -1,0 +1,157 @@
+"""The AMB stand behind the simulated controller: what is drawn for it, its plant, its wiring, who works on it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.rigfile import RigFile
+from bench.toleranced import Toleranced
+from sim_backend.core.amb import AXES, CHANNELS, COILS, AmbPlant
+from sim_backend.core.amb_params import AmbParams, runout
+
+if TYPE_CHECKING:
+    from sim_backend.truth import Truth
+
+Array = npt.NDArray[np.float64]
+Numbers = Mapping[str, float]
+RADIAL = AXES[:4]
+ORDERS = (1, 2, 3, 4)
+DEFECTS = {
+    "position_sign_yi": 1.0, "position_sign_zi": 1.0, "position_sign_yo": 1.0, "position_sign_zo": 1.0,
+    "position_sign_x": 1.0, "exchange_planes": 0.0, "current_sign_i": 1.0, "current_sign_o": 1.0, "pulse_missing": 0.0,
+    "pulse_doubled": 0.0, "loose_speed": 0.0, "loose_shift": 0.0, "drop_fraction": 0.0, "integrator_factor": 1.0,
+    "dead_after_s": 0.0, "fault_after_s": 0.0, "drive_fault_after_s": 0.0,
+}  # fmt: skip
+"""Planted defects and their harmless values. Current signs act on what is told of a bearing's y and z axes."""
+SHARED = {
+    "beta": tuple(f"beta_{a}" for a in RADIAL),
+    "magnetic_offset": tuple(f"offset_{a}" for a in RADIAL),
+    "unbalance": ("unbalance_i", "unbalance_o"),
+    "unbalance_phase": ("unbalance_phase_i", "unbalance_phase_o"),
+    **{f"runout_{n}": (f"runout_i{n}", f"runout_o{n}") for n in ORDERS},
+    "runout_phase": tuple(f"runout_phase_{b}{n}" for b in "io" for n in ORDERS),
+    "mode_damping": ("mode_damping_1", "mode_damping_2"),
+}
+"""Entries of the simulation table that are drawn several times, and the names of the draws."""
+
+
+class Bystander:
+    """Nothing is hung or mounted on this machine; who watches it answers questions."""
+
+    def request(self, line: str) -> str:
+        """One line: `ask TEXT`."""
+        return "yes" if line.split()[:1] == ["ask"] else f"error cannot {line.strip()!r}"
+
+
+def stated(rig: RigFile) -> dict[str, Toleranced]:
+    """Every toleranced number of a rig file by its name; one that holds for several axes or planes once for each."""
+    out = {f"geometry.{k}": t for k, t in rig.geometry.items()} | {f"machine.{k}": t for k, t in rig.machine.items()}
+    out["site.gravity"] = rig.site.gravity
+    for name in (*(f"i_{coil}" for coil in COILS), *(f"pos_{axis}" for axis in AXES)):
+        out |= {f"{name}.gain": rig.sensors[name].gain, f"{name}.offset": rig.sensors[name].offset}
+    for name, value in rig.simulation.items():
+        if isinstance(value, Toleranced):
+            out |= dict.fromkeys(SHARED.get(name, (name,)), value)
+    return out
+
+
+def params(v: Numbers, d: Numbers) -> AmbParams:
+    """The plant that drawn values `v` and planted defects `d` make."""
+    outboard, down = v["geometry.com_to_outboard_amb"], v["site.gravity"]
+    lean, seen = math.pi / 4 + v["roll"], _runout(v)
+    return AmbParams(
+        mass=v["machine.mass"],
+        inertia=v["machine.transverse_inertia"],
+        polar_inertia=v["machine.polar_inertia"],
+        gravity_y=-down * math.cos(lean),
+        gravity_z=-down * math.sin(lean),
+        l_ia=v["geometry.amb_span"] - outboard,
+        l_oa=outboard,
+        l_is=v["geometry.com_to_inboard_sensor"],
+        l_os=v["geometry.com_to_outboard_sensor"],
+        l_iu=v["geometry.com_to_inboard_balance"],
+        l_ou=v["geometry.com_to_outboard_balance"],
+        l_c=v["geometry.com_to_coupling"],
+        coupling=v["geometry.coupling_stiffness"],
+        beta=tuple(v[f"beta_{a}"] for a in AXES),
+        gap=v["geometry.amb_gap"],
+        gap_x=v["geometry.axial_gap"],
+        offset=(v["offset_yi"], v["offset_zi"], v["offset_yo"], v["offset_zo"]),
+        unbalance=(v["unbalance_i"], v["unbalance_o"]),
+        unbalance_phase=(v["unbalance_phase_i"], v["unbalance_phase_o"]),
+        viscous=v["viscous"],
+        coulomb=v["coulomb"],
+        clearance=v["geometry.clearance"],
+        lost_radius=0.98 * v["geometry.clearance"],
+        mode_on=(v["mode_1_on"], v["mode_2_on"]),
+        mode_hz=(v["mode_1"], v["mode_2"]),
+        mode_damping=(v["mode_damping_1"], v["mode_damping_2"]),
+        amplifier_rate=2 * math.pi * v["amplifier_hz"],
+        inductance=v["inductance"],
+        resistance=v["resistance"],
+        u_max=v["supply_V"],
+        current_gain=tuple(v[f"i_{coil}.gain"] for coil in COILS),
+        current_offset=tuple(v[f"i_{coil}.offset"] for coil in COILS),
+        current_noise=v["current_noise"],
+        position_gain=tuple(v[f"pos_{axis}.gain"] for axis in AXES),
+        position_offset=tuple(v[f"pos_{axis}.offset"] for axis in AXES),
+        position_sign=tuple(d[f"position_sign_{axis}"] for axis in AXES),
+        position_noise=v["position_noise"],
+        position_range=v["position_range"],
+        pulse_angle=v["pulse_angle"],
+        pulse_missing=d["pulse_missing"],
+        pulse_doubled=d["pulse_doubled"],
+        exchange_planes=d["exchange_planes"],
+        loose_speed=d["loose_speed"],
+        loose_shift=d["loose_shift"],
+        runout=seen["runout"],
+        runout_phase=seen["runout_phase"],
+    )
+
+
+def _runout(v: Numbers) -> dict[str, tuple[float, ...]]:
+    def of(name: str) -> tuple[float, float, float, float]:
+        return v[f"{name}1"], v[f"{name}2"], v[f"{name}3"], v[f"{name}4"]
+
+    return runout(of("runout_i"), of("runout_o"), of("runout_phase_i"), of("runout_phase_o"))
+
+
+def make(p: AmbParams, seed: int, substeps: int) -> AmbPlant:
+    """The plant itself."""
+    return AmbPlant(p, seed, substeps=substeps)
+
+
+def operator(rig: RigFile, plant: AmbPlant, truth: Truth) -> Bystander:
+    """Who works on it."""
+    return Bystander()
+
+
+def copper_W(plant: AmbPlant) -> float:
+    """What its windings dissipate."""
+    return plant.params.resistance * sum(i * i for i in plant.currents)
+
+
+def places(defects: Numbers, at: Mapping[str, int]) -> tuple[list[int], list[int]]:
+    """Which channels of the core are told, and where each goes among the signals; a bearing whose current sensors are
+    exchanged has the currents of its coils the other way round."""
+    told = [k for k, name in enumerate(CHANNELS) if name in at]
+    goes = {CHANNELS[k]: at[CHANNELS[k]] for k in told}
+    for b in "io":
+        if defects[f"current_sign_{b}"] < 0:
+            for axis in "yz":
+                p, n = f"i_{axis}{b}_p", f"i_{axis}{b}_n"
+                goes[p], goes[n] = goes[n], goes[p]
+    return told, list(goes.values())
+
+
+def spoil(values: Array, at: Mapping[str, int], defects: Numbers) -> None:
+    """What the telemetry's sixteen bits make of angle, pulses and flags, in place (n, signals)."""
+    values[:, at["angle"]] = (values[:, at["angle"]] + math.pi) % (2 * math.pi) - math.pi
+    values[:, at["pulses"]] %= 65536
+    low = values[:, at["flags"]] % 16
+    values[:, at["flags"]] = low + 2 * (values[:, at["flags"]] - low)  # bit 4 is the watchdog's

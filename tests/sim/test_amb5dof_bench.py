@@ -1,0 +1,167 @@
+"""The AMB stand through the whole path: driver, bytes, simulated controller, Modbus drive. No threads, virtual time."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from bench.errors import BenchError, DeviceFault, InterlockError, LinkError
+from bench.rigfile import load_rig
+from bench.session import Session
+from drivers.controller import Controller
+from drivers.fieldbus import Fieldbus, open_devices
+from sim_backend.endpoint import SimulatedRig
+from sim_backend.registers import Followed, RegisterBank
+from sim_backend.truth import draw
+
+RIG = load_rig("amb5dof")
+RADIAL = ("yi", "zi", "yo", "zo")
+PID, CCS, CAC = range(3)
+
+
+class Stand:
+    """A simulated stand and the driver of its controller. `frames` digests everything that comes in."""
+
+    def __init__(self, seed: int, **truth: float) -> None:
+        self.machine = SimulatedRig(RIG, draw(RIG, seed, truth), 1)
+        self.plant = self.machine.device.plant
+        self.bank = RegisterBank(RIG, self.machine.truth, self.plant)
+        base = Followed(self.machine, self.bank)
+        self.controller = Controller(RIG, self.machine.link, base, Session(1, 1_767_225_600, "test"))
+        self.frames, receive = hashlib.sha256(), self.machine.link.receive
+
+        def heard() -> np.ndarray:
+            batch = receive()
+            self.frames.update(batch.tobytes())
+            return batch
+
+        self.machine.link.receive = heard  # type: ignore[method-assign]
+        self.controller.connect()
+
+    def levitate(self, law: int = PID) -> None:
+        self.controller.enable()
+        self.controller.set("law", law)
+        self.controller.levitate()
+
+    def reading(self, *channels: str) -> np.ndarray:
+        return np.array([self.controller.reading(name) for name in channels])
+
+
+@contextmanager
+def driven(stand: Stand) -> Iterator[Fieldbus]:
+    clock = stand.controller.clock
+    with open_devices(RIG, stand.bank.port, clock, stand.controller.envelope) as bus:
+        assert bus.drive is not None
+        bus.drive.may_run = stand.controller.require_levitated
+        stand.controller.companions.append(bus.pump)
+        yield bus
+
+
+def session(seed: int) -> Stand:
+    """Levitate by the PID, spin by the drive, coast, land, switch off."""
+    stand = Stand(seed)
+    controller = stand.controller
+    stand.levitate()
+    assert controller.mode == "LEVITATED"
+    with driven(stand) as bus:
+        drive, speed = bus.drive, 2400 * math.pi / 30
+        assert drive is not None
+        assert bus.supply is not None
+        drive.reach(speed)
+        controller.clock.sleep(0.2)
+        assert controller.mode == "SPINNING"
+        assert controller.speed_rad_s == pytest.approx(speed, rel=0.01)
+        assert drive.speed_rad_s == pytest.approx(speed, rel=0.01)
+        assert bus.supply.voltage_V == 48.0
+        pulses = stand.reading("pulses")[0]
+        controller.clock.sleep(1.0)
+        assert stand.reading("pulses")[0] - pulses == pytest.approx(40, abs=1)
+        drive.coast()
+        with pytest.raises(BenchError, match="refuses LAND: WRONG_STATE"):
+            controller.land()  # it turns
+        for _ in range(60):
+            if controller.mode == "LEVITATED":
+                break
+            controller.clock.sleep(0.5)
+        assert controller.speed_rad_s < controller.landing_speed
+        controller.land()
+        assert controller.mode == "READY"
+        controller.disable()
+    assert controller.mode == "OFF"
+    assert controller.fault == "NONE"
+    return stand
+
+
+def test_levitate_spin_coast_and_land_and_the_same_seed_says_the_same_bytes() -> None:
+    one, same = session(2), session(2)
+    assert one.frames.digest() == same.frames.digest()
+    rest = one.reading(*(f"pos_{axis}" for axis in RADIAL))
+    assert rest == pytest.approx([-71e-6] * 4, abs=8e-6)  # on the rings, 45 degrees to both axes
+
+
+@pytest.mark.parametrize("law", [PID, CCS, CAC])
+def test_each_law_carries_the_weight_at_the_set_point(law: int) -> None:
+    """T (2.6): at the centre and in the magnetic offsets; the upper coils alone with CAC, a bias of 1 A else."""
+    stand = Stand(1)
+    stand.levitate(law)
+    stand.controller.set("ref_y", 20e-6)
+    stand.controller.clock.sleep(4.0)
+    y, z = stand.reading("pos_yi", "pos_yo"), stand.reading("pos_zi", "pos_zo")
+    assert y == pytest.approx([20e-6] * 2, abs=3e-6)
+    assert z == pytest.approx([0] * 2, abs=3e-6)
+    upper, lower = (stand.reading(*(f"i_{axis}_{side}" for axis in RADIAL)) for side in "pn")
+    if law == CAC:
+        assert np.abs(lower).max() < 0.02
+        assert upper.min() > 0.5
+    else:
+        assert upper + lower == pytest.approx([2.0] * 4, abs=0.05)
+    assert abs(stand.reading("pos_x")[0]) < 2e-6
+
+
+def test_the_controller_cannot_turn_the_rotor() -> None:
+    """It has no motor: SPIN is refused, STOP has nothing to do; a lone rotor is turned by nobody."""
+    stand = Stand(1)
+    stand.levitate()
+    assert "speed_ref" not in RIG.parameters
+    with pytest.raises(BenchError, match="refuses SPIN: WRONG_STATE"):
+        stand.controller._orders.command("SPIN")
+    stand.controller.stop()
+    with pytest.raises(InterlockError, match="speed_ref"):
+        stand.controller.spin(10.0)
+    assert stand.controller.mode == "LEVITATED"
+
+
+def test_a_sensor_of_the_wrong_sign_is_never_levitated() -> None:
+    stand = Stand(1, position_sign_yi=-1.0)
+    with pytest.raises((LinkError, DeviceFault)):
+        stand.levitate()
+
+
+def test_twelve_volts_and_a_lost_pulse_show() -> None:
+    stand = Stand(1, supply_V=12.0, pulse_missing=2.0)
+    stand.levitate()
+    assert stand.reading("supply")[0] == 12.0
+    with driven(stand) as bus:
+        assert bus.drive is not None
+        bus.drive.set_speed(300.0)
+        bus.drive.run()
+        stand.controller.clock.sleep(4.0)
+        assert stand.plant.shaft_speed == pytest.approx(300, rel=0.02)
+        assert stand.reading("speed")[0] == pytest.approx(150, rel=0.02)  # one pulse in two turns
+        bus.drive.coast()
+
+
+def test_the_envelope_watches_this_rigs_positions() -> None:
+    """Pressed into the ring by a set point far outside it: the controller trips by itself, or the envelope does."""
+    stand = Stand(1)
+    stand.levitate(CCS)
+    stand.controller.set("slew", 0.0)
+    stand.controller.set("ref_y", 9e-5)
+    stand.controller.set("ref_z", 9e-5)
+    with pytest.raises((InterlockError, DeviceFault), match=r"pos_|LEVITATION_LOST"):
+        stand.controller.clock.sleep(2.0)
