@@ -203,7 +203,7 @@ def _identification(record: Content, around: Surroundings, rig_name: str) -> tup
     started, ended = text.moment(record.get("started")), text.moment(record.get("ended"))
     rig_title = str(around.rig.get("title") or "")
     site = around.rig.get("site")
-    site_name = str(site.get("name") or "") if isinstance(site, Mapping) else ""
+    site_name = str(site.get("place") or "") if isinstance(site, Mapping) else ""
     seed = record.get("seed")
     found = [
         Fact("Item under test", _uut(record.get("uut"))),
@@ -219,7 +219,7 @@ def _identification(record: Content, around: Surroundings, rig_name: str) -> tup
 
 def _conditions(around: Surroundings) -> tuple[Fact, ...]:
     site = around.rig.get("site")
-    at_site = {k: v for k, v in site.items() if k != "name" and v is not None} if isinstance(site, Mapping) else {}
+    at_site = {k: v for k, v in site.items() if k != "place" and v is not None} if isinstance(site, Mapping) else {}
     stated = [dataclasses.replace(f, label=_words(f.label)) for f in tables.facts(at_site)]
     return (*stated, *(Fact(label, said) for label, said in around.conditions.items()))
 

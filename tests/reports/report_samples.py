@@ -89,7 +89,7 @@ def rig_content() -> dict[str, Any]:
         "name": "tsbs12",
         "title": "Toothless self-bearing servomotor on three AMBs",
         "site": {
-            "name": "Edmonton",
+            "place": "Edmonton",
             "latitude_deg": 53.527,
             "elevation_m": 668,
             "gravity": toleranced(9.81123, "m/s^2", u=4.9e-4, k=1, distribution="normal", source="latitude formula"),

@@ -212,7 +212,7 @@ def hostile() -> tuple[dict[str, Any], SampleRecording]:
         measurements=[measurement(h, unit=h, where=h, verdict=h, limit=limit, budget=[entry])] * 2,
     )  # fmt: skip
     rig = {
-        "name": h, "title": h, "site": {"name": h, h: h}, "laboratory": {"name": h, h: h},
+        "name": h, "title": h, "site": {"place": h, h: h}, "laboratory": {"name": h, h: h},
         "masses": {h: toleranced(1.0, h, u=1.0, k=2, source=h)},
     }  # fmt: skip
     return made, SampleRecording(SampleRig(rig))
