@@ -36,13 +36,13 @@ def test_the_group_of_a_test(nodeid: str, group: str) -> None:
 
 
 def test_a_group_runs_on_one_worker(tmp_path: Path) -> None:
-    """In a session of its own: the tests of `links` on one worker, in their order, whatever the others do."""
+    """In a session of its own: the tests of `firmware` on one worker, in their order, whatever the others do."""
     (tmp_path / "pyproject.toml").write_text("[tool.pytest.ini_options]\n")
     (tmp_path / "conftest.py").write_text((ROOT / "tests" / "conftest.py").read_text())
     (tmp_path / "groups.py").write_text((ROOT / "tests" / "groups.py").read_text())
-    (tmp_path / "tests" / "links").mkdir(parents=True)
+    (tmp_path / "tests" / "firmware").mkdir(parents=True)
     many = "import pytest\n@pytest.mark.parametrize('k', range(8))\ndef test_{}(k): pass\n"
-    (tmp_path / "tests" / "links" / "test_a.py").write_text(many.format("a"))
+    (tmp_path / "tests" / "firmware" / "test_a.py").write_text(many.format("a"))
     (tmp_path / "tests" / "test_b.py").write_text(many.format("b"))
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-v", "-n", "2", "--dist", "loadgroup", "-p", "no:cacheprovider",
@@ -50,7 +50,7 @@ def test_a_group_runs_on_one_worker(tmp_path: Path) -> None:
     )  # fmt: skip
     assert done.returncode == 0, done.stdout
     lines = [line.split() for line in done.stdout.splitlines() if "PASSED" in line]
-    of_links = [words for words in lines if "links" in words[-1]]
+    of_one = [words for words in lines if "firmware" in words[-1]]
     assert len(lines) == 16
-    assert len({words[0] for words in of_links}) == 1
-    assert [words[-1][-2] for words in of_links] == list("01234567")
+    assert len({words[0] for words in of_one}) == 1
+    assert [words[-1][-2] for words in of_one] == list("01234567")
