@@ -1,4 +1,4 @@
-"""Every message of tsbs12, byte by byte, written down by hand from the message map's description."""
+"""Every message of tsbs12, and the telemetry of amb5dof, byte by byte, written by hand from the message map's description."""
 
 from __future__ import annotations
 
@@ -41,6 +41,40 @@ TELEMETRY = [
     ("fault", 4, "04 00"),  # HEARTBEAT_LOST
     ("flags", 21, "15 00"),  # bits 0, 2 and 4: 1 + 4 + 16
     ("host_age", 0.08, "50 00"),  # 80 ms / 1 ms = 80 = 0x50
+]
+
+STAND = [
+    ("seq", 4660, "34 12"),
+    ("tick", 74565, "45 23 01 00"),
+    ("pos_yi", -71e-6, "44 E4"),  # -71 um / 10 nm = -7100; 65536 - 7100 = 58436 = 0xE444
+    ("pos_zi", 50e-6, "88 13"),  # 5000 = 0x1388
+    ("pos_yo", 10e-9, "01 00"),  # one step
+    ("pos_zo", -10e-9, "FF FF"),  # one step down
+    ("pos_x", 327.67e-6, "FF 7F"),  # 32767, the top of the range
+    ("angle", 1.5707963267948966, "00 40"),  # pi/2 / (2 pi / 65536) = 16384 = 0x4000
+    ("speed", 1466.0625, "A1 5B"),  # 14 000 r/min: 1466.0625 * 16 = 23457 = 0x5BA1
+    ("i_yi_p", 1.0, "88 13"),  # 1 / 0.0002 = 5000
+    ("i_yi_n", 3.0, "98 3A"),  # 15000 = 0x3A98
+    ("i_zi_p", 0.0002, "01 00"),
+    ("i_zi_n", -0.0002, "FF FF"),
+    ("i_yo_p", 0.5, "C4 09"),  # 2500 = 0x09C4
+    ("i_yo_n", 1.2, "70 17"),  # 6000 = 0x1770
+    ("i_zo_p", 2.0, "10 27"),  # 10000 = 0x2710
+    ("i_zo_n", 0.0, "00 00"),
+    ("i_x_p", 1.1, "7C 15"),  # 5500 = 0x157C
+    ("i_x_n", 0.9, "94 11"),  # 4500 = 0x1194
+    ("u_i", 48.0, "80 BB"),  # 48000 = 0xBB80
+    ("u_o", 12.0, "E0 2E"),  # 12000 = 0x2EE0
+    ("u_x", 1.3, "14 05"),  # 1300 = 0x0514
+    ("pulses", 65535, "FF FF"),
+    ("supply", 48.0, "C0 12"),
+    ("temp_i", 293.15, "83 72"),
+    ("temp_o", 300.0, "30 75"),
+    ("temp_x", 353.0, "E4 89"),
+    ("state", 4, "04 00"),  # SPINNING
+    ("fault", 3, "03 00"),  # OVERSPEED
+    ("flags", 114, "72 00"),  # bits 1, 4, 5 and 6: 2 + 16 + 32 + 64
+    ("host_age", 0.02, "14 00"),
 ]
 
 OWNED = [
@@ -123,6 +157,25 @@ def test_values_to_bytes(messages: MessageMap, name: str) -> None:
     assert messages[name].identifier == identifier
     assert messages[name].length == len(payload)
     assert messages[name].fd
+
+
+def test_telemetry_of_the_amb_stand() -> None:
+    message = load_rig("amb5dof").messages["Telemetry"]
+    assert [n for n, _, _ in STAND] == [s.name for s in message.signals]
+    text = " ".join(text for _, _, text in STAND)
+    values, wrong = Decoder(message).decode(frame(0x100, bytes.fromhex(text)))
+    assert wrong == 0
+    for signal, value, _ in STAND:
+        assert values[signal].tolist() == [pytest.approx(value, rel=1e-14, abs=0)], signal
+    assert encode(message, {signal: value for signal, value, _ in STAND}).hex(" ").upper() == text
+
+
+def test_all_other_messages_of_the_amb_stand_are_the_same(messages: MessageMap) -> None:
+    other = load_rig("amb5dof").messages
+    assert other.messages.keys() == messages.messages.keys()
+    assert [n for n in other.messages if other[n] != messages[n]] == ["Telemetry"]
+    for name in ("state", "fault"):
+        assert other["Telemetry"].signal(name).choices == messages["Telemetry"].signal(name).choices
 
 
 @pytest.mark.parametrize(

@@ -58,9 +58,9 @@ class Served:
 
 
 @contextmanager
-def serving(tmp_path: Path, *arguments: str) -> Iterator[Served]:
+def serving(tmp_path: Path, *arguments: str, rig: str = "tsbs12") -> Iterator[Served]:
     with subprocess.Popen(
-        [sys.executable, "-m", "bench.cli", "serve", "tsbs12", *FREE, *arguments], cwd=tmp_path, text=True,
+        [sys.executable, "-m", "bench.cli", "serve", rig, *FREE, *arguments], cwd=tmp_path, text=True,
         env={**os.environ, "PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     ) as child:  # fmt: skip
         assert child.stdout is not None
@@ -134,6 +134,25 @@ def test_hosts_on_tcp_and_an_operator_at_one_rig_until_ctrl_c(tmp_path: Path) ->
     truth = json.loads((tmp_path / "truth.json").read_text())
     assert truth["seed"] == 4
     assert truth["quantities"]["K_i"] == pytest.approx(70)
+
+
+def test_the_amb_stand_is_served_like_the_other_rig(tmp_path: Path) -> None:
+    with serving(tmp_path, "--truth", "supply_V=12", "--truth-file", "truth.json", rig="amb5dof") as rig:
+        with (
+            rig.connected("controller serial:socket://") as serial,
+            rig.connected("operator line:") as operator,
+            rig.connected("fieldbus modbus-tcp:") as fieldbus,
+        ):
+            serial.sendall(packet.packet(0, 0, [identify(2)]))
+            check(heard(lambda: serial.recv(65536), PacketStream(), 100))
+            fieldbus.sendall(bytes.fromhex("0007 0000 0006 02 04 0064 0001"))  # unit 2, input register 100: 12.00 V
+            with fieldbus.makefile("rb") as answer:
+                assert answer.read(11) == bytes.fromhex("0007 0000 0005 02 04 02 04B0")
+            operator.sendall(b"ask all right?\nhang M2\n")
+            with operator.makefile() as answers:
+                assert [next(answers) for _ in range(2)] == ["yes\n", "error cannot 'hang M2'\n"]
+        assert rig.ended_by(signal.SIGINT)[0] == 0
+    assert json.loads((tmp_path / "truth.json").read_text())["values"]["supply_V"] == 12
 
 
 @pytest.mark.skipif(not ptys.AVAILABLE, reason="no ptys here")

@@ -136,6 +136,24 @@ def test_the_controller_cannot_turn_the_rotor() -> None:
     assert stand.controller.mode == "LEVITATED"
 
 
+def test_without_a_host_the_drive_lets_go_and_the_rotor_coasts_and_lands() -> None:
+    stand = Stand(1)
+    stand.levitate()
+    with driven(stand) as bus:
+        assert bus.drive is not None
+        bus.drive.reach(100.0)
+        stand.machine.link.close()
+        seen = []
+        for _ in range(40):
+            stand.machine.sleep(0.5)
+            stand.bank.tick(stand.machine.now_ns())
+            seen.append(stand.machine.device.state)
+    assert list(dict.fromkeys(seen)) == ["COASTING", "LANDING", "FAULT"]
+    assert stand.machine.device.fault == "HEARTBEAT_LOST"
+    assert stand.bank.drives["drive"].fault == "COMMUNICATION"
+    assert stand.plant.shaft_speed < stand.controller.landing_speed
+
+
 def test_a_sensor_of_the_wrong_sign_is_never_levitated() -> None:
     stand = Stand(1, position_sign_yi=-1.0)
     with pytest.raises((LinkError, DeviceFault)):
