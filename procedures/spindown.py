@@ -68,8 +68,9 @@ def groups(plan: Plan) -> tuple[tuple[str, float], ...]:
 
 
 def step_count(plan: Plan) -> int:
-    """How many steps `acquire` records, for the progress display."""
-    return 1 + 4 * plan.repeats * len(groups(plan))
+    """How many steps `acquire` records, for the progress display; with a drive, once more in each direction, slowly."""
+    slowly = 0 if plan.run_up == "motor" else 2
+    return 2 + (4 * plan.repeats + slowly) * len(groups(plan))
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:

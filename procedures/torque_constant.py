@@ -75,7 +75,7 @@ def sequence(plan: Plan) -> list[tuple[str, Load]]:
 
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records, for the progress display."""
-    return 1 + 4 + plan.detent_angles + plan.gammas * len(sequence(plan))
+    return 2 + 4 + plan.detent_angles + plan.gammas * len(sequence(plan))
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:

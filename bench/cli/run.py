@@ -43,11 +43,13 @@ def run_command(request: Request) -> int:
 def summary(record: Record) -> str:
     """Results, findings and outcome as lines of text; the report is where digits and units are set with care."""
     lines = []
+    widest = max((len(m.name) for m in record.measurements), default=0)
     for m in record.measurements:
         value = "missing"
         if m.value is not None and m.expanded_uncertainty is not None:
             value, expanded = round_to_uncertainty(m.value, m.expanded_uncertainty)
             value = f"{value} +- {expanded} {m.unit}"
-        lines.append(f"  {m.name:8} {value:32} {m.verdict.value}")
+        place = f" ({m.where})" if m.where else ""
+        lines.append(f"  {m.name:{widest}} {value:32} {m.verdict.value}{place}")
     lines += [f"  {f.effect.value}: {f.code}: {f.text}" for f in record.findings]
     return "\n".join([*lines, f"outcome {record.outcome.value}"]) + "\n"

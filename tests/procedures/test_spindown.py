@@ -46,6 +46,8 @@ def test_a_sound_rig_is_recovered_within_its_intervals(tmp_path: Path) -> None:
     for name in ("B", "B_high", "T_c"):
         assert abs(found[name].value - run.truth[name]) < 3 * found[name].u, name
         assert interval(found[name]).method == "monte-carlo"
+    by_motor = run.recording.plan.model_copy(update={"run_up": "motor"})  # this rig has no drive
+    assert len(run.recording.all_steps()) == run.procedure.step_count(by_motor)
     assert correlation(found["B"], found["T_c"]) > 0.95
     limits = load_spec("tsbs12", "spindown")
     assert judge(interval(found["B"]), limits["B"]) is Verdict.PASS

@@ -43,6 +43,7 @@ def test_a_sound_rig_is_recovered_within_its_intervals(tmp_path: Path) -> None:
     assert abs(found["alpha_tau"].value - run.truth["alpha_tau"]) < 3 * found["alpha_tau"].u
     assert abs(found["gamma_0t"].value - run.truth["gamma_0"]) < 3 * found["gamma_0t"].u
     assert found["alpha_tau"].u < 2e-3 * found["alpha_tau"].value
+    assert len(run.recording.all_steps()) == run.procedure.step_count(run.recording.plan)
     assert {f"sensors/i_m{k}/gain" for k in range(1, 5)} <= set(found["alpha_tau"].contributions)
     limit = load_spec("tsbs12", "torque-constant")["alpha_tau"]
     assert judge(interval(found["alpha_tau"]), limit) is Verdict.PASS
