@@ -3,8 +3,10 @@
 #include <string.h>
 #include "amb.h"
 
+#define INLINE inline __attribute__((always_inline))
+
 /* T (2.4): F = beta (ip^2/(gap - xi)^2 - in^2/(gap + xi)^2); below a gap of 0.1 mm the iron saturates */
-static double force(double beta, double gap, double xi, double ip, double in) {
+static INLINE double force(double beta, double gap, double xi, double ip, double in) {
     double near = gap - xi > 1e-4 ? gap - xi : 1e-4, far = gap + xi > 1e-4 ? gap + xi : 1e-4;
     double a = ip * far, b = in * near, both = near * far;
     return beta * (a - b) * (a + b) / (both * both);
@@ -36,6 +38,9 @@ void amb_derive(const amb_params *p, int substeps, amb_derived *d) {
     d->amb[0] = -p->l_ia, d->amb[1] = p->l_oa;
     d->sensor[0] = -p->l_is, d->sensor[1] = p->l_os;
     d->unbalanced[0] = -p->l_iu, d->unbalanced[1] = p->l_ou;
+    d->per_mass = 1 / p->mass;
+    d->per_inertia = 1 / p->inertia;
+    d->per_polar = 1 / p->polar_inertia;
     d->per_position_lsb = p->position_lsb > 0 ? 1 / p->position_lsb : 0;
     d->per_current_lsb = p->current_lsb > 0 ? 1 / p->current_lsb : 0;
     for (int k = 0; k < 10; k++) d->per_gain[k] = 1 / p->current_gain[k];
@@ -63,7 +68,7 @@ void amb_at(amb_derived *d, double angle) {
 }
 
 /* cos and sin of an angle that is less than a tick away from d->angle: two short series, good to 1e-15 at 1600 rad/s */
-static void turn(const amb_derived *d, double e, double *c, double *s) {
+static INLINE void turn(const amb_derived *d, double e, double *c, double *s) {
     double q = e * e;
     double ce = 1 - q / 2 * (1 - q / 12 * (1 - q / 30 * (1 - q / 56)));
     double se = e * (1 - q / 6 * (1 - q / 20 * (1 - q / 42 * (1 - q / 72))));
@@ -72,24 +77,28 @@ static void turn(const amb_derived *d, double e, double *c, double *s) {
 }
 
 /* where a station of the shaft is: rotations by theta about z and by psi about y, and what the shaft bends */
-void amb_plane(const amb_derived *d, const double *s, double station, const double *shape, double *y, double *z) {
+static INLINE void place(int flexible, const double *s, double station, const double *shape, double *y, double *z) {
     *y = s[Y] + station * s[THETA];
     *z = s[Z] - station * s[PSI];
-    if (!d->flexible) return;
+    if (!flexible) return;
     *y += shape[0] * s[12] + shape[2] * s[14];
     *z += shape[0] * s[13] + shape[2] * s[15];
+}
+
+void amb_plane(const amb_derived *d, const double *s, double station, const double *shape, double *y, double *z) {
+    place(d->flexible, s, station, shape, y, z);
 }
 
 typedef struct {
     double fx, fy, fz, psi, theta, torque, modal[4];
 } wrench;
 
-static void add(const amb_derived *d, wrench *w, double station, const double *shape, double fy, double fz) {
+static INLINE void add(int flexible, wrench *w, double station, const double *shape, double fy, double fz) {
     w->fy += fy;
     w->fz += fz;
     w->theta += station * fy;
     w->psi -= station * fz;
-    if (!d->flexible) return;
+    if (!flexible) return;
     for (int k = 0; k < 2; k++) {
         w->modal[2 * k] += shape[2 * k] * fy;
         w->modal[2 * k + 1] += shape[2 * k] * fz;
@@ -106,11 +115,11 @@ static void touchdown(const amb_params *p, const amb_derived *d, const double *s
     double push = p->ring_stiffness * (r - p->clearance) + p->ring_damping * (vy * ny + vz * nz);
     if (push <= 0) return;
     double slip = -vy * nz + vz * ny + p->ring_radius * s[11], drag = p->ring_friction * push * tanh(slip / 0.01);
-    add(d, w, d->sensor[b], p->shape_sensor + b, -push * ny + drag * nz, -push * nz - drag * ny);
+    add(d->flexible, w, d->sensor[b], p->shape_sensor + b, -push * ny + drag * nz, -push * nz - drag * ny);
     w->torque -= drag * p->ring_radius;
 }
 
-static void thrust(const amb_params *p, const double *s, const double *coil, wrench *w) {
+static INLINE void thrust(const amb_params *p, const double *s, const double *coil, wrench *w) {
     w->fx += force(p->beta[4], p->gap_x, s[X], coil[8], coil[9]);
     if (fabs(s[X]) > p->stop) {
         double deep = s[X] > 0 ? s[X] - p->stop : s[X] + p->stop;
@@ -119,7 +128,7 @@ static void thrust(const amb_params *p, const double *s, const double *coil, wre
 }
 
 /* Unbalance u at the angle a: u w^2 (cos, sin)(phi + a) + u w' (sin, -cos)(phi + a): minus mass times the acceleration */
-static void unbalance(const amb_derived *d, const double *s, double spin, wrench *w) {
+static INLINE void unbalance(int flexible, const amb_derived *d, const double *s, double spin, wrench *w) {
     double c, q, square = s[11] * s[11];
     turn(d, s[5] - d->angle, &c, &q);
     double rc = square * c + spin * q, rs = square * q - spin * c;
@@ -127,7 +136,7 @@ static void unbalance(const amb_derived *d, const double *s, double spin, wrench
     w->fz += d->sum_c * rs + d->sum_s * rc;
     w->theta += d->moment_c * rc - d->moment_s * rs;
     w->psi -= d->moment_c * rs + d->moment_s * rc;
-    if (!d->flexible) return;
+    if (!flexible) return;
     for (int k = 0; k < 4; k += 2) {
         w->modal[k] += d->modal[k] * rc - d->modal[k + 1] * rs;
         w->modal[k + 1] += d->modal[k] * rs + d->modal[k + 1] * rc;
@@ -143,32 +152,39 @@ static void bending(const amb_params *p, const amb_derived *d, const double *s, 
 }
 
 /* T (2.3). Drive and drag act along the shaft's own axis, which cancels the terms in w' of the tilted spin momentum. */
-void amb_rates(const amb_params *p, const amb_derived *d, const double *s, const double *coil, double *ds) {
+static INLINE void rates(int flexible, const amb_params *p, const amb_derived *d, const double *s, const double *coil, double *ds) {
     wrench w = {0};
     double y, z, spin;
     for (int b = 0; b < 2; b++) { /* the AMBs stand still while the shaft moves by x */
         double station = d->amb[b] - s[X];
-        amb_plane(d, s, station, p->shape_amb + b, &y, &z);
+        place(flexible, s, station, p->shape_amb + b, &y, &z);
         double fy = force(p->beta[2 * b], p->gap, y + p->offset[2 * b], coil[4 * b], coil[4 * b + 1]);
         double fz = force(p->beta[2 * b + 1], p->gap, z + p->offset[2 * b + 1], coil[4 * b + 2], coil[4 * b + 3]);
-        add(d, &w, station, p->shape_amb + b, fy, fz);
+        add(flexible, &w, station, p->shape_amb + b, fy, fz);
         if (d->near) touchdown(p, d, s, b, &w);
     }
     double shape[4] = {p->shape_coupling[0], 0, p->shape_coupling[1], 0};
-    amb_plane(d, s, -p->l_c, shape, &y, &z);
-    add(d, &w, -p->l_c, shape, -p->coupling * y, -p->coupling * z);
+    place(flexible, s, -p->l_c, shape, &y, &z);
+    add(flexible, &w, -p->l_c, shape, -p->coupling * y, -p->coupling * z);
     thrust(p, s, coil, &w);
-    spin = (d->torque - p->viscous * s[11] + w.torque) / p->polar_inertia;
-    unbalance(d, s, spin, &w);
+    spin = (d->torque - p->viscous * s[11] + w.torque) * d->per_polar;
+    unbalance(flexible, d, s, spin, &w);
     double gyro = p->polar_inertia * s[11];
     memcpy(ds, s + 6, 6 * sizeof *ds);
-    ds[6 + X] = w.fx / p->mass;
-    ds[6 + Y] = w.fy / p->mass + p->gravity_y;
-    ds[6 + Z] = w.fz / p->mass + p->gravity_z;
-    ds[6 + PSI] = (w.psi - gyro * s[6 + THETA]) / p->inertia;
-    ds[6 + THETA] = (w.theta + gyro * s[6 + PSI]) / p->inertia;
+    ds[6 + X] = w.fx * d->per_mass;
+    ds[6 + Y] = w.fy * d->per_mass + p->gravity_y;
+    ds[6 + Z] = w.fz * d->per_mass + p->gravity_z;
+    ds[6 + PSI] = (w.psi - gyro * s[6 + THETA]) * d->per_inertia;
+    ds[6 + THETA] = (w.theta + gyro * s[6 + PSI]) * d->per_inertia;
     ds[11] = spin;
-    if (d->flexible) bending(p, d, s, &w, ds);
+    if (flexible) bending(p, d, s, &w, ds);
+}
+
+void amb_rates(const amb_params *p, const amb_derived *d, const double *s, const double *coil, double *ds) {
+    if (d->flexible) /* twice, so that a rigid shaft does not pay for bending */
+        rates(1, p, d, s, coil, ds);
+    else
+        rates(0, p, d, s, coil, ds);
 }
 
 /* For tests: the right-hand side with `torque` N m of drive and Coulomb drag on the shaft. */

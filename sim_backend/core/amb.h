@@ -98,7 +98,7 @@ typedef struct {
     tsbs_noise noise;
     double sums[16], peak[3];
     int64_t tick, trip_tick;
-    int32_t trips, lost_ticks, flags, in_period, substeps, loose;
+    int32_t trips, lost_ticks, free_ticks, flags, in_period, substeps, loose;
 } amb_state;
 
 void amb_start(const amb_params *, const amb_control *, amb_state *, uint64_t seed);
@@ -117,10 +117,11 @@ enum { X, Y, Z, PSI, THETA };
 #define AMB_COLUMNS 24
 #define AMB_TRACE 32
 #define TWO_PI 6.283185307179586
+#define PER_TICK 1e4
 
 /* what does not change inside a run or a tick */
 typedef struct {
-    double amb[2], sensor[2], unbalanced[2], per_gap, per_current_lsb, per_position_lsb, per_gain[10];
+    double amb[2], sensor[2], unbalanced[2], per_mass, per_inertia, per_polar, per_current_lsb, per_position_lsb, per_gain[10];
     double un_c[2], un_s[2], sum_c, sum_s, moment_c, moment_s, modal[4], square[2], damp[2];
     double angle, turn_c, turn_s, torque, keep[3], runout_c[16], runout_s[16];
     int32_t flexible, runs_out, near, steps[3];

@@ -97,6 +97,11 @@ class AmbPlant:
         return float(self._s.tacho.speed)
 
     @property
+    def phase(self) -> float:
+        """Phase of the ellipse's reference at the last reading, rad, for tests."""
+        return float(self._s.law.phase)
+
+    @property
     def age_ticks(self) -> int:
         """Ticks run since the last completed telemetry period."""
         return int(self._s.in_period)

@@ -14,34 +14,35 @@ static double clip(double x, double low, double high) { return x < low ? low : x
  * di = (F D^2/b - 4 kappa xi ib^2)/(2 [(kappa^2 + xi^2) ib + D sqrt(ib^2 + kappa xi F/b)]),
  * for forces within -4 b ib^2/(kappa + xi)^2 <= F <= 4 b ib^2/(kappa - xi)^2; what is outside is cut. */
 double amb_ccs(double force, double beta, double gap, double xi, double bias) {
-    double near = gap - xi, far = gap + xi, most = 4 * beta * bias * bias;
-    double f = clip(force, -most / (far * far), most / (near * near)) / beta, d = near * far;
+    double near = gap - xi, far = gap + xi, d = near * far, f = force / beta, most = 4 * bias * bias;
+    if (f * near * near >= most) return bias;
+    if (f * far * far <= -most) return -bias;
     double root = sqrt(fmax(bias * bias + gap * xi * f, 0));
-    double over = (gap * gap + xi * xi) * bias + d * root;
-    return clip((f * d * d - 4 * gap * xi * bias * bias) / (2 * over), -bias, bias);
+    return (f * d * d - gap * xi * most) / (2 * ((gap * gap + xi * xi) * bias + d * root));
 }
 
 /* T (2.22), (2.23): only the coil on the side of the force carries current, but for |F| < eta */
 void amb_cac(double force, double beta, double gap, double xi, double eta, double *pair) {
-    double y, root = sqrt(beta);
+    double y = 0, other = 0;
     if (force >= eta) {
-        y = sqrt(force);
+        y = sqrt(force / beta);
     } else if (force < -eta) {
-        y = 0;
+        other = sqrt(-force / beta);
     } else {
         double t = (force + eta) / eta; /* T: P_eta = sqrt(eta) t^3 (15/16 - 13/16 t + 17/64 t^2 - 1/32 t^3) */
-        y = sqrt(eta) * t * t * t * (15.0 / 16 - t * (13.0 / 16 - t * (17.0 / 64 - t / 32)));
+        y = sqrt(eta / beta) * t * t * t * (15.0 / 16 - t * (13.0 / 16 - t * (17.0 / 64 - t / 32)));
+        other = sqrt(fmax(y * y - force / beta, 0));
     }
-    pair[0] = (gap - xi) / root * y;
-    pair[1] = (gap + xi) / root * sqrt(fmax(y * y - force, 0));
+    pair[0] = (gap - xi) * y;
+    pair[1] = (gap + xi) * other;
 }
 
 /* T (2.17) solved for x, y, z, psi, theta; W (y) and V (z) by bearing */
 static void coordinates(const amb_control *c, const double *at, double x, double *q) {
-    double span = c->model_l_is + c->model_l_os;
+    double per_span = 1 / (c->model_l_is + c->model_l_os);
     q[X] = at[AXIAL];
-    q[THETA] = (at[YO] - at[YI]) / span;
-    q[PSI] = (at[ZI] - at[ZO]) / span;
+    q[THETA] = (at[YO] - at[YI]) * per_span;
+    q[PSI] = (at[ZI] - at[ZO]) * per_span;
     q[Y] = at[YI] + (c->model_l_is + x) * q[THETA];
     q[Z] = at[ZO] + (c->model_l_os - x) * q[PSI];
 }
@@ -91,16 +92,16 @@ void amb_forces(const amb_control *c, const double *q, const double *coil, doubl
 
 /* T (2.14) with psi about y and theta about z: forces that give the accelerations v, the coupling included */
 static void flat(const amb_control *c, const double *q, const double *rate, const double *v, double speed, double *force) {
-    double in = c->model_l_ia + q[X], out = c->model_l_oa - q[X], span = in + out, gyro = c->model_polar * speed;
+    double in = c->model_l_ia + q[X], out = c->model_l_oa - q[X], per_span = 1 / (in + out), gyro = c->model_polar * speed;
     double cy = -c->model_coupling * (q[Y] - c->model_l_c * q[THETA]);
     double cz = -c->model_coupling * (q[Z] + c->model_l_c * q[PSI]);
     double ay = c->model_mass * (v[Y] - c->model_gravity_y) - cy, az = c->model_mass * (v[Z] - c->model_gravity_z) - cz;
     double my = c->model_inertia * v[THETA] - gyro * rate[PSI] + c->model_l_c * cy; /* out F_o - in F_i */
     double mz = c->model_inertia * v[PSI] + gyro * rate[THETA] - c->model_l_c * cz; /* in F_i - out F_o */
-    force[YI] = (out * ay - my) / span;
-    force[YO] = (in * ay + my) / span;
-    force[ZI] = (out * az + mz) / span;
-    force[ZO] = (in * az - mz) / span;
+    force[YI] = (out * ay - my) * per_span;
+    force[YO] = (in * ay + my) * per_span;
+    force[ZI] = (out * az + mz) * per_span;
+    force[ZO] = (in * az - mz) * per_span;
     force[AXIAL] = c->model_mass * v[X];
 }
 
@@ -157,7 +158,7 @@ static void begin(const amb_control *c, amb_law_state *l, const double *r) {
 static void filter(const amb_control *c, amb_law_state *l, const double *at) {
     double keep = KEEP(c->derivative_hz);
     for (int k = 0; k < 5; k++) {
-        l->filtered[k] = keep * l->filtered[k] + (1 - keep) * (at[k] - l->previous[k]) / TICK;
+        l->filtered[k] = keep * l->filtered[k] + (1 - keep) * (at[k] - l->previous[k]) * PER_TICK;
         l->previous[k] = at[k];
     }
 }

@@ -98,8 +98,8 @@ class AmbParams:
     exchange_planes: float = 0.0
     loose_speed: float = 0.0  # speed in rad/s above which mounted weights slip, once, by loose_shift; 0: never
     loose_shift: float = 0.0
-    lost_radius: float = 9.8e-5  # stand-in
-    lost_time: float = 0.2  # stand-in: longer than a brush with the ring
+    lost_radius: float = 1e-4  # stand-in: in the ring
+    lost_time: float = 0.1  # stand-in: longer than a brush with the ring
     trip_current: float = 3.4  # stand-in
     trip_speed: float = 15500 * math.pi / 30  # stand-in: above the motor's 15 000 r/min (T 2.2)
 

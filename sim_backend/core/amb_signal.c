@@ -11,7 +11,7 @@ static double toward(double from, double to, double step) {
 static double slewed(double *set, double to, double slew) {
     double from = *set;
     *set = slew > 0 ? toward(from, to, slew * TICK) : to;
-    return slew > 0 ? (*set - from) / TICK : 0;
+    return slew > 0 ? (*set - from) * PER_TICK : 0;
 }
 
 /* T (2.26), (3.16): y = A r sin(w t + p), z = B r cos(w t + p), r going to 0 or 1 in a straight line */
@@ -24,7 +24,7 @@ static void ellipse(const amb_control *c, amb_law_state *l, amb_motion *m) {
     l->share = toward(from, c->ellipse_on != 0, step);
     l->phase += w * TICK;
     if (l->phase > TWO_PI) l->phase -= TWO_PI;
-    double r = l->share, rate = step < 1 ? (r - from) / TICK : 0;
+    double r = l->share, rate = step < 1 ? (r - from) * PER_TICK : 0;
     double s = sin(l->phase + c->ellipse_phase), q = cos(l->phase + c->ellipse_phase);
     m->r[Y] += c->ellipse_y * r * s;
     m->v[Y] += c->ellipse_y * (r * w * q + rate * s);

@@ -45,6 +45,7 @@ def spun(plant: AmbPlant, rpm: float, settle_s: float = 0.5) -> AmbPlant:
     s = plant.state()["s"]
     s[11] = rpm * RPM
     plant.set_state(s)
+    plant.drive(None)
     plant.drive(DRIVE, rpm * RPM)
     plant.run(round(settle_s * 1e4))
     return plant
