@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 
 import numpy as np
 import pytest
@@ -171,6 +171,23 @@ def test_twelve_volts_and_a_lost_pulse_show() -> None:
         stand.controller.clock.sleep(4.0)
         assert stand.plant.shaft_speed == pytest.approx(300, rel=0.02)
         assert stand.reading("speed")[0] == pytest.approx(150, rel=0.02)  # one pulse in two turns
+        bus.drive.coast()
+
+
+@pytest.mark.parametrize("volts", [12.0, 48.0])
+def test_twelve_volts_lose_the_run_up_that_forty_eight_hold(volts: float) -> None:
+    """T Fig. 2.9 with the stand-ins that it needs: CAC, coils of 20 mH, 25 um of eccentricity."""
+    half = 0.98 * 25e-6 / 2
+    stand = Stand(1, supply_V=volts, inductance=20e-3, unbalance_i=half, unbalance_o=half, unbalance_phase_i=0.5,
+                  unbalance_phase_o=0.5 + math.pi / 3)  # fmt: skip
+    stand.levitate(CAC)
+    with driven(stand) as bus:
+        assert bus.drive is not None
+        bus.drive.set_speed(6000 * math.pi / 30)
+        bus.drive.run()
+        lost = pytest.raises(DeviceFault, match="LEVITATION_LOST") if volts == 12 else nullcontext()
+        with lost:
+            stand.controller.clock.sleep(5.0)
         bus.drive.coast()
 
 
