@@ -74,10 +74,12 @@ def motor_quantities(p: PlantParams, bias_A: tuple[float, ...]) -> dict[str, flo
         "alpha_ratio": d / c,
         "alpha_c": c * vertical,
         "gamma_0": p.gamma_zero,
+        "gamma_0t": p.gamma_zero,
         "alpha_tau": (p.alpha_tau + p.beta_4) * sum(g) / 4,
         "B": drag(*bias_A),
         "B_high": drag(HIGH_BIAS_A),
         "T_c": p.coulomb,
+        "J_z": p.polar_inertia,
     }
 
 
