@@ -154,9 +154,9 @@ static void watch(const amb_params *p, const amb_derived *d, amb_state *st, cons
         lost |= square > p->lost_radius * p->lost_radius;
     }
     if (fabs(st->s[X]) > p->stop) st->flags |= CONTACT_X;
-    /* lost: never off the rings for 15 ms in all of lost_time; one that bounces is, one that brushes them is not */
+    /* lost: never off the rings for 5 ms in all of lost_time; one that bounces is, one that brushes them is not */
     st->free_ticks = lost ? 0 : st->free_ticks + 1;
-    st->lost_ticks = st->law.mode != LEVITATE || st->free_ticks > 150 ? 0 : st->lost_ticks + 1;
+    st->lost_ticks = st->law.mode != LEVITATE || st->free_ticks > 50 ? 0 : st->lost_ticks + 1;
     if (st->lost_ticks * TICK > p->lost_time) trips |= TRIP_LOST;
     for (int k = 0; k < 10; k++)
         if (fabs(coil[k]) > p->trip_current) trips |= TRIP_CURRENT;
@@ -210,7 +210,7 @@ void amb_start(const amb_params *p, const amb_control *c, amb_state *st, uint64_
     memset(st, 0, sizeof *st);
     (void)c;
     st->substeps = substeps > 0 ? substeps : 2;
-    st->free_ticks = 151;
+    st->free_ticks = 51;
     tsbs_noise_seed(&st->noise, seed, 0);
     double g = sqrt(p->gravity_y * p->gravity_y + p->gravity_z * p->gravity_z); /* at rest on both rings */
     st->s[Y] = g > 0 ? p->clearance * p->gravity_y / g : 0;
