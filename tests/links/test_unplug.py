@@ -32,6 +32,7 @@ def phases() -> list[object]:
 @pytest.mark.parametrize("phase", phases())
 def test_unplugged_in(phase: str, tmp_path: Path, rig: Served) -> None:
     before = len(rig.child.err)
+    processes.patient_rig(tmp_path)
     with Cable(rig.endpoints["slcan:socket"]) as cable:
         port = ("--link", f"controller=slcan:{cable.path}")
         arguments = processes.live(rig, "slcan:socket", "tiny-levitated", "--no-report", *port)
@@ -52,6 +53,7 @@ def test_unplugged_in(phase: str, tmp_path: Path, rig: Served) -> None:
 
 @pytest.mark.long
 def test_unplugged_while_it_opens(tmp_path: Path, rig: Served) -> None:
+    processes.patient_rig(tmp_path)
     with Cable(rig.endpoints["slcan:socket"]) as cable:
         port = ("--link", f"controller=slcan:{cable.path}")
         arguments = processes.live(rig, "slcan:socket", "tiny-levitated", "--no-report", *port)
