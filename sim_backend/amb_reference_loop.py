@@ -120,23 +120,28 @@ class Law:
 
     def _flatness(self, at: Array, omega: float, r: Array, v: Array, a: Array) -> list[float]:
         c, m = self.c, self.model
-        q, rate, against = m.coordinates(at, at[4]), m.coordinates(self.filtered, 0.0), np.zeros(5)
+        q, rate = m.coordinates(at, at[4]), m.coordinates(self.filtered, 0.0)
+        against, wave, ahead = np.zeros(5), np.zeros(5), np.zeros(5)
         if c.observer:
             self.observer = self.observer or Observer(c, m)
-            rate[1:], against[1:] = self.observer(c, q, omega, self.sent, self.waiting)
+            found = self.observer(c, q, omega, self.sent, self.waiting)
+            rate[1:], against[1:], wave[1:], ahead[1:] = found.rate, found.against, found.wave, found.ahead
         on = np.array([1.0, *[float(c.integral != 0)] * 4])
         self.sum += c.k0 * on * (q - r) * TICK_S
         k2 = {CCS: c.k2_ccs, CAC: c.k2_cac}[int(c.law)]
         wanted = a - k2 * (rate - v) - c.k1 * (q - r) - on * self.sum - against  # (2.16)
+        slow = np.array(m.flat(q, rate, wanted, omega))
+        both, led = (np.array(m.flat(q, rate, wanted - extra, omega)) for extra in (wave, ahead))
         out: list[float] = []
-        for k, force in enumerate(m.flat(q, rate, wanted, omega)):
-            beta, gap = m.beta[k], m.gap[k]
+        for k, (beta, gap) in enumerate(zip(m.beta, m.gap, strict=True)):
             xi = clip(m.gaps(q)[k], -0.9 * gap, 0.9 * gap)
             if c.law == CAC:
-                out += cac(force, beta, gap, xi, c.eta)
-            else:
-                di = ccs(force, beta, gap, xi, c.bias)
-                out += [c.bias + di, c.bias - di]
+                out += cac(led[k], beta, gap, xi, c.eta)
+                continue
+            at_slow = ccs(slow[k], beta, gap, xi, c.bias)  # the lead goes on the current, by the slope of (2.24) there
+            slope = 2 * beta * ((c.bias + at_slow) / (gap - xi) ** 2 + (c.bias - at_slow) / (gap + xi) ** 2)
+            di = clip(ccs(both[k], beta, gap, xi, c.bias) + (led[k] - both[k]) / slope, -c.bias, c.bias)
+            out += [c.bias + di, c.bias - di]
         return out
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -57,6 +58,17 @@ def lead(c: AmbControl, omega: float) -> complex:
     return 1 / (cmath.exp(-jw * TICK_S) * hold / (1 + jw / c.model_rate))
 
 
+@dataclass
+class Estimate:
+    """Of y, z, psi, theta (4,): rates; accelerations to work against; the synchronous ones apart, as they are and as they
+    must be commanded for delay, hold and current loops."""
+
+    rate: Array
+    against: Array = field(default_factory=lambda: np.zeros(4))
+    wave: Array = field(default_factory=lambda: np.zeros(4))
+    ahead: Array = field(default_factory=lambda: np.zeros(4))
+
+
 class Observer:
     """Estimates of y, z, psi, theta, one after the other, the gyroscopic terms by the last estimates of the rates."""
 
@@ -68,10 +80,8 @@ class Observer:
         self.omega = -1.0
         self.gain = np.zeros(5)
 
-    def __call__(
-        self, c: AmbControl, q: Array, omega: float, sent: Array, waiting: Array
-    ) -> tuple[list[float], list[float]]:
-        """Rates of y, z, psi, theta and the accelerations to compensate; `sent` references act, `waiting` will next."""
+    def __call__(self, c: AmbControl, q: Array, omega: float, sent: Array, waiting: Array) -> Estimate:
+        """`sent` references act, `waiting` will next."""
         self.coil = sent + (self.coil - sent) * math.exp(-c.model_rate * TICK_S) if self.x is not None else sent.copy()
         before = (
             np.zeros(4) if self.x is None else self.x[:, 1] + (0 if self.literal else max(self.omega, 0) * self.x[:, 4])
@@ -97,7 +107,7 @@ class Observer:
         theta = (o * oy - i * iy - c.model_l_c * fcy + jxw * rate[2]) / c.model_inertia
         return np.array([y, z, psi, theta])
 
-    def _inside(self, c: AmbControl, q: Array, a: Array) -> tuple[list[float], list[float]]:
+    def _inside(self, c: AmbControl, q: Array, a: Array) -> Estimate:
         assert self.x is not None
         t, w, on = TICK_S, self.omega, self.omega > c.observer_speed
         x = self.x @ transition(w).T
@@ -107,14 +117,15 @@ class Observer:
             x[:, 3:] = 0
         x += np.outer(q - x[:, 0] - x[:, 3], self.gain)
         self.x, self.input = x, a
-        bits, against = int(c.compensate), np.zeros(4)
+        bits, out = int(c.compensate), Estimate(x[:, 1] + w * x[:, 4])
         if bits & CONSTANT:
-            against += x[:, 2]
+            out.against += x[:, 2]
         if bits & HARMONIC and on:  # displacement s = Im of (c + j s); its acceleration is -w^2 s
-            against += ((x[:, 4] + 1j * x[:, 3]) * lead(c, w)).imag * -(w**2)
-        return list(x[:, 1] + w * x[:, 4]), list(against)
+            phasor = x[:, 4] + 1j * x[:, 3]
+            out.wave, out.ahead = -(w**2) * phasor.imag, -(w**2) * (phasor * lead(c, w)).imag
+        return out
 
-    def _literal(self, c: AmbControl, q: Array, a: Array, w: float) -> tuple[list[float], list[float]]:
+    def _literal(self, c: AmbControl, q: Array, a: Array, w: float) -> Estimate:
         assert self.x is not None
         on, h = w > c.observer_speed, self._printed_gains(c, w)
         for k in range(4):
@@ -126,12 +137,12 @@ class Observer:
             if not on:
                 x[3:] = 0
             self.x[k] = x
-        bits, against = int(c.compensate), np.zeros(4)
+        bits, out = int(c.compensate), Estimate(self.x[:, 1].copy())
         if bits & CONSTANT:
-            against += self.x[:, 2] + h[0] * self.x[:, 1]
+            out.against += self.x[:, 2] + h[0] * self.x[:, 1]
         if bits & HARMONIC and on:
-            against += self.x[:, 3] + h[1] * self.x[:, 1]
-        return list(self.x[:, 1]), list(against)
+            out.against += self.x[:, 3] + h[1] * self.x[:, 1]
+        return out
 
     @staticmethod
     def _printed_gains(c: AmbControl, w: float) -> Vector:

@@ -137,5 +137,6 @@ void amb_refer(const amb_control *, amb_law_state *, amb_motion *);
 void amb_notched(const amb_control *, amb_notch *, double *radial);
 double amb_injected(const amb_control *, amb_tones *);
 void amb_forces(const amb_control *, const double *q, const double *coil, double *force);
-void amb_observe(const amb_control *, amb_law_state *, const double *q, double speed, double *rate, double *disturbance);
+void amb_observe(const amb_control *, amb_law_state *, const double *q, double speed, double *rate, double *against,
+                 double *wave, double *ahead);
 #endif

@@ -105,29 +105,64 @@ static void flat(const amb_control *c, const double *q, const double *rate, cons
     force[AXIAL] = c->model_mass * v[X];
 }
 
-static void flatness(const amb_control *c, amb_law_state *l, const double *q, const double *rate, const double *against,
-                     const amb_motion *m, double speed, double *coil) {
-    double v[5], force[5], xi[5], beta[5], k2 = l->law == CAC ? c->k2_cac : c->k2_ccs;
-    for (int k = 0; k < 5; k++) { /* T (2.16); the disturbance is an acceleration; a gain that changes leaves the sum alone */
-        double error = q[k] - m->r[k];
-        if (c->integral != 0 || k == X) l->sum[k] += c->k0 * error * TICK;
-        v[k] = m->a[k] - k2 * (rate[k] - m->v[k]) - c->k1 * error - against[k];
-        if (c->integral != 0 || k == X) v[k] -= l->sum[k];
-    }
-    flat(c, q, rate, v, speed, force);
+/* Differential current by CCS of a slow force and a synchronous one. What the synchronous one must lead by is added to the
+ * current by the slope of (2.24) at the slow force: the amplifiers take it off again, and with it nothing of the mean force,
+ * which goes with the square of the current. */
+static double leading(const amb_control *c, double slow, double wave, double ahead, double beta, double gap, double xi) {
+    double di = amb_ccs(slow + wave, beta, gap, xi, c->bias), near = gap - xi, far = gap + xi;
+    if (ahead == wave) return di;
+    double at = amb_ccs(slow, beta, gap, xi, c->bias);
+    double slope = 2 * beta * ((c->bias + at) / (near * near) + (c->bias - at) / (far * far));
+    return clip(di + (ahead - wave) / slope, -c->bias, c->bias);
+}
+
+static void invert(const amb_control *c, int law, const double *q, const double *force, const double *wave, const double *ahead,
+                   double *coil) {
+    double xi[5], beta[5];
     magnetic(c, q, xi);
     betas(c, beta);
     for (int k = 0; k < 5; k++) {
-        double gap = k == AXIAL ? c->model_gap_x : c->model_gap, pair[2];
-        double at = clip(xi[k], -0.9 * gap, 0.9 * gap);
-        if (l->law == CAC) {
-            amb_cac(force[k], beta[k], gap, at, c->eta, pair);
+        double gap = k == AXIAL ? c->model_gap_x : c->model_gap, at = clip(xi[k], -0.9 * gap, 0.9 * gap), *pair = coil + 2 * k;
+        if (law == CAC) {
+            amb_cac(force[k] + ahead[k], beta[k], gap, at, c->eta, pair);
         } else {
-            double di = amb_ccs(force[k], beta[k], gap, at, c->bias);
+            double di = leading(c, force[k], wave[k], ahead[k], beta[k], gap, at);
             pair[0] = c->bias + di, pair[1] = c->bias - di;
         }
-        coil[2 * k] = pair[0], coil[2 * k + 1] = pair[1];
     }
+}
+
+/* what the law and its observer make of the disturbance: accelerations to work against; the synchronous ones apart, as they
+ * are and as they are to be commanded */
+typedef struct {
+    double against[5], wave[5], ahead[5];
+} estimate;
+
+/* forces that a change of the accelerations by -v makes: T (2.14) is linear in them */
+static void against(const amb_control *c, double x, const double *v, double *force) {
+    double in = c->model_l_ia + x, out = c->model_l_oa - x, per_span = 1 / (in + out), m = c->model_mass, j = c->model_inertia;
+    force[YI] = -(m * out * v[Y] - j * v[THETA]) * per_span;
+    force[YO] = -(m * in * v[Y] + j * v[THETA]) * per_span;
+    force[ZI] = -(m * out * v[Z] + j * v[PSI]) * per_span;
+    force[ZO] = -(m * in * v[Z] - j * v[PSI]) * per_span;
+    force[AXIAL] = 0;
+}
+
+static void flatness(const amb_control *c, amb_law_state *l, const double *q, const double *rate, const estimate *e,
+                     const amb_motion *m, double speed, double *coil) {
+    double v[5], force[5], wave[5] = {0}, ahead[5] = {0}, k2 = l->law == CAC ? c->k2_cac : c->k2_ccs;
+    for (int k = 0; k < 5; k++) { /* T (2.16); a gain that changes leaves the sum alone */
+        double error = q[k] - m->r[k];
+        if (c->integral != 0 || k == X) l->sum[k] += c->k0 * error * TICK;
+        v[k] = m->a[k] - k2 * (rate[k] - m->v[k]) - c->k1 * error - e->against[k];
+        if (c->integral != 0 || k == X) v[k] -= l->sum[k];
+    }
+    flat(c, q, rate, v, speed, force);
+    if (l->observer.turning) {
+        against(c, q[X], e->wave, wave);
+        against(c, q[X], e->ahead, ahead);
+    }
+    invert(c, l->law, q, force, wave, ahead, coil);
 }
 
 /* T 2.4.3: y from W, z from V. The derivative acts on the error; of a set point that jumps there is none. */
@@ -189,7 +224,8 @@ static void inject(const amb_control *c, amb_law_state *l, amb_reference *out) {
 }
 
 void amb_law(const amb_control *c, amb_law_state *l, const amb_reading *r, amb_reference *out) {
-    double at[5], q[5], rate[5], against[5] = {0};
+    double at[5], q[5], rate[5];
+    estimate e = {0};
     amb_motion m;
     memcpy(at, r->position, sizeof at);
     memset(out, 0, sizeof *out);
@@ -205,8 +241,8 @@ void amb_law(const amb_control *c, amb_law_state *l, const amb_reading *r, amb_r
     if (l->law == PID) {
         pid(c, l, at, &m, out->coil);
     } else {
-        if (c->observer != 0) amb_observe(c, l, q, r->speed, rate, against);
-        flatness(c, l, q, rate, against, &m, r->speed, out->coil);
+        if (c->observer != 0) amb_observe(c, l, q, r->speed, rate, e.against, e.wave, e.ahead);
+        flatness(c, l, q, rate, &e, &m, r->speed, out->coil);
     }
     for (int k = 0; k < 10; k++) out->coil[k] = clip(out->coil[k], 0, c->current_limit);
     inject(c, l, out);

@@ -73,7 +73,8 @@ static void start(amb_law_state *l, const double *q, const double *a) {
     o->started = 1;
 }
 
-static void inside(const amb_control *c, amb_law_state *l, const double *q, const double *a, double *rate, double *against) {
+static void inside(const amb_control *c, amb_law_state *l, const double *q, const double *a, double *rate, double *against,
+                   double *wave, double *ahead) {
     amb_observer *o = &l->observer;
     const double t = TICK, *g = o->gain;
     int bits = (int)c->compensate;
@@ -89,8 +90,11 @@ static void inside(const amb_control *c, amb_law_state *l, const double *q, cons
         rate[coordinate[k]] = x[1] + o->speed * x[4];
         o->input[k] = a[k];
         if (bits & CONSTANT) against[coordinate[k]] += x[2];
-        if (bits & HARMONIC && o->turning)
-            against[coordinate[k]] -= o->speed * o->speed * (x[3] * o->lead_c + x[4] * o->lead_s);
+        if (bits & HARMONIC && o->turning) {
+            double square = o->speed * o->speed;
+            wave[coordinate[k]] = -square * x[3];
+            ahead[coordinate[k]] = -square * (x[3] * o->lead_c + x[4] * o->lead_s);
+        }
     }
 }
 
@@ -131,9 +135,11 @@ static void literal(const amb_control *c, amb_law_state *l, const double *q, con
     }
 }
 
-/* Rates and disturbing accelerations of the coordinates y, z, psi, theta; gains are made again when the speed has changed
+/* Rates and disturbing accelerations of the coordinates y, z, psi, theta, their synchronous part as it is and as it must be
+ * commanded because of the actuators; gains are made again when the speed has changed
  * by 2e-4 of itself, or a pole has. */
-void amb_observe(const amb_control *c, amb_law_state *l, const double *q, double speed, double *rate, double *against) {
+void amb_observe(const amb_control *c, amb_law_state *l, const double *q, double speed, double *rate, double *against,
+                 double *wave, double *ahead) {
     amb_observer *o = &l->observer;
     const double made[5] = {c->observer, c->observer_constant, c->observer_damping, c->observer_turning, c->observer_velocity};
     double keep = exp(-c->model_rate * TICK), a[4], before[4];
@@ -148,7 +154,7 @@ void amb_observe(const amb_control *c, amb_law_state *l, const double *q, double
         literal(c, l, q, a, speed, rate, against);
     } else {
         if (changed || fabs(speed - o->speed) > 2e-4 * o->speed) amb_observer_gains(c, o, speed);
-        inside(c, l, q, a, rate, against);
+        inside(c, l, q, a, rate, against, wave, ahead);
     }
     memcpy(o->made, made, sizeof made);
 }

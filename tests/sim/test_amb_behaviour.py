@@ -119,7 +119,7 @@ def test_a5_disturbances_are_compensated_within_150_ms() -> None:
     trace = plant.run(3600, 1)[1]
     late = np.abs(synchronous(trace, slice(0, 4))) + np.abs(trace[:, :4].mean(axis=0))
     assert (soon < 0.2 * before).all()
-    assert late.max() < 1e-6
+    assert late.max() < 0.5e-6  # printed: 1 um
 
 
 def reduction(observer: float, rpm: float, error: float = 1.0) -> float:
