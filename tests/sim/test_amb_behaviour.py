@@ -10,6 +10,7 @@ import math
 import numpy as np
 import pytest
 from amb_plants import COLUMN, DRIVE, RPM, Array, levitated, spun, synchronous
+from scipy.optimize import least_squares
 
 from sim_backend.core import LAND, OFF
 from sim_backend.core.amb import TRACE, AmbPlant
@@ -51,6 +52,36 @@ def test_lifts_holds_and_lands(law: int) -> None:
     plant.run(2000)
     y, z = plant.state()["s"][1:3]
     assert math.hypot(y, z) == pytest.approx(1e-4, abs=3e-6)
+
+
+def test_a1_the_linear_model_does_not_fit_the_bearing() -> None:
+    """Eccentric positions without the coupling, e 0: T (2.8) finds beta and offset, (2.9) leaves 20 times its residual, and
+    its coefficients come out as large as in T Table 2.2, which are not the bearing's slopes."""
+    plant = levitated(1, e=0.0, coupling=0.0, control={"model_coupling": 0.0, "k0": 3e6, "slew": 5e-3})
+    p, parts = plant.params, []
+    for y in np.linspace(-95e-6, 95e-6, 9):
+        plant.set("ref_y", y)
+        plant.run(3000)
+        rows = plant.run(1000)
+        parts.append(
+            np.stack(
+                [rows[:, 0] - (p.l_ia - p.l_is) * (rows[:, 2] - rows[:, 0]) / 0.178, rows[:, 7] / 2 - rows[:, 8] / 2]
+            )
+        )
+    y, di = np.concatenate(parts, axis=1)
+    load = p.mass * p.l_oa / (p.l_ia + p.l_oa) * p.gravity_y
+
+    def residual(q: Array) -> Array:
+        beta, offset = q * 1e-7, q[1] * 1e-4
+        return np.asarray(
+            beta[0] * ((1 - di) ** 2 / (p.gap + offset + y) ** 2 - (1 + di) ** 2 / (p.gap - offset - y) ** 2) - load
+        )
+
+    found = least_squares(residual, [5.0, 0.0])
+    slopes, linear, *_ = np.linalg.lstsq(np.stack([di, y], axis=1), np.full(len(y), load), rcond=None)
+    assert found.x == pytest.approx([6.95, 1.15], rel=0.01)
+    assert linear[0] > 20 * 2 * found.cost
+    assert np.abs(slopes) == pytest.approx([58, 1.33e5], rel=0.05)
 
 
 def test_a3_twelve_volts_lose_where_forty_eight_hold() -> None:
@@ -138,6 +169,26 @@ def reduction(observer: float, rpm: float, error: float = 1.0) -> float:
 def test_a6_vibration_is_reduced_over_the_range_of_speed(rpm: float) -> None:
     assert reduction(1.0, rpm) > 0.95
     assert reduction(1.0, rpm, 0.95) > 0.95
+
+
+@pytest.mark.parametrize("law", [1, 2], ids=["CCS", "CAC"])
+def test_the_run_up_with_compensation_passes_the_critical_speed(law: int) -> None:
+    plant = levitated(law, control=OBSERVED | {"compensate": 3.0})
+    plant.drive(DRIVE, 10000 * RPM)
+    rows = plant.run(55000)
+    assert np.abs(rows[:, :4]).max() < 6e-6  # over 20 um without
+    assert rows[-1, COLUMN["speed"]] > 9900 * RPM
+
+
+def test_laws_and_observers_can_be_changed_while_the_shaft_turns() -> None:
+    plant = spun(levitated(0), 8000)
+    changes = ({"law": 1.0}, {"observer": 1.0}, {"compensate": 3.0, "integral": 0.0}, {"law": 2.0}, {"observer": 2.0},
+               {"compensate": 0.0, "integral": 1.0}, {"observer": 0.0}, {"law": 0.0}, {"notch2_hz": 1240.0})  # fmt: skip
+    for change in changes:
+        for name, value in change.items():
+            plant.set(name, value)
+        assert not touched(plant.run(3000)), change
+    assert plant.trips == 0
 
 
 def test_a6_the_printed_observers_do_not_reach_that() -> None:

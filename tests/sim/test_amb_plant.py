@@ -131,6 +131,12 @@ def test_pulses_tell_turns_and_their_times() -> None:
     angles = 2 * math.pi * np.arange(1, len(new) + 1) - 1.0
     np.testing.assert_allclose(times, (np.sqrt(400**2 + 2 * rate * angles) - 400) / rate, atol=1e-6)
     assert trace[-1, TRACE.index("speed")] == pytest.approx(400 + rate * 0.3, rel=0.01)
+    plant.drive(None)
+    plant.set_state(at())
+    plant.run(1000)
+    assert 0 < plant.speed <= 2 * math.pi / 0.1  # no pulse for 0.1 s: less than a turn in that time
+    plant.run(5000)
+    assert plant.speed == 0
 
 
 @pytest.mark.parametrize(
@@ -182,6 +188,12 @@ def test_same_seed_same_readings_and_another_differs() -> None:
     a, b, c = (AmbPlant(seed=seed).run(200) for seed in (5, 5, 6))
     assert (a == b).all()
     assert (a[:, 0] != c[:, 0]).any()
+
+
+def test_a_run_in_parts_is_the_same_run() -> None:
+    whole, parts = (spun(levitated(1, control={"observer": 1.0, "compensate": 3.0}), 6000) for _ in range(2))
+    rows = np.concatenate([parts.run(n) for n in (1, 7, 995, 3, 994)])
+    assert (whole.run(2000) == rows).all()
 
 
 def test_weights_add_to_the_unbalance_and_take_it_away() -> None:
