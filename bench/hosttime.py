@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
 
 WINDOW_NS = 1_000_000_000
 MAX_DRIFT = 200e-6  # two crystals differ by less; what goes faster is latency
@@ -72,6 +71,8 @@ class HostMap:
         points = np.array(self._minima[1:], float)  # the first window may be short
         if len(points) < FEWEST or np.ptp(points[:, 1]) == 0:
             return None
+        from scipy import stats  # half a second to import, and only a live run needs it
+
         points = points[:: -(-len(points) // MOST)]
         x, y = points[:, 0] - points[0, 0], points[:, 1] - points[0, 1]
         slope, _, low, high = stats.theilslopes(y, x, 0.95)

@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy import special
 
 from bench.findings import Effect, Finding
 from procedures.estimators import mass_hanging
@@ -174,7 +174,7 @@ def of_fit(
 def _loads(data: HangingData, f: Fit, s: Scatter, p: Mapping[str, float], u_mass: Array) -> Iterator[Finding]:
     shares = np.array(mass_hanging.hung_shares(p["hook_to_outboard"], p["amb_span"]))
     total, suspects = misfit(f, data.hangings, s, shares * p["gravity"], u_mass)
-    if total < stats.chi2.ppf(1 - 1e-6, df=2 * (len(u_mass) - 3)):
+    if total < special.chdtri(2 * (len(u_mass) - 3), 1e-6):
         return
     best = suspects[0]
     plausible = [x for x in suspects if x.misfit < best.misfit + 10]

@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy import special
 
 from bench.findings import Effect, Finding
 from procedures.estimators.force_rows import CROSS, DIRECT, FORCE, SEGMENTS
@@ -165,7 +165,7 @@ def exchanged(axis: str, terms: Array) -> Iterator[Finding]:
 
 def beyond(chi2: float, parts: int, dof: int) -> bool:
     """Whether a chi-squared of that many parts is none by chance, its scatter being known with `dof` (F test)."""
-    return bool(chi2 / parts > stats.f.ppf(1 - CHANCE, parts, dof))
+    return bool(chi2 / parts > special.fdtri(parts, dof, 1 - CHANCE))
 
 
 def rows_disagree(axis: str, rows: tuple[float, float], z: float, apart: bool, suspect: str) -> Iterator[Finding]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import linalg, optimize, stats
+from scipy import linalg, optimize, special
 
 from bench.errors import AnalysisError
 
@@ -38,7 +38,7 @@ class Fit:
     @property
     def p_value(self) -> float:
         """Probability of a chi-squared this large by chance; means something where the scatter was stated."""
-        return float(stats.chi2.sf(self.chi2, self.dof)) if self.dof > 0 else 1.0
+        return float(special.chdtrc(self.dof, self.chi2)) if self.dof > 0 else 1.0
 
 
 def linear(design: npt.ArrayLike, observed: npt.ArrayLike, covariance: npt.ArrayLike | None = None) -> Fit:
@@ -126,7 +126,7 @@ def lack_of_fit(fit: Fit, groups: npt.ArrayLike) -> LackOfFit:
     pure = float(((r - means[member]) ** 2).sum())
     lack = max(float((r**2).sum()) - pure, 0.0)
     f = (lack / model) / (pure / repeats) if pure > 0 else (np.inf if lack > 0 else 0.0)
-    return LackOfFit(float(f), model, repeats, float(stats.f.sf(f, model, repeats)))
+    return LackOfFit(float(f), model, repeats, float(special.fdtrc(model, repeats, f)))
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy import special
 
 from bench.findings import Effect, Finding
 from bench.recording import Recording
@@ -146,7 +146,7 @@ def _agreement(angle: Drag, speed: Drag) -> Iterator[Finding]:
 
 def _repeats(drag: Drag) -> Iterator[Finding]:
     for name, r in drag.rates.items():
-        if r.ratio_dof and r.ratio > max(stats.chi2.ppf(1 - 1e-5, r.ratio_dof) / r.ratio_dof, 1) * 3:
+        if r.ratio_dof and r.ratio > max(special.chdtri(r.ratio_dof, 1e-5) / r.ratio_dof, 1) * 3:
             yield Finding(
                 "repeats-disagree",
                 f"repeated run-downs scatter {math.sqrt(r.ratio):.1f} times as far as the residuals of the fits let expect; "

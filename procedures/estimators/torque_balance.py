@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import optimize, stats
+from scipy import optimize, special
 
 from bench.errors import AnalysisError
 from procedures.estimators.leastsquares import Fit, linear, nonlinear
@@ -256,7 +256,7 @@ def shape_over_gamma(b: Balance, s: Steps) -> tuple[float, float]:
     dof = b.fit.dof - more
     if dof < 1 or rest <= 0:
         return 1.0, 0.0
-    return float(stats.f.sf((total - rest) / more / (rest / dof), more, dof)), float(np.abs(terms).max())
+    return float(special.fdtrc(more, dof, (total - rest) / more / (rest / dof))), float(np.abs(terms).max())
 
 
 def slopes_over_gamma(b: Balance, s: Steps, side: int) -> tuple[Array, Array, Array]:
