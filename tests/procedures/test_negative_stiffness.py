@@ -21,8 +21,6 @@ from procedures import carrying, negative_stiffness
 from procedures.estimators.stiffness_estimates import evaluate
 from procedures.negative_stiffness import Plan, check, figures, read
 
-pytestmark = pytest.mark.xdist_group("negative-stiffness")  # one worker makes the calibrations once
-
 NAME = "negative-stiffness"
 QUICK = {"levels_m": [-40e-6, -20e-6, 0.0, 20e-6, 40e-6], "settle_s": 0.5, "average_s": 0.3}
 
