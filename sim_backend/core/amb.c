@@ -105,18 +105,20 @@ static INLINE void add(int flexible, wrench *w, double station, const double *sh
     }
 }
 
-static void touchdown(const amb_params *p, const amb_derived *d, const double *s, int b, wrench *w) {
+static wrench touchdown(const amb_params *p, const amb_derived *d, const double *s, int b) {
     double y, z, vy, vz;
+    wrench w = {0};
     amb_plane(d, s, d->sensor[b], p->shape_sensor + b, &y, &z);
-    if (y * y + z * z <= p->clearance * p->clearance) return;
+    if (y * y + z * z <= p->clearance * p->clearance) return w;
     double r = sqrt(y * y + z * z), ny = y / r, nz = z / r;
     vy = s[6 + Y] + d->sensor[b] * s[6 + THETA];
     vz = s[6 + Z] - d->sensor[b] * s[6 + PSI];
     double push = p->ring_stiffness * (r - p->clearance) + p->ring_damping * (vy * ny + vz * nz);
-    if (push <= 0) return;
+    if (push <= 0) return w;
     double slip = -vy * nz + vz * ny + p->ring_radius * s[11], drag = p->ring_friction * push * tanh(slip / 0.01);
-    add(d->flexible, w, d->sensor[b], p->shape_sensor + b, -push * ny + drag * nz, -push * nz - drag * ny);
-    w->torque -= drag * p->ring_radius;
+    add(d->flexible, &w, d->sensor[b], p->shape_sensor + b, -push * ny + drag * nz, -push * nz - drag * ny);
+    w.torque -= drag * p->ring_radius;
+    return w;
 }
 
 static INLINE void thrust(const amb_params *p, const double *s, const double *coil, wrench *w) {
@@ -143,11 +145,11 @@ static INLINE void unbalance(int flexible, const amb_derived *d, const double *s
     }
 }
 
-static void bending(const amb_params *p, const amb_derived *d, const double *s, const wrench *w, double *ds) {
+static void bending(const amb_params *p, const amb_derived *d, const double *s, const double *modal, double *ds) {
     memcpy(ds + 12, s + 16, 4 * sizeof *ds);
     for (int k = 0; k < 4; k++) {
         int m = k / 2;
-        ds[16 + k] = p->mode_on[m] == 0 ? 0 : w->modal[k] / p->mode_mass[m] - d->damp[m] * s[16 + k] - d->square[m] * s[12 + k];
+        ds[16 + k] = p->mode_on[m] == 0 ? 0 : modal[k] / p->mode_mass[m] - d->damp[m] * s[16 + k] - d->square[m] * s[12 + k];
     }
 }
 
@@ -161,7 +163,11 @@ static INLINE void rates(int flexible, const amb_params *p, const amb_derived *d
         double fy = force(p->beta[2 * b], p->gap, y + p->offset[2 * b], coil[4 * b], coil[4 * b + 1]);
         double fz = force(p->beta[2 * b + 1], p->gap, z + p->offset[2 * b + 1], coil[4 * b + 2], coil[4 * b + 3]);
         add(flexible, &w, station, p->shape_amb + b, fy, fz);
-        if (d->near) touchdown(p, d, s, b, &w);
+        if (d->near) { /* apart, so that the sum of a free shaft stays in registers */
+            wrench t = touchdown(p, d, s, b);
+            w.fy += t.fy, w.fz += t.fz, w.psi += t.psi, w.theta += t.theta, w.torque += t.torque;
+            for (int k = 0; k < 4; k++) w.modal[k] += t.modal[k];
+        }
     }
     double shape[4] = {p->shape_coupling[0], 0, p->shape_coupling[1], 0};
     place(flexible, s, -p->l_c, shape, &y, &z);
@@ -177,7 +183,9 @@ static INLINE void rates(int flexible, const amb_params *p, const amb_derived *d
     ds[6 + PSI] = (w.psi - gyro * s[6 + THETA]) * d->per_inertia;
     ds[6 + THETA] = (w.theta + gyro * s[6 + PSI]) * d->per_inertia;
     ds[11] = spin;
-    if (flexible) bending(p, d, s, &w, ds);
+    if (!flexible) return;
+    double modal[4] = {w.modal[0], w.modal[1], w.modal[2], w.modal[3]};
+    bending(p, d, s, modal, ds);
 }
 
 void amb_rates(const amb_params *p, const amb_derived *d, const double *s, const double *coil, double *ds) {

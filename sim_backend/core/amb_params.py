@@ -36,7 +36,11 @@ UNBALANCE = unbalance(10e-6)
 
 @dataclass(frozen=True)
 class AmbParams:
-    """The machine. Axis order yi, zi, yo, zo, x; coils axis by axis, p then n; planes inboard, outboard."""
+    """The machine. Axis order yi, zi, yo, zo, x; coils axis by axis, p then n; planes inboard, outboard.
+
+    Left out: motional emf and the position's share of the inductance, eddy currents, hysteresis, the amplifiers' ripple, the
+    gyroscopic split of the bending modes.
+    """
 
     mass: float = MASS_KG  # T Table 2.3
     inertia: float = 5.84e-3  # T Table 2.3
