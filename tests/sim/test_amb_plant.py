@@ -178,7 +178,9 @@ def test_sensors_gain_offset_polarity_range_exchange_and_runout() -> None:
     changed.set_state(s)
     read = changed.run(1, 1)[1][0, :4]
     np.testing.assert_allclose(read, [5e-5, 3e-5, 1.22e-5 + 2e-6 * math.cos(0.8), -2.9e-5], rtol=1e-9)
-    changed.run(9)
+    flags = [int(plant.run(9)[0, COLUMN["flags"]]) for plant in (base, changed)]
+    assert flags[1] & 32
+    assert not flags[0] & 32
     noisy = AmbPlant(AmbParams(gravity_y=0.0, gravity_z=0.0, coupling=0.0), 3).run(4000, 1)[1]
     np.testing.assert_allclose(noisy[:, :5].std(axis=0), 3e-7, rtol=0.05)
     np.testing.assert_allclose(noisy[:, 5:15].std(axis=0), 2e-3, rtol=0.05)
