@@ -68,7 +68,9 @@ def test_monte_carlo_is_seeded_and_independent_of_order() -> None:
     assert interval(r + n, 3) != interval(r + n, 4)
 
 
-@pytest.mark.parametrize("small", [("normal", math.inf), ("normal", 6.0), ("rectangular", math.inf), ("arcsine", math.inf)])
+@pytest.mark.parametrize(
+    "small", [("normal", math.inf), ("normal", 6.0), ("rectangular", math.inf), ("arcsine", math.inf)]
+)
 def test_what_is_small_may_be_drawn_as_one_normal(small: tuple[str, float]) -> None:
     # Oracle: every influence drawn by itself.
     parts = [estimate("r", 2.0, 1.0, distribution="rectangular"), estimate("t", 0.0, 0.4, 5)]
