@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -263,10 +264,13 @@ def missing(quantity: Quantity, limit: Limit | None = None, where: str = "") -> 
 
 
 def correlations_of(measured: Sequence[Measured]) -> Correlations:
-    """Correlations of the measured quantities, from the influences that they share."""
+    """Correlations of the measured quantities, from the influences that they share. A quantity that was measured at
+    several places is named with its place (`K_i@upper`)."""
     finite = [m for m in measured if math.isfinite(m.estimate.value) and math.isfinite(m.estimate.u)]
     matrix = correlation_matrix([m.estimate for m in finite])
-    return Correlations(tuple(m.quantity.name for m in finite), tuple(tuple(row) for row in matrix))
+    times = Counter(m.quantity.name for m in finite)
+    names = (m.quantity.name if times[m.quantity.name] == 1 else f"{m.quantity.name}@{m.where}" for m in finite)
+    return Correlations(tuple(names), tuple(tuple(row) for row in matrix))
 
 
 def outcome_of(

@@ -13,6 +13,9 @@ from reports import text
 from reports.view import BudgetRow, BudgetTable, Correlations, Fact, Symbol, Table
 
 SMALL_SHARE = 0.0005  # of the variance; smaller influences are summed in one line, all of them are in record.json
+PAGE_WIDTH = 14  # columns of a correlation matrix
+SMALL_CORRELATION = 0.05
+MOST_PAIRS = 40
 NOT_INPUTS = ("simulation", "plans", "envelope", "parameters", "laboratory", "settling")
 Content = Mapping[str, Any]
 
@@ -155,7 +158,7 @@ def calibrations(found: Any) -> Table:
 
 
 def correlations(record: Content) -> Correlations | None:
-    """The matrix over the measurements; None for fewer than two.
+    """The matrix over the measurements; None for fewer than two. What a page's width does not hold is told by pairs.
 
     Accepts a square list of rows in the order of the measurements, or the same under `names` and `matrix`.
     """
@@ -165,8 +168,31 @@ def correlations(record: Content) -> Correlations | None:
         names, found = [str(n) for n in found.get("names", names)], found.get("matrix")
     if not found or len(names) < 2 or len(found) != len(names):
         return None
+    if len(names) > PAGE_WIDTH:
+        return _pairs(names, found)
     rows = tuple(tuple(_coefficient(r) for r in row) for row in found)
     return Correlations(tuple(symbol_of(shorten(n, 20, placeholder="…")) for n in names), rows)
+
+
+def _pairs(names: Sequence[str], matrix: Sequence[Sequence[float | None]]) -> Correlations:
+    """The pairs of most correlation, largest first."""
+    above = ((matrix[a][b], a, b) for a in range(len(names)) for b in range(a))
+    known = sorted(
+        ((r, a, b) for r, a, b in above if r is not None and abs(r) >= SMALL_CORRELATION), key=lambda p: -abs(p[0])
+    )
+    pairs = tuple((_placed(names[b]), _placed(names[a]), _coefficient(r)) for r, a, b in known[:MOST_PAIRS])
+    count = len(names) * (len(names) - 1) // 2
+    note = (
+        f"{len(known)} of the {count} pairs have a coefficient of at least {SMALL_CORRELATION} in size"
+        f"{f'; the {MOST_PAIRS} largest are listed' if len(known) > MOST_PAIRS else ''}. record.json has the whole matrix."
+    )
+    return Correlations((), (), pairs, note)
+
+
+def _placed(name: str) -> tuple[Symbol, str]:
+    """The symbol of `K_i@upper`, and its place."""
+    symbol, _, place = name.partition("@")
+    return symbol_of(symbol), place
 
 
 def _coefficient(r: float | None) -> str:

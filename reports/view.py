@@ -123,10 +123,14 @@ class Table:
 
 @dataclass(frozen=True)
 class Correlations:
-    """The correlation matrix of the results."""
+    """The correlation matrix of the results; of many results, the pairs that are correlated most."""
 
     symbols: tuple[Symbol, ...]
     rows: tuple[tuple[str, ...], ...]
+    pairs: tuple[
+        tuple[tuple[Symbol, str], tuple[Symbol, str], str], ...
+    ] = ()  # symbol and place, twice, and coefficient
+    note: str = ""
 
 
 @dataclass(frozen=True)

@@ -194,6 +194,22 @@ def test_a_truncated_recording_is_said_aloud() -> None:
     assert made.outcome_text == "The run was stopped before its end. See the finding operator-abort."
 
 
+def test_many_correlations_are_told_by_pairs() -> None:
+    """A matrix of 20 columns would leave the page: the largest pairs instead, with their places."""
+    names = [f"overshoot@{k} µm" for k in range(20)]
+    matrix = [[1.0 if a == b else 0.0 for b in range(20)] for a in range(20)]
+    matrix[3][7] = matrix[7][3] = -0.62
+    matrix[1][2] = matrix[2][1] = 0.93
+    matrix[5][6] = matrix[6][5] = 0.02
+    page = html.render(view(correlations={"names": names, "matrix": matrix}))
+    text = Page(page).text
+    assert "2 of the 190 pairs have a coefficient of at least 0.05 in size. record.json" in text
+    assert text.index("0.93") < text.index("\u22120.62")
+    row = page[page.index("1 µm</td>") :]
+    assert row.index("2 µm</td>") < row.index("0.93")
+    assert "0.02" not in text[text.index("Correlations of the results") :][:600]
+
+
 def hostile() -> tuple[dict[str, Any], SampleRecording]:
     h = HOSTILE
     entry = {
