@@ -98,41 +98,21 @@ def live(rig: RigFile, operator: str, injected: Sequence[Fault] = (), clear_faul
 
     @contextmanager
     def connect(supervisor: Supervisor) -> Iterator[OpenRig]:
-        from drivers.background import Background
         from drivers.controller import Controller
-        from drivers.faulty_link import FaultyLink
         from drivers.fieldbus import open_devices
-        from drivers.live_link import LiveLink
         from drivers.modbus import open_lines
-        from drivers.operator import LineOperator
-        from drivers.operator_line import OperatorLine
-        from drivers.wires import open_wire
 
-        session, name = new_session(), rig.devices["controller"].link
-        identifiers = [m.identifier for m in rig.messages.messages.values()]
+        session = new_session()
         with ExitStack() as stack:
             stack.enter_context(supervisor.finishing())
             wall = WallClock()
-            real = LiveLink(name, lambda: open_wire(spec, name, identifiers, wall.now_ns), beat_of(rig, session),
-                            heartbeat=spec.heartbeat, reconnect_s=spec.reconnect_s)  # fmt: skip
-            telemetry = [rig.messages[m].identifier for m in rig.binding.telemetry]
-            link: Link = real
-            if injected:
-                link = FaultyLink(real, injected, 0, wall, telemetry=telemetry, hush=real.hush,
-                                  reconnect_s=spec.reconnect_s)  # fmt: skip
+            link = _live_link(rig, session, wall, injected)
             stack.callback(link.close)
             base = WatchedClock(wall, link.renew_lease, supervisor.check)
             controller = Controller(rig, link, base, session, LIVE_SLICE_S)
             controller.connect(clear_fault)
             stack.callback(_released, controller)
-            line = None
-            if "operator" in rig.devices and operator != "console":
-                line = stack.enter_context(OperatorLine.open(rig.links[rig.devices["operator"].link].url))
-            hands = None
-            if line is not None:
-                asking = Background(controller.clock, "requests to the operator")
-                stack.callback(asking.close)
-                hands = LineOperator(asking.of(line.request), controller.clock, controller.envelope)
+            hands = _operator_on_a_line(rig, controller, stack) if operator != "console" else None
             lines = stack.enter_context(open_lines(rig))
 
             def port_of(device: str) -> RegisterPort:
@@ -147,6 +127,37 @@ def live(rig: RigFile, operator: str, injected: Sequence[Fault] = (), clear_faul
             yield _opened(controller, base, bus, people, None, injected, lines)
 
     return connect
+
+
+def _live_link(rig: RigFile, session: Session, wall: Clock, injected: Sequence[Fault]) -> Link:
+    """The controller's link with its heartbeat, and with the faults that are to happen on it."""
+    from drivers.faulty_link import FaultyLink
+    from drivers.live_link import LiveLink
+    from drivers.wires import open_wire
+
+    spec, name = rig.link, rig.devices["controller"].link
+    identifiers = [m.identifier for m in rig.messages.messages.values()]
+    real = LiveLink(name, lambda: open_wire(spec, name, identifiers, wall.now_ns), beat_of(rig, session),
+                    heartbeat=spec.heartbeat, reconnect_s=spec.reconnect_s)  # fmt: skip
+    if not injected:
+        return real
+    telemetry = [rig.messages[m].identifier for m in rig.binding.telemetry]
+    return FaultyLink(real, injected, 0, wall, telemetry=telemetry, hush=real.hush,
+                      reconnect_s=spec.reconnect_s)  # fmt: skip
+
+
+def _operator_on_a_line(rig: RigFile, controller: Controller, stack: ExitStack) -> LineOperator | None:
+    """The operator of a rig whose operator is a device, such as the simulated person of `bench serve`."""
+    from drivers.background import Background
+    from drivers.operator import LineOperator
+    from drivers.operator_line import OperatorLine
+
+    if "operator" not in rig.devices:
+        return None
+    line = stack.enter_context(OperatorLine.open(rig.links[rig.devices["operator"].link].url))
+    asking = Background(controller.clock, "requests to the operator")
+    stack.callback(asking.close)
+    return LineOperator(asking.of(line.request), controller.clock, controller.envelope)
 
 
 def beat_of(rig: RigFile, session: Session) -> Any:
