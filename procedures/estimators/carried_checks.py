@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.findings import Effect, Finding
+from procedures.estimators import signals
 from procedures.estimators.carried_data import StepMeans
 
 Array = npt.NDArray[np.float64]
@@ -19,12 +20,6 @@ Array = npt.NDArray[np.float64]
 FATAL = ("stuck-channel", "segment-sign")
 """Findings after which a fit means nothing and is not attempted."""
 UNBALANCED_A = 0.5  # half the sum of opposite segments is the torque current: at rest within 0.1 A
-FLAGS = (
-    (1, "saturated", "an AMB amplifier was at its limit"),
-    (2, "saturated", "a motor segment was at its limit"),
-    (4, "contact", "the rotor touched the inboard touchdown bearing"),
-    (8, "contact", "the rotor touched the outboard touchdown bearing"),
-)  # bits of the telemetry signal `flags`
 
 
 class Tolerances(Protocol):
@@ -44,30 +39,9 @@ class Tolerances(Protocol):
 
 def of_signals(data: StepMeans, channels: Sequence[str], plan: Tolerances) -> Iterator[Finding]:
     """Lost samples, stuck channels, saturation and contact."""
-    share = data.lost / np.maximum(data.expected, 1)
-    if share.max() > plan.max_lost:
-        total = data.lost.sum() / data.expected.sum()
-        yield Finding(
-            "missing-samples",
-            f"{total:.2%} of the samples inside steps are missing ({share.max():.2%} in the worst step; "
-            f"{plan.max_lost:.2%} is allowed). Look at the link: load, cable, gateway.",
-            data.where(share),
-            Effect.INDETERMINATE,
-        )
-    for channel in channels:
-        still = data.spread[channel] == 0
-        if still.any():
-            yield Finding(
-                "stuck-channel",
-                f"{channel} does not move at all in {int(still.sum())} of {still.size} steps; a live sensor has noise.",
-                channel,
-                Effect.ERROR,
-            )
-    for bit, code, text in FLAGS:
-        hit = (data.flags & bit) != 0
-        if hit.any():
-            where = data.where(hit.astype(float))
-            yield Finding(code, f"{text} in {int(hit.sum())} of {hit.size} steps", where, Effect.INDETERMINATE)
+    yield from signals.losses(data.lost, data.expected, plan.max_lost, data.where)
+    yield from signals.stuck(data.spread, channels)
+    yield from signals.flagged(data.flags, data.where)
 
 
 def segments(data: StepMeans) -> Iterator[Finding]:

@@ -6,6 +6,7 @@ Thresholds are chosen so that a sound rig trips one in fewer than one run in a t
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy.typing as npt
 from scipy import special
 
 from bench.findings import Effect, Finding
-from procedures.estimators import mass_hanging
+from procedures.estimators import mass_hanging, signals
 from procedures.estimators.hanging_data import COILS, POSITIONS, HangingData
 from procedures.estimators.mass_hanging import Fit
 from procedures.estimators.repeatability import Scatter, misfit
@@ -23,7 +24,6 @@ Array = npt.NDArray[np.float64]
 FATAL = ("stuck-channel", "no-response", "axes-exchanged", "bearings-exchanged", "wrong-sign")
 """Findings after which a fit means nothing and is not attempted."""
 NAMES = ("inboard", "outboard")
-SATURATED, CONTACT_INBOARD, CONTACT_OUTBOARD = 1, 4, 8  # bits of the telemetry signal `flags`
 
 
 class Tolerances(Protocol):
@@ -39,78 +39,17 @@ class Tolerances(Protocol):
 
 def of_signals(data: HangingData, plan: Tolerances) -> Iterator[Finding]:
     """Checks that need no fit: losses, stuck channels, saturation, contact, settling, wiring."""
-    yield from _lost(data, plan)
-    yield from _stuck(data)
-    yield from _flags(data)
-    yield from _settled(data, plan)
+    where = partial(_worst, data)
+    yield from signals.losses(data.lost, data.expected, plan.max_lost, where)
+    yield from signals.stuck(data.spread, (*COILS, *POSITIONS))
+    yield from signals.flagged(data.flags, where)
+    yield from signals.settled(data.mean, data.drift, ("yi", "yo"), plan.max_position_m, plan.max_drift_A, where)
     yield from _wiring(data)
 
 
 def _worst(data: HangingData, values: Array) -> str:
     turn, point = np.unravel_index(int(np.argmax(values)), values.shape)
     return data.where(int(turn), int(point))
-
-
-def _lost(data: HangingData, plan: Tolerances) -> Iterator[Finding]:
-    share = data.lost / np.maximum(data.expected, 1)
-    if share.max() > plan.max_lost:
-        total = data.lost.sum() / data.expected.sum()
-        yield Finding(
-            "missing-samples",
-            f"{total:.2%} of the samples inside steps are missing ({share.max():.2%} in the worst step; "
-            f"{plan.max_lost:.2%} is allowed). Look at the link: load, cable, gateway.",
-            _worst(data, share),
-            Effect.INDETERMINATE,
-        )
-
-
-def _stuck(data: HangingData) -> Iterator[Finding]:
-    for channel in (*COILS, *POSITIONS):
-        still = data.spread[channel] == 0
-        if still.any():
-            yield Finding(
-                "stuck-channel",
-                f"{channel} does not move at all in {int(still.sum())} of {still.size} steps; a live sensor has noise.",
-                channel,
-                Effect.ERROR,
-            )
-
-
-def _flags(data: HangingData) -> Iterator[Finding]:
-    for bit, code, text in (
-        (SATURATED, "saturated", "an AMB amplifier was at its limit"),
-        (CONTACT_INBOARD, "contact", "the rotor touched the inboard touchdown bearing"),
-        (CONTACT_OUTBOARD, "contact", "the rotor touched the outboard touchdown bearing"),
-    ):
-        hit = (data.flags & bit) != 0
-        if hit.any():
-            yield Finding(code, f"{text} in {int(hit.sum())} of {hit.size} steps", _worst(data, hit.astype(float)),
-                          Effect.INDETERMINATE)  # fmt: skip
-
-
-def _settled(data: HangingData, plan: Tolerances) -> Iterator[Finding]:
-    """Settled means at the sensors' zero and standing still, on position and on control current.
-
-    The drift allowed in position is twice the mean allowed, because the noise of a difference of half means is twice
-    that of the mean.
-    """
-    position = np.max([np.abs(data.mean[c]) for c in ("pos_yi", "pos_yo")], axis=0)
-    moving = np.max([np.abs(data.drift[c]) for c in ("pos_yi", "pos_yo")], axis=0)
-    current = np.max([np.abs(data.drift[f"i_y{b}_p"] - data.drift[f"i_y{b}_n"]) / 2 for b in "io"], axis=0)
-    for values, limit, what, unit, scale in (
-        (position, plan.max_position_m, "mean position", "µm", 1e6),
-        (moving, 2 * plan.max_position_m, "drift of the position", "µm", 1e6),
-        (current, plan.max_drift_A, "drift of the control current", "mA", 1e3),
-    ):
-        bad = values > limit
-        if bad.any():
-            yield Finding(
-                "unsettled",
-                f"{what} within a step: {values.max() * scale:.3g} {unit} at worst, {limit * scale:.3g} {unit} allowed; "
-                f"{int(bad.sum())} of {bad.size} steps. Settle longer, or look at the integrator.",
-                _worst(data, values),
-                Effect.INDETERMINATE,
-            )
 
 
 def _wiring(data: HangingData) -> Iterator[Finding]:

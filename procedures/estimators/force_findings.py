@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy.typing as npt
 from scipy import special
 
 from bench.findings import Effect, Finding
+from procedures.estimators import signals
 from procedures.estimators.force_rows import CROSS, DIRECT, FORCE, SEGMENTS
 from procedures.estimators.ramp_data import COILS, POSITIONS, RampData
 from procedures.estimators.ramp_data import SEGMENTS as SEGMENT_CHANNELS
@@ -22,11 +24,7 @@ Array = npt.NDArray[np.float64]
 
 FATAL = ("stuck-channel", "segment-sign", "segment-current")
 """Findings after which a fit means nothing and is not attempted."""
-FLAGS = ((1, "saturated", "an AMB amplifier was at its limit"),
-         (2, "saturated", "an amplifier of the motor was at its limit"),
-         (4, "contact", "the rotor touched the inboard touchdown bearing"),
-         (8, "contact", "the rotor touched the outboard touchdown bearing"))  # fmt: skip
-"""Bits of the telemetry signal `flags`."""
+AXES = ("yi", "yo", "xi", "xo")
 FOLLOWS = 0.05  # A per A, share of a level that a segment's current may be off: sensors and amplifiers are within 0.5 %
 EXCHANGED = 0.3  # cross over direct force: 8 % by half a degree of encoder zero, a few per cent by ripple
 CHANCE = 1e-6  # false alarm rate of the tests of the fit
@@ -47,64 +45,17 @@ class Tolerances(Protocol):
 
 def of_signals(data: RampData, plan: Tolerances) -> Iterator[Finding]:
     """Checks that need no fit: losses, stuck channels, saturation, contact, settling, segments that do as commanded."""
-    yield from _lost(data, plan)
-    yield from _stuck(data)
-    for bit, code, text in FLAGS:
-        hit = (data.flags & bit) != 0
-        if hit.any():
-            where = _worst(data, hit.astype(float))
-            yield Finding(code, f"{text} in {int(hit.sum())} of {hit.size} steps", where, Effect.INDETERMINATE)
-    yield from _settled(data, plan)
+    where = partial(_worst, data)
+    yield from signals.losses(data.lost, data.expected, plan.max_lost, where)
+    yield from signals.stuck(data.spread, (*COILS, *SEGMENT_CHANNELS, *POSITIONS))
+    yield from signals.flagged(data.flags, where)
+    yield from signals.settled(data.mean, data.drift, AXES, plan.max_position_m, plan.max_drift_A, where)
     yield from _segments(data)
 
 
 def _worst(data: RampData, values: Array) -> str:
     turn, point = np.unravel_index(int(np.argmax(values)), values.shape)
     return data.where(int(turn), int(point))
-
-
-def _lost(data: RampData, plan: Tolerances) -> Iterator[Finding]:
-    share = data.lost / np.maximum(data.expected, 1)
-    if share.max() > plan.max_lost:
-        yield Finding(
-            "missing-samples",
-            f"{data.lost.sum() / data.expected.sum():.2%} of the samples inside steps are missing ({share.max():.2%} in "
-            f"the worst step; {plan.max_lost:.2%} is allowed). Look at the link: load, cable, gateway.",
-            _worst(data, share),
-            Effect.INDETERMINATE,
-        )
-
-
-def _stuck(data: RampData) -> Iterator[Finding]:
-    for channel in (*COILS, *SEGMENT_CHANNELS, *POSITIONS):
-        still = data.spread[channel] == 0
-        if still.any():
-            text = (
-                f"{channel} does not move at all in {int(still.sum())} of {still.size} steps; a live sensor has noise."
-            )
-            yield Finding("stuck-channel", text, channel, Effect.ERROR)
-
-
-def _settled(data: RampData, plan: Tolerances) -> Iterator[Finding]:
-    """At the sensors' zero and standing still; the noise of a difference of half means is twice that of the mean."""
-    position = np.max([np.abs(data.mean[c]) for c in POSITIONS], axis=0)
-    moving = np.max([np.abs(data.drift[c]) for c in POSITIONS], axis=0)
-    pairs = [f"i_{a}{b}" for a in "xy" for b in "io"]
-    current = np.max([np.abs(data.drift[f"{c}_p"] - data.drift[f"{c}_n"]) / 2 for c in pairs], axis=0)
-    for values, limit, what, unit, scale in (
-        (position, plan.max_position_m, "mean position", "µm", 1e6),
-        (moving, 2 * plan.max_position_m, "drift of the position", "µm", 1e6),
-        (current, plan.max_drift_A, "drift of an AMB's control current", "mA", 1e3),
-    ):
-        bad = values > limit
-        if bad.any():
-            yield Finding(
-                "unsettled",
-                f"{what} within a step: {values.max() * scale:.3g} {unit} at worst, {limit * scale:.3g} {unit} allowed; "
-                f"{int(bad.sum())} of {bad.size} steps. Settle longer, or look at the integrator.",
-                _worst(data, values),
-                Effect.INDETERMINATE,
-            )
 
 
 def _segments(data: RampData) -> Iterator[Finding]:

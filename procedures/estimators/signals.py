@@ -1,0 +1,88 @@
+"""What the means of steps say before anything is fitted: losses, stuck channels, limits and contact, settling.
+
+Arrays have one entry per step, in any shape; `where` names the step of the greatest entry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.findings import Effect, Finding
+
+Array = npt.NDArray[np.float64]
+Where = Callable[[Array], str]
+
+FLAGS = (
+    (1, "saturated", "an AMB amplifier was at its limit"),
+    (2, "saturated", "a motor segment was at its limit"),
+    (4, "contact", "the rotor touched the inboard touchdown bearing"),
+    (8, "contact", "the rotor touched the outboard touchdown bearing"),
+)
+"""Bits of the telemetry signal `flags` on the TSBS rig."""
+
+
+def losses(lost: Array, expected: Array, allowed: float, where: Where) -> Iterator[Finding]:
+    """Steps in which more than the share `allowed` of the samples is missing."""
+    share = lost / np.maximum(expected, 1)
+    if share.max() > allowed:
+        yield Finding(
+            "missing-samples",
+            f"{lost.sum() / expected.sum():.2%} of the samples inside steps are missing ({share.max():.2%} in the worst "
+            f"step; {allowed:.2%} is allowed). Look at the link: load, cable, gateway.",
+            where(share),
+            Effect.INDETERMINATE,
+        )
+
+
+def stuck(spread: Mapping[str, Array], channels: Sequence[str]) -> Iterator[Finding]:
+    """Channels whose samples have no scatter within some step."""
+    for channel in channels:
+        still = spread[channel] == 0
+        if still.any():
+            yield Finding(
+                "stuck-channel",
+                f"{channel} does not move at all in {int(still.sum())} of {still.size} steps; a live sensor has noise.",
+                channel,
+                Effect.ERROR,
+            )
+
+
+def flagged(flags: npt.NDArray[np.int64], where: Where) -> Iterator[Finding]:
+    """Saturation and contact, as the controller reported them."""
+    for bit, code, text in FLAGS:
+        hit = (flags & bit) != 0
+        if hit.any():
+            yield Finding(code, f"{text} in {int(hit.sum())} of {hit.size} steps", where(hit.astype(float)),
+                          Effect.INDETERMINATE)  # fmt: skip
+
+
+def settled(
+    mean: Mapping[str, Array], drift: Mapping[str, Array], axes: Sequence[str],
+    max_position_m: float, max_drift_A: float, where: Where,
+) -> Iterator[Finding]:  # fmt: skip
+    """Settled means at the sensors' zero and standing still, on position and on control current, on each of `axes`
+    (such as "yi").
+
+    The drift allowed in position is twice the mean allowed, because the noise of a difference of half means is twice
+    that of the mean.
+    """
+    position = np.max([np.abs(mean[f"pos_{a}"]) for a in axes], axis=0)
+    moving = np.max([np.abs(drift[f"pos_{a}"]) for a in axes], axis=0)
+    current = np.max([np.abs(drift[f"i_{a}_p"] - drift[f"i_{a}_n"]) / 2 for a in axes], axis=0)
+    for values, limit, what, unit, scale in (
+        (position, max_position_m, "mean position", "µm", 1e6),
+        (moving, 2 * max_position_m, "drift of the position", "µm", 1e6),
+        (current, max_drift_A, "drift of an AMB's control current", "mA", 1e3),
+    ):
+        bad = values > limit
+        if bad.any():
+            yield Finding(
+                "unsettled",
+                f"{what} within a step: {values.max() * scale:.3g} {unit} at worst, {limit * scale:.3g} {unit} allowed; "
+                f"{int(bad.sum())} of {bad.size} steps. Settle longer, or look at the integrator.",
+                where(values),
+                Effect.INDETERMINATE,
+            )
