@@ -1,0 +1,177 @@
+"""The response of a position to a step of its set point, from means over a telemetry period. All functions are pure.
+
+A sample at t is the mean over (t - T, t]. The curve behind the samples is the derivative of a spline through their running
+sum, which gives back every mean exactly; damping, frequency and bandwidth are those of a model fitted to the means:
+K w^2/(s^2 + 2 z w s + w^2)/(1 + s T_f), delayed, and a straight line for what integrators do in the same time.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import interpolate, optimize
+
+from bench.errors import AnalysisError
+
+Array = npt.NDArray[np.float64]
+FINE = 20  # points of the curve in a telemetry period
+FIRST_S = 0.05  # the step's own swing: about three periods of what levitates
+SCAN_HZ = np.arange(2.0, 400.0, 0.25)
+
+
+@dataclass(frozen=True)
+class Response:
+    """What one step shows, as shares of it where lengths are meant: `rise` 10 to 90 % and `settling` s, `overshoot`, `error` at
+    the end, `damping` ratio, `frequency` and `bandwidth` Hz, `gain` of the model, `misfit` rms of the model, `shape`: how
+    far damping, frequency and bandwidth move when the model has its lag twice; `within` the band used."""
+
+    rise: float
+    settling: float
+    overshoot: float
+    error: float
+    damping: float
+    frequency: float
+    bandwidth: float
+    gain: float
+    misfit: float
+    shape: tuple[float, float, float]
+    within: float
+    model: Array  # (n,) over the samples of the first FIRST_S
+
+
+def curve(t: Array, y: Array) -> tuple[Array, Array]:
+    """Times and values of the curve of which `y` (n,) at equally spaced `t` are the means over the period before."""
+    period = float(t[1] - t[0])
+    edges = np.concatenate(([t[0] - period], t))
+    total = np.concatenate(([0.0], np.cumsum(y) * period))
+    fine = np.linspace(edges[0], edges[-1], FINE * len(y) + 1)
+    return fine, np.asarray(interpolate.make_interp_spline(edges, total, 3).derivative()(fine))
+
+
+def rise_time(t: Array, y: Array) -> float:
+    """From 10 to 90 % of a step of one.
+
+    Raises:
+        AnalysisError: it does not get there.
+    """
+    fine, x = curve(t, y)
+    above = np.flatnonzero(x >= 0.9)
+    if not len(above):
+        raise AnalysisError(f"the position reaches {x.max():.0%} of the step; expected 90 % at least")
+    last = int(above[0])
+    below = np.flatnonzero(x[: last + 1] < 0.1)
+    first = int(below[-1]) if len(below) else 0
+    step = float(fine[1] - fine[0])
+
+    def crossing(k: int, level: float) -> float:
+        a, b = x[k], x[k + 1]
+        return float(fine[k] + step * (level - a) / (b - a)) if b != a else float(fine[k])
+
+    return crossing(max(last - 1, 0), 0.9) - crossing(first, 0.1)
+
+
+def trailing(y: Array, samples: float) -> Array:
+    """Mean over the last `samples` (a fraction of the oldest one where that is none), (n,); the first ones over fewer."""
+    whole = int(samples)
+    kernel = np.concatenate((np.ones(whole), [samples - whole]))
+    count = np.convolve(np.ones(len(y)), kernel)[: len(y)]
+    return np.convolve(y, kernel)[: len(y)] / count
+
+
+def settling_time(t: Array, y: Array, within: float, samples: float) -> float:
+    """Until the mean over `samples` stays within the band about 1; infinite where it does not before the end."""
+    outside = np.flatnonzero(np.abs(trailing(y, samples) - 1) > within)
+    if not len(outside):
+        return 0.0
+    if outside[-1] >= len(y) - max(20, round(2 * samples)):
+        return math.inf
+    return float(t[outside[-1] + 1])
+
+
+def stepped(t: Array, period: float, w: float, z: float, lag: float, twice: bool) -> Array:
+    """Means over the period before `t` of the model's answer to a unit step at 0: sum over its poles."""
+    root = w * np.sqrt(complex(z * z - 1))
+    lags = [-1 / lag, -1.03 / lag] if twice else [-1 / lag]
+    poles = np.array([-z * w + root, -z * w - root, *lags])
+    scale = w * w * np.prod([-p for p in lags])
+    residues = [scale / (p * np.prod([p - q for q in poles if q is not p and q != p])) for p in poles]
+
+    def integral(at: Array) -> Array:
+        at = np.maximum(at, 0.0)
+        return at + sum((r / p * (np.exp(p * at) - 1)).real for r, p in zip(residues, poles, strict=True))
+
+    return np.asarray((integral(t) - integral(t - period)) / period)
+
+
+def fitted(t: Array, y: Array, other: Array, twice: bool) -> tuple[Array, Array]:
+    """Parameters w, z, lag, delay, K, slope and share of the model, and its values at `t`. `other` (n,) is what the tilt of the
+    same plane does meanwhile: its share of it takes the neighbouring mode out of the response.
+
+    Raises:
+        AnalysisError: there is no fit.
+    """
+    period = float(t[1] - t[0])
+
+    def model(t: Array, w: float, z: float, lag: float, delay: float, k: float, slope: float, share: float) -> Array:
+        return k * stepped(t - delay, period, w, z, lag, twice) + slope * np.clip(t, 0, None) + share * other
+
+    top = float(t[int(np.argmax(y))])
+    over = max(float(y.max()) / max(float(np.mean(y[-10:])), 0.2) - 1, 0.02)
+    z = min(max(-math.log(over) / math.hypot(math.pi, math.log(over)), 0.05), 0.9) if over < 1 else 0.05
+    w = math.pi / max(top - 0.0015, 0.002) / math.sqrt(1 - z * z)
+    low = [20.0, 0.01, 1e-4, -3e-3, 0.2, -20.0, -2.0]
+    high = [2000.0, 0.98, 6e-3, 6e-3, 4.0, 20.0, 2.0]
+    start = [min(max(w, 30.0), 1500.0), z, 5e-4 if not twice else 3e-4, 1e-3, min(max(float(np.mean(y[-10:])), 0.3), 3.0), 0.0, 0.0]
+    try:
+        found, _ = optimize.curve_fit(model, t, y, start, bounds=(low, high), x_scale=[100, 0.1, 1e-3, 1e-3, 1, 1, 1], max_nfev=400)
+    except RuntimeError as error:
+        raise AnalysisError(f"no model of second order fits the response: {error}") from error
+    return np.asarray(found), model(t, *found)
+
+
+def bandwidth(p: Array, twice: bool) -> float:
+    """Hz at which the model's gain has fallen to 0.707 of the set point, after its peak; infinite beyond the scan."""
+    w, z, lag, _, k, _, _ = p
+    s = 2j * math.pi * SCAN_HZ
+    gain = np.abs(k * w * w / (s * s + 2 * z * w * s + w * w)) / np.abs(1 + s * lag) ** (2 if twice else 1)
+    above = np.flatnonzero(gain >= math.sqrt(0.5))
+    if not len(above) or above[-1] + 1 >= len(SCAN_HZ):
+        return math.inf
+    k0 = int(above[-1])
+    return float(np.interp(-math.sqrt(0.5), -gain[k0 : k0 + 2], SCAN_HZ[k0 : k0 + 2]))
+
+
+def response(t: Array, y: Array, other: Array, band: float, noise: float, samples: float) -> Response:
+    """Measure one step. `t` s from when the control answers, with some samples before it; `y` as a share of the step from
+    its rest, `other` the tilt's part likewise; `noise` of `samples` in a mean; the band is four times it at least.
+
+    Raises:
+        AnalysisError: the position does not get to 90 % of the step, or nothing fits.
+    """
+    rise = rise_time(t[t < FIRST_S], y[t < FIRST_S])
+    near = (t > -4e-3) & (t < FIRST_S)
+    p, model = fitted(t[near], y[near], other[near], False)
+    q, _ = fitted(t[near], y[near], other[near], True)
+    _, fine = curve(t[near], y[near])
+    within = max(band, 4 * noise)
+    after = t >= 0
+    tail = t > t[-1] - min(0.2, 0.25 * t[-1])
+    wide, doubled = bandwidth(p, False), bandwidth(q, True)
+    shape = (abs(p[1] - q[1]), abs(p[0] - q[0]) / (2 * math.pi), abs(wide - doubled) if math.isfinite(wide + doubled) else 0.0)
+    return Response(
+        rise=rise,
+        settling=settling_time(t[after], y[after], within, samples),
+        overshoot=float(fine.max()) - 1,
+        error=float(y[tail].mean()) - 1,
+        damping=float(p[1]),
+        frequency=float(p[0]) / (2 * math.pi),
+        bandwidth=wide,
+        gain=float(p[4]),
+        misfit=float(np.sqrt(np.mean((model - y[near]) ** 2))),
+        shape=shape,
+        within=within,
+        model=model,
+    )
