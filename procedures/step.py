@@ -53,7 +53,7 @@ class Plan(BenchPlan):
     names: tuple[str, str] = ("A", "B")
     warm: dict[str, float] = Field(default_factory=dict)  # on top of either setting until it is warm
     warm_s: float = Field(4.0, ge=0)
-    settle_s: float = Field(1.0, ge=0.1)  # with the setting itself
+    settle_s: float = Field(5.0, ge=0.1)  # with the setting itself
     model_error: float = Field(0.0, gt=-0.5, lt=1.0)  # share by which the controller's betas and offsets are made too large
     rest_s: float = Field(0.3, ge=0.1)  # before each step
     record_s: float = Field(1.5, ge=0.2)  # after it

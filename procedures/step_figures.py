@@ -65,8 +65,8 @@ def _swing(done: Sequence[Done], results: Mapping[Case, Result]) -> Figure:
 
 def _settling(done: Sequence[Done], results: Mapping[Case, Result]) -> Figure:
     size = 1e6 * done[0].case.size
-    within = max(r.within for d in done for r in results[d.case].responses)
-    settled = [r.settling for d in done for r in results[d.case].responses]
+    within = max(results[d.case].settled.within for d in done)
+    settled = [results[d.case].settled.time for d in done]
     finite = [s for s in settled if math.isfinite(s)]
     end = done[0].t[-1] if len(finite) < len(settled) else min(max(2.5 * max(finite), 0.2), done[0].t[-1])
     series = tuple(

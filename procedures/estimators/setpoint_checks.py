@@ -17,6 +17,7 @@ from procedures.estimators.setpoint_estimates import Result
 FATAL = ("stuck-channel", "no-step", "wrong-axis", "wrong-way", "wrong-size", "sensor-clipped", "speed-lost")
 CAME = 0.2  # of the step: less is no step
 SIZE_OFF = 0.4  # of the step: what a stiff integrator-less loop may be off, and no more
+DRIFT_S = 0.2  # in which a position before a step must not leave the band
 ASIDE = 0.5  # of the step, that the other axis may move for good
 
 
@@ -84,6 +85,11 @@ def _speed(steps: Sequence[Done], plan: Tolerances) -> Iterator[Finding]:
             f"the pulses say {low:.0f} to {high:.0f} r/min during a step at {most[1].case.speed * 30 / math.pi:.0f} r/min: the drive "
             "does not hold the speed, or pulses are missing or doubled.", most[1].case.where, Effect.ERROR,
         )  # fmt: skip
+    moving = [d for d in steps if abs(d.slope) * DRIFT_S > max(plan.band * d.case.size, 4 * d.noise)]
+    if moving:
+        yield Finding("not-at-rest", f"before {len(moving)} of {len(steps)} steps the position still moved, by "
+                      f"{max(abs(d.slope) for d in moving) * 1e6:.2f} µm/s: wait longer, or start warm.", moving[0].case.where,
+                      Effect.INDETERMINATE)  # fmt: skip
     for d in steps:
         if d.case.speed == 0 and d.speeds[1] > 2:
             yield Finding("turns-at-rest", f"the shaft turned at {d.speeds[1]:.1f} rad/s in a step that was to be done at rest",
@@ -121,12 +127,12 @@ def of_results(
 ) -> Iterator[Finding]:
     """Steps that do not settle, bands that noise has widened, responses without an oscillation."""
     for case, result in results.items():
-        if not all(math.isfinite(r.settling) for r in result.responses):
-            off = max(abs(r.error) for r in result.responses)
+        if not math.isfinite(result.settled.time):
+            off = abs(float(np.mean([r.error for r in result.responses])))
             yield Finding("not-settled", f"still {off:.1%} of the step off at the end of the record ({plan.band:.1%} is the band): "
                           "record longer, or look at the integrator and at the controller's model.", case.where,
                           Effect.INDETERMINATE)  # fmt: skip
-        widest = max(r.within for r in result.responses)
+        widest = result.settled.within
         if widest > plan.band:
             yield Finding("band-widened", f"four times the noise of the averaged position is {widest:.1%} of the step; the settling "
                           f"time is that into this band, not into {plan.band:.1%}.", case.where)  # fmt: skip

@@ -146,11 +146,13 @@ def _done(
     since = t - t[first] + period / 2  # the control changed somewhere in the period that ends with this sample
     keep = slice(max(first - 20, 0), None)
     quiet = clean[0][rest]
+    slope = float(np.polyfit(t[rest], quiet, 1)[0])
+    level = quiet - slope * (t[rest] - t[rest].mean())
     flags = data["flags"].astype(np.int64)
     return Done(
         case, since[keep], clean[0][keep], (case.way * (raw - raw[rest].mean()))[keep], clean[1][keep], clean[2][keep],
-        clean[3][keep], quiet, float(trailing(quiet, samples)[round(samples) :].std()), samples, float(amplitude[0]),
-        float(np.polyfit(t[rest], quiet, 1)[0]), answered,
+        clean[3][keep], quiet, float(trailing(level, samples)[round(samples) :].std()), samples, float(amplitude[0]),
+        slope, answered,
         (float(data["speed"].min()), float(data["speed"].max())), int(np.bitwise_or.reduce(flags)),
         tuple(c for c in (*POSITIONS, *COILS) if np.ptp(data[c]) == 0), step.lost(), step.expected(),
     )  # fmt: skip

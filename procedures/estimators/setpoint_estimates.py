@@ -15,7 +15,7 @@ from bench.uncertainty import Estimate, Influence
 from procedures.estimators import setpoint_data, stepmodel
 from procedures.estimators.inputs import certified
 from procedures.estimators.setpoint_data import Case, Done
-from procedures.estimators.stepmodel import Mode, Response
+from procedures.estimators.stepmodel import Mode, Response, Settling
 
 Array = npt.NDArray[np.float64]
 NEIGHBOUR = 0.05  # what a second mode that is not told apart does to damping, as a share: bound over drawn machines
@@ -31,6 +31,7 @@ class Result:
 
     case: Case
     responses: tuple[Response, ...]
+    settled: Settling
     estimates: Mapping[str, Estimate]
 
 
@@ -42,19 +43,27 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
     """
     out = {}
     for case, done in setpoint_data.by_case(steps).items():
-        responses = tuple(_response(d, band) for d in done)
-        out[case] = Result(case, responses, _estimates(case, done, responses, rig))
+        responses = tuple(_response(d) for d in done)
+        settled = _settled(done, band)
+        out[case] = Result(case, responses, settled, _estimates(case, done, responses, settled, rig))
     return out
 
 
-def _response(d: Done, band: float) -> Response:
+def _settled(done: Sequence[Done], band: float) -> Settling:
+    n = min(int((d.t >= 0).sum()) for d in done)
+    steps = np.array([(d.y / d.case.size)[d.t >= 0][:n] for d in done])
+    noise = float(np.sqrt(np.mean([d.noise**2 for d in done]))) / done[0].case.size
+    return stepmodel.settling(done[0].t[done[0].t >= 0][:n], steps, band, noise, float(np.mean([d.samples for d in done])))
+
+
+def _response(d: Done) -> Response:
     try:
-        return stepmodel.response(d.t, d.y / d.case.size, band, d.noise / d.case.size, d.samples)
+        return stepmodel.response(d.t, d.y / d.case.size)
     except AnalysisError as error:
         raise AnalysisError(f"{d.case.where}: {error}") from error
 
 
-def _estimates(case: Case, done: Sequence[Done], r: Sequence[Response], rig: RigFile) -> dict[str, Estimate]:
+def _estimates(case: Case, done: Sequence[Done], r: Sequence[Response], settled: Settling, rig: RigFile) -> dict[str, Estimate]:
     where = case.where
     period = float(done[0].t[1] - done[0].t[0])
 
@@ -67,10 +76,15 @@ def _estimates(case: Case, done: Sequence[Done], r: Sequence[Response], rig: Rig
         "rise_time": mean("rise_time", "s", lambda x: x.rise) + bound("sampling/rise", "sampling", RISE_SHARE * period, "s"),
         "steady_error": mean("steady_error", "m", lambda x: case.way * x.error * case.size) + _gained(case, rig),
     }
-    if all(math.isfinite(x.settling) for x in r):
-        start = bound(f"start/{where}", "start of the step within a period", period / 2, "s")
-        settling = mean("settling_time", "s", lambda x: x.settling)
-        out["settling_time"] = settling + start + bound(f"period/{where}", "sampling", period / 2, "s")
+    if math.isfinite(settled.time):
+        scatter = Influence(id=f"scatter/settling_time/{where}", name="scatter of the repeats", u=settled.u, unit="s", kind="A",
+                            distribution="normal", dof=float(len(r) - 1), source=f"{len(r)} steps, one left out in turn")  # fmt: skip
+        out["settling_time"] = (
+            Estimate.of(settled.time, scatter)
+            + bound(f"start/{where}", "start of the step within a period", period / 2, "s")
+            + bound(f"period/{where}", "sampling", period / 2, "s")
+            + bound(f"edge/{where}", "noise at the edge of the band", settled.edge, "s")
+        )
     if all(math.isfinite(x.bandwidth) for x in r):
         shape = bound(f"shape/bandwidth/{where}", "shape of the model", max(x.shape + x.misfit * x.bandwidth for x in r), "Hz")
         out["bandwidth"] = mean("bandwidth", "Hz", lambda x: x.bandwidth) + shape

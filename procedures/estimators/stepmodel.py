@@ -26,19 +26,17 @@ SCAN_HZ = np.arange(2.0, 400.0, 0.25)
 
 @dataclass(frozen=True)
 class Response:
-    """What one step shows, as shares of it where lengths are meant: `rise` 10 to 90 % and `settling` s, `overshoot`, `error` at
+    """What one step shows, as shares of it where lengths are meant: `rise` 10 to 90 % s, `overshoot`, `error` at
     the end, `bandwidth` Hz, `gain` of the model, `misfit` rms of the model, `shape` Hz: how far the bandwidth moves when the model has
-    its lag twice; `within` the band used; `model` (n,) at `model_t`."""
+    its lag twice; `model` (n,) at `model_t`."""
 
     rise: float
-    settling: float
     overshoot: float
     error: float
     bandwidth: float
     gain: float
     misfit: float
     shape: float
-    within: float
     model_t: Array
     model: Array
 
@@ -144,6 +142,16 @@ def bandwidth(p: Array, twice: bool) -> float:
     return float(np.interp(-math.sqrt(0.5), -gain[k0 : k0 + 2], SCAN_HZ[k0 : k0 + 2]))
 
 
+def _peak(p: Array, t: Array, residual: Array) -> float:
+    """Greatest value: the model's, and the mean of three residuals about it. The largest of many noisy samples is too large."""
+    w, z, lag, delay, k, slope = p
+    fine = np.arange(0, FIRST_S, 2e-5)
+    x = k * stepped(fine - delay, 1e-6, w, z, lag, False) + slope * fine
+    top = int(np.argmax(x))
+    at = int(np.argmin(np.abs(t - 0.5 * float(t[1] - t[0]) - fine[top])))
+    return float(x[top] + residual[max(at - 1, 0) : at + 2].mean())
+
+
 @dataclass(frozen=True)
 class Mode:
     """An oscillation that dies away: damping ratio, natural frequency Hz, and how large it is in the response at the step."""
@@ -192,9 +200,38 @@ def _swing(t: Array, y: Array) -> float:
     return float(np.pi / max(half, 2e-3))
 
 
-def response(t: Array, y: Array, band: float, noise: float, samples: float) -> Response:
+@dataclass(frozen=True)
+class Settling:
+    """Of the mean of several steps: `time` s (infinite: not within the record), the band `within`, how far leaving out one
+    step moves it (`u`, jackknife), and how far noise moves the band's edge (`edge`, half width)."""
+
+    time: float
+    within: float
+    u: float
+    edge: float
+
+
+def settling(t: Array, steps: Array, band: float, noise: float, samples: float) -> Settling:
+    """Of steps (m, n) at `t` from the control's answer; `noise` is one step's. The band is four times the mean's at least: the
+    largest of thousands of noisy values would leave a narrower one again and again."""
+    m = len(steps)
+    sigma = noise / math.sqrt(m)
+    within = max(band, 4 * sigma)
+    whole = settling_time(t, steps.mean(axis=0), within, samples)
+    if not math.isfinite(whole):
+        return Settling(whole, within, 0.0, 0.0)
+    left = [settling_time(t, np.delete(steps, k, axis=0).mean(axis=0), max(within, 4 * noise / math.sqrt(m - 1)), samples)
+            for k in range(m)]  # fmt: skip
+    edges = [settling_time(t, steps.mean(axis=0), within + k * sigma, samples) for k in (-1, 1)]
+    last = float(t[-1])
+    finite = np.minimum(left, last)
+    u = math.sqrt((m - 1) / m * float(((finite - finite.mean()) ** 2).sum()))
+    return Settling(whole, within, u, (min(edges[0], last) - min(edges[1], last)) / 2 * math.sqrt(3))
+
+
+def response(t: Array, y: Array) -> Response:
     """Measure one step. `t` s from when the control answers, with some samples before it; `y` as a share of the step from
-    its rest; `noise` of `samples` in a mean; the band is four times it at least.
+    its rest.
 
     Raises:
         AnalysisError: the position does not get to 90 % of the step, or nothing fits.
@@ -203,22 +240,17 @@ def response(t: Array, y: Array, band: float, noise: float, samples: float) -> R
     near = (t > -4e-3) & (t < FIRST_S)
     p, model = fitted(t[near], y[near], False)
     q, _ = fitted(t[near], y[near], True)
-    _, fine = curve(t[near], y[near])
-    within = max(band, 4 * noise)
-    after = t >= 0
     tail = t > t[-1] - min(0.2, 0.25 * t[-1])
     wide, doubled = bandwidth(p, False), bandwidth(q, True)
     shape = abs(wide - doubled) if math.isfinite(wide + doubled) else 0.0
     return Response(
         rise=rise,
-        settling=settling_time(t[after], y[after], within, samples),
-        overshoot=float(fine.max()) - 1,
+        overshoot=_peak(p, t[near], y[near] - model) - 1,
         error=float(y[tail].mean()) - 1,
         bandwidth=wide,
         gain=float(p[4]),
         misfit=float(np.sqrt(np.mean((model - y[near]) ** 2))),
         shape=shape,
-        within=within,
         model_t=t[near],
         model=model,
     )
