@@ -14,7 +14,7 @@ from bench.uncertainty import Estimate, coverage_factor
 from procedures.estimators.setpoint_data import CLIPPED, COIL_LIMIT, CONTACT, STEP, VOLTAGE_LIMIT, Case, Done
 from procedures.estimators.setpoint_estimates import Result
 
-FATAL = ("stuck-channel", "no-step", "wrong-axis", "wrong-way", "wrong-size", "sensor-clipped", "speed-lost")
+FATAL = ("current-sign", "stuck-channel", "no-step", "wrong-axis", "wrong-way", "wrong-size", "sensor-clipped", "speed-lost")
 CAME = 0.2  # of the step: less is no step
 SIZE_OFF = 0.4  # of the step: what a stiff integrator-less loop may be off, and no more
 DRIFT_S = 0.2  # in which a position before a step must not leave the band
@@ -90,11 +90,23 @@ def _speed(steps: Sequence[Done], plan: Tolerances) -> Iterator[Finding]:
         yield Finding("not-at-rest", f"before {len(moving)} of {len(steps)} steps the position still moved, by "
                       f"{max(abs(d.slope) for d in moving) * 1e6:.2f} µm/s: wait longer, or start warm.", moving[0].case.where,
                       Effect.INDETERMINATE)  # fmt: skip
+    yield from _kicks(steps)
     for d in steps:
         if d.case.speed == 0 and d.speeds[1] > 2:
             yield Finding("turns-at-rest", f"the shaft turned at {d.speeds[1]:.1f} rad/s in a step that was to be done at rest",
                           d.case.where, Effect.INDETERMINATE)  # fmt: skip
             return
+
+
+def _kicks(steps: Sequence[Done]) -> Iterator[Finding]:
+    """The first push is towards the new set point, at both bearings."""
+    count = len(steps[0].kicks)
+    for k in range(count):
+        wrong = [d for d in steps if d.answered and len(d.kicks) == count and d.kicks[k] < 0 and d.y[d.t > 0.75 * d.t[-1]].mean() > 0]
+        if len(wrong) > len(steps) / 2:
+            bearing = ("inboard", "outboard")[k] if count == 2 else "axial"
+            yield Finding("current-sign", f"the {bearing} control current answers against the step, and the shaft goes the right way: "
+                          "the current sensors of its coils are exchanged.", wrong[0].case.where, Effect.ERROR)  # fmt: skip
 
 
 def _came(steps: Sequence[Done]) -> Iterator[Finding]:

@@ -53,7 +53,8 @@ class Case:
 class Done:
     """One recorded step. `t` s from the control's answer (n,), with some samples before it; `y`, `tilt`, `across` m along the way of
     the step: from where they rested, what turns with the shaft taken away; `raw` as `y` with it; `rest` m the same before the
-    step; `control` A, difference of the coils, both bearings; `answered`: it did. `noise` m of the mean over `samples`."""
+    step; `control` A, difference of the coils, both bearings; `answered`: it did; `kicks` A, of each
+    bearing's at first. `noise` m of the mean over `samples`."""
 
     case: Case
     t: Array
@@ -68,6 +69,7 @@ class Done:
     synchronous: float
     slope: float
     answered: bool
+    kicks: tuple[float, ...]
     speeds: tuple[float, float]
     flags: int
     stuck: tuple[str, ...]
@@ -112,7 +114,7 @@ def shares(rig: RigFile, axis: str) -> dict[str, float]:
 
 
 def _read(recording: Recording[Any], step: Step) -> Done:
-    data, labels = step.read(*CHANNELS), step.labels
+    data, labels = _whole(step.read(*CHANNELS)), step.labels
     axis, signed = str(labels["axis"]), float(labels["step_m"])
     case = Case(str(labels["setting"]), float(labels["speed_rad_s"]), axis, abs(signed), 1 if signed > 0 else -1)
     written = [e["t_ns"] for e in recording.events("parameter")
@@ -126,6 +128,19 @@ def _read(recording: Recording[Any], step: Step) -> Done:
     return _done(recording.rig, step, case, data, rest)
 
 
+def _whole(data: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
+    """Samples at every index: lost ones by straight lines, flags and angle by the sample before. How many were lost is told."""
+    index = data["index"]
+    if not len(index) or index[-1] - index[0] + 1 == len(index):
+        return data
+    every = np.arange(index[0], index[-1] + 1)
+    held = np.searchsorted(index, every, "right") - 1
+    out = {c: x[held] if c == "flags" else np.interp(every, index, x) for c, x in data.items()}
+    out["angle"] = np.interp(every, index, np.unwrap(data["angle"]))
+    out["t_ns"] = np.interp(every, index, data["t_ns"] - data["t_ns"][0]).round().astype(np.int64) + data["t_ns"][0]
+    return out
+
+
 def _done(
     rig: RigFile, step: Step, case: Case, data: Mapping[str, npt.NDArray[Any]], rest: npt.NDArray[np.bool_]
 ) -> Done:
@@ -137,8 +152,9 @@ def _done(
     control = sum((data[f"i_{p}_p"] - data[f"i_{p}_n"] for p in planes), np.zeros(len(rest)))
     t = (data["t_ns"] - data["t_ns"][0]) * 1e-9
     turning = float(np.median(data["speed"])) > TURNING_RAD_S
-    signals = np.array([raw, tilt, across, control])
-    clean, amplitude = _still(t, signals, data["angle"], rest) if turning else (signals, np.zeros(4))
+    ones = [data[f"i_{p}_p"] - data[f"i_{p}_n"] for p in planes]
+    signals = np.array([raw, tilt, across, control, *ones])
+    clean, amplitude = _still(t, signals, data["angle"], rest) if turning else (signals, np.zeros(len(signals)))
     clean = case.way * (clean - clean[:, rest].mean(axis=1, keepdims=True))
     first, answered = _answer(clean[3], rest)
     period = float(np.median(np.diff(t)))
@@ -153,6 +169,7 @@ def _done(
         case, since[keep], clean[0][keep], (case.way * (raw - raw[rest].mean()))[keep], clean[1][keep], clean[2][keep],
         clean[3][keep], quiet, float(trailing(level, samples)[round(samples) :].std()), samples, float(amplitude[0]),
         slope, answered,
+        tuple(float(c[first : first + 3].sum()) for c in clean[4:]),
         (float(data["speed"].min()), float(data["speed"].max())), int(np.bitwise_or.reduce(flags)),
         tuple(c for c in (*POSITIONS, *COILS) if np.ptp(data[c]) == 0), step.lost(), step.expected(),
     )  # fmt: skip

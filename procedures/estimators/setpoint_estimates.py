@@ -103,8 +103,8 @@ def oscillation(group: str, done: Sequence[Done]) -> dict[str, Estimate]:
     """Damping and natural frequency from all steps together, those of large ones weighing more; uncertainty by leaving out
     one block of steps after the other. Nothing where there is no oscillation."""
     blocks = min(len(done), 8)
-    whole = _pooled(done)
-    t = done[0].t[: whole.shape[1]]
+    n = min(len(d.t) for d in done)
+    whole, t = _pooled(done, n), done[0].t[:n]
     out: dict[str, Estimate] = {}
     best = math.inf
     for count in (1, 2):
@@ -112,7 +112,7 @@ def oscillation(group: str, done: Sequence[Done]) -> dict[str, Estimate]:
             continue
         try:
             mode = stepmodel.modes(t, whole, count)
-            left = [stepmodel.modes(t, _pooled([d for k, d in enumerate(done) if k % blocks != b]), count) for b in range(blocks)]
+            left = [stepmodel.modes(t, _pooled([d for k, d in enumerate(done) if k % blocks != b], n), count) for b in range(blocks)]
         except (AnalysisError, np.linalg.LinAlgError):
             continue
         if not (0 < mode.damping < 0.95 and all(0 < m.damping < 0.95 for m in left)):
@@ -139,10 +139,9 @@ def _oscillation(group: str, count: int, mode: Mode, left: Sequence[Mode]) -> di
     return out
 
 
-def _pooled(done: Sequence[Done]) -> Array:
+def _pooled(done: Sequence[Done], n: int) -> Array:
     """Position and tilt (2, n) per metre of step over many steps, each shifted to the common samples: least squares over sizes.
     Starts differ by less than a period, which shifts the phase of an oscillation and nothing else."""
-    n = min(len(d.t) for d in done)
     weight = sum(d.case.size**2 for d in done)
     return np.asarray(sum(d.case.size * np.array([d.y[:n], d.tilt[:n]]) for d in done) / weight)
 
