@@ -19,7 +19,8 @@ from procedures.estimators.stepmodel import Mode, Response, Settling
 
 Array = npt.NDArray[np.float64]
 NEIGHBOUR = 0.05  # what a second mode that is not told apart does to damping, as a share: bound over drawn machines
-NEIGHBOUR_HZ = 0.015  # and to the frequency
+NEIGHBOUR_HZ = 0.02  # and to the frequency, with what the compliance of the shaft in bending takes from it
+BENDS = 0.01  # of the bandwidth, likewise
 CURVE = 3e-3  # of the overshoot's excursion: what the spline leaves of a means' curve
 RISE_SHARE = 0.01  # of a period: the same for crossings
 
@@ -86,7 +87,7 @@ def _estimates(case: Case, done: Sequence[Done], r: Sequence[Response], settled:
             + bound(f"edge/{where}", "noise at the edge of the band", settled.edge, "s")
         )
     if all(math.isfinite(x.bandwidth) for x in r):
-        shape = bound(f"shape/bandwidth/{where}", "shape of the model", max(x.shape + x.misfit * x.bandwidth for x in r), "Hz")
+        shape = bound(f"shape/bandwidth/{where}", "shape of the model", max(x.shape + (x.misfit + BENDS) * x.bandwidth for x in r), "Hz")
         out["bandwidth"] = mean("bandwidth", "Hz", lambda x: x.bandwidth) + shape
     return out
 
@@ -133,8 +134,8 @@ def _oscillation(group: str, count: int, mode: Mode, left: Sequence[Mode]) -> di
         u = math.sqrt((n - 1) / n * float(((np.array(others) - np.mean(others)) ** 2).sum()))
         jackknife = Influence(id=f"scatter/{name}/{group}", name="scatter of the steps", u=u, unit=unit, kind="A",
                               distribution="normal", dof=float(n - 1), source=f"{n} blocks of steps left out in turn")  # fmt: skip
-        beside = share if count == 1 else share / 8
-        text = "a neighbouring mode" if count == 1 else "filters that still ring"
+        beside = share if count == 1 or name == "natural_frequency" else share / 2
+        text = "a neighbouring mode, a shaft that bends" if count == 1 else "filters that still ring, a shaft that bends"
         out[name] = Estimate.of(value, jackknife) + bound(f"mode/{name}/{group}", text, beside * value, unit)
     return out
 
