@@ -45,7 +45,7 @@ class Plan(BenchPlan):
     """Settings of the steps, SI."""
 
     axes: tuple[Axis, ...] = Field(("y", "z"), min_length=1)
-    sizes_m: tuple[float, ...] = Field((10e-6, 20e-6), min_length=1)
+    sizes_m: tuple[float, ...] = Field((10e-6, 20e-6), min_length=2)  # one alone says nothing of linearity
     speeds_rad_s: tuple[float, ...] = Field((0.0,), min_length=1)
     repeats: int = Field(2, ge=2)  # of: up, back, down, back
     a: dict[str, float] = Field(default_factory=lambda: {"law": 1.0})  # parameters of the controller
