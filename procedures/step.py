@@ -54,7 +54,9 @@ class Plan(BenchPlan):
     warm: dict[str, float] = Field(default_factory=dict)  # on top of either setting until it is warm
     warm_s: float = Field(4.0, ge=0)
     settle_s: float = Field(5.0, ge=0.1)  # with the setting itself
-    model_error: float = Field(0.0, gt=-0.5, lt=1.0)  # share by which the controller's betas and offsets are made too large
+    model_error: float = Field(
+        0.0, gt=-0.5, lt=1.0
+    )  # share by which the controller's betas and offsets are made too large
     rest_s: float = Field(0.3, ge=0.1)  # before each step
     record_s: float = Field(1.5, ge=0.2)  # after it
     band: float = Field(0.02, gt=0)  # of settling, as a share of the step
@@ -96,7 +98,9 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
             now = (setting, speed)
         for repeat in range(plan.repeats):
             for begin, end in ((0.0, size), (size, 0.0), (0.0, -size), (-size, 0.0)):
-                with record.step(STEP, setting=setting, speed_rad_s=speed, axis=axis, step_m=end - begin, repeat=repeat):
+                with record.step(
+                    STEP, setting=setting, speed_rad_s=speed, axis=axis, step_m=end - begin, repeat=repeat
+                ):
                     rig.clock.sleep(plan.rest_s)
                     write(f"ref_{axis}", end)
                     rig.clock.sleep(plan.record_s)

@@ -15,6 +15,8 @@ from procedures.estimators.stepmodel import trailing
 
 SWING_S = 0.05
 BEFORE_S = -4e-3
+NEAR = 0.15  # of the step: what the settling is drawn of
+ASIDE = 0.02  # of the largest step, between the settings' points
 
 
 def all_figures(steps: Sequence[Done], results: Mapping[Case, Result]) -> list[Figure]:
@@ -64,20 +66,22 @@ def _swing(done: Sequence[Done], results: Mapping[Case, Result]) -> Figure:
 
 
 def _settling(done: Sequence[Done], results: Mapping[Case, Result]) -> Figure:
-    size = 1e6 * done[0].case.size
+    """How far the averaged position is off, from where it is within NEAR of the step."""
     within = max(results[d.case].settled.within for d in done)
     settled = [results[d.case].settled.time for d in done]
-    finite = [s for s in settled if math.isfinite(s)]
-    end = done[0].t[-1] if len(finite) < len(settled) else min(max(2.5 * max(finite), 0.2), done[0].t[-1])
-    series = tuple(
-        Series(d.case.setting, 1e3 * d.t[m], 1e6 * trailing(d.y, d.samples)[m])
-        for d in done for m in [(d.t >= 0) & (d.t < end)]
-    )  # fmt: skip
+    end = done[0].t[-1] if not all(map(math.isfinite, settled)) else min(max(3 * max(settled), 0.2), done[0].t[-1])
+    series = []
+    for d in done:
+        off = trailing(d.y, d.samples) / d.case.size - 1
+        far = np.flatnonzero((np.abs(off) > NEAR) & (d.t < 0.5 * d.t[-1]))
+        m = (d.t > (d.t[far[-1]] if len(far) else 0)) & (d.t < end)
+        series.append(Series(d.case.setting, 1e3 * d.t[m], 100 * off[m]))
     turn = "one revolution" if done[0].case.speed else "6 ms"
     return Figure(f"settling-{_key(done[0].case)}", f"Settling, {_title(done[0].case)}",
-                  f"Position averaged over {turn}; the band is {within:.1%} of the step on both sides.",
-                  "time since the control answers (ms)", "position (µm)", series,
-                  lines=(("band, above", size * (1 + within)), ("band, below", size * (1 - within))))  # fmt: skip
+                  f"Position off its set point, averaged over {turn}, from where it is within {NEAR:.0%} of the step; the band is "
+                  f"{within:.1%} on both sides. One step of each setting; the settling time is that of the mean of the repeats.",
+                  "time since the control answers (ms)", "off the set point (% of the step)", tuple(series),
+                  lines=(("band, above", 100 * within), ("band, below", -100 * within)))  # fmt: skip
 
 
 def _control(done: Sequence[Done]) -> Figure:
@@ -93,11 +97,15 @@ def _sizes(results: Mapping[Case, Result]) -> Iterator[Figure]:
     """Overshoot over the signed size: a linear loop gives one level."""
     for axis, speed in dict.fromkeys((c.axis, c.speed) for c in results):
         series = []
-        for setting in dict.fromkeys(c.setting for c in results):
-            cases = sorted((c for c in results if (c.axis, c.speed, c.setting) == (axis, speed, setting)), key=lambda c: c.way * c.size)
+        for k, setting in enumerate(dict.fromkeys(c.setting for c in results)):
+            shift = k * ASIDE * max(c.size for c in results)
+            cases = sorted(
+                (c for c in results if (c.axis, c.speed, c.setting) == (axis, speed, setting)),
+                key=lambda c: c.way * c.size,
+            )
             found = [results[c].estimates["overshoot"] for c in cases]
             u = [100 * coverage_factor(len(results[c].responses) - 1) * e.u for c, e in zip(cases, found, strict=True)]
-            series.append(Series(setting, np.array([1e6 * c.way * c.size for c in cases]), np.array([100 * e.value for e in found]),
+            series.append(Series(setting, np.array([1e6 * (c.way * c.size + shift) for c in cases]), np.array([100 * e.value for e in found]),
                                  "points", np.array(u)))  # fmt: skip
         title = f"Overshoot over the step in {axis} at {speed * 30 / math.pi:.0f} r/min"
         yield Figure(f"sizes-{axis}-{speed * 30 / math.pi:.0f}", title, "Mean of the repeats with its 95 % interval; a linear loop has "

@@ -1,4 +1,4 @@
-"""The truth of a set-point step on the AMB stand: the linearised loop's own response, tick by tick (`sim_backend.amb_linear`)."""
+"""The truth of a set-point step on the AMB stand: the response of the linearised loop of `sim_backend.amb_linear`."""
 
 from __future__ import annotations
 
@@ -58,7 +58,9 @@ def truth(p: AmbParams, settings: Mapping[str, float], law: str, axis: str) -> d
     best = max((k for k in range(len(values)) if values[k].imag > 1e-6), key=lambda k: abs(weight[k]))
     s = np.log(values[best]) / TICK_S
     hz = np.arange(5.0, 500.0, 0.5)
-    gain = np.abs([_read(q, settings) @ np.linalg.solve(np.exp(2j * np.pi * f * TICK_S) * np.eye(len(a)) - a, b)[:2] for f in hz])
+    gain = np.abs(
+        [_read(q, settings) @ np.linalg.solve(np.exp(2j * np.pi * f * TICK_S) * np.eye(len(a)) - a, b)[:2] for f in hz]
+    )
     low = np.flatnonzero(gain < math.sqrt(0.5))
     return {
         "damping": float(-s.real / abs(s)),

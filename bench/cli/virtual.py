@@ -127,7 +127,9 @@ def simulated_run(
 
 
 @contextmanager
-def _driven(file: RigFile, drawn: Truth, controller: Controller, bank: RegisterBank | None) -> Iterator[Fieldbus | None]:
+def _driven(
+    file: RigFile, drawn: Truth, controller: Controller, bank: RegisterBank | None
+) -> Iterator[Fieldbus | None]:
     """The register devices, where the controller cannot turn its shaft by itself; they cost time, and others need none."""
     if bank is None:
         yield None

@@ -14,7 +14,16 @@ from bench.uncertainty import Estimate, coverage_factor
 from procedures.estimators.setpoint_data import CLIPPED, COIL_LIMIT, CONTACT, STEP, VOLTAGE_LIMIT, Case, Done
 from procedures.estimators.setpoint_estimates import Result
 
-FATAL = ("current-sign", "stuck-channel", "no-step", "wrong-axis", "wrong-way", "wrong-size", "sensor-clipped", "speed-lost")
+FATAL = (
+    "current-sign",
+    "stuck-channel",
+    "no-step",
+    "wrong-axis",
+    "wrong-way",
+    "wrong-size",
+    "sensor-clipped",
+    "speed-lost",
+)
 CAME = 0.2  # of the step: less is no step
 SIZE_OFF = 0.4  # of the step: what a stiff integrator-less loop may be off, and no more
 DRIFT_S = 0.2  # in which a position before a step must not leave the band
@@ -102,7 +111,11 @@ def _kicks(steps: Sequence[Done]) -> Iterator[Finding]:
     """The first push is towards the new set point, at both bearings."""
     count = len(steps[0].kicks)
     for k in range(count):
-        wrong = [d for d in steps if d.answered and len(d.kicks) == count and d.kicks[k] < 0 and d.y[d.t > 0.75 * d.t[-1]].mean() > 0]
+        wrong = [
+            d
+            for d in steps
+            if d.answered and len(d.kicks) == count and d.kicks[k] < 0 and d.y[d.t > 0.75 * d.t[-1]].mean() > 0
+        ]
         if len(wrong) > len(steps) / 2:
             bearing = ("inboard", "outboard")[k] if count == 2 else "axial"
             yield Finding("current-sign", f"the {bearing} control current answers against the step, and the shaft goes the right way: "
@@ -126,7 +139,10 @@ def _came(steps: Sequence[Done]) -> Iterator[Finding]:
         elif along < 0:
             found = ("wrong-way", f"the position moved by {um}: set point or sensors have the wrong sign.")
         elif abs(along - 1) > SIZE_OFF:
-            found = ("wrong-size", f"the position moved by {um}: the set point is scaled, or the loop holds it loosely.")
+            found = (
+                "wrong-size",
+                f"the position moved by {um}: the set point is scaled, or the loop holds it loosely.",
+            )
         else:
             continue
         if found[0] not in told:
@@ -175,5 +191,7 @@ def _against(quantity: str, unit: str, scale: float, a: Result, b: Result, names
         if e is None:
             texts.append(f"not within the record with {name}")
         else:
-            texts.append(f"{scale * e.value:.3g} ± {scale * coverage_factor(len(r.responses) - 1) * e.u:.2g} {unit} with {name}")
+            texts.append(
+                f"{scale * e.value:.3g} ± {scale * coverage_factor(len(r.responses) - 1) * e.u:.2g} {unit} with {name}"
+            )
     return f"{label} {', '.join(texts)}"

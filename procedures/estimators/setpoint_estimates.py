@@ -54,7 +54,9 @@ def _settled(done: Sequence[Done], band: float) -> Settling:
     n = min(int((d.t >= 0).sum()) for d in done)
     steps = np.array([(d.y / d.case.size)[d.t >= 0][:n] for d in done])
     noise = float(np.sqrt(np.mean([d.noise**2 for d in done]))) / done[0].case.size
-    return stepmodel.settling(done[0].t[done[0].t >= 0][:n], steps, band, noise, float(np.mean([d.samples for d in done])))
+    return stepmodel.settling(
+        done[0].t[done[0].t >= 0][:n], steps, band, noise, float(np.mean([d.samples for d in done]))
+    )
 
 
 def _response(d: Done) -> Response:
@@ -64,7 +66,9 @@ def _response(d: Done) -> Response:
         raise AnalysisError(f"{d.case.where}: {error}") from error
 
 
-def _estimates(case: Case, done: Sequence[Done], r: Sequence[Response], settled: Settling, rig: RigFile) -> dict[str, Estimate]:
+def _estimates(
+    case: Case, done: Sequence[Done], r: Sequence[Response], settled: Settling, rig: RigFile
+) -> dict[str, Estimate]:
     where = case.where
     period = float(done[0].t[1] - done[0].t[0])
 
@@ -74,7 +78,8 @@ def _estimates(case: Case, done: Sequence[Done], r: Sequence[Response], settled:
     overshoot = mean("overshoot", "1", lambda x: x.overshoot)
     out = {
         "overshoot": overshoot + bound(f"means/{where}", "means over a period", CURVE * (1 + overshoot.value), "1"),
-        "rise_time": mean("rise_time", "s", lambda x: x.rise) + bound("sampling/rise", "sampling", RISE_SHARE * period, "s"),
+        "rise_time": mean("rise_time", "s", lambda x: x.rise)
+        + bound("sampling/rise", "sampling", RISE_SHARE * period, "s"),
         "steady_error": mean("steady_error", "m", lambda x: case.way * x.error * case.size) + _gained(case, rig),
     }
     if math.isfinite(settled.time):
@@ -87,7 +92,12 @@ def _estimates(case: Case, done: Sequence[Done], r: Sequence[Response], settled:
             + bound(f"edge/{where}", "noise at the edge of the band", settled.edge, "s")
         )
     if all(math.isfinite(x.bandwidth) for x in r):
-        shape = bound(f"shape/bandwidth/{where}", "shape of the model", max(x.shape + (x.misfit + BENDS) * x.bandwidth for x in r), "Hz")
+        shape = bound(
+            f"shape/bandwidth/{where}",
+            "shape of the model",
+            max(x.shape + (x.misfit + BENDS) * x.bandwidth for x in r),
+            "Hz",
+        )
         out["bandwidth"] = mean("bandwidth", "Hz", lambda x: x.bandwidth) + shape
     return out
 
@@ -113,7 +123,10 @@ def oscillation(group: str, done: Sequence[Done]) -> dict[str, Estimate]:
             continue
         try:
             mode = stepmodel.modes(t, whole, count)
-            left = [stepmodel.modes(t, _pooled([d for k, d in enumerate(done) if k % blocks != b], n), count) for b in range(blocks)]
+            left = [
+                stepmodel.modes(t, _pooled([d for k, d in enumerate(done) if k % blocks != b], n), count)
+                for b in range(blocks)
+            ]
         except (AnalysisError, np.linalg.LinAlgError):
             continue
         if not (0 < mode.damping < 0.95 and all(0 < m.damping < 0.95 for m in left)):
@@ -135,7 +148,9 @@ def _oscillation(group: str, count: int, mode: Mode, left: Sequence[Mode]) -> di
         jackknife = Influence(id=f"scatter/{name}/{group}", name="scatter of the steps", u=u, unit=unit, kind="A",
                               distribution="normal", dof=float(n - 1), source=f"{n} blocks of steps left out in turn")  # fmt: skip
         beside = share if count == 1 or name == "natural_frequency" else share / 2
-        text = "a neighbouring mode, a shaft that bends" if count == 1 else "filters that still ring, a shaft that bends"
+        text = (
+            "a neighbouring mode, a shaft that bends" if count == 1 else "filters that still ring, a shaft that bends"
+        )
         out[name] = Estimate.of(value, jackknife) + bound(f"mode/{name}/{group}", text, beside * value, unit)
     return out
 

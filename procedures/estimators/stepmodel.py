@@ -122,9 +122,18 @@ def fitted(t: Array, y: Array, twice: bool) -> tuple[Array, Array]:
     w = math.pi / max(top - 0.0015, 0.002) / math.sqrt(1 - z * z)
     low = [20.0, 0.01, 1e-4, -3e-3, 0.2, -20.0]
     high = [2000.0, 0.98, 6e-3, 6e-3, 4.0, 20.0]
-    start = [min(max(w, 30.0), 1500.0), z, 5e-4 if not twice else 3e-4, 1e-3, min(max(float(np.mean(y[-10:])), 0.3), 3.0), 0.0]
+    start = [
+        min(max(w, 30.0), 1500.0),
+        z,
+        5e-4 if not twice else 3e-4,
+        1e-3,
+        min(max(float(np.mean(y[-10:])), 0.3), 3.0),
+        0.0,
+    ]
     try:
-        found, _ = optimize.curve_fit(model, t, y, start, bounds=(low, high), x_scale=[100, 0.1, 1e-3, 1e-3, 1, 1], max_nfev=400)
+        found, _ = optimize.curve_fit(
+            model, t, y, start, bounds=(low, high), x_scale=[100, 0.1, 1e-3, 1e-3, 1, 1], max_nfev=400
+        )
     except RuntimeError as error:
         raise AnalysisError(f"no model of second order fits the response: {error}") from error
     return np.asarray(found), model(t, *found)
@@ -184,7 +193,9 @@ def modes(t: Array, both: Array, count: int) -> Mode:
     guess = _swing(t, data[0])
     start = np.array([0.22, 1.0, 0.25, 1.06])[: 2 * count] * guess / 100
     low, high = np.tile([-1.0, 0.3], count), np.tile([10.0, 20.0], count)
-    found = optimize.least_squares(left, np.clip(start, low + 0.01, high - 0.01), bounds=(low, high), x_scale=0.1, max_nfev=200)
+    found = optimize.least_squares(
+        left, np.clip(start, low + 0.01, high - 0.01), bounds=(low, high), x_scale=0.1, max_nfev=200
+    )
     linear = np.linalg.lstsq(columns(found.x), data[0], rcond=None)[0]
     out = [Mode(float(s / np.hypot(s, w)), float(50 * np.hypot(s, w) / np.pi), float(np.hypot(*linear[2 + 2 * k : 4 + 2 * k])))
            for k, (s, w) in enumerate(found.x.reshape(-1, 2))]  # fmt: skip
