@@ -64,7 +64,7 @@ class Plan(BenchPlan):
     max_speed_error: float = Field(0.02, gt=0)  # share of the speed
 
 
-def chosen(plan: Plan) -> dict[str, Mapping[str, float]]:
+def chosen(plan: Plan) -> dict[str, dict[str, float]]:
     """The settings by name."""
     first = {plan.names[0]: plan.a}
     return first | {plan.names[1]: plan.b} if plan.b else first
@@ -90,9 +90,8 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     write("slew", 0.0)
     now: tuple[str, float] | None = None
     for setting, speed, axis, size in cases(tuple(settings), plan.speeds_rad_s, plan.axes, plan.sizes_m):
-        if now is None or now[1] != speed:
-            if not _at(rig, plan, record, speed):
-                break
+        if (now is None or now[1] != speed) and not _at(rig, plan, record, speed):
+            break
         if now != (setting, speed):
             _put(rig, plan, settings[setting], used)
             now = (setting, speed)
@@ -205,16 +204,19 @@ def figures(recording: Recording[Plan]) -> Iterable[Figure]:
 METHOD = """\
 The set point of the centre of mass steps along one axis, at once (no slew): up, back, down and back, several times for
 each size. A step begins where the control current answers; the telemetry's period (means over 1 ms) bounds that to half a
-period. The position is that of the centre of mass as the controller makes it of both sensor planes, from where it rested before.
+period. The position is that of the centre of mass as the controller makes it of both sensor planes, from where it
+rested before.
 
 Where the shaft turns, orders 1 to 4 of its angle are fitted before the step and at the end of the record and taken away; what
 is left is averaged over one revolution for settling (over 6 ms where it does not turn). The settling time holds that
-averaging. The band is the plan's share of the step, or four times the noise of the averaged position where that is more, which the report says.
+averaging. The band is the plan's share of the step, or four times the noise of the averaged position where that is
+more, which the report says.
 
 Rise and overshoot are read from the curve of which the telemetry's samples are the means: the derivative of a spline through
 their running sum. Damping and natural frequency are those of the two oscillations that position and tilt share as they die
-away, or of one where two cannot be told apart with less uncertainty; then 5 % of bound stand for the neighbour.
-Bandwidth is that of a second-order model with a lag and a delay, fitted to the first 50 ms: an estimate, since 1 kHz means end at 500 Hz.
+away, or of one where two cannot be told apart with less uncertainty; then a bound of 8 % stands for the neighbour.
+Bandwidth is that of a second-order model with a lag and a delay, fitted to the first 50 ms: an estimate, since 1 kHz
+means end at 500 Hz.
 
 Scatter is that of the repeats. Lengths are those of the position sensors, within their gains.
 """

@@ -20,7 +20,8 @@ ASIDE = 0.02  # of the largest step, between the settings' points
 
 
 def all_figures(steps: Sequence[Done], results: Mapping[Case, Result]) -> list[Figure]:
-    """In the order of the report: for each axis and speed the swing, the settling and the control current of the largest step."""
+    """In the order of the report: for each axis and speed the swing, the settling and the control current of the
+    largest step."""
     out: list[Figure] = []
     largest = max(c.size for c in results)
     places = dict.fromkeys((c.axis, c.speed) for c in results)
@@ -35,8 +36,10 @@ def raw_figures(steps: Sequence[Done]) -> list[Figure]:
     """The first step of each axis and speed as it came, where the analysis goes no further."""
     first = {(d.case.axis, d.case.speed): d for d in reversed(steps)}
     return [
-        Figure(f"raw-{_key(d.case)}", f"Position along and across, {_title(d.case)}", "As recorded, from where the shaft rested.",
-               "time (ms)", "position (µm)", (Series(d.case.axis, 1e3 * d.t, 1e6 * d.raw), Series("across", 1e3 * d.t, 1e6 * d.across)),
+        Figure(f"raw-{_key(d.case)}", f"Position along and across, {_title(d.case)}", "As recorded, from where the "
+                                                                                      "shaft rested.",
+               "time (ms)", "position (µm)",
+               (Series(d.case.axis, 1e3 * d.t, 1e6 * d.raw), Series("across", 1e3 * d.t, 1e6 * d.across)),
                lines=(("set point", 1e6 * d.case.size),))
         for d in first.values()
     ]  # fmt: skip
@@ -59,7 +62,8 @@ def _swing(done: Sequence[Done], results: Mapping[Case, Result]) -> Figure:
                    Series(f"model, {d.case.setting}", 1e3 * r.model_t, 1e6 * d.case.size * r.model)]  # fmt: skip
     size = 1e6 * done[0].case.size
     return Figure(f"swing-{_key(done[0].case)}", f"First swing, {_title(done[0].case)}",
-                  "Means over 1 ms, without what turns with the shaft, and the fitted second-order model whose bandwidth is told. "
+                  "Means over 1 ms, without what turns with the shaft, and the fitted second-order model whose "
+                  "bandwidth is told. "
                   "Rise is between the dashed levels of 10 and 90 %.",
                   "time since the control answers (ms)", "position (µm)", tuple(series),
                   lines=(("set point", size), ("90 %", 0.9 * size), ("10 %", 0.1 * size)))  # fmt: skip
@@ -78,8 +82,10 @@ def _settling(done: Sequence[Done], results: Mapping[Case, Result]) -> Figure:
         series.append(Series(d.case.setting, 1e3 * d.t[m], 100 * off[m]))
     turn = "one revolution" if done[0].case.speed else "6 ms"
     return Figure(f"settling-{_key(done[0].case)}", f"Settling, {_title(done[0].case)}",
-                  f"Position off its set point, averaged over {turn}, from where it is within {NEAR:.0%} of the step; the band is "
-                  f"{within:.1%} on both sides. One step of each setting; the settling time is that of the mean of the repeats.",
+                  f"Position off its set point, averaged over {turn}, from where it is within {NEAR:.0%} of the step; "
+                  f"the band is "
+                  f"{within:.1%} on both sides. One step of each setting; the settling time is that of the mean of "
+                  f"the repeats.",
                   "time since the control answers (ms)", "off the set point (% of the step)", tuple(series),
                   lines=(("band, above", 100 * within), ("band, below", -100 * within)))  # fmt: skip
 
@@ -89,7 +95,8 @@ def _control(done: Sequence[Done]) -> Figure:
         Series(d.case.setting, 1e3 * d.t[m], d.control[m]) for d in done for m in [(d.t > BEFORE_S) & (d.t < SWING_S)]
     )
     return Figure(f"control-{_key(done[0].case)}", f"Control current, {_title(done[0].case)}",
-                  "Positive less negative coil, inboard and outboard together, from where it rested. It says when the step began.",
+                  "Positive less negative coil, inboard and outboard together, from where it rested. It says when the "
+                  "step began.",
                   "time since the control answers (ms)", "current (A)", series)  # fmt: skip
 
 
@@ -105,8 +112,12 @@ def _sizes(results: Mapping[Case, Result]) -> Iterator[Figure]:
             )
             found = [results[c].estimates["overshoot"] for c in cases]
             u = [100 * coverage_factor(len(results[c].responses) - 1) * e.u for c, e in zip(cases, found, strict=True)]
-            series.append(Series(setting, np.array([1e6 * (c.way * c.size + shift) for c in cases]), np.array([100 * e.value for e in found]),
-                                 "points", np.array(u)))  # fmt: skip
+            x, y = (
+                np.array(v) for v in ([1e6 * (c.way * c.size + shift) for c in cases], [100 * e.value for e in found])
+            )
+            series.append(Series(setting, x, y, "points", np.array(u)))
         title = f"Overshoot over the step in {axis} at {speed * 30 / math.pi:.0f} r/min"
-        yield Figure(f"sizes-{axis}-{speed * 30 / math.pi:.0f}", title, "Mean of the repeats with its 95 % interval; a linear loop has "
-                     "one overshoot for all sizes and both directions.", "step (µm)", "overshoot (%)", tuple(series))  # fmt: skip
+        yield Figure(f"sizes-{axis}-{speed * 30 / math.pi:.0f}", title, "Mean of the repeats with its 95 % interval; "
+                                                                        "a linear loop has "
+                     "one overshoot for all sizes and both directions.", "step (µm)", "overshoot "
+                                                                                      "(%)", tuple(series))  # fmt: skip

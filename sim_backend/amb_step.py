@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_backend import amb_linear
+from sim_backend.amb_quantities import offsets
 from sim_backend.core import TICK_S
 from sim_backend.core.amb_params import AmbParams
 
@@ -17,19 +18,23 @@ Array = npt.NDArray[np.float64]
 
 
 def along(p: AmbParams, axis: str) -> AmbParams:
-    """The same machine with what its z axes have in its y axes, for `axis` "z"."""
+    """The same machine about where its sensors read zero, with what its z axes have in its y axes for `axis` "z"."""
+    yi, zi, yo, zo = offsets(p)
     if axis == "y":
-        return p
-    swap = (1, 1, 3, 3)
+        return dataclasses.replace(p, offset=(yi, zi, yo, zo))
+    swap = (1, 1, 3, 3, 4)
     return dataclasses.replace(
-        p, beta=(*(p.beta[k] for k in swap), p.beta[4]), offset=tuple(p.offset[k] for k in swap),
-        gravity_y=p.gravity_z, position_gain=(*(p.position_gain[k] for k in swap), p.position_gain[4]),
-    )  # fmt: skip
+        p,
+        beta=tuple(p.beta[k] for k in swap),
+        offset=(zi, zi, zo, zo),
+        gravity_y=p.gravity_z,
+        position_gain=tuple(p.position_gain[k] for k in swap),
+    )
 
 
 def response(p: AmbParams, settings: Mapping[str, float], law: str, axis: str, ticks: int = 3000) -> Array:
     """What the sensors read of the centre of mass (with the controller's lengths) after a unit step of its set point."""
-    return both(p, settings, law, axis, ticks)[0]
+    return np.asarray(both(p, settings, law, axis, ticks)[0])
 
 
 def both(p: AmbParams, settings: Mapping[str, float], law: str, axis: str, ticks: int = 3000) -> Array:

@@ -113,8 +113,9 @@ def simulated_run(
         live = Rig(file, controller.clock, controller, controller, operator, counters,
                    lambda: Health(counters, simulated.link.stats, None, 0), simulated.link.close,
                    bus.drive if bus else None)  # fmt: skip
-        for part in (controller, operator, *([bus] if bus else [])):
-            part.recorder = recorder
+        controller.recorder = operator.recorder = recorder
+        if bus is not None:
+            bus.recorder = recorder
         controller.clock.sleep(0.1)
         transition(live, RigState.READY)
         for name, value in chosen.settings(settings).items():

@@ -67,17 +67,21 @@ def _signals(steps: Sequence[Done], plan: Tolerances) -> Iterator[Finding]:
     if parts[worst] > plan.max_lost:
         yield Finding(
             "missing-samples",
-            f"{parts[worst]:.2%} of the samples of a step are missing ({plan.max_lost:.2%} is allowed). Look at the link: load, "
+            f"{parts[worst]:.2%} of the samples of a step are missing ({plan.max_lost:.2%} is allowed). Look at the "
+            f"link: load, "
             "cable, gateway.", steps[worst].case.where, Effect.INDETERMINATE,
         )  # fmt: skip
     for channel in sorted({c for d in steps for c in d.stuck}):
         text = f"{channel} does not move at all; a live sensor has noise."
         yield Finding("stuck-channel", text, channel, Effect.ERROR)
     for bits, code, effect, text in (
-        (CLIPPED, "sensor-clipped", Effect.ERROR, "a position sensor read beyond its range: what it shows of the swing is cut off"),
-        (CONTACT, "contact", Effect.INDETERMINATE, "the shaft touched a ring or the axial stop: the response is not that of the loop"),
+        (CLIPPED, "sensor-clipped", Effect.ERROR, "a position sensor read beyond its range: what it shows of the "
+                                                  "swing is cut off"),
+        (CONTACT, "contact", Effect.INDETERMINATE, "the shaft touched a ring or the axial stop: the response is not "
+                                                   "that of the loop"),
         (COIL_LIMIT, "current-saturated", Effect.INDETERMINATE, "a coil current was at its limit: the response is not linear"),
-        (VOLTAGE_LIMIT, "voltage-saturated", Effect.INDETERMINATE, "an amplifier's voltage was at its limit: the currents slewed, "
+        (VOLTAGE_LIMIT, "voltage-saturated", Effect.INDETERMINATE, "an amplifier's voltage was at its limit: the "
+                                                                   "currents slewed, "
          "and the response is not linear; steps are too large, the supply too low or the coils' inductance too high"),
     ):  # fmt: skip
         hit = [d for d in steps if d.flags & bits]
@@ -91,7 +95,8 @@ def _speed(steps: Sequence[Done], plan: Tolerances) -> Iterator[Finding]:
         low, high = (v * 30 / math.pi for v in most[1].speeds)
         yield Finding(
             "speed-lost",
-            f"the pulses say {low:.0f} to {high:.0f} r/min during a step at {most[1].case.speed * 30 / math.pi:.0f} r/min: the drive "
+            f"the pulses say {low:.0f} to {high:.0f} r/min during a step at {most[1].case.speed * 30 / math.pi:.0f} "
+            f"r/min: the drive "
             "does not hold the speed, or pulses are missing or doubled.", most[1].case.where, Effect.ERROR,
         )  # fmt: skip
     moving = [d for d in steps if abs(d.slope) * DRIFT_S > max(plan.band * d.case.size, 4 * d.noise)]
@@ -118,7 +123,8 @@ def _kicks(steps: Sequence[Done]) -> Iterator[Finding]:
         ]
         if len(wrong) > len(steps) / 2:
             bearing = ("inboard", "outboard")[k] if count == 2 else "axial"
-            yield Finding("current-sign", f"the {bearing} control current answers against the step, and the shaft goes the right way: "
+            yield Finding("current-sign", f"the {bearing} control current answers against the step, and the shaft "
+                                          f"goes the right way: "
                           "the current sensors of its coils are exchanged.", wrong[0].case.where, Effect.ERROR)  # fmt: skip
 
 
@@ -130,11 +136,13 @@ def _came(steps: Sequence[Done]) -> Iterator[Finding]:
         along, across = float(d.y[late].mean()) / d.case.size, float(d.across[late].mean()) / d.case.size
         um = f"{along * d.case.size * 1e6:+.1f} µm of {d.case.size * 1e6:g} µm"
         if abs(across) > ASIDE:
-            found = ("wrong-axis", f"{d.case.axis} moved by {um}, and the axis across by {across * d.case.size * 1e6:+.1f} µm: set "
-                     "points, sensors or axes are exchanged.")  # fmt: skip
+            aside = f"{across * d.case.size * 1e6:+.1f} µm"
+            found = ("wrong-axis", f"{d.case.axis} moved by {um}, and the axis across by {aside}: set points, sensors or axes "
+                     "are exchanged.")  # fmt: skip
         elif abs(along) < CAME:
-            why = "the control current never answered: the set point was not applied" if not d.answered else \
-                "the control current answered and the shaft did not follow: amplifiers, sensors or something that holds it"  # fmt: skip
+            why = "the control current never answered: the set point was not applied"
+            if d.answered:
+                why = "the control current answered and the shaft did not follow: amplifiers, sensors or a rub"
             found = ("no-step", f"the position moved by {um}; {why}.")
         elif along < 0:
             found = ("wrong-way", f"the position moved by {um}: set point or sensors have the wrong sign.")
@@ -157,12 +165,14 @@ def of_results(
     for case, result in results.items():
         if not math.isfinite(result.settled.time):
             off = abs(float(np.mean([r.error for r in result.responses])))
-            yield Finding("not-settled", f"still {off:.1%} of the step off at the end of the record ({plan.band:.1%} is the band): "
+            yield Finding("not-settled", f"still {off:.1%} of the step off at the end of the record ({plan.band:.1%} "
+                                         f"is the band): "
                           "record longer, or look at the integrator and at the controller's model.", case.where,
                           Effect.INDETERMINATE)  # fmt: skip
         widest = result.settled.within
         if widest > plan.band:
-            yield Finding("band-widened", f"four times the noise of the averaged position is {widest:.1%} of the step; the settling "
+            yield Finding("band-widened", f"four times the noise of the averaged position is {widest:.1%} of the "
+                                          f"step; the settling "
                           f"time is that into this band, not into {plan.band:.1%}.", case.where)  # fmt: skip
     for where, estimates in groups.items():
         if "damping" not in estimates:

@@ -1,4 +1,5 @@
-"""From the recorded set-point steps to arrays: the shaft along the axis, its tilt, the axis across, freed of what turns with it."""
+"""From the recorded set-point steps to arrays: the shaft along the axis, its tilt, the axis across, freed of what
+turns with it."""
 
 from __future__ import annotations
 
@@ -51,7 +52,8 @@ class Case:
 
 @dataclass(frozen=True)
 class Done:
-    """One recorded step. `t` s from the control's answer (n,), with some samples before it; `y`, `tilt`, `across` m along the way of
+    """One recorded step. `t` s from the control's answer (n,), with some samples before it; `y`, `tilt`, `across` m
+    along the way of
     the step: from where they rested, what turns with the shaft taken away; `raw` as `y` with it; `rest` m the same before the
     step; `control` A, difference of the coils, both bearings; `answered`: it did; `kicks` A, of each
     bearing's at first. `noise` m of the mean over `samples`."""
@@ -186,7 +188,8 @@ def _answer(control: Array, rest: npt.NDArray[np.bool_]) -> tuple[int, bool]:
 
 
 def _still(t: Array, signals: Array, angle: Array, rest: npt.NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Signals (k, n) without what turns with the shaft, and its first order's amplitude (k,): orders of the angle, fitted before
+    """Signals (k, n) without what turns with the shaft, and its first order's amplitude (k,): orders of the angle,
+    fitted before
     the step and in the last third of the record, each with its own straight line."""
     phase = np.unwrap(angle)
     turning = [f(n * phase) for n in ORDERS for f in (np.cos, np.sin)]

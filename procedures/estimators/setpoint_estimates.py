@@ -18,8 +18,12 @@ from procedures.estimators.setpoint_data import Case, Done
 from procedures.estimators.stepmodel import Mode, Response, Settling
 
 Array = npt.NDArray[np.float64]
-NEIGHBOUR = 0.05  # what a second mode that is not told apart does to damping, as a share: bound over drawn machines
-NEIGHBOUR_HZ = 0.02  # and to the frequency, with what the compliance of the shaft in bending takes from it
+NEIGHBOUR = 0.08  # what a second mode that is not told apart does to damping, as a share: bound over drawn machines
+NEIGHBOUR_HZ = 0.045  # and to the frequency
+APART, APART_HZ = (
+    0.025,
+    0.02,
+)  # where two are told apart: filters that still ring, and the shaft's compliance in bending
 BENDS = 0.01  # of the bandwidth, likewise
 CURVE = 3e-3  # of the overshoot's excursion: what the spline leaves of a means' curve
 RISE_SHARE = 0.01  # of a period: the same for crossings
@@ -84,7 +88,8 @@ def _estimates(
     }
     if math.isfinite(settled.time):
         scatter = Influence(id=f"scatter/settling_time/{where}", name="scatter of the repeats", u=settled.u, unit="s", kind="A",
-                            distribution="normal", dof=float(len(r) - 1), source=f"{len(r)} steps, one left out in turn")  # fmt: skip
+                            distribution="normal", dof=float(len(r) - 1), source=f"{len(r)} steps, one left out in "
+                                                                                 f"turn")  # fmt: skip
         out["settling_time"] = (
             Estimate.of(settled.time, scatter)
             + bound(f"start/{where}", "start of the step within a period", period / 2, "s")
@@ -139,15 +144,21 @@ def oscillation(group: str, done: Sequence[Done]) -> dict[str, Estimate]:
 
 def _oscillation(group: str, count: int, mode: Mode, left: Sequence[Mode]) -> dict[str, Estimate]:
     out = {}
-    for name, unit, value, others, share in (
-        ("damping", "1", mode.damping, [m.damping for m in left], NEIGHBOUR),
-        ("natural_frequency", "Hz", mode.frequency, [m.frequency for m in left], NEIGHBOUR_HZ),
+    for name, unit, value, others, beside in (
+        ("damping", "1", mode.damping, [m.damping for m in left], NEIGHBOUR if count == 1 else APART),
+        (
+            "natural_frequency",
+            "Hz",
+            mode.frequency,
+            [m.frequency for m in left],
+            NEIGHBOUR_HZ if count == 1 else APART_HZ,
+        ),
     ):
         n = len(others)
         u = math.sqrt((n - 1) / n * float(((np.array(others) - np.mean(others)) ** 2).sum()))
         jackknife = Influence(id=f"scatter/{name}/{group}", name="scatter of the steps", u=u, unit=unit, kind="A",
-                              distribution="normal", dof=float(n - 1), source=f"{n} blocks of steps left out in turn")  # fmt: skip
-        beside = share if count == 1 or name == "natural_frequency" else share / 2
+                              distribution="normal", dof=float(n - 1), source=f"{n} blocks of steps left out in "
+                                                                              f"turn")  # fmt: skip
         text = (
             "a neighbouring mode, a shaft that bends" if count == 1 else "filters that still ring, a shaft that bends"
         )

@@ -27,7 +27,8 @@ SCAN_HZ = np.arange(2.0, 400.0, 0.25)
 @dataclass(frozen=True)
 class Response:
     """What one step shows, as shares of it where lengths are meant: `rise` 10 to 90 % s, `overshoot`, `error` at
-    the end, `bandwidth` Hz, `gain` of the model, `misfit` rms of the model, `shape` Hz: how far the bandwidth moves when the model has
+    the end, `bandwidth` Hz, `gain` of the model, `misfit` rms of the model, `shape` Hz: how far the bandwidth moves
+    when the model has
     its lag twice; `model` (n,) at `model_t`."""
 
     rise: float
@@ -77,7 +78,7 @@ def trailing(y: Array, samples: float) -> Array:
     whole = int(samples)
     kernel = np.concatenate((np.ones(whole), [samples - whole]))
     count = np.convolve(np.ones(len(y)), kernel)[: len(y)]
-    return np.convolve(y, kernel)[: len(y)] / count
+    return np.asarray(np.convolve(y, kernel)[: len(y)] / count)
 
 
 def settling_time(t: Array, y: Array, within: float, samples: float) -> float:
@@ -100,7 +101,7 @@ def stepped(t: Array, period: float, w: float, z: float, lag: float, twice: bool
 
     def integral(at: Array) -> Array:
         at = np.maximum(at, 0.0)
-        return at + sum((r / p * (np.exp(p * at) - 1)).real for r, p in zip(residues, poles, strict=True))
+        return np.asarray(at + sum((r / p * (np.exp(p * at) - 1)).real for r, p in zip(residues, poles, strict=True)))
 
     return np.asarray((integral(t) - integral(t - period)) / period)
 
