@@ -158,7 +158,7 @@ def _done(
     signals = np.array([raw, tilt, across, control, *ones])
     clean, amplitude = _still(t, signals, data["angle"], rest) if turning else (signals, np.zeros(len(signals)))
     clean = case.way * (clean - clean[:, rest].mean(axis=1, keepdims=True))
-    first, answered = _answer(clean[3], rest)
+    first, answered = _answer(clean[4:], rest)
     period = float(np.median(np.diff(t)))
     samples = 2 * math.pi / float(np.median(data["speed"])) / period if turning else AT_REST_S / period
     since = t - t[first] + period / 2  # the control changed somewhere in the period that ends with this sample
@@ -178,10 +178,10 @@ def _done(
 
 
 def _answer(control: Array, rest: npt.NDArray[np.bool_]) -> tuple[int, bool]:
-    """The first sample at which the control current shows the step; the one after the write, where none does."""
+    """The first sample at which a bearing's control current (k, n) shows the step; the one after the write, where none does."""
     begin = int(np.flatnonzero(~rest)[0])
-    window = np.abs(control[begin : begin + 40])
-    noise = float(control[rest].std())
+    window = np.abs(control[:, begin : begin + 40]).max(axis=0)
+    noise = float(control[:, rest].std(axis=1).max())
     if window.max() < 8 * noise:
         return begin, False
     return begin + int(np.argmax(window > max(ANSWER * window.max(), 4 * noise))), True
