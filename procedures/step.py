@@ -37,6 +37,7 @@ MEASURES = (OVERSHOOT, RISE, SETTLING, ERROR, BANDWIDTH, DAMPING, FREQUENCY, SIZ
 Axis = Literal["y", "z", "x"]
 MODEL = ("model_beta_{}", "model_offset_{}")
 RADIAL = ("yi", "zi", "yo", "zo")
+PULSES_S = 1.0  # until the speed by the pulses, and with it the controller's state, says that the shaft stands
 SETTLED_S = 0.5  # after the last ramp of a speed
 MARGIN = 0.8  # of the clearance that a step with its overshoot may use
 
@@ -106,6 +107,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     if rig.drive is not None and max(plan.speeds_rad_s) > 0:
         rig.drive.stop()
         rig.drive.coast()
+        rig.clock.sleep(PULSES_S)
     for name in ("slew", *sorted({*used} - {"law"}), *model(rig.file, plan)):
         write(name, rig.file.parameters[name].default)
 
