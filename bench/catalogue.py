@@ -39,6 +39,11 @@ PROCEDURES = (
     Entry(
         "angle-step", "procedures.angle_step", "Angle step while the motor carries: static against priority currents"
     ),
+    Entry(
+        "step",
+        "procedures.step",
+        "Set-point steps of the levitated shaft, with two settings of the controller compared",
+    ),
     Entry("slew", "procedures.slew", "Following a slow sine of the angle, with detent"),
     Entry("force-map", "procedures.force_map", "Terms of the motor's force over displacement, currents and load"),
 )

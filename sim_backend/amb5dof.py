@@ -25,7 +25,7 @@ DEFECTS = {
     "position_sign_yi": 1.0, "position_sign_zi": 1.0, "position_sign_yo": 1.0, "position_sign_zo": 1.0,
     "position_sign_x": 1.0, "exchange_planes": 0.0, "current_sign_i": 1.0, "current_sign_o": 1.0, "pulse_missing": 0.0,
     "pulse_doubled": 0.0, "loose_speed": 0.0, "loose_shift": 0.0, "drop_fraction": 0.0, "integrator_factor": 1.0,
-    "dead_after_s": 0.0, "fault_after_s": 0.0, "drive_fault_after_s": 0.0,
+    "reference_factor": 1.0, "dead_after_s": 0.0, "fault_after_s": 0.0, "drive_fault_after_s": 0.0,
 }  # fmt: skip
 """Planted defects and their harmless values. Current signs act on what is told of a bearing's y and z axes."""
 SHARED = {
