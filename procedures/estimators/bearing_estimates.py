@@ -1,0 +1,137 @@
+"""Force constants and offsets with their influences, from positions and certificates, and the comparison of T Table 2.2."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.recording import Recording
+from bench.rigfile import RigFile
+from bench.uncertainty import Estimate, Influence
+from procedures.estimators import bearing
+from procedures.estimators.bearing import AXES, COILS, AxisFit, Positions, Statics
+from procedures.estimators.bearing_data import Held
+from procedures.estimators.chainrule import by_inputs
+from procedures.estimators.inputs import certified
+from procedures.estimators.typea import scatter
+
+Array = npt.NDArray[np.float64]
+LENGTHS = {"l_is": "com_to_inboard_sensor", "l_os": "com_to_outboard_sensor", "l_oa": "com_to_outboard_amb",
+           "amb_span": "amb_span", "l_c": "com_to_coupling", "gap": "amb_gap"}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Everything the measurements, findings and figures are made of. `noise_N` is the standard deviation of a batch's force within
+    its step, by axis; `gaps` what each axis alone asks for (m) with its standard uncertainty by scatter; `parts` the number of
+    batches."""
+
+    held: Held
+    statics: Statics
+    fits: dict[str, AxisFit]
+    values: dict[str, float]
+    estimates: dict[str, Estimate]
+    noise_N: dict[str, float]
+    gaps: dict[str, tuple[float, float]]
+    parts: int
+
+
+def evaluate(recording: Recording[Any], held: Held) -> Analysis:
+    """Fits with their influences; `estimates` by quantity and axis."""
+    inputs = fit_inputs(recording.rig, recording.plan.coupled)
+    values = {name: e.value for name, e in inputs.items()}
+    means, parts = held.means(), held.parts()
+
+    def model(p: dict[str, float]) -> dict[str, float]:
+        return outputs(means, parts, p)
+
+    s = bearing.statics(means, values)
+    fits = {a: bearing.axis_fit(s, k, values["gap"]) for k, a in enumerate(AXES)}
+    estimates = by_inputs(model, inputs)
+    noise = {a: within(parts, values, k, fits[a], len(held)) for k, a in enumerate(AXES)}
+    count = parts.read.shape[1]
+    for a, f in fits.items():
+        extra = scatter(honest(f, noise[a], count // len(held)), {f"beta_{a}": [1, 0], f"offset_{a}": [0, 1]}, f"bearing-model/{a}",
+                        f"scatter of the positions, {a}")  # fmt: skip
+        extra |= scatter(f.linear, {f"k_linear_{a}": [1, 0], f"stiffness_linear_{a}": [0, 1]}, f"bearing-model/linear/{a}",
+                         f"scatter of the linear fit, {a}")  # fmt: skip
+        extra |= of_sums(a, estimates, noise[a], count)
+        estimates |= {name: estimates[name] + e for name, e in extra.items()}
+    gaps = {a: bearing.gap_of(s, k, fits[a].fit, values["gap"]) for k, a in enumerate(AXES)}
+    return Analysis(held, s, fits, values, estimates, noise, gaps, count)
+
+
+def outputs(means: Positions, parts: Positions, p: dict[str, float]) -> dict[str, float]:
+    """Every value by quantity and axis: terms from the steps' means, sums of squares over the batches."""
+    s, b = bearing.statics(means, p), bearing.statics(parts, p)
+    out = {}
+    for k, a in enumerate(AXES):
+        f = bearing.axis_fit(s, k, p["gap"])
+        one, two = sums(b, k, f, p["gap"])
+        out |= {f"beta_{a}": f.beta, f"offset_{a}": f.offset, f"k_linear_{a}": float(f.linear.terms[0]),
+                f"stiffness_linear_{a}": float(f.linear.terms[1]), f"misfit_{a}": one, f"misfit_linear_{a}": two,
+                f"misfit_ratio_{a}": two / one}  # fmt: skip
+    return out
+
+
+def sums(b: Statics, k: int, f: AxisFit, gap: float) -> tuple[float, float]:
+    """Sums of squared residuals of both models over the batches, N^2."""
+    r, p, n = b.r[k], b.p[k], b.n[k]
+    one = bearing.magnet(f.beta, f.offset, gap, r, p, n) - b.force[k]
+    two = f.linear.terms[0] * (p - n) / 2 + f.linear.terms[1] * r - b.force[k]
+    return float(one @ one), float(two @ two)
+
+
+def within(parts: Positions, values: dict[str, float], k: int, f: AxisFit, steps: int) -> float:
+    """Standard deviation of a batch's residual force about its step's mean, N."""
+    b = bearing.statics(parts, values)
+    left = (bearing.magnet(f.beta, f.offset, values["gap"], b.r[k], b.p[k], b.n[k]) - b.force[k]).reshape(steps, -1)
+    return float(np.sqrt(left.var(axis=1, ddof=1).mean()))
+
+
+def honest(f: AxisFit, noise_N: float, batches: int) -> Any:
+    """The fit with a covariance that is at least what the batches say."""
+    residual = math.sqrt(f.fit.chi2 / f.fit.dof)
+    more = max(1.0, noise_N / math.sqrt(batches) / max(residual, 1e-12))
+    return replace(f.fit, covariance=f.fit.covariance * more**2)
+
+
+def of_sums(a: str, e: dict[str, Estimate], noise_N: float, count: int) -> dict[str, Estimate]:
+    """What the noise of the batches does to sums of squares: 2 sqrt(S) times the noise, and sqrt(2 n) times its square."""
+
+    def spread(total: float) -> float:
+        return math.sqrt(4 * noise_N**2 * max(total - count * noise_N**2, 0) + 2 * count * noise_N**4)
+
+    values = {k: e[f"{k}_{a}"].value for k in ("misfit", "misfit_linear", "misfit_ratio")}
+    u = {k: spread(values[k]) for k in ("misfit", "misfit_linear")}
+    u["misfit_ratio"] = values["misfit_ratio"] * math.hypot(*(u[k] / values[k] for k in ("misfit", "misfit_linear")))
+    return {
+        f"{k}_{a}": Estimate.of(0.0, Influence(f"scatter/bearing-model/{k}/{a}", f"noise of the batches, {a}", x, "1", "A", "normal",
+                                               source="batch means"))
+        for k, x in u.items()
+    }  # fmt: skip
+
+
+def fit_inputs(rig: RigFile, coupled: bool) -> dict[str, Estimate]:
+    """What the fits need besides the positions: certificates of the rig file as influences by identity."""
+    g, m = rig.geometry, rig.machine
+    inputs = {"mass": certified("machine/mass", m["mass"], "mass of the shaft"),
+              "axes": certified("machine/radial_axes", m["radial_axes"], "angle of the axes to the vertical"),
+              "gravity": certified("site/gravity", rig.site.gravity, "gravity")}  # fmt: skip
+    inputs |= {key: certified(f"geometry/{name}", g[name], name.replace("_", " ")) for key, name in LENGTHS.items()}
+    spring = certified("geometry/coupling_stiffness", g["coupling_stiffness"], "stiffness of the coupling")
+    inputs["coupling"] = spring if coupled else Estimate.exact(0.0)
+    for a in AXES:
+        sensor, name = rig.sensors[f"pos_{a}"], f"sensors/pos_{a}"
+        inputs[f"gain_{a}"] = certified(f"{name}/gain", sensor.gain, f"gain of pos_{a}")
+        inputs[f"zero_{a}"] = certified(f"{name}/offset", sensor.offset, f"zero of pos_{a}")
+        inputs[f"runout_{a}"] = certified(f"machine/runout/{a}", m["runout"], f"runout of pos_{a} where the shaft rests")
+    for c in COILS:
+        sensor, name = rig.sensors[f"i_{c}"], f"sensors/i_{c}"
+        inputs[f"gain_{c}"] = certified(f"{name}/gain", sensor.gain, f"gain of i_{c}")
+        inputs[f"offset_{c}"] = certified(f"{name}/offset", sensor.offset, f"offset of i_{c}")
+    return inputs

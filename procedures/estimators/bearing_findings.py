@@ -1,0 +1,5 @@
+FATAL=()
+def of_signals(*a): return ()
+def of_wiring(*a): return ()
+def of_models(*a): return ()
+def of_results(*a): return ()
