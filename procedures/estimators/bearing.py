@@ -152,15 +152,23 @@ def fits(d: Positions, p: Numbers) -> dict[str, AxisFit]:
     return {a: axis_fit(s, k, p["gap"]) for k, a in enumerate(AXES)}
 
 
-def gap_of(s: Statics, k: int, fit: Fit, gap: float) -> tuple[float, float]:
-    """The gap that the data of one axis alone ask for beside beta and offset, with its standard uncertainty by scatter."""
+def with_gap(s: Statics, k: int, start: Array, gap: float) -> Fit:
+    """T (2.8) with a third term: the gap that the data of axis `k` alone ask for (m). `start` is beta and offset at `gap`.
+
+    Raises:
+        AnalysisError: no convergence.
+    """
     r, p, n = s.r[k], s.p[k], s.n[k]
 
     def model(terms: Array) -> Array:
-        return magnet(terms[0] * fit.terms[0], terms[1] * gap, terms[2] * gap, r, p, n)
+        return magnet(terms[0], terms[1], terms[2], r, p, n)
 
-    found = leastsquares.nonlinear(model, s.force[k], np.array([1.0, fit.terms[1] / gap, 1.0]))
-    return float(found.terms[2] * gap), float(found.u[2] * gap)
+    def jacobian(terms: Array) -> Array:
+        near, far = terms[2] - terms[1] - r, terms[2] + terms[1] + r
+        up, down = 2 * terms[0] * p**2 / near**3, 2 * terms[0] * n**2 / far**3
+        return np.column_stack([(p / near) ** 2 - (n / far) ** 2, up + down, down - up])
+
+    return leastsquares.nonlinear(model, s.force[k], np.array([*start, gap]), jacobian=jacobian)
 
 
 def slopes(fit: Fit, gap: float, bias: float) -> tuple[float, float]:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from bench.recording import Recording
 from bench.rigfile import RigFile
-from bench.uncertainty import Estimate, Influence
+from bench.uncertainty import Estimate, Influence, correlation_matrix
 from procedures.estimators import bearing
 from procedures.estimators.bearing import AXES, COILS, AxisFit, Positions, Statics
 from procedures.estimators.bearing_data import Held
@@ -27,8 +27,8 @@ LENGTHS = {"l_is": "com_to_inboard_sensor", "l_os": "com_to_outboard_sensor", "l
 @dataclass(frozen=True)
 class Analysis:
     """Everything the measurements, findings and figures are made of. `noise_N` is the standard deviation of a batch's force within
-    its step, by axis; `gaps` what each axis alone asks for (m) with its standard uncertainty by scatter; `parts` the number of
-    batches."""
+    its step, by axis; `gaps` what each axis alone asks for, `drawing` what the certificate says, `gap` both together (m); `parts` the
+    number of batches."""
 
     held: Held
     statics: Statics
@@ -36,15 +36,21 @@ class Analysis:
     values: dict[str, float]
     estimates: dict[str, Estimate]
     noise_N: dict[str, float]
-    gaps: dict[str, tuple[float, float]]
+    gaps: dict[str, Estimate]
+    drawing: Estimate
+    gap: Estimate
+    bias_A: float
     parts: int
 
 
 def evaluate(recording: Recording[Any], held: Held) -> Analysis:
     """Fits with their influences; `estimates` by quantity and axis."""
     inputs = fit_inputs(recording.rig, recording.plan.coupled)
-    values = {name: e.value for name, e in inputs.items()}
     means, parts = held.means(), held.parts()
+    drawing = inputs["gap"]
+    gaps = gap_estimates(means, inputs)
+    inputs["gap"] = together([drawing, *gaps.values()])
+    values = {name: e.value for name, e in inputs.items()}
 
     def model(p: dict[str, float]) -> dict[str, float]:
         return outputs(means, parts, p)
@@ -61,8 +67,45 @@ def evaluate(recording: Recording[Any], held: Held) -> Analysis:
                          f"scatter of the linear fit, {a}")  # fmt: skip
         extra |= of_sums(a, estimates, noise[a], count)
         estimates |= {name: estimates[name] + e for name, e in extra.items()}
-    gaps = {a: bearing.gap_of(s, k, fits[a].fit, values["gap"]) for k, a in enumerate(AXES)}
-    return Analysis(held, s, fits, values, estimates, noise, gaps, count)
+    return Analysis(held, s, fits, values, estimates, noise, gaps, drawing, inputs["gap"], recording.plan.bias_A, count)
+
+
+def gap_estimates(means: Positions, inputs: dict[str, Estimate]) -> dict[str, Estimate]:
+    """The gap that each axis alone asks for beside its beta and offset, with every influence; the drawing's is no input."""
+    nominal = inputs["gap"].value
+    given = inputs | {"gap": Estimate.exact(nominal)}
+    first = bearing.statics(means, {k: e.value for k, e in given.items()})
+    starts = [bearing.axis_fit(first, k, nominal).fit.terms for k in range(4)]
+
+    def model(p: dict[str, float]) -> dict[str, float]:
+        s = bearing.statics(means, p)
+        return {a: float(bearing.with_gap(s, k, starts[k], nominal).terms[2]) for k, a in enumerate(AXES)}
+
+    found = by_inputs(model, given)
+    for k, a in enumerate(AXES):
+        fit = bearing.with_gap(first, k, starts[k], nominal)
+        found[a] = found[a] + scatter(fit, {a: [0, 0, 1]}, f"bearing-model/gap/{a}", f"scatter of the gap, {a}")[a]
+    return found
+
+
+def together(estimates: list[Estimate]) -> Estimate:
+    """The combination of least variance of estimates of one number, what they share considered; each has a weight of at least
+    zero, so that a strong correlation does not take the result outside of them."""
+    u = np.array([e.u for e in estimates])
+    covariance = np.array(correlation_matrix(estimates)) * np.outer(u, u)
+    use = np.ones(len(u), bool)
+    while True:
+        weights = np.zeros(len(u))
+        solved = np.linalg.solve(covariance[np.ix_(use, use)], np.ones(int(use.sum())))
+        weights[use] = solved / solved.sum()
+        if (weights >= 0).all():
+            break
+        use &= weights > 0
+    total = Estimate.exact(0.0)
+    for w, e in zip(weights, estimates, strict=True):
+        if w > 0:
+            total = total + e * float(w)
+    return total
 
 
 def outputs(means: Positions, parts: Positions, p: dict[str, float]) -> dict[str, float]:
