@@ -29,8 +29,7 @@ Array = npt.NDArray[np.float64]
 Numbers = Mapping[str, float]
 AXES = ("yi", "zi", "yo", "zo")
 COILS = tuple(f"{a}_{c}" for a in AXES for c in "pn")
-SOUGHT = ("beta", "offset")
-COMPARED = ("k_linear", "stiffness_linear", "misfit", "misfit_linear", "misfit_ratio")
+COMPARED = ("k_linear", "stiffness_linear", "misfit", "misfit_linear", "misfit_ratio", "misfit_ratio_means")
 
 
 @dataclass(frozen=True)
@@ -55,7 +54,7 @@ class Statics:
 
 @dataclass(frozen=True)
 class AxisFit:
-    """One axis: both fits. `fit` has the terms beta (in units of the start value's order, N m^2/A^2) and offset (m)."""
+    """One axis: both fits. `fit` has the terms beta (N m^2/A^2) and offset (m)."""
 
     fit: Fit
     linear: Fit

@@ -23,18 +23,19 @@ CHANNELS = (*POSITIONS, *CURRENTS, "flags")
 @dataclass(frozen=True)
 class Held:
     """Steps in time order, N of them. Per channel `mean`, `drift`, `spread` (N,) and `batches` (N, B), means of B parts of a
-    step; `labels` (N,); `lost`, `expected` samples; `flags` ORed; `names` for the reader; `samples` in all."""
+    step; `every` (S,), all samples, step by step, of which `of_step` (S,) says the step; `labels` (N,); `lost`, `expected` samples; `flags` ORed; `names` for the reader."""
 
     mean: dict[str, Array]
     drift: dict[str, Array]
     spread: dict[str, Array]
     batches: dict[str, Array]
+    every: dict[str, Array]
+    of_step: npt.NDArray[np.int64]
     labels: dict[str, Array]
     lost: Array
     expected: Array
     flags: npt.NDArray[np.int64]
     names: tuple[str, ...]
-    samples: int
 
     def __len__(self) -> int:
         return len(self.names)
@@ -50,6 +51,10 @@ class Held:
     def parts(self) -> Positions:
         """One column a batch, step by step (N B)."""
         return _positions({k: v.ravel() for k, v in self.batches.items()})
+
+    def samples(self) -> Positions:
+        """One column a sample, step by step (S)."""
+        return _positions(self.every)
 
 
 def _positions(of: dict[str, Array]) -> Positions:
@@ -75,12 +80,13 @@ def read_steps(recording: Recording[Any], kind: str, labels: tuple[str, ...], ba
         drift,
         spread,
         parts,
+        {c: np.concatenate([r["every"][c] for r in read]) for c in (*POSITIONS, *CURRENTS)},
+        np.repeat(np.arange(len(read)), [r["samples"] for r in read]),
         {key: np.array([float(s.labels[key]) for s in steps]) for key in labels},
         np.array([float(s.lost()) for s in steps]),
         np.array([float(s.expected()) for s in steps]),
         np.array([r["flags"] for r in read]),
         tuple(_name(kind, dict(s.labels)) for s in steps),
-        sum(r["samples"] for r in read),
     )
 
 
@@ -97,5 +103,6 @@ def _read(step: Step, batches: int) -> dict[str, Any]:
         raise AnalysisError(f"step {dict(step.labels)}: found {count} samples; expected {2 * batches} or more")
     out = reduced(data, CHANNELS, step.labels)
     out["batches"] = {c: np.array([part.mean() for part in np.array_split(data[c], batches)]) for c in CHANNELS}
+    out["every"] = {c: data[c] for c in (*POSITIONS, *CURRENTS)}
     out["samples"] = count
     return out

@@ -26,46 +26,47 @@ LENGTHS = {"l_is": "com_to_inboard_sensor", "l_os": "com_to_outboard_sensor", "l
 
 @dataclass(frozen=True)
 class Analysis:
-    """Everything the measurements, findings and figures are made of. `noise_N` is the standard deviation of a batch's force within
-    its step, by axis; `gaps` what each axis alone asks for, `drawing` what the certificate says, `gap` both together (m); `parts` the
-    number of batches."""
+    """Everything the measurements, findings and figures are made of. `noise_N` is the standard deviation of a sample's and of
+    a batch's force within its step, by axis; `gaps` what each axis alone asks for, `drawing` what the certificate says, `gap` both together (m); `samples`
+    how many there are."""
 
     held: Held
     statics: Statics
     fits: dict[str, AxisFit]
     values: dict[str, float]
     estimates: dict[str, Estimate]
-    noise_N: dict[str, float]
+    noise_N: dict[str, tuple[float, float]]
     gaps: dict[str, Estimate]
     drawing: Estimate
     gap: Estimate
     bias_A: float
-    parts: int
+    samples: int
 
 
 def evaluate(recording: Recording[Any], held: Held) -> Analysis:
     """Fits with their influences; `estimates` by quantity and axis."""
     inputs = fit_inputs(recording.rig, recording.plan.coupled)
-    means, parts = held.means(), held.parts()
+    means, parts, samples = held.means(), held.parts(), held.samples()
     drawing = inputs["gap"]
     gaps = gap_estimates(means, inputs)
     inputs["gap"] = together([drawing, *gaps.values()])
     values = {name: e.value for name, e in inputs.items()}
 
     def model(p: dict[str, float]) -> dict[str, float]:
-        return outputs(means, parts, p)
+        return outputs(means, parts, samples, p)
 
     s = bearing.statics(means, values)
     fits = {a: bearing.axis_fit(s, k, values["gap"]) for k, a in enumerate(AXES)}
     estimates = by_inputs(model, inputs)
-    noise = {a: within(parts, values, k, fits[a], len(held)) for k, a in enumerate(AXES)}
-    count = parts.read.shape[1]
+    count = len(held.of_step)
+    noise = {a: _noise(held, values, k, fits[a]) for k, a in enumerate(AXES)}
     for a, f in fits.items():
-        extra = scatter(honest(f, noise[a], count // len(held)), {f"beta_{a}": [1, 0], f"offset_{a}": [0, 1]}, f"bearing-model/{a}",
+        extra = scatter(honest(f, noise[a][1], held.batches["pos_yi"].shape[1]),
+                        {f"beta_{a}": [1, 0], f"offset_{a}": [0, 1]}, f"bearing-model/{a}",
                         f"scatter of the positions, {a}")  # fmt: skip
         extra |= scatter(f.linear, {f"k_linear_{a}": [1, 0], f"stiffness_linear_{a}": [0, 1]}, f"bearing-model/linear/{a}",
                          f"scatter of the linear fit, {a}")  # fmt: skip
-        extra |= of_sums(a, estimates, noise[a], count)
+        extra |= of_sums(a, estimates, noise[a], held)
         estimates |= {name: estimates[name] + e for name, e in extra.items()}
     return Analysis(held, s, fits, values, estimates, noise, gaps, drawing, inputs["gap"], recording.plan.bias_A, count)
 
@@ -108,32 +109,36 @@ def together(estimates: list[Estimate]) -> Estimate:
     return total
 
 
-def outputs(means: Positions, parts: Positions, p: dict[str, float]) -> dict[str, float]:
-    """Every value by quantity and axis: terms from the steps' means, sums of squares over the batches."""
-    s, b = bearing.statics(means, p), bearing.statics(parts, p)
+def outputs(means: Positions, parts: Positions, samples: Positions, p: dict[str, float]) -> dict[str, float]:
+    """Every value by quantity and axis: terms from the steps' means, sums of squares over all samples as in T Table 2.2,
+    and their ratio over batch means too."""
+    s, b, quiet = (bearing.statics(x, p) for x in (means, samples, parts))
     out = {}
     for k, a in enumerate(AXES):
         f = bearing.axis_fit(s, k, p["gap"])
-        one, two = sums(b, k, f, p["gap"])
+        one, two = (float(x @ x) for x in residuals(b, k, f, p["gap"]))
+        low, high = (float(x @ x) for x in residuals(quiet, k, f, p["gap"]))
         out |= {f"beta_{a}": f.beta, f"offset_{a}": f.offset, f"k_linear_{a}": float(f.linear.terms[0]),
                 f"stiffness_linear_{a}": float(f.linear.terms[1]), f"misfit_{a}": one, f"misfit_linear_{a}": two,
-                f"misfit_ratio_{a}": two / one}  # fmt: skip
+                f"misfit_ratio_{a}": two / one, f"misfit_ratio_means_{a}": high / low}  # fmt: skip
     return out
 
 
-def sums(b: Statics, k: int, f: AxisFit, gap: float) -> tuple[float, float]:
-    """Sums of squared residuals of both models over the batches, N^2."""
+def residuals(b: Statics, k: int, f: AxisFit, gap: float) -> tuple[Array, Array]:
+    """What each model gives more than the force that carries, N."""
     r, p, n = b.r[k], b.p[k], b.n[k]
     one = bearing.magnet(f.beta, f.offset, gap, r, p, n) - b.force[k]
     two = f.linear.terms[0] * (p - n) / 2 + f.linear.terms[1] * r - b.force[k]
-    return float(one @ one), float(two @ two)
+    return one, two
 
 
-def within(parts: Positions, values: dict[str, float], k: int, f: AxisFit, steps: int) -> float:
-    """Standard deviation of a batch's residual force about its step's mean, N."""
-    b = bearing.statics(parts, values)
-    left = (bearing.magnet(f.beta, f.offset, values["gap"], b.r[k], b.p[k], b.n[k]) - b.force[k]).reshape(steps, -1)
-    return float(np.sqrt(left.var(axis=1, ddof=1).mean()))
+def _noise(held: Held, values: dict[str, float], k: int, f: AxisFit) -> tuple[float, float]:
+    """Standard deviations of a sample's and of a batch's residual force about its step's mean, N."""
+    one = residuals(bearing.statics(held.samples(), values), k, f, values["gap"])[0]
+    mean = np.bincount(held.of_step, one) / np.bincount(held.of_step)
+    sample = math.sqrt(float(((one - mean[held.of_step]) ** 2).sum()) / (len(one) - len(held)))
+    batch = residuals(bearing.statics(held.parts(), values), k, f, values["gap"])[0].reshape(len(held), -1)
+    return sample, float(np.sqrt(batch.var(axis=1, ddof=1).mean()))
 
 
 def honest(f: AxisFit, noise_N: float, batches: int) -> Any:
@@ -143,20 +148,24 @@ def honest(f: AxisFit, noise_N: float, batches: int) -> Any:
     return replace(f.fit, covariance=f.fit.covariance * more**2)
 
 
-def of_sums(a: str, e: dict[str, Estimate], noise_N: float, count: int) -> dict[str, Estimate]:
-    """What the noise of the batches does to sums of squares: 2 sqrt(S) times the noise, and sqrt(2 n) times its square."""
+def of_sums(a: str, e: dict[str, Estimate], noise_N: tuple[float, float], held: Held) -> dict[str, Estimate]:
+    """What noise does to sums of squares S over n samples in batches of b, whose means scatter by s_b and samples by s:
+    u^2 = 4 b s_b^2 (S - n s^2) + 2 n b s_b^2 s^2."""
+    (sample, batch), n = noise_N, len(held.of_step)
+    each = n / held.batches["pos_yi"].size
 
     def spread(total: float) -> float:
-        return math.sqrt(4 * noise_N**2 * max(total - count * noise_N**2, 0) + 2 * count * noise_N**4)
+        return math.sqrt(each * batch**2 * (4 * max(total - n * sample**2, 0) + 2 * n * sample**2))
 
     values = {k: e[f"{k}_{a}"].value for k in ("misfit", "misfit_linear", "misfit_ratio")}
     u = {k: spread(values[k]) for k in ("misfit", "misfit_linear")}
-    u["misfit_ratio"] = values["misfit_ratio"] * math.hypot(*(u[k] / values[k] for k in ("misfit", "misfit_linear")))
-    return {
-        f"{k}_{a}": Estimate.of(0.0, Influence(f"scatter/bearing-model/{k}/{a}", f"noise of the batches, {a}", x, "1", "A", "normal",
-                                               source="batch means"))
-        for k, x in u.items()
-    }  # fmt: skip
+    u["misfit_ratio"] = values["misfit_ratio"] * math.hypot(*(x / values[k] for k, x in u.items()))
+
+    def noise(k: str) -> Influence:
+        return Influence(f"scatter/bearing-model/{k}/{a}", f"noise of the samples, {a}", u[k], "1", "A", "normal", source="batch means")
+
+    u["misfit_ratio_means"] = e[f"misfit_ratio_means_{a}"].value * math.sqrt(2 / held.batches["pos_yi"].size)
+    return {f"{k}_{a}": Estimate.of(0.0, noise(k)) for k in u}
 
 
 def fit_inputs(rig: RigFile, coupled: bool) -> dict[str, Estimate]:
