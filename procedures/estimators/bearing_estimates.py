@@ -15,7 +15,7 @@ from bench.uncertainty import Estimate, Influence, correlation_matrix
 from procedures.estimators import bearing
 from procedures.estimators.bearing import AXES, COILS, AxisFit, Positions, Statics
 from procedures.estimators.bearing_data import Held
-from procedures.estimators.chainrule import by_inputs
+from procedures.estimators.chainrule import linearised
 from procedures.estimators.inputs import certified
 from procedures.estimators.typea import scatter
 
@@ -57,7 +57,7 @@ def evaluate(recording: Recording[Any], held: Held) -> Analysis:
 
     s = bearing.statics(means, values)
     fits = {a: bearing.axis_fit(s, k, values["gap"]) for k, a in enumerate(AXES)}
-    estimates = by_inputs(model, inputs)
+    estimates = linearised(model, inputs)
     count = len(held.of_step)
     noise = {a: _noise(held, values, k, fits[a]) for k, a in enumerate(AXES)}
     for a, f in fits.items():
@@ -82,7 +82,7 @@ def gap_estimates(means: Positions, inputs: dict[str, Estimate]) -> dict[str, Es
         s = bearing.statics(means, p)
         return {a: float(bearing.with_gap(s, k, starts[k], nominal).terms[2]) for k, a in enumerate(AXES)}
 
-    found = by_inputs(model, given)
+    found = linearised(model, given)
     for k, a in enumerate(AXES):
         fit = bearing.with_gap(first, k, starts[k], nominal)
         found[a] = found[a] + scatter(fit, {a: [0, 0, 1]}, f"bearing-model/gap/{a}", f"scatter of the gap, {a}")[a]
