@@ -150,7 +150,7 @@ def _of_data(recording: Recording[Plan], held: Held, tilted: Held) -> Iterator[F
     found = [*bearing_findings.of_signals(held, tilted, plan), *bearing_findings.of_wiring(held, tilted, rig)]
     yield from found
     if not any(f.code in bearing_findings.FATAL for f in found):
-        yield from bearing_findings.of_models(held, rig, plan)
+        yield from bearing_findings.of_models(held, tilted, rig, plan)
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:

@@ -14,7 +14,7 @@ from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, coverage_factor, welch_satterthwaite
 from procedures.estimators import bearing
-from procedures.estimators.bearing import AXES, Statics
+from procedures.estimators.bearing import AXES, Positions, Statics
 from procedures.estimators.bearing_data import CURRENTS, POSITIONS, Held
 from procedures.estimators.bearing_estimates import Analysis, fit_inputs
 
@@ -159,10 +159,15 @@ def _judged(s: Statics, k: int, gap: float, j: int, coils: int) -> Judged:
     return Judged(fit.chi2, float(np.abs(fit.residuals).max()), beta, offset, beta > 0 and inside, fit.residuals)
 
 
-def of_models(held: Held, rig: RigFile, plan: Tolerances) -> Iterator[Finding]:
-    """Does the model describe each axis as it is wired, and would another wiring do so better? At the drawing's gap."""
+def of_models(held: Held, tilted: Held, rig: RigFile, plan: Tolerances) -> Iterator[Finding]:
+    """Does the model describe each axis as it is wired, and would another wiring do so better? At the drawing's gap.
+
+    The tilts count: without them both planes of an axis move alike, and their coils could be exchanged unseen."""
+    one, two = held.means(), tilted.means()
+    means = Positions(*(np.concatenate(x, axis=1) for x in ((one.read, two.read), (one.p, two.p), (one.n, two.n))))
+    names = (*held.names, *tilted.names)
     values = {name: e.value for name, e in fit_inputs(rig, plan.coupled).items()}
-    by_gravity = {g: bearing.statics(held.means(), values | {"gravity": g * values["gravity"]}) for g in (1, -1)}
+    by_gravity = {g: bearing.statics(means, values | {"gravity": g * values["gravity"]}) for g in (1, -1)}
     for k, axis in enumerate(AXES):
         load = float(np.abs(by_gravity[1].force[k]).mean())
         found = _judged(by_gravity[1], k, values["gap"], k, 1)
@@ -180,7 +185,7 @@ def of_models(held: Held, rig: RigFile, plan: Tolerances) -> Iterator[Finding]:
             yield Finding("model-fails", f"axis {axis}: beta {found.beta:.3g} N m²/A², offset {found.offset * 1e6:+.0f} µm is no magnet, "
                           "and no other wiring of its coils explains it.", axis, Effect.ERROR)  # fmt: skip
         else:
-            at = held.where(np.abs(found.residuals))
+            at = names[int(np.argmax(np.abs(found.residuals)))]
             yield Finding("misfit", f"axis {axis}: one position is {found.worst / load:.1%} of its load off the nonlinear model "
                           f"({plan.max_misfit:.1%} allowed), at {at}. A position that was disturbed, or a reading that is not "
                           "proportional.", axis, Effect.INDETERMINATE)  # fmt: skip

@@ -37,8 +37,12 @@ def found(run: Simulated) -> dict[str, Estimate]:
     return {m.quantity.name + m.where: m.estimate for m in run.results if isinstance(m, Measured)}
 
 
-def serious(run: Simulated) -> dict[str, Finding]:
-    return {f.code: f for f in run.results if isinstance(f, Finding) and f.effect is not Effect.NOTE}
+def serious(run: Simulated) -> dict[str, str]:
+    """What keeps a run from passing: everything said, by code."""
+    out: dict[str, str] = {}
+    for f in (f for f in run.results if isinstance(f, Finding) and f.effect is not Effect.NOTE):
+        out[f.code] = out.get(f.code, "") + f"{f.where}: {f.text} "
+    return out
 
 
 @pytest.fixture(scope="module")
@@ -62,12 +66,13 @@ def test_a_sound_rig_is_recovered_within_its_intervals(sound: Simulated) -> None
 
 
 def test_the_printed_effect_at_the_printed_machine(tmp_path: Path) -> None:
-    """T Table 2.2 on a machine as drawn, offsets of 115 um: the linear model leaves at least 20 times the residual sum over single
+    """T Table 2.2 on a machine as drawn, offsets of 115 um, inboard: the linear model leaves at least 20 times the residual sum over single
     samples (T: 56), and its numbers are those of no slope (T: 68.5 N/A, 162 N/mm)."""
     exact = {k: v for k, v in nominal(load_rig(RIG)).items() if not k.startswith(("runout", "unbalance"))}
     values = found(measure(tmp_path, exact, spacing_m=20e-6))
     for axis in AXES:
-        assert values[f"misfit_ratio{axis}"].value > 20, axis
+        assert values[f"misfit_ratio{axis}"].value > (20 if axis.endswith("i") else 10), axis  # T prints the inboard AMB
+        assert values[f"misfit_ratio_means{axis}"].value > 1000
         assert values[f"k_linear{axis}"].value > 35
         assert values[f"stiffness_linear{axis}"].value > 75e3
 
@@ -115,7 +120,7 @@ def test_without_the_coupling_and_with_it_forgotten(tmp_path: Path) -> None:
 def test_a_defect_is_named_and_does_not_pass(tmp_path: Path, defect: dict[str, float], code: str, named: str) -> None:
     wrong = serious(measure(tmp_path, defect))
     assert code in wrong, wrong
-    assert named in wrong[code].text + wrong[code].where
+    assert named in wrong[code]
 
 
 @pytest.mark.parametrize(
@@ -148,9 +153,11 @@ def test_a_wrong_map_of_the_readings_is_named(sound: Simulated, a: str, b: str, 
 
 def test_exchanged_coils_of_two_axes_and_flags_are_named(sound: Simulated) -> None:
     held, tilted = read(sound.recording)
-    other = exchanged(exchanged(held, "i_yi_p", "i_yo_p"), "i_yi_n", "i_yo_n")
-    wrong = list(bearing_findings.of_models(other, sound.recording.rig, sound.recording.plan))
-    assert {f.code for f in wrong} <= {"coils-exchanged", "misfit", "model-fails"} and wrong
+    for a, b in (("yi", "yo"), ("yi", "zi")):
+        other = [exchanged(exchanged(x, f"i_{a}_p", f"i_{b}_p"), f"i_{a}_n", f"i_{b}_n") for x in (held, tilted)]
+        wrong = list(bearing_findings.of_models(*other, sound.recording.rig, sound.recording.plan))
+        assert {(f.code, f.where) for f in wrong} == {("coils-exchanged", a), ("coils-exchanged", b)}
+        assert f"of {a} and {b}" in wrong[0].text
     for bit, code in ((64, "clipped"), (4, "contact"), (1, "saturated")):
         hit = replace(held, flags=held.flags | bit)
         assert code in {f.code for f in bearing_findings.of_signals(hit, tilted, sound.recording.plan)}
