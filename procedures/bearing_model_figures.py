@@ -44,7 +44,10 @@ def _currents(a: Analysis) -> Figure:
 
 def _residuals(a: Analysis) -> Iterator[Figure]:
     """As T Table 2.2 in a picture: the same scale would hide the nonlinear model's."""
-    for name, title, linear in (("linear", "linear model without intercept (T 2.9)", True), ("nonlinear", "nonlinear model (T 2.8)", False)):
+    for name, title, linear in (
+        ("linear", "linear model without intercept (T 2.9)", True),
+        ("nonlinear", "nonlinear model (T 2.8)", False),
+    ):
         series = []
         for k, axis in enumerate(AXES):
             f = a.fits[axis].linear if linear else a.fits[axis].fit

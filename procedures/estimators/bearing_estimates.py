@@ -162,7 +162,15 @@ def of_sums(a: str, e: dict[str, Estimate], noise_N: tuple[float, float], held: 
     u["misfit_ratio"] = values["misfit_ratio"] * math.hypot(*(x / values[k] for k, x in u.items()))
 
     def noise(k: str) -> Influence:
-        return Influence(f"scatter/bearing-model/{k}/{a}", f"noise of the samples, {a}", u[k], "1", "A", "normal", source="batch means")
+        return Influence(
+            f"scatter/bearing-model/{k}/{a}",
+            f"noise of the samples, {a}",
+            u[k],
+            "1",
+            "A",
+            "normal",
+            source="batch means",
+        )
 
     u["misfit_ratio_means"] = e[f"misfit_ratio_means_{a}"].value * math.sqrt(2 / held.batches["pos_yi"].size)
     return {f"{k}_{a}": Estimate.of(0.0, noise(k)) for k in u}
@@ -181,7 +189,9 @@ def fit_inputs(rig: RigFile, coupled: bool) -> dict[str, Estimate]:
         sensor, name = rig.sensors[f"pos_{a}"], f"sensors/pos_{a}"
         inputs[f"gain_{a}"] = certified(f"{name}/gain", sensor.gain, f"gain of pos_{a}")
         inputs[f"zero_{a}"] = certified(f"{name}/offset", sensor.offset, f"zero of pos_{a}")
-        inputs[f"runout_{a}"] = certified(f"machine/runout/{a}", m["runout"], f"runout of pos_{a} where the shaft rests")
+        inputs[f"runout_{a}"] = certified(
+            f"machine/runout/{a}", m["runout"], f"runout of pos_{a} where the shaft rests"
+        )
     for c in COILS:
         sensor, name = rig.sensors[f"i_{c}"], f"sensors/i_{c}"
         inputs[f"gain_{c}"] = certified(f"{name}/gain", sensor.gain, f"gain of i_{c}")

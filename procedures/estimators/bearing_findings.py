@@ -62,14 +62,18 @@ def of_signals(held: Held, tilted: Held, plan: Tolerances) -> Iterator[Finding]:
     for channel in (*POSITIONS, *CURRENTS):
         still = held.spread[channel] == 0
         if still.any():
-            text = f"{channel} does not move at all in {int(still.sum())} of {still.size} steps; a live sensor has noise."
+            text = (
+                f"{channel} does not move at all in {int(still.sum())} of {still.size} steps; a live sensor has noise."
+            )
             yield Finding("stuck-channel", text, channel, Effect.ERROR)
     for bit, code, text in FLAGS:
         for data in (held, tilted):
             hit = (data.flags & bit) != 0
             if hit.any():
                 said = f"{text} in {int(hit.sum())} of {hit.size} positions"
-                yield Finding(code, said, data.where(hit.astype(float)), Effect.ERROR if code in FATAL else Effect.INDETERMINATE)
+                yield Finding(
+                    code, said, data.where(hit.astype(float)), Effect.ERROR if code in FATAL else Effect.INDETERMINATE
+                )
     speed = np.abs([held.drift[c] for c in POSITIONS]).max(axis=0) / (plan.average_s / 2)
     if speed.max() > plan.max_speed_m_s:
         text = f"the shaft moves at up to {speed.max() * 1e6:.2g} µm/s within a step, {plan.max_speed_m_s * 1e6:.2g} µm/s are " \
@@ -131,7 +135,13 @@ def wirings(k: int) -> Iterator[tuple[str, str, int, int, int]]:
                                "and the probe of this axis are the other way round"), k, 1, -1  # fmt: skip
     for j, other in enumerate(AXES):
         if j != k:
-            yield "coils-exchanged", f"by the currents of axis {other}: the coils of {axis} and {other} are exchanged", j, 1, 1
+            yield (
+                "coils-exchanged",
+                f"by the currents of axis {other}: the coils of {axis} and {other} are exchanged",
+                j,
+                1,
+                1,
+            )
 
 
 @dataclass(frozen=True)
@@ -210,7 +220,9 @@ def of_results(a: Analysis, plan: Tolerances) -> Iterator[Finding]:
     for axis in AXES:
         k, stiffness = bearing.slopes(a.fits[axis].fit, gap, bias)
         f = a.fits[axis].linear.terms
-        both.append(f"{axis}: {f[0]:.3g} N/A and {f[1] * 1e-3:.3g} N/mm, true slopes {k:.3g} and {stiffness * 1e-3:.3g}")
+        both.append(
+            f"{axis}: {f[0]:.3g} N/A and {f[1] * 1e-3:.3g} N/mm, true slopes {k:.3g} and {stiffness * 1e-3:.3g}"
+        )
     sample, batch = (1e3 * max(x[k] for x in a.noise_N.values()) for k in (0, 1))
     yield Finding("models-compared", f"the linear model without intercept (T 2.9) is no model of the slopes: {'; '.join(both)}. Residual "
                   f"sums are over {a.samples} samples with {sample:.2g} mN of noise ({batch:.2g} mN in a batch's mean).")  # fmt: skip

@@ -18,7 +18,9 @@ PLANE = {"mass": 0.98, "gravity": G, "axes": math.pi / 4, "l_is": 0.078, "l_os":
          "coupling": 1200.0, "gap": GAP}  # fmt: skip
 SOUND = (PLANE | {f"{k}_{a}": v for a in AXES for k, v in (("gain", 1.0), ("zero", 0.0), ("runout", 0.0))}
          | {f"{k}_{c}": v for c in COILS for k, v in (("gain", 1.0), ("offset", 0.0))})  # fmt: skip
-PLACES = np.array([(y, z) for y in np.linspace(-80e-6, 80e-6, 9) for z in np.linspace(-80e-6, 80e-6, 9) if math.hypot(y, z) < 82e-6]).T
+PLACES = np.array(
+    [(y, z) for y in np.linspace(-80e-6, 80e-6, 9) for z in np.linspace(-80e-6, 80e-6, 9) if math.hypot(y, z) < 82e-6]
+).T
 
 
 def currents(force: np.ndarray, xi: np.ndarray, beta: float = BETA) -> tuple[np.ndarray, np.ndarray]:
@@ -91,7 +93,10 @@ def test_erratum_the_linear_column_of_table_2_2_is_no_slope() -> None:
     """With the corrected sign the no-intercept model returns about five times the bearing's slopes; with the other one it does not."""
     same = bearing.fits(positions((115e-6,) * 4), SOUND)["yi"]
     k, stiffness = bearing.slopes(same.fit, GAP, BIAS)
-    assert (4 * BETA * BIAS / GAP**2, 4 * BETA * BIAS**2 / GAP**3) == (pytest.approx(10.1, rel=0.01), pytest.approx(1.92e4, rel=0.01))
+    assert (4 * BETA * BIAS / GAP**2, 4 * BETA * BIAS**2 / GAP**3) == (
+        pytest.approx(10.1, rel=0.01),
+        pytest.approx(1.92e4, rel=0.01),
+    )
     assert k == pytest.approx(11.7, rel=0.02)  # at the offset they are a little steeper
     assert same.linear.terms[0] > 4 * k
     assert same.linear.terms[1] > 4 * stiffness

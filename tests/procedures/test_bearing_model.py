@@ -71,7 +71,9 @@ def test_the_printed_effect_at_the_printed_machine(tmp_path: Path) -> None:
     exact = {k: v for k, v in nominal(load_rig(RIG)).items() if not k.startswith(("runout", "unbalance"))}
     values = found(measure(tmp_path, exact, spacing_m=20e-6))
     for axis in AXES:
-        assert values[f"misfit_ratio{axis}"].value > (20 if axis.endswith("i") else 10), axis  # T prints the inboard AMB
+        assert values[f"misfit_ratio{axis}"].value > (20 if axis.endswith("i") else 10), (
+            axis
+        )  # T prints the inboard AMB
         assert values[f"misfit_ratio_means{axis}"].value > 1000
         assert values[f"k_linear{axis}"].value > 35
         assert values[f"stiffness_linear{axis}"].value > 75e3
@@ -125,7 +127,13 @@ def test_a_defect_is_named_and_does_not_pass(tmp_path: Path, defect: dict[str, f
 
 @pytest.mark.parametrize(
     "defect",
-    [{"position_sign_yi": -1}, {"position_sign_zo": -1}, {"exchange_planes": 1}, {"position_range": 60e-6}, {"geometry.clearance": 80e-6}],
+    [
+        {"position_sign_yi": -1},
+        {"position_sign_zo": -1},
+        {"exchange_planes": 1},
+        {"position_range": 60e-6},
+        {"geometry.clearance": 80e-6},
+    ],
     ids=["polarity-yi", "polarity-zo", "planes", "clipping", "contact"],
 )
 def test_a_shaft_that_cannot_be_held_stops_the_run(tmp_path: Path, defect: dict[str, float]) -> None:
@@ -173,7 +181,12 @@ def test_the_grid_stays_in_its_circle_and_moves_little() -> None:
 
 @pytest.mark.parametrize(
     ("plan", "said"),
-    [({"radius_m": 90e-6}, "the ring"), ({"spacing_m": 80e-6}, "nine or more"), ({"bias_A": 1.6}, "amplifiers"), ({"tilt_rad": 2e-3}, "tilt_rad")],
+    [
+        ({"radius_m": 90e-6}, "the ring"),
+        ({"spacing_m": 80e-6}, "nine or more"),
+        ({"bias_A": 1.6}, "amplifiers"),
+        ({"tilt_rad": 2e-3}, "tilt_rad"),
+    ],
 )
 def test_what_cannot_work_is_told_before_anything_starts(plan: dict[str, float], said: str) -> None:
     rig = load_rig(RIG)
@@ -186,7 +199,9 @@ def test_what_cannot_work_is_told_before_anything_starts(plan: dict[str, float],
 def test_figures_show_the_data(sound: Simulated) -> None:
     drawn = {f.key: f for f in figures(sound.recording)}
     assert set(drawn) == {"positions", "currents", "residuals-linear", "residuals-nonlinear", "forces", "gaps"}
-    worst = {k: max(float(np.abs(s.y).max()) for s in drawn[k].series) for k in ("residuals-linear", "residuals-nonlinear")}
+    worst = {
+        k: max(float(np.abs(s.y).max()) for s in drawn[k].series) for k in ("residuals-linear", "residuals-nonlinear")
+    }
     assert worst["residuals-linear"] > 5 * worst["residuals-nonlinear"]
     for figure in drawn.values():
         draw_figure(figure)
