@@ -26,7 +26,7 @@ from procedures import bearing_model_figures as drawn
 from procedures.estimators import bearing_findings
 from procedures.estimators.bearing import AXES, COMPARED
 from procedures.estimators.bearing_data import CURRENTS, HOLD, POSITIONS, TILT, Held, read_steps
-from procedures.estimators.bearing_estimates import evaluate
+from procedures.estimators.bearing_estimates import BEARINGS, evaluate
 
 BETA = {a: Quantity(f"beta_{a}", "N m^2/A^2", f"force constant of axis {a}, at the same gap for all") for a in AXES}
 OFFSET = {
@@ -140,9 +140,9 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     for axis in AXES:
         yield BETA[axis].measured(a.estimates[f"beta_{axis}"])
         yield OFFSET[axis].measured(a.estimates[f"offset_{axis}"])
-    for axis in AXES:
+    for where in BEARINGS.values():
         for name in COMPARED:
-            yield OF_LINEAR[name].measured(a.estimates[f"{name}_{axis}"], axis)
+            yield OF_LINEAR[name].measured(a.estimates[f"{name}_{where}"], where)
 
 
 def _of_data(recording: Recording[Plan], held: Held, tilted: Held) -> Iterator[Finding]:

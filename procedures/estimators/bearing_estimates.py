@@ -20,6 +20,7 @@ from procedures.estimators.inputs import certified
 from procedures.estimators.typea import scatter
 
 Array = npt.NDArray[np.float64]
+BEARINGS = {"i": "inboard", "o": "outboard"}
 LENGTHS = {"l_is": "com_to_inboard_sensor", "l_os": "com_to_outboard_sensor", "l_oa": "com_to_outboard_amb",
            "amb_span": "amb_span", "l_c": "com_to_coupling", "gap": "amb_gap"}  # fmt: skip
 
@@ -68,7 +69,22 @@ def evaluate(recording: Recording[Any], held: Held) -> Analysis:
                          f"scatter of the linear fit, {a}")  # fmt: skip
         extra |= of_sums(a, estimates, noise[a], held)
         estimates |= {name: estimates[name] + e for name, e in extra.items()}
+    estimates |= by_bearing(estimates)
     return Analysis(held, s, fits, values, estimates, noise, gaps, drawing, inputs["gap"], recording.plan.bias_A, count)
+
+
+def by_bearing(e: dict[str, Estimate]) -> dict[str, Estimate]:
+    """The comparison with the linear model by AMB, as T Table 2.2: means of its slopes over both axes, sums of squares of both."""
+    out = {}
+    for b, where in BEARINGS.items():
+        y, z = f"y{b}", f"z{b}"
+        for k in ("k_linear", "stiffness_linear"):
+            out[f"{k}_{where}"] = (e[f"{k}_{y}"] + e[f"{k}_{z}"]) * 0.5
+        total = {k: e[f"{k}_{y}"] + e[f"{k}_{z}"] for k in ("misfit", "misfit_linear", "quiet", "quiet_linear")}
+        out |= {f"{k}_{where}": total[k] for k in ("misfit", "misfit_linear")}
+        out[f"misfit_ratio_{where}"] = total["misfit_linear"] / total["misfit"]
+        out[f"misfit_ratio_means_{where}"] = total["quiet_linear"] / total["quiet"]
+    return out
 
 
 def gap_estimates(means: Positions, inputs: dict[str, Estimate]) -> dict[str, Estimate]:
@@ -120,7 +136,7 @@ def outputs(means: Positions, parts: Positions, samples: Positions, p: dict[str,
         low, high = (float(x @ x) for x in residuals(quiet, k, f, p["gap"]))
         out |= {f"beta_{a}": f.beta, f"offset_{a}": f.offset, f"k_linear_{a}": float(f.linear.terms[0]),
                 f"stiffness_linear_{a}": float(f.linear.terms[1]), f"misfit_{a}": one, f"misfit_linear_{a}": two,
-                f"misfit_ratio_{a}": two / one, f"misfit_ratio_means_{a}": high / low}  # fmt: skip
+                f"misfit_ratio_{a}": two / one, f"misfit_ratio_means_{a}": high / low, f"quiet_{a}": low, f"quiet_linear_{a}": high}  # fmt: skip
     return out
 
 

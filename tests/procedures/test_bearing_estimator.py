@@ -93,10 +93,10 @@ def test_erratum_the_linear_column_of_table_2_2_is_no_slope() -> None:
     """With the corrected sign the no-intercept model returns about five times the bearing's slopes; with the other one it does not."""
     same = bearing.fits(positions((115e-6,) * 4), SOUND)["yi"]
     k, stiffness = bearing.slopes(same.fit, GAP, BIAS)
-    assert (4 * BETA * BIAS / GAP**2, 4 * BETA * BIAS**2 / GAP**3) == (
+    assert (
         pytest.approx(10.1, rel=0.01),
         pytest.approx(1.92e4, rel=0.01),
-    )
+    ) == (4 * BETA * BIAS / GAP**2, 4 * BETA * BIAS**2 / GAP**3)
     assert k == pytest.approx(11.7, rel=0.02)  # at the offset they are a little steeper
     assert same.linear.terms[0] > 4 * k
     assert same.linear.terms[1] > 4 * stiffness
