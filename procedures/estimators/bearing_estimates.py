@@ -129,7 +129,7 @@ def outputs(means: Positions, parts: Positions, samples: Positions, p: dict[str,
     """Every value by quantity and axis: terms from the steps' means, sums of squares over all samples as in T Table 2.2,
     and their ratio over batch means too."""
     s, b, quiet = (bearing.statics(x, p) for x in (means, samples, parts))
-    out: dict[str, Estimate] = {}
+    out: dict[str, float] = {}
     for k, a in enumerate(AXES):
         f = bearing.axis_fit(s, k, p["gap"])
         one, two = (float(x @ x) for x in residuals(b, k, f, p["gap"]))
