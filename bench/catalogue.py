@@ -45,6 +45,7 @@ PROCEDURES = (
         "Set-point steps of the levitated shaft, with two settings of the controller compared",
     ),
     Entry("slew", "procedures.slew", "Following a slow sine of the angle, with detent"),
+    Entry("bearing-model", "procedures.bearing_model", "Force constants and magnetic offsets of the radial AMBs"),
     Entry("force-map", "procedures.force_map", "Terms of the motor's force over displacement, currents and load"),
 )
 

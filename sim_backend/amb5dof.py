@@ -52,6 +52,8 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
     """Every toleranced number of a rig file by its name; one that holds for several axes or planes once for each."""
     out = {f"geometry.{k}": t for k, t in rig.geometry.items()} | {f"machine.{k}": t for k, t in rig.machine.items()}
     out["site.gravity"] = rig.site.gravity
+    out["roll"] = out.pop("machine.radial_axes")  # of the axes against the vertical, both together
+    out.pop("machine.runout")  # drawn as orders and phases
     for name in (*(f"i_{coil}" for coil in COILS), *(f"pos_{axis}" for axis in AXES)):
         out |= {f"{name}.gain": rig.sensors[name].gain, f"{name}.offset": rig.sensors[name].offset}
     for name, value in rig.simulation.items():
@@ -63,7 +65,7 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
 def params(v: Numbers, d: Numbers) -> AmbParams:
     """The plant that drawn values `v` and planted defects `d` make."""
     outboard, down = v["geometry.com_to_outboard_amb"], v["site.gravity"]
-    lean, seen = math.pi / 4 + v["roll"], _runout(v)
+    lean, seen = v["roll"], _runout(v)
     return AmbParams(
         mass=v["machine.mass"],
         inertia=v["machine.transverse_inertia"],
