@@ -40,6 +40,7 @@ PROCEDURES = (
         "angle-step", "procedures.angle_step", "Angle step while the motor carries: static against priority currents"
     ),
     Entry("slew", "procedures.slew", "Following a slow sine of the angle, with detent"),
+    Entry("tracking", "procedures.tracking", "Following an ellipse with the centre of mass: PID, CCS and CAC"),
     Entry("force-map", "procedures.force_map", "Terms of the motor's force over displacement, currents and load"),
 )
 

@@ -1,0 +1,93 @@
+"""From the recorded orbits of a tracking test to arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.errors import AnalysisError
+from bench.recording import Recording, Step
+from bench.rigfile import RigFile
+from procedures.estimators.tracking import Path, Wave, onset
+
+Array = npt.NDArray[np.float64]
+REST, LIFT, PROBE, START, ORBIT = "rest", "lift", "probe", "start", "orbit"
+STARTED, LIFT_LOST, NO_SPEED = "reference-started", "lift-lost", "no-speed"
+AXES = ("yi", "zi", "yo", "zo")
+POSITIONS = tuple(f"pos_{axis}" for axis in AXES)
+UPPER, LOWER = (tuple(f"i_{axis}_{side}" for axis in AXES) for side in "pn")
+CHANNELS = (*POSITIONS, *UPPER, *LOWER, "speed", "flags")
+CURRENT_LIMIT, VOLTAGE_LIMIT, CONTACT, RANGE = 1, 2, 12, 64  # bits of the telemetry signal `flags`
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """One law's orbit: its path, coil currents (4, n) A of both sides, flags (n,), speed (n,) rad/s, the reference's zero of
+    phase in s on the path's time, and the start's jump of current over its noise."""
+
+    law: str
+    path: Path
+    upper: Array
+    lower: Array
+    flags: npt.NDArray[np.int64]
+    speed: Array
+    t_0: float
+    clear: float
+    step: Step
+
+    @property
+    def where(self) -> str:
+        """How it is named to the reader."""
+        w, rpm = self.path.wave, float(np.median(self.speed)) * 30 / np.pi
+        turning = f"{rpm:.0f} r/min" if self.path.turn_s else "at rest"
+        return f"{self.law}, {w.hz:g} Hz, {w.y * 1e6:g} × {w.z * 1e6:g} µm, {turning}"
+
+
+def sampled(rig: RigFile, hz: float, y: float, z: float, period_ns: int) -> Wave:
+    """The reference, as this rig's telemetry samples it."""
+    tick = rig.devices["controller"].tick_s
+    return Wave(hz, y, z, tick, round(period_ns * 1e-9 / tick))
+
+
+def read_orbits(recording: Recording[Any]) -> list[Orbit]:
+    """Every orbit, in time order.
+
+    Raises:
+        AnalysisError: there are none, or one has no start.
+    """
+    starts = {step.labels["law"]: step for step in recording.steps(START)}
+    orbits = list(recording.steps(ORBIT))
+    if not orbits or any(step.labels["law"] not in starts for step in orbits):
+        raise AnalysisError("found no orbits; expected those of the plan (was the run stopped early?)")
+    return [_read(recording, starts[step.labels["law"]], step) for step in orbits]
+
+
+def _read(recording: Recording[Any], start: Step, step: Step) -> Orbit:
+    labels, data, begun = step.labels, step.read(*CHANNELS), start.read(*CHANNELS)
+    if len(data["t_ns"]) < 20 or len(begun["t_ns"]) < 20:
+        raise AnalysisError(f"{labels['law']}: found {len(data['t_ns'])} samples; expected a whole orbit")
+    origin = int(begun["t_ns"][0])
+    inside = [e for e in recording.events() if start.start_ns <= e["t_ns"] < start.end_ns]
+    written = [e["t_ns"] for e in inside if e["kind"] == "parameter" and e["name"] == "ellipse_on"]
+    answered = [e["t_ns"] for e in inside if e["kind"] == STARTED]
+    if not written or not answered:
+        raise AnalysisError(f"{labels['law']}: found no start of the reference; expected its write within the step")
+    period_ns = recording.streams["telemetry"].period_ns
+    wave = sampled(recording.rig, float(labels["hz"]), float(labels["y_m"]), float(labels["z_m"]), period_ns)
+    current = np.sum([begun[f"i_z{b}_p"] - begun[f"i_z{b}_n"] for b in "io"], axis=0)
+    lag = 1 / recording.rig.parameters["model_rate"].default
+    t_0, clear = onset((begun["t_ns"] - origin) * 1e-9, current, (written[0] - origin) * 1e-9,
+                       (answered[0] - origin) * 1e-9, wave, lag)  # fmt: skip
+    speed = data["speed"]
+    turning = float(labels["speed_rad_s"]) > 0 and float(np.median(speed)) > 0
+    path = Path(
+        wave,
+        (data["t_ns"] - origin) * 1e-9,
+        np.array([data[c] for c in POSITIONS]),
+        2 * np.pi / float(np.median(speed)) if turning else 0.0,
+    )
+    upper, lower = (np.array([data[c] for c in names]) for names in (UPPER, LOWER))
+    return Orbit(str(labels["law"]), path, upper, lower, data["flags"].astype(np.int64), speed, t_0, clear, step)
