@@ -92,13 +92,13 @@ class Plan(BenchPlan):
 
 
 def settings(plan: Plan) -> dict[str, float]:
-    """Lifted by the first law, with the poles of T 3.5 where disturbances are compensated."""
-    return {"law": CODES[plan.laws[0]], "ellipse_on": 0.0, **(OBSERVED if plan.observed else {})}
+    """Lifted by the PID, which needs no model; with the poles of T 3.5 where disturbances are compensated."""
+    return {"law": CODES["PID"], "ellipse_on": 0.0, **(OBSERVED if plan.observed else {})}
 
 
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records, for the progress display."""
-    return 2 + 2 * len(NUDGES) + 2 * len(plan.order)
+    return 3 + 2 * len(NUDGES) + len(plan.order)
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
@@ -110,11 +110,12 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     if not _lifted(rig, record):
         return
     _nudged(rig, record)
+    _started(rig, plan, record)
     if plan.speed_rad_s and not _spun(rig, plan, record):
         return
     for law in plan.order:
         _orbit(rig, plan, record, law)
-    rig.levitation.set("law", CODES[plan.laws[0]])
+    rig.levitation.set("ellipse_on", 0.0)
     if plan.speed_rad_s and rig.drive is not None:
         rig.drive.stop()
 
@@ -154,19 +155,25 @@ def _spun(rig: Rig, plan: Plan, record: Recorder) -> bool:
     return True
 
 
-def _orbit(rig: Rig, plan: Plan, record: Recorder, law: Law) -> None:
-    """The reference starts with a small jump of z, whose time the currents tell; then it grows, settles, and fades."""
+def _started(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """The reference starts at rest with a small jump of z, whose time the currents tell. From here on it never stops: its phase
+    is known for every law, at any speed."""
     write = rig.levitation.set
-    write("law", CODES[law])
     for name, value in (("ellipse_hz", plan.hz), ("ellipse_phase", 0.0), ("ellipse_ramp_s", 0.0), ("ellipse_y", 0.0),
                         ("ellipse_z", MARK_M)):  # fmt: skip
         write(name, value)
     rig.clock.sleep(plan.settle_s)
-    with record.step(START, law=law):
+    with record.step(START):
         rig.clock.sleep(0.1)
         write("ellipse_on", 1.0)
-        record.event(STARTED, law=law)  # after the answer: with the write itself it brackets the start
+        record.event(STARTED)  # after the answer: with the write itself it brackets the start
         rig.clock.sleep(0.02)
+
+
+def _orbit(rig: Rig, plan: Plan, record: Recorder, law: Law) -> None:
+    """The reference grows, settles, and shrinks to its mark again."""
+    rig.levitation.set("law", CODES[law])
+    rig.clock.sleep(plan.settle_s)
     for part in range(1, GROW + 1):
         _size(rig, plan, part / GROW)
     rig.clock.sleep(plan.settle_s)
@@ -175,12 +182,11 @@ def _orbit(rig: Rig, plan: Plan, record: Recorder, law: Law) -> None:
         rig.clock.sleep(plan.revolutions / plan.hz + 0.05)
     for part in range(GROW - 1, -1, -1):
         _size(rig, plan, part / GROW)
-    write("ellipse_on", 0.0)
 
 
 def _size(rig: Rig, plan: Plan, share: float) -> None:
     rig.levitation.set("ellipse_y", plan.y_m * share)
-    rig.levitation.set("ellipse_z", max(plan.z_m * share, MARK_M if share else 0.0))
+    rig.levitation.set("ellipse_z", max(plan.z_m * share, MARK_M))
     rig.clock.sleep(GROW_S)
 
 
@@ -245,8 +251,9 @@ controller. The centre of mass and the tilts follow from the four radial sensors
 read zero, as the reference does: an offset of a sensor is no error of tracking, but it counts against the distance to the rings.
 
 Telemetry holds means of ten readings. The mean of a sine is a little smaller and half a period of the telemetry later; both are
-applied to the reference, so that like is compared with like. When the reference began is read from the coils: it begins with a jump
-of z by 5 µm, which the currents answer at once; a controller's tick either way is in the budget.
+applied to the reference, so that like is compared with like. When the reference began is read from the coils: it begins at rest, under
+the PID, with a jump of z by 5 µm, which the currents answer at once; from then on it never stops. Half a tick of the controller
+either way is in the budget.
 
 Peak and rms are of the error averaged over a turn of the shaft, at rest over 3 ms; each is the mean over the revolutions of the
 reference, and their scatter is by batch means. Amplitude and phase are those of a sine of the reference's frequency, fitted to

@@ -151,11 +151,15 @@ def distances(readings: Array, f: Facts) -> Array:
 
 
 def noise(path: Path, f: Facts) -> Array:
-    """Standard deviation of the noise of an averaged y, z, psi, theta, (4,), from neighbouring samples."""
-    q = centre(path.readings, f)
-    second = np.diff(q, n=2, axis=1).std(axis=1) / math.sqrt(6)
-    out: Array = second / math.sqrt(max(path.smooth_s / (path.wave.ticks * path.wave.tick), 1.0))
-    return out
+    """Standard deviation of what is random in an averaged y, z, psi, theta, (4,): from neighbouring samples at rest, from
+    neighbouring turns while the shaft turns (single samples hold its vibration)."""
+    if path.turn_s:
+        error = errors(path, f)
+        stride = max(round(path.turn_s / (path.wave.ticks * path.wave.tick)), 1)
+        kept = error[:, np.isfinite(error).all(axis=0)][:, ::stride]
+        return np.asarray(np.diff(kept, n=2, axis=1).std(axis=1) / math.sqrt(6))
+    second = np.diff(centre(path.readings, f), n=2, axis=1).std(axis=1) / math.sqrt(6)
+    return np.asarray(second / math.sqrt(max(path.smooth_s / (path.wave.ticks * path.wave.tick), 1.0)))
 
 
 def onset(t: Array, current: Array, earliest: float, latest: float, wave: Wave, lag_s: float) -> tuple[float, float]:

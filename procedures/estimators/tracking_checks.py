@@ -196,7 +196,7 @@ def of_results(
                 yield Finding("saturated", f"{text} was at its limit in {share:.2%} of the samples.", o.where,
                               Effect.INDETERMINATE if bad else Effect.NOTE)  # fmt: skip
         low = results[o.law]["lower_current"]
-        if o.law == "CAC" and low.value - 2 * low.u > plan.max_lower_A:
+        if o.law == "CAC" and not o.path.turn_s and low.value - 2 * low.u > plan.max_lower_A:
             yield Finding("lower-coils-on", f"the lower coils carry up to {low.value:.3f} A with CAC ({plan.max_lower_A:g} A "
                           "allowed): they should be off.", o.where, Effect.INDETERMINATE)  # fmt: skip
     yield Finding("laws-compared", "; ".join(_said(o, results[o.law]) for o in orbits) + ".")

@@ -56,35 +56,43 @@ def read_orbits(recording: Recording[Any]) -> list[Orbit]:
     """Every orbit, in time order.
 
     Raises:
-        AnalysisError: there are none, or one has no start.
+        AnalysisError: there are none, or the reference has no start.
     """
-    starts = {step.labels["law"]: step for step in recording.steps(START)}
-    orbits = list(recording.steps(ORBIT))
-    if not orbits or any(step.labels["law"] not in starts for step in orbits):
+    starts, orbits = list(recording.steps(START)), list(recording.steps(ORBIT))
+    if not orbits or not starts:
         raise AnalysisError("found no orbits; expected those of the plan (was the run stopped early?)")
-    return [_read(recording, starts[step.labels["law"]], step) for step in orbits]
+    origin = starts[0].start_ns
+    t_0, clear = _start(recording, starts[0], _wave(recording, orbits[0]))
+    return [_read(recording, step, origin, t_0, clear) for step in orbits]
 
 
-def _read(recording: Recording[Any], start: Step, step: Step) -> Orbit:
-    labels, data, begun = step.labels, step.read(*CHANNELS), start.read(*CHANNELS)
-    if len(data["t_ns"]) < 20 or len(begun["t_ns"]) < 20:
-        raise AnalysisError(f"{labels['law']}: found {len(data['t_ns'])} samples; expected a whole orbit")
-    origin = int(begun["t_ns"][0])
+def _wave(recording: Recording[Any], step: Step) -> Wave:
+    labels, period_ns = step.labels, recording.streams["telemetry"].period_ns
+    return sampled(recording.rig, float(labels["hz"]), float(labels["y_m"]), float(labels["z_m"]), period_ns)
+
+
+def _start(recording: Recording[Any], start: Step, wave: Wave) -> tuple[float, float]:
+    """When the reference's phase was zero, s from the step's start, and how clear the currents tell it."""
+    begun = start.read(*CHANNELS)
     inside = [e for e in recording.events() if start.start_ns <= e["t_ns"] < start.end_ns]
     written = [e["t_ns"] for e in inside if e["kind"] == "parameter" and e["name"] == "ellipse_on"]
     answered = [e["t_ns"] for e in inside if e["kind"] == STARTED]
-    if not written or not answered:
-        raise AnalysisError(f"{labels['law']}: found no start of the reference; expected its write within the step")
-    period_ns = recording.streams["telemetry"].period_ns
-    wave = sampled(recording.rig, float(labels["hz"]), float(labels["y_m"]), float(labels["z_m"]), period_ns)
+    if not written or not answered or len(begun["t_ns"]) < 20:
+        raise AnalysisError("found no start of the reference; expected its write within the step, and samples about it")
     current = np.sum([begun[f"i_z{b}_p"] - begun[f"i_z{b}_n"] for b in "io"], axis=0)
     lag = 1 / recording.rig.parameters["model_rate"].default
-    t_0, clear = onset((begun["t_ns"] - origin) * 1e-9, current, (written[0] - origin) * 1e-9,
-                       (answered[0] - origin) * 1e-9, wave, lag)  # fmt: skip
+    earliest, latest = ((t - start.start_ns) * 1e-9 for t in (written[0], answered[0]))
+    return onset((begun["t_ns"] - start.start_ns) * 1e-9, current, earliest, latest, wave, lag)
+
+
+def _read(recording: Recording[Any], step: Step, origin: int, t_0: float, clear: float) -> Orbit:
+    labels, data = step.labels, step.read(*CHANNELS)
+    if len(data["t_ns"]) < 20:
+        raise AnalysisError(f"{labels['law']}: found {len(data['t_ns'])} samples; expected a whole orbit")
     speed = data["speed"]
     turning = float(labels["speed_rad_s"]) > 0 and float(np.median(speed)) > 0
     path = Path(
-        wave,
+        _wave(recording, step),
         (data["t_ns"] - origin) * 1e-9,
         np.array([data[c] for c in POSITIONS]),
         2 * np.pi / float(np.median(speed)) if turning else 0.0,

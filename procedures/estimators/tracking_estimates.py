@@ -13,10 +13,10 @@ from bench.toleranced import Toleranced
 from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.series import batch_means
 from procedures.estimators.inputs import certified
-from procedures.estimators.tracking import Facts, Path, by_revolution, noise
+from procedures.estimators.tracking import Facts, Path, by_revolution, noise, revolutions
 from procedures.estimators.tracking_data import AXES, LOWER, UPPER, Orbit
 
-TIMING_TICKS = 1.0  # half width: how the reference's zero of phase stands to the answer of the currents
+TIMING_TICKS = 0.5  # half width: how the reference's zero of phase stands to the answer of the currents
 UNITS = {"error": "m", "amplitude": "1", "phase": "rad", "tilt": "rad", "ring": "m"}
 Moved = Callable[[Facts, float], Facts]
 
@@ -57,7 +57,7 @@ def _one(kind: str) -> Moved:
     return moved
 
 
-def inputs(rig: RigFile, law: str, tick_s: float, runout_m: float) -> list[Input]:
+def inputs(rig: RigFile, tick_s: float, runout_m: float) -> list[Input]:
     """Everything that the facts are uncertain by."""
     out = []
     for k, axis in enumerate(AXES):
@@ -70,8 +70,8 @@ def inputs(rig: RigFile, law: str, tick_s: float, runout_m: float) -> list[Input
     for name, kind in (("com_to_inboard_sensor", "l_is"), ("com_to_outboard_sensor", "l_os"), ("clearance", "clearance")):
         out.append(Input(f"geometry.{name}", name.replace("_", " "), rig.geometry[name], _one(kind)))
     clock = Toleranced(value=0.0, unit="s", half_width=TIMING_TICKS * tick_s, distribution="rectangular",
-                       source="a tick of the controller either way")  # fmt: skip
-    out.append(Input(f"timing/{law}", "start of the reference", clock, _one("t_0")))
+                       source="half a tick of the controller either way")  # fmt: skip
+    out.append(Input("timing/start", "start of the reference", clock, _one("t_0")))
     return out
 
 
@@ -85,7 +85,7 @@ def _of_path(orbit: Orbit, rig: RigFile, runout_m: float) -> dict[str, Estimate]
     found = by_revolution(path, facts)
     least = {name: _whole(name, values) for name, values in found.items()}
     moved: list[tuple[Input, Mapping[str, float], Mapping[str, float]]] = []
-    for i in inputs(rig, orbit.law, path.wave.tick, runout_m):
+    for i in inputs(rig, path.wave.tick, runout_m):
         u = i.stated.standard_uncertainty
         up, down = (_means(path, i.moved(facts, way * u)) for way in (1, -1))
         moved.append((i, up, down))
@@ -137,15 +137,16 @@ def _small(identity: str, name: str, u: float, unit: str) -> Estimate:
 
 
 def _of_coils(orbit: Orbit, rig: RigFile) -> dict[str, Estimate]:
-    out = {}
+    out, per = {}, revolutions(orbit.path)
+    batches = max(2, min(16, len(per) // 2))
     for quantity, names, currents in (("lower_current", LOWER, orbit.lower), ("upper_current", UPPER, orbit.upper)):
         means = currents.mean(axis=1)
         k = int(np.argmax(means))
         s = rig.sensors[names[k]]
         gain, offset = (certified(f"{names[k]}.{what}", t) for what, t in (("gain", s.gain), ("offset", s.offset)))
-        found = batch_means(currents[k], 16)
+        found = batch_means([currents[k, m].mean() for m in per], batches)
         seen = Estimate.of(found.value, Influence(
             id=f"scatter/{orbit.law}/{quantity}", name="scatter of the current", u=found.u, unit="A", kind="A",
-            distribution="normal", dof=found.dof, source="sixteen batches"))  # fmt: skip
+            distribution="normal", dof=found.dof, source=f"{batches} batches of revolutions of the reference"))  # fmt: skip
         out[quantity] = replace((seen - offset) / gain, unit="A")
     return out
