@@ -1,4 +1,4 @@
-"""What the tracking test draws, after T Figs. 2.10 and 3.9: orbits in the ring, errors over the revolution, tilts, coils."""
+"""What the tracking test draws, after T Figs. 2.10 to 2.12 and 3.6: orbits in the ring, errors over the revolution, tilts, coils."""
 
 from __future__ import annotations
 

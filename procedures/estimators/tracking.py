@@ -110,6 +110,12 @@ def errors(path: Path, f: Facts) -> Array:
     return averaged(path.t, found, path.smooth_s)
 
 
+def plane_errors(path: Path, f: Facts) -> Array:
+    """Errors at the sensors yi, zi, yo, zo in m, averaged as `errors`: (4, n)."""
+    at = path.readings / np.array(f.gains)[:, None]
+    return averaged(path.t, at - np.tile(path.wave.at(path.t, f.t_0), (2, 1)), path.smooth_s)
+
+
 def revolutions(path: Path) -> list[npt.NDArray[np.bool_]]:
     """Which samples belong to each whole revolution of the reference.
 
@@ -126,7 +132,7 @@ def revolutions(path: Path) -> list[npt.NDArray[np.bool_]]:
 def by_revolution(path: Path, f: Facts) -> Mapping[str, Array]:
     """Every quantity in each revolution, (m,): peaks and rms of the errors, peaks of the tilts, ratio of the amplitudes,
     phase lag rad, and what is left to the ring."""
-    q, error = centre(path.readings, f), errors(path, f)
+    q, error, planes = centre(path.readings, f), errors(path, f), np.abs(plane_errors(path, f))
     per = revolutions(path)
     out: dict[str, list[float]] = {}
     radius = distances(path.readings, f)
@@ -138,6 +144,7 @@ def by_revolution(path: Path, f: Facts) -> Mapping[str, Array]:
             fitted = known_frequency(t[m], q[k, m], wave.hz)
             out.setdefault(f"amplitude_ratio_{axis}", []).append(fitted.amplitude / (size * wave.shrinks))
             out.setdefault(f"phase_lag_{axis}", []).append(-math.remainder(fitted.phase - lead, 2 * math.pi))
+        out.setdefault("error_peak_plane", []).append(float(np.nanmax(planes[:, m])))
         for k, name in ((2, "tilt_psi"), (3, "tilt_theta")):
             out.setdefault(name, []).append(float(np.nanmax(np.abs(error[k, m]))))
         out.setdefault("ring_distance", []).append(f.clearance - float(radius[:, m].max()))

@@ -102,7 +102,7 @@ def _of_path(orbit: Orbit, rig: RigFile, runout_m: float) -> dict[str, Estimate]
         if bent > 0:
             total = total + _small(f"curvature/{orbit.law}/{name}", "second-order part of all inputs", bent, _unit(name))
         if name.startswith(("error_peak", "tilt")):
-            k = {"error_peak_y": 0, "error_peak_z": 1, "tilt_psi": 2, "tilt_theta": 3}[name]
+            k = {"error_peak_y": 0, "error_peak_z": 1, "error_peak_plane": 1, "tilt_psi": 2, "tilt_theta": 3}[name]
             total = total + _small(f"noise/{orbit.law}/{name}", "noise in a peak", float(floor[k]), _unit(name))
         out[name] = replace(total, unit=_unit(name))
     return out
