@@ -37,7 +37,7 @@ def _two(o: Orbit) -> np.ndarray:
 def _orbit(orbits: Sequence[Orbit], facts: Mapping[str, Facts]) -> Figure:
     w, series = orbits[0].path.wave, []
     turn = np.linspace(0, 2 * np.pi, 181)
-    series.append(Series("reference", 1e6 * w.y * np.sin(turn), 1e6 * w.z * np.cos(turn)))
+    series.append(Series("reference", 1e6 * w.y * np.sin(turn), 1e6 * w.z * np.cos(w.ratio * turn)))
     for o in orbits:
         q = 1e6 * centre(o.path.readings, facts[o.law])[:2, _two(o)]
         series.append(Series(o.law, q[0], q[1]))

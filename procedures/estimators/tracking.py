@@ -1,6 +1,6 @@
 """Following an ellipse with the centre of mass: what positions of two planes, read as means of ten ticks, say of it.
 
-The reference is y = A sin(2 pi f (t - t_0)), z = B cos(2 pi f (t - t_0)). A sample of the telemetry is the mean of n readings, the
+The reference is y = A sin(2 pi f (t - t_0)), z = B cos(2 pi n f (t - t_0)), an ellipse where n = 1. A sample of the telemetry is the mean of n readings, the
 last of them one tick before its time. A sine's mean is a sine, smaller by sin(n x/2)/(n sin(x/2)), x = 2 pi f tick, and
 later by (n + 1)/2 ticks: both are applied to the reference, so that like is compared with like.
 
@@ -29,18 +29,24 @@ YI, ZI, YO, ZO = range(4)
 
 @dataclass(frozen=True)
 class Wave:
-    """The reference: `hz`, half axes `y`, `z` in m; and how it is sampled: `ticks` of `tick` s in a sample."""
+    """The reference: `hz`, half axes `y`, `z` in m, `ratio` turns of z in one of y; and how it is sampled: `ticks` of `tick` s
+    in a sample."""
 
     hz: float
     y: float
     z: float
     tick: float
     ticks: int
+    ratio: int = 1
 
     @property
-    def shrinks(self) -> float:
+    def axes(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """Of y and z: Hz, amplitude m, and by how much its sine leads, rad."""
+        return (self.hz, self.y, 0.0), (self.ratio * self.hz, self.z, math.pi / 2)
+
+    def shrinks(self, hz: float) -> float:
         """Amplitude of a sample's mean over that of the sine."""
-        x = 2 * math.pi * self.hz * self.tick
+        x = 2 * math.pi * hz * self.tick
         return math.sin(self.ticks * x / 2) / (self.ticks * math.sin(x / 2))
 
     @property
@@ -50,8 +56,8 @@ class Wave:
 
     def at(self, t: Array, t_0: float) -> Array:
         """The reference as samples at t (n,) s would show it, (2, n) m."""
-        turn = 2 * math.pi * self.hz * (t - self.late - t_0)
-        return self.shrinks * np.array([self.y * np.sin(turn), self.z * np.cos(turn)])
+        since = 2 * math.pi * (t - self.late - t_0)
+        return np.array([self.shrinks(hz) * size * np.sin(hz * since + lead) for hz, size, lead in self.axes])
 
 
 @dataclass(frozen=True)
@@ -138,11 +144,11 @@ def by_revolution(path: Path, f: Facts) -> Mapping[str, Array]:
     radius = distances(path.readings, f)
     t, wave = path.t - path.wave.late - f.t_0, path.wave
     for m in per:
-        for k, (axis, size, lead) in enumerate((("y", wave.y, 0.0), ("z", wave.z, math.pi / 2))):
+        for k, (axis, (hz, size, lead)) in enumerate(zip("yz", wave.axes, strict=True)):
             out.setdefault(f"error_peak_{axis}", []).append(float(np.nanmax(np.abs(error[k, m]))))
             out.setdefault(f"error_rms_{axis}", []).append(float(np.sqrt(np.nanmean(error[k, m] ** 2))))
-            fitted = known_frequency(t[m], q[k, m], wave.hz)
-            out.setdefault(f"amplitude_ratio_{axis}", []).append(fitted.amplitude / (size * wave.shrinks))
+            fitted = known_frequency(t[m], q[k, m], hz)
+            out.setdefault(f"amplitude_ratio_{axis}", []).append(fitted.amplitude / (size * wave.shrinks(hz)))
             out.setdefault(f"phase_lag_{axis}", []).append(-math.remainder(fitted.phase - lead, 2 * math.pi))
         out.setdefault("error_peak_plane", []).append(float(np.nanmax(planes[:, m])))
         for k, name in ((2, "tilt_psi"), (3, "tilt_theta")):

@@ -43,13 +43,14 @@ class Orbit:
         """How it is named to the reader."""
         w, rpm = self.path.wave, float(np.median(self.speed)) * 30 / np.pi
         turning = f"{rpm:.0f} r/min" if self.path.turn_s else "at rest"
-        return f"{self.law}, {w.hz:g} Hz, {w.y * 1e6:g} × {w.z * 1e6:g} µm, {turning}"
+        figure = f"{w.hz:g} Hz" if w.ratio == 1 else f"{w.hz:g} Hz, {w.ratio} : 1"
+        return f"{self.law}, {figure}, {w.y * 1e6:g} × {w.z * 1e6:g} µm, {turning}"
 
 
-def sampled(rig: RigFile, hz: float, y: float, z: float, period_ns: int) -> Wave:
+def sampled(rig: RigFile, hz: float, y: float, z: float, period_ns: int, ratio: int = 1) -> Wave:
     """The reference, as this rig's telemetry samples it."""
     tick = rig.devices["controller"].tick_s
-    return Wave(hz, y, z, tick, round(period_ns * 1e-9 / tick))
+    return Wave(hz, y, z, tick, round(period_ns * 1e-9 / tick), ratio)
 
 
 def read_orbits(recording: Recording[Any]) -> list[Orbit]:
@@ -68,7 +69,8 @@ def read_orbits(recording: Recording[Any]) -> list[Orbit]:
 
 def _wave(recording: Recording[Any], step: Step) -> Wave:
     labels, period_ns = step.labels, recording.streams["telemetry"].period_ns
-    return sampled(recording.rig, float(labels["hz"]), float(labels["y_m"]), float(labels["z_m"]), period_ns)
+    return sampled(recording.rig, float(labels["hz"]), float(labels["y_m"]), float(labels["z_m"]), period_ns,
+                   int(labels["ratio"]))  # fmt: skip
 
 
 def _start(recording: Recording[Any], start: Step, wave: Wave) -> tuple[float, float]:

@@ -93,14 +93,15 @@ def _of_path(orbit: Orbit, rig: RigFile, runout_m: float) -> dict[str, Estimate]
     out = {}
     for name, values in found.items():
         total = Estimate.exact(least[name], _unit(name))
-        bent = 0.0
+        bent = more = 0.0
         for i, up, down in moved:
             c = (up[name] - down[name]) / (2 * i.stated.standard_uncertainty)
-            bent = math.hypot(bent, (up[name] + down[name]) / 2 - least[name])
+            second = (up[name] + down[name]) / 2 - least[name]
+            bent, more = math.hypot(bent, second), more + second
             total = total + (certified(i.id, i.stated, i.name) - i.stated.value) * c
         total = total + _scatter(orbit, name, values)
-        if bent > 0:
-            total = total + _small(f"curvature/{orbit.law}/{name}", "second-order part of all inputs", bent, _unit(name))
+        if bent > 0:  # a peak only grows by what the sensors hide: the second order belongs to the value (GUM 5.1.2, note)
+            total = total + more + _small(f"curvature/{orbit.law}/{name}", "second-order part of all inputs", bent, _unit(name))
         if name.startswith(("error_peak", "tilt")):
             k = {"error_peak_y": 0, "error_peak_z": 1, "error_peak_plane": 1, "tilt_psi": 2, "tilt_theta": 3}[name]
             total = total + _small(f"noise/{orbit.law}/{name}", "noise in a peak", float(floor[k]), _unit(name))

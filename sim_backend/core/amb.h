@@ -34,7 +34,7 @@ typedef struct {
     double notch1_hz, notch1_q, notch2_hz, notch2_q;
     /* references: set points of the coordinates (slew 0: at once), ellipse */
     double ref_x, ref_y, ref_z, ref_psi, ref_theta, slew, slew_tilt;
-    double ellipse_on, ellipse_y, ellipse_z, ellipse_hz, ellipse_phase, ellipse_ramp_s;
+    double ellipse_on, ellipse_y, ellipse_z, ellipse_hz, ellipse_phase, ellipse_ramp_s, ellipse_ratio;
     /* injection into the current reference of one axis (-1: none): lines at hz, hz + step... */
     double inject_axis, inject_amplitude, inject_hz, inject_lines, inject_step;
     double observer, compensate, observer_constant, observer_damping, observer_turning, observer_velocity, observer_speed;

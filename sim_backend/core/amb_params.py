@@ -141,6 +141,7 @@ class AmbControl:
     ellipse_hz: float = 10.0
     ellipse_phase: float = 0.0
     ellipse_ramp_s: float = 1.0  # T (3.16)
+    ellipse_ratio: float = 1.0
     inject_axis: float = -1.0
     inject_amplitude: float = 0.0
     inject_hz: float = 100.0

@@ -25,7 +25,7 @@ from procedures.estimators.tracking import Path as Orbit
 from procedures.tracking import MEASURES, Plan, check, figures, step_count
 from reports.figures import draw as draw_figure
 
-QUICK = {"revolutions": 8, "settle_s": 0.6}
+QUICK = {"revolutions": 8, "settle_s": 1.5}
 ONE = {"laws": ("CCS",), "compare": ()}
 Found = tuple[dict[tuple[str, str], Estimate], list[Finding]]
 
@@ -79,7 +79,7 @@ def test_a_wide_ring_shows_the_pids_error_without_contact(tmp_path: Path) -> Non
         ({"position_range": 60e-6}, "stuck-channel", "range"),
         ({"factor_ellipse_on": 0}, "reference-missing", "not applied"),
         ({"factor_ellipse_hz": 1.02}, "reference-frequency", "10.2 Hz"),
-        ({"supply_V": 6.0, "inductance": 20e-3}, "saturated", "voltage"),
+        ({"supply_V": 4.0, "inductance": 20e-3}, "saturated", "voltage"),
         ({"drop_fraction": 0.01}, "missing-samples", "missing"),
     ],
     ids=lambda x: "-".join(x) if isinstance(x, dict) else "",
@@ -92,6 +92,14 @@ def test_a_planted_defect_is_named_and_never_passes(
     assert found, [(f.code, f.text) for f in findings]
     assert any(f.effect is not Effect.NOTE for f in found)
     assert any(named in f.text for f in found)
+
+
+def test_a_figure_of_lissajous_is_followed(tmp_path: Path) -> None:
+    measured, findings = tracked(tmp_path, hz=5.0, ratio=2, y_m=60e-6, z_m=40e-6, **ONE)
+    assert findings[0].code == "laws-compared"
+    for axis in "yz":
+        assert measured[f"error_peak_{axis}", "CCS"].value < 3e-6
+        assert measured[f"amplitude_ratio_{axis}", "CCS"].value == pytest.approx(1, abs=0.03)
 
 
 def test_contact_that_the_controller_does_not_report_is_named(tmp_path: Path) -> None:
