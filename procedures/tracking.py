@@ -1,7 +1,7 @@
-"""Tracking: the centre of mass follows an ellipse, at rest (thesis 2.6.2, Figs. 2.10 to 2.12) or turning (thesis 3.5, Fig. 3.6).
+"""Tracking: the centre of mass follows an ellipse, at rest (thesis 2.6.2, Fig. 2.10) or turning (thesis 3.5, Fig. 3.6).
 
-Measurands, per law: peak and rms of the error in y and z, ratio of the amplitudes and phase lag at the reference's frequency,
-the tilts psi and theta, what is left to the touchdown rings, and what the coils carry.
+Measurands, per law: peak and rms of the error in y and z, ratio of the amplitudes and phase lag at the reference's
+frequency, the tilts psi and theta, what is left to the touchdown rings, and what the coils carry.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from bench.rigfile import RigFile
 from bench.roles import RigState
 from bench.states import transition
 from procedures import tracking_figures as drawn
-from procedures.estimators import tracking_checks, tracking_estimates
+from procedures.estimators import tracking_checks, tracking_estimates, tracking_wiring
 from procedures.estimators.tracking_data import (
     CHANNELS,
     LIFT,
@@ -161,8 +161,14 @@ def _started(rig: Rig, plan: Plan, record: Recorder) -> None:
     """The reference starts at rest with a small jump of z, whose time the currents tell. From here on it never stops: its phase
     is known for every law, at any speed."""
     write = rig.levitation.set
-    for name, value in (("ellipse_hz", plan.hz), ("ellipse_ratio", plan.ratio), ("ellipse_phase", 0.0), ("ellipse_ramp_s", 0.0), ("ellipse_y", 0.0),
-                        ("ellipse_z", MARK_M)):  # fmt: skip
+    for name, value in (
+        ("ellipse_hz", plan.hz),
+        ("ellipse_ratio", plan.ratio),
+        ("ellipse_phase", 0.0),
+        ("ellipse_ramp_s", 0.0),
+        ("ellipse_y", 0.0),
+        ("ellipse_z", MARK_M),
+    ):
         write(name, value)
     rig.clock.sleep(plan.settle_s)
     with record.step(START):
@@ -194,7 +200,7 @@ def _size(rig: Rig, plan: Plan, share: float) -> None:
 
 def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     """Findings first, then the quantities of each law that is judged; the others are in a note."""
-    early = list(tracking_checks.before_orbits(recording))
+    early = list(tracking_wiring.before_orbits(recording))
     yield from early
     if any(f.effect is Effect.ERROR for f in early):
         return
@@ -216,11 +222,14 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     lacking = [
         f"{table}: found no {', '.join(missing)}; expected them all"
         for table, names, found in (
-            ("channels", CHANNELS, rig.channels), ("parameters", PARAMETERS, rig.parameters), ("sensors", POSITIONS, rig.sensors),
-            ("geometry", LENGTHS, rig.geometry), ("parameters", tuple(OBSERVED) if plan.observed else (), rig.parameters),
+            ("channels", CHANNELS, rig.channels),
+            ("parameters", PARAMETERS, rig.parameters),
+            ("sensors", POSITIONS, rig.sensors),
+            ("geometry", LENGTHS, rig.geometry),
+            ("parameters", tuple(OBSERVED) if plan.observed else (), rig.parameters),
         )
         if (missing := [n for n in names if n not in found])
-    ]  # fmt: skip
+    ]
     yield from lacking
     if lacking:
         return
@@ -236,8 +245,11 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     if plan.speed_rad_s and "drive" not in {role for d in rig.devices.values() for role in d.roles}:
         yield f"speed_rad_s: found {plan.speed_rad_s:g} and no device with role drive; expected 0"
     if 0 < plan.speed_rad_s < 20 * math.pi * plan.hz * plan.ratio:
-        yield (f"speed_rad_s: found {plan.speed_rad_s:g}; expected 0, or ten times the reference's {plan.hz:g} Hz or more: else "
-               "averaging over a turn takes the reference with it")  # fmt: skip
+        yield (
+            f"speed_rad_s: found {plan.speed_rad_s:g}; expected 0, or ten times the reference's {plan.hz:g} Hz or "
+            f"more: else "
+            "averaging over a turn takes the reference with it"
+        )
 
 
 def figures(recording: Recording[Plan]) -> Iterable[Figure]:
@@ -250,21 +262,22 @@ def figures(recording: Recording[Plan]) -> Iterable[Figure]:
 
 
 METHOD = """\
-The rotor is levitated, and the reference of its centre of mass is an ellipse, y = A sin 2πft, z = B cos 2πft (other figures of Lissajous: cos 2πnft), generated in the
-controller. The centre of mass and the tilts follow from the four radial sensors by T (2.17). Positions count from where the sensors
-read zero, as the reference does: an offset of a sensor is no error of tracking, but it counts against the distance to the rings.
+The rotor is levitated, and the reference of its centre of mass is an ellipse, y = A sin 2πft, z = B cos 2πft (other figures
+of Lissajous: cos 2πnft), generated in the controller. The centre of mass and the tilts follow from the four radial sensors
+by T (2.17). Positions count from where the sensors read zero, as the reference does: an offset of a sensor is no error of
+tracking, but it counts against the distance to the rings.
 
-Telemetry holds means of ten readings. The mean of a sine is a little smaller and half a period of the telemetry later; both are
-applied to the reference, so that like is compared with like. When the reference began is read from the coils: it begins at rest, under
-the PID, with a jump of z by 15 µm, which the currents answer at once; from then on it never stops. Half a tick of the controller
-either way is in the budget.
+Telemetry holds means of ten readings. The mean of a sine is a little smaller and half a period of the telemetry later; both
+are applied to the reference, so that like is compared with like. When the reference began is read from the coils: it begins
+at rest, under the PID, with a jump of z by 15 µm, which the currents answer at once; from then on it never stops. Half a
+tick of the controller either way is in the budget.
 
-Peak and rms are of the error averaged over a turn of the shaft, at rest over 3 ms; each is the mean over the revolutions of the
-reference, and their scatter is by batch means. Amplitude and phase are those of a sine of the reference's frequency, fitted to
-each revolution. The distance to the rings is from single samples: it holds vibration and runout.
+Peak and rms are of the error averaged over a turn of the shaft, at rest over 3 ms; each is the mean over the revolutions of
+the reference, and their scatter is by batch means. Amplitude and phase are those of a sine of the reference's frequency,
+fitted to each revolution. The distance to the rings is from single samples: it holds vibration and runout.
 
-Before the lift the rotor lies on its rings, below the middle on both axes. The set points of y and of the tilt about z are then moved a
-little, which shows whether the readings belong to where they are taken.
+Before the lift the rotor lies on its rings, below the middle on both axes. The set points of y and of the tilt about z are
+then moved a little, which shows whether the readings belong to where they are taken.
 """
 
 procedure = Procedure(

@@ -1,4 +1,4 @@
-"""What the tracking test draws, after T Figs. 2.10 to 2.12 and 3.6: orbits in the ring, errors over the revolution, tilts, coils."""
+"""What the tracking test draws, after T Figs. 2.10 to 2.12 and 3.6: orbits, errors over the revolution, coils."""
 
 from __future__ import annotations
 
@@ -41,8 +41,15 @@ def _orbit(orbits: Sequence[Orbit], facts: Mapping[str, Facts]) -> Figure:
     for o in orbits:
         q = 1e6 * centre(o.path.readings, facts[o.law])[:2, _two(o)]
         series.append(Series(o.law, q[0], q[1]))
-    return Figure("orbit", f"Centre of mass, {w.hz:g} Hz", "Two revolutions of the reference, from where the sensors read zero.",
-                  "y (µm)", "z (µm)", tuple(series), "plane")  # fmt: skip
+    return Figure(
+        "orbit",
+        f"Centre of mass, {w.hz:g} Hz",
+        "Two revolutions of the reference, from where the sensors read zero.",
+        "y (µm)",
+        "z (µm)",
+        tuple(series),
+        "plane",
+    )
 
 
 def _plane(orbits: Sequence[Orbit], facts: Mapping[str, Facts], k: int, name: str) -> Figure:
@@ -50,8 +57,15 @@ def _plane(orbits: Sequence[Orbit], facts: Mapping[str, Facts], k: int, name: st
     for o in orbits:
         at = 1e6 * o.path.readings[2 * k : 2 * k + 2, _two(o)]
         series.append(Series(o.law, at[0], at[1]))
-    return Figure(f"ring-{name}", f"Orbit at the {name} sensors", "Single samples, with the touchdown ring as the rig file states it; "
-                  "its middle is within the sensors' zero.", "y (µm)", "z (µm)", tuple(series), "plane")  # fmt: skip
+    return Figure(
+        f"ring-{name}",
+        f"Orbit at the {name} sensors",
+        "Single samples, with the touchdown ring as the rig file states it; its middle is within the sensors' zero.",
+        "y (µm)",
+        "z (µm)",
+        tuple(series),
+        "plane",
+    )
 
 
 def _binned(o: Orbit, f: Facts, values: np.ndarray, count: int = 72) -> tuple[np.ndarray, np.ndarray]:
@@ -68,8 +82,14 @@ def _errors(orbits: Sequence[Orbit], facts: Mapping[str, Facts], k: int, axis: s
     for o in orbits:
         x, y = _binned(o, facts[o.law], errors(o.path, facts[o.law])[k])
         series.append(Series(o.law, x, 1e6 * y))
-    return Figure(f"error-{axis}", f"Error of {axis} over a revolution of the reference", "Means over all revolutions; of a turning "
-                  "shaft, averaged over its turn.", "phase of the reference (°)", f"error of {axis} (µm)", tuple(series))  # fmt: skip
+    return Figure(
+        f"error-{axis}",
+        f"Error of {axis} over a revolution of the reference",
+        "Means over all revolutions; of a turning shaft, averaged over its turn.",
+        "phase of the reference (°)",
+        f"error of {axis} (µm)",
+        tuple(series),
+    )
 
 
 def _tilts(orbits: Sequence[Orbit], facts: Mapping[str, Facts], k: int, name: str) -> Figure:
@@ -78,13 +98,28 @@ def _tilts(orbits: Sequence[Orbit], facts: Mapping[str, Facts], k: int, name: st
         x, y = _binned(o, facts[o.law], errors(o.path, facts[o.law])[k])
         series.append(Series(o.law, x, 1e6 * y))
     key = "tilt-psi" if k == 2 else "tilt-theta"
-    return Figure(key, f"Tilt {name}, over a revolution of the reference", "As the errors.", "phase of the reference (°)",
-                  "tilt (µrad)", tuple(series))  # fmt: skip
+    return Figure(
+        key,
+        f"Tilt {name}, over a revolution of the reference",
+        "As the errors.",
+        "phase of the reference (°)",
+        "tilt (µrad)",
+        tuple(series),
+    )
 
 
 def _coils(o: Orbit) -> Figure:
     use, t = _two(o), o.path.t - o.path.t[0]
-    series = [Series(f"{axis} {side}", t[use], currents[k, use])
-              for side, currents in (("upper", o.upper), ("lower", o.lower)) for k, axis in enumerate(AXES)]  # fmt: skip
-    return Figure(f"coils-{o.law.lower()}", f"Coil currents, {o.law}", "Two revolutions of the reference.", "time (s)",
-                  "current (A)", tuple(series))  # fmt: skip
+    series = [
+        Series(f"{axis} {side}", t[use], currents[k, use])
+        for side, currents in (("upper", o.upper), ("lower", o.lower))
+        for k, axis in enumerate(AXES)
+    ]
+    return Figure(
+        f"coils-{o.law.lower()}",
+        f"Coil currents, {o.law}",
+        "Two revolutions of the reference.",
+        "time (s)",
+        "current (A)",
+        tuple(series),
+    )

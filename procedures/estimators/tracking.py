@@ -1,11 +1,12 @@
 """Following an ellipse with the centre of mass: what positions of two planes, read as means of ten ticks, say of it.
 
-The reference is y = A sin(2 pi f (t - t_0)), z = B cos(2 pi n f (t - t_0)), an ellipse where n = 1. A sample of the telemetry is the mean of n readings, the
-last of them one tick before its time. A sine's mean is a sine, smaller by sin(n x/2)/(n sin(x/2)), x = 2 pi f tick, and
-later by (n + 1)/2 ticks: both are applied to the reference, so that like is compared with like.
+The reference is y = A sin(2 pi f (t - t_0)), z = B cos(2 pi n f (t - t_0)), an ellipse where n = 1. A sample of the
+telemetry is the mean of n readings, the last of them one tick before its time. A sine's mean is a sine, smaller by sin(n
+x/2)/(n sin(x/2)), x = 2 pi f tick, and later by (n + 1)/2 ticks: both are applied to the reference, so that like is
+compared with like.
 
-t_0 is not in the telemetry. The reference of z begins with a jump, and the coil currents of z answer it after two ticks with the
-amplifiers' lag: where that answer begins is read from four samples.
+t_0 is not in the telemetry. The reference of z begins with a jump, and the coil currents of z answer it after two ticks
+with the amplifiers' lag: where that answer begins is read from four samples.
 """
 
 from __future__ import annotations

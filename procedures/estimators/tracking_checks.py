@@ -10,35 +10,33 @@ import numpy as np
 
 from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
-from bench.recording import Recording
 from bench.uncertainty import Estimate
 from procedures.estimators.sines import known_frequency, unknown_frequency
 from procedures.estimators.tracking import centre
 from procedures.estimators.tracking_data import (
-    AXES,
     CONTACT,
     CURRENT_LIMIT,
-    LIFT,
-    LIFT_LOST,
     LOWER,
-    NO_SPEED,
     POSITIONS,
-    PROBE,
     RANGE,
-    REST,
     UPPER,
     VOLTAGE_LIMIT,
     Orbit,
 )
 from procedures.estimators.tracking_estimates import nominal
 
-FATAL = ("stuck-channel", "reference-missing", "reference-frequency", "axes-exchanged", "sensor-range", "start-not-seen")
+FATAL = (
+    "stuck-channel",
+    "reference-missing",
+    "reference-frequency",
+    "axes-exchanged",
+    "sensor-range",
+    "start-not-seen",
+)
 APPLIED, OFF_HZ = 0.3, 2e-3  # share of the amplitude, relative error of the frequency
 CLEAR = 8.0  # jump of the current at the start, over the noise of a sample
 HELD = 5  # samples in a row at an extreme: a sensor that clips
-OWN, OTHER = 0.5, 0.3  # shares of a nudge
 STEADY = 0.01  # of the speed
-UNEVEN = 0.6  # of the rise
 PARTS = 0.02  # share of samples at a limit that a smooth reference does not explain
 
 
@@ -55,85 +53,23 @@ class Settings(Protocol):
     def max_lost(self) -> float: ...
 
 
-def before_orbits(recording: Recording[Any]) -> Iterator[Finding]:
-    """Probes at rest, the lift, nudges, the speed; what is an error leaves nothing to evaluate."""
-    wrong = list(_at_rest(recording))
-    yield from wrong
-    if wrong:
-        return
-    lost = recording.events(LIFT_LOST)
-    if lost:
-        yield from _of_lift(recording, str(lost[0]["fault"]))
-        return
-    yield from _of_nudges(recording)
-    for event in recording.events(NO_SPEED):
-        text = f"the shaft does not reach {event['wanted'] * 30 / math.pi:.0f} r/min: {event['why']}"
-        yield Finding("speed-not-reached", text, "drive", Effect.ERROR)
-
-
-def _at_rest(recording: Recording[Any]) -> Iterator[Finding]:
-    """On the rings the rotor lies below the middle on both axes, at the clearance over the square root of two."""
-    for step in recording.steps(REST):
-        data = step.read(*POSITIONS, "flags")
-        beyond = bool((data["flags"].astype(np.int64) & RANGE).any())
-        for name in POSITIONS:
-            mean = float(np.mean(data[name]))
-            if mean > 0:
-                yield Finding("probe-polarity", f"{name} reads {mean * 1e6:+.0f} µm while the rotor lies on its rings, below the "
-                              "middle: its polarity is wrong. It was not lifted.", name, Effect.ERROR)  # fmt: skip
-            elif np.ptp(data[name]) == 0:
-                why = " and the controller says that a sensor is beyond its range" if beyond else ""
-                yield Finding("stuck-channel", f"{name} stands still at {mean * 1e6:+.0f} µm with the rotor on its rings{why}.",
-                              name, Effect.ERROR)  # fmt: skip
-
-
-def _of_lift(recording: Recording[Any], fault: str) -> Iterator[Finding]:
-    """Which way the rotor went when it was lost. On six virtual rigs it tilted by 2.8 to 10 times its rise with the planes
-    exchanged, and by at most 1.5 times with the axes exchanged."""
-    text, where = "", "lift"
-    for step in recording.steps(LIFT):
-        data = step.read(*POSITIONS)
-        x = np.array([data[name] for name in POSITIONS])
-        x = x - x[:, :20].mean(axis=1, keepdims=True)
-        tilt = math.hypot(float((x[2] - x[0]).std()), float((x[3] - x[1]).std()))
-        apart = float((x[0] + x[2] - x[1] - x[3]).std()) / 2
-        together = float(x.mean(axis=0).std())
-        if tilt > 2 * together:
-            where, text = "planes", ("it tilted far more than it rose: suspect probes or coils of the two planes exchanged")
-        elif max(tilt, apart) > UNEVEN * together:
-            where, text = "axes", ("one of its axes went up while another went down: suspect probes or coils of y and z exchanged, "
-                                   "in one plane or both")  # fmt: skip
-    yield Finding("lift-lost", f"the rotor was lost in the lift ({fault}); {text or 'no wiring is suspected by its path'}.",
-                  where, Effect.ERROR)  # fmt: skip
-
-
-def _of_nudges(recording: Recording[Any]) -> Iterator[Finding]:
-    steps = list(recording.steps(PROBE))
-    facts = nominal(recording.rig, 0.0)
-    for before, after in zip(steps[::2], steps[1::2], strict=False):
-        wanted, name = float(after.labels["value"]), str(after.labels["name"])
-        means = [np.array([[s.mean(p)] for p in POSITIONS]) for s in (before, after)]
-        y, z, psi, theta = (centre(means[1], facts) - centre(means[0], facts))[:, 0]
-        own, other = ((y, z) if name == "ref_y" else (theta, psi))
-        if own < -OWN * wanted or (name == "ref_theta" and own < OWN * wanted and abs(other) < OTHER * wanted):
-            yield Finding("planes-exchanged" if name == "ref_theta" else "axes-exchanged",
-                          f"a nudge of {name} by {wanted:g} moves the readings by {own:+.2g}: suspect the readings of the two planes "
-                          "exchanged, or one of the wrong sign." if name == "ref_theta" else
-                          f"a nudge of {name} by {wanted:g} moves y by {own:+.2g}: suspect a sign.", name, Effect.ERROR)  # fmt: skip
-        elif own < OWN * wanted or abs(other) > OTHER * wanted:
-            yield Finding("axes-exchanged", f"a nudge of {name} by {wanted:g} moves its own reading by {own:+.2g} and the other "
-                          f"axis' by {other:+.2g}: suspect the readings of y and z exchanged, or a set point that does not "
-                          "act.", name, Effect.ERROR)  # fmt: skip
-
-
 def of_signals(orbits: Sequence[Orbit], plan: Settings) -> Iterator[Finding]:
     """Lost samples, channels that stand still or clip, a reference that is not what was planned."""
     for o in orbits:
         share = o.step.lost() / max(o.step.expected(), 1)
         if share > plan.max_lost:
-            yield Finding("missing-samples", f"{share:.2%} of the samples of an orbit are missing ({plan.max_lost:.2%} is "
-                          "allowed). Look at the link: load, cable, gateway.", o.where, Effect.INDETERMINATE)  # fmt: skip
-        rows = (*zip(POSITIONS, o.path.readings, strict=True), *zip(UPPER, o.upper, strict=True), *zip(LOWER, o.lower, strict=True))
+            yield Finding(
+                "missing-samples",
+                f"{share:.2%} of the samples of an orbit are missing ({plan.max_lost:.2%} is "
+                "allowed). Look at the link: load, cable, gateway.",
+                o.where,
+                Effect.INDETERMINATE,
+            )
+        rows = (
+            *zip(POSITIONS, o.path.readings, strict=True),
+            *zip(UPPER, o.upper, strict=True),
+            *zip(LOWER, o.lower, strict=True),
+        )
         for name, values in rows:
             if np.ptp(values) == 0:
                 yield Finding("stuck-channel", f"{name} does not move at all during an orbit.", name, Effect.ERROR)
@@ -142,8 +78,12 @@ def of_signals(orbits: Sequence[Orbit], plan: Settings) -> Iterator[Finding]:
         if plan.speed_rad_s:
             off = float(np.abs(o.speed - plan.speed_rad_s).max()) / plan.speed_rad_s
             if off > STEADY:
-                yield Finding("speed-not-steady", f"the speed is up to {off:.1%} off {plan.speed_rad_s * 30 / math.pi:.0f} r/min.",
-                              o.where, Effect.INDETERMINATE)  # fmt: skip
+                yield Finding(
+                    "speed-not-steady",
+                    f"the speed is up to {off:.1%} off {plan.speed_rad_s * 30 / math.pi:.0f} r/min.",
+                    o.where,
+                    Effect.INDETERMINATE,
+                )
 
 
 def _clipping(o: Orbit) -> Iterator[Finding]:
@@ -155,10 +95,16 @@ def _clipping(o: Orbit) -> Iterator[Finding]:
             runs = np.convolve(at.astype(int), np.ones(HELD, int), "valid")
             if (runs == HELD).any():
                 found = True
-                yield Finding("sensor-range", f"{name} stays at {limit * 1e6:+.1f} µm for {HELD} samples and more: it clips there.",
-                              name, Effect.ERROR)  # fmt: skip
+                yield Finding(
+                    "sensor-range",
+                    f"{name} stays at {limit * 1e6:+.1f} µm for {HELD} samples and more: it clips there.",
+                    name,
+                    Effect.ERROR,
+                )
     if not found and (o.flags & RANGE).any():
-        yield Finding("sensor-range", "the controller reports a position sensor beyond its range.", o.where, Effect.ERROR)
+        yield Finding(
+            "sensor-range", "the controller reports a position sensor beyond its range.", o.where, Effect.ERROR
+        )
 
 
 def _of_reference(o: Orbit) -> Iterator[Finding]:
@@ -169,19 +115,34 @@ def _of_reference(o: Orbit) -> Iterator[Finding]:
     greater = int(np.argmax(sizes))
     own = [known_frequency(t, x, hz).amplitude for x, hz in zip(q, planned, strict=True)]
     if o.clear < CLEAR:
-        yield Finding("start-not-seen", f"the coil currents show no start of the reference ({o.clear:.1f} times their noise): its "
-                      "phase is not known.", o.where, Effect.ERROR)  # fmt: skip
+        yield Finding(
+            "start-not-seen",
+            f"the coil currents show no start of the reference ({o.clear:.1f} times their "
+            f"noise): its "
+            "phase is not known.",
+            o.where,
+            Effect.ERROR,
+        )
     try:
         hz = unknown_frequency(t, q[greater]).hz
     except AnalysisError:
         hz = math.nan
     if abs(hz / planned[greater] - 1) > OFF_HZ and np.ptp(q[greater]) > APPLIED * 2 * sizes[greater]:
-        yield Finding("reference-frequency", f"the rotor moves at {hz:.4g} Hz; the reference should have {planned[greater]:g} Hz.",
-                      o.where, Effect.ERROR)  # fmt: skip
+        yield Finding(
+            "reference-frequency",
+            f"the rotor moves at {hz:.4g} Hz; the reference should have {planned[greater]:g} Hz.",
+            o.where,
+            Effect.ERROR,
+        )
     elif max(own) < APPLIED * max(sizes) or not math.isfinite(hz):
-        yield Finding("reference-missing", f"the rotor moves by {own[0] * 1e6:.2g} and {own[1] * 1e6:.2g} µm at {wave.hz:g} Hz; the "
-                      f"reference should have {wave.y * 1e6:g} and {wave.z * 1e6:g} µm: it is not applied.", o.where,
-                      Effect.ERROR)  # fmt: skip
+        yield Finding(
+            "reference-missing",
+            f"the rotor moves by {own[0] * 1e6:.2g} and {own[1] * 1e6:.2g} µm at "
+            f"{wave.hz:g} Hz; the "
+            f"reference should have {wave.y * 1e6:g} and {wave.z * 1e6:g} µm: it is not applied.",
+            o.where,
+            Effect.ERROR,
+        )
 
 
 def of_results(
@@ -195,12 +156,21 @@ def of_results(
             share = float((o.flags & bit != 0).mean())
             if share > 0:
                 bad = judged and share > PARTS
-                yield Finding("saturated", f"{text} was at its limit in {share:.2%} of the samples.", o.where,
-                              Effect.INDETERMINATE if bad else Effect.NOTE)  # fmt: skip
+                yield Finding(
+                    "saturated",
+                    f"{text} was at its limit in {share:.2%} of the samples.",
+                    o.where,
+                    Effect.INDETERMINATE if bad else Effect.NOTE,
+                )
         low = results[o.law]["lower_current"]
         if o.law == "CAC" and not o.path.turn_s and low.value - 2 * low.u > plan.max_lower_A:
-            yield Finding("lower-coils-on", f"the lower coils carry up to {low.value:.3f} A with CAC ({plan.max_lower_A:g} A "
-                          "allowed): they should be off.", o.where, Effect.INDETERMINATE)  # fmt: skip
+            yield Finding(
+                "lower-coils-on",
+                f"the lower coils carry up to {low.value:.3f} A with CAC ({plan.max_lower_A:g} A "
+                "allowed): they should be off.",
+                o.where,
+                Effect.INDETERMINATE,
+            )
     yield Finding("laws-compared", "; ".join(_said(o, results[o.law]) for o in orbits) + ".")
 
 
@@ -208,23 +178,38 @@ def _of_contact(o: Orbit, left: Estimate, effect: Effect) -> Iterator[Finding]:
     told = float((o.flags & CONTACT != 0).mean())
     if told > 0:
         sides = " and ".join(s for bit, s in ((4, "inboard"), (8, "outboard")) if (o.flags & bit).any())
-        yield Finding("contact", f"the rotor touches the {sides} ring in {told:.1%} of the samples; by its positions "
-                      f"{left.value * 1e6:.1f} ± {2 * left.u * 1e6:.1f} µm are left to it.", o.where, effect)  # fmt: skip
+        yield Finding(
+            "contact",
+            f"the rotor touches the {sides} ring in {told:.1%} of the samples; by its positions "
+            f"{left.value * 1e6:.1f} ± {2 * left.u * 1e6:.1f} µm are left to it.",
+            o.where,
+            effect,
+        )
         if left.value > 3 * left.u:
-            yield Finding("contact-not-seen", "the controller reports contact, the positions show none: look at the sensors' gain "
-                          "and zero, or at what lies between rotor and ring.", o.where, Effect.INDETERMINATE)  # fmt: skip
+            yield Finding(
+                "contact-not-seen",
+                "the controller reports contact, the positions show none: look at the "
+                "sensors' gain "
+                "and zero, or at what lies between rotor and ring.",
+                o.where,
+                Effect.INDETERMINATE,
+            )
     elif left.value < 0:
-        yield Finding("contact-unreported", f"by its positions the rotor is at a ring ({left.value * 1e6:.1f} ± "
-                      f"{2 * left.u * 1e6:.1f} µm are left), but the controller reports no contact.", o.where,
-                      Effect.INDETERMINATE)  # fmt: skip
+        yield Finding(
+            "contact-unreported",
+            f"by its positions the rotor is at a ring ({left.value * 1e6:.1f} ± "
+            f"{2 * left.u * 1e6:.1f} µm are left), but the controller reports no contact.",
+            o.where,
+            Effect.INDETERMINATE,
+        )
 
 
 def _said(o: Orbit, r: Mapping[str, Estimate]) -> str:
     y, z, psi, theta = (r[n] for n in ("error_peak_y", "error_peak_z", "tilt_psi", "tilt_theta"))
     low = r["lower_current"]
-    return (f"{o.law}: peaks {y.value * 1e6:.1f} ± {2 * y.u * 1e6:.1f} µm in y, {z.value * 1e6:.1f} ± {2 * z.u * 1e6:.1f} µm in z, "
-            f"tilts {psi.value * 1e6:.0f} and {theta.value * 1e6:.0f} µrad, lower coils up to {low.value:.2f} A, "
-            f"contact in {float((o.flags & CONTACT != 0).mean()):.0%} of the samples")  # fmt: skip
-
-
-__all__ = ["AXES", "before_orbits", "of_results", "of_signals"]
+    return (
+        f"{o.law}: peaks {y.value * 1e6:.1f} ± {2 * y.u * 1e6:.1f} µm in y, {z.value * 1e6:.1f} ± "
+        f"{2 * z.u * 1e6:.1f} µm in z, "
+        f"tilts {psi.value * 1e6:.0f} and {theta.value * 1e6:.0f} µrad, lower coils up to {low.value:.2f} A, "
+        f"contact in {float((o.flags & CONTACT != 0).mean()):.0%} of the samples"
+    )

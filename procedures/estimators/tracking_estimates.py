@@ -36,9 +36,13 @@ def nominal(rig: RigFile, t_0: float) -> Facts:
     sensors, g = [rig.sensors[f"pos_{axis}"] for axis in AXES], rig.geometry
     gains, offsets = [s.gain.value for s in sensors], [s.offset.value for s in sensors]
     return Facts(
-        (gains[0], gains[1], gains[2], gains[3]), (offsets[0], offsets[1], offsets[2], offsets[3]),
-        g["com_to_inboard_sensor"].value, g["com_to_outboard_sensor"].value, t_0, g["clearance"].value,
-    )  # fmt: skip
+        (gains[0], gains[1], gains[2], gains[3]),
+        (offsets[0], offsets[1], offsets[2], offsets[3]),
+        g["com_to_inboard_sensor"].value,
+        g["com_to_outboard_sensor"].value,
+        t_0,
+        g["clearance"].value,
+    )
 
 
 def _at(k: int, kind: str) -> Moved:
@@ -62,15 +66,28 @@ def inputs(rig: RigFile, tick_s: float, runout_m: float) -> list[Input]:
     out = []
     for k, axis in enumerate(AXES):
         s = rig.sensors[f"pos_{axis}"]
-        out += [Input(f"pos_{axis}.gain", f"gain of pos_{axis}", s.gain, _at(k, "gains")),
-                Input(f"pos_{axis}.offset", f"zero of pos_{axis}", s.offset, _at(k, "offsets"))]  # fmt: skip
+        out += [
+            Input(f"pos_{axis}.gain", f"gain of pos_{axis}", s.gain, _at(k, "gains")),
+            Input(f"pos_{axis}.offset", f"zero of pos_{axis}", s.offset, _at(k, "offsets")),
+        ]
         if runout_m > 0:
-            allowed = Toleranced(value=0.0, unit="m", half_width=runout_m, distribution="rectangular", source="plan: runout_m")
+            allowed = Toleranced(
+                value=0.0, unit="m", half_width=runout_m, distribution="rectangular", source="plan: runout_m"
+            )
             out.append(Input(f"runout/pos_{axis}", f"runout at pos_{axis}", allowed, _at(k, "offsets")))
-    for name, kind in (("com_to_inboard_sensor", "l_is"), ("com_to_outboard_sensor", "l_os"), ("clearance", "clearance")):
+    for name, kind in (
+        ("com_to_inboard_sensor", "l_is"),
+        ("com_to_outboard_sensor", "l_os"),
+        ("clearance", "clearance"),
+    ):
         out.append(Input(f"geometry.{name}", name.replace("_", " "), rig.geometry[name], _one(kind)))
-    clock = Toleranced(value=0.0, unit="s", half_width=TIMING_TICKS * tick_s, distribution="rectangular",
-                       source="half a tick of the controller either way")  # fmt: skip
+    clock = Toleranced(
+        value=0.0,
+        unit="s",
+        half_width=TIMING_TICKS * tick_s,
+        distribution="rectangular",
+        source="half a tick of the controller either way",
+    )
     out.append(Input("timing/start", "start of the reference", clock, _one("t_0")))
     return out
 
@@ -100,8 +117,14 @@ def _of_path(orbit: Orbit, rig: RigFile, runout_m: float) -> dict[str, Estimate]
             bent, more = math.hypot(bent, second), more + second
             total = total + (certified(i.id, i.stated, i.name) - i.stated.value) * c
         total = total + _scatter(orbit, name, values)
-        if bent > 0:  # a peak only grows by what the sensors hide: the second order belongs to the value (GUM 5.1.2, note)
-            total = total + more + _small(f"curvature/{orbit.law}/{name}", "second-order part of all inputs", bent, _unit(name))
+        if (
+            bent > 0
+        ):  # a peak only grows by what the sensors hide: the second order belongs to the value (GUM 5.1.2, note)
+            total = (
+                total
+                + more
+                + _small(f"curvature/{orbit.law}/{name}", "second-order part of all inputs", bent, _unit(name))
+            )
         if name.startswith(("error_peak", "tilt")):
             k = {"error_peak_y": 0, "error_peak_z": 1, "error_peak_plane": 1, "tilt_psi": 2, "tilt_theta": 3}[name]
             total = total + _small(f"noise/{orbit.law}/{name}", "noise in a peak", float(floor[k]), _unit(name))
@@ -126,15 +149,25 @@ def _scatter(orbit: Orbit, name: str, values: np.ndarray) -> Estimate:
     batches = max(2, min(16, len(values) // 2))
     found = batch_means(values, batches)
     u = float(values.std(ddof=1)) if name == "ring_distance" else found.u
-    return Estimate.of(0.0, Influence(
-        id=f"scatter/{orbit.law}/{name}", name="scatter over revolutions", u=u, unit=_unit(name), kind="A",
-        distribution="normal", dof=found.dof, source=f"{batches} batches of revolutions of the reference",
-    ))  # fmt: skip
+    return Estimate.of(
+        0.0,
+        Influence(
+            id=f"scatter/{orbit.law}/{name}",
+            name="scatter over revolutions",
+            u=u,
+            unit=_unit(name),
+            kind="A",
+            distribution="normal",
+            dof=found.dof,
+            source=f"{batches} batches of revolutions of the reference",
+        ),
+    )
 
 
 def _small(identity: str, name: str, u: float, unit: str) -> Estimate:
-    return Estimate.of(0.0, Influence(id=identity, name=name, u=u, unit=unit, kind="B", distribution="normal",
-                                      source="evaluation"))  # fmt: skip
+    return Estimate.of(
+        0.0, Influence(id=identity, name=name, u=u, unit=unit, kind="B", distribution="normal", source="evaluation")
+    )
 
 
 def _of_coils(orbit: Orbit, rig: RigFile) -> dict[str, Estimate]:
@@ -146,8 +179,18 @@ def _of_coils(orbit: Orbit, rig: RigFile) -> dict[str, Estimate]:
         s = rig.sensors[names[k]]
         gain, offset = (certified(f"{names[k]}.{what}", t) for what, t in (("gain", s.gain), ("offset", s.offset)))
         found = batch_means([currents[k, m].mean() for m in per], batches)
-        seen = Estimate.of(found.value, Influence(
-            id=f"scatter/{orbit.law}/{quantity}", name="scatter of the current", u=found.u, unit="A", kind="A",
-            distribution="normal", dof=found.dof, source=f"{batches} batches of revolutions of the reference"))  # fmt: skip
+        seen = Estimate.of(
+            found.value,
+            Influence(
+                id=f"scatter/{orbit.law}/{quantity}",
+                name="scatter of the current",
+                u=found.u,
+                unit="A",
+                kind="A",
+                distribution="normal",
+                dof=found.dof,
+                source=f"{batches} batches of revolutions of the reference",
+            ),
+        )
         out[quantity] = replace((seen - offset) / gain, unit="A")
     return out

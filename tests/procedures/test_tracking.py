@@ -147,7 +147,7 @@ def orbit(hz: float, turn_s: float = 0.0, lag: float = 0.0, ratio: float = 1.0, 
     if turn_s:
         y, z = y + 8e-6 * np.cos(2 * math.pi * reads / turn_s), z + 8e-6 * np.sin(2 * math.pi * reads / turn_s)
     at = [(y - FACTS.l_is * tilt), z, (y + FACTS.l_os * tilt), z]
-    return Orbit(wave, end, np.array([x.mean(axis=1) for x in at]), turn_s)
+    return Orbit(wave, end, np.array([x.mean(axis=1) for x in at], np.float64), turn_s)
 
 
 @settings(max_examples=20, deadline=None)
