@@ -120,6 +120,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     rig.levitation.set("ellipse_on", 0.0)
     if plan.speed_rad_s and rig.drive is not None:
         rig.drive.stop()
+    rig.levitation.set("law", CODES["PID"])
 
 
 def _lifted(rig: Rig, record: Recorder) -> bool:

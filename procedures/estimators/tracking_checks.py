@@ -194,7 +194,7 @@ def _of_contact(o: Orbit, left: Estimate, effect: Effect) -> Iterator[Finding]:
                 o.where,
                 Effect.INDETERMINATE,
             )
-    elif left.value < 0:
+    elif o.ring_distance(nominal(o.step.recording.rig, o.t_0)) < 0:
         yield Finding(
             "contact-unreported",
             f"by its positions the rotor is at a ring ({left.value * 1e6:.1f} ± "

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
-from procedures.estimators.tracking import Path, Wave, onset
+from procedures.estimators.tracking import Facts, Path, Wave, distances, onset
 
 Array = npt.NDArray[np.float64]
 REST, LIFT, PROBE, START, ORBIT = "rest", "lift", "probe", "start", "orbit"
@@ -37,6 +37,10 @@ class Orbit:
     t_0: float
     clear: float
     step: Step
+
+    def ring_distance(self, facts: Facts) -> float:
+        """The least distance to a ring that the readings show, as they stand: m, below zero inside it."""
+        return facts.clearance - float(distances(self.path.readings, facts).max())
 
     @property
     def where(self) -> str:

@@ -103,8 +103,8 @@ def _of_nudges(recording: Recording[Any]) -> Iterator[Finding]:
         if name == "ref_theta":
             if theta < OWN * wanted:
                 text = (
-                    f"a tilt about z by {wanted * 1e6:g} µrad shows as {theta * 1e6:+.0f} µrad: suspect the readings of the two "
-                    "planes exchanged, or a set point that does not act."
+                    f"a tilt about z by {wanted * 1e6:g} µrad shows as {theta * 1e6:+.0f} µrad: suspect the readings of the "
+                    "two planes exchanged, or a set point that does not act."
                 )
                 yield Finding("planes-exchanged", text, name, Effect.ERROR)
         elif y < OWN * wanted or abs(z) > OTHER * wanted:
