@@ -61,6 +61,7 @@ PARAMETERS = ("law", "ref_y", "ref_theta", "model_rate", *REFERENCE)
 LENGTHS = ("com_to_inboard_sensor", "com_to_outboard_sensor", "clearance")
 MARK_M = 15e-6  # of the jump that the reference starts with
 GROW, GROW_S = 25, 0.02
+STANDS_S = 1.0  # the controller knows half a second after the last pulse that the shaft stands
 NUDGES = (("ref_y", 10e-6), ("ref_theta", 100e-6))
 NEAR = 0.95  # of the ring's clearance: no reference may go further
 
@@ -121,6 +122,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     if plan.speed_rad_s and rig.drive is not None:
         rig.drive.stop()
     rig.levitation.set("law", CODES["PID"])
+    rig.clock.sleep(STANDS_S)
 
 
 def _lifted(rig: Rig, record: Recorder) -> bool:
