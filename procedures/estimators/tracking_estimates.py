@@ -49,7 +49,8 @@ def _at(k: int, kind: str) -> Moved:
     def moved(f: Facts, by: float) -> Facts:
         values = list(getattr(f, kind))
         values[k] += by
-        return replace(f, **{kind: tuple(values)})
+        four = (values[0], values[1], values[2], values[3])
+        return replace(f, gains=four) if kind == "gains" else replace(f, offsets=four)
 
     return moved
 
@@ -72,7 +73,13 @@ def inputs(rig: RigFile, tick_s: float, runout_m: float) -> list[Input]:
         ]
         if runout_m > 0:
             allowed = Toleranced(
-                value=0.0, unit="m", half_width=runout_m, distribution="rectangular", source="plan: runout_m"
+                value=0.0,
+                unit="m",
+                u=None,
+                k=1.0,
+                half_width=runout_m,
+                distribution="rectangular",
+                source="plan: runout_m",
             )
             out.append(Input(f"runout/pos_{axis}", f"runout at pos_{axis}", allowed, _at(k, "offsets")))
     for name, kind in (
@@ -84,6 +91,8 @@ def inputs(rig: RigFile, tick_s: float, runout_m: float) -> list[Input]:
     clock = Toleranced(
         value=0.0,
         unit="s",
+        u=None,
+        k=1.0,
         half_width=TIMING_TICKS * tick_s,
         distribution="rectangular",
         source="half a tick of the controller either way",
@@ -104,8 +113,7 @@ def _of_path(orbit: Orbit, rig: RigFile, runout_m: float) -> dict[str, Estimate]
     moved: list[tuple[Input, Mapping[str, float], Mapping[str, float]]] = []
     for i in inputs(rig, path.wave.tick, runout_m):
         u = i.stated.standard_uncertainty
-        up, down = (_means(path, i.moved(facts, way * u)) for way in (1, -1))
-        moved.append((i, up, down))
+        moved.append((i, _means(path, i.moved(facts, u)), _means(path, i.moved(facts, -u))))
     floor = noise(path, facts)
     out = {}
     for name, values in found.items():
