@@ -46,6 +46,7 @@ PROCEDURES = (
     ),
     Entry("slew", "procedures.slew", "Following a slow sine of the angle, with detent"),
     Entry("bearing-model", "procedures.bearing_model", "Force constants and magnetic offsets of the radial AMBs"),
+    Entry("tracking", "procedures.tracking", "Following an ellipse with the centre of mass: PID, CCS and CAC"),
     Entry("force-map", "procedures.force_map", "Terms of the motor's force over displacement, currents and load"),
 )
 

@@ -27,7 +27,6 @@ REST_TICKS = 5000  # it has been on for half a second when the host connects: th
 RESTING = ("OFF", "READY")
 AT_REST = (*RESTING, "FAULT")
 WITHOUT_CURRENT = ("OFF", "FAULT")
-SET_POINTS = ("ref_x", "ref_y", "ref_z")  # what a planted `reference_factor` scales
 TURNING = ("LEVITATED", "SPINNING", "COASTING")
 
 
@@ -292,9 +291,7 @@ class SimulatedController:
             return  # the interface's own; speed_ref acts on SPIN
         if name in self._machine.integral_gains:
             value *= self.truth.defects["integrator_factor"]
-        if name in SET_POINTS:
-            value *= self.truth.defects.get("reference_factor", 1.0)
-        self.plant.set(name, value)
+        self.plant.set(name, value * self.truth.defects.get(f"factor_{name}", 1.0))
 
     def _reply_parameter(self, index: int, status: str, token: float, value: float, clock: tuple[int, int]) -> None:
         self._send(

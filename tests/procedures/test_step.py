@@ -94,9 +94,9 @@ def test_sizes_and_ways_are_compared(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("defect", "plan", "code"),
     [
-        ({"reference_factor": 0.0}, {}, "no-step"),
-        ({"reference_factor": 0.5}, {}, "wrong-size"),
-        ({"reference_factor": -1.0}, {}, "wrong-way"),
+        ({"factor_ref_y": 0.0}, {}, "no-step"),
+        ({"factor_ref_y": 0.5}, {}, "wrong-size"),
+        ({"factor_ref_y": -1.0}, {}, "wrong-way"),
         ({"current_sign_i": -1.0}, {}, "current-sign"),
         ({"position_range": 30e-6}, {}, "sensor-clipped"),
         ({"geometry.clearance": 26e-6}, {}, "contact"),
