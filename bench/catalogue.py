@@ -39,7 +39,14 @@ PROCEDURES = (
     Entry(
         "angle-step", "procedures.angle_step", "Angle step while the motor carries: static against priority currents"
     ),
+    Entry(
+        "step",
+        "procedures.step",
+        "Set-point steps of the levitated shaft, with two settings of the controller compared",
+    ),
     Entry("slew", "procedures.slew", "Following a slow sine of the angle, with detent"),
+    Entry("bearing-model", "procedures.bearing_model", "Force constants and magnetic offsets of the radial AMBs"),
+    Entry("tracking", "procedures.tracking", "Following an ellipse with the centre of mass: PID, CCS and CAC"),
     Entry("force-map", "procedures.force_map", "Terms of the motor's force over displacement, currents and load"),
 )
 

@@ -23,11 +23,14 @@ RADIAL = AXES[:4]
 ORDERS = (1, 2, 3, 4)
 DEFECTS = {
     "position_sign_yi": 1.0, "position_sign_zi": 1.0, "position_sign_yo": 1.0, "position_sign_zo": 1.0,
-    "position_sign_x": 1.0, "exchange_planes": 0.0, "current_sign_i": 1.0, "current_sign_o": 1.0, "pulse_missing": 0.0,
+    "position_sign_x": 1.0, "exchange_planes": 0.0, "exchange_axes": 0.0, "told_planes": 0.0, "told_axes": 0.0,
+    "contact_silent": 0.0, "factor_ellipse_on": 1.0, "factor_ellipse_hz": 1.0, "factor_ref_y": 1.0, "factor_ref_z": 1.0,
+    "current_sign_i": 1.0, "current_sign_o": 1.0, "pulse_missing": 0.0,
     "pulse_doubled": 0.0, "loose_speed": 0.0, "loose_shift": 0.0, "drop_fraction": 0.0, "integrator_factor": 1.0,
     "dead_after_s": 0.0, "fault_after_s": 0.0, "drive_fault_after_s": 0.0,
 }  # fmt: skip
-"""Planted defects and their harmless values. Current signs act on what is told of a bearing's y and z axes."""
+"""Planted defects and their harmless values. Current signs act on what is told of a bearing's y and z axes,
+`told_*` on the telemetry alone; `factor_*` scales a parameter that the controller is told before it acts."""
 SHARED = {
     "beta": tuple(f"beta_{a}" for a in RADIAL),
     "magnetic_offset": tuple(f"offset_{a}" for a in RADIAL),
@@ -52,6 +55,8 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
     """Every toleranced number of a rig file by its name; one that holds for several axes or planes once for each."""
     out = {f"geometry.{k}": t for k, t in rig.geometry.items()} | {f"machine.{k}": t for k, t in rig.machine.items()}
     out["site.gravity"] = rig.site.gravity
+    out["roll"] = out.pop("machine.radial_axes")  # of the axes against the vertical, both together
+    out.pop("machine.runout")  # drawn as orders and phases
     for name in (*(f"i_{coil}" for coil in COILS), *(f"pos_{axis}" for axis in AXES)):
         out |= {f"{name}.gain": rig.sensors[name].gain, f"{name}.offset": rig.sensors[name].offset}
     for name, value in rig.simulation.items():
@@ -63,7 +68,7 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
 def params(v: Numbers, d: Numbers) -> AmbParams:
     """The plant that drawn values `v` and planted defects `d` make."""
     outboard, down = v["geometry.com_to_outboard_amb"], v["site.gravity"]
-    lean, seen = math.pi / 4 + v["roll"], _runout(v)
+    lean, seen = v["roll"], _runout(v)
     return AmbParams(
         mass=v["machine.mass"],
         inertia=v["machine.transverse_inertia"],
@@ -107,6 +112,7 @@ def params(v: Numbers, d: Numbers) -> AmbParams:
         pulse_missing=d["pulse_missing"],
         pulse_doubled=d["pulse_doubled"],
         exchange_planes=d["exchange_planes"],
+        exchange_axes=d["exchange_axes"],
         loose_speed=d["loose_speed"],
         loose_shift=d["loose_shift"],
         runout=seen["runout"],
@@ -146,6 +152,10 @@ def places(defects: Numbers, at: Mapping[str, int]) -> tuple[list[int], list[int
             for axis in "yz":
                 p, n = f"i_{axis}{b}_p", f"i_{axis}{b}_n"
                 goes[p], goes[n] = goes[n], goes[p]
+    pairs = [(f"pos_{a}i", f"pos_{a}o") for a in "yz"] if defects["told_planes"] else []
+    pairs += [(f"pos_y{b}", f"pos_z{b}") for b in "io"] if defects["told_axes"] else []
+    for a, b in pairs:
+        goes[a], goes[b] = goes[b], goes[a]
     return told, list(goes.values())
 
 
@@ -153,5 +163,7 @@ def spoil(values: Array, at: Mapping[str, int], defects: Numbers) -> None:
     """What the telemetry's sixteen bits make of angle, pulses and flags, in place (n, signals)."""
     values[:, at["angle"]] = (values[:, at["angle"]] + math.pi) % (2 * math.pi) - math.pi
     values[:, at["pulses"]] %= 65536
+    if defects["contact_silent"]:
+        values[:, at["flags"]] = (values[:, at["flags"]].astype(int) & ~12).astype(float)
     low = values[:, at["flags"]] % 16
     values[:, at["flags"]] = low + 2 * (values[:, at["flags"]] - low)  # bit 4 is the watchdog's

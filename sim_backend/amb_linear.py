@@ -14,8 +14,9 @@ from sim_backend.core.amb import ccs
 from sim_backend.core.amb_params import AmbParams
 
 Array = npt.NDArray[np.float64]
-Feedback = Callable[[Array, Array, Array], tuple[Array, Array]]
-"""Of filtered readings, their rates and the integrals: references of both bearings, and the integrals after the tick."""
+Feedback = Callable[[Array, Array, Array, float], tuple[Array, Array]]
+"""Of filtered readings, their rates, the integrals and the set point of y: references of both bearings, and the integrals
+after the tick."""
 LAWS = ("pid", "ccs", "cac")
 SLOW_HZ, FAST_HZ = 10.0, 250.0  # where the rigid modes are; slower are the integrators, faster the filters
 PLANT, APPLIED, PAST, PREVIOUS, FILTERED, SUM, SIZE = 0, 6, 8, 16, 18, 20, 22
@@ -35,13 +36,19 @@ def slowest(p: AmbParams, settings: Mapping[str, float], law: str) -> tuple[floa
 def matrix(p: AmbParams, settings: Mapping[str, float], law: str) -> Array:
     """What a tick makes of the state: (22, 22); y, theta, their rates, two currents, two references acting, notch memory
     (eight), last readings, filtered rates and integrals (two each)."""
+    tick = loop(p, settings, law)
+    return np.array([tick(unit, 0.0) for unit in np.eye(SIZE)]).T
+
+
+def loop(p: AmbParams, settings: Mapping[str, float], law: str) -> Callable[[Array, float], Array]:
+    """One tick: of the state (see `matrix`) and the set point of y."""
     moved, driven = _plant(p, law, settings)
     feedback = _pid(settings) if law == "pid" else _flatness(settings, law)
     notches = [_notch(settings[f"notch{k}_hz"], settings[f"notch{k}_q"]) for k in (1, 2)]
     keep = 1 / (1 + 2 * math.pi * settings["derivative_hz"] * TICK_S)
     read = np.array([[1, -p.l_is], [1, p.l_os]]) * np.array([[p.position_gain[0]], [p.position_gain[2]]])
 
-    def tick(x: Array) -> Array:
+    def tick(x: Array, goal: float) -> Array:
         out = np.zeros(SIZE)
         at = read @ x[PLANT : PLANT + 2]
         for k, (b0, b1, b2, a1, a2) in enumerate(notches):
@@ -53,12 +60,12 @@ def matrix(p: AmbParams, settings: Mapping[str, float], law: str) -> Array:
             kept[0], kept[1] = b1 * at - a1 * made + past[1], b2 * at - a2 * made
             at = made
         rate = keep * x[FILTERED : FILTERED + 2] + (1 - keep) * (at - x[PREVIOUS : PREVIOUS + 2]) / TICK_S
-        reference, out[SUM : SUM + 2] = feedback(at, rate, x[SUM : SUM + 2])
+        reference, out[SUM : SUM + 2] = feedback(at, rate, x[SUM : SUM + 2], goal)
         out[PLANT:APPLIED] = moved @ x[PLANT:APPLIED] + driven @ x[APPLIED:PAST]
         out[APPLIED:PAST], out[PREVIOUS:FILTERED], out[FILTERED:SUM] = reference, at, rate
         return out
 
-    return np.array([tick(unit) for unit in np.eye(SIZE)]).T
+    return tick
 
 
 def _slopes(beta: float, gap: float, xi: float, force: float, law: str, bias: float) -> tuple[float, float]:
@@ -102,8 +109,9 @@ def _notch(hz: float, q: float) -> tuple[float, float, float, float, float]:
 
 
 def _pid(s: Mapping[str, float]) -> Feedback:
-    def feedback(at: Array, rate: Array, total: Array) -> tuple[Array, Array]:
-        return total - s["kp"] * at - s["kd"] * rate, total - s["ki"] * TICK_S * at
+    def feedback(at: Array, rate: Array, total: Array, goal: float) -> tuple[Array, Array]:
+        error = at - goal
+        return total - s["kp"] * error - s["kd"] * rate, total - s["ki"] * TICK_S * error
 
     return feedback
 
@@ -125,10 +133,11 @@ def _flatness(s: Mapping[str, float], law: str) -> Feedback:
     ]
     per_current, per_place = (np.array(x) for x in zip(*pairs, strict=True))
 
-    def feedback(at: Array, rate: Array, total: Array) -> tuple[Array, Array]:
+    def feedback(at: Array, rate: Array, total: Array, goal: float) -> tuple[Array, Array]:
         q = back @ at
-        total = total + s["integral"] * TICK_S * q
-        v = -s[f"k2_{law}"] * (back @ rate) - s["k1"] * q - s["k0"] * total
+        error = q - np.array([goal, 0.0])
+        total = total + s["integral"] * TICK_S * error
+        v = -s[f"k2_{law}"] * (back @ rate) - s["k1"] * error - s["k0"] * total
         force = share @ (inertia @ v + coupling @ q)
         return (force - per_place * (planes @ q)) / per_current, total
 

@@ -147,12 +147,14 @@ class References:
         """T (2.26), (3.16) by the product rule."""
         if self.share == 0 and c.ellipse_on == 0:
             return
-        before, w = self.share, 2 * math.pi * c.ellipse_hz
+        before, turning = self.share, 2 * math.pi * c.ellipse_hz
         self.share = toward(before, float(c.ellipse_on != 0), TICK_S / max(c.ellipse_ramp_s, TICK_S))
-        self.phase += w * TICK_S
+        self.phase += turning * TICK_S
         g, rate = self.share, (self.share - before) / TICK_S if c.ellipse_ramp_s > TICK_S else 0.0
-        waves = np.array([math.sin(self.phase + c.ellipse_phase), math.cos(self.phase + c.ellipse_phase)])
-        slopes = w * np.array([waves[1], -waves[0]])
+        turn = self.phase + c.ellipse_phase, c.ellipse_ratio * self.phase + c.ellipse_phase
+        w = turning * np.array([1.0, c.ellipse_ratio])
+        waves = np.array([math.sin(turn[0]), math.cos(turn[1])])
+        slopes = w * np.array([math.cos(turn[0]), -math.sin(turn[1])])
         size = np.array([c.ellipse_y, c.ellipse_z])
         r[1:3] += size * g * waves
         v[1:3] += size * (g * slopes + rate * waves)

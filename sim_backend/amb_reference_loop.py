@@ -24,6 +24,8 @@ def read_positions(p: AmbParams, s: Vector) -> list[float]:
     for k in range(4):
         orders = range(4 * k, 4 * k + 4)
         radial[k] += sum(p.runout[n] * math.cos((n % 4 + 1) * s[5] + p.runout_phase[n]) for n in orders)
+    if p.exchange_axes:
+        radial = [radial[k] for k in (1, 0, 3, 2)]
     rows = zip([*radial, s[0]], p.position_sign, p.position_gain, p.position_offset, strict=True)
     return [clip(sign * (gain * y + off), -p.position_range, p.position_range) for y, sign, gain, off in rows]
 

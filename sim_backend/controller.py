@@ -291,7 +291,7 @@ class SimulatedController:
             return  # the interface's own; speed_ref acts on SPIN
         if name in self._machine.integral_gains:
             value *= self.truth.defects["integrator_factor"]
-        self.plant.set(name, value)
+        self.plant.set(name, value * self.truth.defects.get(f"factor_{name}", 1.0))
 
     def _reply_parameter(self, index: int, status: str, token: float, value: float, clock: tuple[int, int]) -> None:
         self._send(

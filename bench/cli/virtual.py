@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,13 +21,15 @@ from bench.procedure import Measured, Procedure
 from bench.recorder import Recorder, RunHeader
 from bench.recording import Recording
 from bench.rig import Rig
-from bench.rigfile import load_rig
+from bench.rigfile import RigFile, load_rig
 from bench.roles import RigState
 from bench.states import transition
 from drivers.controller import Controller
+from drivers.fieldbus import Fieldbus, open_devices
 from drivers.operator import LineOperator
 from sim_backend.endpoint import SimulatedRig
-from sim_backend.truth import draw
+from sim_backend.registers import Followed, RegisterBank
+from sim_backend.truth import Truth, draw
 
 SUBSTEPS = 1
 SLICE_S = 0.5  # five times the live bench's: each slice costs a round of Python
@@ -88,11 +91,11 @@ def simulated_run(
     used = given(chosen.needs(settings), calibrations or {})
     drawn = draw(file, seed, truth, chosen.settings(settings))
     simulated = SimulatedRig(file, drawn, substeps=SUBSTEPS)
-    controller = Controller(file, simulated.link, simulated, SIMULATED, SLICE_S)
+    bank = None if drawn.machine.turns else RegisterBank(file, drawn, simulated.device.plant)
+    base = simulated if bank is None else Followed(simulated, bank)
+    controller = Controller(file, simulated.link, base, SIMULATED, SLICE_S)
     operator = LineOperator(simulated.request, controller.clock, controller.envelope)
     counters = controller.telemetry.counters
-    live = Rig(file, controller.clock, controller, controller, operator, counters,
-               lambda: Health(counters, simulated.link.stats, None, 0), simulated.link.close)  # fmt: skip
     header = RunHeader(
         {"run": {"procedure": procedure, "seed": str(seed), "backend": "sim"}, "versions": {}},
         {
@@ -102,9 +105,17 @@ def simulated_run(
             "calibrations.json": attachment(used).encode(),
         },
     )
-    layout = controller.telemetry.layout
-    with Recorder(path, clock=controller.clock, streams=[layout], header=header, plain=True) as recorder:
+    with (
+        _driven(file, drawn, controller, bank) as bus,
+        Recorder(path, clock=controller.clock, streams=[controller.telemetry.layout, *(bus.layouts if bus else ())],
+                 header=header, plain=True) as recorder,
+    ):  # fmt: skip
+        live = Rig(file, controller.clock, controller, controller, operator, counters,
+                   lambda: Health(counters, simulated.link.stats, None, 0), simulated.link.close,
+                   bus.drive if bus else None)  # fmt: skip
         controller.recorder = operator.recorder = recorder
+        if bus is not None:
+            bus.recorder = recorder
         controller.clock.sleep(0.1)
         transition(live, RigState.READY)
         for name, value in chosen.settings(settings).items():
@@ -114,6 +125,22 @@ def simulated_run(
         transition(live, RigState.OFF)
     recording: Recording[Any] = Recording.open(path, chosen.plan)
     return Simulated(chosen, recording, seed, drawn.quantities, list(chosen.analyse(recording)))
+
+
+@contextmanager
+def _driven(
+    file: RigFile, drawn: Truth, controller: Controller, bank: RegisterBank | None
+) -> Iterator[Fieldbus | None]:
+    """The register devices, where the controller cannot turn its shaft by itself; they cost time, and others need none."""
+    if bank is None:
+        yield None
+        return
+    controller.clock.sleep(0.1)
+    with open_devices(file, bank.port, controller.clock, controller.envelope) as bus:
+        controller.companions.append(bus.pump)
+        if bus.drive is not None:
+            bus.drive.may_run = controller.require_levitated
+        yield bus
 
 
 def given(needs: Sequence[Need], calibrations: Mapping[str, Calibration]) -> list[Calibration]:

@@ -25,7 +25,7 @@ typedef struct {
     double position_gain[5], position_offset[5], position_sign[5], position_noise, position_lsb, position_range;
     double runout[16], runout_phase[16];
     /* once-per-turn pulse, when the shaft's angle + pulse_angle is a whole turn; defects */
-    double pulse_angle, pulse_missing, pulse_doubled, exchange_planes, loose_speed, loose_shift;
+    double pulse_angle, pulse_missing, pulse_doubled, exchange_planes, exchange_axes, loose_speed, loose_shift;
     double lost_radius, lost_time, trip_current, trip_speed;
 } amb_params;
 
@@ -34,7 +34,7 @@ typedef struct {
     double notch1_hz, notch1_q, notch2_hz, notch2_q;
     /* references: set points of the coordinates (slew 0: at once), ellipse */
     double ref_x, ref_y, ref_z, ref_psi, ref_theta, slew, slew_tilt;
-    double ellipse_on, ellipse_y, ellipse_z, ellipse_hz, ellipse_phase, ellipse_ramp_s;
+    double ellipse_on, ellipse_y, ellipse_z, ellipse_hz, ellipse_phase, ellipse_ramp_s, ellipse_ratio;
     /* injection into the current reference of one axis (-1: none): lines at hz, hz + step... */
     double inject_axis, inject_amplitude, inject_hz, inject_lines, inject_step;
     double observer, compensate, observer_constant, observer_damping, observer_turning, observer_velocity, observer_speed;

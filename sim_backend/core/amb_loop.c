@@ -29,6 +29,10 @@ void amb_sense(const amb_params *p, amb_derived *d, amb_state *st, amb_reading *
     }
     raw[4] = st->s[X];
     if (d->runs_out) runout(d, raw);
+    for (int k = 0; p->exchange_axes != 0 && k < 4; k += 2) {
+        double y = raw[k];
+        raw[k] = raw[k + 1], raw[k + 1] = y;
+    }
     for (int k = 0; k < 5; k++) {
         double noise = p->position_noise > 0 ? p->position_noise * tsbs_normal(&st->noise) : 0;
         double y = p->position_sign[k] * (p->position_gain[k] * raw[k] + p->position_offset[k]) + noise;

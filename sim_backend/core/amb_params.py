@@ -100,6 +100,7 @@ class AmbParams:
     pulse_missing: float = 0.0  # every how manieth pulse does not come; 0: none is missing
     pulse_doubled: float = 0.0  # how far after the mark there is a second one, rad; 0: there is none
     exchange_planes: float = 0.0
+    exchange_axes: float = 0.0  # probes of y and z, in both planes
     loose_speed: float = 0.0  # speed in rad/s above which mounted weights slip, once, by loose_shift; 0: never
     loose_shift: float = 0.0
     lost_radius: float = 1e-4  # stand-in: in the ring
@@ -144,6 +145,7 @@ class AmbControl:
     ellipse_hz: float = 10.0
     ellipse_phase: float = 0.0
     ellipse_ramp_s: float = 1.0  # T (3.16)
+    ellipse_ratio: float = 1.0
     inject_axis: float = -1.0
     inject_amplitude: float = 0.0
     inject_hz: float = 100.0

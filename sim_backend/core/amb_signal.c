@@ -14,9 +14,10 @@ static double slewed(double *set, double to, double slew) {
     return slew > 0 ? (*set - from) * PER_TICK : 0;
 }
 
-/* T (2.26), (3.16): y = A r sin(w t + p), z = B r cos(w t + p), r going to 0 or 1 in a straight line */
+/* T (2.26), (3.16): y = A r sin(w t + p), z = B r cos(n w t + p), r going to 0 or 1 in a straight line; n is whole: 1 makes an
+ * ellipse, other numbers other figures of Lissajous */
 static void ellipse(const amb_control *c, amb_law_state *l, amb_motion *m) {
-    double w = TWO_PI * c->ellipse_hz, from = l->share, step = c->ellipse_ramp_s > TICK ? TICK / c->ellipse_ramp_s : 1;
+    double w = TWO_PI * c->ellipse_hz, n = floor(c->ellipse_ratio + 0.5), from = l->share, step = c->ellipse_ramp_s > TICK ? TICK / c->ellipse_ramp_s : 1;
     if (from == 0 && c->ellipse_on == 0) {
         l->phase = 0;
         return;
@@ -26,12 +27,14 @@ static void ellipse(const amb_control *c, amb_law_state *l, amb_motion *m) {
     if (l->phase > TWO_PI) l->phase -= TWO_PI;
     double r = l->share, rate = step < 1 ? (r - from) * PER_TICK : 0;
     double s = sin(l->phase + c->ellipse_phase), q = cos(l->phase + c->ellipse_phase);
+    double zs = n == 1 ? s : sin(n * l->phase + c->ellipse_phase), zq = n == 1 ? q : cos(n * l->phase + c->ellipse_phase);
     m->r[Y] += c->ellipse_y * r * s;
     m->v[Y] += c->ellipse_y * (r * w * q + rate * s);
     m->a[Y] += c->ellipse_y * (2 * rate * w * q - r * w * w * s);
-    m->r[Z] += c->ellipse_z * r * q;
-    m->v[Z] += c->ellipse_z * (rate * q - r * w * s);
-    m->a[Z] -= c->ellipse_z * (2 * rate * w * s + r * w * w * q);
+    w *= n;
+    m->r[Z] += c->ellipse_z * r * zq;
+    m->v[Z] += c->ellipse_z * (rate * zq - r * w * zs);
+    m->a[Z] -= c->ellipse_z * (2 * rate * w * zs + r * w * w * zq);
 }
 
 /* From rest to the set points and back by the smooth step 3 t^2 - 2 t^3. */

@@ -123,12 +123,12 @@ def test_core_equals_the_reference_in_closed_loop(
     assert np.abs(core.coil - python.coil).max() < 1e-6
 
 
-@pytest.mark.parametrize("law", [0, 1, 2])
-def test_references_equal_the_reference(law: int) -> None:
-    """An ellipse that is ramped in at rest."""
+@pytest.mark.parametrize(("law", "ratio"), [(0, 1.0), (1, 1.0), (2, 1.0), (1, 2.0)])
+def test_references_equal_the_reference(law: int, ratio: float) -> None:
+    """An ellipse, or another figure of Lissajous, that is ramped in at rest."""
     start = START.copy()
     start[11] = 0.0
-    p, c = blemished(), AmbControl(law=law, ref_y=1e-5, ref_psi=2e-5, **ELLIPSE)
+    p, c = blemished(), AmbControl(law=law, ref_y=1e-5, ref_psi=2e-5, ellipse_ratio=ratio, **ELLIPSE)
     core, python = run_core(p, c, start, 1200), by_reference(p, c, start, 1200)
     assert np.abs(core.s[:, 2]).max() > 4.5e-5
     assert error(core.s[:, :5], python.s[:, :5]) < 1e-6

@@ -1,0 +1,198 @@
+"""Following an ellipse with the centre of mass: what positions of two planes, read as means of ten ticks, say of it.
+
+The reference is y = A sin(2 pi f (t - t_0)), z = B cos(2 pi n f (t - t_0)), an ellipse where n = 1. A sample of the
+telemetry is the mean of n readings, the last of them one tick before its time. A sine's mean is a sine, smaller by sin(n
+x/2)/(n sin(x/2)), x = 2 pi f tick, and later by (n + 1)/2 ticks: both are applied to the reference, so that like is
+compared with like.
+
+t_0 is not in the telemetry. The reference of z begins with a jump, and the coil currents of z answer it after two ticks
+with the amplifiers' lag: where that answer begins is read from four samples.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.errors import AnalysisError
+from procedures.estimators.sines import known_frequency
+
+Array = npt.NDArray[np.float64]
+SMOOTH_S = 3e-3  # of peaks at rest: the error of a sine of 10 Hz loses a thousandth
+ONSET_S, BEFORE_S, ONSET_STEP_S = 4e-3, 0.03, 1e-5
+DELAY_TICKS = 2  # from the reference's zero of phase to the amplifiers: computed a tick late, applied one later
+YI, ZI, YO, ZO = range(4)
+
+
+@dataclass(frozen=True)
+class Wave:
+    """The reference: `hz`, half axes `y`, `z` in m, `ratio` turns of z in one of y; and how it is sampled: `ticks` of `tick` s
+    in a sample."""
+
+    hz: float
+    y: float
+    z: float
+    tick: float
+    ticks: int
+    ratio: int = 1
+
+    @property
+    def axes(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """Of y and z: Hz, amplitude m, and by how much its sine leads, rad."""
+        return (self.hz, self.y, 0.0), (self.ratio * self.hz, self.z, math.pi / 2)
+
+    def shrinks(self, hz: float) -> float:
+        """Amplitude of a sample's mean over that of the sine."""
+        x = 2 * math.pi * hz * self.tick
+        return math.sin(self.ticks * x / 2) / (self.ticks * math.sin(x / 2))
+
+    @property
+    def late(self) -> float:
+        """How long before a sample's time its middle lies, s."""
+        return (self.ticks + 1) / 2 * self.tick
+
+    def at(self, t: Array, t_0: float) -> Array:
+        """The reference as samples at t (n,) s would show it, (2, n) m."""
+        since = 2 * math.pi * (t - self.late - t_0)
+        return np.array([self.shrinks(hz) * size * np.sin(hz * since + lead) for hz, size, lead in self.axes])
+
+
+@dataclass(frozen=True)
+class Path:
+    """One law's orbit: `t` (n,) s, `readings` (4, n) m of yi, zi, yo, zo, `turn_s` of a turn of the shaft, 0 at rest."""
+
+    wave: Wave
+    t: Array
+    readings: Array
+    turn_s: float
+
+    @property
+    def smooth_s(self) -> float:
+        """Over how long peaks and rms are averaged: a turn of the shaft."""
+        return self.turn_s or SMOOTH_S
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What the readings are turned into positions with: sensors' `gains` and `offsets` m (yi, zi, yo, zo), lengths from the
+    centre of mass to the sensors m, when the reference's phase was zero (s), the rings' `clearance` m."""
+
+    gains: tuple[float, float, float, float]
+    offsets: tuple[float, float, float, float]
+    l_is: float
+    l_os: float
+    t_0: float
+    clearance: float
+
+
+def centre(readings: Array, f: Facts) -> Array:
+    """y, z of the centre of mass from where the sensors read zero, psi, theta: (4, n); T (2.17) solved."""
+    yi, zi, yo, zo = readings / np.array(f.gains)[:, None]
+    theta, psi = (yo - yi) / (f.l_is + f.l_os), (zi - zo) / (f.l_is + f.l_os)
+    return np.array([yi + f.l_is * theta, zo + f.l_os * psi, psi, theta])
+
+
+def averaged(t: Array, x: Array, window: float) -> Array:
+    """Running means of x (k, n) over a window about each sample; NaN where it reaches beyond the record."""
+    step = np.diff(t, prepend=t[0] - np.median(np.diff(t)))
+    edges = np.concatenate([[t[0] - step[0]], t])
+    middle = t - step / 2
+    out = np.empty_like(x)
+    for row, values in zip(out, x, strict=True):
+        total = np.concatenate([[0.0], np.cumsum(values * step)])
+        row[:] = np.interp(middle + window / 2, edges, total) - np.interp(middle - window / 2, edges, total)
+    out /= window
+    out[:, (middle - window / 2 < edges[0]) | (middle + window / 2 > edges[-1])] = np.nan
+    return out
+
+
+def errors(path: Path, f: Facts) -> Array:
+    """Error of y, z in m and the tilts psi, theta in rad, averaged over a turn of the shaft: (4, n)."""
+    found = centre(path.readings, f)
+    found[:2] -= path.wave.at(path.t, f.t_0)
+    return averaged(path.t, found, path.smooth_s)
+
+
+def plane_errors(path: Path, f: Facts) -> Array:
+    """Errors at the sensors yi, zi, yo, zo in m, averaged as `errors`: (4, n)."""
+    at = path.readings / np.array(f.gains)[:, None]
+    return averaged(path.t, at - np.tile(path.wave.at(path.t, f.t_0), (2, 1)), path.smooth_s)
+
+
+def revolutions(path: Path) -> list[npt.NDArray[np.bool_]]:
+    """Which samples belong to each whole revolution of the reference.
+
+    Raises:
+        AnalysisError: there are fewer than four.
+    """
+    first = path.t[0] + path.smooth_s
+    count = math.floor((path.t[-1] - path.smooth_s - first) * path.wave.hz + 1e-9)
+    if count < 4:
+        raise AnalysisError(f"found {count} whole revolutions of the reference; expected four or more")
+    return [(path.t >= first + k / path.wave.hz) & (path.t < first + (k + 1) / path.wave.hz) for k in range(count)]
+
+
+def by_revolution(path: Path, f: Facts) -> Mapping[str, Array]:
+    """Every quantity in each revolution, (m,): peaks and rms of the errors, peaks of the tilts, ratio of the amplitudes,
+    phase lag rad, and what is left to the ring."""
+    q, error, planes = centre(path.readings, f), errors(path, f), np.abs(plane_errors(path, f))
+    per = revolutions(path)
+    out: dict[str, list[float]] = {}
+    radius = distances(path.readings, f)
+    t, wave = path.t - path.wave.late - f.t_0, path.wave
+    for m in per:
+        for k, (axis, (hz, size, lead)) in enumerate(zip("yz", wave.axes, strict=True)):
+            out.setdefault(f"error_peak_{axis}", []).append(float(np.nanmax(np.abs(error[k, m]))))
+            out.setdefault(f"error_rms_{axis}", []).append(float(np.sqrt(np.nanmean(error[k, m] ** 2))))
+            fitted = known_frequency(t[m], q[k, m], hz)
+            out.setdefault(f"amplitude_ratio_{axis}", []).append(fitted.amplitude / (size * wave.shrinks(hz)))
+            out.setdefault(f"phase_lag_{axis}", []).append(-math.remainder(fitted.phase - lead, 2 * math.pi))
+        out.setdefault("error_peak_plane", []).append(float(np.nanmax(planes[:, m])))
+        for k, name in ((2, "tilt_psi"), (3, "tilt_theta")):
+            out.setdefault(name, []).append(float(np.nanmax(np.abs(error[k, m]))))
+        out.setdefault("ring_distance", []).append(f.clearance - float(radius[:, m].max()))
+    return {name: np.array(values) for name, values in out.items()}
+
+
+def distances(readings: Array, f: Facts) -> Array:
+    """Of the shaft from the rings' centre at the inboard and the outboard sensors, (2, n) m."""
+    at = (readings - np.array(f.offsets)[:, None]) / np.array(f.gains)[:, None]
+    return np.array([np.hypot(at[YI], at[ZI]), np.hypot(at[YO], at[ZO])])
+
+
+def noise(path: Path, f: Facts) -> Array:
+    """Standard deviation of what is random in an averaged y, z, psi, theta, (4,): from neighbouring samples at rest, from
+    neighbouring turns while the shaft turns (single samples hold its vibration)."""
+    if path.turn_s:
+        error = errors(path, f)
+        stride = max(round(path.turn_s / (path.wave.ticks * path.wave.tick)), 1)
+        kept = error[:, np.isfinite(error).all(axis=0)][:, ::stride]
+        return np.asarray(np.diff(kept, n=2, axis=1).std(axis=1) / math.sqrt(6))
+    second = np.diff(centre(path.readings, f), n=2, axis=1).std(axis=1) / math.sqrt(6)
+    return np.asarray(second / math.sqrt(max(path.smooth_s / (path.wave.ticks * path.wave.tick), 1.0)))
+
+
+def onset(t: Array, current: Array, earliest: float, latest: float, wave: Wave, lag_s: float) -> tuple[float, float]:
+    """When the reference's phase was zero, s, by the jump of the z coils' current, and that jump over its noise.
+
+    i = i_0 + J u(t) + c v(t), u the amplifiers' answer to a step and v the square of the time since, for the rotor that begins
+    to follow; each averaged over the readings of a sample. The start with the least misfit is taken.
+    """
+    reads = t[:, None] - wave.tick * np.arange(1, wave.ticks + 1)
+    best, found, jump = math.inf, earliest, 0.0
+    near = (t > earliest - BEFORE_S) & (t < latest + ONSET_S)
+    for t_0 in np.arange(earliest - wave.tick, latest + ONSET_STEP_S, ONSET_STEP_S):
+        use = near & (t < t_0 + ONSET_S)
+        since = np.maximum(reads[use] - t_0 - DELAY_TICKS * wave.tick, 0.0)
+        answer = (1 - np.exp(-since / lag_s)).mean(axis=1)
+        design = np.column_stack([np.ones(use.sum()), answer, (since**2).mean(axis=1) / ONSET_S**2])
+        terms, *_ = np.linalg.lstsq(design, current[use], rcond=None)
+        misfit = float(((current[use] - design @ terms) ** 2).mean())
+        if misfit < best:
+            best, found, jump = misfit, float(t_0), float(terms[1])
+    rest = t < earliest
+    return found, abs(jump) / max(float(current[rest].std()), 1e-12) if rest.sum() > 5 else 0.0

@@ -1,0 +1,299 @@
+"""Tracking: the centre of mass follows an ellipse, at rest (thesis 2.6.2, Fig. 2.10) or turning (thesis 3.5, Fig. 3.6).
+
+Measurands, per law: peak and rms of the error in y and z, ratio of the amplitudes and phase lag at the reference's
+frequency, the tilts psi and theta, what is left to the touchdown rings, and what the coils carry.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import Literal
+
+from pydantic import Field
+
+from bench.errors import DeviceFault, LinkError
+from bench.figures import Figure
+from bench.findings import Effect, Finding
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.rig import Rig
+from bench.rigfile import RigFile
+from bench.roles import RigState
+from bench.states import transition
+from procedures import tracking_figures as drawn
+from procedures.estimators import tracking_checks, tracking_estimates, tracking_wiring
+from procedures.estimators.tracking_data import (
+    CHANNELS,
+    LIFT,
+    LIFT_LOST,
+    NO_SPEED,
+    ORBIT,
+    POSITIONS,
+    PROBE,
+    REST,
+    START,
+    STARTED,
+    read_orbits,
+)
+
+Law = Literal["PID", "CCS", "CAC"]
+CODES: dict[Law, float] = {"PID": 0.0, "CCS": 1.0, "CAC": 2.0}
+PEAK_Y = Quantity("error_peak_y", "m", "greatest error of the centre of mass in a revolution of the reference, y")
+PEAK_Z = Quantity("error_peak_z", "m", "as error_peak_y, z")
+PLANE = Quantity("error_peak_plane", "m", "as error_peak_y, at the sensor where it is greatest")
+RMS_Y = Quantity("error_rms_y", "m", "root mean square of the error of the centre of mass, y")
+RMS_Z = Quantity("error_rms_z", "m", "as error_rms_y, z")
+RATIO_Y = Quantity("amplitude_ratio_y", "1", "amplitude at the reference's frequency over the reference's, y")
+RATIO_Z = Quantity("amplitude_ratio_z", "1", "as amplitude_ratio_y, z")
+LAG_Y = Quantity("phase_lag_y", "rad", "phase behind the reference at its frequency, y")
+LAG_Z = Quantity("phase_lag_z", "rad", "as phase_lag_y, z")
+PSI = Quantity("tilt_psi", "rad", "greatest tilt about y in a revolution of the reference")
+THETA = Quantity("tilt_theta", "rad", "greatest tilt about z in a revolution of the reference")
+DISTANCE = Quantity("ring_distance", "m", "least distance that is left to a touchdown ring")
+LOW = Quantity("lower_current", "A", "mean current of the lower coil that carries most")
+HIGH = Quantity("upper_current", "A", "mean current of the upper coil that carries most")
+MEASURES = (PEAK_Y, PEAK_Z, PLANE, RMS_Y, RMS_Z, RATIO_Y, RATIO_Z, LAG_Y, LAG_Z, PSI, THETA, DISTANCE, LOW, HIGH)
+OBSERVED = {"observer": 1.0, "compensate": 3.0, "integral": 0.0, "k1": 2e5, "k2_ccs": 400.0, "k2_cac": 400.0}
+REFERENCE = ("ellipse_on", "ellipse_y", "ellipse_z", "ellipse_hz", "ellipse_phase", "ellipse_ramp_s", "ellipse_ratio")
+PARAMETERS = ("law", "ref_y", "ref_theta", "model_rate", *REFERENCE)
+LENGTHS = ("com_to_inboard_sensor", "com_to_outboard_sensor", "clearance")
+MARK_M = 15e-6  # of the jump that the reference starts with
+GROW, GROW_S = 25, 0.02
+STANDS_S = 1.0  # the controller knows half a second after the last pulse that the shaft stands
+NUDGES = (("ref_y", 10e-6), ("ref_theta", 100e-6))
+NEAR = 0.95  # of the ring's clearance: no reference may go further
+
+
+class Plan(BenchPlan):
+    """Settings of the tracking test, SI."""
+
+    laws: tuple[Law, ...] = Field(("CCS", "CAC"), min_length=1)  # judged
+    compare: tuple[Law, ...] = ("PID",)  # only reported beside them
+    hz: float = Field(10.0, gt=0, le=50)
+    y_m: float = Field(50e-6, gt=0)
+    z_m: float = Field(80e-6, gt=0)
+    ratio: int = Field(1, ge=1, le=5)  # turns of z in one of y: other figures of Lissajous
+    speed_rad_s: float = Field(0.0, ge=0)  # 0: at rest
+    observer: bool | None = None  # disturbance compensation; by default while it turns
+    revolutions: int = Field(24, ge=6)  # of the reference
+    settle_s: float = Field(3.0, gt=0)  # before and after the reference has grown
+    runout_m: float = Field(4e-6, ge=0)  # of the journals, at most: counts against the ring's distance
+    max_lower_A: float = Field(0.05, gt=0)  # of CAC
+    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
+
+    @property
+    def observed(self) -> bool:
+        """Whether disturbances are compensated."""
+        return self.speed_rad_s > 0 if self.observer is None else self.observer
+
+    @property
+    def order(self) -> tuple[Law, ...]:
+        """All laws in the order in which they are done: one that touches comes last."""
+        return (*self.laws, *(law for law in self.compare if law not in self.laws))
+
+
+def settings(plan: Plan) -> dict[str, float]:
+    """Lifted by the PID, which needs no model; with the poles of T 3.5 where disturbances are compensated."""
+    return {"law": CODES["PID"], "ellipse_on": 0.0, **(OBSERVED if plan.observed else {})}
+
+
+def step_count(plan: Plan) -> int:
+    """How many steps `acquire` records, for the progress display."""
+    return 3 + 2 * len(NUDGES) + len(plan.order)
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Look at the rotor on its rings, lift it, nudge it, spin it up, and let it follow the reference with each law."""
+    with record.step(REST):
+        rig.clock.sleep(0.3)
+    if any(rig.levitation.reading(name) > 0 for name in POSITIONS):
+        return  # it lies below: a probe that says otherwise would close a loop the wrong way round
+    if not _lifted(rig, record):
+        return
+    _nudged(rig, record)
+    _started(rig, plan, record)
+    if plan.speed_rad_s and not _spun(rig, plan, record):
+        return
+    for law in plan.order:
+        _orbit(rig, plan, record, law)
+    rig.levitation.set("ellipse_on", 0.0)
+    if plan.speed_rad_s and rig.drive is not None:
+        rig.drive.stop()
+    rig.levitation.set("law", CODES["PID"])
+    rig.clock.sleep(STANDS_S)
+
+
+def _lifted(rig: Rig, record: Recorder) -> bool:
+    with record.step(LIFT):
+        try:
+            transition(rig, RigState.LEVITATED)
+            rig.clock.sleep(0.5)
+        except DeviceFault as fault:
+            record.event(LIFT_LOST, fault=str(fault))
+            return False
+    return True
+
+
+def _nudged(rig: Rig, record: Recorder) -> None:
+    """The set point of y and of the tilt about z, a little aside: shows whose reading is whose."""
+    for name, aside in NUDGES:
+        for value in (0.0, aside):
+            rig.levitation.set(name, value)
+            rig.clock.sleep(0.5)
+            with record.step(PROBE, name=name, value=value):
+                rig.clock.sleep(0.2)
+        rig.levitation.set(name, 0.0)
+    rig.clock.sleep(0.5)
+
+
+def _spun(rig: Rig, plan: Plan, record: Recorder) -> bool:
+    try:
+        if rig.drive is None:
+            raise LinkError("the rig has no drive")
+        rig.drive.reach(plan.speed_rad_s)
+    except LinkError as error:
+        record.event(NO_SPEED, wanted=plan.speed_rad_s, why=str(error))
+        return False
+    rig.clock.sleep(plan.settle_s)
+    return True
+
+
+def _started(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """The reference starts at rest with a small jump of z, whose time the currents tell. From here on it never stops: its phase
+    is known for every law, at any speed."""
+    write = rig.levitation.set
+    for name, value in (
+        ("ellipse_hz", plan.hz),
+        ("ellipse_ratio", plan.ratio),
+        ("ellipse_phase", 0.0),
+        ("ellipse_ramp_s", 0.0),
+        ("ellipse_y", 0.0),
+        ("ellipse_z", MARK_M),
+    ):
+        write(name, value)
+    rig.clock.sleep(plan.settle_s)
+    with record.step(START):
+        rig.clock.sleep(0.1)
+        write("ellipse_on", 1.0)
+        record.event(STARTED)  # after the answer: with the write itself it brackets the start
+        rig.clock.sleep(0.02)
+
+
+def _orbit(rig: Rig, plan: Plan, record: Recorder, law: Law) -> None:
+    """The reference grows, settles, and shrinks to its mark again."""
+    rig.levitation.set("law", CODES[law])
+    rig.clock.sleep(plan.settle_s)
+    for part in range(1, GROW + 1):
+        _size(rig, plan, part / GROW)
+    rig.clock.sleep(plan.settle_s)
+    labels = {"hz": plan.hz, "y_m": plan.y_m, "z_m": plan.z_m, "speed_rad_s": plan.speed_rad_s, "ratio": plan.ratio}
+    with record.step(ORBIT, law=law, judged=law in plan.laws, **labels):
+        rig.clock.sleep(plan.revolutions / plan.hz + 0.05)
+    for part in range(GROW - 1, -1, -1):
+        _size(rig, plan, part / GROW)
+
+
+def _size(rig: Rig, plan: Plan, share: float) -> None:
+    rig.levitation.set("ellipse_y", plan.y_m * share)
+    rig.levitation.set("ellipse_z", max(plan.z_m * share, MARK_M))
+    rig.clock.sleep(GROW_S)
+
+
+def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
+    """Findings first, then the quantities of each law that is judged; the others are in a note."""
+    early = list(tracking_wiring.before_orbits(recording))
+    yield from early
+    if any(f.effect is Effect.ERROR for f in early):
+        return
+    orbits = read_orbits(recording)
+    wrong = list(tracking_checks.of_signals(orbits, recording.plan))
+    yield from wrong
+    if any(f.code in tracking_checks.FATAL for f in wrong):
+        return
+    results = tracking_estimates.by_law(orbits, recording.rig, recording.plan.runout_m)
+    yield from tracking_checks.of_results(orbits, results, recording.plan)
+    for orbit in orbits:
+        if orbit.law in recording.plan.laws:
+            for quantity in MEASURES:
+                yield quantity.measured(results[orbit.law][quantity.name], orbit.where)
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts."""
+    lacking = [
+        f"{table}: found no {', '.join(missing)}; expected them all"
+        for table, names, found in (
+            ("channels", CHANNELS, rig.channels),
+            ("parameters", PARAMETERS, rig.parameters),
+            ("sensors", POSITIONS, rig.sensors),
+            ("geometry", LENGTHS, rig.geometry),
+            ("parameters", tuple(OBSERVED) if plan.observed else (), rig.parameters),
+        )
+        if (missing := [n for n in names if n not in found])
+    ]
+    yield from lacking
+    if lacking:
+        return
+    if len(set(plan.order)) < len(plan.laws) + len(plan.compare):
+        yield "laws, compare: found one twice; expected each once"
+    ring = NEAR * rig.geometry["clearance"].value
+    if max(plan.y_m, plan.z_m) > ring:
+        yield f"y_m, z_m: found {max(plan.y_m, plan.z_m):g} m; expected at most {ring:g} m, {NEAR:.0%} of the ring's clearance"
+    if plan.z_m < MARK_M:
+        yield f"z_m: found {plan.z_m:g} m; expected {MARK_M:g} m or more, the jump that the reference starts with"
+    if plan.speed_rad_s > rig.envelope.max_speed_rad_s:
+        yield f"speed_rad_s: found {plan.speed_rad_s:g}; the envelope allows {rig.envelope.max_speed_rad_s:g} rad/s"
+    if plan.speed_rad_s and "drive" not in {role for d in rig.devices.values() for role in d.roles}:
+        yield f"speed_rad_s: found {plan.speed_rad_s:g} and no device with role drive; expected 0"
+    if 0 < plan.speed_rad_s < 20 * math.pi * plan.hz * plan.ratio:
+        yield (
+            f"speed_rad_s: found {plan.speed_rad_s:g}; expected 0, or ten times the reference's {plan.hz:g} Hz or "
+            f"more: else "
+            "averaging over a turn takes the reference with it"
+        )
+
+
+def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+    """Orbits with the ring, errors over time and over the reference's revolution, tilts, coil currents."""
+    if not len(recording.steps(ORBIT)):
+        return ()
+    orbits = read_orbits(recording)
+    facts = {o.law: tracking_estimates.nominal(recording.rig, o.t_0) for o in orbits}
+    return drawn.all_figures(orbits, facts)
+
+
+METHOD = """\
+The rotor is levitated, and the reference of its centre of mass is an ellipse, y = A sin 2πft, z = B cos 2πft (other figures
+of Lissajous: cos 2πnft), generated in the controller. The centre of mass and the tilts follow from the four radial sensors
+by T (2.17). Positions count from where the sensors read zero, as the reference does: an offset of a sensor is no error of
+tracking, but it counts against the distance to the rings.
+
+Telemetry holds means of ten readings. The mean of a sine is a little smaller and half a period of the telemetry later; both
+are applied to the reference, so that like is compared with like. When the reference began is read from the coils: it begins
+at rest, under the PID, with a jump of z by 15 µm, which the currents answer at once; from then on it never stops. Half a
+tick of the controller either way is in the budget.
+
+Peak and rms are of the error averaged over a turn of the shaft, at rest over 3 ms; each is the mean over the revolutions of
+the reference, and their scatter is by batch means. Amplitude and phase are those of a sine of the reference's frequency,
+fitted to each revolution. The distance to the rings is from single samples: it holds vibration and runout.
+
+Before the lift the rotor lies on its rings, below the middle on both axes. The set points of y and of the tilt about z are
+then moved a little, which shows whether the readings belong to where they are taken.
+"""
+
+procedure = Procedure(
+    name="tracking",
+    title="Tracking: the centre of mass follows an ellipse",
+    measures=MEASURES,
+    state=RigState.READY,
+    plan=Plan,
+    acquire=acquire,
+    analyse=analyse,
+    figures=figures,
+    check=check,
+    settings=settings,
+    step_count=step_count,
+    method=METHOD,
+)

@@ -1,0 +1,205 @@
+"""Force constants and offsets through the whole path: right within their intervals, follows the truth, names what is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bench.cli.virtual import Simulated, simulated_run
+from bench.errors import DeviceFault
+from bench.findings import Effect, Finding
+from bench.limits import Verdict, judge
+from bench.procedure import Measured
+from bench.rigfile import load_rig
+from bench.specs import load_spec
+from bench.uncertainty import Estimate, interval
+from procedures.bearing_model import MEASURES, Plan, check, figures, grid, read, step_count
+from procedures.estimators import bearing_findings
+from procedures.estimators.bearing import AXES
+from procedures.estimators.bearing_data import Held
+from reports.figures import draw as draw_figure
+from sim_backend.truth import nominal
+
+pytestmark = pytest.mark.xdist_group("bearing-model")  # one worker makes the sound run once
+NAME, RIG, SEED = "bearing-model", "amb5dof", 2026
+QUICK = {"spacing_m": 40e-6, "passes": 1, "settle_s": 0.5, "average_s": 0.3}
+
+
+def measure(folder: Path, truth: Mapping[str, float] | None = None, seed: int = SEED, **plan: object) -> Simulated:
+    return simulated_run(NAME, RIG, seed, {**QUICK, **plan}, folder / "s.mcap", truth)
+
+
+def found(run: Simulated) -> dict[str, Estimate]:
+    return {m.quantity.name + m.where: m.estimate for m in run.results if isinstance(m, Measured)}
+
+
+def serious(run: Simulated) -> dict[str, str]:
+    """What keeps a run from passing: everything said, by code."""
+    out: dict[str, str] = {}
+    for f in (f for f in run.results if isinstance(f, Finding) and f.effect is not Effect.NOTE):
+        out[f.code] = out.get(f.code, "") + f"{f.where}: {f.text} "
+    return out
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> Simulated:
+    return measure(tmp_path_factory.mktemp("sound"))
+
+
+def test_a_sound_rig_is_recovered_within_its_intervals(sound: Simulated) -> None:
+    """Seed fixed before any tuning; three standard uncertainties, so that an honest rig does not fail by chance."""
+    assert serious(sound) == {}
+    values, limits = found(sound), load_spec(RIG, NAME)
+    assert {m.quantity.name for m in sound.results if isinstance(m, Measured)} == {q.name for q in MEASURES}
+    for axis in AXES:
+        for name in (f"beta_{axis}", f"offset_{axis}"):
+            assert abs(values[name].value - sound.truth[name]) < 3 * values[name].u, name
+            assert judge(interval(values[name]), limits[name]) is Verdict.PASS
+        assert values[f"beta_{axis}"].u < 0.05 * values[f"beta_{axis}"].value
+        assert values[f"offset_{axis}"].u < 6e-6
+    assert len(sound.recording.all_steps()) == step_count(sound.recording.plan)
+
+
+def test_the_printed_effect_at_the_printed_machine(tmp_path: Path) -> None:
+    """T Table 2.2 on a machine as drawn, offsets of 115 um, inboard: the linear model leaves at least 20 times the residual sum over
+    single samples (T: 56), and its numbers are those of no slope (T: 68.5 N/A, 162 N/mm)."""
+    exact = {k: v for k, v in nominal(load_rig(RIG)).items() if not k.startswith(("runout", "unbalance"))}
+    values = found(measure(tmp_path, exact, spacing_m=20e-6))
+    for where, least in (("inboard", 20), ("outboard", 10)):  # T prints the inboard AMB
+        assert values[f"misfit_ratio{where}"].value > least
+        assert values[f"misfit_ratio_means{where}"].value > 1000
+        assert values[f"k_linear{where}"].value > 30
+        assert values[f"stiffness_linear{where}"].value > 75e3
+
+
+def test_offsets_against_gravity_hide_the_effect_and_do_not_pass(tmp_path: Path) -> None:
+    """T's -115 um with gravity downwards: found as it is, named, and the linear model is nearly right."""
+    truth = {f"offset_{a}": -115e-6 for a in AXES} | {f"pos_{a}.offset": 0.0 for a in AXES}
+    run = measure(tmp_path, truth, settle_s=1.5)
+    assert "offset-against-load" in serious(run)
+    values = found(run)
+    for axis in AXES:
+        assert abs(values[f"offset_{axis}"].value + 115e-6) < 3 * values[f"offset_{axis}"].u
+    for where in ("inboard", "outboard"):
+        assert values[f"misfit_ratio{where}"].value < 20
+        assert values[f"k_linear{where}"].value < 20
+
+
+def test_the_result_follows_the_truth(tmp_path: Path) -> None:
+    """The printed values are no inputs."""
+    run = measure(tmp_path, {"beta_yi": 5.5e-7, "offset_zo": 60e-6})
+    for name, e in found(run).items():
+        if name in run.truth:
+            assert abs(e.value - run.truth[name]) < 3 * e.u, name
+
+
+def test_without_the_coupling_and_with_it_forgotten(tmp_path: Path) -> None:
+    """Taken off, the result stands; said to be off while it is on, the positions ask for another gap."""
+    (tmp_path / "off").mkdir()
+    run = measure(tmp_path / "off", {"geometry.coupling_stiffness": 0.0}, coupled=False)
+    assert serious(run) == {}
+    assert all(abs(e.value - run.truth[n]) < 3 * e.u for n, e in found(run).items() if n in run.truth)
+    assert "gap-inconsistent" in serious(measure(tmp_path, coupled=False))
+
+
+@pytest.mark.parametrize(
+    ("defect", "code", "named"),
+    [
+        ({"current_sign_i": -1}, "coils-exchanged", "i_yi_p"),
+        ({"current_sign_o": -1}, "coils-exchanged", "i_yo_p"),
+        ({"roll": -0.7854}, "gravity-reversed", "axis z"),
+        ({"position_sign_x": -1}, "contact", "axial stop"),
+        ({"pos_yi.gain": 1.1}, "gap-inconsistent", "pos_yi"),
+        ({"drop_fraction": 0.02}, "missing-samples", "missing"),
+    ],
+)
+def test_a_defect_is_named_and_does_not_pass(tmp_path: Path, defect: dict[str, float], code: str, named: str) -> None:
+    wrong = serious(measure(tmp_path, defect))
+    assert code in wrong, wrong
+    assert named in wrong[code]
+
+
+@pytest.mark.parametrize(
+    "defect",
+    [
+        {"position_sign_yi": -1},
+        {"position_sign_zo": -1},
+        {"exchange_planes": 1},
+        {"position_range": 60e-6},
+        {"geometry.clearance": 80e-6},
+    ],
+    ids=["polarity-yi", "polarity-zo", "planes", "clipping", "contact"],
+)
+def test_a_shaft_that_cannot_be_held_stops_the_run(tmp_path: Path, defect: dict[str, float]) -> None:
+    with pytest.raises(DeviceFault, match="check sensor"):
+        measure(tmp_path, defect)
+
+
+def exchanged(held: Held, a: str, b: str, sign: float = 1.0) -> Held:
+    mean = dict(held.mean)
+    mean[a], mean[b] = sign * held.mean[b], sign * held.mean[a]
+    return replace(held, mean=mean)
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "sign", "code"),
+    [("pos_yi", "pos_yo", 1, "planes-exchanged"), ("pos_yi", "pos_zi", 1, "axes-exchanged"),
+     ("pos_zo", "pos_zo", -1, "sensor-polarity")],
+)  # fmt: skip
+def test_a_wrong_map_of_the_readings_is_named(sound: Simulated, a: str, b: str, sign: float, code: str) -> None:
+    """The controller sees them right, the bench does not: the tilts tell the planes apart."""
+    held, tilted = (exchanged(x, a, b, sign) for x in read(sound.recording))
+    codes = {f.code for f in bearing_findings.of_wiring(held, tilted, sound.recording.rig)}
+    assert codes == {code}
+
+
+def test_exchanged_coils_of_two_axes_and_flags_are_named(sound: Simulated) -> None:
+    held, tilted = read(sound.recording)
+    for a, b in (("yi", "yo"), ("yi", "zi")):
+        other = [exchanged(exchanged(x, f"i_{a}_p", f"i_{b}_p"), f"i_{a}_n", f"i_{b}_n") for x in (held, tilted)]
+        wrong = list(bearing_findings.of_models(*other, sound.recording.rig, sound.recording.plan))
+        assert {(f.code, f.where) for f in wrong} == {("coils-exchanged", a), ("coils-exchanged", b)}
+        assert f"of {a} and {b}" in wrong[0].text
+    for bit, code in ((64, "clipped"), (4, "contact"), (1, "saturated")):
+        hit = replace(held, flags=held.flags | bit)
+        assert code in {f.code for f in bearing_findings.of_signals(hit, tilted, sound.recording.plan)}
+
+
+def test_the_grid_stays_in_its_circle_and_moves_little() -> None:
+    places = np.array(grid(Plan()))
+    assert np.hypot(*places.T).max() <= Plan().radius_m
+    assert len(np.unique(places, axis=0)) == len(places) > 40
+    assert np.abs(np.diff(places, axis=0)).max() <= 4.01 * Plan().spacing_m
+    assert places.min() == pytest.approx(-80e-6)
+
+
+@pytest.mark.parametrize(
+    ("plan", "said"),
+    [
+        ({"radius_m": 90e-6}, "the ring"),
+        ({"spacing_m": 80e-6}, "nine or more"),
+        ({"bias_A": 1.6}, "amplifiers"),
+        ({"tilt_rad": 2e-3}, "tilt_rad"),
+    ],
+)
+def test_what_cannot_work_is_told_before_anything_starts(plan: dict[str, float], said: str) -> None:
+    rig = load_rig(RIG)
+    assert any(said in text for text in check(rig, Plan(**plan)))  # type: ignore[arg-type]
+    assert list(check(rig, Plan())) == []
+    bare = rig.model_copy(update={"machine": {k: v for k, v in rig.machine.items() if k != "runout"}})
+    assert "runout" in next(iter(check(bare, Plan())))
+
+
+def test_figures_show_the_data(sound: Simulated) -> None:
+    drawn = {f.key: f for f in figures(sound.recording)}
+    assert set(drawn) == {"positions", "currents", "residuals-linear", "residuals-nonlinear", "forces", "gaps"}
+    worst = {
+        k: max(float(np.abs(s.y).max()) for s in drawn[k].series) for k in ("residuals-linear", "residuals-nonlinear")
+    }
+    assert worst["residuals-linear"] > 5 * worst["residuals-nonlinear"]
+    for figure in drawn.values():
+        draw_figure(figure)

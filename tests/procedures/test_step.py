@@ -1,0 +1,184 @@
+"""Set-point steps on the AMB stand: against the linearised loop, A7's comparison, planted defects, refused plans."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bench.cli.virtual import simulated_run
+from bench.errors import AnalysisError, BenchError
+from bench.findings import Effect, Finding
+from bench.procedure import Measured
+from bench.recording import Recording
+from bench.rigfile import load_rig
+from bench.uncertainty import Estimate
+from procedures.estimators import stepmodel
+from procedures.step import MEASURES, Plan, check, figures, step_count
+from reports.figures import draw as draw_figure
+from sim_backend import amb_step
+from sim_backend.truth import draw
+
+SHORT = {"axes": ("y",), "sizes_m": (10e-6, 20e-6), "record_s": 0.4, "settle_s": 3.0}
+FAST = 300.0
+OBSERVED = {"law": 1.0, "observer": 1.0, "k1": 2e5, "k2_ccs": 400.0}
+A7 = {
+    "axes": ("z",), "sizes_m": (10e-6, 20e-6), "speeds_rad_s": (10000 * math.pi / 30,), "names": ("integral", "estimate"),
+    "a": {**OBSERVED, "integral": 1.0, "compensate": 2.0, "k0": 0.015 * 2e5},
+    "b": {**OBSERVED, "integral": 0.0, "compensate": 3.0}, "warm": {"integral": 1.0, "compensate": 2.0, "k0": 1e6},
+    "model_error": 0.2, "record_s": 1.5,
+}  # fmt: skip
+Found = tuple[dict[tuple[str, str], Estimate], list[Finding]]
+
+
+def stepped(folder: Path, seed: int = 1, truth: Mapping[str, float] | None = None, **plan: Any) -> Found:
+    run = simulated_run("step", "amb5dof", seed, {**SHORT, **plan}, folder / "recording.mcap", truth)
+    measured = {(m.quantity.name, m.where): m.estimate for m in run.results if isinstance(m, Measured)}
+    return measured, [f for f in run.results if isinstance(f, Finding)]
+
+
+@pytest.mark.parametrize(("law", "name"), [(0.0, "pid"), (1.0, "ccs"), (2.0, "cac")])
+def test_the_response_is_that_of_the_linearised_loop(tmp_path: Path, law: float, name: str) -> None:
+    seed, rig = 4, load_rig("amb5dof")
+    measured, findings = stepped(tmp_path, seed, a={"law": law}, sizes_m=(9e-6, 10e-6))
+    settings = {n: p.default for n, p in rig.parameters.items()}
+    truth = amb_step.truth(draw(rig, seed).plant, settings, name, "y")
+    serious = {f.code for f in findings if f.effect is not Effect.NOTE}
+    assert serious <= ({"not-settled", "not-at-rest"} if name == "pid" else set())  # its integrator takes two seconds
+    damping, frequency = (measured[q, "A, y, 0 r/min"] for q in ("damping", "natural_frequency"))
+    assert damping.value == pytest.approx(truth["damping"], abs=3 * damping.u)
+    assert damping.u < 0.06 * damping.value
+    assert frequency.value == pytest.approx(truth["frequency"], abs=3 * frequency.u)
+    for way in ("up", "down"):
+        where = f"A, y, 0 r/min, 10 µm {way}"
+        for quantity, share in (("overshoot", 0.06), ("rise_time", 0.04), ("bandwidth", 0.03)):
+            e = measured[quantity, where]
+            assert e.value == pytest.approx(truth[quantity], abs=max(3 * e.u, 0.02 * truth[quantity])), quantity
+            assert e.u < share * e.value
+
+
+def test_a7_the_estimate_settles_and_integral_action_does_not(tmp_path: Path) -> None:
+    measured, findings = stepped(tmp_path, 1, **A7)
+    where = "{}, z, 10000 r/min, 20 µm up"
+    settled = measured["settling_time", where.format("estimate")]
+    assert settled.value + 2 * settled.u < 0.2
+    assert ("settling_time", where.format("integral")) not in measured
+    codes = {f.code for f in findings}
+    assert codes >= {"not-settled", "settings-compared"}
+    assert codes <= {"not-settled", "settings-compared", "band-widened", "not-at-rest"}
+    a, b = (measured["overshoot", where.format(n)] for n in ("integral", "estimate"))
+    assert abs(a.value - b.value) < 0.06  # T: the same overshoot and rise
+    a, b = (measured["rise_time", where.format(n)] for n in ("integral", "estimate"))
+    assert abs(a.value - b.value) < 0.3e-3
+    recording = Recording.open(tmp_path / "recording.mcap", Plan)
+    assert len(recording.all_steps()) == step_count(recording.plan)
+    drawn = list(figures(recording))
+    assert [f.key for f in drawn] == ["swing-z-10000", "settling-z-10000", "control-z-10000", "sizes-z-10000"]
+    for figure in drawn:
+        draw_figure(figure)
+
+
+def test_sizes_and_ways_are_compared(tmp_path: Path) -> None:
+    measured, _ = stepped(tmp_path, 2)
+    assert {name for name, _ in measured} == {q.name for q in MEASURES}
+    for name in ("size_effect", "way_effect"):
+        e = measured[name, "A, y, 0 r/min"]
+        assert abs(e.value) < 0.05
+        assert e.u < 0.03
+
+
+@pytest.mark.parametrize(
+    ("defect", "plan", "code"),
+    [
+        ({"factor_ref_y": 0.0}, {}, "no-step"),
+        ({"factor_ref_y": 0.5}, {}, "wrong-size"),
+        ({"factor_ref_y": -1.0}, {}, "wrong-way"),
+        ({"current_sign_i": -1.0}, {}, "current-sign"),
+        ({"position_range": 30e-6}, {}, "sensor-clipped"),
+        ({"geometry.clearance": 26e-6}, {}, "contact"),
+        ({"supply_V": 5.0, "inductance": 20e-3}, {}, "voltage-saturated"),
+        ({"pulse_missing": 3.0}, {"speeds_rad_s": (FAST,)}, "speed-lost"),
+        ({"drop_fraction": 0.01}, {}, "missing-samples"),
+    ],
+)
+def test_a_planted_defect_is_named_and_never_passes(
+    tmp_path: Path, defect: Mapping[str, float], plan: Mapping[str, Any], code: str
+) -> None:
+    _, findings = stepped(tmp_path, 1, defect, **plan)
+    found = [f for f in findings if f.code == code]
+    assert found, [f.code for f in findings]
+    assert found[0].effect is not Effect.NOTE
+    assert list(figures(Recording.open(tmp_path / "recording.mcap", Plan)))
+
+
+@pytest.mark.parametrize(
+    ("defect", "named"),
+    [
+        ({"position_sign_yi": -1.0}, "sensors"),
+        ({"exchange_planes": 1.0}, "sensors"),
+        ({"drive_fault_after_s": 8.0}, "EXTERNAL"),
+        ({"drive_limit": 0.002}, "OVERLOAD"),
+    ],
+)
+def test_what_cannot_levitate_or_turn_ends_the_run(tmp_path: Path, defect: Mapping[str, float], named: str) -> None:
+    """The controller's own supervision or the drive's is first: the run is aborted and says what reported it."""
+    with pytest.raises(BenchError, match=named):
+        stepped(tmp_path, 1, defect, speeds_rad_s=(FAST,))
+
+
+def test_plans_that_cannot_work_are_refused() -> None:
+    rig = load_rig("amb5dof")
+    assert list(check(rig, Plan())) == []
+    assert list(check(rig, Plan(**A7))) == []
+    assert "clearance" in next(iter(check(rig, Plan(sizes_m=(10e-6, 60e-6)))))
+    assert "each once" in next(iter(check(rig, Plan(axes=("y", "y")))))
+    assert "envelope" in next(iter(check(rig, Plan(speeds_rad_s=(2000.0,)))))
+    assert "20 rad/s" in next(iter(check(rig, Plan(speeds_rad_s=(5.0,)))))
+    assert "found no spring" in next(iter(check(rig, Plan(a={"spring": 1.0}))))
+    assert "at rest only" in next(iter(check(rig, Plan(b={"current_limit": 1.0}))))
+    assert "twice" in next(iter(check(rig, Plan(names=("A", "A")))))
+    bare = rig.model_copy(update={"devices": {k: d for k, d in rig.devices.items() if k != "drive"}})
+    assert "nothing turns" in next(iter(check(bare, Plan(speeds_rad_s=(FAST,)))))
+
+
+def second_order(w: float, z: float, shift: float, seconds: float = 0.4) -> tuple[np.ndarray, np.ndarray]:
+    """Times and means over 1 ms of the exact response, whose step comes `shift` before the first full period."""
+    fine = np.arange(-0.02, seconds, 1e-5)
+    x, wd = np.maximum(fine + shift, 0), w * math.sqrt(1 - z * z)
+    y = 1 - np.exp(-z * w * x) * (np.cos(wd * x) + z * w / wd * np.sin(wd * x))
+    return (np.arange(len(fine) // 100) + 1) * 1e-3 - 0.02, y[: len(fine) // 100 * 100].reshape(-1, 100).mean(axis=1)
+
+
+@pytest.mark.parametrize("z", [0.15, 0.3, 0.5])
+@pytest.mark.parametrize("shift", [0.0, 3e-4, 7e-4])
+def test_a_second_order_step_from_means(z: float, shift: float) -> None:
+    w = 2 * math.pi * 70
+    t, y = second_order(w, z, shift)
+    r = stepmodel.response(t, y)
+    assert r.overshoot == pytest.approx(math.exp(-math.pi * z / math.sqrt(1 - z * z)), abs=0.003)
+    b = math.sqrt(1 - 2 * z * z + math.sqrt((1 - 2 * z * z) ** 2 + 1))
+    assert r.bandwidth == pytest.approx(70 * b, rel=0.01)
+    mode = stepmodel.modes(t, np.array([y, 0 * y]), 1)
+    assert mode.damping == pytest.approx(z, rel=0.005)
+    assert mode.frequency == pytest.approx(70, rel=0.003)
+    raw = float(y.max()) - 1
+    assert raw < r.overshoot  # the largest mean is below the largest value
+
+
+def test_settling_into_the_band_and_never() -> None:
+    t = np.arange(1000) * 1e-3
+    y = 1 - np.exp(-t / 0.05)
+    found = stepmodel.settling(t, np.array([y] * 4), 0.02, 0.0, 1.0)
+    assert found.time == pytest.approx(0.05 * math.log(50), abs=2e-3)
+    slow = np.array([1 - 0.05 * np.exp(-t / 67)] * 4)
+    assert stepmodel.settling(t, slow, 0.02, 0.0, 6.0).time == math.inf
+    assert stepmodel.settling(t, slow, 0.02, 0.05, 6.0).within == pytest.approx(0.1)  # noise widens the band
+
+
+def test_a_position_that_does_not_get_there_is_told() -> None:
+    with pytest.raises(AnalysisError, match="90 %"):
+        stepmodel.rise_time(np.arange(50) * 1e-3, np.full(50, 0.3))

@@ -1,0 +1,175 @@
+"""Tracking through the whole path: the printed effects A4, what the telemetry's means hide, and planted defects."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bench.cli.virtual import simulate
+from bench.errors import AnalysisError
+from bench.findings import Effect, Finding
+from bench.procedure import Measured
+from bench.recording import Recording
+from bench.rigfile import load_rig
+from bench.uncertainty import Estimate
+from procedures.estimators import tracking as estimator
+from procedures.estimators.tracking import Facts, Wave
+from procedures.estimators.tracking import Path as Orbit
+from procedures.tracking import MEASURES, Plan, check, figures, step_count
+from reports.figures import draw as draw_figure
+
+QUICK = {"revolutions": 8, "settle_s": 1.5}
+ONE = {"laws": ("CCS",), "compare": ()}
+Found = tuple[dict[tuple[str, str], Estimate], list[Finding]]
+
+
+def tracked(folder: Path, seed: int = 1, truth: Mapping[str, float] | None = None, **plan: Any) -> Found:
+    _, results = simulate("tracking", "amb5dof", seed, {**QUICK, **plan}, folder / "recording.mcap", truth)
+    measured = {(m.quantity.name, m.where.split(",")[0]): m.estimate for m in results if isinstance(m, Measured)}
+    return measured, [f for f in results if isinstance(f, Finding)]
+
+
+def test_a4_flatness_follows_and_the_pid_touches(tmp_path: Path) -> None:
+    """T 2.6.2: CCS and CAC within 3 um and 45 urad, CAC by the upper coils alone; PID over 20 um, and on the ring at 100 um."""
+    measured, findings = tracked(tmp_path)
+    assert {name for name, _ in measured} == {q.name for q in MEASURES}
+    assert {law for _, law in measured} == {"CCS", "CAC"}
+    for law in ("CCS", "CAC"):
+        for axis in "yz":
+            peak = measured[f"error_peak_{axis}", law]
+            assert 0.5e-6 < peak.value < 3e-6
+            assert measured[f"error_rms_{axis}", law].value < peak.value < 3 * measured[f"error_rms_{axis}", law].value
+        assert max(measured[f"tilt_{name}", law].value for name in ("psi", "theta")) < 45e-6
+    assert abs(measured["lower_current", "CAC"].value) < 0.01
+    assert measured["lower_current", "CCS"].value > 0.8
+    assert {f.code for f in findings} == {"contact", "laws-compared"}
+    assert all(f.effect is Effect.NOTE for f in findings)
+    assert findings[0].where.startswith("PID")
+    recording = Recording.open(tmp_path / "recording.mcap", Plan)
+    assert len(recording.all_steps()) == step_count(recording.plan)
+    drawn = list(figures(recording))
+    assert [f.key for f in drawn][:5] == ["orbit", "ring-inboard", "ring-outboard", "error-y", "error-z"]
+    for figure in drawn:
+        draw_figure(figure)
+
+
+def test_a_wide_ring_shows_the_pids_error_without_contact(tmp_path: Path) -> None:
+    wide = {"geometry.clearance": 150e-6}
+    measured, findings = tracked(tmp_path, 1, wide, laws=("PID",), compare=())
+    assert max(measured[f"error_peak_{axis}", "PID"].value for axis in "yz") > 20e-6
+    assert "contact" not in {f.code for f in findings}
+
+
+@pytest.mark.parametrize(
+    ("defect", "code", "named"),
+    [
+        ({"position_sign_zo": -1}, "probe-polarity", "polarity"),
+        ({"exchange_planes": 1}, "lift-lost", "planes"),
+        ({"exchange_axes": 1}, "lift-lost", "y and z"),
+        ({"told_planes": 1}, "planes-exchanged", "planes"),
+        ({"told_axes": 1}, "axes-exchanged", "y and z"),
+        ({"position_range": 76e-6}, "sensor-range", "clips"),
+        ({"position_range": 60e-6}, "stuck-channel", "range"),
+        ({"factor_ellipse_on": 0}, "reference-missing", "not applied"),
+        ({"factor_ellipse_hz": 1.02}, "reference-frequency", "10.2 Hz"),
+        ({"supply_V": 4.0, "inductance": 20e-3}, "saturated", "voltage"),
+        ({"drop_fraction": 0.01}, "missing-samples", "missing"),
+    ],
+    ids=lambda x: "-".join(x) if isinstance(x, dict) else "",
+)
+def test_a_planted_defect_is_named_and_never_passes(
+    tmp_path: Path, defect: Mapping[str, float], code: str, named: str
+) -> None:
+    _, findings = tracked(tmp_path, 1, defect, **ONE)
+    found = [f for f in findings if f.code == code]
+    assert found, [(f.code, f.text) for f in findings]
+    assert any(f.effect is not Effect.NOTE for f in found)
+    assert any(named in f.text for f in found)
+
+
+def test_a_figure_of_lissajous_is_followed(tmp_path: Path) -> None:
+    measured, findings = tracked(tmp_path, hz=5.0, ratio=2, y_m=60e-6, z_m=40e-6, **ONE)
+    assert findings[0].code == "laws-compared"
+    for axis in "yz":
+        assert measured[f"error_peak_{axis}", "CCS"].value < 3e-6
+        assert measured[f"amplitude_ratio_{axis}", "CCS"].value == pytest.approx(1, abs=0.03)
+
+
+def test_contact_that_the_controller_does_not_report_is_named(tmp_path: Path) -> None:
+    _, findings = tracked(tmp_path, 1, {"contact_silent": 1}, laws=("PID",), compare=())
+    found = {f.code: f.effect for f in findings}
+    assert found["contact-unreported"] is Effect.INDETERMINATE
+    assert "contact" not in found
+
+
+def test_contact_of_a_law_under_test_never_passes(tmp_path: Path) -> None:
+    _, findings = tracked(tmp_path, 1, laws=("PID",), compare=())
+    assert {f.code: f.effect for f in findings}["contact"] is Effect.INDETERMINATE
+
+
+def test_without_a_drive_nothing_is_measured_at_speed(tmp_path: Path) -> None:
+    measured, findings = tracked(tmp_path, speed_rad_s=1000.0, hz=2.0, **ONE)
+    assert measured == {}
+    assert [(f.code, f.effect) for f in findings] == [("speed-not-reached", Effect.ERROR)]
+
+
+def test_plans_that_cannot_work_are_refused() -> None:
+    rig = load_rig("amb5dof")
+    assert list(check(rig, Plan())) == []
+    assert "ring" in next(iter(check(rig, Plan(y_m=97e-6))))
+    assert "jump" in next(iter(check(rig, Plan(z_m=10e-6))))
+    assert "envelope" in next(iter(check(rig, Plan(speed_rad_s=1600.0))))
+    assert "ten times" in next(iter(check(rig, Plan(speed_rad_s=500.0))))
+    assert "twice" in next(iter(check(rig, Plan(laws=("CCS",), compare=("CCS",)))))
+    assert "role drive" in next(iter(check(rig.model_copy(update={"devices": {"controller": rig.devices["controller"]}}),
+                                           Plan(speed_rad_s=1000.0))))  # fmt: skip
+    assert list(check(load_rig("tsbs12"), Plan()))
+
+
+FACTS = Facts((1.0,) * 4, (0.0,) * 4, 0.078, 0.1, 0.0123, 1e-4)
+
+
+def orbit(hz: float, turn_s: float = 0.0, lag: float = 0.0, ratio: float = 1.0, tilt: float = 0.0) -> Orbit:
+    """Exact means of ten ticks of a rotor that follows with a ratio and a lag in s, tilted about z by a constant; vibrating
+    by 8 um when it turns."""
+    wave = Wave(hz, 50e-6, 80e-6, 1e-4, 10)
+    end = np.arange(1, round(10e3 / hz) + 1) * 1e-3
+    reads = end[:, None] - 1e-4 * np.arange(1, 11)
+    turn = 2 * math.pi * hz * (reads - FACTS.t_0 - lag)
+    y, z = 50e-6 * ratio * np.sin(turn), 80e-6 * ratio * np.cos(turn)
+    if turn_s:
+        y, z = y + 8e-6 * np.cos(2 * math.pi * reads / turn_s), z + 8e-6 * np.sin(2 * math.pi * reads / turn_s)
+    at = [(y - FACTS.l_is * tilt), z, (y + FACTS.l_os * tilt), z]
+    return Orbit(wave, end, np.array([x.mean(axis=1) for x in at], np.float64), turn_s)
+
+
+@settings(max_examples=20, deadline=None)
+@given(hz=st.sampled_from([2.0, 10.0, 37.0]), ratio=st.floats(0.8, 1.3), lag=st.floats(-1e-3, 1e-3))
+def test_means_of_ten_ticks_cost_nothing(hz: float, ratio: float, lag: float) -> None:
+    """Without the half millisecond that a mean is late, 10 Hz would be 35 mrad or 2.8 um behind."""
+    found = estimator.by_revolution(orbit(hz, lag=lag, ratio=ratio), FACTS)
+    for axis, size in (("y", 50e-6), ("z", 80e-6)):
+        assert found[f"amplitude_ratio_{axis}"] == pytest.approx(ratio, rel=1e-6)
+        assert found[f"phase_lag_{axis}"] == pytest.approx(2 * math.pi * hz * lag, abs=1e-6)
+        whole = size * abs(ratio * np.exp(-2j * math.pi * hz * lag) - 1)
+        assert found[f"error_peak_{axis}"] == pytest.approx(whole, rel=0.03, abs=2e-8)
+
+
+def test_a_turn_of_the_shaft_averages_its_vibration_away() -> None:
+    found = estimator.by_revolution(orbit(2.0, turn_s=6e-3, tilt=20e-6), FACTS)
+    assert max(found["error_peak_y"].max(), found["error_peak_z"].max()) < 0.05e-6
+    assert found["tilt_theta"] == pytest.approx(20e-6, rel=1e-3)
+    assert found["ring_distance"].min() < 100e-6 - 86e-6
+
+
+def test_a_record_that_is_too_short_is_told() -> None:
+    whole = orbit(10.0)
+    with pytest.raises(AnalysisError, match="revolutions"):
+        estimator.revolutions(Orbit(whole.wave, whole.t[:300], whole.readings[:, :300], 0.0))
