@@ -36,6 +36,7 @@ class Decoder:
         self.names = tuple(s.name for s in self._signals)
         self._scales = np.array([s.scale for s in self._signals])[:, None]
         self._offsets = np.array([s.offset for s in self._signals])[:, None]
+        self._shifted = bool(self._offsets.any())
         # What decode_one needs of each signal, worked out once.
         self._single = [
             (s, s.little_endian, _shift(s, message.length), (1 << s.length) - 1,
@@ -73,7 +74,8 @@ class Decoder:
             out[row : row + count] = extract(payloads)
             row += count
         out *= self._scales
-        out += self._offsets
+        if self._shifted:
+            out += self._offsets
         return out
 
     def decode_one(self, payload: bytes) -> dict[str, float]:
