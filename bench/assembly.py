@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -37,6 +38,14 @@ class Rows:
     tick: Integers
     arrived: Integers
     columns: dict[str, Values]
+    table: Values | None = None
+    """The columns as (channels, n), where they are rows of one array."""
+
+    def last(self) -> dict[str, float]:
+        """The newest sample by channel."""
+        if self.table is not None:  # one look for all of them
+            return dict(zip(self.columns, self.table[:, -1].tolist(), strict=True))
+        return {name: float(x[-1]) for name, x in self.columns.items()}
 
     def __len__(self) -> int:
         return len(self.sequence)
@@ -55,7 +64,15 @@ class _Part:
 
     def si(self, table: Values) -> Values:
         """Values (channels, n) in SI of a table of the decoder."""
+        if self.plain:  # it is SI already: nothing is copied
+            return table[self.rows[0] : self.rows[-1] + 1]
         return table[self.rows] * self.factors + self.offsets
+
+    @cached_property
+    def plain(self) -> bool:
+        """Whether the channels are neighbours in the table, in its order and in SI."""
+        neighbours = bool(self.rows) and self.rows == list(range(self.rows[0], self.rows[0] + len(self.rows)))
+        return neighbours and bool((self.factors == 1).all() and (self.offsets == 0).all())
 
     def integers(self, table: Values, signal: str) -> Integers:
         """A signal as it came."""
@@ -113,7 +130,8 @@ class Assembler:
         self.wrong_length += wrong
         table = part.decoder.table(frames["data"])
         sequence, tick = (part.integers(table, name) for name in (b.sequence, b.tick))
-        return Rows(sequence, tick, frames["t_ns"], dict(zip(part.channels, part.si(table), strict=True)))
+        si = part.si(table)
+        return Rows(sequence, tick, frames["t_ns"], dict(zip(part.channels, si, strict=True)), si)
 
     def _several(self, batch: FrameBatch) -> Rows:
         kind = np.full(len(batch), -1)

@@ -36,7 +36,13 @@ class Decoder:
         self.names = tuple(s.name for s in self._signals)
         self._scales = np.array([s.scale for s in self._signals])[:, None]
         self._offsets = np.array([s.offset for s in self._signals])[:, None]
-        self._places = [_shift(s, message.length) for s in self._signals]
+        self._shifted = bool(self._offsets.any())
+        # What decode_one needs of each signal, worked out once.
+        self._single = [
+            (s, s.little_endian, _shift(s, message.length), (1 << s.length) - 1,
+             1 << (s.length - 1) if s.signed and not s.is_float else 0)
+            for s in self._signals
+        ]  # fmt: skip
 
     def decode(self, batch: FrameBatch) -> tuple[dict[str, Array], int]:
         """Values of every frame of this message in a batch.
@@ -68,16 +74,19 @@ class Decoder:
             out[row : row + count] = extract(payloads)
             row += count
         out *= self._scales
-        out += self._offsets
+        if self._shifted:
+            out += self._offsets
         return out
 
     def decode_one(self, payload: bytes) -> dict[str, float]:
         """Values of a single payload of message.length bytes, the same as those of a batch, without its overhead."""
         words = int.from_bytes(payload, "big"), int.from_bytes(payload, "little")
-        return {
-            s.name: _number(s, words[s.little_endian] >> shift) * s.scale + s.offset
-            for s, shift in zip(self._signals, self._places, strict=True)
-        }
+        values = {}
+        for s, little_endian, shift, mask, sign in self._single:
+            raw = words[little_endian] >> shift & mask
+            number = _float(s, raw) if s.is_float else float(raw - ((raw & sign) << 1))
+            values[s.name] = number * s.scale + s.offset
+        return values
 
 
 def _fast(s: Signal) -> str:
@@ -131,13 +140,10 @@ def _shift(s: Signal, length: int) -> int:
     return 8 * length - top - s.length
 
 
-def _number(s: Signal, word: int) -> float:
-    """The raw value in the low bits of a word."""
-    raw = word & ((1 << s.length) - 1)
-    if s.is_float:
-        value: float = struct.unpack(_FLOATS[s.length], raw.to_bytes(s.length // 8, "little"))[0]
-        return value
-    return float(raw - (1 << s.length) if s.signed and raw >> (s.length - 1) else raw)
+def _float(s: Signal, raw: int) -> float:
+    """The floating-point number that a signal's bits are."""
+    value: float = struct.unpack(_FLOATS[s.length], raw.to_bytes(s.length // 8, "little"))[0]
+    return value
 
 
 def _layout(s: Signal) -> tuple[int, list[int]]:

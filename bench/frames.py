@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Final
 
 import numpy as np
@@ -41,9 +41,23 @@ def frame(identifier: int, payload: bytes, *, t_ns: int = 0, flags: int = 0) -> 
     Raises:
         ValueError: the payload is longer than 64 bytes.
     """
+    return batch_of([packed(identifier, payload, t_ns=t_ns, flags=flags)])
+
+
+def packed(identifier: int, payload: bytes, *, t_ns: int = 0, flags: int = 0) -> bytes:
+    """The bytes of one frame of a batch.
+
+    Raises:
+        ValueError: the payload is longer than 64 bytes.
+    """
     if len(payload) > 64:
         raise ValueError(f"payload of {len(payload)} bytes; a CAN FD frame holds at most 64")
-    return np.frombuffer(bytearray(_RECORD.pack(t_ns, 0, identifier, flags, len(payload), payload)), FRAME)
+    return _RECORD.pack(t_ns, 0, identifier, flags, len(payload), payload)
+
+
+def batch_of(frames: Iterable[bytes]) -> FrameBatch:
+    """A batch of packed frames: quicker than joining batches of one frame."""
+    return np.frombuffer(bytearray(b"".join(frames)), FRAME)
 
 
 def joined(batches: Sequence[FrameBatch]) -> FrameBatch:

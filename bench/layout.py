@@ -230,7 +230,9 @@ def _fields(data: bytes) -> list[tuple[int, Any]]:
     """Top-level protobuf fields: number, and an integer or the bytes."""
     out, at = [], 0
     while at < len(data):
-        tag, at = _read_varint(data, at)
+        tag, at = data[at], at + 1
+        if tag > 0x7F:  # most numbers of fields take one byte
+            tag, at = _read_varint(data, at - 1)
         wire = tag & 7
         if wire == 1:
             value: Any = struct.unpack_from("<Q", data, at)[0]

@@ -163,7 +163,7 @@ class TelemetryDecoder:
         ticks = s.tick + round(self._ticks) * np.arange(1, n + 1)
         t_ns = s.offset_ns + ticks * self._tick_ns
         self._stale = 0
-        self.latest = {name: float(x[-1]) for name, x in rows.columns.items()}
+        self.latest = rows.last()
         self.host.take(t_ns, rows.arrived)
         s.raw, s.sequence, s.tick = int(rows.sequence[-1]), s.sequence + n, int(ticks[-1])
         self._index += n

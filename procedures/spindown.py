@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 from pydantic import Field
@@ -162,8 +163,10 @@ class Analysis:
     speed: Drag
 
 
+@lru_cache(maxsize=1)
 def evaluate(recording: Recording[Plan]) -> Analysis:
-    """Read the run-downs and evaluate them by the angle and by the speed."""
+    """Read the run-downs and evaluate them by the angle and by the speed. Kept, because measurements, facts and figures
+    all need it."""
     plan, runs = recording.plan, read_run_downs(recording)
     by = {m: drag.evaluate(runs, recording.rig, m, plan.bias_A, plan.bias_high_A) for m in drag.METHODS}
     return Analysis(runs, by["angle"], by["speed"])

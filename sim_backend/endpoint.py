@@ -9,7 +9,7 @@ import numpy as np
 from bench.codec import encode
 from bench.errors import LinkError
 from bench.faults import CUTS, Fault, FrameFaults, divided, lost
-from bench.frames import ERROR, FD, SENT, FrameBatch, empty_batch, frame, joined
+from bench.frames import ERROR, FD, SENT, FrameBatch, batch_of, empty_batch, joined, packed
 from bench.link import LinkStats
 from bench.messages import load_messages
 from bench.rigfile import RigFile
@@ -138,8 +138,9 @@ class InProcessLink:
         beats = self._beats(now_ns, end)
         self._counts.heartbeats += len(beats)
         self._counts.sent += len(beats)
-        incoming = joined([*self._queued, *beats])
+        incoming = beats
         if self._queued:
+            incoming = joined([*self._queued, beats])
             incoming = incoming[np.argsort(incoming["t_ns"], kind="stable")]
         self._queued = []
         if len(incoming):
@@ -148,7 +149,7 @@ class InProcessLink:
         heard = self._outward.apply(incoming, end - 1)
         self._arrived.append(self._inward.apply(device.advance(ticks, heard, now_ns), end))
 
-    def _beats(self, begin_ns: int, end_ns: int) -> list[FrameBatch]:
+    def _beats(self, begin_ns: int, end_ns: int) -> FrameBatch:
         """The heartbeats of a slice, while the lease lasts."""
         beats = []
         while self._next_beat < end_ns:
@@ -156,6 +157,6 @@ class InProcessLink:
                 self._counter = (self._counter + 1) & 0xFFFF
                 payload = bytearray(self._beat)
                 payload[self._counter_at : self._counter_at + 2] = self._counter.to_bytes(2, "little")
-                beats.append(frame(self._heartbeat.identifier, bytes(payload), t_ns=self._next_beat, flags=FD | SENT))
+                beats.append(packed(self._heartbeat.identifier, bytes(payload), t_ns=self._next_beat, flags=FD | SENT))
             self._next_beat += HEARTBEAT_NS
-        return beats
+        return batch_of(beats)

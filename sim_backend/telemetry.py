@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,8 +20,7 @@ WATCHDOG_ARMED = 16
 PAYLOAD = np.dtype([("sequence", "<u2"), ("tick", "<u4"), ("words", "<u2", (29,))])
 
 
-@dataclass(frozen=True, slots=True)
-class Span:
+class Span(NamedTuple):
     """Rows of the core whose first completes a period after `first_tick`, and the controller's state over them. The
     next span begins where they end."""
 
@@ -47,7 +45,7 @@ class TelemetryEncoder:
         signals = self._message.signals[2:]
         self._names = [s.name for s in signals]
         self._place = {name: k for k, name in enumerate(self._names)}
-        self._told, self._columns = truth.machine.places(truth.defects, self._place)
+        self._moves = _moves(*truth.machine.places(truth.defects, self._place))
         self._scale = np.array([s.scale for s in signals])
         self._offset = np.array([s.offset for s in signals])
         self._low = np.array([-32768.0 if s.signed else 0.0 for s in signals])
@@ -62,8 +60,10 @@ class TelemetryEncoder:
         if not n:
             return empty_batch()
         ticks, values = self._values(spans, n)
-        raw = np.rint((values - self._offset) / self._scale)
-        raw = np.minimum(np.maximum(raw, self._low), self._high)
+        values -= self._offset
+        values /= self._scale
+        raw = np.rint(values, out=values)
+        np.minimum(np.maximum(raw, self._low, out=raw), self._high, out=raw)
         batch = np.zeros(n, FRAME)
         batch["t_ns"] = clock[0] + (ticks - clock[1]) * 100_000
         batch["id"], batch["flags"], batch["length"] = self._message.identifier, FD, 64
@@ -82,7 +82,9 @@ class TelemetryEncoder:
         """Ticks (n,) of the samples, and what their signals say (n, signals)."""
         at = self._place
         values = np.zeros((n, len(at)))
-        values[:, self._columns] = np.concatenate([s.rows for s in spans])[:, self._told]
+        rows = np.concatenate([s.rows for s in spans])
+        for source, goal in self._moves:
+            values[:, goal] = rows[:, source]
         machine = self._truth.machine
         machine.spoil(values, at, self._truth.defects)
         ticks = (spans[0].first_tick // PERIOD_TICKS + np.arange(1, n + 1)) * PERIOD_TICKS
@@ -97,3 +99,15 @@ class TelemetryEncoder:
         for name, above in machine.windings.items():
             values[:, at[name]] = warm + above
         return ticks, values
+
+
+def _moves(told: slice | list[int], columns: list[int]) -> list[tuple[slice, slice]]:
+    """Columns of the rows and where they go among the signals, as few slices: neighbours that stay neighbours move
+    together, which is five times as quick as column by column."""
+    moves: list[tuple[slice, slice]] = []
+    for a, b in zip(range(len(columns)) if isinstance(told, slice) else told, columns, strict=True):
+        if moves and (moves[-1][0].stop, moves[-1][1].stop) == (a, b):
+            moves[-1] = slice(moves[-1][0].start, a + 1), slice(moves[-1][1].start, b + 1)
+        else:
+            moves.append((slice(a, a + 1), slice(b, b + 1)))
+    return moves

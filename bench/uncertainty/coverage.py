@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ from bench.uncertainty.estimate import Array, Estimate, Influence
 PROBABILITY = 0.95
 DRAWS = 200_000
 DOMINANT = 0.5  # share of the variance beyond which one non-normal component decides the shape
+KEPT = 12  # drawn influences, 1.6 MB each
 MINOR = 0.01  # share of the variance under which a component's own shape does not show
 _HALF_WIDTHS = {"rectangular": math.sqrt(3), "triangular": math.sqrt(6), "arcsine": math.sqrt(2)}  # of u, GUM 4.3
 
@@ -106,11 +108,19 @@ def _against_gum(estimate: Estimate) -> str:
     return ""
 
 
+@lru_cache(maxsize=KEPT)
 def draw(influence: Influence, seed: int, count: int) -> Array:
-    """Deviations drawn for one influence, (count,): the same for the same seed and id, whatever else is drawn.
+    """Deviations drawn for one influence, (count,): the same for the same seed and id, whatever else is drawn. Kept,
+    because the quantities of one run share most of their influences; not to be written to.
 
     A normal one with finite degrees of freedom is drawn from the scaled t distribution (JCGM 101, 6.4.9).
     """
+    out = _drawn(influence, seed, count)
+    out.setflags(write=False)
+    return out
+
+
+def _drawn(influence: Influence, seed: int, count: int) -> Array:
     digest = hashlib.sha256(influence.id.encode()).digest()
     rng = np.random.default_rng([seed, int.from_bytes(digest[:8], "little")])
     if influence.distribution == "normal":

@@ -41,6 +41,11 @@ class Influence:
     dof: float = math.inf
     source: str = ""
 
+    def __hash__(self) -> int:
+        return hash(
+            self.id
+        )  # equal influences have one id; that of all fields took a fifth of an evaluation's arithmetic
+
     def __post_init__(self) -> None:
         if not (math.isfinite(self.u) and self.u >= 0):
             raise AnalysisError(f"influence {self.id}: found u = {self.u}; expected a finite number, 0 or more")
@@ -178,13 +183,19 @@ def merged(terms: Iterable[tuple[float, Estimate]]) -> dict[Influence, float]:
     Raises:
         AnalysisError: one id stands for two different influences.
     """
-    found: dict[str, tuple[Influence, float]] = {}
+    firsts: dict[str, Influence] = {}
+    sums: dict[str, float] = {}
     for weight, estimate in terms:
         for influence, c in estimate.sensitivities.items():
-            first, so_far = found.get(influence.id, (influence, 0.0))
-            _same(first, influence)
-            found[influence.id] = (first, so_far + weight * c)
-    return dict(found.values())
+            key = influence.id
+            first = firsts.get(key)
+            if first is None:
+                firsts[key], sums[key] = influence, 0.0 + weight * c
+                continue
+            if first is not influence:  # nearly always it is the very same
+                _same(first, influence)
+            sums[key] += weight * c
+    return dict(zip(firsts.values(), sums.values(), strict=True))
 
 
 def correlation(a: Estimate, b: Estimate) -> float:

@@ -24,6 +24,7 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 Values = Mapping[str, float]
+Sensors = tuple[float, ...]
 TERMS = 5  # constant, direct, cross, branch, time
 DIRECT, CROSS, BRANCH, TIME, BEND = 1, 2, 3, 4, slice(5, 7)
 FORCE, MOMENT = 0, 1
@@ -103,8 +104,14 @@ def curvature(r: Ramps, p: Values, bias_A: float) -> tuple[Array, Array]:
 
     The motor's force is proportional to its current, so K u + K2 v is, too: u = constant + c i + ... - (K2/K) v.
     """
-    u, v = coil_terms(r, p, bias_A)
-    design = _design(r, motor_currents(r, p))
+    return _curvature(r, _coil_sensors(r.axis, p), _segment_sensors(p), bias_A)
+
+
+@lru_cache(maxsize=4)
+def _curvature(r: Ramps, coils: Sensors, segments: Sensors, bias_A: float) -> tuple[Array, Array]:
+    """Kept like `_solvers`."""
+    u, v = _coil_terms(r, coils, bias_A)
+    design = _design(r, _motor_currents(r, segments))
     bent = np.concatenate([np.broadcast_to(design, (2, *design.shape)), v[..., None]], axis=-1)
     solvers = np.linalg.pinv(bent)
     terms = np.einsum("bafp,bap->baf", solvers, u)
@@ -125,17 +132,24 @@ def _gain_off_centre(ratio: Array, bias_A: float) -> Array:
 
 def coil_terms(r: Ramps, p: Values, bias_A: float) -> tuple[Array, Array]:
     """u and v (2, A, P) of F = F_0 + K u + K2 v, from coil currents freed of offsets and gains as in the calibration."""
-    ip, i_n = (
-        np.stack([(r.coils[b, c] - p[f"offset_{r.axis}{name}{coil}"]) / p[f"gain_{r.axis}{name}{coil}"]
-                  for b, name in enumerate("io")])
-        for c, coil in enumerate("pn")
-    )  # fmt: skip
+    return _coil_terms(r, _coil_sensors(r.axis, p), bias_A)
+
+
+@lru_cache(maxsize=4)
+def _coil_terms(r: Ramps, sensors: Sensors, bias_A: float) -> tuple[Array, Array]:
+    """Kept like `_solvers`."""
+    offset, gain = np.array(sensors).reshape(2, 2, 2, 1, 1)
+    ip, i_n = ((r.coils[:, c] - offset[:, c]) / gain[:, c] for c in (0, 1))
     return (ip**2 - i_n**2) / (4 * bias_A), (ip**2 + i_n**2) / 2 - bias_A**2
 
 
 def motor_currents(r: Ramps, p: Values) -> tuple[Array, Array]:
     """The axis' own current and the other axis' current (A, P), freed of the segment sensors' offsets and gains."""
-    i = {k: (r.segments[k - 1] - p[f"offset_m{k}"]) / p[f"gain_m{k}"] for k in (1, 2, 3, 4)}
+    return _motor_currents(r, _segment_sensors(p))
+
+
+def _motor_currents(r: Ramps, sensors: Sensors) -> tuple[Array, Array]:
+    i = {k: (r.segments[k - 1] - sensors[k - 1]) / sensors[k + 3] for k in (1, 2, 3, 4)}
     own, other = SEGMENTS[r.axis]
     return (i[own[0]] - i[own[1]]) / 2, (i[other[0]] - i[other[1]]) / 2
 
@@ -154,20 +168,28 @@ def fit(r: Ramps, p: Values, constants: Constants, bias_A: float, *, turning: fl
     )
     pull = p["motor_stiffness"] * r.motor_m
     rows = np.stack([-(inboard + outboard), inboard * p["amb_span"] / p["motor_to_outboard_amb"]]) - pull
-    sensors = tuple(p[f"{what}_m{k}"] for k in (1, 2, 3, 4) for what in ("offset", "gain"))
-    current, design, solvers, bent = _solvers(r, sensors, turning)
+    current, design, solvers, bent = _solvers(r, _segment_sensors(p), turning)
     terms = np.einsum("afp,rap->raf", solvers, rows)
     residuals = rows - np.einsum("apf,raf->rap", design, terms)
     bends = np.einsum("afp,rap->raf", bent, rows)
     return Fit(terms, residuals, rows, current, solvers, bends, bent)
 
 
+def _coil_sensors(axis: str, p: Values) -> Sensors:
+    """Offsets, then gains, of the axis' coils: inboard p and n, outboard p and n."""
+    return tuple(p[f"{what}_{axis}{b}{coil}"] for what in ("offset", "gain") for b in "io" for coil in "pn")
+
+
+def _segment_sensors(p: Values) -> Sensors:
+    """Offsets, then gains, of the four segments."""
+    return tuple(p[f"{what}_m{k}"] for what in ("offset", "gain") for k in (1, 2, 3, 4))
+
+
 @lru_cache(maxsize=4)
-def _solvers(r: Ramps, sensors: tuple[float, ...], turning: float) -> tuple[Array, Array, Array, Array]:
+def _solvers(r: Ramps, sensors: Sensors, turning: float) -> tuple[Array, Array, Array, Array]:
     """Own current, design, and what maps forces to terms and to square and cube: they only change with the segments'
     sensors, so a propagation over everything else finds them once."""
-    p = {f"{what}_m{k}": sensors[2 * k - 2 + n] for k in (1, 2, 3, 4) for n, what in enumerate(("offset", "gain"))}
-    currents = motor_currents(r, p)
+    currents = _motor_currents(r, sensors)
     design = _design(r, currents, turning)
     scaled = currents[0] / np.abs(currents[0]).max()
     bent = np.linalg.pinv(np.concatenate([design, (scaled**2)[..., None], (scaled**3)[..., None]], axis=-1))[:, BEND]

@@ -19,14 +19,16 @@ def reduced(data: Mapping[str, npt.NDArray[Any]], channels: Sequence[str], label
     Raises:
         AnalysisError: a channel has fewer than two samples.
     """
-    out: dict[str, Any] = {"mean": {}, "drift": {}, "spread": {}}
-    for channel in channels:
-        x = data[channel]
-        half = len(x) // 2
-        if half == 0:
-            raise AnalysisError(f"step {dict(labels)}: found {len(x)} samples of {channel}; expected at least 2")
-        out["mean"][channel] = x.mean()
-        out["drift"][channel] = x[half:].mean() - x[:half].mean()
-        out["spread"][channel] = x.std()
+    x = np.array(
+        [data[channel] for channel in channels]
+    )  # all channels at once: a look at each costs more than the sums
+    half = x.shape[1] // 2
+    if half == 0:
+        raise AnalysisError(f"step {dict(labels)}: found {x.shape[1]} samples of {channels[0]}; expected at least 2")
+    drift = x[:, half:].mean(axis=1) - x[:, :half].mean(axis=1)
+    out: dict[str, Any] = {
+        kind: dict(zip(channels, values, strict=True))
+        for kind, values in (("mean", x.mean(axis=1)), ("drift", drift), ("spread", x.std(axis=1)))
+    }
     out["flags"] = int(np.bitwise_or.reduce(data["flags"].astype(np.int64)))
     return out

@@ -212,9 +212,9 @@ class Plant:
         """
         limit = (ticks + PERIOD_TICKS - 1) // PERIOD_TICKS + 1
         rows = np.empty((limit, len(CHANNELS)))
-        done = _lib.tsbs_run(self._p, self._c, self._s, ticks, _ffi.cast("double *", rows.ctypes.data), limit)
-        before = (self.tick - done) // PERIOD_TICKS
-        return rows[: self.tick // PERIOD_TICKS - before]
+        done = _lib.tsbs_run(self._p, self._c, self._s, ticks, _ffi.from_buffer("double[]", rows), limit)
+        tick = self.tick
+        return rows[: tick // PERIOD_TICKS - (tick - done) // PERIOD_TICKS]
 
     def state(self) -> dict[str, Any]:
         """True state, for tests: `s` (14,) positions and rates, `coil` (10,), `segment` (4,), weight in N."""

@@ -25,31 +25,48 @@ static double lifted(const tsbs_control *c, tsbs_law_state *l) {
     return l->mode == LIFT ? smooth : 1 - smooth;
 }
 
-static void radial(const tsbs_control *c, tsbs_law_state *l, const double *plane, tsbs_reference *out) {
+void tsbs_settle(const tsbs_control *c, tsbs_gains *g) {
     const double kp[] = {c->kp_i, c->kp_i, c->kp_o, c->kp_o, c->kp_z}, kd[] = {c->kd_i, c->kd_i, c->kd_o, c->kd_o, c->kd_z};
     const double ki[] = {c->ki_i, c->ki_i, c->ki_o, c->ki_o, c->ki_z};
     const double bias[] = {c->bias_i, c->bias_i, c->bias_o, c->bias_o, c->bias_z};
     const double set[] = {c->ref_xi, c->ref_yi, c->ref_xo, c->ref_yo, c->ref_z};
-    double up = lifted(c, l), keep = KEEP(c->derivative_hz);
-    int held = l->mode == LEVITATE; /* a landing is the bearings': the motor hands back within 0.1 s */
-    l->share = toward(l->share, held ? c->motor_share : 0, (held ? c->share_slew : 10) * TICK);
+    memcpy(g->kp, kp, sizeof kp);
+    memcpy(g->kd, kd, sizeof kd);
+    memcpy(g->ki, ki, sizeof ki);
+    memcpy(g->bias, bias, sizeof bias);
+    memcpy(g->set, set, sizeof set);
+    g->keep = KEEP(c->derivative_hz);
+    g->angle_keep = KEEP(c->angle_hz);
+}
+
+/* the filtered rates of the five axes: one after the other without a branch, so that the divisions go side by side */
+static void rates(tsbs_law_state *l, double keep, const double *plane) {
     for (int a = 0; a < 5; a++) {
-        double error = l->rest[a] + up * (set[a] - l->rest[a]) - plane[a];
         l->filtered[a] = keep * l->filtered[a] + (1 - keep) * (plane[a] - l->previous[a]) / TICK;
         l->previous[a] = plane[a];
-        double control = kp[a] * error + l->integral[a] - kd[a] * l->filtered[a], room = c->current_limit - bias[a];
+    }
+}
+
+static void radial(const tsbs_control *c, const tsbs_gains *g, tsbs_law_state *l, const double *plane, tsbs_reference *out) {
+    double up = lifted(c, l);
+    int held = l->mode == LEVITATE; /* a landing is the bearings': the motor hands back within 0.1 s */
+    l->share = toward(l->share, held ? c->motor_share : 0, (held ? c->share_slew : 10) * TICK);
+    rates(l, g->keep, plane);
+    for (int a = 0; a < 5; a++) {
+        double error = l->rest[a] + up * (g->set[a] - l->rest[a]) - plane[a], bias = g->bias[a];
+        double control = g->kp[a] * error + l->integral[a] - g->kd[a] * l->filtered[a], room = c->current_limit - bias;
         int waits = l->share > 0 && (a == 2 || a == 3); /* the outboard AMB takes up again what it carried */
-        if (!waits && (fabs(control) < room || control * error < 0)) l->integral[a] += ki[a] * error * TICK;
+        if (!waits && (fabs(control) < room || control * error < 0)) l->integral[a] += g->ki[a] * error * TICK;
         control = clip(control, -room, room);
-        out->coil[2 * a] = clip(bias[a] + control, 0, c->current_limit);
-        out->coil[2 * a + 1] = clip(bias[a] - control, 0, c->current_limit);
+        out->coil[2 * a] = clip(bias + control, 0, c->current_limit);
+        out->coil[2 * a + 1] = clip(bias - control, 0, c->current_limit);
     }
     if (l->share > 0)
         for (int k = 4; k < 8; k++) out->coil[k] *= 1 - l->share;
 }
 
 /* The motor holds the outboard end: PID on the outboard sensors. Adds the share of its currents to those of i_x, i_y. */
-static void carry(const tsbs_control *c, tsbs_law_state *l, const double *y, double *current) {
+static void carry(const tsbs_control *c, double keep, tsbs_law_state *l, const double *y, double *current) {
     const double set[] = {c->ref_xm, c->ref_ym};
     if (l->share == 0) {
         memcpy(l->motor_previous, y, sizeof l->motor_previous);
@@ -57,7 +74,6 @@ static void carry(const tsbs_control *c, tsbs_law_state *l, const double *y, dou
         memset(l->motor_filtered, 0, sizeof l->motor_filtered);
         return;
     }
-    double keep = KEEP(c->derivative_hz);
     for (int a = 0; a < 2; a++) {
         double error = set[a] - y[a];
         l->motor_filtered[a] = keep * l->motor_filtered[a] + (1 - keep) * (y[a] - l->motor_previous[a]) / TICK;
@@ -101,8 +117,8 @@ static double sine(const tsbs_control *c, tsbs_law_state *l) {
     return c->sine_amplitude * sin(l->sine_phase);
 }
 
-static void rotation(const tsbs_control *c, tsbs_law_state *l, const tsbs_reading *r, tsbs_reference *out) {
-    double keep = KEEP(c->angle_hz), angle = r->angle, swing = 0;
+static void rotation(const tsbs_control *c, const tsbs_gains *g, tsbs_law_state *l, const tsbs_reading *r, tsbs_reference *out) {
+    double keep = g->angle_keep, angle = r->angle, swing = 0;
     l->angle_filtered = keep * l->angle_filtered + (1 - keep) * (angle - l->angle_previous) / TICK;
     l->angle_previous = angle;
     /* without torque (coasting, or no gains because something else turns the shaft) stand ready to take over where it is */
@@ -131,12 +147,18 @@ static void rotation(const tsbs_control *c, tsbs_law_state *l, const tsbs_readin
     l->i_x = toward(l->i_x, c->i_x, c->i_ramp * TICK);
     l->i_y = toward(l->i_y, c->i_y, c->i_ramp * TICK);
     double current[] = {l->i_x, l->i_y};
-    carry(c, l, r->position + 2, current);
+    carry(c, g->keep, l, r->position + 2, current);
     allocate(c, current[0], current[1], i, out->segment);
     out->gamma = c->gamma;
 }
 
 void tsbs_law(const tsbs_control *c, tsbs_law_state *l, const tsbs_reading *r, tsbs_reference *out) {
+    tsbs_gains g;
+    tsbs_settle(c, &g);
+    tsbs_act(c, &g, l, r, out);
+}
+
+void tsbs_act(const tsbs_control *c, const tsbs_gains *g, tsbs_law_state *l, const tsbs_reading *r, tsbs_reference *out) {
     const double *y = r->position;
     double plane[5];
     for (int a = 0; a < 2; a++) { /* T (6.7) with the controller's own geometry */
@@ -162,13 +184,13 @@ void tsbs_law(const tsbs_control *c, tsbs_law_state *l, const tsbs_reading *r, t
     }
     if (l->mode < LIFT) {
         memcpy(l->previous, plane, sizeof plane);
-        double keep = KEEP(c->angle_hz);
+        double keep = g->angle_keep;
         l->angle_filtered = keep * l->angle_filtered + (1 - keep) * (r->angle - l->angle_previous) / TICK;
         l->angle_previous = l->goal_previous = r->angle;
         l->angle_target = r->angle;
         return;
     }
-    radial(c, l, plane, out);
-    rotation(c, l, r, out);
+    radial(c, g, l, plane, out);
+    rotation(c, g, l, r, out);
     if (l->mode == LAND && l->lift_clock >= c->lift_time_s) memset(out, 0, sizeof *out);
 }

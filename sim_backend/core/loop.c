@@ -187,6 +187,8 @@ int64_t tsbs_run(const tsbs_params *p, const tsbs_control *c, tsbs_state *st, in
     int before = st->trips;
     tsbs_derived d;
     tsbs_derive(p, TICK / st->substeps, &d);
+    tsbs_gains g;
+    tsbs_settle(c, &g);
     double gamma = NAN;
     while (done < ticks && (filled < row_limit || st->in_period)) {
         tsbs_reading r;
@@ -196,7 +198,7 @@ int64_t tsbs_run(const tsbs_params *p, const tsbs_control *c, tsbs_state *st, in
         /* commutation goes by the encoder: one that counts backwards puts the currents at minus the rotor's angle */
         double at = p->encoder_sign < 0 ? st->applied.gamma - 2 * st->s[5] : st->applied.gamma;
         if (at != gamma) tsbs_commutate(p, gamma = at, &d);
-        tsbs_law(c, &st->law, &r, &st->next);
+        tsbs_act(c, &g, &st->law, &r, &st->next);
         st->speed = d.speed_keep * st->speed + (1 - d.speed_keep) * (r.angle - st->angle_before) / TICK;
         st->angle_before = r.angle;
         watch(p, st, coil, st->speed);

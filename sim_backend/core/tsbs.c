@@ -6,7 +6,9 @@
 /* cos and sin of an angle that is less than a tick away from d->angle: two short series, good to 1e-15 at 200 rad/s */
 static void turn(const tsbs_derived *d, double e, double *c, double *s) {
     double q = e * e;
-    double ce = 1 - q / 2 * (1 - q / 12 * (1 - q / 30)), se = e * (1 - q / 6 * (1 - q / 20 * (1 - q / 42)));
+    /* by factors, for a division costs as much as ten of them */
+    double ce = 1 - q * (1.0 / 2) * (1 - q * (1.0 / 12) * (1 - q * (1.0 / 30)));
+    double se = e * (1 - q * (1.0 / 6) * (1 - q * (1.0 / 20) * (1 - q * (1.0 / 42))));
     *c = d->turn_c * ce - d->turn_s * se;
     *s = d->turn_s * ce + d->turn_c * se;
 }
@@ -52,13 +54,11 @@ void tsbs_at(tsbs_derived *d, double angle, double *tc, double *ts) {
             x3 += n * n * n / 6 * s;
             y3 -= n * n * n / 6 * c;
         }
-        double *x = d->runout_x[b], *y = d->runout_y[b];
-        x[0] = x0, x[1] = x1, x[2] = x2, x[3] = x3;
-        y[0] = y0, y[1] = y1, y[2] = y2, y[3] = y3;
+        int x = 2 * b, y = 2 * b + 1;
+        d->runout[0][x] = x0, d->runout[1][x] = x1, d->runout[2][x] = x2, d->runout[3][x] = x3;
+        d->runout[0][y] = y0, d->runout[1][y] = y1, d->runout[2][y] = y2, d->runout[3][y] = y3;
     }
 }
-
-static double cubic(const double *a, double e) { return a[0] + e * (a[1] + e * (a[2] + e * a[3])); }
 
 void tsbs_commutate(const tsbs_params *p, double gamma, tsbs_derived *d) {
     double turn = p->pole_pairs * (gamma - p->gamma_zero);
@@ -101,7 +101,14 @@ void tsbs_derive(const tsbs_params *p, double step, tsbs_derived *d) {
         d->target_c[n] = p->target[n] * cos(p->target_phase[n]);
         d->target_s[n] = p->target[n] * sin(p->target_phase[n]);
     }
-    for (int b = 0; b < 2; b++) d->beta_x[b] = p->beta[b] * (1 + p->asymmetry[b]);
+    for (int a = 0; a < 4; a++) {
+        int b = a / 2, vertical = a % 2;
+        d->axis_beta[a] = vertical ? p->beta[b] : p->beta[b] * (1 + p->asymmetry[b]);
+        d->axis_gap[a] = p->gap[b];
+        d->axis_z[a] = p->z_amb[b];
+        d->axis_offset[a] = vertical ? p->offset_y[b] : p->offset_x[b];
+    }
+    d->unbalance = p->mass * p->eccentricity;
     d->per_mass = 1 / p->mass;
     d->per_inertia = 1 / p->inertia;
     d->per_coulomb_speed = 1 / p->coulomb_speed;
@@ -114,6 +121,8 @@ void tsbs_derive(const tsbs_params *p, double step, tsbs_derived *d) {
     for (int k = 0; k < 4; k++) d->per_sense[k] = 1 / p->segment_sense[k];
     d->tilt_c = cos(p->tilt);
     d->tilt_s = sin(p->tilt);
+    d->gravity_x = p->gravity * d->tilt_s;
+    d->gravity_y = p->gravity * -d->tilt_c;
     d->unbalance_c = cos(p->eccentricity_phase);
     d->unbalance_s = sin(p->eccentricity_phase);
     d->coil_keep = exp(-p->amplifier_rate * step / 2);
@@ -124,10 +133,24 @@ void tsbs_derive(const tsbs_params *p, double step, tsbs_derived *d) {
 }
 
 /* T (2.4): F = beta (ip^2/(gap - xi)^2 - in^2/(gap + xi)^2); below a gap of 0.2 mm the iron saturates */
-double tsbs_amb_force(double beta, double gap, double xi, double ip, double in) {
+static inline double amb_force(double beta, double gap, double xi, double ip, double in) {
     double near = gap - xi > 2e-4 ? gap - xi : 2e-4, far = gap + xi > 2e-4 ? gap + xi : 2e-4;
     double a = ip * far, b = in * near, both = near * far; /* on one denominator: a division costs more than the rest */
     return beta * (a - b) * (a + b) / (both * both);
+}
+
+double tsbs_amb_force(double beta, double gap, double xi, double ip, double in) {
+    return amb_force(beta, gap, xi, ip, in);
+}
+
+/* the radial AMBs' forces on the axes xi, yi, xo, yo, at e from the angle of the tick's start */
+static void radial(const tsbs_derived *d, const double *s, double e, const double *coil, const double *play, double *force) {
+    const double at[4] = {s[0], s[1], s[0], s[1]}, slope[4] = {s[4], -s[3], s[4], -s[3]};
+    for (int a = 0; a < 4; a++) {
+        double runout = d->runout[0][a] + e * (d->runout[1][a] + e * (d->runout[2][a] + e * d->runout[3][a]));
+        double xi = at[a] + d->axis_z[a] * slope[a] + d->axis_offset[a] + runout;
+        force[a] = amb_force(d->axis_beta[a], d->axis_gap[a], xi, coil[2 * a] - play[a], coil[2 * a + 1] + play[a]);
+    }
 }
 
 typedef struct {
@@ -189,17 +212,14 @@ static void motor(const tsbs_params *p, const tsbs_derived *d, const double *s, 
 void tsbs_rates(const tsbs_params *p, const tsbs_derived *d, const double *s, const double *coil,
                 const double *mixed, const double *play, double hung_mass, double weight, double *ds) {
     wrench w = {0};
-    double tc, ts, e = s[5] - d->angle;
+    double tc, ts, e = s[5] - d->angle, force[4];
     turn(d, e, &tc, &ts);
+    radial(d, s, e, coil, play, force);
     for (int b = 0; b < 2; b++) {
-        double z = p->z_amb[b], rx = cubic(d->runout_x[b], e), ry = cubic(d->runout_y[b], e);
-        const double *i = coil + 4 * b, *h = play + 2 * b;
-        double xi = s[0] + z * s[4] + p->offset_x[b] + rx, eta = s[1] - z * s[3] + p->offset_y[b] + ry;
-        add(&w, z, tsbs_amb_force(d->beta_x[b], p->gap[b], xi, i[0] - h[0], i[1] + h[0]),
-            tsbs_amb_force(p->beta[b], p->gap[b], eta, i[2] - h[1], i[3] + h[1]));
+        add(&w, p->z_amb[b], force[2 * b], force[2 * b + 1]);
         if (d->near) touchdown(p, s, b, &w);
     }
-    w.fz = tsbs_amb_force(p->beta_z, p->gap_z, s[2], coil[8], coil[9]);
+    w.fz = amb_force(p->beta_z, p->gap_z, s[2], coil[8], coil[9]);
     motor(p, d, s, mixed, tc, ts, &w);
     if (d->drive_gain > 0) {
         double torque = d->drive_gain * (d->drive_speed - s[11]), limit = d->drive_limit;
@@ -219,11 +239,11 @@ void tsbs_rates(const tsbs_params *p, const tsbs_derived *d, const double *s, co
         add(&w, p->z_hook, tension * sx, tension * sy);
         rate = (tension - weight) / hung_mass;
     }
-    double spin = s[11], unbalance = p->mass * p->eccentricity * spin * spin;
+    double spin = s[11], unbalance = d->unbalance * spin * spin;
     double ec = d->unbalance_c, es = d->unbalance_s;
     memcpy(ds, s + 6, 6 * sizeof *ds);
-    ds[6] = (w.fx + unbalance * (tc * ec - ts * es)) * d->per_mass + p->gravity * sx;
-    ds[7] = (w.fy + unbalance * (ts * ec + tc * es)) * d->per_mass + p->gravity * sy;
+    ds[6] = (w.fx + unbalance * (tc * ec - ts * es)) * d->per_mass + d->gravity_x;
+    ds[7] = (w.fy + unbalance * (ts * ec + tc * es)) * d->per_mass + d->gravity_y;
     ds[8] = w.fz * d->per_mass;
     ds[9] = (w.mphi - d->polar_inertia * spin * s[10]) * d->per_inertia;
     ds[10] = (w.mpsi + d->polar_inertia * spin * s[9]) * d->per_inertia;

@@ -112,12 +112,21 @@ typedef struct {
     double per_position_lsb, per_current_lsb, per_gain[10], per_sense[4], per_mass, per_inertia, per_coulomb_speed;
     double angle, turn_c, turn_s, detent_c, detent_s, unbalance_c, unbalance_s, coil_keep, segment_keep, speed_keep;
     int near; /* a ring may be touched within this tick */
-    double beta_x[2], runout_x[2][4], runout_y[2][4];
+    /* radial axes in the order xi, yi, xo, yo, so that one loop, and with it one vector, does all four: force constant,
+     * gap, plane, magnetic offset, runout of the journal as cubics about `angle` */
+    double axis_beta[4], axis_gap[4], axis_z[4], axis_offset[4], runout[4][4];
+    double unbalance, gravity_x, gravity_y;
     /* of this tick: the motor's constants at its gamma, the drive, the drag, the lever, the inertia */
     double direct, cross, turning, ripple_dc, ripple_ds, ripple_qc, ripple_qs, ripple_tc, ripple_ts;
     double drive_gain, drive_limit, drive_speed, viscous, coulomb;
     double lever_weight, lever_c, lever_s, polar_inertia, per_polar;
 } tsbs_derived;
+/* the law's parameters by axis, and the shares that its filters keep: they hold over a run */
+typedef struct {
+    double kp[5], kd[5], ki[5], bias[5], set[5], keep, angle_keep;
+} tsbs_gains;
+void tsbs_settle(const tsbs_control *, tsbs_gains *);
+void tsbs_act(const tsbs_control *, const tsbs_gains *, tsbs_law_state *, const tsbs_reading *, tsbs_reference *);
 void tsbs_derive(const tsbs_params *, double step, tsbs_derived *);
 void tsbs_commutate(const tsbs_params *, double gamma, tsbs_derived *);
 void tsbs_hold(const tsbs_params *, const double *coil, const double *lever, tsbs_derived *);
