@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from bench import binding, linkurl, units
+from bench import binding, capture, linkurl, units
 from bench.busload import REFUSE, BusLoad, bus_load
 from bench.errors import ConfigError, Problem
 from bench.messages import MessageMap
@@ -242,7 +242,8 @@ def _bindings(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
         elif channel.unit in units.UNITS and units.UNITS[dbc_unit].si != units.UNITS[channel.unit].si:
             yield Problem(rig.path, f"channels.{name}.unit", channel.unit, f"the kind of {dbc_unit} ({channel.signal})")
     yield from _signals_of_parameters(rig, messages)
-    for key, found, expected in binding.problems_of(rig, messages):
+    captures = capture.problems_of(rig.capture, messages) if rig.capture is not None else ()
+    for key, found, expected in (*binding.problems_of(rig, messages), *captures):
         yield Problem(rig.path, key, found, expected)
 
 

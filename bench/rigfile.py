@@ -17,6 +17,7 @@ from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from bench import catalogue
 from bench.binding import Binding
+from bench.capture import CaptureSpec
 from bench.errors import ConfigError, Problem
 from bench.messages import MessageMap, load_messages
 from bench.part import Part
@@ -138,6 +139,7 @@ class RigFile(Part):
     sensors: Mapping[str, Sensor]
     machine: Mapping[str, Toleranced] = {}
     calibration: CalibrationTable = CalibrationTable()
+    capture: CaptureSpec | None = None
     envelope: Envelope
     plans: Mapping[str, Mapping[str, Any]] = {}
     simulation: Annotated[Mapping[str, Any], BeforeValidator(simulated)] = {}

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from bench.rigfile import RigFile
 from bench.toleranced import Toleranced
-from sim_backend.core.amb import AXES, CHANNELS, COILS, AmbPlant
+from sim_backend.core.amb import AXES, CHANNELS, COILS, TRACE, AmbPlant
 from sim_backend.core.amb_params import AmbParams, runout
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ DEFECTS = {
     "dead_after_s": 0.0, "fault_after_s": 0.0, "drive_fault_after_s": 0.0,
 }  # fmt: skip
 """Planted defects and their harmless values. Current signs act on what is told of a bearing's y and z axes,
-`told_*` on the telemetry alone; `factor_*` scales a parameter that the controller is told before it acts."""
+`told_*` on the telemetry and captures alone; `factor_*` scales a parameter that the controller is told before it acts."""
 SHARED = {
     "beta": tuple(f"beta_{a}" for a in RADIAL),
     "magnetic_offset": tuple(f"offset_{a}" for a in RADIAL),
@@ -145,18 +145,32 @@ def copper_W(plant: AmbPlant) -> float:
 def places(defects: Numbers, at: Mapping[str, int]) -> tuple[list[int], list[int]]:
     """Which channels of the core are told, and where each goes among the signals; a bearing whose current sensors are
     exchanged has the currents of its coils the other way round."""
-    told = [k for k, name in enumerate(CHANNELS) if name in at]
-    goes = {CHANNELS[k]: at[CHANNELS[k]] for k in told}
+    told, shown = [k for k, name in enumerate(CHANNELS) if name in at], told_as(defects)
+    return told, [at[shown.get(CHANNELS[k], CHANNELS[k])] for k in told]
+
+
+def told_as(defects: Numbers) -> dict[str, str]:
+    """What a channel of the core is told as, where planted defects exchange channels."""
+    shown = {name: name for name in (*(f"pos_{a}" for a in AXES), *(f"i_{c}" for c in COILS))}
+
+    def exchange(a: str, b: str) -> None:
+        shown[a], shown[b] = shown[b], shown[a]
+
     for b in "io":
         if defects[f"current_sign_{b}"] < 0:
             for axis in "yz":
-                p, n = f"i_{axis}{b}_p", f"i_{axis}{b}_n"
-                goes[p], goes[n] = goes[n], goes[p]
-    pairs = [(f"pos_{a}i", f"pos_{a}o") for a in "yz"] if defects["told_planes"] else []
-    pairs += [(f"pos_y{b}", f"pos_z{b}") for b in "io"] if defects["told_axes"] else []
-    for a, b in pairs:
-        goes[a], goes[b] = goes[b], goes[a]
-    return told, list(goes.values())
+                exchange(f"i_{axis}{b}_p", f"i_{axis}{b}_n")
+    for a in "yz" if defects["told_planes"] else "":
+        exchange(f"pos_{a}i", f"pos_{a}o")
+    for b in "io" if defects["told_axes"] else "":
+        exchange(f"pos_y{b}", f"pos_z{b}")
+    return shown
+
+
+def traced(defects: Numbers) -> tuple[str, ...]:
+    """The names of the readings of a tick, for captures."""
+    shown = told_as(defects)
+    return tuple(shown.get(name, name) for name in TRACE)
 
 
 def spoil(values: Array, at: Mapping[str, int], defects: Numbers) -> None:
