@@ -82,6 +82,22 @@ def at_speed(rad_s: float) -> Trigger:
 
 
 @dataclass(frozen=True)
+class CaptureData:
+    """A capture that was uploaded: for deciding how to go on; results come from the recording.
+
+    `trigger` is the index of the sample at the trigger, `start_ns` the first sample's time on the sample clock, `columns`
+    values in SI (n,) by channel.
+    """
+
+    stream: str
+    rate_hz: float
+    first_tick: int
+    start_ns: int
+    trigger: int
+    columns: Mapping[str, npt.NDArray[np.float64]]
+
+
+@dataclass(frozen=True)
 class Layout:
     """Which channels a buffer holds, in order of their indexes."""
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal, Protocol
+
+from bench.capture import NOW, CaptureData, Trigger
 
 
 class RigState(StrEnum):
@@ -80,6 +82,26 @@ class Drive(Protocol):
     def reach(self, rad_s: float) -> None: ...  # set_speed, run; returns at that speed
     def coast(self) -> None: ...  # no torque
     def stop(self) -> None: ...  # brakes; returns at standstill
+
+
+class Capture(Protocol):
+    """What records inside the controller, at its full rate, and uploads. One capture at a time."""
+
+    @property
+    def channels(self) -> tuple[str, ...]: ...  # what it can record
+    @property
+    def memory_bytes(self) -> int: ...
+    @property
+    def rate_hz(self) -> float: ...  # the highest
+    def arm(
+        self, channels: Sequence[str], *, seconds: float, before_s: float = 0.0, rate_hz: float | None = None,
+        trigger: Trigger = NOW,
+    ) -> None: ...  # `seconds` in all, `before_s` of them before the trigger; refuses more than memory_bytes  # fmt: skip
+    def wait(self, timeout_s: float) -> None: ...  # returns when it is recorded
+    def upload(
+        self, progress: Callable[[int, int], None] | None = None, **labels: str | float
+    ) -> CaptureData: ...  # into the recording, as stream capture/1, capture/2 ...; progress: bytes so far, and in all
+    def cancel(self) -> None: ...  # gives up what is armed or recorded
 
 
 class Supply(Protocol):

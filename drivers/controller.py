@@ -19,6 +19,8 @@ from bench.samples import SampleBlock
 from bench.session import Session
 from bench.telemetry import TelemetryDecoder
 from drivers import advice, handshake
+from drivers.capture import ControllerCapture
+from drivers.capture_upload import Upload
 from drivers.dialogue import Dialogue, no_reply
 from drivers.orders import Orders
 
@@ -62,6 +64,12 @@ class Controller:
         self.host_age_s = 0.0  # the greatest while the machine was on
         self.companions: list[Callable[[], None]] = []  # polled with it: other devices of the rig
         self._orders = Orders(rig, self._dialogue, session, self.envelope, lambda: self.mode, self._wait)
+        self.capture: ControllerCapture | None = None
+        if rig.capture is not None:
+            upload = Upload(rig, link, self._dialogue, self.clock)
+            self.capture = ControllerCapture(
+                rig, rig.capture, self._dialogue, upload, session, self.telemetry, self.clock, self._wait
+            )
 
     @property
     def recorder(self) -> Recorder | None:
@@ -71,6 +79,8 @@ class Controller:
     @recorder.setter
     def recorder(self, recorder: Recorder | None) -> None:
         self._recorder = self._dialogue.recorder = self._orders.recorder = recorder
+        if self.capture is not None:
+            self.capture.recorder = recorder
         if recorder is not None:
             self.telemetry.start_counting()
 
@@ -134,6 +144,8 @@ class Controller:
         if self._recorder is not None:
             self._recorder.frames(self.link.name, batch, lag_ns=self.telemetry.host.lag_ns)
         self._dialogue.take(batch)
+        if self.capture is not None:
+            self.capture.take(batch)
         blocks = self.telemetry.decode(batch)
         for block in blocks:
             if self._recorder is not None:

@@ -215,7 +215,7 @@ def _opened(
                       replies_wrong_length=controller.replies_wrong_length)  # fmt: skip
 
     rig = Rig(controller.rig, controller.clock, controller, controller, operators[0], controller.telemetry.counters,
-              health, controller.link.close, bus.drive, bus.supply, bus.thermal)  # fmt: skip
+              health, controller.link.close, bus.drive, bus.supply, bus.thermal, controller.capture)  # fmt: skip
     found = [faults.announced(injected)] if injected else []
     if controller.cleared:
         found.append(

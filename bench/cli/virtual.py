@@ -112,7 +112,7 @@ def simulated_run(
     ):  # fmt: skip
         live = Rig(file, controller.clock, controller, controller, operator, counters,
                    lambda: Health(counters, simulated.link.stats, None, 0), simulated.link.close,
-                   bus.drive if bus else None)  # fmt: skip
+                   bus.drive if bus else None, capture=controller.capture)  # fmt: skip
         controller.recorder = operator.recorder = recorder
         if bus is not None:
             bus.recorder = recorder
