@@ -18,7 +18,7 @@ from bench.wire.captureblock import OVERHEAD, block_of, piece_of
 from bench.wire.isotp import Reassembler
 from drivers.dialogue import Dialogue, status_of
 
-LONGEST, SHORTEST = 32_768, 256
+LONGEST, SHORTEST = 131_072, 256
 """Bytes asked for at a time on CAN: half as many after each failure, twice as many after each success."""
 ATTEMPTS = 12  # in a row that brought nothing
 TIMES = 2  # that a whole buffer is fetched
@@ -74,13 +74,14 @@ class Upload:
     def _by_blocks(self, number: int, size: int, progress: Progress) -> bytes:
         buffer, length, failed = bytearray(), LONGEST, 0
         while len(buffer) < size:
-            part = self._block(number, len(buffer), min(length, size - len(buffer)))
+            asked = min(length, size - len(buffer))
+            part = self._block(number, len(buffer), asked)
             if part:
                 buffer += part
                 length, failed = min(2 * length, LONGEST), 0
                 progress(len(buffer), size)
                 continue
-            length, failed = max(length // 2, SHORTEST), failed + 1
+            length, failed = max(asked // 2, SHORTEST), failed + 1
             self._failed(number, len(buffer), size, failed)
         return bytes(buffer)
 

@@ -45,14 +45,14 @@ def test_lost_doubled_and_destroyed_frames(kind: str, fault: str) -> None:
 @KINDS
 def test_a_lost_block_is_asked_for_again_from_where_it_is_missing(kind: str) -> None:
     stand, asked = Stand(kind), list[tuple[int, int]]()
-    buffer = stand.recorded(1.0)
+    buffer = stand.recorded(2.0)
     seen = 0
 
     def lose(batch: FrameBatch) -> FrameBatch:
         nonlocal seen
         mine = of_uploads(batch)
         first, seen = seen, seen + len(mine)
-        return np.delete(batch, mine[(np.arange(first, seen) >= 700) & (np.arange(first, seen) < 720)])
+        return np.delete(batch, mine[(np.arange(first, seen) >= 2200) & (np.arange(first, seen) < 2220)])
 
     meanwhile(stand, lose)
     begin = stand.capture._dialogue.begin
@@ -64,9 +64,9 @@ def test_a_lost_block_is_asked_for_again_from_where_it_is_missing(kind: str) -> 
     stand.capture._dialogue.begin = noted  # type: ignore[method-assign, assignment]
     assert stand.uploaded() == buffer
     if kind == "can":
-        assert asked[:4] == [(0, 32768), (32768, 32768), (32768, 16384), (49152, 30848)]
+        assert asked == [(0, 131072), (131072, 28928), (131072, 14464), (145536, 14464)]
     else:
-        assert asked == [(0, 80000), (700 * 57, 20 * 57)]
+        assert asked == [(0, 160000), (2200 * 57, 20 * 57)]
 
 
 @KINDS
