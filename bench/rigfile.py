@@ -108,6 +108,7 @@ class Envelope(Part):
     max_speed_rad_s: float = Field(gt=0)
     max_temperature_K: float = Field(gt=0)
     max_levitated_position_m: float = Field(gt=0)
+    max_trial_weight_kg: float = Field(0.0, ge=0)  # in a balancing plane
     positions: tuple[str, ...] = ("pos_xi", "pos_yi", "pos_xo", "pos_yo")
 
 

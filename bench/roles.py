@@ -29,6 +29,8 @@ class Load:
 NOTHING = Load("")
 Side = Literal["left", "right"]
 """An end of the lever, seen from its outboard end: a weight on the left turns the shaft forward."""
+Plane = Literal["inboard", "outboard"]
+"""A balancing plane."""
 
 
 class Levitation(Protocol):
@@ -63,6 +65,11 @@ class Operator(Protocol):
     def hang(self, load: Load) -> None: ...  # the hanger stays on; returns when done
     def lever(self, side: Side, load: Load) -> None: ...  # a mass on an end of the level lever, the other end empty
     def mount(self, part: str) -> None: ...  # "ring" on the shaft; "" takes it off
+    def attach(
+        self, plane: Plane, mass_kg: float, angle_rad: float
+    ) -> None: ...  # a weight beside what is there; angle
+    # on the plane's scale, counted from y towards z while its zero faces y; the shaft must be landed
+    def detach(self, plane: Plane) -> None: ...  # every weight of that plane; the shaft must be landed
     def ask(self, question: str) -> str: ...
 
 

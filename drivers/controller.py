@@ -30,6 +30,7 @@ KEPT_S, KEPT_SLICE_S = 0.1, 0.02  # what is to stand or to keep its speed is loo
 STALL_NS = 200_000_000  # between two polls, or two slices: they come with every slice
 SPIN_S = 60.0
 SLOWEST_SLEW = 0.2  # rad/s, of a controller that does not say how fast it turns to an angle
+TOUCHED = 0.5  # rad/s, above which a landed shaft is not at rest
 HOST_AGE = "host_age"
 FIRST_S = 1.5  # for the first telemetry, and for the last owner to be gone
 STATES = {"OFF": RigState.OFF, "READY": RigState.READY, "LIFTING": RigState.READY, "LEVITATED": RigState.LEVITATED,
@@ -178,6 +179,17 @@ class Controller:
         """
         if self.mode not in ("LEVITATED", "SPINNING"):
             raise InterlockError(f"the shaft must not be driven in state {self.mode}: nothing holds it")
+
+    def require_landed(self) -> None:
+        """Raise unless the rotor rests: nobody reaches into the machine else.
+
+        Raises:
+            InterlockError: it does not.
+        """
+        if self.mode not in ("OFF", "READY") or abs(self.speed_rad_s) > TOUCHED:
+            raise InterlockError(
+                f"nobody may touch the shaft in state {self.mode} at {self.speed_rad_s:.1f} rad/s: land it first"
+            )
 
     def _look_at_heartbeat(self, blocks: Sequence[SampleBlock]) -> None:
         """How old the last heartbeat got in the controller's eyes, where it tells and watches."""

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from bench.rigfile import RigFile
 from bench.toleranced import Toleranced
+from sim_backend.balancer import Balancer
 from sim_backend.core.amb import AXES, CHANNELS, COILS, TRACE, AmbPlant
 from sim_backend.core.amb_params import AmbParams, runout
 
@@ -27,7 +28,7 @@ DEFECTS = {
     "contact_silent": 0.0, "factor_ellipse_on": 1.0, "factor_ellipse_hz": 1.0, "factor_ref_y": 1.0, "factor_ref_z": 1.0,
     "current_sign_i": 1.0, "current_sign_o": 1.0, "pulse_missing": 0.0,
     "pulse_doubled": 0.0, "loose_speed": 0.0, "loose_shift": 0.0, "drop_fraction": 0.0, "integrator_factor": 1.0,
-    "dead_after_s": 0.0, "fault_after_s": 0.0, "drive_fault_after_s": 0.0,
+    "dead_after_s": 0.0, "fault_after_s": 0.0, "drive_fault_after_s": 0.0, "weight_lost": 0.0,
 }  # fmt: skip
 """Planted defects and their harmless values. Current signs act on what is told of a bearing's y and z axes,
 `told_*` on the telemetry and captures alone; `factor_*` scales a parameter that the controller is told before it acts."""
@@ -43,20 +44,14 @@ SHARED = {
 """Entries of the simulation table that are drawn several times, and the names of the draws."""
 
 
-class Bystander:
-    """Nothing is hung or mounted on this machine; who watches it answers questions."""
-
-    def request(self, line: str) -> str:
-        """One line: `ask TEXT`."""
-        return "yes" if line.split()[:1] == ["ask"] else f"error cannot {line.strip()!r}"
-
-
 def stated(rig: RigFile) -> dict[str, Toleranced]:
     """Every toleranced number of a rig file by its name; one that holds for several axes or planes once for each."""
     out = {f"geometry.{k}": t for k, t in rig.geometry.items()} | {f"machine.{k}": t for k, t in rig.machine.items()}
     out["site.gravity"] = rig.site.gravity
     out["roll"] = out.pop("machine.radial_axes")  # of the axes against the vertical, both together
     out.pop("machine.runout")  # drawn as orders and phases
+    for name in ("machine.weight_mass", "machine.weight_angle"):  # drawn for each weight that is fixed
+        out.pop(name, None)
     for name in (*(f"i_{coil}" for coil in COILS), *(f"pos_{axis}" for axis in AXES)):
         out |= {f"{name}.gain": rig.sensors[name].gain, f"{name}.offset": rig.sensors[name].offset}
     for name, value in rig.simulation.items():
@@ -132,9 +127,9 @@ def make(p: AmbParams, seed: int, substeps: int) -> AmbPlant:
     return AmbPlant(p, seed, substeps=substeps)
 
 
-def operator(rig: RigFile, plant: AmbPlant, truth: Truth) -> Bystander:
+def operator(rig: RigFile, plant: AmbPlant, truth: Truth) -> Balancer:
     """Who works on it."""
-    return Bystander()
+    return Balancer(plant, rig, truth)
 
 
 def copper_W(plant: AmbPlant) -> float:

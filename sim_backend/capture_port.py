@@ -146,13 +146,12 @@ def _can_ns(rig: RigFile) -> float:
 
 def _serial_ns(rig: RigFile) -> float:
     """From piece to piece on a serial line of 10 bits a byte, beside the telemetry."""
-    baudrate = BAUDRATE
+    baudrate: float = BAUDRATE
     try:
         url = linkurl.parse(rig.link.url)
         baudrate = int(url.query.get("baudrate", "") or BAUDRATE) if url.scheme == "serial" else BAUDRATE
     except (ConfigError, ValueError):
         pass
     telemetry = sum((m.length + PACKET_BYTES) / m.period_s for m in rig.messages.messages.values() if m.period_s)
-    a_piece = MESSAGE.size + PAYLOAD_LIMIT
-    a_piece *= 1 + PACKET_BYTES / LIMIT
+    a_piece = (MESSAGE.size + PAYLOAD_LIMIT) * (1 + PACKET_BYTES / LIMIT)
     return 1e9 * a_piece / (SERIAL_SHARE * max(baudrate / 10 - telemetry, baudrate / 100))

@@ -4,7 +4,7 @@ the plant. It has its own copy of the message map and shares no object with the 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import cast
 
 import numpy as np
@@ -323,7 +323,7 @@ class SimulatedController:
     def _status(self, name: str) -> int:
         return self._map.code("CommandReply", "status", name)
 
-    def _send(self, message: str, values: dict[str, float], clock: tuple[int, int]) -> None:
+    def _send(self, message: str, values: Mapping[str, float], clock: tuple[int, int]) -> None:
         m = self._map[message]
         at = clock[0] + (self.plant.tick - clock[1]) * 100_000
         self._out.append(frame(m.identifier, encode(m, values), t_ns=at, flags=FD))

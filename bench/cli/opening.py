@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from bench import faults, linkurl
 from bench.cli import console
-from bench.cli.safety import safe_steps
+from bench.cli.safety import may_touch, safe_steps
 from bench.clock import Clock, WallClock
 from bench.errors import BenchError, ConfigError
 from bench.faults import Fault
@@ -198,6 +198,9 @@ def _opened(
     controller.companions.append(bus.pump)
     if bus.drive is not None:
         bus.drive.may_run = controller.require_levitated
+
+    for person in operators:
+        person.may_touch = may_touch(controller, bus.drive)
 
     def attach(recorder: Recorder | None) -> None:
         for part in recording:

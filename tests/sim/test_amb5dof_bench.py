@@ -10,9 +10,12 @@ from contextlib import contextmanager, nullcontext
 import numpy as np
 import pytest
 
+from bench.cli.safety import safe_steps
 from bench.errors import BenchError, DeviceFault, InterlockError, LinkError
+from bench.opened import WatchedClock
 from bench.rigfile import load_rig
 from bench.session import Session
+from bench.supervisor import Supervisor
 from drivers.controller import Controller
 from drivers.fieldbus import Fieldbus, open_devices
 from sim_backend.endpoint import SimulatedRig
@@ -152,6 +155,24 @@ def test_without_a_host_the_drive_lets_go_and_the_rotor_coasts_and_lands() -> No
     assert stand.machine.device.fault == "HEARTBEAT_LOST"
     assert stand.bank.drives["drive"].fault == "COMMUNICATION"
     assert stand.plant.shaft_speed < stand.controller.landing_speed
+
+
+def test_make_safe_lands_what_the_controller_sees_turning_for_a_while_yet() -> None:
+    """The drive says standstill; the pulses, and with them the controller's state, say so half a second later."""
+    stand = Stand(1)
+    stand.levitate()
+    supervisor = Supervisor()
+    base = WatchedClock(stand.machine, stand.machine.link.renew_lease, supervisor.check)
+    with driven(stand) as bus:
+        assert bus.drive is not None
+        bus.drive.reach(100.0)
+        brake, _, land = safe_steps(stand.controller, base, bus.drive)[1:4]
+        brake.action()
+        assert stand.controller.mode == "SPINNING"
+        begin = stand.machine.now_ns()
+        land.action()
+        assert (stand.machine.now_ns() - begin) * 1e-9 < land.timeout_s / 4
+    assert stand.controller.mode == "READY"
 
 
 def test_a_sensor_of_the_wrong_sign_is_never_levitated() -> None:
