@@ -22,6 +22,7 @@ from drivers.dialogue import Dialogue, status_of
 
 LOOK_S, LONG_S = 0.02, 0.5
 ASKED = 3  # times, for a state
+WAITING = 0.2  # of what is left at least, between two looks before the trigger
 _log = logging.getLogger("drivers")
 
 
@@ -88,6 +89,10 @@ class ControllerCapture:
                   "divider": divider, "length": length, "before": before}  # fmt: skip
         reply = self._ask("CaptureArm", values)
         status, state = self._said(reply)
+        if status == "WRONG_STATE" and (self._armed is None or self._armed[2] != reply["number"]):
+            self.cancel()  # of a bench that is gone, or the answer to its arming was lost
+            reply = self._ask("CaptureArm", values)
+            status, state = self._said(reply)
         if status == "WRONG_STATE":
             raise BenchError(
                 f"capture: one is {state} already, and the controller records one at a time: wait, or cancel()"
@@ -216,10 +221,11 @@ class ControllerCapture:
         return state
 
     def _due_s(self, reply: dict[str, float], state: str) -> float:
-        """How long the rest of it takes at least."""
-        layout = self._present()[0]
-        left = reply["size"] / layout.sample.itemsize - (reply["samples"] if state == "TRIGGERED" else reply["trigger"])
-        return left * reply["divider"] * self._tick_s if state == "TRIGGERED" else 0.0
+        """When to look again: once the rest is recorded; a part of that while it is not known when the rest begins."""
+        length = reply["size"] / self._present()[0].sample.itemsize
+        if state == "TRIGGERED":
+            return (length - reply["samples"]) * reply["divider"] * self._tick_s
+        return WAITING * (length - min(reply["samples"], reply["trigger"])) * reply["divider"] * self._tick_s
 
     def _ask(self, message: str, values: dict[str, float], times: int = 1) -> dict[str, float]:
         """What changes nothing may be asked again where the answer did not come."""

@@ -120,6 +120,22 @@ def test_the_readings_are_those_of_their_ticks() -> None:
     assert told["pos_yi"][at : at + 30] == pytest.approx(x.reshape(30, 10).mean(axis=1), abs=1.1e-8)
 
 
+def test_a_lower_rate_takes_some_of_the_ticks() -> None:
+    """Those whose number is a multiple."""
+    every, third = Host(), Host()
+    every.arm(length=600)
+    third.arm(length=150, divider=3)
+    for host in (every, third):
+        host.run(0.08)
+    one, other = every.status(), third.status()
+    assert (one["state"], other["state"], other["tick"] % 3) == ("DONE", "DONE", 0)  # type: ignore[operator]
+    x, y = (Layout.of(SPEC, POSITIONS).decoded(h.read(1, 0, n * 8) or b"") for h, n in ((every, 600), (third, 150)))
+    first = int(other["tick"]) - int(one["tick"])  # type: ignore[arg-type]
+    assert 0 <= first < 3
+    for name in POSITIONS:
+        assert y[name].tolist() == x[name][first::3][:150].tolist()
+
+
 @pytest.mark.parametrize(
     ("values", "status"),
     [
@@ -210,6 +226,27 @@ def test_a_new_read_ends_the_last() -> None:
     host.run(1e-3, host.message("CaptureRead", number=1, form=1, length=40000))
     out = host.run(0.05, host.message("CaptureRead", number=1, form=1, offset=39990, length=10))
     assert [piece_of(payload(r)).offset for r in out[out["id"] == 0x201]] == [39990]  # type: ignore[union-attr]
+
+
+def test_what_is_on_its_way_ends_with_the_capture() -> None:
+    host = Host()
+    host.arm(length=5000)
+    host.run(0.6)
+    assert (host.run(2e-3, host.message("CaptureRead", number=1, form=1, length=40000))["id"] == 0x201).any()
+    host.arm(length=10)
+    assert not (host.run(0.05)["id"] == 0x201).any()
+
+
+def test_many_reads_are_no_faster() -> None:
+    host = Host()
+    host.arm(length=100)
+    host.run(0.02)
+    out = np.concatenate([
+        host.run(1e-4, host.message("CaptureRead", number=1, form=1, offset=k, length=8)) for k in range(30)
+    ])  # fmt: skip
+    mine = out[out["id"] == 0x201]
+    assert 8 <= len(mine) <= 13
+    assert np.diff(mine["t_ns"]).min() > 200_000
 
 
 def rows(tick: int, count: int, every: int, **columns: np.ndarray) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,8 +13,9 @@ from capture_stand import POSITIONS, RIG, Stand
 
 from bench import capture
 from bench.capture import CaptureData
-from bench.errors import AnalysisError, BenchError
+from bench.errors import AnalysisError, BenchError, LinkError
 from bench.export import export
+from bench.frames import FrameBatch
 from bench.recording import Recording
 
 CHANNELS = ("pos_yi", "i_yi_p", "u_yi_p", "speed", "pulses", "pulse_age")
@@ -198,6 +200,32 @@ def test_one_at_a_time(stand: Stand) -> None:
     stand.machine.device.captures.memory.cancel()  # type: ignore[union-attr]
     with pytest.raises(BenchError, match=r"does not have it any more \(OK, IDLE\)"):
         role.wait(1.0)
+
+
+def test_what_a_bench_that_is_gone_left_armed_is_given_up() -> None:
+    stand = Stand()
+    stand.capture.arm(POSITIONS, seconds=0.1, trigger=capture.at_speed(100.0))
+    stand.capture._armed = None  # another driver, which knows nothing of it
+    stand.capture.arm(POSITIONS, seconds=0.1)
+    stand.capture.wait(1.0)
+
+
+@pytest.mark.parametrize("lost", [2, 3])
+def test_an_answer_that_is_lost_is_asked_for_again(lost: int) -> None:
+    stand, seen = Stand(), 0
+    stand.capture.arm(POSITIONS, seconds=0.1)
+    receive = stand.machine.link.receive
+
+    def without() -> FrameBatch:
+        nonlocal seen
+        batch = receive()
+        mine = batch["id"] == RIG.messages["CaptureStatus"].identifier
+        seen += int(mine.sum())
+        return batch[~mine] if seen <= lost else batch
+
+    stand.machine.link.receive = without  # type: ignore[method-assign]
+    with nullcontext() if lost < 3 else pytest.raises(LinkError, match=r"waited 0\.5 s for the state of the capture"):
+        stand.capture.wait(5.0)
 
 
 def test_what_it_says_of_itself(stand: Stand) -> None:

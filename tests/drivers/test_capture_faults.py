@@ -62,7 +62,11 @@ def test_a_lost_block_is_asked_for_again_from_where_it_is_missing(kind: str) -> 
         return begin(message, values)
 
     stand.capture._dialogue.begin = noted  # type: ignore[method-assign, assignment]
+    begin_ns = stand.machine.now_ns()
     assert stand.uploaded() == buffer
+    assert stand.machine.now_ns() - begin_ns < (
+        0.85e9 if kind == "can" else 1.2e9
+    )  # no waiting: the loss is seen at once
     if kind == "can":
         assert asked == [(0, 131072), (131072, 28928), (131072, 14464), (145536, 14464)]
     else:
@@ -86,6 +90,21 @@ def test_a_spoilt_block(kind: str) -> None:
     meanwhile(stand, spoil)
     assert stand.uploaded() == buffer
     assert done
+
+
+def test_a_block_from_elsewhere_is_not_taken() -> None:
+    """Such as the answer to an earlier request."""
+    stand = Stand("can")
+    buffer, begin, asked = stand.recorded(0.05), stand.capture._dialogue.begin, 0
+
+    def other(message: str, values: dict) -> int:
+        nonlocal asked
+        asked += 1
+        return begin(message, {**values, "offset": 8, "length": values["length"] - 8} if asked == 1 else values)
+
+    stand.capture._dialogue.begin = other  # type: ignore[method-assign, assignment]
+    assert stand.uploaded() == buffer
+    assert stand.capture._uploads.failures == 1
 
 
 @KINDS
