@@ -38,6 +38,7 @@ bench: setup
 	$(BIN)/python benchmarks/serial_link.py --seconds 10
 	$(BIN)/python benchmarks/recorder_fast.py --seconds 10
 	$(BIN)/python benchmarks/roundtrip.py
+	$(BIN)/python benchmarks/capture.py
 	$(BIN)/python benchmarks/dead_host.py --runs 3
 
 format: setup

@@ -47,3 +47,18 @@ def bus_load(messages: MessageMap, bitrate: float, data_bitrate: float | None) -
         for m in messages.messages.values()
     }
     return BusLoad(sum(parts.values()), parts)
+
+
+def upload_frame_seconds(messages: MessageMap, bitrate: float, data_bitrate: float | None) -> float:
+    """Time from frame to frame of a capture's upload that leaves the bus free for everything else, at a load of REFUSE."""
+    m = messages["CaptureBlock"]
+    periodic = (x for x in messages.messages.values() if x.period_s)
+    busy = sum(frame_seconds(x, bitrate, data_bitrate) / x.period_s for x in periodic)
+    return frame_seconds(m, bitrate, data_bitrate) / max(REFUSE - busy, 1 - REFUSE)
+
+
+def net_bytes_per_second(messages: MessageMap, bitrate: float, data_bitrate: float | None) -> float:
+    """Payload that a bus carries in its longest frames in the time that periodic messages leave, bytes a second."""
+    m = messages["CaptureBlock"]
+    busy = sum(frame_seconds(x, bitrate, data_bitrate) / x.period_s for x in messages.messages.values() if x.period_s)
+    return m.length * (1 - busy) / frame_seconds(m, bitrate, data_bitrate)

@@ -70,6 +70,16 @@ class Envelope:
             found = "no such mass" if mass is None else f"{mass.value:g} kg"
             raise InterlockError(f"mass {label}: found {found}; the envelope allows {limit:g} kg")
 
+    def check_weight(self, mass_kg: float) -> None:
+        """Refuse a weight beyond what may turn in a balancing plane.
+
+        Raises:
+            InterlockError: nothing was asked of the operator.
+        """
+        limit = self.rig.envelope.max_trial_weight_kg
+        if not 0 < mass_kg <= limit:
+            raise InterlockError(f"weight: found {mass_kg * 1e3:g} g; the envelope allows above 0 to {limit * 1e3:g} g")
+
     def problems_of(self, settings: dict[str, float]) -> Iterable[str]:
         """What a plan's settings break, before anything is started."""
         for name, value in settings.items():

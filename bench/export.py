@@ -25,8 +25,8 @@ EVENTS: Final = pa.schema([("t_ns", pa.int64()), ("kind", pa.string()), ("data",
 def export(run: Path, to: Format, out: Path | None = None) -> tuple[Path, ...]:
     """Write a run's streams and events into folder `out` (default RUN/export), replacing older exports.
 
-    `parquet` and `csv` give `<stream>.<to>` and `events.<to>`; `mcap` gives `samples.mcap`, where every sample is a
-    message of scalars that Foxglove and PlotJuggler plot at full rate. Each file appears whole or not at all. Of a
+    `parquet` and `csv` give `<stream>.<to>`, `capture-<n>.<to>` and `events.<to>`; `mcap` gives `samples.mcap`, where every
+    sample is a message of scalars that Foxglove and PlotJuggler plot at full rate. Each file appears whole or not at all. Of a
     truncated recording, what was written before it was cut off.
 
     Returns:
@@ -61,9 +61,9 @@ def _whole(path: Path, write: Callable[[Path], None]) -> Path:
 
 
 def _tables(folder: Path, to: Format, recording: Recording[Any]) -> Iterator[Path]:
-    for stream in recording.streams.values():
+    for stream in (*recording.streams.values(), *recording.capture_streams.values()):
         schema = _schema(stream, with_units=to == "csv")
-        yield _table(folder / f"{stream.name}.{to}", to, schema, _batches(recording, stream, schema))
+        yield _table(folder / f"{stream.name.replace('/', '-')}.{to}", to, schema, _batches(recording, stream, schema))
     yield _table(folder / f"events.{to}", to, EVENTS, iter([_events(recording)]))
 
 
@@ -111,8 +111,8 @@ def _write_mcap(part: Path, recording: Recording[Any]) -> None:
         writer: Any = Writer(file, compression=CompressionType.LZ4, enable_data_crcs=True)
         writer.start(profile="", library="levbench")
         writer.add_metadata("expanded-from", {"file": recording.path.name, "sha256": recording.digest()})
-        for stream in recording.streams.values():
-            kind = f"Sample_{stream.name}"
+        for stream in (*recording.streams.values(), *recording.capture_streams.values()):
+            kind = layout.type_name("Sample", stream.name)
             schema = writer.register_schema(f"levbench.{kind}", "protobuf", layout.sample_schema(stream))
             units = {c.name: c.unit for c in stream.channels}
             channel = writer.register_channel(layout.sample_topic(stream.name), "protobuf", schema, units)

@@ -55,6 +55,11 @@ def sample_topic(stream: str) -> str:
     return f"/{stream}/sample"
 
 
+def type_name(kind: str, stream: str) -> str:
+    """The protobuf name of a stream's messages: `Block_telemetry`, `Block_capture_1`."""
+    return f"{kind}_{stream.replace('/', '_')}"
+
+
 def _file(name: str, fields: list[tuple[str, int, int, bool]]) -> bytes:
     """A FileDescriptorSet with one message of (name, number, type, repeated) fields."""
     file = descriptor_pb2.FileDescriptorProto(name=f"{name}.proto", package="levbench", syntax="proto3")
@@ -84,17 +89,17 @@ def block_schema(layout: StreamLayout) -> bytes:
     fields = [(name, k + 1, _kind(kind), False) for k, (name, kind) in enumerate(HEAD)]
     fields += [("device_ticks", TICKS, _kind("TYPE_FIXED64"), True), ("t_ns", TIMES, _kind("TYPE_FIXED64"), True)]
     fields += [(c.name, FIRST_COLUMN + k, _kind(_TYPES[c.dtype][0]), True) for k, c in enumerate(layout.channels)]
-    return _file(f"Block_{layout.name}", fields)
+    return _file(type_name("Block", layout.name), fields)
 
 
 def view_schema(layout: StreamLayout) -> bytes:
     """`View_<stream>`: scalars, mean, minimum and maximum of each measured channel and the last value of each code."""
-    return _scalars(f"View_{layout.name}", view_names(layout))
+    return _scalars(type_name("View", layout.name), view_names(layout))
 
 
 def sample_schema(layout: StreamLayout) -> bytes:
     """`Sample_<stream>`: scalars, one for each channel."""
-    return _scalars(f"Sample_{layout.name}", [c.name for c in layout.channels])
+    return _scalars(type_name("Sample", layout.name), [c.name for c in layout.channels])
 
 
 def _scalars(name: str, fields: Sequence[str]) -> bytes:

@@ -38,15 +38,16 @@ class McapWriter:
         *,
         view: bool = True,
     ) -> None:
-        self._file, self._streams = file, streams
-        self.blocks = dict.fromkeys(streams, 0)
+        self._file, self._view = file, view
+        self._streams: dict[str, StreamLayout] = {}
+        self.blocks: dict[str, int] = {}
         self._mcap: Any = Writer(file, chunk_size=1 << 20, compression=CompressionType.LZ4, index_types=IndexType.ALL,
                             enable_crcs=True, enable_data_crcs=True)  # fmt: skip
         self._mcap.start(profile="levbench", library="levbench")
         self._channels: dict[str, int] = {}
         self._sequence: dict[str, int] = {}
-        self._pending: dict[str, list[SampleBlock]] = {name: [] for name in streams}
-        self._windows = {name: layout.ViewWindows(s, VIEW_NS) for name, s in streams.items() if view}
+        self._pending: dict[str, list[SampleBlock]] = {}
+        self._windows: dict[str, layout.ViewWindows] = {}
         self._next_flush = start_ns + FLUSH_NS
         self._mcap.add_metadata("layout", {"version": str(layout.VERSION)})
         for name, values in metadata.items():
@@ -54,16 +55,22 @@ class McapWriter:
         for name, data in attachments.items():
             self._mcap.add_attachment(0, 0, name, "text/plain", data)
         for stream in streams.values():
-            described = {"layout": json.dumps({"period_ns": stream.period_ns,
-                         "channels": [[c.name, c.unit, c.dtype] for c in stream.channels]})}  # fmt: skip
-            self._register(layout.block_topic(stream.name), f"levbench.Block_{stream.name}",
-                           layout.block_schema(stream), described)  # fmt: skip
-            if view:
-                schema = layout.view_schema(stream)
-                self._register(layout.view_topic(stream.name), f"levbench.View_{stream.name}", schema)
+            self.stream(stream)
         event = self._mcap.register_schema("levbench.Event", "jsonschema", layout.EVENT_SCHEMA)
         self._channels[layout.EVENTS] = self._mcap.register_channel(layout.EVENTS, "json", event)
         file.flush()
+
+    def stream(self, stream: StreamLayout) -> None:
+        """Add a stream; its samples come later."""
+        name, described = stream.name, {"layout": json.dumps({
+            "period_ns": stream.period_ns, "channels": [[c.name, c.unit, c.dtype] for c in stream.channels]})}  # fmt: skip
+        self._streams[name], self._pending[name], self.blocks[name] = stream, [], 0
+        kind = layout.type_name("Block", name)
+        self._register(layout.block_topic(name), f"levbench.{kind}", layout.block_schema(stream), described)
+        if self._view:
+            self._windows[name] = layout.ViewWindows(stream, VIEW_NS)
+            kind = layout.type_name("View", name)
+            self._register(layout.view_topic(name), f"levbench.{kind}", layout.view_schema(stream))
 
     def _register(self, topic: str, name: str, schema: bytes, metadata: Mapping[str, str] | None = None) -> None:
         number = self._mcap.register_schema(name, "protobuf", schema)

@@ -1,7 +1,8 @@
 """The generated part of docs/reference/protocol.md: message tables, codes and parameters, from a rig file and its DBC.
 
 `python -m bench.protocoldoc [RIG]` prints it, each section between its markers; with `--into PAGE` it replaces the
-sections of a page instead. `--own` are the sections of a page of one rig: its telemetry and its parameters.
+sections of a page instead. `--own` are the sections of a page of one rig: its telemetry and its parameters; `--captures`
+those of the page of captures.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from collections.abc import Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
 
+from bench import capture
 from bench.errors import ConfigError
 from bench.messages import Message, MessageMap, Signal
 from bench.rigfile import RigFile, load_rig
@@ -21,6 +23,8 @@ from bench.rigfile import RigFile, load_rig
 RIG = "rigs/tsbs12.toml"
 CODES = (("state", "CommandReply"), ("fault", "Telemetry"), ("code", "Command"), ("status", "CommandReply"))
 HEADINGS = {"code": "command"}
+CAPTURE_CODES = (("trigger", "CaptureArm"), ("code", "CaptureAsk"), ("form", "CaptureRead"), ("status", "CaptureStatus"),
+                 ("state", "CaptureStatus"))  # fmt: skip
 
 
 def sections(rig: RigFile) -> dict[str, str]:
@@ -39,6 +43,20 @@ def own_sections(rig: RigFile) -> dict[str, str]:
     return {
         "telemetry": "\n\n".join(_layout(rig.messages[name]) for name in rig.binding.telemetry),
         "parameters": _parameters(rig),
+    }
+
+
+def capture_sections(rig: RigFile) -> dict[str, str]:
+    """The generated sections of the page of captures, from a rig that has them."""
+    assert rig.capture is not None
+    messages = [rig.messages[name] for name in capture.MESSAGES]
+    known = sorted(rig.capture.channels.items(), key=lambda item: item[1].index)
+    rows = [(str(c.index), f"`{name}`", c.type, f"{c.scale:g}", c.unit, c.about) for name, c in known]
+    return {
+        "messages": _overview(messages),
+        "layouts": "\n\n".join(_layout(m) for m in messages),
+        "codes": _code_table(rig.messages, CAPTURE_CODES),
+        "channels": _table(("index", "name", "type", "scale", "unit", "about"), rows),
     }
 
 
@@ -106,9 +124,13 @@ def _scale(s: Signal) -> str:
 
 
 def _codes(messages: MessageMap) -> str:
-    tables = [dict(messages[message].signal(signal).choices) for signal, message in CODES]
+    return _code_table(messages, CODES)
+
+
+def _code_table(messages: MessageMap, codes: Sequence[tuple[str, str]]) -> str:
+    tables = [dict(messages[message].signal(signal).choices) for signal, message in codes]
     rows = [(str(n), *(table.get(n, "") for table in tables)) for n in range(max(max(table) for table in tables) + 1)]
-    return _table(("code", *(HEADINGS.get(signal, signal) for signal, _ in CODES)), rows)
+    return _table(("code", *(HEADINGS.get(signal, signal) for signal, _ in codes)), rows)
 
 
 def _parameters(rig: RigFile) -> str:
@@ -136,9 +158,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("rig", nargs="?", default=RIG, help="rig file (default: %(default)s)")
     parser.add_argument("--into", type=Path, metavar="PAGE", help="replace the generated sections of a page")
     parser.add_argument("--own", action="store_true", help="telemetry and parameters alone")
+    parser.add_argument("--captures", action="store_true", help="what belongs to captures alone")
     given = parser.parse_args(arguments)
     try:
-        generated = (own_sections if given.own else sections)(load_rig(given.rig))
+        chosen = capture_sections if given.captures else own_sections if given.own else sections
+        generated = chosen(load_rig(given.rig))
         if given.into is None:
             sys.stdout.write("\n\n".join(marked(name, text) for name, text in generated.items()) + "\n")
         else:

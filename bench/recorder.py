@@ -106,6 +106,17 @@ class Recorder:
             self._put("frames", link, lag_ns, batch.astype(FRAME, copy=True))
             _add(self.integrity.frames, link, len(batch))
 
+    def stream(self, layout: StreamLayout) -> None:
+        """Add a stream, such as a capture, while recording.
+
+        Raises:
+            RecordingError: there is one of that name.
+        """
+        if layout.name in self._streams:
+            raise RecordingError(f"recording {self.path}: stream {layout.name} is there already")
+        self._streams[layout.name] = layout
+        self._put("stream", layout)
+
     def samples(self, block: SampleBlock) -> None:
         """Record decoded samples; small blocks are merged, large ones split.
 

@@ -19,6 +19,7 @@ import numpy.typing as npt
 from bench import layout
 from bench.calibration import Calibration
 from bench.calibrationfile import attached
+from bench.captured import CAPTURES, Captured
 from bench.errors import AnalysisError, ConfigError, RecordingError
 from bench.frames import FrameBatch, frames_of
 from bench.layout import DecodedBlock
@@ -28,7 +29,7 @@ from bench.rigfile import RigFile
 from bench.samples import ChannelInfo, StreamLayout
 from bench.steps import Step, Steps
 
-__all__ = ["Recording", "Step", "Steps"]
+__all__ = ["Captured", "Recording", "Step", "Steps"]
 P = TypeVar("P", bound=BenchPlan)
 Q = TypeVar("Q", bound=BenchPlan)
 J = TypeVar("J", dict[str, Any], list[Any])
@@ -178,17 +179,42 @@ class Recording(Generic[P]):
             return hashlib.file_digest(file, "sha256").hexdigest()
 
     @cached_property
-    def streams(self) -> dict[str, StreamLayout]:
-        """The recorded streams by name."""
+    def _layouts(self) -> dict[str, StreamLayout]:
         out = {}
         for topic, metadata in self._file.topics.values():
             if topic.endswith("/block") and "layout" in metadata:
                 described = json.loads(metadata["layout"])
-                name = topic.split("/")[1]
+                name = topic.removeprefix("/").removesuffix("/block")
                 out[name] = StreamLayout(
                     name, described["period_ns"], tuple(ChannelInfo(*c) for c in described["channels"])
                 )
         return out
+
+    @property
+    def streams(self) -> dict[str, StreamLayout]:
+        """The streams that were recorded all the time, by name."""
+        return {name: s for name, s in self._layouts.items() if not name.startswith(CAPTURES)}
+
+    @property
+    def capture_streams(self) -> dict[str, StreamLayout]:
+        """The streams of captures, by name."""
+        return {name: s for name, s in self._layouts.items() if name.startswith(CAPTURES)}
+
+    def captures(self, **labels: Any) -> tuple[Captured, ...]:
+        """The captures that were uploaded with these labels, in order; all of them by default."""
+        found = (Captured.of(self, event) for event in self.events("capture") if event["stream"] in self._layouts)
+        return tuple(c for c in found if labels.items() <= c.labels.items())
+
+    @cached_property
+    def start_ns(self) -> int:
+        """Time of the first sample of the telemetry; what `t_s` counts from.
+
+        Raises:
+            AnalysisError: there is none.
+        """
+        for block in self.blocks("telemetry"):
+            return int(block.t_ns[0])
+        raise AnalysisError(f"{self.path.name} holds no telemetry")
 
     def blocks(self, stream: str, start_ns: int = 0, end_ns: int = 1 << 63) -> Iterator[DecodedBlock]:
         """Decoded blocks that may hold samples of an interval, in order."""
@@ -202,7 +228,7 @@ class Recording(Generic[P]):
         key = (stream, t_ns, id(data))
         kept = self._kept.get(key)
         if kept is None or kept[0] is not data:
-            kept = self._kept[key] = (data, DecodedBlock(self.streams[stream], data))
+            kept = self._kept[key] = (data, DecodedBlock(self._layouts[stream], data))
             if len(self._kept) > KEPT:
                 self._kept.popitem(last=False)
         return kept[1]
@@ -231,7 +257,7 @@ class Recording(Generic[P]):
     def lost(self, stream: str, start_ns: int, end_ns: int) -> int:
         """How many samples with start <= t < end are missing: those that blocks count as lost before them, and those
         after the last block, where a recording was cut off."""
-        period, missing, last = self.streams[stream].period_ns, 0, None
+        period, missing, last = self._layouts[stream].period_ns, 0, None
         for block in self.blocks(stream, start_ns):
             first, last = int(block.t_ns[0]), int(block.t_ns[-1])
             # The k-th lost sample before a block was due at first - k periods.

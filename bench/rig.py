@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from bench.clock import Clock
 from bench.linkhealth import Health
 from bench.rigfile import RigFile
-from bench.roles import Drive, Levitation, Operator, Rotation, Supply, Thermal
+from bench.roles import Capture, Drive, Levitation, Operator, Rotation, Supply, Thermal
 from bench.telemetry import Counters
 
 
@@ -27,3 +27,4 @@ class Rig:
     drive: Drive | None = None
     supply: Supply | None = None
     thermal: Thermal | None = None
+    capture: Capture | None = None

@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from bench import binding, linkurl, units
+from bench import binding, capture, linkurl, units
 from bench.busload import REFUSE, BusLoad, bus_load
 from bench.errors import ConfigError, Problem
 from bench.messages import MessageMap
@@ -36,12 +36,14 @@ SOME_GEOMETRY = {
     "axial_gap": "air gap of the axial AMB",
     "com_to_inboard_balance": "centre of mass to the inboard balancing plane",
     "com_to_outboard_balance": "centre of mass to the outboard balancing plane",
+    "balance_radius": "shaft axis to where weights are fixed in the balancing planes",
     "com_to_coupling": "centre of mass to the coupling of an external motor",
     "coupling_stiffness": "radial stiffness of that coupling",
 }
 """Lengths that a rig may have; the procedures that need one say so."""
 MACHINE = {"pole_pairs": "1", "polar_inertia": "kg m^2", "ring_inertia": "kg m^2", "amb_asymmetry": "1",
-           "radial_axes": "rad", "runout": "m", "mass": "kg", "transverse_inertia": "kg m^2"}  # fmt: skip
+           "radial_axes": "rad", "runout": "m", "mass": "kg", "transverse_inertia": "kg m^2",
+           "weight_mass": "kg", "weight_angle": "rad"}  # fmt: skip
 FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 
 
@@ -242,7 +244,8 @@ def _bindings(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
         elif channel.unit in units.UNITS and units.UNITS[dbc_unit].si != units.UNITS[channel.unit].si:
             yield Problem(rig.path, f"channels.{name}.unit", channel.unit, f"the kind of {dbc_unit} ({channel.signal})")
     yield from _signals_of_parameters(rig, messages)
-    for key, found, expected in binding.problems_of(rig, messages):
+    captures = capture.problems_of(rig.capture, messages) if rig.capture is not None else ()
+    for key, found, expected in (*binding.problems_of(rig, messages), *captures):
         yield Problem(rig.path, key, found, expected)
 
 

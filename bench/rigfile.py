@@ -17,6 +17,7 @@ from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from bench import catalogue
 from bench.binding import Binding
+from bench.capture import CaptureSpec
 from bench.errors import ConfigError, Problem
 from bench.messages import MessageMap, load_messages
 from bench.part import Part
@@ -107,6 +108,7 @@ class Envelope(Part):
     max_speed_rad_s: float = Field(gt=0)
     max_temperature_K: float = Field(gt=0)
     max_levitated_position_m: float = Field(gt=0)
+    max_trial_weight_kg: float = Field(0.0, ge=0)  # in a balancing plane
     positions: tuple[str, ...] = ("pos_xi", "pos_yi", "pos_xo", "pos_yo")
 
 
@@ -138,6 +140,7 @@ class RigFile(Part):
     sensors: Mapping[str, Sensor]
     machine: Mapping[str, Toleranced] = {}
     calibration: CalibrationTable = CalibrationTable()
+    capture: CaptureSpec | None = None
     envelope: Envelope
     plans: Mapping[str, Mapping[str, Any]] = {}
     simulation: Annotated[Mapping[str, Any], BeforeValidator(simulated)] = {}

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal, Protocol
+
+from bench.capture import NOW, CaptureData, Trigger
 
 
 class RigState(StrEnum):
@@ -27,6 +29,8 @@ class Load:
 NOTHING = Load("")
 Side = Literal["left", "right"]
 """An end of the lever, seen from its outboard end: a weight on the left turns the shaft forward."""
+Plane = Literal["inboard", "outboard"]
+"""A balancing plane."""
 
 
 class Levitation(Protocol):
@@ -61,6 +65,11 @@ class Operator(Protocol):
     def hang(self, load: Load) -> None: ...  # the hanger stays on; returns when done
     def lever(self, side: Side, load: Load) -> None: ...  # a mass on an end of the level lever, the other end empty
     def mount(self, part: str) -> None: ...  # "ring" on the shaft; "" takes it off
+    def attach(
+        self, plane: Plane, mass_kg: float, angle_rad: float
+    ) -> None: ...  # a weight beside what is there; angle
+    # on the plane's scale, counted from y towards z while its zero faces y; the shaft must be landed
+    def detach(self, plane: Plane) -> None: ...  # every weight of that plane; the shaft must be landed
     def ask(self, question: str) -> str: ...
 
 
@@ -80,6 +89,26 @@ class Drive(Protocol):
     def reach(self, rad_s: float) -> None: ...  # set_speed, run; returns at that speed
     def coast(self) -> None: ...  # no torque
     def stop(self) -> None: ...  # brakes; returns at standstill
+
+
+class Capture(Protocol):
+    """What records inside the controller, at its full rate, and uploads. One capture at a time."""
+
+    @property
+    def channels(self) -> tuple[str, ...]: ...  # what it can record
+    @property
+    def memory_bytes(self) -> int: ...
+    @property
+    def rate_hz(self) -> float: ...  # the highest
+    def arm(
+        self, channels: Sequence[str], *, seconds: float, before_s: float = 0.0, rate_hz: float | None = None,
+        trigger: Trigger = NOW,
+    ) -> None: ...  # `seconds` in all, `before_s` of them before the trigger; refuses more than memory_bytes  # fmt: skip
+    def wait(self, timeout_s: float) -> None: ...  # returns when it is recorded
+    def upload(
+        self, progress: Callable[[int, int], None] | None = None, **labels: str | float
+    ) -> CaptureData: ...  # into the recording, as stream capture/1, capture/2 ...; progress: bytes so far, and in all
+    def cancel(self) -> None: ...  # gives up what is armed or recorded
 
 
 class Supply(Protocol):

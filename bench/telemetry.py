@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from bench import units
 from bench.assembly import Assembler, Rows
+from bench.errors import LinkError
 from bench.frames import ERROR, FrameBatch
 from bench.hosttime import HostMap
 from bench.rigfile import RigFile
@@ -87,6 +88,18 @@ class TelemetryDecoder:
         """Time of the newest sample on the sample clock; 0 before the first."""
         s = self._segment
         return s.offset_ns + s.tick * self._tick_ns if s is not None else 0
+
+    def placed(self, tick: int) -> tuple[int, int]:
+        """A tick of 32 bits that the controller named: as the telemetry counts it, and its time on the sample clock.
+
+        Raises:
+            LinkError: no telemetry has come.
+        """
+        s = self._segment
+        if s is None:
+            raise LinkError("no telemetry has come: a tick of the controller has no time yet")
+        whole = s.tick + int(_signed(np.array(tick - s.tick), 32))
+        return whole, s.offset_ns + whole * self._tick_ns
 
     @property
     def period_ns(self) -> int:

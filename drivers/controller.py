@@ -19,6 +19,8 @@ from bench.samples import SampleBlock
 from bench.session import Session
 from bench.telemetry import TelemetryDecoder
 from drivers import advice, handshake
+from drivers.capture import ControllerCapture
+from drivers.capture_upload import Upload
 from drivers.dialogue import Dialogue, no_reply
 from drivers.orders import Orders
 
@@ -28,6 +30,7 @@ KEPT_S, KEPT_SLICE_S = 0.1, 0.02  # what is to stand or to keep its speed is loo
 STALL_NS = 200_000_000  # between two polls, or two slices: they come with every slice
 SPIN_S = 60.0
 SLOWEST_SLEW = 0.2  # rad/s, of a controller that does not say how fast it turns to an angle
+TOUCHED = 0.5  # rad/s, above which a landed shaft is not at rest
 HOST_AGE = "host_age"
 FIRST_S = 1.5  # for the first telemetry, and for the last owner to be gone
 STATES = {"OFF": RigState.OFF, "READY": RigState.READY, "LIFTING": RigState.READY, "LEVITATED": RigState.LEVITATED,
@@ -62,6 +65,12 @@ class Controller:
         self.host_age_s = 0.0  # the greatest while the machine was on
         self.companions: list[Callable[[], None]] = []  # polled with it: other devices of the rig
         self._orders = Orders(rig, self._dialogue, session, self.envelope, lambda: self.mode, self._wait)
+        self.capture: ControllerCapture | None = None
+        if rig.capture is not None:
+            upload = Upload(rig, link, self._dialogue, self.clock)
+            self.capture = ControllerCapture(
+                rig, rig.capture, self._dialogue, upload, session, self.telemetry, self.clock, self._wait
+            )
 
     @property
     def recorder(self) -> Recorder | None:
@@ -71,6 +80,8 @@ class Controller:
     @recorder.setter
     def recorder(self, recorder: Recorder | None) -> None:
         self._recorder = self._dialogue.recorder = self._orders.recorder = recorder
+        if self.capture is not None:
+            self.capture.recorder = recorder
         if recorder is not None:
             self.telemetry.start_counting()
 
@@ -134,6 +145,8 @@ class Controller:
         if self._recorder is not None:
             self._recorder.frames(self.link.name, batch, lag_ns=self.telemetry.host.lag_ns)
         self._dialogue.take(batch)
+        if self.capture is not None:
+            self.capture.take(batch)
         blocks = self.telemetry.decode(batch)
         for block in blocks:
             if self._recorder is not None:
@@ -166,6 +179,17 @@ class Controller:
         """
         if self.mode not in ("LEVITATED", "SPINNING"):
             raise InterlockError(f"the shaft must not be driven in state {self.mode}: nothing holds it")
+
+    def require_landed(self) -> None:
+        """Raise unless the rotor rests: nobody reaches into the machine else.
+
+        Raises:
+            InterlockError: it does not.
+        """
+        if self.mode not in ("OFF", "READY") or abs(self.speed_rad_s) > TOUCHED:
+            raise InterlockError(
+                f"nobody may touch the shaft in state {self.mode} at {self.speed_rad_s:.1f} rad/s: land it first"
+            )
 
     def _look_at_heartbeat(self, blocks: Sequence[SampleBlock]) -> None:
         """How old the last heartbeat got in the controller's eyes, where it tells and watches."""

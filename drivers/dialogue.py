@@ -14,7 +14,7 @@ from bench.recorder import Recorder
 from bench.rigfile import RigFile
 
 REPLY_S = 0.5
-REPLIES = ("CommandReply", "ParamReply", "Identity", "Owner")
+REPLIES = ("CommandReply", "ParamReply", "Identity", "Owner", "CaptureStatus")
 KEPT = 256  # replies that nobody waits for: another host may ask too
 
 
@@ -118,6 +118,17 @@ class Dialogue:
                 f"{error}. A {reply} of {self._misfit[reply]} bytes came, the DBC says {stated}: does the firmware's "
                 "message map match the rig file's?"
             ) from error
+
+    def begin(self, message: str, values: Mapping[str, float]) -> int:
+        """Send a request that is answered by something else than a reply, or refused by one; its token."""
+        self._token = (self._token + 1) & 0xFF
+        self._forget()
+        self.send(message, {**values, "token": self._token})
+        return self._token
+
+    def heard(self, reply: str, token: int) -> dict[str, float] | None:
+        """The reply with a token, if one came since that request."""
+        return next((v for n, v, _ in self._answers if n == reply and v["token"] == token), None)
 
     def send(self, message: str, values: Mapping[str, float]) -> None:
         """Send a message as it is."""

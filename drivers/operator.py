@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -9,16 +10,18 @@ from bench.clock import Clock
 from bench.envelope import Envelope
 from bench.errors import BenchError, OperatorAbort
 from bench.recorder import Recorder
-from bench.roles import Load, Side
+from bench.roles import Load, Plane, Side
 
 
 class LineOperator:
     """An operator that answers lines: `hang M2`, `hang -`, `lever left M2`, `lever left -`, `mount ring`, `mount -`,
-    `ask TEXT` (see the simulated backend's operator)."""
+    `attach inboard KG RAD`, `detach inboard`, `ask TEXT` (see the simulated backend's operators). `may_touch` raises while
+    nobody may reach into the machine."""
 
     def __init__(self, request: Callable[[str], str], clock: Clock, envelope: Envelope) -> None:
         self._request, self._clock, self._envelope = request, clock, envelope
         self.recorder: Recorder | None = None
+        self.may_touch: Callable[[], None] = lambda: None
 
     def hang(self, load: Load) -> None:
         """Have a mass hung in place of what hangs, and wait until it does.
@@ -51,6 +54,29 @@ class LineOperator:
         self._do(f"mount {part or '-'}", f"mount {part or 'nothing'}")
         self._note(action="mount", part=part)
 
+    def attach(self, plane: Plane, mass_kg: float, angle_rad: float) -> None:
+        """Have a weight fixed in a balancing plane, beside what is there, and wait until it is.
+
+        Raises:
+            InterlockError: the weight is beyond the envelope, or the shaft is not landed.
+            BenchError: the other end cannot do it.
+        """
+        self._envelope.check_weight(mass_kg)
+        self.may_touch()
+        self._do(f"attach {plane} {mass_kg!r} {angle_rad!r}", f"fix {mass_kg * 1e3:g} g in the {plane} plane")
+        self._note(action="attach", plane=plane, mass_kg=mass_kg, angle_rad=angle_rad)
+
+    def detach(self, plane: Plane) -> None:
+        """Have every weight taken off a balancing plane, and wait until they are.
+
+        Raises:
+            InterlockError: the shaft is not landed.
+            BenchError: the other end cannot do it.
+        """
+        self.may_touch()
+        self._do(f"detach {plane}", f"take the weights off the {plane} plane")
+        self._note(action="detach", plane=plane)
+
     def _do(self, line: str, what: str) -> None:
         answer = self._request(line).split()
         if not answer or answer[0] != "ok":
@@ -76,6 +102,7 @@ class ConsoleOperator:
     ) -> None:
         self._prompt, self._clock, self._envelope, self._then = prompt, clock, envelope, then
         self.recorder: Recorder | None = None
+        self.may_touch: Callable[[], None] = lambda: None
 
     def hang(self, load: Load) -> None:
         """Ask for a mass to be hung; the hanger stays on.
@@ -112,6 +139,38 @@ class ConsoleOperator:
         self.ask(f"{what}. Press Enter when it sits, or type stop: ")
         if self._then is not None:
             self._then.mount(part)
+
+    def attach(self, plane: Plane, mass_kg: float, angle_rad: float) -> None:
+        """Ask for a weight in a balancing plane, beside what is there.
+
+        Raises:
+            InterlockError: the weight is beyond the envelope, or the shaft is not landed.
+            OperatorAbort: the person answered stop.
+        """
+        self._envelope.check_weight(mass_kg)
+        self.may_touch()
+        where = f"the {plane} balancing plane at {math.degrees(angle_rad) % 360:.1f} deg of its scale"
+        self.ask(
+            f"The shaft is landed and stands. Weigh out {mass_kg * 1e3:.3f} g and fix it in {where}; leave the other weights "
+            "where they are; take tools and hands away. Press Enter when it sits tight, or type stop: "
+        )
+        if self._then is not None:
+            self._then.attach(plane, mass_kg, angle_rad)
+
+    def detach(self, plane: Plane) -> None:
+        """Ask for every weight to be taken off a balancing plane.
+
+        Raises:
+            InterlockError: the shaft is not landed.
+            OperatorAbort: the person answered stop.
+        """
+        self.may_touch()
+        self.ask(
+            f"The shaft is landed and stands. Take every weight that was fixed in the {plane} balancing plane off; take tools "
+            "and hands away. Press Enter when that is done, or type stop: "
+        )
+        if self._then is not None:
+            self._then.detach(plane)
 
     def ask(self, question: str) -> str:
         """The person's answer.

@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from bench.rigfile import RigFile
 from bench.toleranced import Toleranced
-from sim_backend.core.amb import AXES, CHANNELS, COILS, AmbPlant
+from sim_backend.balancer import Balancer
+from sim_backend.core.amb import AXES, CHANNELS, COILS, TRACE, AmbPlant
 from sim_backend.core.amb_params import AmbParams, runout
 
 if TYPE_CHECKING:
@@ -27,10 +28,10 @@ DEFECTS = {
     "contact_silent": 0.0, "factor_ellipse_on": 1.0, "factor_ellipse_hz": 1.0, "factor_ref_y": 1.0, "factor_ref_z": 1.0,
     "current_sign_i": 1.0, "current_sign_o": 1.0, "pulse_missing": 0.0,
     "pulse_doubled": 0.0, "loose_speed": 0.0, "loose_shift": 0.0, "drop_fraction": 0.0, "integrator_factor": 1.0,
-    "dead_after_s": 0.0, "fault_after_s": 0.0, "drive_fault_after_s": 0.0,
+    "dead_after_s": 0.0, "fault_after_s": 0.0, "drive_fault_after_s": 0.0, "weight_lost": 0.0,
 }  # fmt: skip
 """Planted defects and their harmless values. Current signs act on what is told of a bearing's y and z axes,
-`told_*` on the telemetry alone; `factor_*` scales a parameter that the controller is told before it acts."""
+`told_*` on the telemetry and captures alone; `factor_*` scales a parameter that the controller is told before it acts."""
 SHARED = {
     "beta": tuple(f"beta_{a}" for a in RADIAL),
     "magnetic_offset": tuple(f"offset_{a}" for a in RADIAL),
@@ -43,20 +44,14 @@ SHARED = {
 """Entries of the simulation table that are drawn several times, and the names of the draws."""
 
 
-class Bystander:
-    """Nothing is hung or mounted on this machine; who watches it answers questions."""
-
-    def request(self, line: str) -> str:
-        """One line: `ask TEXT`."""
-        return "yes" if line.split()[:1] == ["ask"] else f"error cannot {line.strip()!r}"
-
-
 def stated(rig: RigFile) -> dict[str, Toleranced]:
     """Every toleranced number of a rig file by its name; one that holds for several axes or planes once for each."""
     out = {f"geometry.{k}": t for k, t in rig.geometry.items()} | {f"machine.{k}": t for k, t in rig.machine.items()}
     out["site.gravity"] = rig.site.gravity
     out["roll"] = out.pop("machine.radial_axes")  # of the axes against the vertical, both together
     out.pop("machine.runout")  # drawn as orders and phases
+    for name in ("machine.weight_mass", "machine.weight_angle"):  # drawn for each weight that is fixed
+        out.pop(name, None)
     for name in (*(f"i_{coil}" for coil in COILS), *(f"pos_{axis}" for axis in AXES)):
         out |= {f"{name}.gain": rig.sensors[name].gain, f"{name}.offset": rig.sensors[name].offset}
     for name, value in rig.simulation.items():
@@ -132,9 +127,9 @@ def make(p: AmbParams, seed: int, substeps: int) -> AmbPlant:
     return AmbPlant(p, seed, substeps=substeps)
 
 
-def operator(rig: RigFile, plant: AmbPlant, truth: Truth) -> Bystander:
+def operator(rig: RigFile, plant: AmbPlant, truth: Truth) -> Balancer:
     """Who works on it."""
-    return Bystander()
+    return Balancer(plant, rig, truth)
 
 
 def copper_W(plant: AmbPlant) -> float:
@@ -145,18 +140,32 @@ def copper_W(plant: AmbPlant) -> float:
 def places(defects: Numbers, at: Mapping[str, int]) -> tuple[list[int], list[int]]:
     """Which channels of the core are told, and where each goes among the signals; a bearing whose current sensors are
     exchanged has the currents of its coils the other way round."""
-    told = [k for k, name in enumerate(CHANNELS) if name in at]
-    goes = {CHANNELS[k]: at[CHANNELS[k]] for k in told}
+    told, shown = [k for k, name in enumerate(CHANNELS) if name in at], told_as(defects)
+    return told, [at[shown.get(CHANNELS[k], CHANNELS[k])] for k in told]
+
+
+def told_as(defects: Numbers) -> dict[str, str]:
+    """What a channel of the core is told as, where planted defects exchange channels."""
+    shown = {name: name for name in (*(f"pos_{a}" for a in AXES), *(f"i_{c}" for c in COILS))}
+
+    def exchange(a: str, b: str) -> None:
+        shown[a], shown[b] = shown[b], shown[a]
+
     for b in "io":
         if defects[f"current_sign_{b}"] < 0:
             for axis in "yz":
-                p, n = f"i_{axis}{b}_p", f"i_{axis}{b}_n"
-                goes[p], goes[n] = goes[n], goes[p]
-    pairs = [(f"pos_{a}i", f"pos_{a}o") for a in "yz"] if defects["told_planes"] else []
-    pairs += [(f"pos_y{b}", f"pos_z{b}") for b in "io"] if defects["told_axes"] else []
-    for a, b in pairs:
-        goes[a], goes[b] = goes[b], goes[a]
-    return told, list(goes.values())
+                exchange(f"i_{axis}{b}_p", f"i_{axis}{b}_n")
+    for a in "yz" if defects["told_planes"] else "":
+        exchange(f"pos_{a}i", f"pos_{a}o")
+    for b in "io" if defects["told_axes"] else "":
+        exchange(f"pos_y{b}", f"pos_z{b}")
+    return shown
+
+
+def traced(defects: Numbers) -> tuple[str, ...]:
+    """The names of the readings of a tick, for captures."""
+    shown = told_as(defects)
+    return tuple(shown.get(name, name) for name in TRACE)
 
 
 def spoil(values: Array, at: Mapping[str, int], defects: Numbers) -> None:

@@ -4,7 +4,8 @@ the plant. It has its own copy of the message map and shares no object with the 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import cast
 
 import numpy as np
 
@@ -14,8 +15,10 @@ from bench.frames import FD, FrameBatch, frame, joined
 from bench.messages import load_messages
 from bench.rigfile import RigFile
 from sim_backend import core
+from sim_backend.capture_port import CapturePort
 from sim_backend.core import PERIOD_TICKS, TICK_S
 from sim_backend.device_faults import DeviceFaults
+from sim_backend.machine import TracedPlant
 from sim_backend.ownership import Ownership
 from sim_backend.telemetry import Span, TelemetryEncoder
 from sim_backend.truth import Truth
@@ -45,17 +48,18 @@ class SimulatedController:
     """
 
     def __init__(self, rig: RigFile, truth: Truth, faults: Sequence[Fault] = (), substeps: int = 2) -> None:
-        self._map = load_messages(rig.dbc_text)
+        self._rig, self._map = rig, load_messages(rig.dbc_text)
         handlers = {"Heartbeat": self._heartbeat, "Command": self._command, "ParamSet": self._set,
                     "ParamGet": self._get, "Claim": self._claim}  # fmt: skip
         host = [m for m in self._map.messages.values() if m.sender == "Host"]
-        self._handlers = {m.identifier: (Decoder(m), handlers[m.name]) for m in host}
+        self._handlers = {m.identifier: (Decoder(m), handlers.get(m.name)) for m in host}
         self._parameters = {p.index: (name, p) for name, p in rig.parameters.items()}
         self.truth = truth
         self._machine = truth.machine
         self.plant = self._machine.make(truth.plant, truth.seed, substeps)
         self.plant.run(REST_TICKS)
         self.faults = DeviceFaults(rig, faults) if faults else None
+        self.captures: CapturePort | None = None
         self.restart()
         self._owner = Ownership()
         self._encoder = TelemetryEncoder(self._map, truth, self.plant.tick)
@@ -84,6 +88,8 @@ class SimulatedController:
             self._run_to(start + min(max((t_ns - t0_ns) // 100_000, 0), ticks))
             self._receive(identifier, payloads[64 * k : 64 * k + length], clock)
         self._run_to(start + ticks)
+        if self.captures is not None and len(blocks := self.captures.sent(self.plant.tick, clock)):
+            self._out.append(blocks)
         sent = joined([self._encoder.encode(self._spans, clock), *self._out])
         return sent[np.argsort(sent["t_ns"], kind="stable")] if self._out else sent
 
@@ -96,6 +102,8 @@ class SimulatedController:
         self.plant.mode = core.OFF
         self.plant.clear_trips()
         self._brake()
+        traced = self._machine.traced(self.truth.defects)
+        self.captures = CapturePort(self._rig, self._map, traced) if self._rig.capture is not None and traced else None
         self._own = {name: p.default for name, p in self._parameters.values()}
         for name, value in self._own.items():
             self._apply(name, value)
@@ -111,10 +119,19 @@ class SimulatedController:
                 until = min(tick, deadline) if deadline > before else tick
             if self.state in MOVING:
                 until = min(until, before + 10 * PERIOD_TICKS)
-            rows = plant.run(until - before)
+            rows = self._advanced(until - before)
             self._spans.append(Span(rows, before, self.state, self.fault, owner.heartbeat, owner.armed))
             before = plant.tick
             self._progress(rows, before)
+
+    def _advanced(self, ticks: int) -> core.Array:
+        """Let the plant run; what a capture wants of every so many ticks goes there."""
+        every, start = (self.captures.memory.every if self.captures is not None else 0), self.plant.tick
+        if self.captures is None or not every:
+            return self.plant.run(ticks)
+        rows, readings = cast(TracedPlant, self.plant).run(ticks, every)
+        self.captures.memory.take(-(-start // every) * every, readings)
+        return rows
 
     def _watching(self) -> bool:
         return self._owner.armed and self.state not in ("OFF", "FAULT")
@@ -208,10 +225,14 @@ class SimulatedController:
         decoder, handler = self._handlers[identifier]
         if len(data) != decoder.message.length:
             return
-        values = decoder.decode_one(data)
-        if not all(map(math.isfinite, values.values())) and decoder.message.name != "ParamSet":
+        values, name = decoder.decode_one(data), decoder.message.name
+        if not all(map(math.isfinite, values.values())) and name not in ("ParamSet", "CaptureArm"):
             return
-        handler(values, clock)
+        if handler is not None:
+            handler(values, clock)
+        elif self.captures is not None:
+            self.captures.receive(name, values, self.plant.tick, self._owner, self.state in AT_REST,
+                                  lambda answer, told: self._send(answer, told, clock))  # fmt: skip
 
     def _heartbeat(self, v: dict[str, float], _: tuple[int, int]) -> None:
         self._owner.beat(v, self.plant.tick)
@@ -312,7 +333,7 @@ class SimulatedController:
     def _status(self, name: str) -> int:
         return self._map.code("CommandReply", "status", name)
 
-    def _send(self, message: str, values: dict[str, float], clock: tuple[int, int]) -> None:
+    def _send(self, message: str, values: Mapping[str, float], clock: tuple[int, int]) -> None:
         m = self._map[message]
         at = clock[0] + (self.plant.tick - clock[1]) * 100_000
         self._out.append(frame(m.identifier, encode(m, values), t_ns=at, flags=FD))

@@ -17,6 +17,7 @@ from sim_backend.machine import SimulatedPlant
 
 TICK_NS = round(TICK_S * 1e9)
 PERIOD_NS = PERIOD_TICKS * TICK_NS
+STATUS_TICK = slice(24, 28)  # of CaptureStatus
 
 
 class Device(Protocol):
@@ -47,6 +48,8 @@ class DeviceFaults:
         self._beat = beat.identifier
         self._counter = beat.signal(rig.binding.heartbeat_counter).start // 8
         self._telemetry = rig.messages[rig.binding.telemetry[0]].identifier
+        status = rig.messages.messages.get("CaptureStatus")
+        self._status = status.identifier if status is not None else 0
         self._last = np.zeros(2, np.uint8)  # the counter that a stuck heartbeat repeats
         self._origin: int | None = None
         self._done: set[Fault] = set()
@@ -122,7 +125,8 @@ class DeviceFaults:
         return hit
 
     def _renumbered(self, sent: FrameBatch) -> FrameBatch:
-        """Sequence and tick of the telemetry count from the present boot (places as in sim_backend/telemetry.py)."""
+        """Sequence and tick of the telemetry, and a capture's tick, count from the present boot (places as in
+        sim_backend/telemetry.py and the DBC)."""
         if not self._first_tick:
             return sent
         out = sent.copy()
@@ -136,4 +140,7 @@ class DeviceFaults:
             tick = (tick.astype(np.int64) - self._first_tick).astype("<u4")
             out["data"][mine, 0:2] = sequence.view(np.uint8).reshape(-1, 2)
             out["data"][mine, 2:6] = tick.view(np.uint8).reshape(-1, 4)
+        for k in np.flatnonzero(out["id"] == self._status) if self._status else ():  # of a capture of this boot
+            told = int.from_bytes(out["data"][k, STATUS_TICK].tobytes(), "little") - self._first_tick
+            out["data"][k, STATUS_TICK] = np.frombuffer((told & 0xFFFFFFFF).to_bytes(4, "little"), np.uint8)
         return out

@@ -45,6 +45,12 @@ class SimulatedPlant(Protocol):
     def run(self, ticks: int) -> Array: ...  # rows of the machine's channels, one per telemetry period
 
 
+class TracedPlant(Protocol):
+    """A plant that also gives the readings of single ticks."""
+
+    def run(self, ticks: int, trace: int) -> tuple[Array, Array]: ...  # rows, and the readings of every so many ticks
+
+
 class OperatorLine(Protocol):
     """Who works on a machine."""
 
@@ -71,6 +77,7 @@ class Machine:
         windings: temperatures, and how far each is above the inboard AMB's, K.
         copper_W: what the windings dissipate at the present.
         operator: who works on it.
+        traced: the channels of a tick's readings, for captures; none where the plant gives no such readings.
     """
 
     name: str
@@ -89,6 +96,7 @@ class Machine:
     windings: Numbers
     copper_W: Callable[[Any], float]
     operator: Callable[[RigFile, Any, Truth], OperatorLine]
+    traced: Callable[[Numbers], tuple[str, ...]] = lambda _: ()
 
 
 TSBS = Machine(
@@ -103,6 +111,7 @@ AMB5DOF = Machine(
     quantities=amb_quantities.quantities, targets={}, make=amb5dof.make, radial=slice(0, 4),
     integral_gains=frozenset(("ki", "k0")), turns=False, places=amb5dof.places, spoil=amb5dof.spoil, supply_V=48.0,
     windings={"temp_i": 0.0, "temp_o": 2.0, "temp_x": -3.0}, copper_W=amb5dof.copper_W, operator=amb5dof.operator,
+    traced=amb5dof.traced,
 )  # fmt: skip
 MACHINES = {machine.name: machine for machine in (TSBS, AMB5DOF)}
 

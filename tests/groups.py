@@ -10,7 +10,8 @@ from typing import Any
 
 GROUPS = {
     # Their processes keep up with wall time.
-    "real-time": ("tests/links/test_chain.py", "tests/links/test_killed.py", "tests/links/test_live_run.py",
+    "real-time": ("tests/links/test_captures.py", "tests/links/test_chain.py", "tests/links/test_killed.py",
+                  "tests/links/test_live_run.py",
                   "tests/links/test_two_benches.py", "tests/links/test_unplug.py", "tests/firmware/",
                   "tests/cli/test_serve.py", "tests/drivers/test_heartbeat", "tests/drivers/test_live_link.py",
                   "tests/drivers/test_fieldbus_live.py", "test_docs.py::test_commands_work[serve-a-rig]",

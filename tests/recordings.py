@@ -53,8 +53,10 @@ def frames_of(part: SampleBlock) -> FrameBatch:
     return batch
 
 
-def record(path: Path, blocks: list[SampleBlock], *, header: RunHeader = HEADER, note: str = "") -> Integrity:
-    """Blocks with their frames; a step around each block, labelled with its number."""
+def record(
+    path: Path, blocks: list[SampleBlock], *, header: RunHeader = HEADER, note: str = "", captured: int = 0
+) -> Integrity:
+    """Blocks with their frames; a step around each block, labelled with its number; captures of 1500 samples at the end."""
     clock = SetClock()
     with Recorder(path, clock=clock, streams=[STREAM], header=header) as recorder:
         recorder.event("state", now="LEVITATED", note=note)
@@ -65,9 +67,21 @@ def record(path: Path, blocks: list[SampleBlock], *, header: RunHeader = HEADER,
                 recorder.samples(part)
                 clock.now = int(part.t_ns[-1]) + PERIOD_NS
         recorder.frames("controller", frame(0x11, b"\1\0\0\0\4\0\0\0", t_ns=clock.now, flags=SENT | FD))
+        for n in range(1, captured + 1):
+            _capture(recorder, n)
         recorder.event("state", now="READY")
         recorder.wall["started"] = "2026-01-01"
         return recorder.close()
+
+
+def _capture(recorder: Recorder, number: int) -> None:
+    """At 10 kHz over the second block; its channel counts."""
+    name, index, start = f"capture/{number}", np.arange(1500), START_NS + 100 * PERIOD_NS
+    recorder.stream(StreamLayout(name, 100_000, (ChannelInfo("inject", "A"),)))
+    columns = {"inject": index.astype(np.float64)}
+    recorder.samples(SampleBlock(name, 0, (1000 + index).astype(np.uint64), start + 100_000 * index, start, 0, columns))
+    recorder.event("capture", stream=name, labels={"n": number}, samples=1500, rate_hz=1e4, first_tick=1000, start_ns=start,
+                   trigger=0, waited_for={"kind": "NOW", "channel": "", "level": 0.0})  # fmt: skip
 
 
 def gapped() -> list[SampleBlock]:

@@ -54,6 +54,17 @@ def test_the_reference_reader_reads_everything(reader: list[str], tmp_path: Path
     assert found["attachments"] == ["rig.toml", "plan.json"]
 
 
+def test_the_reference_reader_reads_captures(reader: list[str], tmp_path: Path) -> None:
+    record(tmp_path / "a.mcap", gapped(), captured=2)
+    done = read(reader, tmp_path / "a.mcap")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    for n in (1, 2):
+        assert found["sequential"][f"/capture/{n}/block"] == 2
+        assert found["sequential"][f"/capture/{n}/view"] == 15
+    assert found["indexed"] == found["stated"] == found["sequential"]
+
+
 def test_the_reference_reader_refuses_a_flipped_byte(reader: list[str], tmp_path: Path) -> None:
     record(tmp_path / "a.mcap", gapped())
     data = bytearray((tmp_path / "a.mcap").read_bytes())

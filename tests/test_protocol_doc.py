@@ -24,7 +24,7 @@ from bench.frames import FD, empty_batch, frame
 from bench.messages import Message
 from bench.rigfile import load_rig
 from bench.session import Session
-from bench.wire import packet, slcan
+from bench.wire import captureblock, isotp, packet, slcan
 from drivers import controller, dialogue, handshake, slcan_bus
 from sim_backend import ownership
 from sim_backend.controller import MAP_VERSION, SimulatedController
@@ -114,6 +114,20 @@ def test_a_page_of_one_rig_has_its_telemetry_and_its_parameters(tmp_path: Path) 
     told = RIG.parameters["bias_i"].model_copy(update={"about": "of the inboard AMB"})
     one = RIG.model_copy(update={"parameters": {**RIG.parameters, "bias_i": told}})
     assert "| resting | of the inboard AMB |" in protocoldoc.own_sections(one)["parameters"]
+
+
+def test_the_page_of_captures_is_up_to_date_and_its_bytes_are_right() -> None:
+    page, rig = PAGE.with_name("captures.md").read_text(encoding="utf-8"), load_rig("amb5dof")
+    assert protocoldoc.replaced(page, protocoldoc.capture_sections(rig)) == page, (
+        "run: python -m bench.protocoldoc amb5dof --captures --into docs/reference/captures.md"
+    )
+    shown = re.findall(r"^(?:[0-9A-F]{2} )+[0-9A-F]{2}$", page, re.MULTILINE)
+    arm = {"session": 7, "token": 1, "trigger": 3, "channels0": 15, "divider": 1, "length": 10000, "before": 1000}
+    read = {"number": 3, "offset": 4096, "length": 3, "token": 2}
+    block = captureblock.block(3, 4096, b"\xaa\xbb\xcc")
+    assert [bytes.fromhex(text) for text in shown] == [
+        encode(rig.messages["CaptureArm"], arm), encode(rig.messages["CaptureRead"], read), *isotp.segments(block, 64)
+    ]  # fmt: skip
 
 
 def test_the_page_of_the_amb_stand_is_up_to_date() -> None:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from mcap.writer import Writer
-from recordings import PERIOD_NS, START_NS, STREAM, SetClock, block, frames_of, record
+from recordings import HEADER, PERIOD_NS, START_NS, STREAM, SetClock, block, frames_of, gapped, record
 
-from bench.errors import RecordingError
+from bench.errors import AnalysisError, RecordingError
 from bench.procedure import BenchPlan
 from bench.recorder import Recorder, RunHeader
 from bench.recording import Recording
@@ -156,3 +157,33 @@ def test_a_long_file_is_read_step_by_step_in_little_memory(tmp_path: Path) -> No
     assert len(means) == seconds
     assert (tmp_path / "a.mcap").stat().st_size > 10e6
     assert peak < 6e6
+
+
+def test_captures_are_no_streams_of_the_whole_run(tmp_path: Path) -> None:
+    record(tmp_path / "r.mcap", gapped(), captured=2)
+    recording = Recording.open(tmp_path / "r.mcap")
+    assert list(recording.streams) == ["telemetry"]
+    one, two = recording.captures()
+    assert recording.captures(n=2) == (two,)
+    x = one.arrays()
+    assert x["inject"].tolist() == list(range(1500))
+    assert x["t_s"][[0, -1]].tolist() == pytest.approx([0.1, 0.2499])
+    assert x["tick"][0] == 1000
+    assert one.trigger_ns == START_NS + 100 * PERIOD_NS
+    assert list(two.frame("inject").index) == x["t_s"].tolist()
+    with pytest.raises(AnalysisError, match="inject: not all recorded in one stream"):
+        recording.channel("inject")
+
+
+def test_a_capture_that_was_cut_off_is_no_capture(tmp_path: Path) -> None:
+    record(tmp_path / "r.mcap", gapped(), captured=1)
+    recording = Recording.open(tmp_path / "r.mcap")
+    (one,) = recording.captures()
+    with pytest.raises(AnalysisError, match="capture/1: found 1500 samples; expected 1501"):
+        replace(one, samples=1501).arrays()
+
+
+def test_a_stream_is_added_once(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "r.mcap", clock=SetClock(), streams=[STREAM], header=HEADER) as recorder:
+        with pytest.raises(RecordingError, match="stream telemetry is there already"):
+            recorder.stream(STREAM)

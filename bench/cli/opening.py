@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from bench import faults, linkurl
 from bench.cli import console
-from bench.cli.safety import safe_steps
+from bench.cli.safety import may_touch, safe_steps
 from bench.clock import Clock, WallClock
 from bench.errors import BenchError, ConfigError
 from bench.faults import Fault
@@ -210,6 +210,9 @@ def _opened(
     if bus.drive is not None:
         bus.drive.may_run = controller.require_levitated
 
+    for person in operators:
+        person.may_touch = may_touch(controller, bus.drive)
+
     def attach(recorder: Recorder | None) -> None:
         for part in recording:
             part.recorder = recorder
@@ -226,7 +229,7 @@ def _opened(
                       replies_wrong_length=controller.replies_wrong_length)  # fmt: skip
 
     rig = Rig(controller.rig, controller.clock, controller, controller, operators[0], controller.telemetry.counters,
-              health, controller.link.close, bus.drive, bus.supply, bus.thermal)  # fmt: skip
+              health, controller.link.close, bus.drive, bus.supply, bus.thermal, controller.capture)  # fmt: skip
     found = [faults.announced(injected)] if injected else []
     if controller.cleared:
         found.append(

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from bench.clock import Clock
-from bench.errors import LinkError
+from bench.errors import InterlockError, LinkError
 from bench.opened import WatchedClock
 from bench.roles import Drive
 from bench.supervisor import SafeStep
@@ -58,6 +58,9 @@ def safe_steps(controller: Controller, base: WatchedClock, drive: Drive | None =
             controller.stop()
 
     def land() -> None:
+        _until(
+            lambda: controller.mode != "SPINNING", controller.clock
+        )  # it says so a while after the shaft was stopped
         if controller.mode == "LEVITATED":
             controller.land()
         elif controller.mode == "LIFTING":
@@ -92,6 +95,17 @@ def safe_steps(controller: Controller, base: WatchedClock, drive: Drive | None =
         SafeStep("the controller's own make-safe", then(own), STOP_S + LAND_S),
         SafeStep("the controller's watchdog", then(watchdog), STOP_S + LAND_S),
     )
+
+
+def may_touch(controller: Controller, drive: Drive | None) -> Callable[[], None]:
+    """What raises InterlockError while nobody may reach into the machine: the rotor is not landed, or its drive is on."""
+
+    def check() -> None:
+        controller.require_landed()
+        if drive is not None and not drive.confirm_off():
+            raise InterlockError("nobody may touch the shaft: its drive does not say that it is off")
+
+    return check
 
 
 def _blind(controller: Controller) -> bool:

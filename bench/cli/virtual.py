@@ -14,6 +14,7 @@ from bench.adoption import calibration_of
 from bench.calibration import Calibration, Need, facts_of, settings_differ
 from bench.calibrationfile import attachment
 from bench.cli.opening import SIMULATED
+from bench.cli.safety import may_touch
 from bench.errors import ConfigError
 from bench.findings import Finding
 from bench.linkhealth import Health
@@ -112,8 +113,9 @@ def simulated_run(
     ):  # fmt: skip
         live = Rig(file, controller.clock, controller, controller, operator, counters,
                    lambda: Health(counters, simulated.link.stats, None, 0), simulated.link.close,
-                   bus.drive if bus else None)  # fmt: skip
+                   bus.drive if bus else None, capture=controller.capture)  # fmt: skip
         controller.recorder = operator.recorder = recorder
+        operator.may_touch = may_touch(controller, bus.drive if bus else None)
         if bus is not None:
             bus.recorder = recorder
         controller.clock.sleep(0.1)

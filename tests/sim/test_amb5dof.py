@@ -20,7 +20,8 @@ from sim_backend.truth import Truth, draw, nominal
 
 OWN = {"watchdog_s", "landing_speed"}  # of the interface, not of the laws
 OF_THE_RIG = {"notch1_hz", "notch1_q", "notch2_hz", "notch2_q", "lift_time_s"}  # other than the core's defaults
-NOT_OF_THE_PLANT = {"geometry.com_to_inboard_amb", "drive_gain", "drive_limit", "drive_ramp"}
+NOT_OF_THE_PLANT = {"geometry.com_to_inboard_amb", "drive_gain", "drive_limit", "drive_ramp",
+                    "geometry.balance_radius"}  # fmt: skip
 
 
 @cache

@@ -6,13 +6,20 @@ import hashlib
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from bench import capture
+from bench.cli.safety import safe_steps
 from bench.errors import BenchError, DeviceFault, InterlockError, LinkError
+from bench.opened import WatchedClock
+from bench.recorder import Recorder, RunHeader
+from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.session import Session
+from bench.supervisor import Supervisor
 from drivers.controller import Controller
 from drivers.fieldbus import Fieldbus, open_devices
 from sim_backend.endpoint import SimulatedRig
@@ -152,6 +159,69 @@ def test_without_a_host_the_drive_lets_go_and_the_rotor_coasts_and_lands() -> No
     assert stand.machine.device.fault == "HEARTBEAT_LOST"
     assert stand.bank.drives["drive"].fault == "COMMUNICATION"
     assert stand.plant.shaft_speed < stand.controller.landing_speed
+
+
+def test_a_capture_at_speed(tmp_path: Path) -> None:
+    """Full-rate readings from a turning shaft, from a pulse on; the upload runs while it turns."""
+    stand, speed = Stand(1), 6000 * math.pi / 30
+    stand.levitate()
+    controller = stand.controller
+    role, header = controller.capture, RunHeader({"run": {}}, {})
+    assert role is not None
+    streams = [controller.telemetry.layout]
+    with (
+        driven(stand) as bus,
+        Recorder(tmp_path / "r.mcap", clock=controller.clock, streams=streams, header=header, plain=True) as recorder,
+    ):
+        assert bus.drive is not None
+        controller.recorder = recorder
+        role.arm(("pos_yi", "speed"), seconds=0.1, before_s=0.05, trigger=capture.at_speed(300.0))
+        bus.drive.reach(speed)
+        role.wait(1.0)
+        role.upload(on="the way")
+        role.arm(
+            ("pos_yi", "pos_zi", "pulses", "pulse_age", "angle"), seconds=0.5, before_s=0.02, trigger=capture.PULSE
+        )
+        role.wait(2.0)
+        role.upload(on="speed")
+        assert controller.mode == "SPINNING"
+        bus.drive.coast()
+    recording = Recording.open(tmp_path / "r.mcap")
+    (way,), (level,) = recording.captures(on="the way"), recording.captures(on="speed")
+    rising = way.arrays("speed")["speed"]
+    assert rising[499] < 300 <= rising[500]
+    x = level.arrays()
+    assert x["pulses"][200] == x["pulses"][199] + 1
+    assert 0 <= x["pulse_age"][200] < 1e-4
+    seen = np.flatnonzero(np.diff(x["pulses"])) + 1
+    at = x["t_s"][seen] - x["pulse_age"][seen]  # to better than a tick
+    turn_s = np.diff(at).mean()
+    assert 2 * math.pi / turn_s == pytest.approx(speed, rel=2e-3)
+    assert np.diff(at) == pytest.approx(turn_s, rel=1e-3)
+    whole = slice(seen[0], seen[-1])
+    phase = 2 * math.pi * (x["t_s"] - at[0])[whole] / turn_s
+    vector = 2 * np.mean(x["pos_yi"][whole] * np.exp(-1j * phase))
+    assert 5e-6 < abs(vector) < 50e-6
+    left = x["pos_yi"][whole] - (vector * np.exp(1j * phase)).real
+    assert np.std(left) < 0.5 * abs(vector)
+
+
+def test_make_safe_lands_what_the_controller_sees_turning_for_a_while_yet() -> None:
+    """The drive says standstill; the pulses, and with them the controller's state, say so half a second later."""
+    stand = Stand(1)
+    stand.levitate()
+    supervisor = Supervisor()
+    base = WatchedClock(stand.machine, stand.machine.link.renew_lease, supervisor.check)
+    with driven(stand) as bus:
+        assert bus.drive is not None
+        bus.drive.reach(100.0)
+        brake, _, land = safe_steps(stand.controller, base, bus.drive)[1:4]
+        brake.action()
+        assert stand.controller.mode == "SPINNING"
+        begin = stand.machine.now_ns()
+        land.action()
+        assert (stand.machine.now_ns() - begin) * 1e-9 < land.timeout_s / 4
+    assert stand.controller.mode == "READY"
 
 
 def test_a_sensor_of_the_wrong_sign_is_never_levitated() -> None:

@@ -1,0 +1,57 @@
+"""Who works on the AMB stand: fixes weights in its balancing planes, with the errors that the rig file states."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from bench.rigfile import RigFile
+from sim_backend.core.amb import AmbPlant
+from sim_backend.draws import draw_one
+
+if TYPE_CHECKING:
+    from sim_backend.truth import Truth
+
+WORK_S = 1.0
+PLANES = {"inboard": 0, "outboard": 1}
+
+
+class Balancer:
+    """Each weight is off by a mass and an angle of its own, from the rig file's `machine.weight_mass` and `weight_angle`;
+    all sit at the radius that was drawn for the rig. The defect `weight_lost`: what is fixed falls off."""
+
+    def __init__(self, plant: AmbPlant, rig: RigFile, truth: Truth) -> None:
+        self._plant, self._truth = plant, truth
+        self._errors = [rig.machine.get(name) for name in ("weight_mass", "weight_angle")]
+        self._radius = truth.values.get("geometry.balance_radius", 0.0)
+        self._fixed = 0
+
+    def request(self, line: str) -> str:
+        """One line: `attach inboard KG RAD`, `detach inboard`, `ask TEXT`. Answers `ok SECONDS`, `yes` or `error TEXT`."""
+        match line.split():
+            case ["ask", *_]:
+                return "yes"
+            case ["attach", "inboard" | "outboard" as plane, mass, angle] if self._radius and numbers(mass, angle):
+                self._attach(PLANES[plane], float(mass), float(angle))
+            case ["detach", "inboard" | "outboard" as plane] if self._radius:
+                self._plant.without_weights(PLANES[plane])
+            case _:
+                return f"error cannot {line.strip()!r}"
+        return f"ok {WORK_S}"
+
+    def _attach(self, plane: int, mass: float, angle: float) -> None:
+        self._fixed += 1
+        off = [
+            draw_one(t, self._truth.seed, f"weight:{k}:{self._fixed}") if t is not None else 0.0
+            for k, t in enumerate(self._errors)
+        ]
+        if not self._truth.defects["weight_lost"]:
+            self._plant.weights(plane, (mass + off[0]) * self._radius, angle + off[1])
+
+
+def numbers(mass: str, angle: str) -> bool:
+    """Whether these are a mass and an angle."""
+    try:
+        return float(mass) > 0 and math.isfinite(float(mass)) and math.isfinite(float(angle))
+    except ValueError:
+        return False
