@@ -11,6 +11,7 @@ Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 TOLERANCE = 0.15  # of a turn's time: a shaft cannot change its speed by more within one turn, above a crawl
 TOLERANCES = (0.02, 0.05, TOLERANCE)  # the tightest that explains the spacing decides between explanations
+CRAWL = 0.47  # log of the change beyond which no turn follows another
 MOST_MISSING = 3  # in a row; beyond that the spacing is guesswork
 AROUND = 8  # intervals to either side that say how long a turn takes
 
@@ -24,6 +25,27 @@ def repaired(t: Array, numbers: Integers) -> tuple[Integers, Integers, list[floa
     Raises:
         AnalysisError: none explains the spacing.
     """
+    first, end = _crawl(np.diff(t) / np.diff(numbers))
+    kept, turns, missing, doubled = _mended(t[first:end], numbers[first:end])
+    return kept + first, turns, missing, doubled
+
+
+def _crawl(gaps: Array) -> tuple[int, int]:
+    """First pulse and end of the pulses of a shaft that really turns: one that has just started, or is about to stop, changes
+    its speed by much in a turn, and every turn by less (or more) than the one before. No echo, no missing pulse does that."""
+    change = np.log(gaps[:-1] / gaps[1:])
+
+    def steps(c: Array) -> int:
+        k = 0
+        while k + 1 < c.size and np.log1p(TOLERANCE) <= c[k] < CRAWL and 0 < c[k + 1] < c[k]:
+            k += 1
+        return k
+
+    return steps(change), gaps.size + 1 - steps(-change[::-1])
+
+
+def _mended(t: Array, numbers: Integers) -> tuple[Integers, Integers, list[float], list[float]]:
+    """As `repaired`, of a shaft that turns."""
     gaps = np.diff(t) / np.diff(numbers)
     if (np.abs(np.log(gaps[1:] / gaps[:-1])) < np.log1p(TOLERANCE)).all():
         return np.arange(t.size), numbers - numbers[0], [], []

@@ -58,6 +58,14 @@ def test_one_echo_among_many_turns() -> None:
     assert np.array_equal(found.times, pulses)
 
 
+@pytest.mark.parametrize("way", [1, -1])
+def test_the_first_turns_from_standstill_are_no_defects(way: int) -> None:
+    times = np.sqrt(np.arange(1, 400))
+    found = tachometer(times if way == 1 else 30 - times[::-1])
+    assert found.sound
+    assert found.times.size >= 396
+
+
 def test_a_pickup_that_fires_at_random_is_refused() -> None:
     times = np.sort(np.random.default_rng(3).uniform(0, 2, 300))
     with pytest.raises(AnalysisError, match="neither missing nor doubled"):
