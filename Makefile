@@ -29,6 +29,7 @@ campaigns: setup
 	$(BIN)/bench campaign tsbs-identification --count 1000 --first-seed 1000000 --keep none
 
 bench: setup
+	$(BIN)/python benchmarks/analysis.py
 	$(BIN)/python benchmarks/core.py
 	$(BIN)/python benchmarks/decode.py
 	$(BIN)/python benchmarks/path.py

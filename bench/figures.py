@@ -13,19 +13,35 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Series:
-    """One curve or cloud of points. `u` draws 95 % error bars of half-length `u` on y."""
+    """One curve or cloud of points. `u` draws 95 % error bars of half-length `u` on y.
+
+    "faint" is a thin grey curve, "ridge" a thin one that hides what is behind and below it, "guide" a dashed curve in ink for
+    limits and circles, "mark" filled dots in the colour of the curve before.
+    """
 
     label: str
     x: Array
     y: Array
-    style: Literal["line", "points", "both"] = "line"
+    style: Literal["line", "points", "both", "faint", "ridge", "guide", "mark"] = "line"
     u: Array | None = None
 
 
 @dataclass(frozen=True)
+class Grid:
+    """Values (rows, columns) in colours, over columns at `x` and rows at `y`; NaN is left blank. `label` names them with
+    their unit; `decades`, over how many the colours go down logarithmically from the greatest, 0 for a linear scale."""
+
+    x: Array
+    y: Array
+    values: Array
+    label: str
+    decades: float = 0.0
+
+
+@dataclass(frozen=True)
 class Figure:
-    """One figure: `kind` "xy", "plane" (xy with equal scales), or "polar" with x an angle in rad. Values are in the units
-    that the labels name."""
+    """One figure: `kind` "xy", "plane" (xy with equal scales), "polar" with x an angle in rad, or "vectors" (polar from zero, x
+    a phase lag in rad, against the rotation: clockwise from the top). Values are in the units that the labels name."""
 
     key: str  # file-safe, unique in a report
     title: str
@@ -33,5 +49,11 @@ class Figure:
     x_label: str
     y_label: str
     series: tuple[Series, ...]
-    kind: Literal["xy", "plane", "polar"] = "xy"
+    kind: Literal["xy", "plane", "polar", "vectors"] = "xy"
     lines: tuple[tuple[str, float], ...] = field(default=())  # horizontal lines: label, y
+    bands: tuple[tuple[str, float, float], ...] = field(default=())  # shaded from y to y, best first: label, low, high
+    notes: tuple[tuple[str, float, float], ...] = field(default=())  # small texts beside a point: text, x, y
+    grid: Grid | None = None
+    log_x: bool = False
+    downward: bool = False  # y grows downwards, as phase lags are drawn
+    below: Figure | None = None  # a second panel on the same x axis, of which labels, series and the like are drawn

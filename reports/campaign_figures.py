@@ -16,7 +16,8 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure as Canvas
 
 from reports.campaign_symbols import axis_label as label
-from reports.figures import GRID, INK, PALETTE, STYLE, Drawn, _with_own_ids
+from reports.figures import Drawn, _with_own_ids
+from reports.figurestyle import GRID, INK, PALETTE, STYLE
 
 Array = npt.NDArray[np.float64]
 WIDE_IN = 6.85  # 174 mm: the A4 text block

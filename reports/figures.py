@@ -19,40 +19,15 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure as Canvas
-from matplotlib.ticker import MaxNLocator, ScalarFormatter
+from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from bench.errors import BenchError
 from bench.figures import Array, Figure, Series
+from reports import figurekinds as kinds
+from reports.figurestyle import GRID, INK, MARKERS, PALETTE, STYLE, tick_text
 
 WIDTH_IN, HEIGHT_IN = 3.42, 2.75  # 87 mm: half of the A4 text block
 MAX_LINE_POINTS = 1200  # about three per printed dot column at 300 dpi; beyond, min and max per bin
-# Okabe and Ito (2008), told apart with any colour vision; the yellow is left out: too pale on white.
-PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
-MARKERS = ("o", "s", "^", "D", "v", "P", "X")
-INK, GRID = "#30363d", "#d9dde2"
-STYLE: Any = {
-    "font.family": ["DejaVu Sans"],
-    "font.size": 7.0,
-    "text.parse_math": False,
-    "axes.unicode_minus": True,
-    "axes.linewidth": 0.6,
-    "axes.edgecolor": INK,
-    "axes.labelcolor": INK,
-    "axes.formatter.useoffset": False,
-    "axes.formatter.limits": (-3, 5),
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "xtick.direction": "out",
-    "lines.linewidth": 1.0,
-    "lines.markersize": 3.2,
-    "legend.fontsize": 6.5,
-    "legend.frameon": False,
-    "path.simplify": True,
-    "svg.fonttype": "path",  # the same glyphs everywhere; nothing can be clipped by another font
-    "svg.hashsalt": "levbench",
-}
 
 
 @dataclass(frozen=True)
@@ -71,8 +46,9 @@ def draw(figure: Figure) -> Drawn:
     Raises:
         BenchError: a series has x, y or u of different lengths, or cannot be drawn.
     """
-    for series in figure.series:
-        _same_length(figure, series)
+    for panel in _panels(figure):
+        for series in panel.series:
+            _same_length(panel, series)
     with warnings.catch_warnings(), mpl.rc_context(STYLE):
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")  # a box in a label, not a failed report
         try:
@@ -92,27 +68,72 @@ def _same_length(figure: Figure, series: Series) -> None:
         )
 
 
+def _panels(figure: Figure) -> list[Figure]:
+    """The figure and those below it."""
+    return [figure, *(_panels(figure.below) if figure.below else [])]
+
+
 def _svg(figure: Figure) -> str:
-    polar = figure.kind == "polar"
-    size = (WIDTH_IN, HEIGHT_IN + (0.45 if polar else 0.0))
+    panels = _panels(figure)
+    around = figure.kind in ("polar", "vectors")
+    size = (WIDTH_IN, HEIGHT_IN * (1 + 0.45 * (len(panels) - 1)) + (0.45 if around else 0.0))
     canvas = Canvas(figsize=size, layout="constrained")
     FigureCanvasSVG(canvas)
-    axes = canvas.add_subplot(projection="polar" if polar else None)
-    dense = [_finite(s) for s in figure.series]
-    drawn = [
-        _plot(axes, _closed(series) if polar else series, _look(position, len(dense)))
-        for position, series in enumerate(dense)
+    every = [
+        canvas.add_subplot(len(panels), 1, k + 1, projection="polar" if around else None) for k in range(len(panels))
     ]
-    if polar:
-        drawn += _polar_axes(axes, figure, dense)
-    else:
-        drawn += _plain_axes(axes, figure)
-    if not any(s.x.size for s in dense):
-        axes.text(0.5, 0.5, "no data", transform=axes.transAxes, ha="center", va="center", color=INK)
+    drawn: list[Artist] = []
+    for axes, panel in zip(every, panels, strict=True):
+        artists = _panel(axes, panel)
+        drawn += [] if drawn else artists
+        if panel.below:
+            axes.tick_params(labelbottom=False)
+            axes.set_xlabel("")
+            axes.sharex(every[-1])
     _legend(canvas, drawn)
     out = io.StringIO()
-    canvas.savefig(out, format="svg", metadata={"Date": None, "Creator": None})
+    canvas.savefig(out, format="svg", dpi=220, metadata={"Date": None, "Creator": None})
     return out.getvalue()
+
+
+def _panel(axes: Axes, figure: Figure) -> list[Artist]:
+    """Draws one panel; what stands in the legend."""
+    polar = figure.kind == "polar"
+    dense = [_finite(s) for s in figure.series]
+    looks = _looks(dense)
+    drawn = [
+        _plot(axes, _closed(series) if polar else series, look, position)
+        for position, (series, look) in enumerate(zip(dense, looks, strict=True))
+    ]
+    if figure.grid is not None:
+        kinds.grid(axes, figure.grid)
+    if polar:
+        drawn += _polar_axes(axes, figure, dense)
+    elif figure.kind == "vectors":
+        kinds.vector_axes(axes, figure, dense)
+    else:
+        drawn += _plain_axes(axes, figure)
+        drawn += kinds.bands(axes, figure)
+    kinds.notes(axes, figure)
+    if not any(s.x.size for s in dense) and figure.grid is None:
+        axes.text(0.5, 0.5, "no data", transform=axes.transAxes, ha="center", va="center", color=INK)
+    return [d for s, d in zip(dense, drawn, strict=False) if s.style != "ridge"] + drawn[len(dense) :]
+
+
+def _looks(dense: list[Series]) -> list[dict[str, Any]]:
+    """Of each series: curves take the colours in turn, marks that of the curve before, guides and ridges ink."""
+    curves = [s for s in dense if s.style not in kinds.SPECIAL]
+    looks: list[dict[str, Any]] = []
+    taken = 0
+    for series in dense:
+        if series.style in ("faint", "guide", "ridge"):
+            looks.append({"color": INK, "marker": ""})
+        elif series.style == "mark":
+            looks.append({**_look(max(taken - 1, 0), len(curves)), "marker": "o"})
+        else:
+            looks.append(_look(taken, len(curves)))
+            taken += 1
+    return looks
 
 
 def _look(position: int, count: int) -> dict[str, Any]:
@@ -161,8 +182,10 @@ def _closed(series: Series) -> Series:
     return Series(series.label, np.append(x, x[0] + 2 * np.pi), np.append(series.y, series.y[0]), series.style, u)
 
 
-def _plot(axes: Axes, series: Series, look: dict[str, Any]) -> Artist:
+def _plot(axes: Axes, series: Series, look: dict[str, Any], position: int = 0) -> Artist:
     """Draws one series and returns what stands for it in the legend."""
+    if series.style in kinds.SPECIAL:
+        return kinds.special(axes, series, look, position, _short(series.label))
     face = {} if series.style == "line" else {"markerfacecolor": "white", "markeredgewidth": 0.9}
     style = {
         "linestyle": "none" if series.style == "points" else "-",
@@ -195,20 +218,21 @@ def _plain_axes(axes: Axes, figure: Figure) -> list[Artist]:
     axes.margins(x=0.04, y=0.08)
     if figure.kind == "plane":
         axes.set_aspect("equal", adjustable="datalim")
-    for axis in (axes.xaxis, axes.yaxis):
+    if figure.log_x:
+        axes.set_xscale("log")
+    if figure.downward:
+        axes.invert_yaxis()
+    for axis in (axes.yaxis,) if figure.log_x else (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 2.5, 5, 10]))
-        axis.set_major_formatter(_tick_text())
+        axis.set_major_formatter(tick_text())
+    if figure.log_x:
+        axes.xaxis.set_major_formatter(tick_text())
+    if figure.downward:
+        axes.yaxis.set_major_locator(MultipleLocator(90 if np.ptp(axes.get_ylim()) < 600 else 180))
     return [
         axes.axhline(level, label=_short(label), **_line_style(position))
         for position, (label, level) in enumerate(figure.lines)
     ]
-
-
-def _tick_text() -> ScalarFormatter:
-    """Plain numbers, with a power of ten where they are large or small; never an offset, which readers miss."""
-    formatter = ScalarFormatter(useOffset=False, useMathText=False)
-    formatter.set_powerlimits((-5, 6))
-    return formatter
 
 
 def _polar_axes(axes: Any, figure: Figure, dense: list[Series]) -> list[Artist]:
@@ -219,7 +243,7 @@ def _polar_axes(axes: Any, figure: Figure, dense: list[Series]) -> list[Artist]:
     span = (high - low) or abs(high) or 1.0
     axes.set_rlim(low - 0.6 * span, high + 0.1 * span)
     axes.yaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10]))
-    axes.yaxis.set_major_formatter(_tick_text())
+    axes.yaxis.set_major_formatter(tick_text())
     axes.set_rlabel_position(67.5)
     for text in axes.get_yticklabels():  # readable where a curve passes behind
         text.set_bbox({"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.6})

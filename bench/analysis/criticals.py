@@ -1,0 +1,122 @@
+"""Critical speeds and amplification factors from synchronous vectors against speed, by half power (API 617, Bode plot).
+
+A critical is a greatest amplitude of the response, at N_c; N_1 and N_2 are where it has fallen to 0.707 of it on either side.
+The amplification factor is N_c/(N_2 - N_1). The vectors are smoothed by local rational models first (see `peaks`), and noise
+of their covariance drawn onto the smooth curve says how far each number scatters and what bias it has.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.analysis.peaks import WINDOW, noise, pooled_covariance, smoother
+from bench.analysis.sampling import Array
+from bench.errors import AnalysisError
+
+HALF_POWER = math.sqrt(0.5)
+PROMINENCE = 0.1  # of the greatest amplitude: what a critical must stand out by
+DRAWS = 200
+NEAR = 0.03  # of the record: where a drawn curve's critical is looked for
+
+
+@dataclass(frozen=True)
+class Critical:
+    """One critical: `speed` rad/s at the greatest amplitude, `amplitude` m 0-pk, `low` and `high` speeds at half power,
+    amplification factor `factor` and `damping` = 1/(2 factor); their covariance (4, 4) in the order speed, amplitude, factor,
+    damping. A half-power point outside the record leaves low, high, factor and damping NaN."""
+
+    speed: float
+    amplitude: float
+    low: float
+    high: float
+    factor: float
+    damping: float
+    covariance: Array
+
+    @property
+    def critically_damped(self) -> bool:
+        """API: an amplification factor under 2.5 is no critical speed."""
+        return self.factor < 2.5
+
+
+def criticals(
+    speed: npt.ArrayLike, values: npt.ArrayLike, covariance: Array, *, seed: int = 0, draws: int = DRAWS
+) -> list[Critical]:
+    """All criticals of a curve `values` (b,) at `speed` (b,) rad/s in any order, covariances (b, 2, 2), by rising speed.
+
+    Raises:
+        AnalysisError: fewer than nine blocks, or two at one speed.
+    """
+    order = np.argsort(np.asarray(speed, np.float64))
+    w, z = np.asarray(speed, np.float64)[order], np.asarray(values, np.complex128)[order]
+    if z.size < WINDOW or not (np.diff(w) > 0).all():
+        raise AnalysisError(f"criticals: found {z.size} vectors; expected {WINDOW} or more, at speeds of their own")
+    pooled = pooled_covariance(covariance[order])
+    smooth = smoother(w, z, pooled)
+    fine = np.abs(smooth.everywhere(z))
+    tops = _tops(fine)
+    if not tops:
+        return []
+    lines = smooth.at_lines(z)
+    again = np.abs(smooth.everywhere(lines))
+    drawn = np.abs(smooth.everywhere(lines + noise(pooled, seed, draws)))
+    return [_critical(smooth.x, fine, again, drawn, k) for k in tops]
+
+
+def _tops(size: Array) -> list[int]:
+    """Local greatest values inside the record that stand out."""
+    inner = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
+    return [int(k) for k in inner if _prominence(size, int(k)) > PROMINENCE * size.max()]
+
+
+def _prominence(size: Array, k: int) -> float:
+    left, right = size[:k][::-1], size[k + 1 :]
+    lowest = []
+    for side in (left, right):
+        higher = np.flatnonzero(side > size[k])
+        lowest.append(side[: higher[0] if higher.size else side.size].min())
+    return float(size[k] - max(lowest))
+
+
+def _critical(w: Array, size: Array, again: Array, drawn: Array, k: int) -> Critical:
+    found, base = _numbers(w, size, k), _numbers(w, again, k)
+    scatter = np.array([_numbers(w, d, k) for d in drawn])
+    use = np.isfinite(scatter).all(axis=1)
+    if not np.isfinite(found).all():
+        use, covariance = np.isfinite(scatter[:, :2]).all(axis=1), np.full((4, 4), np.nan)
+        covariance[:2, :2] = np.cov(scatter[use, :2].T)
+        speed, amplitude = found[:2] - (scatter[use, :2].mean(axis=0) - base[:2])
+        return Critical(float(speed), float(amplitude), math.nan, math.nan, math.nan, math.nan, covariance)
+    if use.mean() < 0.9:
+        raise AnalysisError(f"criticals: the one at {w[k]:.4g} rad/s is lost in the noise")
+    better = found - (scatter[use].mean(axis=0) - base)
+    s = scatter[use]
+    columns = np.column_stack([s[:, 0], s[:, 1], s[:, 4], 1 / (2 * s[:, 4])])
+    speed, amplitude, low, high, factor = (float(v) for v in better)
+    return Critical(speed, amplitude, low, high, factor, 1 / (2 * factor), np.cov(columns.T))
+
+
+def _numbers(w: Array, size: Array, near: int) -> Array:
+    """Speed, amplitude, the half-power speeds and the factor of the greatest amplitude next to index `near`, (5,)."""
+    reach = max(NEAR * w.size, 2)
+    first = max(int(near - reach), 0)
+    k = first + int(np.argmax(size[first : int(near + reach) + 1]))
+    if not 0 < k < size.size - 1:
+        return np.full(5, np.nan)
+    top, speed = float(size[k]), float(w[k])
+    below = size < HALF_POWER * top
+    left, right = np.flatnonzero(below[:k]), np.flatnonzero(below[k:])
+    if not (left.size and right.size):
+        return np.array([speed, top, np.nan, np.nan, np.nan])
+    low = _crossing(w, size, left[-1], HALF_POWER * top)
+    high = _crossing(w, size, k + right[0] - 1, HALF_POWER * top)
+    return np.array([speed, top, low, high, speed / (high - low)])
+
+
+def _crossing(w: Array, size: Array, k: int, level: float) -> float:
+    share = (level - size[k]) / (size[k + 1] - size[k])
+    return float(w[k] + share * (w[k + 1] - w[k]))

@@ -1,0 +1,73 @@
+"""Criticals of single-degree rotors in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq, minimize_scalar
+
+from bench.analysis.criticals import criticals
+from bench.errors import AnalysisError
+
+NATURAL = 648.4253  # rad/s, translation of the rotor that ROSS confirmed
+
+
+def response(w: np.ndarray | float, zeta: float) -> np.ndarray:
+    w = np.asarray(w)
+    return np.asarray(1e-5 * w**2 / (NATURAL**2 - w**2 + 2j * zeta * NATURAL * w))
+
+
+def closed_form(zeta: float) -> tuple[float, float]:
+    """Speed of the greatest amplitude and the factor by half power."""
+    top = NATURAL / np.sqrt(1 - 2 * zeta**2)
+    level = np.abs(response(top, zeta)) * np.sqrt(0.5)
+    low = brentq(lambda w: np.abs(response(w, zeta)) - level, 1, top)
+    high = brentq(lambda w: np.abs(response(w, zeta)) - level, top, 50 * top)
+    return top, top / (high - low)
+
+
+@pytest.mark.parametrize("zeta", [0.02, 0.05, 0.129685])
+def test_speed_and_factor_are_the_closed_forms(zeta: float) -> None:
+    w = np.linspace(200, 1500, 260)[::-1]  # a coast-down
+    found = criticals(w, response(w, zeta), np.tile(1e-18 * np.eye(2), (w.size, 1, 1)), draws=20)
+    assert len(found) == 1
+    speed, factor = closed_form(zeta)
+    assert found[0].speed == pytest.approx(speed, rel=2e-3)
+    assert found[0].factor == pytest.approx(factor, rel=0.01)
+    best = minimize_scalar(lambda v: -np.abs(response(v, zeta)), bounds=(300, 1500), method="bounded")
+    assert found[0].amplitude == pytest.approx(-best.fun, rel=5e-3)
+    assert found[0].critically_damped == (factor < 2.5)
+
+
+def test_the_intervals_hold_the_truth() -> None:
+    """30 coast-downs of 1 % noise: 0.95 of them, less 3.3 sigma."""
+    w, zeta, u = np.linspace(300, 1300, 150), 0.06, 8e-7
+    truth, hits = np.array(closed_form(zeta)), []
+    for seed in range(30):
+        noise = np.random.default_rng([3, seed]).normal(0, u, (w.size, 2)).view(np.complex128)[:, 0]
+        found = criticals(w, response(w, zeta) + noise, np.tile(u**2 * np.eye(2), (w.size, 1, 1)), draws=40, seed=seed)[
+            0
+        ]
+        away = np.array([found.speed, found.factor]) - truth
+        hits.append(np.abs(away) <= 2 * np.sqrt(found.covariance[[0, 2], [0, 2]]))
+    assert (np.mean(hits, axis=0) >= 0.82).all()
+
+
+def test_two_criticals_and_a_half_power_point_outside() -> None:
+    w = np.linspace(620, 2500, 300)
+    z = response(w, 0.02) + 4e-6 * w**2 / (1800.0**2 - w**2 + 2j * 0.02 * 1800 * w)
+    found = criticals(w, z, np.tile(1e-18 * np.eye(2), (w.size, 1, 1)), draws=10)
+    fine = np.linspace(620, 2500, 100_001)
+    size = np.abs(response(fine, 0.02) + 4e-6 * fine**2 / (1800.0**2 - fine**2 + 2j * 0.02 * 1800 * fine))
+    expected = [fine[np.argmax(size * (fine < 1000))], fine[np.argmax(size * (fine > 1000))]]
+    assert [c.speed for c in found] == pytest.approx(expected, abs=1.5)
+    near = criticals(w[w > 637], z[w > 637], np.tile(1e-18 * np.eye(2), ((w > 637).sum(), 1, 1)), draws=10)
+    assert np.isnan(near[0].factor)
+    assert np.isfinite(near[0].amplitude)
+
+
+def test_no_critical_and_refusal() -> None:
+    w = np.linspace(100, 300, 50)
+    assert criticals(w, response(w, 0.1), np.tile(1e-18 * np.eye(2), (50, 1, 1)), draws=5) == []
+    with pytest.raises(AnalysisError, match="speeds of their own"):
+        criticals(np.ones(20), np.ones(20), np.tile(np.eye(2), (20, 1, 1)))
