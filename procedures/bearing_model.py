@@ -23,7 +23,7 @@ from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
 from procedures import bearing_model_figures as drawn
-from procedures.estimators import bearing_findings
+from procedures.estimators import bearing_findings, bearing_wiring
 from procedures.estimators.bearing import AXES, COMPARED
 from procedures.estimators.bearing_data import CURRENTS, HOLD, POSITIONS, TILT, Held, read_steps
 from procedures.estimators.bearing_estimates import BEARINGS, evaluate
@@ -147,10 +147,10 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
 
 def _of_data(recording: Recording[Plan], held: Held, tilted: Held) -> Iterator[Finding]:
     plan, rig = recording.plan, recording.rig
-    found = [*bearing_findings.of_signals(held, tilted, plan), *bearing_findings.of_wiring(held, tilted, rig)]
+    found = [*bearing_findings.of_signals(held, tilted, plan), *bearing_wiring.of_wiring(held, tilted, rig)]
     yield from found
     if not any(f.code in bearing_findings.FATAL for f in found):
-        yield from bearing_findings.of_models(held, tilted, rig, plan)
+        yield from bearing_wiring.of_models(held, tilted, rig, plan)
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
@@ -204,27 +204,31 @@ def figures(recording: Recording[Plan]) -> Iterable[Figure]:
 
 METHOD = """\
 The shaft is levitated at rest by flatness control with constant current sum and stands on a grid of positions in y and z
-inside the touchdown rings, without tilt. At each of them gravity and the coupling's spring say which force each radial AMB
-gives, and both coils' currents and the position at the AMB's plane, from both sensors, say how it gives it.
+inside the touchdown rings, without tilt. At each of them gravity and the coupling's spring say which force each radial
+AMB gives, and both coils' currents and the position at the AMB's plane, from both sensors, say how it gives it.
 
-Nonlinear model (T 2.8): beta and magnetic offset of each axis by least squares. Linear model
-(T 2.9), for comparison as in T Table 2.2: force against control current and position, without intercept. Its two numbers
-are not the bearing's slopes: without an intercept, gravity has to be explained by current and position.
+Nonlinear model (T 2.8): beta and magnetic offset of each axis by least squares. Linear model (T 2.9), for comparison as in
+T Table 2.2: force against control current and position, without intercept. Its two numbers are not the bearing's slopes:
+without an intercept, gravity has to be explained by current and position.
 
-Gravity acts along both axes with g cos 45° and g sin 45°, downwards, and the positive coils are the upper ones. An offset towards them
-(above zero) helps to carry; then the linear model fails by much. The sign in T Table 2.2 goes with gravity above zero.
+Gravity acts along both axes with g cos 45° and g sin 45°, downwards, and the positive coils are the upper ones. An
+offset towards them (above zero) helps to carry; then the linear model fails by much. The sign in T Table 2.2 goes with
+gravity above zero.
 
-The offset refers to the sensors' zero, so the sensors' own zeros do not act on it (only on the spring's pull). The
-shaft rests at one angle: what each sensor reads of runout there, less its mean over a turn, is an influence on the offset, and the largest.
+The offset refers to the sensors' zero, so the sensors' own zeros do not act on it (only on the spring's pull). The shaft
+rests at one angle: what each sensor reads of runout there, less its mean over a turn, is an influence on the offset, and
+the largest.
 
-Sums of squares are over all samples, as in T Table 2.2; their noise is stated with them. The models are fitted to the means of the
-positions. The scatter of the results is by batch means or by the residuals of the positions, whichever is more.
+Sums of squares are over all samples, as in T Table 2.2; their noise is stated with them. The models are fitted to the
+means of the positions. The scatter of the results is by batch means or by the residuals of the positions, whichever is
+more.
 
-Beta and the gap act nearly alike. But beside beta and offset the positions ask for a gap of their own, by curvature; the least variance of
-these four and the drawing is used, all shared influences considered. What position and current sensors and the spring get wrong
-acts on that gap, and the budgets show it.
+Beta and the gap act nearly alike. But beside beta and offset the positions ask for a gap of their own, by curvature; the
+least variance of these four and the drawing is used, all shared influences considered. What position and current sensors
+and the spring get wrong acts on that gap, and the budgets show it.
 
-Not covered: iron saturation, hysteresis, a coupling that is not relaxed where the shaft is centred, bending of the shaft by its own weight.
+Not covered: iron saturation, hysteresis, a coupling that is not relaxed where the shaft is centred, bending of the shaft
+by its own weight.
 """
 
 procedure = Procedure(

@@ -1,6 +1,6 @@
 """Force constant and magnetic offset of the radial AMBs from eccentric positions (thesis 2.3), beside the linear model.
 
-At rest every radial force follows from gravity and the coupling's spring, by force and moments about the other AMB's plane:
+At rest every radial force follows from gravity and the coupling's spring, by moments about the other AMB's plane:
 
     F_i = (-m g_a l_oa + K c (l_oa + l_c)) / (l_ia + l_oa)      F_o = (-m g_a l_ia + K c (l_ia - l_c)) / (l_ia + l_oa)
 
@@ -9,8 +9,8 @@ coupling. Nonlinear model, T (2.8) with each coil's own measured current:
 
     F = beta (ip^2 / (gap - xi)^2 - in^2 / (gap + xi)^2),   xi = offset + r
 
-with r the displacement of the AMB's plane off the sensors' zero. Linear model, T (2.9): F = K_i (ip - in)/2 + K_xi r, without an
-intercept, and so without an offset.
+with r the displacement of the AMB's plane off the sensors' zero. Linear model, T (2.9), without an intercept and so
+without an offset: F = K_i (ip - in)/2 + K_xi r.
 """
 
 from __future__ import annotations
@@ -171,8 +171,8 @@ def with_gap(s: Statics, k: int, start: Array, gap: float) -> Fit:
 
 
 def slopes(fit: Fit, gap: float, bias: float) -> tuple[float, float]:
-    """dF/di (N/A) and dF/dxi (N/m) of the fitted magnet at the sensors' zero with both coils at the bias: what the linear model is
-    taken for."""
+    """dF/di (N/A) and dF/dxi (N/m) of the fitted magnet at the sensors' zero with both coils at the bias: what the
+    linear model is taken for."""
     beta, xi = fit.terms
     near, far = gap - xi, gap + xi
     return (

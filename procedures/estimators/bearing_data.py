@@ -22,8 +22,12 @@ CHANNELS = (*POSITIONS, *CURRENTS, "flags")
 
 @dataclass(frozen=True)
 class Held:
-    """Steps in time order, N of them. Per channel `mean`, `drift`, `spread` (N,) and `batches` (N, B), means of B parts of a
-    step; `every` (S,), all samples, step by step, of which `of_step` (S,) says the step; `labels` (N,); `lost`, `expected` samples; `flags` ORed; `names` for the reader."""
+    """Steps in time order, N of them, by channel.
+
+    `mean`, `drift`, `spread` (N,); `batches` (N, B), means of B parts of a step; `every` (S,), all samples, step by step,
+    of which `of_step` (S,) says the step; `labels` (N,); `lost` and `expected` samples; `flags` ORed; `names` for the
+    reader.
+    """
 
     mean: dict[str, Array]
     drift: dict[str, Array]

@@ -27,9 +27,11 @@ LENGTHS = {"l_is": "com_to_inboard_sensor", "l_os": "com_to_outboard_sensor", "l
 
 @dataclass(frozen=True)
 class Analysis:
-    """Everything the measurements, findings and figures are made of. `noise_N` is the standard deviation of a sample's and of
-    a batch's force within its step, by axis; `gaps` what each axis alone asks for, `drawing` what the certificate says, `gap` both together (m); `samples`
-    how many there are."""
+    """Everything the measurements, findings and figures are made of.
+
+    `noise_N` is the standard deviation of a sample's and of a batch's force within its step, by axis; `gaps` what each
+    axis alone asks for, `drawing` what the certificate says, `gap` all together (m); `samples` how many there are.
+    """
 
     held: Held
     statics: Statics
@@ -74,7 +76,8 @@ def evaluate(recording: Recording[Any], held: Held) -> Analysis:
 
 
 def by_bearing(e: dict[str, Estimate]) -> dict[str, Estimate]:
-    """The comparison with the linear model by AMB, as T Table 2.2: means of its slopes over both axes, sums of squares of both."""
+    """The comparison with the linear model by AMB, as T Table 2.2: its slopes' means over both axes, sums of squares of
+    both."""
     out = {}
     for b, where in BEARINGS.items():
         y, z = f"y{b}", f"z{b}"
@@ -134,9 +137,18 @@ def outputs(means: Positions, parts: Positions, samples: Positions, p: dict[str,
         f = bearing.axis_fit(s, k, p["gap"])
         one, two = (float(x @ x) for x in residuals(b, k, f, p["gap"]))
         low, high = (float(x @ x) for x in residuals(quiet, k, f, p["gap"]))
-        out |= {f"beta_{a}": f.beta, f"offset_{a}": f.offset, f"k_linear_{a}": float(f.linear.terms[0]),
-                f"stiffness_linear_{a}": float(f.linear.terms[1]), f"misfit_{a}": one, f"misfit_linear_{a}": two,
-                f"misfit_ratio_{a}": two / one, f"misfit_ratio_means_{a}": high / low, f"quiet_{a}": low, f"quiet_linear_{a}": high}  # fmt: skip
+        out |= {
+            f"beta_{a}": f.beta,
+            f"offset_{a}": f.offset,
+            f"k_linear_{a}": float(f.linear.terms[0]),
+            f"stiffness_linear_{a}": float(f.linear.terms[1]),
+            f"misfit_{a}": one,
+            f"misfit_linear_{a}": two,
+            f"misfit_ratio_{a}": two / one,
+            f"misfit_ratio_means_{a}": high / low,
+            f"quiet_{a}": low,
+            f"quiet_linear_{a}": high,
+        }
     return out
 
 

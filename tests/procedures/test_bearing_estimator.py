@@ -14,8 +14,18 @@ from procedures.estimators.bearing_estimates import together
 
 GAP, BETA, BIAS = 5.25e-4, 6.95e-7, 1.0
 G = 9.81
-PLANE = {"mass": 0.98, "gravity": G, "axes": math.pi / 4, "l_is": 0.078, "l_os": 0.1, "l_oa": 0.081, "amb_span": 0.178, "l_c": 0.155,
-         "coupling": 1200.0, "gap": GAP}  # fmt: skip
+PLANE = {
+    "mass": 0.98,
+    "gravity": G,
+    "axes": math.pi / 4,
+    "l_is": 0.078,
+    "l_os": 0.1,
+    "l_oa": 0.081,
+    "amb_span": 0.178,
+    "l_c": 0.155,
+    "coupling": 1200.0,
+    "gap": GAP,
+}
 SOUND = (PLANE | {f"{k}_{a}": v for a in AXES for k, v in (("gain", 1.0), ("zero", 0.0), ("runout", 0.0))}
          | {f"{k}_{c}": v for c in COILS for k, v in (("gain", 1.0), ("offset", 0.0))})  # fmt: skip
 PLACES = np.array(
@@ -90,7 +100,7 @@ def test_erratum_the_sign_of_the_offset_goes_with_gravity() -> None:
 
 
 def test_erratum_the_linear_column_of_table_2_2_is_no_slope() -> None:
-    """With the corrected sign the no-intercept model returns about five times the bearing's slopes; with the other one it does not."""
+    """With the corrected sign the no-intercept model returns five times the bearing's slopes, with the other it does not."""
     same = bearing.fits(positions((115e-6,) * 4), SOUND)["yi"]
     k, stiffness = bearing.slopes(same.fit, GAP, BIAS)
     assert (

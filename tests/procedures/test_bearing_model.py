@@ -18,7 +18,7 @@ from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import Estimate, interval
 from procedures.bearing_model import MEASURES, Plan, check, figures, grid, read, step_count
-from procedures.estimators import bearing_findings
+from procedures.estimators import bearing_findings, bearing_wiring
 from procedures.estimators.bearing import AXES
 from procedures.estimators.bearing_data import Held
 from reports.figures import draw as draw_figure
@@ -65,8 +65,8 @@ def test_a_sound_rig_is_recovered_within_its_intervals(sound: Simulated) -> None
 
 
 def test_the_printed_effect_at_the_printed_machine(tmp_path: Path) -> None:
-    """T Table 2.2 on a machine as drawn, offsets of 115 um, inboard: the linear model leaves at least 20 times the residual sum over
-    single samples (T: 56), and its numbers are those of no slope (T: 68.5 N/A, 162 N/mm)."""
+    """T Table 2.2 on a machine as drawn, offsets of 115 um, inboard: the linear model leaves at least 20 times the
+    residual sum over single samples (T: 56), and its numbers are those of no slope (T: 68.5 N/A, 162 N/mm)."""
     exact = {k: v for k, v in nominal(load_rig(RIG)).items() if not k.startswith(("runout", "unbalance"))}
     values = found(measure(tmp_path, exact, spacing_m=20e-6))
     for where, least in (("inboard", 20), ("outboard", 10)):  # T prints the inboard AMB
@@ -153,7 +153,7 @@ def exchanged(held: Held, a: str, b: str, sign: float = 1.0) -> Held:
 def test_a_wrong_map_of_the_readings_is_named(sound: Simulated, a: str, b: str, sign: float, code: str) -> None:
     """The controller sees them right, the bench does not: the tilts tell the planes apart."""
     held, tilted = (exchanged(x, a, b, sign) for x in read(sound.recording))
-    codes = {f.code for f in bearing_findings.of_wiring(held, tilted, sound.recording.rig)}
+    codes = {f.code for f in bearing_wiring.of_wiring(held, tilted, sound.recording.rig)}
     assert codes == {code}
 
 
@@ -161,7 +161,7 @@ def test_exchanged_coils_of_two_axes_and_flags_are_named(sound: Simulated) -> No
     held, tilted = read(sound.recording)
     for a, b in (("yi", "yo"), ("yi", "zi")):
         other = [exchanged(exchanged(x, f"i_{a}_p", f"i_{b}_p"), f"i_{a}_n", f"i_{b}_n") for x in (held, tilted)]
-        wrong = list(bearing_findings.of_models(*other, sound.recording.rig, sound.recording.plan))
+        wrong = list(bearing_wiring.of_models(*other, sound.recording.rig, sound.recording.plan))
         assert {(f.code, f.where) for f in wrong} == {("coils-exchanged", a), ("coils-exchanged", b)}
         assert f"of {a} and {b}" in wrong[0].text
     for bit, code in ((64, "clipped"), (4, "contact"), (1, "saturated")):
