@@ -40,8 +40,8 @@ SOME_GEOMETRY = {
     "coupling_stiffness": "radial stiffness of that coupling",
 }
 """Lengths that a rig may have; the procedures that need one say so."""
-MACHINE = {"pole_pairs": "1", "polar_inertia": "kg m^2", "ring_inertia": "kg m^2", "amb_asymmetry": "1",
-           "radial_axes": "rad", "runout": "m", "mass": "kg", "transverse_inertia": "kg m^2"}  # fmt: skip
+MACHINE = {"pole_pairs": "1", "polar_inertia": "kg m^2", "ring_inertia": "kg m^2", "amb_asymmetry": "1", "radial_axes": "rad",
+           "runout": "m", "coupling_offset": "m", "mass": "kg", "transverse_inertia": "kg m^2"}  # fmt: skip
 FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 
 

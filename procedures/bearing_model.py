@@ -46,7 +46,7 @@ MARGIN = 5e-6  # of the radius: noise, and what the controller swings on the way
 PARAMETERS = ("law", "bias", "integral", "ref_y", "ref_z", "ref_psi", "ref_theta", "slew", "current_limit")
 GEOMETRY = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_outboard_amb", "amb_span", "amb_gap", "clearance",
             "com_to_coupling", "coupling_stiffness")  # fmt: skip
-MACHINE = ("mass", "radial_axes", "runout")
+MACHINE = ("mass", "radial_axes", "runout", "coupling_offset")
 ASKED = "Is the motor's coupling taken off the shaft, so that nothing but the AMBs holds it?"
 
 

@@ -29,6 +29,7 @@ Array = npt.NDArray[np.float64]
 Numbers = Mapping[str, float]
 AXES = ("yi", "zi", "yo", "zo")
 COILS = tuple(f"{a}_{c}" for a in AXES for c in "pn")
+STEPS = 3  # of Gauss and Newton: the second already changes nothing that counts
 COMPARED = ("k_linear", "stiffness_linear", "misfit", "misfit_linear", "misfit_ratio", "misfit_ratio_means")
 
 
@@ -74,8 +75,9 @@ class AxisFit:
 def statics(d: Positions, p: Numbers) -> Statics:
     """From readings to displacements, currents and forces.
 
-    `p` holds mass, gravity, axes (rad to the vertical), l_is, l_os, l_oa, amb_span, l_c, coupling (N/m), and per axis gain_*,
-    zero_* (reading where the coupling is relaxed), runout_*; per coil gain_*, offset_* of its current sensor.
+    `p` holds mass, gravity, axes (rad to the vertical), l_is, l_os, l_oa, amb_span, l_c, coupling (N/m), relaxed_y and
+    relaxed_z (m, where the coupling does not pull, off the rings' centre); per axis gain_*, zero_* (reading where the shaft
+    is in the rings' centre), runout_*; per coil gain_*, offset_* of its current sensor.
     """
     l_is, l_os, l_oa = p["l_is"], p["l_os"], p["l_oa"]
     l_ia, span = p["amb_span"] - l_oa, l_is + l_os
@@ -87,7 +89,8 @@ def statics(d: Positions, p: Numbers) -> Statics:
         return x[:2] * (1 - share) + x[2:] * share
 
     r = np.concatenate([at(-l_ia, off), at(l_oa, off)])
-    pull = p["coupling"] * at(-p["l_c"], off - zero)
+    relaxed = np.array([[p["relaxed_y"]], [p["relaxed_z"]]])
+    pull = p["coupling"] * (at(-p["l_c"], off - zero) - relaxed)
     weight = p["mass"] * p["gravity"] * np.array([[math.cos(p["axes"])], [math.sin(p["axes"])]])
     force = np.concatenate([weight * l_oa + pull * (l_oa + p["l_c"]), weight * l_ia + pull * (l_ia - p["l_c"])])
     pos, neg = (
@@ -104,6 +107,27 @@ def magnet(beta: float, offset: float, gap: float, r: Array, p: Array, n: Array)
     return out
 
 
+def slopes_of(terms: Array, gap: float, r: Array, p: Array, n: Array) -> Array:
+    """dF by beta, offset and gap, (N, 3)."""
+    near, far = gap - terms[1] - r, gap + terms[1] + r
+    up, down = 2 * terms[0] * p**2 / near**3, 2 * terms[0] * n**2 / far**3
+    return np.column_stack([(p / near) ** 2 - (n / far) ** 2, up + down, down - up])
+
+
+def nearby(s: Statics, k: int, terms: Array, gap: float) -> Array:
+    """The terms of axis `k` when the data are a little other than those whose fit gave `terms`, by Gauss and Newton's steps:
+    beta and offset at `gap`, or with three terms the gap too. Far cheaper than a fit, for what is asked for many times.
+    """
+    found, count = terms.copy(), len(terms)
+    for _ in range(STEPS):
+        at = float(found[2]) if count == 3 else gap
+        left = s.force[k] - magnet(found[0], found[1], at, s.r[k], s.p[k], s.n[k])
+        design = slopes_of(found, at, s.r[k], s.p[k], s.n[k])[:, :count]
+        scale = np.sqrt((design**2).sum(axis=0))
+        found = found + np.linalg.lstsq(design / scale, left, rcond=None)[0] / scale
+    return found
+
+
 def nonlinear(r: Array, p: Array, n: Array, force: Array, gap: float) -> Fit:
     """T (2.8): beta and offset of one axis.
 
@@ -115,9 +139,7 @@ def nonlinear(r: Array, p: Array, n: Array, force: Array, gap: float) -> Fit:
         return magnet(terms[0], terms[1], gap, r, p, n)
 
     def jacobian(terms: Array) -> Array:
-        near, far = gap - terms[1] - r, gap + terms[1] + r
-        slope = 2 * terms[0] * (p**2 / near**3 + n**2 / far**3)
-        return np.column_stack([(p / near) ** 2 - (n / far) ** 2, slope])
+        return slopes_of(terms, gap, r, p, n)[:, :2]
 
     return leastsquares.nonlinear(model, force, _start(r, p, n, force, gap), jacobian=jacobian)
 
@@ -132,6 +154,14 @@ def _start(r: Array, p: Array, n: Array, force: Array, gap: float) -> Array:
     left = ((force - betas[:, None] * unit) ** 2).sum(axis=1)
     best = int(np.argmin(left))
     return np.array([betas[best], offsets[best]])
+
+
+def linear_terms(r: Array, p: Array, n: Array, force: Array) -> Array:
+    """K_i and K_xi alone, as `linear`."""
+    d = (p - n) / 2
+    a, b, c = float(d @ d), float(d @ r), float(r @ r)
+    e, f = float(d @ force), float(r @ force)
+    return np.array([c * e - b * f, a * f - b * e]) / (a * c - b * b)
 
 
 def linear(r: Array, p: Array, n: Array, force: Array) -> Fit:
@@ -163,9 +193,7 @@ def with_gap(s: Statics, k: int, start: Array, gap: float) -> Fit:
         return magnet(terms[0], terms[1], terms[2], r, p, n)
 
     def jacobian(terms: Array) -> Array:
-        near, far = terms[2] - terms[1] - r, terms[2] + terms[1] + r
-        up, down = 2 * terms[0] * p**2 / near**3, 2 * terms[0] * n**2 / far**3
-        return np.column_stack([(p / near) ** 2 - (n / far) ** 2, up + down, down - up])
+        return slopes_of(terms, float(terms[2]), r, p, n)
 
     return leastsquares.nonlinear(model, s.force[k], np.array([*start, gap]), jacobian=jacobian)
 

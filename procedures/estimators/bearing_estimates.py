@@ -46,33 +46,71 @@ class Analysis:
     samples: int
 
 
+@dataclass(frozen=True)
+class Sums:
+    """Residual sums of one axis, N^2, apart from what the steps' means leave: over single samples and over batch means, each of
+    the nonlinear and the linear model. `count` (N,) samples and `batches` a step; `noise_N` as in `Analysis`.
+
+    Only the means answer to a wrong gain or length by an amount that counts; so what is within the steps is summed once.
+    """
+
+    within: tuple[float, float]
+    within_batches: tuple[float, float]
+    count: Array
+    batches: int
+    noise_N: tuple[float, float]
+
+    @staticmethod
+    def of(held: Held, values: dict[str, float], k: int, f: AxisFit) -> Sums:
+        """Of axis `k`."""
+        gap, steps = values["gap"], len(held)
+        means = residuals(bearing.statics(held.means(), values), k, f, gap)
+        singles = residuals(bearing.statics(held.samples(), values), k, f, gap)
+        batches = residuals(bearing.statics(held.parts(), values), k, f, gap)
+        count = np.bincount(held.of_step).astype(float)
+        each = held.batches["pos_yi"].shape[1]
+        own = np.bincount(held.of_step, singles[0]) / count
+        sample = math.sqrt(float(((singles[0] - own[held.of_step]) ** 2).sum()) / (len(singles[0]) - steps))
+        batch = float(np.sqrt(batches[0].reshape(steps, each).var(axis=1, ddof=1).mean()))
+        one, two = (float(x @ x - count @ m**2) for x, m in zip(singles, means, strict=True))
+        low, high = (float(x @ x - each * (m @ m)) for x, m in zip(batches, means, strict=True))
+        return Sums((one, two), (low, high), count, each, (sample, batch))
+
+
 def evaluate(recording: Recording[Any], held: Held) -> Analysis:
     """Fits with their influences; `estimates` by quantity and axis."""
     inputs = fit_inputs(recording.rig, recording.plan.coupled)
-    means, parts, samples = held.means(), held.parts(), held.samples()
+    means = held.means()
     drawing = inputs["gap"]
     gaps = gap_estimates(means, inputs)
     inputs["gap"] = together([drawing, *gaps.values()])
     values = {name: e.value for name, e in inputs.items()}
-
-    def model(p: dict[str, float]) -> dict[str, float]:
-        return outputs(means, parts, samples, p)
-
     s = bearing.statics(means, values)
     fits = {a: bearing.axis_fit(s, k, values["gap"]) for k, a in enumerate(AXES)}
+    sums = {a: Sums.of(held, values, k, fits[a]) for k, a in enumerate(AXES)}
+
+    def model(p: dict[str, float]) -> dict[str, float]:
+        return outputs(means, fits, sums, p)
+
     estimates = linearised(model, inputs)
-    count = len(held.of_step)
-    noise = {a: _noise(held, values, k, fits[a]) for k, a in enumerate(AXES)}
     for a, f in fits.items():
-        extra = scatter(honest(f, noise[a][1], held.batches["pos_yi"].shape[1]),
-                        {f"beta_{a}": [1, 0], f"offset_{a}": [0, 1]}, f"bearing-model/{a}",
-                        f"scatter of the positions, {a}")  # fmt: skip
-        extra |= scatter(f.linear, {f"k_linear_{a}": [1, 0], f"stiffness_linear_{a}": [0, 1]}, f"bearing-model/linear/{a}",
-                         f"scatter of the linear fit, {a}")  # fmt: skip
-        extra |= of_sums(a, estimates, noise[a], held)
-        estimates |= {name: estimates[name] + e for name, e in extra.items()}
+        estimates |= {name: estimates[name] + e for name, e in type_a(a, f, sums[a], estimates, held).items()}
     estimates |= by_bearing(estimates)
+    noise = {a: sums[a].noise_N for a in AXES}
+    count = len(held.of_step)
     return Analysis(held, s, fits, values, estimates, noise, gaps, drawing, inputs["gap"], recording.plan.bias_A, count)
+
+
+def type_a(a: str, f: AxisFit, sums: Sums, estimates: dict[str, Estimate], held: Held) -> dict[str, Estimate]:
+    """What scatter does to each value of axis `a`; to be added."""
+    fit = honest(f, sums.noise_N[1], held.batches["pos_yi"].shape[1])
+    terms = {f"beta_{a}": [1, 0], f"offset_{a}": [0, 1]}
+    slopes = {f"k_linear_{a}": [1, 0], f"stiffness_linear_{a}": [0, 1]}
+    return {
+        **scatter(fit, terms, f"bearing-model/{a}", f"scatter of the positions, {a}"),
+        **scatter(f.linear, slopes, f"bearing-model/linear/{a}", f"scatter of the linear fit, {a}"),
+        **of_sums(a, estimates, sums.noise_N, held),
+    }
 
 
 def by_bearing(e: dict[str, Estimate]) -> dict[str, Estimate]:
@@ -96,15 +134,15 @@ def gap_estimates(means: Positions, inputs: dict[str, Estimate]) -> dict[str, Es
     given = inputs | {"gap": Estimate.exact(nominal)}
     first = bearing.statics(means, {k: e.value for k, e in given.items()})
     starts = [bearing.axis_fit(first, k, nominal).fit.terms for k in range(4)]
+    fits = [bearing.with_gap(first, k, starts[k], nominal) for k in range(4)]
 
     def model(p: dict[str, float]) -> dict[str, float]:
         s = bearing.statics(means, p)
-        return {a: float(bearing.with_gap(s, k, starts[k], nominal).terms[2]) for k, a in enumerate(AXES)}
+        return {a: float(bearing.nearby(s, k, fits[k].terms, nominal)[2]) for k, a in enumerate(AXES)}
 
     found = linearised(model, given)
     for k, a in enumerate(AXES):
-        fit = bearing.with_gap(first, k, starts[k], nominal)
-        found[a] = found[a] + scatter(fit, {a: [0, 0, 1]}, f"bearing-model/gap/{a}", f"scatter of the gap, {a}")[a]
+        found[a] = found[a] + scatter(fits[k], {a: [0, 0, 1]}, f"bearing-model/gap/{a}", f"scatter of the gap, {a}")[a]
     return found
 
 
@@ -128,20 +166,22 @@ def together(estimates: list[Estimate]) -> Estimate:
     return total
 
 
-def outputs(means: Positions, parts: Positions, samples: Positions, p: dict[str, float]) -> dict[str, float]:
-    """Every value by quantity and axis: terms from the steps' means, sums of squares over all samples as in T Table 2.2,
-    and their ratio over batch means too."""
-    s, b, quiet = (bearing.statics(x, p) for x in (means, samples, parts))
+def outputs(means: Positions, fits: dict[str, AxisFit], sums: dict[str, Sums], p: dict[str, float]) -> dict[str, float]:
+    """Every value by quantity and axis, near the `fits`: terms from the steps' means, sums of squares over all samples as in
+    T Table 2.2, and their ratio over batch means too."""
+    s = bearing.statics(means, p)
     out: dict[str, float] = {}
     for k, a in enumerate(AXES):
-        f = bearing.axis_fit(s, k, p["gap"])
-        one, two = (float(x @ x) for x in residuals(b, k, f, p["gap"]))
-        low, high = (float(x @ x) for x in residuals(quiet, k, f, p["gap"]))
+        w, beta_offset = sums[a], bearing.nearby(s, k, fits[a].fit.terms, p["gap"])
+        slopes = bearing.linear_terms(s.r[k], s.p[k], s.n[k], s.force[k])
+        left = _left(s, k, beta_offset, slopes, p["gap"])
+        one, two = (float(w.count @ x**2) + own for x, own in zip(left, w.within, strict=True))
+        low, high = (w.batches * float(x @ x) + own for x, own in zip(left, w.within_batches, strict=True))
         out |= {
-            f"beta_{a}": f.beta,
-            f"offset_{a}": f.offset,
-            f"k_linear_{a}": float(f.linear.terms[0]),
-            f"stiffness_linear_{a}": float(f.linear.terms[1]),
+            f"beta_{a}": float(beta_offset[0]),
+            f"offset_{a}": float(beta_offset[1]),
+            f"k_linear_{a}": float(slopes[0]),
+            f"stiffness_linear_{a}": float(slopes[1]),
             f"misfit_{a}": one,
             f"misfit_linear_{a}": two,
             f"misfit_ratio_{a}": two / one,
@@ -154,19 +194,13 @@ def outputs(means: Positions, parts: Positions, samples: Positions, p: dict[str,
 
 def residuals(b: Statics, k: int, f: AxisFit, gap: float) -> tuple[Array, Array]:
     """What each model gives more than the force that carries, N."""
+    return _left(b, k, f.fit.terms, f.linear.terms, gap)
+
+
+def _left(b: Statics, k: int, beta_offset: Array, slopes: Array, gap: float) -> tuple[Array, Array]:
     r, p, n = b.r[k], b.p[k], b.n[k]
-    one = bearing.magnet(f.beta, f.offset, gap, r, p, n) - b.force[k]
-    two = f.linear.terms[0] * (p - n) / 2 + f.linear.terms[1] * r - b.force[k]
-    return one, two
-
-
-def _noise(held: Held, values: dict[str, float], k: int, f: AxisFit) -> tuple[float, float]:
-    """Standard deviations of a sample's and of a batch's residual force about its step's mean, N."""
-    one = residuals(bearing.statics(held.samples(), values), k, f, values["gap"])[0]
-    mean = np.bincount(held.of_step, one) / np.bincount(held.of_step)
-    sample = math.sqrt(float(((one - mean[held.of_step]) ** 2).sum()) / (len(one) - len(held)))
-    batch = residuals(bearing.statics(held.parts(), values), k, f, values["gap"])[0].reshape(len(held), -1)
-    return sample, float(np.sqrt(batch.var(axis=1, ddof=1).mean()))
+    one = bearing.magnet(beta_offset[0], beta_offset[1], gap, r, p, n) - b.force[k]
+    return one, slopes[0] * (p - n) / 2 + slopes[1] * r - b.force[k]
 
 
 def honest(f: AxisFit, noise_N: float, batches: int) -> Any:
@@ -213,6 +247,9 @@ def fit_inputs(rig: RigFile, coupled: bool) -> dict[str, Estimate]:
     inputs |= {key: certified(f"geometry/{name}", g[name], name.replace("_", " ")) for key, name in LENGTHS.items()}
     spring = certified("geometry/coupling_stiffness", g["coupling_stiffness"], "stiffness of the coupling")
     inputs["coupling"] = spring if coupled else Estimate.exact(0.0)
+    for d in "yz":
+        name = f"machine/coupling_offset/{d}"
+        inputs[f"relaxed_{d}"] = certified(name, m["coupling_offset"], f"where the coupling is relaxed, {d}")
     for a in AXES:
         sensor, name = rig.sensors[f"pos_{a}"], f"sensors/pos_{a}"
         inputs[f"gain_{a}"] = certified(f"{name}/gain", sensor.gain, f"gain of pos_{a}")

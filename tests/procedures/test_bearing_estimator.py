@@ -24,6 +24,8 @@ PLANE = {
     "amb_span": 0.178,
     "l_c": 0.155,
     "coupling": 1200.0,
+    "relaxed_y": 0.0,
+    "relaxed_z": 0.0,
     "gap": GAP,
 }
 SOUND = (PLANE | {f"{k}_{a}": v for a in AXES for k, v in (("gain", 1.0), ("zero", 0.0), ("runout", 0.0))}
