@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 
 from pydantic import Field
 
-from bench.errors import OperatorAbort
+from bench.errors import DeviceFault, OperatorAbort
 from bench.figures import Figure
 from bench.findings import Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
@@ -22,11 +22,23 @@ from bench.recording import Recording
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
+from bench.states import transition
 from procedures import bearing_model_figures as drawn
-from procedures.estimators import bearing_findings, bearing_wiring
-from procedures.estimators.bearing import AXES, COMPARED
-from procedures.estimators.bearing_data import CURRENTS, HOLD, POSITIONS, TILT, Held, read_steps
-from procedures.estimators.bearing_estimates import BEARINGS, evaluate
+from procedures.estimators import bearing_findings, bearing_rest, bearing_wiring
+from procedures.estimators.bearing import AXES
+from procedures.estimators.bearing_compared import BEARINGS, COMPARED
+from procedures.estimators.bearing_data import (
+    CURRENTS,
+    HOLD,
+    LIFT,
+    LIFT_LOST,
+    POSITIONS,
+    REST,
+    TILT,
+    Held,
+    read_steps,
+)
+from procedures.estimators.bearing_estimates import evaluate
 
 BETA = {a: Quantity(f"beta_{a}", "N m^2/A^2", f"force constant of axis {a}, at the same gap for all") for a in AXES}
 OFFSET = {
@@ -42,6 +54,8 @@ OF_LINEAR = {
 }
 MEASURES = (*BETA.values(), *OFFSET.values(), *OF_LINEAR.values())
 CCS = 1.0
+REST_S = 0.3
+BIAS_STEP_A = 0.1
 MARGIN = 5e-6  # of the radius: noise, and what the controller swings on the way
 PARAMETERS = ("law", "bias", "integral", "ref_y", "ref_z", "ref_psi", "ref_theta", "slew", "current_limit")
 GEOMETRY = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_outboard_amb", "amb_span", "amb_gap", "clearance",
@@ -56,8 +70,9 @@ class Plan(BenchPlan):
     spacing_m: float = Field(20e-6, gt=0)
     radius_m: float = Field(82e-6, gt=0)
     tilt_rad: float = Field(3e-4, gt=0)  # of the check of the wiring
-    passes: int = Field(2, ge=1)  # every second one backwards
-    bias_A: float = Field(1.0, gt=0)
+    biases_A: tuple[float, ...] = Field(
+        (1.2, 0.8), min_length=1
+    )  # of each pass; the first is compared with T Table 2.2
     coupled: bool = True  # False: the operator has taken the coupling off
     settle_s: float = Field(0.6, gt=0)
     average_s: float = Field(0.5, ge=0.1)
@@ -70,7 +85,7 @@ class Plan(BenchPlan):
 
 def settings(plan: Plan) -> dict[str, float]:
     """Controller parameters that the runner writes before levitation: flatness with constant current sum."""
-    return {"law": CCS, "bias": plan.bias_A, "integral": 1.0}
+    return {"law": CCS, "bias": plan.biases_A[0], "integral": 1.0}
 
 
 def grid(plan: Plan) -> list[tuple[float, float]]:
@@ -92,15 +107,55 @@ def tilts(plan: Plan) -> list[tuple[float, float]]:
 
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records, for the progress display."""
-    return len(tilts(plan)) + plan.passes * len(grid(plan))
+    return 2 + len(tilts(plan)) + len(plan.biases_A) * len(grid(plan))
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
-    """Small tilts at the centre, then the grid, as often as the plan says."""
+    """Look at the shaft on its rings, lift it, tilt it a little, then the grid at each bias."""
     if not plan.coupled and rig.operator.ask(ASKED).strip().lower() not in ("yes", "y"):
         raise OperatorAbort("the coupling is on the shaft; expected it off, or a plan with coupled = true")
-    write = rig.levitation.set
+    with record.step(REST):
+        rig.clock.sleep(REST_S)
+    readings = {name: rig.levitation.reading(name) for name in POSITIONS}
+    if any(bearing_rest.of_readings(readings, rig.file)) or not _lifted(rig, record):
+        return
     rig.clock.sleep(3 * plan.settle_s)
+    _tilted(rig, plan, record)
+    for k, bias in enumerate(plan.biases_A):
+        _biased(rig, plan, bias)
+        for y, z in grid(plan) if k % 2 == 0 else reversed(grid(plan)):
+            rig.levitation.set("ref_y", y)
+            rig.levitation.set("ref_z", z)
+            rig.clock.sleep(plan.settle_s)
+            with record.step(HOLD, y_m=y, z_m=z, bias_A=bias):
+                rig.clock.sleep(plan.average_s)
+    rig.levitation.set("ref_y", 0.0)
+    rig.levitation.set("ref_z", 0.0)
+    rig.clock.sleep(plan.settle_s)
+
+
+def _lifted(rig: Rig, record: Recorder) -> bool:
+    with record.step(LIFT):
+        try:
+            transition(rig, RigState.LEVITATED)
+        except DeviceFault as fault:
+            record.event(LIFT_LOST, fault=str(fault))
+            return False
+    return True
+
+
+def _biased(rig: Rig, plan: Plan, bias: float) -> None:
+    """In small steps: each one is a push, until the integrators have taken it up."""
+    before = rig.levitation.get("bias")
+    count = math.ceil(abs(bias - before) / BIAS_STEP_A - 1e-3)
+    for k in range(count):
+        rig.levitation.set("bias", before + (bias - before) * (k + 1) / count)
+        rig.clock.sleep(plan.settle_s / 2)
+    rig.clock.sleep(plan.settle_s if count else 0.0)
+
+
+def _tilted(rig: Rig, plan: Plan, record: Recorder) -> None:
+    write = rig.levitation.set
     for psi, theta in tilts(plan):
         write("ref_psi", psi)
         write("ref_theta", theta)
@@ -108,28 +163,21 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         with record.step(TILT, psi_rad=psi, theta_rad=theta):
             rig.clock.sleep(plan.average_s)
     write("ref_theta", 0.0)
-    for k in range(plan.passes):
-        for y, z in grid(plan) if k % 2 == 0 else reversed(grid(plan)):
-            write("ref_y", y)
-            write("ref_z", z)
-            rig.clock.sleep(plan.settle_s)
-            with record.step(HOLD, y_m=y, z_m=z):
-                rig.clock.sleep(plan.average_s)
-    write("ref_y", 0.0)
-    write("ref_z", 0.0)
-    rig.clock.sleep(plan.settle_s)
 
 
 def read(recording: Recording[Plan]) -> tuple[Held, Held]:
     """The positions, and the tilts before them."""
     batches = recording.plan.batches
-    return read_steps(recording, HOLD, ("y_m", "z_m"), batches), read_steps(
+    return read_steps(recording, HOLD, ("y_m", "z_m", "bias_A"), batches), read_steps(
         recording, TILT, ("psi_rad", "theta_rad"), batches
     )
 
 
 def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     """Findings first (they decide what the numbers are worth), then each axis."""
+    if early := bearing_rest.before(recording):
+        yield from early
+        return
     held, tilted = read(recording)
     found = list(_of_data(recording, held, tilted))
     yield from found
@@ -163,10 +211,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     if places < 9:
         yield f"spacing_m, radius_m: found {places} positions; expected nine or more"
     g = rig.geometry
-    zero = max(rig.sensors[c].offset.half_width or 3 * rig.sensors[c].offset.standard_uncertainty for c in POSITIONS)
-    ring = g["clearance"].value - (g["clearance"].half_width or 3 * g["clearance"].standard_uncertainty)
-    runout = 2 * rig.machine["runout"].standard_uncertainty
-    room = min(ring - math.sqrt(2) * zero - runout, rig.envelope.max_levitated_position_m) - MARGIN
+    room = min(bearing_rest.room(rig), rig.envelope.max_levitated_position_m) - MARGIN
     if plan.radius_m > room:
         yield (
             f"radius_m: found {plan.radius_m * 1e6:.1f} µm; the ring, the sensors' zeros and their runout leave "
@@ -178,8 +223,16 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     arm = max(g[k].value for k in ("com_to_inboard_sensor", "com_to_outboard_sensor"))
     if plan.tilt_rad > rig.parameters["ref_psi"].high or plan.tilt_rad * arm > room:
         yield f"tilt_rad: found {plan.tilt_rad * 1e6:.0f} µrad; reference and ring allow less"
-    if 2 * plan.bias_A > rig.parameters["current_limit"].default or plan.bias_A > rig.parameters["bias"].high:
-        yield f"bias_A: found {plan.bias_A:g} A; the law's currents reach twice that, beyond the amplifiers or the parameter"
+    low, high = (
+        rig.parameters["bias"].low,
+        min(rig.parameters["bias"].high, rig.parameters["current_limit"].default / 2),
+    )
+    for bias in plan.biases_A:
+        if not low <= bias <= high:
+            yield (
+                f"biases_A: found {bias:g} A; parameter and amplifiers, which have to give twice that, leave {low:g} to "
+                f"{high:g} A"
+            )
 
 
 def _missing(rig: RigFile) -> Iterator[str]:
@@ -196,6 +249,8 @@ def _missing(rig: RigFile) -> Iterator[str]:
 
 def figures(recording: Recording[Plan]) -> Iterable[Figure]:
     """Positions, currents, forces by both models and residuals; empty when the data carry no fit."""
+    if bearing_rest.before(recording):
+        return ()
     held, tilted = read(recording)
     if any(f.code in bearing_findings.FATAL for f in _of_data(recording, held, tilted)):
         return ()
@@ -235,7 +290,7 @@ procedure = Procedure(
     name="bearing-model",
     title="Force constants and magnetic offsets of the radial AMBs by eccentric positioning",
     measures=MEASURES,
-    state=RigState.LEVITATED,
+    state=RigState.READY,
     plan=Plan,
     acquire=acquire,
     analyse=analyse,

@@ -47,17 +47,15 @@ def _currents(a: Analysis) -> Figure:
 
 def _residuals(a: Analysis) -> Iterator[Figure]:
     """As T Table 2.2 in a picture: the same scale would hide the nonlinear model's."""
-    load = 1e3 * float(np.mean([np.abs(f.force).mean() for f in a.fits.values()]))
+    load = 1e3 * float(np.abs(a.statics.force).mean())
     caption = f"Force that carries less the model's, of each position; the load of an axis is {load:.0f} mN on average."
     of_linear = {axis: f.linear.residuals for axis, f in a.fits.items()}
     of_nonlinear = {axis: f.fit.residuals for axis, f in a.fits.items()}
-    for key, name, residuals in (
-        ("residuals-linear", "linear model without intercept (T 2.9)", of_linear),
-        ("residuals-nonlinear", "nonlinear model (T 2.8)", of_nonlinear),
+    for key, name, at, residuals in (
+        ("residuals-linear", f"linear model without intercept (T 2.9) at {a.bias_A:g} A", a.compared, of_linear),
+        ("residuals-nonlinear", "nonlinear model (T 2.8)", a.statics, of_nonlinear),
     ):
-        series = tuple(
-            Series(axis, 1e6 * a.statics.r[k], 1e3 * residuals[axis], "points") for k, axis in enumerate(AXES)
-        )
+        series = tuple(Series(axis, 1e6 * at.r[k], 1e3 * residuals[axis], "points") for k, axis in enumerate(AXES))
         title = f"Residuals of the {name}"
         yield Figure(key, title, caption, DISPLACEMENT, "residual (mN)", series, lines=(("zero", 0.0),))
 
@@ -66,13 +64,13 @@ def _forces(a: Analysis) -> Figure:
     """Force of the magnets at equal currents over position: the fit's, and the linear model's line."""
     axis, bias = "yi", a.bias_A
     k, f = AXES.index(axis), a.fits[axis]
-    r = np.linspace(float(a.statics.r[k].min()), float(a.statics.r[k].max()), 60)
+    r = np.linspace(float(a.compared.r[k].min()), float(a.compared.r[k].max()), 60)
     both = np.full_like(r, bias)
     pull = bearing.magnet(f.beta, f.offset, a.values["gap"], r, both, both)
     series = (
         Series("nonlinear, no control current", 1e6 * r, pull),
         Series("linear, no control current", 1e6 * r, f.linear.terms[1] * r),
-        Series("force that carries", 1e6 * a.statics.r[k], a.statics.force[k], "points"),
+        Series("force that carries", 1e6 * a.compared.r[k], a.compared.force[k], "points"),
     )
     caption = (
         f"Pull of both coils at {bias:g} A over the displacement at the AMB, by both models; the points are what "
@@ -83,10 +81,10 @@ def _forces(a: Analysis) -> Figure:
 
 
 def _gaps(a: Analysis) -> Figure:
-    all_of = [*a.gaps.values(), a.drawing, a.gap]
-    values = 1e6 * np.array([e.value for e in all_of])
-    widths = 1e6 * np.array([expanded(e) for e in all_of])
-    series = (Series("gap", np.arange(1.0, len(all_of) + 1), values, "points", widths),)
+    all_of = {AXES.index(axis) + 1.0: e for axis, e in a.gaps.items()} | {5.0: a.drawing, 6.0: a.gap}
+    values = 1e6 * np.array([e.value for e in all_of.values()])
+    widths = 1e6 * np.array([expanded(e) for e in all_of.values()])
+    series = (Series("gap", np.array(list(all_of)), values, "points", widths),)
     caption = (
         "1 to 4: the gap that the positions of yi, zi, yo, zo ask for beside force constant and offset; "
         "5: the drawing; 6: all of them together, which is used. 95 % intervals."

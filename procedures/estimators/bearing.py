@@ -30,7 +30,6 @@ Numbers = Mapping[str, float]
 AXES = ("yi", "zi", "yo", "zo")
 COILS = tuple(f"{a}_{c}" for a in AXES for c in "pn")
 STEPS = 3  # of Gauss and Newton: the second already changes nothing that counts
-COMPARED = ("k_linear", "stiffness_linear", "misfit", "misfit_linear", "misfit_ratio", "misfit_ratio_means")
 
 
 @dataclass(frozen=True)
@@ -55,11 +54,10 @@ class Statics:
 
 @dataclass(frozen=True)
 class AxisFit:
-    """One axis: both fits. `fit` has the terms beta (N m^2/A^2) and offset (m)."""
+    """One axis: both fits. `fit` has the terms beta (N m^2/A^2) and offset (m), `linear` K_i (N/A) and K_xi (N/m)."""
 
     fit: Fit
     linear: Fit
-    force: Array
 
     @property
     def beta(self) -> float:
@@ -169,16 +167,16 @@ def linear(r: Array, p: Array, n: Array, force: Array) -> Fit:
     return leastsquares.linear(np.column_stack([(p - n) / 2, r]), force)
 
 
-def axis_fit(s: Statics, k: int, gap: float) -> AxisFit:
-    """Both models of axis `k`."""
-    of = (s.r[k], s.p[k], s.n[k], s.force[k])
-    return AxisFit(nonlinear(*of, gap), linear(*of), s.force[k])
+def axis_fit(s: Statics, compared: Statics, k: int, gap: float) -> AxisFit:
+    """Axis `k`: the nonlinear model of all positions, the linear one of those at one bias, which alone it can describe."""
+    one, two = ((x.r[k], x.p[k], x.n[k], x.force[k]) for x in (s, compared))
+    return AxisFit(nonlinear(*one, gap), linear(*two))
 
 
 def fits(d: Positions, p: Numbers) -> dict[str, AxisFit]:
-    """Every axis."""
+    """Every axis, of positions at one bias."""
     s = statics(d, p)
-    return {a: axis_fit(s, k, p["gap"]) for k, a in enumerate(AXES)}
+    return {a: axis_fit(s, s, k, p["gap"]) for k, a in enumerate(AXES)}
 
 
 def with_gap(s: Statics, k: int, start: Array, gap: float) -> Fit:
