@@ -78,7 +78,7 @@ class Plan(BenchPlan):
     average_s: float = Field(0.5, ge=0.1)
     batches: int = Field(5, ge=2)  # parts of a step; longer than the loop's swings
     max_speed_m_s: float = Field(5e-6, gt=0)  # a shaft that moves faster is not at rest
-    max_misfit: float = Field(0.01, gt=0)  # residual over the range of the magnets' forces
+    max_misfit: float = Field(0.005, gt=0)  # a position's residual over the mean load of its axis
     min_ratio: float = Field(20.0, gt=1)  # of the residual sums over batch means
     max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 

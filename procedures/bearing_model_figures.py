@@ -1,4 +1,4 @@
-"""What the bearing-model run draws: where the shaft stood, currents over position, both models' residuals, gaps."""
+"""What the bearing-model run draws: where the shaft stood, currents over position, both models' residuals, adjustments."""
 
 from __future__ import annotations
 
@@ -11,14 +11,13 @@ from bench.rigfile import RigFile
 from procedures.estimators import bearing
 from procedures.estimators.bearing import AXES
 from procedures.estimators.bearing_estimates import Analysis
-from procedures.estimators.bearing_findings import expanded
 
 DISPLACEMENT = "displacement at the AMB (µm)"
 
 
 def all_figures(a: Analysis, rig: RigFile) -> list[Figure]:
     """In the order of the report."""
-    return [_places(a, rig), _currents(a), *_residuals(a), _forces(a), _gaps(a)]
+    return [_places(a, rig), _currents(a), *_residuals(a), _forces(a), _adjustments(a)]
 
 
 def _places(a: Analysis, rig: RigFile) -> Figure:
@@ -50,7 +49,7 @@ def _residuals(a: Analysis) -> Iterator[Figure]:
     load = 1e3 * float(np.abs(a.statics.force).mean())
     caption = f"Force that carries less the model's, of each position; the load of an axis is {load:.0f} mN on average."
     of_linear = {axis: f.linear.residuals for axis, f in a.fits.items()}
-    of_nonlinear = {axis: f.fit.residuals for axis, f in a.fits.items()}
+    of_nonlinear = {axis: -f.residuals for axis, f in a.fits.items()}
     for key, name, at, residuals in (
         ("residuals-linear", f"linear model without intercept (T 2.9) at {a.bias_A:g} A", a.compared, of_linear),
         ("residuals-nonlinear", "nonlinear model (T 2.8)", a.statics, of_nonlinear),
@@ -66,7 +65,7 @@ def _forces(a: Analysis) -> Figure:
     k, f = AXES.index(axis), a.fits[axis]
     r = np.linspace(float(a.compared.r[k].min()), float(a.compared.r[k].max()), 60)
     both = np.full_like(r, bias)
-    pull = bearing.magnet(f.beta, f.offset, a.values["gap"], r, both, both)
+    pull = bearing.magnet(f.beta, f.offset, a.adjusted.values["gap"], r, both, both)
     series = (
         Series("nonlinear, no control current", 1e6 * r, pull),
         Series("linear, no control current", 1e6 * r, f.linear.terms[1] * r),
@@ -80,13 +79,17 @@ def _forces(a: Analysis) -> Figure:
     return Figure("forces", f"Force of axis {axis} at the bias", caption, DISPLACEMENT, "force (N)", series)
 
 
-def _gaps(a: Analysis) -> Figure:
-    all_of = {AXES.index(axis) + 1.0: e for axis, e in a.gaps.items()} | {5.0: a.drawing, 6.0: a.gap}
-    values = 1e6 * np.array([e.value for e in all_of.values()])
-    widths = 1e6 * np.array([expanded(e) for e in all_of.values()])
-    series = (Series("gap", np.array(list(all_of)), values, "points", widths),)
+def _adjustments(a: Analysis) -> Figure:
+    moved = a.adjusted.moved
+    at = np.arange(1.0, len(moved) + 1)
+    most = sorted(moved, key=lambda name: -abs(moved[name]))[:3]
+    named = ", ".join(f"{name} ({list(moved).index(name) + 1}) {moved[name]:+.1f}" for name in most)
     caption = (
-        "1 to 4: the gap that the positions of yi, zi, yo, zo ask for beside force constant and offset; "
-        "5: the drawing; 6: all of them together, which is used. 95 % intervals."
+        "How far the positions move each certified number, over its standard uncertainty; beyond the lines they contradict "
+        f"the certificate, if they tell of it at all. The most: {named}."
     )
-    return Figure("gaps", "Gaps", caption, "1 to 4 by axis, 5 drawing, 6 used", "gap (µm)", series)
+    series = (Series("adjustment", at, np.array(list(moved.values())), "points"),)
+    lines = (("+2", 2.0), ("-2", -2.0))
+    return Figure(
+        "adjustments", "Adjustments", caption, "number of the input", "adjustment / u (1)", series, lines=lines
+    )

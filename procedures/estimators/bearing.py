@@ -29,7 +29,6 @@ Array = npt.NDArray[np.float64]
 Numbers = Mapping[str, float]
 AXES = ("yi", "zi", "yo", "zo")
 COILS = tuple(f"{a}_{c}" for a in AXES for c in "pn")
-STEPS = 3  # of Gauss and Newton: the second already changes nothing that counts
 
 
 @dataclass(frozen=True)
@@ -54,20 +53,22 @@ class Statics:
 
 @dataclass(frozen=True)
 class AxisFit:
-    """One axis: both fits. `fit` has the terms beta (N m^2/A^2) and offset (m), `linear` K_i (N/A) and K_xi (N/m)."""
+    """One axis: `terms` beta (N m^2/A^2) and offset (m) of the nonlinear model, its `residuals` (N,) in N, model less force;
+    the linear model's fit with K_i (N/A) and K_xi (N/m)."""
 
-    fit: Fit
+    terms: Array
+    residuals: Array
     linear: Fit
 
     @property
     def beta(self) -> float:
         """N m^2/A^2."""
-        return float(self.fit.terms[0])
+        return float(self.terms[0])
 
     @property
     def offset(self) -> float:
         """From the magnetic centre to where the sensors read zero, m."""
-        return float(self.fit.terms[1])
+        return float(self.terms[1])
 
 
 def statics(d: Positions, p: Numbers) -> Statics:
@@ -105,27 +106,6 @@ def magnet(beta: float, offset: float, gap: float, r: Array, p: Array, n: Array)
     return out
 
 
-def slopes_of(terms: Array, gap: float, r: Array, p: Array, n: Array) -> Array:
-    """dF by beta, offset and gap, (N, 3)."""
-    near, far = gap - terms[1] - r, gap + terms[1] + r
-    up, down = 2 * terms[0] * p**2 / near**3, 2 * terms[0] * n**2 / far**3
-    return np.column_stack([(p / near) ** 2 - (n / far) ** 2, up + down, down - up])
-
-
-def nearby(s: Statics, k: int, terms: Array, gap: float) -> Array:
-    """The terms of axis `k` when the data are a little other than those whose fit gave `terms`, by Gauss and Newton's steps:
-    beta and offset at `gap`, or with three terms the gap too. Far cheaper than a fit, for what is asked for many times.
-    """
-    found, count = terms.copy(), len(terms)
-    for _ in range(STEPS):
-        at = float(found[2]) if count == 3 else gap
-        left = s.force[k] - magnet(found[0], found[1], at, s.r[k], s.p[k], s.n[k])
-        design = slopes_of(found, at, s.r[k], s.p[k], s.n[k])[:, :count]
-        scale = np.sqrt((design**2).sum(axis=0))
-        found = found + np.linalg.lstsq(design / scale, left, rcond=None)[0] / scale
-    return found
-
-
 def nonlinear(r: Array, p: Array, n: Array, force: Array, gap: float) -> Fit:
     """T (2.8): beta and offset of one axis.
 
@@ -137,7 +117,9 @@ def nonlinear(r: Array, p: Array, n: Array, force: Array, gap: float) -> Fit:
         return magnet(terms[0], terms[1], gap, r, p, n)
 
     def jacobian(terms: Array) -> Array:
-        return slopes_of(terms, gap, r, p, n)[:, :2]
+        near, far = gap - terms[1] - r, gap + terms[1] + r
+        slope = 2 * terms[0] * (p**2 / near**3 + n**2 / far**3)
+        return np.column_stack([(p / near) ** 2 - (n / far) ** 2, slope])
 
     return leastsquares.nonlinear(model, force, _start(r, p, n, force, gap), jacobian=jacobian)
 
@@ -154,52 +136,26 @@ def _start(r: Array, p: Array, n: Array, force: Array, gap: float) -> Array:
     return np.array([betas[best], offsets[best]])
 
 
-def linear_terms(r: Array, p: Array, n: Array, force: Array) -> Array:
-    """K_i and K_xi alone, as `linear`."""
-    d = (p - n) / 2
-    a, b, c = float(d @ d), float(d @ r), float(r @ r)
-    e, f = float(d @ force), float(r @ force)
-    return np.array([c * e - b * f, a * f - b * e]) / (a * c - b * b)
-
-
 def linear(r: Array, p: Array, n: Array, force: Array) -> Fit:
     """T (2.9): K_i and K_xi of one axis, without intercept."""
     return leastsquares.linear(np.column_stack([(p - n) / 2, r]), force)
 
 
-def axis_fit(s: Statics, compared: Statics, k: int, gap: float) -> AxisFit:
-    """Axis `k`: the nonlinear model of all positions, the linear one of those at one bias, which alone it can describe."""
-    one, two = ((x.r[k], x.p[k], x.n[k], x.force[k]) for x in (s, compared))
-    return AxisFit(nonlinear(*one, gap), linear(*two))
-
-
 def fits(d: Positions, p: Numbers) -> dict[str, AxisFit]:
-    """Every axis, of positions at one bias."""
+    """Both models of every axis by itself, with the numbers as they are given, of positions at one bias."""
     s = statics(d, p)
-    return {a: axis_fit(s, s, k, p["gap"]) for k, a in enumerate(AXES)}
+    out = {}
+    for k, a in enumerate(AXES):
+        of = (s.r[k], s.p[k], s.n[k], s.force[k])
+        fit = nonlinear(*of, p["gap"])
+        out[a] = AxisFit(fit.terms, -fit.residuals, linear(*of))
+    return out
 
 
-def with_gap(s: Statics, k: int, start: Array, gap: float) -> Fit:
-    """T (2.8) with a third term: the gap that the data of axis `k` alone ask for (m). `start` is beta and offset at `gap`.
-
-    Raises:
-        AnalysisError: no convergence.
-    """
-    r, p, n = s.r[k], s.p[k], s.n[k]
-
-    def model(terms: Array) -> Array:
-        return magnet(terms[0], terms[1], terms[2], r, p, n)
-
-    def jacobian(terms: Array) -> Array:
-        return slopes_of(terms, float(terms[2]), r, p, n)
-
-    return leastsquares.nonlinear(model, s.force[k], np.array([*start, gap]), jacobian=jacobian)
-
-
-def slopes(fit: Fit, gap: float, bias: float) -> tuple[float, float]:
+def slopes(terms: Array, gap: float, bias: float) -> tuple[float, float]:
     """dF/di (N/A) and dF/dxi (N/m) of the fitted magnet at the sensors' zero with both coils at the bias: what the
     linear model is taken for."""
-    beta, xi = fit.terms
+    beta, xi = terms
     near, far = gap - xi, gap + xi
     return (
         float(2 * beta * bias * (1 / near**2 + 1 / far**2)),

@@ -1,7 +1,8 @@
 """The comparison of T Table 2.2: what the nonlinear and the linear model leave of the same forces, by one definition.
 
-Residual of a sample: what the model makes of its currents and position, less the force that carries there. The sums are of
-these data with the rig file's numbers, so that noise alone makes them uncertain, not what the certificates get wrong.
+Residual of a sample: what the model makes of its currents and position, less the force that carries there. Sums and the linear
+model's numbers are of these data with the adjusted inputs, the same for both models: they describe the data, not the machine,
+and scatter alone makes them uncertain.
 """
 
 from __future__ import annotations
@@ -95,5 +96,5 @@ def by_bearing(e: dict[str, Estimate]) -> dict[str, Estimate]:
 
 def residuals(s: Statics, k: int, f: AxisFit, gap: float) -> tuple[Array, Array]:
     """What the nonlinear and the linear model give more than the force that carries, N."""
-    r, p, n, (beta, offset), (k_i, k_xi) = s.r[k], s.p[k], s.n[k], f.fit.terms, f.linear.terms
+    r, p, n, (beta, offset), (k_i, k_xi) = s.r[k], s.p[k], s.n[k], f.terms, f.linear.terms
     return bearing.magnet(beta, offset, gap, r, p, n) - s.force[k], k_i * (p - n) / 2 + k_xi * r - s.force[k]

@@ -36,7 +36,8 @@ FLAGS = (
     (32, "contact", "the shaft touched the axial stop"),
     (64, "clipped", "a position sensor was beyond its range"),
 )  # bits of the telemetry signal `flags`
-ONE_IN_A_THOUSAND = 1.7  # times the 95 % expanded uncertainty
+CONTRADICTED = 4.0  # times its u may an adjustment be: one rig in some hundred by chance, of about fifty inputs
+ALIKE = 0.9  # of the greatest: inputs that act alike are suspected together
 
 
 class Tolerances(Protocol):
@@ -46,6 +47,8 @@ class Tolerances(Protocol):
     def average_s(self) -> float: ...
     @property
     def max_speed_m_s(self) -> float: ...
+    @property
+    def max_misfit(self) -> float: ...
     @property
     def min_ratio(self) -> float: ...
     @property
@@ -99,7 +102,7 @@ def _flags(held: Held, tilted: Held) -> Iterator[Finding]:
 
 def of_results(a: Analysis, plan: Tolerances) -> Iterator[Finding]:
     """The gap that the data ask for, the offset's sign, and the comparison with the linear model."""
-    yield from _gaps(a, plan)
+    yield from _adjustments(a, plan)
     for axis in AXES:
         offset = a.estimates[f"offset_{axis}"]
         if offset.value + expanded(offset) < 0:
@@ -125,7 +128,7 @@ def _compared(a: Analysis) -> Finding:
     """The linear model's two numbers beside the bearing's slopes, and the noise under both residual sums."""
     said = []
     for axis, f in a.fits.items():
-        k, stiffness = bearing.slopes(f.fit, a.values["gap"], a.bias_A)
+        k, stiffness = bearing.slopes(f.terms, a.adjusted.values["gap"], a.bias_A)
         one, two = f.linear.terms
         true = f"true slopes {k:.3g} and {stiffness * 1e-3:.3g}"
         said.append(f"{axis}: {one:.3g} N/A and {two * 1e-3:.3g} N/mm, {true}")
@@ -142,22 +145,39 @@ def expanded(e: Estimate) -> float:
     return coverage_factor(welch_satterthwaite(e)) * e.u
 
 
-def _gaps(a: Analysis, plan: Tolerances) -> Iterator[Finding]:
-    spring = "the coupling's spring" + ("" if plan.coupled else " (is it off?)")
-    for axis, gap in a.gaps.items():
-        off = gap - a.drawing
-        if abs(off.value) > ONE_IN_A_THOUSAND * expanded(off):
+def _adjustments(a: Analysis, plan: Tolerances) -> Iterator[Finding]:
+    """Do the positions fit the certificates, and what is left then?"""
+    pulls = a.adjusted.pulls
+    worst = max(abs(v) for v in pulls.values())
+    if worst > CONTRADICTED:
+        suspects = sorted((n for n, v in pulls.items() if abs(v) >= ALIKE * worst), key=lambda n: -abs(pulls[n]))
+        listed = ", ".join(_told(a, name) for name in suspects[:4])
+        spring = "" if plan.coupled else " The plan says that the coupling is off: is it?"
+        text = f"the positions contradict a certificate by {worst:.1f} standard deviations. Suspect: {listed}.{spring}"
+        yield Finding("certificate-contradicted", text, suspects[0], Effect.INDETERMINATE)
+    for k, axis in enumerate(AXES):
+        load, left = float(np.abs(a.statics.force[k]).mean()), np.abs(a.adjusted.residuals[k])
+        if left.max() > plan.max_misfit * load:
             text = (
-                f"axis {axis} behaves as if its gap were {gap.value * 1e6:.0f} µm, the drawing has "
-                f"{a.drawing.value * 1e6:.0f} µm. Suspect pos_{axis}'s gain, {spring}, or a current sensor of this axis."
+                f"axis {axis}: one position is {left.max() / load:.1%} of its load off the nonlinear model with everything "
+                f"adjusted ({plan.max_misfit:.1%} allowed), at {a.held.where(left)}. A position that was disturbed, or a "
+                "reading that is not proportional."
             )
-            yield Finding("gap-inconsistent", text, axis, Effect.INDETERMINATE)
-
-    def shown(e: Estimate) -> str:
-        return f"{e.value * 1e6:.1f} ± {expanded(e) * 1e6:.1f}"
-
-    asked = ", ".join(f"{axis} {shown(gap)}" for axis, gap in a.gaps.items())
+            yield Finding("misfit", text, axis, Effect.INDETERMINATE)
+    gap, drawing = a.adjusted.estimates["gap"], a.inputs["gap"]
+    noise = 1e3 * float(a.adjusted.noise_N.max())
     text = (
-        f"gaps that the positions ask for (µm, 95 %): {asked}; the drawing has {shown(a.drawing)}; used: {shown(a.gap)}"
+        f"gap {gap.value * 1e6:.1f} ± {expanded(gap) * 1e6:.1f} µm (95 %), the drawing has {drawing.value * 1e6:.1f} ± "
+        f"{expanded(drawing) * 1e6:.1f} µm; the adjustment leaves at most {noise:.2g} mN rms; the certificate that is "
+        f"contradicted most is {_told(a, max(pulls, key=lambda n: abs(pulls[n])))}"
     )
-    yield Finding("gap-from-data", text)
+    yield Finding("adjusted", text)
+
+
+def _told(a: Analysis, name: str) -> str:
+    return f"{_words(a, name)} ({a.adjusted.pulls[name]:+.1f})"
+
+
+def _words(a: Analysis, name: str) -> str:
+    """The influence's own name."""
+    return next((i.name for i in a.inputs[name].sensitivities), name)

@@ -1,0 +1,150 @@
+"""One adjustment of everything that the positions depend on: force constants, offsets, and the certificates' numbers.
+
+The positions overdetermine the force constants and offsets: they also say something of the gap, the spring and the sensors,
+and what they say fits the certificates or does not. So all are adjusted together, each certified number t as an observation of
+itself, with its own standard uncertainty u:
+
+    sum over axes and positions of (F_model(beta, offset, t) - F_carries(t))^2 / s^2  +  sum over t of ((t - t_cert) / u)^2
+
+is made least. s is the noise of a position's mean force, or what the adjustment leaves if that is more. Near the solution the
+result is linear in what was certified: with the normal matrix H, d(result)/d(t_cert) = (H^-1)_t / u^2, so that each certificate
+is an influence by identity, and a wrong one acts as little as the positions let it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.errors import AnalysisError
+from bench.uncertainty import Estimate
+from procedures.estimators import bearing
+from procedures.estimators.bearing import AXES, Positions
+from procedures.estimators.leastsquares import Fit
+from procedures.estimators.typea import scatter
+
+Array = npt.NDArray[np.float64]
+BETA_UNIT, OFFSET_UNIT = 1e-7, 1e-5  # of the terms within the adjustment
+ROUNDS = 5
+TOLD = 0.05  # u of an adjustment over the certificate's, below which the positions say nothing of that number
+STEP = 0.3  # of the numerical slopes, in standard uncertainties
+
+
+@dataclass(frozen=True)
+class Adjusted:
+    """`estimates` of beta_*, offset_* and the gap; `values` of all inputs as adjusted.
+
+    By input, `moved` is the adjustment over the certificate's u, `pulls` over its own, standard normal where the
+    certificates hold. `terms` (4, 2) beta and offset; `residuals` (4, N) N, model less force; `noise_N` s (4,).
+    """
+
+    estimates: dict[str, Estimate]
+    values: dict[str, float]
+    pulls: dict[str, float]
+    moved: dict[str, float]
+    terms: Array
+    residuals: Array
+    noise_N: Array
+
+
+@dataclass(frozen=True)
+class _Problem:
+    means: Positions
+    values: dict[str, float]
+    names: tuple[str, ...]  # inputs that are not exact
+    u: Array
+
+    def inputs(self, t: Array) -> dict[str, float]:
+        shifts = t * self.u
+        return self.values | {n: self.values[n] + float(d) for n, d in zip(self.names, shifts, strict=True)}
+
+    def left(self, x: Array) -> Array:
+        """Model less force (4 N,) of the unknowns `x`: eight terms, then the inputs' shifts over their u."""
+        p = self.inputs(x[8:])
+        s = bearing.statics(self.means, p)
+        terms = x[:8].reshape(4, 2)
+        rows = [
+            bearing.magnet(b * BETA_UNIT, o * OFFSET_UNIT, p["gap"], s.r[k], s.p[k], s.n[k]) - s.force[k]
+            for k, (b, o) in enumerate(terms)
+        ]
+        return np.concatenate(rows)
+
+    def slopes(self, x: Array) -> Array:
+        """(4 N, unknowns), by central differences."""
+        out = []
+        for k in range(len(x)):
+            step = np.zeros(len(x))
+            step[k] = STEP if k >= 8 else 1e-3
+            out.append((self.left(x + step) - self.left(x - step)) / (2 * step[k]))
+        return np.array(out).T
+
+
+def adjust(means: Positions, inputs: Mapping[str, Estimate], noise_N: Array, starts: Array) -> Adjusted:
+    """`inputs` as `bearing.statics` wants them, and the gap; `noise_N` (4,) of a position's mean; `starts` (4, 2) terms.
+
+    Raises:
+        AnalysisError: no solution.
+    """
+    names = tuple(n for n, e in inputs.items() if e.u > 0)
+    problem = _Problem(means, {n: e.value for n, e in inputs.items()}, names, np.array([inputs[n].u for n in names]))
+    count = means.read.shape[1]
+    x = np.concatenate([(starts / [BETA_UNIT, OFFSET_UNIT]).ravel(), np.zeros(len(names))])
+    noise = noise_N.copy()
+    for _ in range(ROUNDS):
+        slopes, left = problem.slopes(x), problem.left(x)
+        per = np.repeat(1 / noise, count)
+        normal = (slopes * per[:, None] ** 2).T @ slopes + np.diag([0.0] * 8 + [1.0] * len(names))
+        right = slopes.T @ (per**2 * left) + np.concatenate([np.zeros(8), x[8:]])
+        x = x - _solved(normal, right[:, None])[:, 0]
+        rows = problem.left(x).reshape(4, count)
+        noise = np.maximum(noise_N, np.sqrt((rows**2).sum(axis=1) / (count - 2)))
+    if not np.isfinite(x).all():
+        raise AnalysisError("the positions and the certificates have no solution together")
+    return _adjusted(problem, inputs, x, noise)
+
+
+def _solved(normal: Array, right: Array) -> Array:
+    scale = np.sqrt(np.diag(normal))
+    try:
+        out: Array = np.linalg.solve(normal / np.outer(scale, scale), right / scale[:, None]) / scale[:, None]
+    except np.linalg.LinAlgError as error:
+        raise AnalysisError("the positions do not determine the force constants and offsets") from error
+    return out
+
+
+def _adjusted(problem: _Problem, inputs: Mapping[str, Estimate], x: Array, noise: Array) -> Adjusted:
+    count, size = problem.means.read.shape[1], len(x)
+    slopes = problem.slopes(x)
+    weighted = slopes * np.repeat(1 / noise, count)[:, None]
+    normal = weighted.T @ weighted + np.diag([0.0] * 8 + [1.0] * (size - 8))
+    inverse = _solved(normal, np.eye(size))
+    by_noise = inverse @ (weighted.T @ weighted) @ inverse
+    by_inputs = inverse[:, 8:]
+    units = np.concatenate([np.tile([BETA_UNIT, OFFSET_UNIT], 4), problem.u])
+    values = problem.inputs(x[8:])
+    rows = {f"{what}_{a}": 2 * k + j for k, a in enumerate(AXES) for j, what in enumerate(("beta", "offset"))}
+    rows["gap"] = 8 + problem.names.index("gap")
+    estimates = {}
+    for name, row in rows.items():
+        total = Estimate.exact(float(x[row] * units[row]) if row < 8 else values["gap"])
+        for j, given in enumerate(problem.names):
+            share = float(by_inputs[row, j] * units[row] / problem.u[j])
+            total = total + (inputs[given] - inputs[given].value) * share
+        estimates[name] = total
+    terms = (x[:8] * units[:8]).reshape(4, 2)
+    left = problem.left(x).reshape(4, count)
+    for k, a in enumerate(AXES):
+        of = slice(2 * k, 2 * k + 2)
+        covariance = by_noise[of, of] * np.outer(units[of], units[of])
+        jac = slopes[k * count : (k + 1) * count, of] / units[of]
+        fit = Fit(terms[k], covariance, -left[k], float(left[k] @ left[k]), count - 2, jac)
+        gradients = {f"beta_{a}": [1, 0], f"offset_{a}": [0, 1]}
+        noisy = scatter(fit, gradients, f"bearing-model/{a}", f"scatter of the positions, {a}")
+        estimates |= {name: estimates[name] + e for name, e in noisy.items()}
+    known = np.sqrt(np.maximum(1 - np.diag(inverse)[8:], 0.0))  # u of an adjustment, over the certificate's
+    moved = {n: float(v) for n, v in zip(problem.names, x[8:], strict=True)}
+    pulls = {n: moved[n] / float(k) for n, k in zip(problem.names, known, strict=True) if k > TOLD}
+    return Adjusted(estimates, values, pulls, moved, terms, left, noise)
