@@ -71,7 +71,7 @@ class Plan(BenchPlan):
     radius_m: float = Field(82e-6, gt=0)
     tilt_rad: float = Field(3e-4, gt=0)  # of the check of the wiring
     biases_A: tuple[float, ...] = Field(
-        (1.2, 0.8), min_length=1
+        (1.15, 0.8), min_length=1
     )  # of each pass; the first is compared with T Table 2.2
     coupled: bool = True  # False: the operator has taken the coupling off
     settle_s: float = Field(0.6, gt=0)

@@ -43,13 +43,18 @@ def room(rig: RigFile) -> float:
 
 def of_readings(readings: Mapping[str, float], rig: RigFile) -> Iterator[Finding]:
     """Readings (m) of a shaft that lies on its rings: what forbids to lift it."""
-    for name in POSITIONS:
-        if readings[name] > 0:
+    for axis in "yz":
+        above = [name for name in POSITIONS if name[4] == axis and readings[name] > 0]
+        said = " and ".join(f"{name} reads {readings[name] * 1e6:+.0f} µm" for name in above)
+        if len(above) == 1:
+            text = f"{said} while the shaft lies on its rings, below the middle: the probe's polarity is wrong."
+            yield Finding("sensor-polarity", f"{text} The shaft was not lifted.", above[0], Effect.ERROR)
+        elif above:
             text = (
-                f"{name} reads {readings[name] * 1e6:+.0f} µm while the shaft lies on its rings, below the middle: the probe's "
-                "polarity is wrong. The shaft was not lifted."
+                f"{said} while the shaft lies on its rings: gravity pulls the other way along axis {axis}, which is turned by "
+                "180°, or the polarity of both its probes is wrong. The shaft was not lifted."
             )
-            yield Finding("sensor-polarity", text, name, Effect.ERROR)
+            yield Finding("gravity-reversed", text, f"axis {axis}", Effect.ERROR)
     for b, where in (("i", "inboard"), ("o", "outboard")):
         y, z = readings[f"pos_y{b}"], readings[f"pos_z{b}"]
         if max(y, z) <= 0 and math.hypot(y, z) < room(rig):
