@@ -6,7 +6,8 @@ itself, with its own standard uncertainty u:
 
     sum over axes and positions of (F_model(beta, offset, t) - F_carries(t))^2 / s^2  +  sum over t of ((t - t_cert) / u)^2
 
-is made least. s is the noise of a position's mean force, or what the adjustment leaves if that is more. Near the solution the
+is made least. s is the noise of a position's mean force, with what the model is not trusted with, or what the adjustment leaves
+if that is more. Near the solution the
 result is linear in what was certified: with the normal matrix H, d(result)/d(t_cert) = (H^-1)_t / u^2, so that each certificate
 is an influence by identity, and a wrong one acts as little as the positions let it.
 """
@@ -28,7 +29,7 @@ from procedures.estimators.typea import scatter
 
 Array = npt.NDArray[np.float64]
 BETA_UNIT, OFFSET_UNIT = 1e-7, 1e-5  # of the terms within the adjustment
-ROUNDS = 5
+ROUNDS, SMALL = 30, 1e-3  # steps at most; the last one, in standard deviations of what is observed
 TOLD = 0.05  # u of an adjustment over the certificate's, below which the positions say nothing of that number
 STEP = 0.3  # of the numerical slopes, in standard uncertainties
 
@@ -92,18 +93,28 @@ def adjust(means: Positions, inputs: Mapping[str, Estimate], noise_N: Array, sta
     problem = _Problem(means, {n: e.value for n, e in inputs.items()}, names, np.array([inputs[n].u for n in names]))
     count = means.read.shape[1]
     x = np.concatenate([(starts / [BETA_UNIT, OFFSET_UNIT]).ravel(), np.zeros(len(names))])
-    noise = noise_N.copy()
-    for _ in range(ROUNDS):
-        slopes, left = problem.slopes(x), problem.left(x)
-        per = np.repeat(1 / noise, count)
-        normal = (slopes * per[:, None] ** 2).T @ slopes + np.diag([0.0] * 8 + [1.0] * len(names))
-        right = slopes.T @ (per**2 * left) + np.concatenate([np.zeros(8), x[8:]])
-        x = x - _solved(normal, right[:, None])[:, 0]
-        rows = problem.left(x).reshape(4, count)
-        noise = np.maximum(noise_N, np.sqrt((rows**2).sum(axis=1) / (count - 2)))
-    if not np.isfinite(x).all():
-        raise AnalysisError("the positions and the certificates have no solution together")
+    x = _least(problem, x, noise_N)
+    left = problem.left(x).reshape(4, count)
+    noise = np.maximum(noise_N, np.sqrt((left**2).sum(axis=1) / (count - 2)))
+    if (noise > noise_N).any():
+        x = _least(problem, x, noise)
     return _adjusted(problem, inputs, x, noise)
+
+
+def _least(problem: _Problem, x: Array, noise: Array) -> Array:
+    """By Gauss and Newton's steps, of the stacked problem: its normal matrix would lose half of the digits."""
+    prior = np.eye(len(x))[8:]
+    per = np.repeat(1 / noise, problem.means.read.shape[1])
+    for _ in range(ROUNDS):
+        design = np.vstack([problem.slopes(x) * per[:, None], prior])
+        scale = np.sqrt((design**2).sum(axis=0))
+        step = np.linalg.lstsq(design / scale, -np.concatenate([problem.left(x) * per, x[8:]]), rcond=None)[0] / scale
+        if not np.isfinite(step).all():
+            break
+        x = x + step
+        if float(np.abs(design @ step).max()) < SMALL:
+            return x
+    raise AnalysisError("the positions and the certificates have no solution together")
 
 
 def _solved(normal: Array, right: Array) -> Array:

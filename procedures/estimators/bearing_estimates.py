@@ -23,6 +23,7 @@ from procedures.estimators.typea import scatter
 Array = npt.NDArray[np.float64]
 LENGTHS = {"l_is": "com_to_inboard_sensor", "l_os": "com_to_outboard_sensor", "l_oa": "com_to_outboard_amb",
            "amb_span": "amb_span", "l_c": "com_to_coupling", "gap": "amb_gap"}  # fmt: skip
+TRUST = 1e-4  # of the load: jitter of currents whose squares count, bending, the telemetry's last digits
 
 
 @dataclass(frozen=True)
@@ -74,14 +75,19 @@ def evaluate(recording: Recording[Any], held: Held) -> Analysis:
 
 
 def _start(held: Held, values: dict[str, float]) -> tuple[Array, Array]:
-    """Noise (4,) of a position's mean force, by its batches, and the terms (4, 2) that fit each axis by itself."""
+    """Noise (4,) of a position's mean force, and the terms (4, 2) that fit each axis by itself.
+
+    The noise is that of the batches and what the model is not trusted with. The latter does not average out over N positions;
+    so each of them gets N of its variance.
+    """
     s, parts = bearing.statics(held.means(), values), bearing.statics(held.parts(), values)
     noise, terms = np.zeros(4), np.zeros((4, 2))
     for k in range(4):
         terms[k] = bearing.nonlinear(s.r[k], s.p[k], s.n[k], s.force[k], values["gap"]).terms
         force = bearing.magnet(*terms[k], values["gap"], parts.r[k], parts.p[k], parts.n[k]) - parts.force[k]
         batches = force.reshape(len(held), -1)
-        noise[k] = math.sqrt(float(batches.var(axis=1, ddof=1).mean()) / batches.shape[1])
+        random = float(batches.var(axis=1, ddof=1).mean()) / batches.shape[1]
+        noise[k] = math.sqrt(random + len(held) * (TRUST * float(s.force[k].mean())) ** 2)
     return noise, terms
 
 
