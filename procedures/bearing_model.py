@@ -258,13 +258,20 @@ def figures(recording: Recording[Plan]) -> Iterable[Figure]:
 
 
 METHOD = """\
-The shaft is levitated at rest by flatness control with constant current sum and stands on a grid of positions in y and z
-inside the touchdown rings, without tilt. At each of them gravity and the coupling's spring say which force each radial
-AMB gives, and both coils' currents and the position at the AMB's plane, from both sensors, say how it gives it.
+The shaft is looked at on its rings, lifted, and levitated at rest by flatness control with constant current sum. It stands
+on a grid of positions in y and z inside the touchdown rings, without tilt, at one bias and then at another. At each of them
+gravity and the coupling's spring say which force each radial AMB gives, and both coils' currents and the position at the
+AMB's plane, from both sensors, say how it gives it.
 
-Nonlinear model (T 2.8): beta and magnetic offset of each axis by least squares. Linear model (T 2.9), for comparison as in
-T Table 2.2: force against control current and position, without intercept. Its two numbers are not the bearing's slopes:
-without an intercept, gravity has to be explained by current and position.
+Nonlinear model (T 2.8): force constant and magnetic offset of each axis. They are adjusted together with every certified
+number that the positions depend on, each of which is held by its own standard uncertainty; so the gap, the spring and the
+sensors are corrected as far as the positions tell, and each certificate is an influence by itself. Two biases tell force
+constant and offset apart, which at one act nearly alike.
+
+Linear model (T 2.9), for comparison as in T Table 2.2 at the first bias: force against control current and position, without
+intercept. Its two numbers are not the bearing's slopes: without an intercept, gravity has to be explained by current and
+position. Residual sums of both models are over all samples, with the same currents, positions and forces, and beside them
+over batch means; they describe these data, and noise alone makes them uncertain.
 
 Gravity acts along both axes with g cos 45° and g sin 45°, downwards, and the positive coils are the upper ones. An
 offset towards them (above zero) helps to carry; then the linear model fails by much. The sign in T Table 2.2 goes with
@@ -274,16 +281,9 @@ The offset refers to the sensors' zero, so the sensors' own zeros do not act on 
 rests at one angle: what each sensor reads of runout there, less its mean over a turn, is an influence on the offset, and
 the largest.
 
-Sums of squares are over all samples, as in T Table 2.2; their noise is stated with them. The models are fitted to the
-means of the positions. The scatter of the results is by batch means or by the residuals of the positions, whichever is
-more.
+A coupling that is not in line with its motor pulls as another weight would. It is in the budget.
 
-Beta and the gap act nearly alike. But beside beta and offset the positions ask for a gap of their own, by curvature; the
-least variance of these four and the drawing is used, all shared influences considered. What position and current sensors
-and the spring get wrong acts on that gap, and the budgets show it.
-
-Not covered: iron saturation, hysteresis, a coupling that is not relaxed where the shaft is centred, bending of the shaft
-by its own weight.
+Not covered: iron saturation, hysteresis, bending of the shaft by its own weight, a coupling that resists a tilt.
 """
 
 procedure = Procedure(

@@ -38,7 +38,7 @@ def _currents(a: Analysis) -> Figure:
     series = (Series(axis, 1e6 * a.statics.r[k], control[k], "points") for k, axis in enumerate(AXES))
     caption = (
         "Half the difference of both coils' currents that carries the shaft, over the displacement at the AMB. "
-        "It falls towards the upper coils, which pull by themselves."
+        "It falls towards the upper coils, which pull by themselves; there is one row of points for each bias."
     )
     title = "Control current over position"
     return Figure("currents", title, caption, DISPLACEMENT, "control current (A)", tuple(series))
@@ -73,8 +73,8 @@ def _forces(a: Analysis) -> Figure:
     )
     caption = (
         f"Pull of both coils at {bias:g} A over the displacement at the AMB, by both models; the points are what "
-        "gravity and spring need. The offset pulls where the sensors read zero; the linear model has no such pull "
-        "and makes up for it with slopes that are too steep."
+        "gravity and spring need. The offset pulls where the sensors read zero; the linear model has no such pull, "
+        "and its slope is what the rest of its fit makes of that."
     )
     return Figure("forces", f"Force of axis {axis} at the bias", caption, DISPLACEMENT, "force (N)", series)
 

@@ -6,10 +6,10 @@ itself, with its own standard uncertainty u:
 
     sum over axes and positions of (F_model(beta, offset, t) - F_carries(t))^2 / s^2  +  sum over t of ((t - t_cert) / u)^2
 
-is made least. s is the noise of a position's mean force, with what the model is not trusted with, or what the adjustment leaves
-if that is more. Near the solution the
-result is linear in what was certified: with the normal matrix H, d(result)/d(t_cert) = (H^-1)_t / u^2, so that each certificate
-is an influence by identity, and a wrong one acts as little as the positions let it.
+is made least. s is the noise of a position's mean force with what the model is not trusted with, or what the adjustment
+leaves if that is more. Near the solution the result is linear in what was certified: with the normal matrix H,
+d(result)/d(t_cert) = (H^-1)_t / u^2, so that each certificate is an influence by identity, and a wrong one acts as little
+as the positions let it.
 """
 
 from __future__ import annotations

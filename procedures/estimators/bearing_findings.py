@@ -165,10 +165,10 @@ def _adjustments(a: Analysis, plan: Tolerances) -> Iterator[Finding]:
             )
             yield Finding("misfit", text, axis, Effect.INDETERMINATE)
     gap, drawing = a.adjusted.estimates["gap"], a.inputs["gap"]
-    noise = 1e3 * float(a.adjusted.noise_N.max())
+    left = 1e3 * float(np.sqrt((a.adjusted.residuals**2).mean()))
     text = (
         f"gap {gap.value * 1e6:.1f} ± {expanded(gap) * 1e6:.1f} µm (95 %), the drawing has {drawing.value * 1e6:.1f} ± "
-        f"{expanded(drawing) * 1e6:.1f} µm; the adjustment leaves at most {noise:.2g} mN rms; the certificate that is "
+        f"{expanded(drawing) * 1e6:.1f} µm; the adjustment leaves {left:.2g} mN rms; the certificate that is "
         f"contradicted most is {_told(a, max(pulls, key=lambda n: abs(pulls[n])))}"
     )
     yield Finding("adjusted", text)
