@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy import linalg
 
 from bench.errors import AnalysisError
 from bench.uncertainty import Estimate
@@ -117,41 +118,41 @@ def _least(problem: _Problem, x: Array, noise: Array) -> Array:
     raise AnalysisError("the positions and the certificates have no solution together")
 
 
-def _solved(normal: Array, right: Array) -> Array:
-    scale = np.sqrt(np.diag(normal))
-    try:
-        out: Array = np.linalg.solve(normal / np.outer(scale, scale), right / scale[:, None]) / scale[:, None]
-    except np.linalg.LinAlgError as error:
-        raise AnalysisError("the positions do not determine the force constants and offsets") from error
+def _inverse(design: Array) -> Array:
+    """(design' design)^-1, by an orthogonal decomposition.
+
+    Raises:
+        AnalysisError: columns that depend on each other.
+    """
+    scale = np.sqrt((design**2).sum(axis=0))
+    r = np.linalg.qr(design / scale, mode="r")
+    if np.abs(np.diag(r)).min() < 1e-9:
+        raise AnalysisError("the positions do not determine the force constants and offsets")
+    upper = linalg.solve_triangular(r, np.eye(len(r)))
+    out: Array = upper @ upper.T / np.outer(scale, scale)
     return out
 
 
 def _adjusted(problem: _Problem, inputs: Mapping[str, Estimate], x: Array, noise: Array) -> Adjusted:
     count, size = problem.means.read.shape[1], len(x)
-    slopes = problem.slopes(x)
+    slopes, left = problem.slopes(x), problem.left(x).reshape(4, count)
     weighted = slopes * np.repeat(1 / noise, count)[:, None]
-    normal = weighted.T @ weighted + np.diag([0.0] * 8 + [1.0] * (size - 8))
-    inverse = _solved(normal, np.eye(size))
-    by_noise = inverse @ (weighted.T @ weighted) @ inverse
-    by_inputs = inverse[:, 8:]
+    inverse = _inverse(np.vstack([weighted, np.eye(size)[8:]]))
     units = np.concatenate([np.tile([BETA_UNIT, OFFSET_UNIT], 4), problem.u])
     values = problem.inputs(x[8:])
     rows = {f"{what}_{a}": 2 * k + j for k, a in enumerate(AXES) for j, what in enumerate(("beta", "offset"))}
     rows["gap"] = 8 + problem.names.index("gap")
     estimates = {}
     for name, row in rows.items():
-        total = Estimate.exact(float(x[row] * units[row]) if row < 8 else values["gap"])
-        for j, given in enumerate(problem.names):
-            share = float(by_inputs[row, j] * units[row] / problem.u[j])
-            total = total + (inputs[given] - inputs[given].value) * share
-        estimates[name] = total
+        value = float(x[row] * units[row]) if row < 8 else values["gap"]
+        shares = inverse[row, 8:] * units[row] / problem.u
+        estimates[name] = Estimate.exact(value) + _certified(problem, inputs, shares)
     terms = (x[:8] * units[:8]).reshape(4, 2)
-    left = problem.left(x).reshape(4, count)
+    by_noise = inverse @ (weighted.T @ weighted) @ inverse * np.outer(units, units)
     for k, a in enumerate(AXES):
         of = slice(2 * k, 2 * k + 2)
-        covariance = by_noise[of, of] * np.outer(units[of], units[of])
-        jac = slopes[k * count : (k + 1) * count, of] / units[of]
-        fit = Fit(terms[k], covariance, -left[k], float(left[k] @ left[k]), count - 2, jac)
+        rows_of_k = slopes[k * count : (k + 1) * count, of] / units[of]
+        fit = Fit(terms[k], by_noise[of, of], -left[k], float(left[k] @ left[k]), count - 2, rows_of_k)
         gradients = {f"beta_{a}": [1, 0], f"offset_{a}": [0, 1]}
         noisy = scatter(fit, gradients, f"bearing-model/{a}", f"scatter of the positions, {a}")
         estimates |= {name: estimates[name] + e for name, e in noisy.items()}
@@ -159,3 +160,11 @@ def _adjusted(problem: _Problem, inputs: Mapping[str, Estimate], x: Array, noise
     moved = {n: float(v) for n, v in zip(problem.names, x[8:], strict=True)}
     pulls = {n: moved[n] / float(k) for n, k in zip(problem.names, known, strict=True) if k > TOLD}
     return Adjusted(estimates, values, pulls, moved, terms, left, noise)
+
+
+def _certified(problem: _Problem, inputs: Mapping[str, Estimate], shares: Array) -> Estimate:
+    """What the certificates' errors do to a result that moves by `shares` of them."""
+    total = Estimate.exact(0.0)
+    for name, share in zip(problem.names, shares, strict=True):
+        total = total + (inputs[name] - inputs[name].value) * float(share)
+    return total

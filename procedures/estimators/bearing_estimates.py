@@ -84,7 +84,8 @@ def _start(held: Held, values: dict[str, float]) -> tuple[Array, Array]:
     noise, terms = np.zeros(4), np.zeros((4, 2))
     for k in range(4):
         terms[k] = bearing.nonlinear(s.r[k], s.p[k], s.n[k], s.force[k], values["gap"]).terms
-        force = bearing.magnet(*terms[k], values["gap"], parts.r[k], parts.p[k], parts.n[k]) - parts.force[k]
+        beta, offset = terms[k]
+        force = bearing.magnet(beta, offset, values["gap"], parts.r[k], parts.p[k], parts.n[k]) - parts.force[k]
         batches = force.reshape(len(held), -1)
         random = float(batches.var(axis=1, ddof=1).mean()) / batches.shape[1]
         noise[k] = math.sqrt(random + len(held) * (TRUST * float(s.force[k].mean())) ** 2)

@@ -8,7 +8,6 @@ and it lies where their pull and its weight push it only if each reading is take
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -68,7 +67,8 @@ def of_readings(readings: Mapping[str, float], rig: RigFile) -> Iterator[Finding
 
 def before(recording: Recording[Any]) -> list[Finding]:
     """What was found before any position: each of them leaves nothing to evaluate."""
-    rig, found = recording.rig, []
+    rig = recording.rig
+    found: list[Finding] = []
     for step in recording.steps(REST):
         found += of_readings({name: step.mean(name) for name in POSITIONS}, rig)
     for event, step in zip(recording.events(LIFT_LOST), recording.steps(LIFT), strict=False):
@@ -87,8 +87,8 @@ def _of_lift(step: Step, fault: str, rig: RigFile) -> Finding:
         p, n = (np.array([data[f"i_{a}_{side}"][last].mean() for a in AXES]) for side in "pn")
         left = {names: unexplained(read[list(order)], p, n, rig) for names, order in exchanges().items()}
         (best, least), (_, second) = sorted(left.items(), key=lambda kv: kv[1])[:2]
-        if best and least < CLEARLY * min(second, left[""]):
-            what = "planes" if all(a[0] == b[0] for a, b in itertools.pairwise(best.split("-")[:2])) else "axes"
+        if best and least < CLEARLY * second:
+            what = "planes" if best[0] == best[3] else "axes"
             said = " and ".join(best.split("+")).replace("-", " with ")
             text = (
                 f"{text}. It lies against its rings where the coils and its weight press it if the readings of {said} are "
