@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from bench.findings import Effect, Finding
-from bench.uncertainty import Estimate, coverage_factor, welch_satterthwaite
+from bench.uncertainty import Estimate, Influence, coverage_factor, welch_satterthwaite
 from procedures.estimators import bearing
 from procedures.estimators.bearing import AXES
 from procedures.estimators.bearing_compared import BEARINGS
@@ -154,7 +154,7 @@ def _adjustments(a: Analysis, plan: Tolerances) -> Iterator[Finding]:
         listed = ", ".join(_told(a, name) for name in suspects[:4])
         spring = "" if plan.coupled else " The plan says that the coupling is off: is it?"
         text = f"the positions contradict a certificate by {worst:.1f} standard deviations. Suspect: {listed}.{spring}"
-        yield Finding("certificate-contradicted", text, suspects[0], Effect.INDETERMINATE)
+        yield Finding("certificate-contradicted", text, _influence(a, suspects[0]).id, Effect.INDETERMINATE)
     for k, axis in enumerate(AXES):
         load, left = float(np.abs(a.statics.force[k]).mean()), np.abs(a.adjusted.residuals[k])
         if left.max() > plan.max_misfit * load:
@@ -175,9 +175,9 @@ def _adjustments(a: Analysis, plan: Tolerances) -> Iterator[Finding]:
 
 
 def _told(a: Analysis, name: str) -> str:
-    return f"{_words(a, name)} ({a.adjusted.pulls[name]:+.1f})"
+    return f"{_influence(a, name).name} ({a.adjusted.pulls[name]:+.1f})"
 
 
-def _words(a: Analysis, name: str) -> str:
-    """The influence's own name."""
-    return next((i.name for i in a.inputs[name].sensitivities), name)
+def _influence(a: Analysis, name: str) -> Influence:
+    """The one that an input has: certificates are influences by themselves."""
+    return next(iter(a.inputs[name].sensitivities))

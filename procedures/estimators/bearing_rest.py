@@ -29,6 +29,7 @@ PRESSED_S = 0.5  # at the end of the lift
 TOUCHES = 0.85  # of the clearance
 FRICTION = 0.15  # of a ring's force
 CLEARLY = 0.5  # of what another wiring leaves
+ALIKE_N = 0.5  # that two exchanges may differ by, both being named
 
 
 def room(rig: RigFile) -> float:
@@ -86,17 +87,23 @@ def _of_lift(step: Step, fault: str, rig: RigFile) -> Finding:
         read = np.array([data[name][last].mean() for name in POSITIONS])
         p, n = (np.array([data[f"i_{a}_{side}"][last].mean() for a in AXES]) for side in "pn")
         left = {names: unexplained(read[list(order)], p, n, rig) for names, order in exchanges().items()}
-        (best, least), (_, second) = sorted(left.items(), key=lambda kv: kv[1])[:2]
-        if best and least < CLEARLY * second:
-            what = "planes" if best[0] == best[3] else "axes"
-            said = " and ".join(best.split("+")).replace("-", " with ")
+        by_kind = {kind: min(left[e] for e in left if kind_of(e) == kind) for kind in ("planes", "axes", "")}
+        what, least = min(by_kind.items(), key=lambda kv: kv[1])
+        if what and least < CLEARLY * min(v for kind, v in by_kind.items() if kind != what):
+            alike = [e for e in left if kind_of(e) == what and left[e] < least + ALIKE_N]
+            said = ", or ".join(" and ".join(e.split("+")).replace("-", " with ") for e in alike)
             text = (
                 f"{text}. It lies against its rings where the coils and its weight press it if the readings of {said} are "
                 f"exchanged ({least:.1f} N unexplained, as wired {left['']:.1f} N): look at the probes, or the coils, of the "
                 f"two {what}."
             )
-            return Finding(f"{what}-exchanged", text, f"pos_{best[:2]}", Effect.ERROR)
+            return Finding(f"{what}-exchanged", text, f"pos_{alike[0][:2]}", Effect.ERROR)
     return Finding("lift-lost", f"{text}; where it lies points to no exchange of probes.", "lift", Effect.ERROR)
+
+
+def kind_of(exchange: str) -> str:
+    """Of planes, of axes, or none."""
+    return "" if not exchange else "planes" if exchange[0] == exchange[3] else "axes"
 
 
 def recording_period(step: Step) -> float:
