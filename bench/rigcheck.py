@@ -42,7 +42,7 @@ SOME_GEOMETRY = {
 }
 """Lengths that a rig may have; the procedures that need one say so."""
 MACHINE = {"pole_pairs": "1", "polar_inertia": "kg m^2", "ring_inertia": "kg m^2", "amb_asymmetry": "1",
-           "radial_axes": "rad", "runout": "m", "mass": "kg", "transverse_inertia": "kg m^2",
+           "radial_axes": "rad", "runout": "m", "coupling_offset": "m", "mass": "kg", "transverse_inertia": "kg m^2",
            "weight_mass": "kg", "weight_angle": "rad"}  # fmt: skip
 FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 

@@ -52,6 +52,7 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
     out.pop("machine.runout")  # drawn as orders and phases
     for name in ("machine.weight_mass", "machine.weight_angle"):  # drawn for each weight that is fixed
         out.pop(name, None)
+    out |= dict.fromkeys(("coupling_offset_y", "coupling_offset_z"), out.pop("machine.coupling_offset"))
     for name in (*(f"i_{coil}" for coil in COILS), *(f"pos_{axis}" for axis in AXES)):
         out |= {f"{name}.gain": rig.sensors[name].gain, f"{name}.offset": rig.sensors[name].offset}
     for name, value in rig.simulation.items():
@@ -78,6 +79,7 @@ def params(v: Numbers, d: Numbers) -> AmbParams:
         l_ou=v["geometry.com_to_outboard_balance"],
         l_c=v["geometry.com_to_coupling"],
         coupling=v["geometry.coupling_stiffness"],
+        coupling_offset=(v["coupling_offset_y"], v["coupling_offset_z"]),
         beta=tuple(v[f"beta_{a}"] for a in AXES),
         gap=v["geometry.amb_gap"],
         gap_x=v["geometry.axial_gap"],

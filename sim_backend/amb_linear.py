@@ -85,7 +85,8 @@ def _plant(p: AmbParams, law: str, settings: Mapping[str, float]) -> tuple[Array
     from scipy import linalg  # the other machine starts without it
 
     span = p.l_ia + p.l_oa
-    weights = (-p.mass * p.gravity_y * p.l_oa / span, -p.mass * p.gravity_y * p.l_ia / span)
+    down, drawn = -p.mass * p.gravity_y, -p.coupling * p.coupling_offset[0]  # the coupling draws at -l_c
+    weights = ((down * p.l_oa + drawn * (p.l_oa + p.l_c)) / span, (down * p.l_ia + drawn * (p.l_ia - p.l_c)) / span)
     a = np.zeros((8, 8))
     a[0, 2] = a[1, 3] = 1
     planes = np.array([[1, -p.l_ia], [1, p.l_oa]])

@@ -91,7 +91,8 @@ def derivative(
         total.push(place, shape, *pair)
         ring_torque += ring(p, s, b, total)
     y, z = displacement(s, -p.l_c, p.shape_coupling)
-    total.push(-p.l_c, p.shape_coupling, -p.coupling * y, -p.coupling * z)
+    stretched_y, stretched_z = y - p.coupling_offset[0], z - p.coupling_offset[1]
+    total.push(-p.l_c, p.shape_coupling, -p.coupling * stretched_y, -p.coupling * stretched_z)
     spin = (torque - p.viscous * omega + ring_torque) / p.polar_inertia
     for b, u in enumerate(unbalances(p, weights)):
         turned = u * cmath.exp(1j * s[5])  # minus its acceleration times the mass: d2/dt2 of r e^(j phi)

@@ -1,6 +1,6 @@
 """Force constant and magnetic offset of the radial AMBs from eccentric positions (thesis 2.3), beside the linear model.
 
-At rest every radial force follows from gravity and the coupling's spring, by force and moments about the other AMB's plane:
+At rest every radial force follows from gravity and the coupling's spring, by moments about the other AMB's plane:
 
     F_i = (-m g_a l_oa + K c (l_oa + l_c)) / (l_ia + l_oa)      F_o = (-m g_a l_ia + K c (l_ia - l_c)) / (l_ia + l_oa)
 
@@ -9,8 +9,8 @@ coupling. Nonlinear model, T (2.8) with each coil's own measured current:
 
     F = beta (ip^2 / (gap - xi)^2 - in^2 / (gap + xi)^2),   xi = offset + r
 
-with r the displacement of the AMB's plane off the sensors' zero. Linear model, T (2.9): F = K_i (ip - in)/2 + K_xi r, without an
-intercept, and so without an offset.
+with r the displacement of the AMB's plane off the sensors' zero. Linear model, T (2.9), without an intercept and so
+without an offset: F = K_i (ip - in)/2 + K_xi r.
 """
 
 from __future__ import annotations
@@ -29,7 +29,6 @@ Array = npt.NDArray[np.float64]
 Numbers = Mapping[str, float]
 AXES = ("yi", "zi", "yo", "zo")
 COILS = tuple(f"{a}_{c}" for a in AXES for c in "pn")
-COMPARED = ("k_linear", "stiffness_linear", "misfit", "misfit_linear", "misfit_ratio", "misfit_ratio_means")
 
 
 @dataclass(frozen=True)
@@ -54,28 +53,30 @@ class Statics:
 
 @dataclass(frozen=True)
 class AxisFit:
-    """One axis: both fits. `fit` has the terms beta (N m^2/A^2) and offset (m)."""
+    """One axis: `terms` beta (N m^2/A^2) and offset (m) of the nonlinear model, its `residuals` (N,) in N, model less force;
+    the linear model's fit with K_i (N/A) and K_xi (N/m)."""
 
-    fit: Fit
+    terms: Array
+    residuals: Array
     linear: Fit
-    force: Array
 
     @property
     def beta(self) -> float:
         """N m^2/A^2."""
-        return float(self.fit.terms[0])
+        return float(self.terms[0])
 
     @property
     def offset(self) -> float:
         """From the magnetic centre to where the sensors read zero, m."""
-        return float(self.fit.terms[1])
+        return float(self.terms[1])
 
 
 def statics(d: Positions, p: Numbers) -> Statics:
     """From readings to displacements, currents and forces.
 
-    `p` holds mass, gravity, axes (rad to the vertical), l_is, l_os, l_oa, amb_span, l_c, coupling (N/m), and per axis gain_*,
-    zero_* (reading where the coupling is relaxed), runout_*; per coil gain_*, offset_* of its current sensor.
+    `p` holds mass, gravity, axes (rad to the vertical), l_is, l_os, l_oa, amb_span, l_c, coupling (N/m), relaxed_y and
+    relaxed_z (m, where the coupling does not pull, off the rings' centre); per axis gain_*, zero_* (reading where the shaft
+    is in the rings' centre), runout_*; per coil gain_*, offset_* of its current sensor.
     """
     l_is, l_os, l_oa = p["l_is"], p["l_os"], p["l_oa"]
     l_ia, span = p["amb_span"] - l_oa, l_is + l_os
@@ -87,7 +88,8 @@ def statics(d: Positions, p: Numbers) -> Statics:
         return x[:2] * (1 - share) + x[2:] * share
 
     r = np.concatenate([at(-l_ia, off), at(l_oa, off)])
-    pull = p["coupling"] * at(-p["l_c"], off - zero)
+    relaxed = np.array([[p["relaxed_y"]], [p["relaxed_z"]]])
+    pull = p["coupling"] * (at(-p["l_c"], off - zero) - relaxed)
     weight = p["mass"] * p["gravity"] * np.array([[math.cos(p["axes"])], [math.sin(p["axes"])]])
     force = np.concatenate([weight * l_oa + pull * (l_oa + p["l_c"]), weight * l_ia + pull * (l_ia - p["l_c"])])
     pos, neg = (
@@ -139,41 +141,21 @@ def linear(r: Array, p: Array, n: Array, force: Array) -> Fit:
     return leastsquares.linear(np.column_stack([(p - n) / 2, r]), force)
 
 
-def axis_fit(s: Statics, k: int, gap: float) -> AxisFit:
-    """Both models of axis `k`."""
-    of = (s.r[k], s.p[k], s.n[k], s.force[k])
-    return AxisFit(nonlinear(*of, gap), linear(*of), s.force[k])
-
-
 def fits(d: Positions, p: Numbers) -> dict[str, AxisFit]:
-    """Every axis."""
+    """Both models of every axis by itself, with the numbers as they are given, of positions at one bias."""
     s = statics(d, p)
-    return {a: axis_fit(s, k, p["gap"]) for k, a in enumerate(AXES)}
+    out = {}
+    for k, a in enumerate(AXES):
+        of = (s.r[k], s.p[k], s.n[k], s.force[k])
+        fit = nonlinear(*of, p["gap"])
+        out[a] = AxisFit(fit.terms, -fit.residuals, linear(*of))
+    return out
 
 
-def with_gap(s: Statics, k: int, start: Array, gap: float) -> Fit:
-    """T (2.8) with a third term: the gap that the data of axis `k` alone ask for (m). `start` is beta and offset at `gap`.
-
-    Raises:
-        AnalysisError: no convergence.
-    """
-    r, p, n = s.r[k], s.p[k], s.n[k]
-
-    def model(terms: Array) -> Array:
-        return magnet(terms[0], terms[1], terms[2], r, p, n)
-
-    def jacobian(terms: Array) -> Array:
-        near, far = terms[2] - terms[1] - r, terms[2] + terms[1] + r
-        up, down = 2 * terms[0] * p**2 / near**3, 2 * terms[0] * n**2 / far**3
-        return np.column_stack([(p / near) ** 2 - (n / far) ** 2, up + down, down - up])
-
-    return leastsquares.nonlinear(model, s.force[k], np.array([*start, gap]), jacobian=jacobian)
-
-
-def slopes(fit: Fit, gap: float, bias: float) -> tuple[float, float]:
-    """dF/di (N/A) and dF/dxi (N/m) of the fitted magnet at the sensors' zero with both coils at the bias: what the linear model is
-    taken for."""
-    beta, xi = fit.terms
+def slopes(terms: Array, gap: float, bias: float) -> tuple[float, float]:
+    """dF/di (N/A) and dF/dxi (N/m) of the fitted magnet at the sensors' zero with both coils at the bias: what the
+    linear model is taken for."""
+    beta, xi = terms
     near, far = gap - xi, gap + xi
     return (
         float(2 * beta * bias * (1 / near**2 + 1 / far**2)),

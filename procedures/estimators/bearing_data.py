@@ -14,7 +14,7 @@ from procedures.estimators.bearing import AXES, COILS, Positions
 from procedures.estimators.stepmeans import reduced
 
 Array = npt.NDArray[np.float64]
-HOLD, TILT = "hold", "tilt"
+REST, LIFT, LIFT_LOST, TILT, HOLD = "rest", "lift", "lift-lost", "tilt", "hold"
 POSITIONS = tuple(f"pos_{a}" for a in AXES)
 CURRENTS = tuple(f"i_{c}" for c in COILS)
 CHANNELS = (*POSITIONS, *CURRENTS, "flags")
@@ -22,8 +22,12 @@ CHANNELS = (*POSITIONS, *CURRENTS, "flags")
 
 @dataclass(frozen=True)
 class Held:
-    """Steps in time order, N of them. Per channel `mean`, `drift`, `spread` (N,) and `batches` (N, B), means of B parts of a
-    step; `every` (S,), all samples, step by step, of which `of_step` (S,) says the step; `labels` (N,); `lost`, `expected` samples; `flags` ORed; `names` for the reader."""
+    """Steps in time order, N of them, by channel.
+
+    `mean`, `drift`, `spread` (N,); `batches` (N, B), means of B parts of a step; `every` (S,), all samples, step by step,
+    of which `of_step` (S,) says the step; `labels` (N,); `lost` and `expected` samples; `flags` ORed; `names` for the
+    reader.
+    """
 
     mean: dict[str, Array]
     drift: dict[str, Array]
@@ -39,6 +43,28 @@ class Held:
 
     def __len__(self) -> int:
         return len(self.names)
+
+    def chosen(self, which: npt.NDArray[np.bool_]) -> Held:
+        """The steps of which `which` (N,) is true."""
+        samples = which[self.of_step]
+        renumbered = np.cumsum(which) - 1
+
+        def steps(of: dict[str, Array]) -> dict[str, Array]:
+            return {name: values[which] for name, values in of.items()}
+
+        return Held(
+            steps(self.mean),
+            steps(self.drift),
+            steps(self.spread),
+            steps(self.batches),
+            {name: values[samples] for name, values in self.every.items()},
+            renumbered[self.of_step[samples]],
+            steps(self.labels),
+            self.lost[which],
+            self.expected[which],
+            self.flags[which],
+            tuple(name for name, use in zip(self.names, which, strict=True) if use),
+        )
 
     def where(self, values: Array) -> str:
         """The name of the step with the greatest of `values` (N,)."""
@@ -93,7 +119,7 @@ def read_steps(recording: Recording[Any], kind: str, labels: tuple[str, ...], ba
 def _name(kind: str, labels: dict[str, Any]) -> str:
     if kind == TILT:
         return f"tilt psi {labels['psi_rad'] * 1e6:+.0f}, theta {labels['theta_rad'] * 1e6:+.0f} µrad"
-    return f"y {labels['y_m'] * 1e6:+.0f}, z {labels['z_m'] * 1e6:+.0f} µm"
+    return f"y {labels['y_m'] * 1e6:+.0f}, z {labels['z_m'] * 1e6:+.0f} µm at {labels['bias_A']:g} A"
 
 
 def _read(step: Step, batches: int) -> dict[str, Any]:

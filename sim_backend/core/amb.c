@@ -171,6 +171,7 @@ static INLINE void rates(int flexible, const amb_params *p, const amb_derived *d
     }
     double shape[4] = {p->shape_coupling[0], 0, p->shape_coupling[1], 0};
     place(flexible, s, -p->l_c, shape, &y, &z);
+    y -= p->coupling_offset[0], z -= p->coupling_offset[1];
     add(flexible, &w, -p->l_c, shape, -p->coupling * y, -p->coupling * z);
     thrust(p, s, coil, &w);
     spin = (d->torque - p->viscous * s[11] + w.torque) * d->per_polar;

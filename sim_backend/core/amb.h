@@ -8,8 +8,10 @@
 
 /* declarations begin */
 typedef struct {
-    /* shaft and planes (T Table 2.3): AMBs, sensors, balancing planes; coupling of stiffness K at -l_c */
+    /* shaft and planes (T Table 2.3): AMBs, sensors, balancing planes; coupling of stiffness K at -l_c, relaxed
+     * where the shaft is at coupling_offset (y, z) there: its motor is not quite in line */
     double mass, inertia, polar_inertia, gravity_y, gravity_z, l_ia, l_oa, l_is, l_os, l_iu, l_ou, l_c, coupling;
+    double coupling_offset[2];
     double beta[5], gap, gap_x, offset[4];
     double unbalance[2], unbalance_phase[2]; /* kg m and rad, by plane */
     double viscous, coulomb, coulomb_speed;

@@ -55,6 +55,7 @@ class AmbParams:
     l_ou: float = 0.081
     l_c: float = 0.155  # T Table 2.3
     coupling: float = 1200.0  # T Table 2.3
+    coupling_offset: Two = (0.0, 0.0)  # where it is relaxed, y and z: how far the motor is out of line
     beta: Many = (6.95e-7, 6.95e-7, 6.95e-7, 6.95e-7, 5e-6)  # T Table 2.2 (inboard, taken for all four) and 2.3
     gap: float = 5.25e-4  # T Table 2.3
     gap_x: float = 7.83e-4  # T Table 2.3

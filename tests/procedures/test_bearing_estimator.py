@@ -1,4 +1,5 @@
-"""Force constant, offset and gap from positions: exact on exact data, with the signs of T (2.6) corrected, and the errata."""
+"""Force constant and offset from positions: exact on exact data, with the signs of T (2.6) corrected, the errata, what the
+adjustment makes of certificates, and what a shaft that lies on its rings tells."""
 
 from __future__ import annotations
 
@@ -7,15 +8,29 @@ import math
 import numpy as np
 import pytest
 
+from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, Influence
 from procedures.estimators import bearing
 from procedures.estimators.bearing import AXES, COILS, Positions
-from procedures.estimators.bearing_estimates import together
+from procedures.estimators.bearing_adjusted import Adjusted, adjust
+from procedures.estimators.bearing_rest import exchanges, of_readings, unexplained
 
 GAP, BETA, BIAS = 5.25e-4, 6.95e-7, 1.0
 G = 9.81
-PLANE = {"mass": 0.98, "gravity": G, "axes": math.pi / 4, "l_is": 0.078, "l_os": 0.1, "l_oa": 0.081, "amb_span": 0.178, "l_c": 0.155,
-         "coupling": 1200.0, "gap": GAP}  # fmt: skip
+PLANE = {
+    "mass": 0.98,
+    "gravity": G,
+    "axes": math.pi / 4,
+    "l_is": 0.078,
+    "l_os": 0.1,
+    "l_oa": 0.081,
+    "amb_span": 0.178,
+    "l_c": 0.155,
+    "coupling": 1200.0,
+    "relaxed_y": 0.0,
+    "relaxed_z": 0.0,
+    "gap": GAP,
+}
 SOUND = (PLANE | {f"{k}_{a}": v for a in AXES for k, v in (("gain", 1.0), ("zero", 0.0), ("runout", 0.0))}
          | {f"{k}_{c}": v for c in COILS for k, v in (("gain", 1.0), ("offset", 0.0))})  # fmt: skip
 PLACES = np.array(
@@ -23,28 +38,30 @@ PLACES = np.array(
 ).T
 
 
-def currents(force: np.ndarray, xi: np.ndarray, beta: float = BETA) -> tuple[np.ndarray, np.ndarray]:
+def currents(force: np.ndarray, xi: np.ndarray, bias: float = BIAS) -> tuple[np.ndarray, np.ndarray]:
     """Coil currents of a constant sum that give the force, by bisection: nothing of the estimators is in it."""
-    low, high = np.full_like(force, -BIAS), np.full_like(force, BIAS)
+    low, high = np.full_like(force, -bias), np.full_like(force, bias)
     for _ in range(80):
         d = (low + high) / 2
-        less = beta * (((BIAS + d) / (GAP - xi)) ** 2 - ((BIAS - d) / (GAP + xi)) ** 2) < force
+        less = BETA * (((bias + d) / (GAP - xi)) ** 2 - ((bias - d) / (GAP + xi)) ** 2) < force
         low, high = np.where(less, d, low), np.where(less, high, d)
-    return BIAS + d, BIAS - d
+    return bias + d, bias - d
 
 
-def positions(offsets: tuple[float, ...], gravity: float = -G) -> Positions:
+def positions(
+    offsets: tuple[float, ...], gravity: float = -G, bias: float = BIAS, relaxed: tuple[float, float] = (0.0, 0.0)
+) -> Positions:
     """The shaft without tilt on a grid, carried by magnets and a spring: forces from a 2 x 2 balance of force and moment."""
     y, z = PLACES
     weight, spring = 0.98 * gravity / math.sqrt(2), 1200.0
     read, p, n = np.array([y, z, y, z]), np.zeros((4, y.size)), np.zeros((4, y.size))
     for first, at in ((0, y), (1, z)):
-        load = -weight + spring * at  # F_i + F_o
-        moment = -0.155 * spring * at  # -l_ia F_i + l_oa F_o, the spring pulls at -l_c
+        load = -weight + spring * (at - relaxed[first])  # F_i + F_o
+        moment = -0.155 * spring * (at - relaxed[first])  # -l_ia F_i + l_oa F_o, the spring pulls at -l_c
         both = np.linalg.solve([[1, 1], [-0.097, 0.081]], np.array([load, moment]))
         for b in (0, 1):
             k = first + 2 * b
-            p[k], n[k] = currents(both[b], offsets[k] + at)
+            p[k], n[k] = currents(both[b], offsets[k] + at, bias)
     return Positions(read, p, n)
 
 
@@ -54,12 +71,9 @@ OFFSETS = (115e-6, 100e-6, 130e-6, 90e-6)
 def test_exact_data_give_the_truth() -> None:
     d = positions(OFFSETS)
     fits = bearing.fits(d, SOUND)
-    s = bearing.statics(d, SOUND)
-    for k, (axis, offset) in enumerate(zip(AXES, OFFSETS, strict=True)):
+    for axis, offset in zip(AXES, OFFSETS, strict=True):
         assert fits[axis].beta == pytest.approx(BETA, rel=1e-7)
         assert fits[axis].offset == pytest.approx(offset, abs=1e-11)
-        wide = bearing.with_gap(s, k, bearing.axis_fit(s, k, 1.05 * GAP).fit.terms, 1.05 * GAP)
-        assert wide.terms == pytest.approx([BETA, offset, GAP], rel=1e-5)  # curvature tells the gap
 
 
 def test_gains_and_zeros_are_taken_off() -> None:
@@ -90,9 +104,9 @@ def test_erratum_the_sign_of_the_offset_goes_with_gravity() -> None:
 
 
 def test_erratum_the_linear_column_of_table_2_2_is_no_slope() -> None:
-    """With the corrected sign the no-intercept model returns about five times the bearing's slopes; with the other one it does not."""
+    """With the corrected sign the no-intercept model returns five times the bearing's slopes, with the other it does not."""
     same = bearing.fits(positions((115e-6,) * 4), SOUND)["yi"]
-    k, stiffness = bearing.slopes(same.fit, GAP, BIAS)
+    k, stiffness = bearing.slopes(same.terms, GAP, BIAS)
     assert (
         pytest.approx(10.1, rel=0.01),
         pytest.approx(1.92e4, rel=0.01),
@@ -101,16 +115,109 @@ def test_erratum_the_linear_column_of_table_2_2_is_no_slope() -> None:
     assert same.linear.terms[0] > 4 * k
     assert same.linear.terms[1] > 4 * stiffness
     against = bearing.fits(positions((-115e-6,) * 4), SOUND)["yi"]
-    k, stiffness = bearing.slopes(against.fit, GAP, BIAS)
+    k, stiffness = bearing.slopes(against.terms, GAP, BIAS)
     assert against.linear.terms[0] < 1.5 * k
 
 
-def test_the_best_of_several_is_between_them_and_shares_what_they_share() -> None:
-    common = Influence("c", "c", 1.0, "1", "B", "normal")
-    a = Estimate.of(10.0, Influence("a", "a", 1.0, "1", "B", "normal")) + Estimate.of(0.0, common)
-    b = Estimate.of(12.0, Influence("b", "b", 2.0, "1", "B", "normal")) + Estimate.of(0.0, common)
-    both = together([a, b])
-    assert both.value == pytest.approx(10 * 0.8 + 12 * 0.2)
-    assert both.u == pytest.approx(math.sqrt(0.8**2 + 0.4**2 + 1))
-    steep = Estimate.of(11.0, common) * 5.0  # would get a weight below zero
-    assert together([a, steep]).u <= a.u + 1e-12
+def test_what_the_linear_model_misses_is_the_curvature_of_the_control_current() -> None:
+    """F |c| sd(r^2) / rms(a + c r^2), with the control current a - b r + c r^2 that carries F."""
+    r = np.array([*PLACES[0]])
+    for bias, load in ((1.0, 3.1), (1.1, 3.7), (1.2, 3.1), (1.2, 3.7)):
+        p, n = currents(np.full_like(r, load), 115e-6 + r, bias)
+        c, _, a = np.polyfit(r, (p - n) / 2, 2)
+        predicted = load * abs(c) * (r**2).std() / math.sqrt(((a + c * r**2) ** 2).mean())
+        left = bearing.linear(r, p, n, np.full_like(r, load)).residuals
+        assert math.sqrt((left**2).mean()) == pytest.approx(predicted, rel=0.02)
+
+
+TOLERANCES = {"gap": 5.8e-6, "coupling": 35.0, "relaxed_y": 29e-6, "relaxed_z": 29e-6, "mass": 3e-3, "gain_yi": 5e-3,
+              "gain_yi_p": 3e-3, "offset_zo_n": 3e-3, "runout_zi": 1.7e-6}  # fmt: skip
+
+
+def certificates(**wrong: float) -> dict[str, Estimate]:
+    """Inputs with tolerances; `wrong` is what a certificate says too much."""
+    out = {}
+    for name, value in SOUND.items():
+        given = Influence(name, name, TOLERANCES.get(name, 0.0), "1", "B", "normal")
+        out[name] = Estimate.of(value + wrong.get(name, 0.0), given) if given.u else Estimate.exact(value)
+    return out
+
+
+def adjusted(relaxed: tuple[float, float] = (0.0, 0.0), **wrong: float) -> Adjusted:
+    """From positions without noise at two biases."""
+    both = [positions(OFFSETS, bias=b, relaxed=relaxed) for b in (1.2, 0.8)]
+    means = Positions(*(np.concatenate([getattr(d, x) for d in both], axis=1) for x in ("read", "p", "n")))
+    return adjust(means, certificates(**wrong), np.full(4, 5e-4), np.array([(6.5e-7, 1e-4)] * 4))
+
+
+def test_the_adjustment_of_exact_data_is_the_truth_and_moves_nothing() -> None:
+    found = adjusted()
+    np.testing.assert_allclose(found.terms[:, 0], BETA, rtol=1e-6)
+    np.testing.assert_allclose(found.terms[:, 1], OFFSETS, atol=1e-10)
+    assert max(abs(v) for v in found.moved.values()) < 1e-3
+    assert np.abs(found.residuals).max() < 1e-6
+
+
+def test_each_certificate_acts_as_its_influence_says() -> None:
+    """A certificate that is wrong by one u moves every result by that influence's share in the budget."""
+    sound = adjusted()
+    for name, u in TOLERANCES.items():
+        moved = adjusted(**{name: u})
+        for key in ("beta_yi", "offset_yi", "beta_zo", "offset_zi", "gap"):
+            e = sound.estimates[key]
+            share = sum(slope * i.u for i, slope in e.sensitivities.items() if i.id == name)
+            assert moved.estimates[key].value - e.value == pytest.approx(share, abs=0.05 * e.u), (name, key)
+
+
+def test_positions_at_two_biases_correct_a_wrong_gap_but_not_the_runout() -> None:
+    found = adjusted(gap=10e-6)
+    assert found.values["gap"] == pytest.approx(GAP, abs=2e-6)
+    assert found.terms[0, 0] == pytest.approx(BETA, rel=0.01)
+    shifted = adjusted(runout_zi=1.7e-6).terms[1, 1] - OFFSETS[1]
+    assert shifted == pytest.approx(1.7e-6 * (1 + 0.019 / 0.178), rel=0.02)  # at the AMB's plane
+
+
+def test_a_coupling_out_of_line_acts_on_the_force_constants_as_another_weight_would() -> None:
+    """K d (l_oa + l_c) / span inboard and K d (l_ia - l_c) / span outboard; the offsets do not take it up."""
+    aside = 29e-6
+    found = bearing.fits(positions(OFFSETS, relaxed=(aside, 0.0)), SOUND)
+    weight = 0.98 * G / math.sqrt(2)
+    inboard = 1200 * aside * (0.081 + 0.155) / (weight * 0.081)
+    outboard = 1200 * aside * (0.097 - 0.155) / (weight * 0.097)
+    assert found["yi"].beta / BETA - 1 == pytest.approx(
+        inboard, rel=0.3
+    )  # a little more: the spring is a part of the load
+    assert found["yo"].beta / BETA - 1 == pytest.approx(outboard, rel=0.15)
+    for axis, offset in zip(AXES, OFFSETS, strict=True):
+        assert found[axis].offset == pytest.approx(offset, abs=0.6e-6)
+
+
+def test_the_spring_tells_a_part_of_how_far_its_coupling_is_out_of_line() -> None:
+    """Its force over the displacement is a known one: at two biases it weighs beta a little, and so the constant part."""
+    e = adjusted().estimates["beta_yi"]
+    alone = 1200 * TOLERANCES["relaxed_y"] * (0.081 + 0.155) / (0.98 * G / math.sqrt(2) * 0.081) * BETA
+    left = next(abs(s) * i.u for i, s in e.sensitivities.items() if i.id == "relaxed_y")
+    assert 0.02 * alone < left < 0.9 * alone
+
+
+def on_rings(**changed: float) -> dict[str, float]:
+    return {f"pos_{a}": -70.7e-6 for a in AXES} | {f"pos_{a}": v for a, v in changed.items()}
+
+
+def test_readings_on_the_rings_forbid_the_lift() -> None:
+    rig = load_rig("amb5dof")
+    assert list(of_readings(on_rings(yi=-75e-6, zi=-66e-6), rig)) == []
+    assert [(f.code, f.where) for f in of_readings(on_rings(zo=70e-6), rig)] == [("sensor-polarity", "pos_zo")]
+    near = on_rings(yi=-57e-6, zi=-57e-6)
+    assert [(f.code, f.where) for f in of_readings(near, rig)] == [("ring-too-near", "inboard")]
+
+
+def test_where_a_failed_lift_presses_the_shaft_tells_the_exchange() -> None:
+    """Outboard the upper coils of y pull it up, inboard the lower ones pull it down, each against its ring."""
+    rig = load_rig("amb5dof")
+    p, n = np.array([0.0, 1.0, 2.0, 1.0]), np.array([2.0, 1.0, 0.0, 1.0])
+    truth = np.array([-99e-6, -10e-6, 99e-6, 3e-6])
+    left = {name: unexplained(truth[list(order)], p, n, rig) for name, order in exchanges().items()}
+    assert left[""] < 0.5
+    assert min(left, key=lambda k: left[k]) == ""
+    assert left["yi-yo"] > 4

@@ -18,7 +18,7 @@ from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import Estimate, interval
 from procedures.bearing_model import MEASURES, Plan, check, figures, grid, read, step_count
-from procedures.estimators import bearing_findings
+from procedures.estimators import bearing_findings, bearing_wiring
 from procedures.estimators.bearing import AXES
 from procedures.estimators.bearing_data import Held
 from reports.figures import draw as draw_figure
@@ -26,7 +26,7 @@ from sim_backend.truth import nominal
 
 pytestmark = pytest.mark.xdist_group("bearing-model")  # one worker makes the sound run once
 NAME, RIG, SEED = "bearing-model", "amb5dof", 2026
-QUICK = {"spacing_m": 40e-6, "passes": 1, "settle_s": 0.5, "average_s": 0.3}
+QUICK = {"spacing_m": 40e-6, "settle_s": 0.5, "average_s": 0.3}
 
 
 def measure(folder: Path, truth: Mapping[str, float] | None = None, seed: int = SEED, **plan: object) -> Simulated:
@@ -59,27 +59,35 @@ def test_a_sound_rig_is_recovered_within_its_intervals(sound: Simulated) -> None
         for name in (f"beta_{axis}", f"offset_{axis}"):
             assert abs(values[name].value - sound.truth[name]) < 3 * values[name].u, name
             assert judge(interval(values[name]), limits[name]) is Verdict.PASS
-        assert values[f"beta_{axis}"].u < 0.05 * values[f"beta_{axis}"].value
-        assert values[f"offset_{axis}"].u < 6e-6
+        assert values[f"beta_{axis}"].u < 0.02 * values[f"beta_{axis}"].value
+        assert values[f"offset_{axis}"].u < 2.5e-6
+    for where in ("inboard", "outboard"):
+        for name in ("misfit_ratio", "misfit_ratio_means"):
+            assert judge(interval(values[name + where]), limits[name]) is Verdict.PASS
     assert len(sound.recording.all_steps()) == step_count(sound.recording.plan)
 
 
-def test_the_printed_effect_at_the_printed_machine(tmp_path: Path) -> None:
-    """T Table 2.2 on a machine as drawn, offsets of 115 um, inboard: the linear model leaves at least 20 times the residual sum over
-    single samples (T: 56), and its numbers are those of no slope (T: 68.5 N/A, 162 N/mm)."""
+@pytest.mark.parametrize(("bias", "ratios", "like_printed"), [(1.15, (20, 20), None), (1.1, (20, 20), "outboard")])
+def test_the_printed_effect_at_the_printed_machine(
+    tmp_path: Path, bias: float, ratios: tuple[float, float], like_printed: str | None
+) -> None:
+    """T Table 2.2 on a machine as drawn, offsets of 115 um: the linear model leaves at least 20 times the residual sum over
+    single samples (T: 56), by what it misses and not by noise alone; outboard at 1.1 A with T's 68.5 N/A and 162 N/mm."""
     exact = {k: v for k, v in nominal(load_rig(RIG)).items() if not k.startswith(("runout", "unbalance"))}
-    values = found(measure(tmp_path, exact, spacing_m=20e-6))
-    for where, least in (("inboard", 20), ("outboard", 10)):  # T prints the inboard AMB
+    values = found(measure(tmp_path, exact, biases_A=(bias,)))
+    for where, least in zip(("inboard", "outboard"), ratios, strict=True):
         assert values[f"misfit_ratio{where}"].value > least
         assert values[f"misfit_ratio_means{where}"].value > 1000
-        assert values[f"k_linear{where}"].value > 30
-        assert values[f"stiffness_linear{where}"].value > 75e3
+    if like_printed:
+        assert values[f"misfit_ratio{like_printed}"].value == pytest.approx(56, rel=0.15)
+        assert values[f"k_linear{like_printed}"].value == pytest.approx(68.5, rel=0.1)
+        assert values[f"stiffness_linear{like_printed}"].value == pytest.approx(162e3, rel=0.05)
 
 
 def test_offsets_against_gravity_hide_the_effect_and_do_not_pass(tmp_path: Path) -> None:
     """T's -115 um with gravity downwards: found as it is, named, and the linear model is nearly right."""
     truth = {f"offset_{a}": -115e-6 for a in AXES} | {f"pos_{a}.offset": 0.0 for a in AXES}
-    run = measure(tmp_path, truth, settle_s=1.5)
+    run = measure(tmp_path, truth, settle_s=1.5, biases_A=(1.2, 1.0))  # less bias could not carry the shaft
     assert "offset-against-load" in serious(run)
     values = found(run)
     for axis in AXES:
@@ -98,12 +106,13 @@ def test_the_result_follows_the_truth(tmp_path: Path) -> None:
 
 
 def test_without_the_coupling_and_with_it_forgotten(tmp_path: Path) -> None:
-    """Taken off, the result stands; said to be off while it is on, the positions ask for another gap."""
+    """Taken off, the result stands; said to be off while it is on, the positions contradict the certificates."""
     (tmp_path / "off").mkdir()
     run = measure(tmp_path / "off", {"geometry.coupling_stiffness": 0.0}, coupled=False)
     assert serious(run) == {}
     assert all(abs(e.value - run.truth[n]) < 3 * e.u for n, e in found(run).items() if n in run.truth)
-    assert "gap-inconsistent" in serious(measure(tmp_path, coupled=False))
+    forgotten = serious(measure(tmp_path, coupled=False))
+    assert "is it?" in forgotten["certificate-contradicted"]
 
 
 @pytest.mark.parametrize(
@@ -113,7 +122,14 @@ def test_without_the_coupling_and_with_it_forgotten(tmp_path: Path) -> None:
         ({"current_sign_o": -1}, "coils-exchanged", "i_yo_p"),
         ({"roll": -0.7854}, "gravity-reversed", "axis z"),
         ({"position_sign_x": -1}, "contact", "axial stop"),
-        ({"pos_yi.gain": 1.1}, "gap-inconsistent", "pos_yi"),
+        ({"pos_yi.gain": 1.1}, "certificate-contradicted", "gain of pos_yi"),
+        ({"i_yi_p.gain": 0.9}, "certificate-contradicted", "gain of i_yi_p"),
+        ({"i_yi_p.offset": 0.1}, "certificate-contradicted", "offset of i_yi_p"),
+        ({"position_sign_yi": -1}, "sensor-polarity", "pos_yi"),
+        ({"position_range": 60e-6}, "ring-too-near", "beyond its range"),
+        ({"geometry.clearance": 80e-6}, "ring-too-near", "the ring is too near"),
+        ({"exchange_planes": 1}, "planes-exchanged", "yi with yo and zi with zo"),
+        ({"exchange_axes": 1}, "axes-exchanged", "yi with zi and yo with zo"),
         ({"drop_fraction": 0.02}, "missing-samples", "missing"),
     ],
 )
@@ -123,20 +139,9 @@ def test_a_defect_is_named_and_does_not_pass(tmp_path: Path, defect: dict[str, f
     assert named in wrong[code]
 
 
-@pytest.mark.parametrize(
-    "defect",
-    [
-        {"position_sign_yi": -1},
-        {"position_sign_zo": -1},
-        {"exchange_planes": 1},
-        {"position_range": 60e-6},
-        {"geometry.clearance": 80e-6},
-    ],
-    ids=["polarity-yi", "polarity-zo", "planes", "clipping", "contact"],
-)
-def test_a_shaft_that_cannot_be_held_stops_the_run(tmp_path: Path, defect: dict[str, float]) -> None:
-    with pytest.raises(DeviceFault, match="check sensor"):
-        measure(tmp_path, defect)
+def test_a_fault_among_the_positions_stops_the_run(tmp_path: Path) -> None:
+    with pytest.raises(DeviceFault, match="SENSOR"):
+        measure(tmp_path, {"fault_after_s": 8.0})
 
 
 def exchanged(held: Held, a: str, b: str, sign: float = 1.0) -> Held:
@@ -153,7 +158,7 @@ def exchanged(held: Held, a: str, b: str, sign: float = 1.0) -> Held:
 def test_a_wrong_map_of_the_readings_is_named(sound: Simulated, a: str, b: str, sign: float, code: str) -> None:
     """The controller sees them right, the bench does not: the tilts tell the planes apart."""
     held, tilted = (exchanged(x, a, b, sign) for x in read(sound.recording))
-    codes = {f.code for f in bearing_findings.of_wiring(held, tilted, sound.recording.rig)}
+    codes = {f.code for f in bearing_wiring.of_wiring(held, tilted, sound.recording.rig)}
     assert codes == {code}
 
 
@@ -161,7 +166,7 @@ def test_exchanged_coils_of_two_axes_and_flags_are_named(sound: Simulated) -> No
     held, tilted = read(sound.recording)
     for a, b in (("yi", "yo"), ("yi", "zi")):
         other = [exchanged(exchanged(x, f"i_{a}_p", f"i_{b}_p"), f"i_{a}_n", f"i_{b}_n") for x in (held, tilted)]
-        wrong = list(bearing_findings.of_models(*other, sound.recording.rig, sound.recording.plan))
+        wrong = list(bearing_wiring.of_models(*other, sound.recording.rig, sound.recording.plan))
         assert {(f.code, f.where) for f in wrong} == {("coils-exchanged", a), ("coils-exchanged", b)}
         assert f"of {a} and {b}" in wrong[0].text
     for bit, code in ((64, "clipped"), (4, "contact"), (1, "saturated")):
@@ -182,7 +187,7 @@ def test_the_grid_stays_in_its_circle_and_moves_little() -> None:
     [
         ({"radius_m": 90e-6}, "the ring"),
         ({"spacing_m": 80e-6}, "nine or more"),
-        ({"bias_A": 1.6}, "amplifiers"),
+        ({"biases_A": (1.2, 1.6)}, "amplifiers"),
         ({"tilt_rad": 2e-3}, "tilt_rad"),
     ],
 )
@@ -196,7 +201,7 @@ def test_what_cannot_work_is_told_before_anything_starts(plan: dict[str, float],
 
 def test_figures_show_the_data(sound: Simulated) -> None:
     drawn = {f.key: f for f in figures(sound.recording)}
-    assert set(drawn) == {"positions", "currents", "residuals-linear", "residuals-nonlinear", "forces", "gaps"}
+    assert set(drawn) == {"positions", "currents", "residuals-linear", "residuals-nonlinear", "forces", "adjustments"}
     worst = {
         k: max(float(np.abs(s.y).max()) for s in drawn[k].series) for k in ("residuals-linear", "residuals-nonlinear")
     }

@@ -64,6 +64,16 @@ def test_coupling_pulls_the_inboard_end_back() -> None:
     np.testing.assert_allclose(pulled[7:9], np.array([1e-4, -2e-4]) * 1200 * p.l_c / p.mass)
 
 
+def test_a_coupling_out_of_line_pulls_with_a_constant_force_at_its_plane() -> None:
+    aside = np.array([4e-5, -3e-5])
+    p = floating(coupling=1200.0, coupling_offset=tuple(aside))
+    pulled = derivative(p, at(), NONE)
+    np.testing.assert_allclose(pulled[7:9], 1200 * aside / p.mass)
+    np.testing.assert_allclose(pulled[[10, 9]], np.array([-1, 1]) * 1200 * p.l_c * aside / p.inertia)
+    relaxed = derivative(p, at(theta=-aside[0] / p.l_c, psi=aside[1] / p.l_c), NONE)
+    np.testing.assert_allclose(relaxed[7:11], 0, atol=1e-12)
+
+
 def test_a_free_spinning_shaft_nutates_forwards() -> None:
     """w = theta - j psi is how the shaft's end moves in y + j z: w'' = j (J_x/J) omega w', with the spin."""
     p, omega = floating(), 14000 * RPM

@@ -34,6 +34,7 @@ def blemished(**changes: Any) -> AmbParams:
         "current_offset": tuple(0.004 * rng.uniform(-1, 1, 10)),
         "position_gain": tuple(1 + 0.01 * rng.uniform(-1, 1, 5)),
         "position_offset": tuple(2e-6 * rng.uniform(-1, 1, 5)),
+        "coupling_offset": (3e-5, -2e-5),
         "pulse_angle": 0.3,
         "u_max": 1e9,
         "trip_speed": 1e9,
@@ -135,7 +136,13 @@ def test_references_equal_the_reference(law: int, ratio: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "change", [{"beta": (6.96e-7,) * 4 + (5e-6,)}, {"polar_inertia": 1.72e-4}, {"coupling": 1210.0}]
+    "change",
+    [
+        {"beta": (6.96e-7,) * 4 + (5e-6,)},
+        {"polar_inertia": 1.72e-4},
+        {"coupling": 1210.0},
+        {"coupling_offset": (2e-5, 0.0)},
+    ],
 )
 def test_the_comparison_sees_a_small_difference(change: dict[str, Any]) -> None:
     p, c = quiet(), AmbControl(law=1.0)
