@@ -124,7 +124,7 @@ def _width(x: Array, z: Complex, weight: Array) -> int:
             break
         near = np.arange(max(0, top - w // 2), min(z.size, top + w // 2 + 1))
         at = _windows(x, near, w)
-        misfit = (weight[at.lines] * np.abs(z[at.lines] - _fitted(z, at, weight)) ** 2).sum(axis=1)
+        misfit = (weight[at.lines] * np.abs(z[at.lines] - _evaluated(z, at, weight, at.u)) ** 2).sum(axis=1)
         if misfit.mean() > (w - 4) * (1 + 2 / np.sqrt(w - 4)):
             break
         width = w
@@ -170,34 +170,33 @@ def _windows(x: Array, chosen: npt.NDArray[np.intp], width: int) -> _Windows:
     return _Windows(lines, u, between / scale[:, None], scale)
 
 
-def _terms(z: Complex, at: _Windows, weight: Array) -> Complex:
-    """a, b, c, d of each local model, (..., k, 4)."""
-    near = z[..., at.lines]
-    u = np.broadcast_to(at.u, near.shape)
-    columns = np.stack([np.ones_like(near), u, u**2, -near * u], axis=-1)
-    weighed = np.swapaxes(columns.conj() * weight[at.lines][..., None], -1, -2)
-    gram = weighed @ columns
-    ridge = 1e-12 * gram * np.eye(4)  # each column by its own size
-    return np.asarray(np.linalg.solve(gram + ridge, weighed @ near[..., None])[..., 0], np.complex128)
-
-
-def _at(terms: Complex, v: Array) -> Complex:
-    """Values of the models at places v (k, f) of their own scale."""
-    a, b, c, d = (terms[..., k, None] for k in range(4))
-    below = 1 + d * v
-    return np.asarray(np.where(np.abs(below) > NEAR_POLE, (a + b * v + c * v**2) / np.where(below == 0, 1, below), a))
-
-
 def _models(z: Complex, at: _Windows, weight: Array) -> Complex:
     """Values (..., k, f) of the local models at their line and between it and its neighbours."""
-    return _at(_terms(z, at, weight), at.between)
+    return _evaluated(z, at, weight, at.between)
 
 
-def _fitted(z: Complex, at: _Windows, weight: Array) -> Complex:
-    """Values (k, w) of the local models at the lines they are fitted to."""
-    a, b, c, d = (_terms(z, at, weight)[..., k, None] for k in range(4))
-    below = 1 + d * at.u
-    return np.asarray((a + b * at.u + c * at.u**2) / np.where(np.abs(below) > 1e-6, below, 1e-6))
+def _evaluated(z: Complex, at: _Windows, weight: Array, v: Array) -> Complex:
+    """Values (..., k, f) of the local models at places v (k, f) of their own scale.
+
+    (1 + d u) z = a + b u + c u^2 in least squares: what is not a parabola in z and in u z gives d; a, b, c follow.
+    """
+    root = np.sqrt(weight[at.lines])
+    powers = np.stack([np.ones_like(at.u), at.u, at.u**2], axis=-1)
+    basis, upper = np.linalg.qr(powers * root[..., None])  # (k, w, 3), the same for every curve
+    shape = np.linalg.solve(np.swapaxes(upper, -1, -2), np.stack([np.ones_like(v), v, v**2], axis=-2))
+    near = z[..., at.lines] * root
+    turned = near * at.u
+    p, q = (np.einsum("kwi,...kw->...ki", basis, x) for x in (near, turned))
+    cross = (turned.conj() * near).sum(axis=-1) - (q.conj() * p).sum(axis=-1)
+    square = (np.abs(turned) ** 2).sum(axis=-1)
+    own = square - (np.abs(q) ** 2).sum(axis=-1)
+    d = (-cross / np.maximum(own, 1e-12 * square + 1e-300))[..., None]
+    parabola = np.einsum("...ki,kif->...kf", p, shape)
+    below = 1 + d * v
+    above = parabola + d * np.einsum("...ki,kif->...kf", q, shape)
+    if v is not at.between:
+        return np.asarray(above / np.where(np.abs(below) > 1e-6, below, 1e-6))
+    return np.asarray(np.where(np.abs(below) > NEAR_POLE, above / np.where(below == 0, 1, below), above[..., :1]))
 
 
 def _top(z: Complex, at: _Windows, weight: Array, x: Array) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
