@@ -27,17 +27,7 @@ from procedures import bearing_model_figures as drawn
 from procedures.estimators import bearing_findings, bearing_rest, bearing_wiring
 from procedures.estimators.bearing import AXES
 from procedures.estimators.bearing_compared import BEARINGS, COMPARED
-from procedures.estimators.bearing_data import (
-    CURRENTS,
-    HOLD,
-    LIFT,
-    LIFT_LOST,
-    POSITIONS,
-    REST,
-    TILT,
-    Held,
-    read_steps,
-)
+from procedures.estimators.bearing_data import CURRENTS, HOLD, LIFT, LIFT_LOST, POSITIONS, REST, TILT, Held, read_steps
 from procedures.estimators.bearing_estimates import evaluate
 
 BETA = {a: Quantity(f"beta_{a}", "N m^2/A^2", f"force constant of axis {a}, at the same gap for all") for a in AXES}
@@ -72,14 +62,14 @@ class Plan(BenchPlan):
     tilt_rad: float = Field(3e-4, gt=0)  # of the check of the wiring
     biases_A: tuple[float, ...] = Field(
         (1.15, 0.8), min_length=1
-    )  # of each pass; the first is compared with T Table 2.2
+    )  # of each pass; T Table 2.2 is compared with the first
     coupled: bool = True  # False: the operator has taken the coupling off
     settle_s: float = Field(0.6, gt=0)
     average_s: float = Field(0.5, ge=0.1)
     batches: int = Field(5, ge=2)  # parts of a step; longer than the loop's swings
     max_speed_m_s: float = Field(5e-6, gt=0)  # a shaft that moves faster is not at rest
     max_misfit: float = Field(0.005, gt=0)  # a position's residual over the mean load of its axis
-    min_ratio: float = Field(20.0, gt=1)  # of the residual sums over batch means
+    min_ratio: float = Field(20.0, gt=1)  # of the residual sums, over samples and over batch means
     max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 
 
@@ -223,10 +213,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     arm = max(g[k].value for k in ("com_to_inboard_sensor", "com_to_outboard_sensor"))
     if plan.tilt_rad > rig.parameters["ref_psi"].high or plan.tilt_rad * arm > room:
         yield f"tilt_rad: found {plan.tilt_rad * 1e6:.0f} µrad; reference and ring allow less"
-    low, high = (
-        rig.parameters["bias"].low,
-        min(rig.parameters["bias"].high, rig.parameters["current_limit"].default / 2),
-    )
+    allowed = rig.parameters["bias"]
+    low, high = allowed.low, min(allowed.high, rig.parameters["current_limit"].default / 2)
     for bias in plan.biases_A:
         if not low <= bias <= high:
             yield (
