@@ -212,7 +212,7 @@ class Plant:
         """
         limit = (ticks + PERIOD_TICKS - 1) // PERIOD_TICKS + 1
         rows = np.empty((limit, len(CHANNELS)))
-        done = _lib.tsbs_run(self._p, self._c, self._s, ticks, _ffi.from_buffer("double[]", rows), limit)
+        done = _lib.tsbs_run(self._p, self._c, self._s, ticks, _ffi.from_buffer("double[]", rows.data), limit)
         tick = self.tick
         return rows[: tick // PERIOD_TICKS - (tick - done) // PERIOD_TICKS]
 
