@@ -20,12 +20,12 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Metadata
 
+from bench import layout
 from bench.errors import RecordingError
 
 MAX_CHUNK = 64 << 20
-KEPT = (
-    256  # decoded chunks of half a second, 0.1 MB each: two minutes, for an analysis goes over its steps more than once
-)
+KEPT = 160  # decoded chunks of half a second: an analysis goes over its steps more than once
+RAW = layout.raw_topic("")
 MAGIC = b"\x89MCAP0\r\n"
 DAMAGED = "the file was damaged after it was written"
 RECORDS: dict[int, Any] = {
@@ -66,14 +66,21 @@ class McapFile:
         """Log time and data of a topic's messages with start <= log time < end, in file order."""
         for number, chunk in enumerate(self.chunks):
             if chunk.end_ns >= start_ns and chunk.start_ns < end_ns:
-                for name, t_ns, data in self._decoded(number):
+                for name, t_ns, data in self._read(number) if topic.startswith(RAW) else self._decoded(number):
                     if name == topic and start_ns <= t_ns < end_ns:
                         yield t_ns, data
 
     def _decoded(self, number: int) -> list[tuple[str, int, bytes]]:
+        """The messages of a chunk but its raw frames, which are most of it and of no use to an analysis. Kept."""
         if number in self._cache:
             self._cache.move_to_end(number)
             return self._cache[number]
+        out = self._cache[number] = [m for m in self._read(number) if not m[0].startswith(RAW)]
+        if len(self._cache) > KEPT:
+            self._cache.popitem(last=False)
+        return out
+
+    def _read(self, number: int) -> list[tuple[str, int, bytes]]:
         place = self.chunks[number]
         with self.path.open("rb") as file:
             file.seek(place.offset)
@@ -82,9 +89,6 @@ class McapFile:
         for channel, t_ns, data in self._parse(records):
             if channel in self.topics:
                 out.append((self.topics[channel][0], t_ns, data))
-        self._cache[number] = out
-        if len(self._cache) > KEPT:
-            self._cache.popitem(last=False)
         return out
 
     def _parse(self, records: bytes) -> Iterator[tuple[int, int, bytes]]:

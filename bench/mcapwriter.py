@@ -6,10 +6,11 @@ Half a second of bench time after the last flush, what is pending is written and
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, BinaryIO
 
 import numpy as np
+import numpy.typing as npt
 from mcap.writer import CompressionType, IndexType, Writer
 
 from bench import layout
@@ -106,7 +107,7 @@ class McapWriter:
         plan, first = self._streams[stream], blocks[0]
         ticks = np.concatenate([b.ticks for b in blocks])
         t_ns = np.concatenate([b.t_ns for b in blocks])
-        columns = {c.name: np.concatenate([b.columns[c.name] for b in blocks]) for c in plan.channels}
+        columns = _joined(blocks, plan)
         for start in range(0, len(ticks), _rows(plan)):
             part = slice(start, start + _rows(plan))
             data = layout.encode_block(plan, first.first_index + start, first.lost_before if start == 0 else 0,
@@ -163,3 +164,12 @@ def _follows(before: SampleBlock, after: SampleBlock, period_ns: int) -> bool:
         and after.first_index == before.first_index + len(before)
         and int(after.t_ns[0]) == int(before.t_ns[-1]) + period_ns
     )
+
+
+def _joined(blocks: Sequence[SampleBlock], plan: StreamLayout) -> dict[str, npt.NDArray[np.float64]]:
+    """The blocks' columns end to end: all at once, where each block's are rows of one array, for thirty joins of a few
+    hundred numbers cost more than all the rest of a block."""
+    tables = [b.table for b in blocks if b.table is not None]
+    if len(tables) == len(blocks):
+        return dict(zip(blocks[0].columns, np.concatenate(tables, axis=1), strict=True))
+    return {c.name: np.concatenate([b.columns[c.name] for b in blocks]) for c in plan.channels}

@@ -103,7 +103,8 @@ class Recorder:
     def frames(self, link: str, batch: FrameBatch, lag_ns: int = 0) -> None:
         """Record frames as they came, or as they were sent (flag SENT); host time less `lag_ns` is sample time."""
         if len(batch):
-            self._put("frames", link, lag_ns, batch.astype(FRAME, copy=True))
+            kept = batch if self._plain else batch.astype(FRAME, copy=True)  # written at once, or by the thread
+            self._put("frames", link, lag_ns, kept)
             _add(self.integrity.frames, link, len(batch))
 
     def stream(self, layout: StreamLayout) -> None:

@@ -33,7 +33,7 @@ __all__ = ["Captured", "Recording", "Step", "Steps"]
 P = TypeVar("P", bound=BenchPlan)
 Q = TypeVar("Q", bound=BenchPlan)
 J = TypeVar("J", dict[str, Any], list[Any])
-KEPT = 256  # decoded blocks: views of the messages, which the file keeps as long
+KEPT = 160  # decoded blocks: views of the messages, which the file keeps as long
 BLOCK_NS = 2_000_000_000  # no block is longer: how far back a block that reaches into an interval can begin
 
 

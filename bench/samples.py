@@ -39,6 +39,8 @@ class SampleBlock:
     host_ns: int
     lost_before: int
     columns: Mapping[str, npt.NDArray[np.float64]]
+    table: npt.NDArray[np.float64] | None = None
+    """The columns as (channels, n), where they are rows of one array."""
 
     def __len__(self) -> int:
         return len(self.ticks)

@@ -181,7 +181,7 @@ class TelemetryDecoder:
         s.raw, s.sequence, s.tick = int(rows.sequence[-1]), s.sequence + n, int(ticks[-1])
         self._index += n
         return SampleBlock(
-            STREAM, self._index - n, ticks.astype(np.uint64), t_ns, int(rows.arrived.max()), 0, rows.columns
+            STREAM, self._index - n, ticks.astype(np.uint64), t_ns, int(rows.arrived.max()), 0, rows.columns, rows.table
         )
 
     def _advance(self, sequence: Integers, tick: Integers) -> tuple[Integers, Integers]:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-
 from bench import units
 from bench.envelope import Envelope
 from bench.errors import BenchError
@@ -61,7 +59,7 @@ class Orders:
                 f"the controller refuses {parameter} = {value:g} {p.unit}: {status} in state {self._mode()}; in force is "
                 f"{reply['value']:g} {p.unit}"
             )
-        if not np.isclose(reply["value"], value, rtol=1e-6, atol=1e-12):
+        if not _reads_back(reply["value"], value):
             raise BenchError(f"{parameter}: wrote {value!r}, the controller reads back {reply['value']!r}")
 
     def restore(self) -> tuple[str, ...]:
@@ -82,7 +80,7 @@ class Orders:
         for index, (name, p) in asked.items():
             reply = found[float(index)]
             known = status_of(self.rig.messages["ParamReply"], reply) == "OK"
-            if known and not np.isclose(reply["value"], p.default, rtol=1e-6, atol=1e-12):
+            if known and not _reads_back(reply["value"], p.default):
                 self.set(name, p.default)
                 other.append(f"{name} {reply['value']:g}")
         return tuple(other)
@@ -161,3 +159,8 @@ class Orders:
                 "parameter is unknown; nothing was sent. Next: land the rotor, then write parameters"
             )
         return commanded(self.rig, STANDING[self._mode()]).get(message, {})
+
+
+def _reads_back(found: float, wanted: float) -> bool:
+    """Whether a controller's float32 is what was written."""
+    return abs(found - wanted) <= 1e-12 + 1e-6 * abs(wanted)

@@ -11,7 +11,7 @@ import numpy as np
 
 from bench.codec import Decoder, encode
 from bench.faults import Fault
-from bench.frames import FD, FrameBatch, frame, joined
+from bench.frames import FD, FrameBatch, by_time, frame, joined
 from bench.messages import load_messages
 from bench.rigfile import RigFile
 from sim_backend import core
@@ -91,7 +91,7 @@ class SimulatedController:
         if self.captures is not None and len(blocks := self.captures.sent(self.plant.tick, clock)):
             self._out.append(blocks)
         sent = joined([self._encoder.encode(self._spans, clock), *self._out])
-        return sent[np.argsort(sent["t_ns"], kind="stable")] if self._out else sent
+        return by_time(sent) if self._out else sent
 
     def restart(self) -> None:
         """As after power-on: OFF, nobody's, default parameters. The machine goes on as it is, without currents."""

@@ -9,7 +9,7 @@ import numpy as np
 from bench.codec import encode
 from bench.errors import LinkError
 from bench.faults import CUTS, Fault, FrameFaults, divided, lost
-from bench.frames import ERROR, FD, SENT, FrameBatch, batch_of, empty_batch, joined, packed
+from bench.frames import ERROR, FD, SENT, FrameBatch, batch_of, by_time, empty_batch, joined, packed
 from bench.link import LinkStats
 from bench.messages import load_messages
 from bench.rigfile import RigFile
@@ -140,8 +140,7 @@ class InProcessLink:
         self._counts.sent += len(beats)
         incoming = beats
         if self._queued:
-            incoming = joined([*self._queued, beats])
-            incoming = incoming[np.argsort(incoming["t_ns"], kind="stable")]
+            incoming = by_time(joined([*self._queued, beats]))
         self._queued = []
         if len(incoming):
             self._inward.start(int(incoming["t_ns"][0]))

@@ -135,8 +135,8 @@ def test_a_layout_version_that_is_no_number(tmp_path: Path, version: str) -> Non
 
 
 def test_a_long_file_is_read_step_by_step_in_little_memory(tmp_path: Path) -> None:
-    """200 s: 16 MB of frames and 5 MB of samples. An hour at 29 channels follows by proportion, as nothing that is kept
-    grows with the length but the places of the chunks and the events."""
+    """200 s: 16 MB of frames and 5 MB of samples, of which the samples of the last 160 s are kept. An hour at 29 channels
+    follows by proportion, as nothing else that is kept grows with the length but the places of the chunks and the events."""
     clock, seconds = SetClock(), 200
     with Recorder(tmp_path / "a.mcap", clock=clock, streams=[STREAM], header=RunHeader({}, {})) as recorder:
         template = frames_of(block(0, 1000))
@@ -156,7 +156,7 @@ def test_a_long_file_is_read_step_by_step_in_little_memory(tmp_path: Path) -> No
     tracemalloc.stop()
     assert len(means) == seconds
     assert (tmp_path / "a.mcap").stat().st_size > 10e6
-    assert peak < 6e6
+    assert peak < 11e6
 
 
 def test_captures_are_no_streams_of_the_whole_run(tmp_path: Path) -> None:
