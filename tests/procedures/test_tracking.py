@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.cli.virtual import simulate
-from bench.errors import AnalysisError
+from bench.errors import AnalysisError, BenchError
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.recording import Recording
@@ -114,10 +114,18 @@ def test_contact_of_a_law_under_test_never_passes(tmp_path: Path) -> None:
     assert {f.code: f.effect for f in findings}["contact"] is Effect.INDETERMINATE
 
 
-def test_without_a_drive_nothing_is_measured_at_speed(tmp_path: Path) -> None:
-    measured, findings = tracked(tmp_path, speed_rad_s=1000.0, hz=2.0, **ONE)
-    assert measured == {}
-    assert [(f.code, f.effect) for f in findings] == [("speed-not-reached", Effect.ERROR)]
+def test_a8_the_error_at_speed_is_within_two_and_a_half_micrometres(tmp_path: Path) -> None:
+    """T 3.5, Fig. 3.6: 90 um by 40 um at 2 Hz and 10 000 r/min, averaged over a revolution of the shaft."""
+    fast = {"speed_rad_s": 10000 * math.pi / 30, "hz": 2.0, "y_m": 90e-6, "z_m": 40e-6, "revolutions": 6}
+    measured, findings = tracked(tmp_path, 1, **ONE, **fast)
+    assert {f.effect for f in findings} == {Effect.NOTE}
+    for axis in "yz":
+        assert measured[f"error_peak_{axis}", "CCS"].value < 2.5e-6
+
+
+def test_a_drive_that_is_too_weak_ends_the_run(tmp_path: Path) -> None:
+    with pytest.raises(BenchError, match="OVERLOAD"):
+        tracked(tmp_path, 1, {"drive_limit": 0.002}, speed_rad_s=1000.0, hz=2.0, **ONE)
 
 
 def test_plans_that_cannot_work_are_refused() -> None:
