@@ -23,8 +23,6 @@ from procedures.estimators.sines import known_frequency
 
 Array = npt.NDArray[np.float64]
 SMOOTH_S = 3e-3  # of peaks at rest: the error of a sine of 10 Hz loses a thousandth
-ONSET_S, BEFORE_S, ONSET_STEP_S = 4e-3, 0.03, 1e-5
-DELAY_TICKS = 2  # from the reference's zero of phase to the amplifiers: computed a tick late, applied one later
 YI, ZI, YO, ZO = range(4)
 
 
@@ -174,25 +172,3 @@ def noise(path: Path, f: Facts) -> Array:
         return np.asarray(np.diff(kept, n=2, axis=1).std(axis=1) / math.sqrt(6))
     second = np.diff(centre(path.readings, f), n=2, axis=1).std(axis=1) / math.sqrt(6)
     return np.asarray(second / math.sqrt(max(path.smooth_s / (path.wave.ticks * path.wave.tick), 1.0)))
-
-
-def onset(t: Array, current: Array, earliest: float, latest: float, wave: Wave, lag_s: float) -> tuple[float, float]:
-    """When the reference's phase was zero, s, by the jump of the z coils' current, and that jump over its noise.
-
-    i = i_0 + J u(t) + c v(t), u the amplifiers' answer to a step and v the square of the time since, for the rotor that begins
-    to follow; each averaged over the readings of a sample. The start with the least misfit is taken.
-    """
-    reads = t[:, None] - wave.tick * np.arange(1, wave.ticks + 1)
-    best, found, jump = math.inf, earliest, 0.0
-    near = (t > earliest - BEFORE_S) & (t < latest + ONSET_S)
-    for t_0 in np.arange(earliest - wave.tick, latest + ONSET_STEP_S, ONSET_STEP_S):
-        use = near & (t < t_0 + ONSET_S)
-        since = np.maximum(reads[use] - t_0 - DELAY_TICKS * wave.tick, 0.0)
-        answer = (1 - np.exp(-since / lag_s)).mean(axis=1)
-        design = np.column_stack([np.ones(use.sum()), answer, (since**2).mean(axis=1) / ONSET_S**2])
-        terms, *_ = np.linalg.lstsq(design, current[use], rcond=None)
-        misfit = float(((current[use] - design @ terms) ** 2).mean())
-        if misfit < best:
-            best, found, jump = misfit, float(t_0), float(terms[1])
-    rest = t < earliest
-    return found, abs(jump) / max(float(current[rest].std()), 1e-12) if rest.sum() > 5 else 0.0
