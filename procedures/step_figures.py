@@ -67,8 +67,8 @@ def _swing(done: Sequence[Done], results: Mapping[Case, Result]) -> Figure:
     size = 1e6 * done[0].case.size
     return Figure(f"swing-{_key(done[0].case)}", f"First swing, {_title(done[0].case)}",
                   "Points: means over 1 ms of one step, at their middles, without what turns with the shaft. Lines: the "
-                  "oscillations fitted to all steps of this size and direction, whose top is the overshoot. Rise is between the "
-                  "dashed levels of 10 and 90 %.",
+                  "oscillations fitted to all steps of this size and direction, whose top is the overshoot. Rise is between "
+                  "the dashed levels of 10 and 90 %.",
                   "time since the set point acts (ms)", "position (µm)", tuple(series),
                   lines=(("set point", size), ("90 %", 0.9 * size), ("10 %", 0.1 * size)))  # fmt: skip
 

@@ -28,7 +28,9 @@ ORDERS = (1, 2, 3, 4)  # per turn: unbalance and the runout of the journals
 TURNING_RAD_S = 20.0
 ANSWER = 0.25  # of the greatest change of the control current: where it first gets there, the step began
 AT_REST_S = 6e-3  # what a position is averaged over where the shaft does not turn
-EARLY_TICKS = 1.5  # a sample's last reading is one tick old, and stands for half a tick either way; the law acts at the next
+EARLY_TICKS = (
+    1.5  # a sample's last reading is one tick old, and stands for half a tick either way; the law acts at the next
+)
 
 
 @dataclass(frozen=True)
@@ -192,7 +194,7 @@ def _acted(rig: RigFile, t: Array, control: Array, first: int, period: float) ->
     """When the set point changed, s: finer than a period, by the control currents."""
     tick = rig.devices["controller"].tick_s
     ticks, lag = round(period / tick), 1 / rig.parameters["model_rate"].default
-    return onset(t, control, t[first] - 2 * period, t[first], tick=tick, ticks=ticks, lag_s=lag)[0]
+    return onset(t, control, t[first] - 1.8 * period, t[first] - 0.5 * period, tick=tick, ticks=ticks, lag_s=lag)[0]
 
 
 def _still(t: Array, signals: Array, angle: Array, rest: npt.NDArray[np.bool_]) -> tuple[Array, Array]:

@@ -21,7 +21,10 @@ RISE_SHARE = 0.012  # of a period: what the spline leaves of a crossing, over al
 ALIAS = 3e-3  # of the bandwidth: what stands above half the sampling rate
 START_S = 1e-4  # how well the control currents tell when the set point acted
 BLOCKS = 8  # of steps, left out in turn
-SIZE_DAMPING, SIZE_FREQUENCY = 6.0, 4.0  # second-order effect of a step's size over the square of its first-order effect
+SIZE_DAMPING, SIZE_FREQUENCY = (
+    6.0,
+    4.0,
+)  # second-order effect of a step's size over the square of its first-order effect
 TAIL_S = 0.2
 
 
@@ -108,9 +111,7 @@ def _fits(ones: Sequence[One]) -> list[Swing]:
         return []
 
 
-def _repeated(
-    unit: str, power: int, ones: Mapping[Case, Sequence[One]], of: Callable[[Case, One], float]
-) -> _Seen:
+def _repeated(unit: str, power: int, ones: Mapping[Case, Sequence[One]], of: Callable[[Case, One], float]) -> _Seen:
     values = {case: [of(case, x) for x in o] for case, o in ones.items()}
     means = {case: float(np.mean(v)) for case, v in values.items()}
     return _Seen(unit, power, means, {case: float(np.var(v, ddof=1)) / len(v) for case, v in values.items()})

@@ -8,6 +8,7 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 ONSET_S, BEFORE_S = 4e-3, 0.03
 COARSE_S, FINE_S = 1e-4, 1e-5  # of the search
+LATE_S = 1.2e-5  # what a square of time leaves of the rotor's answer makes the start late, -20 to 30 us about this mean
 DELAY_TICKS = 2  # from the jump to the amplifiers: computed a tick late, applied one later
 
 
@@ -33,4 +34,4 @@ def onset(
     _, about, _ = min(fitted(t_0) for t_0 in np.arange(earliest - tick, latest + COARSE_S, COARSE_S))
     _, found, jump = min(fitted(t_0) for t_0 in np.arange(about - COARSE_S, about + COARSE_S, FINE_S))
     rest = t < earliest
-    return float(found), abs(jump) / max(float(current[rest].std()), 1e-12) if rest.sum() > 5 else 0.0
+    return float(found) - LATE_S, abs(jump) / max(float(current[rest].std()), 1e-12) if rest.sum() > 5 else 0.0

@@ -20,10 +20,13 @@ from bench.errors import AnalysisError
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
-FROM_S, UNTIL_S = 3.5e-3, 0.05  # from where filters and current loops have died away; about three periods of what levitates
+FROM_S, UNTIL_S = (
+    3.5e-3,
+    0.05,
+)  # from where filters and current loops have died away; about three periods of what levitates
 SCALE = 100.0  # 1/s, of the search
 APART = (1.0, 0.2), (1.06, 0.25)  # start of the search: frequencies over the guess, damping ratios
-HARD = 0.95  # of damping: no oscillation
+SLOW_HZ, HARD = 15.0, 0.95  # below this frequency, above this damping there is no oscillation
 
 
 @dataclass(frozen=True)
@@ -39,8 +42,11 @@ class Swing:
 
     @property
     def pole(self) -> complex:
-        """The mean of the poles, each with its part, 1/s."""
-        return complex((self.parts * self.poles).sum() / self.parts.sum())
+        """The mean of the poles that oscillate, each with its part, 1/s; nan where none does. What else was fitted (slower than
+        SLOW_HZ, or hardly swinging) is an integrator or a filter."""
+        swings = (self.poles.imag > 2 * np.pi * SLOW_HZ) & (-self.poles.real < HARD * np.abs(self.poles))
+        whole = self.parts[swings].sum()
+        return complex((self.parts * self.poles)[swings].sum() / whole) if whole else complex(np.nan)
 
     @property
     def damping(self) -> float:
@@ -61,9 +67,11 @@ class Swing:
         return np.asarray(self.level + self.slope * t + (np.exp(np.outer(t, self.poles)) @ self.parts).real)
 
     def means(self, t: Array, period: float) -> Array:
-        """Means over the period before t."""
+        """Means over the period before t; beyond what was fitted (where one of the two may even grow) with the mean pole."""
         parts = self.parts * shrinks(self.poles, period)
-        return np.asarray(self.level + self.slope * (t - period / 2) + (np.exp(np.outer(t, self.poles)) @ parts).real)
+        swung = np.exp(np.outer(np.minimum(t, UNTIL_S), self.poles)) @ parts
+        swung *= np.exp(self.pole * np.maximum(t - UNTIL_S, 0.0))
+        return np.asarray(self.level + self.slope * (t - period / 2) + swung.real)
 
     @property
     def peak(self) -> float:

@@ -21,7 +21,7 @@ from procedures.estimators.setpoint_swing import One, Swing
 Array = npt.NDArray[np.float64]
 FINE = 20  # points of the curve in a telemetry period
 RAW_S = 8e-3  # until then the bandwidth is that of the samples, from then on of the oscillation that was fitted to them
-LENGTH_S = 0.12 # of the response that makes the bandwidth
+LENGTH_S = 0.12  # of the response that makes the bandwidth
 SCAN_HZ = np.arange(20.0, 480.0, 2.0)
 
 
