@@ -28,7 +28,7 @@ OVERSHOOT = Quantity("overshoot", "1", "greatest position beyond the step, as a 
 RISE = Quantity("rise_time", "s", "10 to 90 % of the step")
 SETTLING = Quantity("settling_time", "s", "until the averaged position stays in the band")
 ERROR = Quantity("steady_error", "m", "position at the end of the record less its set point, from where it rested")
-BANDWIDTH = Quantity("bandwidth", "Hz", "where the gain from set point to position is 3 dB down")
+BANDWIDTH = Quantity("bandwidth", "Hz", "where the spectrum of the response's derivative is 3 dB down")
 DAMPING = Quantity(
     "damping", "1", "damping ratio of the swing: its oscillations' mean pole, each with its part in the step"
 )
@@ -101,7 +101,13 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         for repeat in range(plan.repeats):
             for begin, end in ((0.0, size), (size, 0.0), (0.0, -size), (-size, 0.0)):
                 with record.step(
-                    STEP, setting=setting, speed_rad_s=speed, axis=axis, step_m=end - begin, repeat=repeat
+                    STEP,
+                    setting=setting,
+                    speed_rad_s=speed,
+                    axis=axis,
+                    begin_m=begin,
+                    step_m=end - begin,
+                    repeat=repeat,
                 ):
                     rig.clock.sleep(plan.rest_s)
                     write(f"ref_{axis}", end)

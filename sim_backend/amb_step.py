@@ -64,6 +64,7 @@ class Shown:
     overshoot: float
     rise_time: float
     steady_error: float
+    bandwidth: float
     t: Array
     y: Array
 
@@ -92,17 +93,19 @@ def steps(plant: AmbPlant, settings: Mapping[str, float], axis: str, size: float
         tail = positions(p, settings, after, True)[k][-round(min(0.2, record_s / 4) / TICK_S) :]
         t, top = np.arange(len(y)) * TICK_S, int(np.argmax(y[:800]))
         rise = np.interp(0.9, y[: top + 1], t[: top + 1]) - np.interp(0.1, y[: top + 1], t[: top + 1])
-        yield way, Shown(float(y[:800].max()) - 1, float(rise), float(tail.mean() - rest[1] - way * size), t, y)
+        yield (
+            way,
+            Shown(float(y[:800].max()) - 1, float(rise), float(tail.mean() - rest[1] - way * size), bandwidth(y), t, y),
+        )
 
 
 @dataclasses.dataclass(frozen=True)
 class Small:
     """Of small motions along an axis: `poles` 1/s of the rigid modes with a positive frequency, their `parts` in a unit step
-    when the amplifiers answer, `bandwidth` Hz."""
+    when the amplifiers answer."""
 
     poles: Complex
     parts: Complex
-    bandwidth: float
 
     @property
     def pole(self) -> complex:
@@ -134,8 +137,9 @@ def small(plant: AmbPlant, settings: Mapping[str, float], axis: str) -> Small:
     s = np.log(values.astype(complex)) / (DECIMATED * TICK_S)
     powers = values[None, :] ** np.arange(sampled.shape[1])[:, None]
     parts = np.linalg.lstsq(powers, sampled[k].astype(complex), rcond=None)[0] / (values - 1)
-    use = [j for j in range(len(s)) if SLOW_HZ < s[j].imag / (2 * np.pi) < FAST_HZ and -s[j].real < DAMPED * abs(s[j])]
-    return Small(s[use], parts[use] * np.exp(-s[use] * (begin - ANSWER) * TICK_S), _bandwidth(made[k]))
+    hz = np.where(s.imag > 1.0, np.abs(s), 0.0) / (2 * np.pi)
+    use = (hz > SLOW_HZ) & (hz < FAST_HZ) & (-s.real < DAMPED * np.abs(s))
+    return Small(s[use], parts[use] * np.exp(-s[use] * (begin - ANSWER) * TICK_S))
 
 
 def _eigenvalues(y: Array) -> Complex:
@@ -146,8 +150,9 @@ def _eigenvalues(y: Array) -> Complex:
     return np.asarray(np.linalg.eigvals((u[:, :ORDER].T @ hankel[:, 1:] @ v[:ORDER].T) / np.outer(root, root)))
 
 
-def _bandwidth(y: Array) -> float:
-    """Where the gain from set point to position falls below 0.707 for good, Hz."""
+def bandwidth(y: Array) -> float:
+    """Where the spectrum of the derivative of a response `y` to a unit step falls below 0.707 for good, Hz."""
+    y = y[:2500]
     hz = np.arange(10.0, 500.0, 0.5)
     change = np.diff(y, prepend=0.0)
     gain = np.abs(np.exp(-2j * np.pi * hz[:, None] * np.arange(len(y)) * TICK_S) @ change)

@@ -56,12 +56,13 @@ class Case:
 
 @dataclass(frozen=True)
 class Done:
-    """One recorded step. `t` s from where the set point acts (n,), with some samples before it; `y`, `tilt`, `across` m along
-    the way of the step: from where they rested, what turns with the shaft taken away; `raw` as `y` with it; `rest` m the same
-    before the step; `control` A, difference of the coils, both bearings; `answered`: it did; `kicks` A, of each bearing's at
-    first. `noise` m of the mean over `samples`."""
+    """One recorded step from the set point `begin` m. `t` s from where the set point acts (n,), with some samples before it;
+    `y`, `tilt`, `across` m along the way of the step: from where they rested, what turns with the shaft taken away; `raw` as
+    `y` with it; `rest` m the same before the step; `control` A, difference of the coils, both bearings; `answered`: it did;
+    `kicks` A, of each bearing's at first. `noise` m of the mean over `samples`."""
 
     case: Case
+    begin: float
     t: Array
     y: Array
     raw: Array
@@ -171,9 +172,9 @@ def _done(
     level = quiet - slope * (t[rest] - t[rest].mean())
     flags = data["flags"].astype(np.int64)
     return Done(
-        case, since[keep], clean[0][keep], (case.way * (raw - raw[rest].mean()))[keep], clean[1][keep], clean[2][keep],
-        clean[3][keep], quiet, float(trailing(level, samples)[round(samples) :].std()), samples, float(amplitude[0]),
-        slope, answered,
+        case, float(step.labels["begin_m"]), since[keep], clean[0][keep], (case.way * (raw - raw[rest].mean()))[keep],
+        clean[1][keep], clean[2][keep], clean[3][keep], quiet,
+        float(trailing(level, samples)[round(samples) :].std()), samples, float(amplitude[0]), slope, answered,
         tuple(float(c[first : first + 3].sum()) for c in clean[4:]),
         (float(data["speed"].min()), float(data["speed"].max())), int(np.bitwise_or.reduce(flags)),
         tuple(c for c in (*POSITIONS, *COILS) if np.ptp(data[c]) == 0), step.lost(), step.expected(),

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.rigfile import RigFile
@@ -17,6 +18,7 @@ from procedures.estimators.setpoint_data import Case, Done
 from procedures.estimators.setpoint_swing import One, Swing, swing
 from procedures.estimators.stepmodel import Settling
 
+Array = npt.NDArray[np.float64]
 RISE_SHARE = 0.012  # of a period: what the spline leaves of a crossing, over all phases of the step in its period
 ALIAS = 3e-3  # of the bandwidth: what stands above half the sampling rate
 START_S = 1e-4  # how well the control currents tell when the set point acted
@@ -43,12 +45,13 @@ class Result:
 
 @dataclass(frozen=True)
 class _Seen:
-    """Values of a quantity by case with the variance of each mean, and how a variance goes with the step's size."""
+    """Values of a quantity by case with the variance of each mean and its dof; the deviation goes with size to the -`power`."""
 
     unit: str
     power: int
     values: dict[Case, float]
     variances: dict[Case, float]
+    dof: dict[Case, int]
 
 
 def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
@@ -87,7 +90,7 @@ def _period(d: Done) -> float:
 
 
 def _one(d: Done) -> One:
-    return One(d.t, np.array([d.y, d.tilt]) / d.case.size, d.case.size)
+    return One(d.t, np.array([d.y, d.tilt]) / d.case.size, d.case.size, d.begin)
 
 
 def _rise(case: Case, o: One) -> float:
@@ -112,9 +115,13 @@ def _fits(ones: Sequence[One]) -> list[Swing]:
 
 
 def _repeated(unit: str, power: int, ones: Mapping[Case, Sequence[One]], of: Callable[[Case, One], float]) -> _Seen:
-    values = {case: [of(case, x) for x in o] for case, o in ones.items()}
-    means = {case: float(np.mean(v)) for case, v in values.items()}
-    return _Seen(unit, power, means, {case: float(np.var(v, ddof=1)) / len(v) for case, v in values.items()})
+    seen = _Seen(unit, power, {}, {}, {})
+    for case, o in ones.items():
+        values = np.array([of(case, x) for x in o])
+        within, dof = _alike(o, values)
+        seen.values[case], seen.dof[case] = float(values.mean()), dof
+        seen.variances[case] = within / dof / len(o) if dof else math.nan
+    return seen
 
 
 def _jackknifed(
@@ -123,28 +130,40 @@ def _jackknifed(
     ones: Mapping[Case, Sequence[One]],
     of: Callable[[Swing, Sequence[One]], float],
 ) -> _Seen:
-    means, variances = {}, {}
+    """With one step after the other left out; those that begin at other set points differ where a bearing is not linear, so
+    that each is held against those that begin where it does."""
+    seen = _Seen(unit, 1, {}, {}, {})
     for case, all_of in fits.items():
         if not all_of:
             continue
         o, n = ones[case], len(ones[case])
         value = of(all_of[0], o)
-        left = [of(s, [x for j, x in enumerate(o) if j != k]) for k, s in enumerate(all_of[1:])]
-        if np.isfinite([value, *left]).all():
-            means[case] = value
-            variances[case] = (n - 1) / n * float(((np.array(left) - np.mean(left)) ** 2).sum())
-    return _Seen(unit, 1, means, variances)
+        left = np.array([of(s, [x for j, x in enumerate(o) if j != k]) for k, s in enumerate(all_of[1:])])
+        within, dof = _alike(o, left)
+        if np.isfinite([value, *left]).all() and dof:
+            seen.values[case], seen.dof[case] = value, dof
+            seen.variances[case] = (n - 1) ** 2 / n * within / dof
+    return seen
+
+
+def _alike(ones: Sequence[One], values: Array) -> tuple[float, int]:
+    """Sum of squares of steps that begin at the same set point about their means, and its degrees of freedom."""
+    total, dof = 0.0, 0
+    for begin in {o.begin for o in ones}:
+        of = values[[o.begin == begin for o in ones]]
+        total, dof = total + float(((of - of.mean()) ** 2).sum()), dof + len(of) - 1
+    return total, dof
 
 
 def _estimate(name: str, case: Case, seen: _Seen) -> Estimate:
     """A case's value. Noise is the same for all steps of a setting, an axis and a speed: their scatter is taken together."""
     alike = [c for c in seen.values if c.group == case.group]
-    scaled = [seen.variances[c] * (c.size / case.size) ** (2 * seen.power) for c in alike]
-    dof = 3.0 * len(alike)
+    dof = float(sum(seen.dof[c] for c in alike))
+    scaled = [seen.dof[c] * seen.variances[c] * (c.size / case.size) ** (2 * seen.power) for c in alike]
     influence = Influence(
         id=f"scatter/{name}/{case.where}",
         name="scatter of the repeats",
-        u=math.sqrt(float(np.mean(scaled))),
+        u=math.sqrt(sum(scaled) / dof),
         unit=seen.unit,
         kind="A",
         distribution="normal",

@@ -26,7 +26,8 @@ FROM_S, UNTIL_S = (
 )  # from where filters and current loops have died away; about three periods of what levitates
 SCALE = 100.0  # 1/s, of the search
 APART = (1.0, 0.2), (1.06, 0.25)  # start of the search: frequencies over the guess, damping ratios
-SLOW_HZ, HARD = 15.0, 0.95  # below this frequency, above this damping there is no oscillation
+SLOW_HZ, FAST_HZ = 15.0, 250.0  # of what levitates: slower are integrators, faster filters
+HARD = 0.95  # of damping: no oscillation
 
 
 @dataclass(frozen=True)
@@ -43,8 +44,9 @@ class Swing:
     @property
     def pole(self) -> complex:
         """The mean of the poles that oscillate, each with its part, 1/s; nan where none does. What else was fitted (slower than
-        SLOW_HZ, or hardly swinging) is an integrator or a filter."""
-        swings = (self.poles.imag > 2 * np.pi * SLOW_HZ) & (-self.poles.real < HARD * np.abs(self.poles))
+        SLOW_HZ, faster than FAST_HZ, or hardly swinging) is an integrator or a filter."""
+        size = np.abs(self.poles) / (2 * np.pi)
+        swings = (size > SLOW_HZ) & (size < FAST_HZ) & (-self.poles.real < HARD * np.abs(self.poles))
         whole = self.parts[swings].sum()
         return complex((self.parts * self.poles)[swings].sum() / whole) if whole else complex(np.nan)
 
@@ -81,11 +83,13 @@ class Swing:
 
 @dataclass(frozen=True)
 class One:
-    """One step: `t` s from the control's answer (n,), position and tilt (2, n) as shares of it, and how much it weighs."""
+    """One step: `t` s from the control's answer (n,), position and tilt (2, n) as shares of it, how much it weighs, and from
+    which set point it began, m."""
 
     t: Array
     both: Array
     weight: float = 1.0
+    begin: float = 0.0
 
 
 def shrinks(poles: Complex, period: float) -> Complex:
@@ -128,6 +132,8 @@ def swing(steps: Sequence[One], start: Complex | None = None) -> Swing:
     poles = SCALE * (-found.x[0::2] + 1j * found.x[1::2])
     period = float(steps[0].t[1] - steps[0].t[0])
     parts = (terms[2 : 2 + count] + 1j * terms[2 + count :]) / shrinks(poles, period)
+    turned = poles.imag < 0
+    poles[turned], parts[turned] = poles[turned].conj(), parts[turned].conj()
     out = Swing(poles, parts, float(terms[0] + terms[1] * period / 2), float(terms[1]),
                 float(np.sqrt(np.mean(found.fun**2) / np.mean(weight**2))))  # fmt: skip
     if not (np.isfinite(out.pole) and 0 < out.damping < HARD and out.pole.imag > 0):

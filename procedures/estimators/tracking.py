@@ -18,7 +18,6 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.errors import AnalysisError
-from procedures.estimators.sines import known_frequency
 
 Array = npt.NDArray[np.float64]
 SMOOTH_S = 3e-3  # of peaks at rest: the error of a sine of 10 Hz loses a thousandth
@@ -168,8 +167,11 @@ def turns(path: Path, f: Facts) -> Turns:
 
 def _follows(path: Path, f: Facts, x: Array, m: npt.NDArray[np.bool_], axis: tuple[float, float, float]) -> complex:
     hz, size, lead = axis
-    fitted = known_frequency(path.t[m] - path.wave.late - f.t_0, x, hz)
-    return complex(fitted.amplitude / (size * path.wave.shrinks(hz)) * np.exp(1j * (fitted.phase - lead)))
+    turn = 2 * math.pi * hz * (path.t[m] - path.wave.late - f.t_0) + lead
+    sine, cosine, _ = np.linalg.lstsq(np.column_stack([np.sin(turn), np.cos(turn), np.ones_like(turn)]), x, rcond=None)[
+        0
+    ]
+    return complex(sine, cosine) / (size * path.wave.shrinks(hz))
 
 
 def quantities(turns: Turns) -> dict[str, float]:
