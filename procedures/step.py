@@ -218,7 +218,7 @@ centre of mass as the controller makes it of both sensor planes, from where it r
 
 Where the shaft turns, orders 1 to 4 of its angle are fitted before the step and at the end of the record and taken away; what
 is left is averaged over one revolution for settling (over 6 ms where it does not turn). The settling time holds that
-averaging, and is that of the mean of the repeats. The band is the plan's share of the step, or four times the noise of the
+averaging, and is that of the mean of the repeats. The band is the plan's share of the step, or five times the noise of the
 averaged position where that is more, which the report says.
 
 From 3.5 ms after the step on, filters and current loops have died away, and position and tilt share two oscillations that lie

@@ -171,7 +171,7 @@ def of_results(
                           Effect.INDETERMINATE)  # fmt: skip
         widest = result.settled.within
         if widest > plan.band:
-            yield Finding("band-widened", f"four times the noise of the averaged position is {widest:.1%} of the "
+            yield Finding("band-widened", f"five times the noise of the averaged position is {widest:.1%} of the "
                                           f"step; the settling "
                           f"time is that into this band, not into {plan.band:.1%}.", case.where)  # fmt: skip
     for where, estimates in groups.items():

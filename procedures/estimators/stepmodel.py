@@ -20,6 +20,7 @@ from procedures.estimators.setpoint_swing import One, Swing
 
 Array = npt.NDArray[np.float64]
 FINE = 20  # points of the curve in a telemetry period
+BAND_NOISE = 5.0  # of settling, at least: the largest of a record's noise stays within it
 RAW_S = 8e-3  # until then the bandwidth is that of the samples, from then on of the oscillation that was fitted to them
 LENGTH_S = 0.12  # of the response that makes the bandwidth
 SCAN_HZ = np.arange(20.0, 480.0, 2.0)
@@ -88,15 +89,15 @@ class Settling:
 
 
 def settling(t: Array, steps: Array, band: float, noise: float, samples: float) -> Settling:
-    """Of steps (m, n) at `t` from the control's answer; `noise` is one step's. The band is four times the mean's at least: the
+    """Of steps (m, n) at `t` from the control's answer; `noise` is one step's. The band is five times the mean's at least: the
     largest of thousands of noisy values would leave a narrower one again and again."""
     m = len(steps)
     sigma = noise / math.sqrt(m)
-    within = max(band, 4 * sigma)
+    within = max(band, BAND_NOISE * sigma)
     whole = settling_time(t, steps.mean(axis=0), within, samples)
     if not math.isfinite(whole):
         return Settling(whole, within, 0.0, 0.0)
-    left = [settling_time(t, np.delete(steps, k, axis=0).mean(axis=0), max(within, 4 * noise / math.sqrt(m - 1)), samples)
+    left = [settling_time(t, np.delete(steps, k, axis=0).mean(axis=0), max(within, BAND_NOISE * noise / math.sqrt(m - 1)), samples)
             for k in range(m)]  # fmt: skip
     edges = [settling_time(t, steps.mean(axis=0), within + k * sigma, samples) for k in (-1, 1)]
     last = float(t[-1])
