@@ -97,8 +97,8 @@ def settling(t: Array, steps: Array, band: float, noise: float, samples: float) 
     whole = settling_time(t, steps.mean(axis=0), within, samples)
     if not math.isfinite(whole):
         return Settling(whole, within, 0.0, 0.0)
-    left = [settling_time(t, np.delete(steps, k, axis=0).mean(axis=0), max(within, BAND_NOISE * noise / math.sqrt(m - 1)), samples)
-            for k in range(m)]  # fmt: skip
+    wider = max(within, BAND_NOISE * noise / math.sqrt(m - 1))
+    left = [settling_time(t, np.delete(steps, k, axis=0).mean(axis=0), wider, samples) for k in range(m)]
     edges = [settling_time(t, steps.mean(axis=0), within + k * sigma, samples) for k in (-1, 1)]
     last = float(t[-1])
     finite = np.minimum(left, last)
