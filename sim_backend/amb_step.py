@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,7 @@ SMALL_M = 1e-8
 ANSWER = 2  # ticks from a set point's write to the amplifiers: computed one later, applied another one later
 DECIMATED, ROWS, ORDER = 4, 60, 12  # of the identification: every fourth tick, rows of the Hankel matrix, states
 SLOW_HZ, FAST_HZ, DAMPED = 15.0, 250.0, 0.95  # of the rigid modes: slower are integrators, faster filters and bending
+SWING = 800  # ticks of the first swing
 RADIAL = [TRACE.index(f"pos_{a}") for a in ("yi", "zi", "yo", "zo")]
 AXIAL = TRACE.index("pos_x")
 
@@ -59,14 +60,33 @@ def positions(p: AmbParams, settings: Mapping[str, float], trace: Array, true: b
 
 @dataclasses.dataclass(frozen=True)
 class Shown:
-    """What one step shows, by the measurands' definitions; `t` s from the set point's write, `y` share of the step, as read."""
+    """What steps of one size and direction show together: the mean of their responses `y` (n,) as shares of the step, as read,
+    at `t` s from the set point's write; `steady_error` m, of the shaft itself."""
 
-    overshoot: float
-    rise_time: float
-    steady_error: float
-    bandwidth: float
     t: Array
     y: Array
+    steady_error: float
+
+    @property
+    def overshoot(self) -> float:
+        """Greatest position beyond the step, as a share of it."""
+        return float(self.y[:SWING].max()) - 1
+
+    @property
+    def rise_time(self) -> float:
+        """10 to 90 % of the step, s."""
+        top = int(np.argmax(self.y[:SWING])) + 1
+        low, high = np.interp((0.1, 0.9), self.y[:top], self.t[:top])
+        return float(high - low)
+
+    @property
+    def bandwidth(self) -> float:
+        """Where the spectrum of the response's derivative falls below 0.707 for good, Hz."""
+        y = self.y[:2500]
+        hz = np.arange(10.0, 500.0, 0.5)
+        gain = np.abs(np.exp(-2j * np.pi * hz[:, None] * np.arange(len(y)) * TICK_S) @ np.diff(y, prepend=0.0))
+        last = int(np.flatnonzero(gain >= math.sqrt(0.5))[-1])
+        return float(np.interp(-math.sqrt(0.5), -gain[last : last + 2], hz[last : last + 2]))
 
     def settling_time(self, band: float, window_s: float) -> float:
         """Until the mean over a window stays in the band about 1."""
@@ -78,25 +98,24 @@ class Shown:
         return 0.0 if not len(outside) else float(self.t[outside[-1]]) + TICK_S
 
 
-def steps(plant: AmbPlant, settings: Mapping[str, float], axis: str, size: float, rest_s: float, record_s: float) -> Iterator[
-    tuple[int, Shown]
-]:  # fmt: skip
-    """Up, back, down and back: way (1 up, -1 down) and what it shows."""
+def steps(
+    plant: AmbPlant, settings: Mapping[str, float], axis: str, size: float, rest_s: float, record_s: float
+) -> dict[int, Shown]:
+    """Up, back, down and back: by way (1 up, -1 down) what they show together."""
     k, p = "yzx".index(axis), plant.params
+    responses: dict[int, list[Array]] = {1: [], -1: []}
+    errors: dict[int, list[float]] = {1: [], -1: []}
     for begin, end in ((0.0, size), (size, 0.0), (0.0, -size), (-size, 0.0)):
         way = 1 if end > begin else -1
         before = plant.run(round(rest_s / TICK_S), 1)[1]
         plant.set(f"ref_{axis}", end)
         after = plant.run(round(record_s / TICK_S), 1)[1]
         rest = [positions(p, settings, before, true)[k].mean() for true in (False, True)]
-        y = way * (positions(p, settings, after)[k] - rest[0]) / size
+        responses[way].append(way * (positions(p, settings, after)[k] - rest[0]) / size)
         tail = positions(p, settings, after, True)[k][-round(min(0.2, record_s / 4) / TICK_S) :]
-        t, top = np.arange(len(y)) * TICK_S, int(np.argmax(y[:800]))
-        rise = np.interp(0.9, y[: top + 1], t[: top + 1]) - np.interp(0.1, y[: top + 1], t[: top + 1])
-        yield (
-            way,
-            Shown(float(y[:800].max()) - 1, float(rise), float(tail.mean() - rest[1] - way * size), bandwidth(y), t, y),
-        )
+        errors[way].append(float(tail.mean() - rest[1] - way * size))
+    t = np.arange(round(record_s / TICK_S)) * TICK_S
+    return {w: Shown(t, np.mean(y, axis=0), float(np.mean(errors[w]))) for w, y in responses.items()}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -150,27 +169,17 @@ def _eigenvalues(y: Array) -> Complex:
     return np.asarray(np.linalg.eigvals((u[:, :ORDER].T @ hankel[:, 1:] @ v[:ORDER].T) / np.outer(root, root)))
 
 
-def bandwidth(y: Array) -> float:
-    """Where the spectrum of the derivative of a response `y` to a unit step falls below 0.707 for good, Hz."""
-    y = y[:2500]
-    hz = np.arange(10.0, 500.0, 0.5)
-    change = np.diff(y, prepend=0.0)
-    gain = np.abs(np.exp(-2j * np.pi * hz[:, None] * np.arange(len(y)) * TICK_S) @ change)
-    last = int(np.flatnonzero(gain >= math.sqrt(0.5))[-1])
-    return float(np.interp(-math.sqrt(0.5), -gain[last : last + 2], hz[last : last + 2]))
-
-
 def truth(
     p: AmbParams, settings: Mapping[str, float], axis: str, sizes: Sequence[float], *, speed: float = 0.0, rest_s: float = 0.3,
     record_s: float = 0.5,
-) -> tuple[Small, dict[tuple[float, int], list[Shown]]]:  # fmt: skip
-    """Of one axis: small motions, and by size and way the steps, in the order in which they are done. What turns with the shaft
+) -> tuple[Small, dict[tuple[float, int], Shown]]:  # fmt: skip
+    """Of one axis: small motions, and by size and way the steps. What turns with the shaft
     is left out; at rest runout stays, since it shifts where the shaft floats, and with it the bearings' slopes."""
     even = dataclasses.replace(p, runout=(0.0,) * 16, unbalance=(0.0,) * 2)
     plant = floating(even if speed else p, settings, speed)
     of_small = small(plant, settings, axis)
-    out: dict[tuple[float, int], list[Shown]] = {}
+    out: dict[tuple[float, int], Shown] = {}
     for size in sorted(sizes):
-        for way, shown in steps(plant, settings, axis, size, rest_s, record_s):
-            out.setdefault((size, way), []).append(shown)
+        for way, shown in steps(plant, settings, axis, size, rest_s, record_s).items():
+            out[size, way] = shown
     return of_small, out

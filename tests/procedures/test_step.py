@@ -58,7 +58,7 @@ def test_the_response_is_that_of_the_machine_without_noise(tmp_path: Path, law: 
     assert frequency.u < 0.01 * frequency.value
     for (size, way), shown in steps.items():
         where = f"A, y, 0 r/min, {size * 1e6:g} µm {'up' if way > 0 else 'down'}"
-        true = {q: float(np.mean([getattr(s, q) for s in shown])) for q in SHOWN}
+        true = {q: float(getattr(shown, q)) for q in SHOWN}
         for quantity, value in true.items():
             e = measured[quantity, where]
             assert e.value == pytest.approx(value, abs=4 * e.u), quantity
@@ -212,7 +212,7 @@ def test_settling_into_the_band_and_never() -> None:
     assert found.time == pytest.approx(0.05 * math.log(50), abs=2e-3)
     slow = np.array([1 - 0.05 * np.exp(-t / 67)] * 4)
     assert stepmodel.settling(t, slow, 0.02, 0.0, 6.0).time == math.inf
-    assert stepmodel.settling(t, slow, 0.02, 0.05, 6.0).within == pytest.approx(0.1)  # noise widens the band
+    assert stepmodel.settling(t, slow, 0.02, 0.05, 6.0).within == pytest.approx(0.125)  # noise widens the band
 
 
 def test_a_position_that_does_not_get_there_is_told() -> None:
