@@ -114,7 +114,7 @@ def steps(
         responses[way].append(way * (positions(p, settings, after)[k] - rest[0]) / size)
         tail = positions(p, settings, after, True)[k][-round(min(0.2, record_s / 4) / TICK_S) :]
         errors[way].append(float(tail.mean() - rest[1] - way * size))
-    t = np.arange(round(record_s / TICK_S)) * TICK_S
+    t = np.asarray(np.arange(round(record_s / TICK_S)) * TICK_S, np.float64)
     return {w: Shown(t, np.mean(y, axis=0), float(np.mean(errors[w]))) for w, y in responses.items()}
 
 

@@ -32,7 +32,7 @@ def truth(
     window = 2 * math.pi / speed if speed else REST_S
     ticks = round((REVOLUTIONS / hz + 2 * window) / TICK_S)
     trace = plant.run(ticks, 1)[1]
-    phase = plant.phase - 2 * math.pi * hz * TICK_S * np.arange(ticks - 1, -1, -1)
+    phase = np.asarray(plant.phase - 2 * math.pi * hz * TICK_S * np.arange(ticks - 1, -1, -1), np.float64)
     wanted = np.array([y * np.sin(phase), z * np.cos(ratio * phase)])
     at = trace[:, RADIAL].T / np.array(p.position_gain)[:4, None]
     found = _centre(p, at)

@@ -222,10 +222,11 @@ def _oscillation(group: str, results: Sequence[Result]) -> dict[str, Estimate]:
         return {}
     first = _first_order(results)
     out = {}
-    for name, unit, of, second in (
+    made: tuple[tuple[str, str, Callable[[Swing], float], float], ...] = (
         ("damping", "1", lambda s: s.damping, SIZE_DAMPING),
         ("natural_frequency", "Hz", lambda s: s.frequency, SIZE_FREQUENCY),
-    ):
+    )
+    for name, unit, of, second in made:
         value, others = of(whole), np.array([of(s) for s in left])
         u = math.sqrt((blocks - 1) / blocks * float(((others - others.mean()) ** 2).sum()))
         jackknife = Influence(

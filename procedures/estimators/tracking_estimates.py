@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -111,7 +111,7 @@ def _of_path(orbit: Orbit, rig: RigFile, runout_m: float) -> dict[str, Estimate]
     path, facts = orbit.path, nominal(rig, orbit.t_0)
     whole = turns(path, facts)
     least = quantities(whole)
-    moved: list[tuple[Input, Mapping[str, float], Mapping[str, float]]] = []
+    moved: list[tuple[Input, dict[str, float], dict[str, float]]] = []
     for i in inputs(rig, path.wave.tick, runout_m):
         u = i.stated.standard_uncertainty
         up, down = (quantities(turns(path, i.moved(facts, by))) for by in (u, -u))
