@@ -84,7 +84,7 @@ class Shown:
         """Where the spectrum of the response's derivative falls below 0.707 for good, Hz."""
         y = self.y[:2500]
         hz = np.arange(10.0, 500.0, 0.5)
-        gain = np.abs(np.exp(-2j * np.pi * hz[:, None] * np.arange(len(y)) * TICK_S) @ np.diff(y, prepend=0.0))
+        gain = np.abs(np.exp(-2j * np.pi * hz[:, None] * np.arange(len(y)) * TICK_S) @ np.diff(y, prepend=y[0]))
         last = int(np.flatnonzero(gain >= math.sqrt(0.5))[-1])
         return float(np.interp(-math.sqrt(0.5), -gain[last : last + 2], hz[last : last + 2]))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,7 +22,6 @@ Array = npt.NDArray[np.float64]
 RISE_SHARE = 0.012  # of a period: what the spline leaves of a crossing, over all phases of the step in its period
 ALIAS = 3e-3  # of the bandwidth: what stands above half the sampling rate
 START_S = 1e-4  # how well the control currents tell when the set point acted
-BLOCKS = 8  # of steps, left out in turn
 SIZE_DAMPING, SIZE_FREQUENCY = (
     6.0,
     4.0,
@@ -118,7 +117,7 @@ def _repeated(unit: str, power: int, ones: Mapping[Case, Sequence[One]], of: Cal
     seen = _Seen(unit, power, {}, {}, {})
     for case, o in ones.items():
         values = np.array([of(case, x) for x in o])
-        within, dof = _alike(o, values)
+        within, dof = _alike([x.begin for x in o], values)
         seen.values[case], seen.dof[case] = float(values.mean()), dof
         seen.variances[case] = within / dof / len(o) if dof else math.nan
     return seen
@@ -139,18 +138,18 @@ def _jackknifed(
         o, n = ones[case], len(ones[case])
         value = of(all_of[0], o)
         left = np.array([of(s, [x for j, x in enumerate(o) if j != k]) for k, s in enumerate(all_of[1:])])
-        within, dof = _alike(o, left)
+        within, dof = _alike([x.begin for x in o], left)
         if np.isfinite([value, *left]).all() and dof:
             seen.values[case], seen.dof[case] = value, dof
             seen.variances[case] = (n - 1) ** 2 / n * within / dof
     return seen
 
 
-def _alike(ones: Sequence[One], values: Array) -> tuple[float, int]:
-    """Sum of squares of steps that begin at the same set point about their means, and its degrees of freedom."""
+def _alike(kinds: Sequence[Hashable], values: Array) -> tuple[float, int]:
+    """Sum of squares of steps of the same kind about their means, and its degrees of freedom."""
     total, dof = 0.0, 0
-    for begin in {o.begin for o in ones}:
-        of = values[[o.begin == begin for o in ones]]
+    for kind in set(kinds):
+        of = values[[k == kind for k in kinds]]
         total, dof = total + float(((of - of.mean()) ** 2).sum()), dof + len(of) - 1
     return total, dof
 
@@ -212,12 +211,12 @@ def by_group(steps: list[Done], results: Mapping[Case, Result]) -> dict[str, dic
 
 def _oscillation(group: str, results: Sequence[Result]) -> dict[str, Estimate]:
     """Damping and natural frequency from all steps together, those of large ones weighing more; uncertainty by leaving out
-    one block of steps after the other. Nothing where there is no oscillation."""
+    one step after the other, among those of its kind. Nothing where there is no oscillation."""
     ones = [o for r in results for o in r.ones]
-    blocks = min(len(ones), BLOCKS)
+    kinds, n = [(r.case, o.begin) for r in results for o in r.ones], len(ones)
     try:
         whole = swing(ones)
-        left = [swing([o for k, o in enumerate(ones) if k % blocks != b], whole.poles) for b in range(blocks)]
+        left = [swing(ones[:k] + ones[k + 1 :], whole.poles) for k in range(n)]
     except AnalysisError:
         return {}
     first = _first_order(results)
@@ -227,8 +226,9 @@ def _oscillation(group: str, results: Sequence[Result]) -> dict[str, Estimate]:
         ("natural_frequency", "Hz", lambda s: s.frequency, SIZE_FREQUENCY),
     )
     for name, unit, of, second in made:
-        value, others = of(whole), np.array([of(s) for s in left])
-        u = math.sqrt((blocks - 1) / blocks * float(((others - others.mean()) ** 2).sum()))
+        value = of(whole)
+        within, dof = _alike(kinds, np.array([of(s) for s in left]))
+        u = (n - 1) * math.sqrt(within / dof / n)
         jackknife = Influence(
             id=f"scatter/{name}/{group}",
             name="scatter of the steps",
@@ -236,8 +236,8 @@ def _oscillation(group: str, results: Sequence[Result]) -> dict[str, Estimate]:
             unit=unit,
             kind="A",
             distribution="normal",
-            dof=float(blocks - 1),
-            source=f"{blocks} blocks of steps left out in turn",
+            dof=float(dof),
+            source=f"{n} steps, left out in turn",
         )
         moved = max(abs(of(whole.later(by)) - value) for by in (START_S, -START_S))
         out[name] = Estimate.of(value, jackknife)

@@ -117,7 +117,7 @@ def bandwidth(steps: Sequence[One], swing: Swing) -> float:
         t = s.t[first] + period * np.arange(count)
         raw = s.both[0, first : first + count]
         y = np.where(t < RAW_S, np.append(raw, np.zeros(count - len(raw))), swing.means(t, period))
-        gain += np.exp(-2j * np.pi * SCAN_HZ * t[0]) * (turns @ np.diff(y, prepend=0.0))
+        gain += np.exp(-2j * np.pi * SCAN_HZ * t[0]) * (turns @ np.diff(y, prepend=y[0]))
     whole = np.abs(gain) / len(steps) / np.sinc(SCAN_HZ * period) ** 2
     above = np.flatnonzero(whole >= math.sqrt(0.5))
     if not len(above) or above[-1] + 1 >= len(SCAN_HZ):
