@@ -26,11 +26,13 @@ from procedures.estimators.setpoint_data import CHANNELS, STEP, TURNING_RAD_S, c
 
 OVERSHOOT = Quantity("overshoot", "1", "greatest position beyond the step, as a share of it")
 RISE = Quantity("rise_time", "s", "10 to 90 % of the step")
-SETTLING = Quantity("settling_time", "s", "from the control's answer until the averaged position stays in the band")
+SETTLING = Quantity("settling_time", "s", "until the averaged position stays in the band")
 ERROR = Quantity("steady_error", "m", "position at the end of the record less its set point, from where it rested")
-BANDWIDTH = Quantity("bandwidth", "Hz", "closed loop from set point to position 3 dB down, by the fitted model")
-DAMPING = Quantity("damping", "1", "damping ratio of the oscillation that carries most of the step")
-FREQUENCY = Quantity("natural_frequency", "Hz", "of the same oscillation")
+BANDWIDTH = Quantity("bandwidth", "Hz", "where the spectrum of the response's derivative is 3 dB down")
+DAMPING = Quantity(
+    "damping", "1", "damping ratio of the swing: its oscillations' mean pole, each with its part in the step"
+)
+FREQUENCY = Quantity("natural_frequency", "Hz", "of the same mean pole")
 SIZE = Quantity("size_effect", "1", "overshoot of the largest step less that of the smallest, mean of both ways")
 WAY = Quantity("way_effect", "1", "overshoot upwards less that downwards, at the largest step")
 MEASURES = (OVERSHOOT, RISE, SETTLING, ERROR, BANDWIDTH, DAMPING, FREQUENCY, SIZE, WAY)
@@ -99,7 +101,13 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         for repeat in range(plan.repeats):
             for begin, end in ((0.0, size), (size, 0.0), (0.0, -size), (-size, 0.0)):
                 with record.step(
-                    STEP, setting=setting, speed_rad_s=speed, axis=axis, step_m=end - begin, repeat=repeat
+                    STEP,
+                    setting=setting,
+                    speed_rad_s=speed,
+                    axis=axis,
+                    begin_m=begin,
+                    step_m=end - begin,
+                    repeat=repeat,
                 ):
                     rig.clock.sleep(plan.rest_s)
                     write(f"ref_{axis}", end)
@@ -205,22 +213,26 @@ def figures(recording: Recording[Plan]) -> Iterable[Figure]:
 
 METHOD = """\
 The set point of the centre of mass steps along one axis, at once (no slew): up, back, down and back, several times for
-each size. A step begins where the control current answers; the telemetry's period (means over 1 ms) bounds that to half a
-period. The position is that of the centre of mass as the controller makes it of both sensor planes, from where it
-rested before.
+each size. When the step acts is read from the coil currents that answer it, within 0.1 ms. The position is that of the
+centre of mass as the controller makes it of both sensor planes, from where it rested before.
 
 Where the shaft turns, orders 1 to 4 of its angle are fitted before the step and at the end of the record and taken away; what
 is left is averaged over one revolution for settling (over 6 ms where it does not turn). The settling time holds that
-averaging. The band is the plan's share of the step, or four times the noise of the averaged position where that is
-more, which the report says.
+averaging, and is that of the mean of the repeats. The band is the plan's share of the step, or five times the noise of the
+averaged position where that is more, which the report says.
 
-Rise and overshoot are read from the curve of which the telemetry's samples are the means: the derivative of a spline through
-their running sum. Damping and natural frequency are those of the two oscillations that position and tilt share as they die
-away, or of one where two cannot be told apart with less uncertainty; then a bound of 8 % stands for the neighbour.
-Bandwidth is that of a second-order model with a lag and a delay, fitted to the first 50 ms: an estimate, since 1 kHz
-means end at 500 Hz.
+From 3.5 ms after the step on, filters and current loops have died away, and position and tilt share two oscillations that lie
+close together. They are fitted to both, as means over a telemetry period. The overshoot is the top of that curve. Either pole
+alone is ill determined where the two almost coincide; damping ratio and natural frequency are those of the mean pole, each
+with its part in the position as the step begins: what the swing shows. They are meant of small motions; what large steps add
+is bounded by how far the frequency differs between the directions.
 
-Scatter is that of the repeats. Lengths are those of the position sensors, within their gains.
+Rise is read from the curve of which the telemetry's samples are the means: the derivative of a spline through their running
+sum. Bandwidth is that of the Fourier transform of the response's derivative, from the samples and, after 8 ms, the fitted
+curve, freed of what a mean over 1 ms takes away; telemetry ends at 500 Hz.
+
+Overshoot, rise, settling and error belong to steps of their size and direction. Scatter is that of the repeats; noise is the
+same for all steps of a setting, an axis and a speed. Lengths are those of the position sensors, within their gains.
 """
 
 procedure = Procedure(

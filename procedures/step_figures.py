@@ -11,6 +11,7 @@ from bench.figures import Figure, Series
 from bench.uncertainty import coverage_factor
 from procedures.estimators.setpoint_data import Case, Done
 from procedures.estimators.setpoint_estimates import Result
+from procedures.estimators.setpoint_swing import FROM_S
 from procedures.estimators.stepmodel import trailing
 
 SWING_S = 0.05
@@ -57,15 +58,18 @@ def _swing(done: Sequence[Done], results: Mapping[Case, Result]) -> Figure:
     series = []
     for d in done:
         near = (d.t > BEFORE_S) & (d.t < SWING_S)
-        r = results[d.case].responses[0]
-        series += [Series(d.case.setting, 1e3 * d.t[near], 1e6 * d.y[near], "both"),
-                   Series(f"model, {d.case.setting}", 1e3 * r.model_t, 1e6 * d.case.size * r.model)]  # fmt: skip
+        middle = d.t - (d.t[1] - d.t[0]) / 2
+        series.append(Series(d.case.setting, 1e3 * middle[near], 1e6 * d.y[near], "points"))
+        fitted = results[d.case].swing
+        if fitted is not None:
+            t = np.arange(FROM_S, SWING_S, 2e-4)
+            series.append(Series(f"fit, {d.case.setting}", 1e3 * t, 1e6 * d.case.size * fitted.at(t)))
     size = 1e6 * done[0].case.size
     return Figure(f"swing-{_key(done[0].case)}", f"First swing, {_title(done[0].case)}",
-                  "Means over 1 ms, without what turns with the shaft, and the fitted second-order model whose "
-                  "bandwidth is told. "
-                  "Rise is between the dashed levels of 10 and 90 %.",
-                  "time since the control answers (ms)", "position (µm)", tuple(series),
+                  "Points: means over 1 ms of one step, at their middles, without what turns with the shaft. Lines: the "
+                  "oscillations fitted to all steps of this size and direction, whose top is the overshoot. Rise is between "
+                  "the dashed levels of 10 and 90 %.",
+                  "time since the set point acts (ms)", "position (µm)", tuple(series),
                   lines=(("set point", size), ("90 %", 0.9 * size), ("10 %", 0.1 * size)))  # fmt: skip
 
 
@@ -86,7 +90,7 @@ def _settling(done: Sequence[Done], results: Mapping[Case, Result]) -> Figure:
                   f"the band is "
                   f"{within:.1%} on both sides. One step of each setting; the settling time is that of the mean of "
                   f"the repeats.",
-                  "time since the control answers (ms)", "off the set point (% of the step)", tuple(series),
+                  "time since the set point acts (ms)", "off the set point (% of the step)", tuple(series),
                   lines=(("band, above", 100 * within), ("band, below", -100 * within)))  # fmt: skip
 
 
@@ -97,7 +101,7 @@ def _control(done: Sequence[Done]) -> Figure:
     return Figure(f"control-{_key(done[0].case)}", f"Control current, {_title(done[0].case)}",
                   "Positive less negative coil, inboard and outboard together, from where it rested. It says when the "
                   "step began.",
-                  "time since the control answers (ms)", "current (A)", series)  # fmt: skip
+                  "time since the set point acts (ms)", "current (A)", series)  # fmt: skip
 
 
 def _sizes(results: Mapping[Case, Result]) -> Iterator[Figure]:
@@ -111,7 +115,7 @@ def _sizes(results: Mapping[Case, Result]) -> Iterator[Figure]:
                 key=lambda c: c.way * c.size,
             )
             found = [results[c].estimates["overshoot"] for c in cases]
-            u = [100 * coverage_factor(len(results[c].responses) - 1) * e.u for c, e in zip(cases, found, strict=True)]
+            u = [100 * coverage_factor(len(results[c].ones) - 1) * e.u for c, e in zip(cases, found, strict=True)]
             x, y = (
                 np.array(v) for v in ([1e6 * (c.way * c.size + shift) for c in cases], [100 * e.value for e in found])
             )

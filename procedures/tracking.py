@@ -40,7 +40,9 @@ from procedures.estimators.tracking_data import (
 
 Law = Literal["PID", "CCS", "CAC"]
 CODES: dict[Law, float] = {"PID": 0.0, "CCS": 1.0, "CAC": 2.0}
-PEAK_Y = Quantity("error_peak_y", "m", "greatest error of the centre of mass in a revolution of the reference, y")
+PEAK_Y = Quantity(
+    "error_peak_y", "m", "greatest error of the centre of mass in the mean revolution of the reference, y"
+)
 PEAK_Z = Quantity("error_peak_z", "m", "as error_peak_y, z")
 PLANE = Quantity("error_peak_plane", "m", "as error_peak_y, at the sensor where it is greatest")
 RMS_Y = Quantity("error_rms_y", "m", "root mean square of the error of the centre of mass, y")
@@ -49,8 +51,8 @@ RATIO_Y = Quantity("amplitude_ratio_y", "1", "amplitude at the reference's frequ
 RATIO_Z = Quantity("amplitude_ratio_z", "1", "as amplitude_ratio_y, z")
 LAG_Y = Quantity("phase_lag_y", "rad", "phase behind the reference at its frequency, y")
 LAG_Z = Quantity("phase_lag_z", "rad", "as phase_lag_y, z")
-PSI = Quantity("tilt_psi", "rad", "greatest tilt about y in a revolution of the reference")
-THETA = Quantity("tilt_theta", "rad", "greatest tilt about z in a revolution of the reference")
+PSI = Quantity("tilt_psi", "rad", "greatest tilt about y in the mean revolution of the reference")
+THETA = Quantity("tilt_theta", "rad", "greatest tilt about z in the mean revolution of the reference")
 DISTANCE = Quantity("ring_distance", "m", "least distance that is left to a touchdown ring")
 LOW = Quantity("lower_current", "A", "mean current of the lower coil that carries most")
 HIGH = Quantity("upper_current", "A", "mean current of the upper coil that carries most")
@@ -275,9 +277,10 @@ are applied to the reference, so that like is compared with like. When the refer
 at rest, under the PID, with a jump of z by 15 µm, which the currents answer at once; from then on it never stops. Half a
 tick of the controller either way is in the budget.
 
-Peak and rms are of the error averaged over a turn of the shaft, at rest over 3 ms; each is the mean over the revolutions of
-the reference, and their scatter is by batch means. Amplitude and phase are those of a sine of the reference's frequency,
-fitted to each revolution. The distance to the rings is from single samples: it holds vibration and runout.
+The error is averaged over a turn of the shaft, at rest over 3 ms, and then over the revolutions of the reference, so that
+noise does not make peaks; blocks of revolutions are left out in turn for the scatter. Amplitude and phase are those of a sine
+of the reference's frequency, fitted to each revolution. The distance to the rings is from single samples: it holds vibration
+and runout.
 
 Before the lift the rotor lies on its rings, below the middle on both axes. The set points of y and of the tilt about z are
 then moved a little, which shows whether the readings belong to where they are taken.

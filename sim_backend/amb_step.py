@@ -1,95 +1,185 @@
-"""The truth of a set-point step on the AMB stand: the response of the linearised loop of `sim_backend.amb_linear`."""
+"""The truth of set-point steps on the AMB stand: the same machine does the same steps without noise and quantisation. What
+is meant of small motions (poles, bandwidth) is that of steps of ten nanometres: there it is linear."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from sim_backend import amb_linear
-from sim_backend.amb_quantities import offsets
-from sim_backend.core import TICK_S
-from sim_backend.core.amb_params import AmbParams
+from sim_backend.core import LEVITATE, LIFT, READY, TICK_S, DriveLaw
+from sim_backend.core.amb import TRACE, AmbPlant
+from sim_backend.core.amb_params import AmbControl, AmbParams
 
 Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+SMALL_M = 1e-8
+ANSWER = 2  # ticks from a set point's write to the amplifiers: computed one later, applied another one later
+DECIMATED, ROWS, ORDER = 4, 60, 12  # of the identification: every fourth tick, rows of the Hankel matrix, states
+SLOW_HZ, FAST_HZ, DAMPED = 15.0, 250.0, 0.95  # of the rigid modes: slower are integrators, faster filters and bending
+SWING = 800  # ticks of the first swing
+RADIAL = [TRACE.index(f"pos_{a}") for a in ("yi", "zi", "yo", "zo")]
+AXIAL = TRACE.index("pos_x")
 
 
-def along(p: AmbParams, axis: str) -> AmbParams:
-    """The same machine about where its sensors read zero, with what its z axes have in its y axes for `axis` "z"."""
-    yi, zi, yo, zo = offsets(p)
-    if axis == "y":
-        return dataclasses.replace(p, offset=(yi, zi, yo, zo))
-    swap = (1, 1, 3, 3, 4)
-    return dataclasses.replace(
-        p,
-        beta=tuple(p.beta[k] for k in swap),
-        offset=(zi, zi, zo, zo),
-        gravity_y=p.gravity_z,
-        position_gain=tuple(p.position_gain[k] for k in swap),
-    )
+def quiet(p: AmbParams) -> AmbParams:
+    """Without noise and quantisation."""
+    return dataclasses.replace(p, position_noise=0.0, current_noise=0.0, position_lsb=0.0, current_lsb=0.0)
 
 
-def response(p: AmbParams, settings: Mapping[str, float], law: str, axis: str, ticks: int = 3000) -> Array:
-    """What the sensors read of the centre of mass (with the controller's lengths) after a unit step of its set point."""
-    return np.asarray(both(p, settings, law, axis, ticks)[0])
+def floating(p: AmbParams, settings: Mapping[str, float], speed: float = 0.0, settle_s: float = 8.0) -> AmbPlant:
+    """The quiet machine, lifted by the PID, at a speed in rad/s, with the laws' parameters, its integrators at rest."""
+    known = {f.name for f in dataclasses.fields(AmbControl)}
+    made = {name: value for name, value in settings.items() if name in known} | {"law": 0.0, "slew": 0.0}
+    plant = AmbPlant(quiet(p), 1, control=AmbControl(**made))
+    plant.mode = READY
+    plant.run(1000)
+    plant.mode = LIFT
+    while not plant.moved:
+        plant.run(100)
+    plant.mode = LEVITATE
+    if speed > 0:
+        plant.drive(DriveLaw(gain=0.05, limit=1.0, ramp=2000.0), speed)
+    plant.set("law", settings["law"])
+    plant.run(round((settle_s + speed / 2000.0) / TICK_S))
+    return plant
 
 
-def both(p: AmbParams, settings: Mapping[str, float], law: str, axis: str, ticks: int = 3000) -> Array:
-    """(2, ticks): as `response`, and half of what the outboard reading is ahead of the inboard one."""
-    p, a, b = _system(p, settings, law, axis)
-    per = np.array([[1, -p.l_is], [1, p.l_os]]) * np.array([[p.position_gain[0]], [p.position_gain[2]]])
-    read = np.array([_read(p, settings), (per[1] - per[0]) / 2])
-    x, out = np.zeros(amb_linear.SIZE), np.zeros((2, ticks))
-    for k in range(ticks):
-        out[:, k] = read @ x[:2]
-        x = a @ x + b
-    return out
+def positions(p: AmbParams, settings: Mapping[str, float], trace: Array, true: bool = False) -> Array:
+    """(5, n): y, z, x of the centre of mass with the controller's lengths, and half of what the outboard reading is ahead of
+    the inboard one in y and z; as read, or as it is where `true`."""
+    gain = np.array(p.position_gain) if true else np.ones(5)
+    yi, zi, yo, zo = trace[:, RADIAL].T / gain[:4, None]
+    a, b = settings["model_l_os"], settings["model_l_is"]
+    y, z = (a * yi + b * yo) / (a + b), (a * zi + b * zo) / (a + b)
+    return np.array([y, z, trace[:, AXIAL] / gain[4], (yo - yi) / 2, (zo - zi) / 2])
 
 
-def truth(p: AmbParams, settings: Mapping[str, float], law: str, axis: str) -> dict[str, float]:
-    """`damping` and `frequency` (Hz) of the oscillation that carries most of the step, `overshoot` over the whole step,
-    `rise_time` s, `bandwidth` Hz (where the closed loop from set point to reading is 3 dB down)."""
-    y = response(p, settings, law, axis)
-    fine = np.arange(len(y)) * TICK_S
-    top = int(np.argmax(y))
-    rising = y[: top + 1]
-    rise = float(np.interp(0.9, rising, fine[: top + 1]) - np.interp(0.1, rising, fine[: top + 1]))
-    q, a, b = _system(p, settings, law, axis)
-    values, vectors = np.linalg.eig(a)
-    weight = (_read(q, settings) @ vectors[:2]) * np.linalg.solve(vectors, b) / np.where(values == 1, 1e-9, 1 - values)
-    best = max((k for k in range(len(values)) if values[k].imag > 1e-6), key=lambda k: abs(weight[k]))
-    s = np.log(values[best]) / TICK_S
-    hz = np.arange(5.0, 500.0, 0.5)
-    gain = np.abs(
-        [_read(q, settings) @ np.linalg.solve(np.exp(2j * np.pi * f * TICK_S) * np.eye(len(a)) - a, b)[:2] for f in hz]
-    )
-    low = np.flatnonzero(gain < math.sqrt(0.5))
-    return {
-        "damping": float(-s.real / abs(s)),
-        "frequency": float(abs(s) / (2 * math.pi)),
-        "overshoot": float(y[top]) - 1,
-        "rise_time": rise,
-        "bandwidth": float(hz[low[0]]) if len(low) else 500.0,
-    }
+@dataclasses.dataclass(frozen=True)
+class Shown:
+    """What steps of one size and direction show together: the mean of their responses `y` (n,) as shares of the step, as read,
+    at `t` s from the set point's write; `steady_error` m, of the shaft itself."""
+
+    t: Array
+    y: Array
+    steady_error: float
+
+    @property
+    def overshoot(self) -> float:
+        """Greatest position beyond the step, as a share of it."""
+        return float(self.y[:SWING].max()) - 1
+
+    @property
+    def rise_time(self) -> float:
+        """10 to 90 % of the step, s."""
+        top = int(np.argmax(self.y[:SWING])) + 1
+        low, high = np.interp((0.1, 0.9), self.y[:top], self.t[:top])
+        return float(high - low)
+
+    @property
+    def bandwidth(self) -> float:
+        """Where the spectrum of the response's derivative falls below 0.707 for good, Hz."""
+        y = self.y[:2500]
+        hz = np.arange(10.0, 500.0, 0.5)
+        gain = np.abs(np.exp(-2j * np.pi * hz[:, None] * np.arange(len(y)) * TICK_S) @ np.diff(y, prepend=y[0]))
+        last = int(np.flatnonzero(gain >= math.sqrt(0.5))[-1])
+        return float(np.interp(-math.sqrt(0.5), -gain[last : last + 2], hz[last : last + 2]))
+
+    def settling_time(self, band: float, window_s: float) -> float:
+        """Until the mean over a window stays in the band about 1."""
+        total = np.concatenate(([0.0], np.cumsum(self.y)))
+        n = round(window_s / TICK_S)
+        at = np.arange(1, len(self.y) + 1)
+        mean = (total[at] - total[np.maximum(at - n, 0)]) / np.minimum(at, n)
+        outside = np.flatnonzero(np.abs(mean - 1) > band)
+        return 0.0 if not len(outside) else float(self.t[outside[-1]]) + TICK_S
 
 
-def _system(p: AmbParams, settings: Mapping[str, float], law: str, axis: str) -> tuple[AmbParams, Array, Array]:
-    p = along(p, axis)
-    s = dict(settings)
-    if axis == "z":
-        for b in "io":
-            s[f"model_beta_y{b}"], s[f"model_offset_y{b}"] = s[f"model_beta_z{b}"], s[f"model_offset_z{b}"]
-        s["model_gravity_y"] = s["model_gravity_z"]
-    tick = amb_linear.loop(p, s, law)
-    zero = np.zeros(amb_linear.SIZE)
-    return p, np.array([tick(unit, 0.0) for unit in np.eye(amb_linear.SIZE)]).T, tick(zero, 1.0)
+def steps(
+    plant: AmbPlant, settings: Mapping[str, float], axis: str, size: float, rest_s: float, record_s: float
+) -> dict[int, Shown]:
+    """Up, back, down and back: by way (1 up, -1 down) what they show together."""
+    k, p = "yzx".index(axis), plant.params
+    responses: dict[int, list[Array]] = {1: [], -1: []}
+    errors: dict[int, list[float]] = {1: [], -1: []}
+    for begin, end in ((0.0, size), (size, 0.0), (0.0, -size), (-size, 0.0)):
+        way = 1 if end > begin else -1
+        before = plant.run(round(rest_s / TICK_S), 1)[1]
+        plant.set(f"ref_{axis}", end)
+        after = plant.run(round(record_s / TICK_S), 1)[1]
+        rest = [positions(p, settings, before, true)[k].mean() for true in (False, True)]
+        responses[way].append(way * (positions(p, settings, after)[k] - rest[0]) / size)
+        tail = positions(p, settings, after, True)[k][-round(min(0.2, record_s / 4) / TICK_S) :]
+        errors[way].append(float(tail.mean() - rest[1] - way * size))
+    t = np.asarray(np.arange(round(record_s / TICK_S)) * TICK_S, np.float64)
+    return {w: Shown(t, np.mean(y, axis=0), float(np.mean(errors[w]))) for w, y in responses.items()}
 
 
-def _read(p: AmbParams, settings: Mapping[str, float]) -> Array:
-    l_is, l_os = settings["model_l_is"], settings["model_l_os"]
-    share = np.array([l_os, l_is]) / (l_is + l_os)
-    per = np.array([[1, -p.l_is], [1, p.l_os]]) * np.array([[p.position_gain[0]], [p.position_gain[2]]])
-    return np.asarray(share @ per)
+@dataclasses.dataclass(frozen=True)
+class Small:
+    """Of small motions along an axis: `poles` 1/s of the rigid modes with a positive frequency, their `parts` in a unit step
+    when the amplifiers answer."""
+
+    poles: Complex
+    parts: Complex
+
+    @property
+    def pole(self) -> complex:
+        """Of the oscillation as it begins: the mean of the poles, each with its part."""
+        return complex((self.parts * self.poles).sum() / self.parts.sum())
+
+    @property
+    def damping(self) -> float:
+        """Damping ratio of that pole."""
+        return -self.pole.real / abs(self.pole)
+
+    @property
+    def frequency(self) -> float:
+        """Natural frequency of that pole, Hz."""
+        return abs(self.pole) / (2 * math.pi)
+
+
+def small(plant: AmbPlant, settings: Mapping[str, float], axis: str) -> Small:
+    """Poles by the eigensystem realisation algorithm (Juang and Pappa, 1985) from a step of SMALL_M."""
+    k = "yzx".index(axis)
+    before = positions(plant.params, settings, plant.run(10, 1)[1])
+    plant.set(f"ref_{axis}", SMALL_M)
+    made = (positions(plant.params, settings, plant.run(2500, 1)[1]) - before[:, -1:]) / SMALL_M
+    plant.set(f"ref_{axis}", 0.0)
+    plant.run(20000)
+    begin = 6
+    sampled = np.diff(made[:, begin : 1000 + begin : DECIMATED], axis=1)
+    values = _eigenvalues(sampled[np.abs(sampled).max(axis=1) > 1e-6])
+    s = np.log(values.astype(complex)) / (DECIMATED * TICK_S)
+    powers = values[None, :] ** np.arange(sampled.shape[1])[:, None]
+    parts = np.linalg.lstsq(powers, sampled[k].astype(complex), rcond=None)[0] / (values - 1)
+    hz = np.where(s.imag > 1.0, np.abs(s), 0.0) / (2 * np.pi)
+    use = (hz > SLOW_HZ) & (hz < FAST_HZ) & (-s.real < DAMPED * np.abs(s))
+    return Small(s[use], parts[use] * np.exp(-s[use] * (begin - ANSWER) * TICK_S))
+
+
+def _eigenvalues(y: Array) -> Complex:
+    columns = y.shape[1] - ROWS
+    hankel = np.concatenate([y[:, i : i + columns] for i in range(ROWS)])
+    u, size, v = np.linalg.svd(hankel[:, :-1], full_matrices=False)
+    root = np.sqrt(size[:ORDER])
+    return np.asarray(np.linalg.eigvals((u[:, :ORDER].T @ hankel[:, 1:] @ v[:ORDER].T) / np.outer(root, root)))
+
+
+def truth(
+    p: AmbParams, settings: Mapping[str, float], axis: str, sizes: Sequence[float], *, speed: float = 0.0, rest_s: float = 0.3,
+    record_s: float = 0.5,
+) -> tuple[Small, dict[tuple[float, int], Shown]]:  # fmt: skip
+    """Of one axis: small motions, and by size and way the steps. What turns with the shaft
+    is left out; at rest runout stays, since it shifts where the shaft floats, and with it the bearings' slopes."""
+    even = dataclasses.replace(p, runout=(0.0,) * 16, unbalance=(0.0,) * 2)
+    plant = floating(even if speed else p, settings, speed)
+    of_small = small(plant, settings, axis)
+    out: dict[tuple[float, int], Shown] = {}
+    for size in sorted(sizes):
+        for way, shown in steps(plant, settings, axis, size, rest_s, record_s).items():
+            out[size, way] = shown
+    return of_small, out

@@ -164,14 +164,14 @@ def of_results(
     """Steps that do not settle, bands that noise has widened, responses without an oscillation."""
     for case, result in results.items():
         if not math.isfinite(result.settled.time):
-            off = abs(float(np.mean([r.error for r in result.responses])))
+            off = abs(result.error)
             yield Finding("not-settled", f"still {off:.1%} of the step off at the end of the record ({plan.band:.1%} "
                                          f"is the band): "
                           "record longer, or look at the integrator and at the controller's model.", case.where,
                           Effect.INDETERMINATE)  # fmt: skip
         widest = result.settled.within
         if widest > plan.band:
-            yield Finding("band-widened", f"four times the noise of the averaged position is {widest:.1%} of the "
+            yield Finding("band-widened", f"five times the noise of the averaged position is {widest:.1%} of the "
                                           f"step; the settling "
                           f"time is that into this band, not into {plan.band:.1%}.", case.where)  # fmt: skip
     for where, estimates in groups.items():
@@ -202,6 +202,6 @@ def _against(quantity: str, unit: str, scale: float, a: Result, b: Result, names
             texts.append(f"not within the record with {name}")
         else:
             texts.append(
-                f"{scale * e.value:.3g} ± {scale * coverage_factor(len(r.responses) - 1) * e.u:.2g} {unit} with {name}"
+                f"{scale * e.value:.3g} ± {scale * coverage_factor(len(r.ones) - 1) * e.u:.2g} {unit} with {name}"
             )
     return f"{label} {', '.join(texts)}"

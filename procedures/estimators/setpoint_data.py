@@ -14,6 +14,7 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
+from procedures.estimators.setpoint_onset import onset
 from procedures.estimators.stepmodel import trailing
 
 Array = npt.NDArray[np.float64]
@@ -27,6 +28,9 @@ ORDERS = (1, 2, 3, 4)  # per turn: unbalance and the runout of the journals
 TURNING_RAD_S = 20.0
 ANSWER = 0.25  # of the greatest change of the control current: where it first gets there, the step began
 AT_REST_S = 6e-3  # what a position is averaged over where the shaft does not turn
+EARLY_TICKS = (
+    1.5  # a sample's last reading is one tick old, and stands for half a tick either way; the law acts at the next
+)
 
 
 @dataclass(frozen=True)
@@ -52,13 +56,13 @@ class Case:
 
 @dataclass(frozen=True)
 class Done:
-    """One recorded step. `t` s from the control's answer (n,), with some samples before it; `y`, `tilt`, `across` m
-    along the way of
-    the step: from where they rested, what turns with the shaft taken away; `raw` as `y` with it; `rest` m the same before the
-    step; `control` A, difference of the coils, both bearings; `answered`: it did; `kicks` A, of each
-    bearing's at first. `noise` m of the mean over `samples`."""
+    """One recorded step from the set point `begin` m. `t` s from where the set point acts (n,), with some samples before it;
+    `y`, `tilt`, `across` m along the way of the step: from where they rested, what turns with the shaft taken away; `raw` as
+    `y` with it; `rest` m the same before the step; `control` A, difference of the coils, both bearings; `answered`: it did;
+    `kicks` A, of each bearing's at first. `noise` m of the mean over `samples`."""
 
     case: Case
+    begin: float
     t: Array
     y: Array
     raw: Array
@@ -161,16 +165,16 @@ def _done(
     first, answered = _answer(clean[4:], rest)
     period = float(np.median(np.diff(t)))
     samples = 2 * math.pi / float(np.median(data["speed"])) / period if turning else AT_REST_S / period
-    since = t - t[first] + period / 2  # the control changed somewhere in the period that ends with this sample
+    since = t - _acted(rig, t, clean[3], first, period) - EARLY_TICKS * rig.devices["controller"].tick_s
     keep = slice(max(first - 20, 0), None)
     quiet = clean[0][rest]
     slope = float(np.polyfit(t[rest], quiet, 1)[0])
     level = quiet - slope * (t[rest] - t[rest].mean())
     flags = data["flags"].astype(np.int64)
     return Done(
-        case, since[keep], clean[0][keep], (case.way * (raw - raw[rest].mean()))[keep], clean[1][keep], clean[2][keep],
-        clean[3][keep], quiet, float(trailing(level, samples)[round(samples) :].std()), samples, float(amplitude[0]),
-        slope, answered,
+        case, float(step.labels["begin_m"]), since[keep], clean[0][keep], (case.way * (raw - raw[rest].mean()))[keep],
+        clean[1][keep], clean[2][keep], clean[3][keep], quiet,
+        float(trailing(level, samples)[round(samples) :].std()), samples, float(amplitude[0]), slope, answered,
         tuple(float(c[first : first + 3].sum()) for c in clean[4:]),
         (float(data["speed"].min()), float(data["speed"].max())), int(np.bitwise_or.reduce(flags)),
         tuple(c for c in (*POSITIONS, *COILS) if np.ptp(data[c]) == 0), step.lost(), step.expected(),
@@ -185,6 +189,13 @@ def _answer(control: Array, rest: npt.NDArray[np.bool_]) -> tuple[int, bool]:
     if window.max() < 8 * noise:
         return begin, False
     return begin + int(np.argmax(window > max(ANSWER * window.max(), 4 * noise))), True
+
+
+def _acted(rig: RigFile, t: Array, control: Array, first: int, period: float) -> float:
+    """When the set point changed, s: finer than a period, by the control currents."""
+    tick = rig.devices["controller"].tick_s
+    ticks, lag = round(period / tick), 1 / rig.parameters["model_rate"].default
+    return onset(t, control, t[first] - 1.8 * period, t[first] - 0.5 * period, tick=tick, ticks=ticks, lag_s=lag)[0]
 
 
 def _still(t: Array, signals: Array, angle: Array, rest: npt.NDArray[np.bool_]) -> tuple[Array, Array]:

@@ -1,10 +1,10 @@
-"""From set-point steps to estimates with influences: scatter of the repeats, sampling, shape of the model, sensors' gains."""
+"""From set-point steps to estimates with influences: scatter of the repeats, sampling, size of the steps, sensors' gains."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -15,29 +15,42 @@ from bench.uncertainty import Estimate, Influence
 from procedures.estimators import setpoint_data, stepmodel
 from procedures.estimators.inputs import certified
 from procedures.estimators.setpoint_data import Case, Done
-from procedures.estimators.stepmodel import Mode, Response, Settling
+from procedures.estimators.setpoint_swing import One, Swing, swing
+from procedures.estimators.stepmodel import Settling
 
 Array = npt.NDArray[np.float64]
-NEIGHBOUR = 0.08  # what a second mode that is not told apart does to damping, as a share: bound over drawn machines
-NEIGHBOUR_HZ = 0.045  # and to the frequency
-APART, APART_HZ = (
-    0.025,
-    0.02,
-)  # where two are told apart: filters that still ring, and the shaft's compliance in bending
-BENDS = 0.01  # of the bandwidth, likewise
-CURVE = 3e-3  # of the overshoot's excursion: what the spline leaves of a means' curve
-RISE_SHARE = 0.01  # of a period: the same for crossings
+RISE_SHARE = 0.012  # of a period: what the spline leaves of a crossing, over all phases of the step in its period
+ALIAS = 3e-3  # of the bandwidth: what stands above half the sampling rate
+START_S = 1e-4  # how well the control currents tell when the set point acted
+SIZE_DAMPING, SIZE_FREQUENCY = (
+    6.0,
+    4.0,
+)  # second-order effect of a step's size over the square of its first-order effect
+TAIL_S = 0.2
 
 
 @dataclass(frozen=True)
 class Result:
-    """Responses of the steps of one case, and the mean of each quantity with its influences; no settling time where the
-    position does not settle."""
+    """The steps of one case, what was fitted to their mean (None: no oscillation), and each quantity with its influences; no
+    settling time where the position does not settle."""
 
     case: Case
-    responses: tuple[Response, ...]
+    ones: tuple[One, ...]
+    swing: Swing | None
     settled: Settling
+    error: float
     estimates: Mapping[str, Estimate]
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """Values of a quantity by case with the variance of each mean and its dof; the deviation goes with size to the -`power`."""
+
+    unit: str
+    power: int
+    values: dict[Case, float]
+    variances: dict[Case, float]
+    dof: dict[Case, int]
 
 
 def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
@@ -46,12 +59,117 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
     Raises:
         AnalysisError: a step does not get to nine tenths of its size.
     """
+    done = setpoint_data.by_case(steps)
+    ones = {case: tuple(_one(d) for d in d_all) for case, d_all in done.items()}
+    fits = {case: _fits(o) for case, o in ones.items()}
+    seen = {
+        "rise_time": _repeated("s", 1, ones, _rise),
+        "steady_error": _repeated("m", 0, ones, lambda case, o: case.way * case.size * (_late(o) - 1)),
+        "overshoot": _jackknifed("1", fits, ones, lambda s, _: s.peak - 1),
+        "bandwidth": _jackknifed("Hz", fits, ones, lambda s, o: stepmodel.bandwidth(o, s)),
+    }
     out = {}
-    for case, done in setpoint_data.by_case(steps).items():
-        responses = tuple(_response(d) for d in done)
-        settled = _settled(done, band)
-        out[case] = Result(case, responses, settled, _estimates(case, done, responses, settled, rig))
+    for case, all_of in done.items():
+        settled = _settled(all_of, band)
+        found = {name: _estimate(name, case, s) for name, s in seen.items() if case in s.values}
+        found |= _settling(case, all_of, settled)
+        found["rise_time"] += bound(f"sampling/rise/{case.where}", "sampling", RISE_SHARE * _period(all_of[0]), "s")
+        found["steady_error"] += _gained(case, rig)
+        if "bandwidth" in found:
+            found["bandwidth"] += bound(
+                f"aliasing/{case.where}", "above half the sampling rate", ALIAS * found["bandwidth"].value, "Hz"
+            )
+        error = float(np.mean([_late(o) - 1 for o in ones[case]]))
+        out[case] = Result(case, ones[case], fits[case][0] if fits[case] else None, settled, error, found)
     return out
+
+
+def _period(d: Done) -> float:
+    return float(d.t[1] - d.t[0])
+
+
+def _one(d: Done) -> One:
+    return One(d.t, np.array([d.y, d.tilt]) / d.case.size, d.case.size, d.begin)
+
+
+def _rise(case: Case, o: One) -> float:
+    early = o.t < 0.05
+    try:
+        return stepmodel.rise_time(o.t[early], o.both[0, early])
+    except AnalysisError as error:
+        raise AnalysisError(f"{case.where}: {error}") from error
+
+
+def _late(o: One) -> float:
+    return float(o.both[0, o.t > o.t[-1] - min(TAIL_S, 0.25 * o.t[-1])].mean())
+
+
+def _fits(ones: Sequence[One]) -> list[Swing]:
+    """Of all steps of a case, then without each in turn; nothing where one does not fit."""
+    try:
+        whole = swing(ones)
+        return [whole, *(swing([o for j, o in enumerate(ones) if j != k], whole.poles) for k in range(len(ones)))]
+    except AnalysisError:
+        return []
+
+
+def _repeated(unit: str, power: int, ones: Mapping[Case, Sequence[One]], of: Callable[[Case, One], float]) -> _Seen:
+    seen = _Seen(unit, power, {}, {}, {})
+    for case, o in ones.items():
+        values = np.array([of(case, x) for x in o])
+        within, dof = _alike([x.begin for x in o], values)
+        seen.values[case], seen.dof[case] = float(values.mean()), dof
+        seen.variances[case] = within / dof / len(o) if dof else math.nan
+    return seen
+
+
+def _jackknifed(
+    unit: str,
+    fits: Mapping[Case, Sequence[Swing]],
+    ones: Mapping[Case, Sequence[One]],
+    of: Callable[[Swing, Sequence[One]], float],
+) -> _Seen:
+    """With one step after the other left out; those that begin at other set points differ where a bearing is not linear, so
+    that each is held against those that begin where it does."""
+    seen = _Seen(unit, 1, {}, {}, {})
+    for case, all_of in fits.items():
+        if not all_of:
+            continue
+        o, n = ones[case], len(ones[case])
+        value = of(all_of[0], o)
+        left = np.array([of(s, [x for j, x in enumerate(o) if j != k]) for k, s in enumerate(all_of[1:])])
+        within, dof = _alike([x.begin for x in o], left)
+        if np.isfinite([value, *left]).all() and dof:
+            seen.values[case], seen.dof[case] = value, dof
+            seen.variances[case] = (n - 1) ** 2 / n * within / dof
+    return seen
+
+
+def _alike(kinds: Sequence[Hashable], values: Array) -> tuple[float, int]:
+    """Sum of squares of steps of the same kind about their means, and its degrees of freedom."""
+    total, dof = 0.0, 0
+    for kind in set(kinds):
+        of = values[[k == kind for k in kinds]]
+        total, dof = total + float(((of - of.mean()) ** 2).sum()), dof + len(of) - 1
+    return total, dof
+
+
+def _estimate(name: str, case: Case, seen: _Seen) -> Estimate:
+    """A case's value. Noise is the same for all steps of a setting, an axis and a speed: their scatter is taken together."""
+    alike = [c for c in seen.values if c.group == case.group]
+    dof = float(sum(seen.dof[c] for c in alike))
+    scaled = [seen.dof[c] * seen.variances[c] * (c.size / case.size) ** (2 * seen.power) for c in alike]
+    influence = Influence(
+        id=f"scatter/{name}/{case.where}",
+        name="scatter of the repeats",
+        u=math.sqrt(sum(scaled) / dof),
+        unit=seen.unit,
+        kind="A",
+        distribution="normal",
+        dof=dof,
+        source=f"repeats of {len(alike)} cases together",
+    )
+    return Estimate.of(seen.values[case], influence)
 
 
 def _settled(done: Sequence[Done], band: float) -> Settling:
@@ -63,119 +181,81 @@ def _settled(done: Sequence[Done], band: float) -> Settling:
     )
 
 
-def _response(d: Done) -> Response:
-    try:
-        return stepmodel.response(d.t, d.y / d.case.size)
-    except AnalysisError as error:
-        raise AnalysisError(f"{d.case.where}: {error}") from error
-
-
-def _estimates(
-    case: Case, done: Sequence[Done], r: Sequence[Response], settled: Settling, rig: RigFile
-) -> dict[str, Estimate]:
-    where = case.where
-    period = float(done[0].t[1] - done[0].t[0])
-
-    def mean(name: str, unit: str, of: Callable[[Response], float]) -> Estimate:
-        return repeated(f"{name}/{where}", unit, [of(x) for x in r])
-
-    overshoot = mean("overshoot", "1", lambda x: x.overshoot)
-    out = {
-        "overshoot": overshoot + bound(f"means/{where}", "means over a period", CURVE * (1 + overshoot.value), "1"),
-        "rise_time": mean("rise_time", "s", lambda x: x.rise)
-        + bound("sampling/rise", "sampling", RISE_SHARE * period, "s"),
-        "steady_error": mean("steady_error", "m", lambda x: case.way * x.error * case.size) + _gained(case, rig),
-    }
-    if math.isfinite(settled.time):
-        scatter = Influence(id=f"scatter/settling_time/{where}", name="scatter of the repeats", u=settled.u, unit="s", kind="A",
-                            distribution="normal", dof=float(len(r) - 1), source=f"{len(r)} steps, one left out in "
-                                                                                 f"turn")  # fmt: skip
-        out["settling_time"] = (
-            Estimate.of(settled.time, scatter)
-            + bound(f"start/{where}", "start of the step within a period", period / 2, "s")
-            + bound(f"period/{where}", "sampling", period / 2, "s")
-            + bound(f"edge/{where}", "noise at the edge of the band", settled.edge, "s")
-        )
-    if all(math.isfinite(x.bandwidth) for x in r):
-        shape = bound(
-            f"shape/bandwidth/{where}",
-            "shape of the model",
-            max(x.shape + (x.misfit + BENDS) * x.bandwidth for x in r),
-            "Hz",
-        )
-        out["bandwidth"] = mean("bandwidth", "Hz", lambda x: x.bandwidth) + shape
-    return out
+def _settling(case: Case, done: Sequence[Done], settled: Settling) -> dict[str, Estimate]:
+    if not math.isfinite(settled.time):
+        return {}
+    where, count = case.where, len(done)
+    scatter = Influence(
+        id=f"scatter/settling_time/{where}",
+        name="scatter of the repeats",
+        u=settled.u,
+        unit="s",
+        kind="A",
+        distribution="normal",
+        dof=float(count - 1),
+        source=f"{count} steps, one left out in turn",
+    )
+    made = Estimate.of(settled.time, scatter) + bound(f"start/{where}", "start of the step", START_S, "s")
+    made += bound(f"period/{where}", "sampling", _period(done[0]) / 4, "s")
+    return {"settling_time": made + bound(f"edge/{where}", "noise at the edge of the band", settled.edge, "s")}
 
 
 def by_group(steps: list[Done], results: Mapping[Case, Result]) -> dict[str, dict[str, Estimate]]:
     """Of each setting, axis and speed: the oscillation, and how far size and direction matter."""
     out: dict[str, dict[str, Estimate]] = {}
-    for group, done in setpoint_data.by_group(steps).items():
-        out[group] = oscillation(group, done) | _linearity([r for c, r in results.items() if c.group == group])
+    for group in setpoint_data.by_group(steps):
+        of = [r for c, r in results.items() if c.group == group]
+        out[group] = _oscillation(group, of) | _linearity(of)
     return out
 
 
-def oscillation(group: str, done: Sequence[Done]) -> dict[str, Estimate]:
+def _oscillation(group: str, results: Sequence[Result]) -> dict[str, Estimate]:
     """Damping and natural frequency from all steps together, those of large ones weighing more; uncertainty by leaving out
-    one block of steps after the other. Nothing where there is no oscillation."""
-    blocks = min(len(done), 8)
-    n = min(len(d.t) for d in done)
-    whole, t = _pooled(done, n), done[0].t[:n]
-    out: dict[str, Estimate] = {}
-    best = math.inf
-    for count in (1, 2):
-        if count == 2 and not np.any(whole[1]):
-            continue
-        try:
-            mode = stepmodel.modes(t, whole, count)
-            left = [
-                stepmodel.modes(t, _pooled([d for k, d in enumerate(done) if k % blocks != b], n), count)
-                for b in range(blocks)
-            ]
-        except (AnalysisError, np.linalg.LinAlgError):
-            continue
-        if not (0 < mode.damping < 0.95 and all(0 < m.damping < 0.95 for m in left)):
-            continue
-        made = _oscillation(group, count, mode, left)
-        if made["damping"].u < best:
-            best, out = made["damping"].u, made
-    return out
-
-
-def _oscillation(group: str, count: int, mode: Mode, left: Sequence[Mode]) -> dict[str, Estimate]:
+    one step after the other, among those of its kind. Nothing where there is no oscillation."""
+    ones = [o for r in results for o in r.ones]
+    kinds, n = [(r.case, o.begin) for r in results for o in r.ones], len(ones)
+    try:
+        whole = swing(ones)
+        left = [swing(ones[:k] + ones[k + 1 :], whole.poles) for k in range(n)]
+    except AnalysisError:
+        return {}
+    first = _first_order(results)
     out = {}
-    for name, unit, value, others, beside in (
-        ("damping", "1", mode.damping, [m.damping for m in left], NEIGHBOUR if count == 1 else APART),
-        (
-            "natural_frequency",
-            "Hz",
-            mode.frequency,
-            [m.frequency for m in left],
-            NEIGHBOUR_HZ if count == 1 else APART_HZ,
-        ),
-    ):
-        n = len(others)
-        u = math.sqrt((n - 1) / n * float(((np.array(others) - np.mean(others)) ** 2).sum()))
-        jackknife = Influence(id=f"scatter/{name}/{group}", name="scatter of the steps", u=u, unit=unit, kind="A",
-                              distribution="normal", dof=float(n - 1), source=f"{n} blocks of steps left out in "
-                                                                              f"turn")  # fmt: skip
-        text = (
-            "a neighbouring mode, a shaft that bends" if count == 1 else "filters that still ring, a shaft that bends"
+    made: tuple[tuple[str, str, Callable[[Swing], float], float], ...] = (
+        ("damping", "1", lambda s: s.damping, SIZE_DAMPING),
+        ("natural_frequency", "Hz", lambda s: s.frequency, SIZE_FREQUENCY),
+    )
+    for name, unit, of, second in made:
+        value = of(whole)
+        within, dof = _alike(kinds, np.array([of(s) for s in left]))
+        u = (n - 1) * math.sqrt(within / dof / n)
+        jackknife = Influence(
+            id=f"scatter/{name}/{group}",
+            name="scatter of the steps",
+            u=u,
+            unit=unit,
+            kind="A",
+            distribution="normal",
+            dof=float(dof),
+            source=f"{n} steps, left out in turn",
         )
-        out[name] = Estimate.of(value, jackknife) + bound(f"mode/{name}/{group}", text, beside * value, unit)
+        moved = max(abs(of(whole.later(by)) - value) for by in (START_S, -START_S))
+        out[name] = Estimate.of(value, jackknife)
+        out[name] += bound(f"start/{name}/{group}", "start of the step", moved, unit)
+        out[name] += bound(f"size/{name}/{group}", "size of the steps", second * first**2 * value, unit)
     return out
 
 
-def _pooled(done: Sequence[Done], n: int) -> Array:
-    """Position and tilt (2, n) per metre of step over many steps, each shifted to the common samples: least squares over sizes.
-    Starts differ by less than a period, which shifts the phase of an oscillation and nothing else."""
-    weight = sum(d.case.size**2 for d in done)
-    return np.asarray(sum(d.case.size * np.array([d.y[:n], d.tilt[:n]]) for d in done) / weight)
+def _first_order(results: Sequence[Result]) -> float:
+    """By how much the frequency of the largest steps differs between the directions: 0 in a linear loop."""
+    largest = max(r.case.size for r in results)
+    both = {r.case.way: r.swing.frequency for r in results if r.case.size == largest and r.swing is not None}
+    return both[1] / both[-1] - 1 if len(both) == 2 else 0.0
 
 
 def _linearity(results: Sequence[Result]) -> dict[str, Estimate]:
     sizes = sorted({r.case.size for r in results})
-    of = {(r.case.size, r.case.way): r.estimates["overshoot"] for r in results}
+    of = {(r.case.size, r.case.way): r.estimates["overshoot"] for r in results if "overshoot" in r.estimates}
     if any((s, w) not in of for s in (sizes[0], sizes[-1]) for w in (1, -1)):
         return {}
     top = [of[sizes[-1], w] for w in (1, -1)]
@@ -183,14 +263,6 @@ def _linearity(results: Sequence[Result]) -> dict[str, Estimate]:
     if len(sizes) > 1:
         out["size_effect"] = (top[0] + top[1] - of[sizes[0], 1] - of[sizes[0], -1]) * 0.5
     return out
-
-
-def repeated(identity: str, unit: str, values: Sequence[float]) -> Estimate:
-    """Mean of repeats with its Type A uncertainty."""
-    u = float(np.std(values, ddof=1)) / math.sqrt(len(values))
-    influence = Influence(id=f"scatter/{identity}", name="scatter of the repeats", u=u, unit=unit, kind="A",
-                          distribution="normal", dof=float(len(values) - 1), source=f"{len(values)} steps")  # fmt: skip
-    return Estimate.of(float(np.mean(values)), influence)
 
 
 def bound(identity: str, name: str, half: float, unit: str) -> Estimate:
@@ -207,4 +279,4 @@ def _gained(case: Case, rig: RigFile) -> Estimate:
     for channel, share in setpoint_data.shares(rig, case.axis).items():
         gain = certified(f"sensors/{channel}/gain", rig.sensors[channel].gain, f"gain of {channel}")
         out = out + (gain - gain.value) * (-case.way * case.size * share / gain.value)
-    return Estimate(out.value, "m", out.sensitivities)
+    return replace(out, unit="m")

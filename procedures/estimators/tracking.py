@@ -12,19 +12,15 @@ with the amplifiers' lag: where that answer begins is read from four samples.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.errors import AnalysisError
-from procedures.estimators.sines import known_frequency
 
 Array = npt.NDArray[np.float64]
 SMOOTH_S = 3e-3  # of peaks at rest: the error of a sine of 10 Hz loses a thousandth
-ONSET_S, BEFORE_S, ONSET_STEP_S = 4e-3, 0.03, 1e-5
-DELAY_TICKS = 2  # from the reference's zero of phase to the amplifiers: computed a tick late, applied one later
 YI, ZI, YO, ZO = range(4)
 
 
@@ -136,63 +132,63 @@ def revolutions(path: Path) -> list[npt.NDArray[np.bool_]]:
     return [(path.t >= first + k / path.wave.hz) & (path.t < first + (k + 1) / path.wave.hz) for k in range(count)]
 
 
-def by_revolution(path: Path, f: Facts) -> Mapping[str, Array]:
-    """Every quantity in each revolution, (m,): peaks and rms of the errors, peaks of the tilts, ratio of the amplitudes,
-    phase lag rad, and what is left to the ring."""
-    q, error, planes = centre(path.readings, f), errors(path, f), np.abs(plane_errors(path, f))
+@dataclass(frozen=True)
+class Turns:
+    """Each whole revolution of the reference (m of them): `errors` (m, 4, k) of y, z in m and the tilts psi, theta in rad at k
+    equal parts of it, `planes` (m, 4, k) m at the sensors, `follows` (m, 2) what y and z do over what they should at the
+    reference's frequency, and `left` (m,) m to the rings. Revolutions are alike: noise is what differs between them."""
+
+    errors: Array
+    planes: Array
+    follows: npt.NDArray[np.complex128]
+    left: Array
+
+    def without(self, some: npt.NDArray[np.bool_]) -> Turns:
+        """The other revolutions."""
+        return Turns(self.errors[~some], self.planes[~some], self.follows[~some], self.left[~some])
+
+
+def turns(path: Path, f: Facts) -> Turns:
+    """The revolutions of a path."""
     per = revolutions(path)
-    out: dict[str, list[float]] = {}
-    radius = distances(path.readings, f)
-    t, wave = path.t - path.wave.late - f.t_0, path.wave
-    for m in per:
-        for k, (axis, (hz, size, lead)) in enumerate(zip("yz", wave.axes, strict=True)):
-            out.setdefault(f"error_peak_{axis}", []).append(float(np.nanmax(np.abs(error[k, m]))))
-            out.setdefault(f"error_rms_{axis}", []).append(float(np.sqrt(np.nanmean(error[k, m] ** 2))))
-            fitted = known_frequency(t[m], q[k, m], hz)
-            out.setdefault(f"amplitude_ratio_{axis}", []).append(fitted.amplitude / (size * wave.shrinks(hz)))
-            out.setdefault(f"phase_lag_{axis}", []).append(-math.remainder(fitted.phase - lead, 2 * math.pi))
-        out.setdefault("error_peak_plane", []).append(float(np.nanmax(planes[:, m])))
-        for k, name in ((2, "tilt_psi"), (3, "tilt_theta")):
-            out.setdefault(name, []).append(float(np.nanmax(np.abs(error[k, m]))))
-        out.setdefault("ring_distance", []).append(f.clearance - float(radius[:, m].max()))
-    return {name: np.array(values) for name, values in out.items()}
+    q, radius = centre(path.readings, f), distances(path.readings, f)
+    both = np.concatenate([errors(path, f), plane_errors(path, f)])
+    period = path.wave.tick * path.wave.ticks
+    parts = np.arange(round(1 / path.wave.hz / period)) * period
+    grid = np.array([path.t[m][0] for m in per])[:1] + np.arange(len(per))[:, None] / path.wave.hz + parts
+    folded = np.array([np.interp(grid, path.t, row) for row in both]).transpose(1, 0, 2)
+    return Turns(
+        folded[:, :4],
+        folded[:, 4:],
+        np.array([[_follows(path, f, q[k, m], m, axis) for k, axis in enumerate(path.wave.axes)] for m in per]),
+        np.array([f.clearance - float(radius[:, m].max()) for m in per]),
+    )
+
+
+def _follows(path: Path, f: Facts, x: Array, m: npt.NDArray[np.bool_], axis: tuple[float, float, float]) -> complex:
+    hz, size, lead = axis
+    turn = 2 * math.pi * hz * (path.t[m] - path.wave.late - f.t_0) + lead
+    sine, cosine, _ = np.linalg.lstsq(np.column_stack([np.sin(turn), np.cos(turn), np.ones_like(turn)]), x, rcond=None)[
+        0
+    ]
+    return complex(sine, cosine) / (size * path.wave.shrinks(hz))
+
+
+def quantities(turns: Turns) -> dict[str, float]:
+    """Of the mean revolution: peaks and rms of the errors, peaks of the tilts, ratio of the amplitudes, phase lag rad; and the
+    least that is left to the rings in any. The peak of a mean is freed of what noise adds to the peak of each."""
+    mean, planes, follows = (x.mean(axis=0) for x in (turns.errors, turns.planes, turns.follows))
+    names = ("error_peak_y", "error_peak_z", "tilt_psi", "tilt_theta")
+    out = dict(zip(names, np.abs(mean).max(axis=1).tolist(), strict=True))
+    out["error_peak_plane"] = float(np.abs(planes).max())
+    spread = turns.errors.var(axis=0, ddof=1).mean(axis=1) / len(turns.errors)
+    for k, axis in enumerate("yz"):
+        out[f"error_rms_{axis}"] = math.sqrt(max(float((mean[k] ** 2).mean() - spread[k]), 0.0))
+        out[f"amplitude_ratio_{axis}"], out[f"phase_lag_{axis}"] = abs(follows[k]), -float(np.angle(follows[k]))
+    return out | {"ring_distance": float(turns.left.min())}
 
 
 def distances(readings: Array, f: Facts) -> Array:
     """Of the shaft from the rings' centre at the inboard and the outboard sensors, (2, n) m."""
     at = (readings - np.array(f.offsets)[:, None]) / np.array(f.gains)[:, None]
     return np.array([np.hypot(at[YI], at[ZI]), np.hypot(at[YO], at[ZO])])
-
-
-def noise(path: Path, f: Facts) -> Array:
-    """Standard deviation of what is random in an averaged y, z, psi, theta, (4,): from neighbouring samples at rest, from
-    neighbouring turns while the shaft turns (single samples hold its vibration)."""
-    if path.turn_s:
-        error = errors(path, f)
-        stride = max(round(path.turn_s / (path.wave.ticks * path.wave.tick)), 1)
-        kept = error[:, np.isfinite(error).all(axis=0)][:, ::stride]
-        return np.asarray(np.diff(kept, n=2, axis=1).std(axis=1) / math.sqrt(6))
-    second = np.diff(centre(path.readings, f), n=2, axis=1).std(axis=1) / math.sqrt(6)
-    return np.asarray(second / math.sqrt(max(path.smooth_s / (path.wave.ticks * path.wave.tick), 1.0)))
-
-
-def onset(t: Array, current: Array, earliest: float, latest: float, wave: Wave, lag_s: float) -> tuple[float, float]:
-    """When the reference's phase was zero, s, by the jump of the z coils' current, and that jump over its noise.
-
-    i = i_0 + J u(t) + c v(t), u the amplifiers' answer to a step and v the square of the time since, for the rotor that begins
-    to follow; each averaged over the readings of a sample. The start with the least misfit is taken.
-    """
-    reads = t[:, None] - wave.tick * np.arange(1, wave.ticks + 1)
-    best, found, jump = math.inf, earliest, 0.0
-    near = (t > earliest - BEFORE_S) & (t < latest + ONSET_S)
-    for t_0 in np.arange(earliest - wave.tick, latest + ONSET_STEP_S, ONSET_STEP_S):
-        use = near & (t < t_0 + ONSET_S)
-        since = np.maximum(reads[use] - t_0 - DELAY_TICKS * wave.tick, 0.0)
-        answer = (1 - np.exp(-since / lag_s)).mean(axis=1)
-        design = np.column_stack([np.ones(use.sum()), answer, (since**2).mean(axis=1) / ONSET_S**2])
-        terms, *_ = np.linalg.lstsq(design, current[use], rcond=None)
-        misfit = float(((current[use] - design @ terms) ** 2).mean())
-        if misfit < best:
-            best, found, jump = misfit, float(t_0), float(terms[1])
-    rest = t < earliest
-    return found, abs(jump) / max(float(current[rest].std()), 1e-12) if rest.sum() > 5 else 0.0

@@ -117,9 +117,8 @@ def _of_reference(o: Orbit) -> Iterator[Finding]:
     if o.clear < CLEAR:
         yield Finding(
             "start-not-seen",
-            f"the coil currents show no start of the reference ({o.clear:.1f} times their "
-            f"noise): its "
-            "phase is not known.",
+            f"the coil currents show no start of the reference ({o.clear:.1f} times their noise): its phase is not known. "
+            "Either it was not applied, or current sensors of one bearing are exchanged, so that the answers cancel.",
             o.where,
             Effect.ERROR,
         )

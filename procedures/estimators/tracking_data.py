@@ -11,7 +11,8 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
-from procedures.estimators.tracking import Facts, Path, Wave, distances, onset
+from procedures.estimators.setpoint_onset import onset
+from procedures.estimators.tracking import Facts, Path, Wave, distances
 
 Array = npt.NDArray[np.float64]
 REST, LIFT, PROBE, START, ORBIT = "rest", "lift", "probe", "start", "orbit"
@@ -88,7 +89,8 @@ def _start(recording: Recording[Any], start: Step, wave: Wave) -> tuple[float, f
     current = np.sum([begun[f"i_z{b}_p"] - begun[f"i_z{b}_n"] for b in "io"], axis=0)
     lag = 1 / recording.rig.parameters["model_rate"].default
     earliest, latest = ((t - start.start_ns) * 1e-9 for t in (written[0], answered[0]))
-    return onset((begun["t_ns"] - start.start_ns) * 1e-9, current, earliest, latest, wave, lag)
+    at = (begun["t_ns"] - start.start_ns) * 1e-9
+    return onset(at, current, earliest, latest, tick=wave.tick, ticks=wave.ticks, lag_s=lag)
 
 
 def _read(recording: Recording[Any], step: Step, origin: int, t_0: float, clear: float) -> Orbit:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,11 +13,12 @@ from bench.toleranced import Toleranced
 from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.series import batch_means
 from procedures.estimators.inputs import certified
-from procedures.estimators.tracking import Facts, Path, by_revolution, noise, revolutions
+from procedures.estimators.tracking import Facts, Turns, quantities, revolutions, turns
 from procedures.estimators.tracking_data import AXES, LOWER, UPPER, Orbit
 
 TIMING_TICKS = 0.5  # half width: how the reference's zero of phase stands to the answer of the currents
 UNITS = {"error": "m", "amplitude": "1", "phase": "rad", "tilt": "rad", "ring": "m"}
+BLOCKS = 12  # of revolutions, left out in turn
 Moved = Callable[[Facts, float], Facts]
 
 
@@ -108,23 +109,23 @@ def by_law(orbits: Sequence[Orbit], rig: RigFile, runout_m: float) -> dict[str, 
 
 def _of_path(orbit: Orbit, rig: RigFile, runout_m: float) -> dict[str, Estimate]:
     path, facts = orbit.path, nominal(rig, orbit.t_0)
-    found = by_revolution(path, facts)
-    least = {name: _whole(name, values) for name, values in found.items()}
-    moved: list[tuple[Input, Mapping[str, float], Mapping[str, float]]] = []
+    whole = turns(path, facts)
+    least = quantities(whole)
+    moved: list[tuple[Input, dict[str, float], dict[str, float]]] = []
     for i in inputs(rig, path.wave.tick, runout_m):
         u = i.stated.standard_uncertainty
-        moved.append((i, _means(path, i.moved(facts, u)), _means(path, i.moved(facts, -u))))
-    floor = noise(path, facts)
-    out = {}
-    for name, values in found.items():
-        total = Estimate.exact(least[name], _unit(name))
+        up, down = (quantities(turns(path, i.moved(facts, by))) for by in (u, -u))
+        moved.append((i, up, down))
+    scatter, out = _scatter(orbit, whole), {}
+    for name, value in least.items():
+        total = Estimate.exact(value, _unit(name))
         bent = more = 0.0
         for i, up, down in moved:
             c = (up[name] - down[name]) / (2 * i.stated.standard_uncertainty)
-            second = (up[name] + down[name]) / 2 - least[name]
+            second = (up[name] + down[name]) / 2 - value
             bent, more = math.hypot(bent, second), more + second
             total = total + (certified(i.id, i.stated, i.name) - i.stated.value) * c
-        total = total + _scatter(orbit, name, values)
+        total = total + scatter[name]
         if (
             bent > 0
         ):  # a peak only grows by what the sensors hide: the second order belongs to the value (GUM 5.1.2, note)
@@ -133,43 +134,40 @@ def _of_path(orbit: Orbit, rig: RigFile, runout_m: float) -> dict[str, Estimate]
                 + more
                 + _small(f"curvature/{orbit.law}/{name}", "second-order part of all inputs", bent, _unit(name))
             )
-        if name.startswith(("error_peak", "tilt")):
-            k = {"error_peak_y": 0, "error_peak_z": 1, "error_peak_plane": 1, "tilt_psi": 2, "tilt_theta": 3}[name]
-            total = total + _small(f"noise/{orbit.law}/{name}", "noise in a peak", float(floor[k]), _unit(name))
         out[name] = replace(total, unit=_unit(name))
     return out
-
-
-def _means(path: Path, facts: Facts) -> dict[str, float]:
-    return {name: _whole(name, values) for name, values in by_revolution(path, facts).items()}
-
-
-def _whole(name: str, values: np.ndarray) -> float:
-    """Of all revolutions: the least distance, the mean of all else."""
-    return float(values.min() if name == "ring_distance" else values.mean())
 
 
 def _unit(name: str) -> str:
     return UNITS[name.split("_")[0]]
 
 
-def _scatter(orbit: Orbit, name: str, values: np.ndarray) -> Estimate:
-    batches = max(2, min(16, len(values) // 2))
-    found = batch_means(values, batches)
-    u = float(values.std(ddof=1)) if name == "ring_distance" else found.u
-    return Estimate.of(
-        0.0,
-        Influence(
-            id=f"scatter/{orbit.law}/{name}",
-            name="scatter over revolutions",
-            u=u,
-            unit=_unit(name),
-            kind="A",
-            distribution="normal",
-            dof=found.dof,
-            source=f"{batches} batches of revolutions of the reference",
-        ),
-    )
+def _scatter(orbit: Orbit, whole: Turns) -> dict[str, Estimate]:
+    """Zero, with what the revolutions' scatter makes of each quantity: blocks of them left out in turn; the distance to the
+    rings is the least of single samples, and scatters as those of the revolutions do."""
+    count = len(whole.left)
+    blocks = min(BLOCKS, count)
+    left = [quantities(whole.without(np.arange(count) % blocks == b)) for b in range(blocks)]
+    out = {}
+    for name in left[0]:
+        values = np.array([x[name] for x in left])
+        u = math.sqrt((blocks - 1) / blocks * float(((values - values.mean()) ** 2).sum()))
+        if name == "ring_distance":
+            u = float(whole.left.std(ddof=1))
+        out[name] = Estimate.of(
+            0.0,
+            Influence(
+                id=f"scatter/{orbit.law}/{name}",
+                name="scatter over revolutions",
+                u=u,
+                unit=_unit(name),
+                kind="A",
+                distribution="normal",
+                dof=float(blocks - 1),
+                source=f"{blocks} blocks of revolutions of the reference, left out in turn",
+            ),
+        )
+    return out
 
 
 def _small(identity: str, name: str, u: float, unit: str) -> Estimate:

@@ -17,7 +17,8 @@ from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate
-from procedures.estimators import stepmodel
+from procedures.estimators import setpoint_swing, stepmodel
+from procedures.estimators.setpoint_onset import onset
 from procedures.step import MEASURES, Plan, check, figures, step_count
 from reports.figures import draw as draw_figure
 from sim_backend import amb_step
@@ -25,6 +26,7 @@ from sim_backend.truth import draw
 
 SHORT = {"axes": ("y",), "sizes_m": (10e-6, 20e-6), "record_s": 0.4, "settle_s": 3.0}
 FAST = 300.0
+SHOWN = ("overshoot", "rise_time", "steady_error", "bandwidth")
 OBSERVED = {"law": 1.0, "observer": 1.0, "k1": 2e5, "k2_ccs": 400.0}
 A7 = {
     "axes": ("z",), "sizes_m": (10e-6, 20e-6), "speeds_rad_s": (10000 * math.pi / 30,), "names": ("integral", "estimate"),
@@ -41,24 +43,48 @@ def stepped(folder: Path, seed: int = 1, truth: Mapping[str, float] | None = Non
     return measured, [f for f in run.results if isinstance(f, Finding)]
 
 
-@pytest.mark.parametrize(("law", "name"), [(0.0, "pid"), (1.0, "ccs"), (2.0, "cac")])
-def test_the_response_is_that_of_the_linearised_loop(tmp_path: Path, law: float, name: str) -> None:
-    seed, rig = 4, load_rig("amb5dof")
-    measured, findings = stepped(tmp_path, seed, a={"law": law}, sizes_m=(9e-6, 10e-6))
-    settings = {n: p.default for n, p in rig.parameters.items()}
-    truth = amb_step.truth(draw(rig, seed).plant, settings, name, "y")
+@pytest.mark.parametrize("law", [0.0, 1.0, 2.0], ids=["pid", "ccs", "cac"])
+def test_the_response_is_that_of_the_machine_without_noise(tmp_path: Path, law: float) -> None:
+    seed, rig, sizes = 4, load_rig("amb5dof"), (10e-6, 20e-6)
+    measured, findings = stepped(tmp_path, seed, a={"law": law}, sizes_m=sizes, settle_s=5.0)
+    settings = {n: p.default for n, p in rig.parameters.items()} | {"law": law}
+    of_small, steps = amb_step.truth(draw(rig, seed).plant, settings, "y", sizes, record_s=0.4)
     serious = {f.code for f in findings if f.effect is not Effect.NOTE}
-    assert serious <= ({"not-settled", "not-at-rest"} if name == "pid" else set())  # its integrator takes two seconds
+    assert serious <= ({"not-settled", "not-at-rest"} if law == 0 else set())  # its integrator takes two seconds
     damping, frequency = (measured[q, "A, y, 0 r/min"] for q in ("damping", "natural_frequency"))
-    assert damping.value == pytest.approx(truth["damping"], abs=3 * damping.u)
-    assert damping.u < 0.06 * damping.value
-    assert frequency.value == pytest.approx(truth["frequency"], abs=3 * frequency.u)
-    for way in ("up", "down"):
-        where = f"A, y, 0 r/min, 10 µm {way}"
-        for quantity, share in (("overshoot", 0.06), ("rise_time", 0.04), ("bandwidth", 0.03)):
+    assert damping.value == pytest.approx(of_small.damping, abs=3.5 * damping.u)
+    assert damping.u < 0.03 * damping.value
+    assert frequency.value == pytest.approx(of_small.frequency, abs=3.5 * frequency.u)
+    assert frequency.u < 0.01 * frequency.value
+    for (size, way), shown in steps.items():
+        where = f"A, y, 0 r/min, {size * 1e6:g} µm {'up' if way > 0 else 'down'}"
+        true = {q: float(getattr(shown, q)) for q in SHOWN}
+        for quantity, value in true.items():
             e = measured[quantity, where]
-            assert e.value == pytest.approx(truth[quantity], abs=max(3 * e.u, 0.02 * truth[quantity])), quantity
-            assert e.u < share * e.value
+            assert e.value == pytest.approx(value, abs=4 * e.u), quantity
+            assert quantity == "steady_error" or e.u < 0.06 * e.value
+
+
+def test_damping_of_two_oscillations_that_are_almost_one() -> None:
+    """Either pole is ill determined; the mean pole of the swing is not, and the time from which it counts hardly matters."""
+    rng = np.random.default_rng(1)
+    poles, parts = np.array([-90 + 425j, -85 + 421j]), np.array([-0.5 + 0.1j, -0.3 + 0.1j])
+    tilt = np.array([0.05 + 0.02j, -0.05 - 0.02j])
+    t = np.arange(-5, 60) * 1e-3
+    both = np.array(
+        [1.0 + (np.exp(np.outer(t, poles)) @ (c * setpoint_swing.shrinks(poles, 1e-3))).real for c in (parts, tilt)]
+    )
+    true = setpoint_swing.Swing(poles, parts, 1.0, 0.0, 0.0)
+    exact = setpoint_swing.swing([setpoint_swing.One(t, both)])
+    assert exact.damping == pytest.approx(true.damping, rel=1e-3)
+    assert exact.peak == pytest.approx(true.peak, abs=1e-4)
+    found = [
+        setpoint_swing.swing([setpoint_swing.One(t, both + 1e-3 * rng.normal(size=both.shape))]) for _ in range(10)
+    ]
+    assert np.mean([s.damping for s in found]) == pytest.approx(true.damping, rel=0.015)
+    assert np.std([s.damping for s in found]) < 0.03 * true.damping
+    later = exact.later(1e-4)
+    assert later.damping == pytest.approx(exact.damping, rel=2e-3)
 
 
 def test_a7_the_estimate_settles_and_integral_action_does_not(tmp_path: Path) -> None:
@@ -158,15 +184,25 @@ def second_order(w: float, z: float, shift: float, seconds: float = 0.4) -> tupl
 def test_a_second_order_step_from_means(z: float, shift: float) -> None:
     w = 2 * math.pi * 70
     t, y = second_order(w, z, shift)
-    r = stepmodel.response(t, y)
-    assert r.overshoot == pytest.approx(math.exp(-math.pi * z / math.sqrt(1 - z * z)), abs=0.003)
+    one = setpoint_swing.One(t + shift, np.array([y, 0 * y]))
+    fitted = setpoint_swing.swing([one])
+    assert fitted.peak - 1 == pytest.approx(math.exp(-math.pi * z / math.sqrt(1 - z * z)), abs=1e-3)
     b = math.sqrt(1 - 2 * z * z + math.sqrt((1 - 2 * z * z) ** 2 + 1))
-    assert r.bandwidth == pytest.approx(70 * b, rel=0.01)
-    mode = stepmodel.modes(t, np.array([y, 0 * y]), 1)
-    assert mode.damping == pytest.approx(z, rel=0.005)
-    assert mode.frequency == pytest.approx(70, rel=0.003)
-    raw = float(y.max()) - 1
-    assert raw < r.overshoot  # the largest mean is below the largest value
+    assert stepmodel.bandwidth([one], fitted) == pytest.approx(70 * b, rel=0.005)
+    assert fitted.damping == pytest.approx(z, rel=0.003)
+    assert fitted.frequency == pytest.approx(70, rel=0.002)
+    assert float(y.max()) < fitted.peak  # the largest mean is below the largest value
+
+
+@pytest.mark.parametrize("begun", [0.0, 2.3e-4, 6.1e-4])
+def test_when_a_set_point_acted_is_told_finer_than_the_telemetry(begun: float) -> None:
+    lag, tick = 4e-4, 1e-4
+    t = np.arange(-30, 20) * 1e-3
+    reads = t[:, None] - tick * np.arange(1, 11) - begun - 2 * tick
+    since = np.maximum(reads, 0)
+    current = (1 - np.exp(-since / lag) - 8e3 * since**2).mean(axis=1)
+    found, _ = onset(t, current, begun - 4e-4, begun + 8e-4, tick=tick, ticks=10, lag_s=lag)
+    assert found == pytest.approx(begun, abs=4e-5)
 
 
 def test_settling_into_the_band_and_never() -> None:
@@ -176,7 +212,7 @@ def test_settling_into_the_band_and_never() -> None:
     assert found.time == pytest.approx(0.05 * math.log(50), abs=2e-3)
     slow = np.array([1 - 0.05 * np.exp(-t / 67)] * 4)
     assert stepmodel.settling(t, slow, 0.02, 0.0, 6.0).time == math.inf
-    assert stepmodel.settling(t, slow, 0.02, 0.05, 6.0).within == pytest.approx(0.1)  # noise widens the band
+    assert stepmodel.settling(t, slow, 0.02, 0.05, 6.0).within == pytest.approx(0.125)  # noise widens the band
 
 
 def test_a_position_that_does_not_get_there_is_told() -> None:

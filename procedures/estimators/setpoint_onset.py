@@ -1,0 +1,37 @@
+"""When a set point jumped, by the coil currents that answer: finer than the telemetry's period."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+ONSET_S, BEFORE_S = 4e-3, 0.03
+COARSE_S, FINE_S = 1e-4, 1e-5  # of the search
+LATE_S = 1.2e-5  # what a square of time leaves of the rotor's answer makes the start late, -20 to 30 us about this mean
+DELAY_TICKS = 2  # from the jump to the amplifiers: computed a tick late, applied one later
+
+
+def onset(
+    t: Array, current: Array, earliest: float, latest: float, *, tick: float, ticks: int, lag_s: float
+) -> tuple[float, float]:
+    """When the set point jumped, s on the time of the samples `t` (n,), and the jump of `current` (n,) over its noise.
+
+    i = i_0 + J u(t) + c v(t), u the amplifiers' answer to a step and v the square of the time since, for the rotor that begins
+    to follow; each averaged over the `ticks` readings of a sample. The start with the least misfit is taken.
+    """
+    reads = t[:, None] - tick * np.arange(1, ticks + 1)
+    near = (t > earliest - BEFORE_S) & (t < latest + ONSET_S)
+
+    def fitted(t_0: float) -> tuple[float, float, float]:
+        use = near & (t < t_0 + ONSET_S)
+        since = np.maximum(reads[use] - t_0 - DELAY_TICKS * tick, 0.0)
+        answer = (1 - np.exp(-since / lag_s)).mean(axis=1)
+        design = np.column_stack([np.ones(use.sum()), answer, (since**2).mean(axis=1) / ONSET_S**2])
+        terms, *_ = np.linalg.lstsq(design, current[use], rcond=None)
+        return float(((current[use] - design @ terms) ** 2).mean()), t_0, float(terms[1])
+
+    _, about, _ = min(fitted(t_0) for t_0 in np.arange(earliest - tick, latest + COARSE_S, COARSE_S))
+    _, found, jump = min(fitted(t_0) for t_0 in np.arange(about - COARSE_S, about + COARSE_S, FINE_S))
+    rest = t < earliest
+    return float(found) - LATE_S, abs(jump) / max(float(current[rest].std()), 1e-12) if rest.sum() > 5 else 0.0
