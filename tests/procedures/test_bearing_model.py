@@ -24,7 +24,6 @@ from procedures.estimators.bearing_data import Held
 from reports.figures import draw as draw_figure
 from sim_backend.truth import nominal
 
-pytestmark = pytest.mark.xdist_group("bearing-model")  # one worker makes the sound run once
 NAME, RIG, SEED = "bearing-model", "amb5dof", 2026
 QUICK = {"spacing_m": 40e-6, "passes": 1, "settle_s": 0.5, "average_s": 0.3}
 
