@@ -21,6 +21,7 @@ GROUPS = {
     # Their pages begin with the same commands, which are executed once.
     "chained pages": ("test_docs.py::test_commands_work[force-constant]",
                       "test_docs.py::test_commands_work[force-coupling]",
+                      "test_docs.py::test_commands_work[force-map]",
                       "test_docs.py::test_commands_work[negative-stiffness]"),
 }  # fmt: skip
 ALONE = ("tests/test_docs.py::test_commands_work",)
