@@ -102,7 +102,7 @@ def test_sizes_and_ways_are_compared(tmp_path: Path) -> None:
         ({"geometry.clearance": 26e-6}, {}, "contact"),
         ({"supply_V": 5.0, "inductance": 20e-3}, {}, "voltage-saturated"),
         ({"pulse_missing": 3.0}, {"speeds_rad_s": (FAST,)}, "speed-lost"),
-        ({"drop_fraction": 0.01}, {}, "missing-samples"),
+        ({"drop_fraction": 0.005}, {}, "missing-samples"),
     ],
 )
 def test_a_planted_defect_is_named_and_never_passes(
