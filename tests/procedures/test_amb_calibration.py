@@ -71,14 +71,14 @@ def test_the_constants_hold_for_the_bias_of_the_plan(tmp_path: Path) -> None:
     [
         ({"current_sign_o": -1}, "wrong-sign", "outboard"),
         pytest.param({"current_sign_i": -1}, "wrong-sign", "inboard", marks=pytest.mark.long),
-        ({"exchange_current_axes": 1}, "axes-exchanged", "x and y"),
+        pytest.param({"exchange_current_axes": 1}, "axes-exchanged", "x and y", marks=pytest.mark.long),
         ({"exchange_current_bearings": 1}, "bearings-exchanged", "inboard and outboard"),
         ({"mass_error_M1": 0.02}, "load-inconsistent", "M1"),
         pytest.param({"mass_error_M3": -0.02}, "load-inconsistent", "M3", marks=pytest.mark.long),
         ({"hanger_off_at_zero": 1}, "load-inconsistent", "hanger"),
         ({"drop_fraction": 0.005}, "missing-samples", "missing"),
         ({"integrator_factor": 0.02}, "unsettled", "integrator"),
-        ({"stuck_current_yo_p": 1}, "stuck-channel", "i_yo_p"),
+        pytest.param({"stuck_current_yo_p": 1}, "stuck-channel", "i_yo_p", marks=pytest.mark.long),
     ],
 )
 def test_a_defect_is_named_and_does_not_pass(tmp_path: Path, defect: dict[str, float], code: str, named: str) -> None:

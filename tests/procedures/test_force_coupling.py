@@ -111,7 +111,7 @@ def test_a_count_of_the_wrong_size_is_named(known: dict[str, Calibration], tmp_p
         ({"gamma_zero": 0.04}, "commutation-off", "zero"),
         ({"segment_gain_1": 0.7, "segment_gain_3": 0.7}, "windings-differ", "i_m2"),
         ({"integrator_factor": 0.02}, "unsettled", "integrator"),
-        ({"drop_fraction": 0.005}, "missing-samples", "missing"),
+        pytest.param({"drop_fraction": 0.005}, "missing-samples", "missing", marks=pytest.mark.long),
     ],
 )
 def test_a_defect_is_named_and_does_not_pass(

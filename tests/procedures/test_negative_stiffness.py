@@ -113,7 +113,7 @@ def test_the_result_follows_the_truth(known: dict[str, Calibration], tmp_path: P
         pytest.param({"position_gain_yo": 0.8}, "gap-inconsistent", "pos_yo", marks=pytest.mark.long),
         ({"gamma_zero": 0.04}, "axes-coupled", "commutation"),
         ({"integrator_factor": 0.02}, "unsettled", "integrator"),
-        ({"drop_fraction": 0.005}, "missing-samples", "missing"),
+        pytest.param({"drop_fraction": 0.005}, "missing-samples", "missing", marks=pytest.mark.long),
     ],
 )
 def test_a_defect_is_named_and_does_not_pass(

@@ -80,7 +80,7 @@ def test_figures_and_steps(tmp_path: Path) -> None:
         ({"segment_sign_1": -1}, "segment-sign", "segment 1"),
         ({"detent": 0.2}, "large-detent", "catches"),
         ({"coulomb": 0.5}, "friction", "rubs"),
-        ({"drop_fraction": 0.005}, "missing-samples", "missing"),
+        pytest.param({"drop_fraction": 0.005}, "missing-samples", "missing", marks=pytest.mark.long),
     ],
 )
 def test_a_planted_defect_is_named_and_never_passes(

@@ -92,7 +92,7 @@ def test_the_result_follows_the_truth(tmp_path: Path) -> None:
     [
         ({"encoder_sign": -1}, {"encoder-direction": "backwards", "speed-not-reached": "did not reach"}),
         ({"drive_brakes": 0.15}, {"braked": "brake"}),
-        ({"drop_fraction": 0.005}, {"missing-samples": "missing"}),
+        pytest.param({"drop_fraction": 0.005}, {"missing-samples": "missing"}, marks=pytest.mark.long),
         ({"detent": 3}, {"drag-not-linear": "another shape"}),
         ({"segment_drift_1": 0.003}, {"constant-torque": "forward"}),
     ],

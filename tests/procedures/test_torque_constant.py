@@ -62,12 +62,12 @@ def test_the_result_follows_the_truth(tmp_path: Path) -> None:
     [
         ({"exchange_segments": 1}, "segments-exchanged", "segments 1 and 2"),
         ({"encoder_sign": -1}, "encoder-direction", "backwards"),
-        ({"segment_sign_1": -1}, "segment-sign", "i_m1"),
+        pytest.param({"segment_sign_1": -1}, "segment-sign", "i_m1", marks=pytest.mark.long),
         ({"lever_slip": 0.05}, "lever-slips", "slips"),
-        ({"segment_drift_2": 0.001}, "current-drift", "i_m3"),
+        pytest.param({"segment_drift_2": 0.001}, "current-drift", "i_m3", marks=pytest.mark.long),
         ({"detent": 3}, "detent-large", "detent"),
         ({"geometry.lever_left": 0.231}, "arms-disagree", "arm"),
-        ({"drop_fraction": 0.005}, "missing-samples", "missing"),
+        pytest.param({"drop_fraction": 0.005}, "missing-samples", "missing", marks=pytest.mark.long),
     ],
 )
 def test_a_defect_is_named_and_does_not_pass(tmp_path: Path, defect: dict[str, float], code: str, named: str) -> None:
