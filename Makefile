@@ -6,6 +6,9 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
+# Tests start hundreds of processes: without its bytecode every one of them would compile the project again.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo test check format ci-long campaigns bench clean lock setup
 
 demo: setup

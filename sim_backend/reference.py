@@ -7,6 +7,7 @@ the thesis; x horizontal, y up; planes are signed distances from the centre of m
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy.typing as npt
 from sim_backend.core.params import PlantParams
 
 Array = npt.NDArray[np.float64]
+Vector = Sequence[float] | Array
 TICK_S = 1e-4
 
 
@@ -49,15 +51,15 @@ class Loads:
     hung mass kg and its weight N, the external drive and the lever; `held` are the coil currents (10,) at the start of the
     tick, by which the drag goes."""
 
-    coil: Array
-    segment: Array
-    play: Array
+    coil: Vector
+    segment: Vector
+    play: Vector
     gamma: float = 0.0
     hung_mass: float = 0.0
     weight: float = 0.0
     drive: Drive | None = None
     lever: Lever = EMPTY
-    held: Array | None = None
+    held: Vector | None = None
 
 
 @dataclass(frozen=True)
@@ -73,16 +75,18 @@ class Drive:
         return min(max(self.gain * (self.speed - spin), -self.limit), self.limit)
 
 
-def motor(p: PlantParams, x: float, y: float, theta: float, gamma: float, segment: Array) -> tuple[float, float, float]:
+def motor(
+    p: PlantParams, x: float, y: float, theta: float, gamma: float, segment: Vector
+) -> tuple[float, float, float]:
     """Forces N and torque N m of the motor, displaced by x and y from its magnetic centre: T (5.25) at any gamma.
 
     For gamma = 0 this is T (5.25) less its terms 7 to 9, with beta_4 of the text below; without ripple and displacement it
     is T (6.5). Under the integral of T (6.1) stands sin u sin(u - M gamma) with u = M (Phi - theta), which is
     [cos(M gamma) - cos(P Phi - (P theta + M gamma))] / 2: the ripple goes with P theta + M gamma.
     """
-    wired = segment[[1, 0, 2, 3]] if p.exchange_segments else segment
-    current = wired * np.array(p.segment_gain)
-    ix, iy, turn = (current[3] - current[1]) / 2, (current[0] - current[2]) / 2, current.mean()
+    wired = [segment[k] for k in ((1, 0, 2, 3) if p.exchange_segments else range(4))]
+    current = [gain * i for gain, i in zip(p.segment_gain, wired, strict=True)]
+    ix, iy, turn = (current[3] - current[1]) / 2, (current[0] - current[2]) / 2, sum(current) / 4
     shift = p.pole_pairs * (gamma - p.gamma_zero)
     poles = 2 * p.pole_pairs
     b = poles * theta + shift
@@ -98,7 +102,7 @@ def friction(p: PlantParams, spin: float, u: Loads) -> float:
     """Torque N m against the spin: a drag of which a share goes with the square of the flux of each radial axis (eddy
     currents; `viscous` is for 3 A), smoothed Coulomb friction, and a brake that works while no drive drives."""
     held = u.coil if u.held is None else u.held
-    square = float(np.mean([((held[2 * a] + held[2 * a + 1]) / 2) ** 2 for a in range(4)]))
+    square = sum(((held[2 * a] + held[2 * a + 1]) / 2) ** 2 for a in range(4)) / 4
     dry = p.coulomb + (0.0 if u.drive else p.brake)
     slow = spin / p.coulomb_speed
     return p.viscous * (1 - p.drag_share + p.drag_share * square / 9) * spin + dry * slow / math.sqrt(1 + slow**2)
@@ -106,7 +110,7 @@ def friction(p: PlantParams, spin: float, u: Loads) -> float:
 
 def derivative(p: PlantParams, s: Array, u: Loads) -> Array:
     """Rates of s = (x, y, z, phi, psi, theta, their rates, height and speed of the hung mass), (14,)."""
-    x, y, z, phi, psi, theta, vx, vy, vz, wphi, wpsi, spin, hung, hung_rate = s
+    x, y, z, phi, psi, theta, vx, vy, vz, wphi, wpsi, spin, hung, hung_rate = s = s.tolist()  # plain floats, faster
     forces: list[tuple[float, float, float]] = []  # plane, Fx, Fy
     torque = 0.0
     for b in (0, 1):
@@ -125,7 +129,7 @@ def derivative(p: PlantParams, s: Array, u: Loads) -> Array:
     forces.append((p.z_motor, pushed[0], pushed[1]))
     torque += turned - friction(p, spin, u) - p.detent * math.sin(16 * theta + p.detent_phase)
     torque += u.drive.torque(spin) if u.drive else 0.0
-    down = np.array([math.sin(p.tilt), -math.cos(p.tilt)])
+    down = math.sin(p.tilt), -math.cos(p.tilt)
     torque += u.lever.moment * math.cos(theta + u.lever.slip)
     forces.append((p.z_lever, u.lever.weight * down[0], u.lever.weight * down[1]))
     polar = p.polar_inertia + u.lever.inertia
@@ -150,7 +154,7 @@ def derivative(p: PlantParams, s: Array, u: Loads) -> Array:
                      hung_rate if u.hung_mass > 0 else 0.0, rate])  # fmt: skip
 
 
-def touchdown(p: PlantParams, b: int, s: Array) -> tuple[tuple[float, float, float], float]:
+def touchdown(p: PlantParams, b: int, s: Vector) -> tuple[tuple[float, float, float], float]:
     """Force of a touchdown ring on the shaft (plane, Fx, Fy) and its torque: a damped spring with smoothed friction."""
     plane = p.z_sensor[b]
     x, y = s[0] + plane * s[4] - p.ring_x[b], s[1] - plane * s[3] - p.ring_y[b]

@@ -99,12 +99,10 @@ class Interval:
 
     def loads(self, part: float) -> Loads:
         """What acts after the share `part` of the tick."""
-        i = np.array(amplifier(self.p, self.currents, self.target, part * TICK_S))
+        i = amplifier(self.p, self.currents, self.target, part * TICK_S)
         weight = self.hanging.weight(self.weight_before, self.tick + part)
-        held = np.array(self.currents[:10])
-        return Loads(
-            i[:10], i[10:], np.array(self.lag), self.gamma, self.hanging.mass_kg, weight, self.drive, self.lever, held
-        )
+        mass, held = self.hanging.mass_kg, self.currents[:10]
+        return Loads(i[:10], i[10:], self.lag, self.gamma, mass, weight, self.drive, self.lever, held)
 
 
 def runge_kutta(interval: Interval, s: Sequence[float], substeps: int) -> list[float]:

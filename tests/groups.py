@@ -22,14 +22,17 @@ GROUPS = {
     # Their pages begin with the same commands, which are executed once.
     "chained pages": ("test_docs.py::test_commands_work[force-constant]",
                       "test_docs.py::test_commands_work[force-coupling]",
+                      "test_docs.py::test_commands_work[force-map]",
                       "test_docs.py::test_commands_work[negative-stiffness]"),
 }  # fmt: skip
-LONGEST = ("tests/test_docs.py::test_commands_work",)
+ALONE = ("tests/test_docs.py::test_commands_work",)
+"""Long tests of one file that share nothing: each goes to whichever worker is free."""
 
 
 def group_of(nodeid: str) -> str:
-    """The group's name; a test that belongs to none is one by itself."""
-    return next((name for name, parts in GROUPS.items() if any(part in nodeid for part in parts)), nodeid)
+    """The group's name; where there is none the file, whose fixtures are then made by one worker only."""
+    whole = nodeid if nodeid.startswith(ALONE) else nodeid.partition("::")[0]
+    return next((name for name, parts in GROUPS.items() if any(part in nodeid for part in parts)), whole)
 
 
 def scheduler(config: Any, log: Any) -> Any:

@@ -132,7 +132,7 @@ PARTS = 3
 GAPS = st.sampled_from([0] * 12 + [1, 2, 10, 11, 12, 13, 14, 15, 16, 17, 31, 32, 48, 100, 256, 1000])
 
 
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=120)
 @given(
     start=st.integers(0, 65535),
     bits=st.sampled_from([4, 8]),
@@ -187,7 +187,7 @@ def test_messages_that_are_always_late_are_joined_or_left_out_and_counted(bits: 
         assert (len(done), joiner.misplaced) == (0, 199 - late)
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=60)
 @given(
     start=st.integers(0, 65535),
     bits=st.sampled_from([4, 5, 8]),
@@ -208,7 +208,7 @@ def test_messages_left_out_reach_the_counters() -> None:
     assert decoder.counters.misplaced == 30
 
 
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=60)
 @given(start=st.integers(0, 65535), delays=st.lists(st.integers(0, PARTS), min_size=90, max_size=90))
 def test_what_is_only_out_of_order_is_complete(start: int, delays: list[int]) -> None:
     sent = sorted((n * PARTS + k + delays[n * PARTS + k], n, k) for n in range(30) for k in range(PARTS))
@@ -225,7 +225,7 @@ def test_what_is_only_out_of_order_is_complete(start: int, delays: list[int]) ->
     assert len({s.arrived for s in found}) == len(found)
 
 
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=60)
 @given(st.lists(st.tuples(st.sampled_from([16, 128, 144, 145, 146, 147]), st.binary(max_size=8)), max_size=60))
 def test_arbitrary_bytes_never_crash(frames: list[tuple[int, bytes]]) -> None:
     rows = Assembler(PLAIN).take(joined(*(frame(i, d) for i, d in frames)))

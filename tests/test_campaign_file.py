@@ -141,7 +141,7 @@ def toml(value: Any) -> str:
     return json.dumps(value)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(st.dictionaries(WORDS, VALUES, max_size=6), st.booleans())
 def test_any_toml_is_a_campaign_or_a_config_error(table: dict[str, Any], whole: bool) -> None:
     base: dict[str, Any] = {"schema": 1, "name": "x", "rig": "tsbs12", "step": [{"procedure": "amb-calibration"}]}
@@ -152,7 +152,7 @@ def test_any_toml_is_a_campaign_or_a_config_error(table: dict[str, Any], whole: 
         assert "found" in str(error) or "not TOML" in str(error)  # noqa: PT017 (both ways are allowed)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(st.text(max_size=200))
 def test_any_text_is_a_campaign_or_a_config_error(text: str) -> None:
     with pytest.raises(ConfigError):

@@ -96,7 +96,7 @@ def within_an_ulp(ours: float, theirs: float) -> bool:
     return ours == theirs or abs(ours - theirs) <= np.spacing(abs(theirs))
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(cases())
 def test_decoding_equals_cantools_to_one_ulp(case: tuple[str, list[bytes]]) -> None:
     dbc, payloads = case
@@ -111,7 +111,7 @@ def test_decoding_equals_cantools_to_one_ulp(case: tuple[str, list[bytes]]) -> N
             assert within_an_ulp(values[name][k], float(expected)), (name, values[name][k], expected)
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(cases())
 def test_a_payload_by_itself_has_the_values_it_has_in_a_batch(case: tuple[str, list[bytes]]) -> None:
     dbc, payloads = case
@@ -125,7 +125,7 @@ def test_a_payload_by_itself_has_the_values_it_has_in_a_batch(case: tuple[str, l
         assert np.array_equal([*one.values()], [v[k] for v in values.values()], equal_nan=True)
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.sampled_from(LENGTHS).flatmap(lambda n: st.tuples(st.just(n), placed_signals(n))), st.data())
 def test_encoding_gives_the_bytes_of_cantools(placed: tuple[int, list[Placed]], data: st.DataObject) -> None:
     size, signals = placed

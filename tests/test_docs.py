@@ -17,6 +17,7 @@ import tempfile
 from dataclasses import dataclass, field
 from itertools import takewhile
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -26,8 +27,13 @@ CHAIN = re.compile(r'RUN=\$\(bench run [^\\]*\| tail -1\)|bench adopt "\$RUN" [^
 """A command on one line that leaves nothing but files and the variable RUN."""
 
 
+LONG = ("force-map", "model", "run-a-campaign", "step", "tracking")
+"""Pages whose commands take more than ten seconds."""
+
+
 def test_there_are_pages_to_execute() -> None:
     assert len(PAGES) >= 4
+    assert {*LONG} <= {page.stem for page in PAGES}
 
 
 def commands(page: Path) -> tuple[tuple[str, ...], list[str]]:
@@ -76,8 +82,12 @@ def chains(tmp_path_factory: pytest.TempPathFactory) -> Chains:
     return Chains(tmp_path_factory.mktemp("chains"))
 
 
+def case(page: Path) -> Any:
+    return pytest.param(page, id=page.stem, marks=[pytest.mark.long] if page.stem in LONG else [])
+
+
 @pytest.mark.timeout(180)
-@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.stem)
+@pytest.mark.parametrize("page", [case(page) for page in PAGES])
 def test_commands_work(page: Path, tmp_path: Path, chains: Chains) -> None:
     chain, lines = commands(page)
     if chain:

@@ -29,6 +29,8 @@ def test_every_part_names_something() -> None:
         ("tests/test_docs.py::test_commands_work[connect-a-rig]", "real-time"),
         ("tests/test_docs.py::test_commands_work[force-coupling]", "chained pages"),
         ("tests/test_docs.py::test_commands_work[slew]", "tests/test_docs.py::test_commands_work[slew]"),
+        ("tests/test_docs.py::test_links_lead_somewhere", "tests/test_docs.py"),
+        ("tests/sim/test_truth.py::test_x[a::b]", "tests/sim/test_truth.py"),
     ],
 )
 def test_the_group_of_a_test(nodeid: str, group: str) -> None:

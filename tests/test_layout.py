@@ -73,7 +73,7 @@ def test_the_protobuf_runtime_and_our_decoder_read_what_was_encoded(kinds: list[
         assert np.array_equal(ours.columns[name], x)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(data=st.one_of(st.binary(max_size=60), st.builds(
     lambda at, byte: encoded(3, a=[1, 2, 3], code=[4, 5, 6])[:at] + byte + encoded(3, a=[1, 2, 3], code=[4, 5, 6])[at + 1 :],
     st.integers(0, 120), st.binary(max_size=3))))  # fmt: skip

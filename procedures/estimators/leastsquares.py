@@ -64,8 +64,8 @@ def linear(design: npt.ArrayLike, observed: npt.ArrayLike, covariance: npt.Array
     if n < p or (scale == 0).any() or np.linalg.matrix_rank(xw / scale) < p:
         raise AnalysisError(f"least squares: {n} observations do not determine {p} terms")
     q, r = np.linalg.qr(xw / scale)
-    terms = linalg.solve_triangular(r, q.T @ yw) / scale
-    inverse = linalg.solve_triangular(r, np.eye(p)) / scale[:, None]
+    solved = np.linalg.solve(r, np.column_stack([q.T @ yw, np.eye(p)])) / scale[:, None]  # scipy's would start threads
+    terms, inverse = solved[:, 0], solved[:, 1:]
     chi2 = float(((yw - xw @ terms) ** 2).sum())
     out = inverse @ inverse.T
     if covariance is None:

@@ -99,7 +99,7 @@ def test_many_rigs_interrupted_end_in_order(tmp_path: Path) -> None:
 
 
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+@pytest.mark.parametrize("number", [signal.SIGKILL, pytest.param(signal.SIGINT, marks=pytest.mark.long)])
 def test_one_rig_stopped_in_a_step_goes_on_with_that_step(tmp_path: Path, number: signal.Signals) -> None:
     with start(tmp_path, HEAD + SLOW, "--no-report") as child:
         wait_for(tmp_path, 1, child)

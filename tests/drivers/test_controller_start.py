@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bench.cli.safety import safe_steps
+from bench.cli import safety
 from bench.errors import ConfigError, DeviceFault
 from bench.frames import SENT, FrameBatch, frame
 from bench.link import Link, LinkStats
@@ -59,7 +59,8 @@ class Bench:
         self.controller = Controller(RIG, self.link, self.base, Session(1, 1_767_225_600, "test"))
 
 
-def test_a_state_that_nobody_knows_is_not_taken_for_safe() -> None:
+def test_a_state_that_nobody_knows_is_not_taken_for_safe(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(safety, "STOP_S", 10.0)  # of bench time; nothing turns here, the rotor lands in a second
     bench = Bench()
     bench.controller.connect()
     bench.controller.enable()
@@ -69,7 +70,7 @@ def test_a_state_that_nobody_knows_is_not_taken_for_safe() -> None:
         bench.controller.clock.sleep(0.5)
     bench.controller.guarded = False
     assert bench.machine.device.state == "LEVITATED"
-    found = bench.supervisor.make_safe(safe_steps(bench.controller, bench.base), bench.machine.now_ns)
+    found = bench.supervisor.make_safe(safety.safe_steps(bench.controller, bench.base), bench.machine.now_ns)
     assert bench.machine.device.state == "OFF"
     assert found  # it landed, but nobody could see it
 

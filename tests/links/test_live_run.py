@@ -34,6 +34,7 @@ def test_a_live_run_loses_nothing_and_frees_the_rig(tmp_path: Path) -> None:
     assert states[-1].endswith("-> OFF")
 
 
+@pytest.mark.long
 @pytest.mark.timeout(120)
 def test_the_drive_turns_the_shaft_and_lets_it_coast(tmp_path: Path) -> None:
     plan = ("--plan", 'act="drive"', "--no-report")

@@ -125,6 +125,7 @@ def test_the_heartbeat_is_that_of_the_dbc() -> None:
     assert (beat.identifier, beat.payload, beat.counter_at, beat.fd, beat.period_s) == (16, bytes(4), 0, False, 0.02)
 
 
+@pytest.mark.long
 def test_the_calibration_is_the_same_through_both_maps(tmp_path: Path) -> None:
     bench = Bench()
     foreign, native = (Recording.open(path, Plan) for path in bench.calibrate(tmp_path))

@@ -56,7 +56,7 @@ def test_at_12_degrees_priority_leaves_less_than_a_third_of_the_excursion(tmp_pa
     assert len(recording.all_steps()) == step_count(recording.plan)
 
 
-@pytest.mark.parametrize("seed", [2, 3])
+@pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.long)])
 def test_at_20_degrees_static_loses_levitation_and_priority_completes(tmp_path: Path, seed: int) -> None:
     with pytest.raises(Aborted):
         stepped(tmp_path, seed, steps_rad=(LOST,), allocations=("static",))

@@ -24,7 +24,6 @@ from procedures.estimators.bearing_data import Held
 from reports.figures import draw as draw_figure
 from sim_backend.truth import nominal
 
-pytestmark = pytest.mark.xdist_group("bearing-model")  # one worker makes the sound run once
 NAME, RIG, SEED = "bearing-model", "amb5dof", 2026
 QUICK = {"spacing_m": 40e-6, "settle_s": 0.5, "average_s": 0.3}
 
@@ -119,18 +118,18 @@ def test_without_the_coupling_and_with_it_forgotten(tmp_path: Path) -> None:
     ("defect", "code", "named"),
     [
         ({"current_sign_i": -1}, "coils-exchanged", "i_yi_p"),
-        ({"current_sign_o": -1}, "coils-exchanged", "i_yo_p"),
+        pytest.param({"current_sign_o": -1}, "coils-exchanged", "i_yo_p", marks=pytest.mark.long),
         ({"roll": -0.7854}, "gravity-reversed", "axis z"),
         ({"position_sign_x": -1}, "contact", "axial stop"),
         ({"pos_yi.gain": 1.1}, "certificate-contradicted", "gain of pos_yi"),
         ({"i_yi_p.gain": 0.9}, "certificate-contradicted", "gain of i_yi_p"),
-        ({"i_yi_p.offset": 0.1}, "certificate-contradicted", "offset of i_yi_p"),
+        pytest.param({"i_yi_p.offset": 0.1}, "certificate-contradicted", "offset of i_yi_p", marks=pytest.mark.long),
         ({"position_sign_yi": -1}, "sensor-polarity", "pos_yi"),
         ({"position_range": 60e-6}, "ring-too-near", "beyond its range"),
-        ({"geometry.clearance": 80e-6}, "ring-too-near", "the ring is too near"),
+        pytest.param({"geometry.clearance": 80e-6}, "ring-too-near", "the ring is too near", marks=pytest.mark.long),
         ({"exchange_planes": 1}, "planes-exchanged", "yi with yo and zi with zo"),
         ({"exchange_axes": 1}, "axes-exchanged", "yi with zi and yo with zo"),
-        ({"drop_fraction": 0.02}, "missing-samples", "missing"),
+        pytest.param({"drop_fraction": 0.02}, "missing-samples", "missing", marks=pytest.mark.long),
     ],
 )
 def test_a_defect_is_named_and_does_not_pass(tmp_path: Path, defect: dict[str, float], code: str, named: str) -> None:

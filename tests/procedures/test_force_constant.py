@@ -24,6 +24,7 @@ from procedures.force_constant import Plan, evaluate, facts, figures
 from procedures.force_constant_check import check, predicted_controls
 
 NAME, CALIBRATION = "force-constant", "amb-calibration"
+SHORT = {"settle_s": 0.15}
 
 
 def calibrated(folder: Path, seed: int, **plan: object) -> Calibration:
@@ -83,7 +84,7 @@ def test_the_ripple_is_seen_over_the_angle(tmp_path: Path, calibration: Calibrat
     assert serious(run) == []
 
 
-@pytest.mark.parametrize("factor", [0.8, 1.2])
+@pytest.mark.parametrize("factor", [pytest.param(0.8, marks=pytest.mark.long), 1.2])
 def test_the_result_follows_the_truth(tmp_path: Path, calibration: Calibration, factor: float) -> None:
     """Printed values are no input: with the truth 20 % off they are 20 % off, and the limits say so."""
     run = measure(tmp_path, calibration, {"alpha_d": 12.1 * factor})
@@ -97,20 +98,20 @@ def test_the_result_follows_the_truth(tmp_path: Path, calibration: Calibration, 
     ("defect", "code", "named"),
     [
         ({"exchange_segments": 1}, "segments-exchanged", "1 and 2"),
-        ({"segment_sign_1": -1}, "segment-sign", "segment 1"),
+        pytest.param({"segment_sign_1": -1}, "segment-sign", "segment 1", marks=pytest.mark.long),
         ({"segment_drift_0": 2e-3}, "drifting-sensor", "segment 1 or 3"),
-        ({"drift_2": 1e-3}, "drifting-sensor", "inboard AMB, axis y"),
-        ({"drift_6": 1e-3}, "drifting-sensor", "outboard AMB, axis y"),
-        ({"drop_fraction": 0.02}, "missing-samples", "missing"),
+        pytest.param({"drift_2": 1e-3}, "drifting-sensor", "inboard AMB, axis y", marks=pytest.mark.long),
+        pytest.param({"drift_6": 1e-3}, "drifting-sensor", "outboard AMB, axis y", marks=pytest.mark.long),
+        pytest.param({"drop_fraction": 0.005}, "missing-samples", "missing", marks=pytest.mark.long),
         ({"integrator_factor": 0.05}, "unsettled", "integrator"),
-        ({"stuck_current_yo_p": 1}, "stuck-channel", "i_yo_p"),
+        pytest.param({"stuck_current_yo_p": 1}, "stuck-channel", "i_yo_p", marks=pytest.mark.long),
         ({"asymmetry_o": 0.15}, "rows-disagree", "K_x of an AMB"),
     ],
 )
 def test_a_defect_is_named_and_does_not_pass(
     tmp_path: Path, calibration: Calibration, defect: dict[str, float], code: str, named: str
 ) -> None:
-    found = serious(measure(tmp_path, calibration, defect))
+    found = serious(measure(tmp_path, calibration, defect, **SHORT))
     assert code in {f.code for f in found}, found
     assert any(named in f.text for f in found if f.code == code), found
 
@@ -137,7 +138,7 @@ def altered(calibration: Calibration, change: object) -> Calibration:
 
 def test_a_calibration_with_a_wrong_sign_is_named(tmp_path: Path, calibration: Calibration) -> None:
     wrong = altered(calibration, lambda n, v: -v[n] if n.startswith("K_i@") else v[n])
-    found = {(f.code, f.where): f.text for f in serious(measure(tmp_path, wrong))}
+    found = {(f.code, f.where): f.text for f in serious(measure(tmp_path, wrong, **SHORT))}
     assert "opposite sign of K_i" in found["rows-disagree", "y"]
     assert ("rows-disagree", "x") not in found  # the horizontal constants rest on the vertical ones
 
@@ -147,11 +148,12 @@ def test_a_calibration_of_other_angles_is_named(tmp_path: Path, calibration: Cal
         quantity, at, angle = name.partition("@")
         return values[f"{quantity}@{(int(angle) + 1) % 9}"] if at else values[name]
 
-    found = {f.code: f.text for f in serious(measure(tmp_path, altered(calibration, next_angle)))}
+    found = {f.code: f.text for f in serious(measure(tmp_path, altered(calibration, next_angle), **SHORT))}
     assert set(found) & {"rows-disagree", "lack-of-fit"}
     assert any("further on" in text for text in found.values()), found
 
 
+@pytest.mark.long
 def test_a_calibration_of_another_rig_does_not_pass(tmp_path: Path) -> None:
     """The runner refuses it; where it comes through all the same, forces and moments contradict each other."""
     other = calibrated(tmp_path, SEED + 1)

@@ -84,7 +84,7 @@ def test_the_two_edges_of_the_encoders_count_show_the_ripple(known: dict[str, Ca
     assert "ripple" in notes(run)
 
 
-@pytest.mark.parametrize("swing", [0.1, -0.1])
+@pytest.mark.parametrize("swing", [0.1, pytest.param(-0.1, marks=pytest.mark.long)])
 def test_where_the_rotor_was_before_does_not_matter(
     known: dict[str, Calibration], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, swing: float
 ) -> None:
@@ -107,11 +107,11 @@ def test_a_count_of_the_wrong_size_is_named(known: dict[str, Calibration], tmp_p
     [
         ({"segment_sign_1": -1}, "segment-sign", "i_m1"),
         ({"segment_drift_0": 1e-3}, "drifting-sensor", "segments 1 and 3"),
-        ({"segment_drift_3": -1e-3}, "drifting-sensor", "segments 2 and 4"),
+        pytest.param({"segment_drift_3": -1e-3}, "drifting-sensor", "segments 2 and 4", marks=pytest.mark.long),
         ({"gamma_zero": 0.04}, "commutation-off", "zero"),
         ({"segment_gain_1": 0.7, "segment_gain_3": 0.7}, "windings-differ", "i_m2"),
         ({"integrator_factor": 0.02}, "unsettled", "integrator"),
-        ({"drop_fraction": 0.02}, "missing-samples", "missing"),
+        pytest.param({"drop_fraction": 0.005}, "missing-samples", "missing", marks=pytest.mark.long),
     ],
 )
 def test_a_defect_is_named_and_does_not_pass(

@@ -21,6 +21,7 @@ from sim_backend.truth import draw
 
 CALIBRATION = "amb-calibration"
 QUICK = {"ramp_A_s": 5.0, "settle_s": 0.5, "average_s": 0.3}
+SHORT = {"settle_s": 0.25, "average_s": 0.2}
 
 
 @pytest.fixture(scope="module")
@@ -93,15 +94,15 @@ def test_figures_and_steps(sound: Simulated) -> None:
 def test_a_planted_defect_is_named_and_never_passes(
     tmp_path: Path, calibration: Calibration, defect: Mapping[str, float], code: str, named: str
 ) -> None:
-    found = [f for f in findings(mapped(tmp_path, calibration, defect)) if f.code == code]
+    found = [f for f in findings(mapped(tmp_path, calibration, defect, **SHORT)) if f.code == code]
     assert found
     assert found[0].effect is Effect.ERROR
     assert named in found[0].text
 
 
-def test_a_calibration_of_the_wrong_sign_is_named(sound: Simulated, calibration: Calibration, tmp_path: Path) -> None:
+def test_a_calibration_of_the_wrong_sign_is_named(calibration: Calibration, tmp_path: Path) -> None:
     turned = replace(calibration, values={n: -e if n.startswith("K") else e for n, e in calibration.values.items()})
-    found = [f for f in findings(mapped(tmp_path, turned)) if f.effect is Effect.ERROR]
+    found = [f for f in findings(mapped(tmp_path, turned, **SHORT)) if f.effect is Effect.ERROR]
     assert [f.code for f in found] == ["wrong-sign"]
     assert "calibration" in found[0].text
 

@@ -79,7 +79,7 @@ def test_selection_on_175_synthetic_points() -> None:
 def test_selection_finds_the_model_in_nine_of_ten_tables() -> None:
     """A term that tells nothing is kept in about 1 of 150 cases; there are five, and a good table needs all dropped."""
     right = 0
-    for seed in range(1, 21):
+    for seed in range(1, 11):
         random = np.random.default_rng(seed)
         p = points(random)
         force, torque = measured(p, table_5_3(), random)
@@ -90,7 +90,7 @@ def test_selection_finds_the_model_in_nine_of_ten_tables() -> None:
         assert set(KEPT_FORCE) <= set(chosen.terms)
         assert set(KEPT_TORQUE) <= set(other.terms)
         right += (chosen.terms, other.terms) == (KEPT_FORCE, KEPT_TORQUE)
-    assert right >= 18
+    assert right >= 9
 
 
 @settings(max_examples=30, deadline=None)

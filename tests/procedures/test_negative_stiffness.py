@@ -73,7 +73,7 @@ def test_the_inboard_amb_drops_out(
     assert ratio == pytest.approx(1, abs=5e-4)
 
 
-@pytest.mark.parametrize("swing", [0.1, -0.1])
+@pytest.mark.parametrize("swing", [0.1, pytest.param(-0.1, marks=pytest.mark.long)])
 def test_where_the_rotor_was_before_does_not_matter(
     sound: Simulated, known: dict[str, Calibration], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, swing: float
 ) -> None:
@@ -107,13 +107,13 @@ def test_the_result_follows_the_truth(known: dict[str, Calibration], tmp_path: P
     [
         ({"segment_sign_1": -1}, "segment-sign", "i_m1"),
         ({"segment_drift_0": 1e-3}, "drifting-sensor", "segments 1 and 3"),
-        ({"segment_drift_3": -1e-3}, "drifting-sensor", "segments 2 and 4"),
+        pytest.param({"segment_drift_3": -1e-3}, "drifting-sensor", "segments 2 and 4", marks=pytest.mark.long),
         ({"drift_6": 1e-3}, "drifting-sensor", "i_yo"),
         ({"position_gain_yo": 1.2}, "gap-inconsistent", "pos_yo"),
-        ({"position_gain_yo": 0.8}, "gap-inconsistent", "pos_yo"),
+        pytest.param({"position_gain_yo": 0.8}, "gap-inconsistent", "pos_yo", marks=pytest.mark.long),
         ({"gamma_zero": 0.04}, "axes-coupled", "commutation"),
         ({"integrator_factor": 0.02}, "unsettled", "integrator"),
-        ({"drop_fraction": 0.02}, "missing-samples", "missing"),
+        pytest.param({"drop_fraction": 0.005}, "missing-samples", "missing", marks=pytest.mark.long),
     ],
 )
 def test_a_defect_is_named_and_does_not_pass(

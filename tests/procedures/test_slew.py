@@ -37,7 +37,7 @@ def slewed(folder: Path, seed: int = 1, truth: Mapping[str, float] | None = None
     return measured, [f for f in results if isinstance(f, Finding)]
 
 
-@pytest.mark.parametrize("seed", [7, 8])
+@pytest.mark.parametrize("seed", [7, pytest.param(8, marks=pytest.mark.long)])
 def test_the_detent_and_the_closed_loop_are_recovered(tmp_path: Path, seed: int) -> None:
     measured, findings = slewed(tmp_path, seed)
     assert findings == []
@@ -80,7 +80,7 @@ def test_figures_and_steps(tmp_path: Path) -> None:
         ({"segment_sign_1": -1}, "segment-sign", "segment 1"),
         ({"detent": 0.2}, "large-detent", "catches"),
         ({"coulomb": 0.5}, "friction", "rubs"),
-        ({"drop_fraction": 0.01}, "missing-samples", "missing"),
+        pytest.param({"drop_fraction": 0.005}, "missing-samples", "missing", marks=pytest.mark.long),
     ],
 )
 def test_a_planted_defect_is_named_and_never_passes(

@@ -121,14 +121,14 @@ def test_sizes_and_ways_are_compared(tmp_path: Path) -> None:
     ("defect", "plan", "code"),
     [
         ({"factor_ref_y": 0.0}, {}, "no-step"),
-        ({"factor_ref_y": 0.5}, {}, "wrong-size"),
+        pytest.param({"factor_ref_y": 0.5}, {}, "wrong-size", marks=pytest.mark.long),
         ({"factor_ref_y": -1.0}, {}, "wrong-way"),
         ({"current_sign_i": -1.0}, {}, "current-sign"),
         ({"position_range": 30e-6}, {}, "sensor-clipped"),
         ({"geometry.clearance": 26e-6}, {}, "contact"),
         ({"supply_V": 5.0, "inductance": 20e-3}, {}, "voltage-saturated"),
         ({"pulse_missing": 3.0}, {"speeds_rad_s": (FAST,)}, "speed-lost"),
-        ({"drop_fraction": 0.01}, {}, "missing-samples"),
+        pytest.param({"drop_fraction": 0.005}, {}, "missing-samples", marks=pytest.mark.long),
     ],
 )
 def test_a_planted_defect_is_named_and_never_passes(

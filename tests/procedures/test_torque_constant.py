@@ -62,12 +62,12 @@ def test_the_result_follows_the_truth(tmp_path: Path) -> None:
     [
         ({"exchange_segments": 1}, "segments-exchanged", "segments 1 and 2"),
         ({"encoder_sign": -1}, "encoder-direction", "backwards"),
-        ({"segment_sign_1": -1}, "segment-sign", "i_m1"),
+        pytest.param({"segment_sign_1": -1}, "segment-sign", "i_m1", marks=pytest.mark.long),
         ({"lever_slip": 0.05}, "lever-slips", "slips"),
-        ({"segment_drift_2": 0.001}, "current-drift", "i_m3"),
+        pytest.param({"segment_drift_2": 0.001}, "current-drift", "i_m3", marks=pytest.mark.long),
         ({"detent": 3}, "detent-large", "detent"),
         ({"geometry.lever_left": 0.231}, "arms-disagree", "arm"),
-        ({"drop_fraction": 0.02}, "missing-samples", "missing"),
+        pytest.param({"drop_fraction": 0.005}, "missing-samples", "missing", marks=pytest.mark.long),
     ],
 )
 def test_a_defect_is_named_and_does_not_pass(tmp_path: Path, defect: dict[str, float], code: str, named: str) -> None:
@@ -76,13 +76,13 @@ def test_a_defect_is_named_and_does_not_pass(tmp_path: Path, defect: dict[str, f
     assert named in found[code].text
 
 
-@pytest.mark.parametrize(("mass", "error"), [("M1", -0.02), ("M3", 0.01)])
+@pytest.mark.parametrize(("mass", "error"), [("M1", -0.02), pytest.param("M3", 0.01, marks=pytest.mark.long)])
 def test_a_wrong_mass_is_named(tmp_path: Path, mass: str, error: float) -> None:
     found = serious(calibrate(tmp_path, 3, {f"mass_error_{mass}": error}, THREE))
     assert found["load-inconsistent"].where == mass
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.long) for k in (1, 2))])
 def test_a_detent_as_large_as_the_load_never_passes(tmp_path: Path, seed: int) -> None:
     """Whatever its phase: where it is steepest the rotor is off home, where it is flat the current without load is large."""
     assert {"detent-large", "rotor-does-not-turn"} & set(serious(calibrate(tmp_path, seed, {"detent": 3})))

@@ -16,16 +16,16 @@ from sim_backend.core.params import ControlParams, PlantParams
 from sim_backend.reference_loop import Driving, Hanging, Interval, Levering, Trace, dop853, runge_kutta, simulate
 
 Array = npt.NDArray[np.float64]
-TICKS = 1200
+TICKS = 600
 START = (3e-6, 0.0, 4e-6, 0.0, 1e-5, 0.4, 0.0, 0.0, 0.0, 0.0, 0.0, 38.0, 0.0, 0.0)
-LIGHT = (Hanging(200, 0.5, 4.9, 0.02), Hanging(500, 0.25, 2.4, 0.01))
-HANGINGS = (Hanging(300, 3.25, 31.9, 0.03), Hanging(900, 1.25, 12.2, 0.01))
+LIGHT = (Hanging(100, 0.5, 4.9, 0.01), Hanging(250, 0.25, 2.4, 0.005))
+HANGINGS = (Hanging(150, 3.25, 31.9, 0.015), Hanging(450, 1.25, 12.2, 0.005))
 CONTROL = ControlParams(speed_ref=40.0, i_x=-0.2, i_y=0.3, gamma=0.02, ref_yi=5e-6, ref_z=-3e-6)
 STANDING = (*START[:5], *(0.0,) * 9)
 LEVERINGS = (
-    Levering(100, 1.0, 9.8, 0.23, 0.02, 0.02),
-    Levering(350, 0.5, 4.9, -0.229, 0.01),
-    Levering(600, 0.0, 0.0, 0.23, 0.01),
+    Levering(50, 1.0, 9.8, 0.23, 0.01, 0.02),
+    Levering(175, 0.5, 4.9, -0.229, 0.005),
+    Levering(300, 0.0, 0.0, 0.23, 0.005),
 )
 """On the left with a ring on the shaft, then on the right without, then nothing."""
 CARRYING = ControlParams(motor_share=1.0, share_slew=10.0, ref_xm=2e-6, ref_ym=-3e-6, gamma=-0.03, i_x=0.1, i_ramp=5.0)
@@ -110,7 +110,7 @@ def test_right_hand_side_equals_the_core(spread: float) -> None:
 
 
 def test_core_equals_the_reference_in_closed_loop() -> None:
-    """0.12 s: start-up, rotation at 40 rad/s, motor currents, weights handed over and taken off."""
+    """0.06 s: start-up, rotation at 40 rad/s, motor currents, weights handed over and taken off."""
     p = blemished()
     core, python = run_core(p, CONTROL, TICKS), simulate(p, CONTROL, START, TICKS, hangings=HANGINGS)
     assert np.abs(core.s[:, 1]).max() > 1e-5  # something happened
@@ -135,8 +135,8 @@ def test_what_the_chain_adds_equals_the_reference(
 ) -> None:
     """The lever and the ring act in all of them. The motor takes over from the first tick, so the rotor must be light."""
     p = dataclasses.replace(blemished(), **change)
-    core = run_core(p, control, 700, start, LEVERINGS, hangings=LIGHT)
-    python = simulate(p, control, start, 700, hangings=LIGHT, leverings=LEVERINGS)
+    core = run_core(p, control, 350, start, LEVERINGS, hangings=LIGHT)
+    python = simulate(p, control, start, 350, hangings=LIGHT, leverings=LEVERINGS)
     assert error(core.s, python.s) < 1e-6
     assert error(core.currents, python.currents) < 1e-6
 
@@ -146,20 +146,20 @@ def test_the_brake_works_while_no_drive_drives() -> None:
         dataclasses.replace(blemished(), brake=0.3, drag_share=0.0),
         ControlParams(kp_theta=0.0, kd_theta=0.0, ki_theta=0.0),
     )
-    drivings = (Driving(100, 30.0, 20.0, 8.0, 400.0), Driving(500, 0.0, 0.0, 0.0, 0.0))
-    core = run_core(p, released, 800, START, (), drivings)
-    python = simulate(p, released, START, 800, hangings=HANGINGS, drivings=drivings)
+    drivings = (Driving(100, 30.0, 20.0, 8.0, 400.0), Driving(300, 0.0, 0.0, 0.0, 0.0))
+    core = run_core(p, released, 500, START, (), drivings)
+    python = simulate(p, released, START, 500, hangings=HANGINGS, drivings=drivings)
     assert error(core.s, python.s) < 1e-6
-    decelerations = -np.diff(core.s[[0, 90, 510, 790], 11])[[0, 2]] / np.array([90, 280]) / 1e-4
-    drag = p.viscous * core.s[[45, 650], 11]
+    decelerations = -np.diff(core.s[[0, 90, 310, 490], 11])[[0, 2]] / np.array([90, 180]) / 1e-4
+    drag = p.viscous * core.s[[45, 400], 11]
     np.testing.assert_allclose(decelerations, (drag + p.coulomb + 0.3) / p.polar_inertia, rtol=0.02)
 
 
 @pytest.mark.parametrize("change", [{"hysteresis": 0.0}, {"alpha_d": 12.2}, {"polar_inertia": 0.0331}])
 def test_the_comparison_sees_a_small_difference(change: dict[str, float]) -> None:
     p = blemished()
-    core = run_core(p, CONTROL, 400)
-    other = simulate(dataclasses.replace(p, **change), CONTROL, START, 400, hangings=HANGINGS)
+    core = run_core(p, CONTROL, 250)
+    other = simulate(dataclasses.replace(p, **change), CONTROL, START, 250, hangings=HANGINGS)
     assert error(core.s, other.s) > 1e-6
 
 
@@ -177,7 +177,7 @@ def test_reference_against_dop853_and_order_of_convergence() -> None:
 
     The fastest process is the 1 kHz amplifier: at one step per tick the error is 2e-5 in position.
     """
-    p, ticks = blemished(), 600
+    p, ticks = blemished(), 320
     exact = simulate(p, CONTROL, START, ticks, hangings=HANGINGS, advance=dop853).s
     solutions = {n: solution(p, n, ticks) for n in (1, 2, 4)}
     assert error(solutions[4], exact) < 1e-6
@@ -193,8 +193,8 @@ def test_core_converges_with_its_substeps_to_the_reference() -> None:
     plant = Plant(p, control=CONTROL, substeps=8)
     plant.set_state(np.array(START))
     plant.mode = LEVITATE
-    plant.run(200)
-    coarse, fine = solution(p, 2, 200)[-1], solution(p, 8, 200)[-1]
+    plant.run(80)
+    coarse, fine = solution(p, 2, 80)[-1], solution(p, 8, 80)[-1]
     found = plant.state()["s"]
     np.testing.assert_allclose(found[:12], fine[:12], rtol=1e-9, atol=1e-15)
     assert np.abs(found - coarse)[:3].max() > 1e-13

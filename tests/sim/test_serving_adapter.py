@@ -109,7 +109,7 @@ def test_a_destroyed_frame_shows_in_the_status_once_and_an_adapter_off_the_bus_a
     assert not device.hears
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(
     data=st.one_of(
         st.binary(max_size=300), st.text("StTbBdDrRYOCFVNZ0123456789ABCDEF\r", max_size=300).map(str.encode)
