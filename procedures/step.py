@@ -231,8 +231,9 @@ Rise is read from the curve of which the telemetry's samples are the means: the 
 sum. Bandwidth is that of the Fourier transform of the response's derivative, from the samples and, after 8 ms, the fitted
 curve, freed of what a mean over 1 ms takes away; telemetry ends at 500 Hz.
 
-Overshoot, rise, settling and error belong to steps of their size and direction. Scatter is that of the repeats; noise is the
-same for all steps of a setting, an axis and a speed. Lengths are those of the position sensors, within their gains.
+Overshoot, rise, settling, error and bandwidth belong to steps of their size and direction. Scatter is that of the repeats that
+begin alike; noise is the same for all steps of a setting, an axis and a speed.
+Lengths are those of the position sensors, within their gains.
 """
 
 procedure = Procedure(

@@ -138,8 +138,10 @@ def _jackknifed(
         o, n = ones[case], len(ones[case])
         value = of(all_of[0], o)
         left = np.array([of(s, [x for j, x in enumerate(o) if j != k]) for k, s in enumerate(all_of[1:])])
+        if not np.isfinite([value, *left]).all():
+            continue
         within, dof = _alike([x.begin for x in o], left)
-        if np.isfinite([value, *left]).all() and dof:
+        if dof:
             seen.values[case], seen.dof[case] = value, dof
             seen.variances[case] = (n - 1) ** 2 / n * within / dof
     return seen
