@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.cli.virtual import simulate
-from bench.errors import AnalysisError
+from bench.errors import AnalysisError, BenchError
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.recording import Recording
@@ -114,10 +114,9 @@ def test_contact_of_a_law_under_test_never_passes(tmp_path: Path) -> None:
     assert {f.code: f.effect for f in findings}["contact"] is Effect.INDETERMINATE
 
 
-def test_without_a_drive_nothing_is_measured_at_speed(tmp_path: Path) -> None:
-    measured, findings = tracked(tmp_path, speed_rad_s=1000.0, hz=2.0, **ONE)
-    assert measured == {}
-    assert [(f.code, f.effect) for f in findings] == [("speed-not-reached", Effect.ERROR)]
+def test_a_drive_that_is_too_weak_ends_the_run(tmp_path: Path) -> None:
+    with pytest.raises(BenchError, match="OVERLOAD"):
+        tracked(tmp_path, 1, {"drive_limit": 0.002}, speed_rad_s=1000.0, hz=2.0, **ONE)
 
 
 def test_plans_that_cannot_work_are_refused() -> None:
