@@ -12,7 +12,6 @@ from typing import Literal
 
 from pydantic import Field
 
-from bench.errors import DeviceFault, LinkError
 from bench.figures import Figure
 from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
@@ -21,18 +20,13 @@ from bench.recording import Recording
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
-from bench.states import transition
+from procedures import probing
 from procedures import tracking_figures as drawn
 from procedures.estimators import tracking_checks, tracking_estimates, tracking_wiring
 from procedures.estimators.tracking_data import (
     CHANNELS,
-    LIFT,
-    LIFT_LOST,
-    NO_SPEED,
     ORBIT,
     POSITIONS,
-    PROBE,
-    REST,
     START,
     STARTED,
     read_orbits,
@@ -64,7 +58,6 @@ LENGTHS = ("com_to_inboard_sensor", "com_to_outboard_sensor", "clearance")
 MARK_M = 15e-6  # of the jump that the reference starts with
 GROW, GROW_S = 25, 0.02
 STANDS_S = 1.0  # the controller knows half a second after the last pulse that the shaft stands
-NUDGES = (("ref_y", 10e-6), ("ref_theta", 100e-6))
 NEAR = 0.95  # of the ring's clearance: no reference may go further
 
 
@@ -103,20 +96,15 @@ def settings(plan: Plan) -> dict[str, float]:
 
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records, for the progress display."""
-    return 3 + 2 * len(NUDGES) + len(plan.order)
+    return probing.STEPS + 1 + len(plan.order)
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Look at the rotor on its rings, lift it, nudge it, spin it up, and let it follow the reference with each law."""
-    with record.step(REST):
-        rig.clock.sleep(0.3)
-    if any(rig.levitation.reading(name) > 0 for name in POSITIONS):
-        return  # it lies below: a probe that says otherwise would close a loop the wrong way round
-    if not _lifted(rig, record):
+    if not probing.probed(rig, record):
         return
-    _nudged(rig, record)
     _started(rig, plan, record)
-    if plan.speed_rad_s and not _spun(rig, plan, record):
+    if plan.speed_rad_s and not probing.turned(rig, record, plan.speed_rad_s, plan.settle_s):
         return
     for law in plan.order:
         _orbit(rig, plan, record, law)
@@ -125,41 +113,6 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         rig.drive.stop()
     rig.levitation.set("law", CODES["PID"])
     rig.clock.sleep(STANDS_S)
-
-
-def _lifted(rig: Rig, record: Recorder) -> bool:
-    with record.step(LIFT):
-        try:
-            transition(rig, RigState.LEVITATED)
-            rig.clock.sleep(0.5)
-        except DeviceFault as fault:
-            record.event(LIFT_LOST, fault=str(fault))
-            return False
-    return True
-
-
-def _nudged(rig: Rig, record: Recorder) -> None:
-    """The set point of y and of the tilt about z, a little aside: shows whose reading is whose."""
-    for name, aside in NUDGES:
-        for value in (0.0, aside):
-            rig.levitation.set(name, value)
-            rig.clock.sleep(0.5)
-            with record.step(PROBE, name=name, value=value):
-                rig.clock.sleep(0.2)
-        rig.levitation.set(name, 0.0)
-    rig.clock.sleep(0.5)
-
-
-def _spun(rig: Rig, plan: Plan, record: Recorder) -> bool:
-    try:
-        if rig.drive is None:
-            raise LinkError("the rig has no drive")
-        rig.drive.reach(plan.speed_rad_s)
-    except LinkError as error:
-        record.event(NO_SPEED, wanted=plan.speed_rad_s, why=str(error))
-        return False
-    rig.clock.sleep(plan.settle_s)
-    return True
 
 
 def _started(rig: Rig, plan: Plan, record: Recorder) -> None:

@@ -1,0 +1,139 @@
+"""Runout of a levitated shaft from a slow roll: what the probes read less what the shaft does, by the balance of forces.
+
+A shaft on bearings with a stiff loop does not lie still at slow roll. The loop takes the runout for motion and moves the
+shaft against it: with the sensitivity S of the loop the probes read S R of a runout R, and the shaft moves by -(1 - S) R.
+At a few Hz abs(S) is far from 1, so that the slow-roll reading itself is not the runout and must not be subtracted as such.
+The coils tell what the shaft does. With the vectors of order n at w = n times the speed,
+
+    (D(w) - A' K_x A) q = A' (K_p I_p + K_n I_n) + w^2 B' U   (U at n = 1 alone),   R = M/g - A_s q,
+
+q the shaft's (y, z, psi, theta), A, A_s, B its arms at AMBs, probes and balancing planes, K_p, K_n, K_x the slopes of
+T (2.4b) at the mean currents and place, D = -w^2 M + j w G + K_c. U is what the same balance gives at a high speed with
+the runout just found; at slow roll its share is w^2 U over the stiffness.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+ROUNDS = 4  # U changes R by little, R changes U by little
+
+
+@dataclass(frozen=True)
+class Stand:
+    """What the balance needs, SI. `beta`, `offset`, `gain` (4,) in the order yi zi yo zo; `zero` (4,) of the probes; of the
+    eight coils `i_gain`, `i_zero`; lengths from the centre of mass."""
+
+    beta: Array
+    offset: Array
+    gain: Array
+    zero: Array
+    i_gain: Array
+    i_zero: Array
+    gap: float
+    coupling: float
+    mass: float
+    inertia: float
+    polar: float
+    l_ia: float
+    l_oa: float
+    l_is: float
+    l_os: float
+    l_iu: float
+    l_ou: float
+    l_c: float
+
+    @classmethod
+    def of(cls, v: Mapping[str, float]) -> Stand:
+        """From numbers by name, those of an array with `_0`, `_1`, ... ."""
+        sizes = {"beta": 4, "offset": 4, "gain": 4, "zero": 4, "i_gain": 8, "i_zero": 8}
+        arrays = {name: np.array([v[f"{name}_{k}"] for k in range(n)]) for name, n in sizes.items()}
+        rest = ("gap", "coupling", "mass", "inertia", "polar", "l_ia", "l_oa", "l_is", "l_os", "l_iu", "l_ou", "l_c")
+        return cls(**arrays, **{name: v[name] for name in rest})
+
+
+@dataclass(frozen=True)
+class Turning:
+    """Mean readings (12,) and vectors of one order (12,), four probes and eight coils (p, n by axis), at a speed in rad/s."""
+
+    speed: float
+    means: Array
+    vectors: Complex
+
+
+def arms(inboard: float, outboard: float) -> Array:
+    """Displacements yi zi yo zo of two planes from y z psi theta."""
+    return np.array([[1, 0, 0, -inboard], [0, 1, inboard, 0], [1, 0, 0, outboard], [0, 1, -outboard, 0.0]])
+
+
+def impedance(s: Stand, k_x: Array, speed: float, w: float) -> Complex:
+    """D(w) - A' K_x A, (4, 4) N/m and N m."""
+    gyro = np.zeros((4, 4))
+    gyro[2, 3], gyro[3, 2] = s.polar * speed, -s.polar * speed
+    end = np.array([[1, 0, 0, -s.l_c], [0, 1, s.l_c, 0.0]])
+    at = arms(s.l_ia, s.l_oa)
+    still = s.coupling * end.T @ end - at.T @ np.diag(k_x) @ at
+    return np.asarray(-(w**2) * np.diag([s.mass, s.mass, s.inertia, s.inertia]) + 1j * w * gyro + still)
+
+
+def slopes(s: Stand, means: Array) -> tuple[Array, Array, Array]:
+    """K_p, K_n N/A and K_x N/m of the four axes, at mean readings (12,)."""
+    i = (means[4:] - s.i_zero) / s.i_gain
+    p, n = i[::2], i[1::2]
+    place = arms(s.l_ia, s.l_oa) @ np.linalg.solve(arms(s.l_is, s.l_os), (means[:4] - s.zero) / s.gain)
+    near, far = s.gap - place - s.offset, s.gap + place + s.offset
+    return (
+        2 * s.beta * p / near**2,
+        -2 * s.beta * n / far**2,
+        2 * s.beta * (p**2 / near**3 + n**2 / far**3),
+    )
+
+
+def pushed(s: Stand, turning: Turning) -> tuple[Complex, Array]:
+    """Forces and moments (4,) of the control currents, and K_x (4,)."""
+    k_p, k_n, k_x = slopes(s, turning.means)
+    i = turning.vectors[4:] / s.i_gain
+    return np.asarray(arms(s.l_ia, s.l_oa).T @ (k_p * i[::2] + k_n * i[1::2])), k_x
+
+
+def unbalances(s: Stand, turning: Turning, runout: Complex) -> tuple[Complex, float]:
+    """Unbalance (2,) kg m, e^(j angle from the mark), by least squares; the share of the forces that it leaves unexplained."""
+    force, k_x = pushed(s, turning)
+    w = turning.speed
+    q = np.linalg.solve(arms(s.l_is, s.l_os), turning.vectors[:4] / s.gain - runout)
+    inertial = impedance(s, k_x, w, w) @ q
+    acts = w**2 * arms(s.l_iu, s.l_ou).T @ np.array([[1, 0], [-1j, 0], [0, 1], [0, -1j]])
+    scale = np.array([1, 1, 10, 10])[:, None]  # moments at arms of 0.1 m
+    target = scale * (inertial - force)[:, None]
+    u = np.linalg.lstsq(scale * acts, target, rcond=None)[0]
+    left = float(np.linalg.norm(target - scale * acts @ u))
+    whole = float(np.linalg.norm(scale[:, 0] * inertial) + np.linalg.norm(scale[:, 0] * force))
+    return u[:, 0], left / whole
+
+
+def moved(s: Stand, turning: Turning, order: float, unbalance: Complex) -> Complex:
+    """What the shaft itself does at the probes (4,) m, by the balance of forces."""
+    force, k_x = pushed(s, turning)
+    w = order * turning.speed
+    if order == 1:
+        planes = np.array([unbalance[0], -1j * unbalance[0], unbalance[1], -1j * unbalance[1]])
+        force = force + w**2 * arms(s.l_iu, s.l_ou).T @ planes
+    return np.asarray(arms(s.l_is, s.l_os) @ np.linalg.solve(impedance(s, k_x, turning.speed, w), force))
+
+
+def found(s: Stand, slow: Turning, fast: Turning | None, order: float = 1.0) -> tuple[Complex, Complex, Complex, float]:
+    """Runout (4,) m, what the shaft did at slow roll (4,) m, unbalance (2,) kg m, and the share of the forces at `fast` that
+    is not explained."""
+    unbalance, misfit = np.zeros(2, complex), 0.0
+    for _ in range(ROUNDS if order == 1 and fast is not None else 1):
+        shaft = moved(s, slow, order, unbalance)
+        runout = slow.vectors[:4] / s.gain - shaft
+        if fast is not None and order == 1:
+            unbalance, misfit = unbalances(s, fast, runout)
+    return runout, shaft, unbalance, misfit

@@ -1,0 +1,256 @@
+"""What can be wrong with the dwells of a turning shaft, and what their data can say about it. Each check names its suspect."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+
+from bench.analysis.tachometer import against
+from bench.analysis.vectors import radius2
+from bench.capture import Layout
+from bench.errors import BenchError
+from bench.findings import Effect, Finding
+from bench.recording import Recording
+from bench.rigfile import RigFile
+from procedures.estimators.unbalance_data import (
+    CONTACT,
+    CURRENT_LIMIT,
+    DWELL,
+    RANGE,
+    RECORDED,
+    RPM,
+    SLOW,
+    VOLTAGE_LIMIT,
+    Dwell,
+)
+from procedures.estimators.unbalance_estimates import Result, Results
+
+HELD = 8  # samples in a row at an extreme: a probe that clips
+SLOW_MOST = 0.15  # of the lowest speed of the plan, at slow roll, and of the loop's own frequency
+LOOP_RAD_S = 390.0  # sqrt(k1) of T Table 2.4: the rigid modes
+TURNS = 20  # that a slow roll needs
+PER_TURN = 4.0  # samples in a turn of the highest order
+UNEXPLAINED = 0.2  # share of the forces that two unbalances leave over: a channel is not what its name says
+CHANGED, CHANGED_M = 0.1, 0.3e-6  # of the vector, and at least: a repeat that differs by more
+ZONES = (("A", 0.3), ("B", 0.4), ("C", 0.5), ("D", math.inf))
+"""Upper ends of the zones, D_max over the least clearance (ISO 14839-2, Table 1: numbers not checked against the standard)."""
+
+
+class Settings(Protocol):
+    """The part of a plan that these checks need."""
+
+    @property
+    def slow_rad_s(self) -> float: ...
+    @property
+    def slow_s(self) -> float: ...
+    @property
+    def speeds_rad_s(self) -> tuple[float, ...]: ...
+    @property
+    def variants(self) -> tuple[Any, ...]: ...
+    @property
+    def law(self) -> str: ...
+    @property
+    def observed(self) -> bool: ...
+    @property
+    def capture_s(self) -> float: ...
+    @property
+    def rate_hz(self) -> float: ...
+    @property
+    def orders(self) -> int: ...
+    @property
+    def max_lost(self) -> float: ...
+    @property
+    def max_speed_error(self) -> float: ...
+
+
+def zone(share: float) -> str:
+    """Letter of the zone of a share of the clearance."""
+    return next(name for name, end in ZONES if share <= end)
+
+
+def of_plan(rig: RigFile, plan: Settings) -> Iterable[str]:
+    """What cannot work, before anything starts."""
+    speeds, most = plan.speeds_rad_s, rig.envelope.max_speed_rad_s
+    landing = rig.parameters["landing_speed"].default if "landing_speed" in rig.parameters else 0.0
+    if max(speeds) > most:
+        yield f"speeds_rad_s: found {max(speeds) * RPM:.0f} r/min; the envelope allows {most * RPM:.0f} r/min"
+    if min(speeds) <= 2 * landing or len(set(speeds)) < len(speeds):
+        yield f"speeds_rad_s: expected each once, and above {2 * landing * RPM:.0f} r/min, twice the landing speed"
+    if len(set(plan.variants)) < len(plan.variants) or (plan.observed and plan.law == "PID"):
+        yield "variants: expected each once, and with law PID off alone: only the flatness laws compensate"
+    if 0 < plan.slow_rad_s < 15 or plan.slow_rad_s > too_fast(plan):
+        yield (f"slow_rad_s: found {plan.slow_rad_s * RPM:.0f} r/min; expected 0, or 143 (two turns a second and some more) to "
+               f"{too_fast(plan) * RPM:.0f} r/min: faster, unbalance moves the shaft")  # fmt: skip
+    if plan.slow_rad_s and plan.slow_rad_s * plan.slow_s < 2 * math.pi * TURNS:
+        yield f"slow_s: found {plan.slow_s:g} s; expected {TURNS} turns at {plan.slow_rad_s * RPM:.0f} r/min or more"
+    highest = plan.orders * max(speeds) / (2 * math.pi)
+    if plan.rate_hz < PER_TURN * highest:
+        yield (f"rate_hz: found {plan.rate_hz:g}; expected {PER_TURN * highest:.0f} Hz or more for order {plan.orders} at "
+               f"{max(speeds) * RPM:.0f} r/min: what is above half of the rate folds back")  # fmt: skip
+    if rig.capture is None:
+        yield "capture: the controller has none; orbits and D_max are read at its full rate"
+        return
+    try:
+        size = Layout.of(rig.capture, RECORDED).sample.itemsize * plan.capture_s * plan.rate_hz
+    except BenchError as error:
+        yield str(error)
+        return
+    if size > rig.capture.memory_bytes:
+        yield f"capture_s: needs {size:.0f} bytes; the controller has {rig.capture.memory_bytes}"
+    if plan.capture_s * min(speeds) < 10 * math.pi:
+        yield f"capture_s: found {plan.capture_s:g} s; expected five turns at {min(speeds) * RPM:.0f} r/min or more"
+
+
+def too_fast(plan: Settings) -> float:
+    """Above this speed in rad/s a slow roll is none."""
+    return SLOW_MOST * min(*plan.speeds_rad_s, LOOP_RAD_S) if plan.speeds_rad_s else 0.0
+
+
+def before(recording: Recording[Any]) -> Iterator[Finding]:
+    """Nothing to evaluate; the landing of a controller that gave up is told by the run itself."""
+    if not len(recording.steps(DWELL)):
+        yield Finding("no-dwells", "no dwell was recorded", "", Effect.ERROR)
+
+
+def of_signals(dwells: Sequence[Dwell], plan: Settings) -> Iterator[Finding]:
+    """Lost samples, pulses, probes that clip or stand still, contact, limits, sampling, speed."""
+    for d in dwells:
+        share = d.lost / max(d.expected, 1)
+        if share > plan.max_lost:
+            yield Finding(
+                "missing-samples",
+                f"{share:.2%} of the samples are missing ({plan.max_lost:.2%} is allowed). Look at the link: load, cable, "
+                "gateway.",
+                d.where, Effect.INDETERMINATE,
+            )  # fmt: skip
+        for name in d.stuck:
+            yield Finding("stuck-channel", f"{name} does not move at all; a live sensor has noise.", name, Effect.ERROR)
+        yield from _pulses(d)
+        yield from _limits(d)
+        off = abs(d.speed / d.wanted - 1)
+        if off > plan.max_speed_error:
+            yield Finding("speed-off", f"the pulses say {d.speed * RPM:.0f} r/min, {off:.1%} off.", d.where, Effect.INDETERMINATE)
+    yield from _sampling(dwells, plan)
+    yield from _slow(dwells, plan)
+
+
+def _pulses(d: Dwell) -> Iterator[Finding]:
+    """One a turn: by their spacing, and where that is even, by the drive's own speed."""
+    other = against(d.tacho, d.driven or d.wanted)
+    parts = [("missing", d.tacho.missing), ("doubled", d.tacho.doubled)]
+    for kind, times in parts:
+        if times or other == kind:
+            count = f"{len(times)} times" if times else f"against the drive's {(d.driven or d.wanted) * RPM:.0f} r/min"
+            text = f"once-per-turn pulses are {kind}, {count}: the phases are worth nothing. Look at the pickup and its level."
+            yield Finding(f"pulse-{kind}", text, d.where, Effect.ERROR)
+
+
+def _limits(d: Dwell) -> Iterator[Finding]:
+    if d.flags & RANGE or d.clips >= HELD:
+        text = "a position sensor stood at the end of its range: what it shows of the orbit is cut off."
+        yield Finding("sensor-clipped", text, d.where, Effect.ERROR)
+    for bits, code, text in (
+        (CONTACT, "contact", "the shaft touched a ring or the axial stop: this is not its response to unbalance."),
+        (CURRENT_LIMIT, "current-saturated", "a coil current was at its limit: the response is not linear."),
+        (VOLTAGE_LIMIT, "voltage-saturated", "an amplifier's voltage was at its limit: the currents slewed (T Fig. 2.9)."),
+    ):
+        if d.flags & bits:
+            yield Finding(code, text, d.where, Effect.INDETERMINATE)
+
+
+def _sampling(dwells: Sequence[Dwell], plan: Settings) -> Iterator[Finding]:
+    """The capture must be fast enough for the orders asked."""
+    for d in dwells:
+        if d.full is None:
+            continue
+        need = PER_TURN * plan.orders * d.speed / (2 * math.pi)
+        if d.full.rate < need:
+            text = (f"captured at {d.full.rate:g} Hz; order {plan.orders} needs {need:.0f} Hz: what is above half of the rate "
+                    "appears at other frequencies, and D_max misses peaks.")  # fmt: skip
+            yield Finding("aliasing", text, d.where, Effect.ERROR)
+
+
+def _slow(dwells: Sequence[Dwell], plan: Settings) -> Iterator[Finding]:
+    """Is there a slow roll, and was it slow?"""
+    slow = [d for d in dwells if d.kind == SLOW]
+    if not slow:
+        text = "no slow roll: what the probes read of the journals' runout is in every vector, as if it were unbalance."
+        yield Finding("no-slow-roll", text, "", Effect.INDETERMINATE)
+    elif slow[0].speed > 1.02 * too_fast(plan):
+        text = (f"the slow roll was made at {slow[0].speed * RPM:.0f} r/min; above {too_fast(plan) * RPM:.0f} r/min unbalance and "
+                "the loop's own response are in it.")  # fmt: skip
+        yield Finding("slow-roll-too-fast", text, slow[0].where, Effect.INDETERMINATE)
+
+
+def of_results(results: Results, plan: Settings) -> Iterator[Finding]:
+    """Do forces and motion agree? Is a repeat the same? Then zones and the runout, as notes."""
+    yield from _channels(results)
+    yield from _repeats(results)
+    yield from _told(results)
+    if plan.variants:
+        yield from _zones(results)
+
+
+def _channels(results: Results) -> Iterator[Finding]:
+    """Two unbalances must explain motion less control forces of all four axes: they do not where channels are exchanged."""
+    worst = max(results.dwells, key=lambda r: r.misfit)
+    if worst.misfit > UNEXPLAINED:
+        text = (f"no unbalance in the two planes explains motion and currents: {worst.misfit:.0%} of the forces are left over "
+                f"({UNEXPLAINED:.0%} is allowed). Suspect the polarity of a probe, exchanged planes or axes, or exchanged coils.")  # fmt: skip
+        yield Finding("forces-disagree", text, worst.dwell.where, Effect.ERROR)
+
+
+def _repeats(results: Results) -> Iterator[Finding]:
+    """The lowest speed again at the end: a weight that came loose, a shaft that bent."""
+    for again in (r for r in results.dwells if r.dwell.again):
+        first = next(
+            r for r in results.dwells
+            if not r.dwell.again and r.dwell.wanted == again.dwell.wanted and r.dwell.variant == again.dwell.variant
+        )  # fmt: skip
+        a, b = first.dwell.readings(), again.dwell.readings()
+        moved, size = np.abs(b.values - a.values), np.abs(a.values)
+        noise = np.sqrt(radius2(min(a.dof, b.dof))) * np.hypot(a.u_amplitude, b.u_amplitude)
+        over = moved - noise - np.maximum(CHANGED * size, CHANGED_M)
+        k = int(np.argmax(over))
+        if over[k] > 0:
+            before, after = first.unbalance, again.unbalance
+            turn = np.degrees(np.angle(after / before))
+            text = (f"a vector changed by {moved[k] * 1e6:.2f} µm between the first and the last dwell at "
+                    f"{again.dwell.wanted * RPM:.0f} r/min; by the forces, the unbalance went from "
+                    f"{abs(before[0]) * 1e6:.2f} and {abs(before[1]) * 1e6:.2f} g mm to {abs(after[0]) * 1e6:.2f} and "
+                    f"{abs(after[1]) * 1e6:.2f} g mm, turned by {turn[0]:+.0f}° and {turn[1]:+.0f}°. Suspect a weight that came "
+                    "loose, or a shaft that bent as it warmed.")  # fmt: skip
+            yield Finding("response-changed", text, again.dwell.where, Effect.ERROR)
+
+
+def _told(results: Results) -> Iterator[Finding]:
+    """What was subtracted, and when it was measured."""
+    slow, first = results.slow, results.runouts[1.0]
+    if slow is None:
+        return
+
+    def polar(values: np.ndarray) -> str:
+        return ", ".join(f"{abs(v) * 1e6:.2f} µm ∠{-np.degrees(np.angle(v)) % 360:.0f}°" for v in values)
+
+    text = (f"of yi, zi, yo, zo (0-pk, phase lag), at {slow.speed * RPM:.0f} r/min, {slow.date}: the probes read "
+            f"{polar(first.reading)}; by the forces the shaft itself moved {polar(first.shaft)}; subtracted is the runout "
+            f"{polar(first.values)}.")  # fmt: skip
+    yield Finding("slow-roll", text, slow.where)
+
+
+def _zones(results: Results) -> Iterator[Finding]:
+    """Of each setting, where D_max is greatest."""
+    for variant in results.variants:
+        shares = [
+            (e.value, place, r) for r in results.of(variant) for (name, place), e in r.estimates.items() if name == "d_max_share"
+        ]
+        most, place, r = max(shares, key=lambda s: s[0])
+        text = (f"{variant}: D_max is greatest {place} at {r.dwell.wanted * RPM:.0f} r/min, {most:.1%} of the clearance: zone "
+                f"{zone(most)} of ISO 14839-2.")  # fmt: skip
+        yield Finding("zone", text, f"{place}, {r.dwell.where}")
+
+
+__all__ = ["Result", "before", "of_plan", "of_results", "of_signals", "too_fast", "zone"]

@@ -1,0 +1,286 @@
+"""From dwells to estimates with influences: probes' certificates, runout by the slow roll, scatter, tachometer."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.analysis.orbits import Ellipse, ellipse
+from bench.analysis.vectors import Vectors, estimates
+from bench.rigfile import RigFile
+from bench.uncertainty import Estimate, Influence, propagate
+from bench.uncertainty.estimate import merged
+from procedures.estimators import runout
+from procedures.estimators.inputs import certified
+from procedures.estimators.runout import Stand, Turning
+from procedures.estimators.unbalance_data import AXES, COILS, PLANES, SLOW, Dwell
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+LSB_RAD = 2 * math.pi / 65536  # of the angle in the telemetry
+PARTS = [f"{a}{part}" for a in AXES for part in ("re", "im")]
+TURN = np.linspace(0, 2 * math.pi, 37)
+
+
+class Settings(Protocol):
+    """The part of a plan that the estimates need."""
+
+    @property
+    def beta_share(self) -> float: ...
+    @property
+    def offset_u_m(self) -> float: ...
+
+
+@dataclass(frozen=True)
+class Runout:
+    """Of one order: `parts` re, im of the four probes as Estimates (8,), `values` (4,) m, what the shaft did at slow roll
+    `shaft` (4,), what the probes read there `reading` (4,); `known` by a slow roll."""
+
+    parts: tuple[Estimate, ...]
+    values: Complex
+    shaft: Complex
+    reading: Complex
+    known: bool
+
+
+@dataclass(frozen=True)
+class Result:
+    """A dwell's estimates by name and place; `vectors` of the shaft's centre with their joint covariance; orbits by plane."""
+
+    dwell: Dwell
+    vectors: Vectors
+    orbits: Mapping[str, Ellipse]
+    centres: Mapping[str, tuple[float, float]]
+    misfit: float
+    unbalance: Complex
+    estimates: Mapping[tuple[str, str], Estimate] = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Results:
+    """All dwells; runout by order; slow roll, None where there was none; the clearance m."""
+
+    dwells: tuple[Result, ...]
+    runouts: Mapping[float, Runout]
+    slow: Dwell | None
+    clearance: Estimate
+
+    def of(self, variant: str) -> list[Result]:
+        """Dwells with one setting, the slowest first, no repeats."""
+        some = [r for r in self.dwells if r.dwell.variant == variant and not r.dwell.again]
+        return sorted(some, key=lambda r: r.dwell.speed)
+
+    @property
+    def variants(self) -> list[str]:
+        """In the order in which they were done."""
+        return list(dict.fromkeys(r.dwell.variant for r in self.dwells))
+
+
+def results(dwells: Sequence[Dwell], rig: RigFile, plan: Settings) -> Results:
+    """Estimates of every dwell."""
+    slow = next((d for d in dwells if d.kind == SLOW), None)
+    turning = [d for d in dwells if d.kind != SLOW]
+    fast = max((d for d in turning if d.variant == turning[0].variant), key=lambda d: d.speed)
+    inputs = stated(rig, plan)
+    nominal = Stand.of({name: e.value for name, e in inputs.items()})
+    runouts = {n: _runout(inputs, rig, slow, fast, n) for n in (1.0, 2.0, 3.0)}
+    clearance = certified("geometry/clearance", rig.geometry["clearance"], "least clearance")
+    done = tuple(_result(d, inputs, nominal, runouts, clearance, rig) for d in turning)
+    return Results(done, runouts, slow, clearance)
+
+
+def stated(rig: RigFile, plan: Settings) -> dict[str, Estimate]:
+    """What the rig file and the plan say of the stand (`runout.Stand`), each with its influence."""
+    g, p = rig.geometry, rig.parameters
+    out: dict[str, Estimate] = {}
+    for k, a in enumerate(AXES):
+        beta, offset = p[f"model_beta_{a}"].default, p[f"model_offset_{a}"].default
+        out[f"beta_{k}"] = _bound(f"model/beta_{a}", f"beta of {a}", beta, plan.beta_share * beta / math.sqrt(3), "rectangular")
+        out[f"offset_{k}"] = _bound(f"model/offset_{a}", f"magnetic offset of {a}", offset, plan.offset_u_m, "normal")
+        sensor = rig.sensors[f"pos_{a}"]
+        out[f"gain_{k}"] = certified(f"sensors/pos_{a}/gain", sensor.gain, f"gain of pos_{a}")
+        out[f"zero_{k}"] = certified(f"sensors/pos_{a}/offset", sensor.offset, f"zero of pos_{a}")
+    for k, c in enumerate(COILS):
+        sensor = rig.sensors[f"i_{c}"]
+        out[f"i_gain_{k}"] = certified(f"sensors/i_{c}/gain", sensor.gain, f"gain of i_{c}")
+        out[f"i_zero_{k}"] = certified(f"sensors/i_{c}/offset", sensor.offset, f"zero of i_{c}")
+    for name, key in (("gap", "amb_gap"), ("coupling", "coupling_stiffness"), ("l_ia", "com_to_inboard_amb"),
+                      ("l_oa", "com_to_outboard_amb"), ("l_is", "com_to_inboard_sensor"), ("l_os", "com_to_outboard_sensor"),
+                      ("l_iu", "com_to_inboard_balance"), ("l_ou", "com_to_outboard_balance"),
+                      ("l_c", "com_to_coupling")):  # fmt: skip
+        out[name] = certified(f"geometry/{key}", g[key])
+    for name, key in (("mass", "mass"), ("inertia", "transverse_inertia"), ("polar", "polar_inertia")):
+        out[name] = certified(f"machine/{key}", rig.machine[key])
+    return out
+
+
+def _bound(identity: str, name: str, value: float, u: float, distribution: str) -> Estimate:
+    return Estimate.of(value, Influence(identity, name, u, "", "B", distribution))  # type: ignore[arg-type]
+
+
+def _runout(inputs: Mapping[str, Estimate], rig: RigFile, slow: Dwell | None, fast: Dwell, order: float) -> Runout:
+    """By the slow roll and the forces; without one, nothing but what the rig file says of it."""
+    nothing = np.zeros(4, complex)
+    if slow is None or order not in slow.track.orders:
+        u = rig.machine["runout"].standard_uncertainty
+        parts = tuple(
+            Estimate.of(0.0, Influence(f"runout/{order:g}/{p}", "runout, no slow roll", u, "m", "B", "normal")) for p in PARTS
+        )
+        return Runout(parts, nothing, nothing, nothing, known=False)
+    read = slow.both(order)
+    scatter = estimates(read.parts, read.covariance, f"scatter/slow/{order:g}", "scatter at slow roll", "", read.dof)
+    high = Turning(fast.speed, fast.means, fast.both().values)
+
+    def model(v: dict[str, float]) -> dict[str, float]:
+        vectors = np.array([v[f"s{2 * k}"] + 1j * v[f"s{2 * k + 1}"] for k in range(12)])
+        found, *_ = runout.found(Stand.of(v), Turning(slow.speed, slow.means, vectors), high, order)
+        return dict(zip(PARTS, np.ascontiguousarray(found).view(float), strict=True))
+
+    out = propagate(model, {**inputs, **{f"s{k}": e for k, e in enumerate(scatter)}})
+    parts = tuple(Estimate(out[p].value, "m", out[p].sensitivities) for p in PARTS)
+    at = Turning(slow.speed, slow.means, read.values)
+    nominal = Stand.of({name: e.value for name, e in inputs.items()})
+    values, shaft, _, _ = runout.found(nominal, at, high, order)
+    return Runout(parts, values, shaft, read.values[:4], known=True)
+
+
+def _result(
+    d: Dwell, inputs: Mapping[str, Estimate], nominal: Stand, runouts: Mapping[float, Runout], clearance: Estimate, rig: RigFile
+) -> Result:
+    parts = {n: _shaft(d, inputs, runouts[n], n) for n in d.track.orders if n in runouts}
+    values = np.array([parts[1.0][2 * k].value + 1j * parts[1.0][2 * k + 1].value for k in range(4)])
+    vectors = Vectors(values, _covariance(parts[1.0]), d.readings().dof)
+    u, misfit = runout.unbalances(nominal, Turning(d.speed, d.means, d.both().values), runouts[1.0].values)
+    out: dict[tuple[str, str], Estimate] = {}
+    orbits, centres = {}, {}
+    for k, a in enumerate(AXES):
+        out["vector_cos", a] = parts[1.0][2 * k]
+        out["vector_sin", a] = -parts[1.0][2 * k + 1]
+    for plane, (y, z) in PLANES.items():
+        chosen = [2 * y, 2 * y + 1, 2 * z, 2 * z + 1]
+        orbits[plane] = ellipse(Vectors(values[[y, z]], vectors.covariance[np.ix_(chosen, chosen)], vectors.dof))
+        out["major_half_axis", plane] = _major([parts[1.0][k] for k in chosen])
+        means = [_mean(d, inputs, k) for k in (y, z)]
+        centres[plane] = (means[0].value, means[1].value)
+        far = _reach(means, {n: [p[k] for k in chosen] for n, p in parts.items()})
+        out["d_max", plane] = far
+        out["d_max_share", plane] = _unit(far / clearance, "1")
+        out |= _coils(d, inputs, plane, rig)
+    out["reading", ""] = _reading(d, inputs)
+    return Result(d, vectors, orbits, centres, misfit, u, out)
+
+
+def _shaft(d: Dwell, inputs: Mapping[str, Estimate], off: Runout, order: float) -> list[Estimate]:
+    """Parts of the shaft's vectors (8,): reading over gain, less the runout; turned by what the angle may be off."""
+    read = d.readings(order)
+    scatter = estimates(read.parts, read.covariance, f"scatter/{d.where}/{order:g}", "scatter of the dwell", "m", read.dof)
+    angle = Estimate.of(0.0, Influence("tachometer/angle", "resolution of the angle", LSB_RAD / math.sqrt(12), "rad", "B",
+                                       "rectangular"))  # fmt: skip
+    out = []
+    for k in range(8):
+        gain = inputs[f"gain_{k // 2}"]
+        across = -read.parts[k + 1] if k % 2 == 0 else read.parts[k - 1]
+        value = scatter[k].value / gain.value - off.parts[k].value
+        terms = ((1 / gain.value, scatter[k]), (-scatter[k].value / gain.value**2, gain), (-1.0, off.parts[k]),
+                 (order * across, angle))  # fmt: skip
+        out.append(Estimate(value, "m", merged(terms)))
+    return out
+
+
+def _covariance(parts: Sequence[Estimate]) -> Array:
+    """Joint covariance of estimates by their shared influences."""
+    ids = sorted({i for e in parts for i in e.contributions})
+    rows = np.array([[e.contributions.get(i, 0.0) for i in ids] for e in parts])
+    return np.asarray(rows @ rows.T)
+
+
+def _major(parts: Sequence[Estimate]) -> Estimate:
+    def model(v: dict[str, float]) -> float:
+        y, z = v["0"] + 1j * v["1"], v["2"] + 1j * v["3"]
+        return abs(y + 1j * z) / 2 + abs(y - 1j * z) / 2
+
+    return _unit(propagate(model, {str(k): e for k, e in enumerate(parts)}), "m")
+
+
+def _mean(d: Dwell, inputs: Mapping[str, Estimate], k: int) -> Estimate:
+    """Where the shaft is on the average, from the clearance's centre."""
+    return _unit((inputs[f"zero_{k}"] * -1.0 + float(d.means[k])) / inputs[f"gain_{k}"], "m")
+
+
+def _reach(means: Sequence[Estimate], parts: Mapping[float, Sequence[Estimate]]) -> Estimate:
+    """D_max of what turns with the shaft, about its mean place: the distance at the angle at which it is greatest, along the
+    direction there (the maximum does not move at first order).
+
+    A mean place that is only known to lie about the centre makes D_max greater, whichever way it lies: intervals are by
+    Monte Carlo.
+    """
+    names = [*means, *(e for four in parts.values() for e in four)]
+    fixed = [np.array([e.value]) for e in names]
+    far, way = _farthest(fixed, list(parts))
+    terms = [(float(w[0]), e) for w, e in zip(way, names, strict=True)]
+    straight = Estimate(0.0, "m", merged(terms[2:]))  # the orbit is known so well that it enters linearly
+
+    def sampler(deviations: Mapping[str, Array]) -> Array:
+        placed = _farthest([*(e.sampled(deviations) for e in means), *fixed[2:]], list(parts))[0]
+        return placed + straight.sampled(deviations)
+
+    return Estimate(float(far[0]), "m", merged(terms), sampler)
+
+
+def _farthest(values: Sequence[Array], orders: Sequence[float]) -> tuple[Array, list[Array]]:
+    """Greatest distance (s,) of paths given by their mean y, z and re, im of y, z of each order, (s,) each; its slopes."""
+    best, angle = np.zeros(len(values[0])), np.zeros(len(values[0]))
+
+    def at(theta: Array | float) -> list[Array]:
+        out = [values[0], values[1]]
+        for j, n in enumerate(orders):
+            c, s = np.cos(n * theta), np.sin(n * theta)
+            out = [out[k] + values[2 + 4 * j + 2 * k] * c - values[3 + 4 * j + 2 * k] * s for k in range(2)]
+        return out
+
+    for theta in TURN:
+        r = np.hypot(*at(float(theta)))
+        angle = np.where(r > best, theta, angle)
+        best = np.maximum(best, r)
+    towards = [x / np.maximum(best, 1e-12) for x in at(angle)]
+    slopes = list(towards)
+    for n in orders:
+        slopes += [f for k in range(2) for f in (towards[k] * np.cos(n * angle), -towards[k] * np.sin(n * angle))]
+    return best, slopes
+
+
+def _reading(d: Dwell, inputs: Mapping[str, Estimate]) -> Estimate:
+    """Root mean square of the four probes' amplitudes, runout included."""
+    read = d.readings()
+    scatter = estimates(read.parts, read.covariance, f"scatter/{d.where}/1", "scatter of the dwell", "m", read.dof)
+    size = math.sqrt(float((np.abs(read.values) ** 2).mean()))
+    terms = [(float(p) / (4 * size), e) for p, e in zip(read.parts, scatter, strict=True)]
+    terms += [(-float(abs(v) ** 2) / (4 * size), inputs[f"gain_{k}"]) for k, v in enumerate(read.values)]
+    return Estimate(size, "m", merged(terms))
+
+
+def _coils(d: Dwell, inputs: Mapping[str, Estimate], plane: str, rig: RigFile) -> dict[tuple[str, str], Estimate]:
+    """Greatest current and voltage of a plane's coils in the capture."""
+    if d.full is None:
+        return {}
+    first = 2 * PLANES[plane][0]
+    some = d.full.currents[first : first + 4]
+    k = first + int(np.argmax(some.max(axis=1)))
+    peak = float(d.full.currents[k].max())
+    noise = float(np.diff(d.full.currents[k], 3).std()) / math.sqrt(20)
+    floor = Influence(f"noise/{d.where}/{plane}", "noise in a peak", 3 * noise / math.sqrt(3), "A", "B", "rectangular")
+    current = Estimate(peak, "A", merged(((1.0, Estimate.of(0.0, floor)), (-peak, inputs[f"i_gain_{k}"]),
+                                          (-1.0, inputs[f"i_zero_{k}"]))))  # fmt: skip
+    scale = rig.capture.channels["u_yi_p"].scale if rig.capture else 0.0
+    step = Influence(f"resolution/{d.where}/{plane}", "resolution", scale / math.sqrt(12), "V", "B", "rectangular")
+    voltage = Estimate.of(float(np.abs(d.full.voltages[first : first + 4]).max()), step)
+    return {("current_peak", plane): current, ("voltage_peak", plane): voltage}
+
+
+def _unit(e: Estimate, unit: str) -> Estimate:
+    return Estimate(e.value, unit, e.sensitivities, e.sampler)

@@ -1,0 +1,216 @@
+"""Unbalance response: dwells of the turning shaft at given speeds, with slow roll, orbits and zones (T 2.6.1, Fig. 2.7).
+
+Measurands, by speed and setting: vectors of the shaft's centre of order 1 at each probe, major half axis of each plane's orbit,
+D_max and its share of the clearance (ISO 14839-2), currents and voltages of the coils.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Literal
+
+from pydantic import Field
+
+from bench.figures import Figure
+from bench.findings import Effect, Finding
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.rig import Rig
+from bench.rigfile import RigFile
+from bench.roles import RigState
+from procedures import probing
+from procedures import unbalance_figures as drawn
+from procedures.estimators import tracking_wiring, unbalance_checks, unbalance_estimates
+from procedures.estimators.unbalance_data import DWELL, RECORDED, RPM, SLOW, TOLD, read_dwells
+
+Law = Literal["PID", "CCS", "CAC"]
+Variant = Literal["off", "corrected", "literal"]
+CODES: dict[Law, float] = {"PID": 0.0, "CCS": 1.0, "CAC": 2.0}
+COSINE = Quantity("vector_cos", "m", "order 1 of the shaft's centre at a probe's plane, along the probe: cosine component, 0-pk")
+SINE = Quantity("vector_sin", "m", "as vector_cos: sine component; x = C cos θ + S sin θ, θ from the once-per-turn mark")
+MAJOR = Quantity("major_half_axis", "m", "of the order-1 orbit of the shaft's centre in a sensor plane, 0-pk")
+D_MAX = Quantity("d_max", "m", "greatest distance of the shaft's centre from the clearance's, static offset included (ISO 14839-2)")
+SHARE = Quantity("d_max_share", "1", "D_max over the least clearance")
+READ = Quantity("reading", "m", "order 1 as the probes read it, runout included: root mean square of the four amplitudes, 0-pk")
+CURRENT = Quantity("current_peak", "A", "greatest coil current of a plane")
+VOLTAGE = Quantity("voltage_peak", "V", "greatest coil voltage of a plane, either way")
+MEASURES = (COSINE, SINE, MAJOR, D_MAX, SHARE, READ, CURRENT, VOLTAGE)
+POLES = {"k1": 2e5, "k2_ccs": 400.0, "k2_cac": 400.0}  # T 3.5, with the observer
+SETTINGS: dict[Variant, dict[str, float]] = {
+    "off": {"observer": 0.0, "compensate": 0.0, "integral": 1.0},
+    "corrected": {"observer": 1.0, "compensate": 3.0, "integral": 0.0},
+    "literal": {"observer": 2.0, "compensate": 3.0, "integral": 0.0},
+}
+PARAMETERS = ("law", "ref_y", "ref_theta")
+LENGTHS = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_inboard_amb", "com_to_outboard_amb", "com_to_coupling",
+           "com_to_inboard_balance", "com_to_outboard_balance", "coupling_stiffness", "amb_gap", "clearance")  # fmt: skip
+MARGIN_S = 0.1  # of a dwell beside its capture
+STANDS_S = 1.0  # the controller knows half a second after the last pulse that the shaft stands
+
+
+class Plan(BenchPlan):
+    """Settings of the dwells, SI."""
+
+    law: Law = "CCS"
+    speeds_rad_s: tuple[float, ...] = Field((2000 / RPM, 4000 / RPM, 7000 / RPM, 10000 / RPM), min_length=1)
+    variants: tuple[Variant, ...] = Field(("off",), min_length=1)
+    slow_rad_s: float = Field(300 / RPM, ge=0)  # 0: no slow roll
+    slow_s: float = Field(10.0, ge=1)
+    settle_s: float = Field(1.5, ge=0.2)  # at a speed, and with a setting
+    dwell_s: float = Field(3.0, ge=0.5)
+    capture_s: float = Field(0.3, ge=0.05)
+    rate_hz: float = Field(10000.0, gt=0)  # of the capture
+    orders: int = Field(4, ge=1, le=10)  # that the full spectrum must show
+    repeat: bool = True  # the lowest speed again, at the end
+    beta_share: float = Field(0.05, ge=0)  # half width: how far the controller's betas may be off the bearings'
+    offset_u_m: float = Field(10e-6, ge=0)  # of its magnetic offsets, standard uncertainty
+    max_lost: float = Field(1e-3, ge=0)  # share of a dwell's samples
+    max_speed_error: float = Field(0.01, gt=0)  # share of the speed
+
+    @property
+    def observed(self) -> bool:
+        """Whether disturbances are compensated in some variant."""
+        return any(v != "off" for v in self.variants)
+
+
+def settings(plan: Plan) -> dict[str, float]:
+    """Lifted by the PID, which needs no model."""
+    return {"law": CODES["PID"], "observer": 0.0, "compensate": 0.0, **(POLES if plan.observed else {})}
+
+
+def step_count(plan: Plan) -> int:
+    """How many steps `acquire` records, for the progress display."""
+    return probing.STEPS + (plan.slow_rad_s > 0) + len(plan.speeds_rad_s) * len(plan.variants) + plan.repeat
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Look at the shaft on its rings, lift it, nudge it, roll it slowly, and let it dwell at each speed with each setting."""
+    if not probing.probed(rig, record):
+        return
+    write = rig.levitation.set
+    _put(rig, {"law": CODES[plan.law], **SETTINGS["off"]})
+    if plan.slow_rad_s:
+        if not probing.turned(rig, record, plan.slow_rad_s, plan.settle_s):
+            return
+        with record.step(SLOW, **_labels(rig, plan.slow_rad_s, "off")):
+            rig.clock.sleep(plan.slow_s)
+    if dwelt(rig, plan, record) and plan.repeat:
+        speed = min(plan.speeds_rad_s)
+        if probing.turned(rig, record, speed, plan.settle_s):
+            _put(rig, SETTINGS[plan.variants[0]])
+            rig.clock.sleep(plan.settle_s)
+            _dwell(rig, plan, record, speed, plan.variants[0], -1)
+    _put(rig, SETTINGS["off"])
+    if rig.drive is not None:
+        rig.drive.stop()
+        rig.drive.coast()
+    write("law", CODES["PID"])
+    rig.clock.sleep(STANDS_S)
+
+
+def dwelt(rig: Rig, plan: Plan, record: Recorder) -> bool:
+    """All dwells, the slowest first; False if a speed is not reached."""
+    number = 0
+    for speed in sorted(plan.speeds_rad_s):
+        _put(rig, SETTINGS[plan.variants[0]])
+        if not probing.turned(rig, record, speed, plan.settle_s):
+            return False
+        for variant in plan.variants:
+            _put(rig, SETTINGS[variant])
+            rig.clock.sleep(plan.settle_s)
+            _dwell(rig, plan, record, speed, variant, number)
+            number += 1
+    return True
+
+
+def _dwell(rig: Rig, plan: Plan, record: Recorder, speed: float, variant: Variant, number: int) -> None:
+    with record.step(DWELL, **_labels(rig, speed, variant, number)):
+        if rig.capture is not None:
+            rig.capture.arm(RECORDED, seconds=plan.capture_s, rate_hz=plan.rate_hz)
+            rig.capture.wait(plan.capture_s + 5.0)
+        rig.clock.sleep(max(plan.dwell_s - plan.capture_s, MARGIN_S))
+    if rig.capture is not None:
+        rig.capture.upload(dwell=number, speed_rad_s=speed, variant=variant)
+
+
+def _labels(rig: Rig, speed: float, variant: Variant, number: int = 0) -> dict[str, float | str | bool]:
+    driven = rig.drive.speed_rad_s if rig.drive is not None else 0.0
+    return {"speed_rad_s": speed, "variant": variant, "driven_rad_s": driven, "number": number, "again": number < 0}
+
+
+def _put(rig: Rig, values: Mapping[str, float]) -> None:
+    for name, value in values.items():
+        rig.levitation.set(name, value)
+
+
+def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
+    """Findings first, then the quantities of each dwell."""
+    early = [*tracking_wiring.before_orbits(recording), *unbalance_checks.before(recording)]
+    yield from early
+    if any(f.effect is Effect.ERROR for f in early):
+        return
+    dwells, plan = read_dwells(recording), recording.plan
+    wrong = list(unbalance_checks.of_signals(dwells, plan))
+    yield from wrong
+    if any(f.effect is Effect.ERROR for f in wrong):
+        return
+    results = unbalance_estimates.results(dwells, recording.rig, plan)
+    yield from unbalance_checks.of_results(results, plan)
+    known = {q.name: q for q in MEASURES}
+    for result in results.dwells:
+        if not result.dwell.again:
+            for (name, place), estimate in result.estimates.items():
+                yield known[name].measured(estimate, f"{place}, {result.dwell.where}" if place else result.dwell.where)
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts."""
+    lacking = [
+        f"{table}: found no {', '.join(missing)}; expected them all"
+        for table, names, found in (
+            ("channels", TOLD, rig.channels),
+            ("parameters", (*PARAMETERS, *SETTINGS["off"], *POLES), rig.parameters),
+            ("sensors", [n for n in TOLD if n.startswith(("pos_", "i_"))], rig.sensors),
+            ("geometry", LENGTHS, rig.geometry),
+        )
+        if (missing := [n for n in names if n not in found])
+    ]
+    if not any("drive" in d.roles for d in rig.devices.values()):
+        lacking.append("devices: found none in the role drive; nothing turns the shaft")
+    yield from lacking
+    if lacking:
+        return
+    yield from unbalance_checks.of_plan(rig, plan)
+
+
+def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+    """Orbits of both planes, Bode pair, polar plot, full spectra, what the coils need; empty without dwells."""
+    if any(f.effect is Effect.ERROR for f in tracking_wiring.before_orbits(recording)) or not len(recording.steps(DWELL)):
+        return ()
+    dwells = read_dwells(recording)
+    if any(f.effect is Effect.ERROR for f in unbalance_checks.of_signals(dwells, recording.plan)):
+        return ()
+    results = unbalance_estimates.results(dwells, recording.rig, recording.plan)
+    return drawn.all_figures(results, recording.rig)
+
+
+METHOD = """\
+TODO
+"""
+
+procedure = Procedure(
+    name="unbalance",
+    title="Unbalance response of the turning shaft",
+    measures=MEASURES,
+    state=RigState.READY,
+    plan=Plan,
+    acquire=acquire,
+    analyse=analyse,
+    figures=figures,
+    check=check,
+    settings=settings,
+    step_count=step_count,
+    method=METHOD,
+)

@@ -1,0 +1,80 @@
+"""The truth of a dwell on the AMB stand: what its shaft really does, from the same plant without noise and rounding.
+
+The probes' readings of that plant, less gain, zero and runout, are the shaft's centre in the probes' planes.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.analysis.orders import synchronous
+from bench.analysis.sampling import Sampling
+from bench.analysis.tachometer import counted, tachometer
+from sim_backend.core import LEVITATE, LIFT, READY, TICK_S, DriveLaw
+from sim_backend.core.amb import TRACE, AmbPlant
+from sim_backend.core.amb_params import AmbControl, AmbParams
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+SILENT = {"position_noise": 0.0, "current_noise": 0.0, "position_lsb": 0.0, "current_lsb": 0.0}
+DRIVE = DriveLaw(gain=0.02, limit=0.2, ramp=210.0)
+LIFT_S = 1.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Motion:
+    """Vectors of order 1 from the once-per-turn mark: `read` by the probes over their gain, `shaft` of the shaft's centre, (4,)
+    m, yi zi yo zo; `d_max` (2,) m, the greatest distance of the shaft's centre from the rings' in each sensor plane."""
+
+    read: Complex
+    shaft: Complex
+    d_max: tuple[float, float]
+
+
+def motion(p: AmbParams, settings: Mapping[str, float], speed: float, settle_s: float = 3.0, seconds: float = 1.0) -> Motion:
+    """The shaft at `speed` rad/s under the controller's `settings` (SI, by name), once everything has settled."""
+    known = AmbControl.__dataclass_fields__
+    control = AmbControl(**{k: v for k, v in settings.items() if k in known} | {"law": 0.0, "observer": 0.0})
+    plant = AmbPlant(dataclasses.replace(p, **SILENT), 0, control=control)
+    plant.mode = READY
+    plant.run(1000)
+    plant.mode = LIFT
+    plant.run(round(LIFT_S * 1e4) + 500)
+    plant.mode = LEVITATE
+    s = plant.state()["s"]
+    s[11] = speed
+    plant.set_state(s)
+    plant.drive(DRIVE, speed)
+    for name in ("law", "observer"):
+        plant.set(name, settings[name])
+    plant.run(round(settle_s * 1e4))
+    start, (_, trace) = plant.tick, plant.run(round(seconds * 1e4), 1)
+    t = (start + np.arange(len(trace))) * TICK_S
+    tacho = tachometer(*counted(t, trace[:, TRACE.index("pulses")], trace[:, TRACE.index("pulse_age")]))
+    gain, zero = (np.array(x[:4])[:, None] for x in (p.position_gain, p.position_offset))
+    read = (trace[:, :4].T - zero) / gain
+    track = synchronous(t, read, tacho, Sampling(TICK_S))
+    angle = tacho.angle(t)
+    inside = np.isfinite(angle)
+    shaft = read[:, inside] - _runout(p, angle[inside])
+    far = [float(np.hypot(shaft[k], shaft[k + 1]).max()) for k in (0, 2)]
+    vectors = track.vectors(0, range(4)).values
+    return Motion(vectors, vectors - first(p), (far[0], far[1]))
+
+
+def first(p: AmbParams) -> Complex:
+    """Runout of order 1 at each probe as a vector from the mark, (4,) m."""
+    return np.array([p.runout[4 * k] * np.exp(1j * (p.runout_phase[4 * k] - p.pulse_angle)) for k in range(4)])
+
+
+def _runout(p: AmbParams, angle: Array) -> Array:
+    """What the journals' runout adds at each probe, (4, n) m."""
+    phi = angle - p.pulse_angle
+    return np.array([
+        sum(p.runout[4 * k + n] * np.cos((n + 1) * phi + p.runout_phase[4 * k + n]) for n in range(4)) for k in range(4)
+    ])  # fmt: skip
