@@ -48,6 +48,7 @@ PROCEDURES = (
     Entry("bearing-model", "procedures.bearing_model", "Force constants and magnetic offsets of the radial AMBs"),
     Entry("tracking", "procedures.tracking", "Following an ellipse with the centre of mass: PID, CCS and CAC"),
     Entry("unbalance", "procedures.unbalance", "Unbalance response of the turning shaft: vectors, orbits, zones"),
+    Entry("compensation", "procedures.compensation", "Compensation of unbalance: with and without it, and switched on"),
     Entry("force-map", "procedures.force_map", "Terms of the motor's force over displacement, currents and load"),
 )
 

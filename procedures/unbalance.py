@@ -6,9 +6,9 @@ D_max and its share of the clearance (ISO 14839-2), currents and voltages of the
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Literal
+from dataclasses import dataclass
+from typing import Any, Literal
 
 from pydantic import Field
 
@@ -24,16 +24,25 @@ from procedures import probing
 from procedures import unbalance_figures as drawn
 from procedures.estimators import tracking_wiring, unbalance_checks, unbalance_estimates
 from procedures.estimators.unbalance_data import DWELL, RECORDED, RPM, SLOW, TOLD, read_dwells
+from procedures.estimators.unbalance_estimates import Results
 
 Law = Literal["PID", "CCS", "CAC"]
 Variant = Literal["off", "corrected", "literal"]
 CODES: dict[Law, float] = {"PID": 0.0, "CCS": 1.0, "CAC": 2.0}
-COSINE = Quantity("vector_cos", "m", "order 1 of the shaft's centre at a probe's plane, along the probe: cosine component, 0-pk")
-SINE = Quantity("vector_sin", "m", "as vector_cos: sine component; x = C cos θ + S sin θ, θ from the once-per-turn mark")
+COSINE = Quantity(
+    "vector_cos", "m", "order 1 of the shaft's centre at a probe's plane, along the probe: cosine component, 0-pk"
+)
+SINE = Quantity(
+    "vector_sin", "m", "as vector_cos: sine component; x = C cos θ + S sin θ, θ from the once-per-turn mark"
+)
 MAJOR = Quantity("major_half_axis", "m", "of the order-1 orbit of the shaft's centre in a sensor plane, 0-pk")
-D_MAX = Quantity("d_max", "m", "greatest distance of the shaft's centre from the clearance's, static offset included (ISO 14839-2)")
+D_MAX = Quantity(
+    "d_max", "m", "greatest distance of the shaft's centre from the clearance's, static offset included (ISO 14839-2)"
+)
 SHARE = Quantity("d_max_share", "1", "D_max over the least clearance")
-READ = Quantity("reading", "m", "order 1 as the probes read it, runout included: root mean square of the four amplitudes, 0-pk")
+READ = Quantity(
+    "reading", "m", "order 1 as the probes read it, runout included: root mean square of the four amplitudes, 0-pk"
+)
 CURRENT = Quantity("current_peak", "A", "greatest coil current of a plane")
 VOLTAGE = Quantity("voltage_peak", "V", "greatest coil voltage of a plane, either way")
 MEASURES = (COSINE, SINE, MAJOR, D_MAX, SHARE, READ, CURRENT, VOLTAGE)
@@ -74,6 +83,16 @@ class Plan(BenchPlan):
         """Whether disturbances are compensated in some variant."""
         return any(v != "off" for v in self.variants)
 
+    def at(self, speed: float) -> tuple[Variant, ...]:
+        """Variants at a speed in rad/s."""
+        del speed
+        return self.variants
+
+    @property
+    def dwells(self) -> int:
+        """How many there are, the repeat not counted."""
+        return sum(len(self.at(s)) for s in self.speeds_rad_s)
+
 
 def settings(plan: Plan) -> dict[str, float]:
     """Lifted by the PID, which needs no model."""
@@ -82,31 +101,47 @@ def settings(plan: Plan) -> dict[str, float]:
 
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records, for the progress display."""
-    return probing.STEPS + (plan.slow_rad_s > 0) + len(plan.speeds_rad_s) * len(plan.variants) + plan.repeat
+    return probing.STEPS + (plan.slow_rad_s > 0) + plan.dwells + plan.repeat
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Look at the shaft on its rings, lift it, nudge it, roll it slowly, and let it dwell at each speed with each setting."""
-    if not probing.probed(rig, record):
+    if not rolled(rig, plan, record):
         return
-    write = rig.levitation.set
-    _put(rig, {"law": CODES[plan.law], **SETTINGS["off"]})
+    if dwelt(rig, plan, record):
+        repeated(rig, plan, record)
+    finished(rig)
+
+
+def rolled(rig: Rig, plan: Plan, record: Recorder) -> bool:
+    """Lifted, nudged, under the plan's law, and rolled slowly; False where the run ends here."""
+    if not probing.probed(rig, record):
+        return False
+    put(rig, {"law": CODES[plan.law], **SETTINGS["off"]})
     if plan.slow_rad_s:
         if not probing.turned(rig, record, plan.slow_rad_s, plan.settle_s):
-            return
+            return False
         with record.step(SLOW, **_labels(rig, plan.slow_rad_s, "off")):
             rig.clock.sleep(plan.slow_s)
-    if dwelt(rig, plan, record) and plan.repeat:
-        speed = min(plan.speeds_rad_s)
-        if probing.turned(rig, record, speed, plan.settle_s):
-            _put(rig, SETTINGS[plan.variants[0]])
-            rig.clock.sleep(plan.settle_s)
-            _dwell(rig, plan, record, speed, plan.variants[0], -1)
-    _put(rig, SETTINGS["off"])
+    return True
+
+
+def repeated(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """The lowest speed once more, with the first setting."""
+    speed = min(plan.speeds_rad_s)
+    if plan.repeat and probing.turned(rig, record, speed, plan.settle_s):
+        put(rig, SETTINGS[plan.variants[0]])
+        rig.clock.sleep(plan.settle_s)
+        _dwell(rig, plan, record, speed, plan.variants[0], -1)
+
+
+def finished(rig: Rig) -> None:
+    """Nothing compensated, the drive stopped, the shaft standing under the PID."""
+    put(rig, SETTINGS["off"])
     if rig.drive is not None:
         rig.drive.stop()
         rig.drive.coast()
-    write("law", CODES["PID"])
+    rig.levitation.set("law", CODES["PID"])
     rig.clock.sleep(STANDS_S)
 
 
@@ -114,11 +149,11 @@ def dwelt(rig: Rig, plan: Plan, record: Recorder) -> bool:
     """All dwells, the slowest first; False if a speed is not reached."""
     number = 0
     for speed in sorted(plan.speeds_rad_s):
-        _put(rig, SETTINGS[plan.variants[0]])
+        put(rig, SETTINGS[plan.variants[0]])
         if not probing.turned(rig, record, speed, plan.settle_s):
             return False
-        for variant in plan.variants:
-            _put(rig, SETTINGS[variant])
+        for variant in plan.at(speed):
+            put(rig, SETTINGS[variant])
             rig.clock.sleep(plan.settle_s)
             _dwell(rig, plan, record, speed, variant, number)
             number += 1
@@ -140,24 +175,43 @@ def _labels(rig: Rig, speed: float, variant: Variant, number: int = 0) -> dict[s
     return {"speed_rad_s": speed, "variant": variant, "driven_rad_s": driven, "number": number, "again": number < 0}
 
 
-def _put(rig: Rig, values: Mapping[str, float]) -> None:
+def put(rig: Rig, values: Mapping[str, float]) -> None:
+    """Write parameters of the controller."""
     for name, value in values.items():
         rig.levitation.set(name, value)
 
 
 def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     """Findings first, then the quantities of each dwell."""
-    early = [*tracking_wiring.before_orbits(recording), *unbalance_checks.before(recording)]
-    yield from early
-    if any(f.effect is Effect.ERROR for f in early):
-        return
+    found = evaluated(recording)
+    yield from found.findings
+    if found.results is not None:
+        yield from measured(found.results)
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """Findings, and the dwells' results where there are any."""
+
+    findings: tuple[Finding, ...]
+    results: Results | None
+
+
+def evaluated(recording: Recording[Any]) -> Evaluated:
+    """What a recording of dwells says."""
+    found = [*tracking_wiring.before_orbits(recording), *unbalance_checks.before(recording)]
+    if any(f.effect is Effect.ERROR for f in found):
+        return Evaluated(tuple(found), None)
     dwells, plan = read_dwells(recording), recording.plan
-    wrong = list(unbalance_checks.of_signals(dwells, plan))
-    yield from wrong
-    if any(f.effect is Effect.ERROR for f in wrong):
-        return
+    found += unbalance_checks.of_signals(dwells, plan)
+    if any(f.effect is Effect.ERROR for f in found):
+        return Evaluated(tuple(found), None)
     results = unbalance_estimates.results(dwells, recording.rig, plan)
-    yield from unbalance_checks.of_results(results, plan)
+    return Evaluated((*found, *unbalance_checks.of_results(results, plan)), results)
+
+
+def measured(results: Results) -> Iterator[Measured]:
+    """The quantities of each dwell but the repeat."""
     known = {q.name: q for q in MEASURES}
     for result in results.dwells:
         if not result.dwell.again:
@@ -186,18 +240,28 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 
 def figures(recording: Recording[Plan]) -> Iterable[Figure]:
-    """Orbits of both planes, Bode pair, polar plot, full spectra, what the coils need; empty without dwells."""
-    if any(f.effect is Effect.ERROR for f in tracking_wiring.before_orbits(recording)) or not len(recording.steps(DWELL)):
-        return ()
-    dwells = read_dwells(recording)
-    if any(f.effect is Effect.ERROR for f in unbalance_checks.of_signals(dwells, recording.plan)):
-        return ()
-    results = unbalance_estimates.results(dwells, recording.rig, recording.plan)
-    return drawn.all_figures(results, recording.rig)
+    """Orbits of both planes, Bode pair, polar plot, full spectra, what the coils need; empty where nothing was evaluated."""
+    results = evaluated(recording).results
+    return () if results is None else drawn.all_figures(results, recording.rig)
 
 
 METHOD = """\
-TODO
+The drive brings the shaft to each speed. Vectors of order 1 are least squares on the angle by the once-per-turn pulses, not
+on a nominal speed, over all whole turns of the dwell's telemetry; that telemetry holds means of ten readings is put right.
+Orbits, spectra, D_max's static part and what the coils need come from captures at the controller's full rate.
+
+At slow roll a levitated shaft does not lie still: the loop takes the runout for motion and moves the shaft against it, and
+the probes read only what is left. What the shaft does there is found from the coil currents by the balance of forces, on
+the controller's own idea of the bearings (its betas and magnetic offsets, with the plan's uncertainty); the unbalance's
+small share by the same balance at the highest speed. The runout is the reading less that motion, and is subtracted from
+every vector. Reading, motion and runout are in a note, with the date.
+
+D_max is the greatest distance of the shaft's centre from the clearance's centre over a turn: mean place and orders 1 to 3,
+runout subtracted (order 3 where the telemetry sees it). Where the probes read zero is known within their certificates only,
+and that carries the budget. The least clearance is the rig file's. Zones A to D end at 0.3, 0.4 and 0.5 of it; these
+numbers of ISO 14839-2 are not checked against the standard.
+
+Lag is counted from the mark to the high spot. y is the first probe in the direction of rotation, z the second one.
 """
 
 procedure = Procedure(

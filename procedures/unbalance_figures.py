@@ -85,6 +85,8 @@ def _use(results: Results, name: str, unit: str, what: str) -> Figure:
         for plane in PLANES:
             some = [r for r in results.of(variant) if (name, plane) in r.estimates]
             x = np.array([RPM * r.dwell.speed for r in some])
-            series.append(Series(f"{plane}, {variant}", x, np.array([r.estimates[name, plane].value for r in some]), "both"))
+            series.append(
+                Series(f"{plane}, {variant}", x, np.array([r.estimates[name, plane].value for r in some]), "both")
+            )
     return Figure(f"use-{what}", f"Greatest coil {what}", f"Of a plane's four coils, within the captures ({unit}).",
                   "speed (r/min)", f"{what} ({unit})", tuple(series))  # fmt: skip

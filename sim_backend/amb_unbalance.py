@@ -6,7 +6,6 @@ The probes' readings of that plant, less gain, zero and runout, are the shaft's 
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -36,7 +35,9 @@ class Motion:
     d_max: tuple[float, float]
 
 
-def motion(p: AmbParams, settings: Mapping[str, float], speed: float, settle_s: float = 3.0, seconds: float = 1.0) -> Motion:
+def motion(
+    p: AmbParams, settings: Mapping[str, float], speed: float, settle_s: float = 3.0, seconds: float = 1.0
+) -> Motion:
     """The shaft at `speed` rad/s under the controller's `settings` (SI, by name), once everything has settled."""
     known = AmbControl.__dataclass_fields__
     control = AmbControl(**{k: v for k, v in settings.items() if k in known} | {"law": 0.0, "observer": 0.0})

@@ -18,13 +18,16 @@ PLANES = {"inboard": 0, "outboard": 1}
 
 class Balancer:
     """Each weight is off by a mass and an angle of its own, from the rig file's `machine.weight_mass` and `weight_angle`;
-    all sit at the radius that was drawn for the rig. The defect `weight_lost`: what is fixed falls off."""
+    all sit at the radius that was drawn for the rig. The defect `weight_lost`: what is fixed falls off; `loose_weight`: an
+    unbalance in kg m that somebody left in the inboard plane."""
 
     def __init__(self, plant: AmbPlant, rig: RigFile, truth: Truth) -> None:
         self._plant, self._truth = plant, truth
         self._errors = [rig.machine.get(name) for name in ("weight_mass", "weight_angle")]
         self._radius = truth.values.get("geometry.balance_radius", 0.0)
         self._fixed = 0
+        if truth.defects.get("loose_weight"):
+            plant.weights(0, truth.defects["loose_weight"], 0.0)
 
     def request(self, line: str) -> str:
         """One line: `attach inboard KG RAD`, `detach inboard`, `ask TEXT`. Answers `ok SECONDS`, `yes` or `error TEXT`."""

@@ -132,7 +132,9 @@ def of_signals(dwells: Sequence[Dwell], plan: Settings) -> Iterator[Finding]:
         yield from _limits(d)
         off = abs(d.speed / d.wanted - 1)
         if off > plan.max_speed_error:
-            yield Finding("speed-off", f"the pulses say {d.speed * RPM:.0f} r/min, {off:.1%} off.", d.where, Effect.INDETERMINATE)
+            yield Finding(
+                "speed-off", f"the pulses say {d.speed * RPM:.0f} r/min, {off:.1%} off.", d.where, Effect.INDETERMINATE
+            )
     yield from _sampling(dwells, plan)
     yield from _slow(dwells, plan)
 
@@ -155,7 +157,11 @@ def _limits(d: Dwell) -> Iterator[Finding]:
     for bits, code, text in (
         (CONTACT, "contact", "the shaft touched a ring or the axial stop: this is not its response to unbalance."),
         (CURRENT_LIMIT, "current-saturated", "a coil current was at its limit: the response is not linear."),
-        (VOLTAGE_LIMIT, "voltage-saturated", "an amplifier's voltage was at its limit: the currents slewed (T Fig. 2.9)."),
+        (
+            VOLTAGE_LIMIT,
+            "voltage-saturated",
+            "an amplifier's voltage was at its limit: the currents slewed (T Fig. 2.9).",
+        ),
     ):
         if d.flags & bits:
             yield Finding(code, text, d.where, Effect.INDETERMINATE)
@@ -180,8 +186,8 @@ def _slow(dwells: Sequence[Dwell], plan: Settings) -> Iterator[Finding]:
         text = "no slow roll: what the probes read of the journals' runout is in every vector, as if it were unbalance."
         yield Finding("no-slow-roll", text, "", Effect.INDETERMINATE)
     elif slow[0].speed > 1.02 * too_fast(plan):
-        text = (f"the slow roll was made at {slow[0].speed * RPM:.0f} r/min; above {too_fast(plan) * RPM:.0f} r/min unbalance and "
-                "the loop's own response are in it.")  # fmt: skip
+        text = (f"the slow roll was made at {slow[0].speed * RPM:.0f} r/min; above {too_fast(plan) * RPM:.0f} r/min unbalance "
+                "and the loop's own response are in it.")  # fmt: skip
         yield Finding("slow-roll-too-fast", text, slow[0].where, Effect.INDETERMINATE)
 
 
@@ -199,7 +205,8 @@ def _channels(results: Results) -> Iterator[Finding]:
     worst = max(results.dwells, key=lambda r: r.misfit)
     if worst.misfit > UNEXPLAINED:
         text = (f"no unbalance in the two planes explains motion and currents: {worst.misfit:.0%} of the forces are left over "
-                f"({UNEXPLAINED:.0%} is allowed). Suspect the polarity of a probe, exchanged planes or axes, or exchanged coils.")  # fmt: skip
+                f"({UNEXPLAINED:.0%} is allowed). Suspect the polarity of a probe, exchanged planes or axes, or "
+                "exchanged coils.")  # fmt: skip
         yield Finding("forces-disagree", text, worst.dwell.where, Effect.ERROR)
 
 
@@ -221,8 +228,8 @@ def _repeats(results: Results) -> Iterator[Finding]:
             text = (f"a vector changed by {moved[k] * 1e6:.2f} µm between the first and the last dwell at "
                     f"{again.dwell.wanted * RPM:.0f} r/min; by the forces, the unbalance went from "
                     f"{abs(before[0]) * 1e6:.2f} and {abs(before[1]) * 1e6:.2f} g mm to {abs(after[0]) * 1e6:.2f} and "
-                    f"{abs(after[1]) * 1e6:.2f} g mm, turned by {turn[0]:+.0f}° and {turn[1]:+.0f}°. Suspect a weight that came "
-                    "loose, or a shaft that bent as it warmed.")  # fmt: skip
+                    f"{abs(after[1]) * 1e6:.2f} g mm, turned by {turn[0]:+.0f}° and {turn[1]:+.0f}°. Suspect a weight "
+                    "that came loose, or a shaft that bent as it warmed.")  # fmt: skip
             yield Finding("response-changed", text, again.dwell.where, Effect.ERROR)
 
 
@@ -245,7 +252,10 @@ def _zones(results: Results) -> Iterator[Finding]:
     """Of each setting, where D_max is greatest."""
     for variant in results.variants:
         shares = [
-            (e.value, place, r) for r in results.of(variant) for (name, place), e in r.estimates.items() if name == "d_max_share"
+            (e.value, place, r)
+            for r in results.of(variant)
+            for (name, place), e in r.estimates.items()
+            if name == "d_max_share"
         ]
         most, place, r = max(shares, key=lambda s: s[0])
         text = (f"{variant}: D_max is greatest {place} at {r.dwell.wanted * RPM:.0f} r/min, {most:.1%} of the clearance: zone "

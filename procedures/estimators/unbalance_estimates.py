@@ -100,7 +100,9 @@ def stated(rig: RigFile, plan: Settings) -> dict[str, Estimate]:
     out: dict[str, Estimate] = {}
     for k, a in enumerate(AXES):
         beta, offset = p[f"model_beta_{a}"].default, p[f"model_offset_{a}"].default
-        out[f"beta_{k}"] = _bound(f"model/beta_{a}", f"beta of {a}", beta, plan.beta_share * beta / math.sqrt(3), "rectangular")
+        out[f"beta_{k}"] = _bound(
+            f"model/beta_{a}", f"beta of {a}", beta, plan.beta_share * beta / math.sqrt(3), "rectangular"
+        )
         out[f"offset_{k}"] = _bound(f"model/offset_{a}", f"magnetic offset of {a}", offset, plan.offset_u_m, "normal")
         sensor = rig.sensors[f"pos_{a}"]
         out[f"gain_{k}"] = certified(f"sensors/pos_{a}/gain", sensor.gain, f"gain of pos_{a}")
@@ -129,7 +131,8 @@ def _runout(inputs: Mapping[str, Estimate], rig: RigFile, slow: Dwell | None, fa
     if slow is None or order not in slow.track.orders:
         u = rig.machine["runout"].standard_uncertainty
         parts = tuple(
-            Estimate.of(0.0, Influence(f"runout/{order:g}/{p}", "runout, no slow roll", u, "m", "B", "normal")) for p in PARTS
+            Estimate.of(0.0, Influence(f"runout/{order:g}/{p}", "runout, no slow roll", u, "m", "B", "normal"))
+            for p in PARTS
         )
         return Runout(parts, nothing, nothing, nothing, known=False)
     read = slow.both(order)
@@ -150,7 +153,12 @@ def _runout(inputs: Mapping[str, Estimate], rig: RigFile, slow: Dwell | None, fa
 
 
 def _result(
-    d: Dwell, inputs: Mapping[str, Estimate], nominal: Stand, runouts: Mapping[float, Runout], clearance: Estimate, rig: RigFile
+    d: Dwell,
+    inputs: Mapping[str, Estimate],
+    nominal: Stand,
+    runouts: Mapping[float, Runout],
+    clearance: Estimate,
+    rig: RigFile,
 ) -> Result:
     parts = {n: _shaft(d, inputs, runouts[n], n) for n in d.track.orders if n in runouts}
     values = np.array([parts[1.0][2 * k].value + 1j * parts[1.0][2 * k + 1].value for k in range(4)])
@@ -167,7 +175,7 @@ def _result(
         out["major_half_axis", plane] = _major([parts[1.0][k] for k in chosen])
         means = [_mean(d, inputs, k) for k in (y, z)]
         centres[plane] = (means[0].value, means[1].value)
-        far = _reach(means, {n: [p[k] for k in chosen] for n, p in parts.items()})
+        far = _reach(means, {n: [p[k] for k in chosen] for n, p in parts.items()}, f"{d.where}/{plane}")
         out["d_max", plane] = far
         out["d_max_share", plane] = _unit(far / clearance, "1")
         out |= _coils(d, inputs, plane, rig)
@@ -178,7 +186,9 @@ def _result(
 def _shaft(d: Dwell, inputs: Mapping[str, Estimate], off: Runout, order: float) -> list[Estimate]:
     """Parts of the shaft's vectors (8,): reading over gain, less the runout; turned by what the angle may be off."""
     read = d.readings(order)
-    scatter = estimates(read.parts, read.covariance, f"scatter/{d.where}/{order:g}", "scatter of the dwell", "m", read.dof)
+    scatter = estimates(
+        read.parts, read.covariance, f"scatter/{d.where}/{order:g}", "scatter of the dwell", "m", read.dof
+    )
     angle = Estimate.of(0.0, Influence("tachometer/angle", "resolution of the angle", LSB_RAD / math.sqrt(12), "rad", "B",
                                        "rectangular"))  # fmt: skip
     out = []
@@ -212,7 +222,7 @@ def _mean(d: Dwell, inputs: Mapping[str, Estimate], k: int) -> Estimate:
     return _unit((inputs[f"zero_{k}"] * -1.0 + float(d.means[k])) / inputs[f"gain_{k}"], "m")
 
 
-def _reach(means: Sequence[Estimate], parts: Mapping[float, Sequence[Estimate]]) -> Estimate:
+def _reach(means: Sequence[Estimate], parts: Mapping[float, Sequence[Estimate]], where: str) -> Estimate:
     """D_max of what turns with the shaft, about its mean place: the distance at the angle at which it is greatest, along the
     direction there (the maximum does not move at first order).
 
@@ -223,13 +233,15 @@ def _reach(means: Sequence[Estimate], parts: Mapping[float, Sequence[Estimate]])
     fixed = [np.array([e.value]) for e in names]
     far, way = _farthest(fixed, list(parts))
     terms = [(float(w[0]), e) for w, e in zip(way, names, strict=True)]
-    straight = Estimate(0.0, "m", merged(terms[2:]))  # the orbit is known so well that it enters linearly
+    # the orbit is known so well that it enters linearly, and by so little that its influences may be one
+    u = Estimate(0.0, "m", merged(terms[2:])).u
+    straight = Estimate.of(0.0, Influence(f"orbit/{where}", "the orbit itself", u, "m", "B", "normal"))
 
     def sampler(deviations: Mapping[str, Array]) -> Array:
         placed = _farthest([*(e.sampled(deviations) for e in means), *fixed[2:]], list(parts))[0]
         return placed + straight.sampled(deviations)
 
-    return Estimate(float(far[0]), "m", merged(terms), sampler)
+    return Estimate(float(far[0]), "m", merged([*terms[:2], (1.0, straight)]), sampler)
 
 
 def _farthest(values: Sequence[Array], orders: Sequence[float]) -> tuple[Array, list[Array]]:

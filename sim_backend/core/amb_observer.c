@@ -143,13 +143,16 @@ void amb_observe(const amb_control *c, amb_law_state *l, const double *q, double
     amb_observer *o = &l->observer;
     const double made[5] = {c->observer, c->observer_constant, c->observer_damping, c->observer_turning, c->observer_velocity};
     double keep = exp(-c->model_rate * TICK), a[4], before[4];
-    int changed = memcmp(made, o->made, sizeof made) != 0;
-    if (!o->started || made[0] != o->made[0]) memcpy(l->coil, l->sent, sizeof l->coil);
+    int changed = memcmp(made, o->made, sizeof made) != 0, fresh = !o->started || made[0] != o->made[0];
+    if (fresh) { /* the other observer's states mean something else */
+        memcpy(l->coil, l->sent, sizeof l->coil);
+        memset(o->x, 0, sizeof o->x);
+    }
     for (int k = 0; k < 10; k++) l->coil[k] = l->sent[k] + (l->coil[k] - l->sent[k]) * keep;
     int printed = (int)c->observer == LITERAL;
     for (int k = 0; k < 4; k++) before[k] = o->x[k][1] + (printed ? 0 : o->speed * o->x[k][4]);
     accelerations(c, q, printed ? l->waiting : l->coil, before, speed, a);
-    if (!o->started || made[0] != o->made[0]) start(l, q, a);
+    if (fresh) start(l, q, a);
     if (printed) {
         literal(c, l, q, a, speed, rate, against);
     } else {

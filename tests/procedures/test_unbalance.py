@@ -1,0 +1,232 @@
+"""Unbalance and its compensation: against what the shaft really does, A2, A5, A6, planted defects, refused plans."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bench.cli.virtual import simulated_run
+from bench.errors import BenchError
+from bench.findings import Effect, Finding
+from bench.procedure import Measured
+from bench.recording import Recording
+from bench.rigfile import load_rig
+from bench.uncertainty import Estimate, interval
+from procedures import compensation, unbalance
+from procedures.estimators import runout, unbalance_estimates
+from procedures.estimators.unbalance_data import AXES, read_dwells
+from procedures.estimators.unbalance_estimates import Results
+from procedures.unbalance import CODES, POLES, SETTINGS, check
+from reports.figures import draw as draw_figure
+from sim_backend import amb_unbalance
+from sim_backend.core.amb_params import AmbParams
+from sim_backend.truth import draw
+
+RPM = math.pi / 30
+SHORT = {"slow_s": 4.2, "dwell_s": 0.8, "capture_s": 0.2, "settle_s": 1.0, "repeat": False}
+ONE = {**SHORT, "speeds_rad_s": (3000 * RPM,)}
+SEED = 1
+
+
+@dataclass(frozen=True)
+class Run:
+    measured: dict[tuple[str, str], Estimate]
+    findings: list[Finding]
+    recording: Recording[Any]
+    results: Results
+    plant: AmbParams
+
+    @property
+    def serious(self) -> set[str]:
+        return {f.code for f in self.findings if f.effect is not Effect.NOTE}
+
+
+def done(folder: Path, procedure: str, plan: Mapping[str, Any], truth: Mapping[str, float] | None = None) -> Run:
+    run = simulated_run(procedure, "amb5dof", SEED, plan, folder / "recording.mcap", truth)
+    measured = {(m.quantity.name, m.where): m.estimate for m in run.results if isinstance(m, Measured)}
+    findings = [f for f in run.results if isinstance(f, Finding)]
+    plan_ = run.recording.plan
+    results = unbalance_estimates.results(read_dwells(run.recording), run.recording.rig, plan_)
+    return Run(measured, findings, run.recording, results, draw(load_rig("amb5dof"), SEED, truth).plant)
+
+
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """Two speeds with and without compensation, the literal observer at the higher one, and the switch."""
+    plan = {**SHORT, "speeds_rad_s": (2000 * RPM, 10000 * RPM), "literal_rad_s": (10000 * RPM,), "after_s": 0.6}
+    return done(tmp_path_factory.mktemp("compared"), "compensation", plan)
+
+
+def test_nothing_is_found_on_a_sound_stand(compared: Run) -> None:
+    assert not compared.serious
+    assert {f.code for f in compared.findings} == {"slow-roll", "zone", "reduction-told", "runout-followed"}
+    assert len(compared.recording.all_steps()) == compensation.step_count(compared.recording.plan)
+    assert {name for name, _ in compared.measured} == {q.name for q in compensation.MEASURES}
+
+
+def test_vectors_are_what_the_shaft_really_does(compared: Run) -> None:
+    """Component by component and D_max, with and without compensation, within the intervals."""
+    defaults = {n: p.default for n, p in load_rig("amb5dof").parameters.items()}
+    away = []
+    for r in compared.results.dwells:
+        if r.dwell.variant == "literal":
+            continue  # its limit cycle is not the other plant's
+        settings = {**defaults, **POLES, **SETTINGS[r.dwell.variant], "law": CODES["CCS"]}  # type: ignore[index]
+        true = amb_unbalance.motion(compared.plant, settings, r.dwell.speed, 1.5, 0.4)
+        for k, axis in enumerate(AXES):
+            for name, value in (("vector_cos", true.shaft[k].real), ("vector_sin", -true.shaft[k].imag)):
+                e = r.estimates[name, axis]
+                away.append((e.value - value) / e.u)
+                assert e.u < 0.2e-6
+        for plane, value in zip(("inboard", "outboard"), true.d_max, strict=True):
+            found = interval(r.estimates["d_max", plane])
+            assert found.low - 0.5e-6 < value < found.high + 0.5e-6
+    assert len(away) == 32
+    assert np.sqrt(np.mean(np.square(away))) < 2.0
+    assert np.abs(away).max() < 4.0
+
+
+def test_the_slow_roll_reading_is_not_the_runout(compared: Run) -> None:
+    """The loop moves the shaft against it: the reading alone is off by more than the whole runout; the forces put it right."""
+    true, found = amb_unbalance.first(compared.plant), compared.results.runouts[1.0]
+    assert np.abs(found.reading - true).max() > 1.2 * np.abs(true).max()
+    assert np.abs(found.values - true).max() < 0.1 * np.abs(true).max()
+    for k in range(4):
+        for part, value in ((found.parts[2 * k], true[k].real), (found.parts[2 * k + 1], true[k].imag)):
+            assert part.value == pytest.approx(value, abs=3 * part.u)
+
+
+def test_a6_reduction_over_speed_and_the_literal_observer(compared: Run) -> None:
+    for rpm in (2000, 10000):
+        e = compared.measured["reduction", f"{rpm} r/min"]
+        assert e.value - 2 * e.u > 0.9
+        assert e.u < 0.01
+    off, literal = (compared.measured["reading", f"10000 r/min, {v}"].value for v in ("off", "literal"))
+    assert 1 - literal / off < 0.7
+    assert any("as printed" in f.text for f in compared.findings if f.code == "reduction-told")
+
+
+def test_a5_switched_on(compared: Run) -> None:
+    drop, residual = (compared.measured[name, "10000 r/min"] for name in ("drop", "residual"))
+    assert drop.value - 2 * drop.u > 0.8
+    assert residual.value + 2 * residual.u < 1e-6
+
+
+def test_compensation_lets_the_shaft_follow_the_runout(compared: Run) -> None:
+    """The probes read next to nothing, and the shaft still moves by the runout: what the reduction does not say."""
+    on = next(r for r in compared.results.of("corrected") if r.dwell.wanted > 1000)
+    true = amb_unbalance.first(compared.plant)
+    assert np.abs(on.vectors.values + true).max() < 0.3e-6
+    assert np.abs(on.dwell.readings().values).max() < 0.3e-6
+
+
+def test_figures(compared: Run) -> None:
+    drawn = list(compensation.figures(compared.recording))
+    keys = [f.key for f in drawn]
+    assert len(set(keys)) == len(keys)
+    assert {"reduction", "switch-amplitude", "switch-readings", "bode-inboard", "polar-outboard", "orbit-inboard-off-10000",
+            "spectrum-outboard-corrected-10000", "use-current", "use-voltage"} <= set(keys)  # fmt: skip
+    for figure in drawn:
+        draw_figure(figure)
+
+
+@pytest.mark.parametrize("law", ["PID", "CAC"])
+def test_a2_at_14000(tmp_path: Path, law: str) -> None:
+    run = done(tmp_path, "unbalance", {**SHORT, "law": law, "speeds_rad_s": (14000 * RPM,)})
+    assert not run.serious
+    biased = run.measured["current_peak", "inboard, 14000 r/min, off"].value
+    assert biased > (1.0 if law == "PID" else 0.3)
+    lower = run.results.dwells[0].means[4 + 1]  # of the lower coil of yi
+    assert abs(lower) < 0.05 if law == "CAC" else lower > 0.5
+
+
+@pytest.mark.parametrize(
+    ("truth", "plan", "code", "effect"),
+    [
+        ({"position_sign_yi": -1.0}, {}, "probe-polarity", Effect.ERROR),
+        ({"told_planes": 1.0}, {}, "planes-exchanged", Effect.ERROR),
+        ({"told_axes": 1.0}, {}, "axes-exchanged", Effect.ERROR),
+        ({"current_sign_i": -1.0}, {}, "forces-disagree", Effect.ERROR),
+        ({"pulse_missing": 3.0}, {}, "pulse-missing", Effect.ERROR),
+        ({"pulse_missing": 2.0}, {}, "pulse-missing", Effect.ERROR),
+        ({"pulse_doubled": 1.0}, {}, "pulse-doubled", Effect.ERROR),
+        ({"pulse_doubled": math.pi}, {}, "pulse-doubled", Effect.ERROR),
+        ({}, {"slow_rad_s": 0.0}, "no-slow-roll", Effect.INDETERMINATE),
+        ({}, {"slow_rad_s": 1200 * RPM}, "slow-roll-too-fast", Effect.INDETERMINATE),
+        ({}, {"rate_hz": 500.0}, "aliasing", Effect.ERROR),
+        ({"position_range": 9e-6}, {}, "sensor-clipped", Effect.ERROR),
+        ({"unbalance_i": 20e-6, "unbalance_o": 20e-6}, {"speeds_rad_s": (4000 * RPM,)}, "contact", Effect.INDETERMINATE),
+        ({"loose_weight": 2e-6, "loose_speed": 400.0, "loose_shift": 2.0},
+         {"speeds_rad_s": (3000 * RPM, 5000 * RPM), "repeat": True}, "response-changed", Effect.ERROR),
+        ({"drop_fraction": 0.01}, {}, "missing-samples", Effect.INDETERMINATE),
+    ],
+)  # fmt: skip
+def test_a_planted_defect_is_named_and_never_passes(
+    tmp_path: Path, truth: Mapping[str, float], plan: Mapping[str, Any], code: str, effect: Effect
+) -> None:
+    run = simulated_run("unbalance", "amb5dof", SEED, {**ONE, **plan}, tmp_path / "recording.mcap", truth)
+    found = [f for f in run.results if isinstance(f, Finding) and f.code == code]
+    assert found, [f.code for f in run.results if isinstance(f, Finding)]
+    assert found[0].effect is effect
+    list(unbalance.figures(run.recording))  # what can be drawn is drawn
+
+
+def test_planes_exchanged_within_the_loop_do_not_levitate(tmp_path: Path) -> None:
+    run = simulated_run("unbalance", "amb5dof", SEED, ONE, tmp_path / "recording.mcap", {"exchange_planes": 1.0})
+    assert any(isinstance(f, Finding) and f.effect is Effect.ERROR for f in run.results)
+    assert not any(isinstance(m, Measured) for m in run.results)
+
+
+def test_a_drive_that_gives_up_ends_the_run(tmp_path: Path) -> None:
+    with pytest.raises(BenchError, match="OVERLOAD"):
+        simulated_run("unbalance", "amb5dof", SEED, ONE, tmp_path / "recording.mcap", {"drive_limit": 0.002})
+
+
+def test_plans_that_cannot_work_are_refused() -> None:
+    rig = load_rig("amb5dof")
+
+    def why(**plan: Any) -> str:
+        return "; ".join(check(rig, unbalance.Plan(**plan)))
+
+    assert why() == ""
+    assert why(speeds_rad_s=(14000 * RPM,)) == ""
+    assert "envelope" in why(speeds_rad_s=(1600.0,))
+    assert "landing" in why(speeds_rad_s=(35.0,))
+    assert "unbalance moves the shaft" in why(slow_rad_s=120.0)
+    assert "20 turns" in why(slow_s=2.0)
+    assert "folds back" in why(rate_hz=1000.0)
+    assert "bytes" in why(capture_s=3.0)
+    assert "only the flatness laws" in why(law="PID", variants=("off", "corrected"))
+    bare = rig.model_copy(update={"devices": {k: d for k, d in rig.devices.items() if k != "drive"}})
+    assert "nothing turns" in next(iter(check(bare, unbalance.Plan())))
+    assert list(compensation.check(rig, compensation.Plan())) == []
+    assert "something must be compared" in "; ".join(compensation.check(rig, compensation.Plan(law="PID")))
+    assert "envelope" in "; ".join(compensation.check(rig, compensation.Plan(switch_rad_s=1600.0)))
+
+
+def test_runout_by_forces_is_exact_on_its_own_model() -> None:
+    """A made-up slow roll: shaft and currents that balance, and a runout on top of it."""
+    stand = runout.Stand(
+        np.full(4, 6.95e-7), np.full(4, 1.15e-4), np.ones(4), np.zeros(4), np.ones(8), np.zeros(8), 5.25e-4, 1200.0, 0.98,
+        5.84e-3, 1.71e-4, 0.097, 0.081, 0.078, 0.1, 0.097, 0.081, 0.155,
+    )  # fmt: skip
+    means = np.array([0, 0, 0, 0, 1.2, 0.8, 1.2, 0.8, 1.1, 0.9, 1.1, 0.9])
+    true, u = np.array([2e-6, -2e-6j, 1e-6j, 1e-6]), np.array([3e-6, 2e-6 * np.exp(1j)])
+    made = []
+    for speed in (31.4, 1000.0):
+        i = np.array([0.01, 0.02j, -0.01, 0.005 + 0.001j])
+        vectors = np.concatenate([np.zeros(4), np.stack([i, -i], axis=1).ravel()])
+        turning = runout.Turning(speed, means, vectors)
+        at = runout.moved(stand, turning, 1.0, u) + true
+        made.append(runout.Turning(speed, means, np.concatenate([at, vectors[4:]])))
+    found, shaft, unbalance_, misfit = runout.found(stand, made[0], made[1])
+    assert np.abs(found - true).max() < 1e-11
+    assert np.abs(shaft - made[0].vectors[:4] + true).max() < 1e-11
+    assert np.abs(unbalance_ - u).max() < 1e-10
+    assert misfit < 1e-6
