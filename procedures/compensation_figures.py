@@ -34,11 +34,13 @@ def switched(s: Switched) -> Iterator[Figure]:
     t, size = s.course()
     rpm = f"{s.speed * RPM:.0f} r/min"
     yield Figure("switch-amplitude", f"Switched on at {rpm}: amplitude of order 1", "Root mean square of the "
-                 f"four probes, over five turns each; switched on at 0. The dashed line stands for 20 %, to be reached at "
+                 f"four probes, over six turns each; switched on at 0. The dashed line stands for 20 %, to be reached at "
                  f"{WITHIN_S * 1e3:.0f} ms.", "time (ms)", "amplitude (µm 0-pk)",
                  (Series("order 1", 1e3 * t, 1e6 * size, "both"),),
                  lines=(("20 %", 0.2e6 * float(size[t < -3 * s.turn].mean())),))  # fmt: skip
     part = slice(None, None, max(1, -(-len(s.t) // MOST_POINTS)))
+    places = zip(AXES, s.positions, strict=True)
+    series = tuple(Series(a, 1e3 * s.t[part], 1e6 * x[part] - 40 * k) for k, (a, x) in enumerate(places))
     yield Figure("switch-readings", f"Switched on at {rpm}: the readings", "As read, noise and runout included; "
                  "each one below the one before, 40 µm apart.", "time (ms)", "reading (µm)",
-                 tuple(Series(a, 1e3 * s.t[part], 1e6 * s.positions[k][part] - 40 * k) for k, a in enumerate(AXES)))  # fmt: skip
+                 series)  # fmt: skip

@@ -36,9 +36,9 @@ class Motion:
 
 
 def motion(
-    p: AmbParams, settings: Mapping[str, float], speed: float, settle_s: float = 3.0, seconds: float = 1.0
+    p: AmbParams, settings: Mapping[str, float], speed: float, settle_s: float = 8.0, seconds: float = 0.4
 ) -> Motion:
-    """The shaft at `speed` rad/s under the controller's `settings` (SI, by name), once everything has settled."""
+    """The shaft at `speed` rad/s under the settings of the controller (SI, by name), once the integrators have settled."""
     known = AmbControl.__dataclass_fields__
     control = AmbControl(**{k: v for k, v in settings.items() if k in known} | {"law": 0.0, "observer": 0.0})
     plant = AmbPlant(dataclasses.replace(p, **SILENT), 0, control=control)

@@ -51,11 +51,11 @@ class Switched:
         return 2 * math.pi / self.speed
 
     def course(self) -> tuple[Array, Array]:
-        """Times (b,) s and root mean square (b,) m of the four amplitudes, of every four turns, two apart."""
+        """Times (b,) s and root mean square (b,) m of the four amplitudes, of every six turns, two apart."""
         times, sizes = [], []
-        for begin in np.arange(self.t[0], self.t[-1] - 6 * self.turn, 2 * self.turn):
-            vectors, _ = self.between(float(begin), float(begin) + 5.01 * self.turn)
-            times.append(float(begin) + 2.5 * self.turn)
+        for begin in np.arange(self.tacho.times[0], self.tacho.times[-1] - 6 * self.turn, 2 * self.turn):
+            vectors, _ = self.between(float(begin), float(begin) + 6.1 * self.turn)
+            times.append(float(begin) + 3 * self.turn)
             sizes.append(rms(vectors))
         return np.array(times), np.array(sizes)
 
