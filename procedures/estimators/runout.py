@@ -95,6 +95,13 @@ def slopes(s: Stand, means: Array) -> tuple[Array, Array, Array]:
     )
 
 
+def carried(s: Stand, means: Array) -> Array:
+    """Mean forces of the four axes, N, at mean readings (12,), by T (2.4b)."""
+    k_p, k_n, _ = slopes(s, means)
+    i = (means[4:] - s.i_zero) / s.i_gain
+    return np.asarray((k_p * i[::2] + k_n * i[1::2]) / 2)
+
+
 def pushed(s: Stand, turning: Turning) -> tuple[Complex, Array]:
     """Forces and moments (4,) of the control currents, and K_x (4,)."""
     k_p, k_n, k_x = slopes(s, turning.means)

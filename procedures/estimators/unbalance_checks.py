@@ -16,6 +16,7 @@ from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from procedures.estimators.unbalance_data import (
+    AXES,
     CONTACT,
     CURRENT_LIMIT,
     DWELL,
@@ -33,7 +34,8 @@ SLOW_MOST = 0.15  # of the lowest speed of the plan, at slow roll, and of the lo
 LOOP_RAD_S = 390.0  # sqrt(k1) of T Table 2.4: the rigid modes
 TURNS = 20  # that a slow roll needs
 PER_TURN = 4.0  # samples in a turn of the highest order
-UNEXPLAINED = 0.2  # share of the forces that two unbalances leave over: a channel is not what its name says
+UNEXPLAINED = 0.1  # share of the forces that two unbalances leave over: a channel is not what its name says
+CARRIED = 0.5  # of the share of the weight that an axis should carry: how far its coils may be off
 CHANGED, CHANGED_M = 0.1, 0.3e-6  # of the vector, and at least: a repeat that differs by more
 ZONES = (("A", 0.3), ("B", 0.4), ("C", 0.5), ("D", math.inf))
 """Upper ends of the zones, D_max over the least clearance (ISO 14839-2, Table 1: numbers not checked against the standard)."""
@@ -194,6 +196,7 @@ def _slow(dwells: Sequence[Dwell], plan: Settings) -> Iterator[Finding]:
 def of_results(results: Results, plan: Settings) -> Iterator[Finding]:
     """Do forces and motion agree? Is a repeat the same? Then zones and the runout, as notes."""
     yield from _channels(results)
+    yield from _weight(results)
     yield from _repeats(results)
     yield from _told(results)
     if plan.variants:
@@ -208,6 +211,18 @@ def _channels(results: Results) -> Iterator[Finding]:
                 f"({UNEXPLAINED:.0%} is allowed). Suspect the polarity of a probe, exchanged planes or axes, or "
                 "exchanged coils.")  # fmt: skip
         yield Finding("forces-disagree", text, worst.dwell.where, Effect.ERROR)
+
+
+def _weight(results: Results) -> Iterator[Finding]:
+    """The mean coil forces must carry the weight; they do not where the two coils of an axis are exchanged."""
+    for r in results.dwells:
+        off = np.abs(r.carried - 1)
+        k = int(np.argmax(off))
+        if off[k] > CARRIED:
+            text = (f"by their currents the coils of {AXES[k]} carry {r.carried[k]:.2f} of their share of the weight: "
+                    "suspect the coils of an axis exchanged, a current sensor, or a wrong model of the bearing.")  # fmt: skip
+            yield Finding("weight-not-carried", text, r.dwell.where, Effect.ERROR)
+            return
 
 
 def _repeats(results: Results) -> Iterator[Finding]:

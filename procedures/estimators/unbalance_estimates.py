@@ -50,13 +50,15 @@ class Runout:
 
 @dataclass(frozen=True)
 class Result:
-    """A dwell's estimates by name and place; `vectors` of the shaft's centre with their joint covariance; orbits by plane."""
+    """A dwell's estimates by name and place; `vectors` of the shaft's centre with their joint covariance; orbits by plane;
+    `misfit`, the share of the forces that two unbalances do not explain; `carried` (4,), of what each axis should carry."""
 
     dwell: Dwell
     vectors: Vectors
     orbits: Mapping[str, Ellipse]
     centres: Mapping[str, tuple[float, float]]
     misfit: float
+    carried: Array
     unbalance: Complex
     estimates: Mapping[tuple[str, str], Estimate] = field(repr=False)
 
@@ -180,7 +182,16 @@ def _result(
         out["d_max_share", plane] = _unit(far / clearance, "1")
         out |= _coils(d, inputs, plane, rig)
     out["reading", ""] = _reading(d, inputs)
-    return Result(d, vectors, orbits, centres, misfit, u, out)
+    weight = runout.carried(nominal, d.means) / _shares(rig, nominal)
+    return Result(d, vectors, orbits, centres, misfit, weight, u, out)
+
+
+def _shares(rig: RigFile, s: Stand) -> Array:
+    """What each axis carries of the weight, N."""
+    lean, whole = rig.machine["radial_axes"].value, s.mass * rig.site.gravity.value
+    inboard, outboard = whole * s.l_oa / (s.l_ia + s.l_oa), whole * s.l_ia / (s.l_ia + s.l_oa)
+    along = np.array([math.cos(lean), math.sin(lean)])
+    return np.concatenate([inboard * along, outboard * along])
 
 
 def _shaft(d: Dwell, inputs: Mapping[str, Estimate], off: Runout, order: float) -> list[Estimate]:
