@@ -20,7 +20,7 @@ from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
 from procedures import compensation_figures as drawn
-from procedures import probing, unbalance
+from procedures import probing, unbalance, unbalance_figures
 from procedures.estimators import compensation_checks, switching
 from procedures.estimators.switching import SWITCH
 from procedures.estimators.unbalance_data import RPM
@@ -43,7 +43,7 @@ class Plan(unbalance.Plan):
 
     law: Law = "CCS"
     variants: tuple[Variant, ...] = Field(("off", "corrected"), min_length=2)
-    literal_rad_s: tuple[float, ...] = (
+    literal_rad_s: tuple[float, ...] = (2000 / RPM, 10000 / RPM)  # where the observer as printed is tried too
         10000 / RPM,
     )  # where the observer as printed is tried too; it is unstable at 2 000 r/min
     judged_to_rad_s: float = Field(10001 / RPM, gt=0)  # the range of T 3.5; above it the reduction is told, not judged
@@ -134,7 +134,7 @@ def figures(recording: Recording[Plan]) -> Iterable[Figure]:
     yield from drawn.reductions(compensation_checks.reductions(results))
     if recording.captures(switch=1):
         yield from drawn.switched(switching.read_switch(recording))
-    yield from unbalance.drawn.all_figures(results, recording.rig)
+    yield from unbalance_figures.all_figures(results, recording.rig)
 
 
 METHOD = f"""\

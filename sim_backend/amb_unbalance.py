@@ -20,7 +20,6 @@ from sim_backend.core.amb_params import AmbControl, AmbParams
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
-SILENT = {"position_noise": 0.0, "current_noise": 0.0, "position_lsb": 0.0, "current_lsb": 0.0}
 DRIVE = DriveLaw(gain=0.02, limit=0.2, ramp=210.0)
 LIFT_S = 1.0
 
@@ -41,7 +40,8 @@ def motion(
     """The shaft at `speed` rad/s under the settings of the controller (SI, by name), once the integrators have settled."""
     known = AmbControl.__dataclass_fields__
     control = AmbControl(**{k: v for k, v in settings.items() if k in known} | {"law": 0.0, "observer": 0.0})
-    plant = AmbPlant(dataclasses.replace(p, **SILENT), 0, control=control)
+    quiet = dataclasses.replace(p, position_noise=0.0, current_noise=0.0, position_lsb=0.0, current_lsb=0.0)
+    plant = AmbPlant(quiet, 0, control=control)
     plant.mode = READY
     plant.run(1000)
     plant.mode = LIFT

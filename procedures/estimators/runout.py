@@ -52,10 +52,14 @@ class Stand:
     @classmethod
     def of(cls, v: Mapping[str, float]) -> Stand:
         """From numbers by name, those of an array with `_0`, `_1`, ... ."""
-        sizes = {"beta": 4, "offset": 4, "gain": 4, "zero": 4, "i_gain": 8, "i_zero": 8}
-        arrays = {name: np.array([v[f"{name}_{k}"] for k in range(n)]) for name, n in sizes.items()}
-        rest = ("gap", "coupling", "mass", "inertia", "polar", "l_ia", "l_oa", "l_is", "l_os", "l_iu", "l_ou", "l_c")
-        return cls(**arrays, **{name: v[name] for name in rest})
+
+        def row(name: str, size: int = 4) -> Array:
+            return np.array([v[f"{name}_{k}"] for k in range(size)])
+
+        return cls(
+            row("beta"), row("offset"), row("gain"), row("zero"), row("i_gain", 8), row("i_zero", 8), v["gap"], v["coupling"],
+            v["mass"], v["inertia"], v["polar"], v["l_ia"], v["l_oa"], v["l_is"], v["l_os"], v["l_iu"], v["l_ou"], v["l_c"],
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -121,7 +125,7 @@ def unbalances(s: Stand, turning: Turning, runout: Complex) -> tuple[Complex, fl
     u = np.linalg.lstsq(scale * acts, target, rcond=None)[0]
     left = float(np.linalg.norm(target - scale * acts @ u))
     whole = float(np.linalg.norm(scale[:, 0] * inertial) + np.linalg.norm(scale[:, 0] * force))
-    return u[:, 0], left / whole
+    return np.asarray(u[:, 0], np.complex128), left / whole
 
 
 def moved(s: Stand, turning: Turning, order: float, unbalance: Complex) -> Complex:

@@ -92,7 +92,7 @@ class Dwell:
     @property
     def means(self) -> Array:
         """Of the same twelve channels."""
-        return self.track.means[0]
+        return np.asarray(self.track.means[0])
 
 
 def read_dwells(recording: Recording[Any]) -> list[Dwell]:

@@ -28,6 +28,7 @@ from sim_backend import amb_unbalance
 from sim_backend.core.amb_params import AmbParams
 from sim_backend.truth import draw
 
+pytestmark = pytest.mark.xdist_group("unbalance")  # one worker makes the sound run once
 RPM = math.pi / 30
 SHORT = {"slow_s": 4.2, "dwell_s": 0.8, "capture_s": 0.2, "settle_s": 1.0, "repeat": False}
 ONE = {**SHORT, "speeds_rad_s": (3000 * RPM,)}

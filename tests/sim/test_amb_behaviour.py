@@ -229,3 +229,11 @@ def test_a8_an_ellipse_at_10_000_rpm() -> None:
     _, errors, _ = ellipse_error(plant, 2.0, 90e-6, 40e-6, 60)
     assert errors.max() < 2.5e-6
     assert not touched(plant.run(1000))
+
+
+def test_another_observer_at_speed_starts_from_nothing() -> None:
+    """What the printed observer's states hold is no motion of the other one: taken for it, they throw the shaft out."""
+    plant = spun(levitated(1, control=OBSERVED | {"observer": 2.0, "compensate": 3.0}), 10000, 1.0)
+    for observer in (1.0, 2.0, 1.0):
+        plant.set("observer", observer)
+        assert not touched(plant.run(3000))
