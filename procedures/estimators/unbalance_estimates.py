@@ -24,7 +24,8 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 LSB_RAD = 2 * math.pi / 65536  # of the angle in the telemetry
 PARTS = [f"{a}{part}" for a in AXES for part in ("re", "im")]
-TURN = np.linspace(0, 2 * math.pi, 37)
+TURN = np.linspace(0, 2 * math.pi, 73)
+GRID = 61  # mean places along each axis between which D_max is interpolated
 
 
 class Settings(Protocol):
@@ -249,10 +250,22 @@ def _reach(means: Sequence[Estimate], parts: Mapping[float, Sequence[Estimate]],
     straight = Estimate.of(0.0, Influence(f"orbit/{where}", "the orbit itself", u, "m", "B", "normal"))
 
     def sampler(deviations: Mapping[str, Array]) -> Array:
-        placed = _farthest([*(e.sampled(deviations) for e in means), *fixed[2:]], list(parts))[0]
-        return placed + straight.sampled(deviations)
+        placed = [e.sampled(deviations) for e in means]
+        return _interpolated(placed, fixed[2:], list(parts)) + straight.sampled(deviations)
 
     return Estimate(float(far[0]), "m", merged([*terms[:2], (1.0, straight)]), sampler)
+
+
+def _interpolated(placed: Sequence[Array], orbit: Sequence[Array], orders: Sequence[float]) -> Array:
+    """D_max (s,) of an orbit about many mean places y, z (s,): between a grid's, to which it costs a hundredth."""
+    edges = [np.linspace(x.min() - 1e-12, x.max() + 1e-12, GRID) for x in placed]
+    y, z = np.meshgrid(*edges, indexing="ij")
+    far = _farthest([y.ravel(), z.ravel(), *orbit], orders)[0].reshape(GRID, GRID)
+    at = [(x - e[0]) / (e[1] - e[0]) for x, e in zip(placed, edges, strict=True)]
+    i, j = (np.minimum(a.astype(np.intp), GRID - 2) for a in at)
+    u, v = at[0] - i, at[1] - j
+    low, high = far[i, j] * (1 - v) + far[i, j + 1] * v, far[i + 1, j] * (1 - v) + far[i + 1, j + 1] * v
+    return np.asarray(low * (1 - u) + high * u)
 
 
 def _farthest(values: Sequence[Array], orders: Sequence[float]) -> tuple[Array, list[Array]]:
