@@ -120,6 +120,7 @@ def rolled(rig: Rig, plan: Plan, record: Recorder) -> bool:
     put(rig, {"law": CODES[plan.law], **SETTINGS["off"]})
     if plan.slow_rad_s:
         if not probing.turned(rig, record, plan.slow_rad_s, plan.settle_s):
+            finished(rig)
             return False
         with record.step(SLOW, **_labels(rig, plan.slow_rad_s, "off")):
             rig.clock.sleep(plan.slow_s)
