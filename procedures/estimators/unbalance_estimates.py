@@ -17,6 +17,7 @@ from bench.uncertainty import Estimate, Influence, propagate
 from bench.uncertainty.estimate import merged
 from procedures.estimators import runout
 from procedures.estimators.inputs import certified
+from procedures.estimators.reach import farthest
 from procedures.estimators.runout import Stand, Turning
 from procedures.estimators.unbalance_data import AXES, COILS, PLANES, SLOW, Dwell
 
@@ -24,8 +25,6 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 LSB_RAD = 2 * math.pi / 65536  # of the angle in the telemetry
 PARTS = [f"{a}{part}" for a in AXES for part in ("re", "im")]
-TURN = np.linspace(0, 2 * math.pi, 73)
-GRID = 61  # mean places along each axis between which D_max is interpolated
 
 
 class Settings(Protocol):
@@ -178,7 +177,7 @@ def _result(
         out["major_half_axis", plane] = _major([parts[1.0][k] for k in chosen])
         means = [_mean(d, inputs, k) for k in (y, z)]
         centres[plane] = (means[0].value, means[1].value)
-        far = _reach(means, {n: [p[k] for k in chosen] for n, p in parts.items()}, f"{d.where}/{plane}")
+        far = farthest(means, {n: [p[k] for k in chosen] for n, p in parts.items()}, f"{d.where}/{plane}")
         out["d_max", plane] = far
         out["d_max_share", plane] = _unit(far / clearance, "1")
         out |= _coils(d, inputs, plane, rig)
@@ -232,62 +231,6 @@ def _major(parts: Sequence[Estimate]) -> Estimate:
 def _mean(d: Dwell, inputs: Mapping[str, Estimate], k: int) -> Estimate:
     """Where the shaft is on the average, from the clearance's centre."""
     return _unit((inputs[f"zero_{k}"] * -1.0 + float(d.means[k])) / inputs[f"gain_{k}"], "m")
-
-
-def _reach(means: Sequence[Estimate], parts: Mapping[float, Sequence[Estimate]], where: str) -> Estimate:
-    """D_max of what turns with the shaft, about its mean place: the distance at the angle at which it is greatest, along the
-    direction there (the maximum does not move at first order).
-
-    A mean place that is only known to lie about the centre makes D_max greater, whichever way it lies: intervals are by
-    Monte Carlo.
-    """
-    names = [*means, *(e for four in parts.values() for e in four)]
-    fixed = [np.array([e.value]) for e in names]
-    far, way = _farthest(fixed, list(parts))
-    terms = [(float(w[0]), e) for w, e in zip(way, names, strict=True)]
-    # the orbit is known so well that it enters linearly, and by so little that its influences may be one
-    u = Estimate(0.0, "m", merged(terms[2:])).u
-    straight = Estimate.of(0.0, Influence(f"orbit/{where}", "the orbit itself", u, "m", "B", "normal"))
-
-    def sampler(deviations: Mapping[str, Array]) -> Array:
-        placed = [e.sampled(deviations) for e in means]
-        return _interpolated(placed, fixed[2:], list(parts)) + straight.sampled(deviations)
-
-    return Estimate(float(far[0]), "m", merged([*terms[:2], (1.0, straight)]), sampler)
-
-
-def _interpolated(placed: Sequence[Array], orbit: Sequence[Array], orders: Sequence[float]) -> Array:
-    """D_max (s,) of an orbit about many mean places y, z (s,): between a grid's, to which it costs a hundredth."""
-    edges = [np.linspace(x.min() - 1e-12, x.max() + 1e-12, GRID) for x in placed]
-    y, z = np.meshgrid(*edges, indexing="ij")
-    far = _farthest([y.ravel(), z.ravel(), *orbit], orders)[0].reshape(GRID, GRID)
-    at = [(x - e[0]) / (e[1] - e[0]) for x, e in zip(placed, edges, strict=True)]
-    i, j = (np.minimum(a.astype(np.intp), GRID - 2) for a in at)
-    u, v = at[0] - i, at[1] - j
-    low, high = far[i, j] * (1 - v) + far[i, j + 1] * v, far[i + 1, j] * (1 - v) + far[i + 1, j + 1] * v
-    return np.asarray(low * (1 - u) + high * u)
-
-
-def _farthest(values: Sequence[Array], orders: Sequence[float]) -> tuple[Array, list[Array]]:
-    """Greatest distance (s,) of paths given by their mean y, z and re, im of y, z of each order, (s,) each; its slopes."""
-    best, angle = np.zeros(len(values[0])), np.zeros(len(values[0]))
-
-    def at(theta: Array | float) -> list[Array]:
-        out = [values[0], values[1]]
-        for j, n in enumerate(orders):
-            c, s = np.cos(n * theta), np.sin(n * theta)
-            out = [out[k] + values[2 + 4 * j + 2 * k] * c - values[3 + 4 * j + 2 * k] * s for k in range(2)]
-        return out
-
-    for theta in TURN:
-        r = np.hypot(*at(float(theta)))
-        angle = np.where(r > best, theta, angle)
-        best = np.maximum(best, r)
-    towards = [x / np.maximum(best, 1e-12) for x in at(angle)]
-    slopes = list(towards)
-    for n in orders:
-        slopes += [f for k in range(2) for f in (towards[k] * np.cos(n * angle), -towards[k] * np.sin(n * angle))]
-    return best, slopes
 
 
 def _reading(d: Dwell, inputs: Mapping[str, Estimate]) -> Estimate:
