@@ -200,6 +200,7 @@ def of_results(results: Results, plan: Settings) -> Iterator[Finding]:
     yield from _repeats(results)
     yield from _told(results)
     if plan.variants:
+        yield from _regions(results)
         yield from _zones(results)
 
 
@@ -261,6 +262,21 @@ def _told(results: Results) -> Iterator[Finding]:
             f"{polar(first.reading)}; by the forces the shaft itself moved {polar(first.shaft)}; subtracted is the runout "
             f"{polar(first.values)}.")  # fmt: skip
     yield Finding("slow-roll", text, slow.where)
+
+
+def _regions(results: Results) -> Iterator[Finding]:
+    """Of each setting, the greatest 95 % ellipse of a vector."""
+    for variant in results.variants:
+        some = []
+        for r in results.of(variant):
+            for k, axis in enumerate(AXES):
+                one = r.vectors.one(k)
+                sizes = np.sqrt(radius2(one.dof) * np.linalg.eigvalsh(one.covariance))
+                some.append((float(sizes[1]), float(sizes[0]), f"{axis}, {r.dwell.where}"))
+        most, least, where = max(some)
+        text = (f"{variant}: the greatest 95 % ellipse of a vector has half axes of {most * 1e6:.2f} and {least * 1e6:.2f} µm; "
+                "each follows from its two components and their correlation.")  # fmt: skip
+        yield Finding("ellipse", text, where)
 
 
 def _zones(results: Results) -> Iterator[Finding]:

@@ -19,7 +19,7 @@ from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, interval
 from procedures import compensation, unbalance
-from procedures.estimators import runout, unbalance_checks, unbalance_estimates
+from procedures.estimators import reach, runout, unbalance_checks, unbalance_estimates
 from procedures.estimators.unbalance_data import AXES, read_dwells
 from procedures.estimators.unbalance_estimates import Results
 from procedures.unbalance import CODES, POLES, SETTINGS, check
@@ -66,7 +66,7 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 def test_nothing_is_found_on_a_sound_stand(compared: Run) -> None:
     assert not compared.serious
-    assert {f.code for f in compared.findings} == {"slow-roll", "zone", "reduction-told", "runout-followed"}
+    assert {f.code for f in compared.findings} == {"slow-roll", "ellipse", "zone", "reduction-told", "runout-followed"}
     assert len(compared.recording.all_steps()) == compensation.step_count(compared.recording.plan)
     assert {name for name, _ in compared.measured} == {q.name for q in compensation.MEASURES}
 
@@ -235,3 +235,14 @@ def test_runout_by_forces_is_exact_on_its_own_model() -> None:
     swapped = made[1].vectors.copy()
     swapped[:4] = swapped[[2, 3, 0, 1]]
     assert runout.unbalances(stand, runout.Turning(1000.0, means, swapped), found)[1] > unbalance_checks.UNEXPLAINED
+
+
+def test_d_max_between_the_grid_s_places_is_that_of_the_orbit() -> None:
+    """An ellipse of 10 by 4 um about places within 5 um, against the distance itself."""
+    generator = np.random.default_rng(1)
+    placed = [generator.uniform(-5e-6, 5e-6, 400) for _ in range(2)]
+    orbit = [np.array([x]) for x in (10e-6, 0.0, 0.0, -4e-6)]
+    found = reach._interpolated(placed, orbit, [1.0])
+    turn = np.linspace(0, 2 * math.pi, 2000)
+    true = np.hypot(placed[0][:, None] + 10e-6 * np.cos(turn), placed[1][:, None] + 4e-6 * np.sin(turn)).max(axis=1)
+    assert np.abs(found - true).max() < 0.03e-6
