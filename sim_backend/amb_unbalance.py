@@ -20,7 +20,7 @@ from sim_backend.core.amb_params import AmbControl, AmbParams
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
-DRIVE = DriveLaw(gain=0.02, limit=0.2, ramp=210.0)
+DRIVE = DriveLaw(gain=0.5, limit=0.2, ramp=210.0)  # so stiff that drag takes nothing from the speed asked for
 LIFT_S = 1.0
 
 
