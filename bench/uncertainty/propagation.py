@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import overload
 
 import numpy as np
 
 from bench.errors import AnalysisError
+from bench.uncertainty.curvature import expanded
 from bench.uncertainty.estimate import Array, Deviations, Estimate, Influence, Sampler, merged
 
 NONLINEAR = 0.1  # share of the combined u that a second difference may reach
@@ -48,7 +49,7 @@ def propagate(
     for name, value in middle.items():
         linear = Estimate(value, "", slopes[name])
         bent = bends[name] > NONLINEAR * linear.u or any(e.nonlinear for e in inputs.values())
-        out[name] = Estimate(value, "", slopes[name], _sampler(f, inputs, name)) if bent else linear
+        out[name] = Estimate(value, "", slopes[name], _sampler(f, inputs, name, influences)) if bent else linear
     return out if isinstance(centre, dict) else out[_ONE]
 
 
@@ -65,9 +66,22 @@ def _shifted(shares: Shares, influence: Influence, side: float) -> dict[str, flo
 
 
 def _sampler(
-    f: Callable[[dict[str, float]], float] | Callable[[dict[str, float]], dict[str, float]], inputs: Inputs, name: str
+    f: Callable[[dict[str, float]], float] | Callable[[dict[str, float]], dict[str, float]],
+    inputs: Inputs,
+    name: str,
+    influences: Sequence[Influence],
 ) -> Sampler:
+    shares = {key: (e.value, e.contributions) for key, e in inputs.items()}
+
+    def shifted(by: Mapping[str, float]) -> float:
+        moved = {key: v + sum(share.get(i, 0.0) * z for i, z in by.items()) for key, (v, share) in shares.items()}
+        return _named(f(moved))[name]
+
     def sampled(deviations: Deviations) -> Array:
+        if not any(e.nonlinear for e in inputs.values()):
+            quick = expanded(shifted, {i.id: i.u for i in influences}, deviations)
+            if quick is not None:
+                return quick
         drawn = {key: e.sampled(deviations) for key, e in inputs.items()}
         count = max((len(v) for v in drawn.values()), default=1)
         full = {key: np.broadcast_to(v, (count,)) for key, v in drawn.items()}
