@@ -9,7 +9,7 @@ import numpy as np
 
 from bench.findings import Effect, Finding
 from bench.uncertainty import Estimate, Influence, coverage_factor, welch_satterthwaite
-from procedures.estimators import bearing
+from procedures.estimators import bearing, signals
 from procedures.estimators.bearing import AXES
 from procedures.estimators.bearing_compared import BEARINGS
 from procedures.estimators.bearing_data import CURRENTS, POSITIONS, Held
@@ -59,8 +59,8 @@ class Tolerances(Protocol):
 
 def of_signals(held: Held, tilted: Held, plan: Tolerances) -> Iterator[Finding]:
     """Lost samples, stuck channels, flags, and a shaft that moves within a step."""
-    yield from _lost(held, plan)
-    yield from _stuck(held)
+    yield from signals.losses(held.lost, held.expected, plan.max_lost, held.where)
+    yield from signals.stuck(held.spread, (*POSITIONS, *CURRENTS))
     yield from _flags(held, tilted)
     speed = np.abs([held.drift[c] for c in POSITIONS]).max(axis=0) / (plan.average_s / 2)
     if speed.max() > plan.max_speed_m_s:
@@ -69,25 +69,6 @@ def of_signals(held: Held, tilted: Held, plan: Tolerances) -> Iterator[Finding]:
             "are allowed: its weight is not what the magnets carry alone. Settle longer."
         )
         yield Finding("unsettled", text, held.where(speed), Effect.INDETERMINATE)
-
-
-def _lost(held: Held, plan: Tolerances) -> Iterator[Finding]:
-    share = held.lost / np.maximum(held.expected, 1)
-    if share.max() > plan.max_lost:
-        text = (
-            f"{held.lost.sum() / held.expected.sum():.2%} of the samples inside steps are missing ({share.max():.2%} "
-            f"in the worst step; {plan.max_lost:.2%} is allowed). Look at the link: load, cable, gateway."
-        )
-        yield Finding("missing-samples", text, held.where(share), Effect.INDETERMINATE)
-
-
-def _stuck(held: Held) -> Iterator[Finding]:
-    for channel in (*POSITIONS, *CURRENTS):
-        still = held.spread[channel] == 0
-        if still.any():
-            steps = f"{int(still.sum())} of {still.size} steps"
-            text = f"{channel} does not move at all in {steps}; a live sensor has noise."
-            yield Finding("stuck-channel", text, channel, Effect.ERROR)
 
 
 def _flags(held: Held, tilted: Held) -> Iterator[Finding]:

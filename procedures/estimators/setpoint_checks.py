@@ -11,6 +11,7 @@ import numpy as np
 from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.uncertainty import Estimate, coverage_factor
+from procedures.estimators import signals
 from procedures.estimators.setpoint_data import CLIPPED, COIL_LIMIT, CONTACT, STEP, VOLTAGE_LIMIT, Case, Done
 from procedures.estimators.setpoint_estimates import Result
 
@@ -62,26 +63,19 @@ def of_steps(steps: Sequence[Done], plan: Tolerances) -> Iterator[Finding]:
 
 
 def _signals(steps: Sequence[Done], plan: Tolerances) -> Iterator[Finding]:
-    parts = [d.lost / max(d.expected, 1) for d in steps]
-    worst = int(np.argmax(parts))
-    if parts[worst] > plan.max_lost:
-        yield Finding(
-            "missing-samples",
-            f"{parts[worst]:.2%} of the samples of a step are missing ({plan.max_lost:.2%} is allowed). Look at the "
-            f"link: load, "
-            "cable, gateway.", steps[worst].case.where, Effect.INDETERMINATE,
-        )  # fmt: skip
+    lost, expected = np.array([(d.lost, d.expected) for d in steps], dtype=float).T
+    yield from signals.losses(lost, expected, plan.max_lost, lambda share: steps[int(np.argmax(share))].case.where)
     for channel in sorted({c for d in steps for c in d.stuck}):
         text = f"{channel} does not move at all; a live sensor has noise."
         yield Finding("stuck-channel", text, channel, Effect.ERROR)
     for bits, code, effect, text in (
-        (CLIPPED, "sensor-clipped", Effect.ERROR, "a position sensor read beyond its range: what it shows of the "
-                                                  "swing is cut off"),
-        (CONTACT, "contact", Effect.INDETERMINATE, "the shaft touched a ring or the axial stop: the response is not "
-                                                   "that of the loop"),
+        (CLIPPED, "sensor-clipped", Effect.ERROR,
+         "a position sensor read beyond its range: what it shows of the swing is cut off"),
+        (CONTACT, "contact", Effect.INDETERMINATE,
+         "the shaft touched a ring or the axial stop: the response is not that of the loop"),
         (COIL_LIMIT, "current-saturated", Effect.INDETERMINATE, "a coil current was at its limit: the response is not linear"),
-        (VOLTAGE_LIMIT, "voltage-saturated", Effect.INDETERMINATE, "an amplifier's voltage was at its limit: the "
-                                                                   "currents slewed, "
+        (VOLTAGE_LIMIT, "voltage-saturated", Effect.INDETERMINATE,
+         "an amplifier's voltage was at its limit: the currents slewed, "
          "and the response is not linear; steps are too large, the supply too low or the coils' inductance too high"),
     ):  # fmt: skip
         hit = [d for d in steps if d.flags & bits]

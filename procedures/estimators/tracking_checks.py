@@ -11,6 +11,7 @@ import numpy as np
 from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
 from bench.uncertainty import Estimate
+from procedures.estimators import signals
 from procedures.estimators.sines import known_frequency, unknown_frequency
 from procedures.estimators.tracking import centre
 from procedures.estimators.tracking_data import (
@@ -55,16 +56,9 @@ class Settings(Protocol):
 
 def of_signals(orbits: Sequence[Orbit], plan: Settings) -> Iterator[Finding]:
     """Lost samples, channels that stand still or clip, a reference that is not what was planned."""
+    lost, expected = np.array([(o.step.lost(), o.step.expected()) for o in orbits], dtype=float).T
+    yield from signals.losses(lost, expected, plan.max_lost, lambda share: orbits[int(np.argmax(share))].where)
     for o in orbits:
-        share = o.step.lost() / max(o.step.expected(), 1)
-        if share > plan.max_lost:
-            yield Finding(
-                "missing-samples",
-                f"{share:.2%} of the samples of an orbit are missing ({plan.max_lost:.2%} is "
-                "allowed). Look at the link: load, cable, gateway.",
-                o.where,
-                Effect.INDETERMINATE,
-            )
         rows = (
             *zip(POSITIONS, o.path.readings, strict=True),
             *zip(UPPER, o.upper, strict=True),

@@ -15,6 +15,7 @@ from bench.errors import BenchError
 from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.rigfile import RigFile
+from procedures.estimators import signals
 from procedures.estimators.unbalance_data import (
     AXES,
     CONTACT,
@@ -119,15 +120,9 @@ def before(recording: Recording[Any]) -> Iterator[Finding]:
 
 def of_signals(dwells: Sequence[Dwell], plan: Settings) -> Iterator[Finding]:
     """Lost samples, pulses, probes that clip or stand still, contact, limits, sampling, speed."""
+    lost, expected = np.array([(d.lost, d.expected) for d in dwells], dtype=float).T
+    yield from signals.losses(lost, expected, plan.max_lost, lambda share: dwells[int(np.argmax(share))].where)
     for d in dwells:
-        share = d.lost / max(d.expected, 1)
-        if share > plan.max_lost:
-            yield Finding(
-                "missing-samples",
-                f"{share:.2%} of the samples are missing ({plan.max_lost:.2%} is allowed). Look at the link: load, cable, "
-                "gateway.",
-                d.where, Effect.INDETERMINATE,
-            )  # fmt: skip
         for name in d.stuck:
             yield Finding("stuck-channel", f"{name} does not move at all; a live sensor has noise.", name, Effect.ERROR)
         yield from _pulses(d)
