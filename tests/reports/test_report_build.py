@@ -201,13 +201,16 @@ def test_many_correlations_are_told_by_pairs() -> None:
     matrix[3][7] = matrix[7][3] = -0.62
     matrix[1][2] = matrix[2][1] = 0.93
     matrix[5][6] = matrix[6][5] = 0.02
-    page = html.render(view(correlations={"names": names, "matrix": matrix}))
+    made = view(correlations={"names": names, "matrix": matrix})
+    page = html.render(made)
     text = Page(page).text
     assert "2 of the 190 pairs have a coefficient of at least 0.05 in size. record.json" in text
     assert text.index("0.93") < text.index("\u22120.62")
     row = page[page.index("1 µm</td>") :]
     assert row.index("2 µm</td>") < row.index("0.93")
     assert "0.02" not in text[text.index("Correlations of the results") :][:600]
+    tables_printed = str(typst.query(pdf.sources(made), "table", ignore_system_fonts=True))
+    assert tables_printed.index("2 µm") < tables_printed.index("0.93") < tables_printed.index("\u22120.62")
 
 
 def hostile() -> tuple[dict[str, Any], SampleRecording]:
