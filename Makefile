@@ -9,7 +9,7 @@ READY := .venv/.ready
 # Tests start hundreds of processes: without its bytecode every one of them would compile the project again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check format ci-long campaigns bench clean lock setup
+.PHONY: demo test check format ci-long fuzz campaigns bench clean lock setup
 
 demo: setup
 	$(BIN)/bench run amb-calibration --rig tsbs12 --seed 1
@@ -26,6 +26,9 @@ check: setup
 
 ci-long: setup
 	$(BIN)/python -m pytest -q -m long tests
+
+fuzz: setup
+	$(BIN)/python -m pytest -q -m "hypothesis and not long" -n 2 --hypothesis-profile=search --timeout 600
 
 campaigns: setup
 	$(BIN)/bench campaign tsbs-identification --count 1000 --keep none

@@ -149,7 +149,8 @@ class Layout:
         if len(buffer) % size:
             raise BenchError(f"capture: found {len(buffer)} bytes; expected whole samples of {size} bytes")
         rows = np.frombuffer(buffer, self.sample)
-        return {name: rows[name].astype(np.float64) * c.scale for name, c in self.channels.items()}
+        with np.errstate(invalid="ignore"):  # a controller may send any pattern of a NaN; a signalling one is a NaN too
+            return {name: rows[name].astype(np.float64) * c.scale for name, c in self.channels.items()}
 
 
 def problems_of(spec: CaptureSpec, messages: MessageMap) -> Iterator[Found]:

@@ -89,6 +89,12 @@ def test_any_bytes_are_samples_or_refused(names: set[str], buffer: bytes) -> Non
             assert back[name].tolist() == x.tolist(), name
 
 
+def test_a_signalling_nan_is_a_nan() -> None:
+    layout = Layout.of(SPEC, ("pulse_age",))
+    (value,) = layout.decoded(bytes.fromhex("00 00 81 7F"))["pulse_age"].tolist()
+    assert math.isnan(value)
+
+
 def test_a_choice_that_cannot_be() -> None:
     with pytest.raises(BenchError, match="cannot record pos_w; it can record pos_yi, pos_zi"):
         Layout.of(SPEC, ("pos_yi", "pos_w"))
