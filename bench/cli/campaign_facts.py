@@ -11,6 +11,7 @@ from bench.campaign_directory import CampaignDirectory
 from bench.cli.adopt import adopt as adopted_run
 from bench.cli.campaign_job import RigTask, StepTask
 from bench.cli.compose import Request
+from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import simulated_run
 from bench.findings import Finding
 from bench.procedure import Measured
@@ -23,9 +24,10 @@ if TYPE_CHECKING:
 def simulated_step(
     task: RigTask, step: StepTask, seed: int, path: Path, known: Mapping[str, Calibration]
 ) -> tuple[Mapping[str, float], list[Measured | Finding], Callable[[], Calibration]]:
-    """One step on one virtual rig: the truth, what `analyse` yields, and what makes its calibration."""
+    """One step on one virtual rig: the truth by `name` or `name@where`, what `analyse` yields, and what makes its
+    calibration."""
     done = simulated_run(step.procedure, task.rig, seed, step.plan, path, task.truth, known)
-    return done.truth, done.results, done.calibration
+    return {**done.truth, **truth_of_motion(done)}, done.results, done.calibration
 
 
 def request_of(asked: Asked, directory: CampaignDirectory, step: Planned) -> Request:

@@ -157,7 +157,7 @@ def _values(number: int, measured: Iterable[Any], truth: Mapping[str, float], se
     found = []
     for m in measured:
         bounds = interval(m.estimate, seed)
-        true = truth.get(m.quantity.name)
+        true = truth.get(f"{m.quantity.name}@{m.where}", truth.get(m.quantity.name))
         numbers = (m.estimate.value, bounds.low, bounds.high, bounds.U, 0.0 if true is None else true)
         if not all(map(math.isfinite, numbers)):
             continue  # no value; the rig counts as one that missed it

@@ -78,14 +78,16 @@ def _literal(value: Any) -> str:
     """A TOML value as TOML text.
 
     Raises:
-        ConfigError: a date or a table, which no plan has.
+        ConfigError: a date, which no plan has.
     """
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{json.dumps(k)} = {_literal(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_literal, value)) + "]"
     try:
-        if isinstance(value, Mapping):
-            raise TypeError
         return json.dumps(value)
     except TypeError:
-        raise ConfigError(f"found {value!r}; expected a number, a string, true, false or a list") from None
+        raise ConfigError(f"found {value!r}; expected a number, a string, true, false, a list or a table") from None
 
 
 def _unmet(steps: list[Planned], path: str) -> Iterator[Problem]:

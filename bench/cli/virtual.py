@@ -38,13 +38,18 @@ SLICE_S = 0.5  # five times the live bench's: each slice costs a round of Python
 
 @dataclass(frozen=True)
 class Simulated:
-    """One finished run on one virtual rig: the true quantities, and what `analyse` yields."""
+    """One finished run on one virtual rig: what was drawn, and what `analyse` yields."""
 
     procedure: Procedure
     recording: Recording[Any]
     seed: int
-    truth: Mapping[str, float]
+    drawn: Truth
     results: list[Measured | Finding]
+
+    @property
+    def truth(self) -> Mapping[str, float]:
+        """The true quantities."""
+        return self.drawn.quantities
 
     def calibration(self) -> Calibration:
         """What `bench adopt` would make of this run; its run id and its date follow from the seed, so that a chain of
@@ -126,7 +131,7 @@ def simulated_run(
         chosen.acquire(live, settings, recorder)
         transition(live, RigState.OFF)
     recording: Recording[Any] = Recording.open(path, chosen.plan)
-    return Simulated(chosen, recording, seed, drawn.quantities, list(chosen.analyse(recording)))
+    return Simulated(chosen, recording, seed, drawn, list(chosen.analyse(recording)))
 
 
 @contextmanager

@@ -1,0 +1,95 @@
+"""What a virtual rig truly does in a procedure of motion, where that follows from the plan and not from the machine alone.
+
+The same machine runs without noise and rounding under the same settings; its quantities go by `name@where`, as a
+campaign's table names them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from bench.errors import BenchError
+from bench.findings import Finding
+
+if TYPE_CHECKING:
+    from bench.cli.virtual import Simulated
+
+Found = Iterator[tuple[str, str, float]]  # name, where, value in SI
+
+
+def truth_of_motion(done: Simulated) -> dict[str, float]:
+    """By `name@where`; nothing for a procedure whose quantities are the machine's, and where a run gave nothing to compare."""
+    of = TRUTHS.get(done.procedure.name)
+    try:
+        return {} if of is None else {f"{name}@{where}": value for name, where, value in of(done)}
+    except BenchError:
+        return {}
+
+
+def _settings(done: Simulated, *more: Mapping[str, float]) -> dict[str, float]:
+    """Every parameter of the controller: the rig file's defaults, then what a procedure writes."""
+    rig = done.recording.rig
+    known = {name: p.default for name, p in rig.parameters.items()}
+    for changed in (done.procedure.settings(done.recording.plan), *more):
+        known |= changed
+    return known
+
+
+def _step(done: Simulated) -> Found:
+    from procedures.estimators.setpoint_data import AT_REST_S, Case
+    from procedures.step import chosen, model
+    from sim_backend import amb_step
+
+    plan: Any = done.recording.plan
+    other_band = {r.where for r in done.results if isinstance(r, Finding) and r.code == "band-widened"}
+    for setting, changed in chosen(plan).items():
+        settings = _settings(done, model(done.recording.rig, plan), changed)
+        for speed in plan.speeds_rad_s:
+            window = 2 * math.pi / speed if speed else AT_REST_S
+            for axis in plan.axes:
+                small, shown = amb_step.truth(
+                    done.drawn.plant,
+                    settings,
+                    axis,
+                    plan.sizes_m,
+                    speed=speed,
+                    rest_s=plan.rest_s,
+                    record_s=plan.record_s,
+                )
+                cases = {key: Case(setting, speed, axis, *key) for key in shown}
+                group = next(iter(cases.values())).group
+                yield "damping", group, small.damping
+                yield "natural_frequency", group, small.frequency
+                for key, of in shown.items():
+                    for name in ("overshoot", "rise_time", "steady_error", "bandwidth"):
+                        yield name, cases[key].where, getattr(of, name)
+                    if cases[key].where not in other_band:
+                        yield "settling_time", cases[key].where, of.settling_time(plan.band, window)
+
+
+def _unbalance(done: Simulated) -> Found:
+    from procedures.estimators.unbalance_data import AXES, DWELL, PLANES, read_dwells
+    from procedures.unbalance import CODES, POLES, SETTINGS
+    from sim_backend import amb_unbalance
+
+    plan: Any = done.recording.plan
+    law = {**(POLES if plan.observed else {}), "law": CODES[plan.law]}
+    for dwell in read_dwells(done.recording):
+        if dwell.kind != DWELL or dwell.again:
+            continue
+        settings = _settings(done, law, SETTINGS[dwell.variant])  # type: ignore[index]
+        true = amb_unbalance.motion(done.drawn.plant, settings, dwell.speed)
+        for axis, vector in zip(AXES, true.shaft, strict=True):
+            yield "vector_cos", f"{axis}, {dwell.where}", float(vector.real)
+            yield "vector_sin", f"{axis}, {dwell.where}", float(-vector.imag)
+        for plane, value in zip(PLANES, true.d_max, strict=True):
+            yield "d_max", f"{plane}, {dwell.where}", value
+
+
+TRUTHS: Mapping[str, Callable[[Any], Found]] = {
+    "step": _step,
+    "unbalance": _unbalance,
+    "compensation": _unbalance,
+}

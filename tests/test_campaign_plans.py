@@ -1,0 +1,53 @@
+"""Plans in campaign files: the shipped campaigns fit their rigs; tables arrive as tables; the truth of a place goes first."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+
+from bench import campaign, catalogue
+from bench.campaign import Campaign
+from bench.cli.campaign_job import _values
+from bench.cli.campaign_steps import planned
+from bench.errors import ConfigError
+from bench.procedure import Measured, Quantity
+from bench.rigfile import load_rig
+from bench.uncertainty import Estimate
+
+TABLES = """
+schema = 1
+name = "tables"
+rig = "amb5dof"
+[[step]]
+procedure = "step"
+plan = { axes = ["y"], sizes_um = [10, 20], a = { law = 2, "k1" = 2e5 } }
+"""
+
+
+@pytest.mark.parametrize("name", [entry.name for entry in catalogue.campaigns()])
+def test_a_shipped_campaign_fits_its_rig(name: str) -> None:
+    c, path = campaign.load(name)
+    for short in (False, True):
+        assert len(planned(c, str(path), load_rig(c.rig), short)) == len(c.step)
+
+
+def test_tables_and_lists_of_a_plan_arrive() -> None:
+    (step,) = planned(Campaign.parse(TABLES), "c.toml", load_rig("amb5dof"), short=False)
+    plan: Any = step.plan
+    assert plan.a == {"law": 2.0, "k1": 2e5}
+    assert (plan.axes, plan.sizes_m) == (("y",), pytest.approx((1e-5, 2e-5)))
+
+
+def test_a_date_is_no_setting() -> None:
+    text = TABLES.replace("law = 2", "law = 2026-11-21")
+    with pytest.raises(ConfigError, match="a number, a string, true, false, a list or a table"):
+        planned(Campaign.parse(text), "c.toml", load_rig("amb5dof"), short=False)
+
+
+def test_a_place_has_its_own_truth_before_that_of_the_machine() -> None:
+    quantity = Quantity("mass", "kg", "of the shaft")
+    measured = [Measured(quantity, Estimate.exact(1.0, "kg"), where) for where in ("", "here", "there")]
+    truth: Mapping[str, float] = {"mass": 1.5, "mass@here": 2.5}
+    assert [v["truth"] for v in _values(1, measured, truth, 0)] == [1.5, 2.5, 1.5]
