@@ -15,6 +15,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 
 from bench import catalogue
 from bench.errors import ConfigError, Problem
+from bench.schema import expected_of
 from bench.toleranced import Toleranced, simulated
 
 SCHEMA = 1
@@ -121,8 +122,7 @@ def _toml(text: str, path: str) -> dict[str, Any]:
 def _problem(error: Any, path: str) -> Problem:
     key = ".".join(str(part + 1) if isinstance(part, int) else part for part in error["loc"]) or "(file)"
     found = "nothing" if error["type"] == "missing" else _short(error.get("input"))
-    expected = {"missing": "a value", "extra_forbidden": "no such key"}.get(error["type"], str(error["msg"]))
-    return Problem(path, key, found, expected.removeprefix("Input should be ").removeprefix("Value error, "))
+    return Problem(path, key, found, expected_of(error))
 
 
 def _short(value: Any) -> str:

@@ -16,6 +16,7 @@ from pydantic import ValidationError
 from bench import units
 from bench.errors import ConfigError, Problem
 from bench.procedure import BenchPlan
+from bench.schema import expected_of
 
 P = TypeVar("P", bound=BenchPlan)
 SCHEMA = 1
@@ -146,5 +147,6 @@ def _tuples(values: Mapping[str, Any]) -> dict[str, Any]:
 def _problem(error: Any, origin: Mapping[str, str]) -> Problem:
     key = ".".join(str(part) for part in error["loc"])
     source = origin.get(str(error["loc"][0]) if error["loc"] else "", "plan")
-    found = "nothing" if error["type"] == "missing" else repr(error["input"])
-    return Problem(source, key, found, str(error["msg"]).removeprefix("Input should be ").removeprefix("Value error, "))
+    value = list(error["input"]) if isinstance(error["input"], tuple) else error["input"]
+    found = "nothing" if error["type"] == "missing" else repr(value)
+    return Problem(source, key, found, expected_of(error))

@@ -22,6 +22,7 @@ from bench.errors import ConfigError, Problem
 from bench.messages import MessageMap, load_messages
 from bench.part import Part
 from bench.registers import Register
+from bench.schema import expected_of
 from bench.toleranced import Toleranced, simulated
 
 SCHEMA = 1
@@ -237,8 +238,7 @@ def _problem(error: Any, path: str) -> Problem:
     found = "nothing" if error["type"] == "missing" else repr(error.get("input"))
     if error["type"] != "missing" and isinstance(error.get("input"), dict):
         found = "a table with " + ", ".join(error["input"])
-    expected = {"missing": "a value", "extra_forbidden": "no such key"}.get(error["type"], error["msg"])
-    return Problem(path, key, found, expected)
+    return Problem(path, key, found, expected_of(error))
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,10 @@
-"""The schema number of our JSON files: read before anything else of them."""
+"""What our files are held against: the schema number of JSON files, and what a refused value should have been."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
+from typing import Any
 
 from bench.errors import ConfigError
 
@@ -24,3 +26,24 @@ def require_schema(text: str, name: str, kind: str, schema: int) -> None:
     if found != schema:
         newer = " It was written by a newer Levbench." if found > schema else ""
         raise ConfigError(f"{name}: schema: found {found}; expected {schema}.{newer}")
+
+
+def expected_of(error: Mapping[str, Any]) -> str:
+    """What one of pydantic's errors (an entry of `ValidationError.errors()`) expects, in our words."""
+    count = error.get("ctx", {})
+    match error["type"]:
+        case "missing":
+            return "a value"
+        case "extra_forbidden":
+            return "no such key"
+        case "too_short":
+            return f"at least {_counted(count['min_length'], 'entry', 'entries')}"
+        case "too_long":
+            return f"at most {_counted(count['max_length'], 'entry', 'entries')}"
+        case "string_too_short":
+            return f"at least {_counted(count['min_length'], 'character', 'characters')}"
+    return str(error["msg"]).removeprefix("Input should be ").removeprefix("Value error, ")
+
+
+def _counted(number: int, one: str, more: str) -> str:
+    return f"{number} {one if number == 1 else more}"

@@ -133,9 +133,15 @@ def _visit(rig: Rig, plan: Plan, record: Recorder, visited: list[Point], turn: i
 
 
 @lru_cache(maxsize=1)
+def measured(recording: Recording[Plan]) -> MapData:
+    """What was recorded, point by point. Kept, like what is made of it."""
+    return read_points(recording)
+
+
+@lru_cache(maxsize=1)
 def evaluate(recording: Recording[Plan]) -> tuple[MapData, Result]:
     """Points and terms. Kept, because measurements and figures both need them."""
-    plan, rig, data = recording.plan, recording.rig, read_points(recording)
+    plan, rig, data = recording.plan, recording.rig, measured(recording)
     facts = recording.calibration(CALIBRATION).values
     inputs = map_estimates.inputs_of(rig, facts, plan.angles)
     poles = 2 * round(rig.machine["pole_pairs"].value)
@@ -148,7 +154,7 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     yield from wrong
     if wrong:
         return
-    signals = list(map_data.of_signals(read_points(recording), recording.plan))
+    signals = list(map_data.of_signals(measured(recording), recording.plan))
     yield from signals
     if any(f.code == "stuck-channel" for f in signals):
         return

@@ -11,6 +11,8 @@ import re
 from datetime import datetime
 from decimal import ROUND_HALF_EVEN, Decimal
 
+from bench.uncertainty import power_out
+
 NARROW = "\u202f"  # narrow no-break space
 MINUS = "\u2212"
 TIMES = "\u00d7"
@@ -61,15 +63,6 @@ def _fixed(number: float, last: int, shift: int) -> str:
     return grouped(text)
 
 
-def _shift(largest: float, last: int) -> int:
-    """The power of ten to take out, zero where the plain number reads well; multiples of three where possible."""
-    exponent = math.floor(math.log10(largest)) if largest > 0 else 0
-    if last <= 0 and -3 <= exponent < 6:
-        return 0
-    thousand = 3 * math.floor(exponent / 3)
-    return thousand if last <= thousand else exponent
-
-
 def rounded_together(numbers: list[float], uncertainty: float, digits: int = 2) -> tuple[list[str], str, int]:
     """All `numbers`, and the uncertainty, to `digits` significant digits of the uncertainty.
 
@@ -78,7 +71,7 @@ def rounded_together(numbers: list[float], uncertainty: float, digits: int = 2) 
     if not uncertainty > 0:
         return [plain(n) for n in numbers], "0", 0
     last = int(f"{uncertainty:.{digits - 1}e}".partition("e")[2]) - digits + 1
-    shift = _shift(max(abs(uncertainty), *(abs(n) for n in numbers)), last)
+    shift = power_out(max(abs(uncertainty), *(abs(n) for n in numbers)), last)
     return [_fixed(n, last, shift) for n in numbers], _fixed(uncertainty, last, shift), shift
 
 

@@ -1,5 +1,8 @@
 """The console blocks of the documentation, executed page by page, in order, in a folder of their own.
 
+The default run executes the tutorial, the guides and one page of each machine; every other page is `LONG`. Commands,
+options and plans of all pages are checked there, without starting one.
+
 Pages of procedures that build on others begin with the same runs and adoptions. What such a sequence of commands leaves in a
 fresh folder is kept for the session: the next page with the same beginning goes on from a copy. Every distinct sequence
 is executed once in every session; under xdist these pages are one group (`groups.py`).
@@ -20,15 +23,26 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import typer
+
+from bench import plans
+from bench.cli import compose
+from bench.cli.__main__ import app
+from bench.rigfile import load_rig
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted(p for p in (ROOT / "docs").rglob("*.md") if "```console" in p.read_text(encoding="utf-8"))
+REFUSED = re.compile(r"\|\| (true|test \$\? -eq 2)")
+RIGS = [path.stem for path in (ROOT / "rigs").glob("*.toml")]
 CHAIN = re.compile(r'RUN=\$\(bench run [^\\]*\| tail -1\)|bench adopt "\$RUN" [^\\]*')
 """A command on one line that leaves nothing but files and the variable RUN."""
 
 
-LONG = ("force-map", "model", "run-a-campaign", "step", "tracking")
-"""Pages whose commands take more than ten seconds."""
+LONG = ("amb-calibration", "angle-step", "change-a-plan", "compensation", "force-constant", "force-coupling",
+        "force-map", "model", "negative-stiffness", "run-a-campaign", "slew", "spindown", "step", "torque-constant",
+        "tracking", "unbalance", "use-in-ci")  # fmt: skip
+"""Pages that take long, or that only run a procedure: by default `tests/procedures` takes each through its whole path and
+draws its figures, and the tutorial and `adopt-a-calibration` the same commands with their reports and calibrations."""
 
 
 def test_there_are_pages_to_execute() -> None:
@@ -42,6 +56,22 @@ def commands(page: Path) -> tuple[tuple[str, ...], list[str]]:
     lines = text.splitlines()
     chain = tuple(takewhile(CHAIN.fullmatch, lines))
     return chain, lines[len(chain) :]
+
+
+def bench_commands(page: Path) -> list[tuple[list[str], bool]]:
+    """What its console blocks give to `bench`, word by word, and whether it is meant to start."""
+    text = "\n".join(re.findall(r"```console\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL))
+    found = []
+    for line in text.replace("\\\n", " ").splitlines():
+        if not re.search(r"\bbench ", line):
+            continue
+        lexer = shlex.shlex(line, posix=True, punctuation_chars=True)
+        lexer.whitespace_split = True
+        words = list(lexer)
+        for k in (k for k, word in enumerate(words) if word == "bench"):
+            end = takewhile(lambda word: not set(word) <= set("();<>|&"), words[k + 1 :])
+            found.append((list(end), not REFUSED.search(line)))
+    return found
 
 
 def shell(lines: list[str], folder: Path) -> str:
@@ -95,6 +125,23 @@ def test_commands_work(page: Path, tmp_path: Path, chains: Chains) -> None:
         shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
         lines = [f"RUN={shlex.quote(run)}", *lines]
     shell(lines, tmp_path)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_commands_are_understood(page: Path) -> None:
+    """Commands and options that there are, and plans that fit their rigs."""
+    command = typer.main.get_command(app)
+    for words, well in bench_commands(page):
+        if words[0] == "--help":
+            continue
+        chosen = command.commands[words[0]]  # type: ignore[attr-defined]
+        asked = chosen.make_context(words[0], words[1:]).params
+        if words[0] != "run" or not well or asked["rig"] not in RIGS:
+            continue
+        procedure, rig = compose.load_procedure(asked["procedure"]), load_rig(asked["rig"])
+        defaults = ("rig", rig.plans.get(procedure.name, {}))
+        plan = plans.assemble(procedure.plan, defaults, None, tuple(asked["plan"] or ()))
+        assert list(procedure.check(rig, plan)) == []
 
 
 def test_links_lead_somewhere() -> None:

@@ -18,6 +18,7 @@ class Plan(BenchPlan):
     settle_s: float = Field(2.0, gt=0)
     max_speed: float = 10.0
     levels_m: tuple[float, ...] = ()
+    speeds_rad_s: tuple[float, ...] = Field((30.0,), min_length=1, max_length=3)
 
 
 def made(*assignments: str, defaults: dict[str, object] | None = None, file: Path | None = None) -> Plan:
@@ -54,6 +55,20 @@ def test_every_problem_is_named_with_its_source() -> None:
     assert "8" in said["--plan", "angles"].expected
     assert said["--plan", "angles"].found == "3"
     assert "settle_s" in said["--plan", "seattle_s"].expected
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("speeds_rpm=[]", "--plan: speeds_rad_s: found []; expected at least 1 entry"),
+        ("speeds_rad_s=[1.0, 2.0, 3.0, 4.0]", "found [1.0, 2.0, 3.0, 4.0]; expected at most 3 entries"),
+        ('masses=["M1", 2]', "--plan: masses.1: found 2; expected a valid string"),
+    ],
+)
+def test_a_list_is_refused_by_key_found_and_expected(text: str, said: str) -> None:
+    with pytest.raises(ConfigError) as info:
+        made(text)
+    assert said in str(info.value)
 
 
 @pytest.mark.parametrize(

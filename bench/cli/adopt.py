@@ -14,7 +14,7 @@ from bench.calibrationstore import Store, named
 from bench.cli.compose import load_procedure
 from bench.records import Outcome
 from bench.rigfile import load_rig
-from bench.uncertainty import interval, round_to_uncertainty
+from bench.uncertainty import interval, stated
 
 
 def adopt(run: Path, rig: str = "", calibrations: Path | None = None, anyway: bool = False) -> tuple[Calibration, Path]:
@@ -60,8 +60,7 @@ def values(c: Calibration) -> list[str]:
     whole = {name: e for name, e in c.values.items() if "@" not in name}
     lines = []
     for name, e in whole.items():
-        value, expanded = round_to_uncertainty(e.value, interval(e).U)
         unit = "" if e.unit == "1" else e.unit
-        lines.append(f"{name:8} {value} ± {expanded} {unit}".rstrip())
+        lines.append(f"{name:8} {stated(e.value, interval(e).U, '±')} {unit}".rstrip())
     rest = len(c.values) - len(whole)
     return [*lines, f"and {rest} values by angle"] if rest else lines

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from bench.errors import AnalysisError, ConfigError
-from bench.uncertainty import coverage_factor, round_to_uncertainty
+from bench.uncertainty import coverage_factor, stated
 from procedures import force_map_figures
 from procedures.estimators import force_map, mapping
 from procedures.estimators.force_map import UNITS
@@ -88,8 +88,7 @@ def _constants(part: Part, table: Table, poles: int) -> list[str]:
     values = f"{part.measured.size} values, {part.fit.dof} degrees of freedom, k = {k:.2f} (95 %)"
     lines = [f"{part.name}: {len(part.fit.terms)} of {len(part.terms)} terms; {values}"]
     for term, value, u in zip(part.fit.terms, part.fit.values, part.fit.u, strict=True):
-        rounded, expanded = round_to_uncertainty(float(value), float(k * u))
-        lines.append(f"  {term:8} {rounded:>10} +- {expanded:8} {UNITS[term]:10} {force_map.ABOUT[term]}")
+        lines.append(f"  {term:8} {stated(float(value), float(k * u)):>22} {UNITS[term]:10} {force_map.ABOUT[term]}")
     lines += [
         f"  {term:8} cannot be identified: {force_map.why_unseen(term, table.points, poles)}"
         for term in part.told.unseen

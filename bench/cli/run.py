@@ -12,7 +12,7 @@ from bench.progress import shown_on
 from bench.records import Outcome, Record
 from bench.runner import RunResult
 from bench.supervisor import Supervisor
-from bench.uncertainty import round_to_uncertainty
+from bench.uncertainty import stated
 
 STATUS = {Outcome.PASS: 0, Outcome.FAIL: 1, Outcome.ERROR: 3, Outcome.ABORTED: 4, Outcome.INDETERMINATE: 5}
 
@@ -47,8 +47,8 @@ def summary(record: Record) -> str:
     for m in record.measurements:
         value = "missing"
         if m.value is not None and m.expanded_uncertainty is not None:
-            value, expanded = round_to_uncertainty(m.value, m.expanded_uncertainty)
-            value = f"{value} +- {expanded} {m.unit}"
+            unit = "" if m.unit == "1" else m.unit
+            value = f"{stated(m.value, m.expanded_uncertainty)} {unit}".rstrip()
         place = f" ({m.where})" if m.where else ""
         lines.append(f"  {m.name:{widest}} {value:32} {m.verdict.value}{place}")
     lines += [f"  {f.effect.value}: {f.code}: {f.text}" for f in record.findings]

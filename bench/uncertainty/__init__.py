@@ -3,7 +3,7 @@
 GUM is JCGM 100:2008; JCGM 101:2008 is its supplement on Monte Carlo.
 """
 
-from bench.uncertainty.budgets import BudgetRow, budget, round_to_uncertainty
+from bench.uncertainty.budgets import BudgetRow, budget, power_out, round_to_uncertainty, stated
 from bench.uncertainty.coverage import PROBABILITY, Interval, coverage_factor, interval, welch_satterthwaite
 from bench.uncertainty.estimate import Distribution, Estimate, Influence, correlation, correlation_matrix
 from bench.uncertainty.propagation import propagate
@@ -23,7 +23,9 @@ __all__ = [
     "correlation_matrix",
     "coverage_factor",
     "interval",
+    "power_out",
     "propagate",
     "round_to_uncertainty",
+    "stated",
     "welch_satterthwaite",
 ]

@@ -43,3 +43,23 @@ def round_to_uncertainty(value: float, expanded: float) -> tuple[str, str]:
     rounded = ((Decimal(repr(x)) / step).quantize(Decimal(1), ROUND_HALF_EVEN) * step for x in (value, expanded))
     low, high = (f"{x:f}" if place < 0 else f"{int(x)}" for x in rounded)
     return low, high
+
+
+def power_out(largest: float, place: int) -> int:
+    """The power of ten to take out of a number that ends at the decade `place`: zero where it reads well as it is, from
+    0.001 to 999999; else a multiple of three where no digit is lost by it."""
+    exponent = math.floor(math.log10(largest)) if largest > 0 else 0
+    if place <= 0 and -3 <= exponent < 6:
+        return 0
+    thousand = 3 * math.floor(exponent / 3)
+    return thousand if place <= thousand else exponent
+
+
+def stated(value: float, expanded: float, sign: str = "+-") -> str:
+    """`73.21 +- 0.12`, or with a power of ten that binds both, `(-12.34 +- 0.32)e-6`: a result as a line of text has it."""
+    if not (math.isfinite(value) and math.isfinite(expanded)) or expanded <= 0:
+        return f"{value!r} {sign} {expanded!r}"
+    place = int(f"{expanded:.1e}".partition("e")[2]) - 1
+    power = power_out(max(abs(value), expanded), place)
+    low, high = round_to_uncertainty(*(float(Decimal(repr(x)).scaleb(-power)) for x in (value, expanded)))
+    return f"({low} {sign} {high})e{power}" if power else f"{low} {sign} {high}"

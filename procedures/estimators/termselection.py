@@ -50,23 +50,32 @@ def left_out_errors(design: Array, measured: Array, u: Array | None) -> Array:
     projector (Cook and Weisberg, Residuals and Influence in Regression, 1982, 2.2.2, for a group of rows). All nan
     where the points do not determine the terms.
     """
+    return _of_subsets(design, measured, u, np.arange(design.shape[2])[None])[0]
+
+
+def _of_subsets(design: Array, measured: Array, u: Array | None, columns: npt.NDArray[np.intp]) -> Array:
+    """(s, n, r): the same for each of `columns` (s, k), subsets of one size. A = Q R is decomposed once: the columns of a
+    subset are Q times those of R, which are few."""
     points, rows, terms = design.shape
     weight = np.ones(measured.shape) if u is None else 1 / u
-    out = np.full(measured.shape, np.nan)
+    out = np.full((len(columns), points, rows), np.nan)
     a = (design * weight[:, :, None]).reshape(-1, terms)
+    if len(a) < columns.shape[1]:
+        return out
     norms = np.linalg.norm(a, axis=0)
-    if not norms.all() or len(a) < terms:
-        return out
-    q, r = np.linalg.qr(a / norms)
-    diagonal = np.abs(np.diag(r))
-    if diagonal.min() <= LEVERAGE * diagonal.max():
-        return out
+    q, r = np.linalg.qr(a / np.where(norms > 0, norms, 1))
+    inner, corner = np.linalg.qr(r.T[columns].swapaxes(1, 2))
+    diagonal = np.abs(np.diagonal(corner, axis1=1, axis2=2))
+    clear = diagonal.min(axis=1) > LEVERAGE * diagonal.max(axis=1)
+    bases = q @ inner[clear]
     y = (measured * weight).reshape(-1)
-    residual = (y - q @ (q.T @ y)).reshape(points, rows)
-    blocks = q.reshape(points, rows, terms)
-    spare = np.eye(rows) - np.einsum("nrk,nsk->nrs", blocks, blocks)
-    can = np.linalg.eigvalsh(spare)[:, 0] > LEVERAGE
-    out[can] = np.linalg.solve(spare[can], residual[can][:, :, None])[:, :, 0]
+    residual = (y - (bases @ (y @ bases)[:, :, None])[:, :, 0]).reshape(-1, points, rows)
+    blocks = bases.reshape(-1, points, rows, columns.shape[1])
+    spare = np.eye(rows) - blocks @ blocks.swapaxes(2, 3)
+    can = np.linalg.eigvalsh(spare)[:, :, 0] > LEVERAGE
+    found = np.full(residual.shape, np.nan)
+    found[can] = np.linalg.solve(spare[can], residual[can][:, :, None])[:, :, 0]
+    out[clear] = found
     return out
 
 
@@ -82,13 +91,12 @@ def select(design: Array, measured: Array, u: Array | None, terms: Sequence[str]
         return Selection((), None, spared)
     best: list[tuple[tuple[str, ...], Array]] = []
     for size in range(1, len(terms) + 1):
-        found: tuple[float, tuple[str, ...], Array] | None = None
-        for columns in combinations(range(len(terms)), size):
-            squares = (left_out_errors(design[:, :, columns], measured, u)[spared] ** 2).sum(axis=1)
-            if np.isfinite(squares).all() and (found is None or squares.mean() < found[0]):
-                found = (float(squares.mean()), tuple(terms[k] for k in columns), squares)
-        if found is not None:
-            best.append(found[1:])
+        subsets = np.array(list(combinations(range(len(terms)), size)))
+        squares = (_of_subsets(design, measured, u, subsets)[:, spared] ** 2).sum(axis=2)
+        losses = squares.mean(axis=1)
+        if np.isfinite(losses).any():
+            found = int(np.nanargmin(losses))
+            best.append((tuple(terms[k] for k in subsets[found]), squares[found]))
     reference = min((squares for _, squares in best), key=lambda s: float(s.mean()))
     path = tuple(_against(names, squares, reference) for names, squares in best)
     return Selection(path, next(c for c in path if c.as_good), spared)

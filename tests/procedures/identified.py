@@ -1,4 +1,4 @@
-"""The chain up to the motor's force constant on one virtual rig, for tests of what comes after it."""
+"""The chain up to the motor's force constant on one virtual rig, for its tests and for those of what comes after it."""
 
 from __future__ import annotations
 
@@ -20,22 +20,31 @@ WEIGH = {"levels_A": [-2, -1, 0, 1, 2], "ramp_A_s": 5, "settle_s": 0.25, "averag
 
 @dataclass(frozen=True)
 class Identified:
-    """The last run and the calibrations of both."""
+    """Both runs and their calibrations."""
 
+    amb: Simulated
     motor: Simulated
     known: dict[str, Calibration]
 
 
+_AMB: dict[int, Simulated] = {}
 _MADE: dict[int, Identified] = {}
+
+
+def calibrated(folder: Path, seed: int = SEED) -> Simulated:
+    """The AMB calibration alone; made once, as below."""
+    if seed not in _AMB:
+        _AMB[seed] = simulated_run("amb-calibration", "tsbs12", seed, CALIBRATE, folder / "amb.mcap")
+    return _AMB[seed]
 
 
 def identification(folder: Path, seed: int = SEED) -> Identified:
     """The runs at their short plans; made once for all tests (`groups.py`), by the first that asks, in its folder."""
     if seed not in _MADE:
-        amb = simulated_run("amb-calibration", "tsbs12", seed, CALIBRATE, folder / "amb.mcap").calibration()
-        known = {"amb-calibration": amb}
+        amb = calibrated(folder, seed)
+        known = {"amb-calibration": amb.calibration()}
         motor = simulated_run("force-constant", "tsbs12", seed, WEIGH, folder / "motor.mcap", None, known)
-        _MADE[seed] = Identified(motor, known | {"force-constant": motor.calibration()})
+        _MADE[seed] = Identified(amb, motor, known | {"force-constant": motor.calibration()})
     return _MADE[seed]
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
+from identified import calibrated, serious
 
 from bench.cli.virtual import simulate
 from bench.errors import DeviceFault, InterlockError
@@ -18,7 +19,6 @@ from bench.uncertainty import interval
 from procedures.amb_calibration import Plan, check
 from sim_backend.truth import draw
 
-QUICK = {"settle_s": 0.5, "average_s": 0.3}
 SHORT = {"settle_s": 0.3, "average_s": 0.2}
 
 
@@ -30,13 +30,14 @@ def calibrate(
     return true, measured, [f for f in results if isinstance(f, Finding)]
 
 
-def test_a_sound_rig_is_recovered_within_its_intervals(tmp_path: Path) -> None:
+def test_a_sound_rig_is_recovered_within_its_intervals(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Seed fixed before any tuning; three standard uncertainties, so that an honest rig does not fail by chance."""
-    true, measured, findings = calibrate(tmp_path, 2026, None, QUICK)
+    run = calibrated(tmp_path_factory.mktemp("sound"))
+    measured = {m.quantity.name: m for m in run.results if isinstance(m, Measured)}
     assert set(measured) == {"K_i", "K_o", "K2_i", "K2_o", "Kw_i", "Kw_o"}
-    assert [f for f in findings if f.effect is not Effect.NOTE] == []
+    assert serious(run) == []
     for name, m in measured.items():
-        assert abs(m.estimate.value - true[name]) < 3 * m.estimate.u, name
+        assert abs(m.estimate.value - run.truth[name]) < 3 * m.estimate.u, name
         assert m.estimate.u < 0.01 * abs(measured["K_o"].estimate.value)
     limits = load_spec("tsbs12", "amb-calibration")
     for name in ("K_i", "K_o"):

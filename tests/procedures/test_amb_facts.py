@@ -6,18 +6,18 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
+from identified import CALIBRATE, SEED, calibrated
 
 from bench.calibration import Calibration
 from bench.calibrationfile import from_json, to_json
-from bench.cli.virtual import Simulated, simulated_run
+from bench.cli.virtual import Simulated
 from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.uncertainty import correlation
 from sim_backend.quantities import eccentricity
 from sim_backend.truth import draw
 
-SEED, BIAS_A, ANGLES = 2026, 3.0, 9
-QUICK = {"settle_s": 0.5, "average_s": 0.3, "bias_A": BIAS_A, "angles": ANGLES}
+BIAS_A, ANGLES = 3.0, CALIBRATE["angles"]
 
 
 def true_by_angle(seed: int) -> Mapping[str, float]:
@@ -36,8 +36,7 @@ def true_by_angle(seed: int) -> Mapping[str, float]:
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> Simulated:
-    path = tmp_path_factory.mktemp("facts") / "recording.mcap"
-    return simulated_run("amb-calibration", "tsbs12", SEED, QUICK, path)
+    return calibrated(tmp_path_factory.mktemp("facts"))
 
 
 @pytest.fixture(scope="module")

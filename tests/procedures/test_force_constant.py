@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from identified import CALIBRATE, SEED, WEIGH, estimates, identification, serious
+from reanalysed import reanalysed
 
 from bench.calibration import Calibration
 from bench.cli.virtual import Simulated, simulated_run
@@ -136,19 +137,20 @@ def altered(calibration: Calibration, change: object) -> Calibration:
     return replace(calibration, values=values)
 
 
-def test_a_calibration_with_a_wrong_sign_is_named(tmp_path: Path, calibration: Calibration) -> None:
+def test_a_calibration_with_a_wrong_sign_is_named(sound: Simulated, calibration: Calibration) -> None:
     wrong = altered(calibration, lambda n, v: -v[n] if n.startswith("K_i@") else v[n])
-    found = {(f.code, f.where): f.text for f in serious(measure(tmp_path, wrong, **SHORT))}
+    found = {(f.code, f.where): f.text for f in serious(reanalysed(sound, {CALIBRATION: wrong}))}
     assert "opposite sign of K_i" in found["rows-disagree", "y"]
     assert ("rows-disagree", "x") not in found  # the horizontal constants rest on the vertical ones
 
 
-def test_a_calibration_of_other_angles_is_named(tmp_path: Path, calibration: Calibration) -> None:
+def test_a_calibration_of_other_angles_is_named(sound: Simulated, calibration: Calibration) -> None:
     def next_angle(name: str, values: Mapping[str, Estimate]) -> Estimate:
         quantity, at, angle = name.partition("@")
         return values[f"{quantity}@{(int(angle) + 1) % 9}"] if at else values[name]
 
-    found = {f.code: f.text for f in serious(measure(tmp_path, altered(calibration, next_angle), **SHORT))}
+    wrong = altered(calibration, next_angle)
+    found = {f.code: f.text for f in serious(reanalysed(sound, {CALIBRATION: wrong}))}
     assert set(found) & {"rows-disagree", "lack-of-fit"}
     assert any("further on" in text for text in found.values()), found
 
@@ -161,7 +163,7 @@ def test_a_calibration_of_another_rig_does_not_pass(tmp_path: Path) -> None:
 
 
 def test_eight_angles_cannot_tell_the_ripple(tmp_path: Path) -> None:
-    eight = calibrated(tmp_path, SEED, angles=8)
+    eight = calibrated(tmp_path, SEED, angles=8, settle_s=0.3, average_s=0.2)
     found = serious(measure(tmp_path, eight, angles=8))
     assert [f.code for f in found] == ["ripple-unresolved"]
     assert found[0].effect is Effect.INDETERMINATE

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from identified import SEED, estimates, identified, notes, scaled, serious, swung
+from reanalysed import reanalysed
 
 from bench.calibration import Calibration
 from bench.cli.virtual import Simulated, simulated_run
@@ -121,8 +122,8 @@ def test_a_defect_is_named_and_does_not_pass(
     assert any(f.code == code and named in f"{f.text} {f.where}" for f in fatal), fatal
 
 
-def test_a_force_constant_of_the_wrong_sign_is_named(known: dict[str, Calibration], tmp_path: Path) -> None:
-    assert "wrong-sign" in {f.code for f in serious(measure(tmp_path, scaled(known, -1.0)))}
+def test_a_force_constant_of_the_wrong_sign_is_named(known: dict[str, Calibration], sound: Simulated) -> None:
+    assert "wrong-sign" in {f.code for f in serious(reanalysed(sound, scaled(known, -1.0)))}
 
 
 def test_a_position_gain_does_not_matter_here(known: dict[str, Calibration], sound: Simulated, tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from identified import SEED, estimates, identified
+from reanalysed import reanalysed
 
 from bench.calibration import Calibration
 from bench.cli.virtual import Simulated, simulated_run
@@ -100,9 +101,9 @@ def test_a_planted_defect_is_named_and_never_passes(
     assert named in found[0].text
 
 
-def test_a_calibration_of_the_wrong_sign_is_named(calibration: Calibration, tmp_path: Path) -> None:
+def test_a_calibration_of_the_wrong_sign_is_named(calibration: Calibration, sound: Simulated) -> None:
     turned = replace(calibration, values={n: -e if n.startswith("K") else e for n, e in calibration.values.items()})
-    found = [f for f in findings(mapped(tmp_path, turned, **SHORT)) if f.effect is Effect.ERROR]
+    found = [f for f in findings(reanalysed(sound, {CALIBRATION: turned})) if f.effect is Effect.ERROR]
     assert [f.code for f in found] == ["wrong-sign"]
     assert "calibration" in found[0].text
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from identified import SEED, estimates, identified, notes, scaled, serious, swung
+from reanalysed import reanalysed
 
 from bench.calibration import Calibration
 from bench.cli.virtual import Simulated, simulated_run
@@ -127,9 +128,9 @@ def test_a_defect_is_named_and_does_not_pass(
     ("factor", "code"), [(-1.0, "wrong-sign"), (1.2, "methods-disagree"), (0.97, "methods-disagree")]
 )
 def test_a_wrong_force_constant_is_seen_by_the_second_way(
-    known: dict[str, Calibration], tmp_path: Path, factor: float, code: str
+    known: dict[str, Calibration], sound: Simulated, factor: float, code: str
 ) -> None:
-    assert code in {f.code for f in serious(measure(tmp_path, scaled(known, factor)))}
+    assert code in {f.code for f in serious(reanalysed(sound, scaled(known, factor)))}
 
 
 @pytest.mark.parametrize(

@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from reanalysed import reanalysed
 
 from bench.calibration import Calibration
-from bench.cli.virtual import simulate
+from bench.cli.virtual import simulate, simulated_run
 from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
@@ -106,10 +107,11 @@ def test_a_calibrated_torque_constant_is_used(tmp_path: Path) -> None:
     values = {"alpha_tau": Estimate.of(5.74, own)}
     facts = {"torque-constant": Calibration("torque-constant", values, run_id="earlier", seed=1, sha256="0" * 64)}
     plan = {**QUICK, "torque_constant": "calibration"}
-    _, results = simulate("slew", "tsbs12", 1, plan, tmp_path / "recording.mcap", None, facts)
-    doubled = next(m.estimate for m in results if isinstance(m, Measured) and m.quantity.name == "detent")
-    (tmp_path / "recording.mcap").unlink()
-    design = slewed(tmp_path)[0]["detent", ""]
+    run = simulated_run("slew", "tsbs12", 1, plan, tmp_path / "recording.mcap", None, facts)
+    doubled, design = (
+        next(m.estimate for m in r.results if isinstance(m, Measured) and m.quantity.name == "detent")
+        for r in (run, reanalysed(run, torque_constant="design"))
+    )
     assert doubled.value == pytest.approx(2 * design.value, rel=1e-6)
     assert "earlier/scatter" in doubled.contributions
     assert doubled.u / doubled.value < design.u / design.value

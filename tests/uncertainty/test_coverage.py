@@ -17,6 +17,7 @@ from bench.uncertainty import (
     interval,
     propagate,
     round_to_uncertainty,
+    stated,
     welch_satterthwaite,
 )
 from bench.uncertainty.coverage import draw
@@ -157,3 +158,21 @@ def test_budget_is_sorted_and_its_shares_add_up() -> None:
 )
 def test_rounding(value: float, expanded: float, text: tuple[str, str]) -> None:
     assert round_to_uncertainty(value, expanded) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "expanded", "text"),
+    [
+        (73.21478, 0.1234, "73.21 +- 0.12"),
+        (2.7e-7, 1.2e-8, "(270 +- 12)e-9"),
+        (2.7e-7, 1.2e-7, "(2.7 +- 1.2)e-7"),
+        (-0.000012344, 3.21e-7, "(-12.34 +- 0.32)e-6"),
+        (7321.478, 1234.0, "(7.3 +- 1.2)e3"),
+        (1.62e8, 3.4e5, "(162.00 +- 0.34)e6"),
+        (0.0, 5e-9, "(0.0 +- 5.0)e-9"),
+        (0.0042, 0.00013, "0.00420 +- 0.00013"),
+        (1.0, 0.0, "1.0 +- 0.0"),
+    ],
+)
+def test_a_result_on_one_line(value: float, expanded: float, text: str) -> None:
+    assert stated(value, expanded) == text
