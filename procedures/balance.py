@@ -44,12 +44,16 @@ from procedures.estimators.unbalance_data import DWELL, RPM, SLOW
 Law = Literal["PID", "CCS", "CAC"]
 FOUND_COS = Quantity("unbalance_cos", "kg m", "of the shaft as found, in a plane: component along the scale's zero")
 FOUND_SIN = Quantity("unbalance_sin", "kg m", "as unbalance_cos: component a quarter turn on, from y towards z")
-LEFT_COS = Quantity("residual_cos", "kg m", "what is left with all corrections mounted: component along the scale's zero")
+LEFT_COS = Quantity(
+    "residual_cos", "kg m", "what is left with all corrections mounted: component along the scale's zero"
+)
 LEFT_SIN = Quantity("residual_sin", "kg m", "as residual_cos: component a quarter turn on, from y towards z")
 SHARE = Quantity("residual_share", "1", "amount of what is left over the permissible residual unbalance of the plane")
 BOUND = Quantity("residual_bound", "kg m", "U_res + U: the greatest amount in the 95 % region of what is left")
 PERMITTED = Quantity("permissible", "kg m", "permissible residual unbalance of the plane, ISO 21940-11")
-COSINE = Quantity("influence_cos", "m/(kg m)", "of a weight at the scale's zero on a probe, order 1 0-pk: cosine component")
+COSINE = Quantity(
+    "influence_cos", "m/(kg m)", "of a weight at the scale's zero on a probe, order 1 0-pk: cosine component"
+)
 SINE = Quantity("influence_sin", "m/(kg m)", "as influence_cos: sine component; x = C cos θ + S sin θ")
 MEASURES = (FOUND_COS, FOUND_SIN, LEFT_COS, LEFT_SIN, SHARE, PERMITTED, COSINE, SINE)
 SLOW_HZ = 500.0  # of the slow roll's capture
@@ -232,7 +236,7 @@ def _acted(work: Work, plane: int) -> bool:
 def _correct(work: Work) -> None:
     """Corrections, each with its verification run, until it is reached or the plan allows no more."""
     rig, plan = work.rig.file, work.plan
-    trials = balance_decision.trials_of(work.runs, plan.leave)
+    trials = balance_decision.trials_of(work.runs, rig, plan.leave)
     assert trials is not None
     shown = [balance_decision.shown(trials.before[p], trials.having[p], trials.weights[p], rig, plan) for p in (0, 1)]
     if list(balance_decision.of_trials(shown[0], shown[1])):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -30,6 +31,7 @@ from procedures.estimators.balance_estimates import Balanced, Forces, Trials
 from procedures.estimators.unbalance_data import AXES, CURRENTS, POSITIONS, RPM, SLOW, TOLD, Complex, Dwell
 
 MOST_RPM = 10000.0  # influence runs
+WORST_CONDITION = 50.0  # of the influence coefficients
 DIFFERS = 0.15  # of what was mounted: how far a verification may be from the prediction, beside its uncertainty
 NEEDED = ("com_to_inboard_balance", "com_to_outboard_balance", "balance_radius", "clearance", "coupling_stiffness", "amb_gap",
           *(f"com_to_{b}_{what}" for b in ("inboard", "outboard") for what in ("sensor", "amb")))  # fmt: skip
@@ -97,8 +99,9 @@ def of_plan(rig: RigFile, plan: Settings) -> Iterable[str]:
                    f"predicted response, which may reach {plan.max_share:.0%} of the least clearance")  # fmt: skip
 
 
+@lru_cache(maxsize=1)
 def evaluated(recording: Recording[Any]) -> Evaluated:
-    """What a recording says."""
+    """What a recording says. The last one is kept: analysis and figures ask for the same."""
     found = [*tracking_wiring.before_orbits(recording), *unbalance_checks.before(recording), *_refusals(recording)]
     if any(f.code in ("no-dwells", "probe-polarity", "lift-lost", "stuck-channel") for f in found):
         return Evaluated(tuple(found))
@@ -106,7 +109,7 @@ def evaluated(recording: Recording[Any]) -> Evaluated:
     recorded = read_runs(recording, plan.speeds_rad_s)
     found += unbalance_checks.of_signals(recorded.dwells, plan)
     found += _of_runs(recorded, rig, plan)
-    trials = balance_decision.trials_of(recorded.runs, plan.leave)
+    trials = balance_decision.trials_of(recorded.runs, rig, plan.leave)
     if trials is None and not any(f.effect is Effect.ERROR for f in found):
         text = "the runs with trial weights were not completed: no influence coefficients."
         found.append(Finding("no-trials", text, "", Effect.ERROR))
@@ -160,9 +163,11 @@ def _of_runs(recorded: Recorded, rig: RigFile, plan: Settings) -> Iterator[Findi
     yield from balance_decision.of_trials(added[0], added[1])
 
 
-def _of_result(balance: Balanced, recorded: Recorded, shown: list[Run], plan: Settings, rig: RigFile) -> Iterator[Finding]:
+def _of_result(
+    balance: Balanced, recorded: Recorded, shown: list[Run], plan: Settings, rig: RigFile
+) -> Iterator[Finding]:
     """Was it reached, did the corrections act as predicted, and the sheet."""
-    if balance.solved.condition > balance_estimates.WORST_CONDITION:
+    if balance.solved.condition > WORST_CONDITION:
         text = (f"the condition of the influence coefficients is {balance.solved.condition:.0f}: the probes do not tell the "
                 "planes apart.")  # fmt: skip
         yield Finding("planes-not-told-apart", text, "", Effect.ERROR)
@@ -184,7 +189,9 @@ def _of_result(balance: Balanced, recorded: Recorded, shown: list[Run], plan: Se
 
 def _predicted(balance: Balanced, before: Run, after: Run) -> Iterator[Finding]:
     """What was measured against what was expected of the weights that were fixed in between."""
-    added = balance_estimates.fixed(after.weights, balance.radius) - balance_estimates.fixed(before.weights, balance.radius)
+    added = balance_estimates.fixed(after.weights, balance.radius) - balance_estimates.fixed(
+        before.weights, balance.radius
+    )
     expected = balance.unbalance[before.name].values + added
     found = balance.unbalance[after.name]
     off = found.values - expected
@@ -208,7 +215,9 @@ def balance_scatter(balance: Balanced, scale: float) -> float:
     return 0.02 * scale + 0.03 * G_MM
 
 
-def sheet(fixed: Iterable[tuple[Weight, str]], on: Iterable[Weight], radius: float, plan: Settings) -> Iterator[Finding]:
+def sheet(
+    fixed: Iterable[tuple[Weight, str]], on: Iterable[Weight], radius: float, plan: Settings
+) -> Iterator[Finding]:
     """The weights that stay on the shaft, for the operator."""
     kept = {w.number for w in on}
     for w, purpose in fixed:

@@ -121,7 +121,9 @@ def read_runs(recording: Recording[Any], speeds: Sequence[float]) -> Recorded:
     for step in recording.all_steps():
         labels = step.labels
         if step.kind == MOUNT:
-            w = Weight(SIDES.index(str(labels["plane"])), float(labels["kg"]), float(labels["angle_rad"]), len(fixed) + 1)
+            w = Weight(
+                SIDES.index(str(labels["plane"])), float(labels["kg"]), float(labels["angle_rad"]), len(fixed) + 1
+            )
             fixed.append((w, str(labels["purpose"])))
             mounted.append((step.start_ns, w))
         elif step.kind == UNMOUNT:

@@ -98,7 +98,11 @@ def shown(before: Run, having: Run, weight: Weight, rig: RigFile, plan: Settings
 
 def of_trial(added: Complex, weight: Weight) -> Iterator[Finding]:
     """Did a trial weight do what it should, in its own plane, at every speed alike? `added` as by `shown`."""
-    p, where, name = weight.plane, f"trial {SIDES[weight.plane]}", f"{weight.kg * 1e3:g} g in the {SIDES[weight.plane]} plane"
+    p, where, name = (
+        weight.plane,
+        f"trial {SIDES[weight.plane]}",
+        f"{weight.kg * 1e3:g} g in the {SIDES[weight.plane]} plane",
+    )
     own, other = float(np.abs(added[-1, p])), float(np.abs(added[-1, 1 - p]))
     if own < LEAST and other < LEAST:
         text = (f"the trial weight of {name} moved nothing: by the forces it acts as {own:.0%} of itself. Is it mounted, and "
@@ -177,7 +181,7 @@ def correction(balance: Balanced, name: str, rig: RigFile, plan: Settings) -> Co
     return Correction(tuple(wanted), reached=False, too_heavy=heaviest if heaviest > most else 0.0)
 
 
-def trials_of(runs: Sequence[Run], leave: bool) -> Trials | None:
+def trials_of(runs: Sequence[Run], rig: RigFile, leave: bool) -> Trials | None:
     """The trials among runs in order, None where one is missing."""
     named = {r.name: r for r in runs}
     names = ["base", *(f"trial {s}" for s in SIDES)]
@@ -186,4 +190,5 @@ def trials_of(runs: Sequence[Run], leave: bool) -> Trials | None:
     base, i, o = (named[n] for n in names)
     if not i.weights or not o.weights:
         return None
-    return Trials(base, (base, i if leave else base), (i, o), (i.weights[-1], o.weights[-1]))
+    return Trials(base, (base, i if leave else base), (i, o), (i.weights[-1], o.weights[-1]),
+                  rig.geometry["balance_radius"].value)  # fmt: skip

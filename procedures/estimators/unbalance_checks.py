@@ -301,4 +301,15 @@ def _zones(results: Results) -> Iterator[Finding]:
         yield Finding("zone", text, f"{place}, {r.dwell.where}")
 
 
-__all__ = ["Balanced", "Result", "before", "channels", "of_plan", "of_results", "of_signals", "too_fast", "weight", "zone"]
+__all__ = [
+    "Balanced",
+    "Result",
+    "before",
+    "channels",
+    "of_plan",
+    "of_results",
+    "of_signals",
+    "too_fast",
+    "weight",
+    "zone",
+]
