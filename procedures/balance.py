@@ -6,40 +6,25 @@ permissible residual unbalance; influence coefficients.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
 from typing import Literal
 
 from pydantic import Field
 
-from bench.errors import AnalysisError
 from bench.figures import Figure
-from bench.findings import Effect, Finding
+from bench.findings import Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
-from bench.recorder import Recorder
 from bench.recording import Recording
-from bench.rig import Rig
 from bench.rigfile import RigFile
-from bench.roles import Plane, RigState
-from bench.states import transition
+from bench.roles import RigState
 from procedures import balance_figures as drawn
-from procedures import probing, unbalance
-from procedures.estimators import balance_checks, balance_decision, balance_estimates
+from procedures import balancing, probing, unbalance
+from procedures.estimators import balance_checks, balance_estimates
 from procedures.estimators.balance_data import (
     BASE,
-    CAPTURED,
-    DECISION,
-    MOUNT,
-    REFUSED,
     SIDES,
-    UNMOUNT,
-    Read,
-    Run,
-    Weight,
-    read_capture,
 )
-from procedures.estimators.unbalance_data import DWELL, RPM, SLOW
+from procedures.estimators.unbalance_data import RPM
 
 Law = Literal["PID", "CCS", "CAC"]
 FOUND_COS = Quantity("unbalance_cos", "kg m", "of the shaft as found, in a plane: component along the scale's zero")
@@ -49,14 +34,12 @@ LEFT_COS = Quantity(
 )
 LEFT_SIN = Quantity("residual_sin", "kg m", "as residual_cos: component a quarter turn on, from y towards z")
 SHARE = Quantity("residual_share", "1", "amount of what is left over the permissible residual unbalance of the plane")
-BOUND = Quantity("residual_bound", "kg m", "U_res + U: the greatest amount in the 95 % region of what is left")
 PERMITTED = Quantity("permissible", "kg m", "permissible residual unbalance of the plane, ISO 21940-11")
 COSINE = Quantity(
     "influence_cos", "m/(kg m)", "of a weight at the scale's zero on a probe, order 1 0-pk: cosine component"
 )
 SINE = Quantity("influence_sin", "m/(kg m)", "as influence_cos: sine component; x = C cos θ + S sin θ")
 MEASURES = (FOUND_COS, FOUND_SIN, LEFT_COS, LEFT_SIN, SHARE, PERMITTED, COSINE, SINE)
-SLOW_HZ = 500.0  # of the slow roll's capture
 
 
 class Plan(BenchPlan):
@@ -78,6 +61,7 @@ class Plan(BenchPlan):
     grade_m_s: float = Field(2.5e-3, gt=0)  # G2.5
     service_rad_s: float = Field(15000 / RPM, gt=0)  # the highest, for the permissible residual unbalance
     max_share: float = Field(0.5, gt=0, le=0.9)  # of the least clearance: where a predicted response may reach
+    refit_u_kg_m: float = Field(0.0, ge=0)  # of the shaft's own unbalance, each time a weight has been fixed
     beta_share: float = Field(0.05, ge=0)
     offset_u_m: float = Field(10e-6, ge=0)
     max_lost: float = Field(1e-3, ge=0)
@@ -117,144 +101,6 @@ def step_count(plan: Plan) -> int:
     return probing.STEPS + (plan.slow_rad_s > 0) + runs * (len(plan.speeds_rad_s) + plan.repeat) + mounts
 
 
-@dataclass
-class Work:
-    """A balancing under way: what is on the shaft, what was read so far."""
-
-    rig: Rig
-    plan: Plan
-    record: Recorder
-    mounted: list[Weight] = field(default_factory=list)
-    runs: list[Run] = field(default_factory=list)
-    slow: Read | None = None
-    fixed: int = 0
-    dwells: int = 0
-
-
-def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
-    """Look, lift and nudge; slow roll and base run; a run with a trial weight in each plane; corrections, each verified."""
-    work = Work(rig, plan, record)
-    if not probing.probed(rig, record):
-        return
-    unbalance.put(rig, {"law": unbalance.CODES[plan.law], **unbalance.SETTINGS["off"]})
-    if not _rolled(work) or not _run(work, BASE):
-        return
-    for p, side in enumerate(SIDES):
-        if (allowed := balance_decision.refused(rig.file, plan, work.runs, p)) is not None:
-            record.event(REFUSED, plane=side, kg=plan.trial_kg[p], allowed_kg=allowed)
-            return
-        _mount(work, p, plan.trial_kg[p], plan.trial_angle_rad[p], "trial")
-        if not _run(work, f"trial {side}") or not _acted(work, p):
-            return
-        if not plan.leave:
-            _unmount(work, p)
-    _correct(work)
-
-
-def _rolled(work: Work) -> bool:
-    """The slow roll, where the plan has one."""
-    rig, plan = work.rig, work.plan
-    if not plan.slow_rad_s:
-        return True
-    if not probing.turned(rig, work.record, plan.slow_rad_s, plan.settle_s):
-        unbalance.finished(rig)
-        return False
-    work.slow = _dwell(work, SLOW, BASE, plan.slow_rad_s, plan.slow_s, plan.slow_s, SLOW_HZ)
-    return work.slow is not None
-
-
-def _run(work: Work, name: str) -> bool:
-    """Levitated, all speeds, the lowest again, stopped and landed; False where it was not completed or not sound."""
-    rig, plan = work.rig, work.plan
-    if rig.levitation.state is RigState.READY:  # the base run goes on from the slow roll
-        transition(rig, RigState.LEVITATED)
-    unbalance.put(rig, {"law": unbalance.CODES[plan.law], **unbalance.SETTINGS["off"]})
-    reads: list[Read] = []
-    speeds = sorted(plan.speeds_rad_s)
-    for speed in (*speeds, *(speeds[:1] if plan.repeat else ())):
-        if not probing.turned(rig, work.record, speed, plan.settle_s):
-            break
-        read = _dwell(work, DWELL, name, speed, plan.dwell_s, plan.capture_s, None, again=len(reads) == len(speeds))
-        if read is None or not read.sound:
-            break
-        reads.append(read)
-    unbalance.finished(rig)
-    transition(rig, RigState.READY)
-    if len(reads) < len(speeds) + plan.repeat:
-        return False
-    run = Run(name, tuple(work.mounted), tuple(reads[: len(speeds)]), reads[-1] if plan.repeat else None)
-    work.runs.append(run)
-    return not list(balance_decision.slipped(run))
-
-
-def _dwell(
-    work: Work, kind: str, name: str, speed: float, seconds: float, capture_s: float, rate_hz: float | None,
-    again: bool = False,
-) -> Read | None:  # fmt: skip
-    """A recorded dwell and what its capture says, None where that cannot be told."""
-    rig, number = work.rig, -1 if again else work.dwells
-    assert rig.capture is not None  # `check` refuses a rig without one
-    driven = rig.drive.speed_rad_s if rig.drive is not None else 0.0
-    labels = {"speed_rad_s": speed, "variant": name, "driven_rad_s": driven, "number": number, "again": again}
-    with work.record.step(kind, **labels):
-        rig.capture.arm(CAPTURED, seconds=capture_s, rate_hz=rate_hz)
-        rig.capture.wait(capture_s + 5.0)
-        rig.clock.sleep(max(seconds - capture_s, unbalance.MARGIN_S))
-    work.dwells += 1
-    data = rig.capture.upload(run=name, speed_rad_s=speed)
-    try:
-        return read_capture(data)
-    except AnalysisError:
-        return None  # the analysis says what is wrong with the pulses
-
-
-def _mount(work: Work, plane: int, kg: float, angle: float, purpose: str) -> None:
-    """Have a weight fixed; the shaft is landed."""
-    side: Plane = "inboard" if plane == 0 else "outboard"
-    with work.record.step(MOUNT, plane=side, kg=kg, angle_rad=angle, purpose=purpose):
-        work.rig.operator.attach(side, kg, angle)
-    work.fixed += 1
-    work.mounted.append(Weight(plane, kg, angle, work.fixed))
-
-
-def _unmount(work: Work, plane: int) -> None:
-    """Have every weight of a plane taken off."""
-    side: Plane = "inboard" if plane == 0 else "outboard"
-    with work.record.step(UNMOUNT, plane=side):
-        work.rig.operator.detach(side)
-    work.mounted = [w for w in work.mounted if w.plane != plane]
-
-
-def _acted(work: Work, plane: int) -> bool:
-    """Whether the trial weight of the last run did what it should."""
-    base, last = work.runs[0], work.runs[-1]
-    before = work.runs[-2] if work.plan.leave else base
-    added = balance_decision.shown(before, last, last.weights[-1], work.rig.file, work.plan)
-    return not list(balance_decision.of_trial(added, last.weights[-1]))
-
-
-def _correct(work: Work) -> None:
-    """Corrections, each with its verification run, until it is reached or the plan allows no more."""
-    rig, plan = work.rig.file, work.plan
-    trials = balance_decision.trials_of(work.runs, rig, plan.leave)
-    assert trials is not None
-    shown = [balance_decision.shown(trials.before[p], trials.having[p], trials.weights[p], rig, plan) for p in (0, 1)]
-    if list(balance_decision.of_trials(shown[0], shown[1])):
-        return
-    present = work.runs[-1] if plan.leave else trials.base
-    for n in range(plan.corrections):
-        found = balance_estimates.balanced(work.slow, [present], trials, rig, plan)
-        needed = balance_decision.correction(found, present.name, rig, plan)
-        work.record.event(DECISION, run=present.name, reached=needed.reached, too_heavy_kg=needed.too_heavy)
-        if needed.reached or needed.too_heavy:
-            return
-        for plane, kg, angle in needed.weights:
-            _mount(work, plane, kg, angle, f"correction {n + 1}")
-        if not _run(work, f"check {n + 1}"):
-            return
-        present = work.runs[-1]
-
-
 def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     """Findings first, then the quantities."""
     found = balance_checks.evaluated(recording)
@@ -288,6 +134,23 @@ def figures(recording: Recording[Plan]) -> Iterable[Figure]:
 
 
 METHOD = """\
+A run is: levitate, dwell at each speed of the plan, the lowest one again, stop, land. The base run comes first, then one with
+a trial weight in each plane, which the operator fixes on the landed shaft; then the corrections, each verified by a run.
+Nothing is compensated.
+
+Influence coefficients are differences of vectors over the trial weight, so that runout cancels in them. Unbalance is the
+least-squares solution of X = A (U + U_R) over all probes and speeds. U_R is what the journals' runout is taken for: the
+unbalance that would make the probes read the same, by the runout of the slow roll (as in `unbalance`: what the probes
+read less what the shaft does, by the coil forces) and the shaft's own masses. The controller is in A alone. Weights sit on
+the planes' scales; where the once-per-turn mark is on them is told by the forces that the trial weights make in the coils.
+
+U_per = G m / omega is shared between the planes by the centre of mass (ISO 21940-11; the formula is as commonly quoted, not
+checked against the standard). It is reached where the whole 95 % region of what is left, an ellipse, lies within U_per in
+both planes: U_res + U is the farthest point of the ellipse. What is left is measured by the last run, so that errors of the
+correction weights are in it and not in its uncertainty.
+
+Angles on a scale are counted from y towards z, in the direction of rotation, while its zero faces y. Lags are counted from
+the mark to the high spot.
 """
 
 procedure = Procedure(
@@ -296,7 +159,7 @@ procedure = Procedure(
     measures=MEASURES,
     state=RigState.READY,
     plan=Plan,
-    acquire=acquire,
+    acquire=balancing.acquire,
     analyse=analyse,
     figures=figures,
     check=check,
@@ -304,4 +167,3 @@ procedure = Procedure(
     step_count=step_count,
     method=METHOD,
 )
-assert math.pi and Effect

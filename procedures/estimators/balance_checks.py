@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
@@ -32,6 +33,7 @@ from procedures.estimators.unbalance_data import AXES, CURRENTS, POSITIONS, RPM,
 
 MOST_RPM = 10000.0  # influence runs
 WORST_CONDITION = 50.0  # of the influence coefficients
+SPEEDS_APART = 2e-3
 DIFFERS = 0.15  # of what was mounted: how far a verification may be from the prediction, beside its uncertainty
 NEEDED = ("com_to_inboard_balance", "com_to_outboard_balance", "balance_radius", "clearance", "coupling_stiffness", "amb_gap",
           *(f"com_to_{b}_{what}" for b in ("inboard", "outboard") for what in ("sensor", "amb")))  # fmt: skip
@@ -89,14 +91,15 @@ def of_plan(rig: RigFile, plan: Settings) -> Iterable[str]:
         return
     yield from unbalance_checks.of_plan(rig, plan)
     if max(plan.speeds_rad_s) * RPM > MOST_RPM + 1:
-        yield f"speeds_rad_s: found {max(plan.speeds_rad_s) * RPM:.0f} r/min; influence runs are made at {MOST_RPM:.0f} r/min or below"
+        top = max(plan.speeds_rad_s) * RPM
+        yield f"speeds_rad_s: found {top:.0f} r/min; influence runs are made at {MOST_RPM:.0f} r/min or below"
     if 0 < plan.positions < 3:
         yield f"positions: found {plan.positions}; expected 0 (any angle), or three or more"
     for side, kg, p in zip(SIDES, plan.trial_kg, (0, 1), strict=True):
         allowed = balance_decision.allowed_kg(rig, plan, p)
         if not 0 < kg <= allowed:
-            yield (f"trial_kg: found {kg * 1e3:g} g {side}; allowed are up to {allowed * 1e3:.3g} g: by the envelope, and by the "
-                   f"predicted response, which may reach {plan.max_share:.0%} of the least clearance")  # fmt: skip
+            yield (f"trial_kg: found {kg * 1e3:g} g {side}; allowed are up to {allowed * 1e3:.3g} g: by the envelope, "
+                   f"and by the predicted response, which may reach {plan.max_share:.0%} of the least clearance")  # fmt: skip
 
 
 @lru_cache(maxsize=1)
@@ -108,7 +111,7 @@ def evaluated(recording: Recording[Any]) -> Evaluated:
     plan, rig = recording.plan, recording.rig
     recorded = read_runs(recording, plan.speeds_rad_s)
     found += unbalance_checks.of_signals(recorded.dwells, plan)
-    found += _of_runs(recorded, rig, plan)
+    found += of_runs(recorded, rig, plan)
     trials = balance_decision.trials_of(recorded.runs, rig, plan.leave)
     if trials is None and not any(f.effect is Effect.ERROR for f in found):
         text = "the runs with trial weights were not completed: no influence coefficients."
@@ -125,23 +128,26 @@ def evaluated(recording: Recording[Any]) -> Evaluated:
 
 def _refusals(recording: Recording[Any]) -> Iterator[Finding]:
     for e in recording.events(REFUSED):
-        text = (f"the trial weight of {e['kg'] * 1e3:g} g {e['plane']} was refused: beside what the shaft does already its "
-                f"predicted response would leave the plan's share of the clearance. Allowed are {e['allowed_kg'] * 1e3:.3g} g.")  # fmt: skip
+        text = (
+            f"the trial weight of {e['kg'] * 1e3:g} g {e['plane']} was refused: beside what the shaft does already its "
+            f"predicted response would leave the plan's share of the clearance. Allowed are {e['allowed_kg'] * 1e3:.3g} g."
+        )
         yield Finding("trial-refused", text, str(e["plane"]), Effect.ERROR)
     for e in recording.events(DECISION):
         if e["too_heavy_kg"]:
-            text = (f"the correction needs {e['too_heavy_kg'] * 1e3:.3g} g in one place, more than the envelope allows: it was not "
-                    "mounted.")  # fmt: skip
+            text = (f"the correction needs {e['too_heavy_kg'] * 1e3:.3g} g in one place, more than the envelope allows: it "
+                    "was not mounted.")  # fmt: skip
             yield Finding("correction-refused", text, str(e["run"]), Effect.ERROR)
 
 
-def _of_runs(recorded: Recorded, rig: RigFile, plan: Settings) -> Iterator[Finding]:
+def of_runs(recorded: Recorded, rig: RigFile, plan: Settings) -> Iterator[Finding]:
     """Loose parts, forces, trial weights."""
     for run in recorded.runs:
         yield from balance_decision.slipped(run)
     base = next((r for r in recorded.runs if r.name == BASE), None)
     if base is None:
         return
+    yield from _speeds(recorded)
     off = balance_decision.slow_runout(recorded.slow, base, rig, plan)
     looked = []
     for d in recorded.dwells:
@@ -163,6 +169,17 @@ def _of_runs(recorded: Recorded, rig: RigFile, plan: Settings) -> Iterator[Findi
     yield from balance_decision.of_trials(added[0], added[1])
 
 
+def _speeds(recorded: Recorded) -> Iterator[Finding]:
+    """Influence coefficients hold for one speed: differences of readings at two are none."""
+    for k in range(len(recorded.runs[0].reads)):
+        speeds = np.array([r.reads[k].speed for r in recorded.runs])
+        apart = float(np.ptp(speeds) / speeds.mean())
+        if apart > SPEEDS_APART:
+            text = (f"the runs' speeds at {speeds.mean() * RPM:.0f} r/min are {apart:.2%} apart; {SPEEDS_APART:.1%} is "
+                    "allowed: the response to unbalance changes with speed.")  # fmt: skip
+            yield Finding("speeds-differ", text, "", Effect.INDETERMINATE)
+
+
 def _of_result(
     balance: Balanced, recorded: Recorded, shown: list[Run], plan: Settings, rig: RigFile
 ) -> Iterator[Finding]:
@@ -171,23 +188,31 @@ def _of_result(
         text = (f"the condition of the influence coefficients is {balance.solved.condition:.0f}: the probes do not tell the "
                 "planes apart.")  # fmt: skip
         yield Finding("planes-not-told-apart", text, "", Effect.ERROR)
-    for before, after in zip(shown, shown[1:], strict=False):
+    for before, after in pairwise(shown):
         if after.name.startswith("check"):
-            yield from _predicted(balance, before, after)
+            yield from predicted(balance, before, after)
     name = shown[-1].name
     values = balance.unbalance[name]
     for p, side in enumerate(SIDES):
         size, most, per = abs(values.values[p]), bound(values.one(p)), balance.permissible[p].value
-        text = (f"{side}: U_res {size / G_MM:.2f} g mm, U {(most - size) / G_MM:.2f} g mm, together {most / G_MM:.2f} g mm; "
-                f"U_per {per / G_MM:.2f} g mm (G{plan.grade_m_s * 1e3:g} at {plan.service_rad_s * RPM:.0f} r/min).")  # fmt: skip
+        text = (f"{side}: U_res {size / G_MM:.2f}, U {(most - size) / G_MM:.2f}, together {most / G_MM:.2f} g mm; U_per "
+                f"{per / G_MM:.2f} g mm (G{plan.grade_m_s * 1e3:g} at {plan.service_rad_s * RPM:.0f} r/min).")  # fmt: skip
         if most <= per:
             yield Finding("reached", text, name)
         else:
             yield Finding("not-reached", text, name, Effect.INDETERMINATE)
+    for p, side in enumerate(SIDES):
+        some = ", ".join(
+            f"{axis} {abs(a):.3f} µm ∠{-math.degrees(np.angle(a)) % 360:.0f}°"
+            for axis, a in zip(AXES, balance.solved.influence[-1, :, p], strict=True)
+        )
+        text = (f"1 g mm at the scale's zero of the {side} plane, {max(plan.speeds_rad_s) * RPM:.0f} r/min (0-pk, phase "
+                f"lag): {some}; condition of all {balance.solved.condition:.1f}.")  # fmt: skip
+        yield Finding("influence", text, side)
     yield from sheet(recorded.fixed, shown[-1].weights, balance.radius, plan)
 
 
-def _predicted(balance: Balanced, before: Run, after: Run) -> Iterator[Finding]:
+def predicted(balance: Balanced, before: Run, after: Run) -> Iterator[Finding]:
     """What was measured against what was expected of the weights that were fixed in between."""
     added = balance_estimates.fixed(after.weights, balance.radius) - balance_estimates.fixed(
         before.weights, balance.radius
@@ -200,18 +225,17 @@ def _predicted(balance: Balanced, before: Run, after: Run) -> Iterator[Finding]:
         f"{side} {abs(e) / G_MM:.2f} g mm, found {abs(v) / G_MM:.2f} g mm"
         for side, e, v in zip(SIDES, expected, found.values, strict=True)
     )
-    if np.abs(off).max() > DIFFERS * scale + 3 * balance_scatter(balance, scale):
+    if np.abs(off).max() > DIFFERS * scale + 3 * _mounted(scale):
         worst = SIDES[int(np.argmax(np.abs(off)))]
-        text = (f"predicted {told}: the correction did not act as it should, most {worst}. Suspect a weight of another mass, at "
-                "another angle or in the other plane than the sheet says, or one that came loose.")  # fmt: skip
+        text = (f"predicted {told}: the correction did not act as it should, most {worst}. Suspect a weight of another "
+                "mass, at another angle or in the other plane than the sheet says, or one that came loose.")  # fmt: skip
         yield Finding("correction-not-as-stated", text, after.name, Effect.INDETERMINATE)
     else:
         yield Finding("verified", f"predicted {told}.", after.name)
 
 
-def balance_scatter(balance: Balanced, scale: float) -> float:
+def _mounted(scale: float) -> float:
     """What weights that are mounted within their tolerances leave of an amount, kg m."""
-    del balance
     return 0.02 * scale + 0.03 * G_MM
 
 
@@ -224,9 +248,9 @@ def sheet(
         if w.number in kept:
             degrees = math.degrees(w.angle) % 360
             place = f" (position {round(degrees / 360 * plan.positions) % plan.positions})" if plan.positions else ""
-            text = (f"{purpose}: {w.kg * 1e3:.3f} g in the {SIDES[w.plane]} plane at {degrees:.1f}°{place} of its scale, radius "
-                    f"{radius * 1e3:g} mm ({w.kg * radius / G_MM:.2f} g mm), added. Angles are counted from y towards z, in the "
-                    "direction of rotation, while the scale's zero faces y.")  # fmt: skip
+            text = (f"{purpose}: {w.kg * 1e3:.3f} g in the {SIDES[w.plane]} plane at {degrees:.1f}°{place} of its scale, "
+                    f"radius {radius * 1e3:g} mm ({w.kg * radius / G_MM:.2f} g mm), added. Angles are counted from y towards "
+                    "z, in the direction of rotation, while the scale's zero faces y.")  # fmt: skip
             yield Finding("correction-sheet", text, SIDES[w.plane])
 
 

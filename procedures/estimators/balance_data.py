@@ -1,4 +1,4 @@
-"""Runs of a balancing: the shaft at its speeds with known weights on it; read from captures as it goes on, from telemetry after."""
+"""Runs of a balancing: the shaft at its speeds with known weights on it. Read from captures under way, from telemetry after."""
 
 from __future__ import annotations
 

@@ -109,7 +109,8 @@ def of_trial(added: Complex, weight: Weight) -> Iterator[Finding]:
                 "was it there while the shaft turned? No correction is given.")  # fmt: skip
         yield Finding("trial-moved-nothing", text, where, Effect.ERROR)
     elif own < LEAST:
-        text = f"the trial weight of {name} acts in the {SIDES[1 - p]} plane, as {other:.0%} of itself: it sits in the wrong plane."
+        text = (f"the trial weight of {name} acts in the {SIDES[1 - p]} plane, as {other:.0%} of itself: it sits in the wrong "
+                "plane.")  # fmt: skip
         yield Finding("weight-in-other-plane", text, where, Effect.ERROR)
     elif abs(own - 1) > OFF or other > ASTRAY:
         text = (f"by the forces the trial weight of {name} acts as {own:.0%} of itself there and as {other:.0%} in the other "

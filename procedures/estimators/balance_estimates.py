@@ -34,6 +34,8 @@ class Settings(Protocol):
     @property
     def offset_u_m(self) -> float: ...
     @property
+    def refit_u_kg_m(self) -> float: ...
+    @property
     def grade_m_s(self) -> float: ...
     @property
     def service_rad_s(self) -> float: ...
@@ -99,7 +101,7 @@ def balanced(slow: Read | None, runs: Sequence[Run], trials: Trials, rig: RigFil
     stand, nominal = solve({name: e.value for name, e in known.items()})
     parts = {}
     for run in runs:
-        scatter = balance_scatter.of_run(stand, nominal, slow, run, trials)
+        scatter = balance_scatter.of_run(stand, nominal, slow, run, trials, plan.refit_u_kg_m)
         parts[run.name] = tuple(
             Estimate(e.value, "kg m", merged(((1.0, e), *more)))
             for e, more in zip((out[f"{run.name}/{k}"] for k in range(4)), scatter, strict=True)

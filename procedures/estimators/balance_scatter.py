@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.analysis.vectors import estimates
-from bench.uncertainty import Estimate
+from bench.uncertainty import Estimate, Influence
 from procedures.estimators.balance_data import Read, Run
 from procedures.estimators.balance_solution import Solved, Trials, taken
 from procedures.estimators.runout import Stand, Turning, found
@@ -27,11 +27,15 @@ def of_read(name: str, read: Read, count: int) -> list[Estimate]:
     return estimates(v.parts[:k], v.covariance[:k, :k], f"scatter/{name}", f"scatter, {name}", "", v.dof)
 
 
-def of_run(s: Stand, solution: Solved, slow: Read | None, run: Run, trials: Trials) -> list[Terms]:
-    """What scatters in the parts re, im by plane (4,) of a run's unbalance, deviations as weighted Estimates."""
+def of_run(
+    s: Stand, solution: Solved, slow: Read | None, run: Run, trials: Trials, refit_u: float = 0.0
+) -> list[Terms]:  # fmt: skip
+    """What scatters in the parts re, im by plane (4,) of a run's unbalance, deviations as weighted Estimates; `refit_u` kg m is
+    how far the unbalance may be another one each time a trial weight has been fixed."""
     a = solution.influence
     p = np.linalg.pinv(a.reshape(-1, 2)).reshape(2, *a.shape[:2])  # plane, speed, probe
     u = solution.unbalance(np.array([r.vectors.values[:4] for r in run.reads]) / s.gain)
+    out: list[Terms] = [[] for _ in range(4)]
     factors: dict[tuple[str, int], Complex] = {}
     reads: dict[tuple[str, int], Read] = {}
 
@@ -48,13 +52,22 @@ def of_run(s: Stand, solution: Solved, slow: Read | None, run: Run, trials: Tria
         by = p * ((u + solution.taken)[:, j] / weight)[None, :, None]
         add(trials.having[j], -by)
         add(trials.before[j], by)
-    out: list[Terms] = [[] for _ in range(4)]
+        if refit_u > 0:
+            _append(out, -np.eye(2) * (u + solution.taken[-1])[j] / weight, _refitted(trials.having[j], refit_u))
     for (name, k), by in factors.items():
         _append(out, by, of_read(f"{name}/{k}", reads[name, k], 4))
     if slow is not None:
         by = -np.einsum("jsp,spq,sqn->jn", p, a, _slow(s, solution, slow, trials))
         _append(out, by, of_read("slow", slow, 12))
     return out
+
+
+def _refitted(run: Run, u: float) -> list[Estimate]:
+    """Change of the unbalance by plane, re and im (4,), from fixing a weight."""
+    return [
+        Estimate.of(0.0, Influence(f"refit/{run.name}/{k}", f"refitting, {run.name}", u, "kg m", "B", "normal"))
+        for k in range(4)
+    ]
 
 
 def _append(out: list[Terms], by: Complex, scatter: Sequence[Estimate]) -> None:

@@ -35,9 +35,9 @@ class Trials:
 
 @dataclass(frozen=True)
 class Solved:
-    """By speed: `influence` (s, 4, 2) m/(kg m), probes over their gain; at the highest `placed` (2, 2), what the forces say of each trial
-    weight (row) in each plane, over what it should be and turned to the scale; `mark` rad, from the mark to the scale's zero;
-    `runout` (4,) m from the mark; `taken` (s, 2) kg m, the unbalance that it is taken for, on the scale."""
+    """By speed `influence` (s, 4, 2) m/(kg m), probes over their gain, and `taken` (s, 2) kg m, the unbalance on the scale that
+    the runout is taken for; `placed` (2, 2), what the forces say at the highest speed of each trial weight (row) in each
+    plane, over what it should be; `mark` rad, from the scale's zero to the mark; `runout` (4,) m from the mark."""
 
     influence: Complex
     placed: Complex
@@ -58,9 +58,7 @@ class Solved:
         return np.asarray(np.linalg.lstsq(a, clean.reshape(-1), rcond=None)[0])
 
 
-def solved(
-    s: Stand, slow: Turning | None, trials: Sequence[Trial], base: Sequence[Turning]
-) -> Solved:
+def solved(s: Stand, slow: Turning | None, trials: Sequence[Trial], base: Sequence[Turning]) -> Solved:
     """Influence coefficients and what they need, of one set of numbers. `trials` by plane: weight kg m on the scale, readings
     by speed before it was fixed and with it. The
     mark's angle is that of the highest speed, where masses rule and not the bearings."""

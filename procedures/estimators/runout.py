@@ -137,8 +137,8 @@ def equivalent(s: Stand, force: Complex, w: float) -> tuple[Complex, float]:
 def as_unbalance(s: Stand, means: Array, runout: Complex, w: float) -> Complex:
     """The unbalance (2,) kg m that at `w` rad/s would make the probes read what a runout (4,) m makes them read.
 
-    A loop of any controller sees nothing but what the probes read. With q = H (F + w^2 B U) of the shaft alone and X = A_s q + R
-    the readings of U and R are X = G (U + U_R) with w^2 B U_R = H^-1 A_s^-1 R: the loop is in G alone.
+    A loop of any controller sees nothing but what the probes read. With q = H (F + w^2 B U) of the shaft alone and
+    X = A_s q + R the readings of U and R are X = G (U + U_R) with w^2 B U_R = H^-1 A_s^-1 R: the loop is in G alone.
     """
     _, _, k_x = slopes(s, means)
     return equivalent(s, impedance(s, k_x, w, w) @ np.linalg.solve(arms(s.l_is, s.l_os), runout), w)[0]
