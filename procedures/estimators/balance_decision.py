@@ -116,8 +116,8 @@ def of_trial(added: Complex, weight: Weight) -> Iterator[Finding]:
         text = (f"by the forces the trial weight of {name} acts as {own:.0%} of itself there and as {other:.0%} in the other "
                 "plane: suspect its mass or its place, or an unbalance that changed as it was mounted.")  # fmt: skip
         yield Finding("weight-not-as-stated", text, where, Effect.ERROR)
-    turn = float(np.abs(np.angle(added[:, p] / added[-1, p])).max())
-    if own >= LEAST and turn > SLIPPED_RAD:
+    turn = float(np.abs(np.angle(added[:, p] / added[-1, p])).max()) if own >= LEAST else 0.0
+    if turn > SLIPPED_RAD:
         text = (f"what the trial weight of {name} adds is turned by {math.degrees(turn):.0f}° from one speed to another: it is "
                 "loose.")  # fmt: skip
         yield Finding("weight-loose", text, where, Effect.ERROR)

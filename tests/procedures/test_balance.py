@@ -30,7 +30,6 @@ from reports.figures import draw as draw_figure
 from sim_backend import amb_balance
 from sim_backend.truth import draw
 
-pytestmark = pytest.mark.xdist_group("balance")  # one worker makes the sound run once
 RPM = math.pi / 30
 SHORT = {"slow_s": 4.2, "dwell_s": 0.5, "capture_s": 0.3, "settle_s": 0.8}
 ONE = {**SHORT, "speeds_rad_s": (10000 * RPM,), "repeat": False}
