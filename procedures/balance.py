@@ -20,10 +20,7 @@ from bench.roles import RigState
 from procedures import balance_figures as drawn
 from procedures import balancing, probing, unbalance
 from procedures.estimators import balance_checks, balance_estimates
-from procedures.estimators.balance_data import (
-    BASE,
-    SIDES,
-)
+from procedures.estimators.balance_data import BASE, SIDES
 from procedures.estimators.unbalance_data import RPM
 
 Law = Literal["PID", "CCS", "CAC"]

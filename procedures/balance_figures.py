@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -43,7 +43,7 @@ def _vectors(found: Evaluated, balance: Balanced, side: str, probe: int) -> Figu
     alone = complex(balance.solved.influence[-1, probe] @ balance.solved.taken[-1])
     tips.append(("no unbalance, runout alone", alone))
     series = [Series(name, np.array([-np.angle(z)] * 2), np.array([0.0, UM * abs(z)]), "both") for name, z in tips]
-    notes = tuple((name.removesuffix(", runout alone"), float(-np.angle(z)), UM * abs(z)) for name, z in tips)
+    notes = tuple((name, float(-np.angle(z)), UM * abs(z)) for name, z in _together(tips))
     return Figure(
         f"vectors-{side}", f"Vectors of order 1 at probe {AXES[probe]}, {speed:.0f} r/min, by run",
         f"As read, zero to peak, runout included; the angle is the phase lag from the once-per-turn mark, against "
@@ -74,21 +74,35 @@ def _residual(balance: Balanced, last: str, p: int, side: str) -> Figure:
     )  # fmt: skip
 
 
+def _together(tips: Sequence[tuple[str, complex]]) -> list[tuple[str, complex]]:
+    """Names of points that lie next to each other written as one."""
+    near = 0.1 * max(abs(z) for _, z in tips)
+    out: list[tuple[str, complex]] = []
+    for name, z in tips:
+        short = name.removesuffix(", runout alone")
+        k = next((k for k, (_, w) in enumerate(out) if abs(w - z) < near), None)
+        if k is None:
+            out.append((short, z))
+        else:
+            out[k] = (f"{out[k][0]}, {short}", out[k][1])
+    return out
+
+
 def _sheet(found: Evaluated, balance: Balanced, p: int, side: str) -> Figure:
-    """Unbalance as found and the weights that were fixed, at their angles on the scale."""
+    """Unbalance as found and the weights that were fixed, as vectors on the scale."""
     assert found.recorded is not None
     points = [("unbalance as found", complex(balance.unbalance[BASE].values[p]))]
     points += [(purpose, w.unbalance(balance.radius)) for w, purpose in found.recorded.fixed if w.plane == p]
-    series = [Series(name, np.array([np.angle(z)] * 2), np.array([0.0, abs(z) / G_MM]), "both") for name, z in points]
-    notes = tuple(
-        (f"{name} {abs(z) / G_MM:.2f} g mm ∠{np.degrees(np.angle(z)) % 360:.0f}°", float(np.angle(z)), abs(z) / G_MM)
-        for name, z in points
-    )
+    points = [(name, z / G_MM) for name, z in points]
+    series = [Series(name, np.array([0.0, z.real]), np.array([0.0, z.imag]), "both") for name, z in points]
+    top = 1.1 * max(abs(z) for _, z in points)
+    series.append(Series("scale", top * np.cos(TURN), top * np.sin(TURN), "guide"))
+    notes = [(f"{name} {abs(z):.2f} g mm ∠{np.degrees(np.angle(z)) % 360:.0f}°", z.real, z.imag) for name, z in points]
+    notes += [(f"{k}°", top * np.cos(np.radians(k)), top * np.sin(np.radians(k))) for k in range(0, 360, 45)]
     return Figure(
         f"sheet-{side}", f"Unbalance and weights {side}",
-        f"Angles on the scale of the {side} plane: 0° faces y while the shaft stands with its zero there, and they grow from y "
-        "towards z, in the direction of rotation. Weights are added, at the radius of the plane. A trial weight is on the "
-        "shaft in "
-        "its own run alone, unless the plan leaves it.",
-        "angle on the scale", "g mm", tuple(series), "polar", notes=notes,
+        f"On the scale of the {side} plane: its 0° faces y while the shaft stands with its zero there; angles grow from y "
+        "towards z, in the direction of rotation. Weights are added, at the radius of the plane. A trial weight is on "
+        "the shaft in its own run alone, unless the plan leaves it.",
+        "along the scale's zero (g mm)", "a quarter turn on (g mm)", tuple(series), "plane", notes=tuple(notes),
     )  # fmt: skip
