@@ -77,4 +77,6 @@ def solved(s: Stand, slow: Turning | None, trials: Sequence[Trial], base: Sequen
 
 def taken(s: Stand, base: Sequence[Turning], off: Complex, mark: float) -> Complex:
     """The unbalance by speed (s, 2) kg m on the scale that a runout `off` (4,) m is taken for."""
-    return np.array([runout.as_unbalance(s, t.means, off, t.speed) for t in base]) * np.exp(-1j * mark)
+    back = np.exp(-1j * mark)
+    out: Complex = np.array([runout.as_unbalance(s, t.means, off, t.speed) * back for t in base])
+    return out

@@ -33,6 +33,7 @@ from sim_backend.truth import draw
 RPM = math.pi / 30
 SHORT = {"slow_s": 4.2, "dwell_s": 0.5, "capture_s": 0.3, "settle_s": 0.8}
 ONE = {**SHORT, "speeds_rad_s": (10000 * RPM,), "repeat": False}
+HEAVY = {"unbalance_i": 8e-6, "unbalance_o": 8e-6, "unbalance_phase_i": 0.0, "unbalance_phase_o": 0.0}
 SEED = 1
 RIG = load_rig("amb5dof")
 
@@ -248,9 +249,9 @@ def test_a_trial_weight_that_moved_nothing_is_refused(tmp_path: Path) -> None:
         ({"current_sign_i": -1.0}, ONE, "weight-not-carried", Effect.ERROR),
         ({"pulse_missing": 3.0}, ONE, "pulse-missing", Effect.ERROR),
         ({"pulse_missing": 2.0}, ONE, "pulse-missing", Effect.ERROR),
-        ({"pulse_doubled": 2.0}, ONE, "pulse-doubled", Effect.ERROR),
+        ({"pulse_doubled": 2.0}, {**ONE, "speeds_rad_s": (3000 * RPM,)}, "pulse-doubled", Effect.ERROR),
         ({"geometry.clearance": 20e-6}, {**ONE, "speeds_rad_s": (4000 * RPM,)}, "contact", Effect.INDETERMINATE),
-        ({"unbalance_i": 1.6e-5, "unbalance_o": 1.6e-5}, {**ONE, "max_share": 0.3}, "trial-refused", Effect.ERROR),
+        (HEAVY, {**ONE, "max_share": 0.3}, "trial-refused", Effect.ERROR),
         ({}, {**ONE, "slow_rad_s": 0.0}, "no-slow-roll", Effect.INDETERMINATE),
         ({}, {**ONE, "corrections": 0}, "not-reached", Effect.INDETERMINATE),
     ],
