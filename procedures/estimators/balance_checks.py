@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any, Protocol
@@ -60,7 +60,7 @@ class Evaluated:
     balance: Balanced | None = None
     recorded: Recorded | None = None
     last: str = BASE
-    influences: Mapping[tuple[str, str], tuple[Estimate, Estimate]] | None = None
+    influences: Mapping[tuple[str, str], tuple[Estimate, Estimate]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -33,8 +33,11 @@ def of_run(
     """What scatters in the parts re, im by plane (4,) of a run's unbalance, deviations as weighted Estimates; `refit_u` kg m is
     how far the unbalance may be another one each time a trial weight has been fixed."""
     a = solution.influence
-    p = np.linalg.pinv(a.reshape(-1, 2)).reshape(2, *a.shape[:2])  # plane, speed, probe
-    u = solution.unbalance(np.array([r.vectors.values[:4] for r in run.reads]) / s.gain)
+    p: Complex = np.asarray(
+        np.linalg.pinv(a.reshape(-1, 2)).reshape(2, *a.shape[:2]), np.complex128
+    )  # plane, speed, probe
+    readings: Complex = np.array([r.vectors.values[:4] for r in run.reads])
+    u = solution.unbalance(readings / s.gain)
     out: list[Terms] = [[] for _ in range(4)]
     factors: dict[tuple[str, int], Complex] = {}
     reads: dict[tuple[str, int], Read] = {}
@@ -49,16 +52,16 @@ def of_run(
     add(run, p)
     for j in (0, 1):
         weight = trials.weights[j].unbalance(trials.radius)
-        by = p * ((u + solution.taken)[:, j] / weight)[None, :, None]
+        by: Complex = np.asarray(p * ((u + solution.taken)[:, j] / weight)[None, :, None], np.complex128)
         add(trials.having[j], -by)
         add(trials.before[j], by)
         if refit_u > 0:
             _append(out, -np.eye(2) * (u + solution.taken[-1])[j] / weight, _refitted(trials.having[j], refit_u))
-    for (name, k), by in factors.items():
-        _append(out, by, of_read(f"{name}/{k}", reads[name, k], 4))
+    for (name, k), factor in factors.items():
+        _append(out, factor, of_read(f"{name}/{k}", reads[name, k], 4))
     if slow is not None:
-        by = -np.einsum("jsp,spq,sqn->jn", p, a, _slow(s, solution, slow, trials))
-        _append(out, by, of_read("slow", slow, 12))
+        slowly = -np.einsum("jsp,spq,sqn->jn", p, a, _slow(s, solution, slow, trials))
+        _append(out, slowly, of_read("slow", slow, 12))
     return out
 
 

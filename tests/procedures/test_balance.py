@@ -217,13 +217,13 @@ def test_a_runout_reads_like_the_unbalance_it_is_taken_for() -> None:
     def read(unbalance: np.ndarray, off: np.ndarray) -> np.ndarray:
         forces = np.array([unbalance[0], -1j * unbalance[0], unbalance[1], -1j * unbalance[1]])
         push = w**2 * runout.arms(stand.l_iu, stand.l_ou).T @ forces - loop @ off
-        return seen @ np.linalg.solve(shaft + loop @ seen, push) + off
+        return np.asarray(seen @ np.linalg.solve(shaft + loop @ seen, push) + off)
 
     off = np.array([2e-6, -2e-6j, 1e-6 * np.exp(1j), -1e-6j * np.exp(1j)])
     taken = runout.as_unbalance(stand, means, off, w)
     assert np.abs(read(taken, 0 * off) - read(np.zeros(2), off)).max() < 1e-3 * np.abs(off).max()
     assert np.abs(read(np.zeros(2), off) - off).max() > 0.3e-6  # the loop answers: the reading is not the runout
-    back = balance_estimates.runout.equivalent(stand, shaft @ np.linalg.solve(seen, off), w)[0]
+    back = runout.equivalent(stand, shaft @ np.linalg.solve(seen, off), w)[0]
     assert np.allclose(back, taken)
     assert Turning(w, means, np.zeros(12, complex)).speed == w
 
