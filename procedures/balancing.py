@@ -76,6 +76,8 @@ def _rolled(work: Work) -> bool:
         unbalance.finished(rig)
         return False
     work.slow = _dwell(work, SLOW, BASE, plan.slow_rad_s, plan.slow_s, plan.slow_s, SLOW_HZ)
+    if work.slow is None:
+        unbalance.finished(rig)
     return work.slow is not None
 
 

@@ -24,7 +24,6 @@ from procedures.estimators.balance_data import (
     SIDES,
     Recorded,
     Run,
-    Weight,
     read_dwell,
     read_runs,
 )
@@ -117,7 +116,7 @@ def evaluated(recording: Recording[Any]) -> Evaluated:
         text = "the runs with trial weights were not completed: no influence coefficients."
         found.append(Finding("no-trials", text, "", Effect.ERROR))
     if trials is None or any(f.effect is Effect.ERROR for f in found):
-        return Evaluated(tuple(found))
+        return Evaluated((*found, *sheet(recorded, "still-mounted", rig, plan)))
     checks = [r for r in recorded.runs if r.name.startswith("check")]
     shown = [trials.base, *([trials.having[1]] if plan.leave else []), *checks]
     balance = balance_estimates.balanced(recorded.slow, shown, trials, rig, plan)
@@ -209,7 +208,7 @@ def _of_result(
         text = (f"1 g mm at the scale's zero of the {side} plane, {max(plan.speeds_rad_s) * RPM:.0f} r/min (0-pk, phase "
                 f"lag): {some}; condition of all {balance.solved.condition:.1f}.")  # fmt: skip
         yield Finding("influence", text, side)
-    yield from sheet(recorded.fixed, shown[-1].weights, balance.radius, plan)
+    yield from sheet(recorded, "correction-sheet", rig, plan)
 
 
 def predicted(balance: Balanced, before: Run, after: Run) -> Iterator[Finding]:
@@ -239,19 +238,17 @@ def _mounted(scale: float) -> float:
     return 0.02 * scale + 0.03 * G_MM
 
 
-def sheet(
-    fixed: Iterable[tuple[Weight, str]], on: Iterable[Weight], radius: float, plan: Settings
-) -> Iterator[Finding]:
+def sheet(recorded: Recorded, code: str, rig: RigFile, plan: Settings) -> Iterator[Finding]:
     """The weights that stay on the shaft, for the operator."""
-    kept = {w.number for w in on}
-    for w, purpose in fixed:
+    kept, radius = {w.number for w in recorded.on}, rig.geometry["balance_radius"].value
+    for w, purpose in recorded.fixed:
         if w.number in kept:
             degrees = math.degrees(w.angle) % 360
             place = f" (position {round(degrees / 360 * plan.positions) % plan.positions})" if plan.positions else ""
             text = (f"{purpose}: {w.kg * 1e3:.3f} g in the {SIDES[w.plane]} plane at {degrees:.1f}°{place} of its scale, "
                     f"radius {radius * 1e3:g} mm ({w.kg * radius / G_MM:.2f} g mm), added. Angles are counted from y towards "
                     "z, in the direction of rotation, while the scale's zero faces y.")  # fmt: skip
-            yield Finding("correction-sheet", text, SIDES[w.plane])
+            yield Finding(code, text, SIDES[w.plane])
 
 
 __all__ = ["AXES", "Evaluated", "Trials", "evaluated", "of_plan"]

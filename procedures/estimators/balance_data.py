@@ -95,12 +95,14 @@ def read_dwell(d: Dwell) -> Read:
 
 @dataclass(frozen=True)
 class Recorded:
-    """All of a recording: `dwells` in time order, the slow roll, the complete runs by name, every weight that was fixed."""
+    """All of a recording: `dwells` in time order, the slow roll, the complete runs by name, every weight that was `fixed` with
+    its purpose, and those that are still `on` at the end."""
 
     dwells: tuple[Dwell, ...]
     slow: Read | None
     runs: tuple[Run, ...]
     fixed: tuple[tuple[Weight, str], ...]
+    on: tuple[Weight, ...]
 
     def of(self, name: str) -> list[Dwell]:
         """Dwells of a run."""
@@ -136,7 +138,7 @@ def read_runs(recording: Recording[Any], speeds: Sequence[float]) -> Recorded:
         if len(first) == len(speeds):
             on = _on(mounted, some[0].start_ns)
             runs.append(Run(name, on, tuple(read_dwell(d) for d in first), again))
-    return Recorded(tuple(dwells), slow, tuple(runs), tuple(fixed))
+    return Recorded(tuple(dwells), slow, tuple(runs), tuple(fixed), _on(mounted, 1 << 62))
 
 
 def _on(mounted: Sequence[tuple[int, Weight | int]], at_ns: int) -> tuple[Weight, ...]:

@@ -232,6 +232,7 @@ def test_a_trial_weight_that_moved_nothing_is_refused(tmp_path: Path) -> None:
     run = done(tmp_path, ONE, {"weight_lost": 1.0})
     assert run.serious == {"trial-moved-nothing"}
     assert not run.measured
+    assert [f.code for f in run.findings] == ["trial-moved-nothing", "still-mounted"]
     assert [e["action"] for e in run.recording.events("operator")] == ["attach"]  # no correction was mounted
 
 
