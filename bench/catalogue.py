@@ -49,6 +49,7 @@ PROCEDURES = (
     Entry("tracking", "procedures.tracking", "Following an ellipse with the centre of mass: PID, CCS and CAC"),
     Entry("unbalance", "procedures.unbalance", "Unbalance response of the turning shaft: vectors, orbits, zones"),
     Entry("compensation", "procedures.compensation", "Compensation of unbalance: with and without it, and switched on"),
+    Entry("balance", "procedures.balance", "Two-plane balancing by influence coefficients from trial weights"),
     Entry("force-map", "procedures.force_map", "Terms of the motor's force over displacement, currents and load"),
 )
 

@@ -18,8 +18,9 @@ PLANES = {"inboard": 0, "outboard": 1}
 
 class Balancer:
     """Each weight is off by a mass and an angle of its own, from the rig file's `machine.weight_mass` and `weight_angle`;
-    all sit at the radius that was drawn for the rig. The defect `weight_lost`: what is fixed falls off; `loose_weight`: an
-    unbalance in kg m that somebody left in the inboard plane."""
+    all sit at the radius that was drawn for the rig. The defect `weight_lost`: what is fixed falls off; `weight_astray`:
+    the number of the weight that goes into the other plane; `weight_turned`: that of the one that is turned by
+    `weight_turned_rad`; `loose_weight`: an unbalance in kg m that somebody left in the inboard plane."""
 
     def __init__(self, plant: AmbPlant, rig: RigFile, truth: Truth) -> None:
         self._plant, self._truth = plant, truth
@@ -48,7 +49,12 @@ class Balancer:
             draw_one(t, self._truth.seed, f"weight:{k}:{self._fixed}") if t is not None else 0.0
             for k, t in enumerate(self._errors)
         ]
-        if not self._truth.defects["weight_lost"]:
+        defects = self._truth.defects
+        if self._fixed == defects["weight_astray"]:
+            plane = 1 - plane
+        if self._fixed == defects["weight_turned"]:
+            angle += defects["weight_turned_rad"]
+        if not defects["weight_lost"]:
             self._plant.weights(plane, (mass + off[0]) * self._radius, angle + off[1])
 
 

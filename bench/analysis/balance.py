@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.analysis.sampling import Array, Complex
-from bench.analysis.vectors import Vectors, complexes, parts, propagated, radius2, stacked
+from bench.analysis.vectors import Vectors, complexes, parts, propagated, radius2, region, stacked
 from bench.errors import AnalysisError
 
 G_MM = 1e-6  # kg m in a g mm
@@ -149,6 +149,31 @@ def allocated(total: float, to_left: float, to_right: float) -> tuple[float, flo
 
 
 def reached(residual: Vectors, limit: Sequence[float], probability: float = 0.95) -> list[bool]:
-    """Whether U_res + U <= U_per in each plane (q,), U the expanded uncertainty of the amount along the vector."""
-    k = math.sqrt(radius2(residual.dof, probability))
-    return [bool(a + k * u <= per) for a, u, per in zip(residual.amplitude, residual.u_amplitude, limit, strict=True)]
+    """Whether U_res + U <= U_per in each plane (q,), U_res + U being `bound`."""
+    return [bound(residual.one(k), probability) <= per for k, per in enumerate(limit)]
+
+
+def bound(residual: Vectors, probability: float = 0.95) -> float:
+    """U_res + U of a single vector: the greatest amount in its region (an ellipse), which holds the truth with `probability`.
+
+    Along the vector alone would be too little where the vector is short and the ellipse is long across it.
+    """
+    outline: Complex = region(residual, 181, probability)
+    return float(np.abs(outline).max())
+
+
+def split(weight: complex, positions: int) -> list[complex]:
+    """A weight (kg m) on the two of `positions` equally spaced angles, the first at 0, that enclose it; 0: anywhere.
+
+    Raises:
+        AnalysisError: fewer than three positions cannot enclose every angle.
+    """
+    if positions == 0:
+        return [weight]
+    if positions < 3:
+        raise AnalysisError(f"balance: found {positions} positions; expected 0 (any angle), or three or more")
+    step = 2 * math.pi / positions
+    k = math.floor(np.angle(weight) % (2 * math.pi) / step + 1e-9)
+    a, b = np.exp(1j * step * k), np.exp(1j * step * (k + 1))
+    share = np.linalg.solve([[a.real, b.real], [a.imag, b.imag]], [weight.real, weight.imag])
+    return [complex(m * z) for m, z in zip(share, (a, b), strict=True) if m > 1e-9 * abs(weight)]

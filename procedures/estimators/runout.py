@@ -22,6 +22,7 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
+SCALE = np.array([1.0, 1.0, 10.0, 10.0])  # moments at arms of 0.1 m, beside forces
 ROUNDS = 4  # U changes R by little, R changes U by little
 
 
@@ -119,13 +120,28 @@ def unbalances(s: Stand, turning: Turning, runout: Complex) -> tuple[Complex, fl
     w = turning.speed
     q = np.linalg.solve(arms(s.l_is, s.l_os), turning.vectors[:4] / s.gain - runout)
     inertial = impedance(s, k_x, w, w) @ q
+    u, left = equivalent(s, inertial - force, w)
+    whole = float(np.linalg.norm(SCALE * inertial) + np.linalg.norm(SCALE * force))
+    return u, left / whole
+
+
+def equivalent(s: Stand, force: Complex, w: float) -> tuple[Complex, float]:
+    """Unbalance (2,) kg m in the planes that at `w` rad/s acts as forces and moments (4,), by least squares; the norm of what
+    it leaves over, moments at arms of 0.1 m."""
     acts = w**2 * arms(s.l_iu, s.l_ou).T @ np.array([[1, 0], [-1j, 0], [0, 1], [0, -1j]])
-    scale = np.array([1, 1, 10, 10])[:, None]  # moments at arms of 0.1 m
-    target = scale * (inertial - force)[:, None]
-    u = np.linalg.lstsq(scale * acts, target, rcond=None)[0]
-    left = float(np.linalg.norm(target - scale * acts @ u))
-    whole = float(np.linalg.norm(scale[:, 0] * inertial) + np.linalg.norm(scale[:, 0] * force))
-    return np.asarray(u[:, 0], np.complex128), left / whole
+    target = SCALE * force
+    u = np.linalg.lstsq(SCALE[:, None] * acts, target, rcond=None)[0]
+    return np.asarray(u, np.complex128), float(np.linalg.norm(target - SCALE[:, None] * acts @ u))
+
+
+def as_unbalance(s: Stand, means: Array, runout: Complex, w: float) -> Complex:
+    """The unbalance (2,) kg m that at `w` rad/s would make the probes read what a runout (4,) m makes them read.
+
+    A loop of any controller sees nothing but what the probes read. With q = H (F + w^2 B U) of the shaft alone and
+    X = A_s q + R the readings of U and R are X = G (U + U_R) with w^2 B U_R = H^-1 A_s^-1 R: the loop is in G alone.
+    """
+    _, _, k_x = slopes(s, means)
+    return equivalent(s, impedance(s, k_x, w, w) @ np.linalg.solve(arms(s.l_is, s.l_os), runout), w)[0]
 
 
 def moved(s: Stand, turning: Turning, order: float, unbalance: Complex) -> Complex:

@@ -26,6 +26,7 @@ from procedures.estimators.unbalance_data import (
     RPM,
     SLOW,
     VOLTAGE_LIMIT,
+    Array,
     Dwell,
 )
 from procedures.estimators.unbalance_estimates import Result, Results
@@ -190,8 +191,8 @@ def _slow(dwells: Sequence[Dwell], plan: Settings) -> Iterator[Finding]:
 
 def of_results(results: Results, plan: Settings) -> Iterator[Finding]:
     """Do forces and motion agree? Is a repeat the same? Then zones and the runout, as notes."""
-    yield from _channels(results)
-    yield from _weight(results)
+    yield from channels(results.dwells)
+    yield from weight(results.dwells)
     yield from _repeats(results)
     yield from _told(results)
     if plan.variants:
@@ -199,9 +200,20 @@ def of_results(results: Results, plan: Settings) -> Iterator[Finding]:
         yield from _zones(results)
 
 
-def _channels(results: Results) -> Iterator[Finding]:
+class Balanced(Protocol):
+    """A dwell with the share of the forces left over, and what each axis carries of its share of the weight (4,)."""
+
+    @property
+    def dwell(self) -> Dwell: ...
+    @property
+    def misfit(self) -> float: ...
+    @property
+    def carried(self) -> Array: ...
+
+
+def channels(dwells: Sequence[Balanced]) -> Iterator[Finding]:
     """Two unbalances must explain motion less control forces of all four axes: they do not where channels are exchanged."""
-    worst = max(results.dwells, key=lambda r: r.misfit)
+    worst = max(dwells, key=lambda r: r.misfit)
     if worst.misfit > UNEXPLAINED:
         text = (f"no unbalance in the two planes explains motion and currents: {worst.misfit:.0%} of the forces are left over "
                 f"({UNEXPLAINED:.0%} is allowed). Suspect the polarity of a probe, exchanged planes or axes, or "
@@ -209,9 +221,9 @@ def _channels(results: Results) -> Iterator[Finding]:
         yield Finding("forces-disagree", text, worst.dwell.where, Effect.ERROR)
 
 
-def _weight(results: Results) -> Iterator[Finding]:
+def weight(dwells: Sequence[Balanced]) -> Iterator[Finding]:
     """The mean coil forces must carry the weight; they do not where the two coils of an axis are exchanged."""
-    for r in results.dwells:
+    for r in dwells:
         off = np.abs(r.carried - 1)
         k = int(np.argmax(off))
         if off[k] > CARRIED:
@@ -289,4 +301,15 @@ def _zones(results: Results) -> Iterator[Finding]:
         yield Finding("zone", text, f"{place}, {r.dwell.where}")
 
 
-__all__ = ["Result", "before", "of_plan", "of_results", "of_signals", "too_fast", "zone"]
+__all__ = [
+    "Balanced",
+    "Result",
+    "before",
+    "channels",
+    "of_plan",
+    "of_results",
+    "of_signals",
+    "too_fast",
+    "weight",
+    "zone",
+]

@@ -19,6 +19,7 @@ from bench.errors import AnalysisError
 from bench.recording import Captured, Recording, Step
 
 Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
 DWELL, SLOW, AGAIN = "dwell", "slow-roll", "again"
 AXES = ("yi", "zi", "yo", "zo")
 PLANES = {"inboard": (0, 1), "outboard": (2, 3)}

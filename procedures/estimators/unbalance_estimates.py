@@ -164,7 +164,7 @@ def _result(
 ) -> Result:
     parts = {n: _shaft(d, inputs, runouts[n], n) for n in d.track.orders if n in runouts}
     values = np.array([parts[1.0][2 * k].value + 1j * parts[1.0][2 * k + 1].value for k in range(4)])
-    vectors = Vectors(values, _covariance(parts[1.0]), d.readings().dof)
+    vectors = Vectors(values, covariance(parts[1.0]), d.readings().dof)
     u, misfit = runout.unbalances(nominal, Turning(d.speed, d.means, d.both().values), runouts[1.0].values)
     out: dict[tuple[str, str], Estimate] = {}
     orbits, centres = {}, {}
@@ -182,11 +182,11 @@ def _result(
         out["d_max_share", plane] = _unit(far / clearance, "1")
         out |= _coils(d, inputs, plane, rig)
     out["reading", ""] = _reading(d, inputs)
-    weight = runout.carried(nominal, d.means) / _shares(rig, nominal)
+    weight = runout.carried(nominal, d.means) / shares(rig, nominal)
     return Result(d, vectors, orbits, centres, misfit, weight, u, out)
 
 
-def _shares(rig: RigFile, s: Stand) -> Array:
+def shares(rig: RigFile, s: Stand) -> Array:
     """What each axis carries of the weight, N."""
     lean, whole = rig.machine["radial_axes"].value, s.mass * rig.site.gravity.value
     inboard, outboard = whole * s.l_oa / (s.l_ia + s.l_oa), whole * s.l_ia / (s.l_ia + s.l_oa)
@@ -213,7 +213,7 @@ def _shaft(d: Dwell, inputs: Mapping[str, Estimate], off: Runout, order: float) 
     return out
 
 
-def _covariance(parts: Sequence[Estimate]) -> Array:
+def covariance(parts: Sequence[Estimate]) -> Array:
     """Joint covariance of estimates by their shared influences."""
     ids = sorted({i for e in parts for i in e.contributions})
     rows = np.array([[e.contributions.get(i, 0.0) for i in ids] for e in parts])

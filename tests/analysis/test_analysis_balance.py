@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bench.analysis.balance import G_MM, Trial, allocated, correct, permissible, reached
+from bench.analysis.balance import G_MM, Trial, allocated, bound, correct, permissible, reached, split
 from bench.analysis.vectors import Vectors, contains
 from bench.errors import AnalysisError
 
@@ -128,3 +128,25 @@ def test_the_standards_worked_example() -> None:
 def test_reached_means_that_the_uncertainty_fits_too() -> None:
     residual = Vectors(np.array([1.0 + 0j, 2.0]), np.diag([0.01, 0.01, 0.01, 0.01]))
     assert reached(residual, (1.2, 2.3)) == [False, True]  # U = 2.448 x 0.1
+
+
+def test_a_short_vector_is_bound_by_its_ellipse_not_by_what_lies_along_it() -> None:
+    narrow = Vectors(np.array([0.1 + 0j]), np.diag([0.01**2, 0.2**2]))
+    along = 0.1 + 2.448 * 0.01
+    assert bound(narrow) == pytest.approx(np.hypot(0.1, 2.448 * 0.2), rel=0.01)
+    assert bound(narrow) > 3 * along
+    assert reached(narrow, (0.3,)) == [False]
+    assert bound(Vectors(np.array([1.0 + 0j]), 0.01 * np.eye(2))) == pytest.approx(1.245, abs=1e-3)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, 2.0, 4.5, 2 * np.pi - 1e-12])
+def test_a_weight_on_two_positions_adds_up(angle: float) -> None:
+    weight = 3e-6 * np.exp(1j * angle)
+    parts = split(complex(weight), 8)
+    assert len(parts) <= 2
+    assert abs(sum(parts) - weight) < 1e-14
+    steps = np.angle(parts) / (np.pi / 4)
+    assert np.allclose(steps, np.round(steps), atol=1e-6)
+    assert split(complex(weight), 0) == [complex(weight)]
+    with pytest.raises(AnalysisError, match="three or more"):
+        split(complex(weight), 2)

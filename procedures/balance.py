@@ -1,0 +1,166 @@
+"""Two-plane balancing by influence coefficients from trial weights (Goodman 1964), judged by ISO 21940-11.
+
+Measurands, by plane: unbalance of the shaft as found and as left, on the scale of the balancing planes; what is left over the
+permissible residual unbalance; influence coefficients.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Literal
+
+from pydantic import Field
+
+from bench.figures import Figure
+from bench.findings import Finding
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity
+from bench.recording import Recording
+from bench.rigfile import RigFile
+from bench.roles import RigState
+from procedures import balance_figures as drawn
+from procedures import balancing, probing, unbalance
+from procedures.estimators import balance_checks, balance_estimates
+from procedures.estimators.balance_data import BASE, SIDES
+from procedures.estimators.unbalance_data import RPM
+
+Law = Literal["PID", "CCS", "CAC"]
+FOUND_COS = Quantity("unbalance_cos", "kg m", "of the shaft as found, in a plane: component along the scale's zero")
+FOUND_SIN = Quantity("unbalance_sin", "kg m", "as unbalance_cos: component a quarter turn on, from y towards z")
+LEFT_COS = Quantity(
+    "residual_cos", "kg m", "what is left with all corrections mounted: component along the scale's zero"
+)
+LEFT_SIN = Quantity("residual_sin", "kg m", "as residual_cos: component a quarter turn on, from y towards z")
+SHARE = Quantity("residual_share", "1", "amount of what is left over the permissible residual unbalance of the plane")
+PERMITTED = Quantity("permissible", "kg m", "permissible residual unbalance of the plane, ISO 21940-11")
+COSINE = Quantity(
+    "influence_cos", "m/(kg m)", "of a weight at the scale's zero on a probe, order 1 0-pk: cosine component"
+)
+SINE = Quantity("influence_sin", "m/(kg m)", "as influence_cos: sine component; x = C cos θ + S sin θ")
+MEASURES = (FOUND_COS, FOUND_SIN, LEFT_COS, LEFT_SIN, SHARE, PERMITTED, COSINE, SINE)
+
+
+class Plan(BenchPlan):
+    """Settings of a balancing, SI."""
+
+    law: Law = "CCS"
+    speeds_rad_s: tuple[float, ...] = Field((4000 / RPM, 10000 / RPM), min_length=1)  # of every run
+    slow_rad_s: float = Field(300 / RPM, ge=0)  # 0: no slow roll
+    slow_s: float = Field(10.0, ge=1)
+    settle_s: float = Field(1.5, ge=0.2)
+    dwell_s: float = Field(2.0, ge=0.5)
+    capture_s: float = Field(0.4, ge=0.05)
+    repeat: bool = True  # the lowest speed again at the end of each run
+    trial_kg: tuple[float, float] = (1e-4, 1e-4)  # inboard, outboard
+    trial_angle_rad: tuple[float, float] = (0.0, 0.0)  # on the planes' scales
+    leave: bool = False  # trial weights stay on; else each is taken off after its run
+    corrections: int = Field(2, ge=0, le=3)  # at most
+    positions: int = Field(0, ge=0, le=360)  # equally spaced, the first at the scale's zero; 0: any angle
+    grade_m_s: float = Field(2.5e-3, gt=0)  # G2.5
+    service_rad_s: float = Field(15000 / RPM, gt=0)  # the highest, for the permissible residual unbalance
+    max_share: float = Field(0.5, gt=0, le=0.9)  # of the least clearance: where a predicted response may reach
+    refit_u_kg_m: float = Field(0.0, ge=0)  # of the shaft's own unbalance, each time a weight has been fixed
+    beta_share: float = Field(0.05, ge=0)
+    offset_u_m: float = Field(10e-6, ge=0)
+    max_lost: float = Field(1e-3, ge=0)
+    max_speed_error: float = Field(0.01, gt=0)
+
+    @property
+    def variants(self) -> tuple[str, ...]:
+        """One setting of the controller."""
+        return (BASE,)
+
+    @property
+    def observed(self) -> bool:
+        """Nothing is compensated."""
+        return False
+
+    @property
+    def orders(self) -> int:
+        """Highest order that the captures must hold."""
+        return 1
+
+    @property
+    def rate_hz(self) -> float:
+        """Of the captures, the controller's own."""
+        return 1e4
+
+
+def settings(plan: Plan) -> dict[str, float]:
+    """Lifted by the PID, nothing compensated."""
+    del plan
+    return {"law": unbalance.CODES["PID"], "observer": 0.0, "compensate": 0.0}
+
+
+def step_count(plan: Plan) -> int:
+    """How many steps `acquire` records at most."""
+    runs = 3 + plan.corrections
+    mounts = 2 + (0 if plan.leave else 2) + plan.corrections * (2 if plan.positions == 0 else 4)
+    return probing.STEPS + (plan.slow_rad_s > 0) + runs * (len(plan.speeds_rad_s) + plan.repeat) + mounts
+
+
+def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
+    """Findings first, then the quantities."""
+    found = balance_checks.evaluated(recording)
+    yield from found.findings
+    result = found.balance
+    if result is None:
+        return
+    last = found.last
+    for p, side in enumerate(SIDES):
+        for quantity, k in ((FOUND_COS, 2 * p), (FOUND_SIN, 2 * p + 1)):
+            yield quantity.measured(result.parts[BASE][k], side)
+        yield PERMITTED.measured(result.permissible[p], side)
+        for quantity, k in ((LEFT_COS, 2 * p), (LEFT_SIN, 2 * p + 1)):
+            yield quantity.measured(result.parts[last][k], side)
+        yield SHARE.measured(balance_estimates.share(result, last, p), side)
+    for (axis, side), (cosine, sine) in found.influences.items():
+        where = f"{axis}, weight {side}, {max(recording.plan.speeds_rad_s) * RPM:.0f} r/min"
+        yield COSINE.measured(cosine, where)
+        yield SINE.measured(sine, where)
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts."""
+    yield from balance_checks.of_plan(rig, plan)
+
+
+def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+    """Polar plots of the vectors, influence coefficients, residual against U_per; empty where nothing was evaluated."""
+    found = balance_checks.evaluated(recording)
+    return () if found.balance is None else drawn.all_figures(found)
+
+
+METHOD = """\
+A run is: levitate, dwell at each speed of the plan, the lowest one again, stop, land. The base run comes first, then one with
+a trial weight in each plane, which the operator fixes on the landed shaft; then the corrections, each verified by a run.
+Nothing is compensated.
+
+Influence coefficients are differences of vectors over the trial weight, so that runout cancels in them. Unbalance is the
+least-squares solution of X = A (U + U_R) over all probes and speeds. U_R is what the journals' runout is taken for: the
+unbalance that would make the probes read the same, by the runout of the slow roll (as in `unbalance`: what the probes
+read less what the shaft does, by the coil forces) and the shaft's own masses. The controller is in A alone. Weights sit on
+the planes' scales; where the once-per-turn mark is on them is told by the forces that the trial weights make in the coils.
+
+U_per = G m / omega is shared between the planes by the centre of mass (ISO 21940-11; the formula is as commonly quoted, not
+checked against the standard). It is reached where the whole 95 % region of what is left, an ellipse, lies within U_per in
+both planes: U_res + U is the farthest point of the ellipse. What is left is measured by the last run, so that errors of the
+correction weights are in it and not in its uncertainty.
+
+Angles on a scale are counted from y towards z, in the direction of rotation, while its zero faces y. Lags are counted from
+the mark to the high spot.
+"""
+
+procedure = Procedure(
+    name="balance",
+    title="Two-plane balancing by influence coefficients",
+    measures=MEASURES,
+    state=RigState.READY,
+    plan=Plan,
+    acquire=balancing.acquire,
+    analyse=analyse,
+    figures=figures,
+    check=check,
+    settings=settings,
+    step_count=step_count,
+    method=METHOD,
+)

@@ -1,0 +1,108 @@
+"""What a balancing draws: vectors of every run at the probes, weights on the planes' scales, what is left against U_per."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.analysis.balance import G_MM
+from bench.analysis.vectors import region
+from bench.figures import Figure, Series
+from procedures.estimators.balance_checks import Evaluated
+from procedures.estimators.balance_data import BASE, SIDES
+from procedures.estimators.balance_estimates import Balanced
+from procedures.estimators.unbalance_data import AXES, RPM
+
+Complex = npt.NDArray[np.complex128]
+UM = 1e6
+FIRST = {"inboard": 0, "outboard": 2}  # probe y of each plane
+TURN = np.linspace(0, 2 * np.pi, 181)
+
+
+def all_figures(found: Evaluated) -> Iterator[Figure]:
+    """In the order of the report."""
+    balance = found.balance
+    if balance is None or found.recorded is None:
+        return
+    for p, side in enumerate(SIDES):
+        yield _residual(balance, found.last, p, side)
+    for p, side in enumerate(SIDES):
+        yield _sheet(found, balance, p, side)
+    for side, probe in FIRST.items():
+        yield _vectors(found, balance, side, probe)
+
+
+def _vectors(found: Evaluated, balance: Balanced, side: str, probe: int) -> Figure:
+    """A probe's vectors at the highest speed, one arrow a run, and the reading that would be left of runout alone."""
+    assert found.recorded is not None
+    runs = found.recorded.runs
+    speed = runs[0].fastest.speed * RPM
+    tips = [(r.name, complex(r.fastest.vectors.values[probe])) for r in runs]
+    alone = complex(balance.solved.influence[-1, probe] @ balance.solved.taken[-1])
+    tips.append(("no unbalance, runout alone", alone))
+    series = [Series(name, np.array([-np.angle(z)] * 2), np.array([0.0, UM * abs(z)]), "both") for name, z in tips]
+    notes = tuple((name, float(-np.angle(z)), UM * abs(z)) for name, z in _together(tips))
+    return Figure(
+        f"vectors-{side}", f"Vectors of order 1 at probe {AXES[probe]}, {speed:.0f} r/min, by run",
+        f"As read, zero to peak, runout included; the angle is the phase lag from the once-per-turn mark, against "
+        f"the rotation. "
+        f"A balanced shaft would read what the runout alone leaves. Probe {AXES[probe + 1]} shows the same a quarter turn "
+        "later.",
+        "phase lag", "µm 0-pk", tuple(series), "vectors", notes=notes,
+    )  # fmt: skip
+
+
+def _residual(balance: Balanced, last: str, p: int, side: str) -> Figure:
+    """What each verified run left, with its 95 % ellipse, in the circle of U_per."""
+    per = balance.permissible[p].value / G_MM
+    names = [name for name in balance.unbalance if name.startswith("check")] or [last]
+    series = [Series("U_per", per * np.cos(TURN), per * np.sin(TURN), "guide")]
+    notes: list[tuple[str, float, float]] = []
+    for name in names:
+        one = balance.unbalance[name].one(p)
+        outline, z = region(one, 121) / G_MM, complex(one.values[0]) / G_MM
+        series.append(Series(f"{name}, 95 %", outline.real, outline.imag))
+        series.append(Series(name, np.array([z.real]), np.array([z.imag]), "mark"))
+        notes.append((f"{name}: {abs(z):.2f} g mm", z.real, z.imag))
+    return Figure(
+        f"residual-{side}", f"Residual unbalance {side} against the permissible one",
+        f"On the scale of the {side} plane: to the right along its zero, upwards a quarter turn on (from y towards z, in the "
+        f"direction of rotation). It is reached where the whole ellipse lies within the circle of U_per = {per:.2f} g mm.",
+        "along the scale's zero (g mm)", "a quarter turn on (g mm)", tuple(series), "plane", notes=tuple(notes),
+    )  # fmt: skip
+
+
+def _together(tips: Sequence[tuple[str, complex]]) -> list[tuple[str, complex]]:
+    """Names of points that lie next to each other written as one."""
+    near = 0.1 * max(abs(z) for _, z in tips)
+    out: list[tuple[str, complex]] = []
+    for name, z in tips:
+        short = name.removesuffix(", runout alone")
+        k = next((k for k, (_, w) in enumerate(out) if abs(w - z) < near), None)
+        if k is None:
+            out.append((short, z))
+        else:
+            out[k] = (f"{out[k][0]}, {short}", out[k][1])
+    return out
+
+
+def _sheet(found: Evaluated, balance: Balanced, p: int, side: str) -> Figure:
+    """Unbalance as found and the weights that were fixed, as vectors on the scale."""
+    assert found.recorded is not None
+    points = [("unbalance as found", complex(balance.unbalance[BASE].values[p]))]
+    points += [(purpose, w.unbalance(balance.radius)) for w, purpose in found.recorded.fixed if w.plane == p]
+    points = [(name, z / G_MM) for name, z in points]
+    series = [Series(name, np.array([0.0, z.real]), np.array([0.0, z.imag]), "both") for name, z in points]
+    top = 1.1 * max(abs(z) for _, z in points)
+    series.append(Series("scale", top * np.cos(TURN), top * np.sin(TURN), "guide"))
+    notes = [(f"{name} {abs(z):.2f} g mm ∠{np.degrees(np.angle(z)) % 360:.0f}°", z.real, z.imag) for name, z in points]
+    notes += [(f"{k}°", top * np.cos(np.radians(k)), top * np.sin(np.radians(k))) for k in range(0, 360, 45)]
+    return Figure(
+        f"sheet-{side}", f"Unbalance and weights {side}",
+        f"On the scale of the {side} plane: its 0° faces y while the shaft stands with its zero there; angles grow from y "
+        "towards z, in the direction of rotation. Weights are added, at the radius of the plane. A trial weight is on "
+        "the shaft in its own run alone, unless the plan leaves it.",
+        "along the scale's zero (g mm)", "a quarter turn on (g mm)", tuple(series), "plane", notes=tuple(notes),
+    )  # fmt: skip

@@ -1,0 +1,174 @@
+"""How a balancing goes on: runs with and without weights, decisions in between, weights fixed on the landed shaft."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from bench.errors import AnalysisError
+from bench.recorder import Recorder
+from bench.rig import Rig
+from bench.roles import Plane, RigState
+from bench.states import transition
+from procedures import probing, unbalance
+from procedures.estimators import balance_decision, balance_estimates
+from procedures.estimators.balance_data import (
+    BASE,
+    CAPTURED,
+    DECISION,
+    MOUNT,
+    REFUSED,
+    SIDES,
+    UNMOUNT,
+    Read,
+    Run,
+    Weight,
+    read_capture,
+)
+from procedures.estimators.unbalance_data import CONTACT, DWELL, SLOW
+
+if TYPE_CHECKING:
+    from procedures.balance import Plan
+
+SLOW_HZ = 500.0  # of the slow roll's capture
+
+
+@dataclass
+class Work:
+    """A balancing under way: what is on the shaft, what was read so far."""
+
+    rig: Rig
+    plan: Plan
+    record: Recorder
+    mounted: list[Weight] = field(default_factory=list)
+    runs: list[Run] = field(default_factory=list)
+    slow: Read | None = None
+    fixed: int = 0
+    dwells: int = 0
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Look, lift and nudge; slow roll and base run; a run with a trial weight in each plane; corrections, each verified."""
+    work = Work(rig, plan, record)
+    if not probing.probed(rig, record):
+        return
+    unbalance.put(rig, {"law": unbalance.CODES[plan.law], **unbalance.SETTINGS["off"]})
+    if not _rolled(work) or not _run(work, BASE):
+        return
+    for p, side in enumerate(SIDES):
+        if (allowed := balance_decision.refused(rig.file, plan, work.runs, p)) is not None:
+            record.event(REFUSED, plane=side, kg=plan.trial_kg[p], allowed_kg=allowed)
+            return
+        _mount(work, p, plan.trial_kg[p], plan.trial_angle_rad[p], "trial")
+        if not _run(work, f"trial {side}") or not _acted(work, p):
+            return
+        if not plan.leave:
+            _unmount(work, p)
+    _correct(work)
+
+
+def _rolled(work: Work) -> bool:
+    """The slow roll, where the plan has one."""
+    rig, plan = work.rig, work.plan
+    if not plan.slow_rad_s:
+        return True
+    if not probing.turned(rig, work.record, plan.slow_rad_s, plan.settle_s):
+        unbalance.finished(rig)
+        return False
+    work.slow = _dwell(work, SLOW, BASE, plan.slow_rad_s, plan.slow_s, plan.slow_s, SLOW_HZ)
+    if work.slow is None:
+        unbalance.finished(rig)
+    return work.slow is not None
+
+
+def _run(work: Work, name: str) -> bool:
+    """Levitated, all speeds, the lowest again, stopped and landed; False where it was not completed or not sound."""
+    rig, plan = work.rig, work.plan
+    if rig.levitation.state is RigState.READY:  # the base run goes on from the slow roll
+        transition(rig, RigState.LEVITATED)
+    unbalance.put(rig, {"law": unbalance.CODES[plan.law], **unbalance.SETTINGS["off"]})
+    reads: list[Read] = []
+    speeds = sorted(plan.speeds_rad_s)
+    for speed in (*speeds, *(speeds[:1] if plan.repeat else ())):
+        if not probing.turned(rig, work.record, speed, plan.settle_s):
+            break
+        read = _dwell(work, DWELL, name, speed, plan.dwell_s, plan.capture_s, None, again=len(reads) == len(speeds))
+        if read is None or not read.sound or abs(read.speed / speed - 1) > plan.max_speed_error:
+            break  # the analysis says why
+        reads.append(read)
+    unbalance.finished(rig)
+    transition(rig, RigState.READY)
+    if len(reads) < len(speeds) + plan.repeat:
+        return False
+    run = Run(name, tuple(work.mounted), tuple(reads[: len(speeds)]), reads[-1] if plan.repeat else None)
+    work.runs.append(run)
+    return not list(balance_decision.slipped(run))
+
+
+def _dwell(
+    work: Work, kind: str, name: str, speed: float, seconds: float, capture_s: float, rate_hz: float | None,
+    again: bool = False,
+) -> Read | None:  # fmt: skip
+    """A recorded dwell and what its capture says, None where that cannot be told."""
+    rig, number = work.rig, -1 if again else work.dwells
+    assert rig.capture is not None  # `check` refuses a rig without one
+    driven = rig.drive.speed_rad_s if rig.drive is not None else 0.0
+    labels = {"speed_rad_s": speed, "variant": name, "driven_rad_s": driven, "number": number, "again": again}
+    with work.record.step(kind, **labels):
+        rig.capture.arm(CAPTURED, seconds=capture_s, rate_hz=rate_hz)
+        rig.capture.wait(capture_s + 5.0)
+        rig.clock.sleep(max(seconds - capture_s, unbalance.MARGIN_S))
+    work.dwells += 1
+    touched = int(rig.levitation.reading("flags")) & CONTACT
+    data = rig.capture.upload(run=name, speed_rad_s=speed)
+    try:
+        return None if touched else read_capture(data)
+    except AnalysisError:
+        return None  # of the pulses; the analysis says what is wrong with them
+
+
+def _mount(work: Work, plane: int, kg: float, angle: float, purpose: str) -> None:
+    """Have a weight fixed; the shaft is landed."""
+    side: Plane = "inboard" if plane == 0 else "outboard"
+    with work.record.step(MOUNT, plane=side, kg=kg, angle_rad=angle, purpose=purpose):
+        work.rig.operator.attach(side, kg, angle)
+    work.fixed += 1
+    work.mounted.append(Weight(plane, kg, angle, work.fixed))
+
+
+def _unmount(work: Work, plane: int) -> None:
+    """Have every weight of a plane taken off."""
+    side: Plane = "inboard" if plane == 0 else "outboard"
+    with work.record.step(UNMOUNT, plane=side):
+        work.rig.operator.detach(side)
+    work.mounted = [w for w in work.mounted if w.plane != plane]
+
+
+def _acted(work: Work, plane: int) -> bool:
+    """Whether the trial weight of the last run did what it should."""
+    base, last = work.runs[0], work.runs[-1]
+    before = work.runs[-2] if work.plan.leave else base
+    added = balance_decision.shown(before, last, last.weights[-1], work.rig.file, work.plan)
+    return not list(balance_decision.of_trial(added, last.weights[-1]))
+
+
+def _correct(work: Work) -> None:
+    """Corrections, each with its verification run, until it is reached or the plan allows no more."""
+    rig, plan = work.rig.file, work.plan
+    trials = balance_decision.trials_of(work.runs, rig, plan.leave)
+    assert trials is not None
+    shown = [balance_decision.shown(trials.before[p], trials.having[p], trials.weights[p], rig, plan) for p in (0, 1)]
+    if list(balance_decision.of_trials(shown[0], shown[1])):
+        return
+    present = work.runs[-1] if plan.leave else trials.base
+    for n in range(plan.corrections):
+        found = balance_estimates.balanced(work.slow, [present], trials, rig, plan)
+        needed = balance_decision.correction(found, present.name, rig, plan)
+        work.record.event(DECISION, run=present.name, reached=needed.reached, too_heavy_kg=needed.too_heavy)
+        if needed.reached or needed.too_heavy:
+            return
+        for plane, kg, angle in needed.weights:
+            _mount(work, plane, kg, angle, f"correction {n + 1}")
+        if not _run(work, f"check {n + 1}"):
+            return
+        present = work.runs[-1]

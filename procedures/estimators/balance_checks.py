@@ -1,0 +1,254 @@
+"""What a balancing's recording says: findings, each naming its suspect, and the result where there is one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from itertools import pairwise
+from typing import Any, Protocol
+
+import numpy as np
+
+from bench.analysis.balance import G_MM, bound
+from bench.findings import Effect, Finding
+from bench.recording import Recording
+from bench.rigfile import RigFile
+from bench.uncertainty import Estimate
+from procedures.estimators import balance_decision, balance_estimates, tracking_wiring, unbalance_checks
+from procedures.estimators.balance_data import (
+    BASE,
+    DECISION,
+    REFUSED,
+    SIDES,
+    Recorded,
+    Run,
+    read_dwell,
+    read_runs,
+)
+from procedures.estimators.balance_estimates import Balanced, Forces, Trials
+from procedures.estimators.unbalance_data import AXES, CURRENTS, POSITIONS, RPM, SLOW, TOLD, Complex, Dwell
+
+MOST_RPM = 10000.0  # influence runs
+WORST_CONDITION = 50.0  # of the influence coefficients
+SPEEDS_APART = 2e-3
+DIFFERS = 0.15  # of what was mounted: how far a verification may be from the prediction, beside its uncertainty
+NEEDED = ("com_to_inboard_balance", "com_to_outboard_balance", "balance_radius", "clearance", "coupling_stiffness", "amb_gap",
+          *(f"com_to_{b}_{what}" for b in ("inboard", "outboard") for what in ("sensor", "amb")))  # fmt: skip
+
+
+class Settings(balance_decision.Settings, unbalance_checks.Settings, Protocol):
+    """The plan."""
+
+    @property
+    def leave(self) -> bool: ...
+    @property
+    def corrections(self) -> int: ...
+    @property
+    def repeat(self) -> bool: ...
+    @property
+    def trial_angle_rad(self) -> tuple[float, float]: ...
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """Findings; where there is a result: `balance`, the runs by name, the `last` run, influences by probe and plane."""
+
+    findings: tuple[Finding, ...]
+    balance: Balanced | None = None
+    recorded: Recorded | None = None
+    last: str = BASE
+    influences: Mapping[tuple[str, str], tuple[Estimate, Estimate]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Looked:
+    """A dwell with its balance of forces, as `unbalance_checks` wants it."""
+
+    dwell: Dwell
+    misfit: float
+    carried: np.ndarray
+
+
+def of_plan(rig: RigFile, plan: Settings) -> Iterable[str]:
+    """What cannot work, before anything starts."""
+    lacking = [
+        f"{table}: found no {', '.join(missing)}; expected them all"
+        for table, names, found in (
+            ("channels", TOLD, rig.channels),
+            ("sensors", (*POSITIONS, *CURRENTS), rig.sensors),
+            ("geometry", NEEDED, rig.geometry),
+            ("machine", ("weight_mass", "weight_angle", "runout"), rig.machine),
+        )
+        if (missing := [n for n in names if n not in found])
+    ]
+    if not any("drive" in d.roles for d in rig.devices.values()):
+        lacking.append("devices: found none in the role drive; nothing turns the shaft")
+    yield from lacking
+    if lacking:
+        return
+    yield from unbalance_checks.of_plan(rig, plan)
+    if max(plan.speeds_rad_s) * RPM > MOST_RPM + 1:
+        top = max(plan.speeds_rad_s) * RPM
+        yield f"speeds_rad_s: found {top:.0f} r/min; influence runs are made at {MOST_RPM:.0f} r/min or below"
+    if 0 < plan.positions < 3:
+        yield f"positions: found {plan.positions}; expected 0 (any angle), or three or more"
+    for side, kg, p in zip(SIDES, plan.trial_kg, (0, 1), strict=True):
+        allowed = balance_decision.allowed_kg(rig, plan, p)
+        if not 0 < kg <= allowed:
+            yield (f"trial_kg: found {kg * 1e3:g} g {side}; allowed are up to {allowed * 1e3:.3g} g: by the envelope, "
+                   f"and by the predicted response, which may reach {plan.max_share:.0%} of the least clearance")  # fmt: skip
+
+
+@lru_cache(maxsize=1)
+def evaluated(recording: Recording[Any]) -> Evaluated:
+    """What a recording says. The last one is kept: analysis and figures ask for the same."""
+    found = [*tracking_wiring.before_orbits(recording), *unbalance_checks.before(recording), *_refusals(recording)]
+    if any(f.code in ("no-dwells", "probe-polarity", "lift-lost", "stuck-channel") for f in found):
+        return Evaluated(tuple(found))
+    plan, rig = recording.plan, recording.rig
+    recorded = read_runs(recording, plan.speeds_rad_s)
+    found += unbalance_checks.of_signals(recorded.dwells, plan)
+    found += of_runs(recorded, rig, plan)
+    trials = balance_decision.trials_of(recorded.runs, rig, plan.leave)
+    if trials is None and not any(f.effect is Effect.ERROR for f in found):
+        text = "the runs with trial weights were not completed: no influence coefficients."
+        found.append(Finding("no-trials", text, "", Effect.ERROR))
+    if trials is None or any(f.effect is Effect.ERROR for f in found):
+        return Evaluated((*found, *sheet(recorded, "still-mounted", rig, plan)))
+    checks = [r for r in recorded.runs if r.name.startswith("check")]
+    shown = [trials.base, *([trials.having[1]] if plan.leave else []), *checks]
+    balance = balance_estimates.balanced(recorded.slow, shown, trials, rig, plan)
+    last = shown[-1].name
+    found += _of_result(balance, recorded, shown, plan, rig)
+    return Evaluated(tuple(found), balance, recorded, last, balance_estimates.influences(balance, rig))
+
+
+def _refusals(recording: Recording[Any]) -> Iterator[Finding]:
+    for e in recording.events(REFUSED):
+        text = (
+            f"the trial weight of {e['kg'] * 1e3:g} g {e['plane']} was refused: beside what the shaft does already its "
+            f"predicted response would leave the plan's share of the clearance. Allowed are {e['allowed_kg'] * 1e3:.3g} g."
+        )
+        yield Finding("trial-refused", text, str(e["plane"]), Effect.ERROR)
+    for e in recording.events(DECISION):
+        if e["too_heavy_kg"]:
+            text = (f"the correction needs {e['too_heavy_kg'] * 1e3:.3g} g in one place, more than the envelope allows: it "
+                    "was not mounted.")  # fmt: skip
+            yield Finding("correction-refused", text, str(e["run"]), Effect.ERROR)
+
+
+def of_runs(recorded: Recorded, rig: RigFile, plan: Settings) -> Iterator[Finding]:
+    """Loose parts, forces, trial weights."""
+    for run in recorded.runs:
+        yield from balance_decision.slipped(run)
+    base = next((r for r in recorded.runs if r.name == BASE), None)
+    if base is None:
+        return
+    yield from _speeds(recorded)
+    off = balance_decision.slow_runout(recorded.slow, base, rig, plan)
+    looked = []
+    for d in recorded.dwells:
+        if d.kind != SLOW:
+            f: Forces = balance_estimates.forces(read_dwell(d), off, rig, plan)
+            looked.append(Looked(d, f.misfit, f.carried))
+    yield from unbalance_checks.channels(looked)
+    yield from unbalance_checks.weight(looked)
+    added: list[Complex] = []
+    named = {r.name: r for r in recorded.runs}
+    before = base
+    for side in SIDES:
+        having = named.get(f"trial {side}")
+        if having is None or not having.weights:
+            return
+        added.append(balance_decision.shown(before, having, having.weights[-1], rig, plan))
+        yield from balance_decision.of_trial(added[-1], having.weights[-1])
+        before = having if plan.leave else base
+    yield from balance_decision.of_trials(added[0], added[1])
+
+
+def _speeds(recorded: Recorded) -> Iterator[Finding]:
+    """Influence coefficients hold for one speed: differences of readings at two are none."""
+    for k in range(len(recorded.runs[0].reads)):
+        speeds = np.array([r.reads[k].speed for r in recorded.runs])
+        apart = float(np.ptp(speeds) / speeds.mean())
+        if apart > SPEEDS_APART:
+            text = (f"the runs' speeds at {speeds.mean() * RPM:.0f} r/min are {apart:.2%} apart; {SPEEDS_APART:.1%} is "
+                    "allowed: the response to unbalance changes with speed.")  # fmt: skip
+            yield Finding("speeds-differ", text, "", Effect.INDETERMINATE)
+
+
+def _of_result(
+    balance: Balanced, recorded: Recorded, shown: list[Run], plan: Settings, rig: RigFile
+) -> Iterator[Finding]:
+    """Was it reached, did the corrections act as predicted, and the sheet."""
+    if balance.solved.condition > WORST_CONDITION:
+        text = (f"the condition of the influence coefficients is {balance.solved.condition:.0f}: the probes do not tell the "
+                "planes apart.")  # fmt: skip
+        yield Finding("planes-not-told-apart", text, "", Effect.ERROR)
+    for before, after in pairwise(shown):
+        if after.name.startswith("check"):
+            yield from predicted(balance, before, after)
+    name = shown[-1].name
+    values = balance.unbalance[name]
+    for p, side in enumerate(SIDES):
+        size, most, per = abs(values.values[p]), bound(values.one(p)), balance.permissible[p].value
+        text = (f"{side}: U_res {size / G_MM:.2f}, U {(most - size) / G_MM:.2f}, together {most / G_MM:.2f} g mm; U_per "
+                f"{per / G_MM:.2f} g mm (G{plan.grade_m_s * 1e3:g} at {plan.service_rad_s * RPM:.0f} r/min).")  # fmt: skip
+        if most <= per:
+            yield Finding("reached", text, name)
+        else:
+            yield Finding("not-reached", text, name, Effect.INDETERMINATE)
+    for p, side in enumerate(SIDES):
+        some = ", ".join(
+            f"{axis} {abs(a):.3f} µm ∠{-math.degrees(np.angle(a)) % 360:.0f}°"
+            for axis, a in zip(AXES, balance.solved.influence[-1, :, p], strict=True)
+        )
+        text = (f"1 g mm at the scale's zero of the {side} plane, {max(plan.speeds_rad_s) * RPM:.0f} r/min (0-pk, phase "
+                f"lag): {some}; condition of all {balance.solved.condition:.1f}.")  # fmt: skip
+        yield Finding("influence", text, side)
+    yield from sheet(recorded, "correction-sheet", rig, plan)
+
+
+def predicted(balance: Balanced, before: Run, after: Run) -> Iterator[Finding]:
+    """What was measured against what was expected of the weights that were fixed in between."""
+    added = balance_estimates.fixed(after.weights, balance.radius) - balance_estimates.fixed(
+        before.weights, balance.radius
+    )
+    expected = balance.unbalance[before.name].values + added
+    found = balance.unbalance[after.name]
+    off = found.values - expected
+    scale = float(np.abs(added).max())
+    told = ", ".join(
+        f"{side} {abs(e) / G_MM:.2f} g mm, found {abs(v) / G_MM:.2f} g mm"
+        for side, e, v in zip(SIDES, expected, found.values, strict=True)
+    )
+    if np.abs(off).max() > DIFFERS * scale + 3 * _mounted(scale):
+        worst = SIDES[int(np.argmax(np.abs(off)))]
+        text = (f"predicted {told}: the correction did not act as it should, most {worst}. Suspect a weight of another "
+                "mass, at another angle or in the other plane than the sheet says, or one that came loose.")  # fmt: skip
+        yield Finding("correction-not-as-stated", text, after.name, Effect.INDETERMINATE)
+    else:
+        yield Finding("verified", f"predicted {told}.", after.name)
+
+
+def _mounted(scale: float) -> float:
+    """What weights that are mounted within their tolerances leave of an amount, kg m."""
+    return 0.02 * scale + 0.03 * G_MM
+
+
+def sheet(recorded: Recorded, code: str, rig: RigFile, plan: Settings) -> Iterator[Finding]:
+    """The weights that stay on the shaft, for the operator."""
+    kept, radius = {w.number for w in recorded.on}, rig.geometry["balance_radius"].value
+    for w, purpose in recorded.fixed:
+        if w.number in kept:
+            degrees = math.degrees(w.angle) % 360
+            place = f" (position {round(degrees / 360 * plan.positions) % plan.positions})" if plan.positions else ""
+            text = (f"{purpose}: {w.kg * 1e3:.3f} g in the {SIDES[w.plane]} plane at {degrees:.1f}°{place} of its scale, "
+                    f"radius {radius * 1e3:g} mm ({w.kg * radius / G_MM:.2f} g mm), added. Angles are counted from y towards "
+                    "z, in the direction of rotation, while the scale's zero faces y.")  # fmt: skip
+            yield Finding(code, text, SIDES[w.plane])
+
+
+__all__ = ["AXES", "Evaluated", "Trials", "evaluated", "of_plan"]

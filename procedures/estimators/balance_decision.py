@@ -1,0 +1,195 @@
+"""Deciding within a balancing: may a trial weight turn, did it act as it should, what corrects, is it enough.
+
+`acquire` decides by captures, the analysis says the same of the telemetry. Nothing here moves anything.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.analysis.balance import bound, split
+from bench.findings import Effect, Finding
+from bench.rigfile import RigFile
+from procedures.estimators import balance_estimates, runout, unbalance_estimates
+from procedures.estimators.balance_data import SIDES, Read, Run, Weight
+from procedures.estimators.balance_estimates import Balanced, Trials
+from procedures.estimators.runout import Stand
+from procedures.estimators.unbalance_data import RPM
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+LEAST = 0.5  # of what it should do, by the forces: less, and a trial weight moved nothing
+OFF, ASTRAY = 0.25, 0.25  # of a weight: size, and what shows in the other plane
+TURNED_RAD, SLIPPED_RAD = math.radians(12), math.radians(15)
+LIGHTEST_KG = 1e-6  # what a laboratory balance still tells from nothing
+
+
+class Settings(balance_estimates.Settings, Protocol):
+    """The part of a plan that decides."""
+
+    @property
+    def law(self) -> str: ...
+    @property
+    def speeds_rad_s(self) -> tuple[float, ...]: ...
+    @property
+    def max_share(self) -> float: ...
+    @property
+    def positions(self) -> int: ...
+    @property
+    def trial_kg(self) -> tuple[float, float]: ...
+
+
+def gain(rig: RigFile, plan: Settings, plane: int) -> float:
+    """Greatest response of a probe to an unbalance in a plane on the way to the highest speed, m/(kg m): a rigid shaft in the
+    loop that the controller's gains are meant to make, s^2 + k2 s + k1 in each degree of freedom."""
+    stand = Stand.of({n: e.value for n, e in unbalance_estimates.stated(rig, plan).items()})
+    p = {n: q.default for n, q in rig.parameters.items()}
+    if plan.law == "PID":
+        means = np.concatenate([np.zeros(4), np.full(8, p["bias"])])
+        plus, minus, k_x = runout.slopes(stand, means)
+        force = float((plus - minus)[[0, 2]].sum())
+        k1, k2 = (force * p["kp"] - float(k_x[[0, 2]].sum())) / stand.mass, force * p["kd"] / stand.mass
+    else:
+        k1, k2 = p["k1"], p[f"k2_{plan.law.lower()}"]
+    w = np.linspace(1.0, max(plan.speeds_rad_s), 400)
+    most = float((w**2 / np.abs(k1 - w**2 + 1j * w * k2)).max())
+    arm = (-stand.l_iu, stand.l_ou)[plane]
+    return most * max(abs(1 / stand.mass + arm * at / stand.inertia) for at in (-stand.l_is, stand.l_os))
+
+
+def allowed_kg(rig: RigFile, plan: Settings, plane: int, before: float = 0.0) -> float:
+    """The greatest trial weight whose predicted response, beside `before` m that is there, stays within the plan's share of
+    the least clearance and the envelope."""
+    c, radius = rig.geometry["clearance"], rig.geometry["balance_radius"].value
+    room = plan.max_share * (c.value - math.sqrt(3) * c.standard_uncertainty) - before
+    return float(min(max(room, 0.0) / gain(rig, plan, plane) / radius, rig.envelope.max_trial_weight_kg))
+
+
+def refused(rig: RigFile, plan: Settings, runs: Sequence[Run], plane: int) -> float | None:
+    """The allowed trial weight in kg where the planned one is too heavy beside what the last run showed, else None."""
+    before = max(r.farthest for r in (*runs[-1].reads, *([runs[-1].again] if runs[-1].again else [])))
+    allowed = allowed_kg(rig, plan, plane, before)
+    return allowed if plan.trial_kg[plane] > allowed else None
+
+
+def slow_runout(slow: Read | None, base: Run, rig: RigFile, plan: Settings) -> Complex:
+    """Runout (4,) m by the slow roll and the forces; none without one."""
+    if slow is None:
+        return np.zeros(4, complex)
+    stand = Stand.of({n: e.value for n, e in unbalance_estimates.stated(rig, plan).items()})
+    return runout.found(stand, slow.turning, base.fastest.turning)[0]
+
+
+def shown(before: Run, having: Run, weight: Weight, rig: RigFile, plan: Settings) -> Complex:
+    """By speed and plane (s, 2), what the forces say that a weight added, over what it should; the angle from the mark to the
+    scale's zero is still in it. Runout cancels."""
+    u = weight.unbalance(rig.geometry["balance_radius"].value)
+    none = np.zeros(4, complex)
+    pairs = zip(before.reads, having.reads, strict=True)
+    return np.array([(balance_estimates.forces(b, none, rig, plan).unbalance
+                      - balance_estimates.forces(a, none, rig, plan).unbalance) / u for a, b in pairs])  # fmt: skip
+
+
+def of_trial(added: Complex, weight: Weight) -> Iterator[Finding]:
+    """Did a trial weight do what it should, in its own plane, at every speed alike? `added` as by `shown`."""
+    p, where, name = (
+        weight.plane,
+        f"trial {SIDES[weight.plane]}",
+        f"{weight.kg * 1e3:g} g in the {SIDES[weight.plane]} plane",
+    )
+    own, other = float(np.abs(added[-1, p])), float(np.abs(added[-1, 1 - p]))
+    if own < LEAST and other < LEAST:
+        text = (f"the trial weight of {name} moved nothing: by the forces it acts as {own:.0%} of itself. Is it mounted, and "
+                "was it there while the shaft turned? No correction is given.")  # fmt: skip
+        yield Finding("trial-moved-nothing", text, where, Effect.ERROR)
+    elif own < LEAST:
+        text = (f"the trial weight of {name} acts in the {SIDES[1 - p]} plane, as {other:.0%} of itself: it sits in the wrong "
+                "plane.")  # fmt: skip
+        yield Finding("weight-in-other-plane", text, where, Effect.ERROR)
+    elif abs(own - 1) > OFF or other > ASTRAY:
+        text = (f"by the forces the trial weight of {name} acts as {own:.0%} of itself there and as {other:.0%} in the other "
+                "plane: suspect its mass or its place, or an unbalance that changed as it was mounted.")  # fmt: skip
+        yield Finding("weight-not-as-stated", text, where, Effect.ERROR)
+    turn = float(np.abs(np.angle(added[:, p] / added[-1, p])).max()) if own >= LEAST else 0.0
+    if turn > SLIPPED_RAD:
+        text = (f"what the trial weight of {name} adds is turned by {math.degrees(turn):.0f}° from one speed to another: it is "
+                "loose.")  # fmt: skip
+        yield Finding("weight-loose", text, where, Effect.ERROR)
+
+
+def of_trials(first: Complex, second: Complex) -> Iterator[Finding]:
+    """Both weights sit on one scale: the same angle from the mark."""
+    turn = float(np.angle(second[-1, 1] / first[-1, 0]))
+    if abs(turn) > TURNED_RAD and min(abs(first[-1, 0]), abs(second[-1, 1])) >= LEAST:
+        text = (f"by the forces the trial weights' scales are turned against each other by {math.degrees(turn):+.0f}°: one of "
+                "the weights sits at another angle than stated, or the planes' scales do not agree.")  # fmt: skip
+        yield Finding("weight-angle", text, "trials", Effect.ERROR)
+
+
+def slipped(run: Run) -> Iterator[Finding]:
+    """The slowest speed again at the end of a run: what turned with the shaft must be the same."""
+    if run.again is None:
+        return
+    a, b = run.reads[0].vectors.values[:4], run.again.vectors.values[:4]
+    noise = 2.5 * np.hypot(run.reads[0].vectors.u_amplitude[:4], run.again.vectors.u_amplitude[:4])
+    over = np.abs(b - a) - noise - np.maximum(0.1 * np.abs(a), 0.3e-6)
+    k = int(np.argmax(over))
+    if over[k] > 0:
+        turn = math.degrees(float(np.angle(b[k] / a[k])))
+        text = (f"between the first and the last dwell at {run.reads[0].speed * RPM:.0f} r/min a vector went from "
+                f"{abs(a[k]) * 1e6:.2f} to {abs(b[k]) * 1e6:.2f} µm 0-pk and turned by {-turn:+.0f}° of lag: ")  # fmt: skip
+        if run.weights:
+            yield Finding("weight-loose", text + "a weight has slipped or come off at speed.", run.name, Effect.ERROR)
+        else:
+            yield Finding("response-changed", text + "suspect a part that came loose, or a shaft that bent.", run.name,
+                          Effect.ERROR)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Correction:
+    """Weights to fix by plane as (plane, kg, angle rad); `reached`: none is needed; `too_heavy` kg, where one is."""
+
+    weights: tuple[tuple[int, float, float], ...]
+    reached: bool
+    too_heavy: float = 0.0
+
+
+def reached(balance: Balanced, name: str) -> tuple[bool, bool]:
+    """Of each plane, whether the farthest point of the 95 % region of a run's unbalance lies within U_per."""
+    found = balance.unbalance[name]
+    inside = [bound(found.one(p)) <= balance.permissible[p].value for p in (0, 1)]
+    return inside[0], inside[1]
+
+
+def correction(balance: Balanced, name: str, rig: RigFile, plan: Settings) -> Correction:
+    """What takes the unbalance of a run away, at the plan's positions where it has some."""
+    if all(reached(balance, name)):
+        return Correction((), reached=True)
+    wanted: list[tuple[int, float, float]] = []
+    for p, u in enumerate(balance.unbalance[name].values):
+        for part in split(-complex(u), plan.positions):
+            kg = abs(part) / balance.radius
+            if kg >= LIGHTEST_KG:
+                wanted.append((p, kg, float(np.angle(part)) % (2 * math.pi)))
+    heaviest = max((kg for _, kg, _ in wanted), default=0.0)
+    most = rig.envelope.max_trial_weight_kg
+    return Correction(tuple(wanted), reached=False, too_heavy=heaviest if heaviest > most else 0.0)
+
+
+def trials_of(runs: Sequence[Run], rig: RigFile, leave: bool) -> Trials | None:
+    """The trials among runs in order, None where one is missing."""
+    named = {r.name: r for r in runs}
+    names = ["base", *(f"trial {s}" for s in SIDES)]
+    if any(n not in named for n in names):
+        return None
+    base, i, o = (named[n] for n in names)
+    if not i.weights or not o.weights:
+        return None
+    return Trials(base, (base, i if leave else base), (i, o), (i.weights[-1], o.weights[-1]),
+                  rig.geometry["balance_radius"].value)  # fmt: skip

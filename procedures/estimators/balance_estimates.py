@@ -1,0 +1,236 @@
+"""Unbalance of the shaft on the scale of its planes, with influences: from trial weights, slow roll and certificates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.analysis.balance import allocated, permissible
+from bench.analysis.vectors import Vectors, estimates
+from bench.rigfile import RigFile
+from bench.uncertainty import Estimate, Influence, propagate, welch_satterthwaite
+from bench.uncertainty.estimate import merged
+from procedures.estimators import balance_scatter, runout, unbalance_estimates
+from procedures.estimators.balance_data import SIDES, Read, Run, Weight
+from procedures.estimators.balance_solution import Solved, Trials, solved, taken
+from procedures.estimators.inputs import certified
+from procedures.estimators.runout import Stand, Turning
+from procedures.estimators.unbalance_data import AXES
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+
+class Settings(Protocol):
+    """The part of a plan that the estimates need."""
+
+    @property
+    def beta_share(self) -> float: ...
+    @property
+    def offset_u_m(self) -> float: ...
+    @property
+    def refit_u_kg_m(self) -> float: ...
+    @property
+    def grade_m_s(self) -> float: ...
+    @property
+    def service_rad_s(self) -> float: ...
+
+
+@dataclass(frozen=True)
+class Balanced:
+    """Nominal solution; of each run the unbalance by plane as `vectors` (2,) kg m on the scale and its `parts` re, im by plane
+    (4,); U_per of each plane, kg m."""
+
+    trials: Trials
+    solved: Solved
+    unbalance: Mapping[str, Vectors]
+    parts: Mapping[str, tuple[Estimate, ...]]
+    permissible: tuple[Estimate, Estimate]
+    radius: float
+
+    def added(self, name: str, since: Run, runs: Sequence[Run]) -> Complex:
+        """What was mounted in a run beyond another one's weights, (2,) kg m."""
+        run = next(r for r in runs if r.name == name)
+        return fixed(run.weights, self.radius) - fixed(since.weights, self.radius)
+
+
+def fixed(weights: Sequence[Weight], radius: float) -> Complex:
+    """Sum of weights by plane, (2,) kg m."""
+    out = np.zeros(2, complex)
+    for w in weights:
+        out[w.plane] += w.unbalance(radius)
+    return out
+
+
+def balanced(slow: Read | None, runs: Sequence[Run], trials: Trials, rig: RigFile, plan: Settings) -> Balanced:
+    """Unbalance of every run in `runs`, with influences shared by their identity.
+
+    Certificates and the bearings' model go through the whole model, scatter through its linear part.
+    """
+    radius = rig.geometry["balance_radius"].value
+    known = {
+        **unbalance_estimates.stated(rig, plan),
+        **_weights(trials, rig),
+        **(_unmeasured(rig) if slow is None else {}),
+    }
+
+    def solve(v: Mapping[str, float]) -> tuple[Stand, Solved]:
+        s = Stand.of(v)
+        some = [(complex(v[f"kg_{p}"] * v["radius"] * np.exp(1j * v[f"angle_{p}"])), _turnings(trials.before[p]),
+                 _turnings(trials.having[p])) for p in (0, 1)]  # fmt: skip
+        found = solved(s, None if slow is None else slow.turning, some, _turnings(trials.base))
+        if slow is None:
+            lost = taken(s, _turnings(trials.base), _unknown(v), found.mark)
+            found = replace(found, taken=found.taken + lost)
+        return s, found
+
+    def model(v: dict[str, float]) -> dict[str, float]:
+        s, found = solve(v)
+        out: dict[str, float] = {}
+        for run in runs:
+            u = found.unbalance(_readings(run) / s.gain)
+            out |= {f"{run.name}/{k}": float(x) for k, x in enumerate(u.view(np.float64))}
+        return out
+
+    out = propagate(model, known)
+    stand, nominal = solve({name: e.value for name, e in known.items()})
+    parts = {}
+    for run in runs:
+        scatter = balance_scatter.of_run(stand, nominal, slow, run, trials, plan.refit_u_kg_m)
+        parts[run.name] = tuple(
+            Estimate(e.value, "kg m", merged(((1.0, e), *more)))
+            for e, more in zip((out[f"{run.name}/{k}"] for k in range(4)), scatter, strict=True)
+        )
+    return Balanced(
+        trials, nominal, {name: _vectors(p) for name, p in parts.items()}, parts, permitted(rig, plan), radius
+    )
+
+
+def _turnings(run: Run) -> list[Turning]:
+    return [r.turning for r in run.reads]
+
+
+def _readings(run: Run) -> Complex:
+    return np.array([r.vectors.values[:4] for r in run.reads])
+
+
+def _unmeasured(rig: RigFile) -> dict[str, Estimate]:
+    """Runout that nobody measured, by what the rig file says of it; both probes of a plane see the same journal."""
+    u = rig.machine["runout"].standard_uncertainty
+    names = [f"{part}_{b}" for b in "io" for part in ("re", "im")]
+    return {f"unknown_{n}": Estimate.of(0.0, Influence(f"runout/{n}", "runout, no slow roll", u, "m", "B", "normal"))
+            for n in names}  # fmt: skip
+
+
+def _unknown(v: Mapping[str, float]) -> Complex:
+    i, o = (v[f"unknown_re_{b}"] + 1j * v[f"unknown_im_{b}"] for b in "io")
+    return np.array([i, -1j * i, o, -1j * o])
+
+
+def _weights(trials: Trials, rig: RigFile) -> dict[str, Estimate]:
+    """Trial weights as the balance says and the scale shows; all sit at one radius."""
+    out = {"radius": certified("geometry/balance_radius", rig.geometry["balance_radius"], "radius of the weights")}
+    for p, w in enumerate(trials.weights):
+        for name, key, value in (("kg", "weight_mass", w.kg), ("angle", "weight_angle", w.angle)):
+            t = rig.machine[key]
+            off = Influence(f"weight/{w.number}/{name}", f"{name} of the trial weight, {SIDES[p]}",
+                            t.standard_uncertainty, t.unit, "B", t.distribution, source=t.source)  # fmt: skip
+            out[f"{name}_{p}"] = Estimate.of(value, off)
+    return out
+
+
+def _linear(e: Estimate) -> Estimate:
+    return Estimate(e.value, "kg m", e.sensitivities)
+
+
+def _vectors(parts: Sequence[Estimate]) -> Vectors:
+    values = np.array([parts[2 * k].value + 1j * parts[2 * k + 1].value for k in range(len(parts) // 2)])
+    return Vectors(values, unbalance_estimates.covariance(parts), min(welch_satterthwaite(e) for e in parts))
+
+
+def permitted(rig: RigFile, plan: Settings) -> tuple[Estimate, Estimate]:
+    """U_per of each plane (ISO 21940-11), kg m, uncertain by the rotor's mass and the planes' places."""
+    inputs = {"mass": certified("machine/mass", rig.machine["mass"]),
+              "left": certified("geometry/com_to_inboard_balance", rig.geometry["com_to_inboard_balance"]),
+              "right": certified("geometry/com_to_outboard_balance", rig.geometry["com_to_outboard_balance"])}  # fmt: skip
+
+    def model(v: dict[str, float]) -> dict[str, float]:
+        i, o = allocated(permissible(plan.grade_m_s, v["mass"], plan.service_rad_s), v["left"], v["right"])
+        return {"i": i, "o": o}
+
+    out = propagate(model, inputs)
+    return _linear(out["i"]), _linear(out["o"])
+
+
+def share(balance: Balanced, name: str, plane: int) -> Estimate:
+    """Amount of a run's unbalance in a plane over U_per. Its two components enter as one pair with their covariance, which
+    Monte Carlo draws where the amount is near zero."""
+    one = balance.unbalance[name].one(plane)
+    pair = estimates(
+        one.parts, one.covariance, f"unbalance/{name}/{plane}", "components of the unbalance", "kg m", one.dof
+    )
+    inputs = {"x": pair[0], "y": pair[1], "per": balance.permissible[plane]}
+    out = propagate(lambda v: math.hypot(v["x"], v["y"]) / v["per"], inputs)
+    return Estimate(out.value, "1", out.sensitivities, out.sampler)
+
+
+def influences(balance: Balanced, rig: RigFile) -> dict[tuple[str, str], tuple[Estimate, Estimate]]:
+    """Influence coefficients at the highest speed by probe and plane, cosine and sine, m/(kg m): scatter of both runs, the
+    trial weight, and the probe's gain."""
+    out = {}
+    radius = certified("geometry/balance_radius", rig.geometry["balance_radius"], "radius of the weights")
+    known = _weights(balance.trials, rig)
+    for p, side in enumerate(SIDES):
+        before, having = balance.trials.before[p], balance.trials.having[p]
+        scatter = [balance_scatter.of_read(f"{r.name}/{len(r.reads) - 1}", r.fastest, 4) for r in (before, having)]
+        for k, axis in enumerate(AXES):
+            parts = [scatter[n][2 * k + j] for n in (0, 1) for j in (0, 1)]
+            inputs = {"a": parts[0], "b": parts[1], "c": parts[2], "d": parts[3], "kg": known[f"kg_{p}"],
+                      "angle": known[f"angle_{p}"], "radius": radius,
+                      "gain": certified(f"sensors/pos_{axis}/gain", rig.sensors[f"pos_{axis}"].gain)}  # fmt: skip
+
+            def model(v: dict[str, float]) -> dict[str, float]:
+                u = v["kg"] * v["radius"] * v["gain"] * np.exp(1j * v["angle"])
+                z = complex((v["c"] - v["a"] + 1j * (v["d"] - v["b"])) / u)
+                return {"cos": z.real, "sin": -z.imag}
+
+            found = propagate(model, inputs)
+            out[axis, side] = tuple(
+                Estimate(found[n].value, "m/(kg m)", found[n].sensitivities) for n in ("cos", "sin")
+            )
+    return out  # type: ignore[return-value]
+
+
+@dataclass(frozen=True)
+class Forces:
+    """Of a dwell, what `unbalance_checks` looks at: share of the forces left over, share of the weight carried (4,)."""
+
+    misfit: float
+    carried: Array
+    unbalance: Complex
+
+
+def forces(read: Read, off: Complex, rig: RigFile, plan: Settings) -> Forces:
+    """The balance of forces of one dwell, with a runout (4,) m."""
+    s = Stand.of({name: e.value for name, e in unbalance_estimates.stated(rig, plan).items()})
+    u, misfit = runout.unbalances(s, read.turning, off)
+    return Forces(misfit, runout.carried(s, read.means) / unbalance_estimates.shares(rig, s), u)
+
+
+__all__ = [
+    "Balanced",
+    "Forces",
+    "Settings",
+    "Trials",
+    "balanced",
+    "fixed",
+    "forces",
+    "influences",
+    "permitted",
+    "share",
+]

@@ -1,0 +1,297 @@
+"""Balancing: against the unbalance that is really there, planted defects, refused plans and weights."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bench.analysis.balance import G_MM
+from bench.analysis.vectors import contains
+from bench.cli.virtual import simulated_run
+from bench.findings import Effect, Finding
+from bench.procedure import Measured
+from bench.recording import Recording
+from bench.rigfile import load_rig
+from bench.uncertainty import Estimate, interval
+from procedures import balance
+from procedures.balance import check
+from procedures.estimators import balance_checks, balance_decision, balance_estimates, runout
+from procedures.estimators.balance_checks import Evaluated
+from procedures.estimators.balance_data import BASE, SIDES, Run, Weight
+from procedures.estimators.runout import Stand, Turning
+from reports.figures import draw as draw_figure
+from sim_backend import amb_balance
+from sim_backend.truth import draw
+
+RPM = math.pi / 30
+SHORT = {"slow_s": 4.2, "dwell_s": 0.5, "capture_s": 0.3, "settle_s": 0.8}
+ONE = {**SHORT, "speeds_rad_s": (10000 * RPM,), "repeat": False}
+HEAVY = {"unbalance_i": 8e-6, "unbalance_o": 8e-6, "unbalance_phase_i": 0.0, "unbalance_phase_o": 0.0}
+SEED = 1
+RIG = load_rig("amb5dof")
+
+
+@dataclass(frozen=True)
+class Balancing:
+    measured: dict[tuple[str, str], Estimate]
+    findings: list[Finding]
+    recording: Recording[Any]
+    found: Evaluated
+    true: list[np.ndarray]
+
+    @property
+    def serious(self) -> set[str]:
+        return {f.code for f in self.findings if f.effect is not Effect.NOTE}
+
+
+def done(
+    folder: Path, plan: Mapping[str, Any], truth: Mapping[str, float] | None = None, seed: int = SEED
+) -> Balancing:
+    run = simulated_run("balance", "amb5dof", seed, plan, folder / "recording.mcap", truth)
+    measured = {(m.quantity.name, m.where): m.estimate for m in run.results if isinstance(m, Measured)}
+    findings = [f for f in run.results if isinstance(f, Finding)]
+    true = amb_balance.left(RIG, draw(RIG, seed, truth), run.recording.events("operator"))
+    return Balancing(measured, findings, run.recording, balance_checks.evaluated(run.recording), true)
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> Balancing:
+    """Two speeds, the lower one again at the end of each run."""
+    return done(tmp_path_factory.mktemp("sound"), SHORT)
+
+
+def runs_of(b: Balancing) -> dict[str, Run]:
+    assert b.found.recorded is not None
+    return {r.name: r for r in b.found.recorded.runs}
+
+
+def test_it_is_reached_with_one_correction(sound: Balancing) -> None:
+    assert not sound.serious
+    assert {f.code for f in sound.findings} == {"verified", "reached", "influence", "correction-sheet"}
+    assert list(runs_of(sound)) == ["base", "trial inboard", "trial outboard", "check 1"]
+    assert len(sound.recording.all_steps()) <= balance.step_count(sound.recording.plan)
+    assert {name for name, _ in sound.measured} == {q.name for q in balance.MEASURES}
+    for side in SIDES:
+        assert interval(sound.measured["residual_share", side]).high < 1
+    sheet = [f.text for f in sound.findings if f.code == "correction-sheet"]
+    assert len(sheet) == 2
+    assert "from y towards z, in the direction of rotation" in sheet[0]
+
+
+def test_unbalance_as_found_and_as_left_is_what_is_really_there(sound: Balancing) -> None:
+    assert sound.found.balance is not None
+    for name, true in ((BASE, sound.true[0]), ("check 1", sound.true[-1])):
+        vectors = sound.found.balance.unbalance[name]
+        for p in (0, 1):
+            assert contains(vectors.one(p), complex(true[p]), 0.999)
+            assert vectors.one(p).u_amplitude[0] < 0.12 * G_MM
+    assert np.abs(sound.true[0]).min() > 1.5 * G_MM
+    for p, side in enumerate(SIDES):
+        assert abs(sound.true[-1][p]) < sound.measured["permissible", side].value
+
+
+def test_runout_left_in_would_be_taken_for_unbalance(sound: Balancing) -> None:
+    """Without its share the unbalance found is wrong by more than the permissible one."""
+    b, runs = sound.found.balance, runs_of(sound)
+    assert b is not None
+    readings = np.array([r.vectors.values[:4] for r in runs[BASE].reads])
+    blind = dataclasses.replace(b.solved, taken=0 * b.solved.taken).unbalance(readings)
+    assert np.abs(blind - sound.true[0]).max() > 5 * np.abs(b.unbalance[BASE].values - sound.true[0]).max()
+    assert np.abs(blind - sound.true[0]).max() > 0.8 * G_MM
+
+
+def test_the_forces_tell_what_each_trial_weight_did(sound: Balancing) -> None:
+    b = sound.found.balance
+    assert b is not None
+    assert np.abs(b.solved.placed - np.eye(2)).max() < 0.15
+    turned = b.solved.mark + draw(RIG, SEED).plant.pulse_angle
+    assert abs(math.remainder(turned, 2 * math.pi)) < math.radians(4)
+
+
+def test_figures(sound: Balancing) -> None:
+    drawn = list(balance.figures(sound.recording))
+    assert [f.key for f in drawn] == ["residual-inboard", "residual-outboard", "sheet-inboard", "sheet-outboard",
+                                      "vectors-inboard", "vectors-outboard"]  # fmt: skip
+    for figure in drawn:
+        draw_figure(figure)
+
+
+def test_a_run_says_the_same_of_the_forces_however_large(sound: Balancing) -> None:
+    """Of a trial weight that did nothing, that sits in the other plane, that is too heavy, that slipped between the speeds."""
+    runs = runs_of(sound)
+    base, having = runs[BASE], runs["trial inboard"]
+    weight = having.weights[-1]
+    rig, plan = sound.recording.rig, sound.recording.plan
+
+    def codes(run: Run, w: Weight) -> set[str]:
+        return {f.code for f in balance_decision.of_trial(balance_decision.shown(base, run, w, rig, plan), w)}
+
+    assert codes(having, weight) == set()
+    assert codes(dataclasses.replace(base, name="trial inboard"), weight) == {"trial-moved-nothing"}
+    assert "weight-in-other-plane" in codes(having, dataclasses.replace(weight, plane=1))
+    assert codes(having, dataclasses.replace(weight, kg=1.5 * weight.kg)) == {"weight-not-as-stated"}
+    low, high = having.reads
+    turn = np.exp(0.6j)
+    start = base.reads[0].vectors.values
+    slipped = dataclasses.replace(
+        low, vectors=dataclasses.replace(low.vectors, values=start + turn * (low.vectors.values - start))
+    )
+    assert codes(dataclasses.replace(having, reads=(slipped, high)), weight) == {"weight-loose"}
+    assert not list(balance_decision.slipped(having))
+    assert {f.code for f in balance_decision.slipped(dataclasses.replace(having, again=slipped))} == {"weight-loose"}
+    assert {f.code for f in balance_decision.slipped(dataclasses.replace(base, again=low))} == {"response-changed"}
+
+
+def test_scales_that_disagree_and_corrections_that_act_otherwise(sound: Balancing) -> None:
+    rig, plan, runs, b = sound.recording.rig, sound.recording.plan, runs_of(sound), sound.found.balance
+    assert b is not None
+    shown = [
+        balance_decision.shown(runs[BASE], runs[f"trial {s}"], runs[f"trial {s}"].weights[-1], rig, plan) for s in SIDES
+    ]
+    assert not list(balance_decision.of_trials(*shown))
+    assert [f.code for f in balance_decision.of_trials(shown[0], shown[1] * np.exp(0.3j))] == ["weight-angle"]
+    check_run = runs["check 1"]
+    assert [f.code for f in balance_checks.predicted(b, runs[BASE], check_run)] == ["verified"]
+    for lie in (
+        {"angle": check_run.weights[0].angle + 0.3}, {"kg": 1.3 * check_run.weights[0].kg}, {"plane": 1}
+    ):  # fmt: skip
+        weights = (dataclasses.replace(check_run.weights[0], **lie), *check_run.weights[1:])
+        found = list(balance_checks.predicted(b, runs[BASE], dataclasses.replace(check_run, weights=weights)))
+        assert [(f.code, f.effect) for f in found] == [("correction-not-as-stated", Effect.INDETERMINATE)], lie
+
+
+def test_refitting_and_speeds_that_differ(sound: Balancing) -> None:
+    """A shaft that comes back with another unbalance makes the coefficients uncertain; runs at another speed are named."""
+    b, found = sound.found.balance, sound.found.recorded
+    assert b is not None
+    assert found is not None
+    rig, plan, runs = sound.recording.rig, sound.recording.plan, runs_of(sound)
+    again = balance_estimates.balanced(
+        found.slow, [runs[BASE]], b.trials, rig, plan.model_copy(update={"refit_u_kg_m": 0.2 * G_MM})
+    )
+    before, after = (x.unbalance[BASE].u_amplitude for x in (b, again))
+    assert (after > 2 * before).all()
+    fast = dataclasses.replace(runs["check 1"], reads=tuple(
+        dataclasses.replace(r, speed=1.003 * r.speed) for r in runs["check 1"].reads))  # fmt: skip
+    changed = dataclasses.replace(found, runs=(*found.runs[:-1], fast))
+    assert {f.code for f in balance_checks.of_runs(changed, rig, plan)} == {"speeds-differ"}
+    assert not list(balance_checks.of_runs(found, rig, plan))
+
+
+def test_corrections_at_positions_and_those_too_heavy(sound: Balancing) -> None:
+    b, rig, plan = sound.found.balance, sound.recording.rig, sound.recording.plan
+    assert b is not None
+    whole = balance_decision.correction(b, BASE, rig, plan)
+    parted = balance_decision.correction(b, BASE, rig, plan.model_copy(update={"positions": 12}))
+    assert [p for p, _, _ in whole.weights] == [0, 1]
+    assert [p for p, _, _ in parted.weights] == [0, 0, 1, 1]
+    step = math.pi / 6
+    assert all(abs(angle / step - round(angle / step)) < 1e-9 for _, _, angle in parted.weights)
+    for p in (0, 1):
+        sums = [sum(kg * np.exp(1j * a) for q, kg, a in c.weights if q == p) for c in (whole, parted)]
+        assert abs(sums[0] - sums[1]) < 1e-9
+        assert abs(sums[0] * b.radius + b.unbalance[BASE].values[p]) < 1e-12
+    assert balance_decision.correction(b, "check 1", rig, plan).reached
+    light = rig.model_copy(update={"envelope": rig.envelope.model_copy(update={"max_trial_weight_kg": 1e-5})})
+    assert balance_decision.correction(b, BASE, light, plan).too_heavy > 1e-5
+
+
+def test_a_runout_reads_like_the_unbalance_it_is_taken_for() -> None:
+    """Whatever loop: a shaft in springs that follow the probes, turned by an unbalance or read with a runout."""
+    stand = Stand(
+        np.full(4, 6.95e-7), np.full(4, 1.15e-4), np.ones(4), np.zeros(4), np.ones(8), np.zeros(8), 5.25e-4, 1200.0, 0.98,
+        5.84e-3, 1.71e-4, 0.097, 0.081, 0.078, 0.1, 0.097, 0.081, 0.155,
+    )  # fmt: skip
+    means, w = np.array([0, 0, 0, 0, 1.2, 0.8, 1.2, 0.8, 1.1, 0.9, 1.1, 0.9]), 1000.0
+    seen, acts = runout.arms(stand.l_is, stand.l_os), runout.arms(stand.l_ia, stand.l_oa).T
+    loop = acts @ ((9e4 + 40j * w) * np.eye(4))
+    shaft = runout.impedance(stand, runout.slopes(stand, means)[2], w, w)
+
+    def read(unbalance: np.ndarray, off: np.ndarray) -> np.ndarray:
+        forces = np.array([unbalance[0], -1j * unbalance[0], unbalance[1], -1j * unbalance[1]])
+        push = w**2 * runout.arms(stand.l_iu, stand.l_ou).T @ forces - loop @ off
+        return np.asarray(seen @ np.linalg.solve(shaft + loop @ seen, push) + off)
+
+    off = np.array([2e-6, -2e-6j, 1e-6 * np.exp(1j), -1e-6j * np.exp(1j)])
+    taken = runout.as_unbalance(stand, means, off, w)
+    assert np.abs(read(taken, 0 * off) - read(np.zeros(2), off)).max() < 1e-3 * np.abs(off).max()
+    assert np.abs(read(np.zeros(2), off) - off).max() > 0.3e-6  # the loop answers: the reading is not the runout
+    back = runout.equivalent(stand, shaft @ np.linalg.solve(seen, off), w)[0]
+    assert np.allclose(back, taken)
+    assert Turning(w, means, np.zeros(12, complex)).speed == w
+
+
+def test_a_trial_weight_that_moved_nothing_is_refused(tmp_path: Path) -> None:
+    run = done(tmp_path, ONE, {"weight_lost": 1.0})
+    assert run.serious == {"trial-moved-nothing"}
+    assert not run.measured
+    assert [f.code for f in run.findings] == ["trial-moved-nothing", "still-mounted"]
+    assert [e["action"] for e in run.recording.events("operator")] == ["attach"]  # no correction was mounted
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("truth", "plan", "code", "effect"),
+    [
+        ({"loose_speed": 700.0, "loose_shift": 2.0}, SHORT, "weight-loose", Effect.ERROR),
+        ({"weight_astray": 1.0}, ONE, "weight-in-other-plane", Effect.ERROR),
+        ({"weight_turned": 2.0, "weight_turned_rad": 0.5}, ONE, "weight-angle", Effect.ERROR),
+        ({"weight_turned": 3.0, "weight_turned_rad": 0.5}, ONE, "correction-not-as-stated", Effect.INDETERMINATE),
+        ({"weight_astray": 4.0}, ONE, "correction-not-as-stated", Effect.INDETERMINATE),
+        ({"position_sign_yi": -1.0}, ONE, "probe-polarity", Effect.ERROR),
+        ({"told_planes": 1.0}, ONE, "planes-exchanged", Effect.ERROR),
+        ({"current_sign_i": -1.0}, ONE, "weight-not-carried", Effect.ERROR),
+        ({"pulse_missing": 3.0}, ONE, "pulse-missing", Effect.ERROR),
+        ({"pulse_missing": 2.0}, ONE, "pulse-missing", Effect.ERROR),
+        ({"pulse_doubled": 2.0}, {**ONE, "speeds_rad_s": (3000 * RPM,)}, "pulse-doubled", Effect.ERROR),
+        ({"geometry.clearance": 20e-6}, {**ONE, "speeds_rad_s": (4000 * RPM,)}, "contact", Effect.INDETERMINATE),
+        (HEAVY, {**ONE, "max_share": 0.3}, "trial-refused", Effect.ERROR),
+        ({}, {**ONE, "slow_rad_s": 0.0}, "no-slow-roll", Effect.INDETERMINATE),
+        ({}, {**ONE, "corrections": 0}, "not-reached", Effect.INDETERMINATE),
+    ],
+)  # fmt: skip
+def test_a_planted_defect_is_named_and_never_passes(
+    tmp_path: Path, truth: Mapping[str, float], plan: Mapping[str, Any], code: str, effect: Effect
+) -> None:
+    run = done(tmp_path, plan, truth)
+    found = [f for f in run.findings if f.code == code]
+    assert found, [f.code for f in run.findings]
+    assert found[0].effect is effect
+    list(balance.figures(run.recording))  # what can be drawn is drawn
+
+
+@pytest.mark.long
+def test_trial_weights_left_on_and_corrections_at_positions(tmp_path: Path) -> None:
+    run = done(tmp_path, {**ONE, "leave": True, "positions": 24, "trial_angle_rad": (1.0, 4.0)}, seed=2)
+    assert not run.serious
+    assert run.found.balance is not None
+    for p in (0, 1):
+        assert contains(run.found.balance.unbalance[run.found.last].one(p), complex(run.true[-1][p]), 0.999)
+    assert len([f for f in run.findings if f.code == "correction-sheet"]) == 6  # two trials, four parts
+
+
+def test_plans_that_cannot_work_are_refused() -> None:
+    def why(**plan: Any) -> str:
+        return "; ".join(check(RIG, balance.Plan(**plan)))
+
+    assert why() == ""
+    assert "envelope" in why(speeds_rad_s=(1600.0,))
+    assert "10000 r/min or below" in why(speeds_rad_s=(11000 * RPM,))
+    assert "landing" in why(speeds_rad_s=(35.0,))
+    assert "unbalance moves the shaft" in why(slow_rad_s=120.0)
+    assert "positions" in why(positions=2)
+    assert "allowed are up to 0.5 g" in why(trial_kg=(0.6e-3, 1e-4))
+    tight = why(trial_kg=(4e-4, 1e-4), max_share=0.2)
+    assert "predicted response" in tight
+    allowed = balance_decision.allowed_kg(RIG, balance.Plan(max_share=0.2), 0)
+    assert f"{allowed * 1e3:.3g} g" in tight
+    assert why(trial_kg=(0.99 * allowed, 1e-4), max_share=0.2) == ""
+    bare = RIG.model_copy(update={"devices": {k: d for k, d in RIG.devices.items() if k != "drive"}})
+    assert "nothing turns" in next(iter(check(bare, balance.Plan())))
