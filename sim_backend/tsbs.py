@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -68,9 +69,13 @@ def _four(v: Mapping[str, float], a: str, b: str, c: str, d: str) -> tuple[float
 
 def params(v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
     """The plant that drawn values `v` and planted defects `d` make."""
+    return _sensed(_driven(_carried(v, d), v, d), v, d)
+
+
+def _carried(v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
+    """The shaft, what carries it and what turns or hangs on it; the rest nominal."""
     outboard = v["geometry.com_to_outboard_amb"]
-    nominal = PlantParams()
-    limit = list(nominal.coil_limit)
+    limit = list(PlantParams().coil_limit)
     if d["coil_limit_yo_p"]:
         limit[6] = d["coil_limit_yo_p"]
     return PlantParams(
@@ -78,12 +83,9 @@ def params(v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
         tilt=v["tilt"],
         eccentricity=v["eccentricity"],
         z_amb=(outboard - v["geometry.amb_span"], outboard),
-        z_sensor=(-v["geometry.com_to_inboard_sensor"], v["geometry.com_to_outboard_sensor"]),
-        z_motor=outboard + v["geometry.motor_to_outboard_amb"],
         z_hook=outboard + v["geometry.hook_to_outboard"],
         z_lever=outboard + v["geometry.hook_to_outboard"],
         polar_inertia=v["polar_inertia"],
-        pole_pairs=v["pole_pairs"],
         beta=(beta_of(v["slope_i"], v["amb_gap_i"]), beta_of(v["slope_o"], v["amb_gap_o"])),
         asymmetry=(v["asymmetry_i"], v["asymmetry_o"]),
         gap=(v["amb_gap_i"], v["amb_gap_o"]),
@@ -91,9 +93,24 @@ def params(v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
         offset_y=(v["offset_yi"], v["offset_yo"]),
         runout=tuple(v[f"runout_{b}{n}"] for b in "io" for n in range(1, 5)),
         runout_phase=tuple(v[f"runout_phase_{b}{n}"] for b in "io" for n in range(1, 5)),
-        target=tuple(v.get(f"target_{b}{n}", 0.0) for b in "io" for n in range(1, 5)),
-        target_phase=tuple(v.get(f"target_phase_{b}{n}", 0.0) for b in "io" for n in range(1, 5)),
         hysteresis=v["hysteresis"],
+        viscous=v["viscous"],
+        drag_share=v["drag_share"],
+        coulomb=v["coulomb"],
+        brake=d["drive_brakes"],
+        lever_slip=d["lever_slip"],
+        clearance=v["geometry.clearance"],
+        coil_limit=tuple(limit),
+        lost_radius=0.92 * v["geometry.clearance"],
+    )
+
+
+def _driven(plant: PlantParams, v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
+    """The same with its motor."""
+    return replace(
+        plant,
+        z_motor=v["geometry.com_to_outboard_amb"] + v["geometry.motor_to_outboard_amb"],
+        pole_pairs=v["pole_pairs"],
         alpha_d=v["alpha_d"],
         alpha_c=v["alpha_c"],
         alpha_x=v["geometry.motor_stiffness"],
@@ -109,15 +126,18 @@ def params(v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
         gamma_zero=v["gamma_zero"],
         segment_gain=_four(v, *(f"segment_gain_{k}" for k in range(4))),
         exchange_segments=d["exchange_segments"],
-        viscous=v["viscous"],
-        drag_share=v["drag_share"],
-        coulomb=v["coulomb"],
-        brake=d["drive_brakes"],
-        lever_slip=d["lever_slip"],
         detent=v["detent"],
         detent_phase=v["detent_phase"],
-        clearance=v["geometry.clearance"],
-        coil_limit=tuple(limit),
+    )
+
+
+def _sensed(plant: PlantParams, v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
+    """The same with its sensors."""
+    return replace(
+        plant,
+        z_sensor=(-v["geometry.com_to_inboard_sensor"], v["geometry.com_to_outboard_sensor"]),
+        target=tuple(v.get(f"target_{b}{n}", 0.0) for b in "io" for n in range(1, 5)),
+        target_phase=tuple(v.get(f"target_phase_{b}{n}", 0.0) for b in "io" for n in range(1, 5)),
         current_gain=tuple(v[f"{c}.gain"] for c in COILS),
         current_offset=tuple(v[f"{c}.offset"] for c in COILS),
         current_drift=tuple(v[f"drift_{k}"] for k in range(10)),
@@ -132,7 +152,6 @@ def params(v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
         position_noise=v["position_noise"],
         stuck=(0.0, 0.0, 0.0, d["stuck_position_yo"], 0.0),
         exchange_axes=(0.0, d["exchange_position_axes_o"]),
-        lost_radius=0.92 * v["geometry.clearance"],
     )
 
 

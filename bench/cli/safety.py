@@ -7,6 +7,7 @@ Levitation is not released while the rotor turns above the landing speed: the co
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from bench.clock import Clock
@@ -26,75 +27,83 @@ BLIND_S = 5.0  # the heartbeat's lease, the watchdog and a landing take less
 
 def safe_steps(controller: Controller, base: WatchedClock, drive: Drive | None = None) -> tuple[SafeStep, ...]:
     """The steps for a controller whose heartbeat `base` renews, and an external drive on its shaft."""
+    way = _Way(controller, base, drive)
+    return (
+        SafeStep("see where the machine stands", way.look, COMMAND_S),
+        *([SafeStep("stop the drive", way.brake, STOP_S)] if drive is not None else []),
+        SafeStep("stop the rotor", way.then(way.stop), STOP_S),
+        SafeStep("land the rotor", way.then(way.land), LAND_S),
+        SafeStep("switch the amplifiers off", way.then(way.disable), COMMAND_S),
+        SafeStep("the controller's own make-safe", way.then(way.own), STOP_S + LAND_S),
+        SafeStep("the controller's watchdog", way.then(way.watchdog), STOP_S + LAND_S),
+    )
 
-    off = False
 
-    def look() -> None:
-        controller.clock.sleep(0.02)  # a command may have been sent whose effect nobody has seen yet
+@dataclass
+class _Way:
+    """What each step does; `off`: whether the drive has been seen off."""
 
-    def brake() -> None:
-        nonlocal off
-        if drive is None or drive.confirm_off():  # the last poll may be from before a run command
-            off = True
+    controller: Controller
+    base: WatchedClock
+    drive: Drive | None
+    off: bool = False
+
+    def look(self) -> None:
+        self.controller.clock.sleep(0.02)  # a command may have been sent whose effect nobody has seen yet
+
+    def brake(self) -> None:
+        if self.drive is None or self.drive.confirm_off():  # the last poll may be from before a run command
+            self.off = True
             return
         try:
-            drive.stop()
+            self.drive.stop()
         finally:
-            drive.coast()
-        off = drive.confirm_off()
+            self.drive.coast()
+        self.off = self.drive.confirm_off()
 
-    def then(do: Callable[[], None]) -> Callable[[], None]:
+    def then(self, do: Callable[[], None]) -> Callable[[], None]:
         """A later step. A drive that nobody saw off is told again: its line may be there again."""
 
         def step() -> None:
-            if drive is not None and not off:
-                drive.let_go()
+            if self.drive is not None and not self.off:
+                self.drive.let_go()
             do()
 
         return step
 
-    def stop() -> None:
-        if controller.mode == "SPINNING":
-            controller.stop()
+    def stop(self) -> None:
+        if self.controller.mode == "SPINNING":
+            self.controller.stop()
 
-    def land() -> None:
-        _until(
-            lambda: controller.mode != "SPINNING", controller.clock
-        )  # it says so a while after the shaft was stopped
-        if controller.mode == "LEVITATED":
-            controller.land()
-        elif controller.mode == "LIFTING":
-            controller.make_safe()
-        _until(lambda: controller.mode in RESTING, controller.clock)
+    def land(self) -> None:
+        c = self.controller
+        _until(lambda: c.mode != "SPINNING", c.clock)  # it says so a while after the shaft was stopped
+        if c.mode == "LEVITATED":
+            c.land()
+        elif c.mode == "LIFTING":
+            c.make_safe()
+        _until(lambda: c.mode in RESTING, c.clock)
 
-    def disable() -> None:
-        if controller.mode == "READY":
-            controller.disable()
+    def disable(self) -> None:
+        if self.controller.mode == "READY":
+            self.controller.disable()
 
-    def own() -> None:
-        if controller.mode not in SAFE:
-            controller.make_safe()
-            _until(lambda: controller.mode in SAFE, controller.clock)
+    def own(self) -> None:
+        c = self.controller
+        if c.mode not in SAFE:
+            c.make_safe()
+            _until(lambda: c.mode in SAFE, c.clock)
 
-    def watchdog() -> None:
-        if controller.mode not in SAFE:
-            base.renewing = False
-            _until(lambda: controller.mode in SAFE or _blind(controller), controller.clock)
-        if controller.mode not in SAFE:
+    def watchdog(self) -> None:
+        c = self.controller
+        if c.mode not in SAFE:
+            self.base.renewing = False
+            _until(lambda: c.mode in SAFE or _blind(c), c.clock)
+        if c.mode not in SAFE:
             raise LinkError(
                 "the machine cannot be seen. No heartbeat goes out any more, so that its controller lands it by itself; "
                 "look at it before going near"
             )
-
-    return (
-        SafeStep("see where the machine stands", look, COMMAND_S),
-        *([SafeStep("stop the drive", brake, STOP_S)] if drive is not None else []),
-        SafeStep("stop the rotor", then(stop), STOP_S),
-        SafeStep("land the rotor", then(land), LAND_S),
-        SafeStep("switch the amplifiers off", then(disable), COMMAND_S),
-        SafeStep("the controller's own make-safe", then(own), STOP_S + LAND_S),
-        SafeStep("the controller's watchdog", then(watchdog), STOP_S + LAND_S),
-    )
 
 
 def may_touch(controller: Controller, drive: Drive | None) -> Callable[[], None]:

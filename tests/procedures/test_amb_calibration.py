@@ -77,7 +77,9 @@ def test_the_constants_hold_for_the_bias_of_the_plan(tmp_path: Path) -> None:
         ({"mass_error_M1": 0.02}, "load-inconsistent", "M1"),
         pytest.param({"mass_error_M3": -0.02}, "load-inconsistent", "M3", marks=pytest.mark.long),
         ({"hanger_off_at_zero": 1}, "load-inconsistent", "hanger"),
-        ({"drop_fraction": 0.005}, "missing-samples", "missing"),
+        pytest.param(
+            {"drop_fraction": 0.005}, "missing-samples", "missing", marks=pytest.mark.long
+        ),  # see injected faults
         ({"integrator_factor": 0.02}, "unsettled", "integrator"),
         pytest.param({"stuck_current_yo_p": 1}, "stuck-channel", "i_yo_p", marks=pytest.mark.long),
     ],

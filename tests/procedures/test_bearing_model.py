@@ -67,7 +67,10 @@ def test_a_sound_rig_is_recovered_within_its_intervals(sound: Simulated) -> None
     assert len(sound.recording.all_steps()) == step_count(sound.recording.plan)
 
 
-@pytest.mark.parametrize(("bias", "ratios", "like_printed"), [(1.15, (20, 20), None), (1.1, (20, 20), "outboard")])
+@pytest.mark.parametrize(
+    ("bias", "ratios", "like_printed"),
+    [pytest.param(1.15, (20, 20), None, marks=pytest.mark.long), (1.1, (20, 20), "outboard")],
+)
 def test_the_printed_effect_at_the_printed_machine(
     tmp_path: Path, bias: float, ratios: tuple[float, float], like_printed: str | None
 ) -> None:

@@ -89,7 +89,7 @@ def test_figures_and_steps(sound: Simulated) -> None:
     [
         ({"encoder_sign": -1}, "encoder-direction", "encoder"),
         ({"exchange_segments": 1}, "segments-exchanged", "exchanged"),
-        ({"segment_sign_1": -1}, "segment-sign", "segment 1"),
+        pytest.param({"segment_sign_1": -1}, "segment-sign", "segment 1", marks=pytest.mark.long),
     ],
 )
 def test_a_planted_defect_is_named_and_never_passes(

@@ -82,7 +82,8 @@ def test_a_wrong_mass_is_named(tmp_path: Path, mass: str, error: float) -> None:
     assert found["load-inconsistent"].where == mass
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.long) for k in (1, 2))])
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [0, 1, 2])
 def test_a_detent_as_large_as_the_load_never_passes(tmp_path: Path, seed: int) -> None:
     """Whatever its phase: where it is steepest the rotor is off home, where it is flat the current without load is large."""
     assert {"detent-large", "rotor-does-not-turn"} & set(serious(calibrate(tmp_path, seed, {"detent": 3})))

@@ -83,7 +83,7 @@ def test_a_constant_of_zero_has_no_relative_uncertainty() -> None:
     assert campaign.html(campaign_model.view_of(dataclasses.replace(content, model=model)))
 
 
-@pytest.mark.parametrize("n", [2, 60, 400])
+@pytest.mark.parametrize("n", [2, pytest.param(60, marks=pytest.mark.long), 400])
 def test_many_rigs_in_both_outputs(tmp_path: Path, n: int) -> None:
     view = campaign_coverage.view_of(many(n))
     campaign.build(tmp_path, view, DATE)
