@@ -29,10 +29,12 @@ RIG_TABLES = ("site", "geometry", "masses", "sensors", "machine", "hook")
 
 @dataclass(frozen=True)
 class Need:
-    """A calibration that a run cannot do without: of which procedure, and the settings that it must have been made at."""
+    """A calibration that a run uses: of which procedure, and the settings that it must have been made at. Without an
+    `optional` one the run does; one that is there and does not fit is refused all the same."""
 
     procedure: str
     settings: Mapping[str, float] = field(default_factory=dict)
+    optional: bool = False
 
 
 @dataclass(frozen=True)

@@ -48,6 +48,8 @@ class Lookup:
             problems.append(f"{error}\n    next: {self.remedy(need)}")
             return None
         if calibration is None:
+            if need.optional:
+                return None
             problems.append(
                 f"{need.procedure}: found none for {named(self.store.seed)} in {self.store.folder}\n"
                 f"    next: {self.remedy(need)}"

@@ -160,5 +160,6 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    needs=unbalance.needs,
     method=METHOD,
 )

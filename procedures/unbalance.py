@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
+from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
@@ -22,7 +23,8 @@ from bench.rigfile import RigFile
 from bench.roles import RigState
 from procedures import probing
 from procedures import unbalance_figures as drawn
-from procedures.estimators import tracking_wiring, unbalance_checks, unbalance_estimates
+from procedures.estimators import tracking_wiring, unbalance_bearings, unbalance_checks, unbalance_estimates
+from procedures.estimators.unbalance_bearings import BEARING_MODEL, adopted_bearings
 from procedures.estimators.unbalance_data import DWELL, RECORDED, RPM, SLOW, TOLD, read_dwells
 from procedures.estimators.unbalance_estimates import Results
 
@@ -73,6 +75,9 @@ class Plan(BenchPlan):
     rate_hz: float = Field(10000.0, gt=0)  # of the capture
     orders: int = Field(4, ge=1, le=10)  # that the full spectrum must show
     repeat: bool = True  # the lowest speed again, at the end
+    bearings: Literal["adopted", "plan"] = (
+        "adopted"  # what is known of them: the adopted bearing-model, where there is one
+    )
     beta_share: float = Field(0.05, ge=0)  # half width: how far the controller's betas may be off the bearings'
     offset_u_m: float = Field(10e-6, ge=0)  # of its magnetic offsets, standard uncertainty
     max_lost: float = Field(1e-3, ge=0)  # share of a dwell's samples
@@ -97,6 +102,11 @@ class Plan(BenchPlan):
 def settings(plan: Plan) -> dict[str, float]:
     """Lifted by the PID, which needs no model."""
     return {"law": CODES["PID"], "observer": 0.0, "compensate": 0.0, **(POLES if plan.observed else {})}
+
+
+def needs(plan: Plan) -> tuple[Need, ...]:
+    """The bearings' model, where the rig has one and the plan does not say otherwise."""
+    return (Need(BEARING_MODEL, optional=True),) if plan.bearings == "adopted" else ()
 
 
 def step_count(plan: Plan) -> int:
@@ -207,8 +217,10 @@ def evaluated(recording: Recording[Any]) -> Evaluated:
     found += unbalance_checks.of_signals(dwells, plan)
     if any(f.effect is Effect.ERROR for f in found):
         return Evaluated(tuple(found), None)
-    results = unbalance_estimates.results(dwells, recording.rig, plan)
-    return Evaluated((*found, *unbalance_checks.of_results(results, plan)), results)
+    model = adopted_bearings(recording)
+    results = unbalance_estimates.results(dwells, recording.rig, plan, model)
+    told = unbalance_bearings.told(model, plan)
+    return Evaluated((*found, told, *unbalance_checks.of_results(results, plan)), results)
 
 
 def measured(results: Results) -> Iterator[Measured]:
@@ -253,14 +265,16 @@ Orbits, spectra, D_max's static part and what the coils need come from captures 
 
 At slow roll a levitated shaft does not lie still: the loop takes the runout for motion and moves the shaft against it, and
 the probes read only what is left. What the shaft does there is found from the coil currents by the balance of forces, on
-the controller's own idea of the bearings (its betas and magnetic offsets, with the plan's uncertainty); the unbalance's
-small share by the same balance at the highest speed. The runout is the reading less that motion, and is subtracted from
-every vector. Reading, motion and runout are in a note, with the date.
+an adopted calibration bearing-model, or without one on the controller's own idea of the bearings (its betas and magnetic
+offsets, with the plan's uncertainty; a note says which). What the orders make of each other in forces that are not linear
+is put right; the unbalance's small share is found by the same balance at the highest speed. The runout is the reading less
+that motion, and is subtracted from every vector. Reading, motion and runout are in a note, with the date.
 
 D_max is the greatest distance of the shaft's centre from the clearance's centre over a turn: mean place and orders 1 to 3,
 runout subtracted (order 3 where the telemetry sees it). Where the probes read zero is known within their certificates only,
-and that carries the budget. The least clearance is the rig file's. Zones A to D end at 0.3, 0.4 and 0.5 of it; these
-numbers of ISO 14839-2 are not checked against the standard.
+and that carries the budget. Wherever the shaft may be within them, it is farther from the centre than where they read zero:
+the value is the mean over where it may be. The least clearance is the rig file's. Zones A to D end at 0.3, 0.4 and 0.5 of
+it; these numbers of ISO 14839-2 are not checked against the standard.
 
 Lag is counted from the mark to the high spot. y is the first probe in the direction of rotation, z the second one.
 """
@@ -277,5 +291,6 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    needs=needs,
     method=METHOD,
 )

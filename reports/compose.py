@@ -7,10 +7,11 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from reports import tables, text
+from reports import many, tables, text
 from reports.figures import Drawn
 from reports.linktable import clean, link_table
 from reports.view import (
+    ABOUT_MANY,
     ABOUT_UNCERTAINTY,
     CALIBRATIONS,
     DECISION_RULE,
@@ -66,6 +67,7 @@ def view_of(record: Content, around: Surroundings, figures: Iterable[Drawn] = ()
     measurements = [m for m in record.get("measurements") or () if isinstance(m, Mapping)]
     findings = tuple(_findings(record, around))
     rows = tuple(_result(m, around.definitions) for m in measurements)
+    like = many.names(measurements)
     rig_name = str(around.rig.get("name") or record.get("rig") or text.DASH)
     return ReportView(
         title=around.title,
@@ -79,12 +81,14 @@ def view_of(record: Content, around: Surroundings, figures: Iterable[Drawn] = ()
         tone=_TONES.get(outcome.lower(), "none"),
         outcome_text=_outcome_text(outcome, rows, findings),
         identification=_identification(record, around, rig_name),
-        results=rows,
+        many=many.grouped(measurements, rows),
+        about_many=ABOUT_MANY,
+        results=tuple(r for m, r in zip(measurements, rows, strict=True) if str(m.get("name", "")) not in like),
         no_results="" if rows else NO_RESULTS,
         about_uncertainty=ABOUT_UNCERTAINTY,
         decision_rule=DECISION_RULE,
         findings=findings,
-        budgets=tuple(tables.budget_table(m) for m in measurements if m.get("budget")),
+        budgets=tuple(tables.budget_table(m) for m in measurements if m.get("budget") and m.get("name") not in like),
         method=_paragraphs(around.method),
         figures=tuple(FigureEntry(n, f.key, f.title, f.caption, f.svg) for n, f in enumerate(figures, 1)),
         conditions=_conditions(around),

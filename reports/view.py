@@ -33,6 +33,10 @@ ABOUT_UNCERTAINTY = (
     "The number after ± is the expanded uncertainty U = k·u, with the coverage factor k for the effective degrees of "
     "freedom ν and the coverage probability p stated beside it (JCGM 100:2008)."
 )
+ABOUT_MANY = (
+    "One line for each result, with the influences that carry most of its variance; the full uncertainty budget of each "
+    "result is in record.json, which belongs to this report."
+)
 NO_RESULTS = "No result was obtained. This report makes no statement about the item tested."
 
 
@@ -70,6 +74,26 @@ class ResultRow:
     limit_source: str
     verdict: str
     tone: Tone
+
+
+@dataclass(frozen=True)
+class ManyRow:
+    """One of many results of a quantity; `carried` names the greatest shares of its budget."""
+
+    row: ResultRow
+    interval: str  # in brackets, or empty
+    carried: str
+
+
+@dataclass(frozen=True)
+class ManyResults:
+    """A quantity with many results, one line each; `judged` where a limit was applied to any."""
+
+    symbol: Symbol
+    about: str
+    note: str
+    judged: bool
+    rows: tuple[ManyRow, ...]
 
 
 @dataclass(frozen=True)
@@ -146,7 +170,7 @@ class FigureEntry:
 
 @dataclass(frozen=True)
 class ReportView:
-    """One report. The order of the fields is the order of the page."""
+    """One report. The order of the fields is the order of the page; many results come after the others."""
 
     title: str  # 7.8.2.1 a
     run_id: str  # 7.8.2.1 d: unique identification, on every page
@@ -159,6 +183,8 @@ class ReportView:
     tone: Tone
     outcome_text: str
     identification: tuple[Fact, ...]  # 7.8.2.1 c, g, i
+    many: tuple[ManyResults, ...]  # of the same; their full budgets are in record.json
+    about_many: str
     results: tuple[ResultRow, ...]  # 7.8.2.1 m, 7.8.4.1 a (uncertainty in the measurand's unit), 7.8.4.1 e
     no_results: str
     about_uncertainty: str

@@ -283,6 +283,8 @@ class SimulatedController:
             plant.mode = core.LIFT
             self._enter("LIFTING")
         elif name == "LAND" and state == "LEVITATED" and abs(plant.speed) <= self._own["landing_speed"]:
+            self._torque(0.0)  # a run-up that has just begun ends here
+            self._brake()
             self._land()
         elif name == "SPIN" and state in ("LEVITATED", "SPINNING") and self._machine.turns:
             plant.set("speed_ref", self._own["speed_ref"])

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from bench.adoption import refuse_other_rig
 from bench.calibration import (
     Calibration,
+    Need,
     adopted,
     certificate,
     certificates_of,
@@ -26,6 +27,7 @@ from bench.calibration import (
 from bench.calibrationfile import attached, attachment, from_json, read, to_json, write
 from bench.calibrationstore import Store, stores_of
 from bench.errors import ConfigError
+from bench.needs import Lookup
 from bench.rigfile import RigFile, load_rig
 from bench.uncertainty import Estimate, Influence, correlation
 
@@ -300,3 +302,17 @@ def test_a_rig_with_other_certificates_does_not_take_a_calibration(rig: RigFile)
         refuse_other_rig(made(certificates=older), rig, store)
     with pytest.raises(ConfigError, match="virtual rig 4"):
         refuse_other_rig(made(seed=4), rig, store)
+
+
+def test_an_optional_need_is_not_missed_but_must_fit(rig: RigFile, tmp_path: Path) -> None:
+    store, now = Store.of(rig, 3, tmp_path), datetime(2026, 6, 1, tzinfo=UTC)
+    lookup = Lookup(store, rig, now, lambda need: f"bench run {need.procedure}")
+    need = Need("amb-calibration", optional=True)
+    assert lookup.found("unbalance", [need]) == ()
+    with pytest.raises(ConfigError, match="found none for virtual rig 3"):
+        lookup.found("unbalance", [Need("amb-calibration")])
+    store.adopt(made(due="2026-12-31"))
+    assert [c.procedure for c in lookup.found("unbalance", [need])] == ["amb-calibration"]
+    late = dataclasses.replace(lookup, now=datetime(2027, 6, 1, tzinfo=UTC))
+    with pytest.raises(ConfigError, match="expired on 2026-12-31"):
+        late.found("unbalance", [need])

@@ -58,7 +58,8 @@ def planned(campaign: Campaign, path: str, rig: RigFile, short: bool) -> tuple[P
             for name in judged
             if name not in names
         ]
-        needs = tuple(procedure.needs(plan))
+        before = {earlier.procedure.name for earlier in found}
+        needs = tuple(n for n in procedure.needs(plan) if not n.optional or n.procedure in before)
         found.append(Planned(number, procedure, plan, assignments, bool(step.adopt), judged, needs))
     problems += _unmet(found, path)
     problems += _unknown_equations(campaign, found, path)

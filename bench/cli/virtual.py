@@ -158,8 +158,10 @@ def given(needs: Sequence[Need], calibrations: Mapping[str, Calibration]) -> lis
     """
     for need in needs:
         if need.procedure not in calibrations:
+            if need.optional:
+                continue
             raise ConfigError(f"calibrations: found no {need.procedure}; expected one among `calibrations`")
         differ = settings_differ(calibrations[need.procedure].settings, need.settings)
         if differ:
             raise ConfigError(f"calibration {need.procedure}: {'; '.join(differ)}")
-    return [calibrations[need.procedure] for need in needs]
+    return [calibrations[need.procedure] for need in needs if need.procedure in calibrations]

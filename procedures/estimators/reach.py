@@ -13,6 +13,7 @@ from bench.uncertainty.estimate import merged
 
 Array = npt.NDArray[np.float64]
 TURN = np.linspace(0, 2 * math.pi, 73)
+PLACES = 12  # along each axis, of the mean over them
 GRID = 61  # mean places along each axis between which D_max is interpolated
 
 
@@ -20,12 +21,12 @@ def farthest(means: Sequence[Estimate], parts: Mapping[float, Sequence[Estimate]
     """D_max of what turns with the shaft, about its mean place: the distance at the angle at which it is greatest, along the
     direction there (the maximum does not move at first order).
 
-    A mean place that is only known to lie about the centre makes D_max greater, whichever way it lies: intervals are by
-    Monte Carlo.
+    A mean place that is only known to lie about the centre makes D_max greater, whichever way it lies: the value is the mean
+    of D_max over where it may lie (JCGM 101, 7.6), and intervals are by Monte Carlo.
     """
     names = [*means, *(e for four in parts.values() for e in four)]
     fixed = [np.array([e.value]) for e in names]
-    far, way = _farthest(fixed, list(parts))
+    _, way = _farthest(fixed, list(parts))
     terms = [(float(w[0]), e) for w, e in zip(way, names, strict=True)]
     # the orbit is known so well that it enters linearly, and by so little that its influences may be one
     u = Estimate(0.0, "m", merged(terms[2:])).u
@@ -35,7 +36,14 @@ def farthest(means: Sequence[Estimate], parts: Mapping[float, Sequence[Estimate]
         placed = [e.sampled(deviations) for e in means]
         return _interpolated(placed, fixed[2:], list(parts)) + straight.sampled(deviations)
 
-    return Estimate(float(far[0]), "m", merged([*terms[:2], (1.0, straight)]), sampler)
+    return Estimate(_expected(means, fixed[2:], list(parts)), "m", merged([*terms[:2], (1.0, straight)]), sampler)
+
+
+def _expected(means: Sequence[Estimate], orbit: Sequence[Array], orders: Sequence[float]) -> float:
+    """Mean of D_max over mean places spread evenly, each axis by its u: its zero's certificate is nearly all of it."""
+    even = math.sqrt(3) * ((np.arange(PLACES) + 0.5) * 2 / PLACES - 1)
+    y, z = np.meshgrid(*(e.value + e.u * even for e in means), indexing="ij")
+    return float(_farthest([y.ravel(), z.ravel(), *orbit], orders)[0].mean())
 
 
 def _interpolated(placed: Sequence[Array], orbit: Sequence[Array], orders: Sequence[float]) -> Array:

@@ -9,7 +9,8 @@ The coils tell what the shaft does. With the vectors of order n at w = n times t
 
 q the shaft's (y, z, psi, theta), A, A_s, B its arms at AMBs, probes and balancing planes, K_p, K_n, K_x the slopes of
 T (2.4b) at the mean currents and place, D = -w^2 M + j w G + K_c. U is what the same balance gives at a high speed with
-the runout just found; at slow roll its share is w^2 U over the stiffness.
+the runout just found; at slow roll its share is w^2 U over the stiffness. Orders act on each other by a percent, since the
+forces are not linear: that is put right by the whole of T (2.4b) over the turn.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 SCALE = np.array([1.0, 1.0, 10.0, 10.0])  # moments at arms of 0.1 m, beside forces
 ROUNDS = 4  # U changes R by little, R changes U by little
+TURN = np.arange(32) * (2 * np.pi / 32)
 
 
 @dataclass(frozen=True)
@@ -114,9 +116,12 @@ def pushed(s: Stand, turning: Turning) -> tuple[Complex, Array]:
     return np.asarray(arms(s.l_ia, s.l_oa).T @ (k_p * i[::2] + k_n * i[1::2])), k_x
 
 
-def unbalances(s: Stand, turning: Turning, runout: Complex) -> tuple[Complex, float]:
-    """Unbalance (2,) kg m, e^(j angle from the mark), by least squares; the share of the forces that it leaves unexplained."""
+def unbalances(s: Stand, turning: Turning, runout: Complex, more: Complex | None = None) -> tuple[Complex, float]:
+    """Unbalance (2,) kg m, e^(j angle from the mark), by least squares; the share of the forces that it leaves unexplained.
+    `more` (4,) N at the AMBs, beyond the slopes."""
     force, k_x = pushed(s, turning)
+    if more is not None:
+        force = force + arms(s.l_ia, s.l_oa).T @ more
     w = turning.speed
     q = np.linalg.solve(arms(s.l_is, s.l_os), turning.vectors[:4] / s.gain - runout)
     inertial = impedance(s, k_x, w, w) @ q
@@ -144,9 +149,11 @@ def as_unbalance(s: Stand, means: Array, runout: Complex, w: float) -> Complex:
     return equivalent(s, impedance(s, k_x, w, w) @ np.linalg.solve(arms(s.l_is, s.l_os), runout), w)[0]
 
 
-def moved(s: Stand, turning: Turning, order: float, unbalance: Complex) -> Complex:
-    """What the shaft itself does at the probes (4,) m, by the balance of forces."""
+def moved(s: Stand, turning: Turning, order: float, unbalance: Complex, more: Complex | None = None) -> Complex:
+    """What the shaft itself does at the probes (4,) m, by the balance of forces; `more` (4,) N at the AMBs."""
     force, k_x = pushed(s, turning)
+    if more is not None:
+        force = force + arms(s.l_ia, s.l_oa).T @ more
     w = order * turning.speed
     if order == 1:
         planes = np.array([unbalance[0], -1j * unbalance[0], unbalance[1], -1j * unbalance[1]])
@@ -154,13 +161,58 @@ def moved(s: Stand, turning: Turning, order: float, unbalance: Complex) -> Compl
     return np.asarray(arms(s.l_is, s.l_os) @ np.linalg.solve(impedance(s, k_x, turning.speed, w), force))
 
 
-def found(s: Stand, slow: Turning, fast: Turning | None, order: float = 1.0) -> tuple[Complex, Complex, Complex, float]:
-    """Runout (4,) m, what the shaft did at slow roll (4,) m, unbalance (2,) kg m, and the share of the forces at `fast` that
-    is not explained."""
+@dataclass(frozen=True)
+class Found:
+    """Of slow roll, by order: `runout` (4,) m, what the shaft did at the probes `shaft` (4,) m; `unbalance` (2,) kg m and the
+    share of the forces at the fast dwell that is not explained."""
+
+    runout: Mapping[float, Complex]
+    shaft: Mapping[float, Complex]
+    unbalance: Complex
+    misfit: float
+
+
+@dataclass(frozen=True)
+class Mixed:
+    """Forces beyond the slopes, (4,) N at the AMBs: of each order at slow roll, of order 1 at the fast dwell."""
+
+    slow: Mapping[float, Complex]
+    fast: Complex
+
+
+def found(s: Stand, slow: Mapping[float, Turning], fast: Turning | None, more: Mixed | None = None) -> Found:
+    """Runout of every order of `slow`."""
     unbalance, misfit = np.zeros(2, complex), 0.0
-    for _ in range(ROUNDS if order == 1 and fast is not None else 1):
-        shaft = moved(s, slow, order, unbalance)
-        runout = slow.vectors[:4] / s.gain - shaft
-        if fast is not None and order == 1:
-            unbalance, misfit = unbalances(s, fast, runout)
-    return runout, shaft, unbalance, misfit
+    more = more or Mixed({n: np.zeros(4, complex) for n in slow}, np.zeros(4, complex))
+    shaft = {n: moved(s, at, n, unbalance, more.slow[n]) for n, at in slow.items()}
+    for _ in range(ROUNDS if fast is not None and 1.0 in slow else 0):
+        runout = slow[1.0].vectors[:4] / s.gain - shaft[1.0]
+        unbalance, misfit = unbalances(s, fast, runout, more.fast)  # type: ignore[arg-type]
+        shaft[1.0] = moved(s, slow[1.0], 1.0, unbalance, more.slow[1.0])
+    return Found({n: at.vectors[:4] / s.gain - shaft[n] for n, at in slow.items()}, shaft, unbalance, misfit)
+
+
+def mixed(s: Stand, slow: Mapping[float, Turning], fast: Mapping[float, Turning]) -> Mixed:
+    """What the slopes leave out, at slow roll and at a fast dwell, whose orders are given too."""
+    first = found(s, slow, fast.get(1.0))
+    moving = {n: at.vectors[:4] / s.gain - first.runout[n] for n, at in fast.items() if n in slow}
+    there = bent(s, {n: fast[n] for n in moving}, moving).get(1.0) if moving else None
+    return Mixed(bent(s, slow, first.shaft), np.zeros(4, complex) if there is None else there)
+
+
+def bent(s: Stand, slow: Mapping[float, Turning], shaft: Mapping[float, Complex]) -> dict[float, Complex]:
+    """What T (2.4b) gives of each order beyond its slopes, (4,) N at the AMBs: i^2 and 1/gap^2 make of order 1 times order 2
+    another order 1, a percent of it."""
+    to_amb = arms(s.l_ia, s.l_oa) @ np.linalg.inv(arms(s.l_is, s.l_os))
+    means = next(iter(slow.values())).means
+    place = (to_amb @ ((means[:4] - s.zero) / s.gain))[:, None] + np.zeros(len(TURN))
+    i = ((means[4:] - s.i_zero) / s.i_gain)[:, None] + np.zeros(len(TURN))
+    k_p, k_n, k_x = slopes(s, means)
+    straight: dict[float, Complex] = {}
+    for n, at in slow.items():
+        turn, x, amps = np.exp(1j * n * TURN), to_amb @ shaft[n], at.vectors[4:] / s.i_gain
+        place, i = place + (x[:, None] * turn).real, i + (amps[:, None] * turn).real
+        straight[n] = k_p * amps[::2] + k_n * amps[1::2] + k_x * x
+    near, far = (s.gap + side * (place + s.offset[:, None]) for side in (-1, 1))
+    force = s.beta[:, None] * ((i[::2] / near) ** 2 - (i[1::2] / far) ** 2)
+    return {n: 2 * (force * np.exp(-1j * n * TURN)).mean(axis=1) - straight[n] for n in slow}

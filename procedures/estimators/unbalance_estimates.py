@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.analysis.orbits import Ellipse, ellipse
 from bench.analysis.vectors import Vectors, estimates
+from bench.calibration import Calibration
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate
 from bench.uncertainty.estimate import merged
@@ -19,21 +19,13 @@ from procedures.estimators import runout
 from procedures.estimators.inputs import certified
 from procedures.estimators.reach import farthest
 from procedures.estimators.runout import Stand, Turning
-from procedures.estimators.unbalance_data import AXES, COILS, PLANES, SLOW, Dwell
+from procedures.estimators.unbalance_bearings import Settings, stated
+from procedures.estimators.unbalance_data import AXES, ORDERS, PLANES, SLOW, Dwell
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 LSB_RAD = 2 * math.pi / 65536  # of the angle in the telemetry
 PARTS = [f"{a}{part}" for a in AXES for part in ("re", "im")]
-
-
-class Settings(Protocol):
-    """The part of a plan that the estimates need."""
-
-    @property
-    def beta_share(self) -> float: ...
-    @property
-    def offset_u_m(self) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -83,75 +75,61 @@ class Results:
         return list(dict.fromkeys(r.dwell.variant for r in self.dwells))
 
 
-def results(dwells: Sequence[Dwell], rig: RigFile, plan: Settings) -> Results:
-    """Estimates of every dwell."""
+def results(dwells: Sequence[Dwell], rig: RigFile, plan: Settings, model: Calibration | None = None) -> Results:
+    """Estimates of every dwell; `model` is the bearings' adopted calibration."""
     slow = next((d for d in dwells if d.kind == SLOW), None)
     turning = [d for d in dwells if d.kind != SLOW]
     fast = max((d for d in turning if d.variant == turning[0].variant), key=lambda d: d.speed)
-    inputs = stated(rig, plan)
+    inputs = stated(rig, plan, model)
     nominal = Stand.of({name: e.value for name, e in inputs.items()})
-    runouts = {n: _runout(inputs, rig, slow, fast, n) for n in (1.0, 2.0, 3.0)}
+    runouts = _runouts(inputs, rig, slow, fast)
     clearance = certified("geometry/clearance", rig.geometry["clearance"], "least clearance")
     done = tuple(_result(d, inputs, nominal, runouts, clearance, rig) for d in turning)
     return Results(done, runouts, slow, clearance)
 
 
-def stated(rig: RigFile, plan: Settings) -> dict[str, Estimate]:
-    """What the rig file and the plan say of the stand (`runout.Stand`), each with its influence."""
-    g, p = rig.geometry, rig.parameters
-    out: dict[str, Estimate] = {}
-    for k, a in enumerate(AXES):
-        beta, offset = p[f"model_beta_{a}"].default, p[f"model_offset_{a}"].default
-        out[f"beta_{k}"] = _bound(
-            f"model/beta_{a}", f"beta of {a}", beta, plan.beta_share * beta / math.sqrt(3), "rectangular"
-        )
-        out[f"offset_{k}"] = _bound(f"model/offset_{a}", f"magnetic offset of {a}", offset, plan.offset_u_m, "normal")
-        sensor = rig.sensors[f"pos_{a}"]
-        out[f"gain_{k}"] = certified(f"sensors/pos_{a}/gain", sensor.gain, f"gain of pos_{a}")
-        out[f"zero_{k}"] = certified(f"sensors/pos_{a}/offset", sensor.offset, f"zero of pos_{a}")
-    for k, c in enumerate(COILS):
-        sensor = rig.sensors[f"i_{c}"]
-        out[f"i_gain_{k}"] = certified(f"sensors/i_{c}/gain", sensor.gain, f"gain of i_{c}")
-        out[f"i_zero_{k}"] = certified(f"sensors/i_{c}/offset", sensor.offset, f"zero of i_{c}")
-    for name, key in (("gap", "amb_gap"), ("coupling", "coupling_stiffness"), ("l_ia", "com_to_inboard_amb"),
-                      ("l_oa", "com_to_outboard_amb"), ("l_is", "com_to_inboard_sensor"), ("l_os", "com_to_outboard_sensor"),
-                      ("l_iu", "com_to_inboard_balance"), ("l_ou", "com_to_outboard_balance"),
-                      ("l_c", "com_to_coupling")):  # fmt: skip
-        out[name] = certified(f"geometry/{key}", g[key])
-    for name, key in (("mass", "mass"), ("inertia", "transverse_inertia"), ("polar", "polar_inertia")):
-        out[name] = certified(f"machine/{key}", rig.machine[key])
-    return out
-
-
-def _bound(identity: str, name: str, value: float, u: float, distribution: str) -> Estimate:
-    return Estimate.of(value, Influence(identity, name, u, "", "B", distribution))  # type: ignore[arg-type]
-
-
-def _runout(inputs: Mapping[str, Estimate], rig: RigFile, slow: Dwell | None, fast: Dwell, order: float) -> Runout:
+def _runouts(inputs: Mapping[str, Estimate], rig: RigFile, slow: Dwell | None, fast: Dwell) -> dict[float, Runout]:
     """By the slow roll and the forces; without one, nothing but what the rig file says of it."""
-    nothing = np.zeros(4, complex)
-    if slow is None or order not in slow.track.orders:
-        u = rig.machine["runout"].standard_uncertainty
-        parts = tuple(
-            Estimate.of(0.0, Influence(f"runout/{order:g}/{p}", "runout, no slow roll", u, "m", "B", "normal"))
-            for p in PARTS
-        )
-        return Runout(parts, nothing, nothing, nothing, known=False)
-    read = slow.both(order)
-    scatter = estimates(read.parts, read.covariance, f"scatter/slow/{order:g}", "scatter at slow roll", "", read.dof)
+    orders = [n for n in ORDERS if slow is not None and n in slow.track.orders]
+    lacking = {n: _unknown(rig, n) for n in ORDERS if n not in orders}
+    if slow is None or not orders:
+        return lacking
     high = Turning(fast.speed, fast.means, fast.both().values)
+    read = {n: slow.both(n) for n in orders}
+    scatter = {
+        f"s{n:g}_{k}": e
+        for n, v in read.items()
+        for k, e in enumerate(
+            estimates(v.parts, v.covariance, f"scatter/slow/{n:g}", "scatter at slow roll", "", v.dof)
+        )
+    }
+
+    def at(v: Mapping[str, float]) -> dict[float, Turning]:
+        rows = {n: np.array([v[f"s{n:g}_{k}"] for k in range(24)]).view(complex) for n in orders}
+        return {n: Turning(slow.speed, slow.means, row) for n, row in rows.items()}
+
+    values = {name: e.value for name, e in (inputs | scatter).items()}
+    others = {n: Turning(fast.speed, fast.means, fast.both(n).values) for n in orders if n in fast.track.orders}
+    more = runout.mixed(Stand.of(values), at(values), others)  # so small that what is not known of it does not count
 
     def model(v: dict[str, float]) -> dict[str, float]:
-        vectors = np.array([v[f"s{2 * k}"] + 1j * v[f"s{2 * k + 1}"] for k in range(12)])
-        found, *_ = runout.found(Stand.of(v), Turning(slow.speed, slow.means, vectors), high, order)
-        return dict(zip(PARTS, np.ascontiguousarray(found).view(float), strict=True))
+        made = runout.found(Stand.of(v), at(v), high, more)
+        return {f"{n:g}{p}": x for n in orders for p, x in zip(PARTS, made.runout[n].view(float), strict=True)}
 
-    out = propagate(model, {**inputs, **{f"s{k}": e for k, e in enumerate(scatter)}})
-    parts = tuple(Estimate(out[p].value, "m", out[p].sensitivities) for p in PARTS)
-    at = Turning(slow.speed, slow.means, read.values)
-    nominal = Stand.of({name: e.value for name, e in inputs.items()})
-    values, shaft, _, _ = runout.found(nominal, at, high, order)
-    return Runout(parts, values, shaft, read.values[:4], known=True)
+    out = propagate(model, {**inputs, **scatter})
+    made = runout.found(Stand.of(values), at(values), high, more)
+
+    def of(n: float) -> Runout:
+        parts = tuple(Estimate(out[f"{n:g}{p}"].value, "m", out[f"{n:g}{p}"].sensitivities) for p in PARTS)
+        return Runout(parts, made.runout[n], made.shaft[n], read[n].values[:4], known=True)
+
+    return {**lacking, **{n: of(n) for n in orders}}
+
+
+def _unknown(rig: RigFile, order: float) -> Runout:
+    u, nothing = rig.machine["runout"].standard_uncertainty, np.zeros(4, complex)
+    some = [Influence(f"runout/{order:g}/{p}", "runout, no slow roll", u, "m", "B", "normal") for p in PARTS]
+    return Runout(tuple(Estimate.of(0.0, i) for i in some), nothing, nothing, nothing, known=False)
 
 
 def _result(

@@ -24,8 +24,8 @@ COMMANDS = ["DISABLE", "ENABLE", "LEVITATE", "LAND", "SPIN", "STOP", "CLEAR_FAUL
 class Host:
     """The other end of the wire: sends bytes, keeps what comes back, beats every 20 ms unless told not to."""
 
-    def __init__(self, **defects: float) -> None:
-        self.device = SimulatedController(RIG, draw(RIG, 5, defects))
+    def __init__(self, rig: RigFile = RIG, **defects: float) -> None:
+        self.rig, self.device = rig, SimulatedController(rig, draw(rig, 5, defects))
         self.now, self.beating, self.session, self.count = T0, True, 7, 0
         self.seen: list[FrameBatch] = []
         self.run(0.02)  # the first heartbeat makes this host the owner
@@ -45,17 +45,19 @@ class Host:
         return batch
 
     def message(self, name: str, **values: float) -> FrameBatch:
-        return frame(MESSAGES[name].identifier, encode(MESSAGES[name], values), t_ns=self.now, flags=FD | SENT)
+        return frame(
+            self.rig.messages[name].identifier, encode(self.rig.messages[name], values), t_ns=self.now, flags=FD | SENT
+        )
 
     def command(self, name: str, session: int | None = None) -> str:
-        code = MESSAGES.code("Command", "code", name)
+        code = self.rig.messages.code("Command", "code", name)
         batch = self.run(0.02, self.message("Command", session=session or self.session, code=code, token=9))
         return status(batch, "CommandReply")
 
     def set(self, name: str, value: float) -> tuple[str, float]:
-        index = RIG.parameters[name].index
+        index = self.rig.parameters[name].index
         batch = self.run(0.02, self.message("ParamSet", index=index, value=value, token=3, session8=self.session))
-        return status(batch, "ParamReply"), float(Decoder(MESSAGES["ParamReply"]).decode(batch)[0]["value"][0])
+        return status(batch, "ParamReply"), float(Decoder(self.rig.messages["ParamReply"]).decode(batch)[0]["value"][0])
 
     def levitate(self) -> None:
         assert self.command("ENABLE") == "OK"

@@ -16,8 +16,7 @@ from bench.codec import Decoder
 from bench.messages import load_messages
 from bench.wire.slcanstream import SlcanStream
 
-DBC = Path(__file__).resolve().parents[2] / "rigs" / "tsbs12.dbc"
-TELEMETRY = load_messages(DBC.read_text())["Telemetry"]
+RIGS = Path(__file__).resolve().parents[2] / "rigs"
 
 
 @dataclass(frozen=True)
@@ -33,9 +32,10 @@ class Heard:
 
 
 class Listener:
-    """Listens on an SLCAN endpoint over TCP (`slcan:socket://HOST:PORT`)."""
+    """Listens on an SLCAN endpoint over TCP (`slcan:socket://HOST:PORT`) of a rig."""
 
-    def __init__(self, endpoint: str) -> None:
+    def __init__(self, endpoint: str, rig: str = "tsbs12") -> None:
+        self._telemetry = load_messages((RIGS / f"{rig}.dbc").read_text(encoding="utf-8"))["Telemetry"]
         host, _, port = endpoint.rpartition("//")[2].rpartition(":")
         self._socket = socket.create_connection((host, int(port)))
         self._socket.sendall(b"C\rS8\rY5\rO\r")
@@ -45,8 +45,9 @@ class Listener:
         self._thread.start()
 
     def _listen(self) -> None:
-        stream, decoder = SlcanStream(), Decoder(TELEMETRY)
-        states, faults = TELEMETRY.signal("state").choices, TELEMETRY.signal("fault").choices
+        message = self._telemetry
+        stream, decoder = SlcanStream(), Decoder(message)
+        states, faults = message.signal("state").choices, message.signal("fault").choices
         while True:
             try:
                 data = self._socket.recv(65536)
@@ -56,7 +57,7 @@ class Listener:
                 return
             now = time.monotonic_ns()
             batch = stream.feed(data, now)
-            batch = batch[batch["id"] == TELEMETRY.identifier]
+            batch = batch[batch["id"] == message.identifier]
             columns = decoder.decode_payloads(np.ascontiguousarray(batch["data"]))
             with self._news:
                 for k in range(len(batch)):

@@ -11,15 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bench.cli.virtual import simulated_run
+from bench.calibration import Calibration
+from bench.cli.virtual import given, simulated_run
 from bench.errors import BenchError
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.recording import Recording
-from bench.rigfile import load_rig
-from bench.uncertainty import Estimate, interval
+from bench.rigfile import RigFile, load_rig
+from bench.uncertainty import Estimate, Influence, interval
 from procedures import compensation, unbalance
-from procedures.estimators import reach, runout, unbalance_checks, unbalance_estimates
+from procedures.estimators import reach, runout, unbalance_bearings, unbalance_checks, unbalance_estimates
 from procedures.estimators.unbalance_data import AXES, read_dwells
 from procedures.estimators.unbalance_estimates import Results
 from procedures.unbalance import CODES, POLES, SETTINGS, check
@@ -66,7 +67,14 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 def test_nothing_is_found_on_a_sound_stand(compared: Run) -> None:
     assert not compared.serious
-    assert {f.code for f in compared.findings} == {"slow-roll", "ellipse", "zone", "reduction-told", "runout-followed"}
+    assert {f.code for f in compared.findings} == {
+        "slow-roll",
+        "ellipse",
+        "zone",
+        "bearings",
+        "reduction-told",
+        "runout-followed",
+    }
     assert len(compared.recording.all_steps()) == compensation.step_count(compared.recording.plan)
     assert {name for name, _ in compared.measured} == {q.name for q in compensation.MEASURES}
 
@@ -227,14 +235,89 @@ def test_runout_by_forces_is_exact_on_its_own_model() -> None:
         turning = runout.Turning(speed, means, vectors)
         at = runout.moved(stand, turning, 1.0, u) + true
         made.append(runout.Turning(speed, means, np.concatenate([at, vectors[4:]])))
-    found, shaft, unbalance_, misfit = runout.found(stand, made[0], made[1])
-    assert np.abs(found - true).max() < 1e-11
-    assert np.abs(shaft - made[0].vectors[:4] + true).max() < 1e-11
-    assert np.abs(unbalance_ - u).max() < 1e-10
-    assert misfit < 1e-6
+    found = runout.found(stand, {1.0: made[0]}, made[1])
+    assert np.abs(found.runout[1.0] - true).max() < 1e-11
+    assert np.abs(found.shaft[1.0] - made[0].vectors[:4] + true).max() < 1e-11
+    assert np.abs(found.unbalance - u).max() < 1e-10
+    assert found.misfit < 1e-6
     swapped = made[1].vectors.copy()
     swapped[:4] = swapped[[2, 3, 0, 1]]
-    assert runout.unbalances(stand, runout.Turning(1000.0, means, swapped), found)[1] > unbalance_checks.UNEXPLAINED
+    assert (
+        runout.unbalances(stand, runout.Turning(1000.0, means, swapped), found.runout[1.0])[1]
+        > unbalance_checks.UNEXPLAINED
+    )
+
+
+def test_orders_mix_in_forces_that_are_not_linear() -> None:
+    """Orders 1 and 2 of one coil's current: i^2 makes 2 i1* i2 of them at order 1, beside its slope."""
+    stand = runout.Stand(
+        np.full(4, 6.95e-7), np.zeros(4), np.ones(4), np.zeros(4), np.ones(8), np.zeros(8), 5.25e-4, 1200.0, 0.98,
+        5.84e-3, 1.71e-4, 0.097, 0.081, 0.078, 0.1, 0.097, 0.081, 0.155,
+    )  # fmt: skip
+    means, first, second = np.zeros(12), np.zeros(12, complex), np.zeros(12, complex)
+    means[4], first[4], second[4] = 1.5, 0.05, 0.02j
+    slow = {1.0: runout.Turning(31.4, means, first), 2.0: runout.Turning(31.4, means, second)}
+    found = runout.bent(stand, slow, {n: np.zeros(4, complex) for n in slow})
+    scale = 6.95e-7 / 5.25e-4**2
+    assert found[1.0][0] == pytest.approx(scale * 0.05 * 0.02j)
+    assert found[2.0][0] == pytest.approx(scale * 0.05**2 / 2)
+    assert np.abs(found[1.0][1:]).max() < 1e-15
+
+
+def test_d_max_is_greater_wherever_the_centre_may_be() -> None:
+    """A circle of 5 um about a place known to 5 um (rectangular): the value is the mean over it, inside the interval."""
+    means = [Estimate.of(0.0, Influence(a, a, 5e-6 / math.sqrt(3), "m", "B", "rectangular")) for a in "yz"]
+    orbit = [Estimate.exact(x, "m") for x in (5e-6, 0.0, 0.0, -5e-6)]
+    e = reach.farthest(means, {1.0: orbit}, "a place")
+    generator = np.random.default_rng(2)
+    true = 5e-6 + np.hypot(*generator.uniform(-5e-6, 5e-6, (2, 20000)))
+    assert e.value == pytest.approx(true.mean(), rel=5e-3)
+    found = interval(e)
+    assert found.low == pytest.approx(np.quantile(true, 0.025), rel=0.02)
+    assert found.high == pytest.approx(np.quantile(true, 0.975), rel=0.02)
+
+
+def bearings(rig: RigFile, plant: AmbParams) -> Calibration:
+    """What bearing-model would state of that plant: offsets to where the probes read zero, with smaller influences."""
+    at_bearing = runout.arms(plant.l_ia, plant.l_oa) @ np.linalg.inv(runout.arms(plant.l_is, plant.l_os))
+    zero = at_bearing @ (np.array(plant.position_offset[:4]) / np.array(plant.position_gain[:4]))
+    values = {}
+    for k, a in enumerate(AXES):
+        for name, value, u in (("beta", plant.beta[k], 1e-9), ("offset", plant.offset[k] - zero[k], 1e-6)):
+            values[f"{name}_{a}"] = Estimate.of(float(value), Influence(f"{name}-{a}", name, u, "", "B", "normal"))
+    return Calibration(
+        "bearing-model", values, run_id="bearing-model-1", date="2026-02-03T00:00:00+00:00", rig=rig.name
+    )
+
+
+def test_adopted_bearings_take_the_plan_s_place(compared: Run) -> None:
+    """The runout is known better, by the calibration's influences and not by the plan's; the probes' zeros drop out of it."""
+    rig, model = compared.recording.rig, bearings(compared.recording.rig, compared.plant)
+    dwells = read_dwells(compared.recording)
+    found = unbalance_estimates.results(dwells, rig, compared.recording.plan, model).runouts[1.0]
+    before, true = compared.results.runouts[1.0], amb_unbalance.first(compared.plant)
+    for k, part in enumerate(found.parts):
+        value = true[k // 2].imag if k % 2 else true[k // 2].real
+        ids = {i.id for i in part.sensitivities}
+        assert part.value == pytest.approx(value, abs=3 * part.u)
+        assert {"beta-yi", "offset-zo"} <= ids
+        assert not any(i.startswith("model/") for i in ids)
+        zeros = [c for i, c in part.contributions.items() if i.endswith("/offset") and i.startswith("sensors/pos_")]
+        assert np.abs(zeros).max() < 0.02 * part.u
+    assert max(p.u for p in found.parts) < 0.8 * max(p.u for p in before.parts)
+    (said,) = [f.text for f in compared.findings if f.code == "bearings"]
+    assert "no calibration bearing-model was used" in said
+    assert "bearing-model-1, 2026-02-03" in unbalance_bearings.told(model, compared.recording.plan).text
+
+
+def test_bearings_are_used_where_there_are_some_and_not_missed_where_there_are_none() -> None:
+    rig = load_rig("amb5dof")
+    (need,) = unbalance.needs(unbalance.Plan())
+    assert unbalance.needs(unbalance.Plan(bearings="plan")) == ()
+    assert compensation.procedure.needs(compensation.Plan()) == (need,)
+    model = bearings(rig, draw(rig, SEED).plant)
+    assert given([need], {}) == []
+    assert given([need], {"bearing-model": model}) == [model]
 
 
 def test_d_max_between_the_grid_s_places_is_that_of_the_orbit() -> None:
