@@ -49,6 +49,8 @@ PROCEDURES = (
     Entry("tracking", "procedures.tracking", "Following an ellipse with the centre of mass: PID, CCS and CAC"),
     Entry("unbalance", "procedures.unbalance", "Unbalance response of the turning shaft: vectors, orbits, zones"),
     Entry("compensation", "procedures.compensation", "Compensation of unbalance: with and without it, and switched on"),
+    Entry("run-up", "procedures.runup", "Run-up through the critical speeds: Bode, polar, waterfall, amplification"),
+    Entry("coast-down", "procedures.coast_down", "Coast-down through the critical speeds, analysed as a run-up"),
     Entry("force-map", "procedures.force_map", "Terms of the motor's force over displacement, currents and load"),
 )
 
