@@ -33,8 +33,8 @@ class Surroundings(Protocol):
 
 
 class FieldDrive:
-    """A `bench.roles.Drive`. Registers: target_speed, actual_speed, fault; running and acceleration where the drive has them. Commands: run,
-    coast, stop; reset where it has one. `may_run` raises when the shaft must not be driven now."""
+    """A `bench.roles.Drive`. Registers: target_speed, actual_speed, fault; running and acceleration where the drive has
+    them. Commands: run, coast, stop; reset where it has one. `may_run` raises when the shaft must not be driven now."""
 
     def __init__(self, bus: Surroundings, device: RegisterDevice, envelope: Envelope) -> None:
         """Raises ConfigError: the rig file does not state what a drive cannot do without."""

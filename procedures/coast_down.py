@@ -28,7 +28,7 @@ class Plan(Passing):
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
-    """Look at the shaft on its rings, lift it, nudge it, roll it slowly, bring it to its highest speed, and let it slow down."""
+    """Look at the shaft on its rings, lift it, nudge it, roll it slowly, run it up, and let it slow down."""
     if not unbalance.rolled(rig, plan, record):
         return
     put(rig, plan.parameters)
@@ -38,9 +38,9 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 
 
 METHOD = f"""\
-The drive brings the shaft to its highest speed as fast as it can; then it gives no torque, or brakes at the plan's rate. What the
-shaft shows on the way down is evaluated. On this way the response lags to the other side: a critical speed that the way up shows
-too high, the way down shows too low, unless the lag is taken off.
+The drive brings the shaft to its highest speed as fast as it can; then it gives no torque, or brakes at the plan's rate. What
+the shaft shows on the way down is evaluated. On this way the response lags to the other side: a critical speed that the way up
+shows too high, the way down shows too low, unless the lag is taken off.
 
 {runup.METHOD}"""
 
@@ -56,5 +56,6 @@ procedure = Procedure(
     check=runup.check,
     settings=runup.settings,
     step_count=runup.step_count,
+    optional=runup.CRITICAL,
     method=METHOD,
 )

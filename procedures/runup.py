@@ -1,12 +1,12 @@
 """Run-up: the drive takes the levitated shaft through its speeds at a stated acceleration (T 2.6.1, Figs. 2.7 and 2.9).
 
-Measurands: vectors of the shaft's centre of order 1, orbits, D_max, currents and voltages at the speeds of the captures; critical
-speeds, their amplification factors, and how far they stand off the running speed. `coast_down` shares all but the way down.
+Measurands: vectors of the shaft's centre of order 1, orbits, D_max, currents and voltages at the speeds of the captures;
+critical speeds, their amplification factors, and how far they stand off the running speed. `coast_down` shares the rest.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from pydantic import Field
@@ -37,12 +37,14 @@ FACTOR = Quantity(
 )
 AMPLITUDE = Quantity("critical_amplitude", "m", "of the shaft's centre at that speed, 0-pk")
 MARGIN = Quantity("separation", "1", "distance of the critical speed from the running speed, over the running speed")
-MEASURES = (COSINE, SINE, MAJOR, D_MAX, SHARE, READ, CURRENT, VOLTAGE, SPEED, FACTOR, AMPLITUDE, MARGIN)
+CRITICAL = (SPEED, FACTOR, AMPLITUDE, MARGIN)  # which a well damped shaft does not have
+MEASURES = (COSINE, SINE, MAJOR, D_MAX, SHARE, READ, CURRENT, VOLTAGE, *CRITICAL)
 LOOK_S = 0.2
 NEAR_END = 0.004  # of a speed that the drive is asked for: its own control leaves as much
 LATE = 2.0  # of the time that a ramp should take
 COAST_S = 240.0  # a coast-down is given at most
 HOLD_S = 0.5
+AFTER_S = 5.0  # the drive has passed a speed: a capture that has not come by then does not come
 
 
 class Passing(BenchPlan):
@@ -121,7 +123,7 @@ def ended(rig: Rig, plan: Passing) -> None:
 
 
 def passed(rig: Rig, plan: Passing, record: Recorder, direction: str, goal: float) -> None:
-    """Through all speeds to `goal` in rad/s, with captures on the way; the drive ramps, or coasts where the plan gives no rate."""
+    """Through all speeds to `goal` in rad/s, with captures on the way; the drive coasts where the plan gives no rate."""
     drive, rate = rig.drive, plan.rate_rad_s2
     assert drive is not None
     up = direction == "up"
@@ -142,9 +144,16 @@ def passed(rig: Rig, plan: Passing, record: Recorder, direction: str, goal: floa
             return patience - (rig.clock.now_ns() - started) * 1e-9
 
         for k, speed in enumerate(armed):
+            if (drive.speed_rad_s > speed) if up else (drive.speed_rad_s < speed):
+                record.event(
+                    MISSED, wanted=speed, why="the shaft was past it before the capture before it was uploaded"
+                )
+                continue
             if k:
                 _arm(rig, plan, speed)
-            _fetch(rig, record, speed, left)
+            while ((drive.speed_rad_s < speed) if up else (drive.speed_rad_s > speed)) and left() > 0:
+                rig.clock.sleep(LOOK_S)
+            _fetch(rig, plan, record, speed)
         near = max(0.5, NEAR_END * goal)
         while (drive.speed_rad_s < goal - near) if up else (drive.speed_rad_s > goal + near):
             if left() <= 0:
@@ -162,12 +171,12 @@ def _arm(rig: Rig, plan: Passing, speed: float) -> None:
         )
 
 
-def _fetch(rig: Rig, record: Recorder, speed: float, left: Callable[[], float]) -> None:
+def _fetch(rig: Rig, plan: Passing, record: Recorder, speed: float) -> None:
     """The capture at a speed; the analysis tells where there is none."""
     if rig.capture is None:
         return
     try:
-        rig.capture.wait(max(left(), 1.0))
+        rig.capture.wait(plan.capture_s + AFTER_S)
         rig.capture.upload(passed_rad_s=speed)
     except BenchError as error:
         if type(error) is not BenchError:  # a fault, a lost link, an interlock: the end of the run
@@ -229,21 +238,21 @@ def figures(recording: Recording[Any]) -> Iterable[Figure]:
 
 
 METHOD = """\
-The drive takes the shaft through its speeds. Vectors of order 1 are least squares on the angle by the once-per-turn pulses, over
-blocks of whole turns that are equally wide in speed; that telemetry holds means of ten readings is put right. Runout is found at
-slow roll by the balance of forces, as in procedure unbalance, and is subtracted from every vector.
+The drive takes the shaft through its speeds. Vectors of order 1 are least squares on the angle by the once-per-turn pulses,
+over blocks of whole turns that are equally wide in speed; that telemetry holds means of ten readings is put right. Runout is
+found at slow roll by the balance of forces, as in procedure unbalance, and is subtracted from every vector.
 
-A shaft that runs through its speeds shows its response late, and a block shows a mean over some speeds. Both are taken off to
-first order with the second derivatives of local rational models of the measured curve; what a second round changes is the
-influence "lag of the response". It supposes a shaft whose response depends on the speed through the excitation alone.
+A shaft that runs through its speeds shows its response late, and a block shows a mean over some speeds. Both are taken off
+with the derivatives of local rational models of the measured curve, two terms of a series; what the second one changes is the
+influence "what is left of the lag". It supposes a linear response that depends on the speed through the excitation alone.
 
-A critical speed is a greatest amplitude of a probe's vectors whose amplification factor, that speed over the width at half power
-(0.707 of the amplitude), is 2.5 or more or may be so within its interval (API 617). Its scatter is that of curves onto which noise of
-the measured covariance is drawn; the runout's uncertainty moves it too. What is damped more is in a note. Where nothing is
-critical, the quantities of criticals are missing, and the note no-critical says so.
+A critical speed is a greatest amplitude of a probe's vectors whose amplification factor, that speed over the width at half
+power (0.707 of the amplitude), is 2.5 or more or may be so within its interval (API 617). Its scatter is that of curves onto
+which noise of the measured covariance is drawn; the runout's uncertainty moves it too. What is damped more is in a note. Where
+nothing is critical, there are no quantities of criticals, and the note no-critical says so.
 
-Vectors, orbits, D_max, currents and voltages are given at the speeds of the captures, of the turns within 1.2 % of the speed and
-at least ten, as procedure unbalance gives them of a dwell.
+Vectors, orbits, D_max, currents and voltages are given at the speeds of the captures, of the turns within 1.2 % of the speed
+and at least ten, as procedure unbalance gives them of a dwell.
 
 Lag is counted from the mark to the high spot. y is the first probe in the direction of rotation, z the second one.
 """
@@ -260,5 +269,6 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    optional=CRITICAL,
     method=METHOD,
 )

@@ -40,7 +40,8 @@ def all_figures(run: Run, rig: RigFile) -> Iterator[Figure]:
     yield pictures.waterfall("waterfall", f"Waterfall of {name}, {p.name}", shown, HIGHEST_HZ, (1.0, 2.0, 3.0))
     turns = TURNS_ORDER if abs(_rate(p)) < 100 else TURNS_ORDER // 2
     found = order_map(p.t[part], x, p.tacho, p.sampling, turns=turns, highest=HIGHEST_ORDER)
-    yield pictures.order_map("order-map", f"Order map of {name}, {p.name}", found)
+    drawn = pictures.order_map("order-map", f"Order map of {name}, {p.name}", found)
+    yield replace(drawn, caption=f"{drawn.caption} Faint curves that slant are higher orders that its means fold back.")
     yield _currents(run, rig)
     yield _volts(run)
     yield _speed(p)
@@ -78,8 +79,8 @@ def _bode(run: Run, plane: str) -> Figure:
         f"bode-{plane}",
         f"Bode plot of order 1, {plane}, {run.passage.name}",
         _curves(run, plane),
-        caption="The shaft's centre at the probes: runout subtracted, the ramp's lag taken off; amplitude zero to peak, phase lag "
-        "from the once-per-turn mark to the high spot. Criticals are marked with their amplification factors (AF).",
+        caption="The shaft's centre at the probes: runout subtracted, the ramp's lag taken off; amplitude zero to peak, phase "
+        "lag from the once-per-turn mark to the high spot. Criticals are marked with their amplification factors (AF).",
     )
     series, notes = list(figure.series), list(figure.notes)
     for peak in run.peaks:
@@ -115,8 +116,8 @@ def _currents(run: Run, rig: RigFile) -> Figure:
 def _volts(run: Run) -> Figure:
     c = run.curve
     series = tuple(Series(plane, RPM * c.speed, c.volts[:, k]) for k, plane in enumerate(PLANES))
-    return Figure("use-voltage", "Greatest coil voltage over the speed", "Either way, of all coils of a bearing, as the controller "
-                  "tells it.", "speed (r/min)", "voltage (V)", series)  # fmt: skip
+    return Figure("use-voltage", "Greatest coil voltage over the speed", "Either way, of all coils of a bearing, as the "
+                  "controller tells it.", "speed (r/min)", "voltage (V)", series)  # fmt: skip
 
 
 def _speed(p: Passage) -> Figure:

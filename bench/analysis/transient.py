@@ -6,8 +6,8 @@ The response lags behind the speed: with the acceleration a, an excitation F(w) 
 
 with F'' = 2 F/w^2 of an unbalance: at a peak of half-power width 2 d the next term is smaller by a/d^2 (Lewis, Trans. ASME 54,
 APM-54-24 (1932), has the whole of it for one degree of freedom). A block over which the speed goes by b shows the mean of V,
-V + b^2/24 V''. Both are taken off with the second derivatives of local rational models, and what a second round changes says
-what is left.
+V + b^2/24 V''. The whole series is exp(-C) Y with C = j a/2 (d^2/dw^2 - 2/w^2) - b^2/24 d^2/dw^2, so that Y = V + C V + C C V/2 +
+..., the derivatives those of local rational models. What the last term changes bounds what is left.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from bench.errors import AnalysisError
 
 
 def settled(
-    speed: Array, values: Complex, covariance: Array, acceleration: Array, width: Array, rounds: int = 1
+    speed: Array, values: Complex, covariance: Array, acceleration: Array, width: Array, rounds: int = 2
 ) -> Complex:
     """Vectors (b,) as they would be at each `speed` (b,) rad/s, from those of a passage.
 
@@ -30,7 +30,7 @@ def settled(
         covariance: (b, 2, 2), of their scatter: it says how many blocks a local model takes.
         acceleration: (b,) rad/s^2, below 0 on the way down.
         width: (b,) rad/s, by how much the speed changes over each block.
-        rounds: 2 for the size of what 1 leaves.
+        rounds: terms of the series.
 
     Raises:
         AnalysisError: fewer than nine blocks, or speeds that do not ascend.
@@ -38,9 +38,10 @@ def settled(
     if speed.size < WINDOW or not (np.diff(speed) > 0).all():
         raise AnalysisError(f"passage: found {speed.size} blocks; expected {WINDOW} or more, at ascending speeds")
     smooth = smoother(speed, values, pooled_covariance(covariance))
-    out = values
-    for _ in range(rounds):
-        bent = smooth.curvature(out)
-        lag = 0.5j * acceleration * (bent - 2 * smooth.at_lines(out) / speed**2)
-        out = values + lag - width**2 / 24 * bent
+    out, term = values, values
+    for k in range(1, rounds + 1):
+        bent = smooth.curvature(term)
+        lag = 0.5j * acceleration * (bent - 2 * smooth.at_lines(term) / speed**2)
+        term = (lag - width**2 / 24 * bent) / k
+        out = out + term
     return out

@@ -132,7 +132,8 @@ def curve(p: Passage, blocks: int) -> Curve:
     Raises:
         AnalysisError: too few turns.
     """
-    angle, speed = p.tacho.angle(p.t), p.speeds
+    read = p.t - p.sampling.late
+    angle, speed = np.where(read < p.tacho.times[0], -np.inf, p.tacho.angle(read)), p.speeds
     at, end = p.moving.start, p.moving.stop
     step = abs(float(speed[end - 1] - speed[at])) / blocks
     rate = np.abs(np.gradient(speed[at:end], p.t[at:end]))
@@ -161,8 +162,8 @@ def curve(p: Passage, blocks: int) -> Curve:
 
 def _piece(p: Passage, angle: Array, first: int, last: int, turns: int) -> tuple[Array, ...]:
     """Some blocks of equal turns: mean times, speeds, widths, values, moves, means, volts, order 2."""
-    low, high = np.searchsorted(angle[: p.moving.stop], 2 * math.pi * np.array([first, last]) + [-1e-6, 1e-6])
-    part = slice(max(int(low) - 1, 0), int(high) + 1)
+    low, high = np.searchsorted(angle[: p.moving.stop], 2 * math.pi * np.array([first, last], dtype=float))
+    part = slice(max(int(low) - 1, 0), int(high) + 1)  # a sample beyond either end
     fast = float(np.nanmax(p.speeds[part]))
     orders = (1.0, 2.0) if 2 * fast / (2 * math.pi) < 0.4 / (p.sampling.ticks * p.sampling.tick) else (1.0,)
     track = synchronous(p.t[part], p.data[:, part], p.tacho, p.sampling, orders=orders, turns=turns)

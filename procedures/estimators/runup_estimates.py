@@ -1,9 +1,9 @@
-"""From a passage to estimates: vectors at the captures' speeds, critical speeds and amplification factors with what moves them."""
+"""From a passage to estimates: vectors at the captures' speeds, critical speeds and amplification factors."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -25,7 +25,9 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 DAMPED = 2.5  # amplification factor under which API 617 sees no critical speed
 MATCHED = 0.1  # of a speed: where the same critical is looked for in a curve that differs a little
-FEW = 24  # draws where only the shift of a number is of interest
+UNITS = {"speed": "rad/s", "amplitude": "m", "factor": "1"}
+LAG = "what is left of the lag of the response"
+FEW = 8  # draws where only the shift of a number is of interest
 
 
 class Settings(Protocol):
@@ -104,7 +106,7 @@ def run(passage: Passage, slow: Dwell | None, recording: Recording, plan: Settin
     shaft, peaks = [], []
     for k in range(4):
         line = _Line(found, k, inputs[f"gain_{k}"].value, results.runouts[1.0])
-        shaft.append(line.curve(1))
+        shaft.append(line.curve(2))
         peaks += _peaks(line, inputs[f"gain_{k}"], plan.running_rad_s)
     return Run(passage, found, np.array(shaft), tuple(peaks), results, slow, clearance)
 
@@ -138,38 +140,45 @@ class _Line:
 def _peaks(line: _Line, gain: Estimate, running: float) -> list[Peak]:
     """With the influence of the scatter, of the runout, of what is left of the lag, and of the probe's gain."""
     axis, out = AXES[line.k], []
-    best = line.criticals(1, draws=200)
-    few, again, raw = line.criticals(1), line.criticals(2), line.criticals(0)
+    best = line.criticals(2, draws=120)
+    few, again, raw = line.criticals(2), line.criticals(1), line.criticals(0)
     offs = []
     for j in range(2):
         part = line.runout.parts[2 * line.k + j]
-        offs.append((part, line.criticals(1, part.u * (1j if j else 1.0)) if part.u else few))
+        offs.append((part, line.criticals(2, part.u * (1j if j else 1.0)) if part.u else few))
     for number, c in enumerate(best, 1):
         where = f"{axis}/{number}"
-        base, twice, first = _same(few, c), _same(again, c), _same(raw, c)
-        left = np.abs(twice - base)
+        base, once, first = _same(few, c), _same(again, c), _same(raw, c)
+        left = np.abs(once - base)
         numbers = {"speed": c.speed, "amplitude": c.amplitude, "factor": c.factor}
         moved = [(part, (_same(some, c) - base) / part.u) for part, some in offs if part.u]
-        made = {}
-        for j, (name, value) in enumerate(numbers.items()):
-            unit = {"speed": "rad/s", "amplitude": "m", "factor": "1"}[name]
-            u = math.sqrt(c.covariance[j, j])
-            scatter = Influence(f"scatter/{where}/{name}", "scatter of the passage", u, unit, "A", "normal")
-            rest = Influence(f"lag/{where}/{name}", "lag of the response, second order",
-                             float(left[j]) / math.sqrt(3), unit, "B", "rectangular")  # fmt: skip
-            terms = [(1.0, Estimate.of(0.0, scatter)), (1.0, Estimate.of(0.0, rest))]
-            terms += [(float(slope[j]), part) for part, slope in moved if math.isfinite(slope[j])]
-            if name == "amplitude":
-                terms.append((-value / gain.value, gain))
-            made[name] = Estimate(value, unit, merged(terms)) if math.isfinite(value + u + left[j]) else None
+        made = {
+            name: _number(where, name, value, c.covariance[j, j], float(left[j]), [(p, float(m[j])) for p, m in moved])
+            for j, (name, value) in enumerate(numbers.items())
+        }
         speed, amplitude = made["speed"], made["amplitude"]
         if speed is None or amplitude is None:
             continue
+        amplitude = Estimate(amplitude.value, "m", merged([(1.0, amplitude), (-c.amplitude / gain.value, gain)]))
         margin = Estimate(
             abs(c.speed - running) / running, "1", merged([(math.copysign(1 / running, c.speed - running), speed)])
         )
         out.append(Peak(axis, number, speed, amplitude, made["factor"], margin, c.low, c.high, float(first[0])))
     return out
+
+
+def _number(
+    where: str, name: str, value: float, variance: float, left: float, moved: Sequence[tuple[Estimate, float]]
+) -> Estimate | None:
+    """A number of a critical with its influences; None where the record does not give it."""
+    unit = UNITS[name]
+    if not math.isfinite(value + variance + left):
+        return None
+    scatter = Influence(f"scatter/{where}/{name}", "scatter of the passage", math.sqrt(variance), unit, "A", "normal")
+    rest = Influence(f"lag/{where}/{name}", LAG, left / math.sqrt(3), unit, "B", "rectangular")
+    terms = [(1.0, Estimate.of(0.0, scatter)), (1.0, Estimate.of(0.0, rest))]
+    terms += [(slope, part) for part, slope in moved if math.isfinite(slope)]
+    return Estimate(value, unit, merged(terms))
 
 
 def _same(some: Sequence[Critical], c: Critical) -> Array:
@@ -189,9 +198,9 @@ def _still(c: Curve, dwell: Dwell, width: float) -> tuple[Dwell, Complex]:
     for k in range(12):
         args = (c.speed, c.values[k], c.covariance[k], c.acceleration)
         shift = [settled(*args, np.full(c.speed.size, width), n) - c.values[k] for n in (1, 2)]
-        moved[k] = _at(c.speed, shift[0], at)
+        moved[k] = _at(c.speed, shift[1], at)
         if k < 4:
-            left[k] = _at(c.speed, shift[1], at) - moved[k]
+            left[k] = _at(c.speed, shift[0], at) - moved[k]
     values = dwell.track.values.copy()
     values[0, :, 0] += moved
     return replace(dwell, track=replace(dwell.track, values=values)), left
@@ -207,9 +216,7 @@ def _with(r: Result, left: Complex) -> Result:
     out: dict[tuple[str, str], Estimate] = dict(r.estimates)
     for k, axis in enumerate(AXES):
         half = abs(left[k]) / math.sqrt(3)
-        rest = Influence(
-            f"lag/{r.dwell.where}/{axis}", "lag of the response, second order", half, "m", "B", "rectangular"
-        )
+        rest = Influence(f"lag/{r.dwell.where}/{axis}", LAG, half, "m", "B", "rectangular")
         for name in ("vector_cos", "vector_sin"):
             e = out[name, axis]
             out[name, axis] = Estimate(e.value, e.unit, merged([(1.0, e), (1.0, Estimate.of(0.0, rest))]), e.sampler)
@@ -217,9 +224,8 @@ def _with(r: Result, left: Complex) -> Result:
     return replace(r, estimates=out, vectors=replace(r.vectors, covariance=covariance))
 
 
-def running_margin(peak: Peak, running: float) -> tuple[float, Mapping[str, float]]:
-    """Separation margin that API 617 asks for a critical of that factor, as a share of the running speed; its parts."""
+def asked_margin(peak: Peak, running: float) -> float:
+    """Separation margin that API 617 asks for a critical of that factor, as a share of the running speed."""
     assert peak.factor is not None
     part = 0.17 * (1 - 1 / (max(peak.factor.value, DAMPED) - 1.5))
-    above = peak.speed.value > running
-    return (0.1 + part if above else part), {"factor": part}
+    return 0.1 + part if peak.speed.value > running else part
