@@ -20,7 +20,8 @@ from bench.errors import AnalysisError
 HALF_POWER = math.sqrt(0.5)
 PROMINENCE = 0.1  # of the greatest amplitude: what a critical must stand out by
 DRAWS = 200
-FLAT, LEAST = 0.97, 9  # of the greatest amplitude: what says where it is; points that a cubic needs
+FLAT = 0.97  # of the greatest amplitude: what says where it is
+LEAST, DISTINCT = 9, 5  # points that a cubic needs
 NEAR = 0.03  # of the record: where a drawn curve's critical is looked for
 
 
@@ -125,9 +126,11 @@ def _vertex(w: Array, size: Array, k: int) -> tuple[float, float]:
     left, right = np.flatnonzero(below[:k]), np.flatnonzero(below[k:])
     first, end = int(left[-1]) + 1 if left.size else 0, k + int(right[0]) if right.size else size.size
     if end - first < LEAST:
-        first, end = max(k - 1, 0), min(k + 2, size.size)
+        first, end = max(k - LEAST // 2, 0), min(k + LEAST // 2 + 1, size.size)
     x = (w[first:end] - w[k]) / (w[end - 1] - w[first])
-    a = np.polynomial.polynomial.polyfit(x, size[first:end], 3 if end - first >= LEAST else 2)
+    if np.unique(x).size < DISTINCT:
+        return float(w[k]), float(size[k])
+    a = np.polynomial.polynomial.polyfit(x, size[first:end], 3)
     slope = np.polynomial.polynomial.polyder(a)
     roots = np.polynomial.polynomial.polyroots(slope)
     real = [r.real for r in roots if abs(r.imag) < 1e-9 and x[0] <= r.real <= x[-1]]

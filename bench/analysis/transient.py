@@ -6,8 +6,12 @@ The response lags behind the speed: with the acceleration a, an excitation F(w) 
 
 with F'' = 2 F/w^2 of an unbalance: at a peak of half-power width 2 d the next term is smaller by a/d^2 (Lewis, Trans. ASME 54,
 APM-54-24 (1932), has the whole of it for one degree of freedom). A block over which the speed goes by b shows the mean of V,
-V + b^2/24 V''. The whole series is exp(-C) Y with C = j a/2 (d^2/dw^2 - 2/w^2) - b^2/24 d^2/dw^2, so that Y = V + C V + C C V/2 +
-..., the derivatives those of local rational models. What the last term changes bounds what is left.
+V + b^2/24 V''. The whole series is V = exp(-C) Y with
+C = j a/2 (d^2/dw^2 - 2/w^2) - b^2/24 d^2/dw^2, so that
+
+    Y = V + C V + C C V/2 + ...,
+
+the derivatives those of local rational models. What the last term changes bounds what is left.
 """
 
 from __future__ import annotations

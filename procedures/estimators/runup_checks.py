@@ -58,8 +58,8 @@ def of_plan(rig: RigFile, plan: Settings) -> Iterable[str]:
         yield f"speeds_rad_s: expected {low * RPM:.0f} to {high * RPM:.0f} r/min: the shaft must come through them"
     spaced = np.diff(sorted(plan.speeds_rad_s)) / (plan.rate_rad_s2 or COASTING)
     if spaced.size and spaced.min() < plan.capture_s + UPLOAD_S:
-        yield (f"speeds_rad_s: two are passed within {spaced.min():.2f} s; expected {plan.capture_s + UPLOAD_S:.2f} s or more, in "
-               "which a capture is recorded and uploaded")  # fmt: skip
+        yield (f"speeds_rad_s: two are passed within {spaced.min():.2f} s; expected {plan.capture_s + UPLOAD_S:.2f} s or more, "
+               "in which a capture is recorded and uploaded")  # fmt: skip
     if plan.rate_rad_s2 and not RATES[0] <= plan.rate_rad_s2 <= RATES[1]:
         yield f"the acceleration: found {plan.rate_rad_s2:g} rad/s^2; expected {RATES[0]:g} to {RATES[1]:g}"
     steady = math.sqrt(2 * math.pi * plan.rate_rad_s2 / IN_A_TURN)
@@ -169,21 +169,21 @@ def _criticals(run: Run, plan: Settings) -> Iterator[Finding]:
     for p in found:
         yield Finding("critical", _told(p, plan.running_rad_s), p.where)
         if p.amplitude.value > LARGE * run.clearance:
-            text = (f"at {p.amplitude.value / run.clearance:.0%} of the clearance the bearings' forces are not linear: factor and "
-                    "speed are those of this unbalance. Balance, run up slower, and compare with a coast-down.")  # fmt: skip
+            text = (f"at {p.amplitude.value / run.clearance:.0%} of the clearance the bearings' forces are not linear: factor "
+                    "and speed are those of this unbalance. Balance, run up slower, and compare with a coast-down.")  # fmt: skip
             yield Finding("large-amplitude", text, p.where)
     if not found:
-        text = (f"no critical speed between {speed[0]:.0f} and {speed[-1]:.0f} r/min: no greatest amplitude of any probe has an "
-                f"amplification factor of {DAMPED} or more.")  # fmt: skip
+        text = (f"no critical speed between {speed[0]:.0f} and {speed[-1]:.0f} r/min: no greatest amplitude of any probe has "
+                f"an amplification factor of {DAMPED} or more.")  # fmt: skip
         yield Finding("no-critical", text, run.passage.name)
     for p in run.peaks:
         if p.factor is None:
-            text = (f"the greatest amplitude of {p.axis} at {_rpm(p)} does not fall to 0.707 of itself on both sides within the "
-                    "speeds run through: it has no amplification factor here.")  # fmt: skip
+            text = (f"the greatest amplitude of {p.axis} at {_rpm(p)} does not fall to 0.707 of itself on both sides "
+                    "within the speeds run through: it has no amplification factor here.")  # fmt: skip
             yield Finding("half-power-outside", text, p.where)
         elif not p.critical:
-            text = (f"the amplitude of {p.axis} is greatest at {_rpm(p)}, with an amplification factor of {_value(p)}: critically "
-                    "damped, no critical speed (API 617).")  # fmt: skip
+            text = (f"the amplitude of {p.axis} is greatest at {_rpm(p)}, with an amplification factor of {_value(p)}: "
+                    "critically damped, no critical speed (API 617).")  # fmt: skip
             yield Finding("critically-damped", text, p.where)
 
 
@@ -202,10 +202,11 @@ def _told(p: Peak, running: float) -> str:
     asked = asked_margin(p, running)
     kept = "keeps" if p.margin.value >= asked else "does not keep"
     moved = (p.raw_speed - p.speed.value) * RPM
-    return (f"{_rpm(p)}, amplification factor {_value(p)}, half power from {p.low * RPM:.0f} to {p.high * RPM:.0f} r/min, "
-            f"{p.amplitude.value * 1e6:.1f} µm 0-pk. It stands {p.margin.value:.0%} off the running speed of {running * RPM:.0f} r/min "
-            f"and {kept} the {asked:.0%} that API 617 asks at that factor (not checked against the standard). The passage had moved "
-            f"it by {moved:+.0f} r/min.")  # fmt: skip
+    return (f"{_rpm(p)}, amplification factor {_value(p)}, half power from "
+            f"{p.low * RPM:.0f} to {p.high * RPM:.0f} r/min, {p.amplitude.value * 1e6:.1f} µm 0-pk. "
+            f"It stands {p.margin.value:.0%} off the running speed of "
+            f"{running * RPM:.0f} r/min and {kept} the {asked:.0%} that API 617 asks at that factor (not checked "
+            f"against the standard). The passage had moved it by {moved:+.0f} r/min.")  # fmt: skip
 
 
 def _passed(run: Run) -> Iterator[Finding]:
@@ -213,6 +214,7 @@ def _passed(run: Run) -> Iterator[Finding]:
     rate, ends = np.abs(c.acceleration) * RPM, c.speed[[0, -1] if up else [-1, 0]] * RPM
     most = [(np.abs(run.shaft[k]).max() * 1e6, c.speed[int(np.argmax(np.abs(run.shaft[k])))] * RPM) for k in range(4)]
     greatest = ", ".join(f"{a} {size:.1f} µm at {at:.0f}" for a, (size, at) in zip(AXES, most, strict=True))
-    text = (f"from {ends[0]:.0f} to {ends[1]:.0f} r/min at {rate.min():.0f} to {rate.max():.0f} r/min per second, {c.speed.size} "
-            f"blocks of {np.median(c.width) * RPM:.0f} r/min; greatest amplitudes of the shaft {greatest} r/min.")  # fmt: skip
+    text = (f"from {ends[0]:.0f} to {ends[1]:.0f} r/min at {rate.min():.0f} to {rate.max():.0f} r/min per second, "
+            f"{c.speed.size} blocks of {np.median(c.width) * RPM:.0f} r/min; "
+            f"greatest amplitudes of the shaft {greatest} r/min.")  # fmt: skip
     yield Finding("passed", text, run.passage.name)
