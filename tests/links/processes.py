@@ -115,21 +115,21 @@ def kind_of(url: str) -> str:
     return scheme
 
 
-def patient_rig(folder: Path) -> None:
-    """tsbs12 in `folder/rigs`, where server and bench find it first, with a watchdog of a second: a test machine that
+def patient_rig(folder: Path, rig: str = "tsbs12") -> None:
+    """A rig in `folder/rigs`, where server and bench find it first, with a watchdog of a second: a test machine that
     gives its processes no time for 80 ms is no dead host."""
     rigs = folder / "rigs"
     rigs.mkdir(exist_ok=True)
-    text = (ROOT / "rigs" / "tsbs12.toml").read_text()
-    (rigs / "tsbs12.toml").write_text(re.sub(r"(watchdog_s = .*?default = )[0-9.]+", rf"\g<1>{PATIENCE_S}", text))
-    (rigs / "tsbs12.dbc").write_bytes((ROOT / "rigs" / "tsbs12.dbc").read_bytes())
+    text = (ROOT / "rigs" / f"{rig}.toml").read_text()
+    (rigs / f"{rig}.toml").write_text(re.sub(r"(watchdog_s = .*?default = )[0-9.]+", rf"\g<1>{PATIENCE_S}", text))
+    (rigs / f"{rig}.dbc").write_bytes((ROOT / "rigs" / f"{rig}.dbc").read_bytes())
 
 
 @contextmanager
 def served(folder: Path, *arguments: str, rig: str = "tsbs12", patient: bool = True) -> Iterator[Served]:
     """`bench serve` on free ports for the block; `patient` as `patient_rig` says."""
     if patient:
-        patient_rig(folder)
+        patient_rig(folder, rig)
     child = _start(folder, "-m", "bench.cli.__main__", "serve", rig, *ANY_PORT, *arguments)
     try:
         child.wait_for("ready")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 
@@ -22,8 +21,8 @@ PLAN = (
 @pytest.mark.timeout(300)
 def test_a_run_up_to_14000_with_three_captures(tmp_path: Path) -> None:
     plan = [x for value in PLAN for x in ("--plan", value)]
-    with processes.served(tmp_path, "--seed", "1", rig="amb5dof", patient=False) as rig:
-        links = rig.links(rig.endpoints["slcan:socket"])
+    with processes.served(tmp_path, "--seed", "1", rig="amb5dof") as rig:
+        links = rig.links("slcan:socket")
         given = ("run", "run-up", "--rig", "amb5dof", "--backend", "live", "--operator", "auto", "--no-report")
         with processes.real_bench(tmp_path, *given, *links, *plan) as child:
             status = child.end(240.0)
@@ -33,7 +32,7 @@ def test_a_run_up_to_14000_with_three_captures(tmp_path: Path) -> None:
     assert (status, record["outcome"], serious) == (0, "PASS", []), record["findings"]
     assert "no-critical" in {f["code"] for f in record["findings"]}
     assert states[-1].endswith("-> OFF")
-    recording: Recording[object] = Recording.open(tmp_path / json.loads(json.dumps(child.out[-1])) / "recording.mcap")
+    recording: Recording[object] = Recording.open(tmp_path / child.out[-1] / "recording.mcap")
     assert {"telemetry", "drive"} <= set(recording.streams)
     captures = recording.captures()
     assert [round(c.labels["passed_rad_s"] * 30 / math.pi) for c in captures] == [3000, 8000, 13000]
