@@ -50,6 +50,8 @@ PROCEDURES = (
     Entry("unbalance", "procedures.unbalance", "Unbalance response of the turning shaft: vectors, orbits, zones"),
     Entry("compensation", "procedures.compensation", "Compensation of unbalance: with and without it, and switched on"),
     Entry("balance", "procedures.balance", "Two-plane balancing by influence coefficients from trial weights"),
+    Entry("run-up", "procedures.runup", "Run-up through the critical speeds: Bode, polar, waterfall, amplification"),
+    Entry("coast-down", "procedures.coast_down", "Coast-down through the critical speeds, analysed as a run-up"),
     Entry("force-map", "procedures.force_map", "Terms of the motor's force over displacement, currents and load"),
 )
 

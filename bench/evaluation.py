@@ -156,11 +156,13 @@ def _accept(procedure: Procedure, item: Measured, measured: dict[tuple[str, str]
 def _in_order(
     procedure: Procedure, entries: Mapping[tuple[str, str], Measurement], limits: Mapping[str, Limit]
 ) -> tuple[Measurement, ...]:
-    """As declared, with a missing entry where nothing was yielded."""
+    """As declared, with a missing entry where nothing was yielded that a sound machine has, or that a limit asks for."""
     out: list[Measurement] = []
     for quantity in procedure.measures:
         found = [m for (name, _), m in entries.items() if name == quantity.name]
-        out += found or [missing(quantity, limits.get(quantity.name))]
+        limit = limits.get(quantity.name)
+        if found or quantity not in procedure.optional or limit is not None:
+            out += found or [missing(quantity, limit)]
     return tuple(out)
 
 

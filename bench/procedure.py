@@ -102,4 +102,7 @@ class Procedure:
     needs: Callable[[Any], tuple[Need, ...]] = field(default=_no_needs)
     facts: Callable[[Recording[Any]], Mapping[str, Estimate]] | None = None
     holds_for: Callable[[Any], Mapping[str, float]] = field(default=_numbers_of)
+    optional: tuple[
+        Quantity, ...
+    ] = ()  # of the measures, what a sound machine may not have: not missing where no limit asks
     method: str = ""  # the report's method section: plain paragraphs, blank-line separated

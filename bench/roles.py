@@ -85,8 +85,9 @@ class Drive(Protocol):
     def confirm_off(self) -> bool: ...  # a reading made now says: no torque; raises nothing
     def let_go(self) -> None: ...  # sends coast, waits for nothing and raises nothing
     def set_speed(self, rad_s: float) -> None: ...  # passes the envelope; takes effect while it runs
+    def set_acceleration(self, rad_s2: float) -> None: ...  # towards a speed; 0: as fast as it does by itself
     def run(self) -> None: ...  # it gives torque; the speed follows
-    def reach(self, rad_s: float) -> None: ...  # set_speed, run; returns at that speed
+    def reach(self, rad_s: float) -> None: ...  # set_speed, run, at its own acceleration; returns at that speed
     def coast(self) -> None: ...  # no torque
     def stop(self) -> None: ...  # brakes; returns at standstill
 

@@ -17,6 +17,7 @@ TAKEN_S = 1.0  # for a drive to do what it was told
 STANDSTILL_RAD_S, STOP_S, REACH_S = 0.5, 90.0, 60.0
 NEEDED = ("target_speed", "actual_speed", "fault")
 COMMANDS = ("run", "coast", "stop")
+ACCELERATION = "acceleration"
 
 
 class Surroundings(Protocol):
@@ -32,8 +33,8 @@ class Surroundings(Protocol):
 
 
 class FieldDrive:
-    """A `bench.roles.Drive`. Registers: target_speed, actual_speed, fault; running where the drive has it. Commands: run,
-    coast, stop; reset where it has one. `may_run` raises when the shaft must not be driven now."""
+    """A `bench.roles.Drive`. Registers: target_speed, actual_speed, fault; running and acceleration where the drive has
+    them. Commands: run, coast, stop; reset where it has one. `may_run` raises when the shaft must not be driven now."""
 
     def __init__(self, bus: Surroundings, device: RegisterDevice, envelope: Envelope) -> None:
         """Raises ConfigError: the rig file does not state what a drive cannot do without."""
@@ -97,12 +98,32 @@ class FieldDrive:
                 f"drive speed: found {rad_s:g} rad/s; the envelope allows {limit:g} rad/s; nothing was sent"
             )
         self._bus.record("drive-speed", device=self.name, rad_s=rad_s)
-        self._bus.ask(self._device.write, "target_speed", rad_s)
-        r = self._device.spec.registers["target_speed"]
-        back, step = self._bus.refresh(self.name)["target_speed"], abs(r.scale * units.unit(r.unit).factor)
-        near = 1e-6 * abs(rad_s) if r.type == "f32" else step
-        if not math.isclose(back, rad_s, rel_tol=0, abs_tol=max(near, 1e-12)):
-            raise BenchError(f"drive {self.name}: wrote a speed of {rad_s:g} rad/s, it reads back {back:g} rad/s")
+        self._write("target_speed", rad_s, "a speed")
+
+    def set_acceleration(self, rad_s2: float) -> None:
+        """Set how fast the speed goes to its target, either way; 0: as fast as the drive does by itself. Read back.
+
+        Raises:
+            InterlockError: no finite number of 0 or more; nothing was sent.
+            LinkError: the drive does not answer, or refuses: it cannot be so fast.
+            BenchError: the rig file states no such register, or it reads back something else.
+        """
+        if not 0 <= rad_s2 < math.inf:  # NaN is refused too
+            raise InterlockError(f"drive acceleration: found {rad_s2:g} rad/s^2; expected 0 or more; nothing was sent")
+        self._bus.record("drive-acceleration", device=self.name, rad_s2=rad_s2)
+        self._write(ACCELERATION, rad_s2, "an acceleration")
+
+    def _write(self, name: str, value: float, what: str) -> None:
+        """Write a register and read it back."""
+        self._bus.ask(self._device.write, name, value)
+        r = self._device.spec.registers[name]
+        unit = units.unit(r.unit)
+        back, step = self._bus.refresh(self.name)[name], abs(r.scale * unit.factor)
+        near = 1e-6 * abs(value) if r.type == "f32" else step
+        if not math.isclose(back, value, rel_tol=0, abs_tol=max(near, 1e-12)):
+            raise BenchError(
+                f"drive {self.name}: wrote {what} of {value:g} {unit.si}, it reads back {back:g} {unit.si}"
+            )
 
     def run(self) -> None:
         """Let it give torque.
@@ -119,13 +140,15 @@ class FieldDrive:
         self._until_running(True)
 
     def reach(self, rad_s: float) -> None:
-        """Run at a speed and return when the shaft has it, within 1 % or 0.5 rad/s.
+        """Run at a speed, with the drive's own acceleration, and return when the shaft has it, within 1 % or 0.5 rad/s.
 
         Raises:
             InterlockError: beyond the envelope; nothing was sent.
             DeviceFault: the drive is or goes into fault.
             LinkError: it does not answer, or the shaft does not get there in a minute.
         """
+        if self._bus.latest(self.name).get(ACCELERATION):
+            self.set_acceleration(0.0)
         self.set_speed(rad_s)
         self.run()
         near = max(STANDSTILL_RAD_S, 0.01 * abs(rad_s))

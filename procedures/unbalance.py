@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 from pydantic import Field
 
@@ -99,6 +99,19 @@ class Plan(BenchPlan):
         return sum(len(self.at(s)) for s in self.speeds_rad_s)
 
 
+class Rolling(Protocol):
+    """The part of a plan that lift and slow roll need."""
+
+    @property
+    def law(self) -> Law: ...
+    @property
+    def slow_rad_s(self) -> float: ...
+    @property
+    def slow_s(self) -> float: ...
+    @property
+    def settle_s(self) -> float: ...
+
+
 def settings(plan: Plan) -> dict[str, float]:
     """Lifted by the PID, which needs no model."""
     return {"law": CODES["PID"], "observer": 0.0, "compensate": 0.0, **(POLES if plan.observed else {})}
@@ -123,7 +136,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     finished(rig)
 
 
-def rolled(rig: Rig, plan: Plan, record: Recorder) -> bool:
+def rolled(rig: Rig, plan: Rolling, record: Recorder) -> bool:
     """Lifted, nudged, under the plan's law, and rolled slowly; False where the run ends here."""
     if not probing.probed(rig, record):
         return False
@@ -232,9 +245,9 @@ def measured(results: Results) -> Iterator[Measured]:
                 yield known[name].measured(estimate, f"{place}, {result.dwell.where}" if place else result.dwell.where)
 
 
-def check(rig: RigFile, plan: Plan) -> Iterable[str]:
-    """What cannot work before anything starts."""
-    lacking = [
+def lacking(rig: RigFile) -> Iterator[str]:
+    """What the rig file does not state and a turning shaft needs."""
+    yield from (
         f"{table}: found no {', '.join(missing)}; expected them all"
         for table, names, found in (
             ("channels", TOLD, rig.channels),
@@ -243,13 +256,15 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
             ("geometry", LENGTHS, rig.geometry),
         )
         if (missing := [n for n in names if n not in found])
-    ]
+    )
     if not any("drive" in d.roles for d in rig.devices.values()):
-        lacking.append("devices: found none in the role drive; nothing turns the shaft")
-    yield from lacking
-    if lacking:
-        return
-    yield from unbalance_checks.of_plan(rig, plan)
+        yield "devices: found none in the role drive; nothing turns the shaft"
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts."""
+    missing = list(lacking(rig))
+    yield from missing or unbalance_checks.of_plan(rig, plan)
 
 
 def figures(recording: Recording[Plan]) -> Iterable[Figure]:

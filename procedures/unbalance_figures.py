@@ -23,7 +23,7 @@ def all_figures(results: Results, rig: RigFile) -> Iterator[Figure]:
     clearance = rig.geometry["clearance"].value
     for plane in PLANES:
         for variant in results.variants:
-            yield _orbits(results.of(variant)[-1], plane, clearance)
+            yield orbits(results.of(variant)[-1], plane, clearance)
     for plane in PLANES:
         yield _bode(results, plane)
         yield _polar(results, plane)
@@ -31,7 +31,7 @@ def all_figures(results: Results, rig: RigFile) -> Iterator[Figure]:
         for variant in results.variants:
             shown = results.of(variant)[-1]
             if shown.dwell.full is not None:
-                yield _spectrum(shown, plane)
+                yield spectrum(shown, plane)
     yield _use(results, "current_peak", "A", "current")
     yield _use(results, "voltage_peak", "V", "voltage")
 
@@ -40,7 +40,7 @@ def _key(r: Result) -> str:
     return f"{r.dwell.variant}-{r.dwell.wanted * RPM:.0f}"
 
 
-def _orbits(r: Result, plane: str, clearance: float) -> Figure:
+def orbits(r: Result, plane: str, clearance: float) -> Figure:
     """The highest speed: some turns as read, and the shaft's own order 1 about its mean place."""
     y, z = PLANES[plane]
     x1 = x2 = None
@@ -71,7 +71,7 @@ def _polar(results: Results, plane: str) -> Figure:
     return pictures.polar(f"polar-{plane}", f"Polar plot of order 1, {plane}, {results.variants[0]}", curves)
 
 
-def _spectrum(r: Result, plane: str) -> Figure:
+def spectrum(r: Result, plane: str) -> Figure:
     y, z = PLANES[plane]
     assert r.dwell.full is not None
     found = full(r.dwell.full.positions[y], r.dwell.full.positions[z], r.dwell.full.rate)

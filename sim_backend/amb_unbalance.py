@@ -41,6 +41,31 @@ def motion(
     p: AmbParams, settings: Mapping[str, float], speed: float, settle_s: float = 8.0, seconds: float = 3.0
 ) -> Motion:
     """The shaft at `speed` rad/s under the settings of the controller (SI, by name), once the integrators have settled."""
+    plant = _turning(p, settings, speed)
+    plant.run(round(settle_s * 1e4))
+    return _seen(plant, p, seconds)
+
+
+def response(
+    p: AmbParams, settings: Mapping[str, float], speeds: Array, settle_s: float = 1.0, seconds: float = 0.3
+) -> Complex:
+    """Vectors (n, 4) of the shaft's centre at `speeds` (n,) rad/s, each held, one after the other with one plant."""
+    plant = _turning(p, settings, float(speeds[0]))
+    plant.run(50000)
+    out = []
+    for speed in speeds:
+        s = plant.state()["s"]
+        s[11] = speed
+        plant.set_state(s)
+        plant.drive(None)  # or it would ramp on from where it was
+        plant.drive(DRIVE, float(speed))
+        plant.run(round(settle_s * 1e4))
+        out.append(_seen(plant, p, seconds).shaft)
+    return np.array(out)
+
+
+def _turning(p: AmbParams, settings: Mapping[str, float], speed: float) -> AmbPlant:
+    """Lifted and turning at `speed` rad/s."""
     known = AmbControl.__dataclass_fields__
     control = AmbControl(**{k: v for k, v in settings.items() if k in known} | {"law": 0.0, "observer": 0.0})
     plant = AmbPlant(p, 0, control=control)
@@ -55,7 +80,11 @@ def motion(
     plant.drive(DRIVE, speed)
     for name in ("law", "observer"):
         plant.set(name, settings[name])
-    plant.run(round(settle_s * 1e4))
+    return plant
+
+
+def _seen(plant: AmbPlant, p: AmbParams, seconds: float) -> Motion:
+    """What the shaft does now."""
     start, (_, trace) = plant.tick, plant.run(round(seconds * 1e4), 1)
     t = (start + np.arange(len(trace))) * TICK_S
     tacho = tachometer(*counted(t, trace[:, TRACE.index("pulses")], trace[:, TRACE.index("pulse_age")]))

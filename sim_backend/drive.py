@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from bench.errors import ConfigError
 from bench.rigfile import Device
@@ -39,7 +40,7 @@ class SimulatedDrive:
         self._law = DriveLaw(*(truth.values[name] for name in LAW))
         self._codes = FAULTS | {name: int(code) for code, name in spec.faults.items() if code.isdecimal()}
         self.state, self.fault = "off", ""
-        self._target = 0.0
+        self._target, self._ramp = 0.0, self._law.ramp
         self._asked = self._below_limit = plant.tick
         self._planted_s = truth.defects["drive_fault_after_s"]
 
@@ -57,11 +58,20 @@ class SimulatedDrive:
         self.follow()
         self._asked = self._plant.tick
 
+    def accelerate(self, rad_s2: float) -> bool:
+        """How fast the speed goes to its target; 0: as fast as it does by itself. False: it cannot be so fast."""
+        if rad_s2 > self._law.ramp:
+            return False
+        self._ramp = rad_s2 or self._law.ramp
+        if self.state == "running":
+            self._plant.drive(replace(self._law, ramp=self._ramp), self._target)
+        return True
+
     def aim(self, rad_s: float) -> None:
         """The speed to hold while it runs."""
         self._target = rad_s
         if self.state == "running":
-            self._plant.drive(self._law, rad_s)
+            self._plant.drive(replace(self._law, ramp=self._ramp), rad_s)
 
     def obey(self, command: str) -> None:
         """Carry out a command; in fault it only resets and coasts."""
@@ -74,7 +84,10 @@ class SimulatedDrive:
                 return
             self.state = "running" if command == "run" else "stopping"
             self._below_limit = self._plant.tick
-            self._plant.drive(self._law, self._target if command == "run" else 0.0)
+            if command == "run":
+                self._plant.drive(replace(self._law, ramp=self._ramp), self._target)
+            else:
+                self._plant.drive(self._law, 0.0)
 
     def follow(self) -> None:
         """What it does by itself: ends braking, and trips."""

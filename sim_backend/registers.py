@@ -216,6 +216,8 @@ def _obeyed(device: RegisterBankDevice, drive: SimulatedDrive, names: Sequence[s
     """Carry out what a write to the drive means: a command where its registers hold one, a speed."""
     commands = device.spec.commands
     try:
+        if "acceleration" in names and not drive.accelerate(device.kept("acceleration")[1]):
+            return False
         if "target_speed" in names:
             drive.aim(device.kept("target_speed")[1])
         touched = {register for command in commands.values() for register in command} & set(names)

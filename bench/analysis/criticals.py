@@ -20,6 +20,8 @@ from bench.errors import AnalysisError
 HALF_POWER = math.sqrt(0.5)
 PROMINENCE = 0.1  # of the greatest amplitude: what a critical must stand out by
 DRAWS = 200
+FLAT = 0.97  # of the greatest amplitude: what says where it is
+LEAST, DISTINCT = 9, 5  # points that a cubic needs
 NEAR = 0.03  # of the record: where a drawn curve's critical is looked for
 
 
@@ -107,7 +109,7 @@ def _numbers(w: Array, size: Array, near: int) -> Array:
     k = first + int(np.argmax(size[first : int(near + reach) + 1]))
     if not 0 < k < size.size - 1:
         return np.full(5, np.nan)
-    top, speed = float(size[k]), float(w[k])
+    speed, top = _vertex(w, size, k)
     below = size < HALF_POWER * top
     left, right = np.flatnonzero(below[:k]), np.flatnonzero(below[k:])
     if not (left.size and right.size):
@@ -115,6 +117,27 @@ def _numbers(w: Array, size: Array, near: int) -> Array:
     low = _crossing(w, size, left[-1], HALF_POWER * top)
     high = _crossing(w, size, k + right[0] - 1, HALF_POWER * top)
     return np.array([speed, top, low, high, speed / (high - low)])
+
+
+def _vertex(w: Array, size: Array, k: int) -> tuple[float, float]:
+    """Where a curve is greatest about its greatest point k, and how great, by a cubic through what is nearly as great: the
+    points between lines are too far apart, and each local model's own."""
+    below = size < FLAT * size[k]
+    left, right = np.flatnonzero(below[:k]), np.flatnonzero(below[k:])
+    first, end = int(left[-1]) + 1 if left.size else 0, k + int(right[0]) if right.size else size.size
+    if end - first < LEAST:
+        first, end = max(k - LEAST // 2, 0), min(k + LEAST // 2 + 1, size.size)
+    x = (w[first:end] - w[k]) / (w[end - 1] - w[first])
+    if np.unique(x).size < DISTINCT:
+        return float(w[k]), float(size[k])
+    a = np.polynomial.polynomial.polyfit(x, size[first:end], 3)
+    slope = np.polynomial.polynomial.polyder(a)
+    roots = np.polynomial.polynomial.polyroots(slope)
+    real = [r.real for r in roots if abs(r.imag) < 1e-9 and x[0] <= r.real <= x[-1]]
+    if not real:
+        return float(w[k]), float(size[k])
+    best = max(real, key=lambda r: float(np.polynomial.polynomial.polyval(r, a)))
+    return float(w[k] + best * (w[end - 1] - w[first])), float(np.polynomial.polynomial.polyval(best, a))
 
 
 def _crossing(w: Array, size: Array, k: int, level: float) -> float:

@@ -22,6 +22,7 @@ WINDOWS = (9, 13, 19, 27, 39)  # lines of a local model of four complex terms
 WINDOW = WINDOWS[0]
 FINE = 4  # points between two lines
 DRAWS = 300
+NARROW = 0.02  # of a window, for its second derivative
 NEAR_POLE = 0.5  # a denominator that falls so low between lines is noise
 
 
@@ -104,6 +105,12 @@ class Smoother:
         """Curves (..., m) smoothed, at `x`."""
         fine = _models(values, self._windows, self._weight)
         return fine.reshape(*values.shape[:-1], -1)[..., self._order]
+
+    def curvature(self, values: Complex) -> Complex:
+        """Second derivatives (..., m) of curves (..., m) by the abscissa, at their lines."""
+        places = np.tile([-NARROW, 0.0, NARROW], (self._windows.u.shape[0], 1))
+        low, at, high = np.moveaxis(_evaluated(values, self._windows, self._weight, places), -1, 0)
+        return np.asarray((low - 2 * at + high) / (NARROW * self._windows.scale) ** 2)
 
 
 def smoother(x: Array, values: Complex, covariance: Array) -> Smoother:

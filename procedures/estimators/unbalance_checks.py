@@ -133,8 +133,8 @@ def of_signals(dwells: Sequence[Dwell], plan: Settings) -> Iterator[Finding]:
             yield Finding(
                 "speed-off", f"the pulses say {d.speed * RPM:.0f} r/min, {off:.1%} off.", d.where, Effect.INDETERMINATE
             )
-    yield from _sampling(dwells, plan)
-    yield from _slow(dwells, plan)
+    yield from sampling(dwells, plan)
+    yield from slow_roll(dwells, plan)
 
 
 def _pulses(d: Dwell) -> Iterator[Finding]:
@@ -165,7 +165,7 @@ def _limits(d: Dwell) -> Iterator[Finding]:
             yield Finding(code, text, d.where, Effect.INDETERMINATE)
 
 
-def _sampling(dwells: Sequence[Dwell], plan: Settings) -> Iterator[Finding]:
+def sampling(dwells: Sequence[Dwell], plan: Settings) -> Iterator[Finding]:
     """The capture must be fast enough for the orders asked."""
     for d in dwells:
         if d.full is None:
@@ -177,7 +177,7 @@ def _sampling(dwells: Sequence[Dwell], plan: Settings) -> Iterator[Finding]:
             yield Finding("aliasing", text, d.where, Effect.ERROR)
 
 
-def _slow(dwells: Sequence[Dwell], plan: Settings) -> Iterator[Finding]:
+def slow_roll(dwells: Sequence[Dwell], plan: Settings) -> Iterator[Finding]:
     """Is there a slow roll, and was it slow?"""
     slow = [d for d in dwells if d.kind == SLOW]
     if not slow:

@@ -105,10 +105,15 @@ def read_dwells(recording: Recording[Any]) -> list[Dwell]:
     steps = sorted([*recording.steps(SLOW), *recording.steps(DWELL)], key=lambda s: s.start_ns)
     if not any(s.kind == DWELL for s in steps):
         raise AnalysisError("found no dwells; expected those of the plan (was the run stopped early?)")
-    return [_read(recording, step) for step in steps]
+    return [read_dwell(recording, step) for step in steps]
 
 
-def _read(recording: Recording[Any], step: Step) -> Dwell:
+def read_dwell(recording: Recording[Any], step: Step) -> Dwell:
+    """A slow roll or a dwell.
+
+    Raises:
+        AnalysisError: it has no turns.
+    """
     tick = recording.rig.devices["controller"].tick_s
     data = step.read(*TOLD)
     t = (data["t_ns"] - recording.start_ns) * 1e-9
@@ -124,7 +129,7 @@ def _read(recording: Recording[Any], step: Step) -> Dwell:
     return Dwell(
         step.kind, str(labels["variant"]), float(labels["speed_rad_s"]), float(labels["driven_rad_s"]),
         bool(labels["again"]), tacho, track, full_rate(captures[0]) if captures else None, int(np.bitwise_or.reduce(flags)),
-        _clips(wide[:4]), tuple(c for c, x in zip((*POSITIONS, *CURRENTS), wide, strict=True) if np.ptp(x) == 0),
+        clips(wide[:4]), tuple(c for c, x in zip((*POSITIONS, *CURRENTS), wide, strict=True) if np.ptp(x) == 0),
         step.lost(), step.expected(), step.start_ns,
     )  # fmt: skip
 
@@ -134,7 +139,7 @@ def _seen(orders: Sequence[float], speed: float, period: float) -> tuple[float, 
     return tuple(n for n in orders if n == 1 or n * speed / (2 * math.pi) < 0.4 / period)
 
 
-def _clips(positions: Array) -> int:
+def clips(positions: Array) -> int:
     """Most neighbouring samples of a probe that stand at its extreme: one that clips repeats its limit."""
     most = 0
     for x in positions:

@@ -1,0 +1,295 @@
+"""Run-up and coast-down: against what the shaft does when its speed stands, A3, planted defects, refused plans."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bench.analysis.tachometer import Tachometer
+from bench.analysis.vectors import contains
+from bench.cli.virtual import Simulated, simulated_run
+from bench.errors import DeviceFault
+from bench.findings import Effect, Finding
+from bench.procedure import Measured
+from bench.recording import Recording
+from bench.rigfile import load_rig
+from bench.uncertainty import interval
+from procedures import coast_down, runup, runup_figures
+from procedures.estimators import runup_checks
+from procedures.estimators.runup_data import Passage, read_passage
+from procedures.estimators.runup_estimates import Run
+from procedures.estimators.unbalance_data import RPM
+from procedures.unbalance import CODES, SETTINGS
+from reports.figures import draw as draw_figure
+from sim_backend import amb_unbalance
+from sim_backend.core.amb_params import AmbParams
+from sim_backend.truth import draw
+
+pytestmark = pytest.mark.xdist_group("runup")  # one worker makes the sound run once
+SEED = 1
+SHORT: dict[str, Any] = {
+    "acceleration_rad_s2": 200.0, "bottom_rad_s": 115.0, "slow_s": 4.2, "settle_s": 0.5, "capture_s": 0.2,
+}  # fmt: skip
+ONE: dict[str, Any] = {**SHORT, "top_rad_s": 4000 / RPM, "speeds_rad_s": (2500 / RPM,)}
+A3: dict[str, Any] = {**SHORT, "law": "CAC", "top_rad_s": 6000 / RPM, "speeds_rad_s": (2000 / RPM, 4800 / RPM)}
+A3_TRUTH = {
+    "inductance": 20e-3, "unbalance_i": 10.7e-6, "unbalance_o": 10.7e-6, "unbalance_phase_i": 0.0,
+    "unbalance_phase_o": math.pi / 3,
+}  # fmt: skip
+
+
+def done(
+    folder: Path, plan: Mapping[str, Any], truth: Mapping[str, float] | None = None, procedure: str = "run-up"
+) -> Simulated:
+    return simulated_run(procedure, "amb5dof", SEED, plan, folder / "recording.mcap", truth)
+
+
+def codes(run: Simulated, *, serious: bool = True) -> set[str]:
+    found = [f for f in run.results if isinstance(f, Finding)]
+    return {f.code for f in found if not serious or f.effect is not Effect.NOTE}
+
+
+def evaluated(run: Simulated) -> Run:
+    found = runup.evaluated(run.recording)[1]
+    assert found is not None
+    return found
+
+
+def settled(plant: AmbParams, run: Run, law: str, **parameters: float) -> np.ndarray:
+    """What the shaft does at the captures' speeds when the speed stands, (n, 4)."""
+    assert run.near is not None
+    defaults = {n: p.default for n, p in load_rig("amb5dof").parameters.items()}
+    settings = {**defaults, **SETTINGS["off"], **parameters, "law": CODES[law]}  # type: ignore[index]
+    return amb_unbalance.response(plant, settings, np.array([r.dwell.speed for r in run.near.dwells]))
+
+
+@pytest.fixture(scope="module")
+def up(tmp_path_factory: pytest.TempPathFactory) -> Simulated:
+    """To 14 000 r/min in seven seconds."""
+    return done(tmp_path_factory.mktemp("up"), SHORT)
+
+
+@pytest.fixture(scope="module")
+def found(up: Simulated) -> Run:
+    return evaluated(up)
+
+
+@pytest.fixture(scope="module")
+def passage(up: Simulated) -> Passage:
+    return read_passage(up.recording)
+
+
+def test_nothing_is_found_on_a_sound_stand(up: Simulated) -> None:
+    """Its rigid modes are so well damped that nothing is critical, and that is said; the rest is measured."""
+    assert not codes(up)
+    notes = {"slow-roll", "ellipse", "zone", "no-critical", "critically-damped", "passed"}
+    assert codes(up, serious=False) == notes
+    assert len(up.recording.all_steps()) == runup.step_count(up.recording.plan)
+    names = {m.quantity.name for m in up.results if isinstance(m, Measured)}
+    assert names == {q.name for q in runup.MEASURES if q not in runup.CRITICAL}
+    assert len(up.recording.captures()) == 3
+    assert float(np.max(up.recording.channel("speed")["speed"])) > 0.995 * 14000 / RPM
+
+
+def test_vectors_are_those_of_a_speed_that_stands(found: Run) -> None:
+    run = found
+    assert run.near is not None
+    true = settled(draw(load_rig("amb5dof"), SEED).plant, run, "CCS")
+    held = [
+        contains(r.vectors.one(k), complex(t[k])) for r, t in zip(run.near.dwells, true, strict=True) for k in range(4)
+    ]
+    assert np.mean(held) >= 0.8
+    off = [np.abs(r.vectors.values - t).max() for r, t in zip(run.near.dwells, true, strict=True)]
+    assert max(off) < 0.6e-6
+
+
+def test_the_capture_is_taken_as_the_shaft_comes_through_the_speed(up: Simulated) -> None:
+    for captured in up.recording.captures():
+        pulses = captured.arrays("pulses", "pulse_age")
+        turns = np.ptp(pulses["pulses"])
+        mean = 2 * math.pi * turns / np.ptp(pulses["t_s"])
+        assert mean == pytest.approx(captured.labels["passed_rad_s"], rel=0.1)
+
+
+def test_figures(up: Simulated, found: Run) -> None:
+    drawn = list(runup_figures.all_figures(found, up.recording.rig))
+    keys = [f.key for f in drawn]
+    assert len(set(keys)) == len(keys)
+    assert {"bode-inboard", "polar-outboard", "waterfall", "order-map", "use-current", "use-voltage", "speed"} <= set(
+        keys
+    )
+    assert any(k.startswith("orbit-inboard") for k in keys)
+    assert any(k.startswith("spectrum-outboard") for k in keys)
+    for figure in drawn:
+        if figure.key in ("bode-inboard", "order-map", "speed"):
+            draw_figure(figure)
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "effect"),
+    [
+        ({"flags": 4}, "contact", Effect.INDETERMINATE),
+        ({"flags": 8}, "contact", Effect.INDETERMINATE),
+        ({"flags": 1}, "current-saturated", Effect.INDETERMINATE),
+        ({"flags": 2}, "voltage-saturated", Effect.INDETERMINATE),
+        ({"flags": 64}, "sensor-clipped", Effect.ERROR),
+        ({"clips": 20}, "sensor-clipped", Effect.ERROR),
+        ({"lost": 500}, "missing-samples", Effect.INDETERMINATE),
+        ({"stuck": ("pos_yi",)}, "stuck-channel", Effect.ERROR),
+        ({"missing": (9.0,)}, "pulse-missing", Effect.ERROR),
+        ({"doubled": (9.0,)}, "pulse-doubled", Effect.ERROR),
+        ({"drive": 2.0}, "pulse-missing", Effect.ERROR),
+        ({"drive": 0.5}, "pulse-doubled", Effect.ERROR),
+        ({"top": 15000 / RPM}, "passage-short", Effect.INDETERMINATE),
+    ],
+)
+def test_what_a_passage_shows_is_named(
+    up: Simulated, passage: Passage, change: dict[str, Any], code: str, effect: Effect
+) -> None:
+    plan, p = up.recording.plan, passage
+    assert list(runup_checks.of_passage(p, up.recording, plan)) == []
+    if "flags" in change:
+        flags = p.flags.copy()
+        flags[5000:5010] |= change["flags"]
+        p = dataclasses.replace(p, flags=flags)
+    elif "drive" in change:
+        p = dataclasses.replace(p, driven=(p.driven[0], change["drive"] * p.driven[1]))
+    elif "missing" in change or "doubled" in change:
+        at = {k: (float(p.t[4000]),) for k in change}
+        p = dataclasses.replace(p, tacho=Tachometer(p.tacho.times, p.tacho.turns, **at))
+    elif "top" in change:
+        plan = plan.model_copy(update={"top_rad_s": change["top"]})
+    else:
+        p = dataclasses.replace(p, **change)
+    found = [f for f in runup_checks.of_passage(p, up.recording, plan) if f.code == code]
+    assert found
+    assert found[0].effect is effect
+    if "flags" in change:
+        assert "r/min" in found[0].text  # where on the way
+
+
+def test_plans_that_cannot_work_are_refused() -> None:
+    rig = load_rig("amb5dof")
+
+    def why(**plan: Any) -> str:
+        return "; ".join(runup.check(rig, runup.Plan(**plan)))
+
+    assert why() == ""
+    assert why(**SHORT) == ""
+    assert "the envelope allows" in why(top_rad_s=1600.0)
+    assert "landing" in why(bottom_rad_s=35.0)
+    assert "within a turn" in why(acceleration_rad_s2=200.0)
+    assert "expected 1 to 250" in why(acceleration_rad_s2=400.0, bottom_rad_s=200.0)
+    assert "come through" in why(speeds_rad_s=(1465.0,))
+    assert "recorded and uploaded" in why(speeds_rad_s=(500.0, 510.0))
+    assert "bytes" in why(capture_s=3.0)
+    assert "folds back" in why(rate_hz=500.0)
+    assert "the rig has no k9" in why(parameters={"k9": 1.0})
+    assert list(coast_down.procedure.check(rig, coast_down.Plan())) == []
+    drive = rig.devices["drive"]
+    bare = {k: v for k, v in drive.registers.items() if k != "acceleration"}
+    devices = {**rig.devices, "drive": drive.model_copy(update={"registers": bare})}
+    fixed = rig.model_copy(update={"devices": devices})
+    assert "a ramp needs one" in "; ".join(runup.check(fixed, runup.Plan()))
+    assert list(coast_down.procedure.check(fixed, coast_down.Plan())) == []  # it coasts
+
+
+@pytest.mark.long
+@pytest.mark.timeout(300)
+def test_up_and_down_agree_on_criticals_and_with_the_truth(tmp_path: Path) -> None:
+    """A PID with little damping: the passage moves each critical, on the two ways to opposite sides; without the lag both are
+    where they are when the speed stands."""
+    from bench.analysis.criticals import criticals
+
+    parameters = {"kd": 10.0}
+    truth = {"unbalance_i": 0.7e-6, "unbalance_o": 0.7e-6}
+    plan = {**SHORT, "law": "PID", "parameters": parameters, "top_rad_s": 6500 / RPM, "speeds_rad_s": (2500 / RPM, 5000 / RPM),
+            "bottom_rad_s": 85.0}  # fmt: skip
+    del plan["acceleration_rad_s2"]
+    ways = []
+    for procedure, rate in (("run-up", "acceleration_rad_s2"), ("coast-down", "deceleration_rad_s2")):
+        (tmp_path / procedure).mkdir()
+        run = done(tmp_path / procedure, {**plan, rate: 100.0}, truth, procedure)
+        assert not codes(run)
+        assert "critical" in codes(run, serious=False)
+        ways.append({p.axis: p for p in evaluated(run).peaks if p.critical})
+    rig = load_rig("amb5dof")
+    defaults = {n: p.default for n, p in rig.parameters.items()}
+    speeds = np.linspace(300, 620, 50)
+    settings = {**defaults, **SETTINGS["off"], **parameters, "law": CODES["PID"]}
+    true = amb_unbalance.response(draw(rig, SEED, truth).plant, settings, speeds)
+    both = sorted(set(ways[0]) & set(ways[1]))
+    assert len(both) >= 2
+    for axis in both:
+        up, down = ways[0][axis], ways[1][axis]
+        assert up.raw_speed - down.raw_speed > 20 / RPM
+        assert abs(up.speed.value - down.speed.value) < 0.6 * (up.raw_speed - down.raw_speed)
+        k = ("yi", "zi", "yo", "zo").index(axis)
+        c = criticals(speeds, true[:, k], np.tile(1e-22 * np.eye(2), (50, 1, 1)), draws=2)[0]
+        for p in (up, down):
+            assert p.factor is not None
+            assert p.speed.value == pytest.approx(c.speed, abs=4 * p.speed.u + 1e-3 * c.speed)
+            assert p.factor.value == pytest.approx(c.factor, abs=4 * p.factor.u)
+
+
+@pytest.mark.long
+@pytest.mark.timeout(300)
+def test_a3_twelve_volts_lose_where_forty_eight_hold(tmp_path: Path) -> None:
+    """T Fig. 2.9 with CAC, 20 mH, e 18.9 um (10.7 g mm in each plane, 60 degrees apart), on a drawn stand: its noise, a
+    controller that does not know its betas (5 %) and offsets (10 um), its bending modes."""
+    held = done(tmp_path, A3, {**A3_TRUTH, "supply_V": 48.0})
+    assert not codes(held)
+    assert max(np.abs(evaluated(held).shaft).max(axis=1)) < 95e-6
+    lost = tmp_path / "lost"
+    lost.mkdir()
+    with pytest.raises(DeviceFault, match="LEVITATION_LOST"):
+        done(lost, A3, {**A3_TRUTH, "supply_V": 12.0})
+    recording: Recording[Any] = Recording.open(lost / "recording.mcap", runup.Plan)
+    told = recording.channel("speed")["speed"]
+    assert 3000 < told.max() * RPM < 5500
+    flags = recording.channel("flags")["flags"].astype(int)
+    assert (flags & 2).mean() > 0.05  # the amplifiers' voltages
+    (lost / "small").mkdir()
+    small = done(lost / "small", A3, {**A3_TRUTH, "supply_V": 12.0, "inductance": 2.65e-3})
+    assert "voltage-saturated" not in codes(small)
+
+
+@pytest.mark.long
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize(
+    ("truth", "plan", "code", "effect"),
+    [
+        ({"position_sign_yi": -1.0}, {}, "probe-polarity", Effect.ERROR),
+        ({"told_planes": 1.0}, {}, "planes-exchanged", Effect.ERROR),
+        ({"pulse_missing": 5.0}, {}, "pulse-missing", Effect.ERROR),
+        ({"pulse_missing": 2.0}, {}, "pulse-missing", Effect.ERROR),
+        ({"pulse_doubled": 2.0}, {}, "pulse-doubled", Effect.ERROR),
+        ({}, {"slow_rad_s": 0.0}, "no-slow-roll", Effect.INDETERMINATE),
+        ({}, {"rate_hz": 500.0}, "aliasing", Effect.ERROR),
+        ({"position_range": 78e-6, "unbalance_i": 1.05e-5, "unbalance_o": 1.05e-5}, {}, "sensor-clipped", Effect.ERROR),
+        ({"geometry.clearance": 20e-6}, {}, "contact", Effect.INDETERMINATE),
+        ({"drop_fraction": 0.01}, {}, "missing-samples", Effect.INDETERMINATE),
+    ],
+)
+def test_a_planted_defect_is_named_and_never_passes(
+    tmp_path: Path, truth: Mapping[str, float], plan: Mapping[str, Any], code: str, effect: Effect
+) -> None:
+    run = done(tmp_path, {**ONE, **plan}, truth)
+    found = [f for f in run.results if isinstance(f, Finding) and f.code == code]
+    assert found, codes(run, serious=False)
+    assert found[0].effect is effect
+    list(runup.figures(run.recording))  # what can be drawn is drawn
+
+
+def test_intervals_of_a_peak_are_not_nothing(found: Run) -> None:
+    for p in found.peaks:
+        assert p.factor is not None
+        i = interval(p.factor)
+        assert 0.002 < (i.high - i.low) / 2 / p.factor.value < 0.05
+        assert not p.critical
