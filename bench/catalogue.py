@@ -49,6 +49,9 @@ PROCEDURES = (
     Entry("tracking", "procedures.tracking", "Following an ellipse with the centre of mass: PID, CCS and CAC"),
     Entry("unbalance", "procedures.unbalance", "Unbalance response of the turning shaft: vectors, orbits, zones"),
     Entry("compensation", "procedures.compensation", "Compensation of unbalance: with and without it, and switched on"),
+    Entry(
+        "sensitivity", "procedures.sensitivity", "Sensitivity of the control loops by injection, with zones and margins"
+    ),
     Entry("force-map", "procedures.force_map", "Terms of the motor's force over displacement, currents and load"),
 )
 

@@ -1,0 +1,162 @@
+"""A rational function of frequency fitted to a few lines about a resonance, and the greatest abs of it with its covariance.
+
+z(u) = (b_0 + b_1 u + ...)/(1 + a_1 u + ...), u in -1..1 over the lines. The model of the frequency response of a linear system in
+a band: a pole for each resonance in it, the rest in the other terms. First by the iteration of Sanathanan and Koerner
+(IEEE Trans. AC-8, 56 (1963)), then by Gauss and Newton; the smallest order that the noise allows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import fdtrc
+
+from bench.analysis.sampling import Array, Complex
+from bench.errors import AnalysisError
+
+ORDERS = ((1, 1), (2, 1), (2, 2), (3, 2), (4, 2), (4, 3), (5, 3), (6, 4))  # terms in u above and below
+REFUSED = 0.05  # a model that fits as badly by chance this seldom is too small
+POINTS, DRAWS = 401, 400
+STRONG = 0.25  # share of a curve that a pole must give to be a resonance
+
+
+@dataclass(frozen=True)
+class Rational:
+    """`above` (n + 1,) and `below` (d,) of z(u), u = (x - middle)/half; `covariance` (p, p) of these terms, circular; `misfit`, mean
+    square of the residuals over their expectation, `probability` that noise alone gives as much; `dof` of the noise."""
+
+    middle: float
+    half: float
+    above: Complex
+    below: Complex
+    covariance: Complex
+    misfit: float
+    probability: float
+    dof: float
+
+    def at(self, x: Array) -> Complex:
+        """Values (m,) at `x` (m,)."""
+        return _evaluated(self.above, self.below, (x - self.middle) / self.half)
+
+    def width(self, near: float) -> float:
+        """Half-power width of the resonance at `near`: twice the imaginary part of the pole that gives the curve there a quarter
+        of its value or more and is nearest; infinite where there is none. Poles that a zero cancels give nothing."""
+        poles = np.roots([*self.below[::-1], 1.0])
+        if not poles.size:
+            return np.inf
+        u = (near - self.middle) / self.half
+        slopes = np.polyval(np.polyder([*self.below[::-1], 1.0]), poles)
+        share = np.abs(np.polyval(self.above[::-1], poles) / slopes / (u - poles)) / np.abs(self.at(np.array([near])))
+        strong = poles[share > STRONG]
+        return float(2 * self.half * abs(strong[int(np.abs(strong - u).argmin())].imag)) if strong.size else np.inf
+
+
+@dataclass(frozen=True)
+class Top:
+    """Greatest abs of a fitted curve: `value`, freed of the `bias` that noise gives a maximum, its standard uncertainty `u`;
+    `at`, where, with `u_at`; half-power `width` of its resonance; `inside`, whether it lies within the lines."""
+
+    value: float
+    u: float
+    bias: float
+    at: float
+    u_at: float
+    width: float
+    inside: bool
+
+
+def fitted(x: Array, z: Complex, power: Array, dof: float) -> Rational:
+    """Of lines `z` (m,) at `x` (m,) whose noise has the mean square `power` (m,), known with `dof` degrees of freedom.
+
+    Raises:
+        AnalysisError: fewer than six lines.
+    """
+    if x.size < 6 or z.shape != x.shape or power.shape != x.shape:
+        raise AnalysisError(
+            f"rational model: found {x.size} lines and {power.size} variances; expected six or more of each"
+        )
+    middle, half = (x[0] + x[-1]) / 2, (x[-1] - x[0]) / 2
+    u, root = (x - middle) / half, 1 / np.sqrt(np.maximum(power, 1e-300))
+    best: Rational | None = None
+    for n, d in ORDERS:
+        left = 2 * (x.size - n - d - 1)
+        if left < 4:
+            break
+        above, below, slopes = _solved(u, z, root, n, d)
+        misfit = float((np.abs((z - _evaluated(above, below, u)) * root) ** 2).sum() * 2 / left)
+        chance = float(fdtrc(left, max(dof, 1.0), misfit))
+        covariance = np.linalg.pinv(slopes.conj().T @ slopes)
+        made = Rational(float(middle), float(half), above, below, covariance, misfit, chance, dof)
+        if chance > REFUSED:
+            return made
+        if best is None or misfit < best.misfit:
+            best = made
+    assert best is not None
+    return best
+
+
+def top(model: Rational, low: float, high: float, seed: int = 0) -> Top:
+    """The greatest abs between two places. Noise of the model's covariance is drawn onto the curve: it gives bias and spread."""
+    x = np.linspace(low, high, POINTS)
+    z = model.at(x)
+    slopes = _slopes(model.above, model.below, (x - model.middle) / model.half)
+    values, vectors = np.linalg.eigh(model.covariance)
+    normal = np.random.default_rng(seed).standard_normal((2, DRAWS, values.size))
+    terms = ((normal[0] + 1j * normal[1]) * np.sqrt(np.maximum(values, 0) / 2)) @ vectors.T
+    sizes = np.abs(z + terms @ slopes.T)
+    k = int(np.abs(z).argmax())
+    found, places = _crest(x, np.abs(z)[None])
+    drawn, at = _crest(x, sizes)
+    bias = float(drawn.mean() - found[0])
+    inside = 0 < k < POINTS - 1
+    return Top(
+        float(found[0] - bias),
+        float(drawn.std()),
+        bias,
+        float(places[0]),
+        float(at.std()),
+        model.width(float(places[0])),
+        inside,
+    )
+
+
+def _crest(x: Array, size: Array) -> tuple[Array, Array]:
+    """Greatest of curves (c, m) and where, by a parabola through the greatest point and its neighbours."""
+    k = np.clip(size.argmax(axis=1), 1, x.size - 2)
+    rows = np.arange(len(size))
+    a, b, c = size[rows, k - 1], size[rows, k], size[rows, k + 1]
+    bend = np.minimum(a - 2 * b + c, -1e-300)
+    shift = np.clip((a - c) / (2 * bend), -1, 1)
+    return b - (a - c) * shift / 4, x[k] + shift * (x[1] - x[0])
+
+
+def _evaluated(above: Complex, below: Complex, u: Array) -> Complex:
+    out: Complex = np.polyval(above[::-1], u) / np.polyval([*below[::-1], 1.0], u)
+    return out
+
+
+def _slopes(above: Complex, below: Complex, u: Array) -> Complex:
+    """Derivatives (m, p) of the values to the terms above and below."""
+    under = np.polyval([*below[::-1], 1.0], u)
+    value = np.polyval(above[::-1], u) / under
+    up = [u**k / under for k in range(above.size)]
+    down = [-value * u**k / under for k in range(1, below.size + 1)]
+    return np.array([*up, *down]).T
+
+
+def _solved(u: Array, z: Complex, root: Array, n: int, d: int) -> tuple[Complex, Complex, Complex]:
+    """Terms above (n + 1,), below (d,), and the weighted slopes at the solution."""
+    weight = root.astype(complex)
+    above, below = np.zeros(n + 1, complex), np.zeros(d, complex)
+    for _ in range(12):
+        columns = [u**k for k in range(n + 1)] + [-z * u**k for k in range(1, d + 1)]
+        terms = np.linalg.lstsq(np.array(columns).T * weight[:, None], z * weight, rcond=None)[0]
+        above, below = terms[: n + 1], terms[n + 1 :]
+        weight = root / np.polyval([*below[::-1], 1.0], u)
+    for _ in range(6):
+        step = np.linalg.lstsq(
+            _slopes(above, below, u) * root[:, None], (z - _evaluated(above, below, u)) * root, rcond=None
+        )[0]
+        above, below = above + step[: n + 1], below + step[n + 1 :]
+    return above, below, _slopes(above, below, u) * root[:, None]
