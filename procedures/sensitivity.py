@@ -226,21 +226,24 @@ def figures(recording: Recording[Plan]) -> Iterable[Figure]:
 
 METHOD = """\
 A multisine E is added to the differential current reference of one axis, half the difference of its coils' references, while
-all loops are closed. V2 is that reference as the law gives it, V1 = V2 + E what goes to the amplifiers; the controller records
-the three at its full rate. S = V1/E at each line, averaged over whole periods (H1; E carries no noise). With L the open loop of
-that axis with all others closed, V2 = -L V1 and S = 1/(1 + L). ISO 14839-3 adds E to the sensor's signal; where each axis has its
-own controller (PID) both are the same loop, opened at another place. The flatness law joins the axes: there S belongs to the
-current references.
+all loops are closed. V2 is that reference as the law gives it, V1 = V2 + E what goes to the amplifiers; the controller
+records the three at its full rate. S = V1/E at each line, averaged over whole periods (H1; E carries no noise). With L the
+open loop of that axis with all others closed, V2 = -L V1 and S = 1/(1 + L). ISO 14839-3 adds E to the sensor's signal; where
+each axis has its own controller (PID) both are the same loop, opened at another place. The flatness law joins the axes: there
+S belongs to the current references.
 
-First the whole range is surveyed, with a finer grid about the plan's bending modes. About the greatest |S|, and others that come
-near it, a second grid is laid, at least four lines in half of the half-power width that the first look found, at the plan's amplitude
-and at half of it. A rational function of frequency of the smallest order that the scatter allows is fitted to these lines; S_max is
-its greatest abs, with the bias taken off that noise gives a maximum, and its scatter by the fit's covariance.
+First the whole range is surveyed, with a finer grid about the plan's bending modes. About the greatest |S|, and others that
+come near it, a second grid is laid, four lines or more in half of the half-power width that the first look found, at the
+plan's amplitude and at half of it. A rational function of frequency, of the smallest order that the scatter allows, is fitted
+to these lines; S_max is its greatest abs, with the bias taken off that noise gives a maximum, and its scatter by the fit's
+covariance.
 
-Where the shaft turns, orders 1 to 4 of its angle are fitted to each capture and taken away, and lines within 3 Hz of them are left out.
+Where the shaft turns, orders 1 to 4 of its angle are fitted to each capture and taken away, and lines within 3 Hz of them are
+left out.
 
-Margins are those of L = 1/S - 1 by the survey's lines, smoothed by local models: the least angle from -1 where |L| = 1, and where L
-crosses the negative real axis, how far the gain may fall (|L| above 1: the shaft is unstable without the loop) and rise.
+Margins are those of L = 1/S - 1 by the survey's lines, smoothed by local models: the least angle from -1 where |L| = 1, and
+where L crosses the negative real axis, how far the gain may fall (|L| above 1: the shaft is unstable without the loop) and
+rise.
 
 Ratios of numbers inside the controller: no certificate enters. What is left is the scatter from period to period; that of the
 machine itself (its temperature, another day) is not in it.

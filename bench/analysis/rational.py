@@ -1,7 +1,7 @@
 """A rational function of frequency fitted to a few lines about a resonance, and the greatest abs of it with its covariance.
 
-z(u) = (b_0 + b_1 u + ...)/(1 + a_1 u + ...), u in -1..1 over the lines. The model of the frequency response of a linear system in
-a band: a pole for each resonance in it, the rest in the other terms. First by the iteration of Sanathanan and Koerner
+z(u) = (b_0 + b_1 u + ...)/(1 + a_1 u + ...), u in -1..1 over the lines: in a band, the frequency response of a linear
+system, a pole for each resonance in it, the rest in the other terms. First by the iteration of Sanathanan and Koerner
 (IEEE Trans. AC-8, 56 (1963)), then by Gauss and Newton; the smallest order that the noise allows.
 """
 
@@ -10,12 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import fdtrc
+from scipy.special import chdtrc, fdtrc
 
 from bench.analysis.sampling import Array, Complex
 from bench.errors import AnalysisError
 
-ORDERS = ((1, 1), (2, 1), (2, 2), (3, 2), (4, 2), (4, 3), (5, 3), (6, 4))  # terms in u above and below
+ORDERS = ((3, 2), (4, 2), (4, 3), (5, 3), (6, 4))  # terms in u above and below; smaller ones bias a peak by their u
 REFUSED = 0.05  # a model that fits as badly by chance this seldom is too small
 POINTS, DRAWS = 401, 400
 STRONG = 0.25  # share of a curve that a pole must give to be a resonance
@@ -23,8 +23,8 @@ STRONG = 0.25  # share of a curve that a pole must give to be a resonance
 
 @dataclass(frozen=True)
 class Rational:
-    """`above` (n + 1,) and `below` (d,) of z(u), u = (x - middle)/half; `covariance` (p, p) of these terms, circular; `misfit`, mean
-    square of the residuals over their expectation, `probability` that noise alone gives as much; `dof` of the noise."""
+    """`above` (n + 1,) and `below` (d,) of z(u), u = (x - middle)/half; `covariance` (p, p) of these terms, circular; `misfit`,
+    mean square of the residuals over their expectation, `probability` that noise alone gives as much; `dof` of the noise."""
 
     middle: float
     half: float
@@ -40,8 +40,8 @@ class Rational:
         return _evaluated(self.above, self.below, (x - self.middle) / self.half)
 
     def width(self, near: float) -> float:
-        """Half-power width of the resonance at `near`: twice the imaginary part of the pole that gives the curve there a quarter
-        of its value or more and is nearest; infinite where there is none. Poles that a zero cancels give nothing."""
+        """Half-power width of the resonance at `near`: twice the imaginary part of the nearest pole that gives the curve there
+        a quarter of its value or more; infinite where there is none. Poles that a zero cancels give nothing."""
         poles = np.roots([*self.below[::-1], 1.0])
         if not poles.size:
             return np.inf
@@ -85,7 +85,7 @@ def fitted(x: Array, z: Complex, power: Array, dof: float) -> Rational:
             break
         above, below, slopes = _solved(u, z, root, n, d)
         misfit = float((np.abs((z - _evaluated(above, below, u)) * root) ** 2).sum() * 2 / left)
-        chance = float(fdtrc(left, max(dof, 1.0), misfit))
+        chance = float(chdtrc(left, misfit * left) if np.isinf(dof) else fdtrc(left, max(dof, 1.0), misfit))
         covariance = np.linalg.pinv(slopes.conj().T @ slopes)
         made = Rational(float(middle), float(half), above, below, covariance, misfit, chance, dof)
         if chance > REFUSED:
@@ -97,7 +97,7 @@ def fitted(x: Array, z: Complex, power: Array, dof: float) -> Rational:
 
 
 def top(model: Rational, low: float, high: float, seed: int = 0) -> Top:
-    """The greatest abs between two places. Noise of the model's covariance is drawn onto the curve: it gives bias and spread."""
+    """The greatest abs between two places. Noise of the model's covariance, drawn onto the curve, gives bias and spread."""
     x = np.linspace(low, high, POINTS)
     z = model.at(x)
     slopes = _slopes(model.above, model.below, (x - model.middle) / model.half)

@@ -38,8 +38,9 @@ from procedures.injecting import PARAMETERS, Comb, refused
 
 ZONES = (3.0, 4.0, 5.0)
 """Ends of the zones A, B and C, |S| (ISO 14839-3; 9.5, 12 and 14 dB; not checked against the standard)."""
-SCOPE = ("ISO 14839-3 is for machines above 15 kW and leaves small rotors out; its zones are used here outside of that scope. A/B and B/C "
-         "are from secondary sources, C/D from general knowledge; none was checked against the standard.")  # fmt: skip
+SCOPE = ("ISO 14839-3 is for machines above 15 kW and leaves small rotors out; its zones are used here outside of that "
+         "scope. A/B and B/C are from secondary sources, C/D from general knowledge; none was "
+         "checked against the standard.")  # fmt: skip
 HELD = 8  # samples in a row at an extreme: a probe that clips
 OFF = 0.05  # share of the amplitude asked for by which that found may differ
 SAME = 1e-5  # A: what single precision makes of after - before - inject
@@ -116,7 +117,8 @@ def _injection(rig: RigFile, plan: Settings, combs: Sequence[Comb]) -> Iterator[
         yield f"axes: found {', '.join(plan.axes)}; expected each once"
     top = max(hz for c in combs for hz in c.hz)
     if top > 0.45 * plan.rate_hz:
-        yield f"rate_hz: found {plan.rate_hz:g}; expected {top / 0.45:.0f} Hz or more for lines up to {top:g} Hz: what is above half folds back"
+        yield (f"rate_hz: found {plan.rate_hz:g}; expected {top / 0.45:.0f} Hz or more for lines up to {top:g} Hz: what is "
+               "above half of it folds back")  # fmt: skip
     yield from _memory(rig, plan, combs)
 
 
@@ -133,7 +135,7 @@ def _memory(rig: RigFile, plan: Settings, combs: Sequence[Comb]) -> Iterator[str
             yield str(error)
             return
         if size > rig.capture.memory_bytes:
-            yield f"periods: {kind} needs {size:.0f} bytes; expected {rig.capture.memory_bytes} at most, the controller's memory"
+            yield f"periods: found {size:.0f} bytes for {kind}; expected {rig.capture.memory_bytes} at most, the memory"
             return
 
 
@@ -164,7 +166,7 @@ def before(recording: Recording[Any]) -> Iterator[Finding]:
         grid, rate = grid_of(step.labels), captured[0].rate_hz
         if folds(grid, rate):
             text = (f"captured at {rate:g} Hz; lines up to {grid.hz.max():g} Hz that repeat after {grid.period:g} s need "
-                    f"{grid.hz.max() / 0.45:.0f} Hz or more: what is above half of the rate appears at other frequencies.")  # fmt: skip
+                    f"{grid.hz.max() / 0.45:.0f} Hz or more: what is above half of it appears elsewhere.")  # fmt: skip
             yield Finding("aliasing", text, where, Effect.ERROR)
             return
 
@@ -192,7 +194,7 @@ def _limits(t: Taken) -> Iterator[Finding]:
     for bits, code, text in (
         (CONTACT, "contact", "the shaft touched a ring or the axial stop: this is not the levitated loop."),
         (CURRENT_LIMIT, "current-saturated", "a coil current was at its limit: the loop was not linear. Inject less."),
-        (VOLTAGE_LIMIT, "voltage-saturated", "an amplifier's voltage was at its limit: the currents slewed, S is not that of small motions."),
+        (VOLTAGE_LIMIT, "voltage-saturated", "an amplifier's voltage was at its limit: this is not S of small motions."),
     ):  # fmt: skip
         if t.flags & bits:
             yield Finding(code, text, t.where, Effect.INDETERMINATE)
@@ -210,7 +212,7 @@ def _injected(t: Taken) -> Iterator[Finding]:
     off = float(np.abs(t.injected / t.grid.amplitude - 1).max())
     if off > OFF:
         found = np.median(t.injected) * 1e3
-        text = f"injected were {found:.3g} mA in each line; asked for were {t.grid.amplitude * 1e3:.3g} mA ({off:.0%} off at worst)."
+        text = f"injected were {found:.3g} mA in each line; asked for were {t.grid.amplitude * 1e3:.3g} mA ({off:.0%} off)."
         yield Finding("injection-wrong", text, t.where, Effect.ERROR)
 
 
@@ -277,20 +279,20 @@ def _covered(r: Result) -> Iterator[Finding]:
 def _of_peak(p: Peak, plan: Settings) -> Iterator[Finding]:
     where, half = p.taken.where, p.top.width / 2
     if p.taken.grid.step > half:
-        text = (f"lines stand {p.taken.grid.step:g} Hz apart at {p.top.at:.4g} Hz; half of the half-power width there is {half:.2g} Hz: "
-                "the maximum may lie between them.")  # fmt: skip
+        text = (f"lines stand {p.taken.grid.step:g} Hz apart at {p.top.at:.4g} Hz; half of the half-power width there is "
+                f"{half:.2g} Hz: the maximum may lie between them.")  # fmt: skip
         yield Finding("grid-too-coarse", text, where, Effect.INDETERMINATE)
     if p.model.probability < UNEXPLAINED:
-        text = (f"no model of up to four resonances explains the lines about {p.top.at:.4g} Hz (misfit {p.model.misfit:.1f}): the loop changed "
-                "while it was measured, or something else shakes it.")  # fmt: skip
+        text = (f"no model of up to four resonances explains the lines about {p.top.at:.4g} Hz (misfit "
+                f"{p.model.misfit:.1f}): the loop changed while it was measured, or something else shakes it.")  # fmt: skip
         yield Finding("not-explained", text, where, Effect.INDETERMINATE)
     if p.coherence < plan.min_coherence:
-        text = (f"coherence falls to {p.coherence:.2f} at the peak ({plan.min_coherence:g} is wanted): the injection is too small for what else "
-                "moves the loop. Inject more, or longer.")  # fmt: skip
+        text = (f"coherence falls to {p.coherence:.2f} at the peak ({plan.min_coherence:g} is wanted): the injection is too "
+                "small for what else moves the loop. Inject more, or longer.")  # fmt: skip
         yield Finding("coherence-low", text, where, Effect.INDETERMINATE)
     if abs(p.change) > plan.max_change and abs(p.change) > 3 * p.u_change:
-        text = (f"|S| at the peak changes by {p.change:+.1%} at half the amplitude ({plan.max_change:.0%} is allowed): the loop is not linear at "
-                "this injection. Inject less.")  # fmt: skip
+        text = (f"|S| at the peak changes by {p.change:+.1%} at half the amplitude ({plan.max_change:.0%} is "
+                "allowed): the loop is not linear at this injection. Inject less.")  # fmt: skip
         yield Finding("not-linear", text, where, Effect.INDETERMINATE)
 
 
@@ -307,10 +309,10 @@ def _notes(results: Sequence[Result], plan: Settings) -> Iterator[Finding]:
             else f"between zones {names[0]} and {names[-1]}: the interval reaches both"
         )
         up, down, angle = guaranteed_margins(e.value) if e.value > 1 else (math.inf, 0.0, 180.0)
-        text = (f"|S| is greatest at {p.top.at:.4g} Hz: {e.value:.3f} ± {half:.3f} ({20 * math.log10(e.value):.1f} dB), {said}. It guarantees "
-                f"gain factors of {down:.2f} and {up:.2f} and {angle:.0f}° of phase. Half-power width {p.top.width:.3g} Hz, lines "
-                f"{p.taken.grid.step:g} Hz apart, least coherence {p.coherence:.3f}; {p.change:+.2%} ± {2 * p.u_change:.2%} at half the "
-                "amplitude.")  # fmt: skip
+        text = (f"|S| is greatest at {p.top.at:.4g} Hz: {e.value:.3f} ± {half:.3f} ({20 * math.log10(e.value):.1f} dB), "
+                f"{said}. It guarantees gain factors of {down:.2f} and {up:.2f} and {angle:.0f}° of phase. Half-power width "
+                f"{p.top.width:.3g} Hz, lines {p.taken.grid.step:g} Hz apart, least coherence {p.coherence:.3f}; "
+                f"{p.change:+.2%} ± {2 * p.u_change:.2%} at half the amplitude.")  # fmt: skip
         yield Finding("zone", text, r.where)
         if r.excluded:
             left = ", ".join(f"{hz:g}" for hz in r.excluded[:12]) + (" and more" if len(r.excluded) > 12 else "")
@@ -318,7 +320,8 @@ def _notes(results: Sequence[Result], plan: Settings) -> Iterator[Finding]:
                 "orders-excluded", f"lines beside the orders of the shaft's speed were left out: {left} Hz.", r.where
             )
     peak = max((t.peak for r in results for t in r.taken), default=0.0)
-    text = f"{plan.amplitude_A * 1e3:g} mA 0-pk in each line, at most {peak * 1e3:.0f} mA together, into the differential current reference."
+    text = (f"{plan.amplitude_A * 1e3:g} mA 0-pk in each line, at most {peak * 1e3:.0f} mA together, into the differential "
+            "current reference.")  # fmt: skip
     yield Finding("injection", text)
     yield Finding("scope", SCOPE)
 

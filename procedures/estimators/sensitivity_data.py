@@ -48,10 +48,10 @@ class Grid:
 
 @dataclass(frozen=True)
 class Taken:
-    """One capture under injection into `axis`: `kind` of pass about `about` Hz; `response`, S at the lines that are clear of the
-    shaft's orders, `excluded` Hz those that are not; `injected` (m,) A found; greatest injection `peak` A; `clipped`, the greatest
-    difference of after from before + inject, A; `follows` (5,), the differential coil currents of all axes per `after` at the
-    lowest lines (None where the currents were not captured); `rate` Hz, `flags` ORed; `clips` of a probe."""
+    """One capture under injection into `axis`: `kind` of pass about `about` Hz; `response`, S at the lines that are clear of
+    the shaft's orders, `excluded` Hz those that are not; `injected` (m,) A found; `peak` A, the greatest; `clipped`, the most
+    of the difference of after from before + inject, A; `follows` (5,), the differential coil currents of all axes per `after`
+    at the lowest lines (None where the currents were not captured); `rate` Hz, `flags` ORed; `clips` of a probe."""
 
     axis: str
     speed: float
@@ -168,9 +168,10 @@ def _read(recording: Recording[Any], step: Step) -> Taken:
     clipped = float(np.abs(columns["after"] - columns["before"] - columns["inject"]).max())
     follows = _follows(columns, rate, grid) if kind == SURVEY else None
     turning = turned(columns, columns["t_s"])[1] if "pulses" in columns else 0.0
+    flags = int(np.bitwise_or.reduce(told["flags"].astype(np.int64)))
     return Taken(
-        str(labels["axis"]), float(labels["speed_rad_s"]), turning, kind, float(labels["about_hz"]), grid, found, excluded, injected,
-        float(np.abs(columns["inject"]).max()), clipped, follows, rate, int(np.bitwise_or.reduce(told["flags"].astype(np.int64))),
+        str(labels["axis"]), float(labels["speed_rad_s"]), turning, kind, float(labels["about_hz"]), grid, found, excluded,
+        injected, float(np.abs(columns["inject"]).max()), clipped, follows, rate, flags,
         held([told[f"pos_{a}"] for a in AXES]), step.lost(), step.expected(),
     )  # fmt: skip
 

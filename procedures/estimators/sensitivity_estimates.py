@@ -45,8 +45,8 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Peak:
-    """A peak that was refined: the lines about it with the model, its greatest value, least coherence where |S| is above 0.7 of it;
-    `change`, relative, of |S| there at half the amplitude, with its standard uncertainty."""
+    """A peak that was refined: the lines about it with the model, its greatest value, least coherence where |S| is above 0.7
+    of it; `change`, relative, of |S| there at half the amplitude, with its standard uncertainty."""
 
     taken: Taken
     model: Rational
@@ -58,8 +58,7 @@ class Peak:
 
 @dataclass(frozen=True)
 class Result:
-    """One axis at one speed: `curve`, all lines in order; the peaks, the greatest first; `open` (m,), L by smoothed lines of the
-    survey at `open_hz`; estimates by name."""
+    """One axis at one speed: `curve`, all lines in order; the peaks, the greatest first; estimates by name."""
 
     axis: str
     speed: float
@@ -134,7 +133,7 @@ def results(taken: Sequence[Taken]) -> list[Result]:
 
 
 def _result(axis: str, speed: float, taken: Sequence[Taken]) -> Result:
-    found = sorted(_peaks(taken), key=lambda p: -p.top.value)
+    found = sorted(found_peaks(taken), key=lambda p: -p.top.value)
     where = f"{axis}/{named(speed)}"
     estimates: dict[str, Estimate] = {}
     if found:
@@ -154,7 +153,8 @@ def _typed(value: float, u: float, unit: str, identity: str, name: str, dof: flo
     return Estimate.of(value, Influence(f"scatter/{identity}", name, u, unit, "A", "normal", max(dof, 1.0)))
 
 
-def _peaks(taken: Sequence[Taken]) -> Iterator[Peak]:
+def found_peaks(taken: Sequence[Taken]) -> Iterator[Peak]:
+    """What was refined, each with its model."""
     for t in taken:
         if t.kind != REFINED or t.response.hz.size < 8:
             continue
