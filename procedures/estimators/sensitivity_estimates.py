@@ -210,9 +210,9 @@ def margins(surveys: Sequence[Taken], where: str) -> dict[str, Estimate]:
     out: dict[str, Estimate] = {}
     dof = float(min(t.dof for t in surveys))
     for name, unit, of in (
-        ("phase_margin", "rad", _phase),
-        ("gain_reduction", "1", _fall),
-        ("gain_increase", "1", _rise),
+        ("phase_margin", "rad", phase),
+        ("gain_reduction", "1", fall),
+        ("gain_increase", "1", rise),
     ):
         found, again = of(1 / smooth.everywhere(z) - 1), of(1 / smooth.everywhere(base) - 1)
         values = np.array([of(1 / d - 1) for d in drawn])
@@ -233,7 +233,8 @@ def _crossings(level: Array, other: Complex) -> Complex:
     return np.asarray(other[k] + share * (other[k + 1] - other[k]))
 
 
-def _phase(loop: Complex) -> float:
+def phase(loop: Complex) -> float:
+    """Phase margin of an open loop (m,), rad; NaN where |L| is not 1."""
     at = _crossings(np.abs(loop) - 1, loop)
     return float(np.abs(np.angle(-at)).min()) if at.size else math.nan
 
@@ -244,12 +245,14 @@ def _real(loop: Complex) -> Array:
     return np.asarray(-at[at < 0])
 
 
-def _fall(loop: Complex) -> float:
+def fall(loop: Complex) -> float:
+    """Factor to which its gain may fall; NaN where that is not told."""
     at = _real(loop)
     return float((1 / at[at > 1]).max()) if (at > 1).any() else math.nan
 
 
-def _rise(loop: Complex) -> float:
+def rise(loop: Complex) -> float:
+    """Factor to which its gain may rise; NaN where that is not told."""
     at = _real(loop)
     some = at[(at < 1) & (at > FAINT)]
     return float((1 / some).min()) if some.size else math.nan
