@@ -2,7 +2,7 @@
 
 z(u) = (b_0 + b_1 u + ...)/(1 + a_1 u + ...), u in -1..1 over the lines: in a band, the frequency response of a linear
 system, a pole for each resonance in it, the rest in the other terms. First by the iteration of Sanathanan and Koerner
-(IEEE Trans. AC-8, 56 (1963)), then by Gauss and Newton; the smallest order that the noise allows.
+(IEEE Trans. AC-8, 56 (1963)), then by Levenberg and Marquardt's; of several orders the one that Akaike's criterion takes.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from scipy.special import chdtrc, fdtrc
 from bench.analysis.sampling import Array, Complex
 from bench.errors import AnalysisError
 
-ORDERS = ((3, 2), (4, 2), (4, 3), (5, 3), (6, 4))  # terms in u above and below; smaller ones bias a peak by their u
-REFUSED = 0.05  # a model that fits as badly by chance this seldom is too small
-POINTS, DRAWS = 401, 400
+ORDERS = ((3, 1), (3, 2), (4, 2), (4, 3), (5, 3), (6, 4))  # terms in u above and below
+POINTS, DRAWS = 201, 300
+STEPS = 40  # of the descent, at most
 STRONG = 0.25  # share of a curve that a pole must give to be a resonance
 
 
@@ -78,22 +78,26 @@ def fitted(x: Array, z: Complex, power: Array, dof: float) -> Rational:
         )
     middle, half = (x[0] + x[-1]) / 2, (x[-1] - x[0]) / 2
     u, root = (x - middle) / half, 1 / np.sqrt(np.maximum(power, 1e-300))
-    best: Rational | None = None
+    best, least = None, np.inf
     for n, d in ORDERS:
         left = 2 * (x.size - n - d - 1)
-        if left < 4:
+        if left < 4 or (best is not None and left < 10):
             break
         above, below, slopes = _solved(u, z, root, n, d)
-        misfit = float((np.abs((z - _evaluated(above, below, u)) * root) ** 2).sum() * 2 / left)
-        chance = float(chdtrc(left, misfit * left) if np.isinf(dof) else fdtrc(left, max(dof, 1.0), misfit))
+        chi2 = 2 * float((np.abs((z - _evaluated(above, below, u)) * root) ** 2).sum())
+        if (told := chi2 + 4 * (n + d)) >= least or (best is not None and _hides(below, u)):
+            continue
+        chance = float(chdtrc(left, chi2) if np.isinf(dof) else fdtrc(left, max(dof, 1.0), chi2 / left))
         covariance = np.linalg.pinv(slopes.conj().T @ slopes)
-        made = Rational(float(middle), float(half), above, below, covariance, misfit, chance, dof)
-        if chance > REFUSED:
-            return made
-        if best is None or misfit < best.misfit:
-            best = made
+        best, least = Rational(float(middle), float(half), above, below, covariance, chi2 / left, chance, dof), told
     assert best is not None
     return best
+
+
+def _hides(below: Complex, u: Array) -> bool:
+    """Whether a pole stands between the lines, narrower than they can show: noise makes such poles."""
+    poles = np.roots([*below[::-1], 1.0])
+    return bool(((np.abs(poles.real) < 1) & (2 * np.abs(poles.imag) < np.diff(u).max())).any())
 
 
 def top(model: Rational, low: float, high: float, seed: int = 0) -> Top:
@@ -154,9 +158,29 @@ def _solved(u: Array, z: Complex, root: Array, n: int, d: int) -> tuple[Complex,
         terms = np.linalg.lstsq(np.array(columns).T * weight[:, None], z * weight, rcond=None)[0]
         above, below = terms[: n + 1], terms[n + 1 :]
         weight = root / np.polyval([*below[::-1], 1.0], u)
-    for _ in range(6):
-        step = np.linalg.lstsq(
-            _slopes(above, below, u) * root[:, None], (z - _evaluated(above, below, u)) * root, rcond=None
-        )[0]
-        above, below = above + step[: n + 1], below + step[n + 1 :]
-    return above, below, _slopes(above, below, u) * root[:, None]
+    terms = np.concatenate([above, below])
+    return _descended(u, z, root, terms, n)
+
+
+def _descended(u: Array, z: Complex, root: Array, terms: Complex, n: int) -> tuple[Complex, Complex, Complex]:
+    """Levenberg and Marquardt's steps from there: without their damping, noisy lines do not reach the least squares."""
+
+    def left(t: Complex) -> Complex:
+        return np.asarray((z - _evaluated(t[: n + 1], t[n + 1 :], u)) * root)
+
+    damping, miss = 1e-3, left(terms)
+    slopes = _slopes(terms[: n + 1], terms[n + 1 :], u) * root[:, None]
+    for _ in range(STEPS):
+        normal = slopes.conj().T @ slopes
+        eased = normal + damping * np.diag(np.diag(normal))
+        moved = terms + np.linalg.lstsq(eased, slopes.conj().T @ miss, rcond=None)[0]
+        again = left(moved)
+        before, after = float((np.abs(miss) ** 2).sum()), float((np.abs(again) ** 2).sum())
+        if not after < before:
+            damping = min(damping * 8, 1e8)
+            continue
+        terms, miss, damping = moved, again, damping / 8
+        slopes = _slopes(terms[: n + 1], terms[n + 1 :], u) * root[:, None]
+        if before - after < 1e-6 * after:
+            break
+    return terms[: n + 1], terms[n + 1 :], slopes

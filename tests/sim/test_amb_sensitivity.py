@@ -20,15 +20,14 @@ SETTINGS = {n: p.default for n, p in RIG.parameters.items()}
 PLANT: AmbParams = draw(RIG, 2).plant
 
 
-@pytest.mark.parametrize(("law", "axis"), [(0.0, 0), (1.0, 3), (1.0, 4)])
-@pytest.mark.parametrize("substeps", [1, 2])
+@pytest.mark.parametrize(("law", "axis", "substeps"), [(0.0, 0, 1), (1.0, 3, 2), (1.0, 4, 1)])
 def test_the_core_is_the_closed_form(law: float, axis: int, substeps: int) -> None:
     """Small lines into the quiet machine with bending modes, 20 Hz to 2 kHz. What is left is the integrators' last drift."""
     settings = {**SETTINGS, "law": law}
-    plant = floating(PLANT, settings, substeps=substeps, settle_s=8.0)
+    plant = floating(PLANT, settings, substeps=substeps, settle_s=20.0)
     lines = {
         "inject_axis": axis,
-        "inject_amplitude": 5e-4,
+        "inject_amplitude": 2e-4,
         "inject_hz": 20.0,
         "inject_lines": 100.0,
         "inject_step": 20.0,
