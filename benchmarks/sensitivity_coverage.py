@@ -48,7 +48,7 @@ def light(
         refined = [
             _taken(plant, plan, axis, kind, about, comb)
             for c in sensitivity_estimates.candidates([t.response for t in seen])
-            for kind, about, comb in refinements(plan, c)
+            for kind, about, comb in refinements(plan, c, plan.speeds_rad_s[0])
             if kind == REFINED
         ]
         best = max(sensitivity_estimates.found_peaks(refined), key=lambda peak: peak.top.value)

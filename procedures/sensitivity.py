@@ -70,7 +70,7 @@ class Plan(BenchPlan):
     high_hz: float = Field(2000.0, gt=0)
     modes_hz: tuple[float, ...] = (650.0, 1240.0)  # bending modes, about which a finer grid is laid
     mode_within_hz: float = Field(26.0, gt=0)  # to either side
-    mode_damping: float = Field(1e-3, gt=0)  # least that is expected of them
+    mode_damping: float = Field(2e-3, gt=0)  # least that is expected of them
     periods: int = Field(4, ge=3)  # of the survey
     refined_periods: int = Field(8, ge=4)
     settle_s: float = Field(8.0, ge=0.5)  # under the law, before anything is injected
@@ -96,9 +96,9 @@ def surveys(plan: Plan) -> list[tuple[str, float, Comb]]:
     return out
 
 
-def refinements(plan: Plan, about: Candidate) -> list[tuple[str, float, Comb]]:
+def refinements(plan: Plan, about: Candidate, speed: float) -> list[tuple[str, float, Comb]]:
     """The second pass about a peak, at the plan's amplitude and at half of it."""
-    first, step, count = about.lines
+    first, step, count = about.lines(speed)
     return [(k, about.hz, Comb(first, step, count, plan.amplitude_A * f)) for k, f in ((REFINED, 1.0), (HALF, 0.5))]
 
 
@@ -146,7 +146,7 @@ def _axis(rig: Rig, plan: Plan, record: Recorder, speed: float, axis: str, numbe
         seen += [found] if found is not None else []
         number += 1
     for candidate in sensitivity_estimates.candidates(seen):
-        for kind, about, comb in refinements(plan, candidate):
+        for kind, about, comb in refinements(plan, candidate, speed):
             _taken(rig, plan, record, speed, axis, kind, about, comb, number)
             number += 1
     return number
@@ -216,7 +216,7 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    yield from sensitivity_checks.of_plan(rig, plan, [c for _, _, c in surveys(plan)])
+    yield from sensitivity_checks.of_plan(rig, plan, [(kind, comb) for kind, _, comb in surveys(plan)])
 
 
 def figures(recording: Recording[Plan]) -> Iterable[Figure]:
@@ -233,8 +233,8 @@ each axis has its own controller (PID) both are the same loop, opened at another
 S belongs to the current references.
 
 First the whole range is surveyed, with a finer grid about the plan's bending modes. About the greatest |S|, and others that
-come near it, a second grid is laid, four lines or more in half of the half-power width that the first look found, at the
-plan's amplitude and at half of it. A rational function of frequency, of the smallest order that the scatter allows, is fitted
+come near it, a second grid is laid, six lines or more in the half-power width that the first look found, at the plan's
+amplitude and at half of it. A rational function of frequency, of the smallest order that the scatter allows, is fitted
 to these lines; S_max is its greatest abs, with the bias taken off that noise gives a maximum, and its scatter by the fit's
 covariance.
 

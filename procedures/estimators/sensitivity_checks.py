@@ -23,8 +23,8 @@ from procedures.estimators.sensitivity_data import (
     CURRENT_LIMIT,
     INJECT,
     RANGE,
+    REFINED,
     RPM,
-    SURVEY,
     TOLD,
     VOLTAGE_LIMIT,
     Taken,
@@ -48,6 +48,7 @@ FOLLOWS = (
     0.4,
     1.6,
 )  # of `after`, of the injected axis' coils below 200 Hz: their current loops, and the sample of delay
+LEAST_S = 4.0  # of a capture of the second grid: four periods of the finest
 UNEXPLAINED = 1e-3  # probability below which no model explains the lines about a peak
 SURE = 4.0  # standard deviations of a line above the refined maximum
 
@@ -85,7 +86,7 @@ class Settings(Protocol):
     def min_coherence(self) -> float: ...
 
 
-def of_plan(rig: RigFile, plan: Settings, combs: Sequence[Comb]) -> Iterator[str]:
+def of_plan(rig: RigFile, plan: Settings, combs: Sequence[tuple[str, Comb]]) -> Iterator[str]:
     """What the rig lacks, and what the plan asks too much of: key, found, expected."""
     lacking = [
         f"{table}: found no {', '.join(missing)}; expected them all"
@@ -105,9 +106,9 @@ def of_plan(rig: RigFile, plan: Settings, combs: Sequence[Comb]) -> Iterator[str
         yield from _speeds(rig, plan)
 
 
-def _injection(rig: RigFile, plan: Settings, combs: Sequence[Comb]) -> Iterator[str]:
+def _injection(rig: RigFile, plan: Settings, combs: Sequence[tuple[str, Comb]]) -> Iterator[str]:
     refined = Comb(plan.low_hz, plan.low_hz, 128, plan.amplitude_A)  # at most, in the second pass
-    for why in dict.fromkeys(refused(Envelope(rig), c) for c in [*combs, refined]):
+    for why in dict.fromkeys(refused(Envelope(rig), c) for c in [*(c for _, c in combs), refined]):
         if why:
             yield f"amplitude_A: found {plan.amplitude_A:g} A for each line; expected less: {why}"
     for key, value in (("low_hz", plan.low_hz), ("high_step_hz", plan.high_step_hz)):
@@ -115,27 +116,27 @@ def _injection(rig: RigFile, plan: Settings, combs: Sequence[Comb]) -> Iterator[
             yield f"{key}: found {value:g}; expected a power of two: the lines must repeat after whole samples"
     if len({*plan.axes}) < len(plan.axes):
         yield f"axes: found {', '.join(plan.axes)}; expected each once"
-    top = max(hz for c in combs for hz in c.hz)
+    top = max(hz for _, c in combs for hz in c.hz)
     if top > 0.45 * plan.rate_hz:
         yield (f"rate_hz: found {plan.rate_hz:g}; expected {top / 0.45:.0f} Hz or more for lines up to {top:g} Hz: what is "
                "above half of it folds back")  # fmt: skip
     yield from _memory(rig, plan, combs)
 
 
-def _memory(rig: RigFile, plan: Settings, combs: Sequence[Comb]) -> Iterator[str]:
+def _memory(rig: RigFile, plan: Settings, combs: Sequence[tuple[str, Comb]]) -> Iterator[str]:
     assert rig.capture is not None
     speed = max(plan.speeds_rad_s)
     slowest = min((s for s in plan.speeds_rad_s if s > 0), default=0.0)
     extra = 0.1 + 4 * math.pi / slowest if slowest else 0.0
-    longest = [(SURVEY if k < 2 else "mode", plan.periods * c.period_s) for k, c in enumerate(combs)]
-    for kind, seconds in [*longest, ("refined", plan.refined_periods / plan.low_hz)]:
+    for kind, seconds in [*((k, plan.periods * c.period_s) for k, c in combs), (REFINED, LEAST_S)]:
         try:
             size = Layout.of(rig.capture, channels(kind, speed)).sample.itemsize * (seconds + extra) * plan.rate_hz
         except BenchError as error:
             yield str(error)
             return
         if size > rig.capture.memory_bytes:
-            yield f"periods: found {size:.0f} bytes for {kind}; expected {rig.capture.memory_bytes} at most, the memory"
+            yield (f"periods: found {size:.0f} bytes for the pass {kind!r}; expected {rig.capture.memory_bytes} at most, the "
+                   "controller's memory")  # fmt: skip
             return
 
 

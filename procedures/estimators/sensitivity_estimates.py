@@ -18,7 +18,8 @@ from procedures.estimators.sensitivity_data import HALF, MODE, REFINED, SURVEY, 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 FINEST, COARSEST = 1.0, 4.0  # Hz, of a refined grid: four periods must fit into the controller's memory
-IN_WIDTH = 8  # lines in the half-power width of a refined peak, at least half as many
+IN_WIDTH = 6  # lines in the half-power width of a refined peak, at least
+LEAST = 6  # steps to either side of it
 RIVAL = 0.85  # of the greatest: another maximum that is refined too
 CANDIDATES = 3
 NEAR = 0.3  # of a frequency: how far the lines reach that a first look is fitted to
@@ -35,12 +36,21 @@ class Candidate:
     hz: float
     width: float
 
-    @property
-    def lines(self) -> tuple[float, float, int]:
-        """First line, step and number of a grid over twice its width, eight lines or more in the width."""
+    def lines(self, speed: float) -> tuple[float, float, int]:
+        """First line, step and number of a grid over twice its width, six lines or more in the width. Where the shaft turns the
+        grid is shifted away from what its orbit makes of the injection, lines at n times the speed less the line's own."""
         step = min(max(binary(self.width / IN_WIDTH), FINEST), COARSEST)
-        first = max(step * math.floor((self.hz - self.width) / step), step)
-        return first, step, min(math.floor((self.hz + self.width - first) / step) + 1, 128)
+        reach = max(self.width, LEAST * step)
+        first = max(step * math.floor((self.hz - reach) / step), step)
+        if speed and step >= COARSEST:
+            first += step * max((0.25, 0.5, 0.75, 0.0), key=lambda share: _apart(share, speed / (2 * math.pi * step)))
+        return first, step, min(math.floor((self.hz + reach - first) / step) + 1, 128)
+
+
+def _apart(share: float, turns: float) -> float:
+    """How far, in steps, a grid that is shifted by a share of its step stands from its images at orders 1 to 4."""
+    off = [(2 * share - n * turns) % 1.0 for n in (1, 2, 3, 4)]
+    return min(min(x, 1 - x) for x in off)
 
 
 @dataclass(frozen=True)
