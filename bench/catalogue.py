@@ -52,6 +52,9 @@ PROCEDURES = (
     Entry("balance", "procedures.balance", "Two-plane balancing by influence coefficients from trial weights"),
     Entry("run-up", "procedures.runup", "Run-up through the critical speeds: Bode, polar, waterfall, amplification"),
     Entry("coast-down", "procedures.coast_down", "Coast-down through the critical speeds, analysed as a run-up"),
+    Entry(
+        "sensitivity", "procedures.sensitivity", "Sensitivity of the control loops by injection, with zones and margins"
+    ),
     Entry("force-map", "procedures.force_map", "Terms of the motor's force over displacement, currents and load"),
 )
 

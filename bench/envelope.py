@@ -80,6 +80,24 @@ class Envelope:
         if not 0 < mass_kg <= limit:
             raise InterlockError(f"weight: found {mass_kg * 1e3:g} g; the envelope allows above 0 to {limit * 1e3:g} g")
 
+    def check_injection(self, peak_A: float) -> None:
+        """Refuse an injection into a current reference beyond its greatest value.
+
+        Raises:
+            InterlockError: nothing was sent.
+        """
+        if problem := self.injection_problem(peak_A):
+            raise InterlockError(problem)
+
+    def injection_problem(self, peak_A: float) -> str:
+        """What is wrong with an injection that reaches `peak_A`; empty where nothing is."""
+        limit = self.rig.envelope.max_injection_A
+        if 0 < peak_A <= limit:
+            return ""
+        return (
+            f"injection: found a peak of {peak_A:.3g} A; the envelope allows above 0 to {limit:g} A (max_injection_A)"
+        )
+
     def problems_of(self, settings: dict[str, float]) -> Iterable[str]:
         """What a plan's settings break, before anything is started."""
         for name, value in settings.items():

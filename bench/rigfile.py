@@ -110,6 +110,7 @@ class Envelope(Part):
     max_temperature_K: float = Field(gt=0)
     max_levitated_position_m: float = Field(gt=0)
     max_trial_weight_kg: float = Field(0.0, ge=0)  # in a balancing plane
+    max_injection_A: float = Field(0.0, ge=0)  # into the current reference of an axis, greatest value of the sum
     positions: tuple[str, ...] = ("pos_xi", "pos_yi", "pos_xo", "pos_yo")
 
 

@@ -89,6 +89,10 @@ def _svg(figure: Figure) -> str:
         if panel.below:
             axes.tick_params(labelbottom=False)
             axes.set_xlabel("")
+            if not panel.log_x:
+                axes.sharex(every[-1])
+    for axes, panel in zip(every[:-1], panels[:-1], strict=True):
+        if panel.log_x:  # an axis that is not drawn yet has a range that a logarithm does not
             axes.sharex(every[-1])
     _legend(canvas, drawn)
     out = io.StringIO()

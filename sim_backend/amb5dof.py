@@ -26,6 +26,7 @@ DEFECTS = {
     "position_sign_yi": 1.0, "position_sign_zi": 1.0, "position_sign_yo": 1.0, "position_sign_zo": 1.0,
     "position_sign_x": 1.0, "exchange_planes": 0.0, "exchange_axes": 0.0, "told_planes": 0.0, "told_axes": 0.0,
     "contact_silent": 0.0, "factor_ellipse_on": 1.0, "factor_ellipse_hz": 1.0, "factor_ref_y": 1.0, "factor_ref_z": 1.0,
+    "factor_inject_axis": 1.0, "factor_inject_amplitude": 1.0,
     "current_sign_i": 1.0, "current_sign_o": 1.0, "pulse_missing": 0.0,
     "pulse_doubled": 0.0, "loose_speed": 0.0, "loose_shift": 0.0, "loose_weight": 0.0,
     "drop_fraction": 0.0, "integrator_factor": 1.0,

@@ -44,7 +44,7 @@ def loop(p: AmbParams, settings: Mapping[str, float], law: str) -> Callable[[Arr
     """One tick: of the state (see `matrix`) and the set point of y."""
     moved, driven = _plant(p, law, settings)
     feedback = _pid(settings) if law == "pid" else _flatness(settings, law)
-    notches = [_notch(settings[f"notch{k}_hz"], settings[f"notch{k}_q"]) for k in (1, 2)]
+    notches = [notch(settings[f"notch{k}_hz"], settings[f"notch{k}_q"]) for k in (1, 2)]
     keep = 1 / (1 + 2 * math.pi * settings["derivative_hz"] * TICK_S)
     read = np.array([[1, -p.l_is], [1, p.l_os]]) * np.array([[p.position_gain[0]], [p.position_gain[2]]])
 
@@ -101,7 +101,8 @@ def _plant(p: AmbParams, law: str, settings: Mapping[str, float]) -> tuple[Array
     return whole[:6, :6], whole[:6, 6:]
 
 
-def _notch(hz: float, q: float) -> tuple[float, float, float, float, float]:
+def notch(hz: float, q: float) -> tuple[float, float, float, float, float]:
+    """b0, b1, b2, a1, a2 of the law's notch filter; none where `hz` is 0."""
     if hz <= 0:
         return 1.0, 0.0, 0.0, 0.0, 0.0
     g = math.tan(math.pi * hz * TICK_S)

@@ -30,11 +30,20 @@ def quiet(p: AmbParams) -> AmbParams:
     return dataclasses.replace(p, position_noise=0.0, current_noise=0.0, position_lsb=0.0, current_lsb=0.0)
 
 
-def floating(p: AmbParams, settings: Mapping[str, float], speed: float = 0.0, settle_s: float = 8.0) -> AmbPlant:
-    """The quiet machine, lifted by the PID, at a speed in rad/s, with the laws' parameters, its integrators at rest."""
+def floating(
+    p: AmbParams,
+    settings: Mapping[str, float],
+    speed: float = 0.0,
+    settle_s: float = 8.0,
+    substeps: int = 2,
+    noise: int | None = None,
+) -> AmbPlant:
+    """The quiet machine, lifted by the PID, at a speed in rad/s, with the laws' parameters, its integrators at rest; with the
+    `noise` and the quantisation of a seed where one is given."""
     known = {f.name for f in dataclasses.fields(AmbControl)}
     made = {name: value for name, value in settings.items() if name in known} | {"law": 0.0, "slew": 0.0}
-    plant = AmbPlant(quiet(p), 1, control=AmbControl(**made))
+    made_of = quiet(p) if noise is None else p
+    plant = AmbPlant(made_of, noise or 1, control=AmbControl(**made), substeps=substeps)
     plant.mode = READY
     plant.run(1000)
     plant.mode = LIFT

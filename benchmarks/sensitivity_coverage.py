@@ -1,0 +1,126 @@
+"""Coverage of S_max by procedure `sensitivity` over virtual rigs: the share of 95 % intervals that hold the true peak.
+
+python benchmarks/sensitivity_coverage.py --first 3000 --count 100 --law CCS [--rpm 10000] [--whole]
+
+By a light path, passes and estimator of the procedure on the plant itself; `--whole`: the procedure with its links and its
+recording, some five times slower.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.analysis.responses import Response
+from bench.cli.virtual import SUBSTEPS, simulated_run
+from bench.procedure import Measured
+from bench.rigfile import load_rig
+from bench.uncertainty import coverage_factor, interval
+from procedures.estimators import sensitivity_estimates
+from procedures.estimators.sensitivity_data import REFINED, Grid, Taken, channels, sensitivity
+from procedures.injecting import AXES, Comb, wanted
+from procedures.sensitivity import CODES, MARGIN_S, RPM, Plan, refinements, surveys
+from sim_backend import amb_sensitivity
+from sim_backend.amb_step import floating
+from sim_backend.core.amb import TRACE, AmbPlant
+from sim_backend.core.amb_params import AmbParams
+from sim_backend.truth import draw
+
+RIG = "amb5dof"
+PLAN: dict[str, Any] = {"modes_hz": (), "refined_periods": 4, "start_s": 0.3}
+Row = tuple[float, float, float, float]
+"""Error, half width, standard uncertainty and true value of S_max."""
+
+
+def light(
+    p: AmbParams, settings: Mapping[str, float], plan: Plan, seed: int
+) -> Iterator[tuple[str, float, float, float]]:
+    """Of each axis S_max with its half width and its u, by the passes on a plant with noise."""
+    plant = floating(p, settings, plan.speeds_rad_s[0], substeps=SUBSTEPS, noise=seed)
+    for axis in plan.axes:
+        seen = [_taken(plant, plan, axis, kind, 0.0, comb) for kind, _, comb in surveys(plan)]
+        refined = [
+            _taken(plant, plan, axis, kind, about, comb)
+            for c in sensitivity_estimates.candidates([t.response for t in seen])
+            for kind, about, comb in refinements(plan, c, plan.speeds_rad_s[0])
+            if kind == REFINED
+        ]
+        best = max(sensitivity_estimates.found_peaks(refined), key=lambda peak: peak.top.value)
+        yield axis, best.top.value, coverage_factor(best.taken.dof) * best.top.u, best.top.u
+
+
+def _taken(plant: AmbPlant, plan: Plan, axis: str, kind: str, about: float, comb: Comb) -> Taken:
+    speed = plan.speeds_rad_s[0]
+    for name, value in {**wanted(comb), "inject_axis": float(AXES.index(axis))}.items():
+        plant.set(name, value)
+    plant.run(round(plan.start_s * 1e4))
+    pulses = MARGIN_S + 4 * math.pi / speed if speed else 0.0
+    periods = plan.refined_periods if kind == REFINED else plan.periods
+    start, trace = plant.tick, plant.run(round((comb.period_s * periods + pulses) * 1e4), 1)[1]
+    plant.set("inject_axis", -1.0)
+    names = channels(REFINED, speed)
+    columns = {n: trace[:, TRACE.index(n)] for n in names}
+    grid = Grid(np.array(comb.hz), comb.period_s, comb.amplitude)
+    response: Response
+    response, injected, excluded = sensitivity(columns, (start + np.arange(len(trace))) * 1e-4, 1e4, grid)
+    return Taken(axis, speed, 0.0, kind, about, grid, response, excluded, injected, 0.0, 0.0, None, 1e4, 0, 0, 0, 1)
+
+
+def whole(seed: int, plan: dict[str, Any], folder: Path) -> Iterator[tuple[str, float, float, float]]:
+    """The same by the procedure."""
+    path = folder / "recording.mcap"
+    path.unlink(missing_ok=True)
+    for m in simulated_run("sensitivity", RIG, seed, plan, path).results:
+        if isinstance(m, Measured) and m.quantity.name == "s_max":
+            i = interval(m.estimate)
+            yield m.where.split(",")[0], m.estimate.value, (i.high - i.low) / 2, m.estimate.u
+
+
+def one(seed: int, plan: dict[str, Any], folder: Path | None) -> list[Row]:
+    """A rig's axes."""
+    rig, made = load_rig(RIG), Plan(**plan)
+    plant, speed = draw(rig, seed).plant, made.speeds_rad_s[0]
+    settings = {**{n: p.default for n, p in rig.parameters.items()}, "law": CODES[made.law]}
+    loop = None if speed else amb_sensitivity.loop(plant, settings, 0.0, SUBSTEPS)
+    out = []
+    for name, value, half, u in light(plant, settings, made, seed) if folder is None else whole(seed, plan, folder):
+        axis = AXES.index(name)
+        if loop is not None:
+            true = loop.peak(axis, made.low_hz, made.high_hz)[0]
+        else:
+            true = amb_sensitivity.quiet_peak(plant, settings, axis, speed, SUBSTEPS)[0]
+        out.append((value - true, half, u, true))
+    return out
+
+
+def main() -> None:
+    """Print coverage, width and bias."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--first", type=int, default=3000)
+    parser.add_argument("--count", type=int, default=100)
+    parser.add_argument("--law", default="PID", choices=list(CODES))
+    parser.add_argument("--axes", default="yi,zo")
+    parser.add_argument("--rpm", type=float, default=0.0)
+    parser.add_argument("--whole", action="store_true")
+    chosen = parser.parse_args()
+    plan = {**PLAN, "law": chosen.law, "axes": tuple(chosen.axes.split(",")), "speeds_rad_s": (chosen.rpm / RPM,)}
+    found: list[Row] = []
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in range(chosen.first, chosen.first + chosen.count):
+            found += one(seed, plan, Path(folder) if chosen.whole else None)
+    error, half, u, true = np.array(found).T
+    held = (np.abs(error) <= half).mean()
+    width = 1 / np.quantile(np.abs(error) / half, 0.95)
+    print(f"{chosen.law} {chosen.axes} {chosen.rpm:g} r/min: {held:.3f} of {error.size} hold the truth, "
+          f"{true.min():.2f} to {true.max():.2f}; 1/p95(|e|/U) {width:.2f}; U {np.median(half / true):.2%}; "
+          f"e/u rms {np.sqrt(np.mean((error / u) ** 2)):.2f}, mean {np.mean(error / u):+.2f}")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

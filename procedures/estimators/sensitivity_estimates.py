@@ -1,0 +1,268 @@
+"""From the sensitivity at the lines to its greatest value with an interval, and to the margins of the open loop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.analysis import peaks
+from bench.analysis.rational import Rational, Top, fitted, top
+from bench.analysis.responses import Response
+from bench.uncertainty import Estimate, Influence
+from procedures.estimators.sensitivity_data import HALF, MODE, REFINED, SURVEY, Taken, named, shared_noise
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+FINEST, COARSEST = 1.0, 4.0  # Hz, of a refined grid: four periods must fit into the controller's memory
+IN_WIDTH = 6  # lines in the half-power width of a refined peak, at least
+LEAST = 6  # steps to either side of it
+RIVAL = 0.85  # of the greatest: another maximum that is refined too
+CANDIDATES = 3
+NEAR = 0.3  # of a frequency: how far the lines reach that a first look is fitted to
+DRAWS = 150  # of the margins
+TOLERATED = 0.05  # share of the draws that may have no crossing
+FAINT = 0.1  # where |L| is less, it is noise that crosses the axis: a gain that may rise tenfold is not told
+VAGUE = 0.2  # relative standard uncertainty above which a margin is not told
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Where a greatest sensitivity may be, Hz, and the half-power width of its resonance."""
+
+    hz: float
+    width: float
+
+    def lines(self, speed: float) -> tuple[float, float, int]:
+        """First line, step and number of a grid over twice its width, six lines or more in the width. Where the shaft turns the
+        grid is shifted away from what its orbit makes of the injection, lines at n times the speed less the line's own."""
+        step = min(max(binary(self.width / IN_WIDTH), FINEST), COARSEST)
+        reach = max(self.width, LEAST * step)
+        first = max(step * math.floor((self.hz - reach) / step), step)
+        if speed and step >= COARSEST:
+            first += step * max((0.25, 0.5, 0.75, 0.0), key=lambda share: _apart(share, speed / (2 * math.pi * step)))
+        return first, step, min(math.floor((self.hz + reach - first) / step) + 1, 128)
+
+
+def _apart(share: float, turns: float) -> float:
+    """How far, in steps, a grid that is shifted by a share of its step stands from its images at orders 1 to 4."""
+    off = [(2 * share - n * turns) % 1.0 for n in (1, 2, 3, 4)]
+    return min(min(x, 1 - x) for x in off)
+
+
+@dataclass(frozen=True)
+class Peak:
+    """A peak that was refined: the lines about it with the model, its greatest value, least coherence where |S| is above 0.7
+    of it; `change`, relative, of |S| there at half the amplitude, with its standard uncertainty."""
+
+    taken: Taken
+    model: Rational
+    top: Top
+    coherence: float
+    change: float
+    u_change: float
+
+
+@dataclass(frozen=True)
+class Result:
+    """One axis at one speed: `curve`, all lines in order; the peaks, the greatest first; estimates by name."""
+
+    axis: str
+    speed: float
+    taken: tuple[Taken, ...]
+    curve: Response
+    peaks: tuple[Peak, ...]
+    estimates: Mapping[str, Estimate] = field(repr=False)
+
+    @property
+    def where(self) -> str:
+        """How it is named to the reader."""
+        return f"{self.axis}, {named(self.speed)}"
+
+    @property
+    def excluded(self) -> list[float]:
+        """Lines in Hz that were left out beside the shaft's orders."""
+        return sorted({float(hz) for t in self.taken for hz in t.excluded})
+
+
+def binary(x: float) -> float:
+    """The greatest power of two that is not above `x`: lines on such a grid repeat after whole samples."""
+    return float(2.0 ** math.floor(math.log2(x)))
+
+
+def candidates(seen: Sequence[Response]) -> list[Candidate]:
+    """Where a survey peaks, the greatest first, and those that come near it."""
+    if not seen:
+        return []
+    hz, z, power = _merged([(r, shared_noise(r)) for r in seen])
+    size, free = np.abs(z) - np.sqrt(power), np.ones(hz.size, bool)
+    out: list[Candidate] = []
+    while free.any() and len(out) < CANDIDATES:
+        k = int(np.flatnonzero(free)[size[free].argmax()])
+        if out and size[k] + 3 * math.sqrt(power[k]) < RIVAL * size.max():
+            break
+        found = _looked(hz, z, power, k)
+        out.append(found)
+        free &= np.abs(hz - found.hz) > 2 * found.width
+        free[k] = False
+    return out
+
+
+def _looked(hz: Array, z: Complex, power: Array, k: int) -> Candidate:
+    """A first look at the resonance about line `k`: by a model of the lines near it."""
+    reach = max(NEAR * hz[k], hz[min(k + 6, hz.size - 1)] - hz[k])
+    near = np.abs(hz - hz[k]) <= reach
+    if near.sum() < 8:
+        return Candidate(float(hz[k]), float(NEAR * hz[k]))
+    model = fitted(hz[near], z[near], power[near], math.inf)
+    at = top(model, float(hz[near][0]), float(hz[near][-1]))
+    step = float(np.diff(hz[near]).min())
+    width = min(max(model.width(at.at), step / 2), 0.6 * at.at)
+    return Candidate(at.at, width if math.isfinite(width) else NEAR * at.at)
+
+
+def _merged(parts: Sequence[tuple[Response, Array]]) -> tuple[Array, Complex, Array]:
+    """Lines of several responses in order of frequency, with their noise; of those that coincide the last one counts."""
+    hz = np.concatenate([r.hz for r, _ in parts])
+    z = np.concatenate([r.values for r, _ in parts])
+    power = np.concatenate([p for _, p in parts])
+    kept = {float(f): k for k, f in enumerate(hz)}
+    order = np.array([kept[f] for f in sorted(kept)])
+    return hz[order], z[order], power[order]
+
+
+def results(taken: Sequence[Taken]) -> list[Result]:
+    """By axis and speed, in the order in which they were taken."""
+    groups: dict[tuple[str, float], list[Taken]] = {}
+    for t in taken:
+        groups.setdefault((t.axis, t.speed), []).append(t)
+    return [_result(axis, speed, some) for (axis, speed), some in groups.items()]
+
+
+def _result(axis: str, speed: float, taken: Sequence[Taken]) -> Result:
+    found = sorted(found_peaks(taken), key=lambda p: -p.top.value)
+    where = f"{axis}/{named(speed)}"
+    estimates: dict[str, Estimate] = {}
+    if found:
+        best = found[0]
+        dof = best.taken.dof
+        estimates["s_max"] = _typed(
+            best.top.value, best.top.u, "1", f"{where}/s_max", "scatter over the periods, at the peak", dof
+        )
+        estimates["s_max_hz"] = _typed(
+            best.top.at, best.top.u_at, "Hz", f"{where}/s_max_hz", "scatter of the peak's place", dof
+        )
+    estimates |= margins([t for t in taken if t.kind == SURVEY], where)
+    return Result(axis, speed, tuple(taken), _curve(taken), tuple(found), estimates)
+
+
+def _typed(value: float, u: float, unit: str, identity: str, name: str, dof: float) -> Estimate:
+    return Estimate.of(value, Influence(f"scatter/{identity}", name, u, unit, "A", "normal", max(dof, 1.0)))
+
+
+def found_peaks(taken: Sequence[Taken]) -> Iterator[Peak]:
+    """What was refined, each with its model."""
+    for t in taken:
+        if t.kind != REFINED or t.response.hz.size < 8:
+            continue
+        r = t.response
+        model = fitted(r.hz, r.values, t.noise, t.dof)
+        at = top(model, float(r.hz[0]), float(r.hz[-1]))
+        high = np.abs(r.values) > 0.7 * at.value
+        half = next((h for h in taken if h.kind == HALF and h.about == t.about), None)
+        change, u = _change(t, half, high) if half is not None else (0.0, math.inf)
+        yield Peak(t, model, at, float(r.coherence[high].min()) if high.any() else 0.0, change, u)
+
+
+def _change(t: Taken, half: Taken, high: npt.NDArray[np.bool_]) -> tuple[float, float]:
+    """How much greater |S| is at half the amplitude, relative, over the lines about the peak; with its standard uncertainty."""
+    if half.response.hz.shape != t.response.hz.shape or not high.any():
+        return 0.0, math.inf
+    a, b = t.response.values[high], half.response.values[high]
+    noise = (t.noise[high] + half.noise[high]) / np.abs(a) ** 2 / 2
+    return float(np.real(b / a - 1).mean()), float(np.sqrt(noise.sum()) / noise.size)
+
+
+def _curve(taken: Sequence[Taken]) -> Response:
+    """All lines at the full amplitude; where passes overlap, the finest of them."""
+    some = [t for t in taken if t.kind != HALF]
+    fine = [(t.response.hz[0], t.response.hz[-1]) for t in some if t.kind in (MODE, REFINED) and t.response.hz.size]
+    parts = []
+    for t in some:
+        r = t.response
+        covered = np.zeros(r.hz.size, bool)
+        if t.kind == SURVEY:
+            for low, high in fine:
+                covered |= (r.hz >= low) & (r.hz <= high)
+        parts.append(r.at(~covered))
+    hz = np.concatenate([r.hz for r in parts])
+    order = np.argsort(hz, kind="stable")
+    values, covariance, coherence = (
+        np.concatenate([getattr(r, n) for r in parts])[order] for n in ("values", "covariance", "coherence")
+    )
+    return Response(hz[order], values, covariance, coherence, min(r.dof for r in parts))
+
+
+def margins(surveys: Sequence[Taken], where: str) -> dict[str, Estimate]:
+    """Phase margin and both gain margins by the smoothed lines of the survey, those that exist."""
+    if not surveys:
+        return {}
+    hz, z, power = _merged([(t.response, t.noise) for t in surveys])
+    if hz.size < peaks.WINDOW:
+        return {}
+    covariance = power[:, None, None] / 2 * np.eye(2)
+    smooth = peaks.smoother(hz, z, covariance)
+    base = smooth.at_lines(z)
+    drawn = smooth.everywhere(base + peaks.noise(covariance, 0, DRAWS))
+    out: dict[str, Estimate] = {}
+    dof = float(min(t.dof for t in surveys))
+    for name, unit, of in (
+        ("phase_margin", "rad", phase),
+        ("gain_reduction", "1", fall),
+        ("gain_increase", "1", rise),
+    ):
+        found, again = of(1 / smooth.everywhere(z) - 1), of(1 / smooth.everywhere(base) - 1)
+        values = np.array([of(1 / d - 1) for d in drawn])
+        known = np.isfinite(values)
+        if math.isfinite(found) and math.isfinite(again) and known.mean() > 1 - TOLERATED:
+            bias = float(values[known].mean()) - again
+            u = float(values[known].std())
+            if u > VAGUE * found:
+                continue
+            out[name] = _typed(found - bias, u, unit, f"{where}/{name}", "scatter over the periods", dof)
+    return out
+
+
+def _crossings(level: Array, other: Complex) -> Complex:
+    """A curve where `level` changes its sign, interpolated."""
+    k = np.flatnonzero(np.sign(level[1:]) != np.sign(level[:-1]))
+    share = level[k] / (level[k] - level[k + 1])
+    return np.asarray(other[k] + share * (other[k + 1] - other[k]))
+
+
+def phase(loop: Complex) -> float:
+    """Phase margin of an open loop (m,), rad; NaN where |L| is not 1."""
+    at = _crossings(np.abs(loop) - 1, loop)
+    return float(np.abs(np.angle(-at)).min()) if at.size else math.nan
+
+
+def _real(loop: Complex) -> Array:
+    """Distances from the origin where the loop crosses the negative real axis."""
+    at = _crossings(loop.imag, loop).real
+    return np.asarray(-at[at < 0])
+
+
+def fall(loop: Complex) -> float:
+    """Factor to which its gain may fall; NaN where that is not told."""
+    at = _real(loop)
+    return float((1 / at[at > 1]).max()) if (at > 1).any() else math.nan
+
+
+def rise(loop: Complex) -> float:
+    """Factor to which its gain may rise; NaN where that is not told."""
+    at = _real(loop)
+    some = at[(at < 1) & (at > FAINT)]
+    return float((1 / some).min()) if some.size else math.nan

@@ -1,0 +1,92 @@
+"""Injection of a multisine into one axis' current reference: what it is made of, what of it is allowed, on and off."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from fractions import Fraction
+
+from bench.envelope import Envelope
+from bench.errors import BenchError
+from bench.rig import Rig
+
+AXES = ("yi", "zi", "yo", "zo", "x")  # by their number in `inject_axis`
+PARAMETERS = ("inject_axis", "inject_amplitude", "inject_hz", "inject_lines", "inject_step")
+MOST_LINES = 128
+CREST = 1.1  # greatest of Schroeder's phases over sqrt(2 lines) amplitudes: 1.08 at three lines, less elsewhere
+
+
+@dataclass(frozen=True)
+class Comb:
+    """Lines at `first`, `first` + `step`, ... Hz, `count` of them, each of `amplitude` A 0-pk."""
+
+    first: float
+    step: float
+    count: int
+    amplitude: float
+
+    @property
+    def hz(self) -> list[float]:
+        """The lines."""
+        return [self.first + k * self.step for k in range(self.count)]
+
+    @property
+    def period_s(self) -> float:
+        """After which it repeats."""
+        a, b = Fraction(self.first).limit_denominator(4096), Fraction(self.step).limit_denominator(4096)
+        whole = math.lcm(a.denominator, b.denominator)
+        return whole / math.gcd(int(a * whole), int(b * whole))
+
+    @property
+    def peak(self) -> float:
+        """What the sum does not exceed, A."""
+        return self.amplitude * min(CREST * math.sqrt(2 * self.count), self.count)
+
+
+def combs(first: float, step: float, last: float, amplitude: float) -> list[Comb]:
+    """A band as combs of as many lines as the controller makes."""
+    left, out = math.floor((last - first) / step + 1e-9) + 1, []
+    while left > 0:
+        out.append(Comb(first, step, min(left, MOST_LINES), amplitude))
+        first, left = first + MOST_LINES * step, left - MOST_LINES
+    return out
+
+
+def wanted(comb: Comb) -> dict[str, float]:
+    """The controller's parameters that make it."""
+    return {
+        "inject_hz": comb.first,
+        "inject_step": comb.step,
+        "inject_lines": float(comb.count),
+        "inject_amplitude": comb.amplitude,
+    }
+
+
+def refused(envelope: Envelope, comb: Comb) -> str:
+    """Why the envelope refuses it; empty where it does not."""
+    problems = [*envelope.problems_of(wanted(comb)), envelope.injection_problem(comb.peak)]
+    return "; ".join(p for p in problems if p)
+
+
+@contextmanager
+def injected(rig: Rig, axis: str, comb: Comb, settle_s: float) -> Iterator[None]:
+    """With the injection into an axis, settled; off again in the end, whatever happens.
+
+    Raises:
+        InterlockError: the envelope does not allow it; nothing was sent.
+    """
+    Envelope(rig.file).check_injection(comb.peak)
+    write = rig.levitation.set
+    for name, value in wanted(comb).items():
+        write(name, value)
+    try:
+        write("inject_axis", float(AXES.index(axis)))
+        rig.clock.sleep(settle_s)
+        yield
+    except BaseException:
+        with suppress(BenchError):
+            write("inject_axis", -1.0)
+        raise
+    write("inject_axis", -1.0)

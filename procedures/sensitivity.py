@@ -1,0 +1,265 @@
+"""Sensitivity of the control loops by injection (ISO 14839-3 in its sense): S = V1/E at each axis, all other loops closed.
+
+Measurands, by axis and speed: greatest |S| with its frequency, phase margin, and how far the loop's gain may fall and rise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from bench.analysis.responses import Response
+from bench.capture import Layout
+from bench.errors import AnalysisError
+from bench.figures import Figure
+from bench.findings import Effect, Finding
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.rig import Rig
+from bench.rigfile import RigFile
+from bench.roles import RigState
+from procedures import probing
+from procedures import sensitivity_figures as drawn
+from procedures.estimators import sensitivity_checks, sensitivity_estimates, tracking_wiring
+from procedures.estimators.sensitivity_data import (
+    HALF,
+    INJECT,
+    MODE,
+    REFINED,
+    RPM,
+    SURVEY,
+    Taken,
+    channels,
+    folds,
+    grid_of,
+    read_taken,
+    sensitivity,
+)
+from procedures.estimators.sensitivity_estimates import Candidate, Result
+from procedures.injecting import Comb, combs, injected
+
+Law = Literal["PID", "CCS"]
+Axis = Literal["yi", "zi", "yo", "zo", "x"]
+CODES: dict[Law, float] = {"PID": 0.0, "CCS": 1.0}
+S_MAX = Quantity("s_max", "1", "greatest |V1/E| of an axis, all other loops closed (ISO 14839-3)")
+AT = Quantity("s_max_hz", "Hz", "where it is")
+PHASE = Quantity("phase_margin", "rad", "least angle of the open loop L = 1/S - 1 from -1 where |L| = 1, either way")
+FALL = Quantity("gain_reduction", "1", "factor to which the loop's gain may fall before it is unstable")
+RISE = Quantity("gain_increase", "1", "factor to which the loop's gain may rise before it is unstable")
+MEASURES = (S_MAX, AT, PHASE, FALL, RISE)
+MARGIN_S = 0.1  # of a capture, for the first and last pulse
+STANDS_S = 1.0  # the controller knows half a second after the last pulse that the shaft stands
+
+
+class Plan(BenchPlan):
+    """Settings of the injections, SI."""
+
+    law: Law = "PID"
+    axes: tuple[Axis, ...] = Field(("yi", "zi", "yo", "zo", "x"), min_length=1)
+    speeds_rad_s: tuple[float, ...] = Field((0.0, 10000 / RPM), min_length=1)
+    amplitude_A: float = Field(4e-3, gt=0)  # of each line, 0-pk
+    low_hz: float = Field(2.0, gt=0)
+    middle_hz: float = Field(256.0, gt=0)  # up to here every low_hz; above it every high_step_hz
+    high_step_hz: float = Field(16.0, gt=0)
+    high_hz: float = Field(2000.0, gt=0)
+    modes_hz: tuple[float, ...] = (650.0, 1240.0)  # bending modes, about which a finer grid is laid
+    mode_within_hz: float = Field(26.0, gt=0)  # to either side
+    mode_damping: float = Field(2e-3, gt=0)  # least that is expected of them
+    periods: int = Field(4, ge=3)  # of the survey
+    refined_periods: int = Field(8, ge=4)
+    settle_s: float = Field(8.0, ge=0.5)  # under the law, before anything is injected
+    start_s: float = Field(0.5, ge=0.1)  # of each injection
+    rate_hz: float = Field(10000.0, gt=0)  # of the captures
+    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
+    max_speed_error: float = Field(0.01, gt=0)  # share of the speed
+    max_change: float = Field(0.05, gt=0)  # of S_max, at half the amplitude: linear enough
+    min_coherence: float = Field(0.9, gt=0, lt=1)  # at the lines about the peak
+
+
+def surveys(plan: Plan) -> list[tuple[str, float, Comb]]:
+    """The combs of the first pass with their kind and what they are about: the whole range, and finer about the modes."""
+    a = plan.amplitude_A
+    first = plan.high_step_hz * (math.floor(plan.middle_hz / plan.high_step_hz) + 1)
+    out = [(SURVEY, 0.0, c) for c in combs(plan.low_hz, plan.low_hz, min(plan.middle_hz, plan.high_hz), a)]
+    if first < plan.high_hz:
+        out += [(SURVEY, 0.0, c) for c in combs(first, plan.high_step_hz, plan.high_hz, a)]
+    for hz in plan.modes_hz:
+        step = sensitivity_estimates.binary(plan.mode_damping * hz)  # half of the half-power width 2 zeta f
+        low = step * math.floor((hz - plan.mode_within_hz) / step)
+        out += [(MODE, hz, c) for c in combs(low, step, hz + plan.mode_within_hz, a)]
+    return out
+
+
+def refinements(plan: Plan, about: Candidate, speed: float) -> list[tuple[str, float, Comb]]:
+    """The second pass about a peak, at the plan's amplitude and at half of it."""
+    first, step, count = about.lines(speed)
+    return [(k, about.hz, Comb(first, step, count, plan.amplitude_A * f)) for k, f in ((REFINED, 1.0), (HALF, 0.5))]
+
+
+def size(rig: RigFile, kind: str, speed: float) -> int:
+    """Bytes of a sample of what is captured."""
+    assert rig.capture is not None
+    return Layout.of(rig.capture, channels(kind, speed)).sample.itemsize
+
+
+def settings(plan: Plan) -> dict[str, float]:
+    """Lifted by the PID, which needs no model; nothing compensated, nothing injected."""
+    del plan
+    return {"law": CODES["PID"], "observer": 0.0, "compensate": 0.0, "inject_axis": -1.0}
+
+
+def step_count(plan: Plan) -> int:
+    """How many steps `acquire` records at least, for the progress display."""
+    return probing.STEPS + len(plan.speeds_rad_s) * len(plan.axes) * (len(surveys(plan)) + 2)
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Lift the shaft, nudge it, and at each speed inject into each axis: the survey, then finer where it peaks."""
+    if not probing.probed(rig, record):
+        return
+    rig.levitation.set("law", CODES[plan.law])
+    rig.clock.sleep(plan.settle_s)
+    number = 0
+    for speed in sorted(plan.speeds_rad_s):
+        if speed and not probing.turned(rig, record, speed, plan.settle_s):
+            break
+        for axis in plan.axes:
+            number = _axis(rig, plan, record, speed, axis, number)
+    if rig.drive is not None and max(plan.speeds_rad_s) > 0:
+        rig.drive.stop()
+        rig.drive.coast()
+        rig.clock.sleep(STANDS_S)
+    rig.levitation.set("law", CODES["PID"])
+
+
+def _axis(rig: Rig, plan: Plan, record: Recorder, speed: float, axis: str, number: int) -> int:
+    """Both passes of an axis; the number of the next capture."""
+    seen: list[Response] = []
+    for kind, about, comb in surveys(plan):
+        found = _taken(rig, plan, record, speed, axis, kind, about, comb, number)
+        seen += [found] if found is not None else []
+        number += 1
+    for candidate in sensitivity_estimates.candidates(seen):
+        for kind, about, comb in refinements(plan, candidate, speed):
+            _taken(rig, plan, record, speed, axis, kind, about, comb, number)
+            number += 1
+    return number
+
+
+def _taken(
+    rig: Rig, plan: Plan, record: Recorder, speed: float, axis: str, kind: str, about: float, comb: Comb, number: int
+) -> Response | None:
+    """Inject, capture, upload; what S seems to be, for deciding how to go on; None where that cannot be told."""
+    labels: dict[str, float | str] = {
+        "axis": axis, "speed_rad_s": speed, "pass": kind, "about_hz": about, "number": number, "first_hz": comb.first,
+        "step_hz": comb.step, "lines": comb.count, "period_s": comb.period_s, "amplitude_A": comb.amplitude,
+    }  # fmt: skip
+    assert rig.capture is not None
+    pulses = MARGIN_S + 4 * math.pi / speed if speed else 0.0
+    seconds = comb.period_s * (plan.periods if kind in (SURVEY, MODE) else plan.refined_periods)
+    if kind in (REFINED, HALF):  # as many as fit
+        most = rig.capture.memory_bytes / size(rig.file, kind, speed) / plan.rate_hz - pulses
+        seconds = comb.period_s * min(plan.refined_periods, math.floor(most / comb.period_s))
+    seconds += pulses
+    with injected(rig, axis, comb, plan.start_s):
+        with record.step(INJECT, **labels):
+            rig.capture.arm(channels(kind, speed), seconds=seconds, rate_hz=plan.rate_hz)
+            rig.capture.wait(seconds + 5.0)
+    data, grid = rig.capture.upload(**labels), grid_of(labels)
+    if folds(grid, data.rate_hz):
+        return None
+    t = data.start_ns * 1e-9 + np.arange(len(data.columns["inject"])) / data.rate_hz
+    try:
+        return sensitivity(data.columns, t, data.rate_hz, grid)[0]
+    except AnalysisError:
+        return None  # which the analysis tells
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """Findings, what was taken, and the results where there are any."""
+
+    findings: tuple[Finding, ...]
+    taken: tuple[Taken, ...]
+    results: tuple[Result, ...]
+
+
+def evaluated(recording: Recording[Any]) -> Evaluated:
+    """What a recording of injections says."""
+    found = [*tracking_wiring.before_orbits(recording), *sensitivity_checks.before(recording)]
+    if any(f.effect is Effect.ERROR for f in found):
+        return Evaluated(tuple(found), (), ())
+    plan, taken = recording.plan, read_taken(recording)
+    found += sensitivity_checks.of_signals(taken, plan)
+    if any(f.effect is Effect.ERROR for f in found):
+        return Evaluated(tuple(found), tuple(taken), ())
+    results = sensitivity_estimates.results(taken)
+    found += sensitivity_checks.of_results(results, plan)
+    return Evaluated(tuple(found), tuple(taken), tuple(results))
+
+
+def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
+    """Findings first, then the quantities of each axis and speed."""
+    done = evaluated(recording)
+    yield from done.findings
+    known = {q.name: q for q in MEASURES}
+    for result in done.results:
+        for name, estimate in result.estimates.items():
+            yield known[name].measured(estimate, result.where)
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts."""
+    yield from sensitivity_checks.of_plan(rig, plan, [(kind, comb) for kind, _, comb in surveys(plan)])
+
+
+def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+    """|S| over its zones, Bode pair of S, Nyquist plot and coherence, by speed; empty where nothing was evaluated."""
+    return drawn.all_figures(evaluated(recording).results)
+
+
+METHOD = """\
+A multisine E is added to the differential current reference of one axis, half the difference of its coils' references, while
+all loops are closed. V2 is that reference as the law gives it, V1 = V2 + E what goes to the amplifiers; the controller
+records the three at its full rate. S = V1/E at each line, averaged over whole periods (H1; E carries no noise). With L the
+open loop of that axis with all others closed, V2 = -L V1 and S = 1/(1 + L). ISO 14839-3 adds E to the sensor's signal; where
+each axis has its own controller (PID) both are the same loop, opened at another place. The flatness law joins the axes: there
+S belongs to the current references.
+
+First the whole range is surveyed, with a finer grid about the plan's bending modes. About the greatest |S|, and others that
+come near it, a second grid is laid, six lines or more in the half-power width that the first look found, at the plan's
+amplitude and at half of it. A rational function of frequency, of the smallest order that the scatter allows, is fitted
+to these lines; S_max is its greatest abs, with the bias taken off that noise gives a maximum, and its scatter by the fit's
+covariance.
+
+Where the shaft turns, orders 1 to 4 of its angle are fitted to each capture and taken away, and lines within 3 Hz of them are
+left out.
+
+Margins are those of L = 1/S - 1 by the survey's lines, smoothed by local models: the least angle from -1 where |L| = 1, and
+where L crosses the negative real axis, how far the gain may fall (|L| above 1: the shaft is unstable without the loop) and
+rise.
+
+Ratios of numbers inside the controller: no certificate enters. What is left is the scatter from period to period; that of the
+machine itself (its temperature, another day) is not in it.
+"""
+
+procedure = Procedure(
+    name="sensitivity",
+    title="Sensitivity of the control loops",
+    measures=MEASURES,
+    state=RigState.READY,
+    plan=Plan,
+    acquire=acquire,
+    analyse=analyse,
+    figures=figures,
+    check=check,
+    settings=settings,
+    step_count=step_count,
+    method=METHOD,
+)

@@ -1,0 +1,230 @@
+"""The truth of a sensitivity on the AMB stand: its closed loop linearised where the shaft floats, as the core computes it.
+
+Shaft with bending modes and gyroscopic moments, coils, the core's own integration steps, one sample of delay, notches, the
+rates' low-pass, integrators. Of the loop opened at the differential current reference of axis j, all others closed:
+S_jj = after/inject = ((I - C P)^-1)_jj, P from the references to the readings and C back.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.analysis.rational import fitted, top
+from bench.analysis.responses import clear_of_orders, lines, response, without_orders
+from bench.analysis.tachometer import counted, tachometer
+from sim_backend.amb_linear import notch
+from sim_backend.amb_reference_law import Model
+from sim_backend.amb_step import floating
+from sim_backend.core import TICK_S
+from sim_backend.core.amb import TRACE, ccs, derivative
+from sim_backend.core.amb_params import AmbControl, AmbParams
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+MOVING = [0, 1, 2, 3, 4, 6, 7, 8, 9, 10, *range(12, 20)]  # of the core's state: all but the angle and the speed
+SHAFT, COILS, AXES = len(MOVING), 10, 5
+STEP_M, STEP_A = 1e-8, 1e-6  # of the numerical derivatives
+SMALL_A, LINES = 1e-3, 12  # of the lines about a peak, and to either side of it
+
+
+@dataclasses.dataclass(frozen=True)
+class Loop:
+    """A tick of plant: x+ = a x + b u, y = c x, u the differential references that act (5,), y the readings; `controller`, of
+    z (m,), the law's response (m, 5, 5) from readings to references."""
+
+    a: Array
+    b: Array
+    c: Array
+    controller: Callable[[Complex], Complex]
+
+    def plant(self, hz: Array) -> Complex:
+        """From references, as the law gives them, to readings: (m, 5, 5), the sample of delay included."""
+        z = np.exp(2j * np.pi * hz * TICK_S)
+        inner = z[:, None, None] * np.eye(len(self.a)) - self.a
+        return np.asarray(
+            self.c @ np.linalg.solve(inner, np.broadcast_to(self.b, (hz.size, *self.b.shape))) / z[:, None, None]
+        )
+
+    def sensitivity(self, hz: npt.ArrayLike) -> Complex:
+        """S_jj at `hz` (m,) of the axes yi, zi, yo, zo, x: (m, 5)."""
+        at = np.atleast_1d(np.asarray(hz, np.float64))
+        back = self.controller(np.exp(2j * np.pi * at * TICK_S)) @ self.plant(at)
+        return np.asarray(np.diagonal(np.linalg.inv(np.eye(AXES) - back), axis1=1, axis2=2))
+
+    def peak(self, axis: int, low: float, high: float) -> tuple[float, float]:
+        """Greatest abs(S_jj) between two frequencies in Hz, and where."""
+        hz = np.geomspace(low, high, 4000)
+        for _ in range(4):
+            size = np.abs(self.sensitivity(hz)[:, axis])
+            k = int(size.argmax())
+            hz = np.linspace(hz[max(k - 2, 0)], hz[min(k + 2, hz.size - 1)], 200)
+        size = np.abs(self.sensitivity(hz)[:, axis])
+        return float(size.max()), float(hz[size.argmax()])
+
+
+def loop(p: AmbParams, settings: Mapping[str, float], speed: float = 0.0, substeps: int = 2) -> Loop:
+    """Where the quiet machine floats at `speed` rad/s, under law 0 or 1 of the controller's `settings`.
+
+    What turns with the shaft is left out at speed: an orbit of some micrometres adds some tenths of a percent to the peak (the
+    bearings' slopes go with it), which `quiet_peak` has. At rest runout stays, since it shifts where the shaft floats.
+    """
+    plant = floating(even(p) if speed else p, settings, speed)
+    at, state = plant.run(10, 1)[1][-1, :AXES], plant.state()
+    rates, pulls = _slopes(dataclasses.replace(p, unbalance=(0.0,) * 2), state["s"], state["coil"])
+    a, b = _tick(p, rates, pulls, substeps)
+    known = AmbControl.__dataclass_fields__
+    control = AmbControl(**{k: v for k, v in settings.items() if k in known})
+    return Loop(
+        a, b, _readings(p), _law(control, () if control.law == 0 else _inverted(control, at, state["coil"], speed))
+    )
+
+
+def even(p: AmbParams) -> AmbParams:
+    """Without what turns with the shaft."""
+    return dataclasses.replace(p, runout=(0.0,) * 16, unbalance=(0.0,) * 2)
+
+
+def quiet_peak(
+    p: AmbParams, settings: Mapping[str, float], axis: int, speed: float, substeps: int = 2, seconds: float = 4.0
+) -> tuple[float, float]:
+    """Greatest abs(S_jj) and where, Hz, of the quiet machine that turns with its unbalance and its runout, by lines of SMALL_A
+    about the peak of its linearised loop; the same model of the lines as the procedure's, without noise."""
+    near = loop(p, settings, speed, substeps).peak(axis, 2.0, 2000.0)[1]
+    first, count = 2 * math.floor(near / 2) - 2 * LINES, 2 * LINES + 1
+    plant = floating(p, settings, speed, substeps=substeps)
+    made = {
+        "inject_axis": axis,
+        "inject_amplitude": SMALL_A,
+        "inject_hz": first,
+        "inject_step": 2.0,
+        "inject_lines": count,
+    }
+    for name, value in made.items():
+        plant.set(name, float(value))
+    plant.run(10000)
+    start, trace = plant.tick, plant.run(round(seconds / TICK_S), 1)[1]
+    t, column = (
+        (start + np.arange(len(trace))) * TICK_S,
+        {n: trace[:, TRACE.index(n)] for n in ("inject", "after", "pulses", "pulse_age")},
+    )
+    turn = tachometer(*counted(t, column["pulses"], column["pulse_age"]))
+    angle = turn.angle(t)
+    inside = np.isfinite(angle)
+    clean = without_orders(column["after"][inside], angle[inside], (1.0, 2.0, 3.0, 4.0))
+    hz = first + 2.0 * np.arange(count)
+    clear = clear_of_orders(hz, speed, 3.0, (1.0, 2.0, 3.0, 4.0))
+    found = lines(np.concatenate([column["inject"][None, inside], clean]), 1 / TICK_S, 5000, hz[clear])
+    values = response(found, 1, 0).values
+    best = top(fitted(hz[clear], values, np.full(values.size, 1e-6), math.inf), float(hz[0]), float(hz[-1]))
+    return best.value, best.at
+
+
+def _slopes(p: AmbParams, s: Array, coil: Array) -> tuple[Array, Array]:
+    """Derivatives of the shaft's rates to its state (18, 18) and to the coil currents (18, 10)."""
+    rates, pulls = np.empty((SHAFT, SHAFT)), np.empty((SHAFT, COILS))
+    still = s.copy()
+    still[5] = 0.0
+
+    def of(moved: Array, current: Array) -> Array:
+        return derivative(p, moved, current)[MOVING]
+
+    for k, place in enumerate(MOVING):
+        h = STEP_M * (1.0 if place < 6 or 12 <= place < 16 else 1e3) * np.eye(20)[place]
+        rates[:, k] = (of(still + h, coil) - of(still - h, coil)) / (2 * h[place])
+    for k in range(COILS):
+        h = STEP_A * np.eye(COILS)[k]
+        pulls[:, k] = (of(still, coil + h) - of(still, coil - h)) / (2 * STEP_A)
+    return rates, pulls
+
+
+def _tick(p: AmbParams, rates: Array, pulls: Array, substeps: int) -> tuple[Array, Array]:
+    """Shaft and coils over a tick (28, 28) and (28, 5): Runge and Kutta's steps as the core makes them, coils exact."""
+    axis = np.repeat(np.eye(AXES), 2, axis=0) * np.tile([1.0, -1.0], AXES)[:, None]
+    to = axis / np.array(p.current_gain)[:, None]
+    h, size = TICK_S / substeps, SHAFT + COILS
+    keep = math.exp(-p.amplifier_rate * h / 2)
+    whole = np.concatenate(
+        [np.eye(size), np.zeros((AXES, size))]
+    ).T  # columns: a unit of each state, then of each input
+    m, c, u = whole[:SHAFT], whole[SHAFT:], np.concatenate([np.zeros((COILS, size)), to], axis=1)
+    for _ in range(substeps):
+        c1 = u + (c - u) * keep
+        c2 = u + (c1 - u) * keep
+        k1 = rates @ m + pulls @ c
+        k2 = rates @ (m + h / 2 * k1) + pulls @ c1
+        k3 = rates @ (m + h / 2 * k2) + pulls @ c1
+        k4 = rates @ (m + h * k3) + pulls @ c2
+        m, c = m + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4), c2
+    out = np.concatenate([m, c])
+    return out[:, :size], out[:, size:]
+
+
+def _readings(p: AmbParams) -> Array:
+    """Readings yi zi yo zo x of the state, (5, 28); where the probes see the shaft along its axis is left out."""
+    out = np.zeros((AXES, SHAFT + COILS))
+    for b, station in enumerate((-p.l_is, p.l_os)):
+        y, z = out[2 * b], out[2 * b + 1]
+        y[1], y[4] = 1.0, station
+        z[2], z[3] = 1.0, -station
+        for mode in range(2):
+            if any(p.mode_on):
+                y[10 + 2 * mode] = z[11 + 2 * mode] = p.shape_sensor[2 * mode + b]
+    out[4, 0] = 1.0
+    return out * (np.array(p.position_gain) * np.array(p.position_sign))[:, None]
+
+
+def _law(c: AmbControl, slopes: Sequence[Array]) -> Callable[[Complex], Complex]:
+    """From readings to differential references, at the samples."""
+    back, on_q, on_rate, on_v = slopes or (np.zeros((AXES, AXES)),) * 4
+    keep = 1 / (1 + 2 * math.pi * c.derivative_hz * TICK_S)
+    gains = c.k1, (c.k2_cac if c.law == 2 else c.k2_ccs)
+    summed = c.k0 * TICK_S * np.array([1.0, *(float(c.integral != 0),) * 4])
+    notches = [notch(c.notch1_hz, c.notch1_q), notch(c.notch2_hz, c.notch2_q)]
+
+    def controller(z: Complex) -> Complex:
+        seen = np.ones((z.size, AXES), complex)
+        for b0, b1, b2, a1, a2 in notches:
+            seen[:, :4] *= ((b0 + b1 / z + b2 / z**2) / (1 + a1 / z + a2 / z**2))[:, None]
+        rate = ((1 - keep) * (1 - 1 / z) / TICK_S / (1 - keep / z))[:, None, None]
+        if c.law == 0:  # the integral is as it was before this sample
+            whole = -(c.kp + c.ki * TICK_S / (z - 1))[:, None, None] - c.kd * rate
+            return np.asarray(whole * np.eye(AXES) * seen[:, None, :])
+        held = (z / (z - 1))[:, None, None] * np.diag(summed)
+        forward = on_q - on_v @ (gains[0] * np.eye(AXES) + held) + (on_rate - gains[1] * on_v) * rate
+        return np.asarray(forward @ back * seen[:, None, :])
+
+    return controller
+
+
+def _inverted(c: AmbControl, at: Array, coil: Array, speed: float) -> tuple[Array, Array, Array, Array]:
+    """Coordinates of the readings, and the slopes of the differential currents to coordinates, rates and accelerations, where
+    the probes read `at` (5,) and the coils carry `coil` (10,)."""
+    model, still = Model(c), np.zeros(AXES)
+    q0 = model.coordinates(at, at[4])  # type: ignore[arg-type]
+
+    def currents(q: Array, rate: Array, v: Array) -> Array:
+        force, xi = model.flat(q, rate, v, speed), model.gaps(q)
+        return np.array([ccs(force[k], model.beta[k], model.gap[k], xi[k], c.bias) for k in range(AXES)])
+
+    def slopes(of: Callable[[Array], Array], size: float) -> Array:
+        return np.array([(of(h) - of(-h)) / (2 * size) for h in size * np.eye(AXES)]).T
+
+    pairs = coil.reshape(AXES, 2)
+    wanted = (pairs[:, 0] - pairs[:, 1]) / 2
+
+    def of(v: Array) -> Array:
+        return currents(q0, still, v)
+
+    v = still.copy()  # what the integrators hold
+    for _ in range(6):
+        turn = slopes(lambda h, v=v: of(v + h), 1e-3)  # type: ignore[misc]
+        v = v - np.linalg.solve(turn, of(v) - wanted)
+    back = slopes(lambda at: model.coordinates(at, 0.0), 1e-6)
+    on_q = slopes(lambda q: currents(q0 + q, still, v), 1e-8)
+    on_rate = slopes(lambda rate: currents(q0, rate, v), 1e-3)
+    return back, on_q, on_rate, slopes(lambda h: of(v + h), 1e-3)

@@ -1,0 +1,250 @@
+"""Sensitivity: against the linearised loop, planted defects, refused plans, the envelope."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bench.cli.virtual import SUBSTEPS, simulated_run
+from bench.envelope import Envelope
+from bench.errors import InterlockError
+from bench.findings import Effect, Finding
+from bench.procedure import Measured
+from bench.recording import Recording
+from bench.rigfile import load_rig
+from bench.uncertainty import Estimate
+from procedures import sensitivity
+from procedures.estimators import sensitivity_checks, sensitivity_estimates
+from procedures.estimators.sensitivity_data import AXES, REFINED, RPM, SURVEY, Taken, read_taken
+from procedures.injecting import Comb, combs
+from procedures.sensitivity import CODES, Plan, check
+from reports.figures import draw as draw_figure
+from sim_backend import amb_sensitivity
+from sim_backend.truth import draw
+
+pytestmark = pytest.mark.xdist_group("sensitivity")
+SHORT: dict[str, Any] = {
+    "modes_hz": (), "settle_s": 3.0, "start_s": 0.3, "refined_periods": 4, "high_hz": 500.0, "axes": ("zi",),
+    "speeds_rad_s": (0.0,),
+}  # fmt: skip
+SEED = 1
+
+
+@dataclass(frozen=True)
+class Run:
+    measured: dict[tuple[str, str], Estimate]
+    findings: list[Finding]
+    recording: Recording[Any]
+    taken: list[Taken]
+
+    @property
+    def serious(self) -> set[str]:
+        return {f.code for f in self.findings if f.effect is not Effect.NOTE}
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """One axis at rest and turning."""
+    path = tmp_path_factory.mktemp("sound") / "recording.mcap"
+    run = simulated_run("sensitivity", "amb5dof", SEED, {**SHORT, "speeds_rad_s": (0.0, 6000 / RPM)}, path)
+    measured = {(m.quantity.name, m.where): m.estimate for m in run.results if isinstance(m, Measured)}
+    return Run(measured, [f for f in run.results if isinstance(f, Finding)], run.recording, read_taken(run.recording))
+
+
+@pytest.fixture(scope="module")
+def settings() -> dict[str, float]:
+    return {n: p.default for n, p in load_rig("amb5dof").parameters.items()} | {"law": CODES["PID"]}
+
+
+def test_nothing_is_found_on_a_sound_stand(sound: Run) -> None:
+    assert not sound.serious
+    assert {f.code for f in sound.findings} == {"zone", "injection", "orders-excluded", "scope"}
+    for where in ("zi, at rest", "zi, 6000 r/min"):
+        assert {"s_max", "s_max_hz", "phase_margin", "gain_reduction"} <= {n for n, w in sound.measured if w == where}
+
+
+def test_s_max_is_that_of_the_linearised_loop(sound: Run, settings: Mapping[str, float]) -> None:
+    """At rest the closed form; turning, the quiet machine with its unbalance and runout."""
+    plant = draw(load_rig("amb5dof"), SEED).plant
+    rest = amb_sensitivity.loop(plant, settings, 0.0, SUBSTEPS).peak(1, 2.0, 2000.0)
+    turning = amb_sensitivity.quiet_peak(plant, settings, 1, 6000 / RPM, SUBSTEPS)
+    for where, (value, hz) in (("zi, at rest", rest), ("zi, 6000 r/min", turning)):
+        s_max, at = sound.measured["s_max", where], sound.measured["s_max_hz", where]
+        assert s_max.value == pytest.approx(value, abs=3 * s_max.u)
+        assert at.value == pytest.approx(hz, abs=3.5 * at.u)
+        assert s_max.u < 0.01 * value
+
+
+def test_margins_are_those_of_the_linearised_loop(sound: Run, settings: Mapping[str, float]) -> None:
+    loop = amb_sensitivity.loop(draw(load_rig("amb5dof"), SEED).plant, settings, 0.0, SUBSTEPS)
+    open_loop = 1 / loop.sensitivity(np.geomspace(2.0, 500.0, 4000))[:, 1] - 1
+    for name, value in (
+        ("phase_margin", sensitivity_estimates.phase(open_loop)),
+        ("gain_reduction", sensitivity_estimates.fall(open_loop)),
+    ):
+        e = sound.measured[name, "zi, at rest"]
+        assert e.value == pytest.approx(value, abs=4 * e.u + 0.01 * value)
+
+
+def test_the_refined_grid_is_fine_and_the_orders_are_left_out(sound: Run) -> None:
+    for t in (t for t in sound.taken if t.kind == REFINED):
+        model = next(sensitivity_estimates.found_peaks([t])).model
+        assert t.grid.step <= model.width(75.0) / 2
+    excluded = {hz for t in sound.taken if t.speed for hz in t.excluded}
+    assert {98.0, 100.0, 102.0, 198.0, 200.0, 202.0} <= excluded
+    assert not any(t.excluded.size for t in sound.taken if not t.speed)
+
+
+def test_figures(sound: Run) -> None:
+    drawn = list(sensitivity.figures(sound.recording))
+    assert {f.key for f in drawn} == {
+        f"{k}-{rpm}" for k in ("sensitivity", "bode", "nyquist", "coherence") for rpm in (0, 6000)
+    }
+    assert len(drawn[0].bands) == 4
+    for figure in drawn:
+        draw_figure(figure)
+
+
+def _follow(axis: str, value: complex) -> Any:
+    out = np.zeros(5, complex)
+    out[AXES.index(axis)] = value
+    return out
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "effect"),
+    [
+        ({"flags": 64}, "sensor-clipped", Effect.ERROR),
+        ({"clips": 20}, "sensor-clipped", Effect.ERROR),
+        ({"flags": 4}, "contact", Effect.INDETERMINATE),
+        ({"flags": 1}, "current-saturated", Effect.INDETERMINATE),
+        ({"flags": 2}, "voltage-saturated", Effect.INDETERMINATE),
+        ({"clipped": 1e-3}, "injection-clipped", Effect.INDETERMINATE),
+        ({"follows": _follow("yo", 0.9)}, "wrong-axis", Effect.ERROR),
+        ({"follows": _follow("zi", -0.9)}, "coils-exchanged", Effect.ERROR),
+        ({"lost": 50, "expected": 1000}, "missing-samples", Effect.INDETERMINATE),
+        ({"turning": 300.0, "speed": 350.0}, "speed-off", Effect.INDETERMINATE),
+    ],
+)
+def test_what_is_wrong_with_a_capture_is_named(sound: Run, change: dict[str, Any], code: str, effect: Effect) -> None:
+    survey = next(t for t in sound.taken if t.kind == SURVEY)
+    assert not list(sensitivity_checks.of_signals([survey], sound.recording.plan))
+    found = list(sensitivity_checks.of_signals([dataclasses.replace(survey, **change)], sound.recording.plan))
+    assert [(f.code, f.effect) for f in found] == [(code, effect)]
+    if code == "wrong-axis":
+        assert "those of yo do" in found[0].text
+
+
+def test_an_amplitude_that_is_not_the_one_asked_for(sound: Run) -> None:
+    survey = sound.taken[0]
+    half = dataclasses.replace(survey, injected=survey.injected / 2)
+    assert [f.code for f in sensitivity_checks.of_signals([half], sound.recording.plan)] == ["injection-wrong"]
+
+
+def test_what_is_wrong_with_a_peak_is_named(sound: Run) -> None:
+    """Too coarse a grid, no coherence, another S at half the amplitude, a maximum elsewhere, a machine that changes."""
+    plan = sound.recording.plan
+    result = sensitivity_estimates.results([t for t in sound.taken if not t.speed])[0]
+    peak = result.peaks[0]
+
+    def codes(*peaks: Any) -> set[str]:
+        found = sensitivity_checks.of_results([dataclasses.replace(result, peaks=peaks)], plan)
+        return {f.code for f in found if f.effect is not Effect.NOTE}
+
+    replace = dataclasses.replace
+    assert codes(peak) == set()
+    assert codes() == {"peak-not-refined"}
+    assert codes(replace(peak, top=replace(peak.top, width=1.0))) == {"grid-too-coarse"}
+    assert codes(replace(peak, coherence=0.5)) == {"coherence-low"}
+    assert codes(replace(peak, change=0.2, u_change=0.01)) == {"not-linear"}
+    assert codes(replace(peak, top=replace(peak.top, inside=False))) == {"peak-not-refined"}
+    assert codes(replace(peak, model=replace(peak.model, probability=1e-6))) == {"not-explained"}
+    elsewhere = replace(result.curve, values=np.where(result.curve.hz > 300, 9.0, result.curve.values))
+    found = sensitivity_checks.of_results([replace(result, curve=elsewhere)], plan)
+    assert "peak-not-refined" in {f.code for f in found}
+
+
+def test_zones() -> None:
+    assert [sensitivity_checks.zone(s) for s in (1.0, 2.99, 3.0, 3.99, 4.5, 5.0)] == list("AABBCD")
+
+
+def test_plans_that_cannot_work_are_refused() -> None:
+    rig = load_rig("amb5dof")
+
+    def why(**plan: Any) -> str:
+        return "; ".join(check(rig, Plan(**plan)))
+
+    assert why() == ""
+    assert why(law="CCS", speeds_rad_s=(0.0, 14000 / RPM)) == ""
+    assert (
+        "amplitude_A: found 0.05 A for each line; expected less: injection: found a peak of 0.88 A; the envelope allows"
+        in why(amplitude_A=0.05)
+    )
+    assert "folds back" in why(rate_hz=2000.0)
+    assert "envelope" in why(speeds_rad_s=(0.0, 1600.0))
+    assert "landing" in why(speeds_rad_s=(20.0,))
+    assert "power of two" in why(low_hz=3.0)
+    assert "memory" in why(periods=40)
+    assert "each once" in why(axes=("yi", "yi"))
+    assert "found none" in "; ".join(check(rig.model_copy(update={"capture": None}), Plan()))
+    bare = rig.model_copy(update={"devices": {k: d for k, d in rig.devices.items() if k != "drive"}})
+    assert "nothing turns" in next(iter(check(bare, Plan())))
+
+
+def test_no_injection_leaves_the_envelope() -> None:
+    """What a comb may reach is never less than what it does reach, and the envelope refuses it."""
+    envelope = Envelope(load_rig("amb5dof"))
+    envelope.check_injection(0.25)
+    for peak in (0.26, 0.0, math.nan):
+        with pytest.raises(InterlockError, match="max_injection_A"):
+            envelope.check_injection(peak)
+    t = np.arange(5000) * 1e-4
+    for count in (1, 2, 3, 5, 17, 64, 128):
+        k = np.arange(count)
+        phases = 2 * math.pi * np.outer(t, 2.0 + 2.0 * k) - math.pi * k * (k + 1) / count
+        comb = Comb(2.0, 2.0, count, 0.004)
+        assert np.abs(0.004 * np.sin(phases).sum(axis=1)).max() <= comb.peak * (1 + 1e-9)
+    assert [c.count for c in combs(2.0, 2.0, 600.0, 1e-3)] == [128, 128, 44]
+    assert Comb(262.0, 16.0, 4, 1e-3).period_s == 0.5
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("truth", "plan", "code", "effect"),
+    [
+        ({"position_sign_zi": -1.0}, {}, "probe-polarity", Effect.ERROR),
+        ({"told_planes": 1.0}, {}, "planes-exchanged", Effect.ERROR),
+        ({"told_axes": 1.0}, {}, "axes-exchanged", Effect.ERROR),
+        ({"factor_inject_axis": 2.0}, {}, "wrong-axis", Effect.ERROR),
+        ({"factor_inject_amplitude": 0.5}, {}, "injection-wrong", Effect.ERROR),
+        ({"current_sign_i": -1.0}, {}, "coils-exchanged", Effect.ERROR),
+        ({}, {"rate_hz": 1000.0}, "aliasing", Effect.ERROR),
+        ({"position_range": 72e-6}, {}, "sensor-clipped", Effect.ERROR),
+        ({"supply_V": 1.5}, {}, "voltage-saturated", Effect.INDETERMINATE),
+        ({"geometry.clearance": 12e-6}, {}, "contact", Effect.INDETERMINATE),
+        ({"position_noise": 6e-6}, {"amplitude_A": 1e-3}, "coherence-low", Effect.INDETERMINATE),
+        ({"drop_fraction": 0.01}, {}, "missing-samples", Effect.INDETERMINATE),
+    ],
+)  # fmt: skip
+def test_a_planted_defect_is_named_and_never_passes(
+    tmp_path: Path, truth: Mapping[str, float], plan: Mapping[str, Any], code: str, effect: Effect
+) -> None:
+    run = simulated_run("sensitivity", "amb5dof", SEED, {**SHORT, **plan}, tmp_path / "recording.mcap", truth)
+    found = [f for f in run.results if isinstance(f, Finding) and f.code == code]
+    assert found, [f.code for f in run.results if isinstance(f, Finding)]
+    assert found[0].effect is effect
+    list(sensitivity.figures(run.recording))  # what can be drawn is drawn
+
+
+@pytest.mark.long
+def test_planes_exchanged_within_the_loop_do_not_levitate(tmp_path: Path) -> None:
+    run = simulated_run("sensitivity", "amb5dof", SEED, SHORT, tmp_path / "recording.mcap", {"exchange_planes": 1.0})
+    assert any(isinstance(f, Finding) and f.effect is Effect.ERROR for f in run.results)
+    assert not any(isinstance(m, Measured) for m in run.results)

@@ -1,0 +1,66 @@
+"""The closed form of the sensitivity against the core, and against python-control."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from bench.rigfile import load_rig
+from sim_backend import amb_sensitivity
+from sim_backend.amb_linear import notch
+from sim_backend.amb_step import floating
+from sim_backend.core.amb import TRACE
+from sim_backend.core.amb_params import AmbParams
+from sim_backend.truth import draw
+
+RIG = load_rig("amb5dof")
+SETTINGS = {n: p.default for n, p in RIG.parameters.items()}
+PLANT: AmbParams = draw(RIG, 2).plant
+
+
+@pytest.mark.parametrize(("law", "axis", "substeps"), [(0.0, 0, 1), (1.0, 3, 2), (1.0, 4, 1)])
+def test_the_core_is_the_closed_form(law: float, axis: int, substeps: int) -> None:
+    """Small lines into the quiet machine with bending modes, 20 Hz to 2 kHz. What is left is the integrators' last drift."""
+    settings = {**SETTINGS, "law": law}
+    plant = floating(PLANT, settings, substeps=substeps, settle_s=20.0)
+    lines = {
+        "inject_axis": axis,
+        "inject_amplitude": 2e-4,
+        "inject_hz": 20.0,
+        "inject_lines": 100.0,
+        "inject_step": 20.0,
+    }
+    for name, value in lines.items():
+        plant.set(name, float(value))
+    plant.run(10000)
+    trace = plant.run(5000, 1)[1][:, [TRACE.index("inject"), TRACE.index("after")]]
+    bins = np.fft.rfft(trace, axis=0)[10 : 10 * 100 + 1 : 10]
+    expected = amb_sensitivity.loop(PLANT, settings, 0.0, substeps).sensitivity(20.0 * np.arange(1, 101))[:, axis]
+    away = np.abs(bins[:, 1] / bins[:, 0] - expected)
+    assert away.max() < 2e-3
+    assert np.median(away) < 3e-4
+
+
+def test_python_control_finds_the_same() -> None:
+    """The PID's loop of all five axes put together, closed and evaluated by another program; its margins of one axis."""
+    control = pytest.importorskip("control")
+    loop, s, dt, size = amb_sensitivity.loop(PLANT, SETTINGS), SETTINGS, 1e-4, 28
+    delayed = np.block([[loop.a, loop.b], [np.zeros((5, size)), np.zeros((5, 5))]])
+    enters = np.vstack([np.zeros((size, 5)), np.eye(5)])
+    plant = control.ss(delayed, enters, np.hstack([loop.c, np.zeros((5, 5))]), np.zeros((5, 5)), dt)
+    keep = 1 / (1 + 2 * math.pi * s["derivative_hz"] * dt)
+    rate = control.tf([s["kd"] * (1 - keep) / dt, -s["kd"] * (1 - keep) / dt], [1, -keep], dt)
+    pid = -(control.tf([s["kp"]], [1], dt) + control.tf([s["ki"] * dt], [1, -1], dt) + rate)
+    notches = [notch(s[f"notch{k}_hz"], s[f"notch{k}_q"]) for k in (1, 2)]
+    b0, b1 = (control.tf([n[0], n[1], n[2]], [1, n[3], n[4]], dt) for n in notches)
+    radial, axial = control.ss(pid * b0 * b1), control.ss(pid)
+    law = control.append(radial, radial, radial, radial, axial)
+    closed = control.feedback(control.ss([], [], [], np.eye(5), dt), law * plant, sign=1)
+    hz = np.array([5.0, 30.0, 70.0, 80.0, 150.0, 655.0, 1215.0])
+    found = control.frequency_response(closed, 2 * np.pi * hz).frdata
+    expected = loop.sensitivity(hz)
+    for axis in range(5):
+        np.testing.assert_allclose(found[axis, axis], expected[:, axis], rtol=1e-5)
+    assert np.abs(np.asarray(control.poles(closed))).max() < 1

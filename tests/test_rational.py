@@ -1,0 +1,63 @@
+"""Rational models of a few lines: exact on their own kind, the greatest abs without bias."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from bench.analysis.rational import fitted, top
+from bench.errors import AnalysisError
+
+HZ = np.arange(40.0, 110.0, 3.0)
+
+
+def curve(hz: np.ndarray) -> np.ndarray:
+    """Two close resonances on a smooth ground."""
+    s = 2j * np.pi * hz
+    w1, w2 = 2 * math.pi * 70.0, 2 * math.pi * 90.0
+    return np.asarray(1.0 + 0.9 * w1 * s / (s**2 + 0.4 * w1 * s + w1**2) + 0.1 * w2 * s / (s**2 + 0.6 * w2 * s + w2**2))
+
+
+def true_peak() -> tuple[float, float]:
+    fine = np.linspace(HZ[0], HZ[-1], 100_001)
+    size = np.abs(curve(fine))
+    return float(size.max()), float(fine[size.argmax()])
+
+
+def test_without_noise_the_curve_between_the_lines_is_found() -> None:
+    model = fitted(HZ, curve(HZ), np.full(HZ.size, 1e-8), math.inf)
+    fine = np.linspace(45.0, 105.0, 500)
+    assert np.abs(model.at(fine) - curve(fine)).max() < 1e-3
+    found, (value, at) = top(model, HZ[0], HZ[-1]), true_peak()
+    assert found.value == pytest.approx(value, rel=1e-4)
+    assert found.at == pytest.approx(at, abs=0.1)
+    assert found.inside
+
+
+def test_a_resonance_has_its_width() -> None:
+    s = 2j * np.pi * HZ
+    w = 2 * math.pi * 70.0
+    z = w * s / (s**2 + 2 * 0.05 * w * s + w**2)
+    assert fitted(HZ, z, np.full(HZ.size, 1e-6), math.inf).width(70.0) == pytest.approx(7.0, rel=0.05)
+
+
+def test_the_greatest_of_noisy_lines_is_not_biased() -> None:
+    value, z = true_peak()[0], curve(HZ)
+    power = (0.01 * np.abs(z)) ** 2
+    rng = np.random.default_rng(3)
+    away, raw = [], []
+    for _ in range(40):
+        noisy = z + np.sqrt(power / 2) * (rng.standard_normal(HZ.size) + 1j * rng.standard_normal(HZ.size))
+        found = top(fitted(HZ, noisy, power, 200.0), HZ[0], HZ[-1])
+        away.append((found.value - value) / found.u)
+        raw.append(np.abs(noisy).max() - value)
+    assert abs(np.mean(away)) < 0.6
+    assert 0.6 < np.std(away) < 1.5
+    assert np.mean(raw) > 0.003 * value  # what the greatest line says
+
+
+def test_what_cannot_be_fitted_is_refused() -> None:
+    with pytest.raises(AnalysisError, match="six or more"):
+        fitted(HZ[:4], curve(HZ[:4]), np.ones(4), 10.0)
