@@ -16,7 +16,7 @@ import numpy.typing as npt
 from bench.analysis.balance import bound, split
 from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
-from procedures.estimators import balance_estimates, runout, unbalance_estimates
+from procedures.estimators import balance_estimates, runout, unbalance_bearings
 from procedures.estimators.balance_data import SIDES, Read, Run, Weight
 from procedures.estimators.balance_estimates import Balanced, Trials
 from procedures.estimators.runout import Stand
@@ -48,7 +48,7 @@ class Settings(balance_estimates.Settings, Protocol):
 def gain(rig: RigFile, plan: Settings, plane: int) -> float:
     """Greatest response of a probe to an unbalance in a plane on the way to the highest speed, m/(kg m): a rigid shaft in the
     loop that the controller's gains are meant to make, s^2 + k2 s + k1 in each degree of freedom."""
-    stand = Stand.of({n: e.value for n, e in unbalance_estimates.stated(rig, plan).items()})
+    stand = Stand.of({n: e.value for n, e in unbalance_bearings.stated(rig, plan).items()})
     p = {n: q.default for n, q in rig.parameters.items()}
     if plan.law == "PID":
         means = np.concatenate([np.zeros(4), np.full(8, p["bias"])])
@@ -82,8 +82,8 @@ def slow_runout(slow: Read | None, base: Run, rig: RigFile, plan: Settings) -> C
     """Runout (4,) m by the slow roll and the forces; none without one."""
     if slow is None:
         return np.zeros(4, complex)
-    stand = Stand.of({n: e.value for n, e in unbalance_estimates.stated(rig, plan).items()})
-    return runout.found(stand, slow.turning, base.fastest.turning)[0]
+    stand = Stand.of({n: e.value for n, e in unbalance_bearings.stated(rig, plan).items()})
+    return runout.found(stand, {1.0: slow.turning}, base.fastest.turning).runout[1.0]
 
 
 def shown(before: Run, having: Run, weight: Weight, rig: RigFile, plan: Settings) -> Complex:

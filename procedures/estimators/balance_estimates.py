@@ -15,7 +15,7 @@ from bench.analysis.vectors import Vectors, estimates
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate, welch_satterthwaite
 from bench.uncertainty.estimate import merged
-from procedures.estimators import balance_scatter, runout, unbalance_estimates
+from procedures.estimators import balance_scatter, runout, unbalance_bearings, unbalance_estimates
 from procedures.estimators.balance_data import SIDES, Read, Run, Weight
 from procedures.estimators.balance_solution import Solved, Trials, solved, taken
 from procedures.estimators.inputs import certified
@@ -74,7 +74,7 @@ def balanced(slow: Read | None, runs: Sequence[Run], trials: Trials, rig: RigFil
     """
     radius = rig.geometry["balance_radius"].value
     known = {
-        **unbalance_estimates.stated(rig, plan),
+        **unbalance_bearings.stated(rig, plan),
         **_weights(trials, rig),
         **(_unmeasured(rig) if slow is None else {}),
     }
@@ -217,7 +217,7 @@ class Forces:
 
 def forces(read: Read, off: Complex, rig: RigFile, plan: Settings) -> Forces:
     """The balance of forces of one dwell, with a runout (4,) m."""
-    s = Stand.of({name: e.value for name, e in unbalance_estimates.stated(rig, plan).items()})
+    s = Stand.of({name: e.value for name, e in unbalance_bearings.stated(rig, plan).items()})
     u, misfit = runout.unbalances(s, read.turning, off)
     return Forces(misfit, runout.carried(s, read.means) / unbalance_estimates.shares(rig, s), u)
 

@@ -62,7 +62,7 @@ def solved(s: Stand, slow: Turning | None, trials: Sequence[Trial], base: Sequen
     """Influence coefficients and what they need, of one set of numbers. `trials` by plane: weight kg m on the scale, readings
     by speed before it was fixed and with it. The
     mark's angle is that of the highest speed, where masses rule and not the bearings."""
-    found = np.zeros(4, complex) if slow is None else runout.found(s, slow, base[-1])[0]
+    found = np.zeros(4, complex) if slow is None else runout.found(s, {1.0: slow}, base[-1]).runout[1.0]
     count = len(base)
     influence, moved = np.zeros((count, 4, 2), complex), np.zeros((2, 2), complex)
     for p, (u, before, having) in enumerate(trials):

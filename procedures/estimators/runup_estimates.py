@@ -16,7 +16,7 @@ from bench.analysis.vectors import complexes, parts
 from bench.recording import Recording
 from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.estimate import merged
-from procedures.estimators import unbalance_estimates
+from procedures.estimators import unbalance_bearings, unbalance_estimates
 from procedures.estimators.runup_data import Curve, Passage, curve, near
 from procedures.estimators.unbalance_data import AXES, Dwell
 from procedures.estimators.unbalance_estimates import Result, Results, Runout
@@ -102,7 +102,7 @@ def run(passage: Passage, slow: Dwell | None, recording: Recording, plan: Settin
         left.append(rest)
     results = unbalance_estimates.results([*([] if slow is None else [slow]), *dwells], rig, plan)
     results = replace(results, dwells=tuple(_with(r, rest) for r, rest in zip(results.dwells, left, strict=True)))
-    inputs = unbalance_estimates.stated(rig, plan)
+    inputs = unbalance_bearings.stated(rig, plan)
     shaft, peaks = [], []
     for k in range(4):
         line = _Line(found, k, inputs[f"gain_{k}"].value, results.runouts[1.0])
