@@ -50,7 +50,8 @@ def left_out_errors(design: Array, measured: Array, u: Array | None) -> Array:
     projector (Cook and Weisberg, Residuals and Influence in Regression, 1982, 2.2.2, for a group of rows). All nan
     where the points do not determine the terms.
     """
-    return _of_subsets(design, measured, u, np.arange(design.shape[2])[None])[0]
+    errors: Array = _of_subsets(design, measured, u, np.arange(design.shape[2])[None])[0]
+    return errors
 
 
 def _of_subsets(design: Array, measured: Array, u: Array | None, columns: npt.NDArray[np.intp]) -> Array:
