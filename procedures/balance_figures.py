@@ -95,10 +95,10 @@ def _sheet(found: Evaluated, balance: Balanced, p: int, side: str) -> Figure:
     points += [(purpose, w.unbalance(balance.radius)) for w, purpose in found.recorded.fixed if w.plane == p]
     points = [(name, z / G_MM) for name, z in points]
     series = [Series(name, np.array([0.0, z.real]), np.array([0.0, z.imag]), "both") for name, z in points]
-    top = 1.1 * max(abs(z) for _, z in points)
+    top = 1.4 * max(abs(z) for _, z in points)
     series.append(Series("scale", top * np.cos(TURN), top * np.sin(TURN), "guide"))
     notes = [(f"{name} {abs(z):.2f} g mm ∠{np.degrees(np.angle(z)) % 360:.0f}°", z.real, z.imag) for name, z in points]
-    notes += [(f"{k}°", top * np.cos(np.radians(k)), top * np.sin(np.radians(k))) for k in range(0, 360, 45)]
+    notes += [(f"{k}°", top * np.cos(np.radians(k)), top * np.sin(np.radians(k))) for k in range(0, 360, 90)]
     return Figure(
         f"sheet-{side}", f"Unbalance and weights {side}",
         f"On the scale of the {side} plane: its 0° faces y while the shaft stands with its zero there; angles grow from y "
