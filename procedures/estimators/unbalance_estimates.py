@@ -108,7 +108,7 @@ def _runouts(inputs: Mapping[str, Estimate], rig: RigFile, slow: Dwell | None, f
         rows = {n: np.array([v[f"s{n:g}_{k}"] for k in range(24)]).view(complex) for n in orders}
         return {n: Turning(slow.speed, slow.means, row) for n, row in rows.items()}
 
-    values = {name: e.value for name, e in (inputs | scatter).items()}
+    values = {name: e.value for name, e in {**inputs, **scatter}.items()}
     others = {n: Turning(fast.speed, fast.means, fast.both(n).values) for n in orders if n in fast.track.orders}
     more = runout.mixed(Stand.of(values), at(values), others)  # so small that what is not known of it does not count
 
