@@ -78,6 +78,11 @@ class Passing(BenchPlan):
         """Of the compensation."""
         return ("off",)
 
+    @property
+    def rate_rad_s2(self) -> float:
+        """Of the drive's ramp; 0 where it coasts."""
+        return 0.0
+
 
 class Plan(Passing):
     """Settings of the run-up, SI."""

@@ -139,7 +139,7 @@ def curve(p: Passage, blocks: int) -> Curve:
     rate = np.abs(np.gradient(speed[at:end], p.t[at:end]))
     smooth = np.convolve(rate, np.ones(201) / 201, "same") if rate.size > 400 else np.full(rate.size, rate.mean())
     smooth = np.maximum(smooth, 0.1 * rate.mean())
-    rows: list[tuple[Array, ...]] = []
+    rows: list[tuple[Any, ...]] = []
     whole = math.ceil(angle[at] / (2 * math.pi))
     while True:
         k = int(np.searchsorted(angle[:end], 2 * math.pi * whole))
@@ -160,7 +160,7 @@ def curve(p: Passage, blocks: int) -> Curve:
     return _ordered(joined)
 
 
-def _piece(p: Passage, angle: Array, first: int, last: int, turns: int) -> tuple[Array, ...]:
+def _piece(p: Passage, angle: Array, first: int, last: int, turns: int) -> tuple[Any, ...]:
     """Some blocks of equal turns: mean times, speeds, widths, values, moves, means, volts, order 2."""
     low, high = np.searchsorted(angle[: p.moving.stop], 2 * math.pi * np.array([first, last], dtype=float))
     part = slice(max(int(low) - 1, 0), int(high) + 1)  # a sample beyond either end

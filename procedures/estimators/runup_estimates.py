@@ -127,7 +127,7 @@ class _Line:
     def curve(self, rounds: int, less: complex = 0.0) -> Complex:
         """With the lag taken off so often; a runout that is greater by `less`."""
         c = self.found
-        values = c.values[self.k] / self.gain - self.runout.values[self.k] - less
+        values = np.asarray(c.values[self.k] / self.gain - self.runout.values[self.k] - less, np.complex128)
         if not rounds:
             return values
         return settled(c.speed, values, self.covariance, c.acceleration, c.width, rounds)
