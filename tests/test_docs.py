@@ -27,7 +27,7 @@ CHAIN = re.compile(r'RUN=\$\(bench run [^\\]*\| tail -1\)|bench adopt "\$RUN" [^
 """A command on one line that leaves nothing but files and the variable RUN."""
 
 
-LONG = ("force-map", "model", "run-a-campaign", "step", "tracking")
+LONG = ("force-map", "model", "run-a-campaign", "sensitivity", "step", "tracking")
 """Pages whose commands take more than ten seconds."""
 
 
