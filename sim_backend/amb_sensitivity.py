@@ -29,6 +29,7 @@ Complex = npt.NDArray[np.complex128]
 MOVING = [0, 1, 2, 3, 4, 6, 7, 8, 9, 10, *range(12, 20)]  # of the core's state: all but the angle and the speed
 SHAFT, COILS, AXES = len(MOVING), 10, 5
 STEP_M, STEP_A = 1e-8, 1e-6  # of the numerical derivatives
+SETTLED_S = 20.0  # until the flatness law's integrators hold what its model does not know
 SMALL_A, LINES = 1e-3, 12  # of the lines about a peak, and to either side of it
 
 
@@ -73,7 +74,7 @@ def loop(p: AmbParams, settings: Mapping[str, float], speed: float = 0.0, subste
     What turns with the shaft is left out at speed: an orbit of some micrometres adds some tenths of a percent to the peak (the
     bearings' slopes go with it), which `quiet_peak` has. At rest runout stays, since it shifts where the shaft floats.
     """
-    plant = floating(even(p) if speed else p, settings, speed)
+    plant = floating(even(p) if speed else p, settings, speed, SETTLED_S)
     at, state = plant.run(10, 1)[1][-1, :AXES], plant.state()
     rates, pulls = _slopes(dataclasses.replace(p, unbalance=(0.0,) * 2), state["s"], state["coil"])
     a, b = _tick(p, rates, pulls, substeps)
@@ -96,7 +97,7 @@ def quiet_peak(
     about the peak of its linearised loop; the same model of the lines as the procedure's, without noise."""
     near = loop(p, settings, speed, substeps).peak(axis, 2.0, 2000.0)[1]
     first, count = 2 * math.floor(near / 2) - 2 * LINES, 2 * LINES + 1
-    plant = floating(p, settings, speed, substeps=substeps)
+    plant = floating(p, settings, speed, SETTLED_S, substeps)
     made = {
         "inject_axis": axis,
         "inject_amplitude": SMALL_A,

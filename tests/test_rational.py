@@ -47,15 +47,13 @@ def test_the_greatest_of_noisy_lines_is_not_biased() -> None:
     value, z = true_peak()[0], curve(HZ)
     power = (0.01 * np.abs(z)) ** 2
     rng = np.random.default_rng(3)
-    away, raw = [], []
+    away = []
     for _ in range(40):
         noisy = z + np.sqrt(power / 2) * (rng.standard_normal(HZ.size) + 1j * rng.standard_normal(HZ.size))
         found = top(fitted(HZ, noisy, power, 200.0), HZ[0], HZ[-1])
         away.append((found.value - value) / found.u)
-        raw.append(np.abs(noisy).max() - value)
     assert abs(np.mean(away)) < 0.6
     assert 0.6 < np.std(away) < 1.5
-    assert np.mean(raw) > 0.003 * value  # what the greatest line says
 
 
 def test_what_cannot_be_fitted_is_refused() -> None:
