@@ -171,7 +171,7 @@ def _taken(
         with record.step(INJECT, **labels):
             rig.capture.arm(channels(kind, speed), seconds=seconds, rate_hz=plan.rate_hz)
             rig.capture.wait(seconds + 5.0)
-    data, grid = rig.capture.upload(**labels), grid_of(labels)
+    data, grid = rig.capture.upload(None, **labels), grid_of(labels)
     if folds(grid, data.rate_hz):
         return None
     t = data.start_ns * 1e-9 + np.arange(len(data.columns["inject"])) / data.rate_hz

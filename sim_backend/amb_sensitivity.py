@@ -117,7 +117,7 @@ def quiet_peak(
     angle = turn.angle(t)
     inside = np.isfinite(angle)
     clean = without_orders(column["after"][inside], angle[inside], (1.0, 2.0, 3.0, 4.0))
-    hz = first + 2.0 * np.arange(count)
+    hz = np.asarray(first + 2.0 * np.arange(count), np.float64)
     clear = clear_of_orders(hz, speed, 3.0, (1.0, 2.0, 3.0, 4.0))
     found = lines(np.concatenate([column["inject"][None, inside], clean]), 1 / TICK_S, 5000, hz[clear])
     values = response(found, 1, 0).values
@@ -176,7 +176,7 @@ def _readings(p: AmbParams) -> Array:
             if any(p.mode_on):
                 y[10 + 2 * mode] = z[11 + 2 * mode] = p.shape_sensor[2 * mode + b]
     out[4, 0] = 1.0
-    return out * (np.array(p.position_gain) * np.array(p.position_sign))[:, None]
+    return np.asarray(out * (np.array(p.position_gain) * np.array(p.position_sign))[:, None])
 
 
 def _law(c: AmbControl, slopes: Sequence[Array]) -> Callable[[Complex], Complex]:
@@ -206,7 +206,7 @@ def _inverted(c: AmbControl, at: Array, coil: Array, speed: float) -> tuple[Arra
     """Coordinates of the readings, and the slopes of the differential currents to coordinates, rates and accelerations, where
     the probes read `at` (5,) and the coils carry `coil` (10,)."""
     model, still = Model(c), np.zeros(AXES)
-    q0 = model.coordinates(at, at[4])  # type: ignore[arg-type]
+    q0 = model.coordinates(at, at[4])
 
     def currents(q: Array, rate: Array, v: Array) -> Array:
         force, xi = model.flat(q, rate, v, speed), model.gaps(q)

@@ -38,9 +38,11 @@ CHAIN = re.compile(r'RUN=\$\(bench run [^\\]*\| tail -1\)|bench adopt "\$RUN" [^
 """A command on one line that leaves nothing but files and the variable RUN."""
 
 
-LONG = ("amb-calibration", "angle-step", "balance", "change-a-plan", "coast-down", "compensation", "force-constant", "force-coupling",
-        "force-map", "model", "negative-stiffness", "run-a-campaign", "run-up", "sensitivity", "slew", "spindown", "step", "torque-constant",
-        "tracking", "unbalance", "use-in-ci")  # fmt: skip
+LONG = (
+    "amb-calibration", "angle-step", "balance", "change-a-plan", "coast-down", "compensation", "force-constant",
+    "force-coupling", "force-map", "model", "negative-stiffness", "run-a-campaign", "run-up", "sensitivity", "slew",
+    "spindown", "step", "torque-constant", "tracking", "unbalance", "use-in-ci",
+)  # fmt: skip
 """Pages that take long, or that only run a procedure: by default `tests/procedures` takes each through its whole path and
 draws its figures, and the tutorial and `adopt-a-calibration` the same commands with their reports and calibrations."""
 

@@ -88,7 +88,7 @@ def fitted(x: Array, z: Complex, power: Array, dof: float) -> Rational:
         if (told := chi2 + 4 * (n + d)) >= least or (best is not None and _hides(below, u)):
             continue
         chance = float(chdtrc(left, chi2) if np.isinf(dof) else fdtrc(left, max(dof, 1.0), chi2 / left))
-        covariance = np.linalg.pinv(slopes.conj().T @ slopes)
+        covariance = np.asarray(np.linalg.pinv(slopes.conj().T @ slopes), np.complex128)
         best, least = Rational(float(middle), float(half), above, below, covariance, chi2 / left, chance, dof), told
     assert best is not None
     return best

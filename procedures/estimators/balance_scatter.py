@@ -88,7 +88,9 @@ def _slow(s: Stand, solution: Solved, slow: Read, trials: Trials) -> Complex:
     base = [r.turning for r in trials.base.reads]
 
     def at(vectors: Complex) -> Complex:
-        return taken(s, base, found(s, {1.0: Turning(slow.speed, slow.means, vectors)}, base[-1]).runout[1.0], solution.mark)
+        return taken(
+            s, base, found(s, {1.0: Turning(slow.speed, slow.means, vectors)}, base[-1]).runout[1.0], solution.mark
+        )
 
     start, size = at(slow.vectors.values), 1e-6
     columns = [(at(slow.vectors.values + size * np.eye(12)[n]) - start) / size for n in range(12)]

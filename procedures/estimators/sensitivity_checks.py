@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -332,4 +332,4 @@ def zone(value: float) -> str:
     return "ABCD"[sum(value >= end for end in ZONES)]
 
 
-__all__: Iterable[str] = ["ZONES", "before", "of_plan", "of_results", "of_signals", "zone"]
+__all__ = ["ZONES", "before", "of_plan", "of_results", "of_signals", "zone"]

@@ -153,7 +153,7 @@ def read_taken(recording: Recording[Any]) -> list[Taken]:
 
 def grid_of(labels: Mapping[str, Any]) -> Grid:
     """As it was asked for."""
-    hz = float(labels["first_hz"]) + float(labels["step_hz"]) * np.arange(int(labels["lines"]))
+    hz = np.asarray(float(labels["first_hz"]) + float(labels["step_hz"]) * np.arange(int(labels["lines"])), np.float64)
     return Grid(hz, float(labels["period_s"]), float(labels["amplitude_A"]))
 
 
