@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import Field
 
 from bench.capture import at_speed
-from bench.errors import BenchError
+from bench.errors import AnalysisError, BenchError
 from bench.figures import Figure
 from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
@@ -203,10 +203,16 @@ def evaluated(recording: Recording[Any]) -> tuple[tuple[Finding, ...], Run | Non
     found = [*tracking_wiring.before_orbits(recording), *runup_checks.before(recording)]
     if any(f.effect is Effect.ERROR for f in found):
         return tuple(found), None
-    plan, passage = recording.plan, read_passage(recording)
+    plan = recording.plan
     slow = next((read_dwell(recording, s) for s in recording.steps(SLOW)), None)
-    found += runup_checks.of_passage(passage, recording, plan)
     found += unbalance_checks.of_signals([slow], plan) if slow else unbalance_checks.slow_roll([], plan)
+    if any(f.effect is Effect.ERROR for f in found):  # what a steady speed shows, a changing one may hide
+        return tuple(found), None
+    try:
+        passage = read_passage(recording)
+    except AnalysisError as error:
+        return (*found, Finding("no-passage", str(error), "", Effect.ERROR)), None
+    found += runup_checks.of_passage(passage, recording, plan)
     if any(f.effect is Effect.ERROR for f in found):
         return tuple(found), None
     run = runup_estimates.run(passage, slow, recording, plan)

@@ -35,6 +35,7 @@ SHORT: dict[str, Any] = {
     "speeds_rad_s": (0.0,),
 }  # fmt: skip
 SEED = 1
+TURNING: dict[str, Any] = {"law": "CCS", "speeds_rad_s": (4000 * math.pi / 30,)}
 
 
 @dataclass(frozen=True)
@@ -226,9 +227,9 @@ def test_no_injection_leaves_the_envelope() -> None:
         ({"factor_inject_amplitude": 0.5}, {}, "injection-wrong", Effect.ERROR),
         ({"current_sign_i": -1.0}, {}, "coils-exchanged", Effect.ERROR),
         ({}, {"rate_hz": 1000.0}, "aliasing", Effect.ERROR),
-        ({"position_range": 72e-6}, {}, "sensor-clipped", Effect.ERROR),
+        ({"position_range": 78e-6, "unbalance_i": 1.05e-5, "unbalance_o": 1.05e-5}, TURNING, "sensor-clipped", Effect.ERROR),
         ({"supply_V": 1.5}, {}, "voltage-saturated", Effect.INDETERMINATE),
-        ({"geometry.clearance": 12e-6}, {}, "contact", Effect.INDETERMINATE),
+        ({"geometry.clearance": 20e-6}, TURNING, "contact", Effect.INDETERMINATE),
         ({"position_noise": 6e-6}, {"amplitude_A": 1e-3}, "coherence-low", Effect.INDETERMINATE),
         ({"drop_fraction": 0.01}, {}, "missing-samples", Effect.INDETERMINATE),
     ],
