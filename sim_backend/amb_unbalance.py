@@ -51,7 +51,7 @@ def response(
     p: AmbParams, settings: Mapping[str, float], speeds: Array, settle_s: float = 1.0, seconds: float = 0.3
 ) -> Complex:
     """Vectors (n, 4) of the shaft's centre at `speeds` (n,) rad/s, each held, one after the other with one plant; without
-    noise and rounding, which short dwells would not average out. (Under CAC noise changes the motion by tenths of a percent.)"""
+    noise and rounding, which short dwells would not average out. (Under CAC noise changes motion by tenths of a percent.)"""
     plant = _turning(quiet(p), settings, float(speeds[0]))
     plant.run(50000)
     out = []
