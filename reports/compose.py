@@ -279,13 +279,20 @@ def counts(title: str, tree: Any) -> Iterable[Table]:
         yield Table(title, ("", "Count"), tuple((_words(str(k)), tables.inline(v)) for k, v in flat.items()), (1,))
     leaves = {k: v for k, v in nested.items() if not any(isinstance(x, Mapping) for x in v.values())}
     if leaves:
-        columns = tuple(dict.fromkeys(str(c) for v in leaves.values() for c in v))
-        rows = tuple(
-            (str(k), *(tables.inline(v[c]) if c in v else text.DASH for c in columns)) for k, v in leaves.items()
-        )
-        yield Table(title, ("", *map(_words, columns)), rows, tuple(range(1, len(columns) + 1)))
+        yield _crossed(title, leaves)
     for key in nested.keys() - leaves.keys():
         yield from counts(f"{title}: {key}", nested[key])
+
+
+def _crossed(title: str, leaves: Mapping[Any, Content]) -> Table:
+    """A row for each link or stream and a column for each count, whichever way round they are given: of the two it is the
+    streams that grow many (a capture is one)."""
+    rows, columns = [str(k) for k in leaves], list(dict.fromkeys(str(c) for v in leaves.values() for c in v))
+    cells = [[tables.inline(v[c]) if c in v else text.DASH for c in columns] for v in leaves.values()]
+    if len(columns) > len(rows):
+        rows, columns, cells = columns, rows, [list(row) for row in zip(*cells, strict=True)]
+    made = tuple((name, *row) for name, row in zip(rows, cells, strict=True))
+    return Table(title, ("", *map(_words, columns)), made, tuple(range(1, len(columns) + 1)))
 
 
 def _link_note(around: Surroundings) -> str:

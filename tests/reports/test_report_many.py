@@ -81,3 +81,16 @@ def test_what_carries_a_budget(squares: tuple[float, ...], said: str) -> None:
         for n, s in zip(string.ascii_letters, squares, strict=False)
     ]
     assert many.carried({"budget": entries}) == said
+
+
+@pytest.mark.parametrize("streams", [1, 2, 30])
+def test_many_streams_are_rows(streams: int) -> None:
+    """A table as wide as there are captures would not fit a page."""
+    names = [f"capture/{k}" for k in range(1, streams + 1)]
+    (table,) = compose.counts("Recording", {"samples": dict.fromkeys(names, 5), "lost": {names[0]: 1}})
+    if streams > 2:
+        assert table.header == ("", "Samples", "Lost")
+        assert table.rows[0] == ("capture/1", "5", "1")
+        assert table.rows[-1] == ("capture/30", "5", DASH)
+    assert len(table.header) <= 3
+    assert {len(row) for row in table.rows} == {len(table.header)}
