@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -291,8 +292,13 @@ def _crossed(title: str, leaves: Mapping[Any, Content]) -> Table:
     cells = [[tables.inline(v[c]) if c in v else text.DASH for c in columns] for v in leaves.values()]
     if len(columns) > len(rows):
         rows, columns, cells = columns, rows, [list(row) for row in zip(*cells, strict=True)]
-    made = tuple((name, *row) for name, row in zip(rows, cells, strict=True))
-    return Table(title, ("", *map(_words, columns)), made, tuple(range(1, len(columns) + 1)))
+    made = sorted(((name, *row) for name, row in zip(rows, cells, strict=True)), key=lambda row: _natural(row[0]))
+    return Table(title, ("", *map(_words, columns)), tuple(made), tuple(range(1, len(columns) + 1)))
+
+
+def _natural(name: str) -> list[tuple[str, int]]:
+    """capture/2 before capture/10."""
+    return [(words, int(number or 0)) for words, number in re.findall(r"(\D*)(\d*)", name)]
 
 
 def _link_note(around: Surroundings) -> str:

@@ -86,8 +86,8 @@ def test_what_carries_a_budget(squares: tuple[float, ...], said: str) -> None:
 @pytest.mark.parametrize("streams", [1, 2, 30])
 def test_many_streams_are_rows(streams: int) -> None:
     """A table as wide as there are captures would not fit a page."""
-    names = [f"capture/{k}" for k in range(1, streams + 1)]
-    (table,) = compose.counts("Recording", {"samples": dict.fromkeys(names, 5), "lost": {names[0]: 1}})
+    names = sorted(f"capture/{k}" for k in range(1, streams + 1))  # as a recording gives them: 10 before 2
+    (table,) = compose.counts("Recording", {"samples": dict.fromkeys(names, 5), "lost": {"capture/1": 1}})
     if streams > 2:
         assert table.header == ("", "Samples", "Lost")
         assert table.rows[0] == ("capture/1", "5", "1")
