@@ -29,6 +29,32 @@ def test_a_killed_bench_leaves_a_rig_that_coasts_down_and_lands_alone(tmp_path: 
 
 
 @pytest.mark.long
+@pytest.mark.timeout(300)
+def test_a_stand_whose_bench_is_killed_at_speed_coasts_down_and_lands_alone(tmp_path: Path) -> None:
+    """Its shaft is turned by a drive that no controller commands: both notice by themselves that nobody is there."""
+    speeds = ("--plan", "speeds_rpm=[2000]", "--plan", "dwell_s=30", "--plan", "slow_s=30")
+    with (
+        processes.served(tmp_path, "--seed", "1", rig="amb5dof") as rig,
+        Listener(rig.endpoints["slcan:socket"], "amb5dof") as bus,
+    ):
+        run = ("run", "unbalance", "--rig", "amb5dof", "--backend", "live", "--operator", "auto", "--no-report")
+        with processes.real_bench(tmp_path, *run, *rig.links("slcan:socket"), *speeds) as child:
+            fast = bus.wait_for(lambda h: h.state == "SPINNING" and h.speed > 30, timeout_s=150.0)
+            seen = len(bus.heard)
+            child.kill()
+        left = bus.wait_for(lambda h: h.state != "SPINNING", seen)
+        landing = bus.wait_for(lambda h: h.state == "LANDING", seen, timeout_s=120.0)
+        end = bus.wait_for(lambda h: h.state == "FAULT", seen)
+        heard = bus.heard[seen:]
+    assert fast.state == "SPINNING"
+    assert left.state == "COASTING"
+    assert left.speed > 28  # slow roll, above the landing speed
+    assert left.fault == end.fault == "HEARTBEAT_LOST"
+    assert landing.speed <= 20.1
+    assert [h for h in heard if h.state in ("LANDING", "FAULT") and h.speed > 20.1] == []
+
+
+@pytest.mark.long
 def test_a_killed_rig_is_noticed(tmp_path: Path) -> None:
     with processes.served(tmp_path) as rig:
         arguments = processes.live(rig, "slcan:socket", "tiny-levitated", "--no-report", "--plan", 'act="count"')
