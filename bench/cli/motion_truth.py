@@ -88,8 +88,42 @@ def _unbalance(done: Simulated) -> Found:
             yield "d_max", f"{plane}, {dwell.where}", value
 
 
+def _balance(done: Simulated) -> Found:
+    from procedures.estimators.balance_data import SIDES
+    from sim_backend import amb_balance
+
+    own = amb_balance.left(done.recording.rig, done.drawn, done.recording.events("operator"))
+    for name, values in (("unbalance", own[0]), ("residual", own[-1])):
+        for side, value in zip(SIDES, values, strict=True):
+            yield f"{name}_cos", side, float(value.real)
+            yield f"{name}_sin", side, float(value.imag)
+
+
+def _sensitivity(done: Simulated) -> Found:
+    from bench.cli.virtual import SUBSTEPS
+    from procedures.estimators.sensitivity_data import RPM
+    from procedures.injecting import AXES
+    from procedures.sensitivity import CODES
+    from sim_backend import amb_sensitivity
+
+    plan: Any = done.recording.plan
+    plant, settings = done.drawn.plant, _settings(done, {"law": CODES[plan.law]})
+    for speed in plan.speeds_rad_s:
+        loop = None if speed else amb_sensitivity.loop(plant, settings, 0.0, SUBSTEPS)
+        for axis in plan.axes:
+            k, where = AXES.index(axis), f"{axis}, {f'{speed * RPM:.0f} r/min' if speed else 'at rest'}"
+            if loop is not None:
+                value, hz = loop.peak(k, plan.low_hz, plan.high_hz)
+            else:
+                value, hz = amb_sensitivity.quiet_peak(plant, settings, k, speed, SUBSTEPS)
+            yield "s_max", where, value
+            yield "s_max_hz", where, hz
+
+
 TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "step": _step,
     "unbalance": _unbalance,
     "compensation": _unbalance,
+    "balance": _balance,
+    "sensitivity": _sensitivity,
 }

@@ -14,6 +14,7 @@ import pytest
 
 from bench.analysis.balance import G_MM
 from bench.analysis.vectors import contains
+from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import simulated_run
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
@@ -45,6 +46,7 @@ class Balancing:
     recording: Recording[Any]
     found: Evaluated
     true: list[np.ndarray]
+    truth: Mapping[str, float]
 
     @property
     def serious(self) -> set[str]:
@@ -58,7 +60,9 @@ def done(
     measured = {(m.quantity.name, m.where): m.estimate for m in run.results if isinstance(m, Measured)}
     findings = [f for f in run.results if isinstance(f, Finding)]
     true = amb_balance.left(RIG, draw(RIG, seed, truth), run.recording.events("operator"))
-    return Balancing(measured, findings, run.recording, balance_checks.evaluated(run.recording), true)
+    return Balancing(
+        measured, findings, run.recording, balance_checks.evaluated(run.recording), true, truth_of_motion(run)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -93,6 +97,10 @@ def test_unbalance_as_found_and_as_left_is_what_is_really_there(sound: Balancing
             assert contains(vectors.one(p), complex(true[p]), 0.999)
             assert vectors.one(p).u_amplitude[0] < 0.12 * G_MM
     assert np.abs(sound.true[0]).min() > 1.5 * G_MM
+    for key, value in sound.truth.items():
+        e = sound.measured[tuple(key.split("@"))]  # type: ignore[index]
+        assert e.value == pytest.approx(value, abs=4 * e.u)
+    assert len(sound.truth) == 8
     for p, side in enumerate(SIDES):
         assert abs(sound.true[-1][p]) < sound.measured["permissible", side].value
 
