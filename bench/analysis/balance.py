@@ -20,7 +20,6 @@ from bench.errors import AnalysisError
 
 G_MM = 1e-6  # kg m in a g mm
 WORST_CONDITION = 100.0
-GRADES = (0.4, 1, 2.5, 6.3, 16, 40, 100, 250, 630, 1600, 4000)  # mm/s
 
 
 @dataclass(frozen=True)

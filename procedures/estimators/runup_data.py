@@ -16,7 +16,8 @@ from bench.analysis.tachometer import Tachometer, age, counted, tachometer
 from bench.analysis.vectors import parts
 from bench.errors import AnalysisError
 from bench.recording import Recording
-from procedures.estimators.unbalance_data import CURRENTS, POSITIONS, TOLD, Dwell, clips, full_rate
+from procedures.estimators.signals import clips
+from procedures.estimators.unbalance_data import CURRENTS, POSITIONS, TOLD, Dwell, full_rate
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,7 @@ from bench.analysis.responses import Response, clear_of_orders, lines, response,
 from bench.analysis.tachometer import counted, tachometer
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
+from procedures.estimators.signals import clips
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -172,7 +173,7 @@ def _read(recording: Recording[Any], step: Step) -> Taken:
     return Taken(
         str(labels["axis"]), float(labels["speed_rad_s"]), turning, kind, float(labels["about_hz"]), grid, found, excluded,
         injected, float(np.abs(columns["inject"]).max()), clipped, follows, rate, flags,
-        held([told[f"pos_{a}"] for a in AXES]), step.lost(), step.expected(),
+        clips([told[f"pos_{a}"] for a in AXES]), step.lost(), step.expected(),
     )  # fmt: skip
 
 
@@ -188,14 +189,3 @@ def _follows(columns: Mapping[str, Array], rate: float, grid: Grid) -> Complex |
     spectra = lines(data - data.mean(axis=1, keepdims=True), rate, round(grid.period * rate), low).values.mean(axis=0)
     after = spectra[0]
     return np.asarray((spectra[1:] * after.conj()).sum(axis=1) / (np.abs(after) ** 2).sum())
-
-
-def held(positions: Sequence[Array]) -> int:
-    """Most neighbouring samples of a probe that stand at its extreme: one that clips repeats its limit."""
-    most = 0
-    for x in positions:
-        for limit in (x.max(), x.min()):
-            at = np.concatenate([[0], (np.abs(x - limit) < 1.5e-8).astype(int), [0]])
-            edges = np.flatnonzero(np.diff(at))
-            most = max(most, int((edges[1::2] - edges[::2]).max()))
-    return most

@@ -5,7 +5,7 @@ Arrays have one entry per step, in any shape; `where` names the step of the grea
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from bench.findings import Effect, Finding
 
 Array = npt.NDArray[np.float64]
 Where = Callable[[Array], str]
+SAME_M = 1.5e-8  # apart, and positions are still the same: one and a half of their digits on the bus
 
 FLAGS = (
     (1, "saturated", "an AMB amplifier was at its limit"),
@@ -86,3 +87,15 @@ def settled(
                 where(values),
                 Effect.INDETERMINATE,
             )
+
+
+def longest_at(position: Array, limit: float) -> int:
+    """Most neighbouring samples of a position in m that stand at a limit, within its last digit."""
+    at = np.concatenate([[0], (np.abs(position - limit) < SAME_M).astype(int), [0]])
+    edges = np.flatnonzero(np.diff(at))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
+
+
+def clips(positions: Iterable[Array]) -> int:
+    """Most neighbouring samples of a probe that stand at its extreme: one that clips repeats its limit."""
+    return max(longest_at(x, limit) for x in positions for limit in (x.max(), x.min()))

@@ -85,9 +85,7 @@ def _clipping(o: Orbit) -> Iterator[Finding]:
     found = False
     for name, x in zip(POSITIONS, o.path.readings, strict=True):
         for limit in (x.max(), x.min()):
-            at = np.abs(x - limit) < 1.5e-8
-            runs = np.convolve(at.astype(int), np.ones(HELD, int), "valid")
-            if (runs == HELD).any():
+            if signals.longest_at(x, limit) >= HELD:
                 found = True
                 yield Finding(
                     "sensor-range",

@@ -17,6 +17,7 @@ from bench.analysis.tachometer import Tachometer, age, counted, tachometer
 from bench.analysis.vectors import Vectors
 from bench.errors import AnalysisError
 from bench.recording import Captured, Recording, Step
+from procedures.estimators.signals import clips
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -137,17 +138,6 @@ def read_dwell(recording: Recording[Any], step: Step) -> Dwell:
 def _seen(orders: Sequence[float], speed: float, period: float) -> tuple[float, ...]:
     """Orders that the telemetry's period leaves well below half its rate."""
     return tuple(n for n in orders if n == 1 or n * speed / (2 * math.pi) < 0.4 / period)
-
-
-def clips(positions: Array) -> int:
-    """Most neighbouring samples of a probe that stand at its extreme: one that clips repeats its limit."""
-    most = 0
-    for x in positions:
-        for limit in (x.max(), x.min()):
-            at = np.concatenate([[0], (np.abs(x - limit) < 1.5e-8).astype(int), [0]])
-            edges = np.flatnonzero(np.diff(at))
-            most = max(most, int((edges[1::2] - edges[::2]).max()))
-    return most
 
 
 def full_rate(captured: Captured) -> Full:

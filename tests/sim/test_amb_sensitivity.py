@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import control
 import numpy as np
 import pytest
 
@@ -46,7 +47,6 @@ def test_the_core_is_the_closed_form(law: float, axis: int, substeps: int) -> No
 
 def test_python_control_finds_the_same() -> None:
     """The PID's loop of all five axes put together, closed and evaluated by another program; its margins of one axis."""
-    control = pytest.importorskip("control")
     loop, s, dt, size = amb_sensitivity.loop(PLANT, SETTINGS), SETTINGS, 1e-4, 28
     delayed = np.block([[loop.a, loop.b], [np.zeros((5, size)), np.zeros((5, 5))]])
     enters = np.vstack([np.zeros((size, 5)), np.eye(5)])
