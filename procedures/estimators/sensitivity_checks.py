@@ -108,9 +108,9 @@ def of_plan(rig: RigFile, plan: Settings, combs: Sequence[tuple[str, Comb]]) -> 
 
 def _injection(rig: RigFile, plan: Settings, combs: Sequence[tuple[str, Comb]]) -> Iterator[str]:
     refined = Comb(plan.low_hz, plan.low_hz, 128, plan.amplitude_A)  # at most, in the second pass
-    for why in dict.fromkeys(refused(Envelope(rig), c) for c in [*(c for _, c in combs), refined]):
-        if why:
-            yield f"amplitude_A: found {plan.amplitude_A:g} A for each line; expected less: {why}"
+    greatest = max([*(c for _, c in combs), refined], key=lambda c: c.peak)
+    if why := refused(Envelope(rig), greatest):
+        yield f"amplitude_A: found {plan.amplitude_A:g} A for each line; expected less: {why}"
     for key, value in (("low_hz", plan.low_hz), ("high_step_hz", plan.high_step_hz)):
         if math.log2(value) % 1:
             yield f"{key}: found {value:g}; expected a power of two: the lines must repeat after whole samples"
