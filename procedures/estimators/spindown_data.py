@@ -18,7 +18,10 @@ from procedures.estimators.spindown import Coast
 Array = npt.NDArray[np.float64]
 COILS = tuple(f"i_{axis}{bearing}_{coil}" for axis in "xy" for bearing in "io" for coil in "pn")
 CHANNELS = ("angle", "speed", "flags", *SEGMENTS, *COILS)
-LAGS = 60  # samples of 1 ms: several times the 8 ms of the speed's filter
+ANGLE_LAGS = 60  # samples of 1 ms over which its residuals repeat themselves
+SPEED_LAGS = 200
+"""The speed is the angle differentiated: its noise takes back what it adds, and only far beyond the 8 ms of its filter
+does the sum over the lags come near what is left."""
 SMALLEST_SAMPLES = 400
 
 
@@ -80,7 +83,7 @@ def _read(step: Step, delay_s: float, end: float) -> RunDown:
     return RunDown(
         bias_A=float(labels["bias_A"]), direction=direction, repeat=int(labels["repeat"]), ring=bool(labels["ring"]),
         t=t, speed=speed, angle=angle - angle[0],
-        of_speed=spindown.of_speed(t, speed, LAGS), of_angle=spindown.of_angle(t, angle - angle[0], LAGS),
+        of_speed=spindown.of_speed(t, speed, SPEED_LAGS), of_angle=spindown.of_angle(t, angle - angle[0], ANGLE_LAGS),
         coils={c: float(data[c][used].mean()) for c in COILS},
         segments=np.array([float(data[c][used].mean()) for c in SEGMENTS]),
         lost=step.lost(), expected=step.expected(), flags=int(np.bitwise_or.reduce(data["flags"].astype(np.int64))),

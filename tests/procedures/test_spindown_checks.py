@@ -10,7 +10,7 @@ import pytest
 from bench.findings import Effect
 from bench.rigfile import load_rig
 from procedures.estimators import drag, spindown, spindown_checks
-from procedures.estimators.spindown_data import COILS, LAGS, RunDown
+from procedures.estimators.spindown_data import ANGLE_LAGS, COILS, SPEED_LAGS, RunDown
 from procedures.spindown import Plan
 
 J, COUNT = 0.033, 2 * np.pi / 4096
@@ -30,8 +30,8 @@ def made(
         size=len(t)
     )
     return RunDown(
-        bias, direction, repeat, False, t, seen, angle - angle[0], spindown.of_speed(t, seen, LAGS),
-        spindown.of_angle(t, angle - angle[0], LAGS), dict.fromkeys(COILS, bias), np.zeros(4), 0, 1000, 0,
+        bias, direction, repeat, False, t, seen, angle - angle[0], spindown.of_speed(t, seen, SPEED_LAGS),
+        spindown.of_angle(t, angle - angle[0], ANGLE_LAGS), dict.fromkeys(COILS, bias), np.zeros(4), 0, 1000, 0,
     )  # fmt: skip
 
 

@@ -9,9 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from scipy.signal import lfilter
 
 from bench.errors import AnalysisError
 from procedures.estimators import spindown
+from procedures.estimators.spindown_data import SPEED_LAGS
 
 RPM = math.pi / 30
 J, B, T_C = 0.033, 0.081, 0.1
@@ -61,6 +63,20 @@ def test_a_filter_on_the_speed_changes_the_start_alone() -> None:
     assert coast.c == pytest.approx(c, rel=1e-2)
     early = spindown.of_speed(t, seen, 10)
     assert abs(early.b / b - 1) > 3 * abs(coast.b / b - 1)
+
+
+def test_the_stated_scatter_is_that_of_a_differentiated_angle() -> None:
+    """White noise on the angle, differentiated and filtered at 20 Hz as the controller does it: its variance near zero
+    frequency is far below that of its first few lags (which, alone, would state twice the true scatter)."""
+    rng, keep, step = np.random.default_rng(8), math.exp(-2 * math.pi * 20 * 1e-3), 1e-3
+    t = np.arange(0, 0.95, step)
+    w = spindown.speed(t, B / J, T_C / J, 50.0)
+    found = []
+    for _ in range(100):
+        blue = lfilter([1 - keep], [1, -keep], np.diff(rng.normal(0, 1e-3, len(t) + 201)) / step)[200:]
+        found.append(spindown.of_speed(t, w + blue, SPEED_LAGS))
+    stated = np.sqrt(np.mean([np.diag(x.covariance) for x in found], axis=0))
+    np.testing.assert_allclose(stated, np.std([[x.b, x.c] for x in found], axis=0), rtol=0.3)
 
 
 @pytest.mark.parametrize(("rpm", "bias"), [(100, 0.33), (200, 0.18), (403, 0.10), (601, 0.07)])
