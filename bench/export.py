@@ -18,7 +18,8 @@ from bench.errors import BenchError
 from bench.recording import Recording
 from bench.samples import StreamLayout
 
-Format = Literal["parquet", "csv", "mcap"]
+Tabular = Literal["parquet", "csv"]
+Format = Literal[Tabular, "mcap"]
 EVENTS: Final = pa.schema([("t_ns", pa.int64()), ("kind", pa.string()), ("data", pa.string())])
 
 
@@ -60,14 +61,23 @@ def _whole(path: Path, write: Callable[[Path], None]) -> Path:
     return path
 
 
-def _tables(folder: Path, to: Format, recording: Recording[Any]) -> Iterator[Path]:
+def whole_table(path: Path, to: Tabular, rows: pa.RecordBatch) -> Path:
+    """One batch as a file that is there only once it is complete.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    return _table(path, to, rows.schema, iter([rows]))
+
+
+def _tables(folder: Path, to: Tabular, recording: Recording[Any]) -> Iterator[Path]:
     for stream in (*recording.streams.values(), *recording.capture_streams.values()):
         schema = _schema(stream, with_units=to == "csv")
         yield _table(folder / f"{stream.name.replace('/', '-')}.{to}", to, schema, _batches(recording, stream, schema))
-    yield _table(folder / f"events.{to}", to, EVENTS, iter([_events(recording)]))
+    yield whole_table(folder / f"events.{to}", to, _events(recording))
 
 
-def _table(path: Path, to: Format, schema: pa.Schema, batches: Iterator[pa.RecordBatch]) -> Path:
+def _table(path: Path, to: Tabular, schema: pa.Schema, batches: Iterator[pa.RecordBatch]) -> Path:
     """In memory of one block at a time."""
 
     def write(part: Path) -> None:

@@ -248,9 +248,9 @@ def runs(out: Out = Path("runs")) -> int:
 def export(
     run: RunArgument, to: Annotated[Table, typer.Option("--to", help="File format of the tables.")] = Table.PARQUET
 ) -> int:
-    """Write the channels of a run as tables.
+    """Write the channels, results and figures of a run as tables.
 
-    One file per stream, in RUN/export.
+    One file per stream and per figure, in RUN/export.
     """
     from bench.cli.export import export_command
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from bench.figures import Figure
 from bench.procedure import Procedure
 from bench.recording import Recording
 from bench.records import Record
@@ -24,17 +26,22 @@ def build(directory: Path, record: Record, procedure: Procedure, recording: Reco
     """
     import reports
 
-    analysed = recording is not None and any(m.value is not None for m in record.measurements)
     reports.build(
         directory,
         recording,
         json.loads(json.dumps(dataclasses.asdict(record))),
-        procedure.figures(recording) if recording is not None and analysed else (),
+        figures(record, procedure, recording),
         title=procedure.title,
         method=procedure.method,
         measures=procedure.measures,
         conditions={} if recording is None else conditions(recording),
     )
+
+
+def figures(record: Record, procedure: Procedure, recording: Recording[Any] | None) -> Iterable[Figure]:
+    """What the procedure draws of a run; nothing of one that measured nothing."""
+    measured = any(m.value is not None for m in record.measurements)
+    return procedure.figures(recording) if recording is not None and measured else ()
 
 
 def conditions(recording: Recording[Any]) -> dict[str, str]:

@@ -213,6 +213,19 @@ def test_export_writes_every_sample_of_every_channel(bench: Bench) -> None:
     assert table["index"].to_pylist() == list(range(table.num_rows))
 
 
+def test_export_writes_what_was_found_too(bench: Bench) -> None:
+    _, out, _ = bench(*run())
+    directory = Path(out.splitlines()[-1])
+    assert bench("export", str(directory))[0] == 0
+    (row,) = parquet.read_table(directory / "export" / "results.parquet").to_pylist()
+    (said,) = json.loads((directory / "record.json").read_text())["measurements"]
+    assert (row["name"], row["value"], row["low"]) == ("supply", said["value"], said["interval"][0])
+    (directory / "record.json").unlink()
+    (directory / "export" / "results.parquet").unlink()
+    assert bench("export", str(directory))[0] == 0
+    assert not (directory / "export" / "results.parquet").exists()
+
+
 def test_a_report_can_be_built_again(bench: Bench) -> None:
     _, out, _ = bench(*run())
     directory = Path(out.splitlines()[-1])
