@@ -34,9 +34,7 @@ class SimulatedPlant(Protocol):
     @property
     def speed(self) -> float: ...  # rad/s, as the controller sees it
     @property
-    def pulse_age_s(
-        self,
-    ) -> float | None: ...  # since the last once-per-turn pulse; None: the speed is measured all the time
+    def pulse_age_s(self) -> float | None: ...  # since the last once-per-turn pulse; None: speed not by pulses
     @property
     def shaft_speed(self) -> float: ...  # the true one
     @property

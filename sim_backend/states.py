@@ -105,10 +105,12 @@ class States:
 
     def fail(self, fault: str) -> None:
         """Latch a fault, and set the rotor down as its kind asks for."""
-        self.fault = fault if self.fault == "NONE" else self.fault
+        first = self.fault == "NONE"
+        self.fault = fault if first else self.fault
         self._plant.clear_trips()
         if fault in ("OVERCURRENT", "OVERSPEED", "SENSOR") and self.state in TURNING:
-            self._safe()
+            if first or self.state != "COASTING":  # a trip that comes again and again does not put the landing off
+                self._safe()
         else:
             self._switch_off("FAULT")
 
