@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-
-import numpy as np
 
 from bench.clock import Clock, PumpedClock
 from bench.envelope import Envelope
-from bench.errors import BenchError, DeviceFault, InterlockError, LinkError
-from bench.frames import SENT, FrameBatch
+from bench.errors import BenchError, InterlockError, LinkError
 from bench.link import Link
 from bench.recorder import Recorder
 from bench.rigfile import RigFile
@@ -18,18 +14,16 @@ from bench.roles import RigState
 from bench.samples import SampleBlock
 from bench.session import Session
 from bench.telemetry import TelemetryDecoder
-from drivers import advice, handshake
+from drivers import advice, handshake, waiting
 from drivers.capture import ControllerCapture
 from drivers.capture_upload import Upload
+from drivers.condition import Condition
 from drivers.dialogue import Dialogue, no_reply
 from drivers.orders import Orders
+from drivers.turning import Turning
 
 SILENCE_S = 0.5
-WAIT_SLICE_S, LONG_SLICE_S, PATIENCE = 0.01, 0.1, 0.2  # a wait looks again after a fifth of how long it has waited
-KEPT_S, KEPT_SLICE_S = 0.1, 0.02  # what is to stand or to keep its speed is looked at so often for so long
 STALL_NS = 200_000_000  # between two polls, or two slices: they come with every slice
-SPIN_S = 60.0
-SLOWEST_SLEW = 0.2  # rad/s, of a controller that does not say how fast it turns to an angle
 TOUCHED = 0.5  # rad/s, above which a landed shaft is not at rest
 HOST_AGE = "host_age"
 FIRST_S = 1.5  # for the first telemetry, and for the last owner to be gone
@@ -53,18 +47,16 @@ class Controller:
         self._stall_ns = max(STALL_NS, round(2e9 * slice_s))
         self.clock = PumpedClock(base, self.poll, slice_s, lambda: self.telemetry.host.lag_ns)
         self.guarded = True
-        self._states, self._faults = rig.choices("state"), rig.choices("fault")
+        self._condition = Condition(rig, self.telemetry)
         self._last_ns = self._polled_ns = base.now_ns()
-        self._angle = 0.0
-        self._reboots = 0
         self.cleared = ""
         self.restored: tuple[str, ...] = ()
         self.serial: int | None = None
-        self._host_ids = {rig.messages[name].identifier: name for name in handshake.host_messages(rig)}
-        self._others: set[str] = set()  # host messages that came in
+        self._hosts = handshake.HostFrames(rig)
         self.host_age_s = 0.0  # the greatest while the machine was on
         self.companions: list[Callable[[], None]] = []  # polled with it: other devices of the rig
         self._orders = Orders(rig, self._dialogue, session, self.envelope, lambda: self.mode, self._wait)
+        self._turning = Turning(rig, self._orders, self.telemetry, self.clock, base.now_ns)
         self.capture: ControllerCapture | None = None
         if rig.capture is not None:
             upload = Upload(rig, link, self._dialogue, self.clock)
@@ -101,7 +93,7 @@ class Controller:
         self.guarded = False
         if not self._dialogue.has("Claim"):
             self.clock.sleep(handshake.LISTEN_S)
-            handshake.alone(self._others, self.link.name)
+            handshake.alone(self._hosts.seen, self.link.name)
         self.link.renew_lease()
         silent = (
             f"no telemetry within {FIRST_S:g} s. Is the controller on, the port right, the bit rate that of the bus?"
@@ -122,7 +114,7 @@ class Controller:
         of the time before: a controller whose clock has fallen behind gets there later. Silence ends a run by itself."""
         due, begin = self.clock.now_ns() - self.telemetry.period_ns, self._base.now_ns()
         while self.telemetry.newest_ns < due and self._base.now_ns() - begin < SILENCE_S * 1e9:
-            self.clock.sleep(WAIT_SLICE_S)
+            self.clock.sleep(waiting.SLICE_S)
 
     def release(self) -> None:
         """Let another bench have the controller, which must be at rest."""
@@ -141,7 +133,7 @@ class Controller:
         if now - self._polled_ns > self._stall_ns:  # the bench stood still: the link has had no chance to be heard
             self._last_ns += now - self._polled_ns
         self._polled_ns = now
-        batch = self._marked(self.link.receive())
+        batch = self._hosts.marked(self.link.receive())
         if self._recorder is not None:
             self._recorder.frames(self.link.name, batch, lag_ns=self.telemetry.host.lag_ns)
         self._dialogue.take(batch)
@@ -161,15 +153,6 @@ class Controller:
             self._check()
         for pump in self.companions:
             pump()
-
-    def _marked(self, batch: FrameBatch) -> FrameBatch:
-        """Frames that a host sent are marked so: another host's, or our own heartbeats that the bus brings back."""
-        if not self._host_ids.keys().isdisjoint(batch["id"].tolist()):
-            theirs = np.isin(batch["id"], list(self._host_ids))
-            batch = batch.copy()
-            batch["flags"][theirs] |= SENT
-            self._others |= {self._host_ids[int(i)] for i in batch["id"][theirs]}
-        return batch
 
     def require_levitated(self) -> None:
         """Raise unless the rotor is held.
@@ -201,16 +184,7 @@ class Controller:
         if self.silent_s > SILENCE_S + (self.rig.link.reconnect_s if self.link.reopening else 0.0):
             text = f"no telemetry for {self.silent_s:.2f} s; the link or the controller is lost"
             raise LinkError(f"link {self.link.name}: {text}")
-        if self.telemetry.counters.reboots > self._reboots:
-            self._reboots = self.telemetry.counters.reboots
-            raise DeviceFault("the controller restarted during the run: its tick began anew; look at its supply")
-        fault = self.fault
-        if fault != "NONE":
-            raise DeviceFault(f"the controller reports {fault}: {advice.ADVICE.get(fault, 'see its documentation')}")
-        if self.mode in ("FAULT", "UNKNOWN"):
-            code = int(self.telemetry.latest.get("state", 0))
-            name = self._states.get(code, f"{code}, which its DBC does not name")
-            raise DeviceFault(f"the controller reports no fault, but its state is {name}: see its documentation")
+        self._condition.check()
 
     @property
     def round_trip_ns(self) -> int | None:
@@ -231,17 +205,12 @@ class Controller:
     def mode(self) -> str:
         """What the controller's state amounts to: one of bench.binding.MODES, or UNKNOWN for a state without a name:
         nobody knows what the machine does in it."""
-        if not self.telemetry.latest:
-            return "OFF"
-        name = self._states.get(int(self.telemetry.latest.get("state", 0)))
-        return (self.rig.binding.mode(name) if name is not None else None) or "UNKNOWN"
+        return self._condition.mode
 
     @property
     def fault(self) -> str:
         """The latched fault, NONE without one."""
-        code = int(self.telemetry.latest.get("fault", 0))
-        name = self._faults.get(code, f"code {code}" if code else "NONE")
-        return "NONE" if name in self.rig.binding.no_fault else name
+        return self._condition.fault
 
     @property
     def state(self) -> RigState:
@@ -276,13 +245,12 @@ class Controller:
     @property
     def speed_rad_s(self) -> float:
         """Rotor speed."""
-        return self.telemetry.latest.get("speed", 0.0)
+        return self._turning.speed_rad_s
 
     @property
     def landing_speed(self) -> float:
         """Below this the rotor may be landed, rad/s."""
-        p = self.rig.parameters.get("landing_speed")
-        return p.default if p else 1.0
+        return self._turning.landing_speed
 
     def point(self, angle_rad: float) -> None:
         """Turn the rotor the shorter way to an angle and wait until it stands there.
@@ -290,20 +258,7 @@ class Controller:
         Raises:
             LinkError: it does not arrive in time.
         """
-        here = self.telemetry.latest.get("angle", 0.0)
-        turn = (angle_rad - here + math.pi) % (2 * math.pi) - math.pi
-        self._angle += (angle_rad - self._angle + math.pi) % (2 * math.pi) - math.pi
-        self.set("angle_ref", self._angle)
-        travel_s = abs(turn) / (self._default("angle_slew") or SLOWEST_SLEW)
-
-        def off() -> float:
-            return (self.telemetry.latest["angle"] - angle_rad + math.pi) % (2 * math.pi) - math.pi
-
-        def stands() -> bool:
-            return abs(off()) < 4e-3 and abs(self.speed_rad_s) < 0.5
-
-        self._keep(stands, travel_s, travel_s + 5.0,
-                   lambda: f"the rotor did not reach {angle_rad:.3f} rad: it stands {off():+.4f} rad off")  # fmt: skip
+        self._turning.point(angle_rad)
 
     def spin(self, rad_s: float) -> None:
         """Turn the rotor at a speed; returns when it has kept within 2 % or 0.3 rad/s of it for a tenth of a second.
@@ -311,44 +266,20 @@ class Controller:
         Raises:
             LinkError: it does not get there in time.
         """
-        self.set("speed_ref", rad_s)
-        self._orders.command("SPIN")
-        tolerance = max(0.02 * abs(rad_s), 0.3)
-        self._keep(lambda: abs(self.speed_rad_s - rad_s) < tolerance, 0.0, SPIN_S,
-                   lambda: f"the rotor did not reach {rad_s:.1f} rad/s within {SPIN_S:g} s: it turns at "
-                   f"{self.speed_rad_s:.1f} rad/s")  # fmt: skip
+        self._turning.spin(rad_s)
+
+    def stop(self) -> None:
+        """Brake to a stop, and wait until the rotor is below the landing speed.
+
+        Raises:
+            LinkError: it does not get there in time.
+        """
+        self._turning.stop(self.link.name)
 
     def _default(self, parameter: str) -> float:
         """What a parameter is set to unless a plan says otherwise; 0 where the rig has none."""
         p = self.rig.parameters.get(parameter)
         return p.default if p else 0.0
-
-    def _keep(self, ok: Callable[[], bool], expected_s: float, timeout_s: float, text: Callable[[], str]) -> None:
-        """Let the clock run for the time that it should take, and on until something has been true for a tenth of a
-        second.
-
-        Raises:
-            LinkError: `text`, when time runs out.
-        """
-        begin, since = self._base.now_ns(), None
-        self.clock.sleep(min(expected_s, timeout_s))
-        while True:
-            now = self._base.now_ns()
-            if not ok():
-                since = None
-            elif since is None:
-                since = now
-            elif now - since >= KEPT_S * 1e9:
-                return
-            if now - begin > timeout_s * 1e9:
-                raise LinkError(text())
-            self.clock.sleep(_pause(now - begin) if since is None else KEPT_SLICE_S)
-
-    def stop(self) -> None:
-        """Brake to a stop, and wait until the rotor is below the landing speed."""
-        self._orders.command("STOP")
-        limit = self.landing_speed
-        self._wait(lambda: abs(self.speed_rad_s) < limit, 60.0, f"speed below {limit:g} rad/s")
 
     def set(self, parameter: str, value: float) -> None:
         """Write a parameter (SI) and check what the controller reads back; `drivers.orders.Orders.set` has the errors."""
@@ -383,14 +314,4 @@ class Controller:
         Raises:
             LinkError: the given one, when time runs out.
         """
-        begin = self._base.now_ns()
-        while not done():
-            waited = self._base.now_ns() - begin
-            if waited >= timeout_s * 1e9:
-                raise error
-            self.clock.sleep(min(_pause(waited), max(timeout_s - waited * 1e-9, 1e-3)))
-
-
-def _pause(waited_ns: int) -> float:
-    """How long to wait before looking again, s."""
-    return min(max(PATIENCE * waited_ns * 1e-9, WAIT_SLICE_S), LONG_SLICE_S)
+        waiting.until(done, timeout_s, error, self.clock, self._base.now_ns)

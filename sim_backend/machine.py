@@ -34,6 +34,8 @@ class SimulatedPlant(Protocol):
     @property
     def speed(self) -> float: ...  # rad/s, as the controller sees it
     @property
+    def pulse_age_s(self) -> float | None: ...  # since the last once-per-turn pulse; None: speed not by pulses
+    @property
     def shaft_speed(self) -> float: ...  # the true one
     @property
     def drive_torque(self) -> float: ...  # N m, of the external drive

@@ -258,7 +258,7 @@ def device() -> SimulatedController:
 @pytest.mark.parametrize(("command", "state"), state_rows())
 def test_commands_are_allowed_where_the_page_says(device: SimulatedController, command: str, state: str) -> None:
     allowed, leads = next(row[1:] for row in table("command | allowed in") if row[0] == command)
-    device.state, device.fault = state, "HEARTBEAT_LOST" if state == "FAULT" else "NONE"
+    device.states.state, device.states.fault = state, "HEARTBEAT_LOST" if state == "FAULT" else "NONE"
     reply = ask(device, command)
     status = MESSAGES["CommandReply"].signal("status").choices[int(reply["status"])]
     after = MESSAGES["CommandReply"].signal("state").choices[int(reply["state"])]

@@ -1,25 +1,19 @@
-"""The command `bench`: what can be typed, and the exit status that it ends with.
+"""The command `bench`: what can be typed. `bench.cli.status` says what exit status it ends with.
 
 Only the declarations live here; each command imports its module when it is used, so that `--help` and `list` are fast.
-
-    0 PASS    1 FAIL    2 usage or configuration    3 ERROR    4 ABORTED    5 INDETERMINATE
 """
 
 from __future__ import annotations
 
-import os
 import sys
-import traceback
 from collections.abc import Sequence
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from bench.errors import Aborted, BenchError, ConfigError
-
-USAGE, ERROR, ABORTED = 2, 3, 4
+from bench.cli.options import Backend, Calibrations, Keep, OperatorKind, Out, RunArgument, Table
+from bench.cli.status import run_app
 
 app = typer.Typer(
     help="Test and calibrate magnetically levitated machines, real or simulated.",
@@ -28,44 +22,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-
-
-class Backend(StrEnum):
-    """What stands behind the rig's links."""
-
-    SIM = "sim"
-    LIVE = "live"
-
-
-class OperatorKind(StrEnum):
-    """Who hangs the masses and answers the questions."""
-
-    CONSOLE = "console"
-    AUTO = "auto"
-
-
-class Table(StrEnum):
-    """File formats of `bench export`."""
-
-    PARQUET = "parquet"
-    CSV = "csv"
-    MCAP = "mcap"
-
-
-class Keep(StrEnum):
-    """Which recordings of a campaign over many rigs stay."""
-
-    ALL = "all"
-    MISSED = "missed"
-    NONE = "none"
-
-
-Out = Annotated[Path, typer.Option("--out", help="Folder of the run directories.")]
-Calibrations = Annotated[
-    Path | None,
-    typer.Option("--calibrations", metavar="DIR", help="Folder of calibrations; default beside the rig file."),
-]
-RunArgument = Annotated[Path, typer.Argument(metavar="RUN", help="A run directory.")]
 
 
 @app.command("list")
@@ -309,54 +265,7 @@ def map_(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns its exit status. Nothing that goes wrong leaves as a traceback."""
-    status = _status(arguments)
-    try:
-        sys.stdout.flush()
-    except BrokenPipeError:
-        # Whoever read our output stopped reading, as `head` does; the interpreter must not flush into it again.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return status
-
-
-def _status(arguments: Sequence[str] | None) -> int:
-    try:
-        return _dispatch(sys.argv[1:] if arguments is None else list(arguments))
-    except ConfigError as error:
-        return _told(str(error), USAGE)
-    except (Aborted, KeyboardInterrupt, typer.Abort) as error:
-        return _told(str(error) or "stopped", ABORTED)
-    except BenchError as error:
-        return _told(str(error), ERROR)
-    except BrokenPipeError:
-        return ERROR
-    except OSError as error:
-        return _told(f"{error.filename or 'a file'}: {error.strerror or error}", ERROR)
-    except Exception as error:
-        where = traceback.extract_tb(error.__traceback__)[-1]
-        place = f"{Path(where.filename).name}:{where.lineno}"
-        return _told(f"unexpected {type(error).__name__} in {place}: {error}; please report it", ERROR)
-
-
-def _dispatch(arguments: list[str]) -> int:
-    command = typer.main.get_command(app)
-    try:
-        status: Any = command.main(arguments, prog_name="bench", standalone_mode=False)
-    except typer.Exit as stop:
-        return int(stop.exit_code)
-    except Exception as error:
-        # The library's usage errors have no public common class across its versions, but they all can show themselves.
-        show = getattr(error, "show", None)
-        if show is None or not hasattr(error, "format_message"):
-            raise
-        show()
-        return USAGE
-    return status if isinstance(status, int) else 0
-
-
-def _told(text: str, status: int) -> int:
-    sys.stderr.write(f"bench: {text}\n")
-    sys.stderr.flush()
-    return status
+    return run_app(app, sys.argv[1:] if arguments is None else list(arguments))
 
 
 if __name__ == "__main__":

@@ -100,10 +100,11 @@ class Plant:
     @mode.setter
     def mode(self, mode: int) -> None:
         state = self._s.law
-        if mode == LIFT or state.mode == OFF:
+        # A lift that is broken off is landed from where it stands, and the other way round: the smooth step is its own
+        # mirror image.
+        broken_off = (state.mode, mode) in ((LIFT, LAND), (LAND, LIFT))
+        if state.mode == OFF or (mode == LIFT and not broken_off):
             state.fresh = 1
-        # A lift that is broken off is landed from where it stands: the smooth step is its own mirror image.
-        broken_off = mode == LAND and state.mode == LIFT
         state.lift_clock = self._c.lift_time_s - state.lift_clock if broken_off else 0
         state.mode = mode
 
@@ -116,6 +117,10 @@ class Plant:
     def speed(self) -> float:
         """Speed in rad/s as the controller's filter sees it."""
         return float(self._s.speed)
+
+    @property
+    def pulse_age_s(self) -> None:
+        """There are no pulses: an encoder tells the angle all the time."""
 
     @property
     def age_ticks(self) -> int:

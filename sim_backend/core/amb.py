@@ -8,7 +8,7 @@ from typing import Any, Final, Literal, overload
 import numpy as np
 from cffi import FFI
 
-from sim_backend.core import LAND, LIFT, OFF, PERIOD_TICKS, Array, DriveLaw, _fill
+from sim_backend.core import LAND, LIFT, OFF, PERIOD_TICKS, TICK_S, Array, DriveLaw, _fill
 from sim_backend.core.amb_params import AmbControl, AmbParams
 from sim_backend.core.build import library
 
@@ -80,9 +80,10 @@ class AmbPlant:
     @mode.setter
     def mode(self, mode: int) -> None:
         law = self._s.law
-        if mode == LIFT or law.mode == OFF:
+        # landed, or taken up again, from where it stands: the smooth step is its own mirror
+        broken_off = (law.mode, mode) in ((LIFT, LAND), (LAND, LIFT))
+        if law.mode == OFF or (mode == LIFT and not broken_off):
             law.fresh = 1
-        broken_off = mode == LAND and law.mode == LIFT  # landed from where it stands: the smooth step is its own mirror
         law.lift_clock = self._c.lift_time_s - law.lift_clock if broken_off else 0
         law.mode = mode
 
@@ -95,6 +96,11 @@ class AmbPlant:
     def speed(self) -> float:
         """Speed in rad/s as the pulses tell it."""
         return float(self._s.tacho.speed)
+
+    @property
+    def pulse_age_s(self) -> float:
+        """Time since the last once-per-turn pulse, or since the start."""
+        return float(self.tick * TICK_S - self._s.tacho.last)
 
     @property
     def phase(self) -> float:

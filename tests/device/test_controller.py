@@ -109,7 +109,7 @@ def test_every_command_in_every_state(state: str, command: str) -> None:
         host.levitate()
     elif state == "READY":
         host.command("ENABLE")
-    host.device.state = state  # the interface's state alone decides what is refused
+    host.device.states.state = state  # the interface's state alone decides what is refused
     assert host.command(command) == ("OK" if command in ALLOWED[state] else "WRONG_STATE")
 
 
@@ -267,7 +267,7 @@ def test_no_bytes_upset_the_device(frames: list[tuple[int, bytes]]) -> None:
     batch = [frame(identifier, payload, t_ns=host.now) for identifier, payload in frames]
     host.run(0.02, *batch)
     for name, p in RIG.parameters.items():
-        value = host.device._own[name]
+        value = host.device.parameters.values[name]
         assert p.low - 1e-9 <= value <= p.high * (1 + 1e-6) + 1e-9, name
 
 

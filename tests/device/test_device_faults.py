@@ -69,7 +69,7 @@ def states(batch: FrameBatch) -> list[str]:
 def test_a_reboot_begins_anew_from_sequence_0_and_leaves_the_rotor_lying() -> None:
     host = Host("reboot@2.5+0.3")
     host.levitate()
-    host.device._own["bias_i"] = 2.5
+    host.device.parameters.values["bias_i"] = 2.5
     seen = host.run(1.5)  # to 3.5 s
     values = telemetry(seen)
     (at,) = np.flatnonzero(np.diff(values["tick"]) < 0)
@@ -81,7 +81,7 @@ def test_a_reboot_begins_anew_from_sequence_0_and_leaves_the_rotor_lying() -> No
     assert set(states(seen)[at + 1 :]) == {"OFF"}
     assert values["pos_yo"][-100:].mean() < -1e-4
     assert np.abs(values["i_yo_p"][-100:]).max() < 0.03
-    assert host.device._own["bias_i"] == 3.0
+    assert host.device.parameters.values["bias_i"] == 3.0
 
 
 def test_a_controller_that_reboots_is_deaf_first_and_then_knows_nobody() -> None:

@@ -90,14 +90,14 @@ def test_parameters_that_another_host_left_are_set_back_and_named() -> None:
 
 def test_a_fault_of_the_machine_is_looked_at_before_it_is_cleared() -> None:
     bench = Bench()
-    bench.machine.device.state, bench.machine.device.fault = "FAULT", "LEVITATION_LOST"
+    bench.machine.device.states.state, bench.machine.device.states.fault = "FAULT", "LEVITATION_LOST"
     with pytest.raises(ConfigError, match=r"the fault LEVITATION_LOST of an earlier run: check sensor.*--clear-fault"):
         bench.controller.connect()
     assert bench.machine.device.state == "FAULT"
     bench.controller.connect(clear_fault=True)
     assert bench.controller.cleared == "LEVITATION_LOST"
     assert bench.machine.device.state == "OFF"
-    bench.machine.device.state, bench.machine.device.fault = "FAULT", "HEARTBEAT_LOST"
+    bench.machine.device.states.state, bench.machine.device.states.fault = "FAULT", "HEARTBEAT_LOST"
     bench.controller.connect()
     assert bench.controller.cleared == "HEARTBEAT_LOST"
 

@@ -171,6 +171,7 @@ static void millisecond(int64_t tick) {
     }
     if (state == LIFTING && moving_ms >= LIFT_MS) enter(LEVITATED);
     if (state == COASTING && fabs(speed) < *parameter(51)) enter(LANDING);
+    if (state == LANDING && fabs(speed) > 1.1 * *parameter(51)) enter(COASTING); /* taken up again: something drives it */
     if (state == LANDING && moving_ms >= LIFT_MS) enter(fault ? FAULT : leaving ? OFF : READY);
     angle = remainder(angle + speed * 1e-3, 6.283185307179586);
 }

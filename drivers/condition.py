@@ -1,0 +1,49 @@
+"""What a controller's newest telemetry says of its condition: mode, fault, restarts."""
+
+from __future__ import annotations
+
+from bench.errors import DeviceFault
+from bench.rigfile import RigFile
+from bench.telemetry import TelemetryDecoder
+from drivers import advice
+
+
+class Condition:
+    """State and fault by the names of the rig file, out of what `telemetry` decoded last."""
+
+    def __init__(self, rig: RigFile, telemetry: TelemetryDecoder) -> None:
+        self._binding, self._telemetry = rig.binding, telemetry
+        self._states, self._faults = rig.choices("state"), rig.choices("fault")
+        self._reboots = 0
+
+    @property
+    def mode(self) -> str:
+        """`Controller.mode`."""
+        if not self._telemetry.latest:
+            return "OFF"
+        name = self._states.get(int(self._telemetry.latest.get("state", 0)))
+        return (self._binding.mode(name) if name is not None else None) or "UNKNOWN"
+
+    @property
+    def fault(self) -> str:
+        """`Controller.fault`."""
+        code = int(self._telemetry.latest.get("fault", 0))
+        name = self._faults.get(code, f"code {code}" if code else "NONE")
+        return "NONE" if name in self._binding.no_fault else name
+
+    def check(self) -> None:
+        """Raise unless all is well.
+
+        Raises:
+            DeviceFault: a restart since the last look, a fault, or a state that says so.
+        """
+        if self._telemetry.counters.reboots > self._reboots:
+            self._reboots = self._telemetry.counters.reboots
+            raise DeviceFault("the controller restarted during the run: its tick began anew; look at its supply")
+        fault = self.fault
+        if fault != "NONE":
+            raise DeviceFault(f"the controller reports {fault}: {advice.ADVICE.get(fault, 'see its documentation')}")
+        if self.mode in ("FAULT", "UNKNOWN"):
+            code = int(self._telemetry.latest.get("state", 0))
+            name = self._states.get(code, f"{code}, which its DBC does not name")
+            raise DeviceFault(f"the controller reports no fault, but its state is {name}: see its documentation")

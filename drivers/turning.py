@@ -1,0 +1,74 @@
+"""Turning the rotor by the controller's own motor: to an angle, at a speed, to a stop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from bench.clock import Clock
+from bench.rigfile import RigFile
+from bench.telemetry import TelemetryDecoder
+from drivers import waiting
+from drivers.dialogue import no_reply
+from drivers.orders import Orders
+
+SPIN_S, STOP_S = 60.0, 60.0
+SLOWEST_SLEW = 0.2  # rad/s, of a controller that does not say how fast it turns to an angle
+
+
+class Turning:
+    """The angle that the rotor has been sent to, over turns, and the ways there. `now_ns` as in `drivers.waiting`."""
+
+    def __init__(
+        self, rig: RigFile, orders: Orders, telemetry: TelemetryDecoder, clock: Clock, now_ns: Callable[[], int]
+    ) -> None:
+        self._rig, self._orders, self._telemetry, self._clock, self._now_ns = rig, orders, telemetry, clock, now_ns
+        self._angle = 0.0
+
+    @property
+    def speed_rad_s(self) -> float:
+        """Rotor speed, as it was told last."""
+        return self._telemetry.latest.get("speed", 0.0)
+
+    @property
+    def landing_speed(self) -> float:
+        """Below this the rotor may be landed, rad/s."""
+        p = self._rig.parameters.get("landing_speed")
+        return p.default if p else 1.0
+
+    def point(self, angle_rad: float) -> None:
+        """`Controller.point`."""
+        here = self._telemetry.latest.get("angle", 0.0)
+        turn = (angle_rad - here + math.pi) % (2 * math.pi) - math.pi
+        self._angle += (angle_rad - self._angle + math.pi) % (2 * math.pi) - math.pi
+        self._orders.set("angle_ref", self._angle)
+        slew = self._rig.parameters.get("angle_slew")
+        travel_s = abs(turn) / (slew.default if slew and slew.default else SLOWEST_SLEW)
+
+        def off() -> float:
+            return (self._telemetry.latest["angle"] - angle_rad + math.pi) % (2 * math.pi) - math.pi
+
+        def stands() -> bool:
+            return abs(off()) < 4e-3 and abs(self.speed_rad_s) < 0.5
+
+        self._keep(stands, travel_s, travel_s + 5.0,
+                   lambda: f"the rotor did not reach {angle_rad:.3f} rad: it stands {off():+.4f} rad off")  # fmt: skip
+
+    def spin(self, rad_s: float) -> None:
+        """`Controller.spin`."""
+        self._orders.set("speed_ref", rad_s)
+        self._orders.command("SPIN")
+        tolerance = max(0.02 * abs(rad_s), 0.3)
+        self._keep(lambda: abs(self.speed_rad_s - rad_s) < tolerance, 0.0, SPIN_S,
+                   lambda: f"the rotor did not reach {rad_s:.1f} rad/s within {SPIN_S:g} s: it turns at "
+                   f"{self.speed_rad_s:.1f} rad/s")  # fmt: skip
+
+    def stop(self, link: str) -> None:
+        """`Controller.stop`, over the link of that name."""
+        self._orders.command("STOP")
+        limit = self.landing_speed
+        error = no_reply(link, f"speed below {limit:g} rad/s", STOP_S)
+        waiting.until(lambda: abs(self.speed_rad_s) < limit, STOP_S, error, self._clock, self._now_ns)
+
+    def _keep(self, ok: Callable[[], bool], expected_s: float, timeout_s: float, text: Callable[[], str]) -> None:
+        waiting.keep(ok, expected_s, timeout_s, text, self._clock, self._now_ns)

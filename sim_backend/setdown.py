@@ -1,0 +1,28 @@
+"""Whether a shaft that something else may turn can be let down (docs/reference/protocol.md, "Letting a shaft down")."""
+
+from __future__ import annotations
+
+import math
+
+from sim_backend.core import TICK_S
+from sim_backend.machine import SimulatedPlant
+
+DRIVE_GIVES_UP_S = 1.0  # a drive that nobody asks anything coasts by itself after so long
+TOO_FAST = 1.1  # times the landing speed
+
+
+def slow(plant: SimulatedPlant, limit_rad_s: float, free_tick: int) -> bool:
+    """Whether the shaft turns slower than `limit_rad_s`, if nothing speeds it up from `free_tick` on.
+
+    What the last two pulses tell is the speed of the turn before, and in the first turn of a run-up they tell nothing. But a
+    shaft that nothing speeds up, and that makes less than a turn in 2 pi / limit, is slower than that at the end of it.
+    """
+    if plant.pulse_age_s is None:
+        return abs(plant.speed) < limit_rad_s
+    quiet_s = min(plant.pulse_age_s, (plant.tick - free_tick) * TICK_S)
+    return quiet_s > 2 * math.pi / limit_rad_s
+
+
+def too_fast(plant: SimulatedPlant, limit_rad_s: float) -> bool:
+    """Whether a landing is to be broken off: something drives the shaft."""
+    return abs(plant.speed) > TOO_FAST * limit_rad_s
