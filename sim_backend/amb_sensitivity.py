@@ -81,7 +81,10 @@ def loop(p: AmbParams, settings: Mapping[str, float], speed: float = 0.0, subste
     known = AmbControl.__dataclass_fields__
     control = AmbControl(**{k: v for k, v in settings.items() if k in known})
     return Loop(
-        a, b, _readings(p), _law(control, () if control.law == 0 else _inverted(control, at, state["coil"], speed))
+        a,
+        b,
+        _readings(p),
+        _law(control, () if control.law == 0 else _inverted(control, at, _told(p, state["coil"]), speed)),
     )
 
 
@@ -202,9 +205,16 @@ def _law(c: AmbControl, slopes: Sequence[Array]) -> Callable[[Complex], Complex]
     return controller
 
 
-def _inverted(c: AmbControl, at: Array, coil: Array, speed: float) -> tuple[Array, Array, Array, Array]:
+def _told(p: AmbParams, coil: Array) -> Array:
+    """Differential references (5,) under which the coils carry `coil` (10,): the amplifiers follow their own current sensors,
+    whose gains and offsets the law does not know."""
+    pairs = (coil * np.array(p.current_gain) + np.array(p.current_offset)).reshape(AXES, 2)
+    return np.asarray((pairs[:, 0] - pairs[:, 1]) / 2)
+
+
+def _inverted(c: AmbControl, at: Array, wanted: Array, speed: float) -> tuple[Array, Array, Array, Array]:
     """Coordinates of the readings, and the slopes of the differential currents to coordinates, rates and accelerations, where
-    the probes read `at` (5,) and the coils carry `coil` (10,)."""
+    the probes read `at` (5,) and the law asks for the differential currents `wanted` (5,)."""
     model, still = Model(c), np.zeros(AXES)
     q0 = model.coordinates(at, at[4])
 
@@ -214,9 +224,6 @@ def _inverted(c: AmbControl, at: Array, coil: Array, speed: float) -> tuple[Arra
 
     def slopes(of: Callable[[Array], Array], size: float) -> Array:
         return np.array([(of(h) - of(-h)) / (2 * size) for h in size * np.eye(AXES)]).T
-
-    pairs = coil.reshape(AXES, 2)
-    wanted = (pairs[:, 0] - pairs[:, 1]) / 2
 
     def of(v: Array) -> Array:
         return currents(q0, still, v)
