@@ -26,7 +26,7 @@ from bench.rigfile import RigFile
 from bench.roles import RigState
 from procedures import probing
 from procedures import sensitivity_figures as drawn
-from procedures.estimators import sensitivity_checks, sensitivity_estimates, tracking_wiring
+from procedures.estimators import sensitivity_checks, sensitivity_estimates, sensitivity_plan, tracking_wiring
 from procedures.estimators.sensitivity_data import (
     HALF,
     INJECT,
@@ -216,7 +216,7 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    yield from sensitivity_checks.of_plan(rig, plan, [(kind, comb) for kind, _, comb in surveys(plan)])
+    yield from sensitivity_plan.of_plan(rig, plan, [(kind, comb) for kind, _, comb in surveys(plan)])
 
 
 def figures(recording: Recording[Plan]) -> Iterable[Figure]:
