@@ -24,7 +24,7 @@ from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.uncertainty import coverage_factor, interval
 from procedures.estimators import sensitivity_estimates
-from procedures.estimators.sensitivity_data import REFINED, Grid, Taken, channels, sensitivity
+from procedures.estimators.sensitivity_data import REFINED, WIRING, Grid, Taken, channels, sensitivity
 from procedures.injecting import AXES, Comb, wanted
 from procedures.sensitivity import CODES, MARGIN_S, RPM, Plan, refinements, surveys
 from sim_backend import amb_sensitivity
@@ -44,7 +44,8 @@ def light(p: AmbParams, settings: Mapping[str, float], plan: Plan, seed: int) ->
     """Of each axis the peak, by the passes on a plant with noise."""
     plant = floating(p, settings, plan.speeds_rad_s[0], substeps=SUBSTEPS, noise=seed)
     for axis in plan.axes:
-        seen = [_taken(plant, plan, axis, kind, 0.0, comb) for kind, _, comb in surveys(plan)]
+        combs = surveys(plan, plan.speeds_rad_s[0])
+        seen = [_taken(plant, plan, axis, kind, 0.0, comb) for kind, _, comb in combs if kind != WIRING]
         refined = [
             _taken(plant, plan, axis, kind, about, comb)
             for c in sensitivity_estimates.candidates([t.response for t in seen])

@@ -13,7 +13,7 @@ from bench.analysis import peaks
 from bench.analysis.rational import Rational, Top, averaged, fitted, orders, top
 from bench.analysis.responses import Response, image_distance
 from bench.uncertainty import Estimate, Influence
-from procedures.estimators.sensitivity_data import HALF, MODE, REFINED, SURVEY, Taken, named, shared_noise
+from procedures.estimators.sensitivity_data import HALF, MODE, REFINED, SURVEY, WIRING, Taken, named, shared_noise
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -184,7 +184,7 @@ def _change(t: Taken, half: Taken, high: npt.NDArray[np.bool_]) -> tuple[float, 
 
 def _curve(taken: Sequence[Taken]) -> Response:
     """All lines at the full amplitude; where passes overlap, the finest of them."""
-    some = [t for t in taken if t.kind != HALF]
+    some = [t for t in taken if t.kind not in (WIRING, HALF)]
     fine = [(t.response.hz[0], t.response.hz[-1]) for t in some if t.kind in (MODE, REFINED) and t.response.hz.size]
     parts = []
     for t in some:
@@ -203,7 +203,8 @@ def _curve(taken: Sequence[Taken]) -> Response:
 
 
 def margins(surveys: Sequence[Taken], where: str) -> dict[str, Estimate]:
-    """Phase margin and both gain margins by the smoothed lines of the survey, those that exist."""
+    """Phase margin and both gain margins by the lines of the survey, those that exist. Smoothed, but where the gain may fall:
+    that is among the lowest lines, which bend within a few and carry little noise."""
     if not surveys:
         return {}
     hz, z, power = _merged([(t.response, t.noise) for t in surveys])
@@ -212,15 +213,16 @@ def margins(surveys: Sequence[Taken], where: str) -> dict[str, Estimate]:
     covariance = power[:, None, None] / 2 * np.eye(2)
     smooth = peaks.smoother(hz, z, covariance)
     base = smooth.at_lines(z)
-    drawn = smooth.everywhere(base + peaks.noise(covariance, 0, DRAWS))
+    noisy = base + peaks.noise(covariance, 0, DRAWS)
+    smoothed = smooth.everywhere(z), smooth.everywhere(base), smooth.everywhere(noisy)
     out: dict[str, Estimate] = {}
     dof = float(min(t.dof for t in surveys))
-    for name, unit, of in (
-        ("phase_margin", "rad", phase),
-        ("gain_reduction", "1", fall),
-        ("gain_increase", "1", rise),
+    for name, unit, of, (seen, mean, drawn) in (
+        ("phase_margin", "rad", phase, smoothed),
+        ("gain_reduction", "1", fall, (z, base, noisy)),
+        ("gain_increase", "1", rise, smoothed),
     ):
-        found, again = of(1 / smooth.everywhere(z) - 1), of(1 / smooth.everywhere(base) - 1)
+        found, again = of(1 / seen - 1), of(1 / mean - 1)
         values = np.array([of(1 / d - 1) for d in drawn])
         known = np.isfinite(values)
         if math.isfinite(found) and math.isfinite(again) and known.mean() > 1 - TOLERATED:
