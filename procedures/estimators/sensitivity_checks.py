@@ -218,6 +218,7 @@ def _notes(results: Sequence[Result], plan: Settings) -> Iterator[Finding]:
                 f"{p.top.width:.3g} Hz, lines {p.taken.grid.step:g} Hz apart, least coherence {p.coherence:.3f}; "
                 f"{p.change:+.2%} ± {2 * p.u_change:.2%} at half the amplitude.")  # fmt: skip
         yield Finding("zone", text, r.where)
+        yield from _margins(r)
         if r.excluded:
             left = ", ".join(f"{hz:g}" for hz in r.excluded[:12]) + (" and more" if len(r.excluded) > 12 else "")
             yield Finding(
@@ -228,6 +229,19 @@ def _notes(results: Sequence[Result], plan: Settings) -> Iterator[Finding]:
             "current reference.")  # fmt: skip
     yield Finding("injection", text)
     yield Finding("scope", SCOPE)
+
+
+def _margins(r: Result) -> Iterator[Finding]:
+    """In the field's units: degrees and decibels."""
+    told = []
+    if e := r.estimates.get("phase_margin"):
+        told.append(f"phase margin {math.degrees(e.value):.1f}°")
+    for name, words in (("gain_reduction", "the gain may fall to"), ("gain_increase", "the gain may rise to")):
+        if e := r.estimates.get(name):
+            told.append(f"{words} {e.value:.3g} of what it is ({20 * math.log10(e.value):+.1f} dB)")
+    if told:
+        text = "; ".join(told)
+        yield Finding("margins", f"{text[0].upper()}{text[1:]}.", r.where)
 
 
 def zone(value: float) -> str:

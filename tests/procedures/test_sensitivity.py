@@ -69,7 +69,7 @@ def settings() -> dict[str, float]:
 
 def test_nothing_is_found_on_a_sound_stand(sound: Run) -> None:
     assert not sound.serious
-    assert {f.code for f in sound.findings} == {"zone", "injection", "orders-excluded", "scope"}
+    assert {f.code for f in sound.findings} == {"zone", "margins", "injection", "orders-excluded", "scope"}
     for where in ("zi, at rest", "zi, 6000 r/min"):
         assert {"s_max", "s_max_hz", "phase_margin", "gain_reduction"} <= {n for n, w in sound.measured if w == where}
 
