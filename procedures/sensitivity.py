@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from bench.analysis.responses import Response
+from bench.analysis.responses import Response, image_distance
 from bench.capture import Layout
 from bench.errors import AnalysisError
 from bench.figures import Figure
@@ -26,7 +26,7 @@ from bench.rigfile import RigFile
 from bench.roles import RigState
 from procedures import probing
 from procedures import sensitivity_figures as drawn
-from procedures.estimators import sensitivity_checks, sensitivity_estimates, tracking_wiring
+from procedures.estimators import sensitivity_checks, sensitivity_estimates, sensitivity_plan, tracking_wiring
 from procedures.estimators.sensitivity_data import (
     HALF,
     INJECT,
@@ -34,6 +34,7 @@ from procedures.estimators.sensitivity_data import (
     REFINED,
     RPM,
     SURVEY,
+    WIRING,
     Taken,
     channels,
     folds,
@@ -48,12 +49,13 @@ Law = Literal["PID", "CCS"]
 Axis = Literal["yi", "zi", "yo", "zo", "x"]
 CODES: dict[Law, float] = {"PID": 0.0, "CCS": 1.0}
 S_MAX = Quantity("s_max", "1", "greatest |V1/E| of an axis, all other loops closed (ISO 14839-3)")
-AT = Quantity("s_max_hz", "Hz", "where it is")
+AT = Quantity("s_max_hz", "Hz", "frequency of the greatest |V1/E|")
 PHASE = Quantity("phase_margin", "rad", "least angle of the open loop L = 1/S - 1 from -1 where |L| = 1, either way")
 FALL = Quantity("gain_reduction", "1", "factor to which the loop's gain may fall before it is unstable")
 RISE = Quantity("gain_increase", "1", "factor to which the loop's gain may rise before it is unstable")
 MEASURES = (S_MAX, AT, PHASE, FALL, RISE)
 MARGIN_S = 0.1  # of a capture, for the first and last pulse
+FOLLOWED_HZ, FOLLOWED = 8.0, 12  # lines at its odd multiples: below 200 Hz coils follow their references
 STANDS_S = 1.0  # the controller knows half a second after the last pulse that the shaft stands
 
 
@@ -65,7 +67,7 @@ class Plan(BenchPlan):
     speeds_rad_s: tuple[float, ...] = Field((0.0, 10000 / RPM), min_length=1)
     amplitude_A: float = Field(4e-3, gt=0)  # of each line, 0-pk
     low_hz: float = Field(2.0, gt=0)
-    middle_hz: float = Field(256.0, gt=0)  # up to here every low_hz; above it every high_step_hz
+    middle_hz: float = Field(256.0, gt=0)  # up to here the odd multiples of low_hz; above it every high_step_hz
     high_step_hz: float = Field(16.0, gt=0)
     high_hz: float = Field(2000.0, gt=0)
     modes_hz: tuple[float, ...] = (650.0, 1240.0)  # bending modes, about which a finer grid is laid
@@ -82,13 +84,21 @@ class Plan(BenchPlan):
     min_coherence: float = Field(0.9, gt=0, lt=1)  # at the lines about the peak
 
 
-def surveys(plan: Plan) -> list[tuple[str, float, Comb]]:
-    """The combs of the first pass with their kind and what they are about: the whole range, and finer about the modes."""
-    a = plan.amplitude_A
-    first = plan.high_step_hz * (math.floor(plan.middle_hz / plan.high_step_hz) + 1)
-    out = [(SURVEY, 0.0, c) for c in combs(plan.low_hz, plan.low_hz, min(plan.middle_hz, plan.high_hz), a)]
-    if first < plan.high_hz:
-        out += [(SURVEY, 0.0, c) for c in combs(first, plan.high_step_hz, plan.high_hz, a)]
+def surveys(plan: Plan, speed: float) -> list[tuple[str, float, Comb]]:
+    """The combs of the first pass with their kind and what they are about: the whole range, and finer about the modes.
+
+    The lines of the whole range stand half a step off its multiples: what the bearings' curvature makes of two lines, sum
+    and difference, falls between them (Pintelon and Schoukens, System Identification, 2nd ed., 3.4). Where the shaft turns
+    it is a quarter where that keeps them apart from their images by the orbit.
+    """
+    a, step = plan.amplitude_A, 2 * plan.low_hz
+    turns = speed / (2 * math.pi * step)
+    share = max((0.5, 0.25, 0.75), key=lambda share: image_distance(share, turns)) if speed else 0.5
+    high = plan.high_step_hz * (math.floor(plan.middle_hz / plan.high_step_hz) + 0.5)
+    out = [(WIRING, 0.0, Comb(FOLLOWED_HZ, 2 * FOLLOWED_HZ, FOLLOWED, a))]
+    out += [(SURVEY, 0.0, c) for c in combs(share * step, step, min(plan.middle_hz, plan.high_hz), a)]
+    if high < plan.high_hz:
+        out += [(SURVEY, 0.0, c) for c in combs(high, plan.high_step_hz, plan.high_hz, a)]
     for hz in plan.modes_hz:
         step = sensitivity_estimates.binary(plan.mode_damping * hz)  # half of the half-power width 2 zeta f
         low = step * math.floor((hz - plan.mode_within_hz) / step)
@@ -116,7 +126,7 @@ def settings(plan: Plan) -> dict[str, float]:
 
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records at least, for the progress display."""
-    return probing.STEPS + len(plan.speeds_rad_s) * len(plan.axes) * (len(surveys(plan)) + 2)
+    return probing.STEPS + len(plan.speeds_rad_s) * len(plan.axes) * (len(surveys(plan, 0.0)) + 2)
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
@@ -141,9 +151,9 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 def _axis(rig: Rig, plan: Plan, record: Recorder, speed: float, axis: str, number: int) -> int:
     """Both passes of an axis; the number of the next capture."""
     seen: list[Response] = []
-    for kind, about, comb in surveys(plan):
+    for kind, about, comb in surveys(plan, speed):
         found = _taken(rig, plan, record, speed, axis, kind, about, comb, number)
-        seen += [found] if found is not None else []
+        seen += [found] if found is not None and kind != WIRING else []
         number += 1
     for candidate in sensitivity_estimates.candidates(seen):
         for kind, about, comb in refinements(plan, candidate, speed):
@@ -162,7 +172,7 @@ def _taken(
     }  # fmt: skip
     assert rig.capture is not None
     pulses = MARGIN_S + 4 * math.pi / speed if speed else 0.0
-    seconds = comb.period_s * (plan.periods if kind in (SURVEY, MODE) else plan.refined_periods)
+    seconds = comb.period_s * (plan.refined_periods if kind in (REFINED, HALF) else plan.periods)
     if kind in (REFINED, HALF):  # as many as fit
         most = rig.capture.memory_bytes / size(rig.file, kind, speed) / plan.rate_hz - pulses
         seconds = comb.period_s * min(plan.refined_periods, math.floor(most / comb.period_s))
@@ -216,7 +226,9 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    yield from sensitivity_checks.of_plan(rig, plan, [(kind, comb) for kind, _, comb in surveys(plan)])
+    yield from sensitivity_plan.of_plan(
+        rig, plan, [(kind, comb) for s in plan.speeds_rad_s for kind, _, comb in surveys(plan, s)]
+    )
 
 
 def figures(recording: Recording[Plan]) -> Iterable[Figure]:
@@ -232,7 +244,8 @@ open loop of that axis with all others closed, V2 = -L V1 and S = 1/(1 + L). ISO
 each axis has its own controller (PID) both are the same loop, opened at another place. The flatness law joins the axes: there
 S belongs to the current references.
 
-First the whole range is surveyed, with a finer grid about the plan's bending modes. About the greatest |S|, and others that
+First a few lines tell whether the coils of that axis follow. The whole range is surveyed, with a finer grid about the plan's
+bending modes. About the greatest |S|, and others that
 come near it, a second grid is laid, six lines or more in the half-power width that the first look found, at the plan's
 amplitude and at half of it. A rational function of frequency, of the smallest order that the scatter allows, is fitted
 to these lines; S_max is its greatest abs, with the bias taken off that noise gives a maximum, and its scatter by the fit's

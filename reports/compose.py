@@ -112,11 +112,10 @@ def _result(m: Content, definitions: Mapping[str, str]) -> ResultRow:
     name, unit = str(m.get("name", "")), str(m.get("unit") or "")
     expanded, verdict = m.get("expanded_uncertainty"), str(m.get("verdict") or "none")
     limit = m.get("limit")
-    where = str(m.get("where") or "")
     return ResultRow(
         symbol=tables.symbol_of(name),
         about=definitions.get(name, ""),
-        where="" if where == name else where,
+        where=tables.place(m),
         result=text.result(m.get("value"), expanded, unit),
         interval=_telling_interval(m, unit),
         k=text.DASH if m.get("coverage_factor") is None else f"{m['coverage_factor']:.2f}",

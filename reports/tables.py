@@ -25,6 +25,12 @@ def symbol_of(name: str) -> Symbol:
     return Symbol(name, letter, subscript)
 
 
+def place(measurement: Content) -> str:
+    """Where a measurement of record.json belongs; empty where its name tells."""
+    where = str(measurement.get("where") or "")
+    return "" if where == str(measurement.get("name", "")) else where
+
+
 def budget_table(measurement: Content) -> BudgetTable:
     """The budget of one measurement of record.json, largest share first."""
     unit = str(measurement.get("unit") or "")
@@ -36,6 +42,7 @@ def budget_table(measurement: Content) -> BudgetTable:
     method = "Monte Carlo (JCGM 101)" if measurement.get("method") == "monte-carlo" else "GUM (JCGM 100)"
     return BudgetTable(
         symbol=symbol_of(str(measurement.get("name", ""))),
+        where=place(measurement),
         unit=text.unit_text(unit),
         result=text.result(measurement.get("value"), measurement.get("expanded_uncertainty"), unit),
         standard_uncertainty=text.with_unit(text.significant(measurement.get("standard_uncertainty")), unit),

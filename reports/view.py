@@ -126,6 +126,7 @@ class BudgetTable:
     """The uncertainty budget of one quantity."""
 
     symbol: Symbol
+    where: str  # empty where the quantity's name tells
     unit: str
     result: str
     standard_uncertainty: str

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.analysis.rational import fitted, top
-from bench.analysis.responses import clear_of_orders, lines, response, without_orders
+from bench.analysis.responses import clear_of_orders, image_distance, lines, response, without_orders
 from bench.analysis.tachometer import counted, tachometer
 from sim_backend.amb_linear import notch
 from sim_backend.amb_reference_law import Model
@@ -30,7 +30,8 @@ MOVING = [0, 1, 2, 3, 4, 6, 7, 8, 9, 10, *range(12, 20)]  # of the core's state:
 SHAFT, COILS, AXES = len(MOVING), 10, 5
 STEP_M, STEP_A = 1e-8, 1e-6  # of the numerical derivatives
 SETTLED_S = 20.0  # until the flatness law's integrators hold what its model does not know
-SMALL_A, LINES = 1e-3, 12  # of the lines about a peak, and to either side of it
+SMALL_A, STEP_HZ, LINES = 1e-3, 2.0, 12  # of the lines about a peak, and to either side of it
+SHARES = (0.125, 0.25, 0.375)  # of a step: by one of them the lines stand apart from their images
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,7 +82,10 @@ def loop(p: AmbParams, settings: Mapping[str, float], speed: float = 0.0, subste
     known = AmbControl.__dataclass_fields__
     control = AmbControl(**{k: v for k, v in settings.items() if k in known})
     return Loop(
-        a, b, _readings(p), _law(control, () if control.law == 0 else _inverted(control, at, state["coil"], speed))
+        a,
+        b,
+        _readings(p),
+        _law(control, () if control.law == 0 else _inverted(control, at, _told(p, state["coil"]), speed)),
     )
 
 
@@ -91,24 +95,26 @@ def even(p: AmbParams) -> AmbParams:
 
 
 def quiet_peak(
-    p: AmbParams, settings: Mapping[str, float], axis: int, speed: float, substeps: int = 2, seconds: float = 4.0
+    p: AmbParams, settings: Mapping[str, float], axis: int, speed: float, substeps: int = 2, periods: int = 3
 ) -> tuple[float, float]:
     """Greatest abs(S_jj) and where, Hz, of the quiet machine that turns with its unbalance and its runout, by lines of SMALL_A
-    about the peak of its linearised loop; the same model of the lines as the procedure's, without noise."""
-    near = loop(p, settings, speed, substeps).peak(axis, 2.0, 2000.0)[1]
-    first, count = 2 * math.floor(near / 2) - 2 * LINES, 2 * LINES + 1
-    plant = floating(p, settings, speed, SETTLED_S, substeps)
+    about the peak of its linearised loop, apart from what its orbit makes of them; the same model of the lines as the
+    procedure's, without noise."""
+    near, orders = loop(p, settings, speed, substeps).peak(axis, 2.0, 2000.0)[1], (1.0, 2.0, 3.0, 4.0)
+    share = max(SHARES, key=lambda share: image_distance(share, speed / (2 * math.pi * STEP_HZ)))
+    hz = STEP_HZ * (math.floor(near / STEP_HZ) + share + np.arange(-LINES, LINES + 1))
+    plant, period = floating(p, settings, speed, SETTLED_S, substeps), round(1 / TICK_S / (STEP_HZ * SHARES[0]))
     made = {
         "inject_axis": axis,
         "inject_amplitude": SMALL_A,
-        "inject_hz": first,
-        "inject_step": 2.0,
-        "inject_lines": count,
+        "inject_hz": hz[0],
+        "inject_step": STEP_HZ,
+        "inject_lines": hz.size,
     }
     for name, value in made.items():
         plant.set(name, float(value))
     plant.run(10000)
-    start, trace = plant.tick, plant.run(round(seconds / TICK_S), 1)[1]
+    start, trace = plant.tick, plant.run(periods * period + round(4 * math.pi / speed / TICK_S), 1)[1]
     t, column = (
         (start + np.arange(len(trace))) * TICK_S,
         {n: trace[:, TRACE.index(n)] for n in ("inject", "after", "pulses", "pulse_age")},
@@ -116,12 +122,11 @@ def quiet_peak(
     turn = tachometer(*counted(t, column["pulses"], column["pulse_age"]))
     angle = turn.angle(t)
     inside = np.isfinite(angle)
-    clean = without_orders(column["after"][inside], angle[inside], (1.0, 2.0, 3.0, 4.0))
-    hz = np.asarray(first + 2.0 * np.arange(count), np.float64)
-    clear = clear_of_orders(hz, speed, 3.0, (1.0, 2.0, 3.0, 4.0))
-    found = lines(np.concatenate([column["inject"][None, inside], clean]), 1 / TICK_S, 5000, hz[clear])
+    clean = without_orders(column["after"][inside], angle[inside], orders)
+    hz = hz[clear_of_orders(hz, speed, 3.0, orders)]
+    found = lines(np.concatenate([column["inject"][None, inside], clean]), 1 / TICK_S, period, hz)
     values = response(found, 1, 0).values
-    best = top(fitted(hz[clear], values, np.full(values.size, 1e-6), math.inf), float(hz[0]), float(hz[-1]))
+    best = top(fitted(hz, values, np.full(values.size, 1e-6), math.inf), float(hz[0]), float(hz[-1]))
     return best.value, best.at
 
 
@@ -202,9 +207,16 @@ def _law(c: AmbControl, slopes: Sequence[Array]) -> Callable[[Complex], Complex]
     return controller
 
 
-def _inverted(c: AmbControl, at: Array, coil: Array, speed: float) -> tuple[Array, Array, Array, Array]:
+def _told(p: AmbParams, coil: Array) -> Array:
+    """Differential references (5,) under which the coils carry `coil` (10,): the amplifiers follow their own current sensors,
+    whose gains and offsets the law does not know."""
+    pairs = (coil * np.array(p.current_gain) + np.array(p.current_offset)).reshape(AXES, 2)
+    return np.asarray((pairs[:, 0] - pairs[:, 1]) / 2)
+
+
+def _inverted(c: AmbControl, at: Array, wanted: Array, speed: float) -> tuple[Array, Array, Array, Array]:
     """Coordinates of the readings, and the slopes of the differential currents to coordinates, rates and accelerations, where
-    the probes read `at` (5,) and the coils carry `coil` (10,)."""
+    the probes read `at` (5,) and the law asks for the differential currents `wanted` (5,)."""
     model, still = Model(c), np.zeros(AXES)
     q0 = model.coordinates(at, at[4])
 
@@ -214,9 +226,6 @@ def _inverted(c: AmbControl, at: Array, coil: Array, speed: float) -> tuple[Arra
 
     def slopes(of: Callable[[Array], Array], size: float) -> Array:
         return np.array([(of(h) - of(-h)) / (2 * size) for h in size * np.eye(AXES)]).T
-
-    pairs = coil.reshape(AXES, 2)
-    wanted = (pairs[:, 0] - pairs[:, 1]) / 2
 
     def of(v: Array) -> Array:
         return currents(q0, still, v)

@@ -2,11 +2,14 @@
 
 z(u) = (b_0 + b_1 u + ...)/(1 + a_1 u + ...), u in -1..1 over the lines: in a band, the frequency response of a linear
 system, a pole for each resonance in it, the rest in the other terms. First by the iteration of Sanathanan and Koerner
-(IEEE Trans. AC-8, 56 (1963)), then by Levenberg and Marquardt's; of several orders the one that Akaike's criterion takes.
+(IEEE Trans. AC-8, 56 (1963)), then by Levenberg and Marquardt's. Several orders may explain the lines; what they differ by is
+part of what is not known. They are averaged with Akaike's weights, the spread between them added to their own (Burnham and
+Anderson, Model Selection and Multimodel Inference, 2nd ed., 4.2 and 4.3).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,13 +21,15 @@ from bench.errors import AnalysisError
 ORDERS = ((3, 1), (3, 2), (4, 2), (4, 3), (5, 3), (6, 4))  # terms in u above and below
 POINTS, DRAWS = 201, 300
 STEPS = 40  # of the descent, at most
+NEGLIGIBLE = 1e-3  # weight of an order
 STRONG = 0.25  # share of a curve that a pole must give to be a resonance
 
 
 @dataclass(frozen=True)
 class Rational:
     """`above` (n + 1,) and `below` (d,) of z(u), u = (x - middle)/half; `covariance` (p, p) of these terms, circular; `misfit`,
-    mean square of the residuals over their expectation, `probability` that noise alone gives as much; `dof` of the noise."""
+    mean square of the residuals over their expectation, `probability` that noise alone gives as much; `dof` of the noise;
+    `akaike`, the criterion by which orders are weighed, less is better."""
 
     middle: float
     half: float
@@ -34,6 +39,7 @@ class Rational:
     misfit: float
     probability: float
     dof: float
+    akaike: float
 
     def at(self, x: Array) -> Complex:
         """Values (m,) at `x` (m,)."""
@@ -67,35 +73,41 @@ class Top:
 
 
 def fitted(x: Array, z: Complex, power: Array, dof: float) -> Rational:
-    """Of lines `z` (m,) at `x` (m,) whose noise has the mean square `power` (m,), known with `dof` degrees of freedom.
+    """By the order that Akaike's criterion takes, of lines `z` (m,) at `x` (m,) whose noise has the mean square `power` (m,),
+    known with `dof` degrees of freedom.
 
     Raises:
         AnalysisError: fewer than six lines.
     """
+    return orders(x, z, power, dof)[0]
+
+
+def orders(x: Array, z: Complex, power: Array, dof: float) -> list[Rational]:
+    """All orders that the lines can carry, the likeliest first; arguments and errors as those of `fitted`. One with a pole
+    between two lines, narrower than they can show, is passed over: noise makes such poles."""
     if x.size < 6 or z.shape != x.shape or power.shape != x.shape:
         raise AnalysisError(
             f"rational model: found {x.size} lines and {power.size} variances; expected six or more of each"
         )
-    middle, half = (x[0] + x[-1]) / 2, (x[-1] - x[0]) / 2
+    middle, half = float(x[0] + x[-1]) / 2, float(x[-1] - x[0]) / 2
     u, root = (x - middle) / half, 1 / np.sqrt(np.maximum(power, 1e-300))
-    best, least = None, np.inf
+    out: list[Rational] = []
     for n, d in ORDERS:
         left = 2 * (x.size - n - d - 1)
-        if left < 4 or (best is not None and left < 10):
+        if left < 4 or (out and left < 10):
             break
         above, below, slopes = _solved(u, z, root, n, d)
-        chi2 = 2 * float((np.abs((z - _evaluated(above, below, u)) * root) ** 2).sum())
-        if (told := chi2 + 4 * (n + d)) >= least or (best is not None and _hides(below, u)):
+        if out and _hides(below, u):
             continue
+        chi2 = 2 * float((np.abs((z - _evaluated(above, below, u)) * root) ** 2).sum())
         chance = float(chdtrc(left, chi2) if np.isinf(dof) else fdtrc(left, max(dof, 1.0), chi2 / left))
         covariance = np.asarray(np.linalg.pinv(slopes.conj().T @ slopes), np.complex128)
-        best, least = Rational(float(middle), float(half), above, below, covariance, chi2 / left, chance, dof), told
-    assert best is not None
-    return best
+        out.append(Rational(middle, half, above, below, covariance, chi2 / left, chance, dof, chi2 + 4 * (n + d)))
+    return sorted(out, key=lambda model: model.akaike)
 
 
 def _hides(below: Complex, u: Array) -> bool:
-    """Whether a pole stands between the lines, narrower than they can show: noise makes such poles."""
+    """Whether a pole stands between the lines, narrower than they can show."""
     poles = np.roots([*below[::-1], 1.0])
     return bool(((np.abs(poles.real) < 1) & (2 * np.abs(poles.imag) < np.diff(u).max())).any())
 
@@ -123,6 +135,23 @@ def top(model: Rational, low: float, high: float, seed: int = 0) -> Top:
         model.width(float(places[0])),
         inside,
     )
+
+
+def averaged(models: Sequence[Rational], low: float, high: float) -> Top:
+    """The greatest abs by several orders of the same lines: means with Akaike's weights, `u` with the spread between the
+    orders; width, and whether it lies inside, by the first of them."""
+    told = np.array([model.akaike for model in models])
+    share = np.exp((told.min() - told) / 2)
+    share /= share.sum()
+    kept = [(w, top(m, low, high)) for w, m in zip(share, models, strict=True) if w > NEGLIGIBLE]
+    weight, tops = np.array([w for w, _ in kept]) / sum(w for w, _ in kept), [t for _, t in kept]
+    value, u, bias, at, u_at = np.array([(t.value, t.u, t.bias, t.at, t.u_at) for t in tops]).T
+
+    def pooled(means: Array, spreads: Array) -> tuple[float, float]:
+        mean = float(weight @ means)
+        return mean, float(np.sqrt(weight @ (spreads**2 + (means - mean) ** 2)))
+
+    return Top(*pooled(value, u), float(weight @ bias), *pooled(at, u_at), tops[0].width, tops[0].inside)
 
 
 def _crest(x: Array, size: Array) -> tuple[Array, Array]:

@@ -101,6 +101,13 @@ def clear_of_orders(
     return np.asarray((away > width_hz).all(axis=1))
 
 
+def image_distance(share: float, turns: float, orders: Sequence[float] = (1.0, 2.0, 3.0, 4.0)) -> float:
+    """How far, in steps, lines at `share`, 1 + `share`, ... steps stand from their images: a loop that varies with an orbit
+    answers a line f also at n times the speed less f. `turns` is the shaft's speed in steps."""
+    off = [(2 * share - n * turns) % 1.0 for n in orders]
+    return min(min(x, 1 - x) for x in off)
+
+
 def response(found: Lines, of: int, to: int, estimator: Literal["H1", "H2", "ratio"] = "H1") -> Response:
     """The response of channel `of` to channel `to` over the periods.
 

@@ -9,12 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from bench.analysis.responses import guaranteed_margins
-from bench.capture import Layout
-from bench.envelope import Envelope
-from bench.errors import BenchError
 from bench.findings import Effect, Finding
 from bench.recording import Recording
-from bench.rigfile import RigFile
 from bench.uncertainty import coverage_factor
 from procedures.estimators import signals
 from procedures.estimators.sensitivity_data import (
@@ -23,18 +19,14 @@ from procedures.estimators.sensitivity_data import (
     CURRENT_LIMIT,
     INJECT,
     RANGE,
-    REFINED,
     RPM,
-    TOLD,
     VOLTAGE_LIMIT,
     Taken,
-    channels,
     folds,
     grid_of,
     named,
 )
 from procedures.estimators.sensitivity_estimates import Peak, Result
-from procedures.injecting import PARAMETERS, Comb, refused
 
 ZONES = (3.0, 4.0, 5.0)
 """Ends of the zones A, B and C, |S| (ISO 14839-3; 9.5, 12 and 14 dB; not checked against the standard)."""
@@ -44,11 +36,7 @@ SCOPE = ("ISO 14839-3 is for machines above 15 kW and leaves small rotors out; i
 HELD = 8  # samples in a row at an extreme: a probe that clips
 OFF = 0.05  # share of the amplitude asked for by which that found may differ
 SAME = 1e-5  # A: what single precision makes of after - before - inject
-FOLLOWS = (
-    0.4,
-    1.6,
-)  # of `after`, of the injected axis' coils below 200 Hz: their current loops, and the sample of delay
-LEAST_S = 4.0  # of a capture of the second grid: four periods of the finest
+FOLLOWS = (0.4, 1.6)  # shares of `after` that the injected axis' coils may follow below 200 Hz, lag and delay included
 UNEXPLAINED = 1e-3  # probability below which no model explains the lines about a peak
 SURE = 4.0  # standard deviations of a line above the refined maximum
 
@@ -56,24 +44,6 @@ SURE = 4.0  # standard deviations of a line above the refined maximum
 class Settings(Protocol):
     """The part of a plan that these checks need."""
 
-    @property
-    def axes(self) -> tuple[Any, ...]: ...
-    @property
-    def speeds_rad_s(self) -> tuple[float, ...]: ...
-    @property
-    def rate_hz(self) -> float: ...
-    @property
-    def high_hz(self) -> float: ...
-    @property
-    def low_hz(self) -> float: ...
-    @property
-    def middle_hz(self) -> float: ...
-    @property
-    def high_step_hz(self) -> float: ...
-    @property
-    def periods(self) -> int: ...
-    @property
-    def refined_periods(self) -> int: ...
     @property
     def amplitude_A(self) -> float: ...
     @property
@@ -84,73 +54,6 @@ class Settings(Protocol):
     def max_change(self) -> float: ...
     @property
     def min_coherence(self) -> float: ...
-
-
-def of_plan(rig: RigFile, plan: Settings, combs: Sequence[tuple[str, Comb]]) -> Iterator[str]:
-    """What the rig lacks, and what the plan asks too much of: key, found, expected."""
-    lacking = [
-        f"{table}: found no {', '.join(missing)}; expected them all"
-        for table, names, found in (
-            ("channels", TOLD, rig.channels),
-            ("parameters", (*PARAMETERS, "law"), rig.parameters),
-        )
-        if (missing := [n for n in names if n not in found])
-    ]
-    if rig.capture is None:
-        lacking.append("capture: found none; the injection is read at the controller's full rate")
-    if max(plan.speeds_rad_s) > 0 and not any("drive" in d.roles for d in rig.devices.values()):
-        lacking.append("devices: found none in the role drive; nothing turns the shaft")
-    yield from lacking
-    if not lacking:
-        yield from _injection(rig, plan, combs)
-        yield from _speeds(rig, plan)
-
-
-def _injection(rig: RigFile, plan: Settings, combs: Sequence[tuple[str, Comb]]) -> Iterator[str]:
-    refined = Comb(plan.low_hz, plan.low_hz, 128, plan.amplitude_A)  # at most, in the second pass
-    greatest = max([*(c for _, c in combs), refined], key=lambda c: c.peak)
-    if why := refused(Envelope(rig), greatest):
-        yield f"amplitude_A: found {plan.amplitude_A:g} A for each line; expected less: {why}"
-    for key, value in (("low_hz", plan.low_hz), ("high_step_hz", plan.high_step_hz)):
-        if math.log2(value) % 1:
-            yield f"{key}: found {value:g}; expected a power of two: the lines must repeat after whole samples"
-    if len({*plan.axes}) < len(plan.axes):
-        yield f"axes: found {', '.join(plan.axes)}; expected each once"
-    top = max(hz for _, c in combs for hz in c.hz)
-    if top > 0.45 * plan.rate_hz:
-        yield (f"rate_hz: found {plan.rate_hz:g}; expected {top / 0.45:.0f} Hz or more for lines up to {top:g} Hz: what is "
-               "above half of it folds back")  # fmt: skip
-    yield from _memory(rig, plan, combs)
-
-
-def _memory(rig: RigFile, plan: Settings, combs: Sequence[tuple[str, Comb]]) -> Iterator[str]:
-    assert rig.capture is not None
-    speed = max(plan.speeds_rad_s)
-    slowest = min((s for s in plan.speeds_rad_s if s > 0), default=0.0)
-    extra = 0.1 + 4 * math.pi / slowest if slowest else 0.0
-    for kind, seconds in [*((k, plan.periods * c.period_s) for k, c in combs), (REFINED, LEAST_S)]:
-        try:
-            size = Layout.of(rig.capture, channels(kind, speed)).sample.itemsize * (seconds + extra) * plan.rate_hz
-        except BenchError as error:
-            yield str(error)
-            return
-        if size > rig.capture.memory_bytes:
-            yield (f"periods: found {size:.0f} bytes for the pass {kind!r}; expected {rig.capture.memory_bytes} at most, the "
-                   "controller's memory")  # fmt: skip
-            return
-
-
-def _speeds(rig: RigFile, plan: Settings) -> Iterator[str]:
-    highest, landing = (
-        rig.envelope.max_speed_rad_s,
-        rig.parameters["landing_speed"].default if "landing_speed" in rig.parameters else 0.0,
-    )
-    if max(plan.speeds_rad_s) > highest:
-        yield f"speeds_rad_s: found {max(plan.speeds_rad_s) * RPM:.0f} r/min; the envelope allows {highest * RPM:.0f} r/min"
-    if any(s < 0 or 0 < s < 2 * landing for s in plan.speeds_rad_s) or len({*plan.speeds_rad_s}) < len(
-        plan.speeds_rad_s
-    ):
-        yield f"speeds_rad_s: expected 0 or above {2 * landing * RPM:.0f} r/min, twice the landing speed, and each once"
 
 
 def before(recording: Recording[Any]) -> Iterator[Finding]:
@@ -315,6 +218,7 @@ def _notes(results: Sequence[Result], plan: Settings) -> Iterator[Finding]:
                 f"{p.top.width:.3g} Hz, lines {p.taken.grid.step:g} Hz apart, least coherence {p.coherence:.3f}; "
                 f"{p.change:+.2%} ± {2 * p.u_change:.2%} at half the amplitude.")  # fmt: skip
         yield Finding("zone", text, r.where)
+        yield from _margins(r)
         if r.excluded:
             left = ", ".join(f"{hz:g}" for hz in r.excluded[:12]) + (" and more" if len(r.excluded) > 12 else "")
             yield Finding(
@@ -327,9 +231,22 @@ def _notes(results: Sequence[Result], plan: Settings) -> Iterator[Finding]:
     yield Finding("scope", SCOPE)
 
 
+def _margins(r: Result) -> Iterator[Finding]:
+    """In the field's units: degrees and decibels."""
+    told = []
+    if e := r.estimates.get("phase_margin"):
+        told.append(f"phase margin {math.degrees(e.value):.1f}°")
+    for name, words in (("gain_reduction", "the gain may fall to"), ("gain_increase", "the gain may rise to")):
+        if e := r.estimates.get(name):
+            told.append(f"{words} {e.value:.3g} of what it is ({20 * math.log10(e.value):+.1f} dB)")
+    if told:
+        text = "; ".join(told)
+        yield Finding("margins", f"{text[0].upper()}{text[1:]}.", r.where)
+
+
 def zone(value: float) -> str:
     """A to D."""
     return "ABCD"[sum(value >= end for end in ZONES)]
 
 
-__all__ = ["ZONES", "before", "of_plan", "of_results", "of_signals", "zone"]
+__all__ = ["ZONES", "before", "of_results", "of_signals", "zone"]

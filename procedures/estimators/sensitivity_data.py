@@ -19,7 +19,7 @@ from procedures.estimators.signals import clips
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 INJECT, NOT_REACHED = "inject", "not-reached"
-SURVEY, MODE, REFINED, HALF = "survey", "mode", "refined", "half"
+WIRING, SURVEY, MODE, REFINED, HALF = "wiring", "survey", "mode", "refined", "half"
 AXES = ("yi", "zi", "yo", "zo", "x")
 TOLD = (*(f"pos_{a}" for a in AXES), "flags", "speed")
 LOOP = ("inject", "before", "after")
@@ -102,8 +102,8 @@ def named(speed: float) -> str:
 
 
 def channels(kind: str, speed: float) -> tuple[str, ...]:
-    """What is captured: in the survey also the coil currents, which tell where the injection goes."""
-    return (*LOOP, *(CURRENTS if kind == SURVEY else ()), *(PULSED if speed else ()))
+    """What is captured: first of all also the coil currents, which tell where the injection goes."""
+    return (*LOOP, *(CURRENTS if kind == WIRING else ()), *(PULSED if speed else ()))
 
 
 def folds(grid: Grid, rate: float) -> bool:
@@ -167,7 +167,7 @@ def _read(recording: Recording[Any], step: Step) -> Taken:
     columns = captured[0].arrays(*captured[0].channels)
     found, injected, excluded = sensitivity(columns, columns["t_s"], rate, grid)
     clipped = float(np.abs(columns["after"] - columns["before"] - columns["inject"]).max())
-    follows = _follows(columns, rate, grid) if kind == SURVEY else None
+    follows = _follows(columns, rate, grid) if kind == WIRING else None
     turning = turned(columns, columns["t_s"])[1] if "pulses" in columns else 0.0
     flags = int(np.bitwise_or.reduce(told["flags"].astype(np.int64)))
     return Taken(
@@ -178,14 +178,13 @@ def _read(recording: Recording[Any], step: Step) -> Taken:
 
 
 def _follows(columns: Mapping[str, Array], rate: float, grid: Grid) -> Complex | None:
-    """Differential current of each axis per `after`, by the whole of the lines up to 200 Hz: (5,)."""
+    """Differential current of each axis per `after`, by the whole of the lines: (5,)."""
     if any(c not in columns for c in CURRENTS):
         return None
     pairs = np.array([(columns[f"i_{a}_p"] - columns[f"i_{a}_n"]) / 2 for a in AXES])
     data = np.concatenate([columns["after"][None], pairs])
-    low = grid.hz[grid.hz <= 200.0]
-    if not low.size:
-        return None
-    spectra = lines(data - data.mean(axis=1, keepdims=True), rate, round(grid.period * rate), low).values.mean(axis=0)
+    spectra = lines(data - data.mean(axis=1, keepdims=True), rate, round(grid.period * rate), grid.hz).values.mean(
+        axis=0
+    )
     after = spectra[0]
     return np.asarray((spectra[1:] * after.conj()).sum(axis=1) / (np.abs(after) ** 2).sum())

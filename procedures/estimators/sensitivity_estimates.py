@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.analysis import peaks
-from bench.analysis.rational import Rational, Top, fitted, top
-from bench.analysis.responses import Response
+from bench.analysis.rational import Rational, Top, averaged, fitted, orders, top
+from bench.analysis.responses import Response, image_distance
 from bench.uncertainty import Estimate, Influence
-from procedures.estimators.sensitivity_data import HALF, MODE, REFINED, SURVEY, Taken, named, shared_noise
+from procedures.estimators.sensitivity_data import HALF, MODE, REFINED, SURVEY, WIRING, Taken, named, shared_noise
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -43,20 +43,16 @@ class Candidate:
         reach = max(self.width, LEAST * step)
         first = max(step * math.floor((self.hz - reach) / step), step)
         if speed and step >= COARSEST:
-            first += step * max((0.25, 0.5, 0.75, 0.0), key=lambda share: _apart(share, speed / (2 * math.pi * step)))
+            turns = speed / (2 * math.pi * step)
+            first += step * max((0.25, 0.5, 0.75, 0.0), key=lambda share: image_distance(share, turns))
         return first, step, min(math.floor((self.hz + reach - first) / step) + 1, 128)
-
-
-def _apart(share: float, turns: float) -> float:
-    """How far, in steps, a grid that is shifted by a share of its step stands from its images at orders 1 to 4."""
-    off = [(2 * share - n * turns) % 1.0 for n in (1, 2, 3, 4)]
-    return min(min(x, 1 - x) for x in off)
 
 
 @dataclass(frozen=True)
 class Peak:
-    """A peak that was refined: the lines about it with the model, its greatest value, least coherence where |S| is above 0.7
-    of it; `change`, relative, of |S| there at half the amplitude, with its standard uncertainty."""
+    """A peak that was refined: the lines about it with the likeliest model, its greatest value by all that explain them, least
+    coherence where |S| is above 0.7 of it; `change`, relative, of |S| there at half the amplitude, with its standard
+    uncertainty."""
 
     taken: Taken
     model: Rational
@@ -169,12 +165,12 @@ def found_peaks(taken: Sequence[Taken]) -> Iterator[Peak]:
         if t.kind != REFINED or t.response.hz.size < 8:
             continue
         r = t.response
-        model = fitted(r.hz, r.values, t.noise, t.dof)
-        at = top(model, float(r.hz[0]), float(r.hz[-1]))
+        models = orders(r.hz, r.values, t.noise, t.dof)
+        at = averaged(models, float(r.hz[0]), float(r.hz[-1]))
         high = np.abs(r.values) > 0.7 * at.value
         half = next((h for h in taken if h.kind == HALF and h.about == t.about), None)
         change, u = _change(t, half, high) if half is not None else (0.0, math.inf)
-        yield Peak(t, model, at, float(r.coherence[high].min()) if high.any() else 0.0, change, u)
+        yield Peak(t, models[0], at, float(r.coherence[high].min()) if high.any() else 0.0, change, u)
 
 
 def _change(t: Taken, half: Taken, high: npt.NDArray[np.bool_]) -> tuple[float, float]:
@@ -188,7 +184,7 @@ def _change(t: Taken, half: Taken, high: npt.NDArray[np.bool_]) -> tuple[float, 
 
 def _curve(taken: Sequence[Taken]) -> Response:
     """All lines at the full amplitude; where passes overlap, the finest of them."""
-    some = [t for t in taken if t.kind != HALF]
+    some = [t for t in taken if t.kind not in (WIRING, HALF)]
     fine = [(t.response.hz[0], t.response.hz[-1]) for t in some if t.kind in (MODE, REFINED) and t.response.hz.size]
     parts = []
     for t in some:
@@ -207,7 +203,8 @@ def _curve(taken: Sequence[Taken]) -> Response:
 
 
 def margins(surveys: Sequence[Taken], where: str) -> dict[str, Estimate]:
-    """Phase margin and both gain margins by the smoothed lines of the survey, those that exist."""
+    """Phase margin and both gain margins by the lines of the survey, those that exist. Smoothed, but where the gain may fall:
+    that is among the lowest lines, which bend within a few and carry little noise."""
     if not surveys:
         return {}
     hz, z, power = _merged([(t.response, t.noise) for t in surveys])
@@ -216,15 +213,16 @@ def margins(surveys: Sequence[Taken], where: str) -> dict[str, Estimate]:
     covariance = power[:, None, None] / 2 * np.eye(2)
     smooth = peaks.smoother(hz, z, covariance)
     base = smooth.at_lines(z)
-    drawn = smooth.everywhere(base + peaks.noise(covariance, 0, DRAWS))
+    noisy = base + peaks.noise(covariance, 0, DRAWS)
+    smoothed = smooth.everywhere(z), smooth.everywhere(base), smooth.everywhere(noisy)
     out: dict[str, Estimate] = {}
     dof = float(min(t.dof for t in surveys))
-    for name, unit, of in (
-        ("phase_margin", "rad", phase),
-        ("gain_reduction", "1", fall),
-        ("gain_increase", "1", rise),
+    for name, unit, of, (seen, mean, drawn) in (
+        ("phase_margin", "rad", phase, smoothed),
+        ("gain_reduction", "1", fall, (z, base, noisy)),
+        ("gain_increase", "1", rise, smoothed),
     ):
-        found, again = of(1 / smooth.everywhere(z) - 1), of(1 / smooth.everywhere(base) - 1)
+        found, again = of(1 / seen - 1), of(1 / mean - 1)
         values = np.array([of(1 / d - 1) for d in drawn])
         known = np.isfinite(values)
         if math.isfinite(found) and math.isfinite(again) and known.mean() > 1 - TOLERATED:
