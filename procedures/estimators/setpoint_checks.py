@@ -28,6 +28,8 @@ FATAL = (
 CAME = 0.2  # of the step: less is no step
 SIZE_OFF = 0.4  # of the step: what a stiff integrator-less loop may be off, and no more
 DRIFT_S = 0.2  # in which a position before a step must not leave the band
+FADING = 1.1  # from one quarter of the record to the next; less does not tell a time constant
+AFTER_S = 0.1  # that a record goes on after the position has settled
 ASIDE = 0.5  # of the step, that the other axis may move for good
 
 
@@ -95,9 +97,10 @@ def _speed(steps: Sequence[Done], plan: Tolerances) -> Iterator[Finding]:
         )  # fmt: skip
     moving = [d for d in steps if abs(d.slope) * DRIFT_S > max(plan.band * d.case.size, 4 * d.noise)]
     if moving:
-        yield Finding("not-at-rest", f"before {len(moving)} of {len(steps)} steps the position still moved, by "
-                      f"{max(abs(d.slope) for d in moving) * 1e6:.2f} µm/s: wait longer, or start warm.", moving[0].case.where,
-                      Effect.INDETERMINATE)  # fmt: skip
+        most = max(abs(d.slope) for d in moving) * 1e6
+        yield Finding("not-at-rest", f"before {len(moving)} of {len(steps)} steps the position still moved, by {most:.2f} "
+                      "µm/s: wait longer (record_s between steps, settle_s before the first), or start warm.",
+                      moving[0].case.where, Effect.INDETERMINATE)  # fmt: skip
     yield from _kicks(steps)
     for d in steps:
         if d.case.speed == 0 and d.speeds[1] > 2:
@@ -158,11 +161,8 @@ def of_results(
     """Steps that do not settle, bands that noise has widened, responses without an oscillation."""
     for case, result in results.items():
         if not math.isfinite(result.settled.time):
-            off = abs(result.error)
-            yield Finding("not-settled", f"still {off:.1%} of the step off at the end of the record ({plan.band:.1%} "
-                                         f"is the band): "
-                          "record longer, or look at the integrator and at the controller's model.", case.where,
-                          Effect.INDETERMINATE)  # fmt: skip
+            yield Finding("not-settled", f"still {abs(result.error):.1%} of the step off at the end of the record "
+                          f"({plan.band:.1%} is the band): {_longer(result)}.", case.where, Effect.INDETERMINATE)  # fmt: skip
         widest = result.settled.within
         if widest > plan.band:
             yield Finding("band-widened", f"five times the noise of the averaged position is {widest:.1%} of the "
@@ -172,6 +172,21 @@ def of_results(
         if "damping" not in estimates:
             yield Finding("no-oscillation", "no oscillation that dies away fits the response: damping and frequency are not "
                           "told.", where)  # fmt: skip
+
+
+def _longer(result: Result) -> str:
+    """What to do about a step that has not settled: how long to record, where what is left can be seen to fade."""
+    last = min(float(o.t[-1]) for o in result.ones)
+    third, fourth = (
+        abs(float(np.mean([o.both[0, (o.t > a * last) & (o.t <= (a + 0.25) * last)].mean() - 1 for o in result.ones])))
+        for a in (0.5, 0.75)
+    )
+    if third < FADING * fourth or abs(result.error) <= result.settled.within:
+        return "record longer, or look at the integrator and at the controller's model"
+    constant = 0.25 * last / math.log(third / fourth)
+    enough = last + constant * math.log(abs(result.error) / result.settled.within) + AFTER_S
+    return (f"what is left falls to 1/e in {constant:.2g} s, as an integrator takes it away; "
+            f"record_s of {math.ceil(2 * enough) / 2:g} s shows it settle")  # fmt: skip
 
 
 def compared(results: Mapping[Case, Result], names: tuple[str, str]) -> Iterator[Finding]:

@@ -22,10 +22,9 @@ Array = npt.NDArray[np.float64]
 RISE_SHARE = 0.012  # of a period: what the spline leaves of a crossing, over all phases of the step in its period
 ALIAS = 3e-3  # of the bandwidth: what stands above half the sampling rate
 START_S = 1e-4  # how well the control currents tell when the set point acted
-SIZE_DAMPING, SIZE_FREQUENCY = (
-    6.0,
-    4.0,
-)  # second-order effect of a step's size over the square of its first-order effect
+# Second-order effect of a step's size over the square of its first-order effect: damping either way; frequency from none to
+# less by this much, since what bearings have of quadratic and cubic forces softens them (Landau, Mechanics, section 28).
+SIZE_DAMPING, SIZE_FREQUENCY = (-2.0, 2.0), (-4.0, 0.0)
 TAIL_S = 0.2
 
 
@@ -223,11 +222,11 @@ def _oscillation(group: str, results: Sequence[Result]) -> dict[str, Estimate]:
         return {}
     first = _first_order(results)
     out = {}
-    made: tuple[tuple[str, str, Callable[[Swing], float], float], ...] = (
+    made: tuple[tuple[str, str, Callable[[Swing], float], tuple[float, float]], ...] = (
         ("damping", "1", lambda s: s.damping, SIZE_DAMPING),
         ("natural_frequency", "Hz", lambda s: s.frequency, SIZE_FREQUENCY),
     )
-    for name, unit, of, second in made:
+    for name, unit, of, (low, high) in made:
         value = of(whole)
         within, dof = _alike(kinds, np.array([of(s) for s in left]))
         u = (n - 1) * math.sqrt(within / dof / n)
@@ -242,9 +241,9 @@ def _oscillation(group: str, results: Sequence[Result]) -> dict[str, Estimate]:
             source=f"{n} steps, left out in turn",
         )
         moved = max(abs(of(whole.later(by)) - value) for by in (START_S, -START_S))
-        out[name] = Estimate.of(value, jackknife)
+        out[name] = Estimate.of(value * (1 - (low + high) / 2 * first**2), jackknife)
         out[name] += bound(f"start/{name}/{group}", "start of the step", moved, unit)
-        out[name] += bound(f"size/{name}/{group}", "size of the steps", second * first**2 * value, unit)
+        out[name] += bound(f"size/{name}/{group}", "size of the steps", (high - low) / 2 * first**2 * value, unit)
     return out
 
 

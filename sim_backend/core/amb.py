@@ -196,6 +196,13 @@ class AmbPlant:
         rows = rows[: self.tick // PERIOD_TICKS - start // PERIOD_TICKS]
         return (rows, kept[: -(-self.tick // trace) - -(-start // trace)]) if trace else rows
 
+    def twin(self) -> AmbPlant:
+        """Another one in the same state, whose noise goes on as this one's does: what the two do differently follows from what
+        is done to them."""
+        other = AmbPlant(self.params)
+        other._c[0], other._s[0] = self._c[0], self._s[0]
+        return other
+
     def state(self) -> dict[str, Any]:
         """True state, for tests: `s` (20,) as in `core/amb.h`, `coil` (10,), `observer` (4, 5)."""
         s = self._s
