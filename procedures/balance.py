@@ -11,6 +11,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
@@ -59,6 +60,8 @@ class Plan(BenchPlan):
     service_rad_s: float = Field(15000 / RPM, gt=0)  # the highest, for the permissible residual unbalance
     max_share: float = Field(0.5, gt=0, le=0.9)  # of the least clearance: where a predicted response may reach
     refit_u_kg_m: float = Field(0.0, ge=0)  # of the shaft's own unbalance, each time a weight has been fixed
+    bending_hz: float = Field(650.0, ge=0)  # first bending mode of the free shaft; 0: rigid
+    bearings: Literal["adopted", "plan"] = "adopted"  # as in unbalance
     beta_share: float = Field(0.05, ge=0)
     offset_u_m: float = Field(10e-6, ge=0)
     max_lost: float = Field(1e-3, ge=0)
@@ -89,6 +92,11 @@ def settings(plan: Plan) -> dict[str, float]:
     """Lifted by the PID, nothing compensated."""
     del plan
     return {"law": unbalance.CODES["PID"], "observer": 0.0, "compensate": 0.0}
+
+
+def needs(plan: Plan) -> tuple[Need, ...]:
+    """As unbalance: the runout by the slow roll rests on the bearings' forces."""
+    return unbalance.needs_bearings(plan.bearings)
 
 
 def step_count(plan: Plan) -> int:
@@ -162,5 +170,6 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    needs=needs,
     method=METHOD,
 )

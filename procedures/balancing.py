@@ -11,7 +11,7 @@ from bench.rig import Rig
 from bench.roles import Plane, RigState
 from bench.states import transition
 from procedures import probing, unbalance
-from procedures.estimators import balance_decision, balance_estimates
+from procedures.estimators import balance_decision, balance_estimates, unbalance_bearings
 from procedures.estimators.balance_data import (
     BASE,
     CAPTURED,
@@ -161,11 +161,12 @@ def _correct(work: Work) -> None:
     if list(balance_decision.of_trials(shown[0], shown[1])):
         return
     present = work.runs[-1] if plan.leave else trials.base
+    bearings = unbalance_bearings.adopted_bearings(work.record)
     for n in range(plan.corrections):
-        found = balance_estimates.balanced(work.slow, [present], trials, rig, plan)
+        found = balance_estimates.balanced(work.slow, [present], trials, rig, plan, bearings)
         needed = balance_decision.correction(found, present.name, rig, plan)
         work.record.event(DECISION, run=present.name, reached=needed.reached, too_heavy_kg=needed.too_heavy)
-        if needed.reached or needed.too_heavy:
+        if needed.reached or needed.too_heavy or not needed.weights:  # what is missing is not a matter of weights
             return
         for plane, kg, angle in needed.weights:
             _mount(work, plane, kg, angle, f"correction {n + 1}")

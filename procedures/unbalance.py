@@ -119,7 +119,12 @@ def settings(plan: Plan) -> dict[str, float]:
 
 def needs(plan: Plan) -> tuple[Need, ...]:
     """The bearings' model, where the rig has one and the plan does not say otherwise."""
-    return (Need(BEARING_MODEL, optional=True),) if plan.bearings == "adopted" else ()
+    return needs_bearings(plan.bearings)
+
+
+def needs_bearings(bearings: Literal["adopted", "plan"]) -> tuple[Need, ...]:
+    """The bearings' model where a rig has one, or none."""
+    return (Need(BEARING_MODEL, optional=True),) if bearings == "adopted" else ()
 
 
 def step_count(plan: Plan) -> int:

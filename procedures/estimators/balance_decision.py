@@ -176,10 +176,17 @@ def correction(balance: Balanced, name: str, rig: RigFile, plan: Settings) -> Co
         for part in split(-complex(u), plan.positions):
             kg = abs(part) / balance.radius
             if kg >= LIGHTEST_KG:
-                wanted.append((p, kg, float(np.angle(part)) % (2 * math.pi)))
+                wanted.append((p, kg, _told(float(np.angle(part)), plan.positions)))
     heaviest = max((kg for _, kg, _ in wanted), default=0.0)
     most = rig.envelope.max_trial_weight_kg
     return Correction(tuple(wanted), reached=False, too_heavy=heaviest if heaviest > most else 0.0)
+
+
+def _told(angle: float, positions: int) -> float:
+    """As the operator is told it, rad from 0 to below a whole turn: a part on the scale's zero comes out of `split` just
+    short of one."""
+    whole = 2 * math.pi
+    return round(angle / whole * positions) % positions * whole / positions if positions else angle % whole
 
 
 def trials_of(runs: Sequence[Run], rig: RigFile, leave: bool) -> Trials | None:

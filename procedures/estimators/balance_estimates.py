@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from bench.analysis.balance import allocated, permissible
 from bench.analysis.vectors import Vectors, estimates
+from bench.calibration import Calibration
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate, welch_satterthwaite
 from bench.uncertainty.estimate import merged
@@ -24,6 +25,7 @@ from procedures.estimators.unbalance_data import AXES
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
+BENDING = 0.1  # docs/reference/balance.md, Runout: a free shaft with probes and planes 0.05 to 0.2 of its length from its nodes
 
 
 class Settings(Protocol):
@@ -33,6 +35,8 @@ class Settings(Protocol):
     def beta_share(self) -> float: ...
     @property
     def offset_u_m(self) -> float: ...
+    @property
+    def bending_hz(self) -> float: ...
     @property
     def refit_u_kg_m(self) -> float: ...
     @property
@@ -53,11 +57,6 @@ class Balanced:
     permissible: tuple[Estimate, Estimate]
     radius: float
 
-    def added(self, name: str, since: Run, runs: Sequence[Run]) -> Complex:
-        """What was mounted in a run beyond another one's weights, (2,) kg m."""
-        run = next(r for r in runs if r.name == name)
-        return fixed(run.weights, self.radius) - fixed(since.weights, self.radius)
-
 
 def fixed(weights: Sequence[Weight], radius: float) -> Complex:
     """Sum of weights by plane, (2,) kg m."""
@@ -67,17 +66,23 @@ def fixed(weights: Sequence[Weight], radius: float) -> Complex:
     return out
 
 
-def balanced(slow: Read | None, runs: Sequence[Run], trials: Trials, rig: RigFile, plan: Settings) -> Balanced:
-    """Unbalance of every run in `runs`, with influences shared by their identity.
+def balanced(
+    slow: Read | None, runs: Sequence[Run], trials: Trials, rig: RigFile, plan: Settings, model: Calibration | None = None
+) -> Balanced:  # fmt: skip
+    """Unbalance of every run in `runs`, with influences shared by their identity; `model` is the bearings' adopted calibration.
 
     Certificates and the bearings' model go through the whole model, scatter through its linear part.
     """
     radius = rig.geometry["balance_radius"].value
     known = {
-        **unbalance_bearings.stated(rig, plan),
+        **unbalance_bearings.stated(rig, plan, model),
         **_weights(trials, rig),
+        **_bending(),
         **(_unmeasured(rig) if slow is None else {}),
     }
+
+    speeds = np.array([r.speed for r in trials.base.reads])
+    near = (speeds / (2 * math.pi * plan.bending_hz)) ** 2 if plan.bending_hz else 0 * speeds
 
     def solve(v: Mapping[str, float]) -> tuple[Stand, Solved]:
         s = Stand.of(v)
@@ -87,9 +92,10 @@ def balanced(slow: Read | None, runs: Sequence[Run], trials: Trials, rig: RigFil
         if slow is None:
             lost = taken(s, _turnings(trials.base), _unknown(v), found.mark)
             found = replace(found, taken=found.taken + lost)
-        return s, found
+        bent = np.array([[v[f"bending_{j}{k}"] for k in (0, 1)] for j in (0, 1)])
+        return s, replace(found, taken=found.taken + near[:, None] * (found.taken @ bent.T))
 
-    def model(v: dict[str, float]) -> dict[str, float]:
+    def parted(v: dict[str, float]) -> dict[str, float]:
         s, found = solve(v)
         out: dict[str, float] = {}
         for run in runs:
@@ -97,7 +103,7 @@ def balanced(slow: Read | None, runs: Sequence[Run], trials: Trials, rig: RigFil
             out |= {f"{run.name}/{k}": float(x) for k, x in enumerate(u.view(np.float64))}
         return out
 
-    out = propagate(model, known)
+    out = propagate(parted, known)
     stand, nominal = solve({name: e.value for name, e in known.items()})
     parts = {}
     for run in runs:
@@ -130,6 +136,15 @@ def _unmeasured(rig: RigFile) -> dict[str, Estimate]:
 def _unknown(v: Mapping[str, float]) -> Complex:
     i, o = (v[f"unknown_re_{b}"] + 1j * v[f"unknown_im_{b}"] for b in "io")
     return np.array([i, -1j * i, o, -1j * o])
+
+
+def _bending() -> dict[str, Estimate]:
+    """By how much the shaft's bending changes the unbalance that a runout is taken for, over (omega/omega_1)^2, plane by plane:
+    what the modes add to the rigid shaft's response, over that response, changes with their shapes at probes and planes,
+    which nobody states."""
+    names = [f"{j}{k}" for j in (0, 1) for k in (0, 1)]
+    return {f"bending_{n}": Estimate.of(0.0, Influence(f"bending/{n}", "bending of the shaft", BENDING, "1", "B", "normal"))
+            for n in names}  # fmt: skip
 
 
 def _weights(trials: Trials, rig: RigFile) -> dict[str, Estimate]:

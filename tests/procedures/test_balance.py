@@ -78,7 +78,7 @@ def runs_of(b: Balancing) -> dict[str, Run]:
 
 def test_it_is_reached_with_one_correction(sound: Balancing) -> None:
     assert not sound.serious
-    assert {f.code for f in sound.findings} == {"verified", "reached", "influence", "correction-sheet"}
+    assert {f.code for f in sound.findings} == {"bearings", "verified", "reached", "influence", "correction-sheet"}
     assert list(runs_of(sound)) == ["base", "trial inboard", "trial outboard", "check 1"]
     assert len(sound.recording.all_steps()) <= balance.step_count(sound.recording.plan)
     assert {name for name, _ in sound.measured} == {q.name for q in balance.MEASURES}
@@ -166,12 +166,12 @@ def test_scales_that_disagree_and_corrections_that_act_otherwise(sound: Balancin
     assert not list(balance_decision.of_trials(*shown))
     assert [f.code for f in balance_decision.of_trials(shown[0], shown[1] * np.exp(0.3j))] == ["weight-angle"]
     check_run = runs["check 1"]
-    assert [f.code for f in balance_checks.predicted(b, runs[BASE], check_run)] == ["verified"]
+    assert [f.code for f in balance_checks.predicted(b, runs[BASE], check_run, rig)] == ["verified"]
     for lie in (
         {"angle": check_run.weights[0].angle + 0.3}, {"kg": 1.3 * check_run.weights[0].kg}, {"plane": 1}
     ):  # fmt: skip
         weights = (dataclasses.replace(check_run.weights[0], **lie), *check_run.weights[1:])
-        found = list(balance_checks.predicted(b, runs[BASE], dataclasses.replace(check_run, weights=weights)))
+        found = list(balance_checks.predicted(b, runs[BASE], dataclasses.replace(check_run, weights=weights), rig))
         assert [(f.code, f.effect) for f in found] == [("correction-not-as-stated", Effect.INDETERMINATE)], lie
 
 
