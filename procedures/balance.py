@@ -19,12 +19,12 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.roles import RigState
 from procedures import balance_figures as drawn
-from procedures import balancing, probing, unbalance
+from procedures import balancing, probing, turning, unbalance
 from procedures.estimators import balance_checks, balance_estimates
 from procedures.estimators.balance_data import BASE, SIDES
 from procedures.estimators.unbalance_data import RPM
+from procedures.turning import Law
 
-Law = Literal["PID", "CCS", "CAC"]
 FOUND_COS = Quantity("unbalance_cos", "kg m", "of the shaft as found, in a plane: component along the scale's zero")
 FOUND_SIN = Quantity("unbalance_sin", "kg m", "as unbalance_cos: component a quarter turn on, from y towards z")
 LEFT_COS = Quantity(
@@ -91,7 +91,7 @@ class Plan(BenchPlan):
 def settings(plan: Plan) -> dict[str, float]:
     """Lifted by the PID, nothing compensated."""
     del plan
-    return {"law": unbalance.CODES["PID"], "observer": 0.0, "compensate": 0.0}
+    return {"law": turning.CODES["PID"], "observer": 0.0, "compensate": 0.0}
 
 
 def needs(plan: Plan) -> tuple[Need, ...]:

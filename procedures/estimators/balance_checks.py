@@ -22,6 +22,7 @@ from procedures.estimators import (
     tracking_wiring,
     unbalance_bearings,
     unbalance_checks,
+    unbalance_plan,
 )
 from procedures.estimators.balance_data import (
     BASE,
@@ -45,7 +46,7 @@ NEEDED = ("com_to_inboard_balance", "com_to_outboard_balance", "balance_radius",
           *(f"com_to_{b}_{what}" for b in ("inboard", "outboard") for what in ("sensor", "amb")))  # fmt: skip
 
 
-class Settings(balance_decision.Settings, unbalance_checks.Settings, Protocol):
+class Settings(balance_decision.Settings, unbalance_plan.Settings, Protocol):
     """The plan."""
 
     @property
@@ -95,7 +96,7 @@ def of_plan(rig: RigFile, plan: Settings) -> Iterable[str]:
     yield from lacking
     if lacking:
         return
-    yield from unbalance_checks.of_plan(rig, plan)
+    yield from unbalance_plan.of_plan(rig, plan)
     if max(plan.speeds_rad_s) * RPM > MOST_RPM + 1:
         top = max(plan.speeds_rad_s) * RPM
         yield f"speeds_rad_s: found {top:.0f} r/min; influence runs are made at {MOST_RPM:.0f} r/min or below"

@@ -23,7 +23,8 @@ from procedures import compensation, unbalance
 from procedures.estimators import reach, runout, unbalance_bearings, unbalance_checks, unbalance_estimates
 from procedures.estimators.unbalance_data import AXES, read_dwells
 from procedures.estimators.unbalance_estimates import Results
-from procedures.unbalance import CODES, POLES, SETTINGS, check
+from procedures.turning import CODES, POLES, SETTINGS
+from procedures.unbalance import check
 from reports.figures import draw as draw_figure
 from sim_backend import amb_unbalance
 from sim_backend.core.amb_params import AmbParams
