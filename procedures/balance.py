@@ -145,7 +145,7 @@ Nothing is compensated.
 
 Influence coefficients are differences of vectors over the trial weight, so that runout cancels in them. Unbalance is the
 least-squares solution of X = A (U + U_R) over all probes and speeds. U_R is what the journals' runout is taken for: the
-unbalance that would make the probes read the same, by the runout of the slow roll (as in `unbalance`: what the probes
+unbalance that would make the probes read the same, by the runout of the slow roll (as in procedure unbalance: what the probes
 read less what the shaft does, by the coil forces) and the shaft's own masses. The controller is in A alone. Weights sit on
 the planes' scales; where the once-per-turn mark is on them is told by the forces that the trial weights make in the coils.
 

@@ -151,9 +151,11 @@ def _weights(trials: Trials, rig: RigFile) -> dict[str, Estimate]:
     """Trial weights as the balance says and the scale shows; all sit at one radius."""
     out = {"radius": certified("geometry/balance_radius", rig.geometry["balance_radius"], "radius of the weights")}
     for p, w in enumerate(trials.weights):
-        for name, key, value in (("kg", "weight_mass", w.kg), ("angle", "weight_angle", w.angle)):
+        for name, key, value, what in (
+            ("kg", "weight_mass", w.kg, "mass"), ("angle", "weight_angle", w.angle, "angle")
+        ):  # fmt: skip
             t = rig.machine[key]
-            off = Influence(f"weight/{w.number}/{name}", f"{name} of the trial weight, {SIDES[p]}",
+            off = Influence(f"weight/{w.number}/{name}", f"{what} of the trial weight, {SIDES[p]}",
                             t.standard_uncertainty, t.unit, "B", t.distribution, source=t.source)  # fmt: skip
             out[f"{name}_{p}"] = Estimate.of(value, off)
     return out
