@@ -25,7 +25,8 @@ from procedures.estimators.unbalance_data import AXES
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
-BENDING = 0.1  # docs/reference/balance.md, Runout: a free shaft with probes and planes 0.05 to 0.2 of its length from its nodes
+BENDING = 0.1  # of (omega/omega_1)^2: docs/reference/balance.md, Uncertainty, as the next
+NONLINEAR = 3.0  # of (X/gap)^2
 
 
 class Settings(Protocol):
@@ -78,6 +79,7 @@ def balanced(
         **unbalance_bearings.stated(rig, plan, model),
         **_weights(trials, rig),
         **_bending(),
+        **_nonlinear(trials, rig),
         **(_unmeasured(rig) if slow is None else {}),
     }
 
@@ -100,6 +102,8 @@ def balanced(
         out: dict[str, float] = {}
         for run in runs:
             u = found.unbalance(_readings(run) / s.gain)
+            whole = replace(found, taken=0 * found.taken).unbalance(_readings(run) / s.gain)
+            u = u + whole * [complex(v[f"nonlinear_re_{p}"], v[f"nonlinear_im_{p}"]) for p in (0, 1)]
             out |= {f"{run.name}/{k}": float(x) for k, x in enumerate(u.view(np.float64))}
         return out
 
@@ -145,6 +149,18 @@ def _bending() -> dict[str, Estimate]:
     names = [f"{j}{k}" for j in (0, 1) for k in (0, 1)]
     return {f"bending_{n}": Estimate.of(0.0, Influence(f"bending/{n}", "bending of the shaft", BENDING, "1", "B", "normal"))
             for n in names}  # fmt: skip
+
+
+def _nonlinear(trials: Trials, rig: RigFile) -> dict[str, Estimate]:
+    """How far influence coefficients may be those of another amplitude: forces go as 1/gap^2, so that what the runs with trial
+    weights say of the slope differs from that of a shaft at rest by some (X/gap)^2, X the greatest amplitude in them."""
+    far = max(float(np.abs(_readings(r)).max()) for r in (*trials.before, *trials.having))
+    u = NONLINEAR * (far / rig.geometry["amb_gap"].value) ** 2
+    return {
+        f"nonlinear_{part}_{p}": Estimate.of(
+            0.0, Influence(f"nonlinear/{side}/{part}", f"response not linear, {side}", u, "1", "B", "normal"))
+        for p, side in enumerate(SIDES) for part in ("re", "im")
+    }  # fmt: skip
 
 
 def _weights(trials: Trials, rig: RigFile) -> dict[str, Estimate]:
