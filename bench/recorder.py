@@ -16,6 +16,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from bench.calibration import Calibration
+from bench.calibrationfile import attached
 from bench.clock import Clock
 from bench.errors import RecordingError
 from bench.frames import FRAME, FrameBatch
@@ -76,6 +78,7 @@ class Recorder:
     ) -> None:
         self.path, self._clock, self._live, self._plain = path, clock, live, plain
         self.integrity = Integrity()
+        self._header = header
         self.wall: dict[str, str] = {}
         self._streams = {s.name: s for s in streams}
         self._failure: BaseException | None = None
@@ -99,6 +102,12 @@ class Recorder:
         self._thread = threading.Thread(target=self._drain, name="recorder", daemon=True)
         if not plain:
             self._thread.start()
+
+    @property
+    def calibrations(self) -> tuple[Calibration, ...]:
+        """Those that the run uses, for decisions under way: the same that `Recording.calibrations` gives the analysis."""
+        found = self._header.attachments.get("calibrations.json")
+        return () if found is None else attached(found.decode(), f"recording {self.path}")
 
     def frames(self, link: str, batch: FrameBatch, lag_ns: int = 0) -> None:
         """Record frames as they came, or as they were sent (flag SENT); host time less `lag_ns` is sample time."""

@@ -23,7 +23,8 @@ UNITS: dict[str, Unit] = {
     "s": Unit("s"), "ms": Unit("s", 1e-3), "us": Unit("s", 1e-6), "Hz": Unit("Hz"), "kHz": Unit("Hz", 1e3),
     "1/s": Unit("1/s"), "1/s^2": Unit("1/s^2"), "1/s^3": Unit("1/s^3"), "m/s": Unit("m/s"), "N/(A m)": Unit("N/(A m)"),
     "kg": Unit("kg"), "g": Unit("kg", 1e-3), "mg": Unit("kg", 1e-6), "N": Unit("N"),
-    "kg m": Unit("kg m"), "g mm": Unit("kg m", 1e-6), "N m^2/A^2": Unit("N m^2/A^2"),
+    "kg m": Unit("kg m"), "g mm": Unit("kg m", 1e-6), "m/(kg m)": Unit("m/(kg m)"), "um/(g mm)": Unit("m/(kg m)"),
+    "N m^2/A^2": Unit("N m^2/A^2"),
     "H": Unit("H"), "mH": Unit("H", 1e-3), "Ohm": Unit("Ohm"),
     "A": Unit("A"), "mA": Unit("A", 1e-3), "V": Unit("V"), "mV": Unit("V", 1e-3),
     "K": Unit("K"), "degC": Unit("K", 1.0, 273.15), "°C": Unit("K", 1.0, 273.15),
@@ -43,6 +44,18 @@ SUFFIXES: dict[str, str] = {
     "rad_s": "rad/s", "rpm": "r/min", "percent": "%",
 }  # fmt: skip
 """What may stand after the last underscores of a key, and the unit it means."""
+
+
+HABIT: dict[str, tuple[str, float]] = {
+    "kg m": ("g mm", math.inf), "m/(kg m)": ("um/(g mm)", math.inf), "m": ("um", 1e-3),
+}  # fmt: skip
+"""The unit in which the field states results in an SI unit, where they are smaller than so much."""
+
+
+def habit(si: str, size: float) -> tuple[str, float]:
+    """Symbol of the unit in which a result of about `size` is told, and what one of it is in SI."""
+    symbol, below = HABIT.get(si, (si, 0.0))
+    return (symbol, UNITS[symbol].factor) if abs(size) < below else (si, 1.0)
 
 
 def unit(symbol: str) -> Unit:

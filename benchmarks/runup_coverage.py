@@ -23,7 +23,7 @@ from bench.rigfile import load_rig
 from bench.uncertainty import interval
 from procedures.estimators.unbalance_data import AXES, RPM
 from procedures.runup import evaluated
-from procedures.unbalance import CODES, SETTINGS
+from procedures.turning import CODES, SETTINGS
 from sim_backend import amb_unbalance
 from sim_backend.truth import draw
 

@@ -11,6 +11,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
@@ -18,12 +19,12 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.roles import RigState
 from procedures import balance_figures as drawn
-from procedures import balancing, probing, unbalance
+from procedures import balancing, probing, turning, unbalance
 from procedures.estimators import balance_checks, balance_estimates
 from procedures.estimators.balance_data import BASE, SIDES
 from procedures.estimators.unbalance_data import RPM
+from procedures.turning import Law
 
-Law = Literal["PID", "CCS", "CAC"]
 FOUND_COS = Quantity("unbalance_cos", "kg m", "of the shaft as found, in a plane: component along the scale's zero")
 FOUND_SIN = Quantity("unbalance_sin", "kg m", "as unbalance_cos: component a quarter turn on, from y towards z")
 LEFT_COS = Quantity(
@@ -59,6 +60,8 @@ class Plan(BenchPlan):
     service_rad_s: float = Field(15000 / RPM, gt=0)  # the highest, for the permissible residual unbalance
     max_share: float = Field(0.5, gt=0, le=0.9)  # of the least clearance: where a predicted response may reach
     refit_u_kg_m: float = Field(0.0, ge=0)  # of the shaft's own unbalance, each time a weight has been fixed
+    bending_hz: float = Field(650.0, ge=0)  # first bending mode of the free shaft; 0: rigid
+    bearings: Literal["adopted", "plan"] = "adopted"  # as in unbalance
     beta_share: float = Field(0.05, ge=0)
     offset_u_m: float = Field(10e-6, ge=0)
     max_lost: float = Field(1e-3, ge=0)
@@ -88,7 +91,12 @@ class Plan(BenchPlan):
 def settings(plan: Plan) -> dict[str, float]:
     """Lifted by the PID, nothing compensated."""
     del plan
-    return {"law": unbalance.CODES["PID"], "observer": 0.0, "compensate": 0.0}
+    return {"law": turning.CODES["PID"], "observer": 0.0, "compensate": 0.0}
+
+
+def needs(plan: Plan) -> tuple[Need, ...]:
+    """As unbalance: the runout by the slow roll rests on the bearings' forces."""
+    return unbalance.needs_bearings(plan.bearings)
 
 
 def step_count(plan: Plan) -> int:
@@ -137,7 +145,7 @@ Nothing is compensated.
 
 Influence coefficients are differences of vectors over the trial weight, so that runout cancels in them. Unbalance is the
 least-squares solution of X = A (U + U_R) over all probes and speeds. U_R is what the journals' runout is taken for: the
-unbalance that would make the probes read the same, by the runout of the slow roll (as in `unbalance`: what the probes
+unbalance that would make the probes read the same, by the runout of the slow roll (as in procedure unbalance: what the probes
 read less what the shaft does, by the coil forces) and the shaft's own masses. The controller is in A alone. Weights sit on
 the planes' scales; where the once-per-turn mark is on them is told by the forces that the trial weights make in the coils.
 
@@ -162,5 +170,6 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    needs=needs,
     method=METHOD,
 )

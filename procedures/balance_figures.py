@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.analysis.balance import G_MM
+from bench.analysis.sampling import lag_deg
 from bench.analysis.vectors import region
 from bench.figures import Figure, Series
 from procedures.estimators.balance_checks import Evaluated
@@ -42,15 +43,18 @@ def _vectors(found: Evaluated, balance: Balanced, side: str, probe: int) -> Figu
     tips = [(r.name, complex(r.fastest.vectors.values[probe])) for r in runs]
     alone = complex(balance.solved.influence[-1, probe] @ balance.solved.taken[-1])
     tips.append(("no unbalance, runout alone", alone))
-    series = [Series(name, np.array([-np.angle(z)] * 2), np.array([0.0, UM * abs(z)]), "both") for name, z in tips]
-    notes = tuple((name, float(-np.angle(z)), UM * abs(z)) for name, z in _together(tips))
+    series = [
+        Series(f"{name}, {UM * abs(z):.2f} µm ∠{lag_deg(z):.0f}°", np.array([-np.angle(z)] * 2), np.array([0.0, UM * abs(z)]),
+               "both")
+        for name, z in tips
+    ]  # fmt: skip
     return Figure(
         f"vectors-{side}", f"Vectors of order 1 at probe {AXES[probe]}, {speed:.0f} r/min, by run",
         f"As read, zero to peak, runout included; the angle is the phase lag from the once-per-turn mark, against "
         f"the rotation. "
         f"A balanced shaft would read what the runout alone leaves. Probe {AXES[probe + 1]} shows the same a quarter turn "
         "later.",
-        "phase lag", "µm 0-pk", tuple(series), "vectors", notes=notes,
+        "phase lag", "µm 0-pk", tuple(series), "vectors",
     )  # fmt: skip
 
 
@@ -74,31 +78,20 @@ def _residual(balance: Balanced, last: str, p: int, side: str) -> Figure:
     )  # fmt: skip
 
 
-def _together(tips: Sequence[tuple[str, complex]]) -> list[tuple[str, complex]]:
-    """Names of points that lie next to each other written as one."""
-    near = 0.1 * max(abs(z) for _, z in tips)
-    out: list[tuple[str, complex]] = []
-    for name, z in tips:
-        short = name.removesuffix(", runout alone")
-        k = next((k for k, (_, w) in enumerate(out) if abs(w - z) < near), None)
-        if k is None:
-            out.append((short, z))
-        else:
-            out[k] = (f"{out[k][0]}, {short}", out[k][1])
-    return out
-
-
 def _sheet(found: Evaluated, balance: Balanced, p: int, side: str) -> Figure:
     """Unbalance as found and the weights that were fixed, as vectors on the scale."""
     assert found.recorded is not None
     points = [("unbalance as found", complex(balance.unbalance[BASE].values[p]))]
     points += [(purpose, w.unbalance(balance.radius)) for w, purpose in found.recorded.fixed if w.plane == p]
     points = [(name, z / G_MM) for name, z in points]
-    series = [Series(name, np.array([0.0, z.real]), np.array([0.0, z.imag]), "both") for name, z in points]
+    series = [
+        Series(f"{name}, {abs(z):.2f} g mm ∠{np.degrees(np.angle(z)) % 360:.0f}°", np.array([0.0, z.real]),
+               np.array([0.0, z.imag]), "both")
+        for name, z in points
+    ]  # fmt: skip
     top = 1.4 * max(abs(z) for _, z in points)
     series.append(Series("scale", top * np.cos(TURN), top * np.sin(TURN), "guide"))
-    notes = [(f"{name} {abs(z):.2f} g mm ∠{np.degrees(np.angle(z)) % 360:.0f}°", z.real, z.imag) for name, z in points]
-    notes += [(f"{k}°", top * np.cos(np.radians(k)), top * np.sin(np.radians(k))) for k in range(0, 360, 90)]
+    notes = [(f"{k}°", top * np.cos(np.radians(k)), top * np.sin(np.radians(k))) for k in range(0, 360, 90)]
     return Figure(
         f"sheet-{side}", f"Unbalance and weights {side}",
         f"On the scale of the {side} plane: its 0° faces y while the shaft stands with its zero there; angles grow from y "

@@ -10,8 +10,8 @@ from bench.recorder import Recorder
 from bench.rig import Rig
 from bench.roles import Plane, RigState
 from bench.states import transition
-from procedures import probing, unbalance
-from procedures.estimators import balance_decision, balance_estimates
+from procedures import probing, turning
+from procedures.estimators import balance_decision, balance_estimates, unbalance_bearings
 from procedures.estimators.balance_data import (
     BASE,
     CAPTURED,
@@ -52,7 +52,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     work = Work(rig, plan, record)
     if not probing.probed(rig, record):
         return
-    unbalance.put(rig, {"law": unbalance.CODES[plan.law], **unbalance.SETTINGS["off"]})
+    turning.put(rig, {"law": turning.CODES[plan.law], **turning.SETTINGS["off"]})
     if not _rolled(work) or not _run(work, BASE):
         return
     for p, side in enumerate(SIDES):
@@ -73,11 +73,11 @@ def _rolled(work: Work) -> bool:
     if not plan.slow_rad_s:
         return True
     if not probing.turned(rig, work.record, plan.slow_rad_s, plan.settle_s):
-        unbalance.finished(rig)
+        turning.finished(rig)
         return False
     work.slow = _dwell(work, SLOW, BASE, plan.slow_rad_s, plan.slow_s, plan.slow_s, SLOW_HZ)
     if work.slow is None:
-        unbalance.finished(rig)
+        turning.finished(rig)
     return work.slow is not None
 
 
@@ -86,7 +86,7 @@ def _run(work: Work, name: str) -> bool:
     rig, plan = work.rig, work.plan
     if rig.levitation.state is RigState.READY:  # the base run goes on from the slow roll
         transition(rig, RigState.LEVITATED)
-    unbalance.put(rig, {"law": unbalance.CODES[plan.law], **unbalance.SETTINGS["off"]})
+    turning.put(rig, {"law": turning.CODES[plan.law], **turning.SETTINGS["off"]})
     reads: list[Read] = []
     speeds = sorted(plan.speeds_rad_s)
     for speed in (*speeds, *(speeds[:1] if plan.repeat else ())):
@@ -96,7 +96,7 @@ def _run(work: Work, name: str) -> bool:
         if read is None or not read.sound or abs(read.speed / speed - 1) > plan.max_speed_error:
             break  # the analysis says why
         reads.append(read)
-    unbalance.finished(rig)
+    turning.finished(rig)
     transition(rig, RigState.READY)
     if len(reads) < len(speeds) + plan.repeat:
         return False
@@ -117,7 +117,7 @@ def _dwell(
     with work.record.step(kind, **labels):
         rig.capture.arm(CAPTURED, seconds=capture_s, rate_hz=rate_hz)
         rig.capture.wait(capture_s + 5.0)
-        rig.clock.sleep(max(seconds - capture_s, unbalance.MARGIN_S))
+        rig.clock.sleep(max(seconds - capture_s, turning.MARGIN_S))
     work.dwells += 1
     touched = int(rig.levitation.reading("flags")) & CONTACT
     data = rig.capture.upload(run=name, speed_rad_s=speed)
@@ -161,11 +161,12 @@ def _correct(work: Work) -> None:
     if list(balance_decision.of_trials(shown[0], shown[1])):
         return
     present = work.runs[-1] if plan.leave else trials.base
+    bearings = unbalance_bearings.adopted_bearings(work.record)
     for n in range(plan.corrections):
-        found = balance_estimates.balanced(work.slow, [present], trials, rig, plan)
+        found = balance_estimates.balanced(work.slow, [present], trials, rig, plan, bearings)
         needed = balance_decision.correction(found, present.name, rig, plan)
         work.record.event(DECISION, run=present.name, reached=needed.reached, too_heavy_kg=needed.too_heavy)
-        if needed.reached or needed.too_heavy:
+        if needed.reached or needed.too_heavy or not needed.weights:  # what is missing is not a matter of weights
             return
         for plane, kg, angle in needed.weights:
             _mount(work, plane, kg, angle, f"correction {n + 1}")

@@ -11,9 +11,9 @@ from bench.procedure import Procedure
 from bench.recorder import Recorder
 from bench.rig import Rig
 from bench.roles import RigState
-from procedures import probing, runup, unbalance
+from procedures import probing, runup, turning
 from procedures.runup import Passing, ended, passed
-from procedures.unbalance import put
+from procedures.turning import put
 
 
 class Plan(Passing):
@@ -29,7 +29,7 @@ class Plan(Passing):
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Look at the shaft on its rings, lift it, nudge it, roll it slowly, run it up, and let it slow down."""
-    if not unbalance.rolled(rig, plan, record):
+    if not turning.rolled(rig, plan, record):
         return
     put(rig, plan.parameters)
     if probing.turned(rig, record, plan.top_rad_s, plan.settle_s):

@@ -20,11 +20,11 @@ from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
 from procedures import compensation_figures as drawn
-from procedures import probing, unbalance, unbalance_figures
+from procedures import probing, turning, unbalance, unbalance_figures
 from procedures.estimators import compensation_checks, switching
 from procedures.estimators.switching import SWITCH
 from procedures.estimators.unbalance_data import RPM
-from procedures.unbalance import Law, Variant
+from procedures.turning import Law, Variant
 
 REDUCTION = Quantity(
     "reduction", "1", "of order 1 as the probes read it, root mean square of the four, by the compensation"
@@ -71,24 +71,24 @@ def step_count(plan: Plan) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Slow roll, dwells with each setting, the switch, the lowest speed again."""
-    if not unbalance.rolled(rig, plan, record):
+    if not turning.rolled(rig, plan, record):
         return
-    if unbalance.dwelt(rig, plan, record) and _switched(rig, plan, record):
-        unbalance.repeated(rig, plan, record)
-    unbalance.finished(rig)
+    if turning.dwelt(rig, plan, record) and _switched(rig, plan, record):
+        turning.repeated(rig, plan, record)
+    turning.finished(rig)
 
 
 def _switched(rig: Rig, plan: Plan, record: Recorder) -> bool:
     """Switch the compensation on while the controller records."""
-    unbalance.put(rig, unbalance.SETTINGS["off"])
+    turning.put(rig, turning.SETTINGS["off"])
     if rig.capture is None or not probing.turned(rig, record, plan.switch_rad_s, plan.settle_s):
         return False
-    unbalance.put(rig, WAITING)
+    turning.put(rig, WAITING)
     rig.clock.sleep(plan.settle_s)
     with record.step(SWITCH, speed_rad_s=plan.switch_rad_s):
         rig.capture.arm(switching.RECORDED, seconds=plan.before_s + AFTER_ARM_S + plan.after_s)
         rig.clock.sleep(plan.before_s)
-        rig.levitation.set("compensate", unbalance.SETTINGS["corrected"]["compensate"])
+        rig.levitation.set("compensate", turning.SETTINGS["corrected"]["compensate"])
         rig.capture.wait(plan.after_s + 5.0)
     rig.capture.upload(switch=1)
     return True

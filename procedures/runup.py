@@ -21,14 +21,15 @@ from bench.recording import Recording
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
-from procedures import probing, unbalance
+from procedures import probing, turning, unbalance
 from procedures import runup_figures as drawn
 from procedures.estimators import runup_checks, runup_estimates, tracking_wiring, unbalance_checks
 from procedures.estimators.runup_data import MISSED, PASSAGE, read_passage
 from procedures.estimators.runup_estimates import Run
 from procedures.estimators.tracking_data import NO_SPEED
 from procedures.estimators.unbalance_data import RECORDED, RPM, SLOW, read_dwell
-from procedures.unbalance import CODES, CURRENT, D_MAX, MAJOR, READ, SHARE, VOLTAGE, Law, put
+from procedures.turning import CODES, Law, put
+from procedures.unbalance import CURRENT, D_MAX, MAJOR, READ, SHARE, VOLTAGE
 
 COSINE, SINE = unbalance.COSINE, unbalance.SINE
 SPEED = Quantity("critical_speed", "rad/s", "where the amplitude of a probe is greatest, with a factor of 2.5 or more")
@@ -108,7 +109,7 @@ def step_count(plan: Passing) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Look at the shaft on its rings, lift it, nudge it, roll it slowly, run it up, and stop it."""
-    if not unbalance.rolled(rig, plan, record):
+    if not turning.rolled(rig, plan, record):
         return
     put(rig, plan.parameters)
     if probing.turned(rig, record, plan.bottom_rad_s, plan.settle_s):
@@ -124,7 +125,7 @@ def ended(rig: Rig, plan: Passing) -> None:
         if plan.rate_rad_s2:
             rig.drive.set_acceleration(0.0)
     put(rig, {name: rig.file.parameters[name].default for name in plan.parameters})
-    unbalance.finished(rig)
+    turning.finished(rig)
 
 
 def passed(rig: Rig, plan: Passing, record: Recorder, direction: str, goal: float) -> None:

@@ -6,9 +6,9 @@ D_max and its share of the clearance (ISO 14839-2), currents and voltages of the
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 from pydantic import Field
 
@@ -21,16 +21,20 @@ from bench.recording import Recording
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
-from procedures import probing
+from procedures import probing, turning
 from procedures import unbalance_figures as drawn
-from procedures.estimators import tracking_wiring, unbalance_bearings, unbalance_checks, unbalance_estimates
+from procedures.estimators import (
+    tracking_wiring,
+    unbalance_bearings,
+    unbalance_checks,
+    unbalance_estimates,
+    unbalance_plan,
+)
 from procedures.estimators.unbalance_bearings import BEARING_MODEL, adopted_bearings
-from procedures.estimators.unbalance_data import DWELL, RECORDED, RPM, SLOW, TOLD, read_dwells
+from procedures.estimators.unbalance_data import RPM, TOLD, read_dwells
 from procedures.estimators.unbalance_estimates import Results
+from procedures.turning import CODES, POLES, SETTINGS, Law, Variant
 
-Law = Literal["PID", "CCS", "CAC"]
-Variant = Literal["off", "corrected", "literal"]
-CODES: dict[Law, float] = {"PID": 0.0, "CCS": 1.0, "CAC": 2.0}
 COSINE = Quantity(
     "vector_cos", "m", "order 1 of the shaft's centre at a probe's plane, along the probe: cosine component, 0-pk"
 )
@@ -48,17 +52,9 @@ READ = Quantity(
 CURRENT = Quantity("current_peak", "A", "greatest coil current of a plane")
 VOLTAGE = Quantity("voltage_peak", "V", "greatest coil voltage of a plane, either way")
 MEASURES = (COSINE, SINE, MAJOR, D_MAX, SHARE, READ, CURRENT, VOLTAGE)
-POLES = {"k1": 2e5, "k2_ccs": 400.0, "k2_cac": 400.0}  # T 3.5, with the observer
-SETTINGS: dict[Variant, dict[str, float]] = {
-    "off": {"observer": 0.0, "compensate": 0.0, "integral": 1.0},
-    "corrected": {"observer": 1.0, "compensate": 3.0, "integral": 0.0},
-    "literal": {"observer": 2.0, "compensate": 3.0, "integral": 0.0},
-}
 PARAMETERS = ("law", "ref_y", "ref_theta")
 LENGTHS = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_inboard_amb", "com_to_outboard_amb", "com_to_coupling",
            "com_to_inboard_balance", "com_to_outboard_balance", "coupling_stiffness", "amb_gap", "clearance")  # fmt: skip
-MARGIN_S = 0.1  # of a dwell beside its capture
-STANDS_S = 1.0  # the controller knows half a second after the last pulse that the shaft stands
 
 
 class Plan(BenchPlan):
@@ -99,19 +95,6 @@ class Plan(BenchPlan):
         return sum(len(self.at(s)) for s in self.speeds_rad_s)
 
 
-class Rolling(Protocol):
-    """The part of a plan that lift and slow roll need."""
-
-    @property
-    def law(self) -> Law: ...
-    @property
-    def slow_rad_s(self) -> float: ...
-    @property
-    def slow_s(self) -> float: ...
-    @property
-    def settle_s(self) -> float: ...
-
-
 def settings(plan: Plan) -> dict[str, float]:
     """Lifted by the PID, which needs no model."""
     return {"law": CODES["PID"], "observer": 0.0, "compensate": 0.0, **(POLES if plan.observed else {})}
@@ -119,7 +102,12 @@ def settings(plan: Plan) -> dict[str, float]:
 
 def needs(plan: Plan) -> tuple[Need, ...]:
     """The bearings' model, where the rig has one and the plan does not say otherwise."""
-    return (Need(BEARING_MODEL, optional=True),) if plan.bearings == "adopted" else ()
+    return needs_bearings(plan.bearings)
+
+
+def needs_bearings(bearings: Literal["adopted", "plan"]) -> tuple[Need, ...]:
+    """The bearings' model where a rig has one, or none."""
+    return (Need(BEARING_MODEL, optional=True),) if bearings == "adopted" else ()
 
 
 def step_count(plan: Plan) -> int:
@@ -129,80 +117,11 @@ def step_count(plan: Plan) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Look at the shaft on its rings, lift it, nudge it, roll it slowly, and let it dwell at each speed with each setting."""
-    if not rolled(rig, plan, record):
+    if not turning.rolled(rig, plan, record):
         return
-    if dwelt(rig, plan, record):
-        repeated(rig, plan, record)
-    finished(rig)
-
-
-def rolled(rig: Rig, plan: Rolling, record: Recorder) -> bool:
-    """Lifted, nudged, under the plan's law, and rolled slowly; False where the run ends here."""
-    if not probing.probed(rig, record):
-        return False
-    put(rig, {"law": CODES[plan.law], **SETTINGS["off"]})
-    if plan.slow_rad_s:
-        if not probing.turned(rig, record, plan.slow_rad_s, plan.settle_s):
-            finished(rig)
-            return False
-        with record.step(SLOW, **_labels(rig, plan.slow_rad_s, "off")):
-            rig.clock.sleep(plan.slow_s)
-    return True
-
-
-def repeated(rig: Rig, plan: Plan, record: Recorder) -> None:
-    """The lowest speed once more, with the first setting."""
-    speed = min(plan.speeds_rad_s)
-    if plan.repeat and probing.turned(rig, record, speed, plan.settle_s):
-        put(rig, SETTINGS[plan.variants[0]])
-        rig.clock.sleep(plan.settle_s)
-        _dwell(rig, plan, record, speed, plan.variants[0], -1)
-
-
-def finished(rig: Rig) -> None:
-    """Nothing compensated, the drive stopped, the shaft standing under the PID."""
-    put(rig, SETTINGS["off"])
-    if rig.drive is not None:
-        rig.drive.stop()
-        rig.drive.coast()
-    rig.levitation.set("law", CODES["PID"])
-    rig.clock.sleep(STANDS_S)
-
-
-def dwelt(rig: Rig, plan: Plan, record: Recorder) -> bool:
-    """All dwells, the slowest first; False if a speed is not reached."""
-    number = 0
-    for speed in sorted(plan.speeds_rad_s):
-        put(rig, SETTINGS[plan.variants[0]])
-        if not probing.turned(rig, record, speed, plan.settle_s):
-            return False
-        for variant in plan.at(speed):
-            put(rig, SETTINGS[variant])
-            rig.clock.sleep(plan.settle_s)
-            _dwell(rig, plan, record, speed, variant, number)
-            number += 1
-    return True
-
-
-def _dwell(rig: Rig, plan: Plan, record: Recorder, speed: float, variant: Variant, number: int) -> None:
-    with record.step(DWELL, **_labels(rig, speed, variant, number)):
-        if rig.capture is not None:
-            rig.capture.arm(RECORDED, seconds=plan.capture_s, rate_hz=plan.rate_hz)
-            rig.capture.wait(plan.capture_s + 5.0)
-        rig.clock.sleep(max(plan.dwell_s - plan.capture_s, MARGIN_S))
-    if rig.capture is not None:
-        rig.capture.upload(dwell=number, speed_rad_s=speed, variant=variant)
-
-
-def _labels(rig: Rig, speed: float, variant: Variant, number: int = 0) -> dict[str, float | str | bool]:
-    driven = rig.drive.speed_rad_s if rig.drive is not None else 0.0
-    return {"speed_rad_s": speed, "variant": variant, "driven_rad_s": driven, "number": number, "again": number < 0}
-
-
-def put(rig: Rig, values: Mapping[str, float]) -> None:
-    """Write parameters of the controller."""
-    for name, value in values.items():
-        rig.levitation.set(name, value)
+    if turning.dwelt(rig, plan, record):
+        turning.repeated(rig, plan, record)
+    turning.finished(rig)
 
 
 def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
@@ -264,7 +183,7 @@ def lacking(rig: RigFile) -> Iterator[str]:
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
     missing = list(lacking(rig))
-    yield from missing or unbalance_checks.of_plan(rig, plan)
+    yield from missing or unbalance_plan.of_plan(rig, plan)
 
 
 def figures(recording: Recording[Plan]) -> Iterable[Figure]:

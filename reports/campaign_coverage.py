@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bench import units
 from bench.campaign_bands import Failure, Quantity
 from bench.campaign_speed import Speed
 from reports import campaign_figures, text
@@ -103,11 +104,13 @@ def _table(quantities: Sequence[Quantity]) -> Grid:
             high = f"{c.width_range[1]:.2f}" if np.isfinite(c.width_range[1]) else "∞"
             reach = f"{c.width_range[0]:.2f} to {high}"
         verdict = c.verdict.value
+        unit, one = units.habit(q.unit, c.mean_U or 0.0)
+        mean = None if c.mean_U is None else c.mean_U / one
         rows.append((
             Cell(symbol=symbol(q.name), small=_about(q)),
             Cell(f"{c.coverage:.4f}", f"{c.hits} of {c.rigs}", strong=True),
             Cell("–" if c.width is None else f"{c.width:.3f}", reach, strong=True),
-            Cell(text.with_unit(text.significant(c.mean_U), q.unit)),
+            Cell(text.with_unit(text.significant(mean), unit)),
             Cell("–" if c.bias is None else f"{c.bias:+.3f}".replace("-", text.MINUS)),
             Cell(verdict, tone=_TONES.get(verdict, "none")) if q.judged else Cell("not judged", f"({verdict})"),
         ))  # fmt: skip

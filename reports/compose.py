@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from reports import many, tables, text
+from reports import habit, many, tables, text
 from reports.figures import Drawn
 from reports.linktable import clean, link_table
 from reports.view import (
@@ -65,7 +65,7 @@ class Surroundings:
 def view_of(record: Content, around: Surroundings, figures: Iterable[Drawn] = ()) -> ReportView:
     """The report of one record. Equal inputs give an equal view: nothing here asks for the time."""
     outcome = str(record.get("outcome", "ERROR"))
-    measurements = [m for m in record.get("measurements") or () if isinstance(m, Mapping)]
+    measurements = [habit.told(m) for m in record.get("measurements") or () if isinstance(m, Mapping)]
     findings = tuple(_findings(record, around))
     rows = tuple(_result(m, around.definitions) for m in measurements)
     like = many.names(measurements)

@@ -71,7 +71,7 @@ def _step(done: Simulated) -> Found:
 
 def _unbalance(done: Simulated) -> Found:
     from procedures.estimators.unbalance_data import AXES, DWELL, PLANES, read_dwells
-    from procedures.unbalance import CODES, POLES, SETTINGS
+    from procedures.turning import CODES, POLES, SETTINGS
     from sim_backend import amb_unbalance
 
     plan: Any = done.recording.plan

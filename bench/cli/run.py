@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from contextlib import suppress
 
-from bench import runlog, runner
+from bench import runlog, runner, units
 from bench.cli import reporting
 from bench.cli.compose import Request, prepare
 from bench.progress import shown_on
@@ -47,8 +47,9 @@ def summary(record: Record) -> str:
     for m in record.measurements:
         value = "missing"
         if m.value is not None and m.expanded_uncertainty is not None:
-            unit = "" if m.unit == "1" else m.unit
-            value = f"{stated(m.value, m.expanded_uncertainty)} {unit}".rstrip()
+            symbol, one = units.habit(m.unit, max(abs(m.value), m.expanded_uncertainty))
+            unit = "" if symbol == "1" else symbol
+            value = f"{stated(m.value / one, m.expanded_uncertainty / one)} {unit}".rstrip()
         place = f" ({m.where})" if m.where else ""
         lines.append(f"  {m.name:{widest}} {value:32} {m.verdict.value}{place}")
     lines += [f"  {f.effect.value}: {f.code}: {f.text}" for f in record.findings]

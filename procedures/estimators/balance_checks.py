@@ -16,7 +16,14 @@ from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
-from procedures.estimators import balance_decision, balance_estimates, tracking_wiring, unbalance_checks
+from procedures.estimators import (
+    balance_decision,
+    balance_estimates,
+    tracking_wiring,
+    unbalance_bearings,
+    unbalance_checks,
+    unbalance_plan,
+)
 from procedures.estimators.balance_data import (
     BASE,
     DECISION,
@@ -33,12 +40,13 @@ from procedures.estimators.unbalance_data import AXES, CURRENTS, POSITIONS, RPM,
 MOST_RPM = 10000.0  # influence runs
 WORST_CONDITION = 50.0  # of the influence coefficients
 SPEEDS_APART = 2e-3
+SAME_PLACE_RAD = math.radians(0.1)
 DIFFERS = 0.15  # of what was mounted: how far a verification may be from the prediction, beside its uncertainty
 NEEDED = ("com_to_inboard_balance", "com_to_outboard_balance", "balance_radius", "clearance", "coupling_stiffness", "amb_gap",
           *(f"com_to_{b}_{what}" for b in ("inboard", "outboard") for what in ("sensor", "amb")))  # fmt: skip
 
 
-class Settings(balance_decision.Settings, unbalance_checks.Settings, Protocol):
+class Settings(balance_decision.Settings, unbalance_plan.Settings, Protocol):
     """The plan."""
 
     @property
@@ -88,12 +96,18 @@ def of_plan(rig: RigFile, plan: Settings) -> Iterable[str]:
     yield from lacking
     if lacking:
         return
-    yield from unbalance_checks.of_plan(rig, plan)
+    yield from unbalance_plan.of_plan(rig, plan)
     if max(plan.speeds_rad_s) * RPM > MOST_RPM + 1:
         top = max(plan.speeds_rad_s) * RPM
         yield f"speeds_rad_s: found {top:.0f} r/min; influence runs are made at {MOST_RPM:.0f} r/min or below"
     if 0 < plan.positions < 3:
         yield f"positions: found {plan.positions}; expected 0 (any angle), or three or more"
+    elif plan.positions:
+        for side, angle in zip(SIDES, plan.trial_angle_rad, strict=True):
+            step = 2 * math.pi / plan.positions
+            if abs(math.remainder(angle, step)) > SAME_PLACE_RAD:
+                yield (f"trial_angle_rad: found {math.degrees(angle):.4g}° {side}; the {plan.positions} positions are "
+                       f"{math.degrees(step):.4g}° apart, the first at 0°")  # fmt: skip
     for side, kg, p in zip(SIDES, plan.trial_kg, (0, 1), strict=True):
         allowed = balance_decision.allowed_kg(rig, plan, p)
         if not 0 < kg <= allowed:
@@ -119,8 +133,10 @@ def evaluated(recording: Recording[Any]) -> Evaluated:
         return Evaluated((*found, *sheet(recorded, "still-mounted", rig, plan)))
     checks = [r for r in recorded.runs if r.name.startswith("check")]
     shown = [trials.base, *([trials.having[1]] if plan.leave else []), *checks]
-    balance = balance_estimates.balanced(recorded.slow, shown, trials, rig, plan)
+    model = unbalance_bearings.adopted_bearings(recording)
+    balance = balance_estimates.balanced(recorded.slow, shown, trials, rig, plan, model)
     last = shown[-1].name
+    found.append(unbalance_bearings.told(model, plan))
     found += _of_result(balance, recorded, shown, plan, rig)
     return Evaluated(tuple(found), balance, recorded, last, balance_estimates.influences(balance, rig))
 
@@ -189,7 +205,7 @@ def _of_result(
         yield Finding("planes-not-told-apart", text, "", Effect.ERROR)
     for before, after in pairwise(shown):
         if after.name.startswith("check"):
-            yield from predicted(balance, before, after)
+            yield from predicted(balance, before, after, rig)
     name = shown[-1].name
     values = balance.unbalance[name]
     for p, side in enumerate(SIDES):
@@ -211,7 +227,7 @@ def _of_result(
     yield from sheet(recorded, "correction-sheet", rig, plan)
 
 
-def predicted(balance: Balanced, before: Run, after: Run) -> Iterator[Finding]:
+def predicted(balance: Balanced, before: Run, after: Run, rig: RigFile) -> Iterator[Finding]:
     """What was measured against what was expected of the weights that were fixed in between."""
     added = balance_estimates.fixed(after.weights, balance.radius) - balance_estimates.fixed(
         before.weights, balance.radius
@@ -224,7 +240,7 @@ def predicted(balance: Balanced, before: Run, after: Run) -> Iterator[Finding]:
         f"{side} {abs(e) / G_MM:.2f} g mm, found {abs(v) / G_MM:.2f} g mm"
         for side, e, v in zip(SIDES, expected, found.values, strict=True)
     )
-    if np.abs(off).max() > DIFFERS * scale + 3 * _mounted(scale):
+    if np.abs(off).max() > DIFFERS * scale + 3 * _mounted(balance, before, after, rig):
         worst = SIDES[int(np.argmax(np.abs(off)))]
         text = (f"predicted {told}: the correction did not act as it should, most {worst}. Suspect a weight of another "
                 "mass, at another angle or in the other plane than the sheet says, or one that came loose.")  # fmt: skip
@@ -233,9 +249,15 @@ def predicted(balance: Balanced, before: Run, after: Run) -> Iterator[Finding]:
         yield Finding("verified", f"predicted {told}.", after.name)
 
 
-def _mounted(scale: float) -> float:
-    """What weights that are mounted within their tolerances leave of an amount, kg m."""
-    return 0.02 * scale + 0.03 * G_MM
+def _mounted(balance: Balanced, before: Run, after: Run, rig: RigFile) -> float:
+    """Standard uncertainty, kg m, of what weights within their tolerances leave: those that were fixed between two runs, and
+    the trial weights, by which the amount was measured."""
+    mass, angle = (rig.machine[name].standard_uncertainty for name in ("weight_mass", "weight_angle"))
+    fresh = [w for w in after.weights if w not in before.weights]
+    own = sum((balance.radius * mass) ** 2 + (balance.radius * w.kg * angle) ** 2 for w in fresh)
+    added = np.abs(balance_estimates.fixed(fresh, balance.radius))
+    by_trials = sum(a**2 * ((mass / w.kg) ** 2 + angle**2) for a, w in zip(added, balance.trials.weights, strict=True))
+    return math.sqrt(own + float(by_trials))
 
 
 def sheet(recorded: Recorded, code: str, rig: RigFile, plan: Settings) -> Iterator[Finding]:

@@ -27,6 +27,7 @@ Complex = npt.NDArray[np.complex128]
 LEAST = 0.5  # of what it should do, by the forces: less, and a trial weight moved nothing
 OFF, ASTRAY = 0.25, 0.25  # of a weight: size, and what shows in the other plane
 TURNED_RAD, SLIPPED_RAD = math.radians(12), math.radians(15)
+JUST_RAD = 1e-6
 LIGHTEST_KG = 1e-6  # what a laboratory balance still tells from nothing
 
 
@@ -176,10 +177,18 @@ def correction(balance: Balanced, name: str, rig: RigFile, plan: Settings) -> Co
         for part in split(-complex(u), plan.positions):
             kg = abs(part) / balance.radius
             if kg >= LIGHTEST_KG:
-                wanted.append((p, kg, float(np.angle(part)) % (2 * math.pi)))
+                wanted.append((p, kg, _told(float(np.angle(part)), plan.positions)))
     heaviest = max((kg for _, kg, _ in wanted), default=0.0)
     most = rig.envelope.max_trial_weight_kg
     return Correction(tuple(wanted), reached=False, too_heavy=heaviest if heaviest > most else 0.0)
+
+
+def _told(angle: float, positions: int) -> float:
+    """As the operator is told it, rad from 0 to below a whole turn, which rounding alone may make of an angle just below 0."""
+    whole = 2 * math.pi
+    if positions:
+        return round(angle / whole * positions) % positions * whole / positions
+    return angle % whole if whole - angle % whole > JUST_RAD else 0.0
 
 
 def trials_of(runs: Sequence[Run], rig: RigFile, leave: bool) -> Trials | None:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from bench.analysis.balance import allocated, permissible
 from bench.analysis.vectors import Vectors, estimates
+from bench.calibration import Calibration
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate, welch_satterthwaite
 from bench.uncertainty.estimate import merged
@@ -24,6 +25,8 @@ from procedures.estimators.unbalance_data import AXES
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
+BENDING = 0.1  # of (omega/omega_1)^2: docs/reference/balance.md, Uncertainty, as the next
+NONLINEAR = 3.0  # of (X/gap)^2
 
 
 class Settings(Protocol):
@@ -33,6 +36,8 @@ class Settings(Protocol):
     def beta_share(self) -> float: ...
     @property
     def offset_u_m(self) -> float: ...
+    @property
+    def bending_hz(self) -> float: ...
     @property
     def refit_u_kg_m(self) -> float: ...
     @property
@@ -53,11 +58,6 @@ class Balanced:
     permissible: tuple[Estimate, Estimate]
     radius: float
 
-    def added(self, name: str, since: Run, runs: Sequence[Run]) -> Complex:
-        """What was mounted in a run beyond another one's weights, (2,) kg m."""
-        run = next(r for r in runs if r.name == name)
-        return fixed(run.weights, self.radius) - fixed(since.weights, self.radius)
-
 
 def fixed(weights: Sequence[Weight], radius: float) -> Complex:
     """Sum of weights by plane, (2,) kg m."""
@@ -67,17 +67,24 @@ def fixed(weights: Sequence[Weight], radius: float) -> Complex:
     return out
 
 
-def balanced(slow: Read | None, runs: Sequence[Run], trials: Trials, rig: RigFile, plan: Settings) -> Balanced:
-    """Unbalance of every run in `runs`, with influences shared by their identity.
+def balanced(
+    slow: Read | None, runs: Sequence[Run], trials: Trials, rig: RigFile, plan: Settings, model: Calibration | None = None
+) -> Balanced:  # fmt: skip
+    """Unbalance of every run in `runs`, with influences shared by their identity; `model` is the bearings' adopted calibration.
 
     Certificates and the bearings' model go through the whole model, scatter through its linear part.
     """
     radius = rig.geometry["balance_radius"].value
     known = {
-        **unbalance_bearings.stated(rig, plan),
+        **unbalance_bearings.stated(rig, plan, model),
         **_weights(trials, rig),
+        **_bending(),
+        **_nonlinear(trials, rig),
         **(_unmeasured(rig) if slow is None else {}),
     }
+
+    speeds = np.array([r.speed for r in trials.base.reads])
+    near = (speeds / (2 * math.pi * plan.bending_hz)) ** 2 if plan.bending_hz else 0 * speeds
 
     def solve(v: Mapping[str, float]) -> tuple[Stand, Solved]:
         s = Stand.of(v)
@@ -87,17 +94,20 @@ def balanced(slow: Read | None, runs: Sequence[Run], trials: Trials, rig: RigFil
         if slow is None:
             lost = taken(s, _turnings(trials.base), _unknown(v), found.mark)
             found = replace(found, taken=found.taken + lost)
-        return s, found
+        bent = np.array([[v[f"bending_{j}{k}"] for k in (0, 1)] for j in (0, 1)])
+        return s, replace(found, taken=found.taken + near[:, None] * (found.taken @ bent.T))
 
-    def model(v: dict[str, float]) -> dict[str, float]:
+    def parted(v: dict[str, float]) -> dict[str, float]:
         s, found = solve(v)
         out: dict[str, float] = {}
         for run in runs:
             u = found.unbalance(_readings(run) / s.gain)
+            whole = replace(found, taken=0 * found.taken).unbalance(_readings(run) / s.gain)
+            u = u + whole * [complex(v[f"nonlinear_re_{p}"], v[f"nonlinear_im_{p}"]) for p in (0, 1)]
             out |= {f"{run.name}/{k}": float(x) for k, x in enumerate(u.view(np.float64))}
         return out
 
-    out = propagate(model, known)
+    out = propagate(parted, known)
     stand, nominal = solve({name: e.value for name, e in known.items()})
     parts = {}
     for run in runs:
@@ -132,13 +142,36 @@ def _unknown(v: Mapping[str, float]) -> Complex:
     return np.array([i, -1j * i, o, -1j * o])
 
 
+def _bending() -> dict[str, Estimate]:
+    """By how much the shaft's bending changes the unbalance that a runout is taken for, over (omega/omega_1)^2, plane by plane:
+    what the modes add to the rigid shaft's response, over that response, changes with their shapes at probes and planes,
+    which nobody states."""
+    names = [f"{j}{k}" for j in (0, 1) for k in (0, 1)]
+    return {f"bending_{n}": Estimate.of(0.0, Influence(f"bending/{n}", "bending of the shaft", BENDING, "1", "B", "normal"))
+            for n in names}  # fmt: skip
+
+
+def _nonlinear(trials: Trials, rig: RigFile) -> dict[str, Estimate]:
+    """How far influence coefficients may be those of another amplitude: forces go as 1/gap^2, so that what the runs with trial
+    weights say of the slope differs from that of a shaft at rest by some (X/gap)^2, X the greatest amplitude in them."""
+    far = max(float(np.abs(_readings(r)).max()) for r in (*trials.before, *trials.having))
+    u = NONLINEAR * (far / rig.geometry["amb_gap"].value) ** 2
+    return {
+        f"nonlinear_{part}_{p}": Estimate.of(
+            0.0, Influence(f"nonlinear/{side}/{part}", f"response not linear, {side}", u, "1", "B", "normal"))
+        for p, side in enumerate(SIDES) for part in ("re", "im")
+    }  # fmt: skip
+
+
 def _weights(trials: Trials, rig: RigFile) -> dict[str, Estimate]:
     """Trial weights as the balance says and the scale shows; all sit at one radius."""
     out = {"radius": certified("geometry/balance_radius", rig.geometry["balance_radius"], "radius of the weights")}
     for p, w in enumerate(trials.weights):
-        for name, key, value in (("kg", "weight_mass", w.kg), ("angle", "weight_angle", w.angle)):
+        for name, key, value, what in (
+            ("kg", "weight_mass", w.kg, "mass"), ("angle", "weight_angle", w.angle, "angle")
+        ):  # fmt: skip
             t = rig.machine[key]
-            off = Influence(f"weight/{w.number}/{name}", f"{name} of the trial weight, {SIDES[p]}",
+            off = Influence(f"weight/{w.number}/{name}", f"{what} of the trial weight, {SIDES[p]}",
                             t.standard_uncertainty, t.unit, "B", t.distribution, source=t.source)  # fmt: skip
             out[f"{name}_{p}"] = Estimate.of(value, off)
     return out

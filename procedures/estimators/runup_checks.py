@@ -13,7 +13,7 @@ from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.uncertainty import interval
-from procedures.estimators import signals, unbalance_checks
+from procedures.estimators import signals, unbalance_checks, unbalance_plan
 from procedures.estimators.runup_data import MISSED, PASSAGE, Passage
 from procedures.estimators.runup_estimates import DAMPED, Peak, Run, asked_margin
 from procedures.estimators.unbalance_checks import HELD
@@ -31,7 +31,7 @@ LARGE = 0.5  # of the clearance
 INBOARD, OUTBOARD, AXIAL = 4, 8, 32
 
 
-class Settings(unbalance_checks.Settings, Protocol):
+class Settings(unbalance_plan.Settings, Protocol):
     """The part of a plan that these checks need."""
 
     @property
@@ -69,7 +69,7 @@ def of_plan(rig: RigFile, plan: Settings) -> Iterable[str]:
     drives = [d for d in rig.devices.values() if "drive" in d.roles]
     if plan.rate_rad_s2 and not any("acceleration" in d.registers for d in drives):
         yield "devices: found a drive without a register acceleration; a ramp needs one"
-    yield from unbalance_checks.of_plan(rig, plan)
+    yield from unbalance_plan.of_plan(rig, plan)
 
 
 def before(recording: Recording[Any]) -> Iterator[Finding]:

@@ -5,13 +5,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from bench.calibration import Calibration
 from bench.findings import Effect, Finding
-from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.estimate import merged
@@ -31,7 +30,14 @@ class Settings(Protocol):
     def offset_u_m(self) -> float: ...
 
 
-def adopted_bearings(recording: Recording[Any]) -> Calibration | None:
+class Calibrated(Protocol):
+    """A recording, or one under way."""
+
+    @property
+    def calibrations(self) -> tuple[Calibration, ...]: ...
+
+
+def adopted_bearings(recording: Calibrated) -> Calibration | None:
     """The bearings' calibration that a run used, if it used one."""
     return next((c for c in recording.calibrations if c.procedure == BEARING_MODEL), None)
 

@@ -25,7 +25,7 @@ from procedures.estimators import runup_checks
 from procedures.estimators.runup_data import Passage, read_passage
 from procedures.estimators.runup_estimates import Run
 from procedures.estimators.unbalance_data import RPM
-from procedures.unbalance import CODES, SETTINGS
+from procedures.turning import CODES, SETTINGS
 from reports.figures import draw as draw_figure
 from sim_backend import amb_unbalance
 from sim_backend.core.amb_params import AmbParams

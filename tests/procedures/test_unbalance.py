@@ -10,20 +10,21 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bearing_facts import bearings
 
-from bench.calibration import Calibration
 from bench.cli.virtual import given, simulated_run
 from bench.errors import BenchError
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.recording import Recording
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, Influence, interval
 from procedures import compensation, unbalance
 from procedures.estimators import reach, runout, unbalance_bearings, unbalance_checks, unbalance_estimates
 from procedures.estimators.unbalance_data import AXES, read_dwells
 from procedures.estimators.unbalance_estimates import Results
-from procedures.unbalance import CODES, POLES, SETTINGS, check
+from procedures.turning import CODES, POLES, SETTINGS
+from procedures.unbalance import check
 from reports.figures import draw as draw_figure
 from sim_backend import amb_unbalance
 from sim_backend.core.amb_params import AmbParams
@@ -275,19 +276,6 @@ def test_d_max_is_greater_wherever_the_centre_may_be() -> None:
     found = interval(e)
     assert found.low == pytest.approx(np.quantile(true, 0.025), rel=0.02)
     assert found.high == pytest.approx(np.quantile(true, 0.975), rel=0.02)
-
-
-def bearings(rig: RigFile, plant: AmbParams) -> Calibration:
-    """What bearing-model would state of that plant: offsets to where the probes read zero, with smaller influences."""
-    at_bearing = runout.arms(plant.l_ia, plant.l_oa) @ np.linalg.inv(runout.arms(plant.l_is, plant.l_os))
-    zero = at_bearing @ (np.array(plant.position_offset[:4]) / np.array(plant.position_gain[:4]))
-    values = {}
-    for k, a in enumerate(AXES):
-        for name, value, u in (("beta", plant.beta[k], 1e-9), ("offset", plant.offset[k] - zero[k], 1e-6)):
-            values[f"{name}_{a}"] = Estimate.of(float(value), Influence(f"{name}-{a}", name, u, "", "B", "normal"))
-    return Calibration(
-        "bearing-model", values, run_id="bearing-model-1", date="2026-02-03T00:00:00+00:00", rig=rig.name
-    )
 
 
 def test_adopted_bearings_take_the_plan_s_place(compared: Run) -> None:
