@@ -100,7 +100,7 @@ def step_count(plan: Plan) -> int:
 
 def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     """Findings first, then the quantities."""
-    found = balance_checks.evaluated(recording)
+    found = recording.once(balance_checks.evaluated)
     yield from found.findings
     result = found.balance
     if result is None:
@@ -126,7 +126,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(recording: Recording[Plan]) -> Iterable[Figure]:
     """Polar plots of the vectors, influence coefficients, residual against U_per; empty where nothing was evaluated."""
-    found = balance_checks.evaluated(recording)
+    found = recording.once(balance_checks.evaluated)
     return () if found.balance is None else drawn.all_figures(found)
 
 

@@ -56,6 +56,7 @@ procedure = Procedure(
     check=runup.check,
     settings=runup.settings,
     step_count=runup.step_count,
+    needs=unbalance.needs,
     optional=runup.CRITICAL,
     method=METHOD,
 )

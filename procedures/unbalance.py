@@ -99,6 +99,13 @@ class Plan(BenchPlan):
         return sum(len(self.at(s)) for s in self.speeds_rad_s)
 
 
+class Resting(Protocol):
+    """The part of a plan that says what the forces rest on."""
+
+    @property
+    def bearings(self) -> str: ...
+
+
 class Rolling(Protocol):
     """The part of a plan that lift and slow roll need."""
 
@@ -117,7 +124,7 @@ def settings(plan: Plan) -> dict[str, float]:
     return {"law": CODES["PID"], "observer": 0.0, "compensate": 0.0, **(POLES if plan.observed else {})}
 
 
-def needs(plan: Plan) -> tuple[Need, ...]:
+def needs(plan: Resting) -> tuple[Need, ...]:
     """The bearings' model, where the rig has one and the plan does not say otherwise."""
     return (Need(BEARING_MODEL, optional=True),) if plan.bearings == "adopted" else ()
 
@@ -207,7 +214,7 @@ def put(rig: Rig, values: Mapping[str, float]) -> None:
 
 def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     """Findings first, then the quantities of each dwell."""
-    found = evaluated(recording)
+    found = recording.once(evaluated)
     yield from found.findings
     if found.results is not None:
         yield from measured(found.results)
@@ -269,7 +276,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(recording: Recording[Plan]) -> Iterable[Figure]:
     """Orbits of both planes, Bode pair, polar plot, full spectra, what the coils need; empty where nothing was evaluated."""
-    results = evaluated(recording).results
+    results = recording.once(evaluated).results
     return () if results is None else drawn.all_figures(results, recording.rig)
 
 
