@@ -29,11 +29,13 @@ class BenchPlan(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A declared measurand: its name in records and truth, its unit and its definition in one line."""
+    """A declared measurand: its name in records and truth, its unit and its definition in one line; `shown`, the unit that its
+    field reads in reports, where that is not SI."""
 
     name: str
     unit: str
     about: str
+    shown: str = ""
 
     def measured(self, estimate: Estimate, where: str = "") -> Measured:
         """This quantity's value in this run."""

@@ -32,10 +32,10 @@ from procedures.unbalance import CODES, CURRENT, D_MAX, MAJOR, READ, SHARE, VOLT
 
 COSINE, SINE = unbalance.COSINE, unbalance.SINE
 SPEED = Quantity("critical_speed", "rad/s", "where the amplitude of a probe is greatest, with a factor of 2.5 or more; "
-                 "of small orbits")  # fmt: skip
+                 "of small orbits", "r/min")  # fmt: skip
 FACTOR = Quantity("amplification_factor", "1", "that speed over the width at 0.707 of the amplitude (API 617, half power); "
                   "of small orbits")  # fmt: skip
-AMPLITUDE = Quantity("critical_amplitude", "m", "of the shaft's centre where it was greatest, 0-pk")
+AMPLITUDE = Quantity("critical_amplitude", "m", "of the shaft's centre where it was greatest, 0-pk", "um")
 MARGIN = Quantity("separation", "1", "distance of the critical speed from the running speed, over the running speed")
 CRITICAL = (SPEED, FACTOR, AMPLITUDE, MARGIN)  # which a well damped shaft does not have
 MEASURES = (COSINE, SINE, MAJOR, D_MAX, SHARE, READ, CURRENT, VOLTAGE, *CRITICAL)

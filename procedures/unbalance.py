@@ -32,18 +32,24 @@ Law = Literal["PID", "CCS", "CAC"]
 Variant = Literal["off", "corrected", "literal"]
 CODES: dict[Law, float] = {"PID": 0.0, "CCS": 1.0, "CAC": 2.0}
 COSINE = Quantity(
-    "vector_cos", "m", "order 1 of the shaft's centre at a probe's plane, along the probe: cosine component, 0-pk"
+    "vector_cos", "m", "order 1 of the shaft's centre at a probe's plane, along the probe: cosine component, 0-pk", "um"
 )
 SINE = Quantity(
-    "vector_sin", "m", "as vector_cos: sine component; x = C cos θ + S sin θ, θ from the once-per-turn mark"
+    "vector_sin", "m", "as vector_cos: sine component; x = C cos θ + S sin θ, θ from the once-per-turn mark", "um"
 )
-MAJOR = Quantity("major_half_axis", "m", "of the order-1 orbit of the shaft's centre in a sensor plane, 0-pk")
+MAJOR = Quantity("major_half_axis", "m", "of the order-1 orbit of the shaft's centre in a sensor plane, 0-pk", "um")
 D_MAX = Quantity(
-    "d_max", "m", "greatest distance of the shaft's centre from the clearance's, static offset included (ISO 14839-2)"
+    "d_max",
+    "m",
+    "greatest distance of the shaft's centre from the clearance's, static offset included (ISO 14839-2)",
+    "um",
 )
 SHARE = Quantity("d_max_share", "1", "D_max over the least clearance")
 READ = Quantity(
-    "reading", "m", "order 1 as the probes read it, runout included: root mean square of the four amplitudes, 0-pk"
+    "reading",
+    "m",
+    "order 1 as the probes read it, runout included: root mean square of the four amplitudes, 0-pk",
+    "um",
 )
 CURRENT = Quantity("current_peak", "A", "greatest coil current of a plane")
 VOLTAGE = Quantity("voltage_peak", "V", "greatest coil voltage of a plane, either way")

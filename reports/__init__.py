@@ -53,6 +53,7 @@ def build(
         title=title,
         method=method,
         definitions={q.name: q.about for q in measures},
+        units={q.name: q.shown for q in measures if q.shown},
         rig={} if recording is None else recording.rig.model_dump(mode="json", exclude_none=True),
         integrity=None if recording is None else recording.integrity,
         events=() if recording is None else tuple(recording.events()),

@@ -11,6 +11,7 @@ from typing import Any
 from reports import many, tables, text
 from reports.figures import Drawn
 from reports.linktable import clean, link_table
+from reports.shown import in_unit
 from reports.view import (
     ABOUT_MANY,
     ABOUT_UNCERTAINTY,
@@ -54,6 +55,9 @@ class Surroundings:
     title: str
     method: str = ""
     definitions: Mapping[str, str] = dataclasses.field(default_factory=dict)  # quantity name -> definition
+    units: Mapping[str, str] = dataclasses.field(
+        default_factory=dict
+    )  # quantity name -> unit of the page, where not SI
     rig: Content = dataclasses.field(default_factory=dict)  # the rig file's content
     integrity: Any = None
     events: Sequence[Any] = ()
@@ -65,7 +69,7 @@ class Surroundings:
 def view_of(record: Content, around: Surroundings, figures: Iterable[Drawn] = ()) -> ReportView:
     """The report of one record. Equal inputs give an equal view: nothing here asks for the time."""
     outcome = str(record.get("outcome", "ERROR"))
-    measurements = [m for m in record.get("measurements") or () if isinstance(m, Mapping)]
+    measurements = [in_unit(m, around.units) for m in record.get("measurements") or () if isinstance(m, Mapping)]
     findings = tuple(_findings(record, around))
     rows = tuple(_result(m, around.definitions) for m in measurements)
     like = many.names(measurements)

@@ -169,8 +169,8 @@ def _criticals(run: Run, plan: Settings) -> Iterator[Finding]:
     for p in found:
         yield Finding("critical", _told(p, plan.running_rad_s), p.where)
         if p.amplitude.value > LARGE * run.clearance:
-            text = (f"at {p.amplitude.value / run.clearance:.0%} of the clearance the bearings' forces are not linear: factor "
-                    "and speed are those of this unbalance. Balance, run up slower, compare with a coast-down.")  # fmt: skip
+            text = (f"at {p.amplitude.value / run.clearance:.0%} of the clearance the bearings' forces are not linear: what "
+                    "that did to speed and factor is taken off as far as the bearings are known. Balance first.")  # fmt: skip
             yield Finding("large-amplitude", text, p.where)
     if not found:
         text = (f"no critical speed between {speed[0]:.0f} and {speed[-1]:.0f} r/min: no greatest amplitude of any probe has "
