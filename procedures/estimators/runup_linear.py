@@ -75,7 +75,7 @@ def _turns(s: Stand, c: Curve, runouts: Mapping[float, Complex]) -> _Turns:
     gain, amp = s.gain[:, None], s.i_gain[:, None]
     place = to_amb @ ((c.means[:, :4].T - s.zero[:, None]) / gain) + s.offset[:, None]
     read = c.values[:4] / gain
-    second = np.where(np.isfinite(c.second), c.second, 0.0)
+    second = np.asarray(np.where(np.isfinite(c.second), c.second, 0), np.complex128)
     x2 = np.where(np.isfinite(c.second[:4]), second[:4] / gain - runouts[2.0][:, None], 0.0)
     return _Turns(
         c.speed, place, to_amb @ (read - runouts[1.0][:, None]), to_amb @ x2, (c.means[:, 4:].T - s.i_zero[:, None]) / amp,
@@ -118,7 +118,7 @@ def _inverted(s: Stand, c: Curve, gains: Mapping[str, float], late: Complex) -> 
     """N as the law takes it off (4, b): with its own gap and magnetic offsets, at what the probes read, late."""
     offset = np.array([gains[f"model_offset_{a}"] for a in AXES])
     idea = replace(s, gap=gains["model_gap"], offset=offset, gain=np.ones(4), zero=np.zeros(4))
-    t = _turns(idea, c, {1.0: np.zeros(4), 2.0: np.zeros(4)})
+    t = _turns(idea, c, {1.0: np.zeros(4, complex), 2.0: np.zeros(4, complex)})
     return _beyond(idea, t, _slopes(idea, t), t.x1 * late, t.x2 * late**2)
 
 
