@@ -40,6 +40,7 @@ bench: setup
 	$(BIN)/python benchmarks/decode.py
 	$(BIN)/python benchmarks/path.py
 	$(BIN)/python benchmarks/recorder.py
+	$(BIN)/python benchmarks/runup.py
 	$(BIN)/python benchmarks/startup.py
 	$(BIN)/python benchmarks/slcan.py --seconds 10
 	$(BIN)/python benchmarks/serial_link.py --seconds 10

@@ -8,10 +8,10 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import OrderedDict
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +32,7 @@ from bench.steps import Step, Steps
 __all__ = ["Captured", "Recording", "Step", "Steps"]
 P = TypeVar("P", bound=BenchPlan)
 Q = TypeVar("Q", bound=BenchPlan)
+R = TypeVar("R")
 J = TypeVar("J", dict[str, Any], list[Any])
 KEPT = 160  # decoded blocks: views of the messages, which the file keeps as long
 BLOCK_NS = 2_000_000_000  # no block is longer: how far back a block that reaches into an interval can begin
@@ -43,6 +44,7 @@ class Recording(Generic[P]):
     def __init__(self, file: McapFile, plan: type[P] | None) -> None:
         self._file, self._plan_class = file, plan
         self._kept: OrderedDict[tuple[str, int, int], tuple[bytes, DecodedBlock]] = OrderedDict()
+        self._made: dict[Callable[[Any], Any], Any] = {}
         self.version = int(file.metadata["layout"]["version"])
         self.path = file.path
         self.integrity: Mapping[str, Any] | None = _integrity(file)
@@ -294,6 +296,12 @@ class Recording(Generic[P]):
             Step(self, e["name"], dict(e["labels"]), int(e["t_ns"]), int(ends[e["step"]]))
             for e in self.events("step-begin") if e["step"] in ends
         ))  # fmt: skip
+
+    def once(self, work: Callable[[Recording[P]], R]) -> R:
+        """What `work` makes of this recording, made the first time it is asked for: results and figures share an evaluation."""
+        if work not in self._made:
+            self._made[work] = work(self)
+        return cast(R, self._made[work])
 
     def frames(self, link: str) -> Iterator[FrameBatch]:
         """Raw frames, batch by batch as they were recorded."""

@@ -83,11 +83,11 @@ def run(
             progress.stage(f"{job.procedure.name} on {job.rig.name} ({job.backend}), run {directory.run_id}")
             machine = acquired(job, directory, started, live, supervisor, progress)
         progress.stage("analyse")
-        result = _concluded(job, directory, record, machine, supervisor)
+        result, recording = _concluded(job, directory, record, machine, supervisor)
         write_record(directory.record, result.record)
         if machine.truth is not None:
             _write_json(directory.truth, machine.truth)
-        result = _reported(job, directory, result, report, supervisor, progress)
+        result = _reported(job, directory, result, recording, report, supervisor, progress)
         _indexed(directory)
         logger.info("outcome %s %s", result.outcome, result.reason)
     return result
@@ -119,8 +119,8 @@ def _unfinished(job: Job, directory: RunDirectory, started: datetime) -> Record:
 
 def _concluded(
     job: Job, directory: RunDirectory, record: Record, machine: Acquired, supervisor: Supervisor
-) -> RunResult:
-    """Analyse and judge, from the closed file alone."""
+) -> tuple[RunResult, Recording[Any] | None]:
+    """Analyse and judge, from the closed file alone; and that file, where it can be read."""
     ending = machine.ending
     recording: Recording[Any] | None = None
     digest = None
@@ -135,7 +135,8 @@ def _concluded(
         finding = replace(finding, where="analyse")
         ending = replace(ending, stopped=ending.stopped or stopped, findings=(*ending.findings, finding))
         evaluation = _evaluated(job, None, ending)
-    return RunResult(directory.path, evaluation.finish(record, ending, machine.ended, digest))
+    result = RunResult(directory.path, evaluation.finish(record, ending, machine.ended, digest))
+    return result, recording if digest else None
 
 
 def _evaluated(job: Job, recording: Recording[Any] | None, ending: Ending) -> Evaluation:
@@ -144,8 +145,8 @@ def _evaluated(job: Job, recording: Recording[Any] | None, ending: Ending) -> Ev
 
 
 def _reported(
-    job: Job, directory: RunDirectory, result: RunResult, report: Report | None, supervisor: Supervisor,
-    progress: Progress,
+    job: Job, directory: RunDirectory, result: RunResult, recording: Recording[Any] | None, report: Report | None,
+    supervisor: Supervisor, progress: Progress,
 ) -> RunResult:  # fmt: skip
     """The report; one that fails is a finding and keeps the verdict, a signal makes the run ABORTED."""
     if report is None:
@@ -153,7 +154,6 @@ def _reported(
     progress.stage("report")
     try:
         with supervisor.interruptible():
-            recording = Recording.open(directory.recording, job.procedure.plan) if result.record.recording else None
             report(directory.path, result.record, job.procedure, recording)
         return result
     except SignalAbort as error:

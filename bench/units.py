@@ -48,6 +48,7 @@ SUFFIXES: dict[str, str] = {
 
 HABIT: dict[str, tuple[str, float]] = {
     "kg m": ("g mm", math.inf), "m/(kg m)": ("um/(g mm)", math.inf), "m": ("um", 1e-3),
+    "rad/s": ("r/min", math.inf),
 }  # fmt: skip
 """The unit in which the field states results in an SI unit, where they are smaller than so much."""
 

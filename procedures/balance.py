@@ -11,7 +11,6 @@ from typing import Literal
 
 from pydantic import Field
 
-from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
@@ -94,11 +93,6 @@ def settings(plan: Plan) -> dict[str, float]:
     return {"law": turning.CODES["PID"], "observer": 0.0, "compensate": 0.0}
 
 
-def needs(plan: Plan) -> tuple[Need, ...]:
-    """As unbalance: the runout by the slow roll rests on the bearings' forces."""
-    return unbalance.needs_bearings(plan.bearings)
-
-
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records at most."""
     runs = 3 + plan.corrections
@@ -108,7 +102,7 @@ def step_count(plan: Plan) -> int:
 
 def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     """Findings first, then the quantities."""
-    found = balance_checks.evaluated(recording)
+    found = recording.once(balance_checks.evaluated)
     yield from found.findings
     result = found.balance
     if result is None:
@@ -134,7 +128,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(recording: Recording[Plan]) -> Iterable[Figure]:
     """Polar plots of the vectors, influence coefficients, residual against U_per; empty where nothing was evaluated."""
-    found = balance_checks.evaluated(recording)
+    found = recording.once(balance_checks.evaluated)
     return () if found.balance is None else drawn.all_figures(found)
 
 
@@ -170,6 +164,6 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
-    needs=needs,
+    needs=unbalance.needs,
     method=METHOD,
 )

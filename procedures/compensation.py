@@ -96,7 +96,7 @@ def _switched(rig: Rig, plan: Plan, record: Recorder) -> bool:
 
 def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     """Findings first, then the quantities of each dwell, reductions, and the switch."""
-    found = unbalance.evaluated(recording)
+    found = recording.once(unbalance.evaluated)
     yield from found.findings
     if found.results is None:
         return
@@ -129,7 +129,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(recording: Recording[Plan]) -> Iterable[Figure]:
     """Those of `unbalance`, the reduction over the speed, and the switch."""
-    results = unbalance.evaluated(recording).results
+    results = recording.once(unbalance.evaluated).results
     if results is None:
         return
     yield from drawn.reductions(compensation_checks.reductions(results))

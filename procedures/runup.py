@@ -7,7 +7,7 @@ critical speeds, their amplification factors, and how far they stand off the run
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import Field
 
@@ -23,7 +23,7 @@ from bench.rigfile import RigFile
 from bench.roles import RigState
 from procedures import probing, turning, unbalance
 from procedures import runup_figures as drawn
-from procedures.estimators import runup_checks, runup_estimates, tracking_wiring, unbalance_checks
+from procedures.estimators import runup_checks, runup_estimates, tracking_wiring, unbalance_bearings, unbalance_checks
 from procedures.estimators.runup_data import MISSED, PASSAGE, read_passage
 from procedures.estimators.runup_estimates import Run
 from procedures.estimators.tracking_data import NO_SPEED
@@ -32,11 +32,11 @@ from procedures.turning import CODES, Law, put
 from procedures.unbalance import CURRENT, D_MAX, MAJOR, READ, SHARE, VOLTAGE
 
 COSINE, SINE = unbalance.COSINE, unbalance.SINE
-SPEED = Quantity("critical_speed", "rad/s", "where the amplitude of a probe is greatest, with a factor of 2.5 or more")
-FACTOR = Quantity(
-    "amplification_factor", "1", "that speed over the width at 0.707 of the amplitude (API 617, half power)"
-)
-AMPLITUDE = Quantity("critical_amplitude", "m", "of the shaft's centre at that speed, 0-pk")
+SPEED = Quantity("critical_speed", "rad/s", "where the amplitude of a probe is greatest, with a factor of 2.5 or more; "
+                 "of small orbits")  # fmt: skip
+FACTOR = Quantity("amplification_factor", "1", "that speed over the width at 0.707 of the amplitude (API 617, half power); "
+                  "of small orbits")  # fmt: skip
+AMPLITUDE = Quantity("critical_amplitude", "m", "of the shaft's centre where it was greatest, 0-pk")
 MARGIN = Quantity("separation", "1", "distance of the critical speed from the running speed, over the running speed")
 CRITICAL = (SPEED, FACTOR, AMPLITUDE, MARGIN)  # which a well damped shaft does not have
 MEASURES = (COSINE, SINE, MAJOR, D_MAX, SHARE, READ, CURRENT, VOLTAGE, *CRITICAL)
@@ -64,6 +64,9 @@ class Passing(BenchPlan):
     rate_hz: float = Field(10000.0, gt=0)  # of the captures
     orders: int = Field(4, ge=1, le=10)  # that the full spectrum must show
     blocks: int = Field(150, ge=30, le=1000)  # of equal width in speed
+    bearings: Literal["adopted", "plan"] = (
+        "adopted"  # what is known of them: the adopted bearing-model, where there is one
+    )
     beta_share: float = Field(0.05, ge=0)  # half width: how far the controller's betas may be off the bearings'
     offset_u_m: float = Field(10e-6, ge=0)  # of its magnetic offsets, standard uncertainty
     max_lost: float = Field(1e-3, ge=0)  # share of the samples
@@ -193,7 +196,7 @@ def _fetch(rig: Rig, plan: Passing, record: Recorder, speed: float) -> None:
 
 def analyse(recording: Recording[Any]) -> Iterator[Measured | Finding]:
     """Findings first, then the quantities."""
-    findings, run = evaluated(recording)
+    findings, run = recording.once(evaluated)
     yield from findings
     if run is not None:
         yield from measured(run)
@@ -216,8 +219,9 @@ def evaluated(recording: Recording[Any]) -> tuple[tuple[Finding, ...], Run | Non
     found += runup_checks.of_passage(passage, recording, plan)
     if any(f.effect is Effect.ERROR for f in found):
         return tuple(found), None
-    run = runup_estimates.run(passage, slow, recording, plan)
-    return (*found, *runup_checks.of_run(run, plan)), run
+    model = unbalance_bearings.adopted_bearings(recording)
+    run = runup_estimates.run(passage, slow, recording, plan, model)
+    return (*found, unbalance_bearings.told(model, plan), *runup_checks.of_run(run, plan)), run
 
 
 def measured(run: Run) -> Iterator[Measured]:
@@ -245,7 +249,7 @@ def check(rig: RigFile, plan: Passing) -> Iterable[str]:
 
 def figures(recording: Recording[Any]) -> Iterable[Figure]:
     """Bode pairs, polar plots, waterfall, order map, coil use, orbits; empty where nothing was evaluated."""
-    run = evaluated(recording)[1]
+    run = recording.once(evaluated)[1]
     return () if run is None else drawn.all_figures(run, recording.rig)
 
 
@@ -256,7 +260,11 @@ found at slow roll by the balance of forces, as in procedure unbalance, and is s
 
 A shaft that runs through its speeds shows its response late, and a block shows a mean over some speeds. Both are taken off
 with the derivatives of local rational models of the measured curve, two terms of a series; what the second one changes is the
-influence "what is left of the lag". It supposes a linear response that depends on the speed through the excitation alone.
+influence "what is left of the lag". It supposes a response that depends on the speed through the excitation alone.
+
+Critical speeds and factors are those of small orbits: what the bearings' forces are beyond their slopes follows from the
+measured currents and orbits by T (2.4b) over a turn, and what it does to the vectors is taken off. Betas, magnetic offsets,
+gap and probes carry what is not known of that; an adopted bearing-model says more of them than the plan does.
 
 A critical speed is a greatest amplitude of a probe's vectors whose amplification factor, that speed over the width at half
 power (0.707 of the amplitude), is 2.5 or more or may be so within its interval (API 617). Its scatter is that of curves onto
@@ -281,6 +289,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    needs=unbalance.needs,
     optional=CRITICAL,
     method=METHOD,
 )

@@ -216,7 +216,7 @@ def evaluated(recording: Recording[Any]) -> Evaluated:
 
 def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     """Findings first, then the quantities of each axis and speed."""
-    done = evaluated(recording)
+    done = recording.once(evaluated)
     yield from done.findings
     known = {q.name: q for q in MEASURES}
     for result in done.results:
@@ -233,7 +233,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(recording: Recording[Plan]) -> Iterable[Figure]:
     """|S| over its zones, Bode pair of S, Nyquist plot and coherence, by speed; empty where nothing was evaluated."""
-    return drawn.all_figures(evaluated(recording).results)
+    return drawn.all_figures(recording.once(evaluated).results)
 
 
 METHOD = """\

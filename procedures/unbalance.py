@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 from pydantic import Field
 
@@ -95,19 +95,21 @@ class Plan(BenchPlan):
         return sum(len(self.at(s)) for s in self.speeds_rad_s)
 
 
+class Resting(Protocol):
+    """The part of a plan that says what the forces rest on."""
+
+    @property
+    def bearings(self) -> str: ...
+
+
 def settings(plan: Plan) -> dict[str, float]:
     """Lifted by the PID, which needs no model."""
     return {"law": CODES["PID"], "observer": 0.0, "compensate": 0.0, **(POLES if plan.observed else {})}
 
 
-def needs(plan: Plan) -> tuple[Need, ...]:
+def needs(plan: Resting) -> tuple[Need, ...]:
     """The bearings' model, where the rig has one and the plan does not say otherwise."""
-    return needs_bearings(plan.bearings)
-
-
-def needs_bearings(bearings: Literal["adopted", "plan"]) -> tuple[Need, ...]:
-    """The bearings' model where a rig has one, or none."""
-    return (Need(BEARING_MODEL, optional=True),) if bearings == "adopted" else ()
+    return (Need(BEARING_MODEL, optional=True),) if plan.bearings == "adopted" else ()
 
 
 def step_count(plan: Plan) -> int:
@@ -126,7 +128,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 
 def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     """Findings first, then the quantities of each dwell."""
-    found = evaluated(recording)
+    found = recording.once(evaluated)
     yield from found.findings
     if found.results is not None:
         yield from measured(found.results)
@@ -188,7 +190,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(recording: Recording[Plan]) -> Iterable[Figure]:
     """Orbits of both planes, Bode pair, polar plot, full spectra, what the coils need; empty where nothing was evaluated."""
-    results = evaluated(recording).results
+    results = recording.once(evaluated).results
     return () if results is None else drawn.all_figures(results, recording.rig)
 
 

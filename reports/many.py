@@ -10,7 +10,7 @@ from typing import Any
 from reports import tables, text
 from reports.view import ManyResults, ManyRow, ResultRow
 
-MANY = 6  # results of one quantity that still get a budget each
+MANY = 5  # results of one quantity that still get a budget each
 TOLD = 2  # influences of a line
 BRACKETS = "in brackets the interval, where it is by Monte Carlo (JCGM 101) or does not lie about the value"
 SMALL = 0.1  # of the variance; smaller ones are not told in a line

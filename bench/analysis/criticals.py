@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.analysis.peaks import WINDOW, noise, pooled_covariance, smoother
-from bench.analysis.sampling import Array
+from bench.analysis.sampling import Array, Complex
 from bench.errors import AnalysisError
 
 HALF_POWER = math.sqrt(0.5)
@@ -46,9 +46,18 @@ class Critical:
 
 
 def criticals(
-    speed: npt.ArrayLike, values: npt.ArrayLike, covariance: Array, *, seed: int = 0, draws: int = DRAWS
+    speed: npt.ArrayLike,
+    values: npt.ArrayLike,
+    covariance: Array,
+    *,
+    seed: int = 0,
+    draws: int = DRAWS,
+    scatter: Complex | None = None,
 ) -> list[Critical]:
     """All criticals of a curve `values` (b,) at `speed` (b,) rad/s in any order, covariances (b, 2, 2), by rising speed.
+
+    `scatter` (draws, b) is noise that was drawn already, as of vectors that depend on each other; otherwise it is drawn here,
+    independent from block to block.
 
     Raises:
         AnalysisError: fewer than nine blocks, or two at one speed.
@@ -64,9 +73,24 @@ def criticals(
     if not tops:
         return []
     lines = smooth.at_lines(z)
+    off = noise(pooled, seed, draws) if scatter is None else scatter[:, order]
     again = np.abs(smooth.everywhere(lines))
-    drawn = np.abs(smooth.everywhere(lines + noise(pooled, seed, draws)))
+    drawn = np.abs(smooth.everywhere(lines + off))
     return [_critical(smooth.x, fine, again, drawn, k) for k in tops]
+
+
+def moved(
+    speed: Array, values: npt.ArrayLike, others: npt.ArrayLike, covariance: Array, near: Critical
+) -> tuple[Array, Array]:
+    """Speed, amplitude and factor (3,) of the critical next to `near` on the curve `values` (b,) at ascending `speed` (b,), and
+    by how much they differ on each of the curves `others` (m, b): (m, 3). NaN is what lies outside the record. No bias is
+    taken off."""
+    base = np.asarray(values, np.complex128)
+    smooth = smoother(speed, base, pooled_covariance(covariance))
+    sizes = np.abs(smooth.everywhere(np.vstack([base[None], np.asarray(others, np.complex128)])))
+    k = int(np.argmin(np.abs(smooth.x - near.speed)))
+    found = np.array([_numbers(smooth.x, size, k)[[0, 1, 4]] for size in sizes])
+    return found[0], found[1:] - found[0]
 
 
 def _tops(size: Array) -> list[int]:

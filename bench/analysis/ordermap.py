@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import fft, signal
+from scipy import fft
 from scipy.interpolate import CubicSpline
 
 from bench.analysis.sampling import Array, Sampling, increasing, rows
 from bench.analysis.tachometer import TURN, Tachometer
+from bench.analysis.windows import get_window
 from bench.errors import AnalysisError
 
 BAND = 0.4  # of the sampling rate: above, splines between samples are not to be trusted
@@ -65,7 +66,7 @@ def order_map(
         speeds[k] = TURN * turns / (ends[1] - ends[0])
         times[k] = ends.mean()
         points = fft.next_fast_len(max(math.ceil(1.2 * rate * (ends[1] - ends[0])), 2 * orders.size), real=True)
-        w = signal.get_window(window, points)
+        w = get_window(window, points)
         piece = spline(tacho.time(start + TURN * turns * np.arange(points) / points))
         lines = np.abs(fft.rfft((piece - piece.mean()) * w))[: orders.size] * 2 / w.sum()
         shown = orders * speeds[k] < TURN * BAND * rate

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from bench.analysis.orbits import Ellipse
 from bench.analysis.ordermap import OrderMap
@@ -119,15 +118,18 @@ def _unwrapped(values: Complex) -> Array:
 
 def polar(key: str, title: str, curves: Sequence[Curve], every_rpm: float = 1000.0, order: float = 1.0) -> Figure:
     """Vectors as points of a curve with the speeds written along it."""
-    series, notes = [], []
+    series: list[Series] = []
+    notes: list[tuple[str, float, float]] = []
+    told: list[complex] = []
     for c in (_sorted(c) for c in curves):
-        lag, size = -np.angle(c.values), UM * np.abs(c.values)
-        series.append(Series(c.label, lag, size))
+        series.append(Series(c.label, -np.angle(c.values), UM * np.abs(c.values)))
         rpm = RPM * c.speed
         steps = np.arange(math.ceil(rpm[0] / every_rpm), math.floor(rpm[-1] / every_rpm) + 1) * every_rpm
-        near = np.unique([int(np.argmin(np.abs(rpm - s))) for s in steps]).astype(np.intp)
-        series.append(Series("speed in r/min", lag[near], size[near], "mark"))
-        notes += [(f"{round(rpm[k] / 10) * 10:d}", float(lag[k]), float(size[k])) for k in _apart(c.values, near)]
+        there = np.interp(steps, rpm, c.values.real) + 1j * np.interp(steps, rpm, c.values.imag)
+        lag, size = -np.angle(there), UM * np.abs(there)
+        series.append(Series("speed in r/min", lag, size, "mark"))
+        seen = _apart(there, told, max(float(np.abs(each.values).max()) for each in curves))
+        notes += [(f"{steps[k]:.0f}", float(lag[k]), float(size[k])) for k in seen]
     return Figure(
         key,
         title,
@@ -140,14 +142,19 @@ def polar(key: str, title: str, curves: Sequence[Curve], every_rpm: float = 1000
     )
 
 
-def _apart(values: Complex, near: npt.NDArray[np.intp]) -> list[int]:
-    """Of some points those that are not next to one chosen before: their labels would lie over each other."""
+def _apart(values: Complex, told: list[complex], greatest: float) -> list[int]:
+    """Of some points those whose labels, to the right of them, lie over none of those `told` before; they are told then."""
     chosen: list[int] = []
-    least = 0.12 * float(np.abs(values).max())
-    for k in near:
-        if all(abs(values[k] - values[j]) > least for j in chosen):
-            chosen.append(int(k))
+    for k, z in enumerate(values):
+        if all(abs(z - other) > 0.12 * greatest and not _over(z - other, greatest) for other in told):
+            chosen.append(k)
+            told.append(complex(z))
     return chosen
+
+
+def _over(apart: complex, greatest: float) -> bool:
+    """Whether labels of points so far apart meet: lag zero is up, so that the real part is height."""
+    return abs(apart.real) < 0.1 * greatest and abs(apart.imag) < 0.3 * greatest
 
 
 def waterfall(

@@ -7,10 +7,11 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy import fft, signal
+from scipy import fft
 
 from bench.analysis.sampling import Array, Sampling, rows
 from bench.analysis.tachometer import Tachometer
+from bench.analysis.windows import get_window
 from bench.errors import AnalysisError
 
 Scaling = Literal["0-pk", "pk-pk", "rms"]
@@ -81,7 +82,7 @@ def _averaged(x: npt.ArrayLike, rate: float, segment: int | None, window: str) -
         raise AnalysisError(
             f"spectrum: found segments of {size} in {data.shape[1]} samples; expected 8 or more, no longer"
         )
-    w = signal.get_window(window, size)
+    w = get_window(window, size)
     power = np.zeros((len(data), size // 2 + 1))
     count = 0
     for k, row in enumerate(data):
@@ -122,7 +123,7 @@ def waterfall(
     if not starts.size:
         raise AnalysisError("waterfall: the record has no time between pulses")
     chosen = _spread(speed, count)
-    w = signal.get_window(window, segment)
+    w = get_window(window, segment)
     parts = data[starts[chosen, None] + np.arange(segment)]
     lines = np.abs(fft.rfft((parts - parts.mean(axis=1, keepdims=True)) * w, axis=1)) * 2 / w.sum() * _FACTORS[scaling]
     return Waterfall(middle[chosen], speed[chosen], fft.rfftfreq(segment, 1 / rate), lines, scaling, window)
@@ -161,6 +162,6 @@ def full(
     """
     both = rows(np.array([np.asarray(x, np.float64), np.asarray(y, np.float64)]))
     z = both[0] + 1j * (both[1] if x_to_y else -both[1])
-    w = signal.get_window(window, z.size)
+    w = get_window(window, z.size)
     lines = np.abs(fft.fftshift(fft.fft((z - z.mean()) * w))) / w.sum() * _FACTORS[scaling]
     return FullSpectrum(fft.fftshift(fft.fftfreq(z.size, 1 / rate)), lines, scaling, window)

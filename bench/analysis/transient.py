@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bench.analysis.peaks import WINDOW, pooled_covariance, smoother
+from bench.analysis.peaks import WINDOW, Smoother, pooled_covariance, smoother
 from bench.analysis.sampling import Array, Complex
 from bench.errors import AnalysisError
 
@@ -39,13 +39,29 @@ def settled(
     Raises:
         AnalysisError: fewer than nine blocks, or speeds that do not ascend.
     """
+    smooth = local(speed, values, covariance)
+    return series(smooth, speed, values, acceleration, width, rounds)[-1]
+
+
+def local(speed: Array, values: Complex, covariance: Array) -> Smoother:
+    """The local models of a passage's vectors, as `settled` takes them.
+
+    Raises:
+        AnalysisError: fewer than nine blocks, or speeds that do not ascend.
+    """
     if speed.size < WINDOW or not (np.diff(speed) > 0).all():
         raise AnalysisError(f"passage: found {speed.size} blocks; expected {WINDOW} or more, at ascending speeds")
-    smooth = smoother(speed, values, pooled_covariance(covariance))
-    out, term = values, values
+    return smoother(speed, values, pooled_covariance(covariance))
+
+
+def series(
+    smooth: Smoother, speed: Array, values: Complex, acceleration: Array, width: Array, rounds: int = 2
+) -> list[Complex]:
+    """Sums of the series after none, one, ... `rounds` terms, (b,) each; arguments as of `settled`."""
+    sums, term = [values], values
     for k in range(1, rounds + 1):
         bent = smooth.curvature(term)
         lag = 0.5j * acceleration * (bent - 2 * smooth.at_lines(term) / speed**2)
         term = (lag - width**2 / 24 * bent) / k
-        out = out + term
-    return out
+        sums.append(sums[-1] + term)
+    return sums

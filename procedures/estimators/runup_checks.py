@@ -169,8 +169,8 @@ def _criticals(run: Run, plan: Settings) -> Iterator[Finding]:
     for p in found:
         yield Finding("critical", _told(p, plan.running_rad_s), p.where)
         if p.amplitude.value > LARGE * run.clearance:
-            text = (f"at {p.amplitude.value / run.clearance:.0%} of the clearance the bearings' forces are not linear: factor "
-                    "and speed are those of this unbalance. Balance, run up slower, compare with a coast-down.")  # fmt: skip
+            text = (f"at {p.amplitude.value / run.clearance:.0%} of the clearance the bearings' forces are not linear: what "
+                    "that did to speed and factor is taken off as far as the bearings are known. Balance first.")  # fmt: skip
             yield Finding("large-amplitude", text, p.where)
     if not found:
         text = (f"no critical speed between {speed[0]:.0f} and {speed[-1]:.0f} r/min: no greatest amplitude of any probe has "
@@ -201,12 +201,12 @@ def _value(p: Peak) -> str:
 def _told(p: Peak, running: float) -> str:
     asked = asked_margin(p, running)
     kept = "keeps" if p.margin.value >= asked else "does not keep"
-    moved = (p.raw_speed - p.speed.value) * RPM
     return (f"{_rpm(p)}, amplification factor {_value(p)}, half power from "
             f"{p.low * RPM:.0f} to {p.high * RPM:.0f} r/min, {p.amplitude.value * 1e6:.1f} µm 0-pk. "
             f"It stands {p.margin.value:.0%} off the running speed of "
             f"{running * RPM:.0f} r/min and {kept} the {asked:.0%} that API 617 asks at that factor (not checked "
-            f"against the standard). The passage had moved it by {moved:+.0f} r/min.")  # fmt: skip
+            f"against the standard). The passage had moved it by {p.lagged * RPM:+.0f} r/min, the size of the orbit "
+            f"by {p.bent * RPM:+.0f} r/min; both are taken off.")  # fmt: skip
 
 
 def _passed(run: Run) -> Iterator[Finding]:

@@ -67,8 +67,8 @@ class Passage:
 @dataclass(frozen=True)
 class Curve:
     """Vectors of order 1 of b blocks by rising speed: `speed` rad/s, `acceleration` rad/s^2, `width` rad/s (b,); `values`
-    (12, b) as read; their scatter `covariance` (12, b, 2, 2); `means` (b, 12); `volts` (b, 2) greatest; `second` (4, b) order
-    2 of the probes' amplitudes, NaN where the telemetry does not see it."""
+    (12, b) as read; their scatter `covariance` (12, b, 2, 2); `means` (b, 12); `volts` (b, 2) greatest; `second` (12,
+    b) vectors of order 2, NaN where the telemetry does not see it."""
 
     speed: Array
     acceleration: Array
@@ -77,7 +77,7 @@ class Curve:
     covariance: Array
     means: Array
     volts: Array
-    second: Array
+    second: Complex
 
 
 def read_passage(recording: Recording[Any]) -> Passage:
@@ -173,7 +173,7 @@ def _piece(p: Passage, angle: Array, first: int, last: int, turns: int) -> tuple
     volts = np.maximum.reduceat(p.volts[:, part], np.minimum(places[:-1], p.volts[:, part].shape[1] - 1), axis=1).T
     moved = parts(track.moves[..., 0][..., None])
     covariance = np.einsum("bmci,bmcj->bcij", moved, moved)
-    second = np.abs(track.values[:, :4, 1]) if len(orders) > 1 else np.full((track.speed.size, 4), np.nan)
+    second = track.values[..., 1] if len(orders) > 1 else np.full((track.speed.size, 12), np.nan + 0j)
     width = np.abs(np.diff(p.tacho.speed(np.clip(edges, p.tacho.times[0], p.tacho.times[-1]))))
     return track.t, track.speed, width, track.values[:, :, 0], covariance, track.means, volts, second
 

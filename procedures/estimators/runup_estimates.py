@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from bench.analysis.criticals import Critical, criticals
-from bench.analysis.transient import settled
+from bench.analysis import transient
+from bench.analysis.criticals import criticals, moved
+from bench.analysis.peaks import Smoother, noise, pooled_covariance
 from bench.analysis.vectors import complexes, parts
+from bench.calibration import Calibration
 from bench.recording import Recording
+from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.estimate import merged
-from procedures.estimators import unbalance_bearings, unbalance_estimates
+from procedures.estimators import runup_linear, unbalance_bearings, unbalance_estimates
+from procedures.estimators.runout import Stand
 from procedures.estimators.runup_data import Curve, Passage, curve, near
 from procedures.estimators.unbalance_data import AXES, Dwell
 from procedures.estimators.unbalance_estimates import Result, Results, Runout
@@ -24,10 +29,12 @@ from procedures.estimators.unbalance_estimates import Result, Results, Runout
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 DAMPED = 2.5  # amplification factor under which API 617 sees no critical speed
-MATCHED = 0.1  # of a speed: where the same critical is looked for in a curve that differs a little
 UNITS = {"speed": "rad/s", "amplitude": "m", "factor": "1"}
 LAG = "what is left of the lag of the response"
-FEW = 8  # draws where only the shift of a number is of interest
+DRAWS = 120
+BENDING = (*(f"{name}_{k}" for name in ("beta", "offset", "zero", "gain") for k in range(4)), "gap", "mass", "inertia",
+           "l_ia", "l_oa", "l_is", "l_os")  # fmt: skip
+"""What the bend of the forces rests on; what else there is of it changes it by less than a twentieth."""
 
 
 class Settings(Protocol):
@@ -35,6 +42,8 @@ class Settings(Protocol):
 
     @property
     def law(self) -> str: ...
+    @property
+    def parameters(self) -> Mapping[str, float]: ...
     @property
     def speeds_rad_s(self) -> tuple[float, ...]: ...
     @property
@@ -50,7 +59,8 @@ class Settings(Protocol):
 @dataclass(frozen=True)
 class Peak:
     """A greatest amplitude at a probe: `speed` rad/s, `factor` (None where half power lies outside the record), `amplitude` m
-    0-pk, `margin` from the running speed; half-power speeds `low`, `high`; `raw_speed` before the lag was taken off."""
+    0-pk, `margin` from the running speed; half-power speeds `low`, `high`; by how much
+    the lag of the passage and the size of the orbit had moved the speed, `lagged` and `bent` rad/s, which is taken off."""
 
     axis: str
     number: int
@@ -60,7 +70,8 @@ class Peak:
     margin: Estimate
     low: float
     high: float
-    raw_speed: float
+    lagged: float
+    bent: float
 
     @property
     def critical(self) -> bool:
@@ -87,8 +98,10 @@ class Run:
     clearance: float = field(default=math.nan)
 
 
-def run(passage: Passage, slow: Dwell | None, recording: Recording, plan: Settings) -> Run:  # type: ignore[type-arg]
-    """All estimates of a passage."""
+def run(
+    passage: Passage, slow: Dwell | None, recording: Recording[Any], plan: Settings, model: Calibration | None = None
+) -> Run:
+    """All estimates of a passage; `model` is the bearings' adopted calibration."""
     rig = recording.rig
     found = curve(passage, plan.blocks)
     passed = [n for s in sorted(plan.speeds_rad_s) if (n := near(passage, recording, s, plan.law)) is not None]
@@ -96,19 +109,37 @@ def run(passage: Passage, slow: Dwell | None, recording: Recording, plan: Settin
     if not passed:
         return Run(passage, found, found.values[:4], (), None, slow, clearance)
     dwells, left = [], []
+    models = [transient.local(found.speed, found.values[k], found.covariance[k]) for k in range(12)]
     for dwell, width in passed:
-        moved, rest = _still(found, dwell, width)
-        dwells.append(moved)
+        still, rest = _still(found, models, dwell, width)
+        dwells.append(still)
         left.append(rest)
-    results = unbalance_estimates.results([*([] if slow is None else [slow]), *dwells], rig, plan)
+    results = unbalance_estimates.results([*([] if slow is None else [slow]), *dwells], rig, plan, model)
     results = replace(results, dwells=tuple(_with(r, rest) for r, rest in zip(results.dwells, left, strict=True)))
-    inputs = unbalance_bearings.stated(rig, plan)
+    inputs = unbalance_bearings.stated(rig, plan, model)
+    large = _large(found, inputs, results.runouts, plan.law, gains(rig, plan))
     shaft, peaks = [], []
     for k in range(4):
         line = _Line(found, k, inputs[f"gain_{k}"].value, results.runouts[1.0])
-        shaft.append(line.curve(2))
-        peaks += _peaks(line, inputs[f"gain_{k}"], plan.running_rad_s)
+        series = line.series()
+        shaft.append(series[-1])
+        peaks += _peaks(line, series, {name: bent[k] for name, bent in large.items()}, inputs, plan.running_rad_s)
     return Run(passage, found, np.array(shaft), tuple(peaks), results, slow, clearance)
+
+
+def gains(rig: RigFile, plan: Settings) -> dict[str, float]:
+    """The controller's parameters while the speeds are passed, SI, by name."""
+    return {name: p.default for name, p in rig.parameters.items()} | dict(plan.parameters)
+
+
+def _large(
+    c: Curve, inputs: Mapping[str, Estimate], runouts: Mapping[float, Runout], law: str, set_to: Mapping[str, float]
+) -> dict[str, Complex]:
+    """What large orbits add to the shaft's vectors (4, b) m, under ""; under the name of each of the `BENDING` inputs, if that
+    is off by its standard uncertainty."""
+    values, off = {name: e.value for name, e in inputs.items()}, {n: runouts[n].values for n in (1.0, 2.0)}
+    changed = {"": values} | {name: values | {name: values[name] + inputs[name].u} for name in BENDING}
+    return {name: runup_linear.bend(Stand.of(v), c, off, law, set_to) for name, v in changed.items()}
 
 
 @dataclass(frozen=True)
@@ -120,50 +151,67 @@ class _Line:
     gain: float
     runout: Runout
 
+    def series(self) -> list[Complex]:
+        """As measured, then with the lag taken off by one term and by two."""
+        return self._settled(self._raw)
+
+    def scatter(self) -> Complex:
+        """Of the last of these, drawn (DRAWS, b): what takes the lag off adds to the noise, and makes neighbours alike."""
+        lines = self._smooth.at_lines(self._raw)
+        off = noise(pooled_covariance(self._covariance), 0, DRAWS)
+        return np.asarray(self._settled(lines + off)[-1] - self._settled(lines)[-1])
+
+    def _settled(self, values: Complex) -> list[Complex]:
+        c = self.found
+        return transient.series(self._smooth, c.speed, values, c.acceleration, c.width)
+
+    @cached_property
+    def _raw(self) -> Complex:
+        return np.asarray(self.found.values[self.k] / self.gain - self.runout.values[self.k], np.complex128)
+
+    @cached_property
+    def _smooth(self) -> Smoother:
+        return transient.local(self.found.speed, self._raw, self._covariance)
+
     @property
-    def covariance(self) -> Array:
+    def _covariance(self) -> Array:
         return np.asarray(self.found.covariance[self.k] / self.gain**2)
 
-    def curve(self, rounds: int, less: complex = 0.0) -> Complex:
-        """With the lag taken off so often; a runout that is greater by `less`."""
-        c = self.found
-        values = np.asarray(c.values[self.k] / self.gain - self.runout.values[self.k] - less, np.complex128)
-        if not rounds:
-            return values
-        return settled(c.speed, values, self.covariance, c.acceleration, c.width, rounds)
 
-    def criticals(self, rounds: int, less: complex = 0.0, draws: int = FEW) -> list[Critical]:
-        """Of that curve."""
-        return criticals(self.found.speed, self.curve(rounds, less), self.covariance, draws=draws)
-
-
-def _peaks(line: _Line, gain: Estimate, running: float) -> list[Peak]:
-    """With the influence of the scatter, of the runout, of what is left of the lag, and of the probe's gain."""
-    axis, out = AXES[line.k], []
-    best = line.criticals(2, draws=120)
-    few, again, raw = line.criticals(2), line.criticals(1), line.criticals(0)
-    offs = []
-    for j in range(2):
-        part = line.runout.parts[2 * line.k + j]
-        offs.append((part, line.criticals(2, part.u * (1j if j else 1.0)) if part.u else few))
-    for number, c in enumerate(best, 1):
+def _peaks(
+    line: _Line, series: Sequence[Complex], large: Mapping[str, Complex], inputs: Mapping[str, Estimate], running: float
+) -> list[Peak]:
+    """Of small orbits, with the influences of the scatter, of the runout, of what is left of the lag, of the probe's gain, and
+    of what the bearings' bend rests on; the amplitude is that of the orbit as it was."""
+    axis, gain, out = AXES[line.k], inputs[f"gain_{line.k}"], []
+    raw, once, best = (z - large[""] for z in series)
+    runout = [
+        (p, p.u * (1j if j else 1.0)) for j, p in enumerate(line.runout.parts[2 * line.k : 2 * line.k + 2]) if p.u
+    ]
+    parts_ = [p for p, _ in runout] + [inputs[name] for name in BENDING]
+    others = [series[-1], raw, once, *(best - u for _, u in runout), *(series[-1] - large[name] for name in BENDING)]
+    speeds = line.found.speed
+    scatter = line.scatter()
+    each = parts(scatter[..., None])
+    covariance = np.einsum("nbi,nbj->bij", each, each) / DRAWS
+    for number, c in enumerate(criticals(speeds, best, covariance, scatter=scatter), 1):
         where = f"{axis}/{number}"
-        base, once, first = _same(few, c), _same(again, c), _same(raw, c)
-        left = np.abs(once - base)
-        numbers = {"speed": c.speed, "amplitude": c.amplitude, "factor": c.factor}
-        moved = [(part, (_same(some, c) - base) / part.u) for part, some in offs if part.u]
+        (as_it_was, before, rest, *shifts) = moved(speeds, best, others, covariance, c)[1]
+        slopes = [(part, shift / part.u) for part, shift in zip(parts_, shifts, strict=True)]
+        numbers = {"speed": c.speed, "amplitude": c.amplitude + as_it_was[1], "factor": c.factor}
         made = {
-            name: _number(where, name, value, c.covariance[j, j], float(left[j]), [(p, float(m[j])) for p, m in moved])
+            name: _number(where, name, value, c.covariance[j, j], abs(float(rest[j])), [(p, float(m[j])) for p, m in slopes])
             for j, (name, value) in enumerate(numbers.items())
-        }
+        }  # fmt: skip
         speed, amplitude = made["speed"], made["amplitude"]
         if speed is None or amplitude is None:
             continue
-        amplitude = Estimate(amplitude.value, "m", merged([(1.0, amplitude), (-c.amplitude / gain.value, gain)]))
+        amplitude = Estimate(amplitude.value, "m", merged([(1.0, amplitude), (-amplitude.value / gain.value, gain)]))
         margin = Estimate(
             abs(c.speed - running) / running, "1", merged([(math.copysign(1 / running, c.speed - running), speed)])
         )
-        out.append(Peak(axis, number, speed, amplitude, made["factor"], margin, c.low, c.high, float(first[0])))
+        passed_by, bent_by = float(before[0]), float(as_it_was[0])
+        out.append(Peak(axis, number, speed, amplitude, made["factor"], margin, c.low, c.high, passed_by, bent_by))
     return out
 
 
@@ -181,28 +229,18 @@ def _number(
     return Estimate(value, unit, merged(terms))
 
 
-def _same(some: Sequence[Critical], c: Critical) -> Array:
-    """Speed, amplitude and factor (3,) of the critical that is the same one; NaN where none is."""
-    close = [x for x in some if abs(x.speed / c.speed - 1) < MATCHED]
-    if not close:
-        return np.full(3, np.nan)
-    x = min(close, key=lambda x: abs(x.speed - c.speed))
-    return np.array([x.speed, x.amplitude, x.factor])
-
-
-def _still(c: Curve, dwell: Dwell, width: float) -> tuple[Dwell, Complex]:
+def _still(c: Curve, models: Sequence[Smoother], dwell: Dwell, width: float) -> tuple[Dwell, Complex]:
     """The dwell's vectors as they would be if the speed stood, and what that leaves open (4,) m, of the probes."""
-    moved = np.zeros(12, complex)
+    shift = np.zeros(12, complex)
     left = np.zeros(4, complex)
-    at = dwell.speed
+    width_ = np.full(c.speed.size, width)
     for k in range(12):
-        args = (c.speed, c.values[k], c.covariance[k], c.acceleration)
-        shift = [settled(*args, np.full(c.speed.size, width), n) - c.values[k] for n in (1, 2)]
-        moved[k] = _at(c.speed, shift[1], at)
+        by = [sums - c.values[k] for sums in transient.series(models[k], c.speed, c.values[k], c.acceleration, width_)]
+        shift[k] = _at(c.speed, by[2], dwell.speed)
         if k < 4:
-            left[k] = _at(c.speed, shift[0], at) - moved[k]
+            left[k] = _at(c.speed, by[1], dwell.speed) - shift[k]
     values = dwell.track.values.copy()
-    values[0, :, 0] += moved
+    values[0, :, 0] += shift
     return replace(dwell, track=replace(dwell.track, values=values)), left
 
 

@@ -36,7 +36,7 @@ def test_many_results_get_a_line_each() -> None:
     assert [m.row.where for m in group.rows] == [f"{1000 * n} r/min" for n in range(1, many.MANY + 2)]
     assert {m.carried for m in group.rows} == {SHARES}
     assert group.judged
-    assert "7 results, p = 95" in group.note
+    assert f"{many.MANY + 1} results, p = 95" in group.note
     assert "drawing 12-004, table 2" in group.note
     page = Page(html.render(view)).text
     assert page.count("current sensor gain, inboard 88") == many.MANY + 1
