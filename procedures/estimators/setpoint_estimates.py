@@ -21,6 +21,9 @@ from procedures.estimators.stepmodel import Settling
 Array = npt.NDArray[np.float64]
 RISE_SHARE = 0.012  # of a period: what the spline leaves of a crossing, over all phases of the step in its period
 ALIAS = 3e-3  # of the bandwidth: what stands above half the sampling rate
+HARMONIC = (
+    0.1  # of how far the directions' overshoots differ: a second harmonic at the top, which oscillations leave out
+)
 START_S = 1e-4  # how well the control currents tell when the set point acted
 # Second-order effect of a step's size over the square of its first-order effect: damping either way; frequency from none to
 # less by this much, since what bearings have of quadratic and cubic forces softens them (Landau, Mechanics, section 28).
@@ -74,6 +77,10 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
         found |= _settling(case, all_of, settled)
         found["rise_time"] += bound(f"sampling/rise/{case.where}", "sampling", RISE_SHARE * _period(all_of[0]), "s")
         found["steady_error"] += _gained(case, rig)
+        other = seen["overshoot"].values.get(replace(case, way=-case.way))
+        if "overshoot" in found and other is not None:
+            half = HARMONIC * abs(found["overshoot"].value - other)
+            found["overshoot"] += bound(f"harmonic/{case.where}", "second harmonic of the swing", half, "1")
         if "bandwidth" in found:
             found["bandwidth"] += bound(
                 f"aliasing/{case.where}", "above half the sampling rate", ALIAS * found["bandwidth"].value, "Hz"
