@@ -244,7 +244,7 @@ def _oscillation(group: str, results: Sequence[Result]) -> dict[str, Estimate]:
             unit=unit,
             kind="A",
             distribution="normal",
-            dof=float(dof),
+            dof=_weighed(kinds),
             source=f"{n} steps, left out in turn",
         )
         moved = max(abs(of(whole.later(by)) - value) for by in (START_S, -START_S))
@@ -252,6 +252,13 @@ def _oscillation(group: str, results: Sequence[Result]) -> dict[str, Estimate]:
         out[name] += bound(f"start/{name}/{group}", "start of the step", moved, unit)
         out[name] += bound(f"size/{name}/{group}", "size of the steps", (high - low) / 2 * first**2 * value, unit)
     return out
+
+
+def _weighed(kinds: Sequence[tuple[Case, float]]) -> float:
+    """Degrees of freedom of a scatter to which steps add as the square of their size (Welch-Satterthwaite)."""
+    freedom = {kind: kinds.count(kind) - 1 for kind in set(kinds)}
+    parts = [(many, many * case.size**2) for (case, _), many in freedom.items() if many]
+    return sum(part for _, part in parts) ** 2 / sum(part**2 / many for many, part in parts)
 
 
 def _first_order(results: Sequence[Result]) -> float:
