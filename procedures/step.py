@@ -241,6 +241,7 @@ procedure = Procedure(
     name="step",
     title="Set-point steps of the levitated shaft",
     measures=MEASURES,
+    optional=(SETTLING,),  # what does not settle is a finding
     state=RigState.LEVITATED,
     plan=Plan,
     acquire=acquire,
