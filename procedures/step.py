@@ -224,8 +224,9 @@ averaged position where that is more, which the report says.
 From 3.5 ms after the step on, filters and current loops have died away, and position and tilt share two oscillations that lie
 close together. They are fitted to both, as means over a telemetry period. The overshoot is the top of that curve. Either pole
 alone is ill determined where the two almost coincide; damping ratio and natural frequency are those of the mean pole, each
-with its part in the position as the step begins: what the swing shows. They are meant of small motions; what large steps add
-is bounded by how far the frequency differs between the directions.
+with its part in the position as the step begins: what the swing shows. They are meant of small motions; what large steps
+add is bounded by the square of how far the frequency differs between the directions (half of the bound is taken off the
+frequency, which it can only lower).
 
 Rise is read from the curve of which the telemetry's samples are the means: the derivative of a spline through their running
 sum. Bandwidth is that of the Fourier transform of the response's derivative, from the samples and, after 8 ms, the fitted
@@ -240,6 +241,7 @@ procedure = Procedure(
     name="step",
     title="Set-point steps of the levitated shaft",
     measures=MEASURES,
+    optional=(SETTLING,),  # what does not settle is a finding
     state=RigState.LEVITATED,
     plan=Plan,
     acquire=acquire,

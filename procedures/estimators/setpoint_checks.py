@@ -97,8 +97,8 @@ def _speed(steps: Sequence[Done], plan: Tolerances) -> Iterator[Finding]:
         )  # fmt: skip
     moving = [d for d in steps if abs(d.slope) * DRIFT_S > max(plan.band * d.case.size, 4 * d.noise)]
     if moving:
-        most = max(abs(d.slope) for d in moving) * 1e6
-        yield Finding("not-at-rest", f"before {len(moving)} of {len(steps)} steps the position still moved, by {most:.2f} "
+        fastest = max(abs(d.slope) for d in moving) * 1e6
+        yield Finding("not-at-rest", f"before {len(moving)} of {len(steps)} steps the position still moved, by {fastest:.2f} "
                       "µm/s: wait longer (record_s between steps, settle_s before the first), or start warm.",
                       moving[0].case.where, Effect.INDETERMINATE)  # fmt: skip
     yield from _kicks(steps)

@@ -21,6 +21,9 @@ from procedures.estimators.stepmodel import Settling
 Array = npt.NDArray[np.float64]
 RISE_SHARE = 0.012  # of a period: what the spline leaves of a crossing, over all phases of the step in its period
 ALIAS = 3e-3  # of the bandwidth: what stands above half the sampling rate
+HARMONIC = (
+    0.1  # of how far the directions' overshoots differ: a second harmonic at the top, which oscillations leave out
+)
 START_S = 1e-4  # how well the control currents tell when the set point acted
 # Second-order effect of a step's size over the square of its first-order effect: damping either way; frequency from none to
 # less by this much, since what bearings have of quadratic and cubic forces softens them (Landau, Mechanics, section 28).
@@ -74,6 +77,10 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
         found |= _settling(case, all_of, settled)
         found["rise_time"] += bound(f"sampling/rise/{case.where}", "sampling", RISE_SHARE * _period(all_of[0]), "s")
         found["steady_error"] += _gained(case, rig)
+        other = seen["overshoot"].values.get(replace(case, way=-case.way))
+        if "overshoot" in found and other is not None:
+            half = HARMONIC * abs(found["overshoot"].value - other)
+            found["overshoot"] += bound(f"harmonic/{case.where}", "second harmonic of the swing", half, "1")
         if "bandwidth" in found:
             found["bandwidth"] += bound(
                 f"aliasing/{case.where}", "above half the sampling rate", ALIAS * found["bandwidth"].value, "Hz"
@@ -237,7 +244,7 @@ def _oscillation(group: str, results: Sequence[Result]) -> dict[str, Estimate]:
             unit=unit,
             kind="A",
             distribution="normal",
-            dof=float(dof),
+            dof=_weighed(kinds),
             source=f"{n} steps, left out in turn",
         )
         moved = max(abs(of(whole.later(by)) - value) for by in (START_S, -START_S))
@@ -245,6 +252,13 @@ def _oscillation(group: str, results: Sequence[Result]) -> dict[str, Estimate]:
         out[name] += bound(f"start/{name}/{group}", "start of the step", moved, unit)
         out[name] += bound(f"size/{name}/{group}", "size of the steps", (high - low) / 2 * first**2 * value, unit)
     return out
+
+
+def _weighed(kinds: Sequence[tuple[Case, float]]) -> float:
+    """Degrees of freedom of a scatter to which steps add as the square of their size (Welch-Satterthwaite)."""
+    freedom = {kind: kinds.count(kind) - 1 for kind in set(kinds)}
+    parts = [(many, many * case.size**2) for (case, _), many in freedom.items() if many]
+    return sum(part for _, part in parts) ** 2 / sum(part**2 / many for many, part in parts)
 
 
 def _first_order(results: Sequence[Result]) -> float:
