@@ -247,14 +247,14 @@ S belongs to the current references.
 First a few lines tell whether the coils of that axis follow. The whole range is surveyed, with a finer grid about the plan's
 bending modes. About the greatest |S|, and others that
 come near it, a second grid is laid, six lines or more in the half-power width that the first look found, at the plan's
-amplitude and at half of it. A rational function of frequency, of the smallest order that the scatter allows, is fitted
-to these lines; S_max is its greatest abs, with the bias taken off that noise gives a maximum, and its scatter by the fit's
-covariance.
+amplitude and at half of it. Rational functions of frequency are fitted to these lines; S_max is the greatest abs, with the bias
+taken off that noise gives a maximum, and its scatter by the fit's covariance. Orders that the scatter allows are averaged with
+Akaike's weights, and what they differ by is added to the scatter.
 
 Where the shaft turns, orders 1 to 4 of its angle are fitted to each capture and taken away, and lines within 3 Hz of them are
 left out.
 
-Margins are those of L = 1/S - 1 by the survey's lines, smoothed by local models: the least angle from -1 where |L| = 1, and
+Margins are those of L = 1/S - 1 by the survey's lines: the least angle from -1 where |L| = 1, and
 where L crosses the negative real axis, how far the gain may fall (|L| above 1: the shaft is unstable without the loop) and
 rise.
 

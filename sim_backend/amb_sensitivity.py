@@ -102,7 +102,7 @@ def quiet_peak(
     procedure's, without noise."""
     near, orders = loop(p, settings, speed, substeps).peak(axis, 2.0, 2000.0)[1], (1.0, 2.0, 3.0, 4.0)
     share = max(SHARES, key=lambda share: image_distance(share, speed / (2 * math.pi * STEP_HZ)))
-    hz = STEP_HZ * (math.floor(near / STEP_HZ) + share + np.arange(-LINES, LINES + 1))
+    hz = np.asarray(STEP_HZ * (math.floor(near / STEP_HZ) + share + np.arange(-LINES, LINES + 1)), np.float64)
     plant, period = floating(p, settings, speed, SETTLED_S, substeps), round(1 / TICK_S / (STEP_HZ * SHARES[0]))
     made = {
         "inject_axis": axis,

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from bench.analysis.rational import fitted, top
+from bench.analysis.rational import averaged, fitted, orders, top
 from bench.errors import AnalysisError
 
 HZ = np.arange(40.0, 110.0, 3.0)
@@ -54,6 +55,19 @@ def test_the_greatest_of_noisy_lines_is_not_biased() -> None:
         away.append((found.value - value) / found.u)
     assert abs(np.mean(away)) < 0.6
     assert 0.6 < np.std(away) < 1.5
+
+
+def test_orders_that_differ_widen_what_they_say_together() -> None:
+    """Two of equal weight that stand apart: the mean, and half of their distance in the uncertainty; one alone is as it is."""
+    model = orders(HZ, curve(HZ), (0.01 * np.abs(curve(HZ))) ** 2, 200.0)[0]
+    alone, other = top(model, HZ[0], HZ[-1]), replace(model, above=1.1 * model.above)
+    assert averaged([model], HZ[0], HZ[-1]).value == pytest.approx(alone.value)
+    apart = top(other, HZ[0], HZ[-1]).value - alone.value
+    both = averaged([model, other], HZ[0], HZ[-1])
+    assert both.value == pytest.approx(alone.value + apart / 2)
+    assert both.u == pytest.approx(math.hypot(alone.u, apart / 2), rel=0.1)
+    unlikely = averaged([model, replace(other, akaike=model.akaike + 50)], HZ[0], HZ[-1])
+    assert unlikely.value == pytest.approx(alone.value)
 
 
 def test_what_cannot_be_fitted_is_refused() -> None:
