@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import uniform_filter1d
 
 from bench.analysis.sampling import Array, Complex
 from bench.analysis.vectors import complexes
@@ -106,6 +107,16 @@ class Smoother:
         fine = _models(values, self._windows, self._weight)
         return fine.reshape(*values.shape[:-1], -1)[..., self._order]
 
+    def excess(self, values: Complex, drawn: Complex) -> Array:
+        """By how much a curve (m,) scatters about its local models more than curves (d, m) that were drawn with the noise it
+        is said to have: ratio (m,) of the mean squares, each over the widest window about its line."""
+        found, usual = (self._scatter(each) for each in (values, drawn))
+        return np.asarray(found / usual.mean(axis=0))
+
+    def _scatter(self, values: Complex) -> Array:
+        around = min(WINDOWS[-1], values.shape[-1])
+        return uniform_filter1d(_misfit(values, self._windows, self._weight), around, mode="nearest")
+
     def curvature(self, values: Complex) -> Complex:
         """Second derivatives (..., m) of curves (..., m) by the abscissa, at their lines."""
         places = np.tile([-NARROW, 0.0, NARROW], (self._windows.u.shape[0], 1))
@@ -131,11 +142,16 @@ def _width(x: Array, z: Complex, weight: Array) -> int:
             break
         near = np.arange(max(0, top - w // 2), min(z.size, top + w // 2 + 1))
         at = _windows(x, near, w)
-        misfit = (weight[at.lines] * np.abs(z[at.lines] - _evaluated(z, at, weight, at.u)) ** 2).sum(axis=1)
-        if misfit.mean() > (w - 4) * (1 + 2 / np.sqrt(w - 4)):
+        if _misfit(z, at, weight).mean() > 1 + 2 / np.sqrt(w - 4):
             break
         width = w
     return width
+
+
+def _misfit(z: Complex, at: _Windows, weight: Array) -> Array:
+    """Weighted mean square residual (..., k) of the local models, a little above 1 where noise is all there is."""
+    off: Array = (weight[at.lines] * np.abs(z[..., at.lines] - _evaluated(z, at, weight, at.u)) ** 2).sum(axis=-1)
+    return off / (at.u.shape[1] - 4)
 
 
 def pooled_covariance(covariance: Array) -> Array:
@@ -191,19 +207,27 @@ def _evaluated(z: Complex, at: _Windows, weight: Array, v: Array) -> Complex:
     powers = np.stack([np.ones_like(at.u), at.u, at.u**2], axis=-1)
     basis, upper = np.linalg.qr(powers * root[..., None])  # (k, w, 3), the same for every curve
     shape = np.linalg.solve(np.swapaxes(upper, -1, -2), np.stack([np.ones_like(v), v, v**2], axis=-2))
-    near = z[..., at.lines] * root
-    turned = near * at.u
-    p, q = (np.einsum("kwi,...kw->...ki", basis, x) for x in (near, turned))
-    cross = (turned.conj() * near).sum(axis=-1) - (q.conj() * p).sum(axis=-1)
-    square = (np.abs(turned) ** 2).sum(axis=-1)
-    own = square - (np.abs(q) ** 2).sum(axis=-1)
-    d = (-cross / np.maximum(own, 1e-12 * square + 1e-300))[..., None]
-    parabola = np.einsum("...ki,kif->...kf", p, shape)
-    below = 1 + d * v
-    above = parabola + d * np.einsum("...ki,kif->...kf", q, shape)
-    if v is not at.between:
-        return np.asarray(above / np.where(np.abs(below) > 1e-6, below, 1e-6))
-    return np.asarray(np.where(np.abs(below) > NEAR_POLE, above / np.where(below == 0, 1, below), above[..., :1]))
+    curves = np.ascontiguousarray(z.reshape(-1, z.shape[-1]).T)  # (m, n): all of a line's values together
+    near = curves[at.lines] * root[..., None]
+    turned = near * at.u[..., None]
+    p, q = (_applied(np.swapaxes(basis, -1, -2), x) for x in (near, turned))
+    cross = (turned.conj() * near).sum(axis=1) - (q.conj() * p).sum(axis=1)
+    square = (np.abs(turned) ** 2).sum(axis=1)
+    own = square - (np.abs(q) ** 2).sum(axis=1)
+    d = (-cross / np.maximum(own, 1e-12 * square + 1e-300))[:, None]
+    to_places = np.swapaxes(shape, -1, -2)
+    below = 1 + d * v[..., None]
+    above = _applied(to_places, p) + d * _applied(to_places, q)
+    if v is at.between:
+        found = np.where(np.abs(below) > NEAR_POLE, above / np.where(below == 0, 1, below), above[:, :1])
+    else:
+        found = above / np.where(np.abs(below) > 1e-6, below, 1e-6)
+    return np.moveaxis(found, -1, 0).reshape(*z.shape[:-1], *v.shape)
+
+
+def _applied(matrices: Array, columns: Complex) -> Complex:
+    """Real matrices (k, i, j) on complex columns (k, j, n)."""
+    return np.matmul(matrices, columns.view(np.float64)).view(np.complex128)
 
 
 def _top(z: Complex, at: _Windows, weight: Array, x: Array) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:

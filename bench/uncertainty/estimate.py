@@ -208,5 +208,18 @@ def correlation(a: Estimate, b: Estimate) -> float:
 
 
 def correlation_matrix(estimates: Sequence[Estimate]) -> list[list[float]]:
-    """Symmetric matrix of correlation coefficients with a unit diagonal."""
-    return [[1.0 if a is b else correlation(a, b) for b in estimates] for a in estimates]
+    """Symmetric matrix of correlation coefficients with a unit diagonal.
+
+    Raises:
+        AnalysisError: one id stands for two different influences.
+    """
+    column = {influence.id: k for k, influence in enumerate(merged((1.0, e) for e in estimates))}
+    shares = np.zeros((len(estimates), len(column)))
+    for row, estimate in zip(shares, estimates, strict=True):
+        if estimate.u > 0:
+            for key, c in estimate.contributions.items():
+                row[column[key]] = c / estimate.u
+    matrix = np.clip(np.einsum("ik,jk->ij", shares, shares), -1.0, 1.0)
+    np.fill_diagonal(matrix, 1.0)
+    rows: list[list[float]] = matrix.tolist()
+    return rows

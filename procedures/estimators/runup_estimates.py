@@ -32,6 +32,7 @@ DAMPED = 2.5  # amplification factor under which API 617 sees no critical speed
 UNITS = {"speed": "rad/s", "amplitude": "m", "factor": "1"}
 LAG = "what is left of the lag of the response"
 DRAWS = 120
+USUAL = 30  # of them say how far a curve of the known noise is off its models
 BENDING = (*(f"{name}_{k}" for name in ("beta", "offset", "zero", "gain") for k in range(4)), "gap", "mass", "inertia",
            "l_ia", "l_oa", "l_is", "l_os")  # fmt: skip
 """What the bend of the forces rests on; what else there is of it changes it by less than a twentieth."""
@@ -156,9 +157,14 @@ class _Line:
         return self._settled(self._raw)
 
     def scatter(self) -> Complex:
-        """Of the last of these, drawn (DRAWS, b): what takes the lag off adds to the noise, and makes neighbours alike."""
+        """Of the last of these, drawn (DRAWS, b): what takes the lag off adds to the noise, and makes neighbours alike.
+
+        A block's own turns do not tell all of it: near a critical speed the noise rings on from turn to turn. Where blocks
+        scatter more than their turns say, their scatter counts.
+        """
         lines = self._smooth.at_lines(self._raw)
         off = noise(pooled_covariance(self._covariance), 0, DRAWS)
+        off *= np.sqrt(np.maximum(self._smooth.excess(self._raw, lines + off[:USUAL]), 1.0))
         return np.asarray(self._settled(lines + off)[-1] - self._settled(lines)[-1])
 
     def _settled(self, values: Complex) -> list[Complex]:

@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import brentq, minimize_scalar
 
 from bench.analysis.criticals import criticals
+from bench.analysis.peaks import noise, smoother
 from bench.errors import AnalysisError
 
 NATURAL = 648.4253  # rad/s, translation of the rotor that ROSS confirmed
@@ -51,6 +52,18 @@ def test_the_intervals_hold_the_truth() -> None:
         away = np.array([found.speed, found.factor]) - truth
         hits.append(np.abs(away) <= 2 * np.sqrt(found.covariance[[0, 2], [0, 2]]))
     assert (np.mean(hits, axis=0) >= 0.82).all()
+
+
+@pytest.mark.parametrize("told", [1.0, 1.5])
+def test_blocks_that_scatter_more_than_they_are_said_to_are_seen(told: float) -> None:
+    """Ratio of the mean squares, of a curve with noise `told` times as large as its covariance says."""
+    w, u = np.linspace(300, 1300, 300), 3e-7
+    said = np.tile(u**2 * np.eye(2), (w.size, 1, 1))
+    values = response(w, 0.1) + told * noise(said, 11, 1)[0]
+    smooth = smoother(w, values, said)
+    found = smooth.excess(values, smooth.at_lines(values) + noise(said, 12, 40))
+    assert found.shape == w.shape
+    assert found.mean() == pytest.approx(told**2, rel=0.15)
 
 
 def test_two_criticals_and_a_half_power_point_outside() -> None:
