@@ -7,7 +7,8 @@ itself, with its own standard uncertainty u:
     sum over axes and positions of (F_model(beta, offset, t) - F_carries(t))^2 / s^2  +  sum over t of ((t - t_cert) / u)^2
 
 is made least. s is the noise of a position's mean force with what the model is not trusted with, or what the adjustment
-leaves if that is more. Near the solution the result is linear in what was certified: with the normal matrix H,
+leaves if that is more. The trust is in the weights alone: the scatter that a result is said to have is that of the noise, or of
+what the adjustment leaves. Near the solution the result is linear in what was certified: with the normal matrix H,
 d(result)/d(t_cert) = (H^-1)_t / u^2, so that each certificate is an influence by identity, and a wrong one acts as little
 as the positions let it.
 """
@@ -40,7 +41,7 @@ class Adjusted:
     """`estimates` of beta_*, offset_* and the gap; `values` of all inputs as adjusted.
 
     By input, `moved` is the adjustment over the certificate's u, `pulls` over its own, standard normal where the
-    certificates hold. `terms` (4, 2) beta and offset; `residuals` (4, N) N, model less force; `noise_N` s (4,).
+    certificates hold. `terms` (4, 2) beta and offset; `residuals` (4, N) N, model less force.
     """
 
     estimates: dict[str, Estimate]
@@ -49,7 +50,6 @@ class Adjusted:
     moved: dict[str, float]
     terms: Array
     residuals: Array
-    noise_N: Array
 
 
 @dataclass(frozen=True)
@@ -84,8 +84,11 @@ class _Problem:
         return np.array(out).T
 
 
-def adjust(means: Positions, inputs: Mapping[str, Estimate], noise_N: Array, starts: Array) -> Adjusted:
-    """`inputs` as `bearing.statics` wants them, and the gap; `noise_N` (4,) of a position's mean; `starts` (4, 2) terms.
+def adjust(
+    means: Positions, inputs: Mapping[str, Estimate], noise_N: Array, weighed_N: Array, starts: Array
+) -> Adjusted:
+    """`inputs` as `bearing.statics` wants them, and the gap; `noise_N` (4,) of a position's mean, `weighed_N` (4,) the same
+    with what the model is not trusted with; `starts` (4, 2) terms.
 
     Raises:
         AnalysisError: no solution.
@@ -94,12 +97,13 @@ def adjust(means: Positions, inputs: Mapping[str, Estimate], noise_N: Array, sta
     problem = _Problem(means, {n: e.value for n, e in inputs.items()}, names, np.array([inputs[n].u for n in names]))
     count = means.read.shape[1]
     x = np.concatenate([(starts / [BETA_UNIT, OFFSET_UNIT]).ravel(), np.zeros(len(names))])
-    x = _least(problem, x, noise_N)
+    x = _least(problem, x, weighed_N)
     left = problem.left(x).reshape(4, count)
-    noise = np.maximum(noise_N, np.sqrt((left**2).sum(axis=1) / (count - 2)))
-    if (noise > noise_N).any():
-        x = _least(problem, x, noise)
-    return _adjusted(problem, inputs, x, noise)
+    spread = np.sqrt((left**2).sum(axis=1) / (count - 2))
+    weighed = np.maximum(weighed_N, spread)
+    if (spread > weighed_N).any():
+        x = _least(problem, x, weighed)
+    return _adjusted(problem, inputs, x, weighed, np.maximum(noise_N, spread))
 
 
 def _least(problem: _Problem, x: Array, noise: Array) -> Array:
@@ -133,10 +137,10 @@ def _inverse(design: Array) -> Array:
     return out
 
 
-def _adjusted(problem: _Problem, inputs: Mapping[str, Estimate], x: Array, noise: Array) -> Adjusted:
+def _adjusted(problem: _Problem, inputs: Mapping[str, Estimate], x: Array, weighed: Array, noise: Array) -> Adjusted:
     count, size = problem.means.read.shape[1], len(x)
     slopes, left = problem.slopes(x), problem.left(x).reshape(4, count)
-    weighted = slopes * np.repeat(1 / noise, count)[:, None]
+    weighted = slopes * np.repeat(1 / weighed, count)[:, None]
     inverse = _inverse(np.vstack([weighted, np.eye(size)[8:]]))
     units = np.concatenate([np.tile([BETA_UNIT, OFFSET_UNIT], 4), problem.u])
     values = problem.inputs(x[8:])
@@ -148,7 +152,8 @@ def _adjusted(problem: _Problem, inputs: Mapping[str, Estimate], x: Array, noise
         shares = inverse[row, 8:] * units[row] / problem.u
         estimates[name] = Estimate.exact(value) + _certified(problem, inputs, shares)
     terms = (x[:8] * units[:8]).reshape(4, 2)
-    by_noise = inverse @ (weighted.T @ weighted) @ inverse * np.outer(units, units)
+    random = weighted * np.repeat(noise / weighed, count)[:, None]
+    by_noise = inverse @ (random.T @ random) @ inverse * np.outer(units, units)
     for k, a in enumerate(AXES):
         of = slice(2 * k, 2 * k + 2)
         rows_of_k = slopes[k * count : (k + 1) * count, of] / units[of]
@@ -159,7 +164,7 @@ def _adjusted(problem: _Problem, inputs: Mapping[str, Estimate], x: Array, noise
     known = np.sqrt(np.maximum(1 - np.diag(inverse)[8:], 0.0))  # u of an adjustment, over the certificate's
     moved = {n: float(v) for n, v in zip(problem.names, x[8:], strict=True)}
     pulls = {n: moved[n] / float(k) for n, k in zip(problem.names, known, strict=True) if k > TOLD}
-    return Adjusted(estimates, values, pulls, moved, terms, left, noise)
+    return Adjusted(estimates, values, pulls, moved, terms, left)
 
 
 def _certified(problem: _Problem, inputs: Mapping[str, Estimate], shares: Array) -> Estimate:

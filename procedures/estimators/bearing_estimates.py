@@ -74,22 +74,22 @@ def evaluate(recording: Recording[Any], held: Held) -> Analysis:
     return Analysis(held, s, compared, fits, inputs, found, estimates, noise, bias, len(chosen.of_step))
 
 
-def _start(held: Held, values: dict[str, float]) -> tuple[Array, Array]:
-    """Noise (4,) of a position's mean force, and the terms (4, 2) that fit each axis by itself.
+def _start(held: Held, values: dict[str, float]) -> tuple[Array, Array, Array]:
+    """Noise (4,) of a position's mean force, the same (4,) for the weights, and the terms (4, 2) that fit each axis by itself.
 
-    The noise is that of the batches and what the model is not trusted with. The latter does not average out over N positions;
-    so each of them gets N of its variance.
+    The noise is that of the batches; the weights also hold what the model is not trusted with. That does not average out over
+    N positions; so each of them gets N of its variance.
     """
     s, parts = bearing.statics(held.means(), values), bearing.statics(held.parts(), values)
-    noise, terms = np.zeros(4), np.zeros((4, 2))
+    noise, weighed, terms = np.zeros(4), np.zeros(4), np.zeros((4, 2))
     for k in range(4):
         terms[k] = bearing.nonlinear(s.r[k], s.p[k], s.n[k], s.force[k], values["gap"]).terms
         beta, offset = terms[k]
         force = bearing.magnet(beta, offset, values["gap"], parts.r[k], parts.p[k], parts.n[k]) - parts.force[k]
         batches = force.reshape(len(held), -1)
-        random = float(batches.var(axis=1, ddof=1).mean()) / batches.shape[1]
-        noise[k] = math.sqrt(random + len(held) * (TRUST * float(s.force[k].mean())) ** 2)
-    return noise, terms
+        noise[k] = math.sqrt(float(batches.var(axis=1, ddof=1).mean()) / batches.shape[1])
+        weighed[k] = math.hypot(noise[k], math.sqrt(len(held)) * TRUST * float(s.force[k].mean()))
+    return noise, weighed, terms
 
 
 def fit_inputs(rig: RigFile, coupled: bool) -> dict[str, Estimate]:

@@ -147,7 +147,7 @@ def adjusted(relaxed: tuple[float, float] = (0.0, 0.0), **wrong: float) -> Adjus
     """From positions without noise at two biases."""
     both = [positions(OFFSETS, bias=b, relaxed=relaxed) for b in (1.2, 0.8)]
     means = Positions(*(np.concatenate([getattr(d, x) for d in both], axis=1) for x in ("read", "p", "n")))
-    return adjust(means, certificates(**wrong), np.full(4, 5e-4), np.array([(6.5e-7, 1e-4)] * 4))
+    return adjust(means, certificates(**wrong), np.full(4, 5e-4), np.full(4, 5e-4), np.array([(6.5e-7, 1e-4)] * 4))
 
 
 def test_the_adjustment_of_exact_data_is_the_truth_and_moves_nothing() -> None:
