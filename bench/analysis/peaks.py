@@ -115,7 +115,7 @@ class Smoother:
 
     def _scatter(self, values: Complex) -> Array:
         around = min(WINDOWS[-1], values.shape[-1])
-        return uniform_filter1d(_misfit(values, self._windows, self._weight), around, mode="nearest")
+        return np.asarray(uniform_filter1d(_misfit(values, self._windows, self._weight), around, mode="nearest"))
 
     def curvature(self, values: Complex) -> Complex:
         """Second derivatives (..., m) of curves (..., m) by the abscissa, at their lines."""
@@ -150,8 +150,8 @@ def _width(x: Array, z: Complex, weight: Array) -> int:
 
 def _misfit(z: Complex, at: _Windows, weight: Array) -> Array:
     """Weighted mean square residual (..., k) of the local models, a little above 1 where noise is all there is."""
-    off: Array = (weight[at.lines] * np.abs(z[..., at.lines] - _evaluated(z, at, weight, at.u)) ** 2).sum(axis=-1)
-    return off / (at.u.shape[1] - 4)
+    off = (weight[at.lines] * np.abs(z[..., at.lines] - _evaluated(z, at, weight, at.u)) ** 2).sum(axis=-1)
+    return np.asarray(off / (at.u.shape[1] - 4))
 
 
 def pooled_covariance(covariance: Array) -> Array:
@@ -222,12 +222,13 @@ def _evaluated(z: Complex, at: _Windows, weight: Array, v: Array) -> Complex:
         found = np.where(np.abs(below) > NEAR_POLE, above / np.where(below == 0, 1, below), above[:, :1])
     else:
         found = above / np.where(np.abs(below) > 1e-6, below, 1e-6)
-    return np.moveaxis(found, -1, 0).reshape(*z.shape[:-1], *v.shape)
+    out: Complex = np.moveaxis(found, -1, 0).reshape(*z.shape[:-1], *v.shape)
+    return out
 
 
 def _applied(matrices: Array, columns: Complex) -> Complex:
     """Real matrices (k, i, j) on complex columns (k, j, n)."""
-    return np.matmul(matrices, columns.view(np.float64)).view(np.complex128)
+    return np.asarray(np.matmul(matrices, columns.view(np.float64))).view(np.complex128)
 
 
 def _top(z: Complex, at: _Windows, weight: Array, x: Array) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
