@@ -239,6 +239,8 @@ def _margins(r: Result) -> Iterator[Finding]:
     for name, words in (("gain_reduction", "the gain may fall to"), ("gain_increase", "the gain may rise to")):
         if e := r.estimates.get(name):
             told.append(f"{words} {e.value:.3g} of what it is ({20 * math.log10(e.value):+.1f} dB)")
+        elif told:
+            told.append(f"how far {words.removesuffix(' to')} is not resolved")
     if told:
         text = "; ".join(told)
         yield Finding("margins", f"{text[0].upper()}{text[1:]}.", r.where)
