@@ -12,7 +12,7 @@ from reports.view import ManyResults, ManyRow, ResultRow
 
 MANY = 5  # results of one quantity that still get a budget each
 TOLD = 2  # influences of a line
-BRACKETS = "in brackets the interval, where it is by Monte Carlo (JCGM 101) or does not lie about the value"
+BRACKETS = "In brackets the interval, where it is by Monte Carlo (JCGM 101) or does not lie about the value"
 SMALL = 0.1  # of the variance; smaller ones are not told in a line
 Content = Mapping[str, Any]
 

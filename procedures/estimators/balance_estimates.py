@@ -225,7 +225,8 @@ def influences(balance: Balanced, rig: RigFile) -> dict[tuple[str, str], tuple[E
             parts = [scatter[n][2 * k + j] for n in (0, 1) for j in (0, 1)]
             inputs = {"a": parts[0], "b": parts[1], "c": parts[2], "d": parts[3], "kg": known[f"kg_{p}"],
                       "angle": known[f"angle_{p}"], "radius": radius,
-                      "gain": certified(f"sensors/pos_{axis}/gain", rig.sensors[f"pos_{axis}"].gain)}  # fmt: skip
+                      "gain": certified(f"sensors/pos_{axis}/gain", rig.sensors[f"pos_{axis}"].gain,
+                                        f"gain of pos_{axis}")}  # fmt: skip
 
             def model(v: dict[str, float]) -> dict[str, float]:
                 u = v["kg"] * v["radius"] * v["gain"] * np.exp(1j * v["angle"])

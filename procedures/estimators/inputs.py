@@ -7,10 +7,11 @@ from bench.uncertainty import Estimate, Influence
 
 
 def certified(identity: str, t: Toleranced, name: str = "") -> Estimate:
-    """The certified value as an Estimate with one Type B influence named by `identity` (stable along the chain)."""
+    """The certified value as an Estimate with one Type B influence known by `identity` (stable along the chain); `name` is what
+    a budget calls it, else the last part of its identity."""
     influence = Influence(
         id=identity,
-        name=name or identity,
+        name=name or identity.rpartition("/")[2].replace("_", " "),
         u=t.standard_uncertainty,
         unit=t.unit,
         kind="B",
