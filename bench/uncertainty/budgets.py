@@ -36,6 +36,7 @@ def budget(estimate: Estimate) -> list[BudgetRow]:
 
 def round_to_uncertainty(value: float, expanded: float) -> tuple[str, str]:
     """Value and expanded uncertainty as text: two significant digits of U, the value to the same place (GUM 7.2.6)."""
+    value, expanded = float(value), float(expanded)  # numpy's numbers print their type
     if not (math.isfinite(value) and math.isfinite(expanded)) or expanded <= 0:
         return repr(value), repr(expanded)
     place = int(f"{expanded:.1e}".partition("e")[2]) - 1  # after rounding: 0.0996 is 1.0e-01
@@ -57,6 +58,7 @@ def power_out(largest: float, place: int) -> int:
 
 def stated(value: float, expanded: float, sign: str = "+-") -> str:
     """`73.21 +- 0.12`, or with a power of ten that binds both, `(-12.34 +- 0.32)e-6`: a result as a line of text has it."""
+    value, expanded = float(value), float(expanded)
     if not (math.isfinite(value) and math.isfinite(expanded)) or expanded <= 0:
         return f"{value!r} {sign} {expanded!r}"
     place = int(f"{expanded:.1e}".partition("e")[2]) - 1

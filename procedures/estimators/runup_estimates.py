@@ -204,7 +204,7 @@ def _peaks(
         where = f"{axis}/{number}"
         (as_it_was, before, rest, *shifts) = moved(speeds, best, others, covariance, c)[1]
         slopes = [(part, shift / part.u) for part, shift in zip(parts_, shifts, strict=True)]
-        numbers = {"speed": c.speed, "amplitude": c.amplitude + as_it_was[1], "factor": c.factor}
+        numbers = {"speed": c.speed, "amplitude": c.amplitude + float(as_it_was[1]), "factor": c.factor}
         made = {
             name: _number(where, name, value, c.covariance[j, j], abs(float(rest[j])), [(p, float(m[j])) for p, m in slopes])
             for j, (name, value) in enumerate(numbers.items())

@@ -154,6 +154,7 @@ def test_budget_is_sorted_and_its_shares_add_up() -> None:
         (7321.478, 1234.0, ("7300", "1200")),
         (-0.000012344, 3.21e-7, ("-0.00001234", "0.00000032")),
         (1.0, 0.0, ("1.0", "0.0")),
+        (np.float64(73.21478), np.float64(0.1234), ("73.21", "0.12")),
     ],
 )
 def test_rounding(value: float, expanded: float, text: tuple[str, str]) -> None:
@@ -172,6 +173,7 @@ def test_rounding(value: float, expanded: float, text: tuple[str, str]) -> None:
         (0.0, 5e-9, "(0.0 +- 5.0)e-9"),
         (0.0042, 0.00013, "0.00420 +- 0.00013"),
         (1.0, 0.0, "1.0 +- 0.0"),
+        (np.float64(2.7e-7), np.float64(1.2e-8), "(270 +- 12)e-9"),
     ],
 )
 def test_a_result_on_one_line(value: float, expanded: float, text: str) -> None:
