@@ -23,28 +23,9 @@ from bench.analysis.sampling import Array, Complex
 from bench.errors import AnalysisError
 
 
-def settled(
-    speed: Array, values: Complex, covariance: Array, acceleration: Array, width: Array, rounds: int = 2
-) -> Complex:
-    """Vectors (b,) as they would be at each `speed` (b,) rad/s, from those of a passage.
-
-    Args:
-        speed: ascending.
-        values: without runout, which follows without a lag.
-        covariance: (b, 2, 2), of their scatter: it says how many blocks a local model takes.
-        acceleration: (b,) rad/s^2, below 0 on the way down.
-        width: (b,) rad/s, by how much the speed changes over each block.
-        rounds: terms of the series.
-
-    Raises:
-        AnalysisError: fewer than nine blocks, or speeds that do not ascend.
-    """
-    smooth = local(speed, values, covariance)
-    return series(smooth, speed, values, acceleration, width, rounds)[-1]
-
-
 def local(speed: Array, values: Complex, covariance: Array) -> Smoother:
-    """The local models of a passage's vectors, as `settled` takes them.
+    """The local models of a passage's vectors `values` (b,), without runout, at `speed` (b,) rad/s, ascending; `covariance`
+    (b, 2, 2) of their scatter says how many blocks a model takes.
 
     Raises:
         AnalysisError: fewer than nine blocks, or speeds that do not ascend.
@@ -57,7 +38,16 @@ def local(speed: Array, values: Complex, covariance: Array) -> Smoother:
 def series(
     smooth: Smoother, speed: Array, values: Complex, acceleration: Array, width: Array, rounds: int = 2
 ) -> list[Complex]:
-    """Sums of the series after none, one, ... `rounds` terms, (b,) each; arguments as of `settled`."""
+    """Vectors as they would be if each speed stood: the sums of the series after none, one, ... `rounds` terms, (b,) each.
+
+    Args:
+        smooth: the local models.
+        speed: (b,) rad/s, ascending.
+        values: (b,), without runout, which follows without a lag.
+        acceleration: (b,) rad/s^2, below 0 on the way down.
+        width: (b,) rad/s, by how much the speed changes over each block.
+        rounds: terms of the series.
+    """
     sums, term = [values], values
     for k in range(1, rounds + 1):
         bent = smooth.curvature(term)

@@ -34,7 +34,7 @@ from procedures.estimators.balance_data import (
     read_dwell,
     read_runs,
 )
-from procedures.estimators.balance_estimates import Balanced, Forces, Trials
+from procedures.estimators.balance_estimates import Balanced, Forces
 from procedures.estimators.unbalance_data import AXES, CURRENTS, POSITIONS, RPM, SLOW, TOLD, Complex, Dwell
 
 MOST_RPM = 10000.0  # influence runs
@@ -271,6 +271,3 @@ def sheet(recorded: Recorded, code: str, rig: RigFile, plan: Settings) -> Iterat
                     f"radius {radius * 1e3:g} mm ({w.kg * radius / G_MM:.2f} g mm), added. Angles are counted from y towards "
                     "z, in the direction of rotation, while the scale's zero faces y.")  # fmt: skip
             yield Finding(code, text, SIDES[w.plane])
-
-
-__all__ = ["AXES", "Evaluated", "Trials", "evaluated", "of_plan"]

@@ -18,7 +18,8 @@ from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
 from procedures.estimators import balance_estimates, runout, unbalance_bearings
 from procedures.estimators.balance_data import SIDES, Read, Run, Weight
-from procedures.estimators.balance_estimates import Balanced, Trials
+from procedures.estimators.balance_estimates import Balanced
+from procedures.estimators.balance_solution import Trials
 from procedures.estimators.runout import Stand
 from procedures.estimators.unbalance_data import RPM
 

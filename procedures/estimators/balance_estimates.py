@@ -254,17 +254,3 @@ def forces(read: Read, off: Complex, rig: RigFile, plan: Settings) -> Forces:
     s = Stand.of({name: e.value for name, e in unbalance_bearings.stated(rig, plan).items()})
     u, misfit = runout.unbalances(s, read.turning, off)
     return Forces(misfit, runout.carried(s, read.means) / unbalance_estimates.shares(rig, s), u)
-
-
-__all__ = [
-    "Balanced",
-    "Forces",
-    "Settings",
-    "Trials",
-    "balanced",
-    "fixed",
-    "forces",
-    "influences",
-    "permitted",
-    "share",
-]

@@ -249,6 +249,3 @@ def _margins(r: Result) -> Iterator[Finding]:
 def zone(value: float) -> str:
     """A to D."""
     return "ABCD"[sum(value >= end for end in ZONES)]
-
-
-__all__ = ["ZONES", "before", "of_results", "of_signals", "zone"]

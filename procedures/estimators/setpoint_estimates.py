@@ -21,9 +21,7 @@ from procedures.estimators.stepmodel import Settling
 Array = npt.NDArray[np.float64]
 RISE_SHARE = 0.012  # of a period: what the spline leaves of a crossing, over all phases of the step in its period
 ALIAS = 3e-3  # of the bandwidth: what stands above half the sampling rate
-HARMONIC = (
-    0.1  # of how far the directions' overshoots differ: a second harmonic at the top, which oscillations leave out
-)
+HARMONIC = 0.1  # of the directions' difference of overshoot: the top's second harmonic, which oscillations leave out
 START_S = 1e-4  # how well the control currents tell when the set point acted
 # Second-order effect of a step's size over the square of its first-order effect: damping either way; frequency from none to
 # less by this much, since what bearings have of quadratic and cubic forces softens them (Landau, Mechanics, section 28).

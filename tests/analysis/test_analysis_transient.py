@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import simpson
 
 from bench.analysis.criticals import criticals
-from bench.analysis.transient import settled
+from bench.analysis.transient import local, series
 from bench.errors import AnalysisError
 
 NATURAL, ZETA = 430.0, 0.12
@@ -32,8 +32,7 @@ def passed(w: np.ndarray, rate: float) -> np.ndarray:
 @pytest.mark.parametrize("rate", [60.0, -60.0, 200.0])
 def test_the_lag_is_taken_off(rate: float) -> None:
     values, still = passed(SPEED, rate), np.zeros(SPEED.size)
-    put_right = settled(SPEED, values, TINY, np.full(SPEED.size, rate), still)
-    once = settled(SPEED, values, TINY, np.full(SPEED.size, rate), still, rounds=1)
+    _, once, put_right = series(local(SPEED, values, TINY), SPEED, values, np.full(SPEED.size, rate), still)
     before, after, first = (np.abs(x - held(SPEED)).max() for x in (values, put_right, once))
     assert after < (0.05 if abs(rate) < 100 else 0.15) * before
     assert after < first
@@ -49,11 +48,11 @@ def test_a_block_is_a_mean_over_some_speeds() -> None:
     width = 30.0
     fine = np.linspace(-width / 2, width / 2, 201)
     means = np.array([simpson(held(w + fine), x=fine) / width for w in SPEED])
-    put_right = settled(SPEED, means, TINY, np.zeros(SPEED.size), np.full(SPEED.size, width))
+    *_, put_right = series(local(SPEED, means, TINY), SPEED, means, np.zeros(SPEED.size), np.full(SPEED.size, width))
     assert np.abs(put_right - held(SPEED)).max() < 0.1 * np.abs(means - held(SPEED)).max()
 
 
 def test_refusal() -> None:
     some = np.ones(20)
     with pytest.raises(AnalysisError, match="ascending"):
-        settled(some, some.astype(complex), TINY[:20], some, some)
+        local(some, some.astype(complex), TINY[:20])
