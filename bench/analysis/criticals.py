@@ -22,6 +22,7 @@ PROMINENCE = 0.1  # of the greatest amplitude: what a critical must stand out by
 DRAWS = 200
 FLAT = 0.97  # of the greatest amplitude: what says where it is
 LEAST, DISTINCT = 9, 5  # points that a cubic needs
+SEEN = 0.9  # of the drawn curves must show what is told
 NEAR = 0.03  # of the record: where a drawn curve's critical is looked for
 
 
@@ -29,7 +30,8 @@ NEAR = 0.03  # of the record: where a drawn curve's critical is looked for
 class Critical:
     """One critical: `speed` rad/s at the greatest amplitude, `amplitude` m 0-pk, `low` and `high` speeds at half power,
     amplification factor `factor` and `damping` = 1/(2 factor); their covariance (4, 4) in the order speed, amplitude, factor,
-    damping. A half-power point outside the record leaves low, high, factor and damping NaN."""
+    damping. A half-power point outside the record, or lost in the
+    noise, leaves low, high, factor and damping NaN."""
 
     speed: float
     amplitude: float
@@ -67,7 +69,7 @@ def criticals(
     if z.size < WINDOW or not (np.diff(w) > 0).all():
         raise AnalysisError(f"criticals: found {z.size} vectors; expected {WINDOW} or more, at speeds of their own")
     pooled = pooled_covariance(covariance[order])
-    smooth = smoother(w, z, pooled)
+    smooth = smoother(w, z, pooled, WINDOW)
     fine = np.abs(smooth.everywhere(z))
     tops = _tops(fine)
     if not tops:
@@ -76,7 +78,8 @@ def criticals(
     off = noise(pooled, seed, draws) if scatter is None else scatter[:, order]
     again = np.abs(smooth.everywhere(lines))
     drawn = np.abs(smooth.everywhere(lines + off))
-    return [_critical(smooth.x, fine, again, drawn, k) for k in tops]
+    found = (_critical(smooth.x, fine, again, drawn, k) for k in tops)
+    return [c for c in found if c is not None]
 
 
 def moved(
@@ -86,7 +89,7 @@ def moved(
     by how much they differ on each of the curves `others` (m, b): (m, 3). NaN is what lies outside the record. No bias is
     taken off."""
     base = np.asarray(values, np.complex128)
-    smooth = smoother(speed, base, pooled_covariance(covariance))
+    smooth = smoother(speed, base, pooled_covariance(covariance), WINDOW)
     sizes = np.abs(smooth.everywhere(np.vstack([base[None], np.asarray(others, np.complex128)])))
     k = int(np.argmin(np.abs(smooth.x - near.speed)))
     found = np.array([_numbers(smooth.x, size, k)[[0, 1, 4]] for size in sizes])
@@ -108,19 +111,20 @@ def _prominence(size: Array, k: int) -> float:
     return float(size[k] - max(lowest))
 
 
-def _critical(w: Array, size: Array, again: Array, drawn: Array, k: int) -> Critical:
+def _critical(w: Array, size: Array, again: Array, drawn: Array, k: int) -> Critical | None:
+    """None where the greatest amplitude itself is lost in the noise; where half power is, factor and damping are NaN."""
     found, base = _numbers(w, size, k), _numbers(w, again, k)
     scatter = np.array([_numbers(w, d, k) for d in drawn])
-    use = np.isfinite(scatter).all(axis=1)
-    if not np.isfinite(found).all():
-        use, covariance = np.isfinite(scatter[:, :2]).all(axis=1), np.full((4, 4), np.nan)
-        covariance[:2, :2] = np.cov(scatter[use, :2].T)
-        speed, amplitude = found[:2] - (scatter[use, :2].mean(axis=0) - base[:2])
+    there, whole = (np.isfinite(scatter[:, part]).all(axis=1) for part in (slice(0, 2), slice(None)))
+    if there.mean() < SEEN or not np.isfinite(found[:2] + base[:2]).all():
+        return None
+    if whole.mean() < SEEN or not np.isfinite(found + base).all():
+        covariance = np.full((4, 4), np.nan)
+        covariance[:2, :2] = np.cov(scatter[there, :2].T)
+        speed, amplitude = found[:2] - (scatter[there, :2].mean(axis=0) - base[:2])
         return Critical(float(speed), float(amplitude), math.nan, math.nan, math.nan, math.nan, covariance)
-    if use.mean() < 0.9:
-        raise AnalysisError(f"criticals: the one at {w[k]:.4g} rad/s is lost in the noise")
-    better = found - (scatter[use].mean(axis=0) - base)
-    s = scatter[use]
+    better = found - (scatter[whole].mean(axis=0) - base)
+    s = scatter[whole]
     columns = np.column_stack([s[:, 0], s[:, 1], s[:, 4], 1 / (2 * s[:, 4])])
     speed, amplitude, low, high, factor = (float(v) for v in better)
     return Critical(speed, amplitude, low, high, factor, 1 / (2 * factor), np.cov(columns.T))

@@ -124,10 +124,11 @@ class Smoother:
         return np.asarray((low - 2 * at + high) / (NARROW * self._windows.scale) ** 2)
 
 
-def smoother(x: Array, values: Complex, covariance: Array) -> Smoother:
-    """For curves at `x` (m,) ascending that scatter by `covariance` (m, 2, 2) about something like `values` (m,)."""
+def smoother(x: Array, values: Complex, covariance: Array, lines: int | None = None) -> Smoother:
+    """For curves at `x` (m,) ascending that scatter by `covariance` (m, 2, 2) about something like `values` (m,). A model takes
+    `lines` lines, or else as many as the noise lets it explain about the greatest of `values`."""
     weight = 1 / np.maximum(np.trace(covariance, axis1=1, axis2=2), 1e-300)
-    windows = _windows(x, np.arange(x.size), _width(x, values, weight))
+    windows = _windows(x, np.arange(x.size), lines or _width(x, values, weight))
     places = (x[:, None] + windows.between * windows.scale[:, None]).ravel()
     order = np.argsort(places, kind="stable")
     return Smoother(places[order], windows, weight, order)

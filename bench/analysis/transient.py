@@ -32,7 +32,7 @@ def local(speed: Array, values: Complex, covariance: Array) -> Smoother:
     """
     if speed.size < WINDOW or not (np.diff(speed) > 0).all():
         raise AnalysisError(f"passage: found {speed.size} blocks; expected {WINDOW} or more, at ascending speeds")
-    return smoother(speed, values, pooled_covariance(covariance))
+    return smoother(speed, values, pooled_covariance(covariance), WINDOW)
 
 
 def series(

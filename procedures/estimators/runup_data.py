@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from bench.analysis import serial
 from bench.analysis.orders import synchronous
 from bench.analysis.sampling import Sampling
 from bench.analysis.tachometer import Tachometer, age, counted, tachometer
@@ -171,15 +172,19 @@ def _piece(p: Passage, angle: Array, first: int, last: int, turns: int) -> tuple
     edges = p.tacho.time(2 * math.pi * (first + turns * np.arange(track.speed.size + 1)))
     places = np.searchsorted(p.t[part], edges)
     volts = np.maximum.reduceat(p.volts[:, part], np.minimum(places[:-1], p.volts[:, part].shape[1] - 1), axis=1).T
-    moved = parts(track.moves[..., 0][..., None])
+    moves = track.moves[..., 0]
+    moved = parts(moves[..., None])
     covariance = np.einsum("bmci,bmcj->bcij", moved, moved)
+    alone, whole = serial.variances(moves)
     second = track.values[..., 1] if len(orders) > 1 else np.full((track.speed.size, 12), np.nan + 0j)
     width = np.abs(np.diff(p.tacho.speed(np.clip(edges, p.tacho.times[0], p.tacho.times[-1]))))
-    return track.t, track.speed, width, track.values[:, :, 0], covariance, track.means, volts, second
+    return track.t, track.speed, width, track.values[:, :, 0], covariance, alone, whole, track.means, volts, second
 
 
 def _ordered(joined: Sequence[Any]) -> Curve:
-    t, speed, width, values, covariance, means, volts, second = joined
+    t, speed, width, values, covariance, alone, whole, means, volts, second = joined
+    for kind in (slice(0, 4), slice(4, 12)):  # positions, currents
+        covariance[:, kind] *= serial.inflation(alone[:, kind], whole[:, kind])[:, None, None, None]
     acceleration = np.gradient(speed, t)
     order = np.argsort(speed, kind="stable")
     rising = order[np.concatenate([[True], np.diff(np.maximum.accumulate(speed[order])) > 0])]

@@ -31,6 +31,9 @@ Complex = npt.NDArray[np.complex128]
 DAMPED = 2.5  # amplification factor under which API 617 sees no critical speed
 UNITS = {"speed": "rad/s", "amplitude": "m", "factor": "1"}
 LAG = "what is left of the lag of the response"
+BEND = "what is left of the size of the orbit"
+LEFT = {LAG: "lag", BEND: "bend"}
+HARMONICS = "harmonics"
 DRAWS = 120
 USUAL = 30  # of them say how far a curve of the known noise is off its models
 BENDING = (*(f"{name}_{k}" for name in ("beta", "offset", "zero", "gain") for k in range(4)), "gap", "mass", "inertia",
@@ -137,10 +140,12 @@ def _large(
     c: Curve, inputs: Mapping[str, Estimate], runouts: Mapping[float, Runout], law: str, set_to: Mapping[str, float]
 ) -> dict[str, Complex]:
     """What large orbits add to the shaft's vectors (4, b) m, under ""; under the name of each of the `BENDING` inputs, if that
-    is off by its standard uncertainty."""
+    is off by its standard uncertainty; under `HARMONICS`, without the second harmonics."""
     values, off = {name: e.value for name, e in inputs.items()}, {n: runouts[n].values for n in (1.0, 2.0)}
     changed = {"": values} | {name: values | {name: values[name] + inputs[name].u} for name in BENDING}
-    return {name: runup_linear.bend(Stand.of(v), c, off, law, set_to) for name, v in changed.items()}
+    bends = {name: runup_linear.bend(Stand.of(v), c, off, law, set_to) for name, v in changed.items()}
+    once = replace(c, second=np.full_like(c.second, np.nan))
+    return bends | {HARMONICS: runup_linear.bend(Stand.of(values), once, off, law, set_to)}
 
 
 @dataclass(frozen=True)
@@ -187,28 +192,32 @@ class _Line:
 def _peaks(
     line: _Line, series: Sequence[Complex], large: Mapping[str, Complex], inputs: Mapping[str, Estimate], running: float
 ) -> list[Peak]:
-    """Of small orbits, with the influences of the scatter, of the runout, of what is left of the lag, of the probe's gain, and
-    of what the bearings' bend rests on; the amplitude is that of the orbit as it was."""
+    """Of small orbits, with the influences of the scatter, of the runout, of the probe's gain, of what the bearings' bend rests
+    on, and of what is left of the lag and of that bend: no more than what the last term of the one and the second harmonics in
+    the other change. The amplitude is that of the orbit as it was."""
     axis, gain, out = AXES[line.k], inputs[f"gain_{line.k}"], []
     raw, once, best = (z - large[""] for z in series)
     runout = [
         (p, p.u * (1j if j else 1.0)) for j, p in enumerate(line.runout.parts[2 * line.k : 2 * line.k + 2]) if p.u
     ]
     parts_ = [p for p, _ in runout] + [inputs[name] for name in BENDING]
-    others = [series[-1], raw, once, *(best - u for _, u in runout), *(series[-1] - large[name] for name in BENDING)]
+    others = [series[-1], raw, once, series[-1] - large[HARMONICS]]
+    others += [*(best - u for _, u in runout), *(series[-1] - large[name] for name in BENDING)]
     speeds = line.found.speed
     scatter = line.scatter()
     each = parts(scatter[..., None])
     covariance = np.einsum("nbi,nbj->bij", each, each) / DRAWS
     for number, c in enumerate(criticals(speeds, best, covariance, scatter=scatter), 1):
         where = f"{axis}/{number}"
-        (as_it_was, before, rest, *shifts) = moved(speeds, best, others, covariance, c)[1]
+        (as_it_was, before, lag, bend, *shifts) = moved(speeds, best, others, covariance, c)[1]
         slopes = [(part, shift / part.u) for part, shift in zip(parts_, shifts, strict=True)]
         numbers = {"speed": c.speed, "amplitude": c.amplitude + float(as_it_was[1]), "factor": c.factor}
-        made = {
-            name: _number(where, name, value, c.covariance[j, j], abs(float(rest[j])), [(p, float(m[j])) for p, m in slopes])
-            for j, (name, value) in enumerate(numbers.items())
-        }  # fmt: skip
+        made = {}
+        for j, (name, value) in enumerate(numbers.items()):
+            of_bend = name != "amplitude"
+            left = {LAG: float(lag[j]), BEND: float(bend[j]) if of_bend else 0.0}
+            terms = [(part, float(m[j])) for part, m in (slopes if of_bend else slopes[: len(runout)])]
+            made[name] = _number(where, name, value, c.covariance[j, j], left, terms)
         speed, amplitude = made["speed"], made["amplitude"]
         if speed is None or amplitude is None:
             continue
@@ -222,15 +231,23 @@ def _peaks(
 
 
 def _number(
-    where: str, name: str, value: float, variance: float, left: float, moved: Sequence[tuple[Estimate, float]]
+    where: str,
+    name: str,
+    value: float,
+    variance: float,
+    left: Mapping[str, float],
+    moved: Sequence[tuple[Estimate, float]],
 ) -> Estimate | None:
     """A number of a critical with its influences; None where the record does not give it."""
     unit = UNITS[name]
-    if not math.isfinite(value + variance + left):
+    if not math.isfinite(value + variance + sum(left.values())):
         return None
     scatter = Influence(f"scatter/{where}/{name}", "scatter of the passage", math.sqrt(variance), unit, "A", "normal")
-    rest = Influence(f"lag/{where}/{name}", LAG, left / math.sqrt(3), unit, "B", "rectangular")
-    terms = [(1.0, Estimate.of(0.0, scatter)), (1.0, Estimate.of(0.0, rest))]
+    rests = [
+        Influence(f"{LEFT[what]}/{where}/{name}", what, abs(half) / math.sqrt(3), unit, "B", "rectangular")
+        for what, half in left.items()
+    ]
+    terms = [(1.0, Estimate.of(0.0, influence)) for influence in (scatter, *rests)]
     terms += [(slope, part) for part, slope in moved if math.isfinite(slope)]
     return Estimate(value, unit, merged(terms))
 

@@ -79,6 +79,20 @@ def test_two_criticals_and_a_half_power_point_outside() -> None:
     assert np.isfinite(near[0].amplitude)
 
 
+def test_half_power_that_the_noise_hides_is_not_told() -> None:
+    """The record begins where the amplitude is 0.70 of the greatest: half power is on it, but not on every drawn curve."""
+    zeta, u = 0.1, 2e-6
+    top = closed_form(zeta)[0]
+    begin = brentq(lambda w: np.abs(response(w, zeta)) - 0.70 * np.abs(response(top, zeta)), 1, top)
+    w = np.linspace(begin, 1500, 120)
+    covariance = np.tile(u**2 * np.eye(2), (w.size, 1, 1))
+    (found,) = criticals(w, response(w, zeta), covariance, draws=100)
+    assert np.isnan(found.factor)
+    assert found.speed == pytest.approx(top, rel=0.02)
+    (clear,) = criticals(w, response(w, zeta), covariance * 1e-8, draws=20)
+    assert clear.factor == pytest.approx(closed_form(zeta)[1], rel=0.02)
+
+
 def test_no_critical_and_refusal() -> None:
     w = np.linspace(100, 300, 50)
     assert criticals(w, response(w, 0.1), np.tile(1e-18 * np.eye(2), (50, 1, 1)), draws=5) == []
