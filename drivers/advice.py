@@ -12,7 +12,7 @@ ADVICE = {
     "LEVITATION_LOST": "check sensor signs and wiring, amplifier limits and the load",
     "LIFT_TIMEOUT": "the rotor did not reach its place; check sensors, amplifiers and gains",
     "OVERTEMPERATURE": "let the windings cool",
-    "SENSOR": "check the position sensors",
+    "SENSOR": "check the position sensors and the once-per-turn probe",
 }
 HARMLESS = ("HEARTBEAT_LOST", "COMMUNICATION")
 """Faults of a lost host, which say nothing of the machine: the next run may clear them by itself."""

@@ -46,7 +46,8 @@ class Tachometer:
             if turns[0] == turns[1] or abs(at - self.fired[k]) < 0.5:
                 continue
             self.fired[k] = at
-            if k or not (p.pulse_missing and max(turns) % p.pulse_missing == 0):
+            ended = p.pulse_last and len(self.pulses) >= p.pulse_last
+            if not ended and (k or not (p.pulse_missing and max(turns) % p.pulse_missing == 0)):
                 self.pulses.append((tick + (at - before) / (after - before)) * TICK_S)
 
     def speed(self, now: float) -> float:

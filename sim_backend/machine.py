@@ -36,6 +36,8 @@ class SimulatedPlant(Protocol):
     @property
     def pulse_age_s(self) -> float | None: ...  # since the last once-per-turn pulse; None: speed not by pulses
     @property
+    def turn_s(self) -> float | None: ...  # between the last two pulses; None: there are not two
+    @property
     def shaft_speed(self) -> float: ...  # the true one
     @property
     def drive_torque(self) -> float: ...  # N m, of the external drive

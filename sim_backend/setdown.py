@@ -9,6 +9,8 @@ from sim_backend.machine import SimulatedPlant
 
 DRIVE_GIVES_UP_S = 1.0  # a drive that nobody asks anything coasts by itself after so long
 TOO_FAST = 1.1  # times the landing speed
+HARDEST_RAD_S2 = 250.0  # a drive that brakes as hard as it can
+SILENT_TURNS = 4  # a pulse or two may be missed
 
 
 def slow(plant: SimulatedPlant, limit_rad_s: float, free_tick: int) -> bool:
@@ -16,11 +18,28 @@ def slow(plant: SimulatedPlant, limit_rad_s: float, free_tick: int) -> bool:
 
     What the last two pulses tell is the speed of the turn before, and in the first turn of a run-up they tell nothing. But a
     shaft that nothing speeds up, and that makes less than a turn in 2 pi / limit, is slower than that at the end of it.
+    Where pulses have ended while it turned fast, their silence says nothing.
     """
     if plant.pulse_age_s is None:
         return abs(plant.speed) < limit_rad_s
+    if pulses_lost(plant):
+        return False
     quiet_s = min(plant.pulse_age_s, (plant.tick - free_tick) * TICK_S)
     return quiet_s > 2 * math.pi / limit_rad_s
+
+
+def pulses_lost(plant: SimulatedPlant) -> bool:
+    """Whether pulses have ended that the shaft must give: no brake stops it within a turn from that speed.
+
+    A turn took T; at its end the speed was v = 2 pi / T - a T / 2 at least, and if v^2 > 4 pi a another one is done after
+    t = (v - sqrt(v^2 - 4 pi a)) / a, with a the hardest braking. Slower shafts may have stopped.
+    """
+    age, turn, a = plant.pulse_age_s, plant.turn_s, HARDEST_RAD_S2
+    if age is None or turn is None:
+        return False
+    v = 2 * math.pi / turn - a * turn / 2
+    rest = v * abs(v) - 4 * math.pi * a
+    return rest > 0 and age > SILENT_TURNS * (v - math.sqrt(rest)) / a
 
 
 def too_fast(plant: SimulatedPlant, limit_rad_s: float) -> bool:

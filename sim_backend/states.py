@@ -58,7 +58,8 @@ class States:
     def progress(self, rows: core.Array) -> None:
         """What it does by itself at the present, after `rows` of the plant: trips, watchdog, ends of movements."""
         plant, tick = self._plant, self._plant.tick
-        if plant.trips or (self._planted_s and tick * TICK_S > self._planted_s and self.fault == "NONE"):
+        planted = self._planted_s and tick * TICK_S > self._planted_s
+        if plant.trips or (self.fault == "NONE" and (planted or (self.state in HELD and setdown.pulses_lost(plant)))):
             self.fail(next((name for bit, name in core.TRIPS.items() if plant.trips & bit), "SENSOR"))
         elif self.watching and (tick - self._owner.heartbeat) * TICK_S > self._own["watchdog_s"]:
             self._lose_host()

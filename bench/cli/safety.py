@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 RESTING = ("OFF", "READY", "FAULT")
 SAFE = ("OFF", "FAULT")
 LAND_S, STOP_S, COMMAND_S = 20.0, 90.0, 5.0
+ALONE_S = STOP_S + LAND_S - 5.0  # a little less than the supervisor gives it
 BLIND_S = 5.0  # the heartbeat's lease, the watchdog and a landing take less
 
 
@@ -96,13 +97,20 @@ class _Way:
 
     def watchdog(self) -> None:
         c = self.controller
-        if c.mode not in SAFE:
-            self.base.renewing = False
-            _until(lambda: c.mode in SAFE or _blind(c), c.clock)
-        if c.mode not in SAFE:
+        if c.mode in SAFE:
+            return
+        self.base.renewing = False
+        end_ns = c.clock.now_ns() + round(ALONE_S * 1e9)
+        _until(lambda: c.mode in SAFE or _blind(c) or c.clock.now_ns() > end_ns, c.clock)
+        if c.mode not in SAFE and _blind(c):
             raise LinkError(
                 "the machine cannot be seen. No heartbeat goes out any more, so that its controller lands it by itself; "
                 "look at it before going near"
+            )
+        if c.mode not in SAFE:
+            raise LinkError(
+                f"the controller still says {c.mode}: the rotor is up, and the controller does not take it to be slow. "
+                "Switch the amplifiers off by hand once you see that the shaft stands"
             )
 
 

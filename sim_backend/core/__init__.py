@@ -123,6 +123,10 @@ class Plant:
         """There are no pulses: an encoder tells the angle all the time."""
 
     @property
+    def turn_s(self) -> None:
+        """There are no pulses."""
+
+    @property
     def age_ticks(self) -> int:
         """Ticks run since the last completed telemetry period."""
         return int(self._s.in_period)

@@ -27,7 +27,7 @@ typedef struct {
     double position_gain[5], position_offset[5], position_sign[5], position_noise, position_lsb, position_range;
     double runout[16], runout_phase[16];
     /* once-per-turn pulse, when the shaft's angle + pulse_angle is a whole turn; defects */
-    double pulse_angle, pulse_missing, pulse_doubled, exchange_planes, exchange_axes, loose_speed, loose_shift;
+    double pulse_angle, pulse_missing, pulse_doubled, pulse_last, exchange_planes, exchange_axes, loose_speed, loose_shift;
     double lost_radius, lost_time, trip_current, trip_speed;
 } amb_params;
 

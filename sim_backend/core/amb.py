@@ -103,6 +103,12 @@ class AmbPlant:
         return float(self.tick * TICK_S - self._s.tacho.last)
 
     @property
+    def turn_s(self) -> float | None:
+        """Time between the last two pulses; None before there are two."""
+        tacho = self._s.tacho
+        return float(tacho.last - tacho.before) if tacho.pulses >= 2 else None
+
+    @property
     def phase(self) -> float:
         """Phase of the ellipse's reference at the last reading, rad, for tests."""
         return float(self._s.law.phase)

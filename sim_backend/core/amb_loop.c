@@ -73,6 +73,7 @@ void amb_ticked(const amb_params *p, amb_tacho *t, double before, double after, 
         if (fabs(mark - t->fired[k]) < 0.5) continue;
         t->fired[k] = mark;
         if (k == 0 && p->pulse_missing > 0 && fmod(turn, p->pulse_missing) == 0) continue;
+        if (p->pulse_last > 0 && t->pulses >= p->pulse_last) continue;
         pulse(t, (tick + share) * TICK);
     }
 }

@@ -100,6 +100,7 @@ class AmbParams:
     pulse_angle: float = 0.0
     pulse_missing: float = 0.0  # every how manieth pulse does not come; 0: none is missing
     pulse_doubled: float = 0.0  # how far after the mark there is a second one, rad; 0: there is none
+    pulse_last: float = 0.0  # after so many pulses none comes any more; 0: they do not end
     exchange_planes: float = 0.0
     exchange_axes: float = 0.0  # probes of y and z, in both planes
     loose_speed: float = 0.0  # speed in rad/s above which mounted weights slip, once, by loose_shift; 0: never

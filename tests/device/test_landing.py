@@ -38,8 +38,8 @@ COASTED = {"deadline": None, "derandomize": True, "suppress_health_check": list(
 class Watched(Host):
     """A host that looks every 20 ms whether the shaft has been let go, and how fast it turned then."""
 
-    def __init__(self, name: str) -> None:
-        super().__init__(RIGS[name])
+    def __init__(self, name: str, **defects: float) -> None:
+        super().__init__(RIGS[name], **defects)
         spec = next(d for d in self.rig.devices.values() if "drive" in d.roles)
         most = self.rig.envelope.max_speed_rad_s
         self.drive = SimulatedDrive(self.device.plant, spec, self.device.truth, most)
@@ -165,6 +165,46 @@ def test_a_trip_that_stays_does_not_put_the_landing_off() -> None:
             host.device.states.fail("OVERCURRENT")
             host.passed(SLICE_S)
     assert host.device.state == "LANDING"
+
+
+@pytest.mark.parametrize("end", ["LAND", "MAKE_SAFE", "dead"])
+def test_a_shaft_whose_pulses_have_ended_at_speed_stays_up(end: str) -> None:
+    """The probe of the mark dies at some 1400 r/min; the host notices nothing, and asks for a landing later, or dies too."""
+    host = Watched("amb5dof", pulse_last=60.0)
+    host.levitate()
+    host.drive.asked()
+    host.drive.aim(150.0)
+    host.drive.obey("run")
+    host.passed(1.0)
+    for _ in range(100):
+        if host.device.fault == "SENSOR":
+            break
+        host.passed(0.05)
+    assert (host.device.fault, host.device.state) == ("SENSOR", "COASTING")
+    assert host.device.plant.shaft_speed > 120
+    host.beating = end != "dead"
+    if host.beating:
+        host.looked(lambda: host.command(end))
+    host.passed(4.0)
+    assert host.device.state == "COASTING"
+    assert host.wrong == []
+
+
+def test_a_missed_pulse_and_the_hardest_braking_are_no_dead_probe() -> None:
+    host = Watched("amb5dof", pulse_missing=7.0)
+    host.levitate()
+    host.drive.asked()
+    host.drive.accelerate(250.0)
+    host.drive.aim(300.0)
+    host.drive.obey("run")
+    host.passed(2.0)
+    host.drive.aim(0.0)
+    host.passed(3.0)
+    assert (host.device.fault, host.device.state) == ("NONE", "LEVITATED")
+    assert host.command("LAND") == "OK"
+    host.passed(2.0)
+    assert host.device.state == "READY"
+    assert host.wrong == []
 
 
 @pytest.mark.long

@@ -38,8 +38,10 @@ class Stand:
         self.machine = SimulatedRig(RIG, draw(RIG, seed, truth), 1)
         self.plant = self.machine.device.plant
         self.bank = RegisterBank(RIG, self.machine.truth, self.plant)
-        base = Followed(self.machine, self.bank)
-        self.controller = Controller(RIG, self.machine.link, base, Session(1, 1_767_225_600, "test"))
+        self.supervisor = Supervisor()
+        time = Followed(self.machine, self.bank)
+        self.base = WatchedClock(time, self.machine.link.renew_lease, self.supervisor.check)
+        self.controller = Controller(RIG, self.machine.link, self.base, Session(1, 1_767_225_600, "test"))
         self.frames, receive = hashlib.sha256(), self.machine.link.receive
 
         def heard() -> np.ndarray:
@@ -210,18 +212,34 @@ def test_make_safe_lands_what_the_controller_sees_turning_for_a_while_yet() -> N
     """The drive says standstill; the pulses, and with them the controller's state, say so half a second later."""
     stand = Stand(1)
     stand.levitate()
-    supervisor = Supervisor()
-    base = WatchedClock(stand.machine, stand.machine.link.renew_lease, supervisor.check)
     with driven(stand) as bus:
         assert bus.drive is not None
         bus.drive.reach(100.0)
-        brake, _, land = safe_steps(stand.controller, base, bus.drive)[1:4]
+        brake, _, land = safe_steps(stand.controller, stand.base, bus.drive)[1:4]
         brake.action()
         assert stand.controller.mode == "SPINNING"
         begin = stand.machine.now_ns()
         land.action()
         assert (stand.machine.now_ns() - begin) * 1e-9 < land.timeout_s / 4
     assert stand.controller.mode == "READY"
+
+
+@pytest.mark.long
+def test_make_safe_does_not_let_down_a_shaft_whose_pulses_have_ended() -> None:
+    """The drive is switched off, the rotor stays up, and a person is told."""
+    stand = Stand(1, pulse_last=60.0)
+    stand.levitate()
+    with driven(stand) as bus:
+        assert bus.drive is not None
+        bus.drive.set_speed(300.0)
+        bus.drive.run()
+        with pytest.raises(DeviceFault, match="SENSOR"):
+            stand.controller.clock.sleep(4.0)
+        stand.controller.guarded = False
+        found = stand.supervisor.make_safe(safe_steps(stand.controller, stand.base, bus.drive), stand.machine.now_ns)
+        assert bus.drive.confirm_off()
+    assert "the rotor is up" in found[-1].text
+    assert stand.controller.mode == "COASTING"
 
 
 def test_a_sensor_of_the_wrong_sign_is_never_levitated() -> None:

@@ -108,7 +108,7 @@ OBSERVED = {"observer": 1.0, "compensate": 3.0, "integral": 0.0}
         (1, {"observer": 2.0, "compensate": 3.0}, {}, None),
         (2, NOTCHED | {"inject_axis": 2.0, "inject_amplitude": 0.01, "inject_lines": 5.0, "inject_step": 30.0},
          {"mode_on": (1.0, 1.0), "pulse_missing": 3.0}, None),
-        (0, NOTCHED, {"mode_on": (1.0, 0.0), "pulse_doubled": 2.0}, None),
+        (0, NOTCHED, {"mode_on": (1.0, 0.0), "pulse_doubled": 2.0, "pulse_last": 12.0}, None),
     ],
     ids=["PID", "CCS", "CAC", "CCS observer", "CAC observer", "literal observer", "CAC flexible", "PID flexible"],
 )  # fmt: skip
