@@ -114,16 +114,21 @@ def _critical(w: Array, size: Array, again: Array, drawn: Array, k: int) -> Crit
     use = np.isfinite(scatter).all(axis=1)
     if not np.isfinite(found).all():
         use, covariance = np.isfinite(scatter[:, :2]).all(axis=1), np.full((4, 4), np.nan)
+        _kept(use, w[k])
         covariance[:2, :2] = np.cov(scatter[use, :2].T)
         speed, amplitude = found[:2] - (scatter[use, :2].mean(axis=0) - base[:2])
         return Critical(float(speed), float(amplitude), math.nan, math.nan, math.nan, math.nan, covariance)
-    if use.mean() < 0.9:
-        raise AnalysisError(f"criticals: the one at {w[k]:.4g} rad/s is lost in the noise")
+    _kept(use, w[k])
     better = found - (scatter[use].mean(axis=0) - base)
     s = scatter[use]
     columns = np.column_stack([s[:, 0], s[:, 1], s[:, 4], 1 / (2 * s[:, 4])])
     speed, amplitude, low, high, factor = (float(v) for v in better)
     return Critical(speed, amplitude, low, high, factor, 1 / (2 * factor), np.cov(columns.T))
+
+
+def _kept(use: npt.NDArray[np.bool_], where: float) -> None:
+    if use.mean() < 0.9:
+        raise AnalysisError(f"criticals: the one at {where:.4g} rad/s is lost in the noise")
 
 
 def _numbers(w: Array, size: Array, near: int) -> Array:
@@ -140,6 +145,8 @@ def _numbers(w: Array, size: Array, near: int) -> Array:
         return np.array([speed, top, np.nan, np.nan, np.nan])
     low = _crossing(w, size, left[-1], HALF_POWER * top)
     high = _crossing(w, size, k + right[0] - 1, HALF_POWER * top)
+    if not high > low:  # noise alone makes a width of nothing
+        return np.array([speed, top, np.nan, np.nan, np.nan])
     return np.array([speed, top, low, high, speed / (high - low)])
 
 
