@@ -188,6 +188,16 @@ def test_a_planted_defect_is_named_and_never_passes(
     list(unbalance.figures(run.recording))  # what can be drawn is drawn
 
 
+def test_motion_that_does_not_turn_with_the_shaft_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """D_max is of what turns with the shaft: at 47 Hz beside it the shaft went to 45 µm, and D_max said 16 in zone A."""
+    shaken = {"inject_amplitude": 0.1, "inject_hz": 47.0, "inject_lines": 1.0, "inject_axis": 0.0}
+    monkeypatch.setitem(SETTINGS, "off", SETTINGS["off"] | shaken)
+    run = simulated_run("unbalance", "amb5dof", SEED, ONE, tmp_path / "recording.mcap", {})
+    found = [f for f in run.results if isinstance(f, Finding) and f.code == "not-synchronous"]
+    assert found[0].effect is Effect.INDETERMINATE
+    assert "inboard" in found[0].text
+
+
 def test_planes_exchanged_within_the_loop_do_not_levitate(tmp_path: Path) -> None:
     run = simulated_run("unbalance", "amb5dof", SEED, ONE, tmp_path / "recording.mcap", {"exchange_planes": 1.0})
     assert any(isinstance(f, Finding) and f.effect is Effect.ERROR for f in run.results)
