@@ -127,10 +127,14 @@ def read_dwell(recording: Recording[Any], step: Step) -> Dwell:
     track = synchronous(t, wide, tacho, sampling, orders=_seen(ORDERS, float(step.labels["speed_rad_s"]), ticks * tick))
     labels, flags = step.labels, data["flags"].astype(np.int64)
     captures = recording.captures(dwell=labels["number"]) if step.kind == DWELL else ()
+    full = full_rate(captures[0]) if captures else None
+    held = max(
+        clips(wide[:4]), clips(full.positions) if full else 0
+    )  # a turn at speed is a few samples of the telemetry
     return Dwell(
         step.kind, str(labels["variant"]), float(labels["speed_rad_s"]), float(labels["driven_rad_s"]),
-        bool(labels["again"]), tacho, track, full_rate(captures[0]) if captures else None, int(np.bitwise_or.reduce(flags)),
-        clips(wide[:4]), tuple(c for c, x in zip((*POSITIONS, *CURRENTS), wide, strict=True) if np.ptp(x) == 0),
+        bool(labels["again"]), tacho, track, full, int(np.bitwise_or.reduce(flags)), held,
+        tuple(c for c, x in zip((*POSITIONS, *CURRENTS), wide, strict=True) if np.ptp(x) == 0),
         step.lost(), step.expected(), step.start_ns,
     )  # fmt: skip
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from bearing_facts import bearings
 
+from bench.analysis.vectors import radius2
 from bench.cli.virtual import given, simulated_run
 from bench.errors import BenchError
 from bench.findings import Effect, Finding
@@ -186,6 +187,24 @@ def test_a_planted_defect_is_named_and_never_passes(
     assert found, [f.code for f in run.results if isinstance(f, Finding)]
     assert found[0].effect is effect
     list(unbalance.figures(run.recording))  # what can be drawn is drawn
+
+
+def test_a_clipping_probe_shows_in_the_capture_where_the_controller_does_not_tell(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At 4000 r/min a turn is 15 samples of the telemetry: none of them stays at the limit for eight."""
+    monkeypatch.setattr(unbalance_checks, "RANGE", 0)
+    truth = {"position_range": 78e-6, "unbalance_i": 1.05e-5, "unbalance_o": 1.05e-5}
+    plan = {**ONE, "speeds_rad_s": (4000 * RPM,)}
+    run = simulated_run("unbalance", "amb5dof", SEED, plan, tmp_path / "recording.mcap", truth)
+    assert any(f.code == "sensor-clipped" for f in run.results if isinstance(f, Finding))
+
+
+def test_an_ellipse_has_the_degrees_of_freedom_of_all_its_influences(compared: Run) -> None:
+    """Certificates and runout carry it, not the fourteen of the dwell's batches: k = 2.45 within a few percent, not 2.86."""
+    for r in compared.results.dwells:
+        if r.dwell.variant == "off":
+            assert np.sqrt(radius2(r.vectors.dof)) < 2.6
 
 
 def test_motion_that_does_not_turn_with_the_shaft_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
