@@ -12,13 +12,12 @@ from bench.analysis.tachometer import against
 from bench.analysis.vectors import radius2
 from bench.findings import Effect, Finding
 from bench.recording import Recording
-from procedures.estimators import signals
+from procedures.estimators import signals, unbalance_beside
 from procedures.estimators.unbalance_data import (
     AXES,
     CONTACT,
     CURRENT_LIMIT,
     DWELL,
-    PLANES,
     RANGE,
     RPM,
     SLOW,
@@ -32,11 +31,6 @@ from procedures.estimators.unbalance_plan import PER_TURN, Settings, too_fast
 HELD = 8  # samples in a row at an extreme: a probe that clips
 UNEXPLAINED = 0.1  # share of the forces that two unbalances leave over: a channel is not what its name says
 CARRIED = 0.5  # of the share of the weight that an axis should carry: how far its coils may be off
-BESIDE = 0.05  # of the least clearance: motion beside the orders that D_max may leave out
-FITTED, QUIET = (
-    8,
-    6.0,
-)  # orders that turn with the shaft; standard deviations of a probe's noise that a peak of it reaches
 CHANGED, CHANGED_M = 0.1, 0.3e-6  # of the vector, and at least: a repeat that differs by more
 ZONES = (("A", 0.3), ("B", 0.4), ("C", 0.5), ("D", math.inf))
 """Upper ends of the zones, D_max over the least clearance (ISO 14839-2, Table 1: numbers not checked against the standard)."""
@@ -127,7 +121,8 @@ def of_results(results: Results, plan: Settings) -> Iterator[Finding]:
     """Do forces and motion agree? Is a repeat the same? Then zones and the runout, as notes."""
     yield from channels(results.dwells)
     yield from weight(results.dwells)
-    yield from _beside(results)
+    yield from unbalance_beside.beside(results)
+    yield from unbalance_beside.folded(results)
     yield from _repeats(results)
     yield from _told(results)
     if plan.variants:
@@ -166,37 +161,6 @@ def weight(dwells: Sequence[Balanced]) -> Iterator[Finding]:
                     "suspect the coils of an axis exchanged, a current sensor, or a wrong model of the bearing.")  # fmt: skip
             yield Finding("weight-not-carried", text, r.dwell.where, Effect.ERROR)
             return
-
-
-def beside_orders(d: Dwell) -> Array:
-    """Of both planes (2,) m: the greatest motion in the capture that does not turn with the shaft, its mean and drift apart,
-    beyond what the probes' noise makes of a peak."""
-    assert d.full is not None
-    angle = d.full.tacho.angle(d.full.t)
-    inside = np.isfinite(angle)
-    theta, data = angle[inside], d.full.positions[:, inside]
-    turning = [f(n * theta) for n in range(1, FITTED + 1) for f in (np.cos, np.sin)]
-    steady = np.array([np.ones_like(theta), *turning])
-    design = np.concatenate([steady, steady * np.linspace(-1, 1, theta.size)])  # amplitudes that change evenly
-    rest = data - np.linalg.lstsq(design.T, data.T, rcond=None)[0].T @ design
-    noise = np.diff(data, 3).std(axis=1) / math.sqrt(20)
-    far = [np.hypot(rest[k], rest[k + 1]).max() - QUIET * noise[k : k + 2].max() for k in (0, 2)]
-    return np.asarray(np.maximum(far, 0.0), np.float64)
-
-
-def _beside(results: Results) -> Iterator[Finding]:
-    """D_max is of what turns with the shaft; ISO 14839-2 means the whole motion."""
-    clearance = results.clearance.value
-    for r in results.dwells:
-        if r.dwell.full is None:
-            continue
-        far = beside_orders(r.dwell)
-        if far.max() > BESIDE * clearance:
-            plane = list(PLANES)[int(far.argmax())]
-            text = (f"{plane} the shaft moves by up to {far.max() * 1e6:.1f} µm that does not turn with it "
-                    f"({far.max() / clearance:.0%} of the clearance; {BESIDE:.0%} is allowed): D_max leaves that out and is "
-                    "too small. Suspect a loop near its limit of stability, a rub, or a shaker: see the spectrum.")  # fmt: skip
-            yield Finding("not-synchronous", text, r.dwell.where, Effect.INDETERMINATE)
 
 
 def _repeats(results: Results) -> Iterator[Finding]:

@@ -49,8 +49,8 @@ class Full:
 @dataclass(frozen=True)
 class Dwell:
     """The shaft at one speed with one setting of the controller. `wanted` rad/s as planned, `driven` as the drive says, `speed`
-    by the pulses; `track` of the four positions and eight coil currents; `flags` ORed; `stuck` channels; `again`: a repeat
-    at the end. `full` None where nothing was captured."""
+    by the pulses; `track` of the four positions and eight coil currents, `sampling` of these; `flags` ORed; `stuck` channels;
+    `again`: a repeat at the end. `full` None where nothing was captured."""
 
     kind: str
     variant: str
@@ -66,6 +66,7 @@ class Dwell:
     lost: int
     expected: int
     start_ns: int
+    sampling: Sampling
 
     @property
     def speed(self) -> float:
@@ -135,7 +136,7 @@ def read_dwell(recording: Recording[Any], step: Step) -> Dwell:
         step.kind, str(labels["variant"]), float(labels["speed_rad_s"]), float(labels["driven_rad_s"]),
         bool(labels["again"]), tacho, track, full, int(np.bitwise_or.reduce(flags)), held,
         tuple(c for c, x in zip((*POSITIONS, *CURRENTS), wide, strict=True) if np.ptp(x) == 0),
-        step.lost(), step.expected(), step.start_ns,
+        step.lost(), step.expected(), step.start_ns, sampling,
     )  # fmt: skip
 
 

@@ -207,6 +207,16 @@ def test_an_ellipse_has_the_degrees_of_freedom_of_all_its_influences(compared: R
             assert np.sqrt(radius2(r.vectors.dof)) < 2.6
 
 
+@pytest.mark.parametrize(("rpm", "named"), [(12000, True), (11800, False)])
+def test_an_order_that_the_telemetry_takes_for_order_1_is_named(tmp_path: Path, rpm: int, named: bool) -> None:
+    """A drive that holds 12 000 r/min: five samples of the telemetry in a turn, of which order 4 makes another order 1."""
+    truth = {"drive_gain": 1.0, "runout_i4": 0.45e-6, "runout_o4": 0.45e-6}
+    run = simulated_run("unbalance", "amb5dof", SEED, {**ONE, "speeds_rad_s": (rpm * RPM,)}, tmp_path / "r.mcap", truth)
+    found = [f for f in run.results if isinstance(f, Finding) and f.code == "aliasing"]
+    assert bool(found) == named
+    assert not named or "order 4 as order 1" in found[0].text
+
+
 def test_motion_that_does_not_turn_with_the_shaft_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """D_max is of what turns with the shaft: at 47 Hz beside it the shaft went to 45 µm, and D_max said 16 in zone A."""
     shaken = {"inject_amplitude": 0.1, "inject_hz": 47.0, "inject_lines": 1.0, "inject_axis": 0.0}
