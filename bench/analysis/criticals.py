@@ -144,6 +144,8 @@ def _numbers(w: Array, size: Array, near: int) -> Array:
         return np.array([speed, top, np.nan, np.nan, np.nan])
     low = _crossing(w, size, left[-1], HALF_POWER * top)
     high = _crossing(w, size, k + right[0] - 1, HALF_POWER * top)
+    if not high > low:  # noise alone makes a width of nothing
+        return np.array([speed, top, np.nan, np.nan, np.nan])
     return np.array([speed, top, low, high, speed / (high - low)])
 
 

@@ -36,16 +36,32 @@ class Interval:
 
 
 def welch_satterthwaite(estimate: Estimate) -> float:
-    """Effective degrees of freedom (GUM eq. G.2b), truncated down to an integer (G.6.4); inf if all are exact."""
+    """Effective degrees of freedom (GUM eq. G.2b), truncated down to an integer (G.6.4); inf if all are exact.
+
+    The formula is for variances that are estimated independently. Parts of one covariance (`_ensemble`) are not: all of them
+    scatter with the same residuals, and any sum of them has the degrees of freedom of that one estimate (Willink, Metrologia
+    44, 340 (2007)).
+    """
     u = estimate.u
     if u == 0:
         return math.inf
-    # Ratios first: the fourth power of a small u would underflow.
-    inverse = math.fsum((c * i.u / u) ** 4 / i.dof for i, c in estimate.sensitivities.items())
+    shares: dict[tuple[str, float], list[float]] = {}
+    for i, c in estimate.sensitivities.items():
+        if not math.isinf(i.dof):
+            # Ratios first: the fourth power of a small u would underflow.
+            shares.setdefault((_ensemble(i), i.dof), []).append((c * i.u / u) ** 2)
+    inverse = math.fsum(math.fsum(some) ** 2 / dof for (_, dof), some in shares.items())
     if inverse == 0:
         return math.inf
     effective = 1 / inverse
     return max(1.0, float(math.floor(effective * (1 + 1e-12))))  # 1e-12: a sum of one dof is that dof
+
+
+def _ensemble(i: Influence) -> str:
+    """Which estimate of a covariance an influence is a part of: the roots of a covariance are influences `<identity>/k` of
+    u = 1; else itself."""
+    stem, _, last = i.id.rpartition("/")
+    return stem if stem and last.isdigit() and i.kind == "A" and i.unit == "1" and i.u == 1.0 else i.id
 
 
 def coverage_factor(dof: float) -> float:

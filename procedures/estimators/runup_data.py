@@ -220,5 +220,6 @@ def near(p: Passage, recording: Recording[Any], speed: float, law: str) -> tuple
     dwell = Dwell(
         PASSAGE, f"{p.direction}, {law}", speed, driven, False, p.tacho, track, full_rate(captures[0]) if captures else None,
         int(np.bitwise_or.reduce(p.flags[part])), 0, (), 0, 1, recording.start_ns + round(p.t[k] * 1e9),
+        p.sampling,
     )  # fmt: skip
     return dwell, abs(float(w[part.stop - 1] - w[part.start]))

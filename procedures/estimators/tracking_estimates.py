@@ -69,8 +69,8 @@ def inputs(rig: RigFile, tick_s: float, runout_m: float) -> list[Input]:
     for k, axis in enumerate(AXES):
         s = rig.sensors[f"pos_{axis}"]
         out += [
-            Input(f"pos_{axis}.gain", f"gain of pos_{axis}", s.gain, _at(k, "gains")),
-            Input(f"pos_{axis}.offset", f"zero of pos_{axis}", s.offset, _at(k, "offsets")),
+            Input(f"sensors/pos_{axis}/gain", f"gain of pos_{axis}", s.gain, _at(k, "gains")),
+            Input(f"sensors/pos_{axis}/offset", f"zero of pos_{axis}", s.offset, _at(k, "offsets")),
         ]
         if runout_m > 0:
             allowed = Toleranced(
@@ -88,7 +88,7 @@ def inputs(rig: RigFile, tick_s: float, runout_m: float) -> list[Input]:
         ("com_to_outboard_sensor", "l_os"),
         ("clearance", "clearance"),
     ):
-        out.append(Input(f"geometry.{name}", name.replace("_", " "), rig.geometry[name], _one(kind)))
+        out.append(Input(f"geometry/{name}", name.replace("_", " "), rig.geometry[name], _one(kind)))
     clock = Toleranced(
         value=0.0,
         unit="s",
@@ -183,7 +183,9 @@ def _of_coils(orbit: Orbit, rig: RigFile) -> dict[str, Estimate]:
         means = currents.mean(axis=1)
         k = int(np.argmax(means))
         s = rig.sensors[names[k]]
-        gain, offset = (certified(f"{names[k]}.{what}", t) for what, t in (("gain", s.gain), ("offset", s.offset)))
+        gain, offset = (
+            certified(f"sensors/{names[k]}/{what}", t) for what, t in (("gain", s.gain), ("offset", s.offset))
+        )
         found = batch_means([currents[k, m].mean() for m in per], batches)
         seen = Estimate.of(
             found.value,

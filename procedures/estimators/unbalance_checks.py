@@ -12,7 +12,7 @@ from bench.analysis.tachometer import against
 from bench.analysis.vectors import radius2
 from bench.findings import Effect, Finding
 from bench.recording import Recording
-from procedures.estimators import signals
+from procedures.estimators import signals, unbalance_beside
 from procedures.estimators.unbalance_data import (
     AXES,
     CONTACT,
@@ -121,6 +121,8 @@ def of_results(results: Results, plan: Settings) -> Iterator[Finding]:
     """Do forces and motion agree? Is a repeat the same? Then zones and the runout, as notes."""
     yield from channels(results.dwells)
     yield from weight(results.dwells)
+    yield from unbalance_beside.beside(results)
+    yield from unbalance_beside.folded(results)
     yield from _repeats(results)
     yield from _told(results)
     if plan.variants:

@@ -49,8 +49,8 @@ class Full:
 @dataclass(frozen=True)
 class Dwell:
     """The shaft at one speed with one setting of the controller. `wanted` rad/s as planned, `driven` as the drive says, `speed`
-    by the pulses; `track` of the four positions and eight coil currents; `flags` ORed; `stuck` channels; `again`: a repeat
-    at the end. `full` None where nothing was captured."""
+    by the pulses; `track` of the four positions and eight coil currents, `sampling` of these; `flags` ORed; `stuck` channels;
+    `again`: a repeat at the end. `full` None where nothing was captured."""
 
     kind: str
     variant: str
@@ -66,6 +66,7 @@ class Dwell:
     lost: int
     expected: int
     start_ns: int
+    sampling: Sampling
 
     @property
     def speed(self) -> float:
@@ -127,11 +128,15 @@ def read_dwell(recording: Recording[Any], step: Step) -> Dwell:
     track = synchronous(t, wide, tacho, sampling, orders=_seen(ORDERS, float(step.labels["speed_rad_s"]), ticks * tick))
     labels, flags = step.labels, data["flags"].astype(np.int64)
     captures = recording.captures(dwell=labels["number"]) if step.kind == DWELL else ()
+    full = full_rate(captures[0]) if captures else None
+    held = max(
+        clips(wide[:4]), clips(full.positions) if full else 0
+    )  # a turn at speed is a few samples of the telemetry
     return Dwell(
         step.kind, str(labels["variant"]), float(labels["speed_rad_s"]), float(labels["driven_rad_s"]),
-        bool(labels["again"]), tacho, track, full_rate(captures[0]) if captures else None, int(np.bitwise_or.reduce(flags)),
-        clips(wide[:4]), tuple(c for c, x in zip((*POSITIONS, *CURRENTS), wide, strict=True) if np.ptp(x) == 0),
-        step.lost(), step.expected(), step.start_ns,
+        bool(labels["again"]), tacho, track, full, int(np.bitwise_or.reduce(flags)), held,
+        tuple(c for c, x in zip((*POSITIONS, *CURRENTS), wide, strict=True) if np.ptp(x) == 0),
+        step.lost(), step.expected(), step.start_ns, sampling,
     )  # fmt: skip
 
 

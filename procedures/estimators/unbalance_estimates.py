@@ -13,7 +13,7 @@ from bench.analysis.orbits import Ellipse, ellipse
 from bench.analysis.vectors import Vectors, estimates
 from bench.calibration import Calibration
 from bench.rigfile import RigFile
-from bench.uncertainty import Estimate, Influence, propagate
+from bench.uncertainty import Estimate, Influence, propagate, welch_satterthwaite
 from bench.uncertainty.estimate import merged
 from procedures.estimators import runout
 from procedures.estimators.inputs import certified
@@ -142,7 +142,7 @@ def _result(
 ) -> Result:
     parts = {n: _shaft(d, inputs, runouts[n], n) for n in d.track.orders if n in runouts}
     values = np.array([parts[1.0][2 * k].value + 1j * parts[1.0][2 * k + 1].value for k in range(4)])
-    vectors = Vectors(values, covariance(parts[1.0]), d.readings().dof)
+    vectors = Vectors(values, covariance(parts[1.0]), min(welch_satterthwaite(e) for e in parts[1.0]))
     u, misfit = runout.unbalances(nominal, Turning(d.speed, d.means, d.both().values), runouts[1.0].values)
     out: dict[tuple[str, str], Estimate] = {}
     orbits, centres = {}, {}

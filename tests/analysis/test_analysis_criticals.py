@@ -54,6 +54,16 @@ def test_the_intervals_hold_the_truth() -> None:
     assert (np.mean(hits, axis=0) >= 0.82).all()
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_a_curve_in_much_noise_gives_criticals_or_none(seed: int) -> None:
+    """Noise of a quarter of the peak: smoothed, some greatest values have no width at all, and some are lost."""
+    w, u = np.linspace(300, 1300, 150), 2e-5
+    off = np.random.default_rng([3, seed]).normal(0, u, (w.size, 2)).view(np.complex128)[:, 0]
+    found = criticals(w, response(w, 0.06) + off, np.tile(u**2 * np.eye(2), (w.size, 1, 1)), draws=40, seed=seed)
+    assert all(np.isfinite([c.speed, c.amplitude]).all() for c in found)
+    assert all(not np.isfinite(c.factor) or c.high > c.low for c in found)
+
+
 @pytest.mark.parametrize("told", [1.0, 1.5])
 def test_blocks_that_scatter_more_than_they_are_said_to_are_seen(told: float) -> None:
     """Ratio of the mean squares, of a curve with noise `told` times as large as its covariance says."""

@@ -19,7 +19,9 @@ from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate
+from procedures import unbalance
 from procedures.estimators import tracking as estimator
+from procedures.estimators import tracking_estimates, unbalance_bearings
 from procedures.estimators.tracking import Facts, Wave
 from procedures.estimators.tracking import Path as Orbit
 from procedures.tracking import CODES, MEASURES, OBSERVED, Plan, check, figures, step_count
@@ -198,3 +200,12 @@ def test_a_record_that_is_too_short_is_told() -> None:
     whole = orbit(10.0)
     with pytest.raises(AnalysisError, match="revolutions"):
         estimator.revolutions(Orbit(whole.wave, whole.t[:300], whole.readings[:, :300], 0.0))
+
+
+def test_a_certificate_has_one_name_in_all_procedures() -> None:
+    """Else results that share a probe would count as independent."""
+    rig = load_rig("amb5dof")
+    here = {i.id for i in tracking_estimates.inputs(rig, 1e-4, 0.0)} - {"timing/start", "geometry/clearance"}
+    there = {i.id for e in unbalance_bearings.stated(rig, unbalance.Plan()).values() for i in e.sensitivities}
+    assert here
+    assert here <= there

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from bearing_facts import bearings
 
+from bench.analysis.vectors import radius2
 from bench.cli.virtual import given, simulated_run
 from bench.errors import BenchError
 from bench.findings import Effect, Finding
@@ -186,6 +187,44 @@ def test_a_planted_defect_is_named_and_never_passes(
     assert found, [f.code for f in run.results if isinstance(f, Finding)]
     assert found[0].effect is effect
     list(unbalance.figures(run.recording))  # what can be drawn is drawn
+
+
+def test_a_clipping_probe_shows_in_the_capture_where_the_controller_does_not_tell(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At 4000 r/min a turn is 15 samples of the telemetry: none of them stays at the limit for eight."""
+    monkeypatch.setattr(unbalance_checks, "RANGE", 0)
+    truth = {"position_range": 78e-6, "unbalance_i": 1.05e-5, "unbalance_o": 1.05e-5}
+    plan = {**ONE, "speeds_rad_s": (4000 * RPM,)}
+    run = simulated_run("unbalance", "amb5dof", SEED, plan, tmp_path / "recording.mcap", truth)
+    assert any(f.code == "sensor-clipped" for f in run.results if isinstance(f, Finding))
+
+
+def test_an_ellipse_has_the_degrees_of_freedom_of_all_its_influences(compared: Run) -> None:
+    """Certificates and runout carry it, not the fourteen of the dwell's batches: k = 2.45 within a few percent, not 2.86."""
+    for r in compared.results.dwells:
+        if r.dwell.variant == "off":
+            assert np.sqrt(radius2(r.vectors.dof)) < 2.6
+
+
+@pytest.mark.parametrize(("rpm", "named"), [(12000, True), (11800, False)])
+def test_an_order_that_the_telemetry_takes_for_order_1_is_named(tmp_path: Path, rpm: int, named: bool) -> None:
+    """A drive that holds 12 000 r/min: five samples of the telemetry in a turn, of which order 4 makes another order 1."""
+    truth = {"drive_gain": 1.0, "runout_i4": 0.45e-6, "runout_o4": 0.45e-6}
+    run = simulated_run("unbalance", "amb5dof", SEED, {**ONE, "speeds_rad_s": (rpm * RPM,)}, tmp_path / "r.mcap", truth)
+    found = [f for f in run.results if isinstance(f, Finding) and f.code == "aliasing"]
+    assert bool(found) == named
+    assert not named or "order 4 as order 1" in found[0].text
+
+
+def test_motion_that_does_not_turn_with_the_shaft_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """D_max is of what turns with the shaft: at 47 Hz beside it the shaft went to 45 µm, and D_max said 16 in zone A."""
+    shaken = {"inject_amplitude": 0.1, "inject_hz": 47.0, "inject_lines": 1.0, "inject_axis": 0.0}
+    monkeypatch.setitem(SETTINGS, "off", SETTINGS["off"] | shaken)
+    run = simulated_run("unbalance", "amb5dof", SEED, ONE, tmp_path / "recording.mcap", {})
+    found = [f for f in run.results if isinstance(f, Finding) and f.code == "not-synchronous"]
+    assert found[0].effect is Effect.INDETERMINATE
+    assert "inboard" in found[0].text
 
 
 def test_planes_exchanged_within_the_loop_do_not_levitate(tmp_path: Path) -> None:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 
+import GTC
 import numpy as np
 import pytest
 
+from bench.analysis.vectors import estimates
 from bench.errors import AnalysisError
 from bench.uncertainty import (
     Estimate,
@@ -21,6 +23,8 @@ from bench.uncertainty import (
     welch_satterthwaite,
 )
 from bench.uncertainty.coverage import draw
+from procedures.estimators import leastsquares
+from procedures.estimators.typea import scatter
 
 
 def estimate(identity: str, value: float, u: float, dof: float = math.inf, distribution: str = "normal") -> Estimate:
@@ -46,6 +50,29 @@ def test_effective_degrees_of_freedom_truncate_down_and_survive_tiny_numbers() -
     assert welch_satterthwaite(both) == math.floor(1.25**2 / (1 / 5 + 0.5**4 / 7))
     assert welch_satterthwaite(estimate("a", 0.0, 0.3, 49)) == 49
     assert welch_satterthwaite(Estimate.exact(1.0)) == math.inf
+
+
+def test_what_a_fit_gives_has_its_degrees_of_freedom_and_no_more() -> None:
+    """Intercept, slope and any sum of them scatter with the same residuals: GTC's ensemble of a line's parameters."""
+    x = np.arange(8.0)
+    y = 1 + 2 * x + np.array([0.1, -0.2, 0.05, 0.1, -0.1, 0.2, -0.1, -0.05])
+    a, b = GTC.type_a.line_fit(x, y).a_b
+    fit = leastsquares.linear(np.column_stack([np.ones(8), x]), y)
+    ours = scatter(fit, {"a": [1, 0], "b": [0, 1]}, "line", "scatter")
+    for oracle, found in (
+        (b, ours["b"]),
+        (a + 20 * b, ours["a"] + ours["b"] * 20.0),
+        (a + 2 * b, ours["a"] + ours["b"] * 2.0),
+    ):
+        assert found.u == pytest.approx(GTC.uncertainty(oracle), rel=1e-9)
+        assert welch_satterthwaite(found) == round(GTC.dof(oracle)) == 6
+
+
+def test_a_vectors_components_share_the_degrees_of_freedom_of_their_batches() -> None:
+    re, im = estimates([3.0, 4.0], np.array([[0.04, 0.01], [0.01, 0.09]]), "scatter/dwell/1", "scatter", "m", 14.0)
+    assert welch_satterthwaite(re * 0.6 + im * 0.8) == 14
+    other = estimate("b", 0.0, (re * 0.6 + im * 0.8).u, 5)
+    assert welch_satterthwaite(re * 0.6 + im * 0.8 + other) == math.floor(4 / (1 / 14 + 1 / 5))
 
 
 def test_a_dominant_rectangle_goes_to_monte_carlo() -> None:
