@@ -118,12 +118,12 @@ def _critical(w: Array, size: Array, again: Array, drawn: Array, k: int) -> Crit
     there, whole = (np.isfinite(scatter[:, part]).all(axis=1) for part in (slice(0, 2), slice(None)))
     if there.mean() < SEEN or not np.isfinite(found[:2] + base[:2]).all():
         return None
-    if whole.mean() < SEEN or not np.isfinite(found + base).all():
+    better = found - (scatter[whole].mean(axis=0) - base) if whole.mean() >= SEEN else np.full(5, np.nan)
+    if not (np.isfinite(better).all() and better[3] > better[2]):
         covariance = np.full((4, 4), np.nan)
         covariance[:2, :2] = np.cov(scatter[there, :2].T)
         speed, amplitude = found[:2] - (scatter[there, :2].mean(axis=0) - base[:2])
         return Critical(float(speed), float(amplitude), math.nan, math.nan, math.nan, math.nan, covariance)
-    better = found - (scatter[whole].mean(axis=0) - base)
     s = scatter[whole]
     columns = np.column_stack([s[:, 0], s[:, 1], s[:, 4], 1 / (2 * s[:, 4])])
     speed, amplitude, low, high, factor = (float(v) for v in better)
