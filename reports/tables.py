@@ -171,7 +171,7 @@ def _told(entry: Content) -> Content:
     si = str(entry.get("unit") or "")
     stated_as = [abs(float(entry[key])) for key in ("value", "u", "half_width") if entry.get(key) is not None]
     size = next((x for x in stated_as if x), 0.0)
-    symbol = next((symbol for symbol, below in _WRITTEN.get(si, ()) if size < below), si)
+    symbol = next((symbol for symbol, below in _WRITTEN.get(si, ()) if 0 < size < below), si)
     one = units.unit(symbol).factor if symbol != si else 1.0
     numbers = {k: entry[k] / one for k in ("value", "u", "half_width") if isinstance(entry.get(k), int | float)}
     return {**entry, **numbers, "unit": symbol}
