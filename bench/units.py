@@ -49,7 +49,7 @@ SUFFIXES: dict[str, str] = {
 
 HABIT: dict[str, tuple[tuple[str, float], ...]] = {
     "kg m": (("g mm", math.inf),), "m/(kg m)": (("um/(g mm)", math.inf),), "m": (("um", 1e-3),),
-    "rad/s": (("r/min", math.inf),), "s": (("ms", 1.0),), "rad": (("urad", 3e-4), ("deg", math.inf)),
+    "rad/s": (("r/min", math.inf),), "s": (("ms", 0.1),), "rad": (("urad", 3e-4), ("deg", math.inf)),
 }  # fmt: skip
 """The units in which the field states results in an SI unit, each where they are smaller than so much. Of angles, tilts of
 a shaft are small ones and phases are not."""

@@ -95,10 +95,15 @@ def _apart(entries: Sequence[Content]) -> list[Content]:
     """Influences of one name (the two components of a vector, say) told apart by the end of their identities."""
     count = Counter(str(e.get("name") or "") for e in entries)
     return [
-        {**e, "name": f"{e['name']} ({str(e.get('influence') or '').rpartition('/')[2]})"}
+        {**e, "name": f"{e['name']} ({_end(str(e['influence']))})"}
         if count[str(e.get("name") or "")] > 1 and e.get("influence") else e
         for e in entries
     ]  # fmt: skip
+
+
+def _end(identity: str) -> str:
+    """The last part of an identity; the unit r/min is none of its strokes."""
+    return re.split(r"/(?!min\b)", identity)[-1]
 
 
 def _budget_row(entry: Content, share: float) -> BudgetRow:

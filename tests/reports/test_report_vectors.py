@@ -144,6 +144,12 @@ def test_influences_of_one_name_are_told_apart() -> None:
     ]
 
 
+def test_a_speed_in_an_identity_is_not_cut() -> None:
+    ends = ("A, 0 r/min, up", "A, 0 r/min, down")
+    parts = [{"name": "scatter", "influence": f"run/{end}", "contribution": 1.0, "type": "B"} for end in ends]
+    assert [row.name for row in tables.budget_table(measurement(budget=parts)).rows] == [f"scatter ({e})" for e in ends]
+
+
 def test_judged_quantities_come_first() -> None:
     plain = [measurement("a", verdict="none", limit=None, where=str(k)) for k in range(6)]
     judged = [measurement("b", where=str(k)) for k in range(6)]
