@@ -134,7 +134,7 @@ class WatchedSteps:
 
     @contextmanager
     def step(self, kind: str, **labels: Any) -> Iterator[None]:
-        self._progress.step(f"{kind} {described(labels)}")
+        self._progress.step(f"{kind} {described(labels)}".rstrip())
         with self._recorder.step(kind, **labels):
             yield
         self._catch_up()

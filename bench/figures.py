@@ -56,4 +56,5 @@ class Figure:
     grid: Grid | None = None
     log_x: bool = False
     downward: bool = False  # y grows downwards, as phase lags are drawn
+    closer: tuple[float, float, float] | None = None  # of a plane: beside it the same, about x, y and so far each way
     below: Figure | None = None  # a second panel on the same x axis, of which labels, series and the like are drawn

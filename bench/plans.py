@@ -6,6 +6,7 @@ of the plan is called always comes first.
 
 from __future__ import annotations
 
+import difflib
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -53,7 +54,7 @@ def assemble(
     try:
         made = plan.model_validate(_tuples(values), strict=True)
     except ValidationError as error:
-        problems += [_problem(e, origin) for e in error.errors(include_url=False)]
+        problems += [_problem(e, origin) for e in _causes(error.errors(include_url=False))]
     if problems:
         raise ConfigError("the plan cannot be used; nothing was started:", tuple(problems))
     return made
@@ -117,7 +118,10 @@ def field_of(key: str, fields: tuple[str, ...]) -> tuple[str, float | None]:
             field_base, field_scale, field_unit = _suffix(field)
             if field == base or (field_base == base and field_unit == unit):
                 return field, scale / field_scale if field_unit else scale
-    raise ConfigError(f"one of {', '.join(fields)}, in SI or with a unit suffix of the same kind")
+    close = difflib.get_close_matches(base, {_suffix(field)[0]: field for field in fields}, 1)
+    meant = [field for field in fields if _suffix(field)[0] in close]
+    hint = f". Did you mean {meant[0]}?" if meant else ""
+    raise ConfigError(f"one of {', '.join(fields)}, in SI or with a unit suffix of the same kind{hint}")
 
 
 def _suffix(key: str) -> tuple[str, float, str]:
@@ -142,6 +146,13 @@ def _scaled(value: Any, scale: float | None) -> Any:
 def _tuples(values: Mapping[str, Any]) -> dict[str, Any]:
     """TOML has lists, plans have tuples: equal plans must compare equal."""
     return {key: tuple(v) if isinstance(v, list) else v for key, v in values.items()}
+
+
+def _causes(errors: Iterable[Any]) -> list[Any]:
+    """Without lists that are called too short because an entry was refused: the entry is what is wrong."""
+    some = list(errors)
+    within = {e["loc"][0] for e in some if len(e["loc"]) > 1}
+    return [e for e in some if not (e["type"] == "too_short" and len(e["loc"]) == 1 and e["loc"][0] in within)]
 
 
 def _problem(error: Any, origin: Mapping[str, str]) -> Problem:

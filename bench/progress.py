@@ -8,6 +8,11 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import Any, Protocol, TextIO
 
+# Ends of the names of labels, SI; the unit in which they are told, and what one of it is in SI.
+TOLD = (
+    ("_rad_s2", math.pi / 30, " r/min/s"), ("_rad_s", math.pi / 30, " r/min"), ("_rad", math.pi / 180, "°"),
+    ("_kg", 1e-3, " g"), ("_m", 1e-6, " µm"), ("_A", 1.0, " A"), ("_hz", 1.0, " Hz"), ("_s", 1.0, " s"),
+)  # fmt: skip
 PLAIN_LINES = 20  # about as many lines in a run, however many steps it has
 
 
@@ -145,13 +150,21 @@ def _count(begun: int, total: int) -> str:
 
 
 def described(labels: Mapping[str, Any]) -> str:
-    """A step's labels for people: angles in degrees, nothing as "none"."""
+    """A step's labels for people: speeds in r/min, motion in µm, angles in degrees, nothing as "none"."""
     return ", ".join(_label(name, value) for name, value in labels.items())
 
 
 def _label(name: str, value: Any) -> str:
-    if name.endswith("_rad") and isinstance(value, float):
-        return f"{name.removesuffix('_rad')} {math.degrees(value):.0f}°"
+    if isinstance(value, bool):
+        return f"{name} {'yes' if value else 'no'}"
     if isinstance(value, float):
-        return f"{name} {value:.4g}"
+        for end, one, unit in TOLD:
+            if name.endswith(end):
+                return f"{name.removesuffix(end)} {_number(value / one)}{unit}"
+        return f"{name} {_number(value)}"
     return f"{name} {'none' if value == '' else value}"
+
+
+def _number(value: float) -> str:
+    """Four digits, all of a large number, no negative zero."""
+    return f"{value + 0.0:.4g}" if abs(value) < 1e4 - 0.5 else f"{value:.0f}"

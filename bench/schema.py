@@ -40,6 +40,8 @@ def expected_of(error: Mapping[str, Any]) -> str:
             return f"at least {_counted(count['min_length'], 'entry', 'entries')}"
         case "too_long":
             return f"at most {_counted(count['max_length'], 'entry', 'entries')}"
+        case "tuple_type":
+            return "a list, as in [1, 2]"
         case "string_too_short":
             return f"at least {_counted(count['min_length'], 'character', 'characters')}"
     return str(error["msg"]).removeprefix("Input should be ").removeprefix("Value error, ")

@@ -28,7 +28,8 @@ UNITS: dict[str, Unit] = {
     "H": Unit("H"), "mH": Unit("H", 1e-3), "Ohm": Unit("Ohm"),
     "A": Unit("A"), "mA": Unit("A", 1e-3), "V": Unit("V"), "mV": Unit("V", 1e-3),
     "K": Unit("K"), "degC": Unit("K", 1.0, 273.15), "°C": Unit("K", 1.0, 273.15),
-    "rad": Unit("rad"), "mrad": Unit("rad", 1e-3), "deg": Unit("rad", math.pi / 180),
+    "rad": Unit("rad"), "mrad": Unit("rad", 1e-3), "urad": Unit("rad", 1e-6),
+    "deg": Unit("rad", math.pi / 180),
     "rad/s": Unit("rad/s"), "r/min": Unit("rad/s", 2 * math.pi / 60),
     "rpm": Unit("rad/s", 2 * math.pi / 60), "rad/s^2": Unit("rad/s^2"),
     "m/s^2": Unit("m/s^2"), "kg/m^3": Unit("kg/m^3"), "kg m^2": Unit("kg m^2"),
@@ -46,17 +47,18 @@ SUFFIXES: dict[str, str] = {
 """What may stand after the last underscores of a key, and the unit it means."""
 
 
-HABIT: dict[str, tuple[str, float]] = {
-    "kg m": ("g mm", math.inf), "m/(kg m)": ("um/(g mm)", math.inf), "m": ("um", 1e-3),
-    "rad/s": ("r/min", math.inf),
+HABIT: dict[str, tuple[tuple[str, float], ...]] = {
+    "kg m": (("g mm", math.inf),), "m/(kg m)": (("um/(g mm)", math.inf),), "m": (("um", 1e-3),),
+    "rad/s": (("r/min", math.inf),), "s": (("ms", 0.1),), "rad": (("urad", 3e-4), ("deg", math.inf)),
 }  # fmt: skip
-"""The unit in which the field states results in an SI unit, where they are smaller than so much."""
+"""The units in which the field states results in an SI unit, each where they are smaller than so much. Of angles, tilts of
+a shaft are small ones and phases are not."""
 
 
 def habit(si: str, size: float) -> tuple[str, float]:
     """Symbol of the unit in which a result of about `size` is told, and what one of it is in SI."""
-    symbol, below = HABIT.get(si, (si, 0.0))
-    return (symbol, UNITS[symbol].factor) if abs(size) < below else (si, 1.0)
+    symbol = next((symbol for symbol, below in HABIT.get(si, ()) if abs(size) < below), None)
+    return (si, 1.0) if symbol is None else (symbol, UNITS[symbol].factor)
 
 
 def unit(symbol: str) -> Unit:

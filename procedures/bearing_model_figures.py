@@ -25,7 +25,7 @@ def _places(a: Analysis, rig: RigFile) -> Figure:
     radius = 1e6 * rig.geometry["clearance"].value
     yi, zi, yo, zo = (1e6 * a.held.mean[f"pos_{axis}"] for axis in AXES)
     series = (
-        Series("touchdown ring", radius * np.cos(turn), radius * np.sin(turn)),
+        Series("touchdown ring", radius * np.cos(turn), radius * np.sin(turn), "guide"),
         Series("inboard", yi, zi, "points"),
         Series("outboard", yo, zo, "points"),
     )
@@ -89,7 +89,5 @@ def _adjustments(a: Analysis) -> Figure:
         f"the certificate, if they tell of it at all. The most: {named}."
     )
     series = (Series("adjustment", at, np.array(list(moved.values())), "points"),)
-    lines = (("+2", 2.0), ("-2", -2.0))
-    return Figure(
-        "adjustments", "Adjustments", caption, "number of the input", "adjustment / u (1)", series, lines=lines
-    )
+    lines = (("+2 u", 2.0), ("−2 u", -2.0))
+    return Figure("adjustments", "Adjustments", caption, "number of the input", "adjustment (u)", series, lines=lines)

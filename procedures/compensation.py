@@ -121,8 +121,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     yield from unbalance.check(rig, plan)
     if plan.variants[:2] != ("off", "corrected") or plan.law == "PID":
         yield "variants: expected off, then corrected, with law CCS or CAC; something must be compared"
-    if plan.switch_rad_s > rig.envelope.max_speed_rad_s:
-        yield f"switch_rad_s: found {plan.switch_rad_s:g}; the envelope allows {rig.envelope.max_speed_rad_s:g} rad/s"
+    most = rig.envelope.max_speed_rad_s
+    if plan.switch_rad_s > most:
+        yield f"switch_rad_s: found {plan.switch_rad_s * RPM:.0f} r/min; the envelope allows {most * RPM:.0f} r/min"
     if (plan.after_s - switching.WITHIN_S) * plan.switch_rad_s < 2 * 3.15 * (switching.TURNS_LEFT + 3):
         yield f"after_s: found {plan.after_s:g} s; expected {switching.TURNS_LEFT + 3} turns beyond {switching.WITHIN_S} s"
 

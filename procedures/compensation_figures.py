@@ -34,9 +34,10 @@ def switched(s: Switched) -> Iterator[Figure]:
     t, size = s.course()
     rpm = f"{s.speed * RPM:.0f} r/min"
     yield Figure("switch-amplitude", f"Switched on at {rpm}: amplitude of order 1", "Root mean square of the "
-                 f"four probes, over six turns each; switched on at 0. The dashed line stands for 20 %, to be reached at "
+                 f"four probes, over six turns each; switched on at 0. The dashed lines cross at 20 %, to be reached at "
                  f"{WITHIN_S * 1e3:.0f} ms.", "time (ms)", "amplitude (µm 0-pk)",
-                 (Series("order 1", 1e3 * t, 1e6 * size, "both"),),
+                 (Series("order 1", 1e3 * t, 1e6 * size, "both"),
+                  Series(f"{WITHIN_S * 1e3:.0f} ms", np.full(2, 1e3 * WITHIN_S), np.array([0.0, 1e6 * size.max()]), "guide")),
                  lines=(("20 %", 0.2e6 * float(size[t < -3 * s.turn].mean())),))  # fmt: skip
     part = slice(None, None, max(1, -(-len(s.t) // MOST_POINTS)))
     places = zip(AXES, s.positions, strict=True)

@@ -46,6 +46,7 @@ def all_figures(run: Run, rig: RigFile) -> Iterator[Figure]:
     yield _volts(run)
     yield _speed(p)
     if run.near is not None:
+        yield unbalance_figures.farthest(run.near)
         for result in run.near.dwells[-1:]:
             for plane in PLANES:
                 yield unbalance_figures.orbits(result, plane, run.clearance)
@@ -74,23 +75,24 @@ def _curves(run: Run, plane: str) -> list[pictures.Curve]:
 
 
 def _bode(run: Run, plane: str) -> Figure:
-    """With the criticals, and at the captures' speeds the intervals."""
+    """With the criticals."""
     figure = pictures.bode(
         f"bode-{plane}",
         f"Bode plot of order 1, {plane}, {run.passage.name}",
         _curves(run, plane),
         caption="The shaft's centre at the probes: runout subtracted, the ramp's lag taken off; amplitude zero to peak, phase "
-        "lag from the once-per-turn mark to the high spot. Criticals are marked with their amplification factors (AF).",
+        "lag from the once-per-turn mark to the high spot. Criticals, where there are any, are marked; the legend has their "
+        "amplification factors (AF).",
     )
-    series, notes = list(figure.series), list(figure.notes)
+    series = list(figure.series)
     for peak in run.peaks:
         if peak.critical and peak.factor is not None and AXES.index(peak.axis) in PLANES[plane]:
             i = interval(peak.amplitude)
             x, y = RPM * peak.speed.value, 1e6 * peak.amplitude.value
             half = np.array([1e6 * (i.high - i.low) / 2])
-            series.append(Series(f"critical, {peak.axis}", np.array([x]), np.array([y]), "points", half))
-            notes.append((f"{peak.axis}: {x:.0f} r/min, AF {peak.factor.value:.1f}", x, y))
-    return replace(figure, series=tuple(series), notes=tuple(notes))
+            told = f"{peak.axis} critical, {x:.0f} r/min, AF {peak.factor.value:.1f}"  # in the legend: beside it, two overlap
+            series.append(Series(told, np.array([x]), np.array([y]), "points", half))
+    return replace(figure, series=tuple(series))
 
 
 def _polar(run: Run, plane: str) -> Figure:

@@ -48,7 +48,7 @@ def _bode(some: Sequence[Result], key: str, name: str) -> Figure:
     """Magnitude in dB over phase in degrees."""
     size = tuple(Series(r.axis, r.curve.hz, 20 * np.log10(np.maximum(np.abs(r.curve.values), 1e-6))) for r in some)
     phase = tuple(Series(r.axis, r.curve.hz, np.degrees(np.unwrap(np.angle(r.curve.values[::-1]))[::-1])) for r in some)
-    below = Figure(f"bode-phase-{key}", "", "", "frequency (Hz)", "phase (deg)", phase, log_x=True)
+    below = Figure(f"bode-phase-{key}", "", "", "frequency (Hz)", "phase (°)", phase, log_x=True)
     return Figure(f"bode-{key}", f"Bode plot of the sensitivity, {name}", "S = V1/E: magnitude, and phase lead.",
                   "frequency (Hz)", "|S| (dB)", size, log_x=True, below=below)  # fmt: skip
 

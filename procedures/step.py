@@ -6,6 +6,7 @@ setting, speed and axis: damping ratio and natural frequency, and how far size a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Literal
 
@@ -41,6 +42,7 @@ MODEL = ("model_beta_{}", "model_offset_{}")
 RADIAL = ("yi", "zi", "yo", "zo")
 PULSES_S = 1.0  # until the speed by the pulses, and with it the controller's state, says that the shaft stands
 SETTLED_S = 0.5  # after the last ramp of a speed
+RPM = 30 / math.pi
 MARGIN = 0.8  # of the clearance that a step with its overshoot may use
 
 
@@ -189,9 +191,11 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     if plan.names[0] == plan.names[1]:
         yield f"names: found {plan.names[0]!r} twice; the settings cannot be told apart"
     if any(0 < s < TURNING_RAD_S or s < 0 for s in plan.speeds_rad_s):
-        yield f"speeds_rad_s: found {plan.speeds_rad_s}; expected 0, or {TURNING_RAD_S:g} rad/s and more"
-    if max(plan.speeds_rad_s) > rig.envelope.max_speed_rad_s:
-        yield f"speeds_rad_s: found {max(plan.speeds_rad_s):g}; the envelope allows {rig.envelope.max_speed_rad_s:g} rad/s"
+        least = TURNING_RAD_S * RPM
+        yield f"speeds_rad_s: found {min(plan.speeds_rad_s) * RPM:.0f} r/min; expected 0, or {least:.0f} r/min and more"
+    most = rig.envelope.max_speed_rad_s
+    if max(plan.speeds_rad_s) > most:
+        yield f"speeds_rad_s: found {max(plan.speeds_rad_s) * RPM:.0f} r/min; the envelope allows {most * RPM:.0f} r/min"
     if max(plan.speeds_rad_s) > 0 and not any("drive" in d.roles for d in rig.devices.values()):
         yield "speeds_rad_s: the rig file has no device in the role drive, so that nothing turns the shaft"
 

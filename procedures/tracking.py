@@ -55,6 +55,7 @@ OBSERVED = {"observer": 1.0, "compensate": 3.0, "integral": 0.0, "k1": 2e5, "k2_
 REFERENCE = ("ellipse_on", "ellipse_y", "ellipse_z", "ellipse_hz", "ellipse_phase", "ellipse_ramp_s", "ellipse_ratio")
 PARAMETERS = ("law", "ref_y", "ref_theta", "model_rate", *REFERENCE)
 LENGTHS = ("com_to_inboard_sensor", "com_to_outboard_sensor", "clearance")
+RPM, UM = 30 / math.pi, 1e6
 MARK_M = 15e-6  # of the jump that the reference starts with
 GROW, GROW_S = 25, 0.02
 STANDS_S = 1.0  # the controller knows half a second after the last pulse that the shaft stands
@@ -194,19 +195,20 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     if len(set(plan.order)) < len(plan.laws) + len(plan.compare):
         yield "laws, compare: found one twice; expected each once"
     ring = NEAR * rig.geometry["clearance"].value
-    if max(plan.y_m, plan.z_m) > ring:
-        yield f"y_m, z_m: found {max(plan.y_m, plan.z_m):g} m; expected at most {ring:g} m, {NEAR:.0%} of the ring's clearance"
+    far = max(plan.y_m, plan.z_m)
+    if far > ring:
+        yield f"y_m, z_m: found {far * UM:g} µm; expected at most {ring * UM:g} µm, {NEAR:.0%} of the ring's clearance"
     if plan.z_m < MARK_M:
-        yield f"z_m: found {plan.z_m:g} m; expected {MARK_M:g} m or more, the jump that the reference starts with"
-    if plan.speed_rad_s > rig.envelope.max_speed_rad_s:
-        yield f"speed_rad_s: found {plan.speed_rad_s:g}; the envelope allows {rig.envelope.max_speed_rad_s:g} rad/s"
+        yield f"z_m: found {plan.z_m * UM:g} µm; expected {MARK_M * UM:g} µm or more, the jump that the reference starts with"
+    most = rig.envelope.max_speed_rad_s
+    if plan.speed_rad_s > most:
+        yield f"speed_rad_s: found {plan.speed_rad_s * RPM:.0f} r/min; the envelope allows {most * RPM:.0f} r/min"
     if plan.speed_rad_s and "drive" not in {role for d in rig.devices.values() for role in d.roles}:
-        yield f"speed_rad_s: found {plan.speed_rad_s:g} and no device with role drive; expected 0"
+        yield f"speed_rad_s: found {plan.speed_rad_s * RPM:.0f} r/min and no device with role drive; expected 0"
     if 0 < plan.speed_rad_s < 20 * math.pi * plan.hz * plan.ratio:
         yield (
-            f"speed_rad_s: found {plan.speed_rad_s:g}; expected 0, or ten times the reference's {plan.hz:g} Hz or "
-            f"more: else "
-            "averaging over a turn takes the reference with it"
+            f"speed_rad_s: found {plan.speed_rad_s * RPM:.0f} r/min; expected 0, or ten times the reference's "
+            f"{plan.hz:g} Hz or more: else averaging over a turn takes the reference with it"
         )
 
 

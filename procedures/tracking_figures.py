@@ -25,7 +25,7 @@ def all_figures(orbits: Sequence[Orbit], facts: Mapping[str, Facts]) -> list[Fig
 
 def _ring(f: Facts) -> Series:
     turn = np.linspace(0, 2 * np.pi, 181)
-    return Series("touchdown ring", 1e6 * f.clearance * np.cos(turn), 1e6 * f.clearance * np.sin(turn))
+    return Series("touchdown ring", 1e6 * f.clearance * np.cos(turn), 1e6 * f.clearance * np.sin(turn), "guide")
 
 
 def _two(o: Orbit) -> np.ndarray:
@@ -37,7 +37,7 @@ def _two(o: Orbit) -> np.ndarray:
 def _orbit(orbits: Sequence[Orbit], facts: Mapping[str, Facts]) -> Figure:
     w, series = orbits[0].path.wave, []
     turn = np.linspace(0, 2 * np.pi, 181)
-    series.append(Series("reference", 1e6 * w.y * np.sin(turn), 1e6 * w.z * np.cos(w.ratio * turn)))
+    series.append(Series("reference", 1e6 * w.y * np.sin(turn), 1e6 * w.z * np.cos(w.ratio * turn), "guide"))
     for o in orbits:
         q = 1e6 * centre(o.path.readings, facts[o.law])[:2, _two(o)]
         series.append(Series(o.law, q[0], q[1]))
@@ -109,17 +109,19 @@ def _tilts(orbits: Sequence[Orbit], facts: Mapping[str, Facts], k: int, name: st
 
 
 def _coils(o: Orbit) -> Figure:
+    """Eight curves in one panel could not be told apart."""
     use, t = _two(o), o.path.t - o.path.t[0]
-    series = [
-        Series(f"{axis} {side}", t[use], currents[k, use])
-        for side, currents in (("upper", o.upper), ("lower", o.lower))
-        for k, axis in enumerate(AXES)
-    ]
+    upper, lower = (
+        tuple(Series(axis, t[use], currents[k, use]) for k, axis in enumerate(AXES)) for currents in (o.upper, o.lower)
+    )
+    key = f"coils-{o.law.lower()}"
+    below = Figure(f"{key}-lower", "", "", "time (s)", "lower coils (A)", lower)
     return Figure(
-        f"coils-{o.law.lower()}",
+        key,
         f"Coil currents, {o.law}",
-        "Two revolutions of the reference.",
+        "Two revolutions of the reference; the upper coils above, the lower ones below.",
         "time (s)",
-        "current (A)",
-        tuple(series),
+        "upper coils (A)",
+        upper,
+        below=below,
     )

@@ -10,7 +10,8 @@ from bench.analysis import pictures
 from bench.analysis.spectra import full
 from bench.figures import Figure, Series
 from bench.rigfile import RigFile
-from bench.uncertainty import coverage_factor
+from bench.uncertainty import coverage_factor, interval
+from procedures.estimators.unbalance_checks import ZONES
 from procedures.estimators.unbalance_data import AXES, PLANES, RPM
 from procedures.estimators.unbalance_estimates import Result, Results
 
@@ -32,6 +33,7 @@ def all_figures(results: Results, rig: RigFile) -> Iterator[Figure]:
             shown = results.of(variant)[-1]
             if shown.dwell.full is not None:
                 yield spectrum(shown, plane)
+    yield farthest(results)
     yield _use(results, "current_peak", "A", "current")
     yield _use(results, "voltage_peak", "V", "voltage")
 
@@ -47,7 +49,9 @@ def orbits(r: Result, plane: str, clearance: float) -> Figure:
     if r.dwell.full is not None:
         count = round(SHOWN_TURNS * 2 * np.pi / r.dwell.speed * r.dwell.full.rate)
         x1, x2 = r.dwell.full.positions[y, :count], r.dwell.full.positions[z, :count]
-    shown = pictures.Orbit(f"{SHOWN_TURNS} turns as read", x1, x2, r.orbits[plane], r.centres[plane])
+    shown = pictures.Orbit(
+        f"{SHOWN_TURNS} turns as read", x1, x2, r.orbits[plane], r.centres[plane], "order 1 of the shaft"
+    )
     return pictures.orbits(f"orbit-{plane}-{_key(r)}", f"Orbit {plane}, {r.dwell.where}", [shown], clearance, Y_DEG)
 
 
@@ -79,6 +83,25 @@ def spectrum(r: Result, plane: str) -> Figure:
     return pictures.full_spectrum(f"spectrum-{plane}-{_key(r)}", title, found, r.dwell.speed, 1500.0)
 
 
+def farthest(results: Results) -> Figure:
+    """D_max over the speed within the zones of ISO 14839-2."""
+    series = []
+    for variant in results.variants:
+        for plane in PLANES:
+            some = [r for r in results.of(variant) if ("d_max_share", plane) in r.estimates]
+            found = [r.estimates["d_max_share", plane] for r in some]
+            x = np.array([RPM * r.dwell.speed for r in some])
+            y = np.array([100 * e.value for e in found])
+            u = np.array([50 * (i.high - i.low) for i in map(interval, found)])
+            series.append(Series(f"{plane}, {variant}", x, y, "both", u))
+    edges = [0.0, *(100 * end for _, end in ZONES)]
+    bands = tuple((f"zone {name}", low, high) for (name, _), low, high in zip(ZONES, edges, edges[1:], strict=False))
+    return Figure("d-max", "D_max over the speed", "Greatest distance of the shaft's centre from the clearance's centre over a "
+                  "turn, mean place included, over the least clearance; zones after ISO 14839-2, whose ends were not checked "
+                  "against the standard.", "speed (r/min)", "D_max (% of the clearance)", tuple(series),
+                  bands=bands)  # fmt: skip
+
+
 def _use(results: Results, name: str, unit: str, what: str) -> Figure:
     series = []
     for variant in results.variants:
@@ -88,5 +111,5 @@ def _use(results: Results, name: str, unit: str, what: str) -> Figure:
             series.append(
                 Series(f"{plane}, {variant}", x, np.array([r.estimates[name, plane].value for r in some]), "both")
             )
-    return Figure(f"use-{what}", f"Greatest coil {what}", f"Of a plane's four coils, within the captures ({unit}).",
+    return Figure(f"use-{what}", f"Greatest coil {what}", "Of a plane's four coils, within the captures.",
                   "speed (r/min)", f"{what} ({unit})", tuple(series))  # fmt: skip

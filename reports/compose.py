@@ -8,12 +8,13 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from reports import habit, many, tables, text
+from reports import habit, many, tables, text, vectors
 from reports.figures import Drawn
 from reports.linktable import clean, link_table
 from reports.view import (
     ABOUT_MANY,
     ABOUT_UNCERTAINTY,
+    ABOUT_VECTORS,
     CALIBRATIONS,
     DECISION_RULE,
     EXPIRED,
@@ -30,6 +31,7 @@ from reports.view import (
     Tone,
 )
 
+MOST_ALIKE = 12  # streams that differ in a number only and still get a line each
 Content = Mapping[str, Any]
 _TONES: dict[str, Tone] = {"pass": "pass", "fail": "fail", "indeterminate": "indeterminate", "error": "error"}
 _TONES |= {"aborted": "error", "missing": "error"}
@@ -85,6 +87,8 @@ def view_of(record: Content, around: Surroundings, figures: Iterable[Drawn] = ()
         many=many.grouped(measurements, rows),
         about_many=ABOUT_MANY,
         results=tuple(r for m, r in zip(measurements, rows, strict=True) if str(m.get("name", "")) not in like),
+        vectors=vectors.table(record),
+        about_vectors=ABOUT_VECTORS,
         no_results="" if rows else NO_RESULTS,
         about_uncertainty=ABOUT_UNCERTAINTY,
         decision_rule=DECISION_RULE,
@@ -99,7 +103,7 @@ def view_of(record: Content, around: Surroundings, figures: Iterable[Drawn] = ()
         link=_link(record.get("link"), around),
         link_note=f"{_link_note(around)} {clean(_mapping(record.get('link')))}".strip(),
         correlations=tables.correlations(record),
-        plan=tuple(tables.facts(record.get("plan") or {})),
+        plan=tuple(tables.settings(record.get("plan") or {})),
         versions=tuple(tables.facts(record.get("versions") or {})),
         recording=_recording(record.get("recording")),
         laboratory=_laboratory(around.rig.get("laboratory")),
@@ -121,7 +125,7 @@ def _result(m: Content, definitions: Mapping[str, str]) -> ResultRow:
         k=text.DASH if m.get("coverage_factor") is None else f"{m['coverage_factor']:.2f}",
         dof=text.degrees_of_freedom(m.get("dof")),
         probability=text.probability(m.get("coverage_probability")),
-        limit=_limit(limit, unit),
+        limit=_limit(limit, unit, text.shift_of(m.get("value"), expanded)),
         limit_source=_limit_source(limit),
         verdict="no limit" if verdict.lower() == "none" else verdict.lower(),
         tone=_TONES.get(verdict.lower(), "none"),
@@ -143,15 +147,16 @@ def _telling_interval(m: Content, unit: str) -> str:
     )
 
 
-def _limit(limit: Content | None, unit: str) -> str:
+def _limit(limit: Content | None, unit: str, shift: int) -> str:
+    """The range, with the power of ten of the result that it is held against."""
     if not limit:
         return text.DASH
     low, high = limit.get("low"), limit.get("high")
     if low is not None and high is not None:
-        return f"{text.plain(low)} to {text.with_unit(text.plain(high), unit)}"
+        return text.at_power(f"{text.shifted(low, shift)} to {text.shifted(high, shift)}", shift, unit)
     if low is not None:
-        return f"≥ {text.with_unit(text.plain(low), unit)}"
-    return text.DASH if high is None else f"≤ {text.with_unit(text.plain(high), unit)}"
+        return f"≥ {text.at_power(text.shifted(low, shift), shift, unit)}"
+    return text.DASH if high is None else f"≤ {text.at_power(text.shifted(high, shift), shift, unit)}"
 
 
 def _limit_source(limit: Content | None) -> str:
@@ -166,16 +171,21 @@ def _findings(record: Content, around: Surroundings) -> Iterable[FindingRow]:
     if around.truncated and not any("truncated" in code for code in known):
         said = "The recording is truncated: it was not closed. Everything here comes from its complete part."
         yield FindingRow("truncated-recording", said, "recording", "", True)
+    same: dict[tuple[str, str, str], list[str]] = {}  # what is said alike of many places is said once
     for f in record.get("findings") or ():
-        effect = str(f.get("effect") or "note")
-        loud = effect != "note"
-        yield FindingRow(str(f.get("code", "")), str(f.get("text", "")), str(f.get("where") or ""), effect, loud)
+        said_of = (str(f.get("code", "")), str(f.get("text", "")), str(f.get("effect") or "note"))
+        same.setdefault(said_of, []).append(str(f.get("where") or ""))
+    for (code, said, effect), places in same.items():
+        yield FindingRow(code, said, "; ".join(dict.fromkeys(filter(None, places))), effect, effect != "note")
 
 
 def _outcome_text(outcome: str, rows: Sequence[ResultRow], findings: Sequence[FindingRow]) -> str:
     named = {tone: ", ".join(r.symbol.plain for r in rows if r.tone == tone) for tone in _TONES.values()}
     said = [f for f in findings if f.effect]  # all but our own remark on a truncated recording
-    loud = ", ".join(dict.fromkeys(f.code for f in [f for f in said if f.loud] or said))
+    affecting = [f for f in said if f.loud]
+    # A limit that is crossed explains itself; only where nothing else does may a note be the reason.
+    told = affecting or ([] if outcome == "INDETERMINATE" and named["indeterminate"] else said)
+    loud = ", ".join(dict.fromkeys(f.code for f in told))
     match outcome:
         case "PASS" if any(r.tone == "pass" for r in rows):
             return "Every declared quantity was measured, and every limit is met by the whole 95 % interval."
@@ -225,7 +235,7 @@ def _conditions(around: Surroundings) -> tuple[Fact, ...]:
     site = around.rig.get("site")
     at_site = {k: v for k, v in site.items() if k != "place" and v is not None} if isinstance(site, Mapping) else {}
     stated = [dataclasses.replace(f, label=_words(f.label)) for f in tables.facts(at_site)]
-    return (*stated, *(Fact(label, said) for label, said in around.conditions.items()))
+    return (*stated, *(Fact(label[:1].upper() + label[1:], said) for label, said in around.conditions.items()))
 
 
 def _words(key: str) -> str:
@@ -279,7 +289,7 @@ def counts(title: str, tree: Any) -> Iterable[Table]:
         yield Table(title, ("", "Count"), tuple((_words(str(k)), tables.inline(v)) for k, v in flat.items()), (1,))
     leaves = {k: v for k, v in nested.items() if not any(isinstance(x, Mapping) for x in v.values())}
     if leaves:
-        yield _crossed(title, leaves)
+        yield _crossed(f"{title}, by link and stream", leaves)
     for key in nested.keys() - leaves.keys():
         yield from counts(f"{title}: {key}", nested[key])
 
@@ -287,12 +297,30 @@ def counts(title: str, tree: Any) -> Iterable[Table]:
 def _crossed(title: str, leaves: Mapping[Any, Content]) -> Table:
     """A row for each link or stream and a column for each count, whichever way round they are given: of the two it is the
     streams that grow many (a capture is one)."""
+    leaves = _folded(leaves)
     rows, columns = [str(k) for k in leaves], list(dict.fromkeys(str(c) for v in leaves.values() for c in v))
     cells = [[tables.inline(v[c]) if c in v else text.DASH for c in columns] for v in leaves.values()]
     if len(columns) > len(rows):
         rows, columns, cells = columns, rows, [list(row) for row in zip(*cells, strict=True)]
-    made = sorted(((name, *row) for name, row in zip(rows, cells, strict=True)), key=lambda row: _natural(row[0]))
+    named = zip(rows, cells, strict=True)
+    made = sorted(((name, *row) for name, row in named), key=lambda row: _natural(row[0]))
     return Table(title, ("", *map(_words, columns)), tuple(made), tuple(range(1, len(columns) + 1)))
+
+
+def _folded(leaves: Mapping[Any, Content]) -> Mapping[Any, Content]:
+    """Streams that differ in a number only (captures) as one of their sum, where there are too many to be read."""
+    families: dict[str, list[str]] = {}
+    for name in sorted({str(c) for v in leaves.values() for c in v}, key=_natural):
+        families.setdefault(name.rstrip("0123456789"), []).append(name)
+    sums = {stem: f"{names[0]} to {names[-1]}" for stem, names in families.items() if len(names) > MOST_ALIKE}
+    out: dict[Any, dict[str, Any]] = {}
+    for key, counted in leaves.items():
+        row: dict[str, Any] = {}
+        for name, count in counted.items():
+            place = sums.get(str(name).rstrip("0123456789"), str(name))
+            row[place] = row[place] + count if place in row else count
+        out[key] = row
+    return out
 
 
 def _natural(name: str) -> list[tuple[str, int]]:

@@ -90,7 +90,24 @@ def vector_axes(axes: Any, figure: Figure, dense: list[Series]) -> None:
     axes.set_thetagrids(np.arange(0, 360, 30), [f"{k}°" for k in range(0, 360, 30)])
     axes.yaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10]))
     axes.yaxis.set_major_formatter(tick_text())
-    axes.set_rlabel_position(157.5)
+    axes.set_rlabel_position(_emptiest(dense))
     axes.set_xlabel(f"angle: {figure.x_label}\nradius: {figure.y_label}")
     axes.grid(True, color=GRID, linewidth=0.5)
     axes.spines["polar"].set_color(GRID)
+
+
+def _emptiest(dense: list[Series]) -> float:
+    """Where the numbers of the radial axis cover least of what is drawn, degrees."""
+    candidates = np.arange(15.0, 360.0, 30.0)
+    if not any(s.x.size for s in dense):
+        return 157.5
+    ways = [
+        np.interp(np.linspace(0, 1, 400), np.linspace(0, 1, s.x.size), s.y * np.exp(1j * s.x))
+        for s in dense
+        if s.x.size
+    ]
+    drawn = np.concatenate(ways)
+    rays = np.linspace(0.2, 1.0, 17) * float(np.abs(drawn).max())
+    nearest = [np.abs(drawn[:, None] - rays * np.exp(1j * np.radians(c))).min(axis=0).clip(max=0.25 * rays[-1]).sum()
+               for c in candidates]  # fmt: skip
+    return float(candidates[int(np.argmax(nearest))])

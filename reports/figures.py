@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import re
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from textwrap import shorten
 from typing import Any
 
@@ -76,6 +76,8 @@ def _panels(figure: Figure) -> list[Figure]:
 def _svg(figure: Figure) -> str:
     panels = _panels(figure)
     around = figure.kind in ("polar", "vectors")
+    if figure.closer is not None:
+        return _beside(figure, figure.closer)
     size = (WIDTH_IN, HEIGHT_IN * (1 + 0.45 * (len(panels) - 1)) + (0.45 if around else 0.0))
     canvas = Canvas(figsize=size, layout="constrained")
     FigureCanvasSVG(canvas)
@@ -95,6 +97,29 @@ def _svg(figure: Figure) -> str:
         if panel.log_x:  # an axis that is not drawn yet has a range that a logarithm does not
             axes.sharex(every[-1])
     _legend(canvas, drawn)
+    return _saved(canvas)
+
+
+def _beside(figure: Figure, closer: tuple[float, float, float]) -> str:
+    """A plane, and beside it the part of it that is too small to be seen there."""
+    canvas = Canvas(figsize=(WIDTH_IN, 0.8 * HEIGHT_IN), layout="constrained")
+    FigureCanvasSVG(canvas)
+    whole, near = canvas.add_subplot(1, 2, 1), canvas.add_subplot(1, 2, 2)
+    drawn = _panel(whole, figure)
+    _panel(near, replace(figure, notes=()))
+    x, y, reach = closer
+    near.set_xlim(x - reach, x + reach)
+    near.set_ylim(y - reach, y + reach)
+    near.set_ylabel("")
+    for axes in (whole, near):
+        axes.set_aspect("equal", adjustable="box")
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10]))
+    _legend(canvas, drawn)
+    return _saved(canvas)
+
+
+def _saved(canvas: Canvas) -> str:
     out = io.StringIO()
     canvas.savefig(out, format="svg", dpi=220, metadata={"Date": None, "Creator": None})
     return out.getvalue()
@@ -231,12 +256,21 @@ def _plain_axes(axes: Axes, figure: Figure) -> list[Artist]:
         axis.set_major_formatter(tick_text())
     if figure.log_x:
         axes.xaxis.set_major_formatter(tick_text())
-    if figure.downward:
-        axes.yaxis.set_major_locator(MultipleLocator(90 if np.ptp(axes.get_ylim()) < 600 else 180))
+    if figure.below is not None and figure.below.downward:
+        axes.set_ylim(bottom=0)  # the amplitude over its lag
+    for axis, label in ((axes.xaxis, figure.x_label), (axes.yaxis, figure.y_label)):
+        _degrees(axis, label)
     return [
         axes.axhline(level, label=_short(label), **_line_style(position))
         for position, (label, level) in enumerate(figure.lines)
     ]
+
+
+def _degrees(axis: Any, label: str) -> None:
+    """Angles over half a turn and more have their ticks at quarters of it."""
+    span = float(np.ptp(axis.get_view_interval()))
+    if label.endswith("(°)") and span >= 150:
+        axis.set_major_locator(MultipleLocator(45 if span < 200 else 90 if span < 600 else 180))
 
 
 def _polar_axes(axes: Any, figure: Figure, dense: list[Series]) -> list[Artist]:

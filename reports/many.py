@@ -29,7 +29,8 @@ def grouped(measurements: Sequence[Content], rows: Sequence[ResultRow]) -> tuple
     for m, row in zip(measurements, rows, strict=True):
         if str(m.get("name", "")) in chosen:
             groups.setdefault(str(m["name"]), []).append((m, row))
-    return tuple(_group(members) for members in groups.values())
+    made = [_group(members) for members in groups.values()]
+    return tuple(sorted(made, key=lambda group: not group.judged))  # what was judged is looked for first
 
 
 def _group(members: Sequence[tuple[Content, ResultRow]]) -> ManyResults:
@@ -38,7 +39,7 @@ def _group(members: Sequence[tuple[Content, ResultRow]]) -> ManyResults:
     limits = list(dict.fromkeys((row.limit, row.limit_source) for _, row in members))
     drawn = any(row.interval for _, row in members)
     said = "; ".join(
-        " ".join(filter(None, (f"limit {limit}", source))) for limit, source in limits if limit != text.DASH
+        " ".join(filter(None, (f"Limit {limit}", source))) for limit, source in limits if limit != text.DASH
     )
     return ManyResults(
         symbol=first.symbol,

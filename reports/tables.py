@@ -4,18 +4,26 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import takewhile
-from textwrap import shorten
 from typing import Any
 
+from bench import units
 from reports import text
 from reports.view import BudgetRow, BudgetTable, Correlations, Fact, Symbol, Table
 
 SMALL_SHARE = 0.0005  # of the variance; smaller influences are summed in one line, all of them are in record.json
 PAGE_WIDTH = 14  # columns of a correlation matrix
+NARROW_NAME = 6  # letters that the head of such a column holds
 SMALL_CORRELATION = 0.05
 MOST_PAIRS = 40
+_WRITTEN = {"m": (("um", 1e-4), ("mm", 1.0)), "kg": (("mg", 1e-4), ("g", 1e-2)), "rad": (("deg", math.inf),)}
+# Ends of the names of settings, SI and told: a plan takes either.
+_SETTINGS = (
+    ("_rad_s", "rad/s", (("_rpm", math.inf),)), ("_rad", "rad", (("_mrad", 0.02), ("_deg", math.inf))),
+    ("_m", "m", (("_um", 1e-3),)), ("_kg", "kg", (("_g", 1e-2),)), ("_A", "A", (("_mA", 0.1),)),
+)  # fmt: skip
 NOT_INPUTS = ("simulation", "plans", "envelope", "parameters", "laboratory", "settling")
 Content = Mapping[str, Any]
 
@@ -48,7 +56,9 @@ def budget_table(measurement: Content) -> BudgetTable:
         standard_uncertainty=text.with_unit(text.significant(measurement.get("standard_uncertainty")), unit),
         dof=text.degrees_of_freedom(measurement.get("dof")),
         method=method,
-        rows=tuple(_budget_row(entries[i], shares[i]) for i in shown),
+        rows=tuple(
+            _budget_row(entry, shares[i]) for i, entry in zip(shown, _apart([entries[i] for i in shown]), strict=True)
+        ),
         rest=_rest(rest, unit),
     )
 
@@ -70,7 +80,8 @@ def _together(members: Sequence[Content]) -> Content:
     bare, bracket, run = names[0].partition(" [")
     if len(set(names)) > 1:
         same = takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
-        bare = "".join(letters[0] for letters in same).partition(" [")[0].rstrip(" ,;(")
+        bare = "".join(letters[0] for letters in same).partition(" [")[0]
+    bare = bare.rstrip(" ,;(/")
     return {
         **members[0],
         "name": f"{bare}, {len(members)} parts{bracket}{run}",
@@ -78,6 +89,21 @@ def _together(members: Sequence[Content]) -> Content:
         "sensitivity": None,
         "dof": members[0].get("dof") if len(dofs) == 1 else "",
     }
+
+
+def _apart(entries: Sequence[Content]) -> list[Content]:
+    """Influences of one name (the two components of a vector, say) told apart by the end of their identities."""
+    count = Counter(str(e.get("name") or "") for e in entries)
+    return [
+        {**e, "name": f"{e['name']} ({_end(str(e['influence']))})"}
+        if count[str(e.get("name") or "")] > 1 and e.get("influence") else e
+        for e in entries
+    ]  # fmt: skip
+
+
+def _end(identity: str) -> str:
+    """The last part of an identity; the unit r/min is none of its strokes."""
+    return re.split(r"/(?!min\b)", identity)[-1]
 
 
 def _budget_row(entry: Content, share: float) -> BudgetRow:
@@ -134,7 +160,8 @@ def toleranced(tree: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[st
 def traceability(rig: Content) -> Table:
     """The toleranced numbers of the rig file with their sources; equal sensors share one row."""
     groups: dict[tuple[str, ...], list[tuple[str, ...]]] = {}
-    for path, entry in toleranced(rig):
+    for path, stored in toleranced(rig):
+        entry = _told(stored)
         unit = str(entry.get("unit") or "")
         value = text.with_unit(text.plain(entry["value"]), unit)
         source = str(entry.get("source") or "source not stated")
@@ -142,6 +169,17 @@ def traceability(rig: Content) -> Table:
         groups.setdefault((kind, value, stated(entry), source), []).append(path)
     rows = tuple((_group_name(paths), *key[1:]) for key, paths in groups.items())
     return Table("", ("Rig file entry", "Value", "Uncertainty as stated", "Source"), rows)
+
+
+def _told(entry: Content) -> Content:
+    """A number of the rig file, SI, in the unit that such numbers are written in."""
+    si = str(entry.get("unit") or "")
+    stated_as = [abs(float(entry[key])) for key in ("value", "u", "half_width") if entry.get(key) is not None]
+    size = next((x for x in stated_as if x), 0.0)
+    symbol = next((symbol for symbol, below in _WRITTEN.get(si, ()) if 0 < size < below), si)
+    one = units.unit(symbol).factor if symbol != si else 1.0
+    numbers = {k: entry[k] / one for k in ("value", "u", "half_width") if isinstance(entry.get(k), int | float)}
+    return {**entry, **numbers, "unit": symbol}
 
 
 def _group_name(paths: Sequence[tuple[str, ...]]) -> str:
@@ -177,8 +215,12 @@ def correlations(record: Content) -> Correlations | None:
         return None
     if len(names) > PAGE_WIDTH:
         return _pairs(names, found)
-    rows = tuple(tuple(_coefficient(r) for r in row) for row in found)
-    return Correlations(tuple(symbol_of(shorten(n, 20, placeholder="…")) for n in names), rows)
+    if all(r is None or abs(r) < SMALL_CORRELATION for a, row in enumerate(found) for r in row[:a]):
+        return _pairs(names, found)
+    heads = tuple(_placed(name) for name in names)
+    narrow = all(not place and (symbol.subscript or len(symbol.plain) < NARROW_NAME) for symbol, place in heads)
+    columns = tuple(s if narrow else symbol_of(str(k)) for k, (s, _) in enumerate(heads, 1))
+    return Correlations(columns, tuple(tuple(_coefficient(r) for r in row) for row in found), heads)
 
 
 def _pairs(names: Sequence[str], matrix: Sequence[Sequence[float | None]]) -> Correlations:
@@ -193,7 +235,7 @@ def _pairs(names: Sequence[str], matrix: Sequence[Sequence[float | None]]) -> Co
         f"{len(known)} of the {count} pairs have a coefficient of at least {SMALL_CORRELATION} in size"
         f"{f'; the {MOST_PAIRS} largest are listed' if len(known) > MOST_PAIRS else ''}. record.json has the whole matrix."
     )
-    return Correlations((), (), pairs, note)
+    return Correlations((), (), (), pairs, note)
 
 
 def _placed(name: str) -> tuple[Symbol, str]:
@@ -222,6 +264,29 @@ def facts(tree: Any, prefix: str = "") -> Iterator[Fact]:
             yield from facts(branch, f"{prefix}[{index + 1}]")
     else:
         yield Fact(prefix, inline(tree))
+
+
+def settings(plan: Content) -> Iterator[Fact]:
+    """The settings of a plan, each under the name and in the unit in which it is usually given."""
+    for key, value in plan.items():
+        name, told = _setting(str(key), value)
+        yield from facts(told, name)
+
+
+def _setting(key: str, value: Any) -> tuple[str, Any]:
+    many = value if isinstance(value, list | tuple) else [value]
+    if not many or any(isinstance(v, bool) or not isinstance(v, int | float) for v in many):
+        return key, value
+    for end, si, written in _SETTINGS:
+        if key.endswith(end) and not key.endswith("_kg_m"):
+            size = max(abs(v) for v in many)
+            told = next((other for other, below in written if size < below), "")
+            if not told:
+                break
+            one = units.unit(units.SUFFIXES[told[1:]]).factor / units.unit(si).factor
+            numbers = [float(f"{v / one:.12g}") for v in many]
+            return key.removesuffix(end) + told, numbers if isinstance(value, list | tuple) else numbers[0]
+    return key, value
 
 
 def inline(value: Any) -> str:

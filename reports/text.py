@@ -19,7 +19,17 @@ TIMES = "\u00d7"
 DASH = "\u2013"
 _SUPERSCRIPTS = str.maketrans("0123456789-+", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺")
 _GREEK = {"alpha": "α", "beta": "β", "gamma": "γ", "tau": "τ"}
-_UNIT_WORDS = {"um": "µm", "us": "µs", "uA": "µA", "deg": "°", "degC": "°C", "ohm": "Ω", "Ohm": "Ω", "percent": "%"}
+_UNIT_WORDS = {
+    "um": "µm",
+    "us": "µs",
+    "uA": "µA",
+    "urad": "µrad",
+    "deg": "°",
+    "degC": "°C",
+    "ohm": "Ω",
+    "Ohm": "Ω",
+    "percent": "%",
+}
 
 
 def unit_text(unit: str | None) -> str:
@@ -87,6 +97,25 @@ def result(value: float | None, expanded: float | None, unit: str) -> str:
         return pair
     pair = f"({pair})"
     return with_unit(pair + (power_of_ten(shift) if shift else ""), unit)
+
+
+def shift_of(value: float | None, expanded: float | None) -> int:
+    """The power of ten that `result` sets a value with its uncertainty in; 0 for none."""
+    if value is None or expanded is None:
+        return 0
+    return rounded_together([value], expanded)[2]
+
+
+def shifted(number: float, shift: int) -> str:
+    """A setting over a power of ten that stands beside it, without the last digits that the division makes."""
+    return plain(number) if not shift else plain(float(f"{number / 10.0**shift:.10g}"))
+
+
+def at_power(number: str, shift: int, unit: str) -> str:
+    """Numbers with their common power of ten and unit, in brackets where the power binds more than one."""
+    if not shift:
+        return with_unit(number, unit)
+    return with_unit((f"({number})" if " " in number else number) + power_of_ten(shift), unit)
 
 
 def interval(low: float | None, high: float | None, expanded: float | None, unit: str) -> str:

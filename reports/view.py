@@ -37,6 +37,11 @@ ABOUT_MANY = (
     "One line for each result, with the influences that carry most of its variance; the full uncertainty budget of each "
     "result is in record.json, which belongs to this report."
 )
+ABOUT_VECTORS = (
+    "Two components C (cos) and S (sin) as the amount √(C² + S²) and the angle of S over C: of probes' vectors, zero to peak, "
+    "it is the phase lag from the once-per-turn mark to the high spot; of unbalances the angle on the scale of the plane. "
+    "The intervals are linear in those of the components and their correlation; an angle that is not known to 45° is left out."
+)
 NO_RESULTS = "No result was obtained. This report makes no statement about the item tested."
 
 
@@ -150,8 +155,11 @@ class Table:
 class Correlations:
     """The correlation matrix of the results; of many results, the pairs that are correlated most."""
 
-    symbols: tuple[Symbol, ...]
+    symbols: tuple[Symbol, ...]  # the columns' headings
     rows: tuple[tuple[str, ...], ...]
+    heads: tuple[
+        tuple[Symbol, str], ...
+    ] = ()  # the rows' headings and places; behind a number where columns have numbers
     pairs: tuple[
         tuple[tuple[Symbol, str], tuple[Symbol, str], str], ...
     ] = ()  # symbol and place, twice, and coefficient
@@ -187,6 +195,8 @@ class ReportView:
     many: tuple[ManyResults, ...]  # of the same; their full budgets are in record.json
     about_many: str
     results: tuple[ResultRow, ...]  # 7.8.2.1 m, 7.8.4.1 a (uncertainty in the measurand's unit), 7.8.4.1 e
+    vectors: Table  # of the same, those that are vectors as amount and angle
+    about_vectors: str
     no_results: str
     about_uncertainty: str
     decision_rule: str  # 7.8.6

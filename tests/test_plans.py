@@ -96,3 +96,13 @@ def test_a_plan_file_that_cannot_be_used(tmp_path: Path, content: str | None, sa
         file.write_text(content)
     with pytest.raises(ConfigError, match=said):
         made(file=file)
+
+
+def test_a_misspelt_key_is_answered_with_the_nearest_one() -> None:
+    with pytest.raises(ConfigError, match=r"Did you mean settle_s\?"):
+        made("setle_ms=1")
+
+
+def test_a_number_for_a_list_is_told_so() -> None:
+    with pytest.raises(ConfigError, match=r"expected a list, as in \[1, 2\]"):
+        made("levels_um=10")

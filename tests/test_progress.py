@@ -6,7 +6,7 @@ import io
 
 import pytest
 
-from bench.progress import PlainProgress, clock_text, shown_on
+from bench.progress import PlainProgress, clock_text, described, shown_on
 
 
 def test_plain_lines_are_few_and_say_step_and_time_left() -> None:
@@ -64,3 +64,11 @@ def test_a_pipe_gets_no_control_characters() -> None:
         progress.total(4)
         progress.step("hang")
     assert "\x1b" not in stream.getvalue()
+
+
+def test_labels_are_in_the_fields_units() -> None:
+    labels = {"speed_rad_s": 1047.1975512, "z_m": -6e-5, "angle_rad": 0.7853981634, "judged": True, "name": "", "n": 2,
+              "period_s": 0.125, "low_m": -0.0}  # fmt: skip
+    assert described(labels) == (
+        "speed 10000 r/min, z -60 µm, angle 45°, judged yes, name none, n 2, period 0.125 s, low 0 µm"
+    )

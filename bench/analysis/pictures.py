@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from bench.figures import Figure, Grid, Series
 
 UM, RPM = 1e6, 30 / math.pi
 HIGH = 0.16  # of the axis: the tallest line of a waterfall
+SMALL = 0.4  # of the clearance: the reach of an orbit that is shown closer too
 GAP_DEG = 22.0  # of a turn left blank before the mark: the motion runs from the blank into the dot
 _TURN = np.linspace(0, 2 * math.pi, 181)
 
@@ -31,6 +33,7 @@ class Orbit:
     y: Array | None = None
     ellipse: Ellipse | None = None
     centre: tuple[float, float] = (0.0, 0.0)
+    once: str = ""  # what the synchronous one is called, if not by the label
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,9 @@ class Curve:
 def orbits(key: str, title: str, shown: Sequence[Orbit], clearance: float, x_probe_deg: float = 0.0) -> Figure:
     """Orbits within the clearance circle, seen along the shaft with up above: `x_probe_deg` is where probe x stands,
     counterclockwise from the right. The synchronous orbit is blank before its keyphasor dot."""
+    what, closer = "", _closer(shown, clearance, x_probe_deg)
+    if closer is not None:
+        what = " Beside it the same, closer."
     series = [Series("clearance", UM * clearance * np.cos(_TURN), UM * clearance * np.sin(_TURN), "guide")]
     for o in shown:
         if o.x is not None and o.y is not None:
@@ -53,7 +59,9 @@ def orbits(key: str, title: str, shown: Sequence[Orbit], clearance: float, x_pro
         if o.ellipse is not None:
             x, y = o.ellipse.path(361)
             seen = slice(0, round(361 - GAP_DEG))
-            series.append(_turned(o.label + " 1x", x[seen] + o.centre[0], y[seen] + o.centre[1], x_probe_deg, "line"))
+            series.append(
+                _turned(o.once or f"{o.label} 1x", x[seen] + o.centre[0], y[seen] + o.centre[1], x_probe_deg, "line")
+            )
             at = o.ellipse.mark + complex(*o.centre)
             series.append(_turned("mark", np.array([at.real]), np.array([at.imag]), x_probe_deg, "mark"))
     reach = UM * clearance
@@ -65,13 +73,26 @@ def orbits(key: str, title: str, shown: Sequence[Orbit], clearance: float, x_pro
         key,
         title,
         "Seen along the shaft; X and Y are where the probes stand. The dot is where the shaft's centre is as the "
-        "once-per-turn mark passes; the blank comes just before it.",
+        f"once-per-turn mark passes; the blank comes just before it.{what}",
         "horizontal (µm)",
         "vertical (µm)",
         tuple(series),
         "plane",
         notes=notes,
+        closer=closer,
     )
+
+
+def _closer(shown: Sequence[Orbit], clearance: float, degrees: float) -> tuple[float, float, float] | None:
+    """Where orbits lie that are too small to be seen within the clearance: their middle, and how far they reach, µm."""
+    paths = [o.ellipse.path(361) + np.array(o.centre)[:, None] for o in shown if o.ellipse is not None]
+    paths += [np.array([o.x, o.y]) for o in shown if o.x is not None and o.y is not None]
+    if not paths:
+        return None
+    z = UM * np.concatenate([p[0] + 1j * p[1] for p in paths]) * np.exp(1j * math.radians(degrees))
+    middle = complex(np.ptp(z.real) / 2 + z.real.min(), np.ptp(z.imag) / 2 + z.imag.min())
+    reach = max(float(np.ptp(z.real)), float(np.ptp(z.imag))) / 2
+    return (middle.real, middle.imag, 1.25 * reach) if 0 < reach < SMALL * UM * clearance else None
 
 
 def _turned(label: str, x: Array, y: Array, degrees: float, style: str) -> Series:
@@ -88,7 +109,7 @@ def bode(key: str, title: str, curves: Sequence[Curve], order: float = 1.0, capt
         "",
         "speed (r/min)",
         "phase lag (°)",
-        tuple(Series(c.label, RPM * c.speed, _unwrapped(c.values)) for c in ordered),
+        tuple(Series(c.label, RPM * c.speed, _unwrapped(c.values), _style(c)) for c in ordered),
         downward=True,
     )
     return Figure(
@@ -99,10 +120,16 @@ def bode(key: str, title: str, curves: Sequence[Curve], order: float = 1.0, capt
         "speed (r/min)",
         f"{order:g}x amplitude (µm 0-pk)",
         tuple(
-            Series(c.label, RPM * c.speed, UM * np.abs(c.values), u=None if c.u is None else UM * c.u) for c in ordered
+            Series(c.label, RPM * c.speed, UM * np.abs(c.values), _style(c), None if c.u is None else UM * c.u)
+            for c in ordered
         ),
         below=lower,
     )
+
+
+def _style(curve: Curve) -> Literal["line", "both"]:
+    """Vectors with intervals were measured at these speeds alone; others come so close that they make a curve."""
+    return "line" if curve.u is None else "both"
 
 
 def _sorted(curve: Curve) -> Curve:
@@ -117,14 +144,18 @@ def _unwrapped(values: Complex) -> Array:
 
 
 def polar(key: str, title: str, curves: Sequence[Curve], every_rpm: float = 1000.0, order: float = 1.0) -> Figure:
-    """Vectors as points of a curve with the speeds written along it."""
+    """Vectors as points of a curve with the speeds written along it; of vectors with intervals those that were measured."""
     series: list[Series] = []
     notes: list[tuple[str, float, float]] = []
     told: list[complex] = []
     for c in (_sorted(c) for c in curves):
         series.append(Series(c.label, -np.angle(c.values), UM * np.abs(c.values)))
         rpm = RPM * c.speed
-        steps = np.arange(math.ceil(rpm[0] / every_rpm), math.floor(rpm[-1] / every_rpm) + 1) * every_rpm
+        steps = (
+            rpm
+            if c.u is not None
+            else np.arange(math.ceil(rpm[0] / every_rpm), math.floor(rpm[-1] / every_rpm) + 1) * every_rpm
+        )
         there = np.interp(steps, rpm, c.values.real) + 1j * np.interp(steps, rpm, c.values.imag)
         lag, size = -np.angle(there), UM * np.abs(there)
         series.append(Series("speed in r/min", lag, size, "mark"))
@@ -266,11 +297,11 @@ def nyquist(key: str, title: str, curves: Sequence[tuple[str, Response]], peak: 
     for label, r in curves:
         near = np.abs(r.values + 1) < view
         series.append(Series(label, np.where(near, r.values.real, np.nan), np.where(near, r.values.imag, np.nan)))
-    series.append(Series("-1", np.array([-1.0]), np.array([0.0]), "mark"))
+    series.append(Series("−1", np.array([-1.0]), np.array([0.0]), "mark"))
     return Figure(
         key,
         title,
-        "Open loop L = 1/S - 1. Its distance from -1 is 1/|S|; in the dashed circle about -1 the sensitivity is greater than "
+        "Open loop L = 1/S − 1. Its distance from −1 is 1/|S|; in the dashed circle about −1 the sensitivity is greater than "
         "stated.",
         "real part",
         "imaginary part",

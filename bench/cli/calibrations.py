@@ -14,6 +14,7 @@ from bench.calibrationstore import Store, base_of, machine, stores_of
 from bench.cli.adopt import values
 from bench.errors import ConfigError
 from bench.rigfile import RigFile, load_rig
+from bench.specs import load_spec
 
 HEADER = ("machine", "procedure", "bias", "date", "age", "due", "state")
 
@@ -33,7 +34,10 @@ def calibrations_command(rig: str, calibrations: Path | None) -> int:
     now = datetime.now(UTC)
     rows = [row for store in stores_of(file, calibrations) for row in rows_of(store, file, now)]
     if not rows:
-        first = catalogue.PROCEDURES[0].name
+        # Procedures of another rig would not start on this one: those with limits for it do.
+        first = next(
+            (p.name for p in catalogue.PROCEDURES if load_spec(file.name, p.name)), catalogue.PROCEDURES[0].name
+        )
         where = "" if calibrations is None else f" --calibrations {calibrations}"
         sys.stderr.write(
             f"no calibrations in {base_of(file, calibrations)}. Next: `bench run {first} --rig {rig}`, then "

@@ -14,6 +14,7 @@ from bench.figures import Figure
 from bench.procedure import Procedure
 from bench.recording import Recording
 from bench.records import Record
+from bench.rigfile import RigFile
 
 CELSIUS = 273.15
 
@@ -56,9 +57,22 @@ def conditions(recording: Recording[Any]) -> dict[str, str]:
                 high[name] = max(high[name], float(block.columns[name].max()))
         for name, unit in wanted.items():
             if np.isfinite(low[name]):
-                about = recording.rig.channels[name].about if name in recording.rig.channels else ""
-                found[about or name] = _range(low[name], high[name], unit)
+                found[_named(recording.rig, name, unit)] = _range(low[name], high[name], unit)
     return found
+
+
+def _named(rig: RigFile, name: str, unit: str) -> str:
+    """What a channel shows, with its kind where the description leaves that out, and its device beside the controller."""
+    kind = "temperature" if unit == "K" else "voltage"
+    if name in rig.channels:
+        about, device = rig.channels[name].about, ""
+    else:
+        registers = ((r.about, f" ({d})") for d, of in rig.devices.items() for n, r in of.registers.items()
+                     if f"{d}_{n}" == name)  # fmt: skip
+        about, device = next(registers, ("", ""))
+    if not about:
+        return name
+    return (about if kind in about else f"{kind}, {about}") + device
 
 
 def _range(low: float, high: float, unit: str) -> str:

@@ -52,5 +52,5 @@ def summary(record: Record) -> str:
             value = f"{stated(m.value / one, m.expanded_uncertainty / one)} {unit}".rstrip()
         place = f" ({m.where})" if m.where else ""
         lines.append(f"  {m.name:{widest}} {value:32} {m.verdict.value}{place}")
-    lines += [f"  {f.effect.value}: {f.code}: {f.text}" for f in record.findings]
+    lines += [f"  {f.effect.value}: {f.code}{f' ({f.where})' if f.where else ''}: {f.text}" for f in record.findings]
     return "\n".join([*lines, f"outcome {record.outcome.value}"]) + "\n"

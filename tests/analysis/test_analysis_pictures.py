@@ -120,3 +120,26 @@ def test_a_second_panel_is_checked_too(made: dict[str, Figure]) -> None:
     bad = Figure("k", "t", "c", "x", "y", (Series("s", np.arange(3.0), np.arange(4.0)),))
     with pytest.raises(BenchError, match="series 's'"):
         draw(Figure("k", "t", "c", "x", "y", (), below=bad))
+
+
+def test_a_small_orbit_is_shown_closer_and_a_large_one_is_not(made: dict[str, Figure]) -> None:
+    closer = made["orbits"].closer
+    assert closer is not None
+    x, y, reach = closer
+    curve = series(made["orbits"], "o 1x")
+    assert np.abs(curve.x - x).max() < reach
+    assert np.abs(curve.y - y).max() < reach < 40
+    large = ellipse(Vectors(np.array([6e-5 + 0j, -5e-5j]), 1e-16 * np.eye(4)))
+    assert pictures.orbits("k", "t", [pictures.Orbit("o", ellipse=large)], 1e-4).closer is None
+
+
+def test_measured_speeds_are_marked_and_none_between_them() -> None:
+    """Between two dwells nothing was measured: no speeds there, in neither plot."""
+    rpm = np.array([2000.0, 4000.0, 9990.0])
+    values = 1e-5 * np.array([1, 3 * np.exp(-1j), np.exp(-2.5j)])
+    curve = pictures.Curve("y", rpm * np.pi / 30, values, np.full(3, 1e-7))
+    polar, bode = pictures.polar("polar", "t", [curve]), pictures.bode("bode", "t", [curve])
+    assert [text for text, _, _ in polar.notes] == ["2000", "4000", "9990"]
+    assert series(polar, "speed in r/min").y == pytest.approx(1e6 * np.abs(values))
+    assert bode.below is not None
+    assert bode.series[0].style == bode.below.series[0].style == "both"

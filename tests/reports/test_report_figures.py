@@ -8,10 +8,12 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure as Canvas
 from report_samples import HOSTILE, figures
 
 from bench.errors import BenchError
 from bench.figures import Figure, Series
+from reports import figures as drawing
 from reports.figures import MAX_LINE_POINTS, draw, envelope
 
 
@@ -63,3 +65,25 @@ def test_points_that_are_not_finite_and_empty_series_are_drawn_around() -> None:
 def test_unequal_lengths_are_named() -> None:
     with pytest.raises(BenchError, match=r"'key', series 'a'.*'x': 3.*'y': 4"):
         draw(one(Series("a", np.arange(3.0), np.arange(4.0))))
+
+
+def test_an_amplitude_over_its_lag_begins_at_zero_and_angles_have_quarter_turns() -> None:
+    x = np.linspace(0.0, 10.0, 50)
+    lag = Figure("lag", "", "", "speed (r/min)", "phase lag (°)", (Series("y", x, 27 * x),), downward=True)
+    made = Figure("pair", "t", "c", "speed (r/min)", "amplitude (µm 0-pk)", (Series("y", x, 5 + x),), below=lag)
+    upper, lower = Canvas().subplots(2)
+    drawing._panel(upper, made)
+    drawing._panel(lower, lag)
+    assert upper.get_ylim()[0] == 0
+    assert set(np.abs(np.diff(lower.get_yticks()))) == {90.0}
+
+
+def test_a_plane_with_a_closer_view_is_one_drawing_with_equal_bytes() -> None:
+    turn = np.linspace(0, 2 * np.pi, 60)
+    some = (
+        Series("ring", 100 * np.cos(turn), 100 * np.sin(turn), "guide"),
+        Series("orbit", np.cos(turn), np.sin(turn)),
+    )
+    made = Figure("o", "t", "c", "x (µm)", "y (µm)", some, "plane", closer=(0.0, 0.0, 1.25))
+    assert draw(made).svg == draw(made).svg
+    assert draw(made).svg.count("axes_") > draw(dataclasses.replace(made, closer=None)).svg.count("axes_")

@@ -1,0 +1,73 @@
+"""Vectors that a record holds by their components, as amount and angle: so people read them and plots show them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from bench import units
+from reports import tables, text
+from reports.view import Table
+
+COS, SIN = "_cos", "_sin"
+MOST_ANGLE = math.radians(45)  # a half width beyond which an angle says nothing
+Content = Mapping[str, Any]
+
+
+def table(record: Content) -> Table:
+    """A row for each pair of results `x_cos`, `x_sin` of one place; no rows where a record has none."""
+    measurements = [m for m in record.get("measurements") or () if isinstance(m, Mapping)]
+    rows = tuple(_row(a, b, r) for a, b, r in _pairs(measurements, _coefficients(record, measurements)))
+    return Table("", ("Vector", "Where", "Amount", "Angle"), rows, (2, 3))
+
+
+def _pairs(
+    measurements: Sequence[Content], coefficients: Mapping[tuple[int, int], float]
+) -> Iterator[tuple[Content, Content, float]]:
+    sines = {(str(m["name"]).removesuffix(SIN), m.get("where")): k for k, m in enumerate(measurements)
+             if str(m.get("name", "")).endswith(SIN)}  # fmt: skip
+    for k, m in enumerate(measurements):
+        name = str(m.get("name", ""))
+        other = sines.get((name.removesuffix(COS), m.get("where"))) if name.endswith(COS) else None
+        if other is not None and m.get("value") is not None and measurements[other].get("value") is not None:
+            yield m, measurements[other], coefficients.get((k, other), 0.0)
+
+
+def _coefficients(record: Content, measurements: Sequence[Content]) -> dict[tuple[int, int], float]:
+    """Correlations by the places of two results in the record, where it has a matrix that fits them."""
+    found = record.get("correlations")
+    matrix = found.get("matrix") if isinstance(found, Mapping) else found
+    names = [str(n) for n in found.get("names") or ()] if isinstance(found, Mapping) else []
+    if not matrix:
+        return {}
+    if not names:
+        names = [str(m.get("name", "")) for m in measurements]
+    at = {name: k for k, name in enumerate(names)}
+    own = [at.get(f"{m.get('name')}@{m.get('where')}", at.get(str(m.get("name")))) for m in measurements]
+    return {
+        (a, b): matrix[i][j] or 0.0 for a, i in enumerate(own) for b, j in enumerate(own)
+        if a != b and i is not None and j is not None and _same_vector(measurements[a], measurements[b])
+    }  # fmt: skip
+
+
+def _same_vector(a: Content, b: Content) -> bool:
+    stems = {str(m.get("name", "")).removesuffix(COS).removesuffix(SIN) for m in (a, b)}
+    return len(stems) == 1 and a.get("where") == b.get("where")
+
+
+def _row(cosine: Content, sine: Content, r: float) -> tuple[str, ...]:
+    """Amount and angle with their half widths, linear in those of the components and their correlation."""
+    c, s = float(cosine["value"]), float(sine["value"])
+    u, v = (float(m.get("expanded_uncertainty") or 0.0) for m in (cosine, sine))
+    size = math.hypot(c, s)
+    along = math.sqrt(max(0.0, (c * u) ** 2 + (s * v) ** 2 + 2 * r * c * s * u * v)) / size if size else max(u, v)
+    across = math.sqrt(max(0.0, (s * u) ** 2 + (c * v) ** 2 - 2 * r * c * s * u * v)) / size**2 if size else math.inf
+    symbol, one = units.habit(str(cosine.get("unit") or ""), size)
+    known = across <= MOST_ANGLE
+    return (
+        str(cosine["name"]).removesuffix(COS),
+        tables.place(cosine),
+        text.result(size / one, along / one, symbol),
+        text.result(math.degrees(math.atan2(s, c)) % 360, math.degrees(across), "deg") if known else text.DASH,
+    )
