@@ -36,7 +36,7 @@ class SimulatedPlant(Protocol):
     @property
     def pulse_age_s(self) -> float | None: ...  # since the last once-per-turn pulse; None: speed not by pulses
     @property
-    def turn_s(self) -> float | None: ...  # between the last two pulses; None: there are not two
+    def turn_s(self) -> float | None: ...  # the longer of the last two times between pulses; None: there are not three
     @property
     def shaft_speed(self) -> float: ...  # the true one
     @property

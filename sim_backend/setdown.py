@@ -10,7 +10,8 @@ from sim_backend.machine import SimulatedPlant
 DRIVE_GIVES_UP_S = 1.0  # a drive that nobody asks anything coasts by itself after so long
 TOO_FAST = 1.1  # times the landing speed
 HARDEST_RAD_S2 = 250.0  # a drive that brakes as hard as it can
-SILENT_TURNS = 4  # a pulse or two may be missed
+SILENT_TURNS = 3  # two pulses may be missed
+ROOM = 1.1  # of the time that they take at most
 
 
 def slow(plant: SimulatedPlant, limit_rad_s: float, free_tick: int) -> bool:
@@ -29,17 +30,17 @@ def slow(plant: SimulatedPlant, limit_rad_s: float, free_tick: int) -> bool:
 
 
 def pulses_lost(plant: SimulatedPlant) -> bool:
-    """Whether pulses have ended that the shaft must give: no brake stops it within a turn from that speed.
+    """Whether pulses have ended that the shaft must give: no brake stops it within some turns from that speed.
 
-    A turn took T; at its end the speed was v = 2 pi / T - a T / 2 at least, and if v^2 > 4 pi a another one is done after
-    t = (v - sqrt(v^2 - 4 pi a)) / a, with a the hardest braking. Slower shafts may have stopped.
+    A turn took T; at its end the speed was v = 2 pi / T - a T / 2 at least, with a the hardest braking. If v^2 > 4 pi n a, n
+    more turns are done after t = (v - sqrt(v^2 - 4 pi n a)) / a. Slower shafts may have stopped.
     """
     age, turn, a = plant.pulse_age_s, plant.turn_s, HARDEST_RAD_S2
     if age is None or turn is None:
         return False
     v = 2 * math.pi / turn - a * turn / 2
-    rest = v * abs(v) - 4 * math.pi * a
-    return rest > 0 and age > SILENT_TURNS * (v - math.sqrt(rest)) / a
+    rest = v * abs(v) - 4 * math.pi * SILENT_TURNS * a
+    return rest > 0 and age > ROOM * (v - math.sqrt(rest)) / a
 
 
 def too_fast(plant: SimulatedPlant, limit_rad_s: float) -> bool:

@@ -17,6 +17,7 @@ from bench.analysis.vectors import Vectors
 from bench.capture import CaptureData
 from bench.recording import Recording
 from procedures.estimators.runout import Turning
+from procedures.estimators.unbalance_beside import folds
 from procedures.estimators.unbalance_data import CURRENTS, POSITIONS, SLOW, Dwell, read_dwells
 
 Array = npt.NDArray[np.float64]
@@ -42,12 +43,14 @@ class Weight:
 
 @dataclass(frozen=True)
 class Read:
-    """One dwell: mean `speed` rad/s, `means` (12,) and `vectors` (12,) of four probes and eight coils; its pulses `sound`."""
+    """One dwell: mean `speed` rad/s, `means` (12,) and `vectors` (12,) of four probes and eight coils; its pulses `sound`;
+    `folds` (4,) m, by how much a higher order that shows as order 1 may move the probes' vectors."""
 
     speed: float
     means: Array
     vectors: Vectors
     sound: bool = True
+    folds: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
 
     @property
     def turning(self) -> Turning:
@@ -90,7 +93,7 @@ def read_capture(data: CaptureData) -> Read:
 
 def read_dwell(d: Dwell) -> Read:
     """Vectors of a dwell's telemetry."""
-    return Read(d.speed, d.means, d.both(), d.tacho.sound)
+    return Read(d.speed, d.means, d.both(), d.tacho.sound, tuple(folds(d)[1].tolist()))
 
 
 @dataclass(frozen=True)

@@ -59,10 +59,23 @@ def of_run(
             _append(out, -np.eye(2) * (u + solution.taken[-1])[j] / weight, _refitted(trials.having[j], refit_u))
     for (name, k), factor in factors.items():
         _append(out, factor, of_read(f"{name}/{k}", reads[name, k], 4))
+    for k, read in enumerate(run.reads):
+        if any(read.folds):
+            _append(out, p[:, k] / s.gain, _folded(read, f"{run.name}/{k}"))
     if slow is not None:
         slowly = -np.einsum("jsp,spq,sqn->jn", p, a, _slow(s, solution, slow, trials))
         _append(out, slowly, of_read("slow", slow, 12))
     return out
+
+
+def _folded(read: Read, name: str) -> list[Estimate]:
+    """What a higher order that shows as order 1 may add to the probes' vectors (8,): the runout's does so in every run alike,
+    and takes no part in the influence coefficients."""
+    what, sizes = "higher order that shows as order 1", np.repeat(read.folds, 2) / np.sqrt(2)
+    return [
+        Estimate.of(0.0, Influence(f"folded/{name}/{n}", what, float(u), "m", "B", "arcsine"))
+        for n, u in enumerate(sizes)
+    ]
 
 
 def _refitted(run: Run, u: float) -> list[Estimate]:

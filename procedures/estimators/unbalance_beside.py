@@ -1,10 +1,12 @@
 """What the captures show beside the vectors of order 1: motion that does not turn with the shaft, and orders that the telemetry
-takes for order 1. Neither scatters where it matters, so that no interval tells."""
+takes for order 1. Neither scatters where it matters: both enter the budgets by their size, and where they are large a finding
+says so."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,7 +14,9 @@ from bench.analysis.orders import synchronous
 from bench.analysis.sampling import Sampling
 from bench.findings import Effect, Finding
 from procedures.estimators.unbalance_data import AXES, DWELL, PLANES, RPM, Array, Dwell
-from procedures.estimators.unbalance_estimates import Results
+
+if TYPE_CHECKING:
+    from procedures.estimators.unbalance_estimates import Results
 
 BESIDE = 0.05  # of the least clearance: motion beside the orders that D_max may leave out
 FITTED = 8  # orders that turn with the shaft
@@ -56,9 +60,10 @@ def folds(d: Dwell) -> tuple[int, Array]:
     """By how much an order that the telemetry is too slow for may be off in the vectors of order 1 of the four probes, (4,) m,
     and that order: where the speed is a whole share of the telemetry's rate, it comes out as order 1 in every sample, and
     nothing scatters. Its amplitude is that of the capture."""
-    assert d.full is not None
     turn = d.speed / (2 * math.pi)
     rate, worst, most = 1 / (d.sampling.ticks * d.sampling.tick), 0, np.zeros(4)
+    if d.full is None or d.kind != DWELL:  # a passage stands at no speed
+        return worst, most
     for n in range(2, int(min(FOLDING, HIGHEST * d.full.rate / turn)) + 1):
         away = abs(abs(n * turn - rate * round(n * turn / rate)) - turn) * d.track.turns / turn  # in lines of the dwell
         share = abs(float(d.sampling.gain(n * d.speed) / d.sampling.gain(d.speed))) / max(math.pi * away, 1.0)
@@ -74,14 +79,13 @@ def folds(d: Dwell) -> tuple[int, Array]:
 def folded(results: Results) -> Iterator[Finding]:
     """Beside what is known of the vectors."""
     for r in results.dwells:
-        if r.dwell.full is None or r.dwell.kind != DWELL:  # a passage stands at no speed
-            continue
         n, off = folds(r.dwell)
-        known = np.array([np.sqrt(np.linalg.eigvalsh(r.vectors.one(k).covariance)[0]) for k in range(4)])
+        whole = np.array([np.linalg.eigvalsh(r.vectors.one(k).covariance)[0] for k in range(4)])
+        known = np.sqrt(np.maximum(whole - off**2 / 2, 1e-24))  # without it
         k = int(np.argmax(off / known))
         if off[k] > 2 * known[k]:
             period = r.dwell.sampling.ticks * r.dwell.sampling.tick
             text = (f"at {r.dwell.speed * RPM:.0f} r/min the telemetry, a sample every {period * 1e3:g} ms, shows order {n} as "
-                    f"order 1: the vector of {AXES[k]} may be off by {off[k] * 1e6:.2f} µm, and nothing scatters. Dwell at "
-                    "a speed that is a percent away.")  # fmt: skip
+                    f"order 1: the vector of {AXES[k]} may be off by {off[k] * 1e6:.2f} µm, which its interval holds. "
+                    "Dwell at a speed that is a percent away.")  # fmt: skip
             yield Finding("aliasing", text, r.dwell.where, Effect.INDETERMINATE)

@@ -20,6 +20,7 @@ from procedures.estimators.inputs import certified
 from procedures.estimators.reach import farthest
 from procedures.estimators.runout import Stand, Turning
 from procedures.estimators.unbalance_bearings import Settings, stated
+from procedures.estimators.unbalance_beside import beside_orders, folds
 from procedures.estimators.unbalance_data import AXES, ORDERS, PLANES, SLOW, Dwell
 
 Array = npt.NDArray[np.float64]
@@ -141,6 +142,8 @@ def _result(
     rig: RigFile,
 ) -> Result:
     parts = {n: _shaft(d, inputs, runouts[n], n) for n in d.track.orders if n in runouts}
+    parts[1.0] = _folded(d, parts[1.0])
+    beside = np.zeros(2) if d.full is None else beside_orders(d)
     values = np.array([parts[1.0][2 * k].value + 1j * parts[1.0][2 * k + 1].value for k in range(4)])
     vectors = Vectors(values, covariance(parts[1.0]), min(welch_satterthwaite(e) for e in parts[1.0]))
     u, misfit = runout.unbalances(nominal, Turning(d.speed, d.means, d.both().values), runouts[1.0].values)
@@ -149,13 +152,14 @@ def _result(
     for k, a in enumerate(AXES):
         out["vector_cos", a] = parts[1.0][2 * k]
         out["vector_sin", a] = -parts[1.0][2 * k + 1]
-    for plane, (y, z) in PLANES.items():
+    for more, (plane, (y, z)) in zip(beside, PLANES.items(), strict=True):
         chosen = [2 * y, 2 * y + 1, 2 * z, 2 * z + 1]
         orbits[plane] = ellipse(Vectors(values[[y, z]], vectors.covariance[np.ix_(chosen, chosen)], vectors.dof))
         out["major_half_axis", plane] = _major([parts[1.0][k] for k in chosen])
         means = [_mean(d, inputs, k) for k in (y, z)]
         centres[plane] = (means[0].value, means[1].value)
         far = farthest(means, {n: [p[k] for k in chosen] for n, p in parts.items()}, f"{d.where}/{plane}")
+        far = _with_rest(far, float(more), f"{d.where}/{plane}")
         out["d_max", plane] = far
         out["d_max_share", plane] = _unit(far / clearance, "1")
         out |= _coils(d, inputs, plane, rig)
@@ -189,6 +193,27 @@ def _shaft(d: Dwell, inputs: Mapping[str, Estimate], off: Runout, order: float) 
                  (order * across, angle))  # fmt: skip
         out.append(Estimate(value, "m", merged(terms)))
     return out
+
+
+def _folded(d: Dwell, parts: Sequence[Estimate]) -> list[Estimate]:
+    """With what a higher order that the telemetry takes for order 1 may add to each part, at an unknown phase."""
+    _, off = folds(d)
+    out = []
+    for k, e in enumerate(parts):
+        size = float(off[k // 2])
+        i = Influence(f"folded/{d.where}/{AXES[k // 2]}/{'ri'[k % 2]}", "higher order that shows as order 1",
+                      size / math.sqrt(2), "m", "B", "arcsine")  # fmt: skip
+        out.append(Estimate(e.value, "m", merged([(1.0, e), (1.0, Estimate.of(0.0, i))])) if size else e)
+    return out
+
+
+def _with_rest(far: Estimate, beside: float, where: str) -> Estimate:
+    """D_max with the motion that does not turn with the shaft, m: it may add all of itself, or nothing."""
+    if not beside:
+        return far
+    half = Influence(f"beside/{where}", "motion that does not turn with the shaft", beside / (2 * math.sqrt(3)), "m", "B",
+                     "rectangular")  # fmt: skip
+    return far + Estimate.of(beside / 2, half)
 
 
 def covariance(parts: Sequence[Estimate]) -> Array:

@@ -85,7 +85,7 @@ typedef struct {
 } amb_motion;
 
 typedef struct {
-    double last, before, fired[2], angle, speed, age; /* times of the last two pulses; as of the last reading: angle, speed, age */
+    double last, before, earlier, fired[2], angle, speed, age; /* times of the last three pulses; of the last reading: angle, speed, age */
     int64_t pulses, counted;
     int32_t known;
 } amb_tacho;

@@ -104,9 +104,9 @@ class AmbPlant:
 
     @property
     def turn_s(self) -> float | None:
-        """Time between the last two pulses; None before there are two."""
-        tacho = self._s.tacho
-        return float(tacho.last - tacho.before) if tacho.pulses >= 2 else None
+        """The longer one of the last two times between pulses: one may be doubled. None before there are three pulses."""
+        t = self._s.tacho
+        return float(max(t.last - t.before, t.before - t.earlier)) if t.pulses >= 3 else None
 
     @property
     def phase(self) -> float:

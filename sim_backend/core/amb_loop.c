@@ -56,6 +56,7 @@ void amb_sense(const amb_params *p, amb_derived *d, amb_state *st, amb_reading *
 }
 
 static void pulse(amb_tacho *t, double when) {
+    t->earlier = t->before;
     t->before = t->last;
     t->last = when;
     t->pulses++;

@@ -190,8 +190,9 @@ def test_a_shaft_whose_pulses_have_ended_at_speed_stays_up(end: str) -> None:
     assert host.wrong == []
 
 
-def test_a_missed_pulse_and_the_hardest_braking_are_no_dead_probe() -> None:
-    host = Watched("amb5dof", pulse_missing=7.0)
+@pytest.mark.parametrize("defect", [{"pulse_missing": 3.0}, {"pulse_missing": 7.0}, {"pulse_doubled": 2.0}])
+def test_a_missed_pulse_and_the_hardest_braking_are_no_dead_probe(defect: dict[str, float]) -> None:
+    host = Watched("amb5dof", **defect)
     host.levitate()
     host.drive.asked()
     host.drive.accelerate(250.0)

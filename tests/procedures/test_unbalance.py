@@ -215,6 +215,11 @@ def test_an_order_that_the_telemetry_takes_for_order_1_is_named(tmp_path: Path, 
     found = [f for f in run.results if isinstance(f, Finding) and f.code == "aliasing"]
     assert bool(found) == named
     assert not named or "order 4 as order 1" in found[0].text
+    vectors = [m.estimate for m in run.results if isinstance(m, Measured) and m.quantity.name == "vector_cos"]
+    folded = (
+        [max(abs(c) for i, c in e.contributions.items() if i.startswith("folded/")) for e in vectors] if named else []
+    )
+    assert all(0.3 * e.u < f for e, f in zip(vectors, folded, strict=False))
 
 
 def test_motion_that_does_not_turn_with_the_shaft_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -225,6 +230,10 @@ def test_motion_that_does_not_turn_with_the_shaft_is_named(tmp_path: Path, monke
     found = [f for f in run.results if isinstance(f, Finding) and f.code == "not-synchronous"]
     assert found[0].effect is Effect.INDETERMINATE
     assert "inboard" in found[0].text
+    d_max = next(
+        m for m in run.results if isinstance(m, Measured) and m.quantity.name == "d_max" and "inboard" in m.where
+    )
+    assert interval(d_max.estimate).high > 40e-6
 
 
 def test_planes_exchanged_within_the_loop_do_not_levitate(tmp_path: Path) -> None:
