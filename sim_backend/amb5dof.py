@@ -31,11 +31,11 @@ DEFECTS = {
     "pulse_doubled": 0.0, "pulse_last": 0.0, "loose_speed": 0.0, "loose_shift": 0.0, "loose_weight": 0.0,
     "drop_fraction": 0.0, "integrator_factor": 1.0,
     "dead_after_s": 0.0, "fault_after_s": 0.0, "drive_fault_after_s": 0.0, "weight_lost": 0.0, "weight_astray": 0.0,
-    "weight_turned": 0.0, "weight_turned_rad": 0.0,
+    "weight_turned": 0.0, "weight_turned_rad": 0.0, "weight_heavy": 0.0, "weight_heavy_by": 0.0,
 }  # fmt: skip
 """Planted defects and their harmless values. Current signs act on what is told of a bearing's y and z axes,
 `told_*` on the telemetry and captures alone; `factor_*` scales a parameter that the controller is told before it acts;
-`weight_astray` and `weight_turned` are the numbers of weights, as they are fixed, that go wrong."""
+`weight_astray`, `weight_turned` and `weight_heavy` are the numbers of weights, as they are fixed, that go wrong."""
 SHARED = {
     "beta": tuple(f"beta_{a}" for a in RADIAL),
     "magnetic_offset": tuple(f"offset_{a}" for a in RADIAL),

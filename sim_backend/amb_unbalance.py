@@ -13,9 +13,6 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from bench.analysis.orders import synchronous
-from bench.analysis.sampling import Sampling
-from bench.analysis.tachometer import counted, tachometer
 from sim_backend.amb_step import quiet
 from sim_backend.core import LEVITATE, LIFT, READY, TICK_S, DriveLaw
 from sim_backend.core.amb import TRACE, AmbPlant
@@ -88,18 +85,28 @@ def _turning(p: AmbParams, settings: Mapping[str, float], speed: float) -> AmbPl
 def _seen(plant: AmbPlant, p: AmbParams, seconds: float) -> Motion:
     """What the shaft does now."""
     start, (_, trace) = plant.tick, plant.run(round(seconds * 1e4), 1)
-    t = (start + np.arange(len(trace))) * TICK_S
-    tacho = tachometer(*counted(t, trace[:, TRACE.index("pulses")], trace[:, TRACE.index("pulse_age")]))
+    t = (start + np.arange(len(trace), dtype=np.float64)) * TICK_S
+    angle = _angle(t, *(trace[:, TRACE.index(name)] for name in ("pulses", "pulse_age")))
+    inside = (angle >= 0) & (angle < 2 * np.pi * np.floor(angle.max() / (2 * np.pi)))  # whole turns
     gain, zero = (np.array(x[:4])[:, None] for x in (p.position_gain, p.position_offset))
-    read = (trace[:, :4].T - zero) / gain
-    track = synchronous(t, read, tacho, Sampling(TICK_S), orders=ORDERS)
+    read = (trace[inside, :4].T - zero) / gain
+    waves = np.exp(1j * np.outer(ORDERS, angle[inside]))
+    fitted = np.linalg.lstsq(np.vstack([np.ones(inside.sum()), waves.real, -waves.imag]).T, read.T, rcond=None)[0]
+    vectors = fitted[1 : 1 + len(ORDERS)] + 1j * fitted[1 + len(ORDERS) :]
     turn = np.linspace(0, 2 * np.pi, 721)
-    shaft = track.means[0][:, None] - _runout(p, turn)
-    for n in ORDERS:
-        shaft = shaft + (track.vectors(0, range(4), n).values[:, None] * np.exp(1j * n * turn)).real
+    shaft = fitted[0][:, None] - _runout(p, turn)
+    for n, v in zip(ORDERS, vectors, strict=True):
+        shaft = shaft + (v[:, None] * np.exp(1j * n * turn)).real
     far = [float(np.hypot(shaft[k], shaft[k + 1]).max()) for k in (0, 2)]
-    vectors = track.vectors(0, range(4)).values
-    return Motion(vectors, vectors - first(p), (far[0], far[1]))
+    return Motion(vectors[0], vectors[0] - first(p), (far[0], far[1]))
+
+
+def _angle(t: Array, pulses: Array, age: Array) -> Array:
+    """Angle from the first pulse on, rad (n,): the speed is held, so that pulses lie on a parabola in time, if not on a line."""
+    k = np.flatnonzero(np.diff(pulses) == 1) + 1
+    at = t[k] - age[k] - t[0]
+    turns = np.polynomial.Polynomial.fit(at, np.arange(k.size), 2)
+    return np.asarray(2 * np.pi * turns(t - t[0]))
 
 
 def first(p: AmbParams) -> Complex:

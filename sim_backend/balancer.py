@@ -18,9 +18,10 @@ PLANES = {"inboard": 0, "outboard": 1}
 
 class Balancer:
     """Each weight is off by a mass and an angle of its own, from the rig file's `machine.weight_mass` and `weight_angle`;
-    all sit at the radius that was drawn for the rig. The defect `weight_lost`: what is fixed falls off; `weight_astray`:
-    the number of the weight that goes into the other plane; `weight_turned`: that of the one that is turned by
-    `weight_turned_rad`; `loose_weight`: an unbalance in kg m that somebody left in the inboard plane."""
+    all sit at the radius that was drawn for the rig. Defects: `weight_lost`, what is fixed falls off; the number of the weight
+    that goes into the other plane (`weight_astray`), that is turned by `weight_turned_rad` (`weight_turned`), that is heavier
+    by the share `weight_heavy_by` (`weight_heavy`); `loose_weight`, an unbalance in kg m that somebody left in the inboard
+    plane."""
 
     def __init__(self, plant: AmbPlant, rig: RigFile, truth: Truth) -> None:
         self._plant, self._truth = plant, truth
@@ -54,6 +55,8 @@ class Balancer:
             plane = 1 - plane
         if self._fixed == defects["weight_turned"]:
             angle += defects["weight_turned_rad"]
+        if self._fixed == defects["weight_heavy"]:
+            mass *= 1 + defects["weight_heavy_by"]
         if not defects["weight_lost"]:
             self._plant.weights(plane, (mass + off[0]) * self._radius, angle + off[1])
 

@@ -41,7 +41,9 @@ MOST_RPM = 10000.0  # influence runs
 WORST_CONDITION = 50.0  # of the influence coefficients
 SPEEDS_APART = 2e-3
 SAME_PLACE_RAD = math.radians(0.1)
-DIFFERS = 0.15  # of what was mounted: how far a verification may be from the prediction, beside its uncertainty
+DIFFERS = (
+    0.02  # of what was mounted: how far a verification may be from the prediction, beside three times its uncertainty
+)
 NEEDED = ("com_to_inboard_balance", "com_to_outboard_balance", "balance_radius", "clearance", "coupling_stiffness", "amb_gap",
           *(f"com_to_{b}_{what}" for b in ("inboard", "outboard") for what in ("sensor", "amb")))  # fmt: skip
 
@@ -240,8 +242,9 @@ def predicted(balance: Balanced, before: Run, after: Run, rig: RigFile) -> Itera
         f"{side} {abs(e) / G_MM:.2f} g mm, found {abs(v) / G_MM:.2f} g mm"
         for side, e, v in zip(SIDES, expected, found.values, strict=True)
     )
-    if np.abs(off).max() > DIFFERS * scale + 3 * _mounted(balance, before, after, rig):
-        worst = SIDES[int(np.argmax(np.abs(off)))]
+    over = np.abs(off) - DIFFERS * scale - 3 * _between(balance, before, after, rig)
+    if over.max() > 0:
+        worst = SIDES[int(np.argmax(over))]
         text = (f"predicted {told}: the correction did not act as it should, most {worst}. Suspect a weight of another "
                 "mass, at another angle or in the other plane than the sheet says, or one that came loose.")  # fmt: skip
         yield Finding("correction-not-as-stated", text, after.name, Effect.INDETERMINATE)
@@ -249,15 +252,17 @@ def predicted(balance: Balanced, before: Run, after: Run, rig: RigFile) -> Itera
         yield Finding("verified", f"predicted {told}.", after.name)
 
 
-def _mounted(balance: Balanced, before: Run, after: Run, rig: RigFile) -> float:
-    """Standard uncertainty, kg m, of what weights within their tolerances leave: those that were fixed between two runs, and
-    the trial weights, by which the amount was measured."""
+def _between(balance: Balanced, before: Run, after: Run, rig: RigFile) -> np.ndarray:
+    """Standard uncertainty by plane (2,), kg m, of what a correction should have changed and did: the budget of the difference
+    of both runs, and the tolerances of the weights that were fixed in between."""
     mass, angle = (rig.machine[name].standard_uncertainty for name in ("weight_mass", "weight_angle"))
-    fresh = [w for w in after.weights if w not in before.weights]
-    own = sum((balance.radius * mass) ** 2 + (balance.radius * w.kg * angle) ** 2 for w in fresh)
-    added = np.abs(balance_estimates.fixed(fresh, balance.radius))
-    by_trials = sum(a**2 * ((mass / w.kg) ** 2 + angle**2) for a, w in zip(added, balance.trials.weights, strict=True))
-    return math.sqrt(own + float(by_trials))
+    own = np.zeros(2)
+    for w in after.weights:
+        if w not in before.weights:
+            own[w.plane] += (balance.radius * mass) ** 2 + (balance.radius * w.kg * angle) ** 2
+    pairs = zip(balance.parts[after.name], balance.parts[before.name], strict=True)
+    apart = np.array([(a - b).u for a, b in pairs]).reshape(2, 2)
+    return np.asarray(np.sqrt(own + (apart**2).sum(axis=1)))
 
 
 def sheet(recorded: Recorded, code: str, rig: RigFile, plan: Settings) -> Iterator[Finding]:
