@@ -102,7 +102,7 @@ def _seen(plant: AmbPlant, p: AmbParams, seconds: float) -> Motion:
 
 
 def _angle(t: Array, pulses: Array, age: Array) -> Array:
-    """Angle from the first pulse on, rad (n,): the speed is held, so that pulses lie on a parabola in time, if not on a line."""
+    """Angle from the first pulse on, rad (n,): the speed is held, and pulses lie on a parabola in time, if not on a line."""
     k = np.flatnonzero(np.diff(pulses) == 1) + 1
     at = t[k] - age[k] - t[0]
     turns = np.polynomial.Polynomial.fit(at, np.arange(k.size), 2)

@@ -11,12 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.analysis.balance import allocated, permissible
-from bench.analysis.vectors import Vectors, estimates
+from bench.analysis.vectors import Vectors
 from bench.calibration import Calibration
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate, welch_satterthwaite
 from bench.uncertainty.estimate import merged
 from procedures.estimators import balance_scatter, runout, unbalance_bearings, unbalance_estimates
+from procedures.estimators.amount import amount
 from procedures.estimators.balance_data import SIDES, Read, Run, Weight
 from procedures.estimators.balance_solution import Solved, Trials, solved, taken
 from procedures.estimators.inputs import certified
@@ -201,15 +202,9 @@ def permitted(rig: RigFile, plan: Settings) -> tuple[Estimate, Estimate]:
 
 
 def share(balance: Balanced, name: str, plane: int) -> Estimate:
-    """Amount of a run's unbalance in a plane over U_per. Its two components enter as one pair with their covariance, which
-    Monte Carlo draws where the amount is near zero."""
-    one = balance.unbalance[name].one(plane)
-    pair = estimates(
-        one.parts, one.covariance, f"unbalance/{name}/{plane}", "components of the unbalance", "kg m", one.dof
-    )
-    inputs = {"x": pair[0], "y": pair[1], "per": balance.permissible[plane]}
-    out = propagate(lambda v: math.hypot(v["x"], v["y"]) / v["per"], inputs)
-    return Estimate(out.value, "1", out.sensitivities, out.sampler)
+    """Amount of a run's unbalance in a plane over U_per, with all influences of both."""
+    ratio = amount(*balance.parts[name][2 * plane : 2 * plane + 2]) / balance.permissible[plane]
+    return Estimate(ratio.value, "1", ratio.sensitivities, ratio.sampler)
 
 
 def influences(balance: Balanced, rig: RigFile) -> dict[tuple[str, str], tuple[Estimate, Estimate]]:
