@@ -13,13 +13,12 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import CubicSpline
 
-from bench.analysis.rational import fitted, top
-from bench.analysis.responses import clear_of_orders, image_distance, lines, response, without_orders
-from bench.analysis.tachometer import counted, tachometer
 from sim_backend.amb_linear import notch
 from sim_backend.amb_reference_law import Model
 from sim_backend.amb_step import floating
+from sim_backend.amb_unbalance import angle_of
 from sim_backend.core import TICK_S
 from sim_backend.core.amb import TRACE, ccs, derivative
 from sim_backend.core.amb_params import AmbControl, AmbParams
@@ -32,6 +31,7 @@ STEP_M, STEP_A = 1e-8, 1e-6  # of the numerical derivatives
 SETTLED_S = 20.0  # until the flatness law's integrators hold what its model does not know
 SMALL_A, STEP_HZ, LINES = 1e-3, 2.0, 12  # of the lines about a peak, and to either side of it
 SHARES = (0.125, 0.25, 0.375)  # of a step: by one of them the lines stand apart from their images
+ORDERS, CLEAR_HZ = (1.0, 2.0, 3.0, 4.0), 3.0  # what turns with the shaft, and how far lines keep from it
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,36 +98,42 @@ def quiet_peak(
     p: AmbParams, settings: Mapping[str, float], axis: int, speed: float, substeps: int = 2, periods: int = 3
 ) -> tuple[float, float]:
     """Greatest abs(S_jj) and where, Hz, of the quiet machine that turns with its unbalance and its runout, by lines of SMALL_A
-    about the peak of its linearised loop, apart from what its orbit makes of them; the same model of the lines as the
-    procedure's, without noise."""
-    near, orders = loop(p, settings, speed, substeps).peak(axis, 2.0, 2000.0)[1], (1.0, 2.0, 3.0, 4.0)
-    share = max(SHARES, key=lambda share: image_distance(share, speed / (2 * math.pi * STEP_HZ)))
-    hz = np.asarray(STEP_HZ * (math.floor(near / STEP_HZ) + share + np.arange(-LINES, LINES + 1)), np.float64)
+    about the peak of its linearised loop, apart from what its orbit makes of them: n times the speed, and images of the lines
+    about it. There is no noise, so that a spline through the lines has the peak."""
+    near, turn = loop(p, settings, speed, substeps).peak(axis, 2.0, 2000.0)[1], speed / (2 * math.pi)
+    hz = max((_about(near, share) for share in SHARES), key=lambda some: _from_images(some, turn))
+    hz = hz[np.abs(hz[:, None] - turn * np.array(ORDERS)).min(axis=1) > CLEAR_HZ] if speed else hz
     plant, period = floating(p, settings, speed, SETTLED_S, substeps), round(1 / TICK_S / (STEP_HZ * SHARES[0]))
-    made = {
-        "inject_axis": axis,
-        "inject_amplitude": SMALL_A,
-        "inject_hz": hz[0],
-        "inject_step": STEP_HZ,
-        "inject_lines": hz.size,
-    }
+    whole = _about(near, (hz[0] / STEP_HZ) % 1)
+    made = {"inject_axis": axis, "inject_amplitude": SMALL_A, "inject_hz": whole[0], "inject_step": STEP_HZ,
+            "inject_lines": whole.size}  # fmt: skip
     for name, value in made.items():
         plant.set(name, float(value))
     plant.run(10000)
-    start, trace = plant.tick, plant.run(periods * period + round(4 * math.pi / speed / TICK_S), 1)[1]
-    t, column = (
-        (start + np.arange(len(trace))) * TICK_S,
-        {n: trace[:, TRACE.index(n)] for n in ("inject", "after", "pulses", "pulse_age")},
-    )
-    turn = tachometer(*counted(t, column["pulses"], column["pulse_age"]))
-    angle = turn.angle(t)
-    inside = np.isfinite(angle)
-    clean = without_orders(column["after"][inside], angle[inside], orders)
-    hz = hz[clear_of_orders(hz, speed, 3.0, orders)]
-    found = lines(np.concatenate([column["inject"][None, inside], clean]), 1 / TICK_S, period, hz)
-    values = response(found, 1, 0).values
-    best = top(fitted(hz, values, np.full(values.size, 1e-6), math.inf), float(hz[0]), float(hz[-1]))
-    return best.value, best.at
+    start, trace = plant.tick, plant.run(periods * period, 1)[1]
+    t = (start + np.arange(len(trace), dtype=np.float64)) * TICK_S
+    seen = {n: trace[:, TRACE.index(n)] for n in ("inject", "after", "pulses", "pulse_age")}
+    turning = np.outer(ORDERS, angle_of(t, seen["pulses"], seen["pulse_age"])) if speed else np.empty((0, t.size))
+    waves = np.exp(1j * np.concatenate([2 * np.pi * np.outer(whole, t), turning]))
+    design = np.concatenate([np.ones((1, t.size)), waves.real, waves.imag]).T
+    both = np.linalg.lstsq(design, np.array([seen["inject"], seen["after"]]).T, rcond=None)[0]
+    parts = both[1 : 1 + len(waves)] - 1j * both[1 + len(waves) :]
+    size = np.abs(parts[: whole.size, 1] / parts[: whole.size, 0])[np.isin(whole, hz)]
+    fine = np.linspace(hz[0], hz[-1], 20001)
+    curve = CubicSpline(hz, size)(fine)
+    return float(curve.max()), float(fine[curve.argmax()])
+
+
+def _about(near: float, share: float) -> Array:
+    """Lines in Hz to either side of a peak, `share` of a step beside whole ones."""
+    return np.asarray(STEP_HZ * (math.floor(near / STEP_HZ) + share + np.arange(-LINES, LINES + 1)), np.float64)
+
+
+def _from_images(hz: Array, turn: float) -> float:
+    """How far lines are from each other's images, Hz: a loop that varies with an orbit answers f also at n times the speed less
+    f."""
+    away = [np.remainder(n * turn - 2 * hz[0] + STEP_HZ / 2, STEP_HZ) - STEP_HZ / 2 for n in ORDERS]
+    return float(np.abs(away).min())
 
 
 def _slopes(p: AmbParams, s: Array, coil: Array) -> tuple[Array, Array]:

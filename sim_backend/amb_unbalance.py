@@ -86,7 +86,7 @@ def _seen(plant: AmbPlant, p: AmbParams, seconds: float) -> Motion:
     """What the shaft does now."""
     start, (_, trace) = plant.tick, plant.run(round(seconds * 1e4), 1)
     t = (start + np.arange(len(trace), dtype=np.float64)) * TICK_S
-    angle = _angle(t, *(trace[:, TRACE.index(name)] for name in ("pulses", "pulse_age")))
+    angle = angle_of(t, *(trace[:, TRACE.index(name)] for name in ("pulses", "pulse_age")))
     inside = (angle >= 0) & (angle < 2 * np.pi * np.floor(angle.max() / (2 * np.pi)))  # whole turns
     gain, zero = (np.array(x[:4])[:, None] for x in (p.position_gain, p.position_offset))
     read = (trace[inside, :4].T - zero) / gain
@@ -101,7 +101,7 @@ def _seen(plant: AmbPlant, p: AmbParams, seconds: float) -> Motion:
     return Motion(vectors[0], vectors[0] - first(p), (far[0], far[1]))
 
 
-def _angle(t: Array, pulses: Array, age: Array) -> Array:
+def angle_of(t: Array, pulses: Array, age: Array) -> Array:
     """Angle from the first pulse on, rad (n,): the speed is held, and pulses lie on a parabola in time, if not on a line."""
     k = np.flatnonzero(np.diff(pulses) == 1) + 1
     at = t[k] - age[k] - t[0]
