@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from reports import habit, many, tables, text, vectors
+from reports.counts import counts, words
 from reports.figures import Drawn
 from reports.linktable import clean, link_table
 from reports.view import (
@@ -31,7 +31,6 @@ from reports.view import (
     Tone,
 )
 
-MOST_ALIKE = 12  # streams that differ in a number only and still get a line each
 Content = Mapping[str, Any]
 _TONES: dict[str, Tone] = {"pass": "pass", "fail": "fail", "indeterminate": "indeterminate", "error": "error"}
 _TONES |= {"aborted": "error", "missing": "error"}
@@ -234,17 +233,8 @@ def _identification(record: Content, around: Surroundings, rig_name: str) -> tup
 def _conditions(around: Surroundings) -> tuple[Fact, ...]:
     site = around.rig.get("site")
     at_site = {k: v for k, v in site.items() if k != "place" and v is not None} if isinstance(site, Mapping) else {}
-    stated = [dataclasses.replace(f, label=_words(f.label)) for f in tables.facts(at_site)]
+    stated = [dataclasses.replace(f, label=words(f.label)) for f in tables.facts(at_site)]
     return (*stated, *(Fact(label[:1].upper() + label[1:], said) for label, said in around.conditions.items()))
-
-
-def _words(key: str) -> str:
-    """`latitude_deg` -> `Latitude (°)`, `air_density` -> `Air density`."""
-    head, _, tail = key.rpartition("_")
-    units = {"deg": "°", "m": "m", "c": "°C", "k": "K", "pa": "Pa"}
-    words, unit = (head, f" ({units[tail]})") if head and tail in units else (key, "")
-    words = words.replace("_", " ")
-    return words[:1].upper() + words[1:] + unit
 
 
 def _simulated(record: Content) -> bool:
@@ -277,57 +267,6 @@ def _link(link: Any, around: Surroundings) -> tuple[Table, ...]:
     return tuple(made)
 
 
-def counts(title: str, tree: Any) -> Iterable[Table]:
-    """Counts as tables: one of the plain values, one for each group of like entries (a row per link or stream)."""
-    if dataclasses.is_dataclass(tree) and not isinstance(tree, type):
-        tree = dataclasses.asdict(tree)
-    if not isinstance(tree, Mapping) or not tree:
-        return
-    flat = {k: v for k, v in tree.items() if not isinstance(v, Mapping)}
-    nested = {k: v for k, v in tree.items() if isinstance(v, Mapping) and v}
-    if flat:
-        yield Table(title, ("", "Count"), tuple((_words(str(k)), tables.inline(v)) for k, v in flat.items()), (1,))
-    leaves = {k: v for k, v in nested.items() if not any(isinstance(x, Mapping) for x in v.values())}
-    if leaves:
-        yield _crossed(f"{title}, by link and stream", leaves)
-    for key in nested.keys() - leaves.keys():
-        yield from counts(f"{title}: {key}", nested[key])
-
-
-def _crossed(title: str, leaves: Mapping[Any, Content]) -> Table:
-    """A row for each link or stream and a column for each count, whichever way round they are given: of the two it is the
-    streams that grow many (a capture is one)."""
-    leaves = _folded(leaves)
-    rows, columns = [str(k) for k in leaves], list(dict.fromkeys(str(c) for v in leaves.values() for c in v))
-    cells = [[tables.inline(v[c]) if c in v else text.DASH for c in columns] for v in leaves.values()]
-    if len(columns) > len(rows):
-        rows, columns, cells = columns, rows, [list(row) for row in zip(*cells, strict=True)]
-    named = zip(rows, cells, strict=True)
-    made = sorted(((name, *row) for name, row in named), key=lambda row: _natural(row[0]))
-    return Table(title, ("", *map(_words, columns)), tuple(made), tuple(range(1, len(columns) + 1)))
-
-
-def _folded(leaves: Mapping[Any, Content]) -> Mapping[Any, Content]:
-    """Streams that differ in a number only (captures) as one of their sum, where there are too many to be read."""
-    families: dict[str, list[str]] = {}
-    for name in sorted({str(c) for v in leaves.values() for c in v}, key=_natural):
-        families.setdefault(name.rstrip("0123456789"), []).append(name)
-    sums = {stem: f"{names[0]} to {names[-1]}" for stem, names in families.items() if len(names) > MOST_ALIKE}
-    out: dict[Any, dict[str, Any]] = {}
-    for key, counted in leaves.items():
-        row: dict[str, Any] = {}
-        for name, count in counted.items():
-            place = sums.get(str(name).rstrip("0123456789"), str(name))
-            row[place] = row[place] + count if place in row else count
-        out[key] = row
-    return out
-
-
-def _natural(name: str) -> list[tuple[str, int]]:
-    """capture/2 before capture/10."""
-    return [(words, int(number or 0)) for words, number in re.findall(r"(\D*)(\d*)", name)]
-
-
 def _link_note(around: Surroundings) -> str:
     if not around.readable:
         return "There is no recording that can be read."
@@ -349,7 +288,7 @@ def _laboratory(given: Any) -> tuple[Fact, ...]:
     known: Content = given if isinstance(given, Mapping) else {}
     asked = {key for key, _ in _PEOPLE}
     facts = [Fact(label, str(known.get(key) or ""), blank=not known.get(key)) for key, label in _PEOPLE]
-    return (*facts[:-2], *(Fact(_words(k), tables.inline(v)) for k, v in known.items() if k not in asked), *facts[-2:])
+    return (*facts[:-2], *(Fact(words(k), tables.inline(v)) for k, v in known.items() if k not in asked), *facts[-2:])
 
 
 def _paragraphs(method: str) -> tuple[str, ...]:

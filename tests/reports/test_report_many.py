@@ -9,6 +9,7 @@ from report_samples import HOSTILE, measurement, record
 from test_report_build import Page, around
 
 from reports import compose, html, many, pdf
+from reports.counts import counts
 from reports.text import DASH, NARROW
 from reports.view import ABOUT_MANY, ReportView
 
@@ -87,7 +88,7 @@ def test_what_carries_a_budget(squares: tuple[float, ...], said: str) -> None:
 def test_many_streams_are_rows(streams: int) -> None:
     """A table as wide as there are captures would not fit a page."""
     names = sorted(f"capture/{k}" for k in range(1, streams + 1))  # as a recording gives them: 10 before 2
-    (table,) = compose.counts("Recording", {"samples": dict.fromkeys(names, 5), "lost": {"capture/1": 1}})
+    (table,) = counts("Recording", {"samples": dict.fromkeys(names, 5), "lost": {"capture/1": 1}})
     if streams > 2:
         assert table.header == ("", "Samples", "Lost")
         assert table.rows[0] == ("capture/1", "5", "1")
@@ -100,5 +101,5 @@ def test_very_many_streams_are_one_row_of_their_sum() -> None:
     """Seventy captures would fill two pages with what nobody reads."""
     names = [f"capture/{k}" for k in range(1, 71)]
     tree = {"samples": dict.fromkeys([*names, "telemetry", "drive"], 5), "lost": {"capture/1": 1, "capture/70": 2}}
-    (table,) = compose.counts("Recording", tree)
+    (table,) = counts("Recording", tree)
     assert table.rows == (("capture/1 to capture/70", "350", "3"), ("drive", "5", DASH), ("telemetry", "5", DASH))
