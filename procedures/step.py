@@ -6,7 +6,6 @@ setting, speed and axis: damping ratio and natural frequency, and how far size a
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Literal
 
@@ -24,6 +23,7 @@ from bench.roles import RigState
 from procedures import step_figures as drawn
 from procedures.estimators import setpoint_checks, setpoint_estimates
 from procedures.estimators.setpoint_data import CHANNELS, STEP, TURNING_RAD_S, cases, read_steps
+from procedures.estimators.unbalance_data import RPM
 
 OVERSHOOT = Quantity("overshoot", "1", "greatest position beyond the step, as a share of it")
 RISE = Quantity("rise_time", "s", "10 to 90 % of the step")
@@ -42,7 +42,6 @@ MODEL = ("model_beta_{}", "model_offset_{}")
 RADIAL = ("yi", "zi", "yo", "zo")
 PULSES_S = 1.0  # until the speed by the pulses, and with it the controller's state, says that the shaft stands
 SETTLED_S = 0.5  # after the last ramp of a speed
-RPM = 30 / math.pi
 MARGIN = 0.8  # of the clearance that a step with its overshoot may use
 
 

@@ -31,6 +31,7 @@ from procedures.estimators.tracking_data import (
     STARTED,
     read_orbits,
 )
+from procedures.estimators.unbalance_data import RPM
 
 Law = Literal["PID", "CCS", "CAC"]
 CODES: dict[Law, float] = {"PID": 0.0, "CCS": 1.0, "CAC": 2.0}
@@ -55,7 +56,7 @@ OBSERVED = {"observer": 1.0, "compensate": 3.0, "integral": 0.0, "k1": 2e5, "k2_
 REFERENCE = ("ellipse_on", "ellipse_y", "ellipse_z", "ellipse_hz", "ellipse_phase", "ellipse_ramp_s", "ellipse_ratio")
 PARAMETERS = ("law", "ref_y", "ref_theta", "model_rate", *REFERENCE)
 LENGTHS = ("com_to_inboard_sensor", "com_to_outboard_sensor", "clearance")
-RPM, UM = 30 / math.pi, 1e6
+UM = 1e6
 MARK_M = 15e-6  # of the jump that the reference starts with
 GROW, GROW_S = 25, 0.02
 STANDS_S = 1.0  # the controller knows half a second after the last pulse that the shaft stands

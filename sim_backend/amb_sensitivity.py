@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
+from bench.analysis.responses import image_distance
 from sim_backend.amb_linear import notch
 from sim_backend.amb_reference_law import Model
 from sim_backend.amb_step import floating
@@ -101,7 +102,7 @@ def quiet_peak(
     about the peak of its linearised loop, apart from what its orbit makes of them: n times the speed, and images of the lines
     about it. There is no noise, so that a spline through the lines has the peak."""
     near, turn = loop(p, settings, speed, substeps).peak(axis, 2.0, 2000.0)[1], speed / (2 * math.pi)
-    hz = max((_about(near, share) for share in SHARES), key=lambda some: _from_images(some, turn))
+    hz = _about(near, max(SHARES, key=lambda share: image_distance(share, turn / STEP_HZ, ORDERS)))
     hz = hz[np.abs(hz[:, None] - turn * np.array(ORDERS)).min(axis=1) > CLEAR_HZ] if speed else hz
     plant, period = floating(p, settings, speed, SETTLED_S, substeps), round(1 / TICK_S / (STEP_HZ * SHARES[0]))
     whole = _about(near, (hz[0] / STEP_HZ) % 1)
@@ -127,13 +128,6 @@ def quiet_peak(
 def _about(near: float, share: float) -> Array:
     """Lines in Hz to either side of a peak, `share` of a step beside whole ones."""
     return np.asarray(STEP_HZ * (math.floor(near / STEP_HZ) + share + np.arange(-LINES, LINES + 1)), np.float64)
-
-
-def _from_images(hz: Array, turn: float) -> float:
-    """How far lines are from each other's images, Hz: a loop that varies with an orbit answers f also at n times the speed less
-    f."""
-    away = [np.remainder(n * turn - 2 * hz[0] + STEP_HZ / 2, STEP_HZ) - STEP_HZ / 2 for n in ORDERS]
-    return float(np.abs(away).min())
 
 
 def _slopes(p: AmbParams, s: Array, coil: Array) -> tuple[Array, Array]:

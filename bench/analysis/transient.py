@@ -24,8 +24,8 @@ from bench.errors import AnalysisError
 
 
 def local(speed: Array, values: Complex, covariance: Array) -> Smoother:
-    """The local models of a passage's vectors `values` (b,), without runout, at `speed` (b,) rad/s, ascending; `covariance`
-    (b, 2, 2) of their scatter says how many blocks a model takes.
+    """The local models, of nine blocks each, of a passage's vectors `values` (b,), without runout, at `speed` (b,) rad/s,
+    ascending; `covariance` (b, 2, 2) of their scatter weighs them.
 
     Raises:
         AnalysisError: fewer than nine blocks, or speeds that do not ascend.

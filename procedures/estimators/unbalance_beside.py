@@ -1,24 +1,16 @@
 """What the captures show beside the vectors of order 1: motion that does not turn with the shaft, and orders that the telemetry
-takes for order 1. Neither scatters where it matters: both enter the budgets by their size, and where they are large a finding
-says so."""
+takes for order 1. Neither scatters where it matters, so that both enter the budgets by their size."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bench.analysis.orders import synchronous
 from bench.analysis.sampling import Sampling
-from bench.findings import Effect, Finding
-from procedures.estimators.unbalance_data import AXES, DWELL, PLANES, RPM, Array, Dwell
+from procedures.estimators.unbalance_data import DWELL, Array, Dwell
 
-if TYPE_CHECKING:
-    from procedures.estimators.unbalance_estimates import Results
-
-BESIDE = 0.05  # of the least clearance: motion beside the orders that D_max may leave out
 FITTED = 8  # orders that turn with the shaft
 QUIET = 6.0  # standard deviations of a probe's noise that a peak of it reaches
 FOLDING, HIGHEST = 12, 0.4  # orders that may fold; share of the capture's rate up to which they are looked at
@@ -27,8 +19,9 @@ LEAKS = 0.02  # share of an order that shows as order 1, below which it is nothi
 
 def beside_orders(d: Dwell) -> Array:
     """Of both planes (2,) m: the greatest motion in the capture that does not turn with the shaft, its mean and drift apart,
-    beyond what the probes' noise makes of a peak."""
-    assert d.full is not None
+    beyond what the probes' noise makes of a peak; nothing without a capture."""
+    if d.full is None:
+        return np.zeros(2)
     angle = d.full.tacho.angle(d.full.t)
     inside = np.isfinite(angle)
     theta, data = angle[inside], d.full.positions[:, inside]
@@ -39,21 +32,6 @@ def beside_orders(d: Dwell) -> Array:
     noise = np.diff(data, 3).std(axis=1) / math.sqrt(20)
     far = [np.hypot(rest[k], rest[k + 1]).max() - QUIET * noise[k : k + 2].max() for k in (0, 2)]
     return np.asarray(np.maximum(far, 0.0), np.float64)
-
-
-def beside(results: Results) -> Iterator[Finding]:
-    """D_max is of what turns with the shaft; ISO 14839-2 means the whole motion."""
-    clearance = results.clearance.value
-    for r in results.dwells:
-        if r.dwell.full is None:
-            continue
-        far = beside_orders(r.dwell)
-        if far.max() > BESIDE * clearance:
-            plane = list(PLANES)[int(far.argmax())]
-            text = (f"{plane} the shaft moves by up to {far.max() * 1e6:.1f} µm that does not turn with it "
-                    f"({far.max() / clearance:.0%} of the clearance; {BESIDE:.0%} is allowed): D_max leaves that out and is "
-                    "too small. Suspect a loop near its limit of stability, a rub, or a shaker: see the spectrum.")  # fmt: skip
-            yield Finding("not-synchronous", text, r.dwell.where, Effect.INDETERMINATE)
 
 
 def folds(d: Dwell) -> tuple[int, Array]:
@@ -74,18 +52,3 @@ def folds(d: Dwell) -> tuple[int, Array]:
         if off.max() > most.max():
             worst, most = n, off
     return worst, most
-
-
-def folded(results: Results) -> Iterator[Finding]:
-    """Beside what is known of the vectors."""
-    for r in results.dwells:
-        n, off = folds(r.dwell)
-        whole = np.array([np.linalg.eigvalsh(r.vectors.one(k).covariance)[0] for k in range(4)])
-        known = np.sqrt(np.maximum(whole - off**2 / 2, 1e-24))  # without it
-        k = int(np.argmax(off / known))
-        if off[k] > 2 * known[k]:
-            period = r.dwell.sampling.ticks * r.dwell.sampling.tick
-            text = (f"at {r.dwell.speed * RPM:.0f} r/min the telemetry, a sample every {period * 1e3:g} ms, shows order {n} as "
-                    f"order 1: the vector of {AXES[k]} may be off by {off[k] * 1e6:.2f} µm, which its interval holds. "
-                    "Dwell at a speed that is a percent away.")  # fmt: skip
-            yield Finding("aliasing", text, r.dwell.where, Effect.INDETERMINATE)

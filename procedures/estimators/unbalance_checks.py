@@ -12,12 +12,13 @@ from bench.analysis.tachometer import against
 from bench.analysis.vectors import radius2
 from bench.findings import Effect, Finding
 from bench.recording import Recording
-from procedures.estimators import signals, unbalance_beside
+from procedures.estimators import signals
 from procedures.estimators.unbalance_data import (
     AXES,
     CONTACT,
     CURRENT_LIMIT,
     DWELL,
+    PLANES,
     RANGE,
     RPM,
     SLOW,
@@ -31,6 +32,7 @@ from procedures.estimators.unbalance_plan import PER_TURN, Settings, too_fast
 HELD = 8  # samples in a row at an extreme: a probe that clips
 UNEXPLAINED = 0.1  # share of the forces that two unbalances leave over: a channel is not what its name says
 CARRIED = 0.5  # of the share of the weight that an axis should carry: how far its coils may be off
+BESIDE = 0.05  # of the least clearance: motion that does not turn with the shaft
 CHANGED, CHANGED_M = 0.1, 0.3e-6  # of the vector, and at least: a repeat that differs by more
 ZONES = (("A", 0.3), ("B", 0.4), ("C", 0.5), ("D", math.inf))
 """Upper ends of the zones, D_max over the least clearance (ISO 14839-2, Table 1: numbers not checked against the standard)."""
@@ -121,8 +123,8 @@ def of_results(results: Results, plan: Settings) -> Iterator[Finding]:
     """Do forces and motion agree? Is a repeat the same? Then zones and the runout, as notes."""
     yield from channels(results.dwells)
     yield from weight(results.dwells)
-    yield from unbalance_beside.beside(results)
-    yield from unbalance_beside.folded(results)
+    yield from _beside(results)
+    yield from _folded(results)
     yield from _repeats(results)
     yield from _told(results)
     if plan.variants:
@@ -161,6 +163,33 @@ def weight(dwells: Sequence[Balanced]) -> Iterator[Finding]:
                     "suspect the coils of an axis exchanged, a current sensor, or a wrong model of the bearing.")  # fmt: skip
             yield Finding("weight-not-carried", text, r.dwell.where, Effect.ERROR)
             return
+
+
+def _beside(results: Results) -> Iterator[Finding]:
+    """D_max holds what does not turn with the shaft by its size only; where it is large, that is not enough to know."""
+    clearance = results.clearance.value
+    for r in results.dwells:
+        if r.beside.max() > BESIDE * clearance:
+            plane, far = list(PLANES)[int(r.beside.argmax())], float(r.beside.max())
+            text = (f"{plane} the shaft moves by up to {far * 1e6:.1f} µm that does not turn with it ({far / clearance:.0%} of "
+                    f"the clearance; {BESIDE:.0%} is allowed): D_max holds what that may add to the orbit. Suspect a loop near "
+                    "its limit of stability, a rub, or a shaker: see the spectrum.")  # fmt: skip
+            yield Finding("not-synchronous", text, r.dwell.where, Effect.INDETERMINATE)
+
+
+def _folded(results: Results) -> Iterator[Finding]:
+    """An order that the telemetry takes for order 1 and that is more than all else that is uncertain in a vector."""
+    for r in results.dwells:
+        n, off = r.folded
+        whole = np.array([np.linalg.eigvalsh(r.vectors.one(k).covariance)[0] for k in range(4)])
+        known = np.sqrt(np.maximum(whole - off**2 / 2, 1e-24))  # without it
+        k = int(np.argmax(off / known))
+        if off[k] > 2 * known[k]:
+            period = r.dwell.sampling.ticks * r.dwell.sampling.tick
+            text = (f"at {r.dwell.speed * RPM:.0f} r/min the telemetry, a sample every {period * 1e3:g} ms, shows order {n} as "
+                    f"order 1: the vector of {AXES[k]} may be off by {off[k] * 1e6:.2f} µm, which its interval holds. "
+                    "Dwell at a speed that is a percent away.")  # fmt: skip
+            yield Finding("aliasing", text, r.dwell.where, Effect.INDETERMINATE)
 
 
 def _repeats(results: Results) -> Iterator[Finding]:

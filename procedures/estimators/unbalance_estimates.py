@@ -44,7 +44,9 @@ class Runout:
 @dataclass(frozen=True)
 class Result:
     """A dwell's estimates by name and place; `vectors` of the shaft's centre with their joint covariance; orbits by plane;
-    `misfit`, the share of the forces that two unbalances do not explain; `carried` (4,), of what each axis should carry."""
+    `misfit`, the share of the forces that two unbalances do not explain; `carried` (4,), of what each axis should carry;
+    `beside` (2,) m, by plane what does not turn with the shaft; `folded`, the order that shows as order 1, and how much (4,) m.
+    """
 
     dwell: Dwell
     vectors: Vectors
@@ -53,6 +55,8 @@ class Result:
     misfit: float
     carried: Array
     unbalance: Complex
+    beside: Array
+    folded: tuple[int, Array]
     estimates: Mapping[tuple[str, str], Estimate] = field(repr=False)
 
 
@@ -142,8 +146,8 @@ def _result(
     rig: RigFile,
 ) -> Result:
     parts = {n: _shaft(d, inputs, runouts[n], n) for n in d.track.orders if n in runouts}
-    parts[1.0] = _folded(d, parts[1.0])
-    beside = np.zeros(2) if d.full is None else beside_orders(d)
+    beside, folded = beside_orders(d), folds(d)
+    parts[1.0] = _folded(d, parts[1.0], folded[1])
     values = np.array([parts[1.0][2 * k].value + 1j * parts[1.0][2 * k + 1].value for k in range(4)])
     vectors = Vectors(values, covariance(parts[1.0]), min(welch_satterthwaite(e) for e in parts[1.0]))
     u, misfit = runout.unbalances(nominal, Turning(d.speed, d.means, d.both().values), runouts[1.0].values)
@@ -165,7 +169,7 @@ def _result(
         out |= _coils(d, inputs, plane, rig)
     out["reading", ""] = _reading(d, inputs)
     weight = runout.carried(nominal, d.means) / shares(rig, nominal)
-    return Result(d, vectors, orbits, centres, misfit, weight, u, out)
+    return Result(d, vectors, orbits, centres, misfit, weight, u, beside, folded, out)
 
 
 def shares(rig: RigFile, s: Stand) -> Array:
@@ -195,9 +199,8 @@ def _shaft(d: Dwell, inputs: Mapping[str, Estimate], off: Runout, order: float) 
     return out
 
 
-def _folded(d: Dwell, parts: Sequence[Estimate]) -> list[Estimate]:
+def _folded(d: Dwell, parts: Sequence[Estimate], off: Array) -> list[Estimate]:
     """With what a higher order that the telemetry takes for order 1 may add to each part, at an unknown phase."""
-    _, off = folds(d)
     out = []
     for k, e in enumerate(parts):
         size = float(off[k // 2])
