@@ -16,6 +16,7 @@ WINDOW_NS = 1_000_000_000
 MAX_DRIFT = 200e-6  # two crystals differ by less; what goes faster is latency
 JITTER_NS = 2_000_000
 FEWEST, MOST = 8, 600  # windows for a slope
+FASTEST = 0.01  # no clock that is read for its drift gains more; lateness that goes faster than that was latency
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,10 +35,11 @@ class HostMap:
         self._first_ns: int | None = None
         self._minima: list[tuple[int, int]] = []  # sample time and least lateness of each finished window
         self._window = 0
+        self._earliest_ns = 0  # the least lateness ever, less the drift that there may have been until then
         self._least: tuple[int, int] | None = None
         self.latest_ns = latest_ns  # greatest lateness beyond drift
         self.lag_ns = 0  # host time less this is sample time
-        self._beyond, self.longest_beyond = 0, 0  # windows in a row whose least lateness is more than drift can make
+        self.beyond = 0  # the last windows in a row that are later than drift can make, and do not catch up
 
     def take(self, samples_ns: npt.NDArray[np.int64], hosts_ns: npt.NDArray[np.int64]) -> None:
         """One batch: sample times and when each arrived."""
@@ -54,21 +56,28 @@ class HostMap:
             self._least = (sample_ns, late)
         # Earlier than ever is a proof that the first sample itself was late; later than any drift is latency.
         self.lag_ns = min(self._bound(sample_ns), *(x for _, x in [*self._minima[-2:], self._least]))
+        self._earliest_ns = min(self._earliest_ns, late - self._drift_ns(sample_ns))
         self.latest_ns = max(self.latest_ns, int(lateness.max()) - self.lag_ns)
 
     def _bound(self, sample_ns: int) -> int:
+        return self._earliest_ns + JITTER_NS + self._drift_ns(sample_ns)
+
+    def _drift_ns(self, sample_ns: int) -> int:
         assert self._first_ns is not None
-        return JITTER_NS + round(MAX_DRIFT * (sample_ns - self._first_ns))
+        return round(MAX_DRIFT * (sample_ns - self._first_ns))
 
     def _finish(self, least: tuple[int, int]) -> None:
+        before = self._minima[-1][1] if self._minima else least[1]
+        gains = least[1] < before - JITTER_NS  # what stood still comes back, a clock does not
+        self.beyond = self.beyond + 1 if least[1] > self._bound(least[0]) and not gains else 0
         self._minima.append(least)
-        self._beyond = self._beyond + 1 if least[1] > self._bound(least[0]) else 0
-        self.longest_beyond = max(self.longest_beyond, self._beyond)
 
     def drift(self) -> Drift | None:
-        """Slope of the windows' minima (Theil and Sen: no latency of a few windows moves it); None with too few
-        windows, or where nothing varies (simulation)."""
-        points = np.array(self._minima[1:], float)  # the first window may be short
+        """Slope of the windows' minima (Theil and Sen: no latency of a few windows moves it) but of those that a later,
+        much earlier one proves late; None with too few windows, or where nothing varies (simulation)."""
+        points = np.array(self._minima[1:], float).reshape(-1, 2)  # the first window may be short
+        least = points[:, 1] + FASTEST * points[:, 0]
+        points = points[least <= np.minimum.accumulate(least[::-1])[::-1] + JITTER_NS]
         if len(points) < FEWEST or np.ptp(points[:, 1]) == 0:
             return None
         from scipy import stats  # half a second to import, and only a live run needs it

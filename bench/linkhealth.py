@@ -11,10 +11,9 @@ from bench.link import LinkStats
 from bench.records import LinkCounts
 from bench.telemetry import Counters
 
-LOST_S = 0.5  # telemetry that comes later than this may belong to another step than it looks
 LATE_S = 0.04  # telemetry that comes later than this is worth a word
 DRIFT_PPM, WRONG_PPM = 200.0, 1000.0  # bench.hosttime follows no more; no crystal is as wrong as that
-BEYOND = 5  # windows of a second in a row; a stall is shorter
+BEYOND = 5  # windows of a second in a row
 PERIODS, PERIOD_S = 3, 0.02  # of a heartbeat; a longer gap comes near the watchdog
 
 
@@ -29,7 +28,8 @@ class Health:
     host_age_s: float = 0.0  # the controller heard no heartbeat for so long
     round_trip_ns: int | None = None  # least time from a request to its answer
     others: Mapping[str, LinkStats] = field(default_factory=dict)  # of the rig's further links
-    beyond_drift: int = 0  # windows in a row in which telemetry fell behind faster than drift (HostMap.longest_beyond)
+    cut_ns: int = 0  # by so much telemetry had not reached the end of a step when the run went on
+    beyond_drift: int = 0  # the last windows in a row in which telemetry was further behind than by drift
     replies_wrong_length: int = 0  # frames of a wrong length that are no telemetry (Dialogue.wrong_length)
 
     @property
@@ -92,9 +92,10 @@ class Health:
                 yield Finding("link-reconnected", text, name)
         if self.latest_ns > LATE_S * 1e9:
             text = f"telemetry came up to {self.latest_ns * 1e-9:.2f} s late; samples carry the device's own time"
-            yield Finding(
-                "telemetry-late", text, "link", Effect.INDETERMINATE if self.latest_ns > LOST_S * 1e9 else Effect.NOTE
-            )
+            yield Finding("telemetry-late", text, "link")
+        if self.cut_ns > 0:
+            yield Finding("step-cut", f"a step ended {self.cut_ns * 1e-9:.2f} s before its telemetry had come: what was "
+                          "commanded next may act within it", "link", Effect.INDETERMINATE)  # fmt: skip
 
     def _clock(self) -> Iterator[Finding]:
         """Host times follow the samples up to 200 ppm; beyond that steps and events slide along the samples."""

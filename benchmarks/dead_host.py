@@ -26,7 +26,7 @@ END = ("the bench is killed", "the cable is pulled")
 
 def measured(folder: Path, how: str) -> float:
     """Seconds from the event to the first message that tells of another state than LEVITATED."""
-    with processes.served(folder, patient=False) as rig, Listener(rig.endpoints["slcan:socket"]) as bus:
+    with processes.served(folder, patience_s=None) as rig, Listener(rig.endpoints["slcan:socket"]) as bus:
         with Cable(rig.endpoints["slcan:socket"]) as cable:
             url = ("--link", f"controller=slcan:{cable.path}")
             arguments = processes.live(

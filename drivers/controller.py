@@ -22,11 +22,10 @@ from drivers.dialogue import Dialogue, no_reply
 from drivers.orders import Orders
 from drivers.turning import Turning
 
-SILENCE_S = 0.5
-STALL_NS = 200_000_000  # between two polls, or two slices: they come with every slice
 TOUCHED = 0.5  # rad/s, above which a landed shaft is not at rest
 HOST_AGE = "host_age"
 FIRST_S = 1.5  # for the first telemetry, and for the last owner to be gone
+BEHIND_S = 15.0  # a controller further behind the host's clock is not waited for
 STATES = {"OFF": RigState.OFF, "READY": RigState.READY, "LIFTING": RigState.READY, "LEVITATED": RigState.LEVITATED,
           "SPINNING": RigState.SPINNING, "LANDING": RigState.LEVITATED, "COASTING": RigState.SPINNING,
           "FAULT": RigState.OFF, "UNKNOWN": RigState.SPINNING}  # fmt: skip
@@ -44,7 +43,8 @@ class Controller:
         self.telemetry = TelemetryDecoder(rig)
         self._recorder: Recorder | None = None
         self._dialogue = Dialogue(rig, link, base.now_ns)
-        self._stall_ns = max(STALL_NS, round(2e9 * slice_s))
+        self._patience_s = waiting.patience_s(rig)
+        self._stall_ns = max(waiting.STALL_NS, round(2e9 * slice_s))
         self.clock = PumpedClock(base, self.poll, slice_s, lambda: self.telemetry.host.lag_ns)
         self.guarded = True
         self._condition = Condition(rig, self.telemetry)
@@ -54,6 +54,7 @@ class Controller:
         self.serial: int | None = None
         self._hosts = handshake.HostFrames(rig)
         self.host_age_s = 0.0  # the greatest while the machine was on
+        self.cut_ns = 0
         self.companions: list[Callable[[], None]] = []  # polled with it: other devices of the rig
         self._orders = Orders(rig, self._dialogue, session, self.envelope, lambda: self.mode, self._wait)
         self._turning = Turning(rig, self._orders, self.telemetry, self.clock, base.now_ns)
@@ -111,10 +112,12 @@ class Controller:
 
     def catch_up(self) -> None:
         """Let the clock run until telemetry has reached the present, so that what is commanded next cannot act on samples
-        of the time before: a controller whose clock has fallen behind gets there later. Silence ends a run by itself."""
-        due, begin = self.clock.now_ns() - self.telemetry.period_ns, self._base.now_ns()
-        while self.telemetry.newest_ns < due and self._base.now_ns() - begin < SILENCE_S * 1e9:
+        of the time before: a controller whose clock has fallen behind gets there later. Silence ends a run by itself;
+        `cut_ns` is the most that was missing when it was not waited for any longer."""
+        due, watch = self.clock.now_ns() - self.telemetry.period_ns, waiting.Stopwatch(self._base.now_ns)
+        while self.telemetry.newest_ns < due and self.silent_s < self._patience_s and watch.look() < BEHIND_S * 1e9:
             self.clock.sleep(waiting.SLICE_S)
+        self.cut_ns = max(self.cut_ns, due - self.telemetry.newest_ns)
 
     def release(self) -> None:
         """Let another bench have the controller, which must be at rest."""
@@ -125,7 +128,7 @@ class Controller:
         """Read the link, record, decode, and look after the machine.
 
         Raises:
-            LinkError: no telemetry for half a second.
+            LinkError: no telemetry for half a second (`drivers.waiting.patience_s`).
             InterlockError: the envelope tripped.
             DeviceFault: the controller reports a fault, or has restarted.
         """
@@ -181,7 +184,7 @@ class Controller:
             self.host_age_s = max([self.host_age_s, *ages])
 
     def _check(self) -> None:
-        if self.silent_s > SILENCE_S + (self.rig.link.reconnect_s if self.link.reopening else 0.0):
+        if self.silent_s > self._patience_s + (self.rig.link.reconnect_s if self.link.reopening else 0.0):
             text = f"no telemetry for {self.silent_s:.2f} s; the link or the controller is lost"
             raise LinkError(f"link {self.link.name}: {text}")
         self._condition.check()
@@ -198,8 +201,8 @@ class Controller:
 
     @property
     def silent_s(self) -> float:
-        """How long no telemetry has come."""
-        return (self._base.now_ns() - self._last_ns) * 1e-9
+        """How long no telemetry had come when it was looked for last."""
+        return max(0, self._polled_ns - self._last_ns) * 1e-9
 
     @property
     def mode(self) -> str:

@@ -12,8 +12,8 @@ from bench.link import Link
 from bench.messages import Message
 from bench.recorder import Recorder
 from bench.rigfile import RigFile
+from drivers.waiting import patience_s
 
-REPLY_S = 0.5
 REPLIES = ("CommandReply", "ParamReply", "Identity", "Owner", "CaptureStatus")
 KEPT = 256  # replies that nobody waits for: another host may ask too
 
@@ -109,7 +109,7 @@ class Dialogue:
     def _waited(self, wait: Callable[..., None], arrived: Callable[[], bool], reply: str, what: str) -> None:
         """Wait for a reply. Where it came but did not fit, the error says so."""
         try:
-            wait(arrived, REPLY_S, what)
+            wait(arrived, patience_s(self._rig), what)
         except LinkError as error:
             if reply not in self._misfit:
                 raise

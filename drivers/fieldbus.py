@@ -30,6 +30,7 @@ from drivers.fielddrive import FieldDrive
 from drivers.monitors import FieldSupply, FieldThermal
 from drivers.polling import Poll, PolledStream, Reading
 from drivers.registerdevice import RegisterDevice
+from drivers.waiting import STALL_NS, Stopwatch
 
 logger = logging.getLogger("drivers.fieldbus")
 T = TypeVar("T")
@@ -79,7 +80,7 @@ class Fieldbus:
         self._arrived: deque[Reading] = deque(maxlen=10_000)
         self._ended = threading.Event()
         self._threads: list[threading.Thread] = []
-        self._pumped_s = time.monotonic()
+        self._pumped_s, self._looked_ns = time.monotonic(), clock.now_ns()
         self._hands = Background(clock, "requests to register devices") if threaded else None
         role = _by_role(self.devices)
         self.drive = FieldDrive(self, role["drive"], envelope) if "drive" in role else None
@@ -119,7 +120,7 @@ class Fieldbus:
             advice.may_clear("drive", self.drive.fault, clear_fault)
             self.cleared = self.drive.fault
             self.drive.reset()
-        self._pumped_s = time.monotonic()
+        self._pumped_s, self._looked_ns = time.monotonic(), self._clock.now_ns()
         links: dict[str, list[Poll]] = {}
         for name, poll in self._polls.items():
             poll.start()
@@ -191,9 +192,9 @@ class Fieldbus:
         Raises:
             LinkError: time runs out.
         """
-        deadline = self._clock.now_ns() + round(timeout_s * 1e9)
+        watch = Stopwatch(self._clock.now_ns)
         while not done():
-            if self._clock.now_ns() >= deadline:
+            if watch.look() >= timeout_s * 1e9:
                 raise LinkError(f"waited {timeout_s:g} s for {what}; it did not come")
             self._clock.sleep(WAIT_SLICE_S)
             self.pump()
@@ -252,8 +253,11 @@ class Fieldbus:
         for error in self._trouble.values():
             if isinstance(error, RegisterRefused):
                 raise error
-        now = self._clock.now_ns()
+        now, before = self._clock.now_ns(), self._looked_ns
+        self._looked_ns = now
         for name, device in self.devices.items():
+            if now - before > STALL_NS:  # the bench stood still, and with it its polls
+                self._answered[name] = min(now, self._answered[name] + now - before)
             silent = (now - self._answered[name]) * 1e-9
             if silent > self._patience[name]:
                 why = f": {self._trouble[name]}" if name in self._trouble else ""

@@ -6,11 +6,34 @@ from collections.abc import Callable
 
 from bench.clock import Clock
 from bench.errors import LinkError
+from bench.rigfile import RigFile
 
 SLICE_S, LONG_SLICE_S, PATIENCE = 0.01, 0.1, 0.2  # a wait looks again after a fifth of how long it has waited
 KEPT_S, KEPT_SLICE_S = 0.1, 0.02  # what is to stand or to keep its speed is looked at so often for so long
 
 Now = Callable[[], int]
+SILENCE_S = 0.5
+STALL_NS = 200_000_000  # no wait is that long in one piece: the bench stood still, and could not hear what came
+
+
+def patience_s(rig: RigFile) -> float:
+    """How long a controller may say nothing: half a second, or as long as it waits for a silent host itself."""
+    watchdog = rig.parameters.get("watchdog_s")
+    return max(SILENCE_S, watchdog.default if watchdog else 0.0)
+
+
+class Stopwatch:
+    """How long the bench has waited, ns. Of a time in which its computer did not let it run no more than a fifth of a second
+    counts: what it waits for had no chance to be heard."""
+
+    def __init__(self, now_ns: Now) -> None:
+        self._now_ns, self._last, self._ns = now_ns, now_ns(), 0
+
+    def look(self) -> int:
+        """The time so far; to be looked at in each turn of a wait."""
+        before, self._last = self._last, self._now_ns()
+        self._ns += min(self._last - before, STALL_NS)
+        return self._ns
 
 
 def until(done: Callable[[], bool], timeout_s: float, error: LinkError, clock: Clock, now_ns: Now) -> None:
@@ -19,9 +42,9 @@ def until(done: Callable[[], bool], timeout_s: float, error: LinkError, clock: C
     Raises:
         LinkError: the given one, when time runs out.
     """
-    begin = now_ns()
+    watch = Stopwatch(now_ns)
     while not done():
-        waited = now_ns() - begin
+        waited = watch.look()
         if waited >= timeout_s * 1e9:
             raise error
         clock.sleep(min(_pause(waited), max(timeout_s - waited * 1e-9, 1e-3)))
@@ -35,19 +58,20 @@ def keep(
     Raises:
         LinkError: `text`, when time runs out.
     """
-    begin, since = now_ns(), None
-    clock.sleep(min(expected_s, timeout_s))
+    since, expected = None, min(expected_s, timeout_s)
+    clock.sleep(expected)
+    watch = Stopwatch(now_ns)
     while True:
-        now = now_ns()
+        now = watch.look()
         if not ok():
             since = None
         elif since is None:
             since = now
         elif now - since >= KEPT_S * 1e9:
             return
-        if now - begin > timeout_s * 1e9:
+        if now > (timeout_s - expected) * 1e9:
             raise LinkError(text())
-        clock.sleep(_pause(now - begin) if since is None else KEPT_SLICE_S)
+        clock.sleep(_pause(now + round(expected * 1e9)) if since is None else KEPT_SLICE_S)
 
 
 def _pause(waited_ns: int) -> float:

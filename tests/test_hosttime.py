@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bench.hosttime import HostMap
-from bench.linkhealth import BEYOND
+from bench.linkhealth import BEYOND, DRIFT_PPM
 
 MS = 1_000_000
 
@@ -49,6 +49,38 @@ def test_a_stall_is_lateness_and_no_drift() -> None:
     assert abs(host.lag_ns) < 3 * MS
 
 
+def behind(seed: int) -> HostMap:
+    """40 s on a computer that stands still every few seconds; the telemetry catches up at three halves of its pace."""
+    random, host = np.random.default_rng(seed), HostMap()
+    now = device = debt = 0.0
+    due = random.uniform(2, 8)
+    while now < 40:
+        now += 0.02
+        if now > due:
+            pause = random.uniform(0.5, 4.0)
+            now, debt, due = now + pause, debt + pause, now + pause + random.uniform(2, 8)
+        more = min(0.01, debt)
+        device, debt = device + 0.02 + more, debt - more
+        host.take(np.array([round(device * 1e9)]), np.array([round(now * 1e9 + random.exponential(0.4) * MS)]))
+    return host
+
+
+def test_a_computer_that_stands_still_time_and_again_is_no_drift() -> None:
+    """Half of these are called a drift of thousands of ppm where windows that a later one proves late are not left out."""
+    found = [behind(seed).drift() for seed in range(20)]
+    assert sum(d is not None and abs(d.ppm) - d.expanded_ppm > DRIFT_PPM for d in found) <= 1
+
+
+def test_a_long_stall_after_a_late_first_sample_moves_no_step() -> None:
+    """The clock that steps are timed by would stand until the host's had made up what it once gained."""
+    host, lags = HostMap(), []
+    for k in range(400):
+        late = 0 if k == 0 else -200 + (3000 if 200 <= k < 300 else 0)
+        host.take(np.array([k * 50 * MS]), np.array([(k * 50 + late) * MS]))
+        lags.append(host.lag_ns)
+    assert max(lags[1:]) < -190 * MS
+
+
 def test_nothing_varies_in_simulation() -> None:
     host = HostMap()
     for k in range(100):
@@ -61,15 +93,16 @@ def test_nothing_varies_in_simulation() -> None:
 def test_windows_that_drift_cannot_explain_are_counted(ppm: float, beyond: bool) -> None:
     host = fed(ppm, 4, seconds=8)
     assert host.drift() is None
-    assert (host.longest_beyond >= BEYOND) is beyond
+    assert (host.beyond >= BEYOND) is beyond
 
 
 def test_a_stall_is_beyond_drift_for_no_longer_than_it_lasts() -> None:
-    assert 1 <= fed(0.0, 5, stall=True).longest_beyond <= 2
+    assert fed(0.0, 5, seconds=22, stall=True).beyond == 1
+    assert fed(0.0, 5, stall=True).beyond == 0
     host = HostMap()
     for k in range(400):  # one second in two is a stall
         host.take(np.array([k * 50 * MS]), np.array([k * 50 * MS + 300 * MS * (k // 20 % 2)]))
-    assert host.longest_beyond == 1
+    assert host.beyond <= 1
 
 
 def test_the_oldest_of_a_burst_tells_how_late_it_was() -> None:

@@ -55,6 +55,16 @@ def test_late_telemetry_is_named(latest_ns: int, count: int) -> None:
     assert [f.code for f in Health(Counters(), CLEAN, None, latest_ns).findings()] == ["telemetry-late"] * count
 
 
+def test_late_telemetry_alone_is_no_reason_to_doubt_what_was_measured_but_a_step_that_was_left_before_it_came_is() -> (
+    None
+):
+    (late,) = Health(Counters(), CLEAN, None, 9_000_000_000).findings()
+    assert late.effect is Effect.NOTE
+    (cut,) = Health(Counters(), CLEAN, None, 0, cut_ns=700_000_000).findings()
+    assert (cut.code, cut.effect) == ("step-cut", Effect.INDETERMINATE)
+    assert "0.70 s" in cut.text
+
+
 @pytest.mark.parametrize(("gap_ns", "count"), [(59_000_000, 0), (61_000_000, 1)])
 def test_a_heartbeat_gap_near_the_watchdog_is_named(gap_ns: int, count: int) -> None:
     heard = Health(Counters(), CLEAN, None, 0, host_age_s=gap_ns * 1e-9)

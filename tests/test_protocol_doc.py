@@ -25,7 +25,7 @@ from bench.messages import Message
 from bench.rigfile import load_rig
 from bench.session import Session
 from bench.wire import captureblock, isotp, packet, slcan
-from drivers import controller, dialogue, handshake, slcan_bus
+from drivers import controller, handshake, slcan_bus, waiting
 from sim_backend import ownership
 from sim_backend.controller import MAP_VERSION, SimulatedController
 from sim_backend.truth import draw
@@ -297,8 +297,13 @@ def test_numbers_of_the_host_and_of_the_rig() -> None:
     assert MESSAGES["Telemetry"].period_s == pytest.approx(10 * RIG.devices["controller"].tick_s)
     assert rows["Heartbeat"] == f"every {MESSAGES['Heartbeat'].period_s * 1e3:g} ms"
     assert rows["`watchdog_s`"] == f"{RIG.parameters['watchdog_s'].default * 1e3:g} ms by default"
-    assert rows["reply to a request"] == f"at once; the host waits {dialogue.REPLY_S:g} s"
-    assert rows["telemetry missing: the link is lost"] == f"{controller.SILENCE_S:g} s"
+    assert (
+        rows["reply to a request"]
+        == f"at once; the host waits {waiting.SILENCE_S:g} s, or `watchdog_s` where that is longer"
+    )
+    assert (
+        rows["telemetry missing: the link is lost"] == f"{waiting.SILENCE_S:g} s, or `watchdog_s` where that is longer"
+    )
     assert rows["first telemetry after opening"] == f"within {controller.FIRST_S:g} s"
     assert rows["silent owner at rest may be replaced"] == f"after {ownership.TAKEOVER_S:g} s"
     assert rows["the host keeps asking for ownership"] == f"{handshake.TAKEOVER_S:g} s"

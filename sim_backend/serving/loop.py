@@ -150,7 +150,7 @@ class Server:
         if self.pacer.drops != self._drops:
             self._drops = self.pacer.drops
             self._say(
-                f"{self._bench_s():.3f} s: over a second behind wall time; gave up catching up, "
+                f"{self._bench_s():.3f} s: over ten seconds behind wall time; gave up catching up, "
                 f"{self.pacer.dropped_ns * 1e-9:.1f} s so far"
             )
         if now - self._told_ns >= REPORT_NS:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from bench.acquisition import WatchedSteps
+from bench.errors import LinkError
 from bench.frames import FrameBatch
 from bench.progress import Silent
 from bench.recorder import Recorder, RunHeader
@@ -16,11 +19,10 @@ from sim_backend.endpoint import SimulatedRig
 from sim_backend.truth import draw
 
 RIG = load_rig("tsbs12")
-BEHIND_S = 0.08
 
 
 class Host:
-    """The host's clock and link. From `starve` on the machine's time is 80 ms behind the host's."""
+    """The host's clock and link. The machine's time is `behind_ns` behind the host's."""
 
     def __init__(self) -> None:
         self.machine = SimulatedRig(RIG, draw(RIG, 2), 1)
@@ -37,15 +39,20 @@ class Host:
         self._now += round(seconds * 1e9)
         self.machine.sleep(max(0, self._now - self.behind_ns - self.machine.now_ns()) * 1e-9)
 
+    def stand_still(self, seconds: float) -> None:
+        """The whole computer: bench and machine."""
+        self._now += round(seconds * 1e9)
+        self.behind_ns += round(seconds * 1e9)
+
     def receive(self) -> FrameBatch:
         batch = self.machine.link.receive().copy()
         batch["t_ns"] = self._now
         return batch
 
 
-def recorded(path: Path, wait: bool) -> tuple[float, int]:
+def recorded(path: Path, behind_s: float, wait: bool = True) -> tuple[float, int, Controller]:
     """Fall behind, record a step, and command a motor current after it: by how much that current is greater in the last 50 ms
-    of the step than before, A, and how many samples the step has."""
+    of the step than before, A, how many samples the step has, and the driver."""
     host = Host()
     controller = Controller(RIG, host, host, Session(1, 1_767_225_600, "test"))
     header = RunHeader({"run": {}}, {"rig.toml": RIG.toml_text.encode(), "rig.dbc": RIG.dbc_text.encode()})
@@ -55,7 +62,7 @@ def recorded(path: Path, wait: bool) -> tuple[float, int]:
         controller.enable()
         controller.levitate()
         controller.set("i_ramp", 5.0)
-        host.behind_ns = round(BEHIND_S * 1e9)
+        host.stand_still(behind_s)
         controller.clock.sleep(2.0)
         steps = WatchedSteps(recorder, Silent(), controller.catch_up if wait else lambda: None)
         with steps.step("dwell"):
@@ -64,11 +71,45 @@ def recorded(path: Path, wait: bool) -> tuple[float, int]:
         controller.clock.sleep(0.5)
     step = next(iter(Recording.open(path).steps("dwell")))
     data = step.read("i_m1")["i_m1"]
-    return float(data[-50:].mean() - data[:-100].mean()), len(data)
+    return float(data[-50:].mean() - data[:-100].mean()), len(data), controller
 
 
-def test_what_is_commanded_after_a_step_does_not_act_within_it(tmp_path: Path) -> None:
-    assert recorded(tmp_path / "without.mcap", wait=False)[0] > 0.1
-    change, samples = recorded(tmp_path / "with.mcap", wait=True)
+def test_without_waiting_what_is_commanded_after_a_step_acts_within_it(tmp_path: Path) -> None:
+    assert recorded(tmp_path / "without.mcap", 0.08, wait=False)[0] > 0.1
+
+
+@pytest.mark.parametrize("behind_s", [0.08, 3.0])
+def test_what_is_commanded_after_a_step_does_not_act_within_it(tmp_path: Path, behind_s: float) -> None:
+    change, samples, controller = recorded(tmp_path / "with.mcap", behind_s)
     assert samples == 200
     assert abs(change) < 0.05
+    assert controller.cut_ns <= 0
+
+
+def test_a_controller_that_is_too_far_behind_is_not_waited_for_and_the_run_says_so() -> None:
+    host = Host()
+    controller = Controller(RIG, host, host, Session(1, 1_767_225_600, "test"))
+    controller.connect()
+    controller.guarded = False
+    controller.clock.sleep(1.0)
+    host.behind_ns = 20_000_000_000
+    controller.clock.sleep(0.1)
+    controller.catch_up()
+    assert controller.cut_ns > 0
+
+
+def test_a_bench_that_stood_still_does_not_take_the_controller_for_dead() -> None:
+    """Nor where that was in the middle of a look at it, before or after the link was read."""
+    host = Host()
+    controller = Controller(RIG, host, host, Session(1, 1_767_225_600, "test"))
+    controller.connect()
+    receive = host.receive
+    host.renew_lease = lambda: host.stand_still(0.6)
+    for _ in range(3):
+        host.stand_still(4)
+        controller.clock.sleep(0.3)
+    assert controller.mode == "OFF"
+    host.renew_lease = lambda: None
+    host.receive = lambda: receive()[:0]  # type: ignore[method-assign]
+    with pytest.raises(LinkError, match=r"no telemetry for 0\.[56]"):
+        controller.clock.sleep(2.0)

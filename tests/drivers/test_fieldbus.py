@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -90,6 +91,23 @@ def test_reads_are_grouped() -> None:
         go(bench, bus, 1.0)
         assert bench.lines["drive"].reads == [("holding", 0, 3), ("input", 0, 5)] * 10
         assert bench.lines["thermal"].reads == [("input", 0, 3), ("input", 8, 2)] * 3
+
+
+def test_a_bench_that_stood_still_does_not_take_its_devices_for_lost() -> None:
+    with opened(up=False) as (bench, bus):
+        go(bench, bus, 0.5)
+        ahead = 0
+
+        def now() -> int:
+            return bench.clock.now_ns() + ahead
+
+        bus._clock = SimpleNamespace(now_ns=now, sleep=bench.clock.sleep)
+        ahead = 30_000_000_000
+        bus.pump()
+        for line in bench.lines.values():
+            line.failure = LinkError("no answer")
+        with pytest.raises(LinkError, match=r"no reading for [34]\.\d s: no answer"):
+            go(bench, bus, 6.0)
 
 
 def test_a_drive_that_goes_into_fault_ends_the_wait() -> None:

@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 ANY_PORT = ("--link", "controller=slcan:socket://127.0.0.1:0", "--link", "operator=line:127.0.0.1:0",
             "--link", "fieldbus=modbus-tcp:127.0.0.1:0")  # fmt: skip
 LINE_S = 60.0
-PATIENCE_S = 1.0
+PATIENCE_S = 3.0
 EXPECTED = ("simulated-controller", "telemetry-late", "heartbeat-late")
 """Findings of every served rig, and those about the machine that the test runs on."""
 
@@ -115,21 +115,26 @@ def kind_of(url: str) -> str:
     return scheme
 
 
-def patient_rig(folder: Path, rig: str = "tsbs12") -> None:
-    """A rig in `folder/rigs`, where server and bench find it first, with a watchdog of a second: a test machine that
-    gives its processes no time for 80 ms is no dead host."""
+def patient_rig(folder: Path, rig: str = "tsbs12", patience_s: float = PATIENCE_S) -> None:
+    """A rig in `folder/rigs`, where server and bench find it first, with a watchdog of seconds: a test machine that
+    gives its processes no time for so long is no dead host, and no dead controller."""
     rigs = folder / "rigs"
     rigs.mkdir(exist_ok=True)
     text = (ROOT / "rigs" / f"{rig}.toml").read_text()
-    (rigs / f"{rig}.toml").write_text(re.sub(r"(watchdog_s = .*?default = )[0-9.]+", rf"\g<1>{PATIENCE_S}", text))
+    patient = rf"\g<1>{patience_s}\g<2>{patience_s}"
+    (rigs / f"{rig}.toml").write_text(
+        re.sub(r"(watchdog_s = .*?default = )[0-9.]+(, .*?high = )[0-9.]+", patient, text)
+    )
     (rigs / f"{rig}.dbc").write_bytes((ROOT / "rigs" / f"{rig}.dbc").read_bytes())
 
 
 @contextmanager
-def served(folder: Path, *arguments: str, rig: str = "tsbs12", patient: bool = True) -> Iterator[Served]:
-    """`bench serve` on free ports for the block; `patient` as `patient_rig` says."""
-    if patient:
-        patient_rig(folder, rig)
+def served(
+    folder: Path, *arguments: str, rig: str = "tsbs12", patience_s: float | None = PATIENCE_S
+) -> Iterator[Served]:
+    """`bench serve` on free ports for the block; patient as `patient_rig` says, or as the rig file is."""
+    if patience_s is not None:
+        patient_rig(folder, rig, patience_s)
     child = _start(folder, "-m", "bench.cli.__main__", "serve", rig, *ANY_PORT, *arguments)
     try:
         child.wait_for("ready")

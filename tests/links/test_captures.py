@@ -72,7 +72,7 @@ def judge(recording: Recording) -> None:
 
 @pytest.mark.timeout(120)
 def test_from_a_served_rig(tmp_path: Path) -> None:
-    with processes.served(tmp_path, rig="amb5dof", patient=False) as rig:
+    with processes.served(tmp_path, rig="amb5dof", patience_s=None) as rig:
         for kind in ("slcan:socket", "serial:pty"):
             judge(captured(rig.endpoints[kind], tmp_path / f"{kind.replace(':', '-')}.mcap"))
 

@@ -40,7 +40,7 @@ def test_bench_time_follows_wall_time_and_is_made_up_after_every_pause(steps: li
 
 
 @settings(deadline=None)
-@given(pause=st.integers(0, 990 * MS))
+@given(pause=st.integers(0, 9990 * MS))
 def test_it_catches_up_slowly_enough_for_a_watchdog_that_heartbeats_of_wall_time_keep_quiet(pause: int) -> None:
     pacer, now = Pacer(T0), T0 + pause
     first = pacer.due(now)
@@ -50,10 +50,10 @@ def test_it_catches_up_slowly_enough_for_a_watchdog_that_heartbeats_of_wall_time
         for _ in range(10):
             now += 2 * MS
             ten += pacer.due(now)
-        assert ten * TICK_NS <= 20 * MS * 5 // 4 + 7.5 * MS
+        assert ten * TICK_NS <= 20 * MS * 3 // 2 + 7.5 * MS
 
 
-def test_a_late_slice_is_an_overrun_and_a_debt_over_a_second_is_given_up_and_counted() -> None:
+def test_a_late_slice_is_an_overrun_and_a_debt_over_ten_seconds_is_given_up_and_counted() -> None:
     pacer = Pacer(T0)
     pacer.due(T0 + 2 * MS)
     pacer.due(T0 + 24 * MS)  # 20 ms late: not yet
@@ -61,13 +61,13 @@ def test_a_late_slice_is_an_overrun_and_a_debt_over_a_second_is_given_up_and_cou
     pacer.due(T0 + 47 * MS)
     assert (pacer.overruns, pacer.worst_ns) == (1, 21 * MS)
     before = pacer.ticks
-    late = T0 + 47 * MS + 5 * SECOND
+    late = T0 + 47 * MS + 15 * SECOND
     assert pacer.due(late) * TICK_NS == 2 * MS
     assert pacer.drops == 1
     assert pacer.dropped_ns == late - T0 - before * TICK_NS - 2 * MS
     assert pacer.bench_ns() == late
     assert pacer.due(late + 3 * MS) == 30  # and on at the pace of the wall
-    assert DEBT_NS == SECOND
+    assert DEBT_NS == 10 * SECOND
 
 
 def test_the_next_slice_starts_two_milliseconds_after_the_last() -> None:
@@ -183,10 +183,10 @@ def test_time_that_is_given_up_is_told_once(served: Served, monkeypatch: pytest.
     bus = served()
     client = bus.client(bus.serial)
     bus.run(0.01)
-    bus.clock.now += 3 * SECOND
+    bus.clock.now += 13 * SECOND
     bus.run(0.01)
     assert [line for line in bus.lines if "gave up" in line] == [
-        "0.012 s: over a second behind wall time; gave up catching up, 3.0 s so far"
+        "0.012 s: over ten seconds behind wall time; gave up catching up, 13.0 s so far"
     ]
     sequences = client.sequences()
     assert sequences == list(range(sequences[0], sequences[0] + len(sequences)))
@@ -194,7 +194,7 @@ def test_time_that_is_given_up_is_told_once(served: Served, monkeypatch: pytest.
     before = len(bus.lines)
     bus.run(1.5)
     assert len(bus.lines) == before  # no news
-    assert "overruns 1 (worst 3000 ms), time given up 3.0 s" in bus.lines[-1]
+    assert "overruns 1 (worst 13000 ms), time given up 13.0 s" in bus.lines[-1]
 
 
 def test_a_fault_unplugs_the_endpoints_and_plugs_them_in_again(served: Served) -> None:
