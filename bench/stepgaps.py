@@ -17,7 +17,7 @@ def incomplete_steps(recording: Recording[Any]) -> Iterator[Finding]:
     if not any((recording.integrity or {}).get("lost", {}).values()):
         return
     found = [
-        f"step {number} ({step.kind} {described(step.labels)}): {lost} of {step.expected(stream)} samples of {stream} "
+        f"step {number} ({step.kind} {described(step.labels)}): {lost} of {max(lost, step.expected(stream))} samples of {stream} "
         "are missing"
         for number, step in enumerate(recording.all_steps(), 1)
         for stream in recording.streams
