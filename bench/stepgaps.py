@@ -17,8 +17,8 @@ def incomplete_steps(recording: Recording[Any]) -> Iterator[Finding]:
     if not any((recording.integrity or {}).get("lost", {}).values()):
         return
     found = [
-        f"step {number} ({step.kind} {described(step.labels)}): {lost} of {max(lost, step.expected(stream))} samples of {stream} "
-        "are missing"
+        f"step {number} ({step.kind} {described(step.labels)}): {lost} of {max(lost, step.expected(stream))} samples of "
+        f"{stream} are missing"
         for number, step in enumerate(recording.all_steps(), 1)
         for stream in recording.streams
         if (lost := step.lost(stream))
