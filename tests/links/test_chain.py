@@ -51,7 +51,7 @@ def over(folder: Path, link: str, steps: int) -> Records:
     with processes.served(folder, "--seed", SEED) as rig:
         arguments = ("campaign", str(short(folder, steps)), "--backend", "live", "--operator", "auto", "--no-report")
         with processes.real_bench(folder, *arguments, *rig.links(link)) as child:
-            assert child.end(RUN_S) == 0, child.err[-12:]
+            assert child.end(RUN_S) == 0, "\n".join(child.err[-12:])
             return records(folder, child)
 
 
@@ -60,7 +60,7 @@ def in_one_process(tmp_path_factory: pytest.TempPathFactory) -> Records:
     folder = tmp_path_factory.mktemp("simulated")
     arguments = ("campaign", str(short(folder, 6)), "--seed", SEED, "--no-report")
     with processes.real_bench(folder, *arguments) as child:
-        assert child.end(RUN_S) == 0, child.err[-8:]
+        assert child.end(RUN_S) == 0, "\n".join(child.err[-8:])
         return records(folder, child)
 
 
