@@ -54,7 +54,7 @@ class Controller:
         self.serial: int | None = None
         self._hosts = handshake.HostFrames(rig)
         self.host_age_s = 0.0  # the greatest while the machine was on
-        self.cut_ns = 0
+        self.cut_ns = 0  # the most that a step lacked of its telemetry when it was left
         self.companions: list[Callable[[], None]] = []  # polled with it: other devices of the rig
         self._orders = Orders(rig, self._dialogue, session, self.envelope, lambda: self.mode, self._wait)
         self._turning = Turning(rig, self._orders, self.telemetry, self.clock, base.now_ns)
@@ -112,8 +112,7 @@ class Controller:
 
     def catch_up(self) -> None:
         """Let the clock run until telemetry has reached the present, so that what is commanded next cannot act on samples
-        of the time before: a controller whose clock has fallen behind gets there later. Silence ends a run by itself;
-        `cut_ns` is the most that was missing when it was not waited for any longer."""
+        of the time before: a controller whose clock has fallen behind gets there later. Silence ends a run by itself."""
         due, watch = self.clock.now_ns() - self.telemetry.period_ns, waiting.Stopwatch(self._base.now_ns)
         while self.telemetry.newest_ns < due and self.silent_s < self._patience_s and watch.look() < BEHIND_S * 1e9:
             self.clock.sleep(waiting.SLICE_S)

@@ -60,7 +60,7 @@ class Dialogue:
         """Send a request and wait for its reply: the one with its token, where the reply has one.
 
         Raises:
-            LinkError: no reply within half a second.
+            LinkError: no reply in time (`drivers.waiting.patience_s`).
         """
         self._token = (self._token + 1) & 0xFF
         self._forget()
@@ -88,7 +88,7 @@ class Dialogue:
         """Send many requests at once and wait for their replies; by the value of their signal `key`.
 
         Raises:
-            LinkError: one does not come within half a second.
+            LinkError: one does not come in time (`drivers.waiting.patience_s`).
         """
         self._forget()
         for values in requests:
