@@ -58,10 +58,12 @@ def view_of(c: CoverageContent) -> SummaryView:
     outcome = c.verdict.upper()
     out = [q.name for q in c.quantities if q.judged and q.coverage.verdict.value != "pass"]
     named = ", ".join(out[:NAMED]) + (f" and {len(out) - NAMED} more" if len(out) > NAMED else "")
+    judged = any(q.judged for q in c.quantities)
+    untold = "A quantity that was to be judged has no truth." if judged else "Nothing could be judged."
     said = {
         "PASS": "Every judged quantity lies within both bands.",
         "FAIL": f"Outside a band: {named}.",
-        "INDETERMINATE": f"More rigs are needed to decide: {named}." if out else "Nothing could be judged.",
+        "INDETERMINATE": f"More rigs are needed to decide: {named}." if out else untold,
     }[outcome]
     return SummaryView(
         title=c.title, campaign=c.campaign, simulated=SIMULATED, outcome=outcome, tone=_TONES.get(c.verdict, "none"),

@@ -101,6 +101,13 @@ def test_nothing_at_all_was_measured() -> None:
     assert "No rig gave a finding" in page
 
 
+def test_all_within_their_bands_but_one_without_a_truth() -> None:
+    passed = [q for q in many(400).quantities if q.coverage.verdict.value == "pass"]
+    content = dataclasses.replace(many(400), quantities=tuple(passed), verdict="indeterminate")
+    assert passed
+    assert "has no truth" in campaign_coverage.view_of(content).outcome_text
+
+
 def test_a_width_without_an_upper_end() -> None:
     content = many(30)
     found = content.quantities[0].coverage
