@@ -102,7 +102,8 @@ class Sensor(Part):
 
 
 class Envelope(Part):
-    """Protection range. `positions` are the channels that `max_levitated_position_m` bounds while the rotor is held."""
+    """Protection range. `positions` are the channels that `max_levitated_position_m` bounds while the rotor is held; the
+    supply's voltage is bounded then too."""
 
     max_hung_kg: float = Field(ge=0)
     max_current_A: float = Field(gt=0)
@@ -111,6 +112,9 @@ class Envelope(Part):
     max_levitated_position_m: float = Field(gt=0)
     max_trial_weight_kg: float = Field(0.0, ge=0)  # in a balancing plane
     max_injection_A: float = Field(0.0, ge=0)  # into the current reference of an axis, greatest value of the sum
+    min_supply_V: float | None = Field(None, gt=0)
+    max_supply_V: float | None = Field(None, gt=0)
+    max_drive_torque_Nm: float | None = Field(None, gt=0)
     positions: tuple[str, ...] = ("pos_xi", "pos_yi", "pos_xo", "pos_yo")
 
 

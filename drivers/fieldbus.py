@@ -66,7 +66,9 @@ class Fieldbus:
         names = register_devices(rig)
         self.devices = {n: RegisterDevice(n, rig.devices[n], port_of(n)) for n in names}
         self.guarded, self.cleared = True, ""
-        self._clock, self._threaded = clock, threaded
+        self._clock, self._threaded, self._envelope = clock, threaded, envelope
+        self.held: Callable[[], bool] = lambda: False  # whether the controller holds the rotor
+        self._held_ns: int | None = None  # since when it does
         self._recorder: Recorder | None = None
         periods = {n: round(max(d.spec.poll_s, 0 if threaded else PUMP_S) * 1e9) for n, d in self.devices.items()}
         self._polls = {n: Poll(d, periods[n], clock) for n, d in self.devices.items()}
@@ -177,8 +179,13 @@ class Fieldbus:
         Raises:
             LinkError: a device is lost, or refuses (while guarded).
             DeviceFault: the drive reports a fault (while guarded).
+            InterlockError: a reading is outside the envelope (while guarded).
         """
         self._pumped_s = time.monotonic()
+        if not self.held():
+            self._held_ns = None
+        elif self._held_ns is None:
+            self._held_ns = self._clock.now_ns()
         if not self._threaded:
             self._poll(self._polls.values())
         while self._arrived:
@@ -248,6 +255,9 @@ class Fieldbus:
         block = self._streams[name].block(reading)
         if self._recorder is not None and block is not None:
             self._recorder.samples(block)
+        if self.guarded:  # a supply that was still off when it was asked may have been switched on for the lift
+            held = self._held_ns is not None and reading.t_ns > self._held_ns
+            self._envelope.check_reading(name, reading.values, held)
 
     def _check(self) -> None:
         for error in self._trouble.values():

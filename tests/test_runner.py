@@ -165,6 +165,14 @@ def test_an_interlock_on_telemetry_ends_in_make_safe(run: Run, rig: RigFile) -> 
     assert last_state(result, rig) == "OFF"
 
 
+def test_a_supply_that_sags_while_the_rotor_is_held_ends_in_make_safe(run: Run, rig: RigFile) -> None:
+    result = run(procedure=tiny_procedures.levitated, truth={"supply_V": 100.0})
+    assert result.outcome is Outcome.ABORTED
+    assert codes(result) == ["interlock"]
+    assert "supply" in result.reason
+    assert last_state(result, rig) == "OFF"
+
+
 def test_a_fault_of_the_controller_is_an_abort(run: Run) -> None:
     result = run(truth={"fault_after_s": 0.6})
     assert result.outcome is Outcome.ABORTED

@@ -23,7 +23,7 @@ T0 = 10_000_000_000_000
 def one(sequence: int, tick: int | None = None, **values: float) -> FrameBatch:
     tick = sequence * 10 if tick is None else tick
     payload = encode(MESSAGE, {"seq": sequence & 0xFFFF, "tick": tick & 0xFFFFFFFF, "temp_i": 295, "temp_o": 295,
-                               "temp_m": 295, **values})  # fmt: skip
+                               "temp_m": 295, "supply": 148, **values})  # fmt: skip
     return frame(MESSAGE.identifier, payload, t_ns=T0 + sequence * 1_000_000)
 
 
@@ -135,7 +135,8 @@ def block(**values: float) -> SampleBlock:
 @pytest.mark.parametrize(
     ("values", "name"),
     [({"speed": 76.0}, "speed"), ({"i_yo_p": 13.0}, "i_yo_p"), ({"temp_m": 360.0}, "temp_m"),
-     ({"pos_yi": 1.6e-4, "state": 3}, "pos_yi"), ({"pos_xo": -1.6e-4, "state": 4}, "pos_xo")],
+     ({"pos_yi": 1.6e-4, "state": 3}, "pos_yi"), ({"pos_xo": -1.6e-4, "state": 4}, "pos_xo"),
+     ({"supply": 100.0, "state": 3}, "supply fell to 100 V"), ({"supply": 170.0, "state": 4}, "supply reached 170 V")],
 )  # fmt: skip
 def test_the_envelope_trips_and_names_the_channel(values: dict[str, float], name: str) -> None:
     with pytest.raises(InterlockError, match=name):
@@ -143,7 +144,7 @@ def test_the_envelope_trips_and_names_the_channel(values: dict[str, float], name
 
 
 def test_the_envelope_lets_a_resting_rotor_rest() -> None:
-    Envelope(RIG).check_block(block(pos_yi=-2.5e-4, state=0, speed=74.9))
+    Envelope(RIG).check_block(block(pos_yi=-2.5e-4, state=0, speed=74.9, supply=0))
 
 
 @pytest.mark.parametrize(

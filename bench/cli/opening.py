@@ -12,6 +12,7 @@ from bench import faults, linkurl
 from bench.cli import console
 from bench.cli.safety import may_touch, safe_steps
 from bench.clock import Clock, WallClock
+from bench.envelope import HELD
 from bench.errors import BenchError, ConfigError
 from bench.faults import Fault
 from bench.findings import SIMULATED_CONTROLLER, Finding
@@ -207,6 +208,7 @@ def _opened(
 ) -> OpenRig:  # fmt: skip
     recording: list[Any] = [controller, bus, *operators]
     controller.companions.append(bus.pump)
+    bus.held = lambda: controller.mode in HELD
     if bus.drive is not None:
         bus.drive.may_run = controller.require_levitated
 
