@@ -165,8 +165,10 @@ def test_an_interlock_on_telemetry_ends_in_make_safe(run: Run, rig: RigFile) -> 
     assert last_state(result, rig) == "OFF"
 
 
-def test_a_supply_that_sags_while_the_rotor_is_held_ends_in_make_safe(run: Run, rig: RigFile) -> None:
-    result = run(procedure=tiny_procedures.levitated, truth={"supply_V": 100.0})
+def test_a_supply_outside_its_range_while_the_rotor_is_held_ends_in_make_safe(run: Run, rig: RigFile) -> None:
+    text = rig.toml_text.replace("min_supply_V = 130.0", "min_supply_V = 150.0")
+    assert text != rig.toml_text
+    result = run(on=RigFile.parse(text, rig.dbc_text), procedure=tiny_procedures.levitated)
     assert result.outcome is Outcome.ABORTED
     assert codes(result) == ["interlock"]
     assert "supply" in result.reason
