@@ -9,7 +9,7 @@ BenchError
     InterlockError   the envelope refused a command or tripped on telemetry
     DeviceFault      the controller reported a fault
     OperatorAbort    the operator said stop
-    SignalAbort      SIGINT or SIGTERM
+    SignalAbort      SIGINT, SIGTERM or SIGHUP
 """
 
 from __future__ import annotations
@@ -71,4 +71,4 @@ class OperatorAbort(Aborted):
 
 
 class SignalAbort(Aborted):
-    """SIGINT or SIGTERM arrived."""
+    """SIGINT, SIGTERM or SIGHUP arrived."""

@@ -57,7 +57,7 @@ class Supervisor:
 
     @contextmanager
     def watching(self) -> Iterator[Supervisor]:
-        """SIGINT and SIGTERM come here within the block and go where they went before after it."""
+        """SIGINT, SIGTERM and SIGHUP come here within the block and go where they went before after it."""
         with signals.delivered_to(self._received):
             yield self
         self._log_ignored()
