@@ -126,7 +126,9 @@ class Envelope:
             row = int(np.argmin(inside.all(axis=1)))
             k, name = int(np.argmin(inside[row])), names[row]
             unit = units.UNITS[self.rig.channels[name].unit].si
-            raise InterlockError(_left(name, x[row, k], f" at tick {int(block.ticks[k])}", low[row, 0], high[row, 0], unit))
+            raise InterlockError(
+                _left(name, x[row, k], f" at tick {int(block.ticks[k])}", low[row, 0], high[row, 0], unit)
+            )
 
     @property
     def _supply(self) -> tuple[float, float]:
@@ -152,7 +154,9 @@ class Envelope:
             raise InterlockError(f"interlock: {device} says that it is off while the rotor is held; look at it first")
         low, high = self._supply
         if "voltage" in values and not low <= values["voltage"] <= high:
-            raise InterlockError(_left(f"{device} voltage", values["voltage"], " while the rotor is held", low, high, "V"))
+            raise InterlockError(
+                _left(f"{device} voltage", values["voltage"], " while the rotor is held", low, high, "V")
+            )
 
     @cached_property
     def _readings(self) -> dict[str, dict[str, tuple[float, float]]]:
@@ -161,7 +165,7 @@ class Envelope:
         for device, spec in self.rig.devices.items():
             kelvin = [n for n, r in spec.registers.items() if units.unit(r.unit).si == "K"]
             hot = [n for n in kelvin if n.startswith("temp_") or ("thermal" in spec.roles and n != AMBIENT)]
-            limits = {n: (-math.inf, e.max_temperature_K) for n in hot}
+            limits = dict.fromkeys(hot, (-math.inf, e.max_temperature_K))
             if "drive" in spec.roles:
                 limits["actual_speed"] = (-e.max_speed_rad_s, e.max_speed_rad_s)
                 torque = e.max_drive_torque_Nm or math.inf

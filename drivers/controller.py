@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 from bench.clock import Clock, PumpedClock
@@ -13,13 +14,16 @@ from bench.rigfile import RigFile
 from bench.roles import RigState
 from bench.samples import SampleBlock
 from bench.session import Session
+from bench.stillness import StuckChannels
 from bench.telemetry import TelemetryDecoder
 from drivers import advice, handshake, waiting
 from drivers.capture import ControllerCapture
 from drivers.capture_upload import Upload
 from drivers.condition import Condition
 from drivers.dialogue import Dialogue, no_reply
+from drivers.hosts import HostFrames
 from drivers.orders import Orders
+from drivers.sight import Sight
 from drivers.turning import Turning
 
 TOUCHED = 0.5  # rad/s, above which a landed shaft is not at rest
@@ -52,7 +56,10 @@ class Controller:
         self.cleared = ""
         self.restored: tuple[str, ...] = ()
         self.serial: int | None = None
-        self._hosts = handshake.HostFrames(rig)
+        self.owned = False  # until then heartbeats mean nothing, and would alarm its owner
+        self.sight = Sight(rig, self.telemetry, lambda: self.mode, base.now_ns)
+        self.stuck = StuckChannels(rig)
+        self._hosts = HostFrames(rig, session.number, lambda: link.stats.heartbeats)
         self.host_age_s = 0.0  # the greatest while the machine was on
         self.cut_ns = 0  # the most that a step lacked of its telemetry when it was left
         self.companions: list[Callable[[], None]] = []  # polled with it: other devices of the rig
@@ -95,20 +102,27 @@ class Controller:
         if not self._dialogue.has("Claim"):
             self.clock.sleep(handshake.LISTEN_S)
             handshake.alone(self._hosts.seen, self.link.name)
-        self.link.renew_lease()
+            self._own()
         silent = (
             f"no telemetry within {FIRST_S:g} s. Is the controller on, the port right, the bit rate that of the bus?"
         )
         self.wait(lambda: bool(self.telemetry.latest), FIRST_S, LinkError(f"link {self.link.name}: {silent}"))
         handshake.claim(self._dialogue, self.rig, self._session, self.clock, self._wait)
+        self._own()
         self.serial = handshake.identify(self._dialogue, self.rig, self._session, self._wait)
         if self.mode == "FAULT":
             advice.may_clear("controller", self.fault, clear_fault)
             self.cleared = self.fault
             self._command("CLEAR_FAULT", "OFF", 1.0)
         self.restored = self._orders.restore()
+        self._hosts.forget()
         self._last_ns = self._base.now_ns()
         self.guarded = True
+
+    def _own(self) -> None:
+        """The controller is ours: heartbeats begin."""
+        self.owned = True
+        self.link.renew_lease()
 
     def catch_up(self) -> None:
         """Let the clock run until telemetry has reached the present, so that what is commanded next cannot act on samples
@@ -130,6 +144,7 @@ class Controller:
             LinkError: no telemetry for half a second (`drivers.waiting.patience_s`).
             InterlockError: the envelope tripped.
             DeviceFault: the controller reports a fault, or has restarted.
+            FrozenError, AnotherHost: `Condition.check`, `HostFrames.check`.
         """
         now = self._base.now_ns()
         if now - self._polled_ns > self._stall_ns:  # the bench stood still: the link has had no chance to be heard
@@ -139,10 +154,13 @@ class Controller:
         if self._recorder is not None:
             self._recorder.frames(self.link.name, batch, lag_ns=self.telemetry.host.lag_ns)
         self._dialogue.take(batch)
+        self.sight.frames(batch)
         if self.capture is not None:
             self.capture.take(batch)
         blocks = self.telemetry.decode(batch)
+        self.sight.samples(blocks)
         for block in blocks:
+            self.stuck.take(block)
             if self._recorder is not None:
                 self._recorder.samples(block)
         if blocks:
@@ -183,10 +201,17 @@ class Controller:
             self.host_age_s = max([self.host_age_s, *ages])
 
     def _check(self) -> None:
-        if self.silent_s > self._patience_s + (self.rig.link.reconnect_s if self.link.reopening else 0.0):
+        patience_s = self._patience_s + (self.rig.link.reconnect_s if self.link.reopening else 0.0)
+        if self.silent_s > patience_s and not self._frames_come:
             text = f"no telemetry for {self.silent_s:.2f} s; the link or the controller is lost"
             raise LinkError(f"link {self.link.name}: {text}")
+        self._hosts.check()
         self._condition.check()
+
+    @property
+    def _frames_come(self) -> bool:
+        """Whether telemetry comes that says nothing new: `Condition.check` waits a while, and calls it by its name."""
+        return self._polled_ns - self.telemetry.stillness.newest_ns < self._patience_s * 1e9
 
     @property
     def round_trip_ns(self) -> int | None:
@@ -235,9 +260,17 @@ class Controller:
         """READY to OFF."""
         self._command("DISABLE", "OFF", 1.0)
 
+    def command(self, name: str) -> None:
+        """Send a command and wait for its reply, not for its effect; `drivers.orders.Orders.command` has the errors."""
+        self._orders.command(name)
+
     def make_safe(self) -> None:
         """Ask the controller to coast, land and switch off by itself."""
         self._orders.command("MAKE_SAFE")
+
+    def ask_state(self) -> None:
+        """Ask for a reply, which tells the state, where the controller has one; nothing is waited for."""
+        self._orders.ask_state()
 
     @property
     def _lift_s(self) -> float:
@@ -277,6 +310,11 @@ class Controller:
             LinkError: it does not get there in time.
         """
         self._turning.stop(self.link.name)
+
+    @property
+    def landing_s(self) -> float:
+        """How long a landing takes: until a shaft of which no pulse comes is known to be slow, and until it is down."""
+        return self._lift_s + 2 * math.pi / self.landing_speed
 
     def _default(self, parameter: str) -> float:
         """What a parameter is set to unless a plan says otherwise; 0 where the rig has none."""

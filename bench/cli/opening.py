@@ -112,7 +112,12 @@ def live(rig: RigFile, operator: str, injected: Sequence[Fault] = (), clear_faul
             real = _live_link(rig, session, wall)
             link = _with_faults(rig, real, wall, injected)
             stack.callback(link.close)
-            base = WatchedClock(wall, link.renew_lease, supervisor.check)
+
+            def renew() -> None:
+                if controller.owned:
+                    link.renew_lease()
+
+            base = WatchedClock(wall, renew, supervisor.check)
             controller = Controller(rig, link, base, session, LIVE_SLICE_S)
             controller.connect(clear_fault)
             stack.callback(_released, controller)
@@ -248,7 +253,7 @@ def _opened(
         return Health(telemetry.counters, controller.link.stats, telemetry.host.drift(), telemetry.host.latest_ns,
                       controller.host_age_s, controller.round_trip_ns, others,
                       cut_ns=controller.cut_ns, beyond_drift=telemetry.host.beyond,
-                      replies_wrong_length=controller.replies_wrong_length)  # fmt: skip
+                      replies_wrong_length=controller.replies_wrong_length, stuck=controller.stuck.found)  # fmt: skip
 
     rig = Rig(controller.rig, controller.clock, controller, controller, operators[0], controller.telemetry.counters,
               health, controller.link.close, bus.drive, bus.supply, bus.thermal, controller.capture)  # fmt: skip

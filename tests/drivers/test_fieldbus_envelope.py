@@ -1,4 +1,4 @@
-"""The envelope over the devices on registers: a winding, the supply and the drive trip a run as the controller's channels do."""
+"""The envelope over the devices on registers: winding, supply and drive trip a run as the controller's channels do."""
 
 from __future__ import annotations
 
