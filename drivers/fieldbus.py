@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 
 from bench.clock import Clock
 from bench.envelope import Envelope
-from bench.errors import BenchError, ConfigError, DeviceFault, LinkError
+from bench.errors import BenchError, DeviceFault, LinkError
 from bench.recorder import Recorder
 from bench.registers import RegisterPort, RegisterRefused
 from bench.rigfile import RigFile
@@ -29,12 +29,11 @@ from drivers.background import Background
 from drivers.fielddrive import FieldDrive
 from drivers.monitors import FieldSupply, FieldThermal
 from drivers.polling import Poll, PolledStream, Reading
-from drivers.registerdevice import RegisterDevice
+from drivers.registerdevice import RegisterDevice, by_role, register_devices
 from drivers.waiting import STALL_NS, Stopwatch
 
 logger = logging.getLogger("drivers.fieldbus")
 T = TypeVar("T")
-ROLES = ("drive", "supply", "thermal")
 WAIT_SLICE_S = 0.05
 PUMP_S = 0.1  # without a thread nothing is polled faster: a clock calls `pump` that often
 SILENT_POLLS, SILENT_S = 3, 1.0
@@ -84,7 +83,7 @@ class Fieldbus:
         self._threads: list[threading.Thread] = []
         self._pumped_s, self._looked_ns = time.monotonic(), clock.now_ns()
         self._hands = Background(clock, "requests to register devices") if threaded else None
-        role = _by_role(self.devices)
+        role = by_role(self.devices)
         self.drive = FieldDrive(self, role["drive"], envelope) if "drive" in role else None
         self.supply = FieldSupply(role["supply"], self.latest) if "supply" in role else None
         self.thermal = FieldThermal(role["thermal"], self.latest) if "thermal" in role else None
@@ -274,23 +273,6 @@ class Fieldbus:
                 raise LinkError(f"device {name} on link {device.spec.link}: no reading for {silent:.1f} s{why}")
         if self.drive is not None and self.drive.fault:
             raise DeviceFault(f"the drive reports {self.drive.fault}; look at it before the next run")
-
-
-def register_devices(rig: RigFile) -> tuple[str, ...]:
-    """Names of the rig's devices in the roles of this module."""
-    return tuple(name for name, d in rig.devices.items() if set(d.roles) & set(ROLES))
-
-
-def _by_role(devices: Mapping[str, RegisterDevice]) -> dict[str, RegisterDevice]:
-    out: dict[str, RegisterDevice] = {}
-    for device in devices.values():
-        for role in device.spec.roles:
-            other = out.setdefault(role, device)
-            if other is not device:
-                raise ConfigError(
-                    f"devices.{device.name}.roles: found {role}, which {other.name} has; expected one device"
-                )
-    return out
 
 
 @contextmanager

@@ -251,9 +251,9 @@ def _opened(
         telemetry = controller.telemetry
         others = {name: line.stats for name, line in lines.items()}
         return Health(telemetry.counters, controller.link.stats, telemetry.host.drift(), telemetry.host.latest_ns,
-                      controller.host_age_s, controller.round_trip_ns, others,
+                      controller.watch.host_age_s, controller.round_trip_ns, others,
                       cut_ns=controller.cut_ns, beyond_drift=telemetry.host.beyond,
-                      replies_wrong_length=controller.replies_wrong_length, stuck=controller.stuck.found)  # fmt: skip
+                      replies_wrong_length=controller.replies_wrong_length, stuck=controller.watch.stuck.found)  # fmt: skip
 
     rig = Rig(controller.rig, controller.clock, controller, controller, operators[0], controller.telemetry.counters,
               health, controller.link.close, bus.drive, bus.supply, bus.thermal, controller.capture)  # fmt: skip

@@ -43,12 +43,12 @@ def test_a_code_without_a_name_that_comes_for_less_than_a_second_ends_nothing() 
 def test_readings_that_stand_while_the_tick_runs_are_stuck_channels() -> None:
     bench = Bench()
     bench.controller.clock.sleep(1.5)
-    assert bench.controller.stuck.found == set()
+    assert bench.controller.watch.stuck.found == set()
     bench.link.change = Telemetry(TSBS, frozen=("pos_yi", "i_yo_p", "i_m1", "supply", "temp_i"), stuck=False)
     bench.controller.clock.sleep(0.9)
-    assert bench.controller.stuck.found == set()
+    assert bench.controller.watch.stuck.found == set()
     bench.controller.clock.sleep(0.3)
-    assert bench.controller.stuck.found == {"pos_yi", "i_yo_p", "i_m1"}
+    assert bench.controller.watch.stuck.found == {"pos_yi", "i_yo_p", "i_m1"}
 
 
 def test_a_rotor_at_rest_may_read_the_same() -> None:
@@ -56,7 +56,7 @@ def test_a_rotor_at_rest_may_read_the_same() -> None:
     bench.controller.land()
     bench.link.change = Telemetry(TSBS, frozen=("pos_yi",), stuck=False)
     bench.controller.clock.sleep(2.0)
-    assert bench.controller.stuck.found == set()
+    assert bench.controller.watch.stuck.found == set()
 
 
 def test_coarse_counts_are_not_stuck() -> None:
@@ -65,7 +65,7 @@ def test_coarse_counts_are_not_stuck() -> None:
     bench = Bench(RigFile.parse(quiet, TSBS.dbc_text))
     bench.link.change = Telemetry(TSBS, frozen=("pos_yi", "i_yo_p"), stuck=False)
     bench.controller.clock.sleep(2.0)
-    assert bench.controller.stuck.found == set()
+    assert bench.controller.watch.stuck.found == set()
 
 
 def heartbeat(session: int, counter: int, t_ns: int = 0) -> FrameBatch:
