@@ -3,8 +3,8 @@ it to the controller, first by command and at last by withholding the heartbeat.
 
 What is safe at any speed goes at once. LAND goes only when a source that still changes says that the shaft is below the
 landing speed, and OFF only to a controller that says READY. There is one measure of time: how long nothing has gone forward.
-A speed that falls, a state that changes and a command that is accepted are progress. Without any, the controller is told to make itself safe after
-GIVE_UP_S, the heartbeat is withheld after twice and make-safe ends after three times as long.
+A speed that falls, a state that changes and a command that is accepted are progress. Without any, the controller is told to
+make itself safe after GIVE_UP_S, the heartbeat is withheld after twice and make-safe ends after three times as long.
 """
 
 from __future__ import annotations
