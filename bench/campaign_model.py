@@ -51,8 +51,8 @@ class StatedEquation:
 class Constant:
     """One measured constant, SI. `dof` None is infinite; `interval` has the coverage probability.
 
-    `standard_uncertainty` and `coverage_factor` are None where the interval alone is stated. `holds_for` are the settings at which it was measured. `terms` are the largest of its budget, `rest` the standard
-    uncertainty of all others together.
+    `standard_uncertainty` and `coverage_factor` are None where the interval alone is stated. `holds_for` are the settings at
+    which it was measured. `terms` are the largest of its budget, `rest` the standard uncertainty of all others together.
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = _STRICT

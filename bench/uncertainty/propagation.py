@@ -82,8 +82,8 @@ def _between(
     """How much each output bends between two influences: root of the sum of squares of the mixed second differences.
 
     Along a direction s of n signs the second difference is the trace plus the sum of s_i s_j H_ij, whose mean square over
-    random signs is twice the sum of squares (Hutchinson, Commun. Stat. Simul. Comput. 19, 433 (1990)): 2 x DIRECTIONS evaluations
-    in place of n^2. The step is one standard uncertainty in all, to stay as near as one influence does.
+    random signs is twice the sum of squares (Hutchinson, Commun. Stat. Simul. Comput. 19, 433 (1990)): 2 DIRECTIONS
+    evaluations in place of n^2. The step is one standard uncertainty in all, to stay as near as one influence does.
     """
     n, squares = len(influences), dict.fromkeys(middle, 0.0)
     if n < 2:

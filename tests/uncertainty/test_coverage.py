@@ -222,7 +222,7 @@ def test_with_two_degrees_of_freedom_or_fewer_the_interval_alone_is_stated(dof: 
     few = estimate("few", 5.0, 0.1, dof)
     plain = interval(few)
     assert (plain.u, plain.k) == (None, None)
-    assert plain.U == pytest.approx(coverage_factor(dof) * 0.1)
+    assert pytest.approx(coverage_factor(dof) * 0.1) == plain.U
     drawn = interval(propagate(lambda p: p["x"] ** 2, {"x": few}) + estimate("r", 0.0, 9.0, distribution="rectangular"))
     assert drawn.method == "monte-carlo"
     assert (drawn.u, drawn.k) == (None, None)
