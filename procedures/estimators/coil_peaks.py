@@ -51,10 +51,9 @@ def exceeded(x: Array, edges: npt.NDArray[np.intp]) -> Exceeded:
 
 def blocks(full: Full) -> npt.NDArray[np.intp]:
     """Sample indices (b + 1,) between which a capture has whole turns, as many in each of up to BLOCKS blocks as there are."""
-    turns = full.tacho.angle(full.t) / (2 * math.pi)
-    first, last = math.ceil(np.nanmin(turns)), math.floor(np.nanmax(turns))
-    count = min(BLOCKS, last - first)
-    whole = first + np.round(np.linspace(0, last - first, count + 1))
+    times, turns = full.tacho.times, full.tacho.turns
+    seen = turns[(times >= full.t[0]) & (times <= full.t[-1])]
+    whole = np.round(np.linspace(seen[0], seen[-1], min(BLOCKS, int(seen[-1] - seen[0])) + 1))
     return np.searchsorted(full.t, full.tacho.time(2 * math.pi * whole))
 
 
