@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from bench.uncertainty import Estimate, Influence, interval, propagate, welch_satterthwaite
+from bench.calibration import adopted
+from bench.uncertainty import Estimate, Influence, correlation, interval, propagate, welch_satterthwaite
 from bench.uncertainty.coverage import draw
 from procedures.estimators.angle_facts import with_scatter
 from procedures.estimators.repeatability import OUTPUTS
@@ -65,3 +66,15 @@ def test_the_scatter_of_a_calibration_is_pooled_over_its_angles() -> None:
     assert welch_satterthwaite(facts["K_i"]) == 34
     assert welch_satterthwaite(facts["K_o@3"] - facts["K_i@7"] * 0.5) == 34
     assert facts["K_i"].u == pytest.approx(1 / 3)
+
+
+def test_adopted_scatter_stays_one_estimate_and_that_of_another_run_another() -> None:
+    values = {name: Estimate.exact(1.0) for o in OUTPUTS for name in (o, *(f"{o}@{k}" for k in range(9)))}
+    facts = with_scatter(values, np.tile(np.eye(6), (9, 1, 1)), 34)
+    one, two = (adopted(facts, run) for run in ("amb-calibration-1", "amb-calibration-2"))
+    assert welch_satterthwaite(one["K_i"] + one["K_o@2"]) == 34
+    assert welch_satterthwaite(one["K_i"] + two["K_i"]) == 68
+    assert correlation(one["K_i"], two["K_i"]) == 0
+    assert correlation(one["K_i"], one["K_i@4"]) == pytest.approx(1 / 3)
+    carried = adopted({"a": one["K_i"] * 2}, "force-constant-1", {i.id for e in one.values() for i in e.sensitivities})
+    assert correlation(carried["a"], one["K_i"]) == pytest.approx(1.0)
