@@ -102,7 +102,7 @@ def step_count(plan: Plan) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Look at the shaft on its rings, lift it, tilt it a little, then the grid at each bias."""
-    if not plan.coupled and rig.operator.ask(ASKED).strip().lower() not in ("yes", "y"):
+    if not plan.coupled and not rig.operator.ask(ASKED):
         raise OperatorAbort("the coupling is on the shaft; expected it off, or a plan with coupled = true")
     with record.step(REST):
         rig.clock.sleep(REST_S)
