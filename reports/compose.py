@@ -66,7 +66,7 @@ class Surroundings:
 def view_of(record: Content, around: Surroundings, shown: Sequence[Drawn | Sheet] = ()) -> ReportView:
     """The report of one record. Equal inputs give an equal view: nothing here asks for the time."""
     outcome = str(record.get("outcome", "ERROR"))
-    measurements = [habit.told(m) for m in record.get("measurements") or () if isinstance(m, Mapping)]
+    measurements = front.main_first([habit.told(m) for m in record.get("measurements") or () if isinstance(m, Mapping)])
     findings = tuple(_findings(record, around))
     rows = tuple(_result(m, around) for m in measurements)
     judged_title, judged, judged_note = front.judged(rows)

@@ -9,9 +9,16 @@ from bench.figures import Sheet
 from reports.figures import Drawn
 from reports.view import FigureEntry, ResultRow, Table, Tone
 
+Content = Mapping[str, Any]
 SHOWN, BUDGETS, FIGURES = 10, 6, 2
 WORST_FIRST: tuple[Tone, ...] = ("error", "fail", "indeterminate", "pass", "none")
 JUDGED, MEASURED = "What was judged", "What was measured"
+
+
+def main_first(measurements: Sequence[Content]) -> list[Content]:
+    """In their order, a quantity's result of no particular place (the one that counts) before those of its name that have one."""
+    names = list(dict.fromkeys(str(m.get("name", "")) for m in measurements))
+    return sorted(measurements, key=lambda m: (names.index(str(m.get("name", ""))), bool(m.get("where"))))
 
 
 def judged(rows: Sequence[ResultRow]) -> tuple[str, tuple[ResultRow, ...], str]:
@@ -27,7 +34,7 @@ def judged(rows: Sequence[ResultRow]) -> tuple[str, tuple[ResultRow, ...], str]:
     return title, tuple(chosen[:SHOWN]), f"{note}." if note else ""
 
 
-def budgeted(measurements: Sequence[Mapping[str, Any]]) -> Sequence[Mapping[str, Any]]:
+def budgeted(measurements: Sequence[Content]) -> Sequence[Content]:
     """Whose budgets stand in the body of the report: those of the judged results, else the first ones."""
     found = [m for m in measurements if str(m.get("verdict") or "none").lower() != "none"]
     return (found or list(measurements))[:BUDGETS]
