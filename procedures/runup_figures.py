@@ -112,7 +112,8 @@ def _criticals(run: Run, running: float) -> Sheet:
             peak.where, "yes" if peak.critical else "no, damped",
             stated(RPM * peak.speed.value, RPM * speed.U, "±"), stated(peak.factor.value, factor.U, "±"), ends,
             stated(1e6 * peak.amplitude.value, 1e6 * amplitude.U, "±"), f"{2e6 * peak.amplitude.value:.3g}",
-            stated(100 * peak.margin.value, 100 * margin.U, "±"), f"{100 * asked_margin(peak, running):.1f}" if peak.critical else "–",
+            stated(100 * peak.margin.value, 100 * margin.U, "±"),
+            f"{100 * asked_margin(peak, running):.1f}" if peak.critical else "–",
         ))  # fmt: skip
     head = (
         "Peak",

@@ -16,7 +16,7 @@ JUDGED, MEASURED = "What was judged", "What was measured"
 
 
 def main_first(measurements: Sequence[Content]) -> list[Content]:
-    """In their order, a quantity's result of no particular place (the one that counts) before those of its name that have one."""
+    """In their order, a quantity's result of no particular place (the one that counts) before its others."""
     names = list(dict.fromkeys(str(m.get("name", "")) for m in measurements))
     return sorted(measurements, key=lambda m: (names.index(str(m.get("name", ""))), bool(m.get("where"))))
 

@@ -127,7 +127,7 @@ def test_the_first_two_figures_and_the_tables_stand_before_the_results() -> None
     assert [f.first for f in made.figures] == [True, True, False]
     page = Page(html.render(made)).text
     places = [
-        page.index(words) for words in ("What was judged", "0.141", "Figure 2.", "Decision rule", "Figure 3.", "Annex")
+        page.index(words) for words in ("What was judged", "Figure 2.", "0.141", "Decision rule", "Figure 3.", "Annex")
     ]
     assert places == sorted(places)
 
