@@ -40,7 +40,12 @@ OF_LINEAR = {
     "misfit": Quantity("misfit", "N^2", "sum of squared residuals of the nonlinear model, over all samples"),
     "misfit_linear": Quantity("misfit_linear", "N^2", "sum of squared residuals of the linear model, over all samples"),
     "misfit_ratio": Quantity("misfit_ratio", "1", "residual sum of the linear model over that of the nonlinear one"),
-    "misfit_ratio_means": Quantity("misfit_ratio_means", "1", "the same over batch means, where noise covers less"),
+    "misfit_ratio_means": Quantity(
+        "misfit_ratio_means",
+        "1",
+        "the same over batch means, where noise covers less",
+        title="misfit ratio of batch means",
+    ),
 }
 MEASURES = (*BETA.values(), *OFFSET.values(), *OF_LINEAR.values())
 CCS = 1.0
