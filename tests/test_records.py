@@ -112,7 +112,7 @@ def test_with_two_degrees_of_freedom_the_interval_is_stated_alone(tmp_path: Path
     assert m.verdict is Verdict.PASS
     record = dataclasses.replace(full(), measurements=(m,))
     assert from_json(to_json(record)) == record
-    assert "73.00 +- 0.43" in summary(record)
+    assert "73.00 ± 0.43" in summary(record, tmp_path)
 
 
 def test_correlations_come_from_shared_influences() -> None:
