@@ -7,6 +7,7 @@ but the last second.
 
 from __future__ import annotations
 
+import errno
 import json
 import queue
 import threading
@@ -198,7 +199,9 @@ class Recorder:
     def _raise(self) -> None:
         if self._failure is not None:
             why = getattr(self._failure, "strerror", None) or repr(self._failure)
-            raise RecordingError(f"recording {self.path}: cannot be written: {why}") from self._failure
+            full = getattr(self._failure, "errno", None) in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+            next_step = ". Next: free space there, or give another --out" if full else ""
+            raise RecordingError(f"recording {self.path}: cannot be written: {why}{next_step}") from self._failure
 
     def _too_slow(self) -> str:
         return f"recording {self.path}: the disk did not keep up with the live link"

@@ -20,8 +20,8 @@ from bench.calibrationfile import attached
 from bench.captured import CAPTURES, Captured
 from bench.errors import AnalysisError, ConfigError, RecordingError
 from bench.frames import FrameBatch, frames_of
-from bench.layout import DecodedBlock
 from bench.kept import Kept
+from bench.layout import DecodedBlock
 from bench.mcapchunk import sound
 from bench.mcapfile import McapFile, index
 from bench.procedure import BenchPlan
@@ -334,6 +334,12 @@ class Recording(Generic[P]):
         if work not in self._made:
             self._made[work] = work(self)
         return cast(R, self._made[work])
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """The links whose frames were recorded."""
+        raw = layout.raw_topic("")
+        return tuple(sorted({t.removeprefix(raw) for t, _ in self._file.topics.values() if t.startswith(raw)}))
 
     def frames(self, link: str) -> Iterator[FrameBatch]:
         """Raw frames, batch by batch as they were recorded."""
