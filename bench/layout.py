@@ -239,7 +239,8 @@ class DecodedBlock:
 
 def _fields(data: bytes) -> list[tuple[int, Any]]:
     """Top-level protobuf fields: number, and an integer or the bytes."""
-    out, at = [], 0
+    out: list[tuple[int, Any]] = []
+    at = 0
     while at < len(data):
         if len(out) > MOST_FIELDS:
             raise RecordingError(f"a message of more than {MOST_FIELDS} fields; expected fewer")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 from bench import rundir
 from bench.cli.compose import load_procedure
@@ -28,7 +28,7 @@ def export_command(run: Path, to: Format | Log) -> int:
         BenchError: a file cannot be written.
     """
     directory = rundir.existing(run)
-    folder = _logs(directory, to) if to in ("blf", "asc", "candump") else export(run, to)[0].parent
+    folder = _logs(directory, to) if to in ("blf", "asc", "candump") else export(run, cast(Format, to))[0].parent
     if Recording.open(directory.recording).truncated:
         sys.stderr.write("bench: the recording is truncated: the files hold what was written before it was cut off\n")
     if to in ("parquet", "csv"):
