@@ -96,7 +96,7 @@ class Recorder:
         except OSError as error:
             with suppress(OSError):  # closing tries the same bytes again
                 self._file.close()
-            raise RecordingError(f"recording {path}: cannot be written: {error.strerror or error}") from error
+            raise RecordingError(f"recording {path}: cannot be written: {_why(error)}") from error
         self._queue: queue.Queue[tuple[str, tuple[Any, ...]] | None] = queue.Queue(
             LIVE_ITEMS if live else WAITING_ITEMS
         )
@@ -198,10 +198,7 @@ class Recorder:
 
     def _raise(self) -> None:
         if self._failure is not None:
-            why = getattr(self._failure, "strerror", None) or repr(self._failure)
-            full = getattr(self._failure, "errno", None) in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-            next_step = ". Next: free space there, or give another --out" if full else ""
-            raise RecordingError(f"recording {self.path}: cannot be written: {why}{next_step}") from self._failure
+            raise RecordingError(f"recording {self.path}: cannot be written: {_why(self._failure)}") from self._failure
 
     def _too_slow(self) -> str:
         return f"recording {self.path}: the disk did not keep up with the live link"
@@ -248,6 +245,12 @@ class Recorder:
             getattr(self._writer, what)(*arguments)
         except BaseException as error:
             self._failure = error
+
+
+def _why(failure: BaseException) -> str:
+    full = isinstance(failure, OSError) and failure.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+    why = getattr(failure, "strerror", None) or repr(failure)
+    return f"{why}. Next: free space there, or give another --out" if full else why
 
 
 def _add(counts: dict[str, int], name: str, count: int) -> None:
