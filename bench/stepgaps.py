@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from bench.described import described
 from bench.findings import Effect, Finding
 from bench.procedure import Procedure
-from bench.progress import described
 from bench.recording import Recording
 
 NAMED = 12  # more are counted together

@@ -35,10 +35,12 @@ def event_of(data: bytes, where: str) -> dict[str, Any]:
     """
     event = parsed(data, where)
     sound = isinstance(event, dict) and isinstance(event.get("kind"), str) and _is_time(event.get("t_ns"))
-    if sound and event["kind"] in ("step-begin", "step-end"):
+    if sound and event["kind"] in ("step-begin", "step-end", "step-corrected"):
         sound = type(event.get("step")) is int
+    if sound and event["kind"] in ("step-begin", "step-corrected"):
+        sound = isinstance(event.get("labels"), dict)
     if sound and event["kind"] == "step-begin":
-        sound = isinstance(event.get("name"), str) and isinstance(event.get("labels"), dict)
+        sound = isinstance(event.get("name"), str)
     if sound and event["kind"] == "capture":
         sound = _is_capture(event)
     if not sound:

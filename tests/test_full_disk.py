@@ -49,7 +49,7 @@ def test_a_disk_that_fills_up_ends_the_run_and_is_in_its_record(tmp_path: Path) 
     (folder,) = (tmp_path / "runs").glob("amb-calibration-*")
     record = json.loads((folder / "record.json").read_text(encoding="utf-8"))
     assert (done.returncode, record["outcome"], done.stdout.strip()) == (3, "ERROR", str(folder))
-    assert done.stderr.splitlines()[-1] == "outcome ERROR"
+    assert "ERROR: amb-calibration on tsbs12" in done.stderr.splitlines()
     found = {f["code"]: f["text"] for f in record["findings"]}
     assert found["recording-failed"].startswith(f"recording {folder / 'recording.mcap'}: cannot be written: {NEXT}")
     assert "Traceback" not in done.stderr

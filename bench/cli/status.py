@@ -17,6 +17,7 @@ import typer
 from bench.errors import Aborted, BenchError, ConfigError
 
 USAGE, ERROR, ABORTED = 2, 3, 4
+INTERRUPTED = 130  # what the library makes of Ctrl-C
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -64,6 +65,8 @@ def _dispatch(app: typer.Typer, arguments: list[str]) -> int:
             raise
         show()
         return USAGE
+    if status == INTERRUPTED:
+        raise KeyboardInterrupt
     return status if isinstance(status, int) else 0
 
 
