@@ -21,6 +21,7 @@ MAX_RECORDS: Final = 1 << 18
 """In a chunk; ours end at 1 MiB, with some tens of records."""
 DAMAGED: Final = "the file was damaged after it was written"
 _MESSAGE: Final = struct.Struct("<HIQQ")
+_MESSAGE_CODE, _CHANNEL_CODE, _SCHEMA_CODE = int(Opcode.MESSAGE), int(Opcode.CHANNEL), int(Opcode.SCHEMA)
 _HEAD: Final = struct.Struct("<QQQII")
 
 
@@ -102,12 +103,12 @@ def records_in(path: Path, records: bytes) -> Iterator[tuple[int, int, bytes]]:
             raise RecordingError(f"recording {path}: a chunk ends in the middle of a record")
         if count > MAX_RECORDS:
             raise RecordingError(f"recording {path}: a chunk of more than {MAX_RECORDS} records; expected fewer")
-        if opcode == Opcode.MESSAGE and length >= _MESSAGE.size:
+        if opcode == _MESSAGE_CODE and length >= _MESSAGE.size:
             channel, _, t_ns, _ = _MESSAGE.unpack_from(records, at)
             yield channel, t_ns, records[at + _MESSAGE.size : at + length]
-        elif opcode == Opcode.CHANNEL:
+        elif opcode == _CHANNEL_CODE:
             yield -1, 0, records[at : at + length]
-        elif opcode != Opcode.SCHEMA:
+        elif opcode != _SCHEMA_CODE:
             raise RecordingError(
                 f"recording {path}: a chunk holds a record of kind 0x{opcode:02X} and {length} bytes; expected schemas, "
                 "channels and messages"

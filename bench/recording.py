@@ -346,11 +346,10 @@ class Recording(Generic[P]):
 
     def frames(self, link: str) -> Iterator[FrameBatch]:
         """Raw frames, batch by batch as they were recorded."""
-        for _, data in self._file.messages(layout.raw_topic(link)):
-            with sound(self.path):
+        with sound(self.path):
+            for _, data in self._file.messages(layout.raw_topic(link)):
                 _, records = layout.decode_frames(data)
-                batch = frames_of(records, self.version)
-            yield batch
+                yield frames_of(records, self.version)
 
     def close(self) -> None:
         """Nothing stays open between reads; here for symmetry with the recorder."""
