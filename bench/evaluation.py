@@ -29,7 +29,7 @@ from bench.records import (
     missing,
     outcome_of,
 )
-from bench.stepgaps import incomplete_steps
+from bench.stepgaps import incomplete_steps, missing_steps
 
 logger = logging.getLogger("bench.evaluation")
 RUN_END = "run-end"
@@ -118,6 +118,8 @@ def evaluate(
         for key, item in measured.items():
             entries[key] = measurement(item, limits.get(item.quantity.name), recording.seed)
         correlations = correlations_of(list(measured.values()))
+        if all(f.effect is Effect.NOTE for f in findings):  # else a procedure that ended early has said why
+            findings += missing_steps(procedure, recording)
     except SignalAbort:
         raise
     except Exception as error:

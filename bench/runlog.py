@@ -25,10 +25,21 @@ class _Forward(logging.Handler):
             self._sink(record)
 
 
+class _Quiet(logging.FileHandler):
+    """A full disk costs lines of the log, and no tracebacks on the terminal in the middle of a run."""
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        pass
+
+    def close(self) -> None:
+        with suppress(OSError):
+            super().close()
+
+
 @contextmanager
 def to_file(path: Path) -> Iterator[None]:
     """Everything from INFO on goes to `path` within the block, tracebacks included."""
-    handler = logging.FileHandler(path, encoding="utf-8", delay=False)
+    handler = _Quiet(path, encoding="utf-8", delay=False)
     layout = logging.Formatter("%(asctime)s.%(msecs)03dZ %(levelname)-7s %(name)s: %(message)s", "%Y-%m-%dT%H:%M:%S")
     layout.converter = time.gmtime
     handler.setFormatter(layout)

@@ -74,6 +74,11 @@ def step_count(plan: Plan) -> int:
     return 2 + (4 * plan.repeats + slowly) * len(groups(plan))
 
 
+def fewest_steps(plan: Plan) -> int:
+    """Without a drive `auto` runs up by the motor."""
+    return step_count(plan) - (2 * len(groups(plan)) if plan.run_up == "auto" else 0)
+
+
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Run down in both directions at both biases, and with the ring; the angle is held again in the end."""
     rotor.probe(rig, record)
@@ -265,6 +270,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    fewest_steps=fewest_steps,
     facts=facts,
     holds_for=holds_for,
     method=METHOD,

@@ -271,6 +271,20 @@ def test_limits_decide(run: Run, low: float, high: float, outcome: Outcome) -> N
     assert run(limits={"supply": Limit(low, high, "V", "test", True)}).outcome is outcome
 
 
+@pytest.mark.parametrize(
+    ("least", "outcome"), [(10**9, Outcome.INDETERMINATE), (3, Outcome.INDETERMINATE), (2, Outcome.PASS)]
+)
+def test_a_recording_that_lacks_steps_of_its_plan_is_no_pass(run: Run, least: int, outcome: Outcome) -> None:
+    limits = {"supply": Limit(140, 160, "V", "test", True)}
+    counted = dataclasses.replace(tiny_procedures.resting, step_count=lambda _: least)
+    result = run(procedure=counted, limits=limits)
+    assert (result.outcome, "steps-missing" in codes(result)) == (outcome, outcome is not Outcome.PASS)
+    ends_early = dataclasses.replace(counted, fewest_steps=lambda _: 2)
+    assert run(procedure=ends_early, limits=limits).outcome is Outcome.PASS
+    doubtful = run(Plan(then="doubt"), procedure=counted)
+    assert codes(doubtful) == ["doubt"]  # whose reason is said already
+
+
 def test_an_undeclared_quantity_is_an_error(run: Run) -> None:
     odd = dataclasses.replace(tiny_procedures.resting, measures=())
     result = run(procedure=odd)
