@@ -162,7 +162,7 @@ def of_results(
     for case, result in results.items():
         if result.settled.open:
             yield Finding("not-settled", f"the position runs along the edge of the band ({result.settled.within:.1%}), so that "
-                          "its noise hides whether it has settled at the end of the record: record longer, repeat more often or "
+                          "its noise hides whether it has settled at the end of the record: record longer, repeat more often, "
                           "take larger steps.", case.where, Effect.INDETERMINATE)  # fmt: skip
         elif not math.isfinite(result.settled.time):
             yield Finding("not-settled", f"still {abs(result.error):.1%} of the step off at the end of the record "

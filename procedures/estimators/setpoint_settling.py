@@ -18,7 +18,7 @@ from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import matmul_toeplitz
+from scipy import linalg
 
 from bench.errors import AnalysisError
 from procedures.estimators.setpoint_data import Case, Done
@@ -34,19 +34,25 @@ NEAR = 3.0  # standard uncertainties from the band's edge within which an extrem
 DRAWS, FEW = 1000, 20
 PER_SWING, DEAD = 100.0, 1e-4  # times looked at in a period, until the swing is that small
 SLOW_S = 5e-3  # between the times that are looked at from then on
+FIRST, SECOND, PLAIN = (
+    3,
+    5,
+    10.0,
+)  # regressors up to first and second order; variance ratio from which the latter are used
 END_S = 0.02  # before the record's end, within which nothing can be said to have settled
 
 
 @dataclass(frozen=True)
 class Curve:
-    """Fitted to steps (shares of each): `poles` 1/s, `fades` s, `terms` (3, n) of 1, size and beginning, both over `largest` m;
-    `covariance` (n, n) of one of the largest steps with `dof`, `spread` (3, 3) what a case's mean has of it."""
+    """Fitted to steps (shares of each): `poles` 1/s, `fades` s, `terms` (SECOND, n) over the `_regressors` of a step, its sizes
+    over `largest` m. `covariances` of one of the largest steps, of what fades and what swings, with `dof`; `spreads`
+    (SECOND, SECOND) what a case's mean has of them."""
 
     poles: Complex
     fades: tuple[float, ...]
     terms: Array
-    covariance: Array
-    spread: Array
+    covariances: tuple[Array, Array]
+    spreads: tuple[Array, Array]
     dof: int
     largest: float
 
@@ -98,28 +104,51 @@ def fit(steps: Sequence[Done], poles: Complex) -> Curve:
         after = np.flatnonzero(d.t > FROM_S)[:count]
         made = columns(d.t[after], poles, fades, period)
         if len(after) < 2 * made.shape[1]:
-            raise AnalysisError(f"{d.case.where}: found {len(after)} samples after the step; expected {2 * made.shape[1]}")
+            raise AnalysisError(
+                f"{d.case.where}: found {len(after)} samples after the step; expected {2 * made.shape[1]}"
+            )
         y = d.y[after] / d.case.size
         terms.append(np.linalg.lstsq(made, y, rcond=None)[0])
         left.append(y - made @ terms[-1])
-    design = np.array([_regressors(d.case, d.begin, largest) for d in steps]) * weight[:, None]
-    dof = len(steps) - int(np.linalg.matrix_rank(design))
+    scaled, fading = np.array(terms) * weight[:, None], 1 + len(fades)
+    full = np.array([_regressors(d.case, d.begin, largest) for d in steps]) * weight[:, None]
+    first = full[:, :FIRST]
+    fade = full[:, : _order(full, scaled[:, :fading] @ made[:, :fading].T)]
+    dof = len(steps) - int(np.linalg.matrix_rank(fade))
     if dof < 2:
-        raise AnalysisError(f"{steps[0].case.group}: found {len(steps)} steps; expected at least {design.shape[1] + 2}")
-    scaled = np.array(terms) * weight[:, None]
-    found = np.linalg.lstsq(design, scaled, rcond=None)[0]
-    apart = scaled - design @ found
-    covariance = _propagated(np.array(left) * weight[:, None], made)
-    fading = 1 + len(fades)
-    covariance[:fading], covariance[:, :fading] = 0.0, 0.0
-    covariance[:fading, :fading] = (apart.T @ apart)[:fading, :fading] / dof
-    return Curve(poles, fades, found, covariance, np.linalg.pinv(design.T @ design), dof, largest)
+        raise AnalysisError(f"{steps[0].case.group}: found {len(steps)} steps; expected at least {FIRST + 2}")
+    found = np.zeros((full.shape[1], made.shape[1]))
+    found[: fade.shape[1], :fading] = np.linalg.lstsq(fade, scaled[:, :fading], rcond=None)[0]
+    found[:FIRST, fading:] = np.linalg.lstsq(first, scaled[:, fading:], rcond=None)[0]
+    apart = scaled[:, :fading] - fade @ found[: fade.shape[1], :fading]
+    noise = _propagated(np.array(left) * weight[:, None], made)[fading:, fading:]
+    return Curve(poles, fades, found, (apart.T @ apart / dof, noise), (_spread(fade), _spread(first)), dof, largest)
 
 
-def _regressors(case: Case, begin: float, largest: float) -> tuple[float, float, float]:
-    """1, the signed size, and where the step began beside the mean of those of its size and way."""
+def _spread(design: Array) -> Array:
+    """Variance of the design's coefficients (k, k) in units of a largest step's; zeros for columns that are not used."""
+    out = np.zeros((SECOND, SECOND))
+    used = design.shape[1]
+    out[:used, :used] = np.linalg.pinv(design.T @ design)
+    return out
+
+
+def _regressors(case: Case, begin: float, largest: float) -> tuple[float, ...]:
+    """1, the signed size, where the step began beside the mean of those of its size and way; then second order."""
     size = case.way * case.size / largest
-    return 1.0, size, begin / largest + size / 2
+    began = begin / largest + size / 2
+    return 1.0, size, began, size**2, size * began
+
+
+def _order(design: Array, faded: Array) -> int:
+    """How many columns of the design: all where the second order is plain in what fades (k, m), as with an integrator that
+    carries a third of the step; else those of first order, which leave the smallest steps far more certain."""
+    rest = []
+    for many in (FIRST, design.shape[1]):
+        used = design[:, :many]
+        rest.append(float(((faded - used @ np.linalg.lstsq(used, faded, rcond=None)[0]) ** 2).sum()))
+    more, dof = design.shape[1] - FIRST, len(design) - design.shape[1]
+    return design.shape[1] if dof >= more and (rest[0] - rest[1]) / more > PLAIN * rest[1] / dof else FIRST
 
 
 def _propagated(left: Array, made: Array) -> Array:
@@ -128,7 +157,7 @@ def _propagated(left: Array, made: Array) -> Array:
     power = (np.abs(np.fft.rfft(left, 2 * m, axis=1)) ** 2).sum(axis=0)
     correlation = np.fft.irfft(power)[:m] / (k * (m - made.shape[1]))
     inverse = np.linalg.pinv(made)
-    return np.asarray(inverse @ matmul_toeplitz(correlation, inverse.T))
+    return np.asarray(inverse @ linalg.matmul_toeplitz(correlation, inverse.T))
 
 
 def settling(curve: Curve, case: Case, steps: Sequence[Done], band: float, seed: int = 0) -> Settling:
@@ -140,7 +169,8 @@ def settling(curve: Curve, case: Case, steps: Sequence[Done], band: float, seed:
     made = columns(t, curve.poles, curve.fades, window)
     of = np.array(_regressors(case, -case.way * case.size / 2, curve.largest))
     off = made @ (of @ curve.terms) - 1
-    values, vectors = np.linalg.eigh(curve.covariance * float(of @ curve.spread @ of))
+    parts = (c * float(of @ s @ of) for c, s in zip(curve.covariances, curve.spreads, strict=True))
+    values, vectors = np.linalg.eigh(linalg.block_diag(*parts))
     shapes = made @ (vectors * np.sqrt(np.maximum(values, 0.0)))
     touching = _touching(np.abs(off) - within, NEAR * np.sqrt((shapes**2).sum(axis=1)))
     best = float(crossings(t, off[None, :], within)[0])
