@@ -75,7 +75,8 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
     for case, all_of in done.items():
         settled = setpoint_settling.settling(curves[case.group], case, all_of, band)
         found = {name: _estimate(name, case, s) for name, s in seen.items() if case in s.values}
-        found |= _settling(case, settled)
+        if math.isfinite(settled.time):
+            found["settling_time"] = settling_estimate(case, settled)
         found["rise_time"] += bound(f"sampling/rise/{case.where}", "sampling", RISE_SHARE * _period(all_of[0]), "s")
         found["steady_error"] += _gained(case, rig)
         other = seen["overshoot"].values.get(replace(case, way=-case.way))
@@ -189,10 +190,8 @@ def _curve(done: Sequence[Done]) -> Curve:
     return setpoint_settling.fit(done, poles)
 
 
-def _settling(case: Case, settled: Settling) -> dict[str, Estimate]:
-    """The time that is most likely, with all that are possible: a distribution, not a standard uncertainty (JCGM 101, 6.5)."""
-    if not math.isfinite(settled.time):
-        return {}
+def settling_estimate(case: Case, settled: Settling) -> Estimate:
+    """The time that is most likely, with all that are possible: a distribution of its own (JCGM 101, 6.5)."""
     noise = Influence(
         id=f"scatter/settling_time/{case.where}",
         name="noise of the mean response",
@@ -208,7 +207,7 @@ def _settling(case: Case, settled: Settling) -> dict[str, Estimate]:
         return np.interp(share, np.arange(len(settled.times)), settled.times)
 
     made = Estimate(settled.time, "s", {noise: 1.0}, sampled if noise.u else None)
-    return {"settling_time": made + bound(f"start/{case.where}", "start of the step", START_S, "s")}
+    return made + bound(f"start/{case.where}", "start of the step", START_S, "s")
 
 
 def by_group(steps: list[Done], results: Mapping[Case, Result]) -> dict[str, dict[str, Estimate]]:

@@ -59,7 +59,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Settling:
-    """Into the band `within`: the most likely `time` s, infinite where it is not within the record or cannot be told to be
+    """Into the band `within`: the most likely `time` s, infinite where it is not within the record, or cannot be told to be
     (`open`); all times that are possible, at equal steps of probability (n,)."""
 
     time: float
@@ -172,10 +172,11 @@ def settling(curve: Curve, case: Case, steps: Sequence[Done], band: float, seed:
     parts = (c * float(of @ s @ of) for c, s in zip(curve.covariances, curve.spreads, strict=True))
     values, vectors = np.linalg.eigh(linalg.block_diag(*parts))
     shapes = made @ (vectors * np.sqrt(np.maximum(values, 0.0)))
-    touching = _touching(np.abs(off) - within, NEAR * np.sqrt((shapes**2).sum(axis=1)))
+    beyond, reach = np.abs(off) - within, NEAR * np.sqrt((shapes**2).sum(axis=1))
+    touching = _touching(beyond, reach)
     best = float(crossings(t, off[None, :], within)[0])
     if not math.isfinite(best) or (len(touching) and t[touching[-1][-1]] > t[-1] - END_S):
-        return Settling(math.inf, within, np.zeros(0), math.isfinite(best))
+        return Settling(math.inf, within, np.zeros(0), bool(beyond[-1] < reach[-1]))
     if not len(touching):
         return Settling(FROM_S / 2, within, np.linspace(0, FROM_S, DRAWS))
     rng = np.random.default_rng(seed)
