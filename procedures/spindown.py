@@ -32,7 +32,7 @@ from procedures.estimators.spindown_data import CHANNELS, COILS, RunDown, read_r
 
 B = Quantity("B", "N m s/rad", "viscous drag at the bias of the plan, mean over both directions")
 B_HIGH = Quantity("B_high", "N m s/rad", "viscous drag at the higher bias, mean over both directions")
-T_C = Quantity("T_c", "N m", "Coulomb torque at the bias of the plan, mean over both directions")
+T_C = Quantity("T_c", "N m", "Coulomb torque of the rotor alone at the bias of the plan, mean over both directions")
 J_Z = Quantity("J_z", "kg m^2", "polar inertia: by the ring where one was mounted, else the rig file's as used")
 MEASURES = (B, B_HIGH, T_C, J_Z)
 RAMP_S = 0.25  # what is left of the run-up's ramp when the speed is nearly there
@@ -254,10 +254,14 @@ gain and offset as far as the certificates state them, say what the mean square 
 gives B at exactly the nominal ones.
 
 b and c become B and T_c through the polar inertia, whose tolerance in the rig file dominates both. With a ring of known
-inertia on the shaft the decay is slower, and J = J_ring b_ring / (b - b_ring) is measured instead.
+inertia on the shaft the decay is slower, and J = J_ring b_ring / (b - b_ring) is measured instead; the rig file's must agree.
 
-What no data can show: a constant torque that acts against either direction alike, such as a seal or a brake that drags, is
-Coulomb friction as far as a run-down can tell. An error of the inertia scales B and T_c by itself.
+A drive that holds the rotor at several speeds says how much constant torque that takes: by the mean over both directions, in
+which what drives the released motor one way drops out, extrapolated to no speed. What the run-downs show beyond it acts only
+while the rotor coasts. The drive's own drag does, and is taken off as the rig file states it; more is a finding.
+
+What no data can show: a constant torque that acts against either direction alike whatever turns the rotor, such as a seal
+that drags, is Coulomb friction. An error of the inertia within its tolerance scales B and T_c.
 """
 
 procedure = Procedure(

@@ -191,7 +191,7 @@ def _curve(done: Sequence[Done]) -> Curve:
 
 
 def settling_estimate(case: Case, settled: Settling) -> Estimate:
-    """The time that is most likely, with all that are possible: a distribution of its own (JCGM 101, 6.5)."""
+    """The expected time with all that are possible: a distribution of its own (JCGM 101, 6.5)."""
     noise = Influence(
         id=f"scatter/settling_time/{case.where}",
         name="noise of the mean response",

@@ -59,8 +59,8 @@ class Curve:
 
 @dataclass(frozen=True)
 class Settling:
-    """Into the band `within`: the most likely `time` s, infinite where it is not within the record, or cannot be told to be
-    (`open`); all times that are possible, at equal steps of probability (n,)."""
+    """Into the band `within`: expected `time` s (JCGM 101, 7.6), infinite where it is not within the record, or cannot be told
+    to be (`open`); all times that are possible, at equal steps of probability (n,)."""
 
     time: float
     within: float
@@ -181,7 +181,8 @@ def settling(curve: Curve, case: Case, steps: Sequence[Done], band: float, seed:
         return Settling(FROM_S / 2, within, np.linspace(0, FROM_S, DRAWS))
     rng = np.random.default_rng(seed)
     drawn = rng.standard_normal((DRAWS, len(values))) * np.sqrt(curve.dof / rng.chisquare(curve.dof, (DRAWS, 1)))
-    return Settling(best, within, _possible(t, off, crossings(t, off + drawn @ shapes.T, within), touching))
+    times = _possible(t, off, crossings(t, off + drawn @ shapes.T, within), touching)
+    return Settling(float(times.mean()), within, times)
 
 
 def _looked_at(curve: Curve, last: float) -> Array:
