@@ -261,7 +261,8 @@ which what drives the released motor one way drops out, extrapolated to no speed
 while the rotor coasts. The drive's own drag does, and is taken off as the rig file states it; more is a finding.
 
 What no data can show: a constant torque that acts against either direction alike whatever turns the rotor, such as a seal
-that drags, is Coulomb friction. An error of the inertia within its tolerance scales B and T_c.
+that drags, is Coulomb friction. An error of the inertia within its tolerance scales B and T_c; with the ring, one of the
+ring's inertia scales them and J_z, until J_z leaves the rig file's tolerance.
 """
 
 procedure = Procedure(
