@@ -103,6 +103,8 @@ def run_all(procedure: str, section: Mapping[str, Any], seeds: Sequence[int], pa
                 continue
             with open(os.devnull, "w") as nowhere, contextlib.redirect_stderr(nowhere):
                 line = run_one(procedure, section, plant, seed)
+            if "signal" in line["codes"]:  # the run was stopped with this script: it says nothing, and is done again
+                return
             with path.open("a") as file:
                 file.write(
                     json.dumps({"key": key, "plant": plant.name, "size": plant.size, "seed": seed, **line}) + "\n"
