@@ -9,7 +9,7 @@ READY := .venv/.ready
 # Tests start hundreds of processes: without its bytecode every one of them would compile the project again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check format ci-long fuzz campaigns bench clean lock setup
+.PHONY: demo test check format ci-long fuzz campaigns plants bench clean lock setup
 
 demo: setup
 	$(BIN)/bench run amb-calibration --rig tsbs12 --seed 1
@@ -33,6 +33,9 @@ fuzz: setup
 campaigns: setup
 	$(BIN)/bench campaign tsbs-identification --count 1000 --keep none
 	$(BIN)/bench campaign tsbs-identification --count 1000 --first-seed 1000000 --keep none
+
+plants: setup
+	$(BIN)/python benchmarks/plants.py spindown step --seeds 60
 
 bench: setup
 	$(BIN)/python benchmarks/analysis.py

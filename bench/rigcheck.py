@@ -43,7 +43,7 @@ SOME_GEOMETRY = {
 """Lengths that a rig may have; the procedures that need one say so."""
 MACHINE = {"pole_pairs": "1", "polar_inertia": "kg m^2", "ring_inertia": "kg m^2", "amb_asymmetry": "1",
            "radial_axes": "rad", "runout": "m", "coupling_offset": "m", "mass": "kg", "transverse_inertia": "kg m^2",
-           "weight_mass": "kg", "weight_angle": "rad"}  # fmt: skip
+           "weight_mass": "kg", "weight_angle": "rad", "drive_drag": "N m"}  # fmt: skip
 FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 
 
