@@ -111,7 +111,7 @@ class ProcedureItem(pytest.Item):
     def setup(self) -> None:
         from bench.cli.compose import Request
         from bench.cli.run import execute
-        from bench.records import Outcome
+        from bench.outcomes import Outcome
 
         option = self.config.getoption
         request = Request(
@@ -139,7 +139,7 @@ class ProcedureItem(pytest.Item):
             adopt(self.result.directory, option("--rig"), option("--calibrations"))
 
     def runtest(self) -> None:
-        from bench.records import Outcome
+        from bench.outcomes import Outcome
 
         assert self.result is not None
         if self.result.outcome is not Outcome.PASS:

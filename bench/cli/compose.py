@@ -49,6 +49,8 @@ class Request:
     report: bool = True
     calibrations: Path | None = None
     allow_expired: bool = False
+    spec: Path | None = None
+    require_verdict: bool = False
 
 
 def load_procedure(name: str) -> Procedure:
@@ -75,7 +77,9 @@ def prepare(request: Request) -> tuple[Job, Connect]:
     problems = [*procedure.check(rig, plan), *Envelope(rig).problems_of(dict(procedure.settings(plan)))]
     if problems:
         raise ConfigError("\n  ".join(["the plan does not fit the rig; nothing was started:", *problems]))
-    limits = load_spec(rig.name, procedure.name, [q.name for q in procedure.measures])
+    measures, settings = [q.name for q in procedure.measures], tuple(procedure.plan.model_fields)
+    limits = load_spec(rig.name, procedure.name, measures, file=request.spec, settings=settings)
+    judged = request.require_verdict or request.spec is not None
     seed = None if request.backend == "live" else request.seed or 0
     lookup = Lookup(
         Store.of(rig, seed, request.calibrations),
@@ -88,12 +92,13 @@ def prepare(request: Request) -> tuple[Job, Connect]:
     injected = [faults.parse(text) for text in request.faults]
     if seed is None:
         kind = request.operator or ("console" if sys.stdin.isatty() else "auto")
-        job = Job(procedure, rig, plan, limits, "live", None, rig_lock(rig.link.url.partition("?")[0]), used)
+        job = Job(procedure, rig, plan, limits, "live", None, rig_lock(rig.link.url.partition("?")[0]), used,
+                  judged)  # fmt: skip
         return job, live(rig, kind, injected, request.clear_fault)
     overrides = dict(plans.assignment(text) for text in request.truth)
     _refuse_words(overrides)
     connect = simulated(rig, seed, overrides, request.operator or "auto", procedure.settings(plan), injected)
-    return Job(procedure, rig, plan, limits, request.backend, seed, calibrations=used), connect
+    return Job(procedure, rig, plan, limits, request.backend, seed, None, used, judged), connect
 
 
 def remedy(request: Request, need: Need) -> str:

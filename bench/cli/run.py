@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from contextlib import suppress
 
 from bench import runlog, runner, units
 from bench.cli import reporting
 from bench.cli.compose import Request, prepare
+from bench.limits import Verdict
+from bench.outcomes import Outcome, outranking
 from bench.progress import shown_on
-from bench.records import Outcome, Record
+from bench.records import Measurement, Record
 from bench.runner import RunResult
 from bench.supervisor import Supervisor
 from bench.uncertainty import stated
 
-STATUS = {Outcome.PASS: 0, Outcome.FAIL: 1, Outcome.ERROR: 3, Outcome.ABORTED: 4, Outcome.INDETERMINATE: 5}
+STATUS = {Outcome.PASS: 0, Outcome.DONE: 0, Outcome.FAIL: 1, Outcome.ERROR: 3, Outcome.ABORTED: 4,
+          Outcome.INDETERMINATE: 5}  # fmt: skip
 
 
 def execute(request: Request, supervisor: Supervisor | None = None) -> RunResult:
@@ -42,15 +46,21 @@ def run_command(request: Request) -> int:
 
 def summary(record: Record) -> str:
     """Results, findings and outcome as lines of text; the report is where digits and units are set with care."""
-    lines = []
     widest = max((len(m.name) for m in record.measurements), default=0)
-    for m in record.measurements:
-        value = "missing"
-        if m.value is not None and m.expanded_uncertainty is not None:
-            symbol, one = units.habit(m.unit, max(abs(m.value), m.expanded_uncertainty))
-            unit = "" if symbol == "1" else symbol
-            value = f"{stated(m.value / one, m.expanded_uncertainty / one)} {unit}".rstrip()
-        place = f" ({m.where})" if m.where else ""
-        lines.append(f"  {m.name:{widest}} {value:32} {m.verdict.value}{place}")
+    first = sorted(record.measurements, key=lambda m: m.verdict is not Verdict.FAIL)
+    lines = [_line(m, widest, outranking(m, record.findings)) for m in first]
     lines += [f"  {f.effect.value}: {f.code}{f' ({f.where})' if f.where else ''}: {f.text}" for f in record.findings]
-    return "\n".join([*lines, f"outcome {record.outcome.value}"]) + "\n"
+    done = ": no acceptance limit was applied" if record.outcome is Outcome.DONE else ""
+    return "\n".join([*lines, f"outcome {record.outcome.value}{done}"]) + "\n"
+
+
+def _line(m: Measurement, widest: int, outranked: Sequence[str]) -> str:
+    """A measurement; a verdict of fail that a finding outranks is told with it."""
+    value = "missing"
+    if m.value is not None and m.expanded_uncertainty is not None:
+        symbol, one = units.habit(m.unit, max(abs(m.value), m.expanded_uncertainty))
+        unit = "" if symbol == "1" else symbol
+        value = f"{stated(m.value / one, m.expanded_uncertainty / one)} {unit}".rstrip()
+    place = f" ({m.where})" if m.where else ""
+    but = f", outranked by {', '.join(outranked)}" if outranked else ""
+    return f"  {m.name:{widest}} {value:32} {m.verdict.value}{but}{place}"

@@ -36,12 +36,18 @@ def run(*extra: str) -> tuple[str, ...]:
     return ("run", "tiny-levitated", "--rig", "tsbs12", "--no-report", *extra)
 
 
-def spec(tmp_path: Path, low: float, high: float) -> None:
+def spec(tmp_path: Path, low: float, high: float, at: str = "") -> None:
     (tmp_path / "specs").mkdir()
     (tmp_path / "specs" / "tsbs12.toml").write_text(
         f'schema = 1\n[limits.tiny-levitated]\nsupply = {{ low = {low}, high = {high}, unit = "V", source = "test", '
-        "verified = true }\n"
+        f"verified = true{at} }}\n"
     )
+
+
+def outcome_of(out: str) -> tuple[str, list[str]]:
+    """Outcome and codes of the findings of the run or analysis whose directory a command printed last."""
+    record = json.loads((Path(out.splitlines()[-1]) / "record.json").read_text())
+    return record["outcome"], [f["code"] for f in record["findings"]]
 
 
 @pytest.mark.parametrize(
@@ -61,6 +67,43 @@ def test_verdicts_are_exit_statuses(
     found, out, _ = bench("analyse", str(directory))
     assert found == status
     assert (Path(out.splitlines()[-1]) / "record.json").is_file()
+
+
+def test_a_run_that_nothing_judged_is_done(bench: Bench) -> None:
+    """It passes nothing and fails nothing; who needs a verdict asks for one, and so does a spec that is named."""
+    status, out, err = bench(*run())
+    assert (status, outcome_of(out)) == (0, ("DONE", []))
+    assert err.splitlines()[-1] == "outcome DONE: no acceptance limit was applied"
+    status, out, err = bench(*run("--require-verdict"))
+    assert (status, outcome_of(out)) == (3, ("ERROR", ["nothing-judged"]))
+    assert "there is no limit for this procedure" in err
+    status, out, _ = bench("analyse", out.splitlines()[-1])
+    assert (status, outcome_of(out)) == (3, ("ERROR", ["nothing-judged"]))
+    Path("mine.toml").write_text("schema = 1\n[limits.other]\n")
+    status, out, _ = bench(*run("--spec", "mine.toml"))
+    assert (status, outcome_of(out)) == (3, ("ERROR", ["nothing-judged"]))
+
+
+def test_a_limit_judges_at_the_settings_that_it_was_stated_for(bench: Bench, tmp_path: Path) -> None:
+    spec(tmp_path, 160.0, 180.0, ", at = { bias_A = 3.0 }")
+    status, out, _ = bench(*run("--require-verdict"))
+    assert (status, outcome_of(out)) == (1, ("FAIL", []))
+    status, out, err = bench(*run("--plan", "bias_A=2.0"))
+    assert (status, outcome_of(out)) == (0, ("DONE", ["limit-not-applied"]))
+    assert "no verdict on supply: the limit was stated for bias_A = 3, here it is 2" in err
+    status, out, _ = bench("analyse", out.splitlines()[-1])
+    assert (status, outcome_of(out)) == (0, ("DONE", ["limit-not-applied"]))
+    status, out, err = bench(*run("--plan", "bias_A=2.0", "--require-verdict"))
+    assert (status, outcome_of(out)) == (3, ("ERROR", ["limit-not-applied", "nothing-judged"]))
+    assert "none of its limits holds for this plan" in err
+
+
+def test_a_fail_stands_first_and_a_finding_outranks_it(bench: Bench, tmp_path: Path) -> None:
+    spec(tmp_path, 160.0, 180.0)
+    status, out, err = bench(*run("--plan", 'then="doubt"'))
+    assert (status, outcome_of(out)[0]) == (5, "INDETERMINATE")
+    told = [line for line in err.splitlines() if line.startswith("  ")]
+    assert "fail, outranked by" in told[0]
 
 
 @pytest.mark.parametrize(("act", "status"), [("raise", 3), ("refuse", 4), ("stop", 4)])
@@ -92,6 +135,7 @@ USAGE = [
     (run("--truth", "K_x=70"), "K_x"),
     (run("--truth", 'K_i="much"'), "a number"),
     (run("--plan", "secunds=1"), "secunds"),
+    (run("--spec", "absent.toml"), "absent.toml"),
     (run("--plan", "seconds"), "KEY=VALUE"),
     (run("--plan", "bias_A=7"), "the envelope allows"),
     (run("--plan-file", "absent.toml"), "absent.toml"),
@@ -192,7 +236,7 @@ def test_runs_lists_them_and_rebuilds_a_lost_index(bench: Bench, tmp_path: Path)
     for _ in range(2):
         status, out, _ = bench("runs")
         assert status == 0
-        assert out.startswith("PASS")
+        assert out.startswith("DONE")
         assert "seed 7" in out
         assert directory in out
         (tmp_path / "runs" / "index.sqlite").unlink()
