@@ -20,8 +20,9 @@ class Effect(StrEnum):
 class Finding:
     """A code (kebab-case, stable), a sentence for the reader, where it was seen, and its effect on the outcome.
 
-    `concerns` are the quantities whose data or influences it is about: `name`, `name@place` or `@place` (all that is
-    measured there); empty is all of the run.
+    `concerns` are the quantities whose data or influences it puts in doubt: `name`, `name@place` or `@place` (all that is
+    measured there); empty is all of the run. Their verdict of fail is no statement of non-conformity. A finding that says of
+    a quantity what a limit says too does not put that quantity in doubt.
     """
 
     code: str

@@ -62,9 +62,10 @@ def unjudged(measurements: Iterable[Judged], limits: int) -> Finding | None:
 
 
 def concerns(finding: Said, m: Judged) -> bool:
-    """Whether a finding concerns a measurement: by its name, `name@place` or `@place`; one that names none concerns all."""
+    """Whether a finding concerns a measurement: by its name, `name@place` or `@place`; one that names none concerns all.
+    What is measured at `inboard, 3000 r/min` is measured at `3000 r/min` too."""
     return not finding.concerns or any(
-        quantity in ("", m.name) and (not at or place == m.where)
+        quantity in ("", m.name) and (not at or f", {m.where}".endswith(f", {place}"))
         for quantity, at, place in (entry.partition("@") for entry in finding.concerns)
     )
 

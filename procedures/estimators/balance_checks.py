@@ -217,7 +217,10 @@ def _of_result(
         if most <= per:
             yield Finding("reached", text, name)
         else:
-            yield Finding("not-reached", text, name, Effect.INDETERMINATE)
+            # The limit on residual_share says so too: a share that fails is not put in doubt by it.
+            yield Finding(
+                "not-reached", text, name, Effect.INDETERMINATE, (f"residual_cos@{side}", f"residual_sin@{side}")
+            )
     for p, side in enumerate(SIDES):
         some = ", ".join(
             f"{axis} {abs(a):.3f} µm ∠{-math.degrees(np.angle(a)) % 360:.0f}°"
