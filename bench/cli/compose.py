@@ -74,7 +74,7 @@ def prepare(request: Request) -> tuple[Job, Connect]:
     rig = with_links(load_rig(request.rig), request.links)
     defaults = (f"{rig.path} [plans.{procedure.name}]", rig.plans.get(procedure.name, {}))
     plan = plans.assemble(procedure.plan, defaults, request.plan_file, request.plan)
-    problems = [*procedure.check(rig, plan), *Envelope(rig).problems_of(dict(procedure.settings(plan)))]
+    problems = [*procedure.problems(rig, plan), *Envelope(rig).problems_of(dict(procedure.settings(plan)))]
     if problems:
         raise ConfigError("\n  ".join(["the plan does not fit the rig; nothing was started:", *problems]))
     measures, settings = [q.name for q in procedure.measures], tuple(procedure.plan.model_fields)
