@@ -25,7 +25,7 @@ from bench.errors import ConfigError
 from bench.lock import rig_lock
 from bench.needs import Lookup
 from bench.opened import Connect, Job
-from bench.procedure import Procedure
+from bench.procedure import BenchPlan, Procedure
 from bench.rigfile import RigFile, load_rig
 from bench.specs import load_spec
 
@@ -63,20 +63,32 @@ def load_procedure(name: str) -> Procedure:
     return found
 
 
-def prepare(request: Request) -> tuple[Job, Connect]:
-    """Everything that can be wrong before a machine is touched, found out.
+def planned(request: Request) -> tuple[Procedure, RigFile, BenchPlan]:
+    """The procedure, the rig, and the plan, of which the rig can do what it asks.
 
     Raises:
-        ConfigError: usage, rig file, plan or spec; every problem of the first of them that has one.
+        ConfigError: usage, rig file or plan; every problem of the first of them that has one.
     """
     _refuse_mixed_backends(request)
     procedure = load_procedure(request.procedure)
     rig = with_links(load_rig(request.rig), request.links)
+    if lacking := procedure.requires.lacking(rig):
+        raise ConfigError("\n  ".join([f"{rig.name} cannot run {procedure.name}; nothing was started:", *lacking]))
     defaults = (f"{rig.path} [plans.{procedure.name}]", rig.plans.get(procedure.name, {}))
     plan = plans.assemble(procedure.plan, defaults, request.plan_file, request.plan)
-    problems = [*procedure.problems(rig, plan), *Envelope(rig).problems_of(dict(procedure.settings(plan)))]
+    problems = [*procedure.check(rig, plan), *Envelope(rig).problems_of(dict(procedure.settings(plan)))]
     if problems:
         raise ConfigError("\n  ".join(["the plan does not fit the rig; nothing was started:", *problems]))
+    return procedure, rig, plan
+
+
+def prepare(request: Request) -> tuple[Job, Connect]:
+    """Everything that can be wrong before a machine is touched, found out.
+
+    Raises:
+        ConfigError: usage, rig file, plan, spec or calibrations; every problem of the first of them that has one.
+    """
+    procedure, rig, plan = planned(request)
     measures, settings = [q.name for q in procedure.measures], tuple(procedure.plan.model_fields)
     limits = load_spec(rig.name, procedure.name, measures, file=request.spec, settings=settings)
     judged = request.require_verdict or request.spec is not None

@@ -46,8 +46,10 @@ SAME_PLACE_RAD = math.radians(0.1)
 DIFFERS = (
     0.02  # of what was mounted: how far a verification may be from the prediction, beside three times its uncertainty
 )
-NEEDED = ("com_to_coupling", "com_to_inboard_balance", "com_to_outboard_balance", "balance_radius", "clearance",
-          "coupling_stiffness", "amb_gap", *(f"com_to_{b}_{what}" for b in ("inboard", "outboard") for what in ("sensor", "amb")))  # fmt: skip
+NEEDED = (
+    *(f"com_to_{b}_{what}" for b in ("inboard", "outboard") for what in ("balance", "sensor", "amb")),
+    *("com_to_coupling", "balance_radius", "clearance", "coupling_stiffness", "amb_gap"),
+)
 
 
 class Settings(balance_decision.Settings, unbalance_plan.Settings, Protocol):
