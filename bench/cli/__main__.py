@@ -33,11 +33,14 @@ def list_() -> int:
 
 
 @app.command()
-def check(rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig file, or its name in rigs/.")]) -> int:
-    """Validate a rig file and name every error at once."""
+def check(
+    rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig file, or its name in rigs/.")],
+    procedure: Annotated[str, typer.Argument(metavar="PROCEDURE", help="Say all that it lacks for this one.")] = "",
+) -> int:
+    """Validate a rig file, name every error at once, and say what it can run."""
     from bench.cli.check import check_rig_file
 
-    return check_rig_file(rig)
+    return check_rig_file(rig, procedure)
 
 
 @app.command()
