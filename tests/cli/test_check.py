@@ -53,7 +53,8 @@ def test_plans_limits_and_the_simulated_machine_are_checked_too(
     (tmp_path / "tsbs12.dbc").write_bytes((RIGS / "tsbs12.dbc").read_bytes())
     (tmp_path / "specs").mkdir()
     (tmp_path / "specs" / "tsbs12.toml").write_text(
-        'schema = 1\n[limits.spindown]\nB = { low = 0, unit = "N m s/rad", source = "x", verified = false, at = { bias = 3 } }\n'
+        'schema = 1\n[limits.spindown]\nB = { low = 0, unit = "N m s/rad", source = "x", verified = false, '
+        "at = { bias = 3 } }\n"
     )
     monkeypatch.chdir(tmp_path)
     status, _, err = check(capsys, "rig.toml")
