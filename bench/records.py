@@ -212,7 +212,7 @@ def unfinished(
     """What is written before anything moves: if the run dies, this is what it says."""
     said = Finding("unfinished", "The run did not end: its process was killed or lost power.", "", Effect.ERROR)
     return Record(
-        schema=SCHEMA, run_id=run_id, procedure=procedure, rig=rig, uut=uut, outcome=Outcome.ERROR, started=started,
+        schema=2, run_id=run_id, procedure=procedure, rig=rig, uut=uut, outcome=Outcome.ERROR, started=started,
         ended=None, seed=seed, plan=plan, calibrations=tuple(c.summary for c in calibrations), versions=versions,
         recording=None, link=LinkCounts(), findings=findings_of([said]), measurements=(), correlations=Correlations((), ()),
     )  # fmt: skip

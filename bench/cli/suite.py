@@ -18,6 +18,7 @@ from bench.cli.compose import Request, load_procedure, planned
 from bench.cli.run import execute
 from bench.errors import BenchError, ConfigError
 from bench.plans import assignment, field_of
+from bench.procedure import Procedure
 from bench.records import Measurement
 from bench.rigfile import load_rig
 from bench.runner import RunResult
@@ -133,7 +134,7 @@ def by_procedure(assignments: Sequence[str], rig: str) -> dict[str, tuple[str, .
         ConfigError: no such procedure, or a key that none has.
     """
     found: dict[str, tuple[str, ...]] = {}
-    able = {}
+    able: dict[str, Procedure] = {}
     for text in assignments:
         name, colon, rest = text.partition(":")
         given = name if colon and "=" not in name else ""

@@ -16,7 +16,7 @@ from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import interval
-from procedures.amb_calibration import Plan, check
+from procedures.amb_calibration import Plan, check, procedure
 from sim_backend.truth import draw
 
 SHORT = {"settle_s": 0.3, "average_s": 0.2}
@@ -106,6 +106,5 @@ def test_what_the_rig_file_lacks_is_told_before_anything_starts(kind: str) -> No
     rig = load_rig("tsbs12")
     name = {"sensors": "i_yi_p", "channels": "flags", "parameters": "angle_ref"}[kind]
     table = {k: v for k, v in getattr(rig, kind).items() if k != name}
-    found = list(check(rig.model_copy(update={kind: table}), Plan()))
-    assert found == [f"{kind}: found no {name}; the calibration needs it"]
+    assert procedure.problems(rig.model_copy(update={kind: table}), Plan()) == (f"{kind}: found no {name}",)
     assert list(check(rig, Plan())) == []
