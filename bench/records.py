@@ -31,7 +31,7 @@ _STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 @dataclass(frozen=True)
 class BudgetEntry:
-    """One influence of a measurement; `contribution` in its unit, `dof` None is infinite."""
+    """One influence of a measurement; `contribution` in the measurement's unit, `dof` None is infinite."""
 
     __pydantic_config__: ClassVar[ConfigDict] = _STRICT
     name: str
@@ -41,6 +41,7 @@ class BudgetEntry:
     type: Literal["A", "B"]
     distribution: str
     dof: float | None
+    unit: str = ""  # of the influence
 
 
 @dataclass(frozen=True)
@@ -240,7 +241,7 @@ def measurement(measured: Measured, limit: Limit | None, seed: int | None = 0) -
         missing(quantity, limit, measured.where), value=estimate.value, standard_uncertainty=estimate.u,
         dof=_finite(found.dof), coverage_factor=found.k, expanded_uncertainty=found.U, method=found.method,
         verdict=judge(found, limit), interval=(found.low, found.high), coverage_probability=PROBABILITY,
-        budget=tuple(BudgetEntry(r.name, r.id, r.contribution, r.sensitivity, r.kind, r.distribution, _finite(r.dof))
+        budget=tuple(BudgetEntry(r.name, r.id, r.contribution, r.sensitivity, r.kind, r.distribution, _finite(r.dof), r.unit)
                      for r in budget(estimate)),
     )  # fmt: skip
 

@@ -17,6 +17,7 @@ from bench.plans import field_of
 from bench.procedure import BenchPlan
 
 SCHEMA = 1
+NOT_APPLIED = "limit-not-applied"  # a note: the limit was stated for other settings
 INSTALLED = Path(__file__).resolve().parent.parent / "specs"
 
 
@@ -106,7 +107,7 @@ def applied(limits: Mapping[str, Limit], plan: BenchPlan) -> tuple[Mapping[str, 
         if differ := "; ".join(_differences(limit, plan)):
             others.setdefault(differ, []).append(name)
     notes = tuple(
-        Finding("limit-not-applied", f"no verdict on {', '.join(names)}: the limit was stated for {differ}", "spec")
+        Finding(NOT_APPLIED, f"no verdict on {', '.join(names)}: the limit was stated for {differ}", "spec")
         for differ, names in others.items()
     )
     left_out = {name for names in others.values() for name in names}

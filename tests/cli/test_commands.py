@@ -61,7 +61,7 @@ def test_verdicts_are_exit_statuses(
     spec(tmp_path, low, high)
     found, out, err = bench(*run())
     assert found == status
-    assert err.splitlines()[-1] == f"outcome {outcome}"
+    assert any(line.startswith(f"{outcome}: tiny-levitated on tsbs12") for line in err.splitlines())
     directory = Path(out.splitlines()[-1])
     assert directory.parent == Path("runs")
     assert json.loads((directory / "record.json").read_text())["outcome"] == outcome
@@ -74,10 +74,10 @@ def test_a_run_that_nothing_judged_is_done(bench: Bench) -> None:
     """It passes nothing and fails nothing; who needs a verdict asks for one, and so does a spec that is named."""
     status, out, err = bench(*run())
     assert (status, outcome_of(out)) == (0, ("DONE", []))
-    assert err.splitlines()[-1] == "outcome DONE: no acceptance limit was applied"
+    assert "DONE: tiny-levitated on tsbs12\n  decided  no acceptance limit was applied\n" in err
     status, out, err = bench(*run("--require-verdict"))
     assert (status, outcome_of(out)) == (3, ("ERROR", ["nothing-judged"]))
-    assert "there is no limit for this procedure" in err
+    assert "there is no limit for this procedure" in " ".join(err.split())
     status, out, _ = bench("analyse", out.splitlines()[-1])
     assert (status, outcome_of(out)) == (3, ("ERROR", ["nothing-judged"]))
     Path("mine.toml").write_text("schema = 1\n[limits.other]\n")
@@ -91,20 +91,21 @@ def test_a_limit_judges_at_the_settings_that_it_was_stated_for(bench: Bench, tmp
     assert (status, outcome_of(out)) == (1, ("FAIL", []))
     status, out, err = bench(*run("--plan", "bias_A=2.0"))
     assert (status, outcome_of(out)) == (0, ("DONE", ["limit-not-applied"]))
-    assert "no verdict on supply: the limit was stated for bias_A = 3, here it is 2" in err
+    assert "no verdict on supply: the limit was stated for bias_A = 3, here it is 2" in " ".join(err.split())
     status, out, _ = bench("analyse", out.splitlines()[-1])
     assert (status, outcome_of(out)) == (0, ("DONE", ["limit-not-applied"]))
     status, out, err = bench(*run("--plan", "bias_A=2.0", "--require-verdict"))
     assert (status, outcome_of(out)) == (3, ("ERROR", ["limit-not-applied", "nothing-judged"]))
-    assert "none of its limits holds for this plan" in err
+    assert "none of its limits holds for this plan" in " ".join(err.split())
 
 
 def test_a_fail_stands_first_and_a_finding_outranks_it(bench: Bench, tmp_path: Path) -> None:
     spec(tmp_path, 160.0, 180.0)
     status, out, err = bench(*run("--plan", 'then="doubt"'))
     assert (status, outcome_of(out)[0]) == (5, "INDETERMINATE")
-    told = [line for line in err.splitlines() if line.startswith("  ")]
-    assert "fail, outranked by" in told[0]
+    head, first = err[err.index("INDETERMINATE: ") :].splitlines()[:2]
+    assert head == "INDETERMINATE: tiny-levitated on tsbs12"
+    assert first == "  decided  outside its limit, but outranked by doubt: supply"
 
 
 @pytest.mark.parametrize(("act", "status"), [("raise", 3), ("refuse", 4), ("stop", 4)])
