@@ -118,6 +118,15 @@ def test_a_limit_holds_at_the_settings_that_it_was_stated_for(at: str, holds: bo
     assert (set(found), [f.code for f in notes]) == (({"q"}, []) if holds else (set(), ["limit-not-applied"]))
 
 
+@pytest.mark.parametrize("bias", [2.0, 4.0])
+def test_the_slopes_of_3_A_do_not_judge_another_bias(bias: float) -> None:
+    """A sound machine has 49 or 98 N/A there."""
+    limits = load_spec("tsbs12", "amb-calibration", folders=(INSTALLED,))
+    found, (note,) = applied(limits, load_procedure("amb-calibration").plan(bias_A=bias))
+    assert found == {}
+    assert note.text == f"no verdict on K_i, K_o: the limit was stated for bias_A = 3, here it is {bias:g}"
+
+
 def test_limits_are_kept_with_a_run_as_they_are() -> None:
     """A recording holds them as JSON; the analysis of a stored run judges by these."""
     at = 'bias_A = 3, law = ["CAC"], speeds_rpm = { low = 2000 }'

@@ -18,9 +18,13 @@ from bench.calibration import Calibration
 from bench.cli.virtual import simulate, simulated_run
 from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
+from bench.limits import Verdict
+from bench.outcomes import Outcome, outcome_of
 from bench.procedure import Measured
 from bench.recording import Recording
+from bench.records import measurement
 from bench.rigfile import load_rig
+from bench.specs import load_spec
 from bench.uncertainty import Estimate, Influence
 from procedures.estimators import slewing
 from procedures.estimators.slewing import Gains, Swing
@@ -92,6 +96,15 @@ def test_a_planted_defect_is_named_and_never_passes(
     assert found, [f.code for f in findings]
     assert found[0].effect is not Effect.NOTE
     assert named in found[0].text
+
+
+def test_a_detent_beyond_its_limit_fails_the_run(tmp_path: Path) -> None:
+    """The finding says of the detent what its limit says too: it puts what follows the angle in doubt, not the detent."""
+    measured, findings = slewed(tmp_path, 1, {"detent": 0.2})
+    (detent,) = (q for q in MEASURES if q.name == "detent")
+    judged = measurement(detent.measured(measured["detent", ""]), load_spec("tsbs12", "slew")["detent"])
+    assert judged.verdict is Verdict.FAIL
+    assert outcome_of([judged], findings) is Outcome.FAIL
 
 
 def test_no_detent_is_not_resolved(tmp_path: Path) -> None:
