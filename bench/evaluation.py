@@ -13,7 +13,7 @@ from typing import Any
 from bench.errors import AnalysisError, BenchError, RecordingError, SignalAbort
 from bench.findings import Effect, Finding
 from bench.limits import Limit
-from bench.outcomes import Outcome, outcome_of, unjudged
+from bench.outcomes import SOUND, Outcome, outcome_of, unjudged
 from bench.procedure import Measured, Procedure
 from bench.recorder import Recorder
 from bench.recording import Recording
@@ -144,7 +144,7 @@ def _calibrations(recording: Recording[Any]) -> Iterator[Finding]:
             if here.get(used.procedure, used.run_id) != used.run_id:
                 text = f"{name} rests on {used.run_id}; this run uses {here[used.procedure]} beside it"
                 yield Finding("calibrations-of-two-runs", text, c.run_id)
-        if not Outcome(c.outcome).sound:
+        if c.outcome not in SOUND:
             yield Finding(
                 "calibration-not-passed", f"{name} was adopted although its outcome was {c.outcome}", c.run_id
             )

@@ -24,7 +24,10 @@ class Outcome(StrEnum):
     @property
     def sound(self) -> bool:
         """Nothing speaks against the run: its results may be relied on."""
-        return self in (Outcome.PASS, Outcome.DONE)
+        return self in SOUND
+
+
+SOUND = (Outcome.PASS, Outcome.DONE)
 
 
 class Judged(Protocol):
