@@ -26,9 +26,9 @@ from bench.errors import (
 from bench.evaluation import Ending
 from bench.findings import Effect, Finding
 from bench.opened import Job, OpenRig
+from bench.outcomes import Outcome
 from bench.progress import Progress
 from bench.recorder import Recorder
-from bench.records import Outcome
 from bench.roles import RigState
 from bench.rundir import RunDirectory
 from bench.states import transition

@@ -13,6 +13,7 @@ from typing import Any
 from bench.errors import AnalysisError, BenchError, RecordingError, SignalAbort
 from bench.findings import Effect, Finding
 from bench.limits import Limit
+from bench.outcomes import SOUND, Outcome, outcome_of, unjudged
 from bench.procedure import Measured, Procedure
 from bench.recorder import Recorder
 from bench.recording import Recording
@@ -20,15 +21,14 @@ from bench.records import (
     Correlations,
     LinkCounts,
     Measurement,
-    Outcome,
     Record,
     RecordingFile,
     correlations_of,
     findings_of,
     measurement,
     missing,
-    outcome_of,
 )
+from bench.specs import applied
 from bench.stepgaps import incomplete_steps, missing_steps
 
 logger = logging.getLogger("bench.evaluation")
@@ -65,7 +65,8 @@ class Ending:
             return cls(Outcome.ERROR, (Finding("recording-truncated", text, recording.path.name, Effect.ERROR),))
         try:
             e = events[-1]
-            found = tuple(Finding(f["code"], f["text"], f["where"], Effect(f["effect"])) for f in e["findings"])
+            found = tuple(Finding(f["code"], f["text"], f["where"], Effect(f["effect"]), tuple(f.get("concerns", ())))
+                          for f in e["findings"])  # fmt: skip
             return cls(Outcome(e["stopped"]) if e["stopped"] else None, found, LinkCounts(**e["link"]))
         except (KeyError, TypeError, ValueError) as error:
             raise RecordingError(f"{recording.path}: its event {RUN_END} cannot be read: {error!r}") from error
@@ -98,15 +99,17 @@ def evaluate(
     """Run `analyse` on the file and judge what it yields; what was declared and not yielded is missing.
 
     A run that was stopped early is not analysed: its recording is kept, its quantities are missing. An analysis that
-    fails is a finding, not an exception.
+    fails is a finding, not an exception. A limit that does not hold for the plan judges nothing, and a note says so.
+    A run that was to give a verdict (`bench run --require-verdict`, `--spec`) and gave none is an error.
 
     Raises:
         SignalAbort: the user stops it.
     """
     if stopped:
         return Evaluation(_in_order(procedure, {}, limits), Correlations((), ()), ())
+    stated, (limits, notes) = limits, applied(limits, recording.plan)
     measured: dict[tuple[str, str], Measured] = {}
-    findings = [*_calibrations(recording), *incomplete_steps(recording)]
+    findings = [*_calibrations(recording), *incomplete_steps(recording), *notes]
     entries: dict[tuple[str, str], Measurement] = {}
     correlations = Correlations((), ())
     try:
@@ -125,7 +128,10 @@ def evaluate(
     except Exception as error:
         findings.append(_failed(error))
         entries, correlations = {}, Correlations((), ())
-    return Evaluation(_in_order(procedure, entries, limits), correlations, tuple(findings))
+    measurements = _in_order(procedure, entries, limits)
+    if recording.verdict_required and (nothing := unjudged(measurements, len(stated))) is not None:
+        findings.append(nothing)
+    return Evaluation(measurements, correlations, tuple(findings))
 
 
 def _calibrations(recording: Recording[Any]) -> Iterator[Finding]:
@@ -143,7 +149,7 @@ def _calibrations(recording: Recording[Any]) -> Iterator[Finding]:
             if here.get(used.procedure, used.run_id) != used.run_id:
                 text = f"{name} rests on {used.run_id}; this run uses {here[used.procedure]} beside it"
                 yield Finding("calibrations-of-two-runs", text, c.run_id)
-        if c.outcome != Outcome.PASS:
+        if c.outcome not in SOUND:
             yield Finding(
                 "calibration-not-passed", f"{name} was adopted although its outcome was {c.outcome}", c.run_id
             )

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict
 
 from bench.figures import Shown
 from bench.findings import Finding
+from bench.requires import Requires
 from bench.roles import RigState
 
 if TYPE_CHECKING:
@@ -80,7 +81,8 @@ def _numbers_of(plan: BenchPlan) -> Mapping[str, float]:
 class Procedure:
     """A procedure. `acquire` moves the machine, `analyse` is pure and sees only the closed file.
 
-    `check` looks at a plan against a rig file before anything starts and names what cannot work. `settings` are the
+    `requires` is what a rig must have, whatever the plan. `check` looks at a plan against a rig that has it, before anything
+    starts, and names what cannot work. `settings` are the
     controller parameters (SI) that the runner writes in READY, before it levitates. `step_count` is how many steps
     `acquire` will record, for the progress display; 0 is unknown. `fewest_steps` is how many a run that goes to its end has
     at least, where these are fewer.
@@ -100,6 +102,7 @@ class Procedure:
     acquire: Callable[[Rig, Any, Recorder], None]
     analyse: Callable[[Recording[Any]], Iterator[Measured | Finding]]
     figures: Callable[[Recording[Any]], Iterable[Shown]] = field(default=_no_figures)
+    requires: Requires = field(default=Requires())
     check: Callable[[RigFile, Any], Iterable[str]] = field(default=_no_problems)
     settings: Callable[[Any], Mapping[str, float]] = field(default=_no_settings)
     step_count: Callable[[Any], int] = field(default=_unknown_count)
@@ -111,3 +114,7 @@ class Procedure:
         Quantity, ...
     ] = ()  # of the measures, what a sound machine may not have: not missing where no limit asks
     method: str = ""  # the report's method section: plain paragraphs, blank-line separated
+
+    def problems(self, rig: RigFile, plan: Any) -> tuple[str, ...]:
+        """What cannot work, found before anything starts: what the rig lacks, else what the plan asks too much of it."""
+        return self.requires.lacking(rig) or tuple(self.check(rig, plan))

@@ -162,6 +162,11 @@ class Recording(Generic[P]):
         return self._file.metadata.get("run", {})
 
     @property
+    def verdict_required(self) -> bool:
+        """Whether the run was to give a verdict: one without is an error."""
+        return self.run.get("verdict") == "required"
+
+    @property
     def procedure(self) -> str:
         return self.run.get("procedure", "")
 

@@ -5,16 +5,13 @@ from __future__ import annotations
 import contextlib
 import difflib
 from collections.abc import Iterator
-from typing import Any
-
-from pydantic import ValidationError
 
 from bench import binding, capture, linkurl, units
 from bench.busload import REFUSE, BusLoad, bus_load
 from bench.errors import ConfigError, Problem
-from bench.inputfile import parse_toml
 from bench.messages import MessageMap
-from bench.rigfile import RigFile, RigText, migrated, read_rig
+from bench.rigfile import RigFile, RigText, read_rig
+from bench.rigrest import rest_of
 from bench.units import Unit
 
 GEOMETRY = {
@@ -68,21 +65,26 @@ def check_rig(rig: str) -> tuple[tuple[Problem, ...], BusLoad | None]:
 
 def _behind(text: RigText, problems: tuple[Problem, ...]) -> Iterator[Problem]:
     """What else is wrong with a file that breaks the types: the entries at fault are left out and the rest checked."""
-    data = migrated(parse_toml(text.toml), str(text.path))
-    left_out = {".".join(p.key.split(".")[:2]) for p in problems}
-    for p in problems:
-        table: Any = data
-        keys = p.key.split(".")
-        depth = len(keys) if p.expected == "no such key" else min(2, len(keys))
-        for key in keys[: depth - 1]:
-            table = table.get(key, {}) if isinstance(table, dict) else {}
-        if isinstance(table, dict):
-            table.pop(keys[depth - 1], None)
-    try:
-        rest = RigFile.model_validate({**data, "toml_text": text.toml, "dbc_text": text.dbc, "path": str(text.path)})
-    except ValidationError:  # a table that cannot be missing is at fault; the rest cannot be judged without it
+    if (rest := rest_of(text, problems)) is None:
         return
-    yield from (p for p in problems_of(rest) if ".".join(p.key.split(".")[:2]) not in left_out)
+    told = {p.key for p in problems}
+    entries = {".".join(key.split(".")[:2]) for key in told}
+    for p in problems_of(rest):
+        if p.key not in told and ".".join(p.key.split(".")[:2]) not in entries:
+            yield p
+
+
+def as_far_as_read(rig: str) -> RigFile | None:
+    """A rig file, whatever is wrong with it: entries at fault are left out; None where nothing of it can be told.
+
+    Raises:
+        ConfigError: there is no such rig, or its files cannot be read at all.
+    """
+    text = read_rig(rig)
+    try:
+        return RigFile.parse(text.toml, text.dbc, str(text.path))
+    except ConfigError as error:
+        return rest_of(text, error.problems) if error.problems else None
 
 
 def problems_of(rig: RigFile) -> list[Problem]:

@@ -22,10 +22,11 @@ from bench.errors import ConfigError, RecordingError, SignalAbort
 from bench.evaluation import Ending, Evaluation, evaluate
 from bench.findings import SIMULATED_CONTROLLER, Effect, Finding
 from bench.opened import Connect, Job, OpenRig
+from bench.outcomes import Outcome, outcome_of
 from bench.procedure import Procedure
 from bench.progress import Progress
 from bench.recording import Recording
-from bench.records import Outcome, Record, RecordingFile, findings_of, outcome_of, unfinished, write_record
+from bench.records import Record, RecordingFile, findings_of, unfinished, write_record
 from bench.reserve import reserved
 from bench.rundir import RunDirectory
 from bench.supervisor import Supervisor

@@ -20,13 +20,14 @@ from bench.findings import Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recorder import Recorder
 from bench.recording import Recording
+from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import NOTHING, Load, RigState
 from bench.uncertainty import Estimate, Influence, propagate
 from procedures import amb_calibration_figures as drawn
 from procedures.estimators import angle_facts, consistency, mass_hanging
-from procedures.estimators.hanging_data import CHANNELS, COILS, HangingData, read_hangings
+from procedures.estimators.hanging_data import CHANNELS, COILS, LEVERS, HangingData, read_hangings
 from procedures.estimators.inputs import certified
 from procedures.estimators.mass_hanging import Fit
 from procedures.estimators.repeatability import OUTPUTS, Scatter, covariance_by_angle, covariance_over_a_turn, scatter
@@ -223,11 +224,6 @@ def masses_u(recording: Recording[Plan]) -> np.ndarray:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    needed = (("sensors", [c for c in COILS if c.startswith("i_y")], rig.sensors), ("channels", CHANNELS, rig.channels),
-              ("parameters", ("bias_i", "bias_o", "angle_ref"), rig.parameters))  # fmt: skip
-    for table, names, found in needed:
-        if missing := [n for n in names if n not in found]:
-            yield f"{table}: found no {', '.join(missing)}; the calibration needs {'it' if len(missing) == 1 else 'them'}"
     unknown = [m for m in plan.masses if m not in rig.masses]
     if unknown:
         yield f"masses: found {', '.join(unknown)}; the rig file certifies {', '.join(rig.masses)}"
@@ -271,6 +267,14 @@ procedure = Procedure(
     acquire=acquire,
     analyse=analyse,
     figures=figures,
+    requires=Requires(
+        roles=("levitation", "rotation"),
+        channels=CHANNELS,
+        sensors=tuple(c for c in COILS if c.startswith("i_y")),
+        parameters=("bias_i", "bias_o", "angle_ref"),
+        geometry=("hook_to_outboard", "amb_span", "amb_gap", "com_to_motor", "motor_stiffness", *LEVERS),
+        masses=True,
+    ),
     check=check,
     settings=settings,
     step_count=step_count,

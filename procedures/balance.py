@@ -199,6 +199,7 @@ procedure = Procedure(
     acquire=balancing.acquire,
     analyse=analyse,
     figures=figures,
+    requires=balance_checks.REQUIRES,
     check=check,
     settings=settings,
     step_count=step_count,

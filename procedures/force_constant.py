@@ -32,7 +32,7 @@ from procedures.estimators import force_estimates, force_findings, force_rows
 from procedures.estimators.force_estimates import AxisResult
 from procedures.estimators.force_rows import TIME
 from procedures.estimators.ramp_data import STEP, RampData, read_ramps
-from procedures.force_constant_check import check
+from procedures.force_constant_check import REQUIRES, check
 
 Array = npt.NDArray[np.float64]
 
@@ -291,6 +291,7 @@ procedure = Procedure(
     acquire=acquire,
     analyse=analyse,
     figures=figures,
+    requires=REQUIRES,
     check=check,
     settings=settings,
     step_count=step_count,

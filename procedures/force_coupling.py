@@ -20,6 +20,7 @@ from bench.findings import Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recorder import Recorder
 from bench.recording import Recording
+from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
@@ -122,11 +123,6 @@ def _of_signals(data: StepMeans, plan: Plan) -> Iterator[Finding]:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    parameters = (*carrying.PARAMETERS, "gamma", "segment_max")
-    lacking = list(carrying.missing(rig, (*SEGMENTS, *POSITIONS), CHANNELS, parameters, GEOMETRY))
-    yield from lacking
-    if lacking:
-        return
     gammas = plan.gamma_rad
     if list(gammas) != sorted(set(gammas)) or gammas[0] >= 0 or gammas[-1] <= 0:
         yield f"gamma_rad: found {gammas}; expected different angles in ascending order, on both sides of zero"
@@ -192,6 +188,14 @@ procedure = Procedure(
     acquire=acquire,
     analyse=analyse,
     figures=figures,
+    requires=Requires(
+        roles=("levitation", "rotation"),
+        channels=CHANNELS,
+        sensors=(*SEGMENTS, *POSITIONS),
+        parameters=(*carrying.PARAMETERS, "gamma", "segment_max"),
+        geometry=GEOMETRY,
+        machine=("pole_pairs",),
+    ),
     check=check,
     step_count=step_count,
     needs=needs,

@@ -19,6 +19,7 @@ from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recorder import Recorder
 from bench.recording import Recording
+from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
@@ -222,7 +223,6 @@ def holds_for(plan: Plan) -> dict[str, float]:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    yield from rotor.missing(rig, CHANNELS, ("bias_i", "bias_o", "speed_ref"), COILS)
     needed = ["ring_inertia"] if plan.added_inertia else ["polar_inertia"]
     for name in needed:
         if name not in rig.machine:
@@ -279,6 +279,12 @@ procedure = Procedure(
     acquire=acquire,
     analyse=analyse,
     figures=figures,
+    requires=Requires(
+        roles=("levitation", "rotation"),
+        channels=CHANNELS,
+        sensors=COILS,
+        parameters=(*rotor.PARAMETERS, "bias_i", "bias_o", "speed_ref"),
+    ),
     check=check,
     settings=settings,
     step_count=step_count,

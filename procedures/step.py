@@ -17,6 +17,7 @@ from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recorder import Recorder
 from bench.recording import Recording
+from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
@@ -180,16 +181,13 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    lacking = [n for n in CHANNELS if n not in rig.channels]
-    if lacking:
-        yield f"channels: found no {', '.join(lacking)}; the steps are read from all of them"
     needed = ["slew", *(f"ref_{a}" for a in plan.axes), *model_names(plan), *plan.a, *plan.b, *plan.warm]
     for name in dict.fromkeys(needed):
         if name not in rig.parameters:
             yield f"parameters: found no {name}; needed are the set points, slew and those of the plan's settings"
         elif rig.parameters[name].when == "resting":
             yield f"{name}: can be written at rest only; a setting is changed while the shaft levitates"
-    if "clearance" in rig.geometry and 2 * max(plan.sizes_m) > MARGIN * rig.geometry["clearance"].value:
+    if 2 * max(plan.sizes_m) > MARGIN * rig.geometry["clearance"].value:
         yield (f"sizes_m: found {max(plan.sizes_m) * 1e6:g} um; with its overshoot that needs more than {MARGIN:.0%} of the "
                f"clearance, {rig.geometry['clearance'].value * 1e6:g} um")  # fmt: skip
     if min(plan.sizes_m) <= 0 or len({*plan.sizes_m}) < len(plan.sizes_m) or len({*plan.axes}) < len(plan.axes):
@@ -260,6 +258,12 @@ procedure = Procedure(
     acquire=acquire,
     analyse=analyse,
     figures=figures,
+    requires=Requires(
+        channels=CHANNELS,
+        sensors=tuple(n for n in CHANNELS if n.startswith(("pos_", "i_"))),
+        parameters=("slew", "model_rate", "model_l_is", "model_l_os"),
+        geometry=("clearance",),
+    ),
     check=check,
     step_count=step_count,
     method=METHOD,

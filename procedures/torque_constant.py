@@ -19,6 +19,7 @@ from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recorder import Recorder
 from bench.recording import Recording
+from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import NOTHING, Load, RigState
@@ -235,14 +236,6 @@ def arms_u(rig: RigFile) -> float:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    yield from rotor.missing(rig, CHANNELS, ("gamma", "i_x", "i_y", "i_ramp", "bias_i", "bias_o"), SEGMENTS)
-    for table, names, found in (
-        ("geometry", [f"lever_{s}" for s in SIDES], rig.geometry),
-        ("machine", ["pole_pairs"], rig.machine),
-    ):
-        if lacking := [n for n in names if n not in found]:
-            yield f"{table}: found no {', '.join(lacking)}; the torque of the loads needs it"
-            return
     unknown = [m for m in plan.masses if m not in rig.masses]
     if unknown:
         yield f"masses: found {', '.join(unknown)}; the rig file certifies {', '.join(rig.masses)}"
@@ -292,6 +285,15 @@ procedure = Procedure(
     acquire=acquire,
     analyse=analyse,
     figures=figures,
+    requires=Requires(
+        roles=("levitation", "rotation"),
+        channels=CHANNELS,
+        sensors=SEGMENTS,
+        parameters=(*rotor.PARAMETERS, "gamma", "i_x", "i_y", "i_ramp", "bias_i", "bias_o"),
+        geometry=tuple(f"lever_{s}" for s in SIDES),
+        machine=("pole_pairs",),
+        masses=True,
+    ),
     check=check,
     settings=settings,
     step_count=step_count,

@@ -280,6 +280,24 @@ def test_another_schema_is_refused(tmp_path: Path, schema: str, message: str) ->
     assert load is None
 
 
+def test_what_is_missing_hides_nothing_else(tmp_path: Path) -> None:
+    """Tables and entries that cannot be left out are stood in for, so that one pass names every problem."""
+    toml = changed(
+        TOML,
+        ("max_temperature_K", "max_temp_K"),
+        ("model = ", "modell = "),
+        ('roles = ["levitation", "rotation"]', ""),
+        ("gravity = {", "gravty = {"),
+        ("clearance = { value = 0.25", "clearance = { value = 0.6"),
+        ("default = 3, low = 0, high = 5", "default = 6, low = 0, high = 5"),
+    )
+    dbc = changed(DBC, (" SG_ pos_xi : 48|16@1-", " SG_ pos_xj : 48|16@1-"))
+    assert set(problems(tmp_path, toml, dbc)) == {
+        "envelope.max_temp_K", "envelope.max_temperature_K", "uut.model", "uut.modell", "devices.controller.roles",
+        "site.gravty", "site.gravity", "geometry.clearance.value", "parameters.bias_i.default", "channels.pos_xi.signal",
+    }  # fmt: skip
+
+
 def test_an_older_schema_is_migrated_step_by_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def renamed(data: dict[str, object]) -> dict[str, object]:
         return {("title" if k == "heading" else k): v for k, v in data.items()}

@@ -26,10 +26,11 @@ from bench.cli.compose import simulated
 from bench.errors import BenchError
 from bench.limits import Limit, Verdict
 from bench.opened import Job
+from bench.outcomes import Outcome
 from bench.procedure import Procedure
 from bench.progress import PlainProgress
 from bench.recording import Recording
-from bench.records import SCHEMA_FILE, Outcome, Record
+from bench.records import SCHEMA_FILE, Record
 from bench.rigfile import RigFile, load_rig
 from bench.runner import RunResult
 from bench.supervisor import Supervisor
@@ -78,7 +79,7 @@ def last_state(result: RunResult, rig: RigFile) -> str:
 
 def test_a_run_leaves_a_recording_a_record_a_truth_and_a_log(run: Run, rig: RigFile) -> None:
     result = run()
-    assert result.outcome is Outcome.PASS
+    assert result.outcome is Outcome.DONE
     files = {p.name for p in result.directory.iterdir()}
     assert files == {"recording.mcap", "record.json", "truth.json", "run.log"}
     stored = json.loads((result.directory / "record.json").read_text())
@@ -97,7 +98,7 @@ def test_a_run_leaves_a_recording_a_record_a_truth_and_a_log(run: Run, rig: RigF
 
 def test_a_levitated_run_lands_and_switches_off(run: Run, rig: RigFile) -> None:
     result = run(procedure=tiny_procedures.levitated)
-    assert result.outcome is Outcome.PASS
+    assert result.outcome is Outcome.DONE
     recording: Recording[Any] = Recording.open(result.directory / "recording.mcap")
     commands = [e["name"] for e in recording.events("command")]
     assert commands == ["ENABLE", "LEVITATE", "LAND", "DISABLE"]
@@ -297,7 +298,7 @@ def test_a_failing_report_is_a_finding_and_keeps_the_verdict(run: Run) -> None:
         raise BenchError("no ink")
 
     result = run(report=broken)
-    assert result.outcome is Outcome.PASS
+    assert result.outcome is Outcome.DONE
     assert codes(result) == ["report-failed"]
     assert "no ink" in (result.directory / "record.json").read_text()
 
@@ -377,7 +378,7 @@ def test_a_display_that_nobody_reads_does_not_stop_a_run(tmp_path: Path, rig: Ri
         result = runner.run(job, tmp_path, connect, supervisor, PlainProgress(stream), None)
     with contextlib.suppress(BrokenPipeError):
         stream.close()
-    assert result.outcome is Outcome.PASS
+    assert result.outcome is Outcome.DONE
 
 
 def test_warnings_are_events(run: Run) -> None:

@@ -1,6 +1,6 @@
 """From what a command returns or raises to the exit status and a line for the user.
 
-0 PASS    1 FAIL    2 usage or configuration    3 ERROR    4 ABORTED    5 INDETERMINATE
+0 PASS, DONE    1 FAIL    2 usage or configuration    3 ERROR    4 ABORTED    5 INDETERMINATE
 """
 
 from __future__ import annotations

@@ -206,7 +206,8 @@ def settling_estimate(case: Case, settled: Settling) -> Estimate:
 
     def sampled(deviations: Deviations) -> Array:
         share = ndtr(deviations[noise.id] / noise.u) * len(settled.times) - 0.5
-        return np.interp(share, np.arange(len(settled.times)), settled.times)
+        times: Array = np.interp(share, np.arange(len(settled.times)), settled.times)
+        return times
 
     made = Estimate(settled.time, "s", {noise: 1.0}, sampled if noise.u else None)
     return made + bound(f"start/{case.where}", "start of the step", START_S, "s")

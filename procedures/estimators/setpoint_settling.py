@@ -236,4 +236,5 @@ def _possible(t: Array, off: Array, drawn: Array, touching: Sequence[npt.NDArray
     every, share = np.concatenate(times), np.concatenate(shares)
     order = np.argsort(every)
     total = np.cumsum(share[order])
-    return np.interp((np.arange(DRAWS) + 0.5) / DRAWS, (total - share[order] / 2) / total[-1], every[order])
+    quantiles: Array = np.interp((np.arange(DRAWS) + 0.5) / DRAWS, (total - share[order] / 2) / total[-1], every[order])
+    return quantiles

@@ -125,6 +125,7 @@ def of_result(runs: Sequence[RunDown], angle: Drag, speed: Drag, plan: Plan) -> 
             "braked",
             f"a constant torque of {coulomb.value:.3f} N m slows the rotor; a levitated one has at most "
             f"{plan.max_coulomb_N_m:g} N m. A drive or brake that still holds, or something rubs.", "T_c", Effect.INDETERMINATE,
+            ("B", "B_high", "J_z"),
         )  # fmt: skip
     elif coulomb.value < -3 * coulomb.u - 1e-3:
         yield Finding("driven", f"a constant torque of {-coulomb.value:.3f} N m drives the coasting rotor in both directions.",

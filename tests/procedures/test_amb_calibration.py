@@ -12,11 +12,13 @@ from bench.cli.virtual import simulate
 from bench.errors import DeviceFault, InterlockError
 from bench.findings import Effect, Finding
 from bench.limits import Verdict, judge
+from bench.outcomes import Outcome, outcome_of
 from bench.procedure import Measured
+from bench.records import measurement
 from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import interval
-from procedures.amb_calibration import Plan, check
+from procedures.amb_calibration import Plan, check, procedure
 from sim_backend.truth import draw
 
 SHORT = {"settle_s": 0.3, "average_s": 0.2}
@@ -54,6 +56,16 @@ def test_the_result_follows_the_truth(tmp_path: Path, factor: float) -> None:
         assert true[name] == pytest.approx(value, rel=1e-9)
         assert abs(measured[name].estimate.value - value) < 3 * measured[name].estimate.u
         assert judge(interval(measured[name].estimate), limits[name]) is Verdict.FAIL
+
+
+def test_loads_that_contradict_each_other_support_no_statement_of_non_conformity(tmp_path: Path) -> None:
+    """The reading lies outside the limit; with a wrong mass that says nothing of the machine."""
+    _, measured, findings = calibrate(tmp_path, 11, {"mass_error_M2": 0.05, "K_o": 0.8 * 74.4})
+    limits = load_spec("tsbs12", "amb-calibration")
+    judged = [measurement(m, limits.get(name)) for name, m in measured.items()]
+    assert [m.name for m in judged if m.verdict is Verdict.FAIL] == ["K_o"]
+    assert outcome_of(judged, findings) is Outcome.INDETERMINATE
+    assert outcome_of(judged, [f for f in findings if f.effect is Effect.NOTE]) is Outcome.FAIL
 
 
 def test_the_constants_hold_for_the_bias_of_the_plan(tmp_path: Path) -> None:
@@ -106,6 +118,5 @@ def test_what_the_rig_file_lacks_is_told_before_anything_starts(kind: str) -> No
     rig = load_rig("tsbs12")
     name = {"sensors": "i_yi_p", "channels": "flags", "parameters": "angle_ref"}[kind]
     table = {k: v for k, v in getattr(rig, kind).items() if k != name}
-    found = list(check(rig.model_copy(update={kind: table}), Plan()))
-    assert found == [f"{kind}: found no {name}; the calibration needs it"]
+    assert procedure.problems(rig.model_copy(update={kind: table}), Plan()) == (f"{kind}: found no {name}",)
     assert list(check(rig, Plan())) == []

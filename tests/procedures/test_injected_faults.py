@@ -14,8 +14,9 @@ from bench.cli.compose import load_procedure
 from bench.cli.opening import simulated
 from bench.faults import Fault
 from bench.opened import Job
+from bench.outcomes import Outcome
 from bench.progress import PlainProgress
-from bench.records import FindingEntry, Outcome
+from bench.records import FindingEntry
 from bench.rigfile import RigFile, load_rig
 from bench.runner import RunResult
 from bench.specs import load_spec

@@ -20,7 +20,7 @@ from bench.specs import load_spec
 from bench.uncertainty import interval
 from procedures import carrying, negative_stiffness
 from procedures.estimators.stiffness_estimates import evaluate
-from procedures.negative_stiffness import Plan, check, figures, read
+from procedures.negative_stiffness import Plan, check, figures, procedure, read
 
 NAME = "negative-stiffness"
 QUICK = {"levels_m": [-40e-6, -20e-6, 0.0, 20e-6, 40e-6], "settle_s": 0.5, "average_s": 0.3}
@@ -179,7 +179,7 @@ def test_what_the_rig_file_lacks_is_told(kind: str) -> None:
     rig = load_rig("tsbs12")
     name = {"sensors": "i_m1", "channels": "i_m1", "parameters": "motor_share", "geometry": "amb_gap"}[kind]
     table = {k: v for k, v in getattr(rig, kind).items() if k != name}
-    assert list(check(rig.model_copy(update={kind: table}), Plan())) == [f"{kind}: found no {name}; needed it is"]
+    assert procedure.problems(rig.model_copy(update={kind: table}), Plan()) == (f"{kind}: found no {name}",)
 
 
 def test_figures_show_the_data_with_the_fit(sound: Simulated) -> None:

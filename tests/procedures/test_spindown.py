@@ -14,8 +14,8 @@ from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
 from bench.limits import Verdict, judge
+from bench.outcomes import Outcome
 from bench.procedure import Measured
-from bench.records import Outcome
 from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import Estimate, correlation, interval

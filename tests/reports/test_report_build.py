@@ -225,6 +225,28 @@ def test_findings_that_affect_the_outcome_are_loud() -> None:
     assert 'class="finding loud"' in html.render(made)
 
 
+def test_a_fail_stands_first_and_says_where_a_finding_outranks_it() -> None:
+    doubt = {"code": "load-inconsistent", "text": "The loads contradict each other.", "where": "M2",
+             "effect": "indeterminate", "concerns": []}  # fmt: skip
+    failed = [measurement("K_o", verdict="fail"), measurement("K_i")]
+    made = view(outcome="INDETERMINATE", findings=[doubt], measurements=failed, correlations=None)
+    assert made.outcome_text.startswith("Outside the limits with the whole 95 % interval: K_o.")
+    assert "no statement of non-conformity: the data are contradicted (load-inconsistent)" in made.outcome_text
+    assert made.judged[0].verdict == "fail"
+    touched = view(outcome="FAIL", findings=[doubt | {"concerns": ["K_i"]}], measurements=failed, correlations=None)
+    assert touched.outcome_text == (
+        "Outside the limits with the whole 95 % interval: K_o. Findings that prevent other decisions: load-inconsistent."
+    )
+
+
+def test_a_run_that_nothing_judged_has_a_neutral_box() -> None:
+    made = view(outcome="DONE", measurements=[measurement(verdict="none", limit=None)], correlations=None)
+    assert (made.tone, made.outcome) == ("none", "DONE")
+    assert made.outcome_text == "Every declared quantity was measured. No acceptance limit was applied."
+    assert 'class="outcome none"' in html.render(made)
+    assert pdf.render(made, None).startswith(b"%PDF")
+
+
 def test_pass_without_limits_claims_no_conformity() -> None:
     made = view(measurements=[measurement(verdict="none", limit=None)])
     assert made.outcome_text.endswith("No acceptance limit was applied.")
