@@ -199,7 +199,9 @@ def balance(
     fit = nonlinear(model, current, np.concatenate([[1 / start[0], 0.0, 0.0], start[1:]]), relative, slopes)
     alpha, gamma_0, ripple = (float(x) for x in fit.terms[:3])
     covariance = fit.covariance[:2, :2] * fit.chi2 / fit.dof
-    return Balance(alpha, gamma_0, ripple, covariance, current, lines @ fit.terms[3:], torque, fit, relative, pole_pairs)
+    return Balance(
+        alpha, gamma_0, ripple, covariance, current, lines @ fit.terms[3:], torque, fit, relative, pole_pairs
+    )
 
 
 @dataclass(frozen=True)
