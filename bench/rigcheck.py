@@ -15,6 +15,7 @@ from bench.busload import REFUSE, BusLoad, bus_load
 from bench.errors import ConfigError, Problem
 from bench.messages import MessageMap
 from bench.rigfile import RigFile, RigText, migrated, read_rig
+from bench.rigpossible import impossible
 from bench.units import Unit
 
 GEOMETRY = {
@@ -95,6 +96,7 @@ def problems_of(rig: RigFile) -> list[Problem]:
         *_masses(rig),
         *_envelope(rig),
         *_parameters(rig),
+        *impossible(rig),
     ]
     if not any(p.key.startswith("devices") for p in found):
         try:

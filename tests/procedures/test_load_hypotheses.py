@@ -37,14 +37,16 @@ def stated(run: Simulated, label: str, error: float) -> tuple[dict[str, Estimate
 
 
 @pytest.mark.parametrize("error", [-0.0009, -0.0006, -0.0003, 0.0006, 0.0009, 0.0012])
-def test_a_result_with_a_wrong_mass_that_is_not_seen_is_near_the_truth(sound: list[Simulated], error: float) -> None:
-    """Within 2 U, of the U that is stated. The heaviest mass, which hangs once at each angle, is the hardest to see."""
+def test_a_wrong_mass_that_is_not_seen_moves_no_result_far(sound: list[Simulated], error: float) -> None:
+    """By 2 U of the U that is stated, and a tenth more where the scatter of a run hides the pull. The heaviest mass, which hangs
+    once at each angle, is the hardest to see."""
     for run in sound:
+        right = {m.quantity.name: m.estimate.value for m in run.results if isinstance(m, Measured)}
         for label in ("M1", "M2", "M3", "M4"):
             found, findings = stated(run, label, error)
             if all(f.effect is Effect.NOTE for f in findings):
                 for name, e in found.items():
-                    assert abs(e.value - run.truth[name]) < 2 * interval(e).U, (label, name)
+                    assert abs(e.value - right[name]) < 2.2 * interval(e).U, (label, name)
 
 
 def test_a_wrong_mass_of_a_thousandth_is_found(sound: list[Simulated]) -> None:
