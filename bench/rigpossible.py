@@ -54,8 +54,8 @@ def _densities(rig: RigFile) -> Iterator[Problem]:
 
 
 def _gain(rig: RigFile, key: str, gain: Toleranced) -> Iterator[Problem]:
-    """A gain is what a sensor reads over what is there. One that is far from 1 is a slip of the pen, a scale that belongs in the
-    DBC, or a sensor to be repaired; what it may be within that is a certificate's matter."""
+    """A gain is what a sensor reads over what is there. One that is far from 1 is a slip of the pen, a scale that belongs in
+    the DBC, or a sensor to be repaired; what it may be within that is a certificate's matter."""
     if abs(gain.value - 1) > GAIN:
         yield Problem(str(rig.path), f"{key}.value", f"{gain.value:g}",
                       f"1 within {GAIN:.0%}, readings over true values; a scale belongs in the DBC")  # fmt: skip

@@ -91,18 +91,16 @@ def run_missing(asked: argparse.Namespace) -> None:
     """Every seed of both rigs through its cases, one line for each run as it ends."""
     known = {(e["rig"], e["case"], e["seed"]) for e in read(asked.file)}
     seeds = range(asked.first, asked.first + max(asked.count, asked.choices))
-    with ProcessPoolExecutor(asked.jobs) as pool, asked.file.open("a", encoding="utf-8") as out:
-        waiting = []
+    waiting = []
+    with ProcessPoolExecutor(asked.jobs) as pool:
         for seed in seeds:
             for rig in RIGS:
                 cases = [c for c in cases_of(rig, asked.only) if seed - asked.first < limit_of(c, asked)]
                 left = [c for c in cases if (rig, c.name, seed) not in known]
                 if left:
-                    waiting.append(pool.submit(run_rig, rig, seed, left))
+                    waiting.append(pool.submit(run_rig, rig, seed, left, asked.file))
         for job in as_completed(waiting):
-            for line in job.result():
-                out.write(json.dumps(line) + "\n")
-            out.flush()
+            job.result()
 
 
 def limit_of(case: Case, asked: argparse.Namespace) -> int:
@@ -143,8 +141,9 @@ def load(name: str) -> Procedure:
     return found
 
 
-def run_rig(rig: str, seed: int, cases: list[Case]) -> list[dict[str, Any]]:
-    """The cases on one virtual rig; the calibrations that any of them uses are made first, with default plans."""
+def run_rig(rig: str, seed: int, cases: list[Case], file: Path) -> None:
+    """The cases on one virtual rig; the calibrations that any of them uses are made first, with default plans. Each is a line
+    of the file as soon as it has ended: one write, so that processes do not mix theirs."""
     known: dict[str, Calibration] = {}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "recording.mcap"
@@ -153,11 +152,19 @@ def run_rig(rig: str, seed: int, cases: list[Case]) -> list[dict[str, Any]]:
                 known[name] = attempt(rig, name, seed, {}, path, known).calibration()
             except BenchError:
                 continue  # the cases that need it say so
-        return [run_case(case, seed, path, known if case.chain else {}) for case in cases]
+        for case in cases:
+            line = run_case(case, seed, path, known if case.chain else {})
+            with file.open("ab", buffering=0) as out:
+                out.write(json.dumps(line).encode() + b"\n")
 
 
 def needed(cases: list[Case]) -> list[str]:
     """Procedures whose calibrations the cases use, in the order in which they can be made."""
+    return list(dict.fromkeys(name for case in cases if case.chain for name in needed_by(case.procedure)))
+
+
+def needed_by(procedure: str) -> list[str]:
+    """Procedures whose calibrations one uses, in the order in which they can be made."""
     out: list[str] = []
 
     def add(name: str) -> None:
@@ -167,9 +174,7 @@ def needed(cases: list[Case]) -> list[str]:
                 add(need.procedure)
                 out.append(need.procedure)
 
-    for case in cases:
-        if case.chain:
-            add(case.procedure)
+    add(procedure)
     return out
 
 

@@ -25,6 +25,7 @@ from bench.rigfile import RigFile
 from bench.roles import NOTHING, Load, RigState
 from bench.uncertainty import Estimate, propagate
 from procedures import amb_calibration_figures as drawn
+from procedures import assumed
 from procedures.estimators import angle_facts, consistency, load_hypotheses, mass_hanging
 from procedures.estimators.hanging_data import CHANNELS, COILS, HangingData, read_hangings
 from procedures.estimators.hanging_estimates import less_sure, turning_point, unresolved_angles
@@ -260,9 +261,6 @@ At each angle F = F0 + K i + K2 i² is fitted per bearing by least squares, in a
 sum is not exactly twice the bias, with a term for the direction of loading that takes hysteresis and drift out of K.
 Forces are referred to the sensors' zero by the residual displacement times the stiffness. The reported values are means
 over the angles. The vertical axis is calibrated; the horizontal one is not loaded and not reported.
-
-What no data can show: an error common to all masses, to gravity or to the ratio of the spans scales K by itself. It is
-in the budget as far as the certificates state it, and nowhere else.
 """
 
 procedure = Procedure(
@@ -279,5 +277,7 @@ procedure = Procedure(
     step_count=step_count,
     facts=facts,
     holds_for=lambda plan: {"bias_A": plan.bias_A, "angles": plan.angles},
+    reached=("masses/*", "!masses/hanger", "!masses/density"),
+    assumes=assumed.AMB_CALIBRATION,
     method=METHOD,
 )

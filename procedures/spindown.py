@@ -24,7 +24,7 @@ from bench.rigfile import RigFile
 from bench.roles import RigState
 from bench.states import transition
 from bench.uncertainty import Estimate
-from procedures import rotor
+from procedures import assumed, rotor
 from procedures import spindown_figures as drawn
 from procedures.estimators import drag, spindown_checks
 from procedures.estimators.drag import Drag
@@ -248,9 +248,6 @@ gives B at exactly the nominal ones.
 
 b and c become B and T_c through the polar inertia, whose tolerance in the rig file dominates both. With a ring of known
 inertia on the shaft the decay is slower, and J = J_ring b_ring / (b - b_ring) is measured instead.
-
-What no data can show: a constant torque that acts against either direction alike, such as a seal or a brake that drags, is
-Coulomb friction as far as a run-down can tell. An error of the inertia scales B and T_c by itself.
 """
 
 procedure = Procedure(
@@ -267,5 +264,6 @@ procedure = Procedure(
     step_count=step_count,
     facts=facts,
     holds_for=holds_for,
+    assumes=assumed.SPINDOWN,
     method=METHOD,
 )

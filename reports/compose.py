@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from reports import habit, many, tables, text, vectors
+from reports import habit, many, tables, text, unseen, vectors
 from reports.counts import counts, words
 from reports.figures import Drawn
 from reports.linktable import clean, link_table
@@ -54,6 +54,8 @@ class Surroundings:
 
     title: str
     method: str = ""
+    reached: Sequence[str] = ()  # patterns of influences that a check of the procedure reaches
+    assumes: Sequence[str] = ()  # what is in no budget and no data can show
     definitions: Mapping[str, str] = dataclasses.field(default_factory=dict)  # quantity name -> definition
     rig: Content = dataclasses.field(default_factory=dict)  # the rig file's content
     integrity: Any = None
@@ -91,6 +93,9 @@ def view_of(record: Content, around: Surroundings, figures: Iterable[Drawn] = ()
         no_results="" if rows else NO_RESULTS,
         about_uncertainty=ABOUT_UNCERTAINTY,
         decision_rule=DECISION_RULE,
+        unseen=unseen.unseen(measurements, around.reached),
+        about_unseen=unseen.ABOUT,
+        assumed=tuple(around.assumes) if rows else (),
         findings=findings,
         budgets=tuple(tables.budget_table(m) for m in measurements if m.get("budget") and m.get("name") not in like),
         method=_paragraphs(around.method),

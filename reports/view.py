@@ -200,6 +200,9 @@ class ReportView:
     no_results: str
     about_uncertainty: str
     decision_rule: str  # 7.8.6
+    unseen: Table  # influences that no check can reach, and below what is assumed besides
+    about_unseen: str
+    assumed: tuple[str, ...]
     findings: tuple[FindingRow, ...]  # 7.8.2.1 n: deviations the bench itself noticed
     budgets: tuple[BudgetTable, ...]  # 7.8.4.1 a
     method: tuple[str, ...]  # 7.8.2.1 f

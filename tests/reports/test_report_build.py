@@ -27,7 +27,7 @@ from report_samples import (
 import reports
 from bench.errors import BenchError
 from bench.procedure import Quantity
-from reports import compose, html, pdf, tables
+from reports import compose, html, pdf, tables, unseen
 from reports.figures import draw
 from reports.view import SIMULATED, ReportView
 
@@ -100,6 +100,36 @@ def test_what_only_the_simulator_knows_is_not_printed_and_like_sensors_share_a_r
     assert rows[-1][0] == "sensors: gain of i_xi_p, i_xi_n, i_yi_p, i_yi_n"
     certificate = ("masses.M1", "0.5\u202fkg", "U = 5\u202f×\u202f10⁻⁵\u202fkg (k = 2), normal")
     assert certificate in [row[:3] for row in rows]
+
+
+def test_what_no_data_can_show_is_made_from_the_budget() -> None:
+    """What carries most comes first, with the result that it carries most of; what a check reaches and Type A is left out."""
+    entries = [
+        ("sensors/a/gain", "B", 3.0),
+        ("masses/M1", "B", 2.0),
+        ("scatter/1", "A", 1.0),
+        ("site/gravity", "B", 0.1),
+    ]
+    budget = [
+        {"name": f"the {i}", "influence": i, "type": kind, "contribution": c, "sensitivity": -7.0, "distribution": "normal",
+         "dof": None}
+        for i, kind, c in entries
+    ]  # fmt: skip
+    made = view(around(reached=("masses/*",), assumes=("All masses alike: K by that share.",)), measurements=[
+        measurement(budget=budget), measurement(name="K_o", budget=budget[2:])])  # fmt: skip
+    rows = made.unseen.rows
+    assert [row[0] for row in rows] == ["the sensors/a/gain", "1 further influence"]
+    assert rows[0][1:] == ("64\u202f%", "K_i", "3.0\u202fN/A", "−7.00")
+    page = Page(html.render(made)).text
+    places = [page.index(w) for w in ("Results", "What no data can show", "All masses alike", "Findings")]
+    assert places == sorted(places)
+
+
+def test_a_pattern_takes_away_again() -> None:
+    reached = ("masses/*", "!masses/hanger")
+    assert unseen.is_reached("masses/M1", reached)
+    assert not unseen.is_reached("masses/hanger", reached)
+    assert not unseen.is_reached("sensors/i_yo_p/gain", reached)
 
 
 def test_every_required_field_is_in_the_page_in_order() -> None:
@@ -267,7 +297,7 @@ def test_the_pdf_has_the_sections_of_the_page_in_the_same_order() -> None:
     asked = typst.query(pdf.sources(made), "heading.where(level: 1)", field="body", ignore_system_fonts=True)
     in_pdf = [heading["text"] for heading in json.loads(asked)]
     assert in_pdf == in_page
-    assert len(in_pdf) == 13
+    assert len(in_pdf) == 14
 
 
 def test_the_page_fetches_nothing() -> None:
