@@ -9,7 +9,7 @@ READY := .venv/.ready
 # Tests start hundreds of processes: without its bytecode every one of them would compile the project again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check format ci-long fuzz campaigns sound bench clean lock setup
+.PHONY: demo test check format ci-long fuzz campaigns sound moved bench clean lock setup
 
 demo: setup
 	$(BIN)/bench run amb-calibration --rig tsbs12 --seed 1
@@ -41,6 +41,11 @@ sound: setup
 	mkdir -p runs
 	nohup nice $(BIN)/python benchmarks/sound.py runs/sound-$(FIRST).jsonl --first $(FIRST) --count 60 --choices 20 --jobs 2 > runs/sound-$(FIRST).log 2>&1 &
 	@echo "look at it with: $(BIN)/python benchmarks/sound.py runs/sound-$(FIRST).jsonl --report"
+
+# Every drawn number moved by three half widths, for every procedure: caught, harmless, in the budget, or listed on the report.
+moved: setup
+	mkdir -p runs
+	$(BIN)/python -m benchmarks.moved --all runs/moved.jsonl
 
 bench: setup
 	$(BIN)/python benchmarks/analysis.py

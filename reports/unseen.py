@@ -48,7 +48,7 @@ def unseen(measurements: Iterable[Content], reached: Sequence[str]) -> Table:
     if left := ranked[len(shown) :]:
         noun = "influence" if len(left) == 1 else "influences"
         rows.append((f"{len(left)} further {noun}", f"below {_share(left[0][0])} each", "", "", ""))
-    header = ("Influence", "Share of the variance", "Result", "One u of it moves the result by", "Sensitivity")
+    header = ("Influence", "Share of the variance", "Result", "Moved by one u", "Sensitivity")
     return Table("", header, tuple(rows), (1, 3, 4))
 
 
