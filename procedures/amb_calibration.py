@@ -84,7 +84,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     changes = {axis: after - before[axis] for axis, after in _controls(rig).items()}
     rig.operator.hang(NOTHING)
     if max(map(abs, changes.values())) > CLEAR_A and any(consistency.wiring(**changes)):
-        record.event(consistency.WIRED_WRONG, **changes)  # an hour of hangings would say no more
+        record.event(consistency.WIRED_WRONG, changes=changes)  # an hour of hangings would say no more
         return
     for turn in range(plan.angles):
         angle = 2 * math.pi * turn / plan.angles

@@ -27,7 +27,7 @@ FATAL = ("stuck-channel", "no-response", "axes-exchanged", "bearings-exchanged",
 """Findings after which a fit means nothing and is not attempted."""
 NAMES = ("inboard", "outboard")
 AXES = ("yi", "yo", "xi", "xo")
-WIRED_WRONG = "wired-wrong"  # event: the changes of the control currents under the first mass, A
+WIRED_WRONG = "wired-wrong"  # event: changes of the control currents under the first mass, A
 MOST_WRONG = 0.03  # relative: a set of masses that is off by more would be seen by eye
 
 
@@ -76,7 +76,7 @@ def _wiring(data: HangingData) -> Iterator[Finding]:
 def of_first(recording: Recording[Any]) -> Iterator[Finding]:
     """What the first hanging showed, where the run ended by it."""
     for event in recording.events(WIRED_WRONG):
-        yield from wiring(*(float(event[axis]) for axis in AXES))
+        yield from wiring(*(float(event["changes"][axis]) for axis in AXES))
 
 
 def wiring(yi: float, yo: float, xi: float, xo: float) -> Iterator[Finding]:
