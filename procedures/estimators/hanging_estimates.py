@@ -19,11 +19,10 @@ def less_sure(estimate: Estimate, masses: Mapping[str, float], beyond: float) ->
         return estimate
     dof = len(masses) - 2.0
     slopes = {i.id: c for i, c in estimate.sensitivities.items()}
-    for label, kg in masses.items():
-        more = Influence(id=f"masses/{label}/beyond", name=f"mass {label}, beyond its certificate", unit="kg", kind="A",
-                         u=beyond * kg, distribution="normal", dof=dof,
-                         source="contradiction of the loads")  # fmt: skip
-        estimate = estimate + Estimate.of(0.0, more) * slopes.get(f"masses/{label}", 0.0)
+    for k, (label, kg) in enumerate(masses.items(), 1):
+        more = Influence(id=f"masses/beyond/{k}", name=f"mass {label}, beyond its certificate", unit="1", kind="A", u=1.0,
+                         distribution="normal", dof=dof, source="contradiction of the loads")  # fmt: skip
+        estimate = estimate + Estimate.of(0.0, more) * (slopes.get(f"masses/{label}", 0.0) * beyond * kg)
     return estimate
 
 
