@@ -29,7 +29,9 @@ def is_reached(identity: str, reached: Sequence[str]) -> bool:
     return found
 
 
-def unseen(measurements: Iterable[Content], reached: Sequence[str]) -> Table:
+def unseen(
+    measurements: Iterable[Content], reached: Sequence[str], titles: Mapping[str, str] | None = None
+) -> Table:  # fmt: skip
     """The influences of Type B that are out of reach, largest share first, each with the result that it carries most of."""
     best: dict[str, tuple[float, Content, Content]] = {}
     for m in measurements:
@@ -44,7 +46,7 @@ def unseen(measurements: Iterable[Content], reached: Sequence[str]) -> Table:
                 best[name] = (share, m, e)
     ranked = sorted(best.values(), key=lambda found: -found[0])
     shown = [found for found in ranked if found[0] >= SHOWN][:MOST]
-    rows = [_row(*found) for found in shown]
+    rows = [_row(*found, titles or {}) for found in shown]
     if left := ranked[len(shown) :]:
         noun = "influence" if len(left) == 1 else "influences"
         rows.append((f"{len(left)} further {noun}", f"below {_share(left[0][0])} each", "", "", ""))
@@ -52,13 +54,13 @@ def unseen(measurements: Iterable[Content], reached: Sequence[str]) -> Table:
     return Table("", header, tuple(rows), (1, 3, 4))
 
 
-def _row(share: float, measurement: Content, entry: Content) -> tuple[str, ...]:
+def _row(share: float, measurement: Content, entry: Content, titles: Mapping[str, str]) -> tuple[str, ...]:
     where = tables.place(measurement)
     unit = str(measurement.get("unit") or "")
     return (
         str(entry.get("name") or entry.get("influence")),
         _share(share),
-        str(measurement.get("name", "")) + (f" ({where})" if where else ""),
+        tables.symbol_of(str(measurement.get("name", "")), titles).plain + (f" ({where})" if where else ""),
         text.with_unit(text.significant(abs(float(entry.get("contribution") or 0.0))), unit),
         text.significant(entry.get("sensitivity"), 3),
     )
