@@ -9,7 +9,7 @@ READY := .venv/.ready
 # Tests start hundreds of processes: without its bytecode every one of them would compile the project again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check format ci-long fuzz campaigns sound moved bench clean lock setup
+.PHONY: demo test check format ci-long fuzz campaigns plants sound moved bench clean lock setup
 
 demo: setup
 	$(BIN)/bench run amb-calibration --rig tsbs12 --seed 1
@@ -46,6 +46,9 @@ sound: setup
 moved: setup
 	mkdir -p runs
 	$(BIN)/python -m benchmarks.moved --all runs/moved.jsonl
+
+plants: setup
+	$(BIN)/python benchmarks/plants.py spindown step --seeds 60
 
 bench: setup
 	$(BIN)/python benchmarks/analysis.py

@@ -13,8 +13,10 @@ from bench import provenance, runlog
 from bench.described import described
 from bench.errors import (
     Aborted,
+    AnotherHost,
     BenchError,
     DeviceFault,
+    FrozenError,
     InterlockError,
     LinkError,
     OperatorAbort,
@@ -35,8 +37,8 @@ from bench.supervisor import SafeStep, Supervisor
 logger = logging.getLogger("bench.runner")
 CODES: tuple[tuple[type[BaseException], str], ...] = (
     (SignalAbort, "signal"), (OperatorAbort, "operator-stop"), (DeviceFault, "controller-fault"),
-    (InterlockError, "interlock"), (LinkError, "link-lost"), (RecordingError, "recording-failed"),
-    (BenchError, "run-failed"),
+    (AnotherHost, "another-host"), (InterlockError, "interlock"), (FrozenError, "telemetry-frozen"),
+    (LinkError, "link-lost"), (RecordingError, "recording-failed"), (BenchError, "run-failed"),
 )  # fmt: skip
 
 

@@ -3,13 +3,15 @@
 BenchError
   ConfigError        rig, plan, spec or usage is wrong; nothing was started      exit 2
   LinkError          a link is lost, silent or corrupt                           exit 3
+    FrozenError      telemetry comes, but its counters stand
   RecordingError     a recording cannot be written or read                       exit 3
   AnalysisError      the data do not allow the number                            exit 3
   Aborted            the run was stopped on purpose                              exit 4
     InterlockError   the envelope refused a command or tripped on telemetry
     DeviceFault      the controller reported a fault
+    AnotherHost      heartbeats of another host came in
     OperatorAbort    the operator said stop
-    SignalAbort      SIGINT or SIGTERM
+    SignalAbort      SIGINT, SIGTERM or SIGHUP
 """
 
 from __future__ import annotations
@@ -46,6 +48,10 @@ class LinkError(BenchError):
     """A link is lost, silent past its timeout, or delivers bytes that cannot be right."""
 
 
+class FrozenError(LinkError):
+    """Telemetry comes, but its tick or its sequence stands: nobody knows what the machine does."""
+
+
 class RecordingError(BenchError):
     """A recording cannot be written, or what is read is not one, is newer, or fails its CRC."""
 
@@ -66,9 +72,13 @@ class DeviceFault(Aborted):
     """The controller reported a fault."""
 
 
+class AnotherHost(Aborted):
+    """Another host's heartbeats reach the controller."""
+
+
 class OperatorAbort(Aborted):
     """The operator said stop."""
 
 
 class SignalAbort(Aborted):
-    """SIGINT or SIGTERM arrived."""
+    """SIGINT, SIGTERM or SIGHUP arrived."""

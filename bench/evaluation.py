@@ -29,7 +29,7 @@ from bench.records import (
     missing,
     outcome_of,
 )
-from bench.stepgaps import incomplete_steps
+from bench.stepgaps import incomplete_steps, missing_steps
 
 logger = logging.getLogger("bench.evaluation")
 RUN_END = "run-end"
@@ -81,7 +81,10 @@ class Evaluation:
 
     def finish(self, record: Record, ending: Ending, ended: str, recording: RecordingFile | None) -> Record:
         """An unfinished record with its end; the outcome follows from what it holds."""
-        findings = (*ending.findings, *self.findings)
+        known = {
+            (f.code, f.where) for f in ending.findings
+        }  # a channel that stood is seen while it does, and in its steps
+        findings = (*ending.findings, *(f for f in self.findings if (f.code, f.where) not in known))
         return replace(
             record, ended=ended, recording=recording, link=ending.link, findings=findings_of(findings),
             measurements=self.measurements, correlations=self.correlations,
@@ -115,6 +118,8 @@ def evaluate(
         for key, item in measured.items():
             entries[key] = measurement(item, limits.get(item.quantity.name), recording.seed)
         correlations = correlations_of(list(measured.values()))
+        if all(f.effect is Effect.NOTE for f in findings):  # else a procedure that ended early has said why
+            findings += missing_steps(procedure, recording)
     except SignalAbort:
         raise
     except Exception as error:

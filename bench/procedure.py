@@ -82,7 +82,8 @@ class Procedure:
 
     `check` looks at a plan against a rig file before anything starts and names what cannot work. `settings` are the
     controller parameters (SI) that the runner writes in READY, before it levitates. `step_count` is how many steps
-    `acquire` will record, for the progress display; 0 is unknown.
+    `acquire` will record, for the progress display; 0 is unknown. `fewest_steps` is how many a run that goes to its end has
+    at least, where these are fewer.
     `analyse` yields what it measured and what it found, in the order of the report. `figures` come in the order in which a
     specialist looks at them: the first two stand on page 1, and so do its tables.
 
@@ -106,6 +107,7 @@ class Procedure:
     check: Callable[[RigFile, Any], Iterable[str]] = field(default=_no_problems)
     settings: Callable[[Any], Mapping[str, float]] = field(default=_no_settings)
     step_count: Callable[[Any], int] = field(default=_unknown_count)
+    fewest_steps: Callable[[Any], int] | None = None
     needs: Callable[[Any], tuple[Need, ...]] = field(default=_no_needs)
     facts: Callable[[Recording[Any]], Mapping[str, Estimate]] | None = None
     holds_for: Callable[[Any], Mapping[str, float]] = field(default=_numbers_of)

@@ -221,7 +221,12 @@ def unfinished(
     plan: Mapping[str, Any], versions: Mapping[str, str], calibrations: Sequence[Calibration] = (),
 ) -> Record:  # fmt: skip
     """What is written before anything moves: if the run dies, this is what it says."""
-    said = Finding("unfinished", "The run did not end: its process was killed or lost power.", "", Effect.ERROR)
+    said = Finding(
+        "unfinished",
+        "The run did not end: its process was killed, lost power or could write nothing any more.",
+        "",
+        Effect.ERROR,
+    )
     return Record(
         schema=1, run_id=run_id, procedure=procedure, rig=rig, uut=uut, outcome=Outcome.ERROR, started=started,
         ended=None, seed=seed, plan=plan, calibrations=tuple(c.summary for c in calibrations), versions=versions,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from bench.errors import ConfigError, Problem
+from bench.inputfile import TomlError, parse_toml
 from bench.limits import Limit
 
 SCHEMA = 1
@@ -68,9 +68,9 @@ def parse_spec(text: str, name: str = "spec") -> dict[str, dict[str, Limit]]:
         ConfigError: not TOML, another schema, unknown or missing keys, wrong limits; every problem is named.
     """
     try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"spec {name}: not TOML: {error}") from error
+        table = parse_toml(text)
+    except TomlError as error:
+        raise ConfigError(f"spec {name}: {error}") from error
     schema = table.pop("schema", None)
     if type(schema) is not int or schema != SCHEMA:
         newer = " It was written for a newer Levbench." if isinstance(schema, int) and schema > SCHEMA else ""

@@ -168,13 +168,21 @@ class FieldDrive:
         self._command("coast")
         self._until_running(False)
 
+    def brake(self) -> None:
+        """Begin to brake; nothing is waited for but that the drive takes it.
+
+        Raises:
+            LinkError: the drive does not answer, or refuses.
+        """
+        self._command("stop")
+
     def stop(self) -> None:
         """Brake, and return when the shaft stands.
 
         Raises:
             LinkError: the drive does not answer, refuses, or the shaft goes on turning.
         """
-        self._command("stop")
+        self.brake()
         self._bus.wait(lambda: abs(self.speed_rad_s) < STANDSTILL_RAD_S, STOP_S, "the drive to stop the shaft")
 
     def reset(self) -> None:

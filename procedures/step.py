@@ -229,7 +229,10 @@ centre of mass as the controller makes it of both sensor planes, from where it r
 Where the shaft turns, orders 1 to 4 of its angle are fitted before the step and at the end of the record and taken away; what
 is left is averaged over one revolution for settling (over 6 ms where it does not turn). The settling time holds that
 averaging, and is that of the mean of the repeats. The band is the plan's share of the step, or five times the noise of the
-averaged position where that is more, which the report says.
+averaged position where that is more, which the report says. The time is read from a curve fitted to all steps of a setting, an
+axis and a speed: level, slow decays and the swing, each with what size and beginning of the step change. Draws of that curve
+say which times are possible; each extreme of the swing within three standard uncertainties of the band's edge may touch it or
+not, so that the interval holds either time.
 
 From 3.5 ms after the step on, filters and current loops have died away, and position and tilt share two oscillations that lie
 close together. They are fitted to both, as means over a telemetry period. The overshoot is the top of that curve. Either pole

@@ -152,7 +152,7 @@ def test_worked_frames(name: str, block: str) -> None:
     assert {signal: column[0] for signal, column in decoded.items()} == pytest.approx(values, rel=1e-12, abs=1e-12)
     written = re.sub(r" \((\d+) digits 0\)", lambda m: "0" * int(m[1]), line)
     assert slcan.line(message.identifier, payload, fd=True, brs=True) == written.encode() + b"\r"
-    assert slcan.parse(written.encode()) == (message.identifier, payload, True, -1)
+    assert slcan.parse(written.encode()) == (message.identifier, payload, True, -1, True)
 
 
 @pytest.mark.parametrize(("names", "block"), PACKETS, ids=["crc16", "crc32"])

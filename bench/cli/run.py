@@ -34,7 +34,7 @@ def run_command(request: Request, whole: bool = False) -> int:
     """Run, say the outcome on standard error and the run directory on standard output; the outcome's exit status. `whole` is
     for every result and finding."""
     result = execute(request)
-    with suppress(BrokenPipeError):  # nobody reads any more; the outcome stands all the same
+    with suppress(OSError):  # nobody reads any more, or the terminal is closed; the outcome stands all the same
         sys.stderr.write(summary(result.record, result.directory, whole=whole, width=columns()))
         sys.stdout.write(f"{result.directory}\n")
         sys.stdout.flush()
