@@ -15,7 +15,7 @@ TORQUE_CONSTANT = (
 SPINDOWN = (
     "A constant torque that acts against either direction alike, such as a seal or a brake that drags whatever turns the "
     "rotor, is in T_c with its whole amount.",
-    "With the ring an error of the ring's inertia changes J_z, B and T_c by its share, until J_z leaves the drawing's tolerance.",
+    "With the ring an error of its inertia changes J_z, B and T_c by its share, until J_z leaves the drawing's tolerance.",
 )
 FORCE_CONSTANT = (
     "An asymmetry K_x/K_y that is common to both AMBs changes alpha_dx by the same share: both rows move together.",
