@@ -92,6 +92,10 @@ class Procedure:
     `needs` are the calibrations that a run with that plan uses; it reads them with `Recording.calibration`. `facts` is
     what `bench adopt` keeps of a run: values by name, None for what `analyse` yields. `holds_for` are the settings that these
     facts hold for, by default the plan's numbers; a setting that a need names must be equal in it.
+
+    `reached` are patterns of influences' identities ("!" takes away again): a check of the procedure sees an error of such a
+    one that matters. The others of Type B in its budgets are listed on the report as what no data can show, with the
+    sentences of `assumes`: what is in no budget and no data of any size can show, each with its sensitivity.
     """
 
     name: str
@@ -113,6 +117,8 @@ class Procedure:
     optional: tuple[
         Quantity, ...
     ] = ()  # of the measures, what a sound machine may not have: not missing where no limit asks
+    reached: tuple[str, ...] = ()
+    assumes: tuple[str, ...] = ()
     method: str = ""  # the report's method section: plain paragraphs, blank-line separated
 
     def problems(self, rig: RigFile, plan: Any) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from bench.busload import REFUSE, BusLoad, bus_load
 from bench.errors import ConfigError, Problem
 from bench.messages import MessageMap
 from bench.rigfile import RigFile, RigText, read_rig
+from bench.rigpossible import impossible
 from bench.rigrest import rest_of
 from bench.units import Unit
 
@@ -97,6 +98,7 @@ def problems_of(rig: RigFile) -> list[Problem]:
         *_masses(rig),
         *_envelope(rig),
         *_parameters(rig),
+        *impossible(rig),
     ]
     if not any(p.key.startswith("devices") for p in found):
         try:

@@ -27,6 +27,7 @@ from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
 from bench.uncertainty import Estimate
+from procedures import assumed
 from procedures import force_constant_figures as drawn
 from procedures.estimators import force_estimates, force_findings, force_rows
 from procedures.estimators.force_estimates import AxisResult
@@ -295,6 +296,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    assumes=assumed.FORCE_CONSTANT,
     method=METHOD,
     needs=needs,
     facts=facts,

@@ -24,7 +24,7 @@ from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
-from procedures import carrying
+from procedures import assumed, carrying
 from procedures import force_coupling_figures as drawn
 from procedures.estimators import carried_checks, coupling_findings
 from procedures.estimators.carried_data import CHANNELS, POSITIONS, SEGMENTS, StepMeans, read_steps
@@ -175,8 +175,6 @@ The thesis fits differences of the same equations linearly, with gamma_0 = 0 (T 
 
 At the home angle the ripple of the force over the rotor's angle (T 5.25, terms 2 and 3) has the same effect as the constants
 themselves; what is measured is alpha_d - alpha_2 over alpha_c + alpha_3.
-
-What no data here can show: an error common to both axes' currents, and gamma itself counted in wrong units by the controller.
 """
 
 procedure = Procedure(
@@ -199,5 +197,6 @@ procedure = Procedure(
     check=check,
     step_count=step_count,
     needs=needs,
+    assumes=assumed.FORCE_COUPLING,
     method=METHOD,
 )

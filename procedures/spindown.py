@@ -25,7 +25,7 @@ from bench.rigfile import RigFile
 from bench.roles import RigState
 from bench.states import transition
 from bench.uncertainty import Estimate
-from procedures import rotor
+from procedures import assumed, rotor
 from procedures import spindown_figures as drawn
 from procedures.estimators import drag, spindown_checks
 from procedures.estimators.drag import Drag
@@ -264,10 +264,6 @@ inertia on the shaft the decay is slower, and J = J_ring b_ring / (b - b_ring) i
 A drive that holds the rotor at several speeds says how much constant torque that takes: by the mean over both directions, in
 which what drives the released motor one way drops out, extrapolated to no speed. What the run-downs show beyond it acts only
 while the rotor coasts. The drive's own drag does, and is taken off as the rig file states it; more is a finding.
-
-What no data can show: a constant torque that acts against either direction alike whatever turns the rotor, such as a seal
-that drags, is Coulomb friction. An error of the inertia within its tolerance scales B and T_c; with the ring, one of the
-ring's inertia scales them and J_z, until J_z leaves the rig file's tolerance.
 """
 
 procedure = Procedure(
@@ -291,5 +287,6 @@ procedure = Procedure(
     fewest_steps=fewest_steps,
     facts=facts,
     holds_for=holds_for,
+    assumes=assumed.SPINDOWN,
     method=METHOD,
 )

@@ -24,7 +24,7 @@ from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import NOTHING, Load, RigState
 from bench.uncertainty import Estimate, Influence, propagate
-from procedures import rotor
+from procedures import assumed, rotor
 from procedures import torque_constant_figures as drawn
 from procedures.estimators import torque_balance, torque_checks
 from procedures.estimators.direction import SEGMENTS, of_probe
@@ -271,9 +271,6 @@ time at each gamma. Detent, offsets of the sensors and any other constant torque
 detent makes where the rotor stands a count of the encoder off home is taken off by the detent measured before.
 
 Sideways currents and the outboard AMB's answer show that the segments are wired as they are called.
-
-What no data can show: an error common to all masses, to gravity or to both arms scales alpha_tau by itself, and so does a
-common gain error of the four current sensors. A lever that is not level by 1 deg takes 0.015 % off every torque.
 """
 
 procedure = Procedure(
@@ -297,5 +294,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    reached=("masses/*", "!masses/density", "geometry/lever_*"),
+    assumes=assumed.TORQUE_CONSTANT,
     method=METHOD,
 )

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from bench.figures import Sheet
-from reports import budgets, front, habit, many, tables, text, vectors
+from reports import budgets, front, habit, many, tables, text, unseen, vectors
 from reports.counts import counts, words
 from reports.figures import Drawn
 from reports.linktable import clean, link_table
@@ -54,6 +54,8 @@ class Surroundings:
 
     title: str
     method: str = ""
+    reached: Sequence[str] = ()  # patterns of influences that a check of the procedure reaches
+    assumes: Sequence[str] = ()  # what is in no budget and no data can show
     definitions: Mapping[str, str] = dataclasses.field(default_factory=dict)  # quantity name -> definition
     titles: Mapping[str, str] = dataclasses.field(default_factory=dict)  # quantity name -> what readers call it
     rig: Content = dataclasses.field(default_factory=dict)  # the rig file's content
@@ -99,6 +101,9 @@ def view_of(record: Content, around: Surroundings, shown: Sequence[Drawn | Sheet
         no_results="" if rows else NO_RESULTS,
         about_uncertainty=ABOUT_UNCERTAINTY,
         decision_rule=DECISION_RULE,
+        unseen=unseen.unseen(measurements, around.reached, around.titles),
+        about_unseen=unseen.ABOUT,
+        assumed=tuple(around.assumes) if rows else (),
         notes=tuple(f for f in findings if not f.loud),
         figures=front.entries(shown),
         budgets=tuple(table for told, table in budgeted if told),

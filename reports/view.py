@@ -212,6 +212,9 @@ class ReportView:
     no_results: str
     about_uncertainty: str
     decision_rule: str  # 7.8.6
+    unseen: Table  # influences that no check can reach, and below what is assumed besides
+    about_unseen: str
+    assumed: tuple[str, ...]
     notes: tuple[FindingRow, ...]  # 7.8.2.1 n: what the bench itself noticed and what did not affect the outcome
     figures: tuple[FigureEntry, ...]
     budgets: tuple[BudgetTable, ...]  # 7.8.4.1 a

@@ -13,6 +13,7 @@ from bench.envelope import Envelope
 from bench.errors import ConfigError, InterlockError, Problem
 from bench.rigcheck import check_rig
 from bench.rigfile import RigFile, load_rig
+from bench.rigpossible import normal_gravity
 from bench.samples import SampleBlock
 
 RIGS = Path(__file__).resolve().parent.parent / "rigs"
@@ -336,3 +337,37 @@ def test_files_that_cannot_be_read_are_one_clear_error(tmp_path: Path) -> None:
     path.write_bytes(b"name = '\xff'")
     with pytest.raises(ConfigError, match=r"rig\.toml: byte 8 is not UTF-8"):
         check_rig(str(path))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "found", "expected"),
+    [
+        ("gravity = { value = 9.81175", "gravity = { value = 9.5", "site.gravity.value", "9.5", "9.81175"),
+        ("gravity = { value = 9.81175", "gravity = { value = 0", "site.gravity.value", "0", "9.81175"),
+        ("gravity = { value = 9.81175", "gravity = { value = -9.81175", "site.gravity.value", "-9.81", "9.81175"),
+        ("latitude_deg = 53.527", "latitude_deg = -10", "site.gravity.value", "9.81175", "latitude -10"),
+        ("elevation_m = 668", "elevation_m = 66800", "site.elevation_m", "66800", "9000"),
+        ("air_density = { value = 1.11", "air_density = { value = 7950", "site.air_density.value", "7950", "1.5"),
+        ("mass_density = { value = 7950", "mass_density = { value = 1.1", "mass_density.value", "1.1", "not of the air"),
+        ("i_yi_p = { gain = { value = 1,", "i_yi_p = { gain = { value = 0,", "sensors.i_yi_p.gain.value", "0", "5%"),
+        ("i_yi_p = { gain = { value = 1,", "i_yi_p = { gain = { value = 1.06,", "sensors.i_yi_p.gain.value", "1.06", "1 wit"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_refused(tmp_path: Path, old: str, new: str, key: str, found: str, expected: str) -> None:
+    """Gravity against place and elevation, gains and densities against what there is: nothing else is wrong then."""
+    p = problems(tmp_path, changed(TOML, (old, new)))
+    assert list(p) == [key]
+    assert found in p[key].found
+    assert expected in p[key].expected
+
+
+def test_gravity_is_the_formula_of_the_rig_file() -> None:
+    """Equator and pole at sea level by hand: 9.780327 and 9.780327 * 1.0053024; the free-air term is 0.3086 mGal a metre."""
+    assert normal_gravity(0, 0) == pytest.approx(9.780327, rel=1e-9)
+    assert normal_gravity(-90, 0) == pytest.approx(9.8321862, rel=1e-7)
+    assert normal_gravity(53.527, 668) == pytest.approx(9.81175, abs=5e-6)
+
+
+def test_a_sensor_that_its_certificate_corrects_is_right(tmp_path: Path) -> None:
+    path = written(tmp_path, changed(TOML, ("i_yi_p = { gain = { value = 1,", "i_yi_p = { gain = { value = 1.012,")))
+    assert check_rig(path)[0] == ()

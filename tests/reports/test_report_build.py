@@ -29,7 +29,7 @@ import reports
 from bench.errors import BenchError
 from bench.figures import Sheet
 from bench.procedure import Quantity
-from reports import budgets, compose, html, pdf, text
+from reports import budgets, compose, html, pdf, text, unseen
 from reports.figures import draw
 from reports.view import SIMULATED, FigureEntry, ReportView
 
@@ -156,6 +156,36 @@ def test_what_only_the_simulator_knows_is_not_printed_and_like_sensors_share_a_r
     assert not any("M2" in row[0] or "i_xi_p" in row[0] for row in rows)  # no result rests on them
     certificate = ("masses.M1", "0.5\u202fkg", "U = 5\u202f×\u202f10⁻⁵\u202fkg (k = 2), normal")
     assert certificate in [row[:3] for row in rows]
+
+
+def test_what_no_data_can_show_is_made_from_the_budget() -> None:
+    """What carries most comes first, with the result that it carries most of; what a check reaches and Type A is left out."""
+    entries = [
+        ("sensors/a/gain", "B", 3.0),
+        ("masses/M1", "B", 2.0),
+        ("scatter/1", "A", 1.0),
+        ("site/gravity", "B", 0.1),
+    ]
+    budget = [
+        {"name": f"the {i}", "influence": i, "type": kind, "contribution": c, "sensitivity": -7.0, "distribution": "normal",
+         "dof": None}
+        for i, kind, c in entries
+    ]  # fmt: skip
+    made = view(around(reached=("masses/*",), assumes=("All masses alike: K by that share.",)), measurements=[
+        measurement(budget=budget), measurement(name="K_o", budget=budget[2:])])  # fmt: skip
+    rows = made.unseen.rows
+    assert [row[0] for row in rows] == ["the sensors/a/gain", "1 further influence"]
+    assert rows[0][1:] == ("64\u202f%", "K_i", "3.0\u202fN/A", "−7.00")
+    page = Page(html.render(made)).text
+    places = [page.index(w) for w in ("Decision rule", "What no data can show", "All masses alike", "Notes")]
+    assert places == sorted(places)
+
+
+def test_a_pattern_takes_away_again() -> None:
+    reached = ("masses/*", "!masses/hanger")
+    assert unseen.is_reached("masses/M1", reached)
+    assert not unseen.is_reached("masses/hanger", reached)
+    assert not unseen.is_reached("sensors/i_yo_p/gain", reached)
 
 
 def test_every_required_field_is_in_the_page_in_order() -> None:
@@ -346,7 +376,7 @@ def test_the_pdf_has_the_sections_of_the_page_in_the_same_order() -> None:
     asked = typst.query(pdf.sources(made), "heading.where(level: 1)", field="body", ignore_system_fonts=True)
     in_pdf = [heading["text"] for heading in json.loads(asked)]
     assert in_pdf == in_page
-    assert len(in_pdf) == 15
+    assert len(in_pdf) == 16
 
 
 def test_the_page_fetches_nothing() -> None:
