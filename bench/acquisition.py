@@ -13,12 +13,20 @@ from bench import provenance, runlog
 from bench.errors import (
     Aborted,
     BenchError,
+    BytesUnreadable,
     DeviceFault,
+    DriveFault,
     InterlockError,
     LinkError,
+    NoReply,
     OperatorAbort,
+    OperatorRefused,
+    OperatorSilent,
     RecordingError,
+    Refused,
+    RotorNotArrived,
     SignalAbort,
+    StateNotReached,
 )
 from bench.evaluation import Ending
 from bench.findings import Effect, Finding
@@ -26,6 +34,7 @@ from bench.opened import Job, OpenRig
 from bench.progress import Progress, described
 from bench.recorder import Recorder
 from bench.records import Outcome
+from bench.registers import RegisterRefused
 from bench.roles import RigState
 from bench.rundir import RunDirectory
 from bench.states import transition
@@ -33,10 +42,14 @@ from bench.supervisor import SafeStep, Supervisor
 
 logger = logging.getLogger("bench.runner")
 CODES: tuple[tuple[type[BaseException], str], ...] = (
-    (SignalAbort, "signal"), (OperatorAbort, "operator-stop"), (DeviceFault, "controller-fault"),
-    (InterlockError, "interlock"), (LinkError, "link-lost"), (RecordingError, "recording-failed"),
+    (SignalAbort, "signal"), (OperatorAbort, "operator-stop"), (DriveFault, "drive-fault"),
+    (DeviceFault, "controller-fault"), (InterlockError, "interlock"), (RegisterRefused, "device-refused"),
+    (NoReply, "no-reply"), (BytesUnreadable, "bytes-unreadable"), (OperatorSilent, "operator-silent"),
+    (LinkError, "link-lost"), (StateNotReached, "state-not-reached"), (RotorNotArrived, "rotor-not-arrived"),
+    (OperatorRefused, "operator-refused"), (Refused, "controller-refused"), (RecordingError, "recording-failed"),
     (BenchError, "run-failed"),
 )  # fmt: skip
+"""The finding of an error that ends a run: the first kind that it is."""
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from bench.clock import Clock, PumpedClock
 from bench.envelope import Envelope
-from bench.errors import BenchError, InterlockError, LinkError
+from bench.errors import BenchError, InterlockError, LinkError, StateNotReached
 from bench.link import Link
 from bench.recorder import Recorder
 from bench.rigfile import RigFile
@@ -14,7 +14,7 @@ from bench.roles import RigState
 from bench.samples import SampleBlock
 from bench.session import Session
 from bench.telemetry import TelemetryDecoder
-from drivers import advice, handshake, waiting
+from drivers import advice, handshake, unheard, waiting
 from drivers.capture import ControllerCapture
 from drivers.capture_upload import Upload
 from drivers.condition import Condition
@@ -49,6 +49,7 @@ class Controller:
         self.guarded = True
         self._condition = Condition(rig, self.telemetry)
         self._last_ns = self._polled_ns = base.now_ns()
+        self._heard = unheard.Heard.of(link)  # what had come when telemetry came last
         self.cleared = ""
         self.restored: tuple[str, ...] = ()
         self.serial: int | None = None
@@ -87,7 +88,7 @@ class Controller:
             clear_fault: clear whatever fault there is; else only HEARTBEAT_LOST, which says nothing of the machine.
 
         Raises:
-            LinkError: no telemetry, or no answer.
+            LinkError: no telemetry, or no answer; BytesUnreadable: bytes that are no telemetry.
             ConfigError: another host owns it or talks to it, its protocol or message map is another one, or it has a
                 fault that somebody should look at.
         """
@@ -96,10 +97,11 @@ class Controller:
             self.clock.sleep(handshake.LISTEN_S)
             handshake.alone(self._hosts.seen, self.link.name)
         self.link.renew_lease()
-        silent = (
-            f"no telemetry within {FIRST_S:g} s. Is the controller on, the port right, the bit rate that of the bus?"
-        )
-        self.wait(lambda: bool(self.telemetry.latest), FIRST_S, LinkError(f"link {self.link.name}: {silent}"))
+        begun = unheard.Heard.of(self.link)
+        self.wait(lambda: bool(self.telemetry.latest), FIRST_S, lambda: unheard.error(
+            self.link, begun, FIRST_S,
+            f"no telemetry within {FIRST_S:g} s. Is the controller on, the port right, the bit rate that of the bus?",
+        ))  # fmt: skip
         handshake.claim(self._dialogue, self.rig, self._session, self.clock, self._wait)
         self.serial = handshake.identify(self._dialogue, self.rig, self._session, self._wait)
         if self.mode == "FAULT":
@@ -127,7 +129,7 @@ class Controller:
         """Read the link, record, decode, and look after the machine.
 
         Raises:
-            LinkError: no telemetry for half a second (`drivers.waiting.patience_s`).
+            LinkError: no telemetry for half a second (`drivers.waiting.patience_s`); BytesUnreadable where bytes come.
             InterlockError: the envelope tripped.
             DeviceFault: the controller reports a fault, or has restarted.
         """
@@ -146,7 +148,8 @@ class Controller:
             if self._recorder is not None:
                 self._recorder.samples(block)
         if blocks:
-            self._last_ns = self._base.now_ns()
+            self._last_ns, self._heard = self._base.now_ns(), unheard.Heard.of(self.link)
+        self._condition.look(now)
         if self.guarded:
             self.link.renew_lease()
             for block in blocks:
@@ -185,13 +188,18 @@ class Controller:
     def _check(self) -> None:
         if self.silent_s > self._patience_s + (self.rig.link.reconnect_s if self.link.reopening else 0.0):
             text = f"no telemetry for {self.silent_s:.2f} s; the link or the controller is lost"
-            raise LinkError(f"link {self.link.name}: {text}")
+            raise unheard.error(self.link, self._heard, self.silent_s, text)
         self._condition.check()
 
     @property
     def round_trip_ns(self) -> int | None:
         """The least time from a request to its answer."""
         return self._dialogue.round_trip_ns
+
+    @property
+    def repeats(self) -> int:
+        """Requests that were sent again because no reply had come."""
+        return self._dialogue.repeats
 
     @property
     def replies_wrong_length(self) -> int:
@@ -258,7 +266,7 @@ class Controller:
         """Turn the rotor the shorter way to an angle and wait until it stands there.
 
         Raises:
-            LinkError: it does not arrive in time.
+            RotorNotArrived: it does not arrive in time.
         """
         self._turning.point(angle_rad)
 
@@ -266,7 +274,7 @@ class Controller:
         """Turn the rotor at a speed; returns when it has kept within 2 % or 0.3 rad/s of it for a tenth of a second.
 
         Raises:
-            LinkError: it does not get there in time.
+            RotorNotArrived: it does not get there in time.
         """
         self._turning.spin(rad_s)
 
@@ -274,9 +282,9 @@ class Controller:
         """Brake to a stop, and wait until the rotor is below the landing speed.
 
         Raises:
-            LinkError: it does not get there in time.
+            RotorNotArrived: it does not get there in time.
         """
-        self._turning.stop(self.link.name)
+        self._turning.stop()
 
     def _default(self, parameter: str) -> float:
         """What a parameter is set to unless a plan says otherwise; 0 where the rig has none."""
@@ -305,15 +313,18 @@ class Controller:
     def _command(self, name: str, goal: str, timeout_s: float, expected_s: float = 0.0) -> None:
         self._orders.command(name)
         self.clock.sleep(expected_s)
-        self._wait(lambda: self.mode == goal, timeout_s, f"state {goal} after {name}")
+        self.wait(lambda: self.mode == goal, timeout_s, lambda: StateNotReached(
+            f"the controller took {name} and is not {goal} after {expected_s + timeout_s:g} s: its state is "
+            f"{self._condition.described(self._base.now_ns())}"
+        ))  # fmt: skip
 
     def _wait(self, done: Callable[[], bool], timeout_s: float, what: str) -> None:
-        self.wait(done, timeout_s, no_reply(self.link.name, what, timeout_s))
+        self.wait(done, timeout_s, lambda: no_reply(self.link.name, what, timeout_s))
 
-    def wait(self, done: Callable[[], bool], timeout_s: float, error: LinkError) -> None:
+    def wait(self, done: Callable[[], bool], timeout_s: float, error: Callable[[], BenchError]) -> None:
         """Let the clock run until something is true.
 
         Raises:
-            LinkError: the given one, when time runs out.
+            BenchError: the given one, when time runs out.
         """
         waiting.until(done, timeout_s, error, self.clock, self._base.now_ns)

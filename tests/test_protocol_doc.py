@@ -4,6 +4,7 @@ commands the simulated controller, and its C functions work."""
 from __future__ import annotations
 
 import ctypes
+import itertools
 import os
 import re
 import shutil
@@ -272,9 +273,12 @@ def test_commands_are_allowed_where_the_page_says(device: SimulatedController, c
         assert after == state
 
 
+TOKENS = itertools.cycle(range(256))
+
+
 def ask(device: SimulatedController, command: str) -> dict[str, float]:
     code = MESSAGES.code("Command", "code", command)
-    payload = encode(MESSAGES["Command"], {"session": 0x11, "code": code, "token": 1})
+    payload = encode(MESSAGES["Command"], {"session": 0x11, "code": code, "token": next(TOKENS)})
     out = device.advance(0, frame(MESSAGES["Command"].identifier, payload, flags=FD), 0)
     values, _ = Decoder(MESSAGES["CommandReply"]).decode(out if len(out) else empty_batch())
     return {name: float(column[0]) for name, column in values.items()}
