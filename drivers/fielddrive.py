@@ -121,9 +121,7 @@ class FieldDrive:
         back, step = self._bus.refresh(self.name)[name], abs(r.scale * unit.factor)
         near = 1e-6 * abs(value) if r.type == "f32" else step
         if not math.isclose(back, value, rel_tol=0, abs_tol=max(near, 1e-12)):
-            raise Refused(
-                f"drive {self.name}: wrote {what} of {value:g} {unit.si}, it reads back {back:g} {unit.si}"
-            )
+            raise Refused(f"drive {self.name}: wrote {what} of {value:g} {unit.si}, it reads back {back:g} {unit.si}")
 
     def run(self) -> None:
         """Let it give torque.
@@ -208,6 +206,7 @@ class FieldDrive:
     def _until_running(self, running: bool) -> None:
         if "running" not in self._device.spec.registers:
             return
+
         def done() -> bool:
             values = self._bus.refresh(self.name)
             fault = self.fault_of(values)

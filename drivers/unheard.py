@@ -30,7 +30,9 @@ def error(link: Link, before: Heard, seconds: float, text: str) -> LinkError:
         return LinkError(f"link {link.name}: {text}. {frames} other messages came meanwhile")
     if not octets:
         return LinkError(f"link {link.name}: {text}")
-    wrong = [f"{malformed} pieces that are no message"] * bool(malformed) + [f"{corrupt} with a wrong CRC"] * bool(corrupt)
+    wrong = [f"{malformed} pieces that are no message"] * bool(malformed) + [f"{corrupt} with a wrong CRC"] * bool(
+        corrupt
+    )
     return BytesUnreadable(
         f"link {link.name}: {octets} bytes came in {seconds:.2g} s ({octets / max(seconds, 1e-3) * 1e-3:.1f} kB/s), but no "
         f"message can be made of them{': ' * bool(wrong)}{', '.join(wrong)}. Next: compare the kind of the link (packets or "

@@ -36,7 +36,9 @@ class Stopwatch:
         return self._ns
 
 
-def until(done: Callable[[], bool], timeout_s: float, error: Callable[[], BenchError], clock: Clock, now_ns: Now) -> None:
+def until(
+    done: Callable[[], bool], timeout_s: float, error: Callable[[], BenchError], clock: Clock, now_ns: Now
+) -> None:
     """Let the clock run until something is true; `now_ns` is looked at without letting it run.
 
     Raises:

@@ -26,7 +26,7 @@ from bench.messages import Message
 from bench.rigfile import load_rig
 from bench.session import Session
 from bench.wire import captureblock, isotp, packet, slcan
-from drivers import controller, handshake, slcan_bus, waiting
+from drivers import controller, dialogue, handshake, slcan_bus, waiting
 from sim_backend import ownership
 from sim_backend.controller import MAP_VERSION, SimulatedController
 from sim_backend.truth import draw
@@ -309,6 +309,7 @@ def test_numbers_of_the_host_and_of_the_rig() -> None:
         rows["telemetry missing: the link is lost"] == f"{waiting.SILENCE_S:g} s, or `watchdog_s` where that is longer"
     )
     assert rows["first telemetry after opening"] == f"within {controller.FIRST_S:g} s"
+    assert rows["a request without a reply"] == f"is sent {dialogue.ATTEMPTS} times in all"
     assert rows["silent owner at rest may be replaced"] == f"after {ownership.TAKEOVER_S:g} s"
     assert rows["the host keeps asking for ownership"] == f"{handshake.TAKEOVER_S:g} s"
     known = RIG.devices["controller"]

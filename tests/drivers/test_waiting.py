@@ -10,7 +10,6 @@ from bench.errors import LinkError, RotorNotArrived
 from drivers import waiting
 
 
-
 def late() -> LinkError:
     return LinkError("late")
 
