@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from bench.clock import Clock, PumpedClock
 from bench.envelope import Envelope
-from bench.errors import BenchError, InterlockError, LinkError, StateNotReached
+from bench.errors import BenchError, InterlockError, StateNotReached
 from bench.link import Link
 from bench.recorder import Recorder
 from bench.rigfile import RigFile

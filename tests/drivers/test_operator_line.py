@@ -90,7 +90,7 @@ def test_a_line_that_is_lost_stays_lost(monkeypatch: pytest.MonkeyPatch, answer:
 
 def test_an_operator_that_says_nothing_is_called_silent(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(operator_line, "ANSWER_S", 0.2)
-    with opened(b"") as (line, _), pytest.raises(OperatorSilent, match="no answer .* the line is open"):
+    with opened(b"") as (line, _), pytest.raises(OperatorSilent, match=r"no answer .* the line is open"):
         line.request("hang M1")
 
 

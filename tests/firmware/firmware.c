@@ -18,6 +18,17 @@
 
 static int port; /* the descriptor */
 
+/* ---- output: whole lines and packets, or nothing of them ---- */
+
+static uint8_t queue[65536];
+static size_t queued;
+
+void enqueue(const uint8_t *bytes, size_t n) {
+    if (queued + n > sizeof queue) return;
+    memcpy(queue + queued, bytes, n);
+    queued += n;
+}
+
 static void flush(void) {
     ssize_t n = queued ? write(port, queue, queued) : 0;
     if (n <= 0) return;

@@ -28,10 +28,14 @@ void telemetry(uint32_t tick);
 
 /* wire.c: packets and SLCAN, both ways */
 extern int packets;                /* rather than SLCAN */
-extern uint8_t queue[65536];       /* what waits to be written */
-extern size_t queued;
-void enqueue(const uint8_t *bytes, size_t n);
 void send_message(int identifier, const uint8_t *payload, int length);
 void close_packet(void);
 void take_bytes(const uint8_t *in, size_t n);
+uint32_t crc16(const uint8_t *in, size_t n);
+uint32_t crc32(const uint8_t *in, size_t n);
+size_t cobs_encode(const uint8_t *in, size_t n, uint8_t *out);
+size_t cobs_decode(const uint8_t *in, size_t n, uint8_t *out);
+
+/* firmware.c: the port */
+void enqueue(const uint8_t *bytes, size_t n);
 #endif

@@ -5,23 +5,12 @@
 
 int packets;
 
-/* ---- output: whole lines and packets, or nothing of them ---- */
-
-uint8_t queue[65536];
-size_t queued;
-
-void enqueue(const uint8_t *bytes, size_t n) {
-    if (queued + n > sizeof queue) return;
-    memcpy(queue + queued, bytes, n);
-    queued += n;
-}
-
 /* ---- transport: packets ---- */
 
 static uint8_t content[1032];
 static size_t filled = 7; /* bytes of content so far */
 
-static uint32_t crc16(const uint8_t *in, size_t n) {
+uint32_t crc16(const uint8_t *in, size_t n) {
     uint32_t crc = 0xFFFF;
     while (n--) {
         crc ^= (uint32_t)*in++ << 8;
@@ -30,7 +19,7 @@ static uint32_t crc16(const uint8_t *in, size_t n) {
     return crc;
 }
 
-static uint32_t crc32(const uint8_t *in, size_t n) {
+uint32_t crc32(const uint8_t *in, size_t n) {
     uint32_t crc = 0xFFFFFFFF;
     while (n--) {
         crc ^= *in++;
@@ -39,7 +28,7 @@ static uint32_t crc32(const uint8_t *in, size_t n) {
     return crc ^ 0xFFFFFFFF;
 }
 
-static size_t cobs_encode(const uint8_t *in, size_t n, uint8_t *out) {
+size_t cobs_encode(const uint8_t *in, size_t n, uint8_t *out) {
     size_t code = 0, at = 1, i;
     for (i = 0; i < n; i++) {
         if (in[i]) out[at++] = in[i];
@@ -49,7 +38,7 @@ static size_t cobs_encode(const uint8_t *in, size_t n, uint8_t *out) {
     return at;
 }
 
-static size_t cobs_decode(const uint8_t *in, size_t n, uint8_t *out) {
+size_t cobs_decode(const uint8_t *in, size_t n, uint8_t *out) {
     size_t at = 0, i = 0;
     while (i < n) {
         size_t code = in[i], k;
