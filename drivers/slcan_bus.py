@@ -65,7 +65,7 @@ class SlcanBatchBus(can.BusABC):
         self._writing = threading.Lock()
         self._ask: Callable[[bytes], None] = self._write
         self._waiting: deque[can.Message] = deque()
-        self.octets = 0  # that came since it was set up
+        self.octets = 0  # that came since it was set up, without what the adapter itself answers
         self._came = 0  # frames while it was set up
         self._filter: Callable[[FrameBatch], Any] | None = None
         self.stream = SlcanStream(timestamp=timestamp)
@@ -149,8 +149,9 @@ class SlcanBatchBus(can.BusABC):
         data = self.port.read(SILENT_S if timeout_s is None else min(timeout_s, SILENT_S))
         if not data:
             return empty_batch()
-        self.octets += len(data)
+        answered = self.stream.answered
         batch = self.stream.feed(data, self._now_ns())
+        self.octets += len(data) - (self.stream.answered - answered)
         if len(batch):
             self._heard = time.monotonic()
         return batch if self._filter is None else batch[self._filter(batch)]

@@ -8,6 +8,9 @@ from bench.errors import BytesUnreadable, LinkError
 from bench.link import Link
 
 
+FEW = 3  # bytes: a delimiter, and what opening a port may stir up
+
+
 class Heard(NamedTuple):
     """What has come over a link so far: bytes where it has some, frames, what is no packet or line, wrong CRCs."""
 
@@ -28,7 +31,7 @@ def error(link: Link, before: Heard, seconds: float, text: str) -> LinkError:
     octets, frames, malformed, corrupt = (now - then for now, then in zip(Heard.of(link), before, strict=True))
     if frames:
         return LinkError(f"link {link.name}: {text}. {frames} other messages came meanwhile")
-    if not octets:
+    if octets <= FEW:
         return LinkError(f"link {link.name}: {text}")
     wrong = [f"{malformed} pieces that are no message"] * bool(malformed) + [f"{corrupt} with a wrong CRC"] * bool(
         corrupt

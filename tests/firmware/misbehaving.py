@@ -11,9 +11,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,15 +25,17 @@ K_I, K_O = 73.2, 74.4  # N/A, what the limits of specs/tsbs12.toml expect
 WATCHDOG_S = 1.0  # a busy machine is no dead host
 PLAN = ("angles=8", "settle_s=0.1", "average_s=0.1")
 LIMIT_S = 240.0
+ELSEWHERE = ("mb", "answer-", "deafoperator", "wrongmass")  # switches that the C program has nothing to do with
 SWITCH = re.compile(r"([\w-]+)(?:=([-\d.e]+))?(?:@([\d.]+))?")
 
 
 @dataclass(frozen=True)
 class Ended:
-    """How a run ended: exit status, seconds, what was printed, and, where there was a run, its outcome and its findings."""
+    """How a run ended: exit status, seconds, the longest time without a line, what was printed, and, where there was a run, its outcome and its findings."""
 
     status: int
     seconds: float
+    quiet_s: float
     printed: str
     outcome: str
     findings: tuple[str, ...]
@@ -42,7 +43,7 @@ class Ended:
 
     def __str__(self) -> str:
         found = ", ".join(self.findings) or "no finding"
-        return f"exit {self.status} after {self.seconds:.0f} s, {self.outcome or 'no run'}: {found}; {self.device}\n{self.printed}"
+        return f"exit {self.status} after {self.seconds:.0f} s ({self.quiet_s:.0f} s quiet), {self.outcome or 'no run'}: {found}; {self.device}\n{self.printed}"
 
 
 class Switches:
@@ -65,14 +66,16 @@ class Switches:
 class Operator:
     """Answers lines, and tells the controller's plant what hangs."""
 
-    def __init__(self, switches: Switches, hang: Iterator[None] | object, masses: dict[str, float]) -> None:
+    def __init__(self, switches: Switches, hang: Callable[[float], None], masses: dict[str, float]) -> None:
         self._switches, self._hang, self._masses = switches, hang, masses
+        self._closed = threading.Event()
         self._server = socketserver.ThreadingTCPServer(("127.0.0.1", 0), self._handler())
-        self._server.daemon_threads = True
         self.port = int(self._server.server_address[1])
         threading.Thread(target=self._server.serve_forever, name="operator", daemon=True).start()
 
     def close(self) -> None:
+        """End with every thread."""
+        self._closed.set()
         self._server.shutdown()
         self._server.server_close()
 
@@ -84,7 +87,7 @@ class Operator:
                 for line in self.rfile:
                     answer = outer._answer(line.decode().split())
                     if answer is None:
-                        threading.Event().wait(LIMIT_S)
+                        outer._closed.wait(LIMIT_S)
                         return
                     self.wfile.write(answer)
 
@@ -102,7 +105,8 @@ class Operator:
             return b"error the hook is gone\n"
         if s.active("answer-gone") is not None:
             raise ConnectionAbortedError
-        self._hang(self._masses.get(words[1], 0.0))  # type: ignore[operator]
+        wrong = s.active("wrongmass") if words[1] == "M2" else None
+        self._hang(self._masses.get(words[1], 0.0) * (wrong or 1.0))
         return b"ok 0\n"
 
 
@@ -121,7 +125,7 @@ def rig_that(program: Path, wire: str, switches: Sequence[str]) -> Iterator[tupl
     """A rig that misbehaves so, for the block: the options of `bench run` that name its links, and a list that gets the
     controller's last words."""
     others = Switches(switches)
-    mine = [s for s in switches if not s.startswith(("mb", "answer-", "deafoperator"))]
+    mine = [s for s in switches if not s.startswith(ELSEWHERE)]
     last: list[str] = []
     child = subprocess.Popen(
         [program, wire, "1", str(K_I), str(K_O), *mine], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -147,6 +151,22 @@ def rig_that(program: Path, wire: str, switches: Sequence[str]) -> Iterator[tupl
         last.append(child.communicate(timeout=10)[0].strip())
 
 
+def watched(command: Sequence[str]) -> tuple[int, list[str], float]:
+    """Run it; its status, its lines, and the longest time between two of them, s."""
+    child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=ROOT,
+                             env={**os.environ, "NO_COLOR": "1", "PYTHONUNBUFFERED": "1"})  # fmt: skip
+    with child:
+        stop = threading.Timer(LIMIT_S, child.kill)
+        stop.start()
+        assert child.stdout
+        lines, quiet_s, last = [], 0.0, time.monotonic()
+        for line in child.stdout:
+            quiet_s, last = max(quiet_s, time.monotonic() - last), time.monotonic()
+            lines.append(line)
+        stop.cancel()
+    return child.returncode, lines, max(quiet_s, time.monotonic() - last)
+
+
 def ended(program: Path, folder: Path, wire: str, switches: Sequence[str]) -> Ended:
     """Let `bench run` at a rig that misbehaves so."""
     with rig_that(program, wire, switches) as (links, last):
@@ -154,10 +174,9 @@ def ended(program: Path, folder: Path, wire: str, switches: Sequence[str]) -> En
         command = [sys.executable, "-m", "bench.cli", "run", "amb-calibration", "--rig", str(rig_file(folder)), "--backend", "live",
                    "--operator", "auto", "--no-report", "--out", str(folder / "runs"), *plan, *links]  # fmt: skip
         begin = time.monotonic()
-        child = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S, cwd=ROOT, check=False,
-                               env={**os.environ, "NO_COLOR": "1"})  # fmt: skip
+        status, lines, quiet_s = watched(command)
         took = time.monotonic() - begin
     records = [json.loads(path.read_text(encoding="utf-8")) for path in (folder / "runs").glob("*/record.json")]
     record = records[0] if records else {"outcome": "", "findings": []}
-    return Ended(child.returncode, took, child.stdout + child.stderr, record["outcome"],
+    return Ended(status, took, quiet_s, "".join(lines), record["outcome"],
                  tuple(f["code"] for f in record["findings"]), last[0] if last else "")  # fmt: skip

@@ -83,6 +83,7 @@ static void spoil_reply(int identifier, uint8_t *m) {
     } else if (identifier == IDENTITY) {
         if (on("wrongproto")) put(m, 2, 2);
         if (on("wrongmap")) put(m + 2, 3, 2);
+        if (on("serial0")) put(m + 4, 0, 4);
     } else if (identifier == OWNER) {
         if (on("otherowner")) { put(m, 0x01020304, 4); put(m + 4, 1767225600, 4); memset(m + 8, 0, 54); memcpy(m + 8, "nobody@else", 11); }
         if (on("badname")) { put(m, 0x01020304, 4); memset(m + 4, 0xFF, 58); memcpy(m + 8, "\033[31mred", 8); }

@@ -148,7 +148,7 @@ static int told(void) { /* what the operator did; 0 at the end */
     for (ssize_t k = 0; k < n; k++) {
         if (in[k] != '\n') { if (length < sizeof line - 1) line[length++] = in[k]; continue; }
         line[length] = 0;
-        if (!strncmp(line, "hang ", 5)) hung_kg = atof(line + 5) * (on("wrongmass") ? *on("wrongmass") : 1);
+        if (!strncmp(line, "hang ", 5)) hung_kg = atof(line + 5);
         length = 0;
     }
     return n > 0;
