@@ -7,7 +7,6 @@ from typing import NamedTuple
 from bench.errors import BytesUnreadable, LinkError
 from bench.link import Link
 
-
 FEW = 3  # bytes: a delimiter, and what opening a port may stir up
 
 

@@ -25,7 +25,12 @@ def registers(active: Active) -> dict[tuple[int, int], dict[int, int]]:
         (DRIVE, HOLDING): dict.fromkeys(range(3), 0),
         (DRIVE, INPUT): {0: 0, 1: int(active("mbfault") or 0), 2: 0, 3: 0, 4: 0},
         (SUPPLY, INPUT): {100: 0 if off else 14_800, 101: 0 if off else 350, 110: 0 if off else 1},
-        (THERMAL, INPUT): {0: hot, 1: 220, 2: 220, **dict(enumerate(struct.unpack(">2H", struct.pack(">f", ambient)), 8))},
+        (THERMAL, INPUT): {
+            0: hot,
+            1: 220,
+            2: 220,
+            **dict(enumerate(struct.unpack(">2H", struct.pack(">f", ambient)), 8)),
+        },
     }
 
 

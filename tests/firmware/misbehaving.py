@@ -31,7 +31,8 @@ SWITCH = re.compile(r"([\w-]+)(?:=([-\d.e]+))?(?:@([\d.]+))?")
 
 @dataclass(frozen=True)
 class Ended:
-    """How a run ended: exit status, seconds, the longest time without a line, what was printed, and, where there was a run, its outcome and its findings."""
+    """How a run ended: exit status, seconds, the longest time without a line, what was printed, and, where there was a run, its
+    outcome and its findings; the controller's last words."""
 
     status: int
     seconds: float
@@ -43,7 +44,8 @@ class Ended:
 
     def __str__(self) -> str:
         found = ", ".join(self.findings) or "no finding"
-        return f"exit {self.status} after {self.seconds:.0f} s ({self.quiet_s:.0f} s quiet), {self.outcome or 'no run'}: {found}; {self.device}\n{self.printed}"
+        head = f"exit {self.status} after {self.seconds:.0f} s, {self.quiet_s:.0f} s of them quiet, {self.outcome or 'no run'}"
+        return f"{head}: {found}; {self.device}\n{self.printed}"
 
 
 class Switches:
@@ -87,24 +89,25 @@ class Operator:
                 for line in self.rfile:
                     answer = outer._answer(line.decode().split())
                     if answer is None:
-                        outer._closed.wait(LIMIT_S)
                         return
                     self.wfile.write(answer)
 
         return Handler
 
     def _answer(self, words: list[str]) -> bytes | None:
+        """What is said to a request; None: nothing more, the line closes."""
         s = self._switches
         if s.levitated_s is None:
             s.levitated_s = time.monotonic()
         if s.active("deafoperator") is not None:
+            self._closed.wait(LIMIT_S)
             return None
         if s.active("answer-empty") is not None:
             return b"\n"
         if s.active("answer-error") is not None:
             return b"error the hook is gone\n"
         if s.active("answer-gone") is not None:
-            raise ConnectionAbortedError
+            return None
         wrong = s.active("wrongmass") if words[1] == "M2" else None
         self._hang(self._masses.get(words[1], 0.0) * (wrong or 1.0))
         return b"ok 0\n"
@@ -171,8 +174,19 @@ def ended(program: Path, folder: Path, wire: str, switches: Sequence[str]) -> En
     """Let `bench run` at a rig that misbehaves so."""
     with rig_that(program, wire, switches) as (links, last):
         plan = [word for text in PLAN for word in ("--plan", text)]
-        command = [sys.executable, "-m", "bench.cli", "run", "amb-calibration", "--rig", str(rig_file(folder)), "--backend", "live",
-                   "--operator", "auto", "--no-report", "--out", str(folder / "runs"), *plan, *links]  # fmt: skip
+        options = [
+            "--backend",
+            "live",
+            "--operator",
+            "auto",
+            "--no-report",
+            "--out",
+            str(folder / "runs"),
+            *plan,
+            *links,
+        ]
+        rig = str(rig_file(folder))
+        command = [sys.executable, "-m", "bench.cli", "run", "amb-calibration", "--rig", rig, *options]
         begin = time.monotonic()
         status, lines, quiet_s = watched(command)
         took = time.monotonic() - begin

@@ -9,7 +9,9 @@ from dataclasses import dataclass
 
 PASS, INDETERMINATE, ERROR, ABORTED, NO_RUN = "PASS", "INDETERMINATE", "ERROR", "ABORTED", "no run"
 STATUS = {PASS: {0}, INDETERMINATE: {5}, ERROR: {3}, ABORTED: {4}, NO_RUN: {2, 3}}
-NOISE = frozenset({"parameters-restored", "telemetry-late", "heartbeat-late", "heartbeat-unprioritised", "step-incomplete"})
+NOISE = frozenset(
+    {"parameters-restored", "telemetry-late", "heartbeat-late", "heartbeat-unprioritised", "step-incomplete"}
+)
 """Findings of a busy machine, or that say no more than another one."""
 
 
@@ -40,7 +42,9 @@ HARMLESS = (
     Kind("drift-inside", "ppm=150", PASS, (), "the controller's clock runs 150 ppm fast"),
     Kind("bundles", "bundle=5", PASS, (), "5 ms of telemetry in a packet"),
     Kind("dribble", "dribble", PASS, (), "bytes come seven at a time"),
-    Kind("prefix", "prefix=300000", PASS, ("bytes-malformed",), "300 kB of noise at the start", also=("packets-corrupt",)),
+    Kind(
+        "prefix", "prefix=300000", PASS, ("bytes-malformed",), "300 kB of noise at the start", also=("packets-corrupt",)
+    ),
     Kind("pause", "pause=0.3@1", PASS, (), "0.3 s of telemetry come late"),
     Kind("packet-numbers-jump", "packetseqjump=300@1", PASS, ("packets-lost",), "the packets' number leaps by 300"),
     Kind("noise-between", "huge2k=0.01@1", PASS, ("bytes-malformed",), "2 kB of noise behind 1 packet in 100"),
@@ -59,28 +63,77 @@ HARMLESS = (
 )
 SPOILED = (
     Kind("crc", "crc=0.003", INDETERMINATE, CRC, "3 packets in 1000 have a wrong CRC", also=("requests-repeated",)),
-    Kind("flipped-bits", "flip=0.004", INDETERMINATE, LOST, "4 packets in 1000 have a bit flipped",
-         also=("packets-corrupt", "packets-lost", "bytes-malformed", "requests-repeated")),
+    Kind(
+        "flipped-bits",
+        "flip=0.004",
+        INDETERMINATE,
+        LOST,
+        "4 packets in 1000 have a bit flipped",
+        also=("packets-corrupt", "packets-lost", "bytes-malformed", "requests-repeated"),
+    ),
     Kind("drops", "drop=0.003", INDETERMINATE, LOST, "3 telemetries in 1000 are missing"),
-    Kind("bad-lines", "badline=0.01", INDETERMINATE, ("bytes-malformed", *LOST), "1 SLCAN line in 100 is none", wire="slcan",
-         also=("requests-repeated",)),
-    Kind("other-version", "badversion=0.01@1", INDETERMINATE, LOST, "1 packet in 100 has another version",
-         also=("bytes-malformed", "packets-corrupt", "packets-lost", "requests-repeated")),
-    Kind("wrong-length", "wronglength=0.003", INDETERMINATE, ("wrong-length",), "3 telemetries in 1000 are short", also=LOST),
-    Kind("flood", "huge=2000000@1", f"{PASS} or {INDETERMINATE}", ("bytes-malformed",), "2 MB of noise at once",
-         also=("packets-lost", *LOST, "requests-repeated")),
+    Kind(
+        "bad-lines",
+        "badline=0.01",
+        INDETERMINATE,
+        ("bytes-malformed", *LOST),
+        "1 SLCAN line in 100 is none",
+        wire="slcan",
+        also=("requests-repeated",),
+    ),
+    Kind(
+        "other-version",
+        "badversion=0.01@1",
+        INDETERMINATE,
+        LOST,
+        "1 packet in 100 has another version",
+        also=("bytes-malformed", "packets-corrupt", "packets-lost", "requests-repeated"),
+    ),
+    Kind(
+        "wrong-length",
+        "wronglength=0.003",
+        INDETERMINATE,
+        ("wrong-length",),
+        "3 telemetries in 1000 are short",
+        also=LOST,
+    ),
+    Kind(
+        "flood",
+        "huge=2000000@1",
+        f"{PASS} or {INDETERMINATE}",
+        ("bytes-malformed",),
+        "2 MB of noise at once",
+        also=("packets-lost", *LOST, "requests-repeated"),
+    ),
     Kind("drift", "ppm=400", INDETERMINATE, ("clock-drift",), "the controller's clock runs 400 ppm fast"),
-    Kind("drift-slow", "ppm=-400", INDETERMINATE, ("clock-drift",), "the controller's clock runs 400 ppm slow", wire="slcan"),
+    Kind(
+        "drift-slow",
+        "ppm=-400",
+        INDETERMINATE,
+        ("clock-drift",),
+        "the controller's clock runs 400 ppm slow",
+        wire="slcan",
+    ),
     Kind("drift-far", "ppm=5000", ERROR, ("clock-drift",), "the controller's clock is off by half a percent"),
     Kind("drift-absurd", "ppm=-20000", ERROR, ("clock-drift",), "the controller's clock is slow by two percent"),
 )
 COUNTERS = (
-    Kind("sequence-leaps", "seqjump=5000@1", PASS, ("sequence-leapt",), "the sequence leaps by 5000, the tick does not"),
+    Kind(
+        "sequence-leaps", "seqjump=5000@1", PASS, ("sequence-leapt",), "the sequence leaps by 5000, the tick does not"
+    ),
     Kind("sequence-leaps-3", "seqjump=3@1", PASS, ("sequence-leapt",), "the sequence leaps by 3, the tick does not"),
-    Kind("tick-leaps", "tickjump=30@1", INDETERMINATE, ("tick-leapt",), "the tick leaps by 3 ms, the sequence does not"),
+    Kind(
+        "tick-leaps", "tickjump=30@1", INDETERMINATE, ("tick-leapt",), "the tick leaps by 3 ms, the sequence does not"
+    ),
     Kind("tick-leaps-far", "tickjump=100000@1", f"{INDETERMINATE} or {ERROR}", (), "the tick leaps by 10 s"),
     Kind("tick-goes-back", "tickback=5000@1", f"{INDETERMINATE} or {ERROR}", (), "the tick goes back by 0.5 s"),
-    Kind("tick-goes-back-far", "tickback=30000@1", ABORTED, ("controller-fault", "controller-restarted"), "the tick goes back by 3 s"),
+    Kind(
+        "tick-goes-back-far",
+        "tickback=30000@1",
+        ABORTED,
+        ("controller-fault", "controller-restarted"),
+        "the tick goes back by 3 s",
+    ),
     Kind("tick-frozen", "tickfrozen@1", ERROR, ("telemetry-frozen",), "frames come, the tick stands", long=True),
     Kind("sequence-frozen", "seqfrozen@1", ERROR, ("telemetry-frozen",), "frames come, the sequence stands"),
     Kind("restart", "reset@1", ABORTED, ("controller-fault", "controller-restarted"), "the controller begins anew"),
@@ -98,7 +151,14 @@ READINGS = (
     Kind("wrong-mass", "wrongmass=1.02", INDETERMINATE, ("load-inconsistent",), "M2 weighs 2 % more", long=True),
     Kind("contact", "badflags=12@1", INDETERMINATE, ("contact",), "flags say that the shaft touches its rings"),
     Kind("all-flags", "badflags=65535@1", INDETERMINATE, ("contact",), "every flag is set"),
-    Kind("unknown-state", "badstate=42@1", ABORTED, ("controller-fault",), "a state that the DBC does not name", long=True),
+    Kind(
+        "unknown-state",
+        "badstate=42@1",
+        ABORTED,
+        ("controller-fault",),
+        "a state that the DBC does not name",
+        long=True,
+    ),
     Kind("unknown-fault", "badfault=77@1", ABORTED, ("controller-fault",), "a fault that the DBC does not name"),
 )
 SILENCE = (
@@ -111,16 +171,32 @@ SILENCE = (
     Kind("noise", "garbage=200@1", ERROR, ("bytes-unreadable",), "200 kB/s of noise in place of everything", long=True),
     Kind("slow-bytes", "slowloris=10@1", ERROR, ("bytes-unreadable",), "10 bytes a second"),
     Kind("slow-bytes-slcan", "slowloris=10@1", ERROR, ("bytes-unreadable",), "the same on SLCAN", wire="slcan"),
-    Kind("bus-off", "statusF=128@1 pause=2@2", ERROR, ("bus-off",), "the adapter tells bus errors, and nothing comes", wire="slcan"),
+    Kind(
+        "bus-off",
+        "statusF=128@1 pause=2@2",
+        ERROR,
+        ("bus-off",),
+        "the adapter tells bus errors, and nothing comes",
+        wire="slcan",
+    ),
     Kind("deaf-to-heartbeats", "deafheart@1", ABORTED, ("controller-fault",), "heartbeats are not heard"),
-    Kind("second-host", "hostspoof=0.01@1", ABORTED, ("second-host",), "heartbeats of another host come in", wire="slcan"),
+    Kind(
+        "second-host", "hostspoof=0.01@1", ABORTED, ("second-host",), "heartbeats of another host come in", wire="slcan"
+    ),
 )
 ANSWERS = (
     Kind("mute", "mute@1", ERROR, ("no-reply",), "requests are not answered any more", long=True),
     Kind("command-token", "cmdtoken", ERROR, ("no-reply",), "CommandReply has another token"),
     Kind("command-status", "cmdstatus=9", ERROR, ("controller-refused",), "CommandReply has status 9"),
     Kind("parameter-status", "badstatus=200", ERROR, ("controller-refused",), "ParamReply has status 200"),
-    Kind("does-not-enable", "disobey=1", ERROR, ("state-not-reached",), "ENABLE is answered, and nothing happens", long=True),
+    Kind(
+        "does-not-enable",
+        "disobey=1",
+        ERROR,
+        ("state-not-reached",),
+        "ENABLE is answered, and nothing happens",
+        long=True,
+    ),
     Kind("does-not-levitate", "disobey=2", ERROR, ("state-not-reached",), "LEVITATE is answered, and nothing happens"),
     Kind("does-not-turn", "stuckangle", ERROR, ("rotor-not-arrived",), "the rotor does not turn", long=True),
     Kind("operator-silent", "deafoperator@1", ERROR, ("operator-silent",), "the operator does not answer"),
@@ -145,13 +221,13 @@ AT_START = (
     Kind("slow-bytes-at-start", "slowloris=10", NO_RUN, (), "10 bytes a second", r"bytes came .* no message can be made"),
     Kind("no-claim", "noclaim", NO_RUN, (), "Claim is not answered", "the answer to Claim; it did not come, though .* 3 times"),
     Kind("no-identity", "nocommand", NO_RUN, (), "IDENTIFY is not answered", "Identity; it did not come, though .* 3 times"),
-    Kind("no-reading", "noparamget", NO_RUN, (), "ParamGet is not answered", "replies to ParamGet; it did not come, though"),
+    Kind("no-reading", "noparamget", NO_RUN, (), "ParamGet is not answered", "replies to ParamGet; it did not"),
     Kind("no-writing", "noparamset", NO_RUN, (), "ParamSet is not answered", "reply to watchdog_s; it did not come, though"),
-    Kind("parameter-token", "wrongtoken", NO_RUN, (), "ParamReply has another token", r"ParamReply with token \d+ came; expected"),
+    Kind("parameter-token", "wrongtoken", NO_RUN, (), "ParamReply has other tokens", r"ParamReply with token \d+ came; exp"),
     Kind("parameter-nan", "nanreply", NO_RUN, (), "ParamReply has NaN", "the controller reads back nan"),
     Kind("parameter-other", "wrongvalue", NO_RUN, (), "ParamReply has another value", "the controller reads back 3.0"),
     Kind("other-owner", "otherowner", NO_RUN, (), "another host owns it", "in use: its controller obeys nobody@else"),
-    Kind("odd-owner", "badname", NO_RUN, (), "another host, with control characters in its name", "in use: its controller obeys"),
+    Kind("odd-owner", "badname", NO_RUN, (), "another host, its name no text", "in use: its controller obeys"),
     Kind("other-map", "wrongmap", NO_RUN, (), "another message map", "map_version 3.*expected 2"),
     Kind("other-protocol", "wrongproto", NO_RUN, (), "another protocol", "protocol 2.*expected 1"),
     Kind("slow-fieldbus-at-start", "mbslow=5", NO_RUN, (), "the fieldbus answers after 5 s", "no usable answer"),
@@ -165,16 +241,19 @@ GROUPS = {
 KINDS = tuple(kind for kinds in GROUPS.values() for kind in kinds)
 HEAD = """# What a misbehaving rig ends in
 
-What a run must end in when its controller, its operator or its fieldbus does something wrong. `make faults` lets `amb-calibration` loose on each
-of these rigs: the C controller of `tests/firmware` with its mischief, over TCP, with an operator who hangs masses in it. The page is made of
-`tests/firmware/misbehaviours.py` (`python tests/firmware/misbehaviours.py > docs/reference/faults.md`), and a test keeps it so.
+What a run must end in when its controller, its operator or its fieldbus does something wrong. `make faults` lets
+`amb-calibration` loose on each of these rigs: the C controller of `tests/firmware` with its mischief, over TCP, with an
+operator who hangs masses in it. The page is made of `tests/firmware/misbehaviours.py`
+(`python tests/firmware/misbehaviours.py > docs/reference/faults.md`), and a test keeps it so.
 
 - What is harmless passes, with its counts where the link counts it; nothing else passes.
-- Every run ends with its finding by its name ([record](record.md#findings)), and no wait is longer than 30 s without a word on the terminal.
+- Every run ends with its finding by its name ([record](record.md#findings)), and no wait is longer than 30 s without a word
+  on the terminal.
 - *No run*: nothing was started, status 2 or 3; the text is on the terminal.
 
-In the switches `KIND=VALUE@START`, START is in seconds after the rotor was first levitated; without it they act from power-on.
-Faults that the bench itself can put into a link or a simulated controller are on [another page](../how-to/inject-faults.md).
+In the switches `KIND=VALUE@START`, START is in seconds after the rotor was first levitated; without it they act from
+power-on. Faults that the bench itself can put into a link or a simulated controller are on
+[another page](../how-to/inject-faults.md).
 """
 
 

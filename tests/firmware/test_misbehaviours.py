@@ -39,7 +39,9 @@ def test_a_misbehaviour_ends_as_the_table_says(kind: Kind, mischief: Path, tmp_p
 
 
 def test_the_page_is_the_table() -> None:
-    assert PAGE.read_text(encoding="utf-8") == page(), "run: python tests/firmware/misbehaviours.py > docs/reference/faults.md"
+    assert PAGE.read_text(encoding="utf-8") == page(), (
+        "run: python tests/firmware/misbehaviours.py > docs/reference/faults.md"
+    )
 
 
 def test_names_are_unique_and_a_dozen_are_run_by_ci() -> None:
