@@ -14,3 +14,10 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if os.name != "posix":
         pytest.skip("the program needs POSIX")
     return c_programs.firmware(tmp_path_factory.mktemp("firmware"))
+
+
+@pytest.fixture(scope="session")
+def mischief(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    if os.name != "posix":
+        pytest.skip("the program needs POSIX")
+    return c_programs.mischief(tmp_path_factory.mktemp("mischief"))

@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[2]
 K_I, K_O = 73.2, 74.4  # N/A, what the limits of specs/tsbs12.toml expect
 WATCHDOG_S = 1.0  # a busy machine is no dead host
 PLAN = ("angles=8", "settle_s=0.1", "average_s=0.1")
-LIMIT_S = 240.0
+LIMIT_S, STALL_S = 240.0, 0.5
 ELSEWHERE = ("mb", "answer-", "deafoperator", "wrongmass")  # switches that the C program has nothing to do with
 SWITCH = re.compile(r"([\w-]+)(?:=([-\d.e]+))?(?:@([\d.]+))?")
 
@@ -41,6 +41,12 @@ class Ended:
     outcome: str
     findings: tuple[str, ...]
     device: str
+
+    @property
+    def stalled(self) -> bool:
+        """Whether the computer let the controller stand still for so long that a sound one would look dead."""
+        found = re.search(r"stalled ([\d.]+)", self.device)
+        return found is not None and float(found[1]) > STALL_S
 
     def __str__(self) -> str:
         found = ", ".join(self.findings) or "no finding"
@@ -171,7 +177,8 @@ def watched(command: Sequence[str]) -> tuple[int, list[str], float]:
 
 
 def ended(program: Path, folder: Path, wire: str, switches: Sequence[str]) -> Ended:
-    """Let `bench run` at a rig that misbehaves so."""
+    """Let `bench run` at a rig that misbehaves so, with its files in a new folder."""
+    folder.mkdir()
     with rig_that(program, wire, switches) as (links, last):
         plan = [word for text in PLAN for word in ("--plan", text)]
         options = [

@@ -3,7 +3,7 @@
  *     mischief slcan|packets SEED K_I K_O [KIND[=VALUE][@START] ...]
  *
  * Listens on a free TCP port, which it prints. `hang KG` on standard input hangs a mass. Ends when standard input does, and then
- * prints its state and its fault. */
+ * prints its state, its fault, and for how long the computer let it stand still, s. */
 #define _XOPEN_SOURCE 600
 #include "mischief.h"
 #include <arpa/inet.h>
@@ -162,7 +162,7 @@ static void hear(void) {
 }
 
 int main(int argc, char **argv) {
-    int64_t ms = 0, start;
+    int64_t ms = 0, stalled = 0, start; /* stalled: the longest turn of the loop, ticks */
     if (argc < 5 || (strcmp(argv[1], "slcan") && strcmp(argv[1], "packets"))) return 2;
     packets = !strcmp(argv[1], "packets");
     make_rotor((unsigned)atoi(argv[2]), atof(argv[3]), atof(argv[4]));
@@ -173,7 +173,9 @@ int main(int argc, char **argv) {
         struct pollfd fds[3] = {{0, POLLIN, 0}, {client < 0 ? door : -1, POLLIN, 0}, {client, POLLIN, 0}};
         poll(fds, 3, 1);
         if (fds[0].revents && !told()) break;
+        int64_t before = now;
         now = (elapsed_us() - start) / 100;
+        if (now - before > stalled) stalled = now - before;
         if (client < 0 && (client = accept(door, NULL, NULL)) >= 0) greet();
         hear();
         for (; ms < now / 10; ms++) {
@@ -186,6 +188,6 @@ int main(int argc, char **argv) {
         }
         flush(ms);
     }
-    printf("state %d fault %d\n", state, fault);
+    printf("state %d fault %d stalled %.2f\n", state, fault, (double)stalled * 1e-4);
     return 0;
 }
