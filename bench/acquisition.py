@@ -12,10 +12,12 @@ from typing import Any, cast
 from bench import provenance, runlog
 from bench.errors import (
     Aborted,
+    AnotherHost,
     BenchError,
     BytesUnreadable,
     DeviceFault,
     DriveFault,
+    FrozenError,
     InterlockError,
     LinkError,
     NoReply,
@@ -43,9 +45,10 @@ from bench.supervisor import SafeStep, Supervisor
 logger = logging.getLogger("bench.runner")
 CODES: tuple[tuple[type[BaseException], str], ...] = (
     (SignalAbort, "signal"), (OperatorAbort, "operator-stop"), (DriveFault, "drive-fault"),
-    (DeviceFault, "controller-fault"), (InterlockError, "interlock"), (RegisterRefused, "device-refused"),
-    (NoReply, "no-reply"), (BytesUnreadable, "bytes-unreadable"), (OperatorSilent, "operator-silent"),
-    (LinkError, "link-lost"), (StateNotReached, "state-not-reached"), (RotorNotArrived, "rotor-not-arrived"),
+    (DeviceFault, "controller-fault"), (AnotherHost, "another-host"), (InterlockError, "interlock"),
+    (RegisterRefused, "device-refused"), (NoReply, "no-reply"), (BytesUnreadable, "bytes-unreadable"),
+    (OperatorSilent, "operator-silent"), (FrozenError, "telemetry-frozen"), (LinkError, "link-lost"),
+    (StateNotReached, "state-not-reached"), (RotorNotArrived, "rotor-not-arrived"),
     (OperatorRefused, "operator-refused"), (Refused, "controller-refused"), (RecordingError, "recording-failed"),
     (BenchError, "run-failed"),
 )  # fmt: skip

@@ -5,6 +5,7 @@ BenchError
   LinkError          a link is lost, silent or corrupt                           exit 3
     NoReply          a request was not answered, though it was repeated
     BytesUnreadable  bytes come, but no telemetry can be made of them
+    FrozenError      telemetry comes, but its counters stand
     OperatorSilent   the operator does not answer
   NotReached         what was told to move did not get there                     exit 3
     StateNotReached  a device took a command and did not go into its state
@@ -17,8 +18,9 @@ BenchError
     InterlockError   the envelope refused a command or tripped on telemetry
     DeviceFault      the controller reported a fault
       DriveFault     the drive reported one
+    AnotherHost      heartbeats of another host came in
     OperatorAbort    the operator said stop
-    SignalAbort      SIGINT or SIGTERM
+    SignalAbort      SIGINT, SIGTERM or SIGHUP
 """
 
 from __future__ import annotations
@@ -87,6 +89,10 @@ class OperatorRefused(Refused):
     """The operator answers that what was asked for cannot be done."""
 
 
+class FrozenError(LinkError):
+    """Telemetry comes, but its tick or its sequence stands: nobody knows what the machine does."""
+
+
 class RecordingError(BenchError):
     """A recording cannot be written, or what is read is not one, is newer, or fails its CRC."""
 
@@ -111,9 +117,13 @@ class DriveFault(DeviceFault):
     """The drive reported a fault."""
 
 
+class AnotherHost(Aborted):
+    """Another host's heartbeats reach the controller."""
+
+
 class OperatorAbort(Aborted):
     """The operator said stop."""
 
 
 class SignalAbort(Aborted):
-    """SIGINT or SIGTERM arrived."""
+    """SIGINT, SIGTERM or SIGHUP arrived."""

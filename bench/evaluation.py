@@ -81,7 +81,10 @@ class Evaluation:
 
     def finish(self, record: Record, ending: Ending, ended: str, recording: RecordingFile | None) -> Record:
         """An unfinished record with its end; the outcome follows from what it holds."""
-        findings = (*ending.findings, *self.findings)
+        known = {
+            (f.code, f.where) for f in ending.findings
+        }  # a channel that stood is seen while it does, and in its steps
+        findings = (*ending.findings, *(f for f in self.findings if (f.code, f.where) not in known))
         return replace(
             record, ended=ended, recording=recording, link=ending.link, findings=findings_of(findings),
             measurements=self.measurements, correlations=self.correlations,

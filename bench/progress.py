@@ -94,7 +94,8 @@ class TerminalProgress:
         self._bar.start()
 
     def stop(self) -> None:
-        self._bar.stop()
+        with suppress(OSError):
+            self._bar.stop()
 
     def stage(self, text: str) -> None:
         with suppress(OSError):

@@ -212,6 +212,9 @@ def _envelope(rig: RigFile) -> Iterator[Problem]:
         for name in rig.envelope.positions:
             if name not in rig.channels:
                 yield Problem(rig.path, "envelope.positions", name, "a channel of this rig")
+    low, high = rig.envelope.min_supply_V or 0.0, rig.envelope.max_supply_V
+    if high is not None and high <= low:
+        yield Problem(rig.path, "envelope.max_supply_V", f"{high:g}", f"more than min_supply_V = {low:g}")
 
 
 def _parameters(rig: RigFile) -> Iterator[Problem]:

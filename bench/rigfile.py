@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
-from bench import catalogue
+from bench import catalogue, units
 from bench.binding import Binding
 from bench.capture import CaptureSpec
 from bench.errors import ConfigError, Problem
@@ -78,9 +78,12 @@ class Device(Part):
 
 
 class Channel(Part):
+    """`noise`: the least standard deviation of its readings while the rotor is held, SI."""
+
     signal: str
     unit: str
     about: str = ""
+    noise: float | None = Field(None, gt=0)
 
 
 class Parameter(Part):
@@ -102,7 +105,8 @@ class Sensor(Part):
 
 
 class Envelope(Part):
-    """Protection range. `positions` are the channels that `max_levitated_position_m` bounds while the rotor is held."""
+    """Protection range. `positions` are the channels that `max_levitated_position_m` bounds while the rotor is held; the
+    supply's voltage is bounded then too."""
 
     max_hung_kg: float = Field(ge=0)
     max_current_A: float = Field(gt=0)
@@ -111,6 +115,9 @@ class Envelope(Part):
     max_levitated_position_m: float = Field(gt=0)
     max_trial_weight_kg: float = Field(0.0, ge=0)  # in a balancing plane
     max_injection_A: float = Field(0.0, ge=0)  # into the current reference of an axis, greatest value of the sum
+    min_supply_V: float | None = Field(None, gt=0)
+    max_supply_V: float | None = Field(None, gt=0)
+    max_drive_torque_Nm: float | None = Field(None, gt=0)
     positions: tuple[str, ...] = ("pos_xi", "pos_yi", "pos_xo", "pos_yo")
 
 
@@ -191,6 +198,13 @@ class RigFile(Part):
         """The names of a channel's codes, from the DBC's value table."""
         message, _, signal = self.channels[channel].signal.partition(".")
         return self.messages[message].signal(signal).choices
+
+    def noisy(self, channel: str) -> bool:
+        """Whether the readings of a channel must differ while the rotor is held: its stated noise is above one count."""
+        c = self.channels[channel]
+        message, _, signal = c.signal.partition(".")
+        s = self.messages[message].signal(signal)
+        return c.noise is not None and c.noise > abs(s.scale * units.UNITS[s.unit].factor)
 
     @property
     def link(self) -> LinkSpec:

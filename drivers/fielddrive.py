@@ -168,6 +168,14 @@ class FieldDrive:
         self._command("coast")
         self._until_running(False)
 
+    def brake(self) -> None:
+        """Begin to brake; nothing is waited for but that the drive takes it.
+
+        Raises:
+            LinkError: the drive does not answer, or refuses.
+        """
+        self._command("stop")
+
     def stop(self) -> None:
         """Brake, and return when the shaft stands.
 
@@ -175,7 +183,7 @@ class FieldDrive:
             LinkError: the drive does not answer, or refuses.
             RotorNotArrived: the shaft goes on turning.
         """
-        self._command("stop")
+        self.brake()
         self._bus.wait(lambda: abs(self.speed_rad_s) < STANDSTILL_RAD_S, STOP_S, lambda: RotorNotArrived(
             f"the drive did not stop the shaft within {STOP_S:g} s: it turns at {self.speed_rad_s:.1f} rad/s"
         ))  # fmt: skip

@@ -146,6 +146,20 @@ class Orders:
             elif status != "OK":
                 raise Refused(f"the controller refuses {name}: {status} in state {self._mode()}")
 
+    def ask_state(self) -> None:
+        """Send what changes nothing and is answered by the state (IDENTIFY), where the controller has that; whoever takes
+        its frames sees the answer.
+
+        Raises:
+            LinkError: the link is lost.
+        """
+        if not self._dialogue.has("CommandReply") or not self.rig.binding.knows("IDENTIFY", self.rig.messages):
+            return
+        for message, values in commanded(self.rig, "IDENTIFY").items():
+            if any(s.name == "session" for s in self.rig.messages[message].signals):
+                values["session"] = self._session.number
+            self._dialogue.begin(message, values)
+
     def _send_held(self, message: str, values: dict[str, float]) -> None:
         owned = any(s.name == "session" for s in self.rig.messages[message].signals)
         self._dialogue.send_held(message, {**values, "session": self._session.number} if owned else values)

@@ -17,7 +17,7 @@ TROUBLES = [f.name for f in fields(Counters) if f.name != "gaps"]
 TROUBLES += [f.name for f in fields(LinkStats) if f.name not in
              ("received", "sent", "octets", "heartbeats", "longest_heartbeat_gap_ns")]  # fmt: skip
 STOPPING = {"wrong_length": Effect.INDETERMINATE, "reboots": Effect.ERROR, "overflows": Effect.ERROR,
-            "bus_off": Effect.ERROR, "reconnects": Effect.INDETERMINATE}  # fmt: skip
+            "bus_off": Effect.ERROR, "reconnects": Effect.INDETERMINATE, "tick_leaps": Effect.INDETERMINATE}  # fmt: skip
 
 
 def test_a_clean_link_has_no_findings() -> None:
@@ -41,6 +41,12 @@ def test_each_trouble_is_counted_and_named(trouble: str) -> None:
     counts = health.counts(0)
     assert counts.counts[trouble] == 37
     assert counts.errors == 37
+
+
+def test_channels_that_stood_are_named_each() -> None:
+    found = list(Health(Counters(), CLEAN, None, 0, stuck={"pos_yi", "i_yo_p"}).findings())
+    assert [(f.code, f.where, f.effect) for f in found] == [
+        ("stuck-channel", "i_yo_p", Effect.ERROR), ("stuck-channel", "pos_yi", Effect.ERROR)]  # fmt: skip
 
 
 def test_every_finding_has_a_code_of_its_own() -> None:

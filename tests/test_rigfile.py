@@ -105,7 +105,8 @@ def test_protected_positions_are_those_that_the_rig_file_names(tmp_path: Path) -
     assert check_rig(written(tmp_path, named))[0] == ()
     rig = RigFile.parse(named, DBC)
     levitated = next(code for code, name in rig.choices("state").items() if name == "LEVITATED")
-    columns = {name: np.zeros(1) for name in rig.channels} | {"state": np.array([float(levitated)])}
+    columns = {name: np.zeros(1) for name in rig.channels}
+    columns |= {"state": np.array([float(levitated)]), "supply": np.array([148.0])}
     for name, refused in (("pos_z", True), ("pos_yi", False)):
         block = SampleBlock("x", 0, np.array([10], np.uint64), np.array([0]), 0, 0, columns | {name: np.array([2e-4])})
         with pytest.raises(InterlockError, match="pos_z") if refused else nullcontext():

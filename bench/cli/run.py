@@ -33,7 +33,7 @@ def execute(request: Request, supervisor: Supervisor | None = None) -> RunResult
 def run_command(request: Request) -> int:
     """Run, say the outcome on standard error and the run directory on standard output; the outcome's exit status."""
     result = execute(request)
-    with suppress(BrokenPipeError):  # nobody reads any more; the outcome stands all the same
+    with suppress(OSError):  # nobody reads any more, or the terminal is closed; the outcome stands all the same
         sys.stderr.write(summary(result.record))
         sys.stdout.write(f"{result.directory}\n")
         sys.stdout.flush()

@@ -60,7 +60,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Session:
     counters = controller.telemetry.counters
     (run / "record.json").write_text("{}")
     return Session(
-        Recording.open(run / "recording.mcap"), run, data, progress, counters.lost, controller.host_age_s, modes
+        Recording.open(run / "recording.mcap"), run, data, progress, counters.lost, controller.watch.host_age_s, modes
     )
 
 

@@ -181,7 +181,12 @@ SILENCE = (
     ),
     Kind("deaf-to-heartbeats", "deafheart@1", ABORTED, ("controller-fault",), "heartbeats are not heard"),
     Kind(
-        "second-host", "hostspoof=0.01@1", ABORTED, ("second-host",), "heartbeats of another host come in", wire="slcan"
+        "second-host",
+        "hostspoof=0.01@1",
+        ABORTED,
+        ("another-host",),
+        "heartbeats of another host come in",
+        wire="slcan",
     ),
 )
 ANSWERS = (

@@ -52,6 +52,11 @@ def levitated(c: Controller) -> None:
     c.levitate()
 
 
+def held(c: Controller) -> None:
+    levitated(c)
+    c.clock.sleep(5.0)
+
+
 def called(error: BenchError) -> tuple[str, str]:
     """The finding that a record would have, and its text."""
     _, finding = cause_of(error)
@@ -87,8 +92,7 @@ def test_a_rotor_that_does_not_turn_has_not_arrived(mischief: Path) -> None:
 def test_noise_in_place_of_telemetry_is_told_as_noise(mischief: Path, wire: str) -> None:
     with controller_that(mischief, "garbage=200@0", wire=wire) as c:
         with pytest.raises(BenchError) as caught:
-            levitated(c)
-            c.clock.sleep(5.0)
+            held(c)
     code, text = called(caught.value)
     assert code == "bytes-unreadable"
     assert "kB/s), but no message can be made of them: " in text

@@ -215,12 +215,14 @@ def test_make_safe_lands_what_the_controller_sees_turning_for_a_while_yet() -> N
     with driven(stand) as bus:
         assert bus.drive is not None
         bus.drive.reach(100.0)
-        brake, _, land = safe_steps(stand.controller, stand.base, bus.drive)[1:4]
-        brake.action()
-        assert stand.controller.mode == "SPINNING"
+        at_once, slow, land = safe_steps(stand.controller, stand.base, bus.drive)[:3]
         begin = stand.machine.now_ns()
+        at_once.action()
+        assert stand.controller.mode == "SPINNING"
+        slow.action()
         land.action()
-        assert (stand.machine.now_ns() - begin) * 1e-9 < land.timeout_s / 4
+        assert (stand.machine.now_ns() - begin) * 1e-9 < 5.0
+        assert bus.drive.confirm_off()
     assert stand.controller.mode == "READY"
 
 
