@@ -52,6 +52,13 @@ HARMLESS = (
     Kind("double-replies", "dupreply", PASS, (), "every reply comes twice"),
     Kind("lost-replies", "lostreply=0.05", PASS, ("requests-repeated",), "1 reply in 20 is lost", long=True),
     Kind("lost-levitate", "lostlevitate", PASS, ("requests-repeated",), "LEVITATE is executed, its reply lost"),
+    Kind(
+        "forgetful",
+        "lostlevitate forgetful",
+        PASS,
+        ("requests-repeated",),
+        "the same, and the repeat is refused: WRONG_STATE",
+    ),
     Kind("slow-replies", "slowreply=0.45", PASS, ("link-slow",), "replies take 0.45 s"),
     Kind("late-replies", "slowreply=1.2", PASS, ("requests-repeated",), "replies take longer than they are waited for"),
     Kind("odd-reply-state", "cmdstate=99", PASS, (), "CommandReply tells a state that the DBC does not name"),

@@ -73,8 +73,10 @@ def test_a_command_that_is_not_obeyed_is_told_with_the_state_that_was_seen(misch
     assert text.startswith("the controller took ENABLE and is not READY after 1 s: its state is OFF since ")
 
 
-def test_a_levitate_of_which_the_reply_is_lost_is_executed_once(mischief: Path) -> None:
-    with controller_that(mischief, "lostlevitate") as c:
+@pytest.mark.parametrize("firmware", [[], ["forgetful"]])
+def test_a_levitate_of_which_the_reply_is_lost_is_executed_once(mischief: Path, firmware: list[str]) -> None:
+    """Or refused the second time, by a firmware that does not know that it is the first one again."""
+    with controller_that(mischief, "lostlevitate", *firmware) as c:
         levitated(c)
         assert c.mode == "LEVITATED"
         assert c.repeats == 1
