@@ -27,7 +27,7 @@ class Dialogue:
         self._decoders = {m.identifier: Decoder(m) for n, m in rig.messages.messages.items() if n in REPLIES}
         self._answers: deque[tuple[str, dict[str, float], int]] = deque(maxlen=KEPT)
         self._held: dict[str, dict[str, float]] = {}
-        self._token = 0
+        self._token, self._tokens = 0, dict[str, int]()  # the last, and that of each kind of request
         self._misfit: dict[str, int] = {}  # length of replies that do not fit, since the last request
         self.wrong_length = 0  # replies that do not have the length of the DBC
         self.recorder: Recorder | None = None
@@ -66,7 +66,7 @@ class Dialogue:
         Raises:
             NoReply: no reply to any of them.
         """
-        self._token = (self._token + 1) & 0xFF
+        self._next_token(message)
         self._forget()
         request, answer = self._rig.messages[message], self._rig.messages[reply]
         tokens = _has(request, "token") and _has(answer, "token")
@@ -113,6 +113,11 @@ class Dialogue:
         self._waited(send, wait, arrived, reply, f"the replies to {message}")
         return found
 
+    def _next_token(self, message: str) -> None:
+        """One up, round after 256; never that of the last request of the kind, which would be taken for a repeat."""
+        step = 2 if self._tokens.get(message) == (self._token + 1) & 0xFF else 1
+        self._token = self._tokens[message] = (self._token + step) & 0xFF
+
     def _forget(self) -> None:
         self._answers.clear()
         self._misfit.clear()
@@ -145,7 +150,7 @@ class Dialogue:
 
     def begin(self, message: str, values: Mapping[str, float]) -> int:
         """Send a request that is answered by something else than a reply, or refused by one; its token."""
-        self._token = (self._token + 1) & 0xFF
+        self._next_token(message)
         self._forget()
         self.send(message, {**values, "token": self._token})
         return self._token

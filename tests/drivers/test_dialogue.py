@@ -130,6 +130,23 @@ def test_a_lost_reply_costs_a_repeat_with_the_same_token(lost: int) -> None:
     assert talk.dialogue.round_trip_ns is not None
 
 
+@pytest.mark.parametrize("between", [254, 255, 256, 511])
+def test_two_equal_commands_never_have_one_token(between: int) -> None:
+    """Whatever else was asked for between them: the second would be taken for a repeat, and not be executed."""
+
+    def answer(name: str, v: dict[str, float]) -> list[FrameBatch]:
+        reply = {"Command": "CommandReply", "ParamGet": "ParamReply"}[name]
+        return [message(reply, token=v["token"])]
+
+    talk, commands = Conversation(answer), []
+    for _ in range(2):
+        talk.dialogue.ask("Command", {"code": 4}, "CommandReply", "the reply", talk.wait)
+        commands.append(payload(talk.sent[-1][0]))
+        for _ in range(between):
+            talk.dialogue.ask("ParamGet", {"index": 1}, "ParamReply", "the reply", talk.wait)
+    assert commands[0] != commands[1]
+
+
 def test_of_many_requests_only_the_lost_ones_are_sent_again() -> None:
     seen: list[int] = []
 
