@@ -235,10 +235,6 @@ class Controller:
         """Send a command and wait for its reply, not for its effect; `drivers.orders.Orders.command` has the errors."""
         self._orders.command(name)
 
-    def make_safe(self) -> None:
-        """Ask the controller to coast, land and switch off by itself."""
-        self._orders.command("MAKE_SAFE")
-
     def ask_state(self) -> None:
         """Ask for a reply, which tells the state, where the controller has one; nothing is waited for."""
         self._orders.ask_state()

@@ -36,9 +36,10 @@ class HostFrames:
     def __init__(self, rig: RigFile, session: int, sent: Callable[[], int]) -> None:
         self._names = {rig.messages[name].identifier: name for name in host_messages(rig)}
         b = rig.binding
-        self._heartbeat = Decoder(rig.messages[b.heartbeat])
+        self._heartbeat = rig.messages.messages.get(b.heartbeat)
+        self._decoder = Decoder(self._heartbeat) if self._heartbeat is not None else None
         self._counter, self._session, self._sent = b.heartbeat_counter, session, sent
-        self._sessions = any(s.name == "session" for s in rig.messages[b.heartbeat].signals)
+        self._sessions = self._heartbeat is not None and any(s.name == "session" for s in self._heartbeat.signals)
         self._echoed: deque[int] = deque(maxlen=ECHO)
         self._theirs: deque[int] = deque(maxlen=RATE)  # when the last heartbeats came that are not ours
         self._other: int | None = None  # another session
@@ -51,8 +52,9 @@ class HostFrames:
             batch = batch.copy()
             batch["flags"][theirs] |= SENT
             self.seen |= {self._names[int(i)] for i in batch["id"][theirs]}
-            for one in batch[batch["id"] == self._heartbeat.message.identifier]:
-                self._beat(payload(one), int(one["t_ns"]))
+            if self._heartbeat is not None:
+                for one in batch[batch["id"] == self._heartbeat.identifier]:
+                    self._beat(payload(one), int(one["t_ns"]))
         return batch
 
     def forget(self) -> None:
@@ -79,9 +81,9 @@ class HostFrames:
             )
 
     def _beat(self, data: bytes, t_ns: int) -> None:
-        if len(data) != self._heartbeat.message.length:
+        if self._decoder is None or len(data) != self._decoder.message.length:
             return
-        values = self._heartbeat.decode_one(data)
+        values = self._decoder.decode_one(data)
         if self._sessions:
             if int(values["session"]) != self._session:
                 self._other = int(values["session"])

@@ -11,8 +11,8 @@ from bench.codec import Decoder
 from bench.frames import ERROR, FrameBatch
 from bench.rigfile import RigFile
 from bench.samples import SampleBlock
-from bench.stillness import STILL_S
 from bench.telemetry import TelemetryDecoder
+from drivers.waiting import SILENCE_S
 
 UNSEEN = "UNSEEN"
 UNKNOWN = "UNKNOWN"
@@ -71,7 +71,7 @@ class Sight:
     def alive(self) -> bool:
         """Whether telemetry comes and changes."""
         still = self._telemetry.stillness
-        return still.alive and self._now_ns() - still.newest_ns < STILL_S * 1e9
+        return still.alive and self._now_ns() - still.newest_ns < SILENCE_S * 1e9
 
     @property
     def told(self) -> bool:

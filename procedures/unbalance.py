@@ -13,7 +13,7 @@ from typing import Any, Literal, Protocol
 from pydantic import Field
 
 from bench.calibration import Need
-from bench.figures import Figure
+from bench.figures import Shown
 from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recorder import Recorder
@@ -30,27 +30,37 @@ from procedures.estimators import (
     unbalance_estimates,
     unbalance_plan,
 )
+from procedures.estimators.coil_peaks import uncertified
 from procedures.estimators.unbalance_bearings import BEARING_MODEL, adopted_bearings
 from procedures.estimators.unbalance_data import RPM, TOLD, read_dwells
 from procedures.estimators.unbalance_estimates import Results
 from procedures.turning import CODES, POLES, SETTINGS, Law, Variant
 
 COSINE = Quantity(
-    "vector_cos", "m", "order 1 of the shaft's centre at a probe's plane, along the probe: cosine component, 0-pk"
+    "vector_cos",
+    "m",
+    "order 1 of the shaft's centre at a probe's plane, along the probe: cosine component, 0-pk",
+    title="order 1, cos",
 )
 SINE = Quantity(
-    "vector_sin", "m", "as vector_cos: sine component; x = C cos θ + S sin θ, θ from the once-per-turn mark"
+    "vector_sin",
+    "m",
+    "as vector_cos: sine component; x = C cos θ + S sin θ, θ from the once-per-turn mark",
+    title="order 1, sin",
 )
 MAJOR = Quantity("major_half_axis", "m", "of the order-1 orbit of the shaft's centre in a sensor plane, 0-pk")
 D_MAX = Quantity(
     "d_max", "m", "greatest distance of the shaft's centre from the clearance's, static offset included (ISO 14839-2)"
 )
-SHARE = Quantity("d_max_share", "1", "D_max over the least clearance")
+SHARE = Quantity("d_max_share", "1", "D_max over the least clearance", title="D_max / clearance")
 READ = Quantity(
-    "reading", "m", "order 1 as the probes read it, runout included: root mean square of the four amplitudes, 0-pk"
+    "reading",
+    "m",
+    "order 1 as the probes read it, runout included: root mean square of the four amplitudes, 0-pk",
+    title="order 1 as read",
 )
-CURRENT = Quantity("current_peak", "A", "greatest coil current of a plane")
-VOLTAGE = Quantity("voltage_peak", "V", "greatest coil voltage of a plane, either way")
+CURRENT = Quantity("current_peak", "A", "coil current of a plane that is exceeded for 1 % of the time")
+VOLTAGE = Quantity("voltage_peak", "V", "coil voltage of a plane that is exceeded for 1 % of the time, either way")
 MEASURES = (COSINE, SINE, MAJOR, D_MAX, SHARE, READ, CURRENT, VOLTAGE)
 PARAMETERS = ("law", "ref_y", "ref_theta")
 LENGTHS = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_inboard_amb", "com_to_outboard_amb", "com_to_coupling",
@@ -153,8 +163,8 @@ def evaluated(recording: Recording[Any]) -> Evaluated:
         return Evaluated(tuple(found), None)
     model = adopted_bearings(recording)
     results = unbalance_estimates.results(dwells, recording.rig, plan, model)
-    told = unbalance_bearings.told(model, plan)
-    return Evaluated((*found, told, *unbalance_checks.of_results(results, plan)), results)
+    told = (unbalance_bearings.told(model, plan), *uncertified(recording.rig))
+    return Evaluated((*found, *told, *unbalance_checks.of_results(results, plan)), results)
 
 
 def measured(results: Results) -> Iterator[Measured]:
@@ -188,7 +198,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     yield from missing or unbalance_plan.of_plan(rig, plan)
 
 
-def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+def figures(recording: Recording[Plan]) -> Iterable[Shown]:
     """Orbits of both planes, Bode pair, polar plot, full spectra, what the coils need; empty where nothing was evaluated."""
     results = recording.once(evaluated).results
     return () if results is None else drawn.all_figures(results, recording.rig)
@@ -211,6 +221,9 @@ runout subtracted (order 3 where the telemetry sees it). Where the probes read z
 and that carries the budget. Wherever the shaft may be within them, it is farther from the centre than where they read zero:
 the value is the mean over where it may be. The least clearance is the rig file's. Zones A to D end at 0.3, 0.4 and 0.5 of
 it; these numbers of ISO 14839-2 are not checked against the standard.
+
+What the coils need at most is the current, and the voltage either way, of the plane's coil that needs most, exceeded for
+1 % of the time: the largest of many noisy readings would grow with their number. Voltages are what the amplifiers read.
 
 Lag is counted from the mark to the high spot. y is the first probe in the direction of rotation, z the second one.
 """

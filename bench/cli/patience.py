@@ -46,6 +46,10 @@ class Patience:
             self._progress_ns = self._progress_ns if self._least is None else now
             self._least = speed
 
+    def went_on(self) -> None:
+        """Something else went forward."""
+        self._progress_ns = self._clock.now_ns()
+
     @property
     def still_s(self) -> float:
         """How long nothing has gone forward."""

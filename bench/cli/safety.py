@@ -3,8 +3,8 @@ it to the controller, first by command and at last by withholding the heartbeat.
 
 What is safe at any speed goes at once. LAND goes only when a source that still changes says that the shaft is below the
 landing speed, and OFF only to a controller that says READY. There is one measure of time: how long nothing has gone forward.
-A speed that falls and a state that changes are progress. Without any, the controller is told to make itself safe after
-GIVE_UP_S, the heartbeat is withheld after twice and make-safe ends after three times as long.
+A speed that falls, a state that changes and a command that is accepted are progress. Without any, the controller is told to
+make itself safe after GIVE_UP_S, the heartbeat is withheld after twice and make-safe ends after three times as long.
 """
 
 from __future__ import annotations
@@ -33,7 +33,6 @@ GIVE_UP_S = 10.0  # without progress, until the next means
 END_S = 3 * GIVE_UP_S  # and until nothing more is waited for
 LOOK_S, ASK_S = 0.05, 0.5
 LANDED_S = 3.0  # beyond its own time, for a landing to show
-OFF_S = 2.0  # for the amplifiers to be off
 
 
 def safe_steps(controller: Controller, base: WatchedClock, drive: Drive | None = None) -> tuple[SafeStep, ...]:
@@ -76,7 +75,7 @@ class _Way:
         if mode in (*UNTOLD, "LIFTING"):
             self._own_way()
         elif mode == "SPINNING" or (mode == "LEVITATED" and self.patience.fast):
-            c.command("STOP")
+            self._send("STOP")
 
     def then(self, do: Callable[[], None]) -> Callable[[], None]:
         """A later step. A drive that nobody saw off is told again: its line may be there again."""
@@ -116,14 +115,14 @@ class _Way:
         if self.asked or mode in RESTING or not (p.slow or mode in ("LANDING", "COASTING")):
             return
         if mode not in ("LANDING", "COASTING"):
-            c.command("LAND")
+            self._send("LAND")
         self._until(lambda: c.sight.mode in RESTING, max(GIVE_UP_S, c.landing_s + LANDED_S), "the landing")
 
     def disable(self) -> None:
         c = self.controller
         if c.sight.mode == "READY":
-            c.command("DISABLE")
-            self._until(lambda: c.sight.mode in SAFE, OFF_S, "amplifiers off")
+            self._send("DISABLE")
+            self._until(lambda: c.sight.mode in SAFE, GIVE_UP_S, "amplifiers off")
 
     def own(self) -> None:
         """The controller's own way, in as long as it goes forward."""
@@ -156,10 +155,18 @@ class _Way:
     def _own_way(self) -> None:
         self.asked = True
         try:
-            self.controller.make_safe()
+            self._send("MAKE_SAFE")
         except BenchError:
             self.heard = False
             raise
+
+    def _send(self, name: str) -> None:
+        """A command. One that was answered and accepted is progress, however long that took."""
+        sight = self.controller.sight
+        before = sight.answered_ns
+        self.controller.command(name)
+        if sight.answered_ns != before:
+            self.patience.went_on()
 
     def _until(self, done: Callable[[], bool], limit_s: float, what: str) -> None:
         """Wait, and say for what, while something goes forward.
