@@ -17,6 +17,7 @@ from bench.errors import (
     BenchError,
     BytesUnreadable,
     DeviceFault,
+    DeviceUnreadable,
     DriveFault,
     FrozenError,
     InterlockError,
@@ -47,9 +48,9 @@ logger = logging.getLogger("bench.runner")
 CODES: tuple[tuple[type[BaseException], str], ...] = (
     (SignalAbort, "signal"), (OperatorAbort, "operator-stop"), (DriveFault, "drive-fault"),
     (DeviceFault, "controller-fault"), (AnotherHost, "another-host"), (InterlockError, "interlock"),
-    (RegisterRefused, "device-refused"), (NoReply, "no-reply"), (BytesUnreadable, "bytes-unreadable"),
-    (OperatorSilent, "operator-silent"), (FrozenError, "telemetry-frozen"), (LinkError, "link-lost"),
-    (StateNotReached, "state-not-reached"), (RotorNotArrived, "rotor-not-arrived"),
+    (RegisterRefused, "device-refused"), (DeviceUnreadable, "device-unreadable"), (NoReply, "no-reply"),
+    (BytesUnreadable, "bytes-unreadable"), (OperatorSilent, "operator-silent"), (FrozenError, "telemetry-frozen"),
+    (LinkError, "link-lost"), (StateNotReached, "state-not-reached"), (RotorNotArrived, "rotor-not-arrived"),
     (OperatorRefused, "operator-refused"), (Refused, "controller-refused"), (RecordingError, "recording-failed"),
     (BenchError, "run-failed"),
 )  # fmt: skip

@@ -6,6 +6,7 @@ BenchError
     NoReply          a request was not answered, though it was repeated
     BytesUnreadable  bytes come, but no telemetry can be made of them
     FrozenError      telemetry comes, but its counters stand
+    DeviceUnreadable a register device says what is no number
     OperatorSilent   the operator does not answer
   NotReached         what was told to move did not get there                     exit 3
     StateNotReached  a device took a command and did not go into its state
@@ -63,6 +64,10 @@ class NoReply(LinkError):
 
 class BytesUnreadable(LinkError):
     """Bytes come, but no telemetry can be made of them."""
+
+
+class DeviceUnreadable(LinkError):
+    """A register device answers with words that are no number."""
 
 
 class OperatorSilent(LinkError):

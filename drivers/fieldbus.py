@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 
 from bench.clock import Clock
 from bench.envelope import Envelope
-from bench.errors import BenchError, DriveFault, LinkError
+from bench.errors import BenchError, DeviceUnreadable, DriveFault, LinkError
 from bench.recorder import Recorder
 from bench.registers import RegisterPort, RegisterRefused
 from bench.rigfile import RigFile
@@ -176,7 +176,7 @@ class Fieldbus:
         """Take what polling found; poll what is due where no thread does.
 
         Raises:
-            LinkError: a device is lost, or refuses (while guarded).
+            LinkError: a device is lost, refuses, or says what is no number (DeviceUnreadable), while guarded.
             DriveFault: the drive reports a fault (while guarded).
             InterlockError: a reading is outside the envelope (while guarded).
         """
@@ -270,7 +270,9 @@ class Fieldbus:
             silent = (now - self._answered[name]) * 1e-9
             if silent > self._patience[name]:
                 why = f": {self._trouble[name]}" if name in self._trouble else ""
-                raise LinkError(f"device {name} on link {device.spec.link}: no reading for {silent:.1f} s{why}")
+                odd = isinstance(self._trouble.get(name), DeviceUnreadable)
+                kind = DeviceUnreadable if odd else LinkError
+                raise kind(f"device {name} on link {device.spec.link}: no reading for {silent:.1f} s{why}")
         if self.drive is not None and self.drive.fault:
             raise DriveFault(f"the drive reports {self.drive.fault}; look at it before the next run")
 
