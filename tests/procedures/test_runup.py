@@ -17,6 +17,7 @@ from bench.analysis.tachometer import Tachometer
 from bench.analysis.vectors import contains
 from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import DeviceFault
+from bench.figures import Figure, Sheet
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.recording import Recording
@@ -120,16 +121,19 @@ def test_the_capture_is_taken_as_the_shaft_comes_through_the_speed(up: Simulated
 
 
 def test_figures(up: Simulated, found: Run) -> None:
-    drawn = list(runup_figures.all_figures(found, up.recording.rig))
+    drawn = list(runup_figures.all_figures(found, up.recording.rig, 14000 / RPM))
     keys = [f.key for f in drawn]
     assert len(set(keys)) == len(keys)
+    criticals = drawn[0]
+    assert isinstance(criticals, Sheet)
+    assert len(criticals.rows) == sum(peak.factor is not None for peak in found.peaks) > 0
     assert {"bode-inboard", "polar-outboard", "waterfall", "order-map", "use-current", "use-voltage", "speed"} <= set(
         keys
     )
     assert any(k.startswith("orbit-inboard") for k in keys)
     assert any(k.startswith("spectrum-outboard") for k in keys)
     for figure in drawn:
-        if figure.key in ("bode-inboard", "order-map", "speed"):
+        if isinstance(figure, Figure) and figure.key in ("bode-inboard", "order-map", "speed"):
             draw_figure(figure)
 
 
