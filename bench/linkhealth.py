@@ -31,6 +31,7 @@ class Health:
     others: Mapping[str, LinkStats] = field(default_factory=dict)  # of the rig's further links
     cut_ns: int = 0  # by so much telemetry had not reached the end of a step when the run went on
     beyond_drift: int = 0  # the last windows in a row in which telemetry was further behind than by drift
+    repeats: int = 0  # requests that were sent again because no reply had come
     replies_wrong_length: int = 0  # frames of a wrong length that are no telemetry (Dialogue.wrong_length)
     stuck: Collection[str] = ()  # channels that read the same for a second while the rotor was held
 
@@ -42,11 +43,11 @@ class Health:
     def counts(self, frames: int) -> LinkCounts:
         """As the record has it; `frames` is how many were recorded, in both directions."""
         c, s = self.counters, self.stats
-        named = {**asdict(c), **asdict(s), "wrong_length": self.wrong_length}
+        named = {**asdict(c), **asdict(s), "wrong_length": self.wrong_length, "repeats": self.repeats}
         errors = self.wrong_length + c.lost + c.late + c.misplaced + c.duplicates + c.reordered + c.unknown + c.reboots
         errors += c.sequence_leaps + c.tick_leaps
         errors += s.crc_errors + s.malformed + s.packets_lost + s.error_frames + s.refused + s.adapter_overruns
-        errors += s.overflows + s.bus_off + s.reconnects
+        errors += s.overflows + s.bus_off + s.reconnects + self.repeats
         drift = self.drift
         return LinkCounts(frames, c.gaps, errors, named, drift.ppm if drift else None,
                           drift.expanded_ppm if drift else None, self.latest_ns * 1e-6,
@@ -70,6 +71,8 @@ class Health:
              "left out. Does the firmware's message map match the rig file's?", Effect.INDETERMINATE),
             (c.unknown, "unknown-frames", f"{c.unknown} frames have identifiers that the DBC does not know", Effect.NOTE),
             (c.reboots, "controller-restarted", f"the controller restarted {c.reboots} times", Effect.ERROR),
+            (self.repeats, "requests-repeated", f"{self.repeats} requests were sent again because no reply had come; the "
+             "controller executes each once", Effect.NOTE),
             (s.crc_errors, "packets-corrupt", f"{s.crc_errors} packets failed their CRC and were dropped", Effect.NOTE),
             (s.malformed, "bytes-malformed", f"{s.malformed} pieces of the byte stream could not be taken apart",
              Effect.NOTE),

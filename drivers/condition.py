@@ -16,6 +16,7 @@ class Condition:
         self._binding, self._telemetry = rig.binding, telemetry
         self._states, self._faults = rig.choices("state"), rig.choices("fault")
         self._reboots = 0
+        self._code, self._since_ns = 0, 0  # of the state, and since when it is that
         self._unknown_ns: int | None = None  # since when its state has no name, by the frames that came
 
     @property
@@ -25,6 +26,18 @@ class Condition:
             return "OFF"
         name = self._states.get(int(self._telemetry.latest.get("state", 0)))
         return (self._binding.mode(name) if name is not None else None) or "UNKNOWN"
+
+    def look(self, now_ns: int) -> None:
+        """Note since when the state is what it is; after each look at the telemetry."""
+        code = int(self._telemetry.latest.get("state", 0))
+        if code != self._code or not self._since_ns:
+            self._code, self._since_ns = code, now_ns
+
+    def described(self, now_ns: int) -> str:
+        """The state by its name in the rig file and in the DBC, and since when: `OFF (aus) since 12.3 s`."""
+        name = self._states.get(self._code, f"code {self._code}, which the DBC does not name")
+        own = "" if name == self.mode else f" ({name})"
+        return f"{self.mode}{own} since {max(0, now_ns - self._since_ns) * 1e-9:.1f} s"
 
     @property
     def fault(self) -> str:

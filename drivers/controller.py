@@ -7,14 +7,14 @@ from collections.abc import Callable
 
 from bench.clock import Clock, PumpedClock
 from bench.envelope import Envelope
-from bench.errors import BenchError, InterlockError, LinkError
+from bench.errors import BenchError, InterlockError, StateNotReached
 from bench.link import Link
 from bench.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.roles import RigState
 from bench.session import Session
 from bench.telemetry import TelemetryDecoder
-from drivers import advice, handshake, waiting
+from drivers import advice, handshake, unheard, waiting
 from drivers.capture import ControllerCapture
 from drivers.capture_upload import Upload
 from drivers.dialogue import Dialogue, no_reply
@@ -86,7 +86,7 @@ class Controller:
             clear_fault: clear whatever fault there is; else only HEARTBEAT_LOST, which says nothing of the machine.
 
         Raises:
-            LinkError: no telemetry, or no answer.
+            LinkError: no telemetry, or no answer; BytesUnreadable: bytes that are no telemetry.
             ConfigError: another host owns it or talks to it, its protocol or message map is another one, or it has a
                 fault that somebody should look at.
         """
@@ -95,10 +95,11 @@ class Controller:
             self.clock.sleep(handshake.LISTEN_S)
             handshake.alone(self.watch.hosts.seen, self.link.name)
             self._own()
-        silent = (
-            f"no telemetry within {FIRST_S:g} s. Is the controller on, the port right, the bit rate that of the bus?"
-        )
-        self.wait(lambda: bool(self.telemetry.latest), FIRST_S, LinkError(f"link {self.link.name}: {silent}"))
+        begun = unheard.Heard.of(self.link)
+        self.wait(lambda: bool(self.telemetry.latest), FIRST_S, lambda: unheard.error(
+            self.link, begun, FIRST_S,
+            f"no telemetry within {FIRST_S:g} s. Is the controller on, the port right, the bit rate that of the bus?",
+        ))  # fmt: skip
         handshake.claim(self._dialogue, self.rig, self._session, self.clock, self._wait)
         self._own()
         self.serial = handshake.identify(self._dialogue, self.rig, self._session, self._wait)
@@ -136,7 +137,7 @@ class Controller:
         """Read the link, record, decode, and look after the machine.
 
         Raises:
-            LinkError: no telemetry for half a second (`drivers.waiting.patience_s`).
+            LinkError: no telemetry for half a second (`drivers.waiting.patience_s`); BytesUnreadable where bytes come.
             InterlockError: the envelope tripped.
             DeviceFault: the controller reports a fault, or has restarted.
             FrozenError, AnotherHost: as `Watch.check` says.
@@ -187,6 +188,11 @@ class Controller:
     def round_trip_ns(self) -> int | None:
         """The least time from a request to its answer."""
         return self._dialogue.round_trip_ns
+
+    @property
+    def repeats(self) -> int:
+        """Requests that were sent again because no reply had come."""
+        return self._dialogue.repeats
 
     @property
     def replies_wrong_length(self) -> int:
@@ -252,7 +258,7 @@ class Controller:
         """Turn the rotor the shorter way to an angle and wait until it stands there.
 
         Raises:
-            LinkError: it does not arrive in time.
+            RotorNotArrived: it does not arrive in time.
         """
         self._turning.point(angle_rad)
 
@@ -260,7 +266,7 @@ class Controller:
         """Turn the rotor at a speed; returns when it has kept within 2 % or 0.3 rad/s of it for a tenth of a second.
 
         Raises:
-            LinkError: it does not get there in time.
+            RotorNotArrived: it does not get there in time.
         """
         self._turning.spin(rad_s)
 
@@ -268,9 +274,9 @@ class Controller:
         """Brake to a stop, and wait until the rotor is below the landing speed.
 
         Raises:
-            LinkError: it does not get there in time.
+            RotorNotArrived: it does not get there in time.
         """
-        self._turning.stop(self.link.name)
+        self._turning.stop()
 
     @property
     def landing_s(self) -> float:
@@ -304,15 +310,18 @@ class Controller:
     def _command(self, name: str, goal: str, timeout_s: float, expected_s: float = 0.0) -> None:
         self._orders.command(name)
         self.clock.sleep(expected_s)
-        self._wait(lambda: self.mode == goal, timeout_s, f"state {goal} after {name}")
+        self.wait(lambda: self.mode == goal, timeout_s, lambda: StateNotReached(
+            f"the controller took {name} and is not {goal} after {expected_s + timeout_s:g} s: its state is "
+            f"{self.watch.condition.described(self._base.now_ns())}"
+        ))  # fmt: skip
 
     def _wait(self, done: Callable[[], bool], timeout_s: float, what: str) -> None:
-        self.wait(done, timeout_s, no_reply(self.link.name, what, timeout_s))
+        self.wait(done, timeout_s, lambda: no_reply(self.link.name, what, timeout_s))
 
-    def wait(self, done: Callable[[], bool], timeout_s: float, error: LinkError) -> None:
+    def wait(self, done: Callable[[], bool], timeout_s: float, error: Callable[[], BenchError]) -> None:
         """Let the clock run until something is true.
 
         Raises:
-            LinkError: the given one, when time runs out.
+            BenchError: the given one, when time runs out.
         """
         waiting.until(done, timeout_s, error, self.clock, self._base.now_ns)

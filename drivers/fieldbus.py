@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 
 from bench.clock import Clock
 from bench.envelope import Envelope
-from bench.errors import BenchError, DeviceFault, LinkError
+from bench.errors import BenchError, DeviceUnreadable, DriveFault, LinkError
 from bench.recorder import Recorder
 from bench.registers import RegisterPort, RegisterRefused
 from bench.rigfile import RigFile
@@ -112,7 +112,7 @@ class Fieldbus:
         Raises:
             ConfigError: a register that a device does not have, or a drive with a fault that somebody should look at.
             LinkError: a device does not answer.
-            DeviceFault: the drive's fault stays.
+            DriveFault: the drive's fault stays.
         """
         for name, device in self.devices.items():
             self._latest[name] = self.ask(device.check)
@@ -176,8 +176,8 @@ class Fieldbus:
         """Take what polling found; poll what is due where no thread does.
 
         Raises:
-            LinkError: a device is lost, or refuses (while guarded).
-            DeviceFault: the drive reports a fault (while guarded).
+            LinkError: a device is lost, refuses, or says what is no number (DeviceUnreadable), while guarded.
+            DriveFault: the drive reports a fault (while guarded).
             InterlockError: a reading is outside the envelope (while guarded).
         """
         self._pumped_s = time.monotonic()
@@ -192,16 +192,16 @@ class Fieldbus:
         if self.guarded:
             self._check()
 
-    def wait(self, done: Callable[[], bool], timeout_s: float, what: str) -> None:
+    def wait(self, done: Callable[[], bool], timeout_s: float, error: Callable[[], BenchError]) -> None:
         """Let the clock run until something is true.
 
         Raises:
-            LinkError: time runs out.
+            BenchError: the given one, when time runs out.
         """
         watch = Stopwatch(self._clock.now_ns)
         while not done():
             if watch.look() >= timeout_s * 1e9:
-                raise LinkError(f"waited {timeout_s:g} s for {what}; it did not come")
+                raise error()
             self._clock.sleep(WAIT_SLICE_S)
             self.pump()
 
@@ -270,9 +270,11 @@ class Fieldbus:
             silent = (now - self._answered[name]) * 1e-9
             if silent > self._patience[name]:
                 why = f": {self._trouble[name]}" if name in self._trouble else ""
-                raise LinkError(f"device {name} on link {device.spec.link}: no reading for {silent:.1f} s{why}")
+                odd = isinstance(self._trouble.get(name), DeviceUnreadable)
+                kind = DeviceUnreadable if odd else LinkError
+                raise kind(f"device {name} on link {device.spec.link}: no reading for {silent:.1f} s{why}")
         if self.drive is not None and self.drive.fault:
-            raise DeviceFault(f"the drive reports {self.drive.fault}; look at it before the next run")
+            raise DriveFault(f"the drive reports {self.drive.fault}; look at it before the next run")
 
 
 @contextmanager
@@ -286,7 +288,7 @@ def open_devices(
     Raises:
         ConfigError: a map that cannot be, or a register that a device does not have.
         LinkError: a device does not answer.
-        DeviceFault: the drive has a fault that stays.
+        DriveFault: the drive has a fault that stays.
     """
     bus = Fieldbus(rig, port_of, clock, envelope, threaded=threaded)
     try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from bench.errors import ConfigError, LinkError
+from bench.errors import ConfigError, DeviceUnreadable
 from bench.registers import GAP, Register, RegisterPort, RegisterRefused, Words, grouped, values_of
 from bench.rigfile import Device, RigFile
 
@@ -75,7 +75,8 @@ class RegisterDevice:
         """All values in SI, in as few requests as the map allows.
 
         Raises:
-            LinkError: no answer, an exception response, or words that are no number; the text names the registers.
+            LinkError: no answer, an exception response, or words that are no number (DeviceUnreadable); the text names the
+                registers.
         """
         out: dict[str, float] = {}
         for block in self._blocks:
@@ -86,7 +87,7 @@ class RegisterDevice:
                 where = f"{self.name} ({', '.join(block.names)}): {error.where}"
                 raise RegisterRefused(error.code, where) from error
             except ValueError as error:
-                raise LinkError(f"device {self.name}: {error}") from error
+                raise DeviceUnreadable(f"device {self.name}: {error}") from error
         return out
 
     def write(self, register: str, value: float) -> None:

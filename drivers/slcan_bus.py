@@ -29,6 +29,7 @@ from drivers.canframes import messages_of
 
 ANSWER_S = 0.3  # for each of the adapter's answers while it is set up; one that does not know V or F gives none
 POLL_S = 1.0  # between requests for the status
+STRANGE = 3  # pieces that fit nothing, before anything else: the remainder of one line, and the noise of plugging in
 SILENT_S = 0.1  # without frames the status is asked for so often: silence may mean that the bus is off
 
 
@@ -70,6 +71,8 @@ class SlcanBatchBus(can.BusABC):
         self._writing = threading.Lock()
         self._ask: Callable[[bytes], None] = self._write
         self._waiting: deque[can.Message] = deque()
+        self.octets = 0  # that came since it was set up, without what the adapter itself answers
+        self._came = 0  # frames while it was set up
         self._filter: Callable[[FrameBatch], Any] | None = None
         self.stream = SlcanStream(timestamp=timestamp, remotes=True)
         self.brs = data_bitrate is not None and fd is not False
@@ -104,6 +107,11 @@ class SlcanBatchBus(can.BusABC):
         """
         self._write(b"\r\r" + slcan.CLOSE + slcan.VERSION)  # CRs end whatever an earlier user left half written
         self._await(lambda s: bool(s.replies))
+        if self.stream.malformed > STRANGE and not self._came:
+            raise ConfigError(
+                f"port {channel}: {self.stream.malformed} pieces came that are no SLCAN, and no frame; expected an SLCAN "
+                "adapter. Next: is it another device, or a controller that sends packets (serial: in place of slcan:)?"
+            )
         self.stream.refused = 0
         self.stream.replies.clear()
         self._write(self._setup + slcan.VERSION)
@@ -130,7 +138,7 @@ class SlcanBatchBus(can.BusABC):
         """Read until the answer came, or the time for it is over."""
         deadline = time.monotonic() + ANSWER_S
         while not came(self.stream) and (left := deadline - time.monotonic()) > 0:
-            self.stream.feed(self.port.read(left), self._now_ns())
+            self._came += len(self.stream.feed(self.port.read(left), self._now_ns()))
 
     def recv_batch(self, timeout_s: float | None) -> FrameBatch:
         """Data frames that came, after waiting for the next bytes no longer than `timeout_s` and 0.1 s. May be empty
@@ -153,7 +161,9 @@ class SlcanBatchBus(can.BusABC):
         data = self.port.read(SILENT_S if timeout_s is None else min(timeout_s, SILENT_S))
         if not data:
             return empty_batch()
+        answered = self.stream.answered
         batch = self.stream.feed(data, self._now_ns())
+        self.octets += len(data) - (self.stream.answered - answered)
         if len(batch):
             self._heard = time.monotonic()
         return batch if self._filter is None else batch[self._filter(batch)]

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from bench.errors import LinkError
 from bench.link import Link
 from bench.rigfile import RigFile
 from bench.samples import SampleBlock
 from bench.stillness import StuckChannels
 from bench.telemetry import TelemetryDecoder
-from drivers import waiting
+from drivers import unheard, waiting
 from drivers.condition import Condition
 from drivers.hosts import HostFrames
 
@@ -45,6 +44,7 @@ class Watch:
         self.patience_s = waiting.patience_s(rig)
         self.host_age_s = 0.0
         self._last_ns = self._polled_ns = now_ns()
+        self._heard = unheard.Heard.of(link)  # what had come when telemetry came last
 
     def begin(self) -> None:
         """The controller is ours from now on."""
@@ -63,7 +63,8 @@ class Watch:
         for block in blocks:
             self.stuck.take(block)
         if blocks:
-            self._last_ns = self._now_ns()
+            self._last_ns, self._heard = self._now_ns(), unheard.Heard.of(self._link)
+        self.condition.look(self._polled_ns)
         if recording and self.condition.mode not in ("OFF", "FAULT"):
             ages = [float(b.columns[HOST_AGE].max()) for b in blocks if HOST_AGE in b.columns]
             self.host_age_s = max([self.host_age_s, *ages])
@@ -77,14 +78,14 @@ class Watch:
         """Raise unless all is well.
 
         Raises:
-            LinkError: no telemetry for half a second (`drivers.waiting.patience_s`).
+            LinkError: no telemetry for half a second (`drivers.waiting.patience_s`); BytesUnreadable where bytes come.
             AnotherHost: `HostFrames.check`.
             DeviceFault, FrozenError: `Condition.check`.
         """
         patience_s = self.patience_s + (self._rig.link.reconnect_s if self._link.reopening else 0.0)
         if self.silent_s > patience_s and not self._frames_come:
             text = f"no telemetry for {self.silent_s:.2f} s; the link or the controller is lost"
-            raise LinkError(f"link {self._link.name}: {text}")
+            raise unheard.error(self._link, self._heard, self.silent_s, text)
         self.hosts.check()
         self.condition.check()
 

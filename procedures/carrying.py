@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from bench.errors import LinkError
+from bench.errors import RotorNotArrived
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from procedures import rotor
@@ -21,13 +21,13 @@ def home(rig: Rig) -> None:
     """Turn the rotor to its home angle.
 
     Raises:
-        LinkError: it does not arrive; the text names what an angle loop that runs away points to.
+        RotorNotArrived: it does not arrive; the text names what an angle loop that runs away points to.
     """
     try:
         rig.rotation.point(0.0)
-    except LinkError as error:
+    except RotorNotArrived as error:
         why = "does the encoder count in the direction of the motor's torque, and is the shaft free?"
-        raise LinkError(f"{error}; {why}") from error
+        raise RotorNotArrived(f"{error}; {why}") from error
 
 
 def carry(rig: Rig, settle_s: float) -> None:

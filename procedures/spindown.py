@@ -13,7 +13,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from bench.errors import LinkError
+from bench.errors import NotReached
 from bench.figures import Figure
 from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
@@ -152,8 +152,7 @@ def _run_up(rig: Rig, wanted: float, by: str) -> bool:
         else:
             rotor.hold(rig)
             rig.rotation.spin(wanted)
-    except LinkError:
-        rig.clock.sleep(0.1)  # a link that is lost says so again by itself
+    except NotReached:
         return False
     return True
 

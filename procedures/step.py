@@ -11,7 +11,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from bench.errors import LinkError
+from bench.errors import NotReached
 from bench.figures import Figure
 from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
@@ -135,7 +135,7 @@ def _at(rig: Rig, plan: Plan, record: Recorder, speed: float) -> bool:
         return True
     try:
         rig.drive.reach(speed)
-    except LinkError:
+    except NotReached:
         record.event("not-reached", wanted=speed, reached=rig.rotation.speed_rad_s)
         return False
     rig.clock.sleep(SETTLED_S)

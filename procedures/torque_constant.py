@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import Field
 
-from bench.errors import LinkError
+from bench.errors import RotorNotArrived
 from bench.figures import Figure
 from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
@@ -106,8 +106,7 @@ def _at_home(rig: Rig, record: Recorder, angle: float) -> bool:
     """Turn to an angle and wait until the rotor stands there; a rotor that does not is told in the recording."""
     try:
         rig.rotation.point(angle)
-    except LinkError as error:
-        rig.clock.sleep(0.1)  # a link that is lost says so again by itself
+    except RotorNotArrived as error:
         record.event("not-held", angle=angle, text=str(error))
         rotor.release(rig)
         return False

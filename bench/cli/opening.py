@@ -259,7 +259,7 @@ def _opened(
         others = {name: line.stats for name, line in lines.items()}
         return Health(telemetry.counters, controller.link.stats, telemetry.host.drift(), telemetry.host.latest_ns,
                       controller.watch.host_age_s, controller.round_trip_ns, others,
-                      cut_ns=controller.cut_ns, beyond_drift=telemetry.host.beyond,
+                      repeats=controller.repeats, cut_ns=controller.cut_ns, beyond_drift=telemetry.host.beyond,
                       replies_wrong_length=controller.replies_wrong_length, stuck=controller.watch.stuck.found)  # fmt: skip
 
     rig = Rig(controller.rig, controller.clock, controller, controller, operators[0], controller.telemetry.counters,

@@ -76,6 +76,8 @@ class SlcanStream:
         """BEL: the adapter did not take a command or a frame."""
         self.remote = 0
         """Remote frames."""
+        self.answered = 0
+        """Bytes of lines that are no frames and that the adapter may say: acknowledgements, answers."""
         self.status: int | None = None
         """The last answer to F: bits as in bench.wire.slcan."""
         self.overruns = 0
@@ -107,8 +109,11 @@ class SlcanStream:
         for text in lines:
             parsed = parse(text, timestamp=self._timestamp)
             if parsed is None:
+                before = self.malformed
                 if text not in _ACKS and (row := self._other(text, t_ns)):
                     rows.append(row)
+                else:
+                    self.answered += (len(text) + (text[-1:] != BEL)) * (self.malformed == before)
                 continue
             identifier, payload, fd, ms, brs = parsed
             hw_ns = 0 if ms < 0 else self._unwrapped(ms * 1_000_000, t_ns)

@@ -78,7 +78,7 @@ CASES = (
     Case("stall@12", Outcome.ERROR, ("link-lost",), AT_ONCE),
     Case("disconnect@12", Outcome.ERROR, ("link-lost",), AT_ONCE),
     Case("bus-off@12", Outcome.ERROR, ("link-lost", "bus-off"), AT_ONCE),
-    Case("mute@12", Outcome.ERROR, ("link-lost",), 10.0),
+    Case("mute@12", Outcome.ERROR, ("no-reply",), 10.0),
     Case("reboot@12", Outcome.ABORTED, ("controller-fault", "controller-restarted"), 0.0),
     Case("stuck-heartbeat@12", Outcome.ABORTED, ("controller-fault",), AT_ONCE),
 )  # fmt: skip

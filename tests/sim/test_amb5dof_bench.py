@@ -13,7 +13,7 @@ import pytest
 
 from bench import capture
 from bench.cli.safety import safe_steps
-from bench.errors import BenchError, DeviceFault, InterlockError, LinkError
+from bench.errors import BenchError, DeviceFault, InterlockError, StateNotReached
 from bench.opened import WatchedClock
 from bench.recorder import Recorder, RunHeader
 from bench.recording import Recording
@@ -246,7 +246,7 @@ def test_make_safe_does_not_let_down_a_shaft_whose_pulses_have_ended() -> None:
 
 def test_a_sensor_of_the_wrong_sign_is_never_levitated() -> None:
     stand = Stand(1, position_sign_yi=-1.0)
-    with pytest.raises((LinkError, DeviceFault)):
+    with pytest.raises((StateNotReached, DeviceFault)):
         stand.levitate()
 
 
