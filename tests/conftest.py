@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import threading
 from collections.abc import Iterator
 from typing import Any
@@ -17,6 +18,10 @@ settings.register_profile("repeatable", derandomize=True, deadline=None, databas
 settings.register_profile("search", max_examples=2000, deadline=None)
 settings.load_profile("repeatable")
 """The same examples in every run: a check that is green stays green. `make fuzz` looks for new ones."""
+if hasattr(
+    signal, "SIGHUP"
+):  # where the tests themselves were started to outlive a terminal, what they start must not be
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 GRACE_S = 2.0  # for a thread that was told to end and is on its way
 
 

@@ -107,7 +107,7 @@ def test_what_a_killed_run_leaves_behind(tmp_path: Path) -> None:
 
 def test_a_full_disk_ends_the_run_with_the_machine_safe(tmp_path: Path) -> None:
     def small_files() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (2_300_000, 2_300_000))  # 2 MB are kept free for the end of a run
 
     with start(tmp_path, *RUN, "--plan", "seconds=20.0", preexec_fn=small_files) as child:
         _, err = child.communicate()

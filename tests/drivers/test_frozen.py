@@ -6,7 +6,7 @@ import struct
 
 import numpy as np
 import pytest
-from hostile import AMB, TSBS, Bench, Telemetry, unchanged
+from hostile_controller import AMB, TSBS, Bench, Telemetry, unchanged
 
 from bench.errors import AnotherHost, DeviceFault, FrozenError
 from bench.frames import FrameBatch, frame

@@ -7,7 +7,7 @@ import os
 import signal
 
 import pytest
-from hostile import AMB, TSBS, Bench, Telemetry, unchanged
+from hostile_controller import AMB, TSBS, Bench, Telemetry, unchanged
 
 from bench.cli.safety import END_S
 from bench.frames import FrameBatch
@@ -49,7 +49,7 @@ def test_a_machine_of_which_nothing_tells_is_left_to_itself(speed: float) -> Non
     bench = Bench(AMB)
     leases = bench.link.leases
     found, took_s = bench.made_safe(Telemetry(AMB, {"speed": speed}, lost=("CommandReply",)))
-    assert bench.said == ["MAKE_SAFE"]
+    assert set(bench.said) == {"MAKE_SAFE"}  # and its repeats: no reply comes
     assert bench.link.leases - leases < 200  # of a lease in each slice of 50 ms of 30 s
     assert not bench.base.renewing
     assert "the machine cannot be seen" in found[-1].text
@@ -156,6 +156,6 @@ def test_a_signal_during_it_is_answered_and_changes_no_step(
         logging.getLogger("bench.supervisor").removeHandler(heard)
     assert len(answered) == 2
     assert max(answered) <= 0.2
-    assert bench.said == ["MAKE_SAFE"]
+    assert set(bench.said) == {"MAKE_SAFE"}  # and its repeats: no reply comes
     assert took_s == pytest.approx(END_S, abs=1.0)
     assert "the machine cannot be seen" in found[-1].text

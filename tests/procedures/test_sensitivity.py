@@ -229,7 +229,7 @@ def test_no_injection_leaves_the_envelope() -> None:
         ({"current_sign_i": -1.0}, {}, "coils-exchanged", Effect.ERROR),
         ({}, {"rate_hz": 1000.0}, "aliasing", Effect.ERROR),
         ({"position_range": 78e-6, "unbalance_i": 1.05e-5, "unbalance_o": 1.05e-5}, TURNING, "sensor-clipped", Effect.ERROR),
-        ({"supply_V": 1.5}, {}, "voltage-saturated", Effect.INDETERMINATE),
+        ({"supply_V": 12.0, "inductance": 60e-3}, {}, "voltage-saturated", Effect.INDETERMINATE),
         ({"geometry.clearance": 20e-6}, TURNING, "contact", Effect.INDETERMINATE),
         ({"position_noise": 6e-6}, {"amplitude_A": 1e-3}, "coherence-low", Effect.INDETERMINATE),
         ({"drop_fraction": 0.01}, {}, "missing-samples", Effect.INDETERMINATE),

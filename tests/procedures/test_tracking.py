@@ -95,7 +95,7 @@ def test_a_wide_ring_shows_the_pids_error_without_contact(tmp_path: Path) -> Non
         ({"position_range": 60e-6}, "stuck-channel", "range"),
         ({"factor_ellipse_on": 0}, "reference-missing", "not applied"),
         ({"factor_ellipse_hz": 1.02}, "reference-frequency", "10.2 Hz"),
-        ({"supply_V": 4.0, "inductance": 20e-3}, "saturated", "voltage"),
+        ({"supply_V": 12.0, "inductance": 60e-3}, "saturated", "voltage"),
         pytest.param({"drop_fraction": 0.005}, "missing-samples", "missing", marks=pytest.mark.long),
     ],
     ids=lambda x: "-".join(x) if isinstance(x, dict) else "",
