@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from datetime import datetime
+from pathlib import Path
 from typing import Any, cast
 
 from bench import provenance, runlog
@@ -27,7 +27,6 @@ from bench.progress import Progress, described
 from bench.recorder import Recorder
 from bench.records import Outcome
 from bench.roles import RigState
-from bench.rundir import RunDirectory
 from bench.states import transition
 from bench.supervisor import SafeStep, Supervisor
 
@@ -41,40 +40,50 @@ CODES: tuple[tuple[type[BaseException], str], ...] = (
 
 @dataclass(frozen=True)
 class Acquired:
-    """The machine's part of a run: how and when it ended, and the truth if the rig is simulated."""
+    """The machine's part of a run: how and when it ended, the truth if the rig is simulated, and what raised where it was
+    stopped early."""
 
     ending: Ending
     ended: str
     truth: Mapping[str, Any] | None
+    cause: BaseException | None
 
 
 def acquired(
-    job: Job, directory: RunDirectory, started: datetime, live: OpenRig, supervisor: Supervisor, progress: Progress
-) -> Acquired:
-    """Open the recording, move, make safe, close it. Raises nothing: what went wrong is in the ending."""
+    job: Job, path: Path, live: OpenRig, supervisor: Supervisor, progress: Progress, *, plain: bool = False,
+    wall: Callable[[], Mapping[str, str]] = dict,
+) -> Acquired:  # fmt: skip
+    """Open the recording at `path`, move, make safe, close it. Raises nothing: what went wrong is in the ending.
+
+    Args:
+        plain: record without a thread and without the 100 Hz view (`bench.recorder.Recorder`).
+        wall: what the recording says of the wall clock, asked at its end.
+    """
     ending: Ending | None = None
-    wall = provenance.wall(directory, started, job.rig.path)
+    cause: BaseException | None = None
+    said = wall()
     try:
         recorder = Recorder(
-            directory.recording, clock=live.rig.clock, streams=live.streams, header=provenance.header(job),
-            live=job.backend == "live",
+            path, clock=live.rig.clock, streams=live.streams, header=provenance.header(job),
+            live=job.backend == "live", plain=plain,
         )  # fmt: skip
         with recorder:
             live.attach(recorder)
             cause, findings = _moved(job, live, recorder, supervisor, progress)
             ending = _ending(cause, findings, live, recorder)
-            wall = provenance.wall(directory, started, job.rig.path)
-            recorder.wall |= wall
+            said = wall()
+            recorder.wall |= said
             with suppress(RecordingError):  # closing raises the same failure again
                 ending.write(recorder)
     except Exception as error:
+        cause = cause or error
         stopped, finding = cause_of(error)
         before = ending or Ending()
         known = finding.code in [f.code for f in before.findings]  # a failed recorder raises again when it is closed
         findings = before.findings if known else (*before.findings, finding)
         ending = replace(before, stopped=before.stopped or stopped, findings=findings)
     assert ending is not None
-    return Acquired(ending, wall["ended"], live.truth)
+    return Acquired(ending, said.get("ended", ""), live.truth, cause)
 
 
 def _moved(

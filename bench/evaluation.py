@@ -103,11 +103,11 @@ def evaluate(
     if stopped:
         return Evaluation(_in_order(procedure, {}, limits), Correlations((), ()), ())
     measured: dict[tuple[str, str], Measured] = {}
-    findings = [*_calibrations(recording), *incomplete_steps(recording)]
+    findings = []
     entries: dict[tuple[str, str], Measurement] = {}
     correlations = Correlations((), ())
     try:
-        for item in procedure.analyse(recording):
+        for item in yielded(procedure, recording):
             if isinstance(item, Finding):
                 findings.append(item)
             else:
@@ -121,6 +121,14 @@ def evaluate(
         findings.append(_failed(error))
         entries, correlations = {}, Correlations((), ())
     return Evaluation(_in_order(procedure, entries, limits), correlations, tuple(findings))
+
+
+def yielded(procedure: Procedure, recording: Recording[Any]) -> Iterator[Measured | Finding]:
+    """What a closed recording says: of the calibrations that the run used, of steps that lack samples, and what `analyse`
+    yields."""
+    yield from _calibrations(recording)
+    yield from incomplete_steps(recording)
+    yield from procedure.analyse(recording)
 
 
 def _calibrations(recording: Recording[Any]) -> Iterator[Finding]:

@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -81,7 +82,8 @@ def run(
             stack.enter_context(runlog.to_file(directory.log))
             logger.info("run %s on rig %s, backend %s, seed %s", directory.run_id, job.rig.name, job.backend, job.seed)
             progress.stage(f"{job.procedure.name} on {job.rig.name} ({job.backend}), run {directory.run_id}")
-            machine = acquired(job, directory, started, live, supervisor, progress)
+            wall = partial(provenance.wall, directory, started, job.rig.path)
+            machine = acquired(job, directory.recording, live, supervisor, progress, wall=wall)
         progress.stage("analyse")
         result, recording = _concluded(job, directory, record, machine, supervisor)
         write_record(directory.record, result.record)
