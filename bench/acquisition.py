@@ -40,13 +40,14 @@ CODES: tuple[tuple[type[BaseException], str], ...] = (
 
 @dataclass(frozen=True)
 class Acquired:
-    """The machine's part of a run: how and when it ended, the truth if the rig is simulated, and what raised where it was
-    stopped early."""
+    """The machine's part of a run: how and when it ended, the truth if the rig is simulated, what raised where it was
+    stopped early, and whether the rig had come into the procedure's state."""
 
     ending: Ending
     ended: str
     truth: Mapping[str, Any] | None
     cause: BaseException | None
+    brought_up: bool
 
 
 def acquired(
@@ -61,7 +62,7 @@ def acquired(
     """
     ending: Ending | None = None
     cause: BaseException | None = None
-    said = wall()
+    said, up = wall(), False
     try:
         recorder = Recorder(
             path, clock=live.rig.clock, streams=live.streams, header=provenance.header(job),
@@ -69,7 +70,7 @@ def acquired(
         )  # fmt: skip
         with recorder:
             live.attach(recorder)
-            cause, findings = _moved(job, live, recorder, supervisor, progress)
+            cause, findings, up = _moved(job, live, recorder, supervisor, progress)
             ending = _ending(cause, findings, live, recorder)
             said = wall()
             recorder.wall |= said
@@ -83,14 +84,16 @@ def acquired(
         findings = before.findings if known else (*before.findings, finding)
         ending = replace(before, stopped=before.stopped or stopped, findings=findings)
     assert ending is not None
-    return Acquired(ending, said.get("ended", ""), live.truth, cause)
+    return Acquired(ending, said.get("ended", ""), live.truth, cause, up)
 
 
 def _moved(
     job: Job, live: OpenRig, recorder: Recorder, supervisor: Supervisor, progress: Progress
-) -> tuple[BaseException | None, tuple[Finding, ...]]:
-    """Bring the rig to the procedure's state, acquire, make safe; what ended it early, and what make-safe could not do."""
+) -> tuple[BaseException | None, tuple[Finding, ...], bool]:
+    """Bring the rig to the procedure's state, acquire, make safe; what ended it early, what make-safe could not do, and
+    whether the rig had come into its state."""
     cause: BaseException | None = None
+    up = False
     rig, procedure = live.rig, job.procedure
     with runlog.warnings_to(lambda room, text: recorder.event("log", room=room, text=text)):
         try:
@@ -100,6 +103,7 @@ def _moved(
                 for name, value in procedure.settings(job.plan).items():
                     rig.levitation.set(name, value)
                 transition(rig, procedure.state)
+                up = True
                 progress.stage("acquire")
                 progress.total(procedure.step_count(job.plan))
                 procedure.acquire(rig, job.plan, cast(Recorder, WatchedSteps(recorder, progress, live.catch_up)))
@@ -111,7 +115,7 @@ def _moved(
                 _told(cause, progress)
             live.unguard()
             findings = supervisor.make_safe([_recording_or_not(s, live) for s in live.safe_steps], rig.clock.now_ns)
-    return cause, findings
+    return cause, findings, up
 
 
 def _told(cause: BaseException | None, progress: Progress) -> None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bench.acquisition import acquired
+from bench.acquisition import Acquired, acquired
 from bench.adoption import calibration_of
 from bench.calibration import Calibration, Need, facts_of, settings_differ
 from bench.cli import opening
@@ -25,6 +25,19 @@ from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.supervisor import Supervisor
 from sim_backend.truth import Truth, draw
+
+
+@dataclass(frozen=True)
+class Knobs:
+    """What costs time in a run, as `bench run` has it: see `bench.cli.opening.of_truth` and `bench.recorder.Recorder`."""
+
+    substeps: int = opening.SUBSTEPS
+    slice_s: float = opening.SLICE_S
+    plain: bool = False
+
+
+QUICK = Knobs(plain=True)
+"""What may be saved without moving a result by a tenth of its standard uncertainty."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +81,49 @@ def simulate(
     return done.truth, done.results
 
 
+@dataclass(frozen=True)
+class Flown:
+    """The machine's part of a run on one virtual rig, its recording closed."""
+
+    job: Job
+    drawn: Truth
+    machine: Acquired
+    path: Path
+
+    def analysed(self) -> Simulated:
+        """What the recording says, after what the end of the run says."""
+        procedure, seed = self.job.procedure, self.drawn.seed
+        recording: Recording[Any] = Recording.open(self.path, procedure.plan)
+        found = [*self.machine.ending.findings, *yielded(procedure, recording)]
+        return Simulated(procedure, recording, seed, self.drawn, found)
+
+
+def flown(
+    procedure: str,
+    rig: str,
+    seed: int,
+    plan: Mapping[str, Any],
+    path: Path,
+    truth: Mapping[str, float] | None = None,
+    calibrations: Mapping[str, Calibration] | None = None,
+    knobs: Knobs = QUICK,
+) -> Flown:
+    """Draw a rig and take it through the machine's part of a run; what ended that early is in it.
+
+    Raises:
+        ConfigError: a calibration that is needed is not given, or was made at other settings.
+    """
+    chosen, file = load_procedure(procedure), load_rig(rig)
+    settings = chosen.plan.model_validate({**file.plans.get(procedure, {}), **plan})
+    used = given(chosen.needs(settings), calibrations or {})
+    drawn = draw(file, seed, truth, chosen.settings(settings))
+    job = Job(chosen, file, settings, {}, "sim", seed, calibrations=tuple(used))
+    supervisor = Supervisor()
+    with opening.of_truth(file, drawn, "auto", substeps=knobs.substeps, slice_s=knobs.slice_s)(supervisor) as live:
+        machine = acquired(job, path, live, supervisor, Silent(), plain=knobs.plain)
+    return Flown(job, drawn, machine, path)
+
+
 def simulated_run(
     procedure: str,
     rig: str,
@@ -76,34 +132,19 @@ def simulated_run(
     path: Path,
     truth: Mapping[str, float] | None = None,
     calibrations: Mapping[str, Calibration] | None = None,
-    *,
-    substeps: int = opening.SUBSTEPS,
-    slice_s: float = opening.SLICE_S,
-    plain: bool = True,
+    knobs: Knobs = QUICK,
 ) -> Simulated:
     """As `simulate`; the result can also be adopted. `calibrations` are by procedure; those that are needed are used. What
     ends a run early is raised, after the machine was made safe.
-
-    Args:
-        substeps, slice_s, plain: what costs time; see `bench.cli.opening.of_truth` and `bench.recorder.Recorder`.
 
     Raises:
         ConfigError: a calibration that is needed is not given, or was made at other settings.
         BenchError: what ended the run early.
     """
-    chosen = load_procedure(procedure)
-    file = load_rig(rig)
-    settings = chosen.plan.model_validate({**file.plans.get(procedure, {}), **plan})
-    used = given(chosen.needs(settings), calibrations or {})
-    drawn = draw(file, seed, truth, chosen.settings(settings))
-    job = Job(chosen, file, settings, {}, "sim", seed, calibrations=tuple(used))
-    supervisor = Supervisor()
-    with opening.of_truth(file, drawn, "auto", substeps=substeps, slice_s=slice_s)(supervisor) as live:
-        machine = acquired(job, path, live, supervisor, Silent(), plain=plain)
-    if machine.cause is not None:
-        raise machine.cause
-    recording: Recording[Any] = Recording.open(path, chosen.plan)
-    return Simulated(chosen, recording, seed, drawn, [*machine.ending.findings, *yielded(chosen, recording)])
+    done = flown(procedure, rig, seed, plan, path, truth, calibrations, knobs)
+    if done.machine.cause is not None:
+        raise done.machine.cause
+    return done.analysed()
 
 
 def given(needs: Sequence[Need], calibrations: Mapping[str, Calibration]) -> list[Calibration]:

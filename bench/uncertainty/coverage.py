@@ -13,6 +13,7 @@ from scipy.special import ndtri, stdtrit
 
 from bench.errors import AnalysisError
 from bench.uncertainty.estimate import Array, Estimate, Influence
+from bench.uncertainty.tails import Tails, tails_of_draws, tails_of_t
 
 PROBABILITY = 0.95
 DRAWS = 200_000
@@ -24,7 +25,8 @@ _HALF_WIDTHS = {"rectangular": math.sqrt(3), "triangular": math.sqrt(6), "arcsin
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """A 95 % coverage interval [low, high]; U is its half width and k is U/u. `why` says what chose the method."""
+    """A 95 % coverage interval [low, high]; U is its half width and k is U/u. `why` says what chose the method. `tails` are
+    the probabilities of an error beyond 2 and 3 half widths."""
 
     low: float
     high: float
@@ -33,6 +35,7 @@ class Interval:
     dof: float
     method: Literal["gum", "monte-carlo"]
     why: str
+    tails: Tails
 
 
 def welch_satterthwaite(estimate: Estimate) -> float:
@@ -87,12 +90,14 @@ def interval(estimate: Estimate, seed: int = 0) -> Interval:
         k = coverage_factor(dof)
         wide = k * estimate.u
         why = "normal or many comparable components, linear model"
-        return Interval(estimate.value - wide, estimate.value + wide, k, wide, dof, "gum", why)
-    low, high = (float(q) for q in np.quantile(_sampled(estimate, seed), [0.025, 0.975]))
+        return Interval(estimate.value - wide, estimate.value + wide, k, wide, dof, "gum", why, tails_of_t(k, dof))
+    draws = _sampled(estimate, seed)
+    low, high = (float(q) for q in np.quantile(draws, [0.025, 0.975]))
     if not (math.isfinite(low) and math.isfinite(high)):
         raise AnalysisError("the model does not give finite numbers over the spread of its inputs")
     half = (high - low) / 2
-    return Interval(low, high, half / estimate.u if estimate.u > 0 else 0.0, half, dof, "monte-carlo", reason)
+    beyond = tails_of_draws(draws, estimate.value, low, high)
+    return Interval(low, high, half / estimate.u if estimate.u > 0 else 0.0, half, dof, "monte-carlo", reason, beyond)
 
 
 def _sampled(estimate: Estimate, seed: int) -> Array:
