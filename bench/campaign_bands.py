@@ -120,7 +120,9 @@ class Quantity:
     @property
     def farthest(self) -> tuple[tuple[int, float], ...]:
         """Seeds and ratios of the errors beyond the interval's double, the greatest first."""
-        found = [(seed, s.ratio) for seed, s in zip(self.seeds, self.samples, strict=True) if abs(s.ratio) > MULTIPLES[0]]
+        found = [
+            (seed, s.ratio) for seed, s in zip(self.seeds, self.samples, strict=True) if abs(s.ratio) > MULTIPLES[0]
+        ]
         return tuple(sorted(found, key=lambda item: -abs(item[1])))
 
 

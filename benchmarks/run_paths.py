@@ -58,7 +58,9 @@ RIGS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
 """Short plans, those of the campaigns where they have the procedure, in an order in which calibrations come before their use."""
 
 
-def measure(like: Mapping[str, Any] | None, seeds: Sequence[int], names: Sequence[str], knobs: Mapping[str, Any]) -> Any:
+def measure(
+    like: Mapping[str, Any] | None, seeds: Sequence[int], names: Sequence[str], knobs: Mapping[str, Any]
+) -> Any:
     """Every procedure on every seed. Calibrations are made on the way, or are those of `like`."""
     found: dict[str, Any] = {"calibrations": {}, "runs": {}}
     for rig, seed in ((rig, seed) for rig in RIGS for seed in seeds):

@@ -71,8 +71,11 @@ def view_of(c: CoverageContent) -> SummaryView:
     untold = "A quantity that was to be judged has no truth." if judged else "Nothing could be judged."
     said = {
         "PASS": "Every judged quantity lies within its bands, and its errors within its tails.",
-        "FAIL": " ".join(f"{what}: {_named(names)}." for what, names in
-                         (("Outside a band", out), ("Too many errors beyond 2 U or 3 U", far)) if names),
+        "FAIL": " ".join(
+            f"{what}: {_named(names)}."
+            for what, names in (("Outside a band", out), ("Too many errors beyond 2 U or 3 U", far))
+            if names
+        ),
         "INDETERMINATE": f"More rigs are needed to decide: {_named(out)}." if out else untold,
     }[outcome]
     return SummaryView(

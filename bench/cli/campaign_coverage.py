@@ -50,8 +50,12 @@ class Result:
         lines += [f"  {row.name:{widest}}  {_figures(row)}" for row in self.rows]
         if self.rows:
             low, high = self.rows[0].coverage.band
-            lines.append(f"bands: coverage {low:.4f} to {high:.4f}, width 0.80 to 1.25; errors beyond 2 U and 3 U: found/at most")
-            lines += [f"  tails of {_farthest(row)}" for row in self.rows if any(t.verdict is Verdict.FAIL for t in row.tails)]
+            lines.append(
+                f"bands: coverage {low:.4f} to {high:.4f}, width 0.80 to 1.25; errors beyond 2 U and 3 U: found/at most"
+            )
+            lines += [
+                f"  tails of {_farthest(row)}" for row in self.rows if any(t.verdict is Verdict.FAIL for t in row.tails)
+            ]
         lines += [_unable(u) for u in self.unable]
         lines += [f"  {f.effect}: {f.code} in {f.procedure}: {f.rigs} rigs, as seed {f.example}: {f.text}"
                   for f in self.failures if f.effect != "note"]  # fmt: skip

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import gc
 import importlib
+import logging
 import math
 import os
 import shutil
@@ -70,6 +71,9 @@ def settle_in(procedures: Sequence[Any]) -> None:
     from bench import catalogue
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    logging.getLogger().addHandler(
+        logging.NullHandler()
+    )  # what stops a rig is in its line; the terminal is the parent's
     parent = parent_process()
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
