@@ -1,6 +1,6 @@
 """What the speed knobs of a simulated run do to its results: every procedure, some seeds, with and without them.
 
-    python benchmarks/run_paths.py measure run.json                                # as `bench run` does
+    python benchmarks/run_paths.py measure run.json --whole                        # as `bench run` does
     python benchmarks/run_paths.py measure one.json --like run.json --substeps 1   # with its calibrations
     python benchmarks/run_paths.py compare run.json one.json
 
@@ -22,7 +22,7 @@ from typing import Any
 
 from bench.calibration import Calibration
 from bench.calibrationfile import attached, attachment
-from bench.cli.virtual import simulated_run
+from bench.cli.virtual import Knobs, simulated_run
 from bench.findings import Effect
 from bench.procedure import Measured
 
@@ -55,7 +55,7 @@ RIGS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "coast-down": {**SWEPT, "deceleration_rad_s2": 200.0},
     },
 }  # fmt: skip
-"""Short plans, those of the campaigns where they have the procedure, in an order in which calibrations come before their use."""
+"""Short plans, those of the campaigns where they have the procedure; what gives a calibration comes before what needs it."""
 
 
 def measure(
@@ -72,7 +72,7 @@ def measure(
                 continue
             with tempfile.TemporaryDirectory() as folder:
                 began = time.process_time()
-                run = simulated_run(name, rig, seed, plan, Path(folder) / "recording.mcap", None, known, **knobs)
+                run = simulated_run(name, rig, seed, plan, Path(folder) / "recording.mcap", None, known, knobs=knobs)
                 took = time.process_time() - began
                 if like is None:
                     known[name] = run.calibration()
@@ -113,8 +113,9 @@ def main() -> int:
     one = commands.add_parser("measure")
     one.add_argument("out", type=Path)
     one.add_argument("--like", type=Path, help="a file of `measure` whose calibrations are used")
-    one.add_argument("--substeps", type=int)
-    one.add_argument("--slice", type=float, dest="slice_s")
+    one.add_argument("--substeps", type=int, default=Knobs.substeps)
+    one.add_argument("--slice", type=float, default=Knobs.slice_s, dest="slice_s")
+    one.add_argument("--whole", action="store_true", help="with the recorder of `bench run`")
     one.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
     one.add_argument("--only", nargs="+", default=[], metavar="PROCEDURE")
     two = commands.add_parser("compare")
@@ -124,9 +125,9 @@ def main() -> int:
     if asked.command == "compare":
         print("\n".join(compare(json.loads(asked.base.read_text()), json.loads(asked.other.read_text()))))
         return 0
-    given = {name: getattr(asked, name) for name in ("substeps", "slice_s") if getattr(asked, name) is not None}
+    knobs = Knobs(asked.substeps, asked.slice_s, plain=not asked.whole)
     like = json.loads(asked.like.read_text()) if asked.like else None
-    asked.out.write_text(json.dumps(measure(like, asked.seeds, asked.only, given)))
+    asked.out.write_text(json.dumps(measure(like, asked.seeds, asked.only, knobs)))
     return 0
 
 
