@@ -108,7 +108,7 @@ def _sensitivity(done: Simulated) -> Found:
     plan: Any = done.recording.plan
     plant, settings = done.drawn.plant, _settings(done, {"law": CODES[plan.law]})
     for speed in plan.speeds_rad_s:
-        loop = None if speed else amb_sensitivity.loop(plant, settings, 0.0)
+        loop = None if speed else amb_sensitivity.loop(plant, settings)
         for axis in plan.axes:
             k, where = AXES.index(axis), f"{axis}, {f'{speed * RPM:.0f} r/min' if speed else 'at rest'}"
             if loop is not None:
