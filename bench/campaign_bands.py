@@ -6,10 +6,10 @@ could all be divided and still hold 95 % of the truths; its band is 0.8 to 1.25 
 worth over N rigs follows from order statistics, whatever the distribution: with fewer than 59 rigs even the largest error
 is not beyond the 95th percentile with 95 % confidence (1 - 0.95^59 = 0.95), so that nothing is decided.
 
-Tails: errors beyond 2 U and 3 U, U being the half width on the side towards the truth, are counted, and may not be more than
-the 99.9 % quantile (Bonferroni over the quantities that are judged) of what each interval says of itself: t with its degrees of
-freedom, or the share of its JCGM 101 draws that lies so far out. One error that an interval jumped over is enough where such
-an error should not be met at all.
+Tails: errors beyond 2 U, 3 U and 10 U, U being the half width on the side towards the truth, are counted, and may not be more
+than the 99.9 % quantile (Bonferroni over the quantities that are judged) of what each interval says of itself: t with its
+degrees of freedom, or the share of its JCGM 101 draws that lies so far out. With eight degrees of freedom two of 300 may lie
+beyond 3 U, and a jump that the interval missed among them; beyond 10 U there should be none.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ WIDTH_BAND = (0.8, 1.25)
 @dataclass(frozen=True)
 class Sample:
     """One quantity of one rig: error of the value, interval bounds relative to the truth, half width U, and how probable the
-    interval takes errors beyond 2 and 3 half widths to be."""
+    interval takes errors beyond multiples of the half width to be."""
 
     error: float
     low: float
@@ -187,7 +187,7 @@ def coverage(samples: Sequence[Sample], rigs: int) -> Coverage:
 
 
 def tails(samples: Sequence[Sample], judged: int) -> tuple[Tail, ...]:
-    """The errors beyond 2 and 3 half widths of one quantity, of `judged` that are judged."""
+    """The errors beyond the multiples of the half width of one quantity, of `judged` that are judged."""
     found = []
     for n, multiple in enumerate(MULTIPLES):
         expected = [s.tails[n] for s in samples]

@@ -25,8 +25,8 @@ READING = (
     "analysis, and compared with what was drawn. Coverage is the share of rigs whose 95 % interval holds the truth; a rig "
     "without a value counts as a miss. Width is one over the 95th percentile of |error|/U, with the "
     "95 % range that order statistics leave it. A quantity passes if its coverage lies within 0.95 ± 3.3 √(0.95 · 0.05/N) "
-    "and its width within 0.8 to 1.25. Errors beyond 2 U and 3 U (U on the side towards the truth) may not be more than the "
-    "99.9 % quantile, shared among the judged quantities, of what t with the degrees of freedom of each interval gives, or "
+    "and its width within 0.8 to 1.25. Errors beyond 2 U, 3 U and 10 U (U on the side towards the truth) may not be more than "
+    "the 99.9 % quantile, shared among the judged quantities, of what t with the degrees of freedom of each interval gives, or "
     "its own JCGM 101 draws. A width outside whose range reaches inside is indeterminate, and so is everything "
     "below 59 rigs."
 )
@@ -73,7 +73,7 @@ def view_of(c: CoverageContent) -> SummaryView:
         "PASS": "Every judged quantity lies within its bands, and its errors within its tails.",
         "FAIL": " ".join(
             f"{what}: {_named(names)}."
-            for what, names in (("Outside a band", out), ("Too many errors beyond 2 U or 3 U", far))
+            for what, names in (("Outside a band", out), ("Too many errors far out", far))
             if names
         ),
         "INDETERMINATE": f"More rigs are needed to decide: {_named(out)}." if out else untold,
@@ -138,7 +138,7 @@ def _table(quantities: Sequence[Quantity]) -> Grid:
             Cell("–" if c.bias is None else f"{c.bias:+.3f}".replace("-", text.MINUS)),
             Cell(verdict, tone=_TONES.get(verdict, "none")) if q.judged else Cell("not judged", f"({verdict})"),
         ))  # fmt: skip
-    header = ("Quantity", "Coverage", "Width", "Beyond 2 U, 3 U", "Mean U", "Mean error / s.d.", "")
+    header = ("Quantity", "Coverage", "Width", "Beyond 2 U, 3 U, 10 U", "Mean U", "Mean error / s.d.", "")
     return Grid(header, (3.0, 1.3, 1.4, 1.2, 1.4, 1.1, 1.6), tuple(rows), (1, 2, 3, 4, 5))
 
 

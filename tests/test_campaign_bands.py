@@ -136,9 +136,10 @@ def test_a_sound_sample_of_few_degrees_of_freedom_is_accused_no_more_often_than_
 
 
 def test_the_most_errors_are_those_of_the_poisson_distribution_where_they_are_rare() -> None:
-    two, three = tails(student_samples(1000, 8, 1), 20)
+    two, three, ten = tails(student_samples(1000, 8, 1), 20)
     expected = [1000 * 2 * float(student.sf(m * student.ppf(0.975, 8), 8)) for m in (2, 3)]
     assert [two.expected, three.expected] == pytest.approx(expected)
+    assert ten.most == 0
     for found, mean in zip((two, three), expected, strict=True):
         assert found.most == poisson.ppf(1 - LEVEL / 20, mean)
 
@@ -156,6 +157,7 @@ def test_a_heavy_tail_is_caught_where_few_degrees_of_freedom_excuse_a_single_one
     sound = student_samples(300, 8, 2)
     assert not failing([*sound[:-1], far(3.5, sound[-1])], judged=20)
     assert failing([*sound[:-6], *(far(3.5, s) for s in sound[-6:])], judged=20)
+    assert failing([*sound[:-1], far(17.2, sound[-1])], judged=20)  # a jump, whatever the degrees of freedom
 
 
 def test_the_half_width_is_the_one_towards_the_truth() -> None:
@@ -173,16 +175,16 @@ def test_tails_of_draws_are_those_of_their_distribution() -> None:
     """chi2 of one degree of freedom, from its mean: skewed, so that the side matters."""
     draws = np.random.default_rng(1).chisquare(1, 2_000_000)
     low, high = (float(q) for q in np.quantile(draws, [0.025, 0.975]))
-    two, _ = tails_of_draws(draws, 1.0, low, high)
+    two, *_ = tails_of_draws(draws, 1.0, low, high)
     assert two == pytest.approx(float(chi2.sf(1 + 2 * (high - 1), 1)), rel=0.05)
 
 
 def test_an_interval_says_how_far_out_its_errors_may_lie() -> None:
     scatter = Influence("s", "scatter", 1.0, "m", "A", "normal", dof=4)
     by_t = interval(Estimate.of(0.0, scatter))
-    assert by_t.tails == pytest.approx([2 * student.sf(m * student.ppf(0.975, 4), 4) for m in (2, 3)])
+    assert by_t.tails == pytest.approx([2 * student.sf(m * student.ppf(0.975, 4), 4) for m in (2, 3, 10)])
     box = interval(Estimate.of(0.0, Influence("b", "box", 1.0, "m", "B", "rectangular")))
-    assert (box.method, box.tails) == ("monte-carlo", (0.0, 0.0))
+    assert (box.method, box.tails) == ("monte-carlo", (0.0, 0.0, 0.0))
 
 
 def test_the_verdict_of_a_quantity_has_its_tails_in_it_and_names_the_worst() -> None:

@@ -46,13 +46,11 @@ class Result:
         lines = [f"{self.rigs} rigs from seed {self.first_seed}, {self.rig_s:.2f} s a rig"]
         widest = max((len(row.name) for row in self.rows), default=0)
         if self.rows:
-            lines.append(f"  {'':{widest}}  coverage  width   >2U   >3U")
+            lines.append(f"  {'':{widest}}  coverage  width   >2U   >3U  >10U")
         lines += [f"  {row.name:{widest}}  {_figures(row)}" for row in self.rows]
         if self.rows:
             low, high = self.rows[0].coverage.band
-            lines.append(
-                f"bands: coverage {low:.4f} to {high:.4f}, width 0.80 to 1.25; errors beyond 2 U and 3 U: found/at most"
-            )
+            lines.append(f"bands: coverage {low:.4f} to {high:.4f}, width 0.80 to 1.25; errors far out: found/at most")
             lines += [
                 f"  tails of {_farthest(row)}" for row in self.rows if any(t.verdict is Verdict.FAIL for t in row.tails)
             ]
@@ -96,9 +94,9 @@ def judged(campaign: Campaign, steps: Sequence[Planned], entries: Sequence[Entry
 def _figures(row: Quantity) -> str:
     c = row.coverage
     width = "-" if c.width is None else f"{c.width:.3f}"
-    two, three = (f"{t.found}/{t.most}" for t in row.tails)
+    tails = "  ".join(f"{f'{t.found}/{t.most}':>4}" for t in row.tails)
     said = row.verdict.value if row.judged else f"not judged ({row.verdict.value})"
-    return f"{c.coverage:.4f}    {width:5}  {two:>4}  {three:>4}  {said}"
+    return f"{c.coverage:.4f}    {width:5}  {tails}  {said}"
 
 
 def _farthest(row: Quantity) -> str:

@@ -26,7 +26,7 @@ _HALF_WIDTHS = {"rectangular": math.sqrt(3), "triangular": math.sqrt(6), "arcsin
 @dataclass(frozen=True, slots=True)
 class Interval:
     """A 95 % coverage interval [low, high]; U is its half width and k is U/u. `why` says what chose the method. `tails` are
-    the probabilities of an error beyond 2 and 3 half widths."""
+    the probabilities of an error beyond multiples of the half width (`bench.uncertainty.tails`)."""
 
     low: float
     high: float

@@ -49,7 +49,7 @@ def chain(names: tuple[str, ...] = ("K_i", "alpha_x_prime", "B@by speed"), outco
 
 def many(n: int = 100, judged: bool = True) -> CoverageContent:
     errors = np.random.default_rng(1).standard_normal(n)
-    samples = tuple(Sample(float(e), float(e) - 1.96, float(e) + 1.96, 1.96, (8.9e-5, 4e-9)) for e in errors)
+    samples = tuple(Sample(float(e), float(e) - 1.96, float(e) + 1.96, 1.96, (8.9e-5, 4e-9, 0.0)) for e in errors)
     seeds = tuple(range(n))
     quantity = Quantity(1, "p", "K_i", "N/A", NASTY, judged, coverage(samples, n), tails(samples, 2), seeds, samples, 3)
     empty = dataclasses.replace(
