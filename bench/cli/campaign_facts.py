@@ -33,7 +33,7 @@ class StepResult:
     its calibration; `cannot` says why this machine cannot do it."""
 
     truth: Mapping[str, float]
-    results: list[Measured | Finding]
+    results: Sequence[Measured | Finding]
     calibration: Callable[[], Calibration] | None = None
     cannot: str = ""
 
