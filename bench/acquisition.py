@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from bench import provenance, runlog
+from bench.described import described
 from bench.errors import (
     Aborted,
     BenchError,
@@ -23,7 +24,7 @@ from bench.errors import (
 from bench.evaluation import Ending
 from bench.findings import Effect, Finding
 from bench.opened import Job, OpenRig
-from bench.progress import Progress, described
+from bench.progress import Progress
 from bench.recorder import Recorder
 from bench.records import Outcome
 from bench.roles import RigState
@@ -121,6 +122,7 @@ def _moved(
 def _told(cause: BaseException | None, progress: Progress) -> None:
     if cause is not None:
         logger.warning("stopped: %s", str(cause) or type(cause).__name__)
+    progress.total(0)
     progress.stage("make safe")
 
 

@@ -1,4 +1,4 @@
-"""Figures as data: a procedure says what to draw, `reports` draws it."""
+"""Figures and tables as data: a procedure says what to show, `reports` shows it."""
 
 from __future__ import annotations
 
@@ -58,3 +58,18 @@ class Figure:
     downward: bool = False  # y grows downwards, as phase lags are drawn
     closer: tuple[float, float, float] | None = None  # of a plane: beside it the same, about x, y and so far each way
     below: Figure | None = None  # a second panel on the same x axis, of which labels, series and the like are drawn
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A table of finished texts for page 1, such as the weights of a correction; `numeric` columns are set flush right."""
+
+    key: str  # unique in a report
+    title: str
+    caption: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    numeric: tuple[int, ...] = ()
+
+
+Shown = Figure | Sheet

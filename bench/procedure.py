@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ConfigDict
 
-from bench.figures import Figure
+from bench.figures import Shown
 from bench.findings import Finding
 from bench.roles import RigState
 
@@ -29,11 +29,13 @@ class BenchPlan(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A declared measurand: its name in records and truth, its unit and its definition in one line."""
+    """A declared measurand: its name in records and truth, its unit and its definition in one line; `title` is what a report
+    calls it where the name is no word."""
 
     name: str
     unit: str
     about: str
+    title: str = ""
 
     def measured(self, estimate: Estimate, where: str = "") -> Measured:
         """This quantity's value in this run."""
@@ -49,7 +51,7 @@ class Measured:
     where: str = ""
 
 
-def _no_figures(_: Recording[Any]) -> Iterable[Figure]:
+def _no_figures(_: Recording[Any]) -> Iterable[Shown]:
     return ()
 
 
@@ -81,7 +83,8 @@ class Procedure:
     `check` looks at a plan against a rig file before anything starts and names what cannot work. `settings` are the
     controller parameters (SI) that the runner writes in READY, before it levitates. `step_count` is how many steps
     `acquire` will record, for the progress display; 0 is unknown.
-    `analyse` yields what it measured and what it found, in the order of the report.
+    `analyse` yields what it measured and what it found, in the order of the report. `figures` come in the order in which a
+    specialist looks at them: the first two stand on page 1, and so do its tables.
 
     `needs` are the calibrations that a run with that plan uses; it reads them with `Recording.calibration`. `facts` is
     what `bench adopt` keeps of a run: values by name, None for what `analyse` yields. `holds_for` are the settings that these
@@ -95,7 +98,7 @@ class Procedure:
     plan: type[BenchPlan]
     acquire: Callable[[Rig, Any, Recorder], None]
     analyse: Callable[[Recording[Any]], Iterator[Measured | Finding]]
-    figures: Callable[[Recording[Any]], Iterable[Figure]] = field(default=_no_figures)
+    figures: Callable[[Recording[Any]], Iterable[Shown]] = field(default=_no_figures)
     check: Callable[[RigFile, Any], Iterable[str]] = field(default=_no_problems)
     settings: Callable[[Any], Mapping[str, float]] = field(default=_no_settings)
     step_count: Callable[[Any], int] = field(default=_unknown_count)

@@ -10,13 +10,13 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from bench.export import Tabular, whole_table
-from bench.figures import Figure, Grid
+from bench.figures import Figure, Grid, Shown
 from bench.records import Measurement
 
 Array = npt.NDArray[np.float64]
 
 
-def products(folder: Path, to: Tabular, found: Iterable[Measurement], figures: Iterable[Figure]) -> Iterator[Path]:
+def products(folder: Path, to: Tabular, found: Iterable[Measurement], figures: Iterable[Shown]) -> Iterator[Path]:
     """Write `results.<to>` and, per figure and panel, `figure-<key>.<to>` into a folder that is there; colour maps are
     `figure-<key>-map.<to>`.
 
@@ -31,7 +31,8 @@ def products(folder: Path, to: Tabular, found: Iterable[Measurement], figures: I
     """
     yield whole_table(folder / f"results.{to}", to, results(found))
     for figure in figures:
-        yield from _figure(folder, to, figure)
+        if isinstance(figure, Figure):  # a table of texts has its numbers in the results
+            yield from _figure(folder, to, figure)
 
 
 def results(found: Iterable[Measurement]) -> pa.RecordBatch:

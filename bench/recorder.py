@@ -78,6 +78,7 @@ class Recorder:
     ) -> None:
         self.path, self._clock, self._live, self._plain = path, clock, live, plain
         self.integrity = Integrity()
+        self._newest: tuple[int, frozenset[str]] = (-1, frozenset())  # step: its number and its labels
         self._header = header
         self.wall: dict[str, str] = {}
         self._streams = {s.name: s for s in streams}
@@ -150,9 +151,18 @@ class Recorder:
         """A labelled interval of the recording; left open when the block raises."""
         index = self.integrity.steps
         self.integrity.steps += 1
+        self._newest = (index, frozenset(labels))
         self.event("step-begin", step=index, name=kind, labels=labels)
         yield
         self.event("step-end", step=index, name=kind)
+
+    def correct(self, **labels: Any) -> bool:
+        """Other labels for the newest step, as a person tells them who was there; False where it has no such labels."""
+        index, known = self._newest
+        if index < 0 or not known.issuperset(labels):
+            return False
+        self.event("step-corrected", step=index, labels=labels)
+        return True
 
     def close(self) -> Integrity:
         """Write what is pending, the integrity and the wall record, and close the file.

@@ -292,8 +292,11 @@ class Recording(Generic[P]):
     def all_steps(self) -> Steps:
         """The completed steps of every kind, in time order."""
         ends = {e["step"]: e["t_ns"] for e in self.events("step-end")}
+        told: dict[int, dict[str, Any]] = {}
+        for e in self.events("step-corrected"):
+            told.setdefault(e["step"], {}).update(e["labels"])
         return Steps(tuple(
-            Step(self, e["name"], dict(e["labels"]), int(e["t_ns"]), int(ends[e["step"]]))
+            Step(self, e["name"], {**e["labels"], **told.get(e["step"], {})}, int(e["t_ns"]), int(ends[e["step"]]))
             for e in self.events("step-begin") if e["step"] in ends
         ))  # fmt: skip
 

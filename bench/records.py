@@ -40,7 +40,7 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True)
 class BudgetEntry:
-    """One influence of a measurement; `contribution` in its unit, `dof` None is infinite."""
+    """One influence of a measurement; `contribution` in the measurement's unit, `dof` None is infinite."""
 
     __pydantic_config__: ClassVar[ConfigDict] = _STRICT
     name: str
@@ -50,6 +50,7 @@ class BudgetEntry:
     type: Literal["A", "B"]
     distribution: str
     dof: float | None
+    unit: str = ""  # of the influence
 
 
 @dataclass(frozen=True)
@@ -248,7 +249,7 @@ def measurement(measured: Measured, limit: Limit | None, seed: int | None = 0) -
         missing(quantity, limit, measured.where), value=estimate.value, standard_uncertainty=estimate.u,
         dof=_finite(found.dof), coverage_factor=found.k, expanded_uncertainty=found.U, method=found.method,
         verdict=judge(found, limit), interval=(found.low, found.high), coverage_probability=PROBABILITY,
-        budget=tuple(BudgetEntry(r.name, r.id, r.contribution, r.sensitivity, r.kind, r.distribution, _finite(r.dof))
+        budget=tuple(BudgetEntry(r.name, r.id, r.contribution, r.sensitivity, r.kind, r.distribution, _finite(r.dof), r.unit)
                      for r in budget(estimate)),
     )  # fmt: skip
 

@@ -62,15 +62,17 @@ class Rotation(Protocol):
 class Operator(Protocol):
     """A person, or what stands in for one."""
 
-    def hang(self, load: Load) -> None: ...  # the hanger stays on; returns when done
-    def lever(self, side: Side, load: Load) -> None: ...  # a mass on an end of the level lever, the other end empty
+    def hang(self, load: Load) -> Load: ...  # the hanger stays on; returns when done, with what hangs
+    def lever(
+        self, side: Side, load: Load
+    ) -> Load: ...  # on an end of the level lever, the other end empty; what hangs
     def mount(self, part: str) -> None: ...  # "ring" on the shaft; "" takes it off
     def attach(
         self, plane: Plane, mass_kg: float, angle_rad: float
-    ) -> None: ...  # a weight beside what is there; angle
+    ) -> tuple[float, float]: ...  # a weight beside what is there; kg and rad of what was fixed; angle
     # on the plane's scale, counted from y towards z while its zero faces y; the shaft must be landed
     def detach(self, plane: Plane) -> None: ...  # every weight of that plane; the shaft must be landed
-    def ask(self, question: str) -> str: ...
+    def ask(self, question: str) -> bool: ...  # yes or no
 
 
 class Drive(Protocol):

@@ -81,11 +81,11 @@ def run(
             write_record(directory.record, record)
             stack.enter_context(runlog.to_file(directory.log))
             logger.info("run %s on rig %s, backend %s, seed %s", directory.run_id, job.rig.name, job.backend, job.seed)
-            progress.stage(f"{job.procedure.name} on {job.rig.name} ({job.backend}), run {directory.run_id}")
+            progress.line(f"{job.procedure.name} on {job.rig.name} ({job.backend}), run {directory.run_id}")
             wall = partial(provenance.wall, directory, started, job.rig.path)
             machine = acquired(job, directory.recording, live, supervisor, progress, wall=wall)
-        progress.stage("analyse")
-        result, recording = _concluded(job, directory, record, machine, supervisor)
+        with progress.busy("analyse"):
+            result, recording = _concluded(job, directory, record, machine, supervisor)
         write_record(directory.record, result.record)
         if machine.truth is not None:
             _write_json(directory.truth, machine.truth)
@@ -153,9 +153,8 @@ def _reported(
     """The report; one that fails is a finding and keeps the verdict, a signal makes the run ABORTED."""
     if report is None:
         return result
-    progress.stage("report")
     try:
-        with supervisor.interruptible():
+        with progress.busy("report"), supervisor.interruptible():
             report(directory.path, result.record, job.procedure, recording)
         return result
     except SignalAbort as error:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from bench.described import described
 from bench.findings import Finding
-from bench.progress import described
 from bench.recording import Recording
 
 NAMED = 12  # more are counted together

@@ -82,10 +82,9 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         angle = 2 * math.pi * turn / plan.angles
         rig.rotation.point(angle)
         for load, branch in sequence(plan):
-            if load != NOTHING or branch < 0:
-                rig.operator.hang(load)
+            hanging = rig.operator.hang(load)
             rig.clock.sleep(plan.settle_s)
-            with record.step("hang", angle_rad=angle, load=load.label, branch=branch):
+            with record.step("hang", angle_rad=angle, load=hanging.label, branch=branch):
                 rig.clock.sleep(plan.average_s)
 
 

@@ -34,7 +34,7 @@ SETTLING = Quantity("settling_time", "s", "from the answer of the torque current
 FINAL = Quantity("final_error", "rad", "angle at the end less its reference")
 PEAK = Quantity("peak_outboard", "m", "greatest distance off centre at the outboard sensor during the step")
 PEAK_MOTOR = Quantity("peak_motor", "m", "greatest distance off centre at the motor during the step")
-EXCESS = Quantity("excess", "m", "peak at the outboard sensor above that at standstill")
+EXCESS = Quantity("excess", "m", "peak at the outboard sensor above that at standstill", title="excess over standstill")
 SATURATED = Quantity("saturated", "s", "how long an amplifier of the motor cut its demand")
 MEASURES = (RISE, OVERSHOOT, SETTLING, FINAL, PEAK, PEAK_MOTOR, EXCESS, SATURATED)
 TORQUE_CONSTANT = 2.87  # N m/A, T Table 6.2; for predictions before a run, and for nothing that is measured

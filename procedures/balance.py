@@ -11,7 +11,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from bench.figures import Figure
+from bench.figures import Shown
 from bench.findings import Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recording import Recording
@@ -24,18 +24,51 @@ from procedures.estimators.balance_data import BASE, SIDES
 from procedures.estimators.unbalance_data import RPM
 from procedures.turning import Law
 
-FOUND_COS = Quantity("unbalance_cos", "kg m", "of the shaft as found, in a plane: component along the scale's zero")
-FOUND_SIN = Quantity("unbalance_sin", "kg m", "as unbalance_cos: component a quarter turn on, from y towards z")
+FOUND_COS = Quantity(
+    "unbalance_cos",
+    "kg m",
+    "of the shaft as found, in a plane: component along the scale's zero",
+    title="unbalance, along zero",
+)
+FOUND_SIN = Quantity(
+    "unbalance_sin",
+    "kg m",
+    "as unbalance_cos: component a quarter turn on, from y towards z",
+    title="unbalance, a quarter turn on",
+)
 LEFT_COS = Quantity(
-    "residual_cos", "kg m", "what is left with all corrections mounted: component along the scale's zero"
+    "residual_cos",
+    "kg m",
+    "what is left with all corrections mounted: component along the scale's zero",
+    title="residual, along zero",
 )
-LEFT_SIN = Quantity("residual_sin", "kg m", "as residual_cos: component a quarter turn on, from y towards z")
-SHARE = Quantity("residual_share", "1", "amount of what is left over the permissible residual unbalance of the plane")
-PERMITTED = Quantity("permissible", "kg m", "permissible residual unbalance of the plane, ISO 21940-11")
+LEFT_SIN = Quantity(
+    "residual_sin",
+    "kg m",
+    "as residual_cos: component a quarter turn on, from y towards z",
+    title="residual, a quarter turn on",
+)
+SHARE = Quantity(
+    "residual_share",
+    "1",
+    "amount of what is left over the permissible residual unbalance of the plane",
+    title="residual / permissible",
+)
+PERMITTED = Quantity(
+    "permissible",
+    "kg m",
+    "permissible residual unbalance of the plane, ISO 21940-11",
+    title="permissible residual unbalance",
+)
 COSINE = Quantity(
-    "influence_cos", "m/(kg m)", "of a weight at the scale's zero on a probe, order 1 0-pk: cosine component"
+    "influence_cos",
+    "m/(kg m)",
+    "of a weight at the scale's zero on a probe, order 1 0-pk: cosine component",
+    title="influence, cos",
 )
-SINE = Quantity("influence_sin", "m/(kg m)", "as influence_cos: sine component; x = C cos θ + S sin θ")
+SINE = Quantity(
+    "influence_sin", "m/(kg m)", "as influence_cos: sine component; x = C cos θ + S sin θ", title="influence, sin"
+)
 MEASURES = (FOUND_COS, FOUND_SIN, LEFT_COS, LEFT_SIN, SHARE, PERMITTED, COSINE, SINE)
 
 
@@ -126,7 +159,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     yield from balance_checks.of_plan(rig, plan)
 
 
-def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+def figures(recording: Recording[Plan]) -> Iterable[Shown]:
     """Polar plots of the vectors, influence coefficients, residual against U_per; empty where nothing was evaluated."""
     found = recording.once(balance_checks.evaluated)
     return () if found.balance is None else drawn.all_figures(found)

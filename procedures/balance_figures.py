@@ -10,7 +10,7 @@ import numpy.typing as npt
 from bench.analysis.balance import G_MM
 from bench.analysis.sampling import lag_deg
 from bench.analysis.vectors import region
-from bench.figures import Figure, Series
+from bench.figures import Figure, Series, Sheet, Shown
 from procedures.estimators.balance_checks import Evaluated
 from procedures.estimators.balance_data import BASE, SIDES
 from procedures.estimators.balance_estimates import Balanced
@@ -22,17 +22,45 @@ FIRST = {"inboard": 0, "outboard": 2}  # probe y of each plane
 TURN = np.linspace(0, 2 * np.pi, 181)
 
 
-def all_figures(found: Evaluated) -> Iterator[Figure]:
+def all_figures(found: Evaluated) -> Iterator[Shown]:
     """In the order of the report."""
     balance = found.balance
     if balance is None or found.recorded is None:
         return
+    yield _weights(found, balance)
+    yield _before_and_after(found, balance)
     for p, side in enumerate(SIDES):
         yield _residual(balance, found.last, p, side)
     for p, side in enumerate(SIDES):
         yield _sheet(found, balance, p, side)
     for side, probe in FIRST.items():
         yield _vectors(found, balance, side, probe)
+
+
+def _weights(found: Evaluated, balance: Balanced) -> Sheet:
+    """What was fixed, in order."""
+    assert found.recorded is not None
+    on = {w.number for w in found.recorded.on}
+    rows = tuple(
+        (purpose, SIDES[w.plane], f"{1e3 * w.kg:.3f}", f"{np.degrees(w.angle) % 360:.1f}",
+         f"{abs(w.unbalance(balance.radius)) / G_MM:.2f}", "on the shaft" if w.number in on else "taken off")
+        for w, purpose in found.recorded.fixed
+    )  # fmt: skip
+    head = ("Weight", "Plane", "mass (g)", "angle (°)", "unbalance (g mm)", "now")
+    return Sheet("weights", "Weights", f"At a radius of {1e3 * balance.radius:.1f} mm, on the scales of the planes: from y "
+                 "towards z, in the direction of rotation.", head, rows, (2, 3, 4))  # fmt: skip
+
+
+def _before_and_after(found: Evaluated, balance: Balanced) -> Sheet:
+    """Unbalance as found and as left, against the permissible one."""
+    rows = []
+    for p, side in enumerate(SIDES):
+        before, after = (abs(complex(balance.unbalance[name].values[p])) / G_MM for name in (BASE, found.last))
+        per = balance.permissible[p].value / G_MM
+        rows.append((side, f"{before:.2f}", f"{after:.2f}", f"{per:.2f}", f"{100 * after / per:.0f} %"))
+    head = ("Plane", "as found (g mm)", "as left (g mm)", "permissible (g mm)", "as left / permissible")
+    return Sheet("before-after", "Unbalance before and after", "Their intervals stand in the results.", head, tuple(rows),
+                 (1, 2, 3, 4))  # fmt: skip
 
 
 def _vectors(found: Evaluated, balance: Balanced, side: str, probe: int) -> Figure:

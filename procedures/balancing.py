@@ -131,7 +131,10 @@ def _mount(work: Work, plane: int, kg: float, angle: float, purpose: str) -> Non
     """Have a weight fixed; the shaft is landed."""
     side: Plane = "inboard" if plane == 0 else "outboard"
     with work.record.step(MOUNT, plane=side, kg=kg, angle_rad=angle, purpose=purpose):
-        work.rig.operator.attach(side, kg, angle)
+        really = work.rig.operator.attach(side, kg, angle)
+        if really != (kg, angle):
+            kg, angle = really
+            work.record.correct(kg=kg, angle_rad=angle)
     work.fixed += 1
     work.mounted.append(Weight(plane, kg, angle, work.fixed))
 

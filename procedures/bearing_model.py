@@ -40,7 +40,12 @@ OF_LINEAR = {
     "misfit": Quantity("misfit", "N^2", "sum of squared residuals of the nonlinear model, over all samples"),
     "misfit_linear": Quantity("misfit_linear", "N^2", "sum of squared residuals of the linear model, over all samples"),
     "misfit_ratio": Quantity("misfit_ratio", "1", "residual sum of the linear model over that of the nonlinear one"),
-    "misfit_ratio_means": Quantity("misfit_ratio_means", "1", "the same over batch means, where noise covers less"),
+    "misfit_ratio_means": Quantity(
+        "misfit_ratio_means",
+        "1",
+        "the same over batch means, where noise covers less",
+        title="misfit ratio of batch means",
+    ),
 }
 MEASURES = (*BETA.values(), *OFFSET.values(), *OF_LINEAR.values())
 CCS = 1.0
@@ -102,7 +107,7 @@ def step_count(plan: Plan) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Look at the shaft on its rings, lift it, tilt it a little, then the grid at each bias."""
-    if not plan.coupled and rig.operator.ask(ASKED).strip().lower() not in ("yes", "y"):
+    if not plan.coupled and not rig.operator.ask(ASKED):
         raise OperatorAbort("the coupling is on the shaft; expected it off, or a plan with coupled = true")
     with record.step(REST):
         rig.clock.sleep(REST_S)

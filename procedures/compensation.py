@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 from pydantic import Field
 
 from bench.errors import AnalysisError
-from bench.figures import Figure
+from bench.figures import Shown
 from bench.findings import Effect, Finding
 from bench.procedure import Measured, Procedure, Quantity
 from bench.recorder import Recorder
@@ -27,11 +27,17 @@ from procedures.estimators.unbalance_data import RPM
 from procedures.turning import Law, Variant
 
 REDUCTION = Quantity(
-    "reduction", "1", "of order 1 as the probes read it, root mean square of the four, by the compensation"
+    "reduction",
+    "1",
+    "of order 1 as the probes read it, root mean square of the four, by the compensation",
+    title="reduction of order 1",
 )
-DROP = Quantity("drop", "1", "the same, from before the switch to 0.15 s after it")
+DROP = Quantity("drop", "1", "the same, from before the switch to 0.15 s after it", title="reduction at the switch")
 RESIDUAL = Quantity(
-    "residual", "m", "greatest |mean| + order 1 (0-pk) of a probe's reading, over 50 turns after the switch"
+    "residual",
+    "m",
+    "greatest |mean| + order 1 (0-pk) of a probe's reading, over 50 turns after the switch",
+    title="reading after the switch",
 )
 MEASURES = (*unbalance.MEASURES, REDUCTION, DROP, RESIDUAL)
 WAITING = {"observer": 1.0, "compensate": 0.0, "integral": 0.0}  # the estimates run and do nothing
@@ -128,7 +134,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         yield f"after_s: found {plan.after_s:g} s; expected {switching.TURNS_LEFT + 3} turns beyond {switching.WITHIN_S} s"
 
 
-def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+def figures(recording: Recording[Plan]) -> Iterable[Shown]:
     """Those of `unbalance`, the reduction over the speed, and the switch."""
     results = recording.once(unbalance.evaluated).results
     if results is None:

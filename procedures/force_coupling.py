@@ -29,7 +29,9 @@ from procedures.estimators import carried_checks, coupling_findings
 from procedures.estimators.carried_data import CHANNELS, POSITIONS, SEGMENTS, StepMeans, read_steps
 from procedures.estimators.coupling_estimates import evaluate
 
-RATIO = Quantity("alpha_ratio", "1", "alpha_d/alpha_c, direct over coupled force constant at the home angle")
+RATIO = Quantity(
+    "alpha_ratio", "1", "alpha_d/alpha_c, direct over coupled force constant at the home angle", title="α_d/α_c"
+)
 ALPHA_C = Quantity("alpha_c", "N/A", "coupled force constant at the home angle: x force per y current in quadrature")
 GAMMA_0 = Quantity("gamma_0", "rad", "phase angle at which direct and coupled force are apart: zero of the commutation")
 MEASURES = (RATIO, ALPHA_C, GAMMA_0)

@@ -113,9 +113,9 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     rig.rotation.point(0.0)
     sides: tuple[Literal["left", "right"], ...] = ("left", "right")
     for side in sides:
-        rig.operator.lever(side, Load(plan.mass))
+        load = rig.operator.lever(side, Load(plan.mass))
         rig.clock.sleep(2 * plan.settle_s)
-        _visit(rig, plan, record, loaded_points(plan), 0, side, Load(plan.mass))
+        _visit(rig, plan, record, loaded_points(plan), 0, side, load)
         rig.operator.lever(side, NOTHING)
         rig.clock.sleep(2 * plan.settle_s)
 

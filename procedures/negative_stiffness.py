@@ -29,9 +29,14 @@ from procedures.estimators import carried_checks, stiffness_findings
 from procedures.estimators.carried_data import CHANNELS, POSITIONS, SEGMENTS, StepMeans, read_steps
 from procedures.estimators.stiffness_estimates import COILS, evaluate
 
-ALPHA_X = Quantity("alpha_x_prime", "N/m", "negative stiffness at the outboard sensor, from the motor's own current")
+ALPHA_X = Quantity(
+    "alpha_x_prime", "N/m", "negative stiffness at the outboard sensor, from the motor's own current", title="α′_x"
+)
 ALPHA_X_AMB = Quantity(
-    "alpha_x_prime_amb", "N/m", "negative stiffness at the outboard sensor, from AMB currents at two biases"
+    "alpha_x_prime_amb",
+    "N/m",
+    "negative stiffness at the outboard sensor, from AMB currents at two biases",
+    title="α′_x by the AMBs",
 )
 MEASURES = (ALPHA_X, ALPHA_X_AMB)
 MARGIN = carrying.MARGIN

@@ -13,7 +13,7 @@ from pydantic import Field
 
 from bench.capture import at_speed
 from bench.errors import AnalysisError, BenchError
-from bench.figures import Figure
+from bench.figures import Shown
 from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recorder import Recorder
@@ -37,7 +37,12 @@ SPEED = Quantity("critical_speed", "rad/s", "where the amplitude of a probe is g
 FACTOR = Quantity("amplification_factor", "1", "that speed over the width at 0.707 of the amplitude (API 617, half power); "
                   "of small orbits")  # fmt: skip
 AMPLITUDE = Quantity("critical_amplitude", "m", "of the shaft's centre where it was greatest, 0-pk")
-MARGIN = Quantity("separation", "1", "distance of the critical speed from the running speed, over the running speed")
+MARGIN = Quantity(
+    "separation",
+    "1",
+    "distance of the critical speed from the running speed, over the running speed",
+    title="separation margin",
+)
 CRITICAL = (SPEED, FACTOR, AMPLITUDE, MARGIN)  # which a well damped shaft does not have
 MEASURES = (COSINE, SINE, MAJOR, D_MAX, SHARE, READ, CURRENT, VOLTAGE, *CRITICAL)
 LOOK_S = 0.2
@@ -247,10 +252,10 @@ def check(rig: RigFile, plan: Passing) -> Iterable[str]:
         yield from runup_checks.of_plan(rig, plan)
 
 
-def figures(recording: Recording[Any]) -> Iterable[Figure]:
+def figures(recording: Recording[Any]) -> Iterable[Shown]:
     """Bode pairs, polar plots, waterfall, order map, coil use, orbits; empty where nothing was evaluated."""
     run = recording.once(evaluated)[1]
-    return () if run is None else drawn.all_figures(run, recording.rig)
+    return () if run is None else drawn.all_figures(run, recording.rig, recording.plan.running_rad_s)
 
 
 METHOD = """\

@@ -11,32 +11,35 @@ import numpy as np
 from bench.analysis import pictures
 from bench.analysis.ordermap import order_map
 from bench.analysis.spectra import waterfall
-from bench.figures import Figure, Series
+from bench.figures import Figure, Series, Sheet, Shown
 from bench.rigfile import RigFile
-from bench.uncertainty import interval
+from bench.uncertainty import interval, stated
 from procedures import unbalance_figures
 from procedures.estimators.runup_data import Passage
-from procedures.estimators.runup_estimates import Run
+from procedures.estimators.runup_estimates import Run, asked_margin
 from procedures.estimators.unbalance_data import AXES, PLANES, RPM
 
 HIGHEST_HZ = 480.0
 HIGHEST_ORDER = 5.0
 SHOWN = 600  # samples of the speed over time
+SPECTRA = 24  # of the waterfall: so many can be told apart
 TURNS_ORDER = 16
 EVERY_RPM = 1000.0
 
 
-def all_figures(run: Run, rig: RigFile) -> Iterator[Figure]:
+def all_figures(run: Run, rig: RigFile, running: float) -> Iterator[Shown]:
     """In the order of the report."""
     p = run.passage
+    yield _criticals(run, running)
     for plane in PLANES:
         yield _bode(run, plane)
+    for plane in PLANES:
         yield _polar(run, plane)
     probe = _loudest(run)
     part = p.moving
     x = p.data[probe, part]
     name = f"pos_{AXES[probe]}"
-    shown = waterfall(p.t[part], x, p.tacho, p.sampling, segment=_segment(p), count=60)
+    shown = waterfall(p.t[part], x, p.tacho, p.sampling, segment=_segment(p), count=SPECTRA)
     yield pictures.waterfall("waterfall", f"Waterfall of {name}, {p.name}", shown, HIGHEST_HZ, (1.0, 2.0, 3.0))
     turns = TURNS_ORDER if abs(_rate(p)) < 100 else TURNS_ORDER // 2
     found = order_map(p.t[part], x, p.tacho, p.sampling, turns=turns, highest=HIGHEST_ORDER)
@@ -90,9 +93,45 @@ def _bode(run: Run, plane: str) -> Figure:
             i = interval(peak.amplitude)
             x, y = RPM * peak.speed.value, 1e6 * peak.amplitude.value
             half = np.array([1e6 * (i.high - i.low) / 2])
+            ends = np.array([e for e in (peak.low, peak.high) if math.isfinite(e)])
+            series.append(Series(f"{peak.axis} half power", RPM * ends, np.full(ends.size, math.sqrt(0.5) * y), "mark"))
             told = f"{peak.axis} critical, {x:.0f} r/min, AF {peak.factor.value:.1f}"  # in the legend: beside it, two overlap
             series.append(Series(told, np.array([x]), np.array([y]), "points", half))
     return replace(figure, series=tuple(series))
+
+
+def _criticals(run: Run, running: float) -> Sheet:
+    """What a rotordynamics reader looks up first (API 617): N_c, AF, half-power speeds, margins."""
+    rows = []
+    for peak in run.peaks:
+        if peak.factor is None:
+            continue
+        speed, amplitude, factor, margin = map(interval, (peak.speed, peak.amplitude, peak.factor, peak.margin))
+        ends = " to ".join(f"{RPM * e:.0f}" if math.isfinite(e) else "beyond" for e in (peak.low, peak.high))
+        rows.append((
+            peak.where, "yes" if peak.critical else "no, damped",
+            stated(RPM * peak.speed.value, RPM * speed.U, "±"), stated(peak.factor.value, factor.U, "±"), ends,
+            stated(1e6 * peak.amplitude.value, 1e6 * amplitude.U, "±"), f"{2e6 * peak.amplitude.value:.3g}",
+            stated(100 * peak.margin.value, 100 * margin.U, "±"),
+            f"{100 * asked_margin(peak, running):.1f}" if peak.critical else "–",
+        ))  # fmt: skip
+    head = (
+        "Peak",
+        "critical",
+        "N_c (r/min)",
+        "AF",
+        "half power (r/min)",
+        "µm 0-pk",
+        "µm pk-pk",
+        "margin (%)",
+        "asked (%)",
+    )
+    caption = (
+        f"N_c of small orbits, amplification factor AF by half power, separation margin from the running speed of "
+        f"{RPM * running:.0f} r/min and the one that API 617 asks for a critical of that factor; below 2.5 it is "
+        "none. ± is U at 95 %."
+    )
+    return Sheet("criticals", "Critical speeds", caption, head, tuple(rows), tuple(range(2, len(head))))
 
 
 def _polar(run: Run, plane: str) -> Figure:

@@ -22,7 +22,7 @@ STRETCHES = 14  # a run-down is cut into so many to show its deceleration
 def all_figures(runs: Sequence[RunDown], result: Drag, speed_rad_s: float) -> list[Figure]:
     """In the order of the report."""
     firsts = _firsts(runs)
-    return [_speeds(firsts), *_residuals(firsts), *_deceleration(runs, result, speed_rad_s)]
+    return [_speeds(firsts), *_deceleration(runs, result, speed_rad_s), *_residuals(firsts)]
 
 
 def _firsts(runs: Sequence[RunDown]) -> dict[str, RunDown]:

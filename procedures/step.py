@@ -34,8 +34,15 @@ DAMPING = Quantity(
     "damping", "1", "damping ratio of the swing: its oscillations' mean pole, each with its part in the step"
 )
 FREQUENCY = Quantity("natural_frequency", "Hz", "of the same mean pole")
-SIZE = Quantity("size_effect", "1", "overshoot of the largest step less that of the smallest, mean of both ways")
-WAY = Quantity("way_effect", "1", "overshoot upwards less that downwards, at the largest step")
+SIZE = Quantity(
+    "size_effect",
+    "1",
+    "overshoot of the largest step less that of the smallest, mean of both ways",
+    title="effect of the size",
+)
+WAY = Quantity(
+    "way_effect", "1", "overshoot upwards less that downwards, at the largest step", title="effect of the direction"
+)
 MEASURES = (OVERSHOOT, RISE, SETTLING, ERROR, BANDWIDTH, DAMPING, FREQUENCY, SIZE, WAY)
 Axis = Literal["y", "z", "x"]
 MODEL = ("model_beta_{}", "model_offset_{}")

@@ -132,7 +132,7 @@ def _loads(rig: Rig, plan: Plan, record: Recorder, gamma: float) -> None:
         if hanging and hanging != side:
             rig.operator.lever("left" if hanging == "left" else "right", NOTHING)
         if side:
-            rig.operator.lever("left" if side == "left" else "right", load)
+            load = rig.operator.lever("left" if side == "left" else "right", load)
         hanging = side
         rig.clock.sleep(plan.settle_s)
         with record.step("lever", gamma_rad=gamma, side=side, load=load.label):

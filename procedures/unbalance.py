@@ -13,7 +13,7 @@ from typing import Any, Literal, Protocol
 from pydantic import Field
 
 from bench.calibration import Need
-from bench.figures import Figure
+from bench.figures import Shown
 from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recorder import Recorder
@@ -36,18 +36,27 @@ from procedures.estimators.unbalance_estimates import Results
 from procedures.turning import CODES, POLES, SETTINGS, Law, Variant
 
 COSINE = Quantity(
-    "vector_cos", "m", "order 1 of the shaft's centre at a probe's plane, along the probe: cosine component, 0-pk"
+    "vector_cos",
+    "m",
+    "order 1 of the shaft's centre at a probe's plane, along the probe: cosine component, 0-pk",
+    title="order 1, cos",
 )
 SINE = Quantity(
-    "vector_sin", "m", "as vector_cos: sine component; x = C cos θ + S sin θ, θ from the once-per-turn mark"
+    "vector_sin",
+    "m",
+    "as vector_cos: sine component; x = C cos θ + S sin θ, θ from the once-per-turn mark",
+    title="order 1, sin",
 )
 MAJOR = Quantity("major_half_axis", "m", "of the order-1 orbit of the shaft's centre in a sensor plane, 0-pk")
 D_MAX = Quantity(
     "d_max", "m", "greatest distance of the shaft's centre from the clearance's, static offset included (ISO 14839-2)"
 )
-SHARE = Quantity("d_max_share", "1", "D_max over the least clearance")
+SHARE = Quantity("d_max_share", "1", "D_max over the least clearance", title="D_max / clearance")
 READ = Quantity(
-    "reading", "m", "order 1 as the probes read it, runout included: root mean square of the four amplitudes, 0-pk"
+    "reading",
+    "m",
+    "order 1 as the probes read it, runout included: root mean square of the four amplitudes, 0-pk",
+    title="order 1 as read",
 )
 CURRENT = Quantity("current_peak", "A", "greatest coil current of a plane")
 VOLTAGE = Quantity("voltage_peak", "V", "greatest coil voltage of a plane, either way")
@@ -188,7 +197,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     yield from missing or unbalance_plan.of_plan(rig, plan)
 
 
-def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+def figures(recording: Recording[Plan]) -> Iterable[Shown]:
     """Orbits of both planes, Bode pair, polar plot, full spectra, what the coils need; empty where nothing was evaluated."""
     results = recording.once(evaluated).results
     return () if results is None else drawn.all_figures(results, recording.rig)

@@ -8,7 +8,7 @@ import numpy as np
 
 from bench.analysis import pictures
 from bench.analysis.spectra import full
-from bench.figures import Figure, Series
+from bench.figures import Figure, Series, Sheet, Shown
 from bench.rigfile import RigFile
 from bench.uncertainty import coverage_factor, interval
 from procedures.estimators.unbalance_checks import ZONES
@@ -19,12 +19,14 @@ Y_DEG = 45.0  # both radial axes stand at 45 degrees to the vertical; where y st
 SHOWN_TURNS = 4
 
 
-def all_figures(results: Results, rig: RigFile) -> Iterator[Figure]:
+def all_figures(results: Results, rig: RigFile) -> Iterator[Shown]:
     """In the order of the report."""
     clearance = rig.geometry["clearance"].value
-    for plane in PLANES:
-        for variant in results.variants:
-            yield orbits(results.of(variant)[-1], plane, clearance)
+    drawn = [orbits(results.of(variant)[-1], plane, clearance) for plane in PLANES for variant in results.variants]
+    yield _dwells(results)
+    yield drawn[0]
+    yield farthest(results)
+    yield from drawn[1:]
     for plane in PLANES:
         yield _bode(results, plane)
         yield _polar(results, plane)
@@ -33,9 +35,20 @@ def all_figures(results: Results, rig: RigFile) -> Iterator[Figure]:
             shown = results.of(variant)[-1]
             if shown.dwell.full is not None:
                 yield spectrum(shown, plane)
-    yield farthest(results)
     yield _use(results, "current_peak", "A", "current")
     yield _use(results, "voltage_peak", "V", "voltage")
+
+
+def _dwells(results: Results) -> Sheet:
+    """What each speed was, and how far the shaft moved there, peak to peak as shops say it."""
+    rows = []
+    for variant in results.variants:
+        for r in results.of(variant):
+            widest = [f"{2e6 * float(np.abs(r.vectors.values[list(PLANES[plane])]).max()):.1f}" for plane in PLANES]
+            rows.append((f"{RPM * r.dwell.wanted:.0f}", f"{RPM * r.dwell.speed:.1f}", variant, *widest))
+    head = ("asked (r/min)", "driven (r/min)", "variant", *(f"{plane} (µm pk-pk)" for plane in PLANES))
+    return Sheet("dwells", "Speeds", "Driven: by the once-per-turn pulses. Order 1 of the shaft's centre at the probe of a "
+                 "plane where it is greatest, runout subtracted.", head, tuple(rows), (0, 1, 3, 4))  # fmt: skip
 
 
 def _key(r: Result) -> str:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from bench.errors import BenchError
 
 if TYPE_CHECKING:
-    from bench.figures import Figure
+    from bench.figures import Shown
     from bench.procedure import Quantity
     from bench.recording import Recording
 
@@ -31,7 +31,7 @@ def build(
     run_dir: Path,
     recording: Recording[Any] | None,
     record: Mapping[str, Any],
-    figures: Iterable[Figure] = (),
+    figures: Iterable[Shown] = (),
     *,
     title: str,
     method: str = "",
@@ -46,6 +46,7 @@ def build(
     Raises:
         BenchError: a figure, a page or a file cannot be made. Record and verdict are not affected.
     """
+    from bench.figures import Sheet
     from reports import compose, html, pdf  # heavy: only who builds a report pays
     from reports import figures as drawing
 
@@ -53,6 +54,7 @@ def build(
         title=title,
         method=method,
         definitions={q.name: q.about for q in measures},
+        titles={q.name: q.title for q in measures if q.title},
         rig={} if recording is None else recording.rig.model_dump(mode="json", exclude_none=True),
         integrity=None if recording is None else recording.integrity,
         events=() if recording is None else tuple(recording.events()),
@@ -61,7 +63,8 @@ def build(
         readable=recording is not None,
     )
     try:
-        view = compose.view_of(record, around, [drawing.draw(f) for f in figures])
+        shown = [f if isinstance(f, Sheet) else drawing.draw(f) for f in figures]
+        view = compose.view_of(record, around, shown)
         page, document = html.render(view), pdf.render(view, record.get("ended"))
     except BenchError:
         raise

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from reports import habit, many, tables, text, vectors
+from bench.figures import Sheet
+from reports import budgets, front, habit, many, tables, text, vectors
 from reports.counts import counts, words
 from reports.figures import Drawn
 from reports.linktable import clean, link_table
@@ -23,7 +23,6 @@ from reports.view import (
     SIMULATED,
     STATEMENTS,
     Fact,
-    FigureEntry,
     FindingRow,
     ReportView,
     ResultRow,
@@ -55,6 +54,7 @@ class Surroundings:
     title: str
     method: str = ""
     definitions: Mapping[str, str] = dataclasses.field(default_factory=dict)  # quantity name -> definition
+    titles: Mapping[str, str] = dataclasses.field(default_factory=dict)  # quantity name -> what readers call it
     rig: Content = dataclasses.field(default_factory=dict)  # the rig file's content
     integrity: Any = None
     events: Sequence[Any] = ()
@@ -63,13 +63,17 @@ class Surroundings:
     readable: bool = True  # False: there is no recording that could be read
 
 
-def view_of(record: Content, around: Surroundings, figures: Iterable[Drawn] = ()) -> ReportView:
+def view_of(record: Content, around: Surroundings, shown: Sequence[Drawn | Sheet] = ()) -> ReportView:
     """The report of one record. Equal inputs give an equal view: nothing here asks for the time."""
     outcome = str(record.get("outcome", "ERROR"))
-    measurements = [habit.told(m) for m in record.get("measurements") or () if isinstance(m, Mapping)]
+    measurements = front.main_first([habit.told(m) for m in record.get("measurements") or () if isinstance(m, Mapping)])
     findings = tuple(_findings(record, around))
-    rows = tuple(_result(m, around.definitions) for m in measurements)
+    rows = tuple(_result(m, around) for m in measurements)
+    judged_title, judged, judged_note = front.judged(rows)
     like = many.names(measurements)
+    few = [m for m in measurements if m.get("budget") and m.get("name") not in like]
+    chosen = front.budgeted(few)
+    budgeted = [(m in chosen, budgets.budget_table(m, around.rig, around.titles)) for m in few]
     rig_name = str(around.rig.get("name") or record.get("rig") or text.DASH)
     return ReportView(
         title=around.title,
@@ -83,41 +87,47 @@ def view_of(record: Content, around: Surroundings, figures: Iterable[Drawn] = ()
         tone=_TONES.get(outcome.lower(), "none"),
         outcome_text=_outcome_text(outcome, rows, findings),
         identification=_identification(record, around, rig_name),
-        many=many.grouped(measurements, rows),
-        about_many=ABOUT_MANY,
+        decided=tuple(f for f in findings if f.loud),
+        judged=judged,
+        judged_title=judged_title,
+        judged_note=judged_note,
+        sheets=front.sheets(shown),
         results=tuple(r for m, r in zip(measurements, rows, strict=True) if str(m.get("name", "")) not in like),
         vectors=vectors.table(record),
         about_vectors=ABOUT_VECTORS,
         no_results="" if rows else NO_RESULTS,
         about_uncertainty=ABOUT_UNCERTAINTY,
         decision_rule=DECISION_RULE,
-        findings=findings,
-        budgets=tuple(tables.budget_table(m) for m in measurements if m.get("budget") and m.get("name") not in like),
+        notes=tuple(f for f in findings if not f.loud),
+        figures=front.entries(shown),
+        budgets=tuple(table for told, table in budgeted if told),
         method=_paragraphs(around.method),
-        figures=tuple(FigureEntry(n, f.key, f.title, f.caption, f.svg) for n, f in enumerate(figures, 1)),
         conditions=_conditions(around),
-        traceability=tables.traceability(around.rig),
+        traceability=tables.traceability(around.rig, budgets.identities(measurements)),
         calibrations=tables.calibrations(record.get("calibrations")),
         about_calibrations=CALIBRATIONS if record.get("calibrations") else NO_CALIBRATIONS,
+        laboratory=_laboratory(around.rig.get("laboratory")),
+        statements=STATEMENTS,
+        many=many.grouped(measurements, rows),
+        about_many=ABOUT_MANY,
+        more_budgets=tuple(table for told, table in budgeted if not told),
         link=_link(record.get("link"), around),
         link_note=f"{_link_note(around)} {clean(_mapping(record.get('link')))}".strip(),
-        correlations=tables.correlations(record),
+        correlations=tables.correlations(record, around.titles),
         plan=tuple(tables.settings(record.get("plan") or {})),
         versions=tuple(tables.facts(record.get("versions") or {})),
         recording=_recording(record.get("recording")),
-        laboratory=_laboratory(around.rig.get("laboratory")),
-        statements=STATEMENTS,
         end=f"End of report {record.get('run_id') or ''}".rstrip(),
     )
 
 
-def _result(m: Content, definitions: Mapping[str, str]) -> ResultRow:
+def _result(m: Content, around: Surroundings) -> ResultRow:
     name, unit = str(m.get("name", "")), str(m.get("unit") or "")
     expanded, verdict = m.get("expanded_uncertainty"), str(m.get("verdict") or "none")
     limit = m.get("limit")
     return ResultRow(
-        symbol=tables.symbol_of(name),
-        about=definitions.get(name, ""),
+        symbol=tables.symbol_of(name, around.titles),
+        about=around.definitions.get(name, ""),
         where=tables.place(m),
         result=text.result(m.get("value"), expanded, unit),
         interval=_telling_interval(m, unit),
@@ -260,10 +270,6 @@ def _mapping(found: Any) -> Content:
 def _link(link: Any, around: Surroundings) -> tuple[Table, ...]:
     made = [link_table(link)] if _mapping(link) else []
     made += counts("Recording", around.integrity)
-    kinds = Counter(str(e.get("kind") if isinstance(e, Mapping) else getattr(e, "kind", "")) for e in around.events)
-    if kinds:
-        rows = tuple((kind, text.plain(n)) for kind, n in sorted(kinds.items()))
-        made.append(Table("Events", ("Kind", "Count"), rows, (1,)))
     return tuple(made)
 
 

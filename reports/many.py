@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from reports import tables, text
+from reports import budgets, text
 from reports.view import ManyResults, ManyRow, ResultRow
 
 MANY = 5  # results of one quantity that still get a budget each
@@ -52,7 +52,7 @@ def _group(members: Sequence[tuple[Content, ResultRow]]) -> ManyResults:
 
 def carried(measurement: Content) -> str:
     """The influences with the greatest shares of a variance, and how many others there are."""
-    entries = tables.grouped(measurement.get("budget") or ())
+    entries = budgets.grouped(measurement.get("budget") or ())
     squares = sorted(
         ((float(e.get("contribution") or 0.0) ** 2, str(e.get("name", ""))) for e in entries), reverse=True
     )

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-import re
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import takewhile
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 from bench import units
 from reports import text
-from reports.view import BudgetRow, BudgetTable, Correlations, Fact, Symbol, Table
+from reports.view import Correlations, Fact, Symbol, Table
 
-SMALL_SHARE = 0.0005  # of the variance; smaller influences are summed in one line, all of them are in record.json
 PAGE_WIDTH = 14  # columns of a correlation matrix
 NARROW_NAME = 6  # letters that the head of such a column holds
 SMALL_CORRELATION = 0.05
@@ -24,109 +21,26 @@ _SETTINGS = (
     ("_rad_s", "rad/s", (("_rpm", math.inf),)), ("_rad", "rad", (("_mrad", 0.02), ("_deg", math.inf))),
     ("_m", "m", (("_um", 1e-3),)), ("_kg", "kg", (("_g", 1e-2),)), ("_A", "A", (("_mA", 0.1),)),
 )  # fmt: skip
+# Identities of influences that are not the path of their number in the rig file's content.
+RENAMED = {"masses/hanger": "hanger", "masses/density": "mass_density"}
 NOT_INPUTS = ("simulation", "plans", "envelope", "parameters", "laboratory", "settling")
 Content = Mapping[str, Any]
 
 
-def symbol_of(name: str) -> Symbol:
+def symbol_of(name: str, titles: Mapping[str, str] = MappingProxyType({})) -> Symbol:
+    """A quantity as readers know it: by its title, else as a letter with its subscript, else in words."""
+    if name in titles:
+        return Symbol(titles[name], titles[name], "")
     letter, subscript = text.symbol(name)
-    return Symbol(name, letter, subscript)
+    return (
+        Symbol(name, letter, subscript) if subscript else Symbol(name.replace("_", " "), letter.replace("_", " "), "")
+    )
 
 
 def place(measurement: Content) -> str:
     """Where a measurement of record.json belongs; empty where its name tells."""
     where = str(measurement.get("where") or "")
     return "" if where == str(measurement.get("name", "")) else where
-
-
-def budget_table(measurement: Content) -> BudgetTable:
-    """The budget of one measurement of record.json, largest share first."""
-    unit = str(measurement.get("unit") or "")
-    entries = sorted(grouped(measurement.get("budget") or ()), key=lambda e: -abs(float(e.get("contribution") or 0.0)))
-    variance = math.fsum(float(e.get("contribution") or 0.0) ** 2 for e in entries)
-    shares = [float(e.get("contribution") or 0.0) ** 2 / variance if variance > 0 else 0.0 for e in entries]
-    shown = [i for i, share in enumerate(shares) if share >= SMALL_SHARE]
-    rest = [e for i, e in enumerate(entries) if shares[i] < SMALL_SHARE]
-    method = "Monte Carlo (JCGM 101)" if measurement.get("method") == "monte-carlo" else "GUM (JCGM 100)"
-    return BudgetTable(
-        symbol=symbol_of(str(measurement.get("name", ""))),
-        where=place(measurement),
-        unit=text.unit_text(unit),
-        result=text.result(measurement.get("value"), measurement.get("expanded_uncertainty"), unit),
-        standard_uncertainty=text.with_unit(text.significant(measurement.get("standard_uncertainty")), unit),
-        dof=text.degrees_of_freedom(measurement.get("dof")),
-        method=method,
-        rows=tuple(
-            _budget_row(entry, shares[i]) for i, entry in zip(shown, _apart([entries[i] for i in shown]), strict=True)
-        ),
-        rest=_rest(rest, unit),
-    )
-
-
-def grouped(entries: Sequence[Content]) -> list[Content]:
-    """The entries of a budget with the parts of one scatter as one entry: those of Type A whose identities differ in
-    numbers only (`RUN/scatter/0/1`, `RUN/scatter/0/2`). The record keeps them apart, because correlations need that."""
-    groups: dict[str, list[Content]] = {}
-    for number, entry in enumerate(entries):
-        first, *rest = str(entry.get("influence") or number).split("/")
-        stem = "/".join([first, *filter(None, (part.rstrip("0123456789") for part in rest))])
-        groups.setdefault(stem if entry.get("type") == "A" else f"{number}:", []).append(entry)
-    return [members[0] if len(members) == 1 else _together(members) for members in groups.values()]
-
-
-def _together(members: Sequence[Content]) -> Content:
-    dofs = {m.get("dof") for m in members}
-    names = [re.sub(r" at \S+°| \(\d+\)", "", str(m.get("name") or "")) for m in members]
-    bare, bracket, run = names[0].partition(" [")
-    if len(set(names)) > 1:
-        same = takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
-        bare = "".join(letters[0] for letters in same).partition(" [")[0]
-    bare = bare.rstrip(" ,;(/")
-    return {
-        **members[0],
-        "name": f"{bare}, {len(members)} parts{bracket}{run}",
-        "contribution": math.hypot(*(float(m.get("contribution") or 0.0) for m in members)),
-        "sensitivity": None,
-        "dof": members[0].get("dof") if len(dofs) == 1 else "",
-    }
-
-
-def _apart(entries: Sequence[Content]) -> list[Content]:
-    """Influences of one name (the two components of a vector, say) told apart by the end of their identities."""
-    count = Counter(str(e.get("name") or "") for e in entries)
-    return [
-        {**e, "name": f"{e['name']} ({_end(str(e['influence']))})"}
-        if count[str(e.get("name") or "")] > 1 and e.get("influence") else e
-        for e in entries
-    ]  # fmt: skip
-
-
-def _end(identity: str) -> str:
-    """The last part of an identity; the unit r/min is none of its strokes."""
-    return re.split(r"/(?!min\b)", identity)[-1]
-
-
-def _budget_row(entry: Content, share: float) -> BudgetRow:
-    sensitivity = entry.get("sensitivity")
-    return BudgetRow(
-        name=str(entry.get("name", "")),
-        kind=str(entry.get("type") or text.DASH),
-        distribution=str(entry.get("distribution") or text.DASH),
-        dof=text.DASH if entry.get("dof") == "" else text.degrees_of_freedom(entry.get("dof")),
-        sensitivity=text.significant(sensitivity, 3),
-        contribution=text.significant(abs(float(entry.get("contribution") or 0.0))),
-        share=f"{100 * share:.1f}{text.NARROW}%",
-        percent=round(100 * share, 2),
-    )
-
-
-def _rest(entries: Sequence[Content], unit: str) -> str:
-    if not entries:
-        return ""
-    combined = math.sqrt(math.fsum(float(e.get("contribution") or 0.0) ** 2 for e in entries))
-    noun = "influence" if len(entries) == 1 else "influences"
-    amount = text.with_unit(text.significant(combined), unit)
-    return f"{len(entries)} further {noun}, each below {100 * SMALL_SHARE:g}{text.NARROW}% of the variance: {amount}"
 
 
 def stated(entry: Content) -> str:
@@ -157,10 +71,14 @@ def toleranced(tree: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[st
             yield from toleranced(branch, (*path, str(index + 1)))
 
 
-def traceability(rig: Content) -> Table:
-    """The toleranced numbers of the rig file with their sources; equal sensors share one row."""
+def traceability(rig: Content, influences: Collection[str]) -> Table:
+    """The toleranced numbers of the rig file on which results rest, by the identities of their `influences`, with their
+    sources; equal sensors share one row."""
     groups: dict[tuple[str, ...], list[tuple[str, ...]]] = {}
     for path, stored in toleranced(rig):
+        identity = "/".join(path)
+        if not any(RENAMED.get(i, i) == identity or i.startswith(f"{identity}/") for i in influences):
+            continue
         entry = _told(stored)
         unit = str(entry.get("unit") or "")
         value = text.with_unit(text.plain(entry["value"]), unit)
@@ -176,10 +94,15 @@ def _told(entry: Content) -> Content:
     si = str(entry.get("unit") or "")
     stated_as = [abs(float(entry[key])) for key in ("value", "u", "half_width") if entry.get(key) is not None]
     size = next((x for x in stated_as if x), 0.0)
-    symbol = next((symbol for symbol, below in _WRITTEN.get(si, ()) if 0 < size < below), si)
-    one = units.unit(symbol).factor if symbol != si else 1.0
+    symbol, one = written(si, size)
     numbers = {k: entry[k] / one for k in ("value", "u", "half_width") if isinstance(entry.get(k), int | float)}
     return {**entry, **numbers, "unit": symbol}
+
+
+def written(si: str, size: float) -> tuple[str, float]:
+    """Symbol of the unit in which a number of about `size` is written in a certificate, and what one of it is in SI."""
+    symbol = next((symbol for symbol, below in _WRITTEN.get(si, ()) if 0 < size < below), si)
+    return symbol, units.unit(symbol).factor if symbol != si else 1.0
 
 
 def _group_name(paths: Sequence[tuple[str, ...]]) -> str:
@@ -202,7 +125,7 @@ def calibrations(found: Any) -> Table:
     return Table("", ("Procedure", "Run", "Date", "Due", "State", "SHA-256 of its recording"), rows)
 
 
-def correlations(record: Content) -> Correlations | None:
+def correlations(record: Content, titles: Mapping[str, str]) -> Correlations | None:
     """The matrix over the measurements; None for fewer than two. What a page's width does not hold is told by pairs.
 
     Accepts a square list of rows in the order of the measurements, or the same under `names` and `matrix`.
@@ -214,22 +137,24 @@ def correlations(record: Content) -> Correlations | None:
     if not found or len(names) < 2 or len(found) != len(names):
         return None
     if len(names) > PAGE_WIDTH:
-        return _pairs(names, found)
+        return _pairs(names, found, titles)
     if all(r is None or abs(r) < SMALL_CORRELATION for a, row in enumerate(found) for r in row[:a]):
-        return _pairs(names, found)
-    heads = tuple(_placed(name) for name in names)
+        return _pairs(names, found, titles)
+    heads = tuple(_placed(name, titles) for name in names)
     narrow = all(not place and (symbol.subscript or len(symbol.plain) < NARROW_NAME) for symbol, place in heads)
     columns = tuple(s if narrow else symbol_of(str(k)) for k, (s, _) in enumerate(heads, 1))
     return Correlations(columns, tuple(tuple(_coefficient(r) for r in row) for row in found), heads)
 
 
-def _pairs(names: Sequence[str], matrix: Sequence[Sequence[float | None]]) -> Correlations:
+def _pairs(names: Sequence[str], matrix: Sequence[Sequence[float | None]], titles: Mapping[str, str]) -> Correlations:
     """The pairs of most correlation, largest first."""
     above = ((matrix[a][b], a, b) for a in range(len(names)) for b in range(a))
     known = sorted(
         ((r, a, b) for r, a, b in above if r is not None and abs(r) >= SMALL_CORRELATION), key=lambda p: -abs(p[0])
     )
-    pairs = tuple((_placed(names[b]), _placed(names[a]), _coefficient(r)) for r, a, b in known[:MOST_PAIRS])
+    pairs = tuple(
+        (_placed(names[b], titles), _placed(names[a], titles), _coefficient(r)) for r, a, b in known[:MOST_PAIRS]
+    )
     count = len(names) * (len(names) - 1) // 2
     note = (
         f"{len(known)} of the {count} pairs have a coefficient of at least {SMALL_CORRELATION} in size"
@@ -238,10 +163,10 @@ def _pairs(names: Sequence[str], matrix: Sequence[Sequence[float | None]]) -> Co
     return Correlations((), (), (), pairs, note)
 
 
-def _placed(name: str) -> tuple[Symbol, str]:
+def _placed(name: str, titles: Mapping[str, str]) -> tuple[Symbol, str]:
     """The symbol of `K_i@upper`, and its place."""
     symbol, _, place = name.partition("@")
-    return symbol_of(symbol), place
+    return symbol_of(symbol, titles), place
 
 
 def _coefficient(r: float | None) -> str:

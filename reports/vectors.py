@@ -19,7 +19,7 @@ def table(record: Content) -> Table:
     """A row for each pair of results `x_cos`, `x_sin` of one place; no rows where a record has none."""
     measurements = [m for m in record.get("measurements") or () if isinstance(m, Mapping)]
     rows = tuple(_row(a, b, r) for a, b, r in _pairs(measurements, _coefficients(record, measurements)))
-    return Table("", ("Vector", "Where", "Amount", "Angle"), rows, (2, 3))
+    return Table("", ("Vector", "Where", "Amount", "Peak to peak", "Angle"), rows, (2, 3, 4))
 
 
 def _pairs(
@@ -66,8 +66,9 @@ def _row(cosine: Content, sine: Content, r: float) -> tuple[str, ...]:
     symbol, one = units.habit(str(cosine.get("unit") or ""), size)
     known = across <= MOST_ANGLE
     return (
-        str(cosine["name"]).removesuffix(COS),
+        str(cosine["name"]).removesuffix(COS).replace("_", " "),
         tables.place(cosine),
         text.result(size / one, along / one, symbol),
+        text.with_unit(text.significant(2 * size / one, 3), symbol) if cosine.get("unit") == "m" else text.DASH,
         text.result(math.degrees(math.atan2(s, c)) % 360, math.degrees(across), "deg") if known else text.DASH,
     )

@@ -114,9 +114,11 @@ class FindingRow:
 
 @dataclass(frozen=True)
 class BudgetRow:
-    """One influence: its standard uncertainty contribution in the measurand's unit, and its share of the variance."""
+    """One influence: estimate and standard uncertainty, contribution in the measurand's unit, share of the variance."""
 
     name: str
+    estimate: str
+    u: str
     kind: str
     distribution: str
     dof: str
@@ -149,6 +151,7 @@ class Table:
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     numeric: tuple[int, ...] = ()
+    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -175,11 +178,12 @@ class FigureEntry:
     title: str
     caption: str
     svg: str
+    first: bool = False  # it stands on page 1
 
 
 @dataclass(frozen=True)
 class ReportView:
-    """One report. The order of the fields is the order of the page; many results come after the others."""
+    """One report. The order of the fields is the order of the page; long tables stand in the annex."""
 
     title: str  # 7.8.2.1 a
     run_id: str  # 7.8.2.1 d: unique identification, on every page
@@ -192,28 +196,34 @@ class ReportView:
     tone: Tone
     outcome_text: str
     identification: tuple[Fact, ...]  # 7.8.2.1 c, g, i
-    many: tuple[ManyResults, ...]  # of the same; their full budgets are in record.json
-    about_many: str
+    decided: tuple[FindingRow, ...]  # the findings that affect the outcome
+    judged: tuple[ResultRow, ...]  # the results that were held against a limit, the worst first; else the first results
+    judged_title: str
+    judged_note: str
+    sheets: tuple[Table, ...]  # of the procedure
     results: tuple[ResultRow, ...]  # 7.8.2.1 m, 7.8.4.1 a (uncertainty in the measurand's unit), 7.8.4.1 e
     vectors: Table  # of the same, those that are vectors as amount and angle
     about_vectors: str
     no_results: str
     about_uncertainty: str
     decision_rule: str  # 7.8.6
-    findings: tuple[FindingRow, ...]  # 7.8.2.1 n: deviations the bench itself noticed
+    notes: tuple[FindingRow, ...]  # 7.8.2.1 n: what the bench itself noticed and what did not affect the outcome
+    figures: tuple[FigureEntry, ...]
     budgets: tuple[BudgetTable, ...]  # 7.8.4.1 a
     method: tuple[str, ...]  # 7.8.2.1 f
-    figures: tuple[FigureEntry, ...]
     conditions: tuple[Fact, ...]  # 7.8.4.1 b
     traceability: Table  # 7.8.4.1 c
     calibrations: Table  # 7.8.4.1 c, d: earlier results this run used
     about_calibrations: str
+    laboratory: tuple[Fact, ...]  # 7.8.2.1 b, e, h, j, n, o, p: what only people know; from [laboratory] or blank
+    statements: tuple[str, ...]  # 7.8.2.1 l and its note
+    many: tuple[ManyResults, ...]  # the annex: quantities with many results; their full budgets are in record.json
+    about_many: str
+    more_budgets: tuple[BudgetTable, ...]  # of what was not judged
     link: tuple[Table, ...]
     link_note: str
     correlations: Correlations | None
     plan: tuple[Fact, ...]  # 7.8.2.1 f, k: settings; no sampling beyond them
     versions: tuple[Fact, ...]
     recording: tuple[Fact, ...]  # the file that everything above was computed from
-    laboratory: tuple[Fact, ...]  # 7.8.2.1 b, e, h, j, n, o, p: what only people know; from [laboratory] or blank
-    statements: tuple[str, ...]  # 7.8.2.1 l and its note
     end: str  # 7.8.2.1 d: a clear end

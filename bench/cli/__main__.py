@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from bench.cli.options import Backend, Calibrations, Keep, OperatorKind, Out, RunArgument, Table
+from bench.cli.options import Backend, Calibrations, Keep, OperatorKind, Out, RunArgument, Table, Verbose
 from bench.cli.status import run_app
 
 app = typer.Typer(
@@ -22,6 +22,23 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from bench import __version__
+
+        sys.stdout.write(f"bench {__version__}\n")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Test and calibrate magnetically levitated machines, real or simulated."""
 
 
 @app.command("list")
@@ -69,6 +86,7 @@ def run(
     allow_expired: Annotated[
         bool, typer.Option("--allow-expired", help="Use calibrations that are overdue; the report says so.")
     ] = False,
+    verbose: Verbose = False,
 ) -> int:
     """Run a procedure on a rig. The last line on standard output is the run directory."""
     from bench.cli.compose import Request
@@ -91,7 +109,8 @@ def run(
             report=not no_report,
             calibrations=calibrations,
             allow_expired=allow_expired,
-        )
+        ),
+        verbose,
     )
 
 
@@ -174,14 +193,14 @@ def calibrations_(
 
 
 @app.command()
-def analyse(run: RunArgument) -> int:
+def analyse(run: RunArgument, verbose: Verbose = False) -> int:
     """Analyse a stored run again, from its recording alone.
 
     Writes RUN/analyses/<UTC>/record.json; the original stays as it is.
     """
     from bench.cli.runs import analyse_command
 
-    return analyse_command(run)
+    return analyse_command(run, verbose)
 
 
 @app.command()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -63,6 +64,12 @@ class StepProgress:
     def line(self, text: str) -> None:
         self.base.line(text)
 
+    def busy(self, text: str) -> AbstractContextManager[None]:
+        return self.base.busy(f"{self.title} {text}")
+
+    def asking(self, question: str) -> AbstractContextManager[None]:
+        return self.base.asking(question)
+
 
 def run_chain(asked: Asked, directory: CampaignDirectory, progress: Progress) -> list[Done]:
     """Every step that has not passed yet, in order. The first that does not pass ends it, or with `--go-on` those
@@ -112,7 +119,7 @@ def _run(
     began = time.monotonic()
     title = f"[{step.number}/{len(asked.steps)}]"
     try:
-        job, connect = prepare(request_of(asked, directory, step))
+        job, connect = prepare(request_of(asked, directory, step), progress.asking)
         report = reporting.build if asked.request.report else None
         result = runner.run(job, directory.runs, connect, supervisor, StepProgress(progress, title), report)
     except ConfigError as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from bench import campaign_model, provenance
@@ -98,6 +99,7 @@ def _figures(directory: CampaignDirectory, d: Done) -> tuple[Figure, ...]:
         return ()
     try:
         recording: Recording[Any] = Recording.open(run.recording, d.step.procedure.plan)
-        return tuple(d.step.procedure.figures(recording))[:FIGURES]
+        shown = (s for s in d.step.procedure.figures(recording) if isinstance(s, Figure))
+        return tuple(islice(shown, FIGURES))
     except BenchError:
         return ()

@@ -19,6 +19,7 @@ from typing import Any
 from bench import catalogue, faults, linkurl, plans
 from bench.calibration import Need, number
 from bench.calibrationstore import Store
+from bench.cli.console import Asking, quietly
 from bench.cli.opening import live, simulated
 from bench.envelope import Envelope
 from bench.errors import ConfigError
@@ -61,8 +62,8 @@ def load_procedure(name: str) -> Procedure:
     return found
 
 
-def prepare(request: Request) -> tuple[Job, Connect]:
-    """Everything that can be wrong before a machine is touched, found out.
+def prepare(request: Request, asking: Asking = quietly) -> tuple[Job, Connect]:
+    """Everything that can be wrong before a machine is touched, found out. `asking` shows a question while a person answers it.
 
     Raises:
         ConfigError: usage, rig file, plan or spec; every problem of the first of them that has one.
@@ -89,10 +90,10 @@ def prepare(request: Request) -> tuple[Job, Connect]:
     if seed is None:
         kind = request.operator or ("console" if sys.stdin.isatty() else "auto")
         job = Job(procedure, rig, plan, limits, "live", None, rig_lock(rig.link.url.partition("?")[0]), used)
-        return job, live(rig, kind, injected, request.clear_fault)
+        return job, live(rig, kind, injected, request.clear_fault, asking)
     overrides = dict(plans.assignment(text) for text in request.truth)
     _refuse_words(overrides)
-    connect = simulated(rig, seed, overrides, request.operator or "auto", procedure.settings(plan), injected)
+    connect = simulated(rig, seed, overrides, request.operator or "auto", procedure.settings(plan), injected, asking)
     return Job(procedure, rig, plan, limits, request.backend, seed, calibrations=used), connect
 
 

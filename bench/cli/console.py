@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import select
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 
 from bench.clock import Clock
 from bench.errors import OperatorAbort
@@ -15,12 +16,23 @@ LOOK_S = 0.05
 CLOSED = "standard input is closed: nobody can answer"
 
 
-def blocking(supervisor: Supervisor) -> Callable[[str], str]:
+Asking = Callable[[str], AbstractContextManager[None]]
+"""Puts a question where a person sees it; within the block they type."""
+
+
+@contextmanager
+def quietly(question: str) -> Iterator[None]:
+    """The question as it is, on standard error, where no display is in the way."""
+    sys.stderr.write(f"{question}\n")
+    sys.stderr.flush()
+    yield
+
+
+def blocking(supervisor: Supervisor, asking: Asking = quietly) -> Callable[[str], str]:
     """For a simulated rig, whose time stands still meanwhile; a signal ends the waiting at once."""
 
     def ask(question: str) -> str:
-        _say(question)
-        with supervisor.interruptible():
+        with asking(question), supervisor.interruptible():
             answer = sys.stdin.readline()
         if not answer:
             raise OperatorAbort(CLOSED)
@@ -29,14 +41,14 @@ def blocking(supervisor: Supervisor) -> Callable[[str], str]:
     return ask
 
 
-def attentive(clock: Clock) -> Callable[[str], str]:
+def attentive(clock: Clock, asking: Asking = quietly) -> Callable[[str], str]:
     """For a live rig: its clock runs while the person thinks, so that heartbeats, recording and interlocks go on."""
     keyboard = Keyboard(sys.stdin.fileno())
 
     def ask(question: str) -> str:
-        _say(question)
-        while (answer := keyboard.line()) is None:
-            clock.sleep(LOOK_S)
+        with asking(question):
+            while (answer := keyboard.line()) is None:
+                clock.sleep(LOOK_S)
         if not answer:
             raise OperatorAbort(CLOSED)
         return answer
@@ -68,8 +80,3 @@ class Keyboard:
 
             return msvcrt.kbhit()
         return bool(select.select([self._fileno], [], [], 0)[0])
-
-
-def _say(question: str) -> None:
-    sys.stderr.write(question)
-    sys.stderr.flush()

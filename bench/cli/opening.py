@@ -46,6 +46,7 @@ def simulated(
     operator: str,
     settings: Mapping[str, float] | None = None,
     injected: Sequence[Fault] = (),
+    asking: console.Asking = console.quietly,
 ) -> Connect:
     """How to open a simulated rig. The truth is drawn now, so that a wrong override is found before the start.
 
@@ -89,7 +90,7 @@ def of_truth(
         try:
             controller.connect()
             with open_devices(rig, bank.port, controller.clock, controller.envelope) as bus:
-                hands = _operators(operator, line, controller, lambda _: console.blocking(supervisor))
+                hands = _operators(operator, line, controller, lambda _: console.blocking(supervisor, asking))
                 yield _opened(controller, base, bus, hands, facts, injected)
         finally:
             machine.link.close()
@@ -97,7 +98,13 @@ def of_truth(
     return connect
 
 
-def live(rig: RigFile, operator: str, injected: Sequence[Fault] = (), clear_fault: bool = False) -> Connect:
+def live(
+    rig: RigFile,
+    operator: str,
+    injected: Sequence[Fault] = (),
+    clear_fault: bool = False,
+    asking: console.Asking = console.quietly,
+) -> Connect:
     """How to open a live rig: its controller's link with its heartbeat, its other devices, and the operator.
 
     Raises:
@@ -138,7 +145,7 @@ def live(rig: RigFile, operator: str, injected: Sequence[Fault] = (), clear_faul
                     rig, port_of, controller.clock, controller.envelope, threaded=True, clear_fault=clear_fault
                 )
             )
-            people = _operators(operator, hands, controller, console.attentive)
+            people = _operators(operator, hands, controller, lambda clock: console.attentive(clock, asking))
             yield _opened(controller, base, bus, people, None, injected, lines)
 
     return connect
@@ -208,7 +215,7 @@ def _operators(
     kind: str, line: LineOperator | None, controller: Controller, prompt: Callable[[Clock], Callable[[str], str]]
 ) -> list[Operator]:
     """The operator, and whoever else records what is done by hand. `prompt` makes what asks a person."""
-    from drivers.operator import ConsoleOperator
+    from drivers.person import ConsoleOperator
 
     if kind == "console" or line is None:
         person = ConsoleOperator(prompt(controller.clock), controller.clock, controller.envelope, line)

@@ -44,4 +44,7 @@ Calibrations = Annotated[
     Path | None,
     typer.Option("--calibrations", metavar="DIR", help="Folder of calibrations; default beside the rig file."),
 ]
+Verbose = Annotated[
+    bool, typer.Option("--verbose", "-v", help="Say every result and every note, not only what was judged.")
+]
 RunArgument = Annotated[Path, typer.Argument(metavar="RUN", help="A run directory.")]

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.figures import Figure
+from bench.figures import Shown
 from bench.procedure import Procedure
 from bench.recording import Recording
 from bench.records import Record
@@ -39,7 +39,7 @@ def build(directory: Path, record: Record, procedure: Procedure, recording: Reco
     )
 
 
-def figures(record: Record, procedure: Procedure, recording: Recording[Any] | None) -> Iterable[Figure]:
+def figures(record: Record, procedure: Procedure, recording: Recording[Any] | None) -> Iterable[Shown]:
     """What the procedure draws of a run; nothing of one that measured nothing."""
     measured = any(m.value is not None for m in record.measurements)
     return procedure.figures(recording) if recording is not None and measured else ()

@@ -11,8 +11,10 @@ from typing import Any
 from bench import index, reanalysis, rundir, runlog
 from bench.cli import reporting
 from bench.cli.compose import load_procedure
-from bench.cli.run import STATUS, summary
+from bench.cli.run import STATUS
+from bench.cli.summary import summary
 from bench.errors import BenchError, ConfigError, RecordingError
+from bench.progress import columns
 from bench.recording import Recording
 from bench.records import read_record
 from bench.supervisor import Supervisor
@@ -24,11 +26,11 @@ def _line(text: str) -> None:
     sys.stderr.write(text + "\n")
 
 
-def analyse_command(run: Path) -> int:
+def analyse_command(run: Path, whole: bool = False) -> int:
     """Analyse again; the verdict's exit status, the analysis directory on standard output."""
     with Supervisor().watching(), runlog.to_lines(_line):
         result = reanalysis.analyse(run, load_procedure)
-    sys.stderr.write(summary(result.record))
+    sys.stderr.write(summary(result.record, result.directory, whole=whole, width=columns()))
     sys.stdout.write(f"{result.directory}\n")
     return STATUS[result.outcome]
 

@@ -16,6 +16,7 @@ import typer
 from bench.errors import Aborted, BenchError, ConfigError
 
 USAGE, ERROR, ABORTED = 2, 3, 4
+INTERRUPTED = 130  # what the library makes of Ctrl-C
 
 
 def run_app(app: typer.Typer, arguments: list[str]) -> int:
@@ -61,6 +62,8 @@ def _dispatch(app: typer.Typer, arguments: list[str]) -> int:
             raise
         show()
         return USAGE
+    if status == INTERRUPTED:
+        raise KeyboardInterrupt
     return status if isinstance(status, int) else 0
 
 

@@ -22,13 +22,16 @@ class BudgetRow:
     distribution: str
     dof: float
     share: float
+    unit: str = ""  # of the influence
 
 
 def budget(estimate: Estimate) -> list[BudgetRow]:
     """All influences, the largest contribution first; equal ones by id."""
     u = estimate.u
     rows = [
-        BudgetRow(i.name, i.id, abs(c * i.u), c, i.kind, i.distribution, i.dof, (c * i.u / u) ** 2 if u > 0 else 0.0)
+        BudgetRow(
+            i.name, i.id, abs(c * i.u), c, i.kind, i.distribution, i.dof, (c * i.u / u) ** 2 if u > 0 else 0.0, i.unit
+        )
         for i, c in estimate.sensitivities.items()
     ]
     return sorted(rows, key=lambda row: (-row.contribution, row.id))

@@ -64,7 +64,12 @@ def read_hangings(recording: Recording[Any], masses: tuple[str, ...]) -> Hanging
     mean = {c: stack("mean", c) for c in CHANNELS}
     steps = [s for _, s in groups]
     labels = {"": -1} | {label: k for k, label in enumerate(masses)}
-    load = np.array([[labels[str(s.labels["load"])] for s in row] for row in steps])
+    hung = [[str(s.labels["load"]) for s in row] for row in steps]
+    if strange := sorted({label for row in hung for label in row} - set(labels)):
+        raise AnalysisError(
+            f"masses: found {', '.join(strange)} on the hanger; expected those of the plan, {', '.join(masses)}"
+        )
+    load = np.array([[labels[label] for label in row] for row in hung])
     branch = np.array([[float(s.labels["branch"]) for s in row] for row in steps])
     currents = np.stack([np.stack([mean[f"i_y{b}_{c}"] for c in "pn"]) for b in "io"])
     inboard, outboard, motor = _plane_positions(recording.rig, mean["pos_yi"], mean["pos_yo"])

@@ -60,6 +60,10 @@ def read_torques(recording: Recording[Any], masses: tuple[str, ...], count: floa
         raise AnalysisError("found no loads on the lever (was the run stopped early?)")
     read = [_reduce(step) for step in found]
     index = {"": -1} | {label: k for k, label in enumerate(masses)}
+    if strange := sorted({str(s.labels["load"]) for s in found} - set(index)):
+        raise AnalysisError(
+            f"masses: found {', '.join(strange)} on the lever; expected those of the plan, {', '.join(masses)}"
+        )
     sides = {"left": 1, "right": -1, "": 0}
     start = found[0].start_ns
     steps = Steps(

@@ -50,4 +50,4 @@ def test_time_goes_on_until_the_answer(monkeypatch: pytest.MonkeyPatch, capsys: 
         assert clock.slept == pytest.approx(3 * console.LOOK_S)
         with pytest.raises(OperatorAbort, match="standard input is closed"):
             ask("Hang M2: ")
-    assert capsys.readouterr().err == "Hang M1: Hang M2: "
+    assert capsys.readouterr().err == "Hang M1: \nHang M2: \n"

@@ -16,17 +16,17 @@ RUN_ID = "amb-calibration-20260101T000000Z-3f2a"
 def budget() -> list[dict[str, Any]]:
     """Nine influences; the last two are negligible."""
     rows = (
-        ("current sensor gain, inboard", "sensors.i_yi.gain", 0.0392, 23.4, "B", "rectangular", None),
-        ("AMB span", "geometry.amb_span", 0.0094, 187.2, "B", "normal", None),
-        ("hook to outboard AMB", "geometry.hook_to_outboard", 0.0078, 156.0, "B", "normal", None),
-        ("angle dependence, mean over a turn", "run.angle", 0.0061, 1.0, "A", "t", 7),
-        ("residuals of the fit", "run.fit", 0.0041, 1.0, "A", "t", 69),
-        ("local gravity", "site.gravity", 0.0012, 2.385, "B", "normal", None),
-        ("mass M4", "masses.M4", 0.0009, 7.8, "B", "normal", None),
-        ("air density", "site.air_density", 0.00017, -0.0029, "B", "rectangular", None),
-        ("mass M1", "masses.M1", 0.00011, 7.8, "B", "normal", None),
+        ("current sensor gain, inboard", "sensors/i_yi_p/gain", 0.0392, 23.4, "B", "rectangular", None, "1"),
+        ("AMB span", "geometry/amb_span", 0.0094, 187.2, "B", "normal", None, "m"),
+        ("hook to outboard AMB", "geometry/hook_to_outboard", 0.0078, 156.0, "B", "normal", None, "m"),
+        ("angle dependence, mean over a turn", "run/angle", 0.0061, 1.0, "A", "t", 7, "N/A"),
+        ("residuals of the fit", "run/fit", 0.0041, 1.0, "A", "t", 69, "N/A"),
+        ("local gravity", "site/gravity", 0.0012, 2.385, "B", "normal", None, "m/s^2"),
+        ("mass M4", "masses/M4", 0.0009, 7.8, "B", "normal", None, "kg"),
+        ("air density", "site/air_density", 0.00017, -0.0029, "B", "rectangular", None, "kg/m3"),
+        ("mass M1", "masses/M1", 0.00011, 7.8, "B", "normal", None, "kg"),
     )
-    names = ("name", "influence", "contribution", "sensitivity", "type", "distribution", "dof")
+    names = ("name", "influence", "contribution", "sensitivity", "type", "distribution", "dof", "unit")
     return [dict(zip(names, row, strict=True)) for row in rows]
 
 

@@ -17,6 +17,7 @@ from report_samples import (
     RUN_ID,
     SampleRecording,
     SampleRig,
+    budget,
     figures,
     measurement,
     record,
@@ -26,10 +27,11 @@ from report_samples import (
 
 import reports
 from bench.errors import BenchError
+from bench.figures import Sheet
 from bench.procedure import Quantity
-from reports import compose, html, pdf, tables
+from reports import budgets, compose, html, pdf
 from reports.figures import draw
-from reports.view import SIMULATED, ReportView
+from reports.view import SIMULATED, FigureEntry, ReportView
 
 K_I = Quantity("K_i", "N/A", "inboard AMB: dF/di at zero control current")
 TITLE = "AMB force-current constants"
@@ -90,14 +92,52 @@ def test_budget_shares_add_up_and_the_small_rest_is_stated() -> None:
     table = view().budgets[0]
     assert [row.name for row in table.rows][:2] == ["current sensor gain, inboard", "AMB span"]
     assert table.rows[0].share == "88.2\u202f%"
-    assert sum(row.percent for row in table.rows) == pytest.approx(100, abs=0.2)
-    assert table.rest.startswith("3 further influences, each below 0.05\u202f% of the variance: 9.2\u202f×\u202f10⁻⁴")
+    assert sum(row.percent for row in table.rows) == pytest.approx(100, abs=1.5)
+    assert table.rest.startswith("5 further influences, each below 1\u202f% of the variance: 0.0044\u202fN/A")
+
+
+def test_a_budget_has_estimate_and_uncertainty_of_each_input_and_the_unit_of_its_sensitivity() -> None:
+    """187.2 (N/A)/m at u = 0.0094/187.2 m: a reader can compute each line again."""
+    rows = {row.name: row for row in view().budgets[0].rows}
+    span = rows["AMB span"]
+    assert (span.estimate, span.u, span.sensitivity) == ("125\u202fmm", "0.050\u202fmm", "0.187\u202fN/A/mm")
+    assert rows["angle dependence, mean over a turn"].estimate == "–"
+    assert rows["current sensor gain, inboard"].sensitivity == "23.4\u202fN/A"
+
+
+def test_page_one_has_what_was_judged_the_worst_first_and_what_decided() -> None:
+    made = view(
+        outcome="FAIL",
+        findings=[{"code": "clipped", "text": "A probe clips.", "where": "yi", "effect": "indeterminate"},
+                  {"code": "slow", "text": "It was slow.", "where": "", "effect": "note"}],
+        measurements=[measurement("a"), measurement("b", verdict="none", limit=None), measurement("c", verdict="fail")],
+        correlations=None,
+    )  # fmt: skip
+    assert (made.judged_title, [r.symbol.plain for r in made.judged]) == ("What was judged", ["c", "a"])
+    assert made.judged_note == "1 more result in the sections below."
+    assert [f.code for f in made.decided] == ["clipped"]
+    assert [f.code for f in made.notes] == ["slow"]
+    assert [b.symbol.plain for b in made.budgets] == ["a", "c"]
+    assert [b.symbol.plain for b in made.more_budgets] == ["b"]
+
+
+def test_the_first_two_figures_and_the_tables_stand_before_the_results() -> None:
+    weights = Sheet("weights", "Weights", "On the scale.", ("Plane", "g"), (("inboard", "0.141"),), (1,))
+    made = compose.view_of(record(), around(), [weights, *(draw(f) for f in figures()[:3])])
+    assert [f.first for f in made.figures] == [True, True, False]
+    page = Page(html.render(made)).text
+    places = [
+        page.index(words) for words in ("What was judged", "Figure 2.", "0.141", "Decision rule", "Figure 3.", "Annex")
+    ]
+    assert places == sorted(places)
 
 
 def test_what_only_the_simulator_knows_is_not_printed_and_like_sensors_share_a_row() -> None:
-    rows = view().traceability.rows
+    other = {**budget()[0], "influence": "sensors/i_yi_n/gain"}
+    rows = view(measurements=[measurement(budget=[*budget(), other])]).traceability.rows
     assert not any("42.4242" in cell for row in rows for cell in row)
-    assert rows[-1][0] == "sensors: gain of i_xi_p, i_xi_n, i_yi_p, i_yi_n"
+    assert rows[-1][0] == "sensors: gain of i_yi_p, i_yi_n"
+    assert not any("M2" in row[0] or "i_xi_p" in row[0] for row in rows)  # no result rests on them
     certificate = ("masses.M1", "0.5\u202fkg", "U = 5\u202f×\u202f10⁻⁵\u202fkg (k = 2), normal")
     assert certificate in [row[:3] for row in rows]
 
@@ -112,20 +152,20 @@ def test_every_required_field_is_in_the_page_in_order() -> None:
         "2026-01-01 00:00:00 UTC",
         "Edmonton",
         "PASS",
+        "What was judged",
         "Results",
         K_I.about,
     ]
     wanted += [
         "23.412",
         "Decision rule",
-        "Findings",
+        "Notes",
         "Return to zero",
         "Uncertainty budget",
         "Method",
         "A fit is made.",
     ]
-    wanted += ["Conditions", "Gravity", "Air density", "Traceability", "certificate SIM-M-001", "Link and recording"]
-    wanted += ["872\u202f341", "Correlations", "−0.43", "Plan settings", "settle_s", "Versions and digest", "a3f1" * 16]
+    wanted += ["Conditions", "Gravity", "Air density", "Traceability", "certificate SIM-M-001"]
     wanted += [
         "Laboratory",
         "Customer",
@@ -135,7 +175,8 @@ def test_every_required_field_is_in_the_page_in_order() -> None:
         "relate only",
         "except in full",
     ]
-    wanted += [f"End of report {RUN_ID}"]
+    wanted += ["Annex", "Correlations", "−0.43", "Link and recording", "872\u202f341", "Plan settings", "settle_s"]
+    wanted += ["Versions and digest", "a3f1" * 16, f"End of report {RUN_ID}"]
     at = 0
     for words in wanted:
         words = " ".join(words.split())
@@ -163,7 +204,7 @@ def test_simulated_is_marked_even_for_seed_zero_and_never_on_a_real_rig() -> Non
 def test_findings_that_affect_the_outcome_are_loud() -> None:
     loud = {"code": "mass-suspect", "text": "M3 is off the line.", "where": "M3", "effect": "indeterminate"}
     made = view(findings=[loud], outcome="INDETERMINATE")
-    assert made.findings[0].loud
+    assert made.decided[0].loud
     assert "mass-suspect" in made.outcome_text
     assert 'class="finding loud"' in html.render(made)
 
@@ -189,7 +230,7 @@ def test_an_error_without_measurements_says_that_it_says_nothing() -> None:
 def test_a_truncated_recording_is_said_aloud() -> None:
     stopped = {"code": "operator-abort", "text": "Stopped.", "where": ""}
     made = view(around(truncated=True), outcome="ABORTED", findings=[stopped])
-    assert made.findings[0].loud
+    assert made.decided[0].loud
     assert "truncated" in made.link_note
     assert made.outcome_text == "The run was stopped before its end. See the finding operator-abort."
 
@@ -262,12 +303,12 @@ def test_equal_input_gives_equal_bytes_and_a_build_leaves_its_input_alone(tmp_pa
 
 
 def test_the_pdf_has_the_sections_of_the_page_in_the_same_order() -> None:
-    made = compose.view_of(record(), around(), [draw(figures()[0])])
+    made = compose.view_of(record(), around(), [draw(f) for f in figures()[:3]])
     in_page = re.findall(r"<h2>(.*?)</h2>", html.render(made))
     asked = typst.query(pdf.sources(made), "heading.where(level: 1)", field="body", ignore_system_fonts=True)
     in_pdf = [heading["text"] for heading in json.loads(asked)]
     assert in_pdf == in_page
-    assert len(in_pdf) == 13
+    assert len(in_pdf) == 15
 
 
 def test_the_page_fetches_nothing() -> None:
@@ -283,7 +324,7 @@ def test_a_record_that_cannot_be_printed_is_our_error(tmp_path: Path) -> None:
 
 
 def test_a_refusal_of_typst_is_our_error() -> None:
-    bad = compose.FigureEntry(1, "bad", "t", "c", "this is not SVG")
+    bad = FigureEntry(1, "bad", "t", "c", "this is not SVG")
     with pytest.raises(BenchError, match="the PDF report cannot be made"):
         pdf.render(dataclasses.replace(view(), figures=(bad,)))
 
@@ -310,7 +351,7 @@ def test_the_parts_of_one_scatter_are_one_row() -> None:
         entry("masses/M1", "mass M1", 0.1, "B"),
         entry("masses/M2", "mass M2", 0.1, "B"),
     ]
-    table = tables.budget_table(measurement(budget=entries))
+    table = budgets.budget_table(measurement(budget=entries))
     assert [(r.name, r.contribution, r.dof) for r in table.rows] == [
         ("scatter, 2 parts [run-1]", "0.50", "43"), ("scatter (1)", "0.20", "7"), ("scatter (1) [run-2]", "0.10", "43"),
         ("mass M1", "0.10", "43"), ("mass M2", "0.10", "43"),

@@ -10,7 +10,7 @@ import pytest
 from report_samples import measurement, record
 
 from bench import units
-from reports import compose, html, many, pdf, tables, vectors
+from reports import budgets, compose, html, many, pdf, tables, vectors
 from reports.text import DASH
 
 NARROW = "\u202f"
@@ -25,7 +25,7 @@ def pair(c: float, s: float, u: float, where: str = "yi") -> list[dict[str, Any]
 
 def test_components_are_told_as_amount_and_lag() -> None:
     made = vectors.table(record(measurements=[*pair(3e-6, 4e-6, 0.05e-6), measurement()], correlations=None))
-    assert made.rows == (("vector", "yi", f"(5.00 ± 0.10){NARROW}µm", "(53.1 ± 1.1)°"),)
+    assert made.rows == (("vector", "yi", f"(5.00 ± 0.10){NARROW}µm", f"10.0{NARROW}µm", "(53.1 ± 1.1)°"),)
 
 
 @pytest.mark.parametrize("r", [-0.9, 0.0, 0.6])
@@ -37,12 +37,12 @@ def test_the_half_widths_follow_from_the_correlation(r: float) -> None:
     cloud = np.random.default_rng(1).multivariate_normal([c, s], u**2 * np.array([[1, r], [r, 1]]), 100_000)
     amount, angle = np.hypot(*cloud.T), np.degrees(np.arctan2(cloud[:, 1], cloud[:, 0]))
     assert float(row[2].split("± ")[1].split(")")[0]) == pytest.approx(2e6 * amount.std(), rel=0.1)
-    assert float(row[3].split("± ")[1].split(")")[0]) == pytest.approx(2 * angle.std(), rel=0.1)
+    assert float(row[4].split("± ")[1].split(")")[0]) == pytest.approx(2 * angle.std(), rel=0.1)
 
 
 def test_a_vector_that_may_be_none_has_no_angle() -> None:
-    assert vectors.table(record(measurements=pair(1e-7, 0.0, 1e-7), correlations=None)).rows[0][3] == DASH
-    assert vectors.table(record(measurements=pair(0.0, 0.0, 1e-7), correlations=None)).rows[0][3] == DASH
+    assert vectors.table(record(measurements=pair(1e-7, 0.0, 1e-7), correlations=None)).rows[0][4] == DASH
+    assert vectors.table(record(measurements=pair(0.0, 0.0, 1e-7), correlations=None)).rows[0][4] == DASH
 
 
 def test_places_are_kept_apart_and_what_is_missing_is_left_out() -> None:
@@ -83,7 +83,7 @@ def test_settings_are_told_as_a_plan_takes_them(key: str, value: Any, label: str
 def test_a_certificate_is_told_in_the_unit_that_it_is_written_in() -> None:
     def row(value: float, half: float, unit: str) -> tuple[str, ...]:
         entry = {"value": value, "unit": unit, "half_width": half, "source": "s"}
-        return tables.traceability({"geometry": {"x": entry}}).rows[0][1:3]
+        return tables.traceability({"geometry": {"x": entry}}, {"geometry/x"}).rows[0][1:3]
 
     assert row(0.000525, 1e-5, "m") == (f"0.525{NARROW}mm", f"± 0.01{NARROW}mm")
     assert row(0.0, 5e-6, "m") == (f"0{NARROW}µm", f"± 5{NARROW}µm")
@@ -109,27 +109,27 @@ def test_notes_are_no_reason_where_a_limit_is_crossed() -> None:
 def test_what_is_found_alike_in_many_places_is_said_once() -> None:
     same = [{"code": "c", "text": "t", "where": where, "effect": "note"} for where in ("yi", "zi", "yi")]
     made = compose.view_of(record(findings=same), compose.Surroundings("t"))
-    assert [(f.text, f.where) for f in made.findings] == [("t", "yi; zi")]
+    assert [(f.text, f.where) for f in made.notes] == [("t", "yi; zi")]
 
 
 def test_long_names_head_the_rows_of_a_correlation_matrix_and_numbers_its_columns() -> None:
     names = [f"{name}@{axis}, at rest" for axis in ("yi", "zo") for name in ("s_max", "gain_reduction")]
     matrix = [[1.0 if a == b else 0.3 for b in range(4)] for a in range(4)]
     given = record(correlations={"names": names, "matrix": matrix})
-    found = tables.correlations(given)
+    found = tables.correlations(given, {})
     assert found is not None
     assert [s.plain for s in found.symbols] == ["1", "2", "3", "4"]
     assert [at for _, at in found.heads] == ["yi, at rest"] * 2 + ["zo, at rest"] * 2
     view = compose.view_of(given, compose.Surroundings("t"))
-    assert "gain_reduction" in html.render(view)
+    assert "gain reduction" in html.render(view)
     assert pdf.render(view).startswith(b"%PDF")
 
 
 def test_short_symbols_head_the_columns_and_nothing_correlated_is_a_sentence() -> None:
-    found = tables.correlations(record())
+    found = tables.correlations(record(), {})
     assert found is not None
     assert [s.plain for s in found.symbols] == ["K_i", "K_o"]
-    none = tables.correlations(record(correlations=[[1.0, 0.0], [0.0, 1.0]]))
+    none = tables.correlations(record(correlations=[[1.0, 0.0], [0.0, 1.0]]), {})
     assert none is not None
     assert none.note.startswith("0 of the 1 pairs")
 
@@ -138,7 +138,7 @@ def test_influences_of_one_name_are_told_apart() -> None:
     parts = [
         {"name": "response", "influence": f"nonlinear/{p}", "contribution": 1.0, "type": "B"} for p in ("re", "im")
     ]
-    assert [row.name for row in tables.budget_table(measurement(budget=parts)).rows] == [
+    assert [row.name for row in budgets.budget_table(measurement(budget=parts)).rows] == [
         "response (re)",
         "response (im)",
     ]
@@ -147,7 +147,9 @@ def test_influences_of_one_name_are_told_apart() -> None:
 def test_a_speed_in_an_identity_is_not_cut() -> None:
     ends = ("A, 0 r/min, up", "A, 0 r/min, down")
     parts = [{"name": "scatter", "influence": f"run/{end}", "contribution": 1.0, "type": "B"} for end in ends]
-    assert [row.name for row in tables.budget_table(measurement(budget=parts)).rows] == [f"scatter ({e})" for e in ends]
+    assert [row.name for row in budgets.budget_table(measurement(budget=parts)).rows] == [
+        f"scatter ({e})" for e in ends
+    ]
 
 
 def test_judged_quantities_come_first() -> None:

@@ -14,7 +14,8 @@ from bench.rigcheck import problems_of
 from bench.rigfile import load_rig
 from bench.session import Session
 from drivers.controller import Controller
-from drivers.operator import ConsoleOperator, LineOperator
+from drivers.operator import LineOperator
+from drivers.person import ConsoleOperator
 from sim_backend.core.amb import AmbPlant
 from sim_backend.endpoint import SimulatedRig
 from sim_backend.truth import draw
@@ -126,7 +127,7 @@ def test_a_person_is_told_every_step() -> None:
         person.attach("inboard", 0.1e-3, 0.0)
     assert bench.weights()[0] == 0
     assert asked[0].startswith(
-        "The shaft is landed and stands. Weigh out 0.250 g and fix it in the outboard balancing plane at 315.0 deg of its scale"
+        "The shaft is landed and stands. Weigh out 0.250 g and fix it in the outboard balancing plane at 315.0° of its scale"
     )
     assert "Take every weight that was fixed in the outboard balancing plane off" in asked[1]
 
@@ -135,3 +136,18 @@ def test_the_rig_file_states_what_a_weight_is() -> None:
     assert problems_of(RIG) == []
     assert RIG.machine["weight_mass"].standard_uncertainty == pytest.approx(1e-6)
     assert RIG.geometry["balance_radius"].value == 25e-3
+
+
+def test_the_weight_that_was_really_fixed_can_be_told() -> None:
+    bench, answers = Bench(), iter(["0.143 270", "9000 0", "one two", "0.2 nan", ""])
+    asked: list[str] = []
+    person = ConsoleOperator(
+        lambda q: (asked.append(q), next(answers))[1], bench.controller.clock, Envelope(RIG), bench.hands
+    )
+    person.may_touch = bench.hands.may_touch
+    assert person.attach("inboard", 0.145e-3, math.radians(273)) == pytest.approx((0.143e-3, math.radians(270)))
+    radius = RIG.geometry["balance_radius"].value
+    assert abs(bench.weights()[0]) == pytest.approx(0.143e-3 * radius, rel=0.05)
+    assert person.attach("inboard", 0.145e-3, 0.0) == (0.145e-3, 0.0)
+    assert "weight: found 9000 g; the envelope allows" in asked[2]
+    assert asked[3].startswith("'one two' is no answer here.")

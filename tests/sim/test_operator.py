@@ -8,7 +8,8 @@ from bench.envelope import Envelope
 from bench.errors import BenchError, InterlockError, OperatorAbort
 from bench.rigfile import load_rig
 from bench.roles import NOTHING, Load
-from drivers.operator import ConsoleOperator, LineOperator
+from drivers.operator import LineOperator
+from drivers.person import ConsoleOperator
 from sim_backend.endpoint import SimulatedRig
 from sim_backend.truth import draw
 
@@ -96,3 +97,71 @@ def test_a_person_is_asked_and_the_simulated_rig_follows(machine: SimulatedRig, 
     assert machine.device.plant._s.ring_inertia == 0
     with pytest.raises(OperatorAbort):
         person.mount("ring")
+
+
+def person_answering(*answers: str, machine: SimulatedRig, hands: LineOperator) -> tuple[ConsoleOperator, list[str]]:
+    asked: list[str] = []
+
+    def prompt(question: str) -> str:
+        asked.append(question)
+        return answers[len(asked) - 1]
+
+    return ConsoleOperator(prompt, machine, Envelope(RIG), hands), asked
+
+
+def test_a_wrong_answer_is_explained_and_the_question_comes_again(machine: SimulatedRig, hands: LineOperator) -> None:
+    person, asked = person_answering("xyz", "?", "", machine=machine, hands=hands)
+    assert person.hang(Load("M2")) == Load("M2")
+    assert asked[0].splitlines() == [
+        "Hang M2 on the hanger.",
+        "Press Enter when it hangs still, or type stop to end the run, ? for more.",
+    ]
+    assert asked[1].startswith("'xyz' is no answer here. Another mass hangs: type its label")
+    assert asked[1].endswith(asked[0])
+    assert asked[2].startswith("Another mass hangs: type its label (M1, M2, M3, M4, - for none).")
+
+
+def test_nothing_is_asked_twice(machine: SimulatedRig, hands: LineOperator) -> None:
+    person, asked = person_answering("", "", "", machine=machine, hands=hands)
+    for load in (NOTHING, NOTHING, Load("M1"), NOTHING):
+        person.hang(load)
+    assert ["every mass off" in q for q in asked] == [True, False, True]
+
+
+def test_what_really_hangs_can_be_told(machine: SimulatedRig, hands: LineOperator) -> None:
+    person, asked = person_answering("m1", "", machine=machine, hands=hands)
+    assert person.hang(Load("M2")) == Load("M1")
+    assert person.hang(Load("M2")) == Load("M2")
+    assert len(asked) == 2
+
+
+class Steps:
+    """A recorder whose newest step may have a load."""
+
+    def __init__(self, loaded: bool) -> None:
+        self.loaded, self.told = loaded, list[dict[str, str]]()
+
+    def correct(self, **labels: str) -> bool:
+        self.told += [labels] if self.loaded else []
+        return self.loaded
+
+    def event(self, kind: str, **fields: object) -> None: ...
+
+
+@pytest.mark.parametrize(
+    ("loaded", "said"), [(True, "Written down: M1 hung in the step before."), (False, "No step with a load")]
+)
+def test_what_hung_before_can_be_told(machine: SimulatedRig, hands: LineOperator, loaded: bool, said: str) -> None:
+    person, asked = person_answering("was M1", "", machine=machine, hands=hands)
+    person.recorder = steps = Steps(loaded)  # type: ignore[assignment]
+    assert person.hang(Load("M2")) == Load("M2")
+    assert asked[1].startswith(said)
+    assert steps.told == ([{"load": "M1"}] if loaded else [])
+
+
+def test_a_question_takes_yes_or_no(machine: SimulatedRig, hands: LineOperator) -> None:
+    person, asked = person_answering("", "perhaps", "No", "y", machine=machine, hands=hands)
+    assert not person.ask("Is the coupling off?")
+    assert person.ask("Is the coupling off?")
+    assert asked[1].startswith("An empty line is no answer here.")
+    assert asked[2].startswith("'perhaps' is no answer here.")

@@ -1,0 +1,217 @@
+"""The operator: a person at the terminal, who is asked, and may say what was really done."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from bench.clock import Clock
+from bench.envelope import Envelope
+from bench.errors import InterlockError, OperatorAbort
+from bench.recorder import Recorder
+from bench.roles import NOTHING, Load, Plane, Side
+from drivers.operator import LineOperator
+
+T = TypeVar("T")
+YES, NO, STOP = ("y", "yes"), ("n", "no"), ("stop", "abort", "quit")
+DONE = ("", *YES, "ok", "done")
+LANDED = "The shaft is landed and stands."
+CLEAR = "take tools and hands away"
+
+
+class ConsoleOperator:
+    """`prompt` shows a question and returns the line that is typed. What is confirmed is passed on to `then` (a simulated rig's
+    line), if there is one. `may_touch` raises while nobody may reach into the machine."""
+
+    def __init__(
+        self, prompt: Callable[[str], str], clock: Clock, envelope: Envelope, then: LineOperator | None
+    ) -> None:
+        self._prompt, self._clock, self._envelope, self._then = prompt, clock, envelope, then
+        self._hanging: Load | None = None  # on the hanger; None is not known
+        self.recorder: Recorder | None = None
+        self.may_touch: Callable[[], None] = lambda: None
+
+    def hang(self, load: Load) -> Load:
+        """Ask for a mass to be hung, and return what hangs then; the hanger stays on. Nothing is asked where it hangs already.
+
+        Raises:
+            InterlockError: the mass is beyond the envelope.
+            OperatorAbort: the person answered stop.
+        """
+        self._envelope.check_load(load.label)
+        if load != self._hanging:
+            what = f"Hang {load.label} on the hanger" if load.label else "Take every mass off; leave the hanger on"
+            load = self._hanging = self._loaded(what, load)
+        if self._then is not None:
+            self._then.hang(load)
+        return load
+
+    def lever(self, side: Side, load: Load) -> Load:
+        """Ask for a mass on an end of the lever, seen from outboard, the other end empty; return what hangs then.
+
+        Raises:
+            InterlockError: the mass is beyond the envelope.
+            OperatorAbort: the person answered stop.
+        """
+        self._envelope.check_load(load.label)
+        what = f"Set the lever level and hang {load.label} on its {side} end (seen from outboard), nothing on the other"
+        really = self._loaded(what if load.label else "Take every mass off the lever", load)
+        if self._then is not None:
+            self._then.lever(side, really)
+        return really
+
+    def mount(self, part: str) -> None:
+        """Ask for a part on the shaft, or for everything to be taken off.
+
+        Raises:
+            OperatorAbort: the person answered stop.
+        """
+        what = f"Mount the {part} on the shaft" if part else "Take the ring off the shaft"
+        self._confirmed(f"{what}.", "it sits", None, _Other())
+        if self._then is not None:
+            self._then.mount(part)
+
+    def attach(self, plane: Plane, mass_kg: float, angle_rad: float) -> tuple[float, float]:
+        """Ask for a weight in a balancing plane, beside what is there; return what was fixed, kg and rad of the plane's scale.
+
+        Raises:
+            InterlockError: the weight is beyond the envelope, or the shaft is not landed.
+            OperatorAbort: the person answered stop.
+        """
+        self._envelope.check_weight(mass_kg)
+        self.may_touch()
+        degrees = math.degrees(angle_rad) % 360
+        kg, angle = self._confirmed(
+            f"{LANDED} Weigh out {mass_kg * 1e3:.3f} g and fix it in the {plane} balancing plane at {degrees:.1f}° of its "
+            f"scale; leave the other weights where they are; {CLEAR}.",
+            "it sits tight",
+            (mass_kg, angle_rad),
+            _Other(
+                f"Another weight or place: type its grams and degrees, as {mass_kg * 1e3:.3f} {degrees:.0f}.",
+                self._weight,
+            ),
+        )
+        if self._then is not None:
+            self._then.attach(plane, kg, angle)
+        return kg, angle
+
+    def detach(self, plane: Plane) -> None:
+        """Ask for every weight to be taken off a balancing plane.
+
+        Raises:
+            InterlockError: the shaft is not landed.
+            OperatorAbort: the person answered stop.
+        """
+        self.may_touch()
+        what = f"{LANDED} Take every weight that was fixed in the {plane} balancing plane off; {CLEAR}."
+        self._confirmed(what, "that is done", None, _Other())
+        if self._then is not None:
+            self._then.detach(plane)
+
+    def ask(self, question: str) -> bool:
+        """Whether the person says yes.
+
+        Raises:
+            OperatorAbort: the person answered stop.
+        """
+        asked = f"{question}\nType yes or no, or stop to end the run."
+        answer = self._answer(asked)
+        while answer not in (*YES, *NO):
+            answer = self._answer(f"{_unknown(answer)}\n{asked}")
+        return answer in YES
+
+    def _loaded(self, what: str, load: Load) -> Load:
+        """What hangs after the person was asked for `load`."""
+        labels = ", ".join(self._envelope.rig.masses)
+        more = (
+            f"Another mass hangs: type its label ({labels}, - for none). Another hung in the step before: type was and "
+            "its label."
+        )
+        return self._confirmed(f"{what}.", "it hangs still", load, _Other(more, self._mass))
+
+    def _mass(self, answer: str) -> Load | None:
+        """The load of an answer, None where it names none. One that hung before is put into the recording, and asks again.
+
+        Raises:
+            Misunderstood: no such mass, or none that may hang.
+        """
+        was, label = answer.startswith("was "), answer.removeprefix("was ").strip()
+        masses = {name.lower(): name for name in self._envelope.rig.masses}
+        load = NOTHING if label in ("-", "none") else Load(masses[label]) if label in masses else None
+        if load is None:
+            return None
+        try:
+            self._envelope.check_load(load.label)
+        except InterlockError as error:
+            raise Misunderstood(f"{error}.") from error
+        if not was:
+            return load
+        if self.recorder is None or not self.recorder.correct(load=load.label):
+            raise Misunderstood("No step with a load was recorded before this one.")
+        raise Misunderstood(f"Written down: {load.label or 'nothing'} hung in the step before.")
+
+    def _weight(self, answer: str) -> tuple[float, float] | None:
+        """kg and rad of `GRAMS DEGREES`, None where it is not that.
+
+        Raises:
+            Misunderstood: a weight beyond the envelope.
+        """
+        try:
+            grams, degrees = (float(word) for word in answer.split())
+        except ValueError:
+            return None
+        if not math.isfinite(degrees):
+            return None
+        try:
+            self._envelope.check_weight(grams * 1e-3)
+        except InterlockError as error:
+            raise Misunderstood(f"{error}.") from error
+        return grams * 1e-3, math.radians(degrees)
+
+    def _confirmed(self, what: str, when: str, asked: T, other: _Other[T]) -> T:
+        """Ask until it is done as asked, or the person says what was done instead."""
+        question = (
+            f"{what}\nPress Enter when {when}, or type stop to end the run{', ? for more' if other.more else ''}."
+        )
+        answer = self._answer(question)
+        while answer not in DONE:
+            try:
+                if (really := other.read(answer)) is not None:
+                    return really
+                why = other.more if answer == "?" else f"{_unknown(answer)} {other.more}".rstrip()
+            except Misunderstood as error:
+                why = str(error)
+            answer = self._answer(f"{why}\n{question}")
+        return asked
+
+    def _answer(self, question: str) -> str:
+        """What the person types, in small letters; into the recording with its question.
+
+        Raises:
+            OperatorAbort: stop.
+        """
+        answer = self._prompt(question).strip()
+        self._clock.sleep(0.01)
+        if self.recorder is not None:
+            self.recorder.event("operator", question=question, answer=answer)
+        if answer.lower() in STOP:
+            raise OperatorAbort(f"the operator answered {answer!r}")
+        return answer.lower()
+
+
+@dataclass(frozen=True)
+class _Other(Generic[T]):
+    """What a person may say that was done instead: how they say it, and what makes something of their answer."""
+
+    more: str = ""
+    read: Callable[[str], T | None] = lambda _: None
+
+
+class Misunderstood(Exception):
+    """Why an answer asks for another."""
+
+
+def _unknown(answer: str) -> str:
+    return f"{answer!r} is no answer here." if answer else "An empty line is no answer here."

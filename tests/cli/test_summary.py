@@ -1,0 +1,74 @@
+"""What a finished run says on the terminal."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from bench.cli.summary import summary
+from bench.findings import Effect
+from bench.limits import Verdict
+from bench.procedure import Quantity
+from bench.records import FindingEntry, LimitEntry, Measurement, Outcome, Record, missing, unfinished
+
+LIMIT = LimitEntry(None, 30e-6, "m", "test", True)
+
+
+def result(name: str, verdict: Verdict, value: float | None = 12.3e-6, where: str = "") -> Measurement:
+    empty = missing(Quantity(name, "m", ""), None, where)
+    if value is None:
+        return empty
+    limit = None if verdict is Verdict.NONE else LIMIT
+    return replace(empty, value=value, standard_uncertainty=0.2e-6, coverage_factor=2.0, expanded_uncertainty=0.4e-6,
+                   verdict=verdict, limit=limit)  # fmt: skip
+
+
+def record(outcome: Outcome, *results: Measurement, findings: tuple[FindingEntry, ...] = ()) -> Record:
+    empty = unfinished(run_id="r", procedure="unbalance", rig="stand", uut={}, started="", seed=1, plan={}, versions={})
+    return replace(empty, outcome=outcome, measurements=results, findings=findings)
+
+
+def test_it_says_outcome_what_decided_what_was_judged_and_where_to_look(tmp_path: Path) -> None:
+    (tmp_path / "report.html").touch()
+    results = [result("reading", Verdict.NONE), result("d_max", Verdict.PASS, where="inboard"),
+               result("d_max", Verdict.FAIL, 40e-6, "outboard")]  # fmt: skip
+    note = FindingEntry("samples-lost", "3 samples were lost.", "telemetry", Effect.NOTE)
+    lines = summary(record(Outcome.FAIL, *results, findings=(note,)), tmp_path).splitlines()
+    assert lines == [
+        "FAIL: unbalance on stand",
+        "  decided  outside its limit: d_max (outboard)",
+        "  results  d_max (outboard)  40.00 ± 0.40 µm  fail  at most 30 µm",
+        "           d_max (inboard)   12.30 ± 0.40 µm  pass  at most 30 µm",
+        "           1 more result and 1 note: -v, or the report",
+        f"  see      {tmp_path / 'report.html'}",
+    ]
+    whole = summary(record(Outcome.FAIL, *results, findings=(note,)), tmp_path, whole=True)
+    assert "reading" in whole
+    assert "samples-lost (telemetry): 3 samples were lost." in whole
+
+
+def test_a_run_that_was_stopped_says_why_first_and_lists_nothing_missing(tmp_path: Path) -> None:
+    stop = FindingEntry("operator-stop", "the operator answered 'stop'", "acquire", Effect.ERROR)
+    results = [result(f"K_{n}", Verdict.MISSING, None) for n in range(6)]
+    lines = summary(record(Outcome.ABORTED, *results, findings=(stop,)), tmp_path).splitlines()
+    assert lines[:3] == [
+        "ABORTED: unbalance on stand",
+        "  decided  operator-stop (acquire): the operator answered 'stop'",
+        "  missing  nothing was measured of 6 declared quantities",
+    ]
+
+
+def test_many_results_are_few_lines_the_worst_first(tmp_path: Path) -> None:
+    results = [result("a", Verdict.PASS, where=f"{n}") for n in range(40)] + [result("b", Verdict.INDETERMINATE)]
+    lines = summary(record(Outcome.INDETERMINATE, *results), tmp_path).splitlines()
+    assert len(lines) == 2 + 12 + 2
+    assert lines[1] == "  decided  crosses a limit: b"
+    assert lines[2].startswith("  results  b ")
+
+
+def test_a_long_finding_is_broken_between_words(tmp_path: Path) -> None:
+    text = "the data agree if M2 is 1.0499 kg instead of 1.0000 kg " * 3
+    long = FindingEntry("load-inconsistent", text, "M2", Effect.INDETERMINATE)
+    lines = summary(record(Outcome.INDETERMINATE, findings=(long,)), tmp_path).splitlines()
+    assert len(lines) > 3
+    assert all(len(line) <= 80 for line in lines[:-1])
