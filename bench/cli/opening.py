@@ -55,12 +55,12 @@ def simulated(
     """
     from sim_backend.truth import draw
 
-    return of_truth(rig, draw(rig, seed, overrides, settings), operator, injected)
+    return of_truth(rig, draw(rig, seed, overrides, settings), operator, injected, asking)
 
 
 def of_truth(
-    rig: RigFile, truth: Truth, operator: str, injected: Sequence[Fault] = (), *, substeps: int = SUBSTEPS,
-    slice_s: float = SLICE_S,
+    rig: RigFile, truth: Truth, operator: str, injected: Sequence[Fault] = (), asking: console.Asking = console.quietly,
+    *, substeps: int = SUBSTEPS, slice_s: float = SLICE_S,
 ) -> Connect:  # fmt: skip
     """How to open the simulated rig of a truth.
 
