@@ -119,9 +119,10 @@ class Adoption:
         """Raises ConfigError where the facts are not what the record's verdict was about."""
         for m in self.record.measurements:
             fact = facts.get(m.name + (f"@{m.where}" if m.where else ""))
-            if fact is None or m.value is None or not m.standard_uncertainty:
+            uncertainty = m.standard_uncertainty or m.expanded_uncertainty
+            if fact is None or m.value is None or not uncertainty:
                 continue
-            if abs(fact.value - m.value) > SAME * m.standard_uncertainty:
+            if abs(fact.value - m.value) > SAME * uncertainty:
                 raise ConfigError(
                     f"{self.run.path}: {m.name}: this version finds {fact.value:.8g}; the record has {m.value:.8g}. "
                     f"Next: `bench run {self.record.procedure}` again, or adopt it with Levbench "

@@ -51,8 +51,8 @@ class StatedEquation:
 class Constant:
     """One measured constant, SI. `dof` None is infinite; `interval` has the coverage probability.
 
-    `holds_for` are the settings at which it was measured. `terms` are the largest of its budget, `rest` the standard
-    uncertainty of all others together.
+    `standard_uncertainty` and `coverage_factor` are None where the interval alone is stated. `holds_for` are the settings at
+    which it was measured. `terms` are the largest of its budget, `rest` the standard uncertainty of all others together.
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = _STRICT
@@ -60,9 +60,9 @@ class Constant:
     unit: str
     about: str
     value: float
-    standard_uncertainty: float
+    standard_uncertainty: float | None
     dof: float | None
-    coverage_factor: float
+    coverage_factor: float | None
     coverage_probability: float
     expanded_uncertainty: float
     interval: tuple[float, float]
@@ -154,8 +154,6 @@ def label(m: Measurement) -> str:
 
 def _constant(m: Measurement, source: Source, equation: Equation | None) -> Constant:
     assert m.value is not None
-    assert m.standard_uncertainty is not None
-    assert m.coverage_factor is not None
     assert m.expanded_uncertainty is not None
     assert m.interval is not None
     assert m.method is not None

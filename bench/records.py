@@ -20,7 +20,7 @@ from bench.findings import Effect, Finding
 from bench.limits import Limit, Verdict, judge
 from bench.procedure import Measured, Quantity
 from bench.schema import require_schema
-from bench.uncertainty import PROBABILITY, budget, correlation_matrix, interval
+from bench.uncertainty import PROBABILITY, Estimate, Interval, budget, correlation_matrix, interval
 from bench.wholefile import write_whole
 
 SCHEMA = 1
@@ -67,7 +67,9 @@ class LimitEntry:
 
 @dataclass(frozen=True)
 class Measurement:
-    """One quantity of a run. All numbers are None where it is missing; `dof` None is infinite."""
+    """One quantity of a run. All numbers are None where it is missing; `dof` None is infinite.
+
+    `standard_uncertainty` and `coverage_factor` are None too where the interval alone is stated (see `Interval`)."""
 
     __pydantic_config__: ClassVar[ConfigDict] = _STRICT
     name: str
@@ -246,12 +248,18 @@ def measurement(measured: Measured, limit: Limit | None, seed: int | None = 0) -
         return missing(quantity, limit, measured.where)
     found = interval(estimate, seed or 0)
     return replace(
-        missing(quantity, limit, measured.where), value=estimate.value, standard_uncertainty=estimate.u,
+        missing(quantity, limit, measured.where), value=estimate.value, standard_uncertainty=found.u,
         dof=_finite(found.dof), coverage_factor=found.k, expanded_uncertainty=found.U, method=found.method,
-        verdict=judge(found, limit), interval=(found.low, found.high), coverage_probability=PROBABILITY,
+        verdict=_judged(estimate, found, limit), interval=(found.low, found.high), coverage_probability=PROBABILITY,
         budget=tuple(BudgetEntry(r.name, r.id, r.contribution, r.sensitivity, r.kind, r.distribution, _finite(r.dof), r.unit)
                      for r in budget(estimate)),
     )  # fmt: skip
+
+
+def _judged(estimate: Estimate, found: Interval, limit: Limit | None) -> Verdict:
+    """As `judge`; what has influences none of which moves it is not judged: its uncertainty is not nought but unknown."""
+    unknown = found.U == 0 and any(i.u > 0 for i in estimate.sensitivities)
+    return Verdict.INDETERMINATE if unknown and limit is not None else judge(found, limit)
 
 
 def missing(quantity: Quantity, limit: Limit | None = None, where: str = "") -> Measurement:

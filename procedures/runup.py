@@ -24,6 +24,7 @@ from bench.roles import RigState
 from procedures import probing, turning, unbalance
 from procedures import runup_figures as drawn
 from procedures.estimators import runup_checks, runup_estimates, tracking_wiring, unbalance_bearings, unbalance_checks
+from procedures.estimators.coil_peaks import uncertified
 from procedures.estimators.runup_data import MISSED, PASSAGE, read_passage
 from procedures.estimators.runup_estimates import Run
 from procedures.estimators.tracking_data import NO_SPEED
@@ -226,7 +227,8 @@ def evaluated(recording: Recording[Any]) -> tuple[tuple[Finding, ...], Run | Non
         return tuple(found), None
     model = unbalance_bearings.adopted_bearings(recording)
     run = runup_estimates.run(passage, slow, recording, plan, model)
-    return (*found, unbalance_bearings.told(model, plan), *runup_checks.of_run(run, plan)), run
+    told = (unbalance_bearings.told(model, plan), *uncertified(recording.rig))
+    return (*found, *told, *runup_checks.of_run(run, plan)), run
 
 
 def measured(run: Run) -> Iterator[Measured]:

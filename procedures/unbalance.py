@@ -30,6 +30,7 @@ from procedures.estimators import (
     unbalance_estimates,
     unbalance_plan,
 )
+from procedures.estimators.coil_peaks import uncertified
 from procedures.estimators.unbalance_bearings import BEARING_MODEL, adopted_bearings
 from procedures.estimators.unbalance_data import RPM, TOLD, read_dwells
 from procedures.estimators.unbalance_estimates import Results
@@ -58,8 +59,8 @@ READ = Quantity(
     "order 1 as the probes read it, runout included: root mean square of the four amplitudes, 0-pk",
     title="order 1 as read",
 )
-CURRENT = Quantity("current_peak", "A", "greatest coil current of a plane")
-VOLTAGE = Quantity("voltage_peak", "V", "greatest coil voltage of a plane, either way")
+CURRENT = Quantity("current_peak", "A", "coil current of a plane that is exceeded for 1 % of the time")
+VOLTAGE = Quantity("voltage_peak", "V", "coil voltage of a plane that is exceeded for 1 % of the time, either way")
 MEASURES = (COSINE, SINE, MAJOR, D_MAX, SHARE, READ, CURRENT, VOLTAGE)
 PARAMETERS = ("law", "ref_y", "ref_theta")
 LENGTHS = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_inboard_amb", "com_to_outboard_amb", "com_to_coupling",
@@ -162,8 +163,8 @@ def evaluated(recording: Recording[Any]) -> Evaluated:
         return Evaluated(tuple(found), None)
     model = adopted_bearings(recording)
     results = unbalance_estimates.results(dwells, recording.rig, plan, model)
-    told = unbalance_bearings.told(model, plan)
-    return Evaluated((*found, told, *unbalance_checks.of_results(results, plan)), results)
+    told = (unbalance_bearings.told(model, plan), *uncertified(recording.rig))
+    return Evaluated((*found, *told, *unbalance_checks.of_results(results, plan)), results)
 
 
 def measured(results: Results) -> Iterator[Measured]:
@@ -220,6 +221,9 @@ runout subtracted (order 3 where the telemetry sees it). Where the probes read z
 and that carries the budget. Wherever the shaft may be within them, it is farther from the centre than where they read zero:
 the value is the mean over where it may be. The least clearance is the rig file's. Zones A to D end at 0.3, 0.4 and 0.5 of
 it; these numbers of ISO 14839-2 are not checked against the standard.
+
+What the coils need at most is the current, and the voltage either way, of the plane's coil that needs most, exceeded for
+1 % of the time: the largest of many noisy readings would grow with their number. Voltages are what the amplifiers read.
 
 Lag is counted from the mark to the high spot. y is the first probe in the direction of rotation, z the second one.
 """

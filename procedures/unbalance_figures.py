@@ -124,5 +124,6 @@ def _use(results: Results, name: str, unit: str, what: str) -> Figure:
             series.append(
                 Series(f"{plane}, {variant}", x, np.array([r.estimates[name, plane].value for r in some]), "both")
             )
-    return Figure(f"use-{what}", f"Greatest coil {what}", "Of a plane's four coils, within the captures.",
+    caption = "What a plane's four coils need at most: exceeded for 1 % of the time within the captures."
+    return Figure(f"use-{what}", f"Greatest coil {what}", caption,
                   "speed (r/min)", f"{what} ({unit})", tuple(series))  # fmt: skip

@@ -39,8 +39,8 @@ def budget_table(
         where=tables.place(measurement),
         unit=text.unit_text(unit),
         result=text.result(measurement.get("value"), measurement.get("expanded_uncertainty"), unit),
-        standard_uncertainty=text.with_unit(text.significant(measurement.get("standard_uncertainty")), unit),
-        dof=text.degrees_of_freedom(measurement.get("dof")),
+        standard_uncertainty=_standard_uncertainty(measurement, unit),
+        dof="" if measurement.get("method") == "monte-carlo" else text.degrees_of_freedom(measurement.get("dof")),
         method=method,
         rows=tuple(
             _budget_row(entry, shares[i], unit, inputs)
@@ -48,6 +48,11 @@ def budget_table(
         ),
         rest=_rest(rest, unit),
     )
+
+
+def _standard_uncertainty(measurement: Content, unit: str) -> str:
+    u = measurement.get("standard_uncertainty")
+    return "not stated" if u is None else text.with_unit(text.significant(u), unit)
 
 
 def grouped(entries: Sequence[Content]) -> list[Content]:

@@ -149,7 +149,7 @@ def _constants(constants: Sequence[Constant]) -> Grid:
         rows.append((
             Cell(symbol=symbol(k.name), small=about),
             Cell(text.result(k.value, k.expanded_uncertainty, k.unit), interval, strong=True),
-            Cell(f"{k.coverage_factor:.2f}", f"ν {text.degrees_of_freedom(k.dof)}" if k.method == "gum" else ""),
+            Cell(text.factor(k.coverage_factor), f"ν {text.degrees_of_freedom(k.dof)}" if k.method == "gum" else ""),
             Cell(largest), Cell(k.date[:10], k.procedure),
         ))  # fmt: skip
     header = ("Constant", "Value", "k", "Largest influences", "Date, step")

@@ -9,9 +9,8 @@ from __future__ import annotations
 import math
 import re
 from datetime import datetime
-from decimal import ROUND_HALF_EVEN, Decimal
 
-from bench.uncertainty import power_out
+from bench.uncertainty import power_out, rounded_at
 
 NARROW = "\u202f"  # narrow no-break space
 MINUS = "\u2212"
@@ -68,7 +67,7 @@ def power_of_ten(exponent: int) -> str:
 
 def _fixed(number: float, last: int, shift: int) -> str:
     """`number` / 10^shift, rounded at the decade `last` of the unshifted number; never a negative zero."""
-    scaled = Decimal(repr(float(number))).quantize(Decimal(1).scaleb(last), ROUND_HALF_EVEN).scaleb(-shift)
+    scaled = rounded_at(number, last).scaleb(-shift)
     text = format(abs(scaled) if scaled.is_zero() else scaled, "f")
     return grouped(text)
 
@@ -160,6 +159,11 @@ def degrees_of_freedom(dof: float | None) -> str:
     if dof is None:
         return "∞"
     return grouped(str(math.floor(dof + 1e-9))) if dof < 1000 else "> 999"
+
+
+def factor(k: float | None) -> str:
+    """A coverage factor; none where the interval alone is stated."""
+    return DASH if k is None else f"{k:.2f}"
 
 
 def probability(p: float | None) -> str:

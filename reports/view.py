@@ -30,8 +30,11 @@ STATEMENTS = (
     "This report shall not be reproduced except in full.",
 )
 ABOUT_UNCERTAINTY = (
-    "The number after ± is the expanded uncertainty U = k·u, with the coverage factor k for the effective degrees of "
-    "freedom ν and the coverage probability p stated beside it (JCGM 100:2008)."
+    "The number after ± is the expanded uncertainty U, half of the width of the interval with the coverage probability p. "
+    "Where ν is stated, U = k·u, with k of the t distribution at the effective degrees of freedom ν (JCGM 100:2008). Where "
+    "it is not, the interval is by Monte Carlo, u is the standard deviation of the draws, and k = U/u (JCGM 101:2008). Where k "
+    "is not stated, the interval stands alone: there are two degrees of freedom or fewer, or the draws have no standard "
+    "deviation."
 )
 ABOUT_MANY = (
     "One line for each result, with the influences that carry most of its variance; the full uncertainty budget of each "

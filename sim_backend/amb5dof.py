@@ -57,7 +57,8 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
     for name in ("machine.weight_mass", "machine.weight_angle"):  # drawn for each weight that is fixed
         out.pop(name, None)
     out |= dict.fromkeys(("coupling_offset_y", "coupling_offset_z"), out.pop("machine.coupling_offset"))
-    for name in (*(f"i_{coil}" for coil in COILS), *(f"pos_{axis}" for axis in AXES)):
+    read = [f"u_{coil}" for coil in COILS if f"u_{coil}" in rig.sensors]
+    for name in (*read, *(f"i_{coil}" for coil in COILS), *(f"pos_{axis}" for axis in AXES)):
         out |= {f"{name}.gain": rig.sensors[name].gain, f"{name}.offset": rig.sensors[name].offset}
     for name, value in rig.simulation.items():
         if isinstance(value, Toleranced):
@@ -104,6 +105,8 @@ def params(v: Numbers, d: Numbers) -> AmbParams:
         current_gain=tuple(v[f"i_{coil}.gain"] for coil in COILS),
         current_offset=tuple(v[f"i_{coil}.offset"] for coil in COILS),
         current_noise=v["current_noise"],
+        voltage_gain=tuple(v.get(f"u_{coil}.gain", 1.0) for coil in COILS),
+        voltage_offset=tuple(v.get(f"u_{coil}.offset", 0.0) for coil in COILS),
         position_gain=tuple(v[f"pos_{axis}.gain"] for axis in AXES),
         position_offset=tuple(v[f"pos_{axis}.offset"] for axis in AXES),
         position_sign=tuple(d[f"position_sign_{axis}"] for axis in AXES),

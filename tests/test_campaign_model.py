@@ -66,6 +66,13 @@ def test_identities_follow_the_rule_of_adoption() -> None:
     assert identity(f"{D1}/scatter/1", made) == f"{D1}/scatter/1"
 
 
+def test_a_constant_of_two_degrees_of_freedom_has_its_interval_alone() -> None:
+    few = Estimate.of(70.0, Influence("scatter/few", "scatter", 0.5, "N/A", "A", "normal", 2.0))
+    (k,) = constants_of([Source(record(D1, {"K": few}), {}, {})], {})
+    assert (k.standard_uncertainty, k.coverage_factor) == (None, None)
+    assert k.expanded_uncertainty == pytest.approx(2.151, abs=1e-3)
+
+
 def test_a_constant_says_where_it_comes_from_and_what_limits_it() -> None:
     first, _ = chain()
     source = Source(record(D1, first), {"K": "force per current"}, {"bias_A": 3.0})

@@ -11,6 +11,7 @@ from typing import Any
 import jsonschema
 import pytest
 
+from bench.cli.run import summary
 from bench.errors import ConfigError
 from bench.findings import Effect, Finding
 from bench.limits import Limit, Verdict
@@ -100,6 +101,18 @@ def test_measurement_golden() -> None:
         "scatter/1": (1.0, 20.0),
     }
     assert m.method == "gum"
+
+
+def test_with_two_degrees_of_freedom_the_interval_is_stated_alone(tmp_path: Path) -> None:
+    """In the record, on the terminal, and back from the file."""
+    few = Estimate.of(73.0, Influence("scatter/few", "scatter", 0.1, "N/A", "A", "normal", 2.0))
+    m = measurement(K_I.measured(few), limit())
+    assert (m.standard_uncertainty, m.coverage_factor, m.dof) == (None, None, 2.0)
+    assert m.interval == pytest.approx((73 - 0.43027, 73 + 0.43027), abs=1e-4)
+    assert m.verdict is Verdict.PASS
+    record = dataclasses.replace(full(), measurements=(m,))
+    assert from_json(to_json(record)) == record
+    assert "73.00 ± 0.43" in summary(record, tmp_path)
 
 
 def test_correlations_come_from_shared_influences() -> None:

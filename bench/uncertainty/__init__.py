@@ -3,7 +3,7 @@
 GUM is JCGM 100:2008; JCGM 101:2008 is its supplement on Monte Carlo.
 """
 
-from bench.uncertainty.budgets import BudgetRow, budget, power_out, round_to_uncertainty, stated
+from bench.uncertainty.budgets import BudgetRow, budget, power_out, round_to_uncertainty, rounded_at, stated
 from bench.uncertainty.coverage import PROBABILITY, Interval, coverage_factor, interval, welch_satterthwaite
 from bench.uncertainty.estimate import Distribution, Estimate, Influence, correlation, correlation_matrix
 from bench.uncertainty.propagation import propagate
@@ -26,6 +26,7 @@ __all__ = [
     "power_out",
     "propagate",
     "round_to_uncertainty",
+    "rounded_at",
     "stated",
     "welch_satterthwaite",
 ]

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from decimal import ROUND_HALF_EVEN, Decimal
+from decimal import ROUND_HALF_EVEN, Context, Decimal
 from typing import Literal
 
 from bench.uncertainty.estimate import Estimate
+
+LONG = Context(prec=700)  # digits between the greatest float and the smallest: quantize refuses what does not fit
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,10 +45,17 @@ def round_to_uncertainty(value: float, expanded: float) -> tuple[str, str]:
     if not (math.isfinite(value) and math.isfinite(expanded)) or expanded <= 0:
         return repr(value), repr(expanded)
     place = int(f"{expanded:.1e}".partition("e")[2]) - 1  # after rounding: 0.0996 is 1.0e-01
-    step = Decimal(1).scaleb(place)
-    rounded = ((Decimal(repr(x)) / step).quantize(Decimal(1), ROUND_HALF_EVEN) * step for x in (value, expanded))
-    low, high = (f"{x:f}" if place < 0 else f"{int(x)}" for x in rounded)
-    return low, high
+    return _at_place(value, place), _at_place(expanded, place)
+
+
+def _at_place(number: float, place: int, power: int = 0) -> str:
+    """A number rounded at the decade `place`, over 10^power."""
+    return f"{rounded_at(number, place).scaleb(-power, LONG):f}"
+
+
+def rounded_at(number: float, place: int) -> Decimal:
+    """A number rounded at the decade `place`, ties to even, however many digits that leaves."""
+    return Decimal(repr(float(number))).quantize(Decimal(1).scaleb(place), ROUND_HALF_EVEN, LONG)
 
 
 def power_out(largest: float, place: int) -> int:
@@ -66,5 +75,5 @@ def stated(value: float, expanded: float, sign: str = "+-") -> str:
         return f"{value!r} {sign} {expanded!r}"
     place = int(f"{expanded:.1e}".partition("e")[2]) - 1
     power = power_out(max(abs(value), expanded), place)
-    low, high = round_to_uncertainty(*(float(Decimal(repr(x)).scaleb(-power)) for x in (value, expanded)))
+    low, high = (_at_place(x, place, power) for x in (value, expanded))
     return f"({low} {sign} {high})e{power}" if power else f"{low} {sign} {high}"

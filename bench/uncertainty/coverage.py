@@ -19,29 +19,38 @@ PROBABILITY = 0.95
 DRAWS = 200_000
 DOMINANT = 0.5  # share of the variance beyond which one non-normal component decides the shape
 KEPT = 12  # drawn influences, 1.6 MB each
+FEW = 2  # degrees of freedom at which a t distribution has no standard deviation, and fewer
+NO_U = "no standard deviation"
+ONE_DRAW = 0.1  # of the sum of squares: of a normal's 200 000 draws the greatest carries 0.0001
 MINOR = 0.01  # share of the variance under which a component's own shape does not show
 _HALF_WIDTHS = {"rectangular": math.sqrt(3), "triangular": math.sqrt(6), "arcsine": math.sqrt(2)}  # of u, GUM 4.3
 
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """A 95 % coverage interval [low, high]; U is its half width and k is U/u. `why` says what chose the method. `tails` are
-    the probabilities of an error beyond multiples of the half width (`bench.uncertainty.tails`)."""
+    """A 95 % coverage interval [low, high]; U is its half width and k is U/u. `why` says what chose the method.
+
+    `u` is the standard uncertainty by the same method: of the linear model, or the standard deviation of the draws. It and k
+    are None where the interval alone is stated: with two degrees of freedom or fewer, and where the distribution has no
+    standard deviation. `tails` are the probabilities of an error beyond multiples of the half width
+    (`bench.uncertainty.tails`).
+    """
 
     low: float
     high: float
-    k: float
+    k: float | None
     U: float
     dof: float
     method: Literal["gum", "monte-carlo"]
     why: str
+    u: float | None
     tails: Tails
 
 
 def welch_satterthwaite(estimate: Estimate) -> float:
     """Effective degrees of freedom (GUM eq. G.2b), truncated down to an integer (G.6.4); inf if all are exact.
 
-    The formula is for variances that are estimated independently. Parts of one covariance (`_ensemble`) are not: all of them
+    The formula is for variances that are estimated independently. Parts of one covariance (`ensemble`) are not: all of them
     scatter with the same residuals, and any sum of them has the degrees of freedom of that one estimate (Willink, Metrologia
     44, 340 (2007)).
     """
@@ -52,7 +61,7 @@ def welch_satterthwaite(estimate: Estimate) -> float:
     for i, c in estimate.sensitivities.items():
         if not math.isinf(i.dof):
             # Ratios first: the fourth power of a small u would underflow.
-            shares.setdefault((_ensemble(i), i.dof), []).append((c * i.u / u) ** 2)
+            shares.setdefault((ensemble(i), i.dof), []).append((c * i.u / u) ** 2)
     inverse = math.fsum(math.fsum(some) ** 2 / dof for (_, dof), some in shares.items())
     if inverse == 0:
         return math.inf
@@ -60,9 +69,9 @@ def welch_satterthwaite(estimate: Estimate) -> float:
     return max(1.0, float(math.floor(effective * (1 + 1e-12))))  # 1e-12: a sum of one dof is that dof
 
 
-def _ensemble(i: Influence) -> str:
+def ensemble(i: Influence) -> str:
     """Which estimate of a covariance an influence is a part of: the roots of a covariance are influences `<identity>/k` of
-    u = 1; else itself."""
+    Type A with u = 1, unit 1; else itself. A variance that is pooled over many cases is one such estimate."""
     stem, _, last = i.id.rpartition("/")
     return stem if stem and last.isdigit() and i.kind == "A" and i.unit == "1" and i.u == 1.0 else i.id
 
@@ -89,31 +98,62 @@ def interval(estimate: Estimate, seed: int = 0) -> Interval:
     if not reason:
         k = coverage_factor(dof)
         wide = k * estimate.u
+        u = estimate.u if dof > FEW else None
         why = "normal or many comparable components, linear model"
-        return Interval(estimate.value - wide, estimate.value + wide, k, wide, dof, "gum", why, tails_of_t(k, dof))
-    draws = _sampled(estimate, seed)
-    low, high = (float(q) for q in np.quantile(draws, [0.025, 0.975]))
+        return _stated(estimate.value - wide, estimate.value + wide, dof, "gum", why, u, tails_of_t(k, dof))
+    drawn = _sampled(estimate, seed)
+    low, high = (float(q) for q in np.quantile(drawn, [0.025, 0.975]))
     if not (math.isfinite(low) and math.isfinite(high)):
         raise AnalysisError("the model does not give finite numbers over the spread of its inputs")
+    u = None if _few(estimate) else _standard_deviation(drawn)
+    beyond = tails_of_draws(drawn, estimate.value, low, high)
+    return _stated(low, high, dof, "monte-carlo", reason if u is not None else f"{reason}; {NO_U}", u, beyond)
+
+
+def _stated(
+    low: float, high: float, dof: float, method: Literal["gum", "monte-carlo"], why: str, u: float | None, tails: Tails
+) -> Interval:
     half = (high - low) / 2
-    beyond = tails_of_draws(draws, estimate.value, low, high)
-    return Interval(low, high, half / estimate.u if estimate.u > 0 else 0.0, half, dof, "monte-carlo", reason, beyond)
+    k = None if u is None else half / u if u > 0 else 0.0
+    return Interval(low, high, k, half, dof, method, why, u, tails)
+
+
+def _few(estimate: Estimate) -> bool:
+    """Whether something is drawn from a t distribution that has no standard deviation (JCGM 101, 6.4.9.4)."""
+    return any(i.dof <= FEW and i.u > 0 and (c != 0 or estimate.nonlinear) for i, c in estimate.sensitivities.items())
+
+
+def _standard_deviation(drawn: Array) -> float | None:
+    """Of the draws; None where one of them alone carries a tenth of the sum of squares: so it is where the distribution has
+    no standard deviation (a ratio whose denominator may be zero), and the next draws would give another number."""
+    middle = float(np.median(drawn))
+    off = drawn - middle
+    total = float(off @ off)
+    if not math.isfinite(total) or float(np.abs(off).max()) ** 2 > ONE_DRAW * total:
+        return None if total else 0.0
+    return float(drawn.std(ddof=1))
 
 
 def _sampled(estimate: Estimate, seed: int) -> Array:
     """Draws of the output. In a linear model what is normal, and what carries under a hundredth of the variance by
-    itself, is drawn as one normal of their joint variance: one draw in place of some hundred. What that leaves out of
-    the fourth moment is under a hundredth of it, and moves the interval by less than the draws scatter."""
+    itself, is drawn as one normal of their joint variance, and the roots of one covariance are drawn as one t: a few draws in
+    place of some hundred. What the former leaves out of the fourth moment is under a hundredth of it, and moves the interval by
+    less than the draws scatter."""
     if estimate.nonlinear:
         return estimate.sampled({i.id: draw(i, seed, DRAWS) for i in estimate.sensitivities})
+    together: dict[tuple[str, float], list[tuple[Influence, float]]] = {}
+    for influence, c in estimate.sensitivities.items():
+        together.setdefault((ensemble(influence), influence.dof), []).append((influence, c))
     small, variance = MINOR * estimate.u**2, 0.0
     apart: dict[Influence, float] = {}
-    for influence, c in estimate.sensitivities.items():
-        own = (c * influence.u) ** 2
-        if (math.isinf(influence.dof) and influence.distribution == "normal") or (own < small and influence.dof > 4):
-            variance += own if math.isinf(influence.dof) else own * influence.dof / (influence.dof - 2)
+    for (_, dof), members in together.items():
+        own = math.fsum((c * i.u) ** 2 for i, c in members)
+        if (math.isinf(dof) and members[0][0].distribution == "normal") or (own < small and dof > 4):
+            variance += own if math.isinf(dof) else own * dof / (dof - 2)
+        elif len(members) > 1:
+            apart[members[0][0]] = math.sqrt(own)  # roots have u = 1
         else:
-            apart[influence] = c
+            apart[members[0][0]] = members[0][1]
     if variance > 0:
         apart[Influence("", "the others", math.sqrt(variance), estimate.unit, "B", "normal")] = 1.0
     return Estimate(estimate.value, estimate.unit, apart).sampled({i.id: draw(i, seed, DRAWS) for i in apart})
@@ -134,7 +174,8 @@ def draw(influence: Influence, seed: int, count: int) -> Array:
     """Deviations drawn for one influence, (count,): the same for the same seed and id, whatever else is drawn. Kept,
     because the quantities of one run share most of their influences; not to be written to.
 
-    A normal one with finite degrees of freedom is drawn from the scaled t distribution (JCGM 101, 6.4.9).
+    A normal one with finite degrees of freedom is drawn from the scaled t distribution (JCGM 101, 6.4.9); those that are parts
+    of one covariance (`ensemble`) from one multivariate t (JCGM 102, 5.3.2).
     """
     out = _drawn(influence, seed, count)
     out.setflags(write=False)
@@ -142,15 +183,26 @@ def draw(influence: Influence, seed: int, count: int) -> Array:
 
 
 def _drawn(influence: Influence, seed: int, count: int) -> Array:
-    digest = hashlib.sha256(influence.id.encode()).digest()
-    rng = np.random.default_rng([seed, int.from_bytes(digest[:8], "little")])
+    rng = _generator(influence.id, seed)
     if influence.distribution == "normal":
-        if math.isinf(influence.dof):
-            return influence.u * rng.standard_normal(count)
-        return influence.u * rng.standard_t(influence.dof, count)
+        normal = influence.u * rng.standard_normal(count)
+        return (
+            normal if math.isinf(influence.dof) else normal * _spread(ensemble(influence), influence.dof, seed, count)
+        )
     a = influence.u * _HALF_WIDTHS[influence.distribution]
     if influence.distribution == "rectangular":
         return rng.uniform(-a, a, count)
     if influence.distribution == "arcsine":
         return a * np.sin(rng.uniform(-math.pi, math.pi, count))
     return a * (rng.random(count) + rng.random(count) - 1)
+
+
+@lru_cache(maxsize=KEPT // 2)
+def _spread(identity: str, dof: float, seed: int, count: int) -> Array:
+    """What turns normal draws into those of a t, (count,): sqrt(dof/chi-squared), the same for all parts of one covariance."""
+    return np.sqrt(dof / _generator(f"chi-squared of {identity}", seed).chisquare(dof, count))
+
+
+def _generator(identity: str, seed: int) -> np.random.Generator:
+    digest = hashlib.sha256(identity.encode()).digest()
+    return np.random.default_rng([seed, int.from_bytes(digest[:8], "little")])

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -20,6 +20,8 @@ Array = npt.NDArray[np.float64]
 Distribution = Literal["normal", "rectangular", "triangular", "arcsine"]
 Deviations = Mapping[str, Array]  # influence id -> drawn deviations from its expectation
 Sampler = Callable[[Deviations], Array]
+NONLINEAR = 0.1  # share of the combined u that second differences may reach
+ROUNDING = 1e-10  # of squares that cancel, as in x/x
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +73,8 @@ class Estimate:
     """A value with its sensitivity (derivative) to each elementary influence.
 
     Arithmetic is linear propagation (GUM 5.1). Units are carried by sums and by factors, not computed.
-    `sampler` is set where that is not enough (see `propagate`): it evaluates the model for drawn influences.
+    `sampler` is set where that is not enough: it evaluates the model for drawn influences. Products, ratios and powers set it
+    where their second order is more than NONLINEAR of the combined u, as `propagate` does.
     """
 
     __array_ufunc__: ClassVar[None] = None  # a numpy number on the left leaves the arithmetic to us
@@ -125,21 +128,26 @@ class Estimate:
     def __mul__(self, other: Estimate | float) -> Estimate:
         b = _lifted(other)
         unit = "" if self.unit and b.unit else self.unit or b.unit
-        return _combined(self.value * b.value, unit, ((b.value, self), (self.value, b)), lambda x, y: x * y)
+        terms = ((b.value, self), (self.value, b))
+        return _combined(self.value * b.value, unit, terms, lambda x, y: x * y, (0.0, 1.0, 0.0))
 
     def __truediv__(self, other: Estimate | float) -> Estimate:
         b = _lifted(other)
         terms = ((1 / b.value, self), (-self.value / b.value**2, b))
-        return _combined(self.value / b.value, "" if b.unit else self.unit, terms, lambda x, y: x / y)
+        bends = (0.0, -1 / b.value**2, 2 * self.value / b.value**3)
+        return _combined(self.value / b.value, "" if b.unit else self.unit, terms, lambda x, y: x / y, bends)
 
     def __pow__(self, other: Estimate | float) -> Estimate:
         b = _lifted(other)
         value = self.value**b.value
         if isinstance(value, complex):
             raise AnalysisError(f"{self.value} ** {b.value} is not a real number")
-        slope = b.value * self.value ** (b.value - 1) if b.value != 0 else 0.0
-        log = value * math.log(self.value) if b.sensitivities else 0.0
-        return _combined(value, "", ((slope, self), (log, b)), lambda x, y: x**y)
+        x, y = self.value, b.value
+        slope = y * x ** (y - 1) if y != 0 else 0.0
+        bend = y * (y - 1) * x ** (y - 2) if y not in (0, 1) and self.sensitivities else 0.0
+        log = math.log(x) if b.sensitivities else 0.0
+        bends = (bend, (value / x) * (1 + y * log) if b.sensitivities else 0.0, value * log**2)
+        return _combined(value, "", ((slope, self), (value * log, b)), lambda x, y: x**y, bends)
 
     def __neg__(self) -> Estimate:
         return _combined(-self.value, self.unit, ((-1.0, self),), lambda x: -x)
@@ -165,16 +173,46 @@ def _lifted(x: Estimate | float, unit: str = "") -> Estimate:
 
 
 def _combined(
-    value: float, unit: str, terms: Sequence[tuple[float, Estimate]], operation: Callable[..., Array]
+    value: float,
+    unit: str,
+    terms: Sequence[tuple[float, Estimate]],
+    operation: Callable[..., Array],
+    bends: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Estimate:
+    """`bends` are the second derivatives of the operation, xx, xy, yy."""
     operands = [e for _, e in terms]
+    made = Estimate(float(value), unit, merged(terms))
     sampler: Sampler | None = None
-    if any(e.nonlinear for e in operands):
+    second = _second_order(operands[0], operands[-1], bends)
+    if any(e.nonlinear for e in operands) or (second > 0 and second > NONLINEAR * made.u):
 
         def sampler(deviations: Deviations) -> Array:
             return operation(*(e.sampled(deviations) for e in operands))
 
-    return Estimate(float(value), unit, merged(terms), sampler)
+    return made if sampler is None else replace(made, sampler=sampler)
+
+
+def _second_order(x: Estimate, y: Estimate, bends: tuple[float, float, float]) -> float:
+    """Size of the matrix of second differences that an operation has for the influences of its operands, each moved by its u:
+    root of the sum of squares of all its elements, so that what bends between two influences counts too (GUM 5.1.2, note).
+
+    With the vectors X and Y of their contributions it is f_xx XX' + f_xy (XY' + YX') + f_yy YY'.
+    """
+    f_xx, f_xy, f_yy = bends
+    both = bool(f_xy and x.sensitivities and y.sensitivities)
+    u = x.u if both or (f_xx and x.sensitivities) else 0.0
+    v = y.u if both or (f_yy and y.sensitivities) else 0.0
+    if u == v == 0:
+        return 0.0
+    other = y.contributions if both and u and v else {}
+    r = math.fsum(c / u * (other[i] / v) for i, c in x.contributions.items() if i in other) if other else 0.0
+    a, b, d = f_xx * u * u, f_xy * u * v, f_yy * v * v
+    largest = max(abs(a), abs(b), abs(d))
+    if largest == 0:
+        return 0.0
+    a, b, d = a / largest, b / largest, d / largest  # squares of small numbers would underflow
+    total = a * a + d * d + 2 * b * b * (1 + r * r) + 2 * a * d * r * r + 4 * (a + d) * b * r
+    return largest * math.sqrt(total) if total > ROUNDING else 0.0
 
 
 def merged(terms: Iterable[tuple[float, Estimate]]) -> dict[Influence, float]:

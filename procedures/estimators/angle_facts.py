@@ -13,12 +13,13 @@ from procedures.estimators.repeatability import OUTPUTS
 Array = npt.NDArray[np.float64]
 
 
-def scatter_terms(identity: str, covariance: Array, dof: int, where: str = "") -> dict[str, Estimate]:
+def scatter_terms(identity: str, covariance: Array, dof: int, where: str = "", after: int = 0) -> dict[str, Estimate]:
     """Type A estimates of value zero for each of OUTPUTS that carry `covariance` (6, 6) between them, through independent
-    influences `<identity>/1`, `<identity>/2` ... with common degrees of freedom; `where` stands in their names."""
+    influences `<identity>/1`, `<identity>/2` ... with common degrees of freedom; `where` stands in their names. The first
+    `after` of the identities are left to others."""
     root = np.linalg.cholesky(covariance + 1e-15 * np.diag(np.diag(covariance)))
     parts = [
-        Influence(id=f"{identity}/{k + 1}", name=f"scatter of the hangings{where} ({k + 1})", u=1.0, unit="1", kind="A",
+        Influence(id=f"{identity}/{after + k + 1}", name=f"scatter of the hangings{where} ({k + 1})", u=1.0, unit="1", kind="A",
                   distribution="normal", dof=float(dof), source="residuals of the fits")
         for k in range(len(root))
     ]  # fmt: skip
@@ -31,10 +32,13 @@ def scatter_terms(identity: str, covariance: Array, dof: int, where: str = "") -
 def with_scatter(estimates: Mapping[str, Estimate], spread: Array, dof: int) -> dict[str, Estimate]:
     """Values by angle (`name@k`) with the scatter of their angle, means over a turn with the mean of all.
 
-    `spread` (A, 6, 6) is the covariance at each angle, in the order of OUTPUTS.
+    `spread` (A, 6, 6) is the covariance at each angle, in the order of OUTPUTS. All of them are one estimate with `dof` degrees
+    of freedom, pooled over the angles, and so have one identity with running numbers: no mean over angles has more.
     """
-    turn = len(spread)
-    terms = [scatter_terms(f"scatter/{k}", spread[k], dof, f" at {360 * k / turn:.0f}°") for k in range(turn)]
+    turn, six = len(spread), len(OUTPUTS)
+    terms = [
+        scatter_terms("scatter/angles", spread[k], dof, f" at {360 * k / turn:.0f}°", six * k) for k in range(turn)
+    ]
     out: dict[str, Estimate] = {}
     for name, estimate in estimates.items():
         quantity, at, angle = name.partition("@")

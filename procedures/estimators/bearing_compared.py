@@ -27,13 +27,14 @@ COMPARED = ("k_linear", "stiffness_linear", "misfit", "misfit_linear", "misfit_r
 class Sums:
     """Residual sums of one axis, N^2, of the nonlinear and the linear model: `singles` over single samples, `means` over the
     batches' means. `noise_N` are the standard deviations of a sample's and of a batch's force within its step; `count`
-    samples in all, `batches` in all."""
+    samples in all, `batches` in all; `dof` of the batches' deviation."""
 
     singles: tuple[float, float]
     means: tuple[float, float]
     noise_N: tuple[float, float]
     count: int
     batches: int
+    dof: int
 
     @staticmethod
     def of(held: Held, values: dict[str, float], k: int, f: AxisFit) -> Sums:
@@ -50,6 +51,7 @@ class Sums:
             (sample, batch),
             len(one),
             len(low),
+            len(low) - steps,
         )
 
     def estimates(self, a: str) -> dict[str, Estimate]:
@@ -66,18 +68,17 @@ class Sums:
 
         (one, two), (low, high) = self.singles, self.means
         return {
-            f"misfit_{a}": noisy(one, spread(one), f"misfit/{a}"),
-            f"misfit_linear_{a}": noisy(two, spread(two), f"misfit_linear/{a}"),
-            f"quiet_{a}": noisy(low, spread_of_means(low), f"quiet/{a}"),
-            f"quiet_linear_{a}": noisy(high, spread_of_means(high), f"quiet_linear/{a}"),
+            f"misfit_{a}": self._noisy(one, spread(one), f"misfit/{a}"),
+            f"misfit_linear_{a}": self._noisy(two, spread(two), f"misfit_linear/{a}"),
+            f"quiet_{a}": self._noisy(low, spread_of_means(low), f"quiet/{a}"),
+            f"quiet_linear_{a}": self._noisy(high, spread_of_means(high), f"quiet_linear/{a}"),
         }
 
-
-def noisy(value: float, u: float, identity: str) -> Estimate:
-    """A sum with the influence of its noise."""
-    name = f"noise of the samples, {identity}"
-    noise = Influence(f"scatter/bearing-model/{identity}", name, u, "N^2", "A", "normal", source="batch means")
-    return Estimate.of(value, noise)
+    def _noisy(self, value: float, u: float, identity: str) -> Estimate:
+        """A sum with the influence of its noise."""
+        name, dof = f"noise of the samples, {identity}", float(self.dof)
+        noise = Influence(f"scatter/bearing-model/{identity}", name, u, "N^2", "A", "normal", dof, "batch means")
+        return Estimate.of(value, noise)
 
 
 def by_bearing(e: dict[str, Estimate]) -> dict[str, Estimate]:

@@ -126,7 +126,8 @@ def _named(f: Fit) -> dict[str, float]:
 
 
 def _scatter(f: Fit, r: Ramps) -> dict[str, Estimate]:
-    """Type A: the steps' covariance between the rows, through the solvers of each angle, as independent influences."""
+    """Type A: the steps' covariance between the rows, which is one for all angles, through the solvers of each, as influences
+    of one identity with running numbers."""
     steps, dof = force_rows.scatter(f)
     across = np.linalg.cholesky(steps + 1e-18 * np.eye(2))
     out: dict[str, Estimate] = {}
@@ -134,7 +135,7 @@ def _scatter(f: Fit, r: Ramps) -> dict[str, Estimate]:
         maps = np.concatenate([f.solvers[k, [DIRECT]], f.bend_solvers[k]])
         along = np.linalg.cholesky(maps @ maps.T)
         parts = [
-            [Estimate.of(0.0, Influence(id=f"scatter/{r.axis}{k}/{j + 1}{c + 1}", u=1.0, unit="1", kind="A",
+            [Estimate.of(0.0, Influence(id=f"scatter/{r.axis}/{6 * k + 2 * j + c + 1}", u=1.0, unit="1", kind="A",
                                         name=f"scatter of the steps at {math.degrees(angle):.0f}°, {r.axis}",
                                         distribution="normal", dof=float(dof), source="residuals of the fits"))
              for c in (0, 1)]
@@ -150,7 +151,8 @@ def _scatter(f: Fit, r: Ramps) -> dict[str, Estimate]:
 
 
 def _add_curvature(found: dict[str, Estimate], r: Ramps, p: Mapping[str, float], bias_A: float, fitted: Fit) -> None:
-    """Type A of K2/K, which the horizontal constants are found with at each angle: one influence per AMB and angle."""
+    """Type A of K2/K, which the horizontal constants are found with at each angle: one influence per AMB and angle,
+    of one identity per AMB, whose residuals of all angles give one variance."""
     u = force_rows.curvature(r, p, bias_A)[1]
     y = force_rows.vertical(p, len(r.angles))
     dof = float(len(r.angles) * (r.time.shape[1] - force_rows.TERMS - 1))
@@ -159,7 +161,7 @@ def _add_curvature(found: dict[str, Estimate], r: Ramps, p: Mapping[str, float],
         moved = force_rows.fit(r, p, force_rows.horizontal(r, p, y, bias_A, shift), bias_A)
         change, bent = moved.terms[:, :, DIRECT] - fitted.terms[:, :, DIRECT], moved.bends - fitted.bends
         for k, angle in enumerate(r.angles):
-            part = Estimate.of(0.0, Influence(id=f"scatter/x{k}/curvature_{bearing}", u=1.0, unit="1", kind="A", dof=dof,
+            part = Estimate.of(0.0, Influence(id=f"scatter/curvature_{bearing}/{k + 1}", u=1.0, unit="1", kind="A", dof=dof,
                                               name=f"scatter of K2/K at {math.degrees(angle):.0f}°, x",
                                               distribution="normal", source="residuals of the fits"))  # fmt: skip
             for row, name in enumerate(ROWS):

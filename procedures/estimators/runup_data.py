@@ -68,8 +68,8 @@ class Passage:
 @dataclass(frozen=True)
 class Curve:
     """Vectors of order 1 of b blocks by rising speed: `speed` rad/s, `acceleration` rad/s^2, `width` rad/s (b,); `values`
-    (12, b) as read; their scatter `covariance` (12, b, 2, 2); `means` (b, 12); `volts` (b, 2) greatest; `second` (12,
-    b) vectors of order 2, NaN where the telemetry does not see it."""
+    (12, b) as read; their scatter `covariance` (12, b, 2, 2) with `dof` (b,); `means` (b, 12); `volts` (b, 2) greatest;
+    `second` (12, b) vectors of order 2, NaN where the telemetry does not see it."""
 
     speed: Array
     acceleration: Array
@@ -79,6 +79,7 @@ class Curve:
     means: Array
     volts: Array
     second: Complex
+    dof: Array
 
 
 def read_passage(recording: Recording[Any]) -> Passage:
@@ -177,12 +178,13 @@ def _piece(p: Passage, angle: Array, first: int, last: int, turns: int) -> tuple
     covariance = np.einsum("bmci,bmcj->bcij", moved, moved)
     alone, whole = serial.variances(moves)
     second = track.values[..., 1] if len(orders) > 1 else np.full((track.speed.size, 12), np.nan + 0j)
+    dof = np.full(track.speed.size, track.dof)
     width = np.abs(np.diff(p.tacho.speed(np.clip(edges, p.tacho.times[0], p.tacho.times[-1]))))
-    return track.t, track.speed, width, track.values[:, :, 0], covariance, alone, whole, track.means, volts, second
+    return track.t, track.speed, width, track.values[:, :, 0], covariance, alone, whole, track.means, volts, second, dof
 
 
 def _ordered(joined: Sequence[Any]) -> Curve:
-    t, speed, width, values, covariance, alone, whole, means, volts, second = joined
+    t, speed, width, values, covariance, alone, whole, means, volts, second, dof = joined
     for kind in (slice(0, 4), slice(4, 12)):  # positions, currents
         covariance[:, kind] *= serial.inflation(alone[:, kind], whole[:, kind])[:, None, None, None]
     acceleration = np.gradient(speed, t)
@@ -197,6 +199,7 @@ def _ordered(joined: Sequence[Any]) -> Curve:
         means[rising],
         volts[rising],
         second[rising].T,
+        dof[rising],
     )
 
 

@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.analysis import transient
-from bench.analysis.criticals import criticals, moved
-from bench.analysis.peaks import Smoother, noise, pooled_covariance
-from bench.analysis.vectors import complexes, parts
+from bench.analysis.criticals import Critical, criticals, moved
+from bench.analysis.peaks import Smoother
+from bench.analysis.vectors import complexes, estimates, parts
 from bench.calibration import Calibration
 from bench.recording import Recording
 from bench.rigfile import RigFile
@@ -23,6 +22,7 @@ from bench.uncertainty.estimate import merged
 from procedures.estimators import runup_linear, unbalance_bearings, unbalance_estimates
 from procedures.estimators.runout import Stand
 from procedures.estimators.runup_data import Curve, Passage, curve, near
+from procedures.estimators.runup_line import DRAWS, Line
 from procedures.estimators.unbalance_data import AXES, Dwell
 from procedures.estimators.unbalance_estimates import Result, Results, Runout
 
@@ -34,8 +34,6 @@ LAG = "what is left of the lag of the response"
 BEND = "what is left of the size of the orbit"
 LEFT = {LAG: "lag", BEND: "bend"}
 HARMONICS = "harmonics"
-DRAWS = 120
-USUAL = 30  # of them say how far a curve of the known noise is off its models
 BENDING = (*(f"{name}_{k}" for name in ("beta", "offset", "zero", "gain") for k in range(4)), "gap", "mass", "inertia",
            "l_ia", "l_oa", "l_is", "l_os")  # fmt: skip
 """What the bend of the forces rests on; what else there is of it changes it by less than a twentieth."""
@@ -124,7 +122,7 @@ def run(
     large = _large(found, inputs, results.runouts, plan.law, gains(rig, plan))
     shaft, peaks = [], []
     for k in range(4):
-        line = _Line(found, k, inputs[f"gain_{k}"].value, results.runouts[1.0])
+        line = Line(found, k, inputs[f"gain_{k}"].value, results.runouts[1.0])
         series = line.series()
         shaft.append(series[-1])
         peaks += _peaks(line, series, {name: bent[k] for name, bent in large.items()}, inputs, plan.running_rad_s)
@@ -148,49 +146,8 @@ def _large(
     return bends | {HARMONICS: runup_linear.bend(Stand.of(values), once, off, law, set_to)}
 
 
-@dataclass(frozen=True)
-class _Line:
-    """A probe's vectors over speed, less its runout."""
-
-    found: Curve
-    k: int
-    gain: float
-    runout: Runout
-
-    def series(self) -> list[Complex]:
-        """As measured, then with the lag taken off by one term and by two."""
-        return self._settled(self._raw)
-
-    def scatter(self) -> Complex:
-        """Of the last of these, drawn (DRAWS, b): what takes the lag off adds to the noise, and makes neighbours alike.
-
-        A block's own turns do not tell all of it: near a critical speed the noise rings on from turn to turn. Where blocks
-        scatter more than their turns say, their scatter counts.
-        """
-        lines = self._smooth.at_lines(self._raw)
-        off = noise(pooled_covariance(self._covariance), 0, DRAWS)
-        off *= np.sqrt(np.maximum(self._smooth.excess(self._raw, lines + off[:USUAL]), 1.0))
-        return np.asarray(self._settled(lines + off)[-1] - self._settled(lines)[-1])
-
-    def _settled(self, values: Complex) -> list[Complex]:
-        c = self.found
-        return transient.series(self._smooth, c.speed, values, c.acceleration, c.width)
-
-    @cached_property
-    def _raw(self) -> Complex:
-        return np.asarray(self.found.values[self.k] / self.gain - self.runout.values[self.k], np.complex128)
-
-    @cached_property
-    def _smooth(self) -> Smoother:
-        return transient.local(self.found.speed, self._raw, self._covariance)
-
-    @property
-    def _covariance(self) -> Array:
-        return np.asarray(self.found.covariance[self.k] / self.gain**2)
-
-
 def _peaks(
-    line: _Line, series: Sequence[Complex], large: Mapping[str, Complex], inputs: Mapping[str, Estimate], running: float
+    line: Line, series: Sequence[Complex], large: Mapping[str, Complex], inputs: Mapping[str, Estimate], running: float
 ) -> list[Peak]:
     """Of small orbits, with the influences of the scatter, of the runout, of the probe's gain, of what the bearings' bend rests
     on, and of what is left of the lag and of that bend: no more than what the last term of the one and the second harmonics in
@@ -212,12 +169,12 @@ def _peaks(
         (as_it_was, before, lag, bend, *shifts) = moved(speeds, best, others, covariance, c)[1]
         slopes = [(part, shift / part.u) for part, shift in zip(parts_, shifts, strict=True)]
         numbers = {"speed": c.speed, "amplitude": c.amplitude + float(as_it_was[1]), "factor": c.factor}
-        made = {}
+        made, scattered = {}, scatter_of(c, where, line.dof(c.speed))
         for j, (name, value) in enumerate(numbers.items()):
             of_bend = name != "amplitude"
             left = {LAG: float(lag[j]), BEND: float(bend[j]) if of_bend else 0.0}
             terms = [(part, float(m[j])) for part, m in (slopes if of_bend else slopes[: len(runout)])]
-            made[name] = _number(where, name, value, c.covariance[j, j], left, terms)
+            made[name] = _number(where, name, value, scattered.get(name), left, terms)
         speed, amplitude = made["speed"], made["amplitude"]
         if speed is None or amplitude is None:
             continue
@@ -230,24 +187,31 @@ def _peaks(
     return out
 
 
+def scatter_of(c: Critical, where: str, dof: float) -> dict[str, Estimate]:
+    """Zero, with the scatter of a critical's speed, amplitude and, where it has one, factor: one covariance, `dof` of it."""
+    names = [name for name, v in zip(UNITS, np.diag(c.covariance), strict=False) if math.isfinite(v)]
+    covariance = c.covariance[: len(names), : len(names)]
+    made = estimates(np.zeros(len(names)), covariance, f"scatter/{where}", "scatter of the passage", "", dof)
+    return dict(zip(names, made, strict=True))
+
+
 def _number(
     where: str,
     name: str,
     value: float,
-    variance: float,
+    scatter: Estimate | None,
     left: Mapping[str, float],
     moved: Sequence[tuple[Estimate, float]],
 ) -> Estimate | None:
     """A number of a critical with its influences; None where the record does not give it."""
     unit = UNITS[name]
-    if not math.isfinite(value + variance + sum(left.values())):
+    if scatter is None or not math.isfinite(value + sum(left.values())):
         return None
-    scatter = Influence(f"scatter/{where}/{name}", "scatter of the passage", math.sqrt(variance), unit, "A", "normal")
     rests = [
         Influence(f"{LEFT[what]}/{where}/{name}", what, abs(half) / math.sqrt(3), unit, "B", "rectangular")
         for what, half in left.items()
     ]
-    terms = [(1.0, Estimate.of(0.0, influence)) for influence in (scatter, *rests)]
+    terms = [(1.0, scatter), *((1.0, Estimate.of(0.0, influence)) for influence in rests)]
     terms += [(slope, part) for part, slope in moved if math.isfinite(slope)]
     return Estimate(value, unit, merged(terms))
 

@@ -161,21 +161,23 @@ def _alike(kinds: Sequence[Hashable], values: Array) -> tuple[float, int]:
 
 
 def _estimate(name: str, case: Case, seen: _Seen) -> Estimate:
-    """A case's value. Noise is the same for all steps of a setting, an axis and a speed: their scatter is taken together."""
+    """A case's value. Noise is the same for all steps of a setting, an axis and a speed: their scatter is taken together, one
+    estimate whose parts have one identity with running numbers."""
     alike = [c for c in seen.values if c.group == case.group]
     dof = float(sum(seen.dof[c] for c in alike))
     scaled = [seen.dof[c] * seen.variances[c] * (c.size / case.size) ** (2 * seen.power) for c in alike]
+    u = math.sqrt(sum(scaled) / dof)
     influence = Influence(
-        id=f"scatter/{name}/{case.where}",
+        id=f"scatter/{name}/{case.group}/{alike.index(case) + 1}",
         name="scatter of the repeats",
-        u=math.sqrt(sum(scaled) / dof),
-        unit=seen.unit,
+        u=1.0,
+        unit="1",
         kind="A",
         distribution="normal",
         dof=dof,
         source=f"repeats of {len(alike)} cases together",
     )
-    return Estimate.of(seen.values[case], influence)
+    return Estimate(seen.values[case], seen.unit, {influence: u})
 
 
 def _settled(done: Sequence[Done], band: float) -> Settling:

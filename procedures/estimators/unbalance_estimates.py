@@ -15,7 +15,7 @@ from bench.calibration import Calibration
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate, welch_satterthwaite
 from bench.uncertainty.estimate import merged
-from procedures.estimators import runout
+from procedures.estimators import coil_peaks, runout
 from procedures.estimators.inputs import certified
 from procedures.estimators.reach import farthest
 from procedures.estimators.runout import Stand, Turning
@@ -166,7 +166,7 @@ def _result(
         far = _with_rest(far, float(more), f"{d.where}/{plane}")
         out["d_max", plane] = far
         out["d_max_share", plane] = _unit(far / clearance, "1")
-        out |= _coils(d, inputs, plane, rig)
+        out |= coil_peaks.peaks(d, inputs, plane, rig)
     out["reading", ""] = _reading(d, inputs)
     weight = runout.carried(nominal, d.means) / shares(rig, nominal)
     return Result(d, vectors, orbits, centres, misfit, weight, u, beside, folded, out)
@@ -247,24 +247,6 @@ def _reading(d: Dwell, inputs: Mapping[str, Estimate]) -> Estimate:
     terms = [(float(p) / (4 * size), e) for p, e in zip(read.parts, scatter, strict=True)]
     terms += [(-float(abs(v) ** 2) / (4 * size), inputs[f"gain_{k}"]) for k, v in enumerate(read.values)]
     return Estimate(size, "m", merged(terms))
-
-
-def _coils(d: Dwell, inputs: Mapping[str, Estimate], plane: str, rig: RigFile) -> dict[tuple[str, str], Estimate]:
-    """Greatest current and voltage of a plane's coils in the capture."""
-    if d.full is None:
-        return {}
-    first = 2 * PLANES[plane][0]
-    some = d.full.currents[first : first + 4]
-    k = first + int(np.argmax(some.max(axis=1)))
-    peak = float(d.full.currents[k].max())
-    noise = float(np.diff(d.full.currents[k], 3).std()) / math.sqrt(20)
-    floor = Influence(f"noise/{d.where}/{plane}", "noise in a peak", 3 * noise / math.sqrt(3), "A", "B", "rectangular")
-    current = Estimate(peak, "A", merged(((1.0, Estimate.of(0.0, floor)), (-peak, inputs[f"i_gain_{k}"]),
-                                          (-1.0, inputs[f"i_zero_{k}"]))))  # fmt: skip
-    scale = rig.capture.channels["u_yi_p"].scale if rig.capture else 0.0
-    step = Influence(f"resolution/{d.where}/{plane}", "resolution", scale / math.sqrt(12), "V", "B", "rectangular")
-    voltage = Estimate.of(float(np.abs(d.full.voltages[first : first + 4]).max()), step)
-    return {("current_peak", plane): current, ("voltage_peak", plane): voltage}
 
 
 def _unit(e: Estimate, unit: str) -> Estimate:

@@ -20,9 +20,9 @@ typedef struct {
     /* bending modes: on or off, and the shape at both AMBs, sensors and balancing planes (mode by mode), at the coupling */
     double mode_on[2], mode_hz[2], mode_damping[2], mode_mass[2];
     double shape_amb[4], shape_sensor[4], shape_unbalance[4], shape_coupling[2];
-    /* amplifiers: current loop of first order with a voltage limit; current sensors */
+    /* amplifiers: current loop of first order with a voltage limit; current sensors; what they read of the voltages */
     double amplifier_rate, inductance, resistance, u_max, coil_limit;
-    double current_gain[10], current_offset[10], current_noise, current_lsb;
+    double current_gain[10], current_offset[10], current_noise, current_lsb, voltage_gain[10], voltage_offset[10];
     /* position sensors yi zi yo zo x; runout of orders 1..4 of each radial one */
     double position_gain[5], position_offset[5], position_sign[5], position_noise, position_lsb, position_range;
     double runout[16], runout_phase[16];

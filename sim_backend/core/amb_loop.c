@@ -91,7 +91,7 @@ double amb_follow(const amb_params *p, double current, double reference, double 
     return reference + (edge - reference) * exp(-p->amplifier_rate * left);
 }
 
-/* the references as the amplifiers' own sensors make them; the voltages at the start of the tick; whether any is limited */
+/* the references as the amplifiers' own sensors make them; the voltages at the start of the tick as they read them; whether any is limited */
 static int amplifiers(const amb_params *p, const amb_derived *d, amb_state *st, double *to) {
     double lw = p->inductance * p->amplifier_rate, limited = 0;
     int enabled = st->law.mode != OFF;
@@ -101,7 +101,7 @@ static int amplifiers(const amb_params *p, const amb_derived *d, amb_state *st, 
         to[k] = enabled ? most((ref - p->current_offset[k]) * d->per_gain[k], 0) : 0;
         double u = lw * (to[k] - st->coil[k]) + p->resistance * st->coil[k];
         limited = most(limited, fabs(u));
-        st->voltage[k] = least(most(u, -p->u_max), p->u_max);
+        st->voltage[k] = p->voltage_gain[k] * least(most(u, -p->u_max), p->u_max) + p->voltage_offset[k];
         if (st->applied.coil[k] >= p->coil_limit) st->flags |= SATURATED;
     }
     if (limited <= p->u_max) return 0;

@@ -89,6 +89,8 @@ class AmbParams:
     current_offset: Many = (0.0,) * 10
     current_noise: float = 2e-3  # stand-in
     current_lsb: float = 10.0 / 65536  # stand-in: 16 bits over +-5 A
+    voltage_gain: Many = (1.0,) * 10
+    voltage_offset: Many = (0.0,) * 10
     position_gain: Many = (1.0,) * 5
     position_offset: Many = (0.0,) * 5
     position_sign: Many = (1.0,) * 5

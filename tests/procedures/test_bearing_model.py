@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -48,6 +49,13 @@ def serious(run: Simulated) -> dict[str, str]:
 @pytest.fixture(scope="module")
 def sound(tmp_path_factory: pytest.TempPathFactory) -> Simulated:
     return measure(tmp_path_factory.mktemp("sound"))
+
+
+def test_every_scatter_has_its_degrees_of_freedom(sound: Simulated) -> None:
+    """What repeats told is known by as many as there were."""
+    scattered = {i for m in sound.results if isinstance(m, Measured) for i in m.estimate.sensitivities if i.kind == "A"}
+    assert len(scattered) > 20
+    assert [i.id for i in scattered if math.isinf(i.dof)] == []
 
 
 def test_a_sound_rig_is_recovered_within_its_intervals(sound: Simulated) -> None:

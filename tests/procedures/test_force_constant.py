@@ -19,6 +19,7 @@ from bench.limits import Verdict, judge
 from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import Estimate, interval
+from bench.uncertainty.coverage import ensemble
 from procedures.estimators import force_findings
 from procedures.estimators.ramp_data import read_ramps
 from procedures.force_constant import Plan, evaluate, facts, figures
@@ -60,6 +61,14 @@ def test_a_sound_rig_is_recovered_within_its_intervals(sound: Simulated) -> None
         assert judge(interval(e), limits[name]) is Verdict.PASS
     assert found["alpha_d"].u < 2e-3 * found["alpha_d"].value
     assert found["alpha_dx"].u < 2e-2 * found["alpha_dx"].value
+
+
+def test_scatter_that_was_pooled_over_the_angles_is_counted_once(sound: Simulated) -> None:
+    """Of the calibration and of the steps: each covariance is one estimate, however many angles a mean is over."""
+    for name, e in estimates(sound).items():
+        stems = {ensemble(i).partition("/")[2] or i.id for i in e.sensitivities if i.kind == "A"}
+        own = {"curvature_i", "curvature_o"} if name == "alpha_dx" else set()
+        assert stems == {"scatter/angles", name.replace("alpha_dx", "x").replace("alpha_d", "y"), *own}
 
 
 def test_what_the_calibration_shares_is_in_the_report(sound: Simulated) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,17 +12,19 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bench.analysis.criticals import Critical
 from bench.analysis.tachometer import Tachometer
 from bench.analysis.vectors import contains
 from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import DeviceFault
+from bench.figures import Figure, Sheet
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
-from bench.uncertainty import interval
+from bench.uncertainty import Estimate, correlation, interval, welch_satterthwaite
 from procedures import coast_down, runup, runup_figures
-from procedures.estimators import runup_checks
+from procedures.estimators import runup_checks, runup_estimates
 from procedures.estimators.runup_data import Passage, read_passage
 from procedures.estimators.runup_estimates import Run
 from procedures.estimators.unbalance_data import RPM
@@ -118,16 +121,19 @@ def test_the_capture_is_taken_as_the_shaft_comes_through_the_speed(up: Simulated
 
 
 def test_figures(up: Simulated, found: Run) -> None:
-    drawn = list(runup_figures.all_figures(found, up.recording.rig))
+    drawn = list(runup_figures.all_figures(found, up.recording.rig, 14000 / RPM))
     keys = [f.key for f in drawn]
     assert len(set(keys)) == len(keys)
+    criticals = drawn[0]
+    assert isinstance(criticals, Sheet)
+    assert len(criticals.rows) == sum(peak.factor is not None for peak in found.peaks) > 0
     assert {"bode-inboard", "polar-outboard", "waterfall", "order-map", "use-current", "use-voltage", "speed"} <= set(
         keys
     )
     assert any(k.startswith("orbit-inboard") for k in keys)
     assert any(k.startswith("spectrum-outboard") for k in keys)
     for figure in drawn:
-        if figure.key in ("bode-inboard", "order-map", "speed"):
+        if isinstance(figure, Figure) and figure.key in ("bode-inboard", "order-map", "speed"):
             draw_figure(figure)
 
 
@@ -295,3 +301,34 @@ def test_intervals_of_a_peak_are_not_nothing(found: Run) -> None:
         i = interval(p.factor)
         assert 0.002 < (i.high - i.low) / 2 / p.factor.value < 0.05
         assert not p.critical
+
+
+def test_the_numbers_of_a_critical_are_correlated_and_their_scatter_has_degrees_of_freedom(found: Run) -> None:
+    """Speed, amplitude and factor are read off one noisy curve."""
+    for p in found.peaks:
+        assert p.factor is not None
+        own = f"scatter/{p.axis}/{p.number}"
+        scattered = [
+            Estimate(0.0, "", {i: c for i, c in e.sensitivities.items() if i.id.startswith(own)})
+            for e in (p.speed, p.amplitude, p.factor)
+        ]
+        whole = scattered[0] * (1 / scattered[0].u) + scattered[2] * (0.5 / scattered[2].u)
+        assert len({welch_satterthwaite(e) for e in (*scattered, whole)}) == 1
+        assert 10 < welch_satterthwaite(whole) < 120
+    of_speed_and_amplitude = [correlation(p.speed, p.amplitude) for p in found.peaks]
+    assert max(np.abs(of_speed_and_amplitude)) > 0.1
+
+
+def test_a_criticals_scatter_is_its_covariance() -> None:
+    """Against the covariance it was given; a factor outside the record is left out."""
+    root = np.array([[2.0, 0, 0, 0], [1e-7, 2e-7, 0, 0], [0.1, -0.3, 0.4, 0], [0.01, 0.02, 0, 0.02]])
+    c = Critical(300.0, 5e-6, 280.0, 320.0, 7.5, 0.066, root @ root.T)
+    found = runup_estimates.scatter_of(c, "yi/1", 40.0)
+    assert [found[n].u for n in ("speed", "amplitude", "factor")] == pytest.approx(np.sqrt(np.diag(c.covariance)[:3]))
+    for (i, a), (j, b) in itertools.combinations(enumerate(("speed", "amplitude", "factor")), 2):
+        told = c.covariance[i, j] / math.sqrt(c.covariance[i, i] * c.covariance[j, j])
+        assert correlation(found[a], found[b]) == pytest.approx(told, abs=1e-9)
+    covariance = np.full((4, 4), np.nan)
+    covariance[:2, :2] = c.covariance[:2, :2]
+    without = runup_estimates.scatter_of(dataclasses.replace(c, factor=math.nan, covariance=covariance), "yi/1", 40.0)
+    assert set(without) == {"speed", "amplitude"}

@@ -31,7 +31,9 @@ def passing(shaft: np.ndarray, currents: np.ndarray, means: float = 1.0) -> Curv
     values = np.concatenate([shaft, currents])[:, None]
     still = np.concatenate([np.zeros(4), np.full(8, means)])[None]
     one = np.array([W])
-    return Curve(one, one, one, values, np.zeros((12, 1, 2, 2)), still, np.zeros((1, 2)), np.full((12, 1), np.nan + 0j))
+    return Curve(
+        one, one, one, values, np.zeros((12, 1, 2, 2)), still, np.zeros((1, 2)), np.full((12, 1), np.nan + 0j), one
+    )
 
 
 @pytest.mark.parametrize("amplitude", [20e-6, 40e-6])

@@ -19,6 +19,7 @@ from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate
+from bench.uncertainty.coverage import ensemble
 from procedures.estimators import setpoint_checks, setpoint_data, setpoint_estimates, setpoint_swing, stepmodel
 from procedures.estimators.setpoint_onset import onset
 from procedures.step import MEASURES, Plan, check, figures, step_count
@@ -108,6 +109,9 @@ def test_a7_the_estimate_settles_and_integral_action_does_not(tmp_path: Path) ->
 def test_sizes_and_ways_are_compared(tmp_path: Path) -> None:
     measured, _ = stepped(tmp_path, 2)
     assert {name for name, _ in measured} == {q.name for q in MEASURES}
+    for name in ("overshoot", "way_effect", "size_effect"):  # of repeats whose scatter was taken together, once
+        parts = [i for (n, _), e in measured.items() if n == name for i, c in e.sensitivities.items() if i.kind == "A"]
+        assert len({(ensemble(i), i.dof) for i in parts}) == 1
     for name in ("size_effect", "way_effect"):
         e = measured[name, "A, y, 0 r/min"]
         assert abs(e.value) < 0.05

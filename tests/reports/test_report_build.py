@@ -29,7 +29,7 @@ import reports
 from bench.errors import BenchError
 from bench.figures import Sheet
 from bench.procedure import Quantity
-from reports import budgets, compose, html, pdf
+from reports import budgets, compose, html, pdf, text
 from reports.figures import draw
 from reports.view import SIMULATED, FigureEntry, ReportView
 
@@ -86,6 +86,22 @@ def test_an_unverified_limit_and_an_unsymmetric_interval_say_so() -> None:
     assert row.limit_source == "ISO 14839-3 (limit not verified against its source)"
     assert "Monte Carlo" in row.interval
     assert "[23.300, 23.550]" in row.interval
+
+
+def test_each_method_prints_what_it_has() -> None:
+    """k of the t distribution beside its degrees of freedom; k = U/u without them by Monte Carlo; neither where the interval
+    stands alone."""
+    drawn = measurement("K_i", method="monte-carlo", coverage_factor=1.65, dof=None)
+    alone = measurement("K_o", standard_uncertainty=None, coverage_factor=None, dof=2.0)
+    made = view(measurements=[measurement("Kw_i"), drawn, alone])
+    assert [(r.k, r.dof) for r in made.results] == [("1.96", "812"), ("1.65", text.DASH), (text.DASH, "2")]
+    assert [(b.dof, b.standard_uncertainty == "not stated") for b in made.budgets] == [
+        ("812", False), ("", False), ("2", True)
+    ]  # fmt: skip
+    page = Page(html.render(made)).text
+    assert "Combined standard uncertainty not stated" in page
+    assert "Where ν is stated, U = k·u" in page
+    assert pdf.render(made).startswith(b"%PDF")
 
 
 def test_budget_shares_add_up_and_the_small_rest_is_stated() -> None:

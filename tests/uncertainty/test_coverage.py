@@ -205,3 +205,41 @@ def test_rounding(value: float, expanded: float, text: tuple[str, str]) -> None:
 )
 def test_a_result_on_one_line(value: float, expanded: float, text: str) -> None:
     assert stated(value, expanded) == text
+
+
+def test_where_the_interval_is_by_monte_carlo_the_standard_uncertainty_is_too() -> None:
+    """JCGM 101, 7.6: the standard deviation of the draws, not of a linear model that does not hold."""
+    square = propagate(lambda p: p["x"] ** 2, {"x": estimate("x", 0.1, 1.0)})
+    found = interval(square)
+    assert square.u == pytest.approx(0.2)
+    assert found.u == pytest.approx(math.sqrt(2 + 4 * 0.01), rel=0.02)
+    assert found.k is not None
+    assert found.k == pytest.approx(found.U / found.u)
+
+
+@pytest.mark.parametrize("dof", [1.0, 2.0])
+def test_with_two_degrees_of_freedom_or_fewer_the_interval_alone_is_stated(dof: float) -> None:
+    few = estimate("few", 5.0, 0.1, dof)
+    plain = interval(few)
+    assert (plain.u, plain.k) == (None, None)
+    assert pytest.approx(coverage_factor(dof) * 0.1) == plain.U
+    drawn = interval(propagate(lambda p: p["x"] ** 2, {"x": few}) + estimate("r", 0.0, 9.0, distribution="rectangular"))
+    assert drawn.method == "monte-carlo"
+    assert (drawn.u, drawn.k) == (None, None)
+    assert interval(estimate("more", 5.0, 0.1, 3.0)).u == 0.1
+
+
+def test_a_distribution_without_a_standard_deviation_has_none() -> None:
+    """A denominator that may be zero: one draw makes the sum of squares."""
+    found = interval(estimate("a", 1.0, 0.1) / estimate("b", 1.0, 0.4))
+    assert found.method == "monte-carlo"
+    assert (found.u, found.k) == (None, None)
+    assert "no standard deviation" in found.why
+
+
+@pytest.mark.parametrize(("value", "expanded"), [(1e20, 1e-9), (-3.3e40, 2.0), (1e300, 1e-300), (5e-324, 5e-324)])
+def test_rounding_holds_however_far_value_and_uncertainty_lie_apart(value: float, expanded: float) -> None:
+    low, high = round_to_uncertainty(value, expanded)
+    assert float(low) == pytest.approx(value)
+    assert float(high) == pytest.approx(expanded, rel=0.05)
+    assert stated(value, expanded)
