@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from datetime import datetime
+from pathlib import Path
 from typing import Any, cast
 
 from bench import provenance, runlog
@@ -40,7 +40,6 @@ from bench.progress import Progress
 from bench.recorder import Recorder
 from bench.registers import RegisterRefused
 from bench.roles import RigState
-from bench.rundir import RunDirectory
 from bench.states import transition
 from bench.supervisor import SafeStep, Supervisor
 
@@ -59,47 +58,60 @@ CODES: tuple[tuple[type[BaseException], str], ...] = (
 
 @dataclass(frozen=True)
 class Acquired:
-    """The machine's part of a run: how and when it ended, and the truth if the rig is simulated."""
+    """The machine's part of a run: how and when it ended, the truth if the rig is simulated, what raised where it was
+    stopped early, and whether the rig had come into the procedure's state."""
 
     ending: Ending
     ended: str
     truth: Mapping[str, Any] | None
+    cause: BaseException | None
+    brought_up: bool
 
 
 def acquired(
-    job: Job, directory: RunDirectory, started: datetime, live: OpenRig, supervisor: Supervisor, progress: Progress
-) -> Acquired:
-    """Open the recording, move, make safe, close it. Raises nothing: what went wrong is in the ending."""
+    job: Job, path: Path, live: OpenRig, supervisor: Supervisor, progress: Progress, *, plain: bool = False,
+    wall: Callable[[], Mapping[str, str]] = dict,
+) -> Acquired:  # fmt: skip
+    """Open the recording at `path`, move, make safe, close it. Raises nothing: what went wrong is in the ending.
+
+    Args:
+        plain: record without a thread and without the 100 Hz view (`bench.recorder.Recorder`).
+        wall: what the recording says of the wall clock, asked at its end.
+    """
     ending: Ending | None = None
-    wall = provenance.wall(directory, started, job.rig.path)
+    cause: BaseException | None = None
+    said, up = wall(), False
     try:
         recorder = Recorder(
-            directory.recording, clock=live.rig.clock, streams=live.streams, header=provenance.header(job),
-            live=job.backend == "live",
+            path, clock=live.rig.clock, streams=live.streams, header=provenance.header(job),
+            live=job.backend == "live", plain=plain,
         )  # fmt: skip
         with recorder:
             live.attach(recorder)
-            cause, findings = _moved(job, live, recorder, supervisor, progress)
+            cause, findings, up = _moved(job, live, recorder, supervisor, progress)
             ending = _ending(cause, findings, live, recorder)
-            wall = provenance.wall(directory, started, job.rig.path)
-            recorder.wall |= wall
+            said = wall()
+            recorder.wall |= said
             with suppress(RecordingError):  # closing raises the same failure again
                 ending.write(recorder)
     except Exception as error:
+        cause = cause or error
         stopped, finding = cause_of(error)
         before = ending or Ending()
         known = finding.code in [f.code for f in before.findings]  # a failed recorder raises again when it is closed
         findings = before.findings if known else (*before.findings, finding)
         ending = replace(before, stopped=before.stopped or stopped, findings=findings)
     assert ending is not None
-    return Acquired(ending, wall["ended"], live.truth)
+    return Acquired(ending, said.get("ended", ""), live.truth, cause, up)
 
 
 def _moved(
     job: Job, live: OpenRig, recorder: Recorder, supervisor: Supervisor, progress: Progress
-) -> tuple[BaseException | None, tuple[Finding, ...]]:
-    """Bring the rig to the procedure's state, acquire, make safe; what ended it early, and what make-safe could not do."""
+) -> tuple[BaseException | None, tuple[Finding, ...], bool]:
+    """Bring the rig to the procedure's state, acquire, make safe; what ended it early, what make-safe could not do, and
+    whether the rig had come into its state."""
     cause: BaseException | None = None
+    up = False
     rig, procedure = live.rig, job.procedure
     with runlog.warnings_to(lambda room, text: recorder.event("log", room=room, text=text)):
         try:
@@ -109,6 +121,7 @@ def _moved(
                 for name, value in procedure.settings(job.plan).items():
                     rig.levitation.set(name, value)
                 transition(rig, procedure.state)
+                up = True
                 progress.stage("acquire")
                 progress.total(procedure.step_count(job.plan))
                 procedure.acquire(rig, job.plan, cast(Recorder, WatchedSteps(recorder, progress, live.catch_up)))
@@ -120,7 +133,7 @@ def _moved(
                 _told(cause, progress)
             live.unguard()
             findings = supervisor.make_safe([_recording_or_not(s, live) for s in live.safe_steps], rig.clock.now_ns)
-    return cause, findings
+    return cause, findings, up
 
 
 def _told(cause: BaseException | None, progress: Progress) -> None:

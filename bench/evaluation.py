@@ -109,11 +109,11 @@ def evaluate(
         return Evaluation(_in_order(procedure, {}, limits), Correlations((), ()), ())
     stated, (limits, notes) = limits, applied(limits, recording.plan)
     measured: dict[tuple[str, str], Measured] = {}
-    findings = [*_calibrations(recording), *incomplete_steps(recording), *notes]
+    findings = list(notes)
     entries: dict[tuple[str, str], Measurement] = {}
     correlations = Correlations((), ())
     try:
-        for item in procedure.analyse(recording):
+        for item in yielded(procedure, recording):
             if isinstance(item, Finding):
                 findings.append(item)
             else:
@@ -132,6 +132,14 @@ def evaluate(
     if recording.verdict_required and (nothing := unjudged(measurements, len(stated))) is not None:
         findings.append(nothing)
     return Evaluation(measurements, correlations, tuple(findings))
+
+
+def yielded(procedure: Procedure, recording: Recording[Any]) -> Iterator[Measured | Finding]:
+    """What a closed recording says: of the calibrations that the run used, of steps that lack samples, and what `analyse`
+    yields."""
+    yield from _calibrations(recording)
+    yield from incomplete_steps(recording)
+    yield from procedure.analyse(recording)
 
 
 def _calibrations(recording: Recording[Any]) -> Iterator[Finding]:

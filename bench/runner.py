@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack, nullcontext, suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -83,7 +84,8 @@ def run(
             stack.enter_context(runlog.to_file(directory.log))
             logger.info("run %s on rig %s, backend %s, seed %s", directory.run_id, job.rig.name, job.backend, job.seed)
             progress.line(f"{job.procedure.name} on {job.rig.name} ({job.backend}), run {directory.run_id}")
-            machine = acquired(job, directory, started, live, supervisor, progress)
+            wall = partial(provenance.wall, directory, started, job.rig.path)
+            machine = acquired(job, directory.recording, live, supervisor, progress, wall=wall)
         release()  # a disk that is full by now still takes the record
         with progress.busy("analyse"):
             result, recording = _concluded(job, directory, record, machine, supervisor)

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from bench.analysis.responses import Response
-from bench.cli.virtual import SUBSTEPS, simulated_run
+from bench.cli.virtual import simulated_run
 from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.uncertainty import coverage_factor, interval
@@ -42,7 +42,7 @@ Found = Iterator[tuple[str, str, float, float, float]]  # axis, quantity, value,
 
 def light(p: AmbParams, settings: Mapping[str, float], plan: Plan, seed: int) -> Found:
     """Of each axis the peak, by the passes on a plant with noise."""
-    plant = floating(p, settings, plan.speeds_rad_s[0], substeps=SUBSTEPS, noise=seed)
+    plant = floating(p, settings, plan.speeds_rad_s[0], noise=seed)
     for axis in plan.axes:
         combs = surveys(plan, plan.speeds_rad_s[0])
         seen = [_taken(plant, plan, axis, kind, 0.0, comb) for kind, _, comb in combs if kind != WIRING]
@@ -90,7 +90,7 @@ def one(seed: int, plan: dict[str, Any], folder: Path | None) -> Iterator[tuple[
     rig, made = load_rig(RIG), Plan(**plan)
     plant, speed = draw(rig, seed).plant, made.speeds_rad_s[0]
     settings = {**{n: p.default for n, p in rig.parameters.items()}, "law": CODES[made.law]}
-    loop = None if speed else amb_sensitivity.loop(plant, settings, 0.0, SUBSTEPS)
+    loop = None if speed else amb_sensitivity.loop(plant, settings)
     known: dict[str, tuple[float, float]] = {}
     for name, quantity, value, half, u in (
         light(plant, settings, made, seed) if folder is None else whole(seed, plan, folder)
@@ -100,7 +100,7 @@ def one(seed: int, plan: dict[str, Any], folder: Path | None) -> Iterator[tuple[
             known[name] = (
                 loop.peak(axis, made.low_hz, made.high_hz)
                 if loop is not None
-                else amb_sensitivity.quiet_peak(plant, settings, axis, speed, SUBSTEPS)
+                else amb_sensitivity.quiet_peak(plant, settings, axis, speed)
             )
         true = known[name][quantity == "s_max_hz"]
         yield quantity, (value - true, half, u, true)

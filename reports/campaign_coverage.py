@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench import units
-from bench.campaign_bands import Failure, Quantity
+from bench.campaign_bands import Failure, Quantity, Unable
 from bench.campaign_speed import Speed
 from reports import campaign_figures, text
 from reports.campaign_model import _Numbers
@@ -18,14 +18,22 @@ from reports.compose import _TONES
 from reports.view import Fact
 
 NAMED = 6  # quantities in the box with the outcome
+FARTHEST = 20  # errors that are listed
 SIMULATED = "Simulated rigs – a test of the method, not of a machine"
 READING = (
     "Each virtual rig is drawn from the tolerances of the rig file, taken through all steps by bytes, recording and "
     "analysis, and compared with what was drawn. Coverage is the share of rigs whose 95 % interval holds the truth; a rig "
     "without a value counts as a miss. Width is one over the 95th percentile of |error|/U, with the "
     "95 % range that order statistics leave it. A quantity passes if its coverage lies within 0.95 ± 3.3 √(0.95 · 0.05/N) "
-    "and its width within 0.8 to 1.25. A width outside whose range reaches inside is indeterminate, and so is everything "
+    "and its width within 0.8 to 1.25. Errors beyond 2 U, 3 U and 10 U (U on the side towards the truth) may not be more than "
+    "the 99.9 % quantile, shared among the judged quantities, of what t with the degrees of freedom of each interval gives, or "
+    "its own JCGM 101 draws. A width outside whose range reaches inside is indeterminate, and so is everything "
     "below 59 rigs."
+)
+UNABLE = (
+    "A machine whose controller or drive reports a fault, or that does not come into the state in which the step begins, with "
+    "the share of such rigs and its 95 % interval (Clopper and Pearson). Coverage is over the others. A rig that flies and "
+    "gives no value counts as a miss."
 )
 EFFICIENCY = (
     "Parallel efficiency is T₁ n/(processes × T): n rigs took the wall time T, and one rig takes T₁ while it is alone on "
@@ -48,6 +56,7 @@ class CoverageContent:
     verdict: str
     quantities: tuple[Quantity, ...]
     failures: tuple[Failure, ...]
+    unable: tuple[Unable, ...]
     steps: tuple[tuple[str, str, float], ...]  # procedure, plan, mean wall time
     rig_s: float
     speed: Speed | None
@@ -57,13 +66,17 @@ def view_of(c: CoverageContent) -> SummaryView:
     """The summary as text."""
     outcome = c.verdict.upper()
     out = [q.name for q in c.quantities if q.judged and q.coverage.verdict.value != "pass"]
-    named = ", ".join(out[:NAMED]) + (f" and {len(out) - NAMED} more" if len(out) > NAMED else "")
+    far = [q.name for q in c.quantities if q.judged and any(t.verdict.value == "fail" for t in q.tails)]
     judged = any(q.judged for q in c.quantities)
     untold = "A quantity that was to be judged has no truth." if judged else "Nothing could be judged."
     said = {
-        "PASS": "Every judged quantity lies within both bands.",
-        "FAIL": f"Outside a band: {named}.",
-        "INDETERMINATE": f"More rigs are needed to decide: {named}." if out else untold,
+        "PASS": "Every judged quantity lies within its bands, and its errors within its tails.",
+        "FAIL": " ".join(
+            f"{what}: {_named(names)}."
+            for what, names in (("Outside a band", out), ("Too many errors far out", far))
+            if names
+        ),
+        "INDETERMINATE": f"More rigs are needed to decide: {_named(out)}." if out else untold,
     }[outcome]
     return SummaryView(
         title=c.title, campaign=c.campaign, simulated=SIMULATED, outcome=outcome, tone=_TONES.get(c.verdict, "none"),
@@ -75,11 +88,15 @@ def view_of(c: CoverageContent) -> SummaryView:
     )  # fmt: skip
 
 
+def _named(names: Sequence[str]) -> str:
+    return ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
+
+
 def _sections(c: CoverageContent, numbers: _Numbers) -> Iterator[Section]:
     if c.quantities:
         low, high = c.quantities[0].coverage.band
         yield Section(
-            "Coverage and width", grid=_table(c.quantities),
+            "Coverage, width and tails", grid=_table(c.quantities),
             note=f"Bands for {c.rigs} rigs: coverage {low:.4f} to {high:.4f}, width 0.80 to 1.25. {READING}",
         )  # fmt: skip
         judged = [_judged(q) for q in c.quantities]
@@ -90,6 +107,10 @@ def _sections(c: CoverageContent, numbers: _Numbers) -> Iterator[Section]:
                 numbers.picture(campaign_figures.histograms(shown), True),
                 numbers.picture(campaign_figures.scatters(shown), True),
             ))  # fmt: skip
+        if (farthest := _farthest(c.quantities)).rows:
+            yield Section("Errors farthest out", grid=farthest)
+    if c.unable:
+        yield Section("Rigs that cannot do a step", grid=_unable(c.unable), note=UNABLE)
     yield (Section("Findings", grid=_failures(c)) if c.failures else Section("Findings", lead="No rig gave a finding."))
     yield Section("Time", facts=tuple(_time(c)), note=EFFICIENCY if c.speed else "")
     rows = tuple((Cell(str(n)), Cell(name), Cell(plan), Cell(f"{s:.2f}{text.NARROW}s")) for n, (name, plan, s) in
@@ -105,19 +126,41 @@ def _table(quantities: Sequence[Quantity]) -> Grid:
         if c.width_range is not None:
             high = f"{c.width_range[1]:.2f}" if np.isfinite(c.width_range[1]) else "∞"
             reach = f"{c.width_range[0]:.2f} to {high}"
-        verdict = c.verdict.value
+        verdict = q.verdict.value
         unit, one = units.habit(q.unit, c.mean_U or 0.0)
         mean = None if c.mean_U is None else c.mean_U / one
         rows.append((
             Cell(symbol=symbol(q.name), small=_about(q)),
             Cell(f"{c.coverage:.4f}", f"{c.hits} of {c.rigs}", strong=True),
             Cell("–" if c.width is None else f"{c.width:.3f}", reach, strong=True),
+            Cell(", ".join(str(t.found) for t in q.tails), "at most " + ", ".join(str(t.most) for t in q.tails)),
             Cell(text.with_unit(text.significant(mean), unit)),
             Cell("–" if c.bias is None else f"{c.bias:+.3f}".replace("-", text.MINUS)),
             Cell(verdict, tone=_TONES.get(verdict, "none")) if q.judged else Cell("not judged", f"({verdict})"),
         ))  # fmt: skip
-    header = ("Quantity", "Coverage", "Width", "Mean U", "Mean error / s.d.", "")
-    return Grid(header, (3.2, 1.3, 1.4, 1.4, 1.2, 1.6), tuple(rows), (1, 2, 3, 4))
+    header = ("Quantity", "Coverage", "Width", "Beyond 2 U, 3 U, 10 U", "Mean U", "Mean error / s.d.", "")
+    return Grid(header, (3.0, 1.3, 1.4, 1.2, 1.4, 1.1, 1.6), tuple(rows), (1, 2, 3, 4, 5))
+
+
+def _farthest(quantities: Sequence[Quantity]) -> Grid:
+    """Those beyond 2 U, over all quantities."""
+    found = sorted(((q, *one) for q in quantities for one in q.farthest), key=lambda item: -abs(item[2]))
+    rows = tuple(
+        (Cell(symbol=symbol(q.name), small=_about(q)), Cell(q.procedure), Cell(str(seed)),
+         Cell(f"{ratio:+.1f}{text.NARROW}U".replace("-", text.MINUS), strong=True))
+        for q, seed, ratio in found[:FARTHEST]
+    )  # fmt: skip
+    return Grid(("Quantity", "Step", "Seed", "Error"), (4, 1.5, 1.2, 1), rows, (2, 3))
+
+
+def _unable(unable: Sequence[Unable]) -> Grid:
+    rows = []
+    for u in unable:
+        low, high = (100 * x for x in u.interval)
+        seeds = ", ".join(str(seed) for seed, _ in u.which)
+        share = f"{100 * u.share:.1f}{text.NARROW}% ({low:.1f} to {high:.1f}{text.NARROW}%)"
+        rows.append((Cell(u.procedure), Cell(str(len(u.which)), share), Cell(f"seeds {seeds}", u.which[0][1])))
+    return Grid(("Step", "Rigs", "Which, and why the first"), (1.4, 1.4, 4), tuple(rows), (1,))
 
 
 def _about(q: Quantity) -> str:
@@ -130,7 +173,7 @@ def _judged(q: Quantity) -> campaign_figures.Judged:
     return campaign_figures.Judged(
         name=q.name, judged=q.judged, passed=c.verdict.value != "fail", coverage=c.coverage, band=c.band, width=c.width,
         width_range=c.width_range, seeds=np.array(q.seeds, dtype=np.float64),
-        ratios=np.array([s.error / s.U if s.U > 0 else 0.0 for s in q.samples]),
+        ratios=np.array([s.ratio for s in q.samples]),
         holds=np.array([s.holds for s in q.samples], dtype=np.bool_),
     )  # fmt: skip
 

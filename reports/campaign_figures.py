@@ -44,7 +44,8 @@ class Made:
 
 @dataclass(frozen=True)
 class Judged:
-    """A quantity for the figures of many rigs; `ratios` are error over U by rig."""
+    """A quantity for the figures of many rigs; `ratios` are error over U by rig, U on the side towards the
+    truth."""
 
     name: str
     judged: bool
@@ -191,8 +192,8 @@ def histograms(rows: Sequence[Judged]) -> Drawn:
 
     return _multiples(
         "histograms", "Error over expanded uncertainty",
-        "One panel for each quantity, with its coverage. Within \u22121 and 1 the interval holds the truth (symmetric "
-        "intervals); misses are orange. The line is a normal distribution whose 95 % lies there.",
+        "One panel for each quantity, with its coverage. U is the half width on the side towards the truth: within \u22121 and "
+        "1 the interval holds it; misses are orange. The line is a normal distribution whose 95 % lies there.",
         rows, "error / U", "rigs", paint,
     )  # fmt: skip
 

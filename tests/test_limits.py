@@ -12,7 +12,7 @@ from bench.uncertainty import Interval
 
 
 def between(low: float, high: float) -> Interval:
-    return Interval(low, high, 2.0, (high - low) / 2, math.inf, "gum", "", (high - low) / 4)
+    return Interval(low, high, 2.0, (high - low) / 2, math.inf, "gum", "", (high - low) / 4, (0.0, 0.0, 0.0))
 
 
 BOTH = Limit(1.0, 2.0, "N/A", "house", True)

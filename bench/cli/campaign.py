@@ -136,7 +136,7 @@ def identity(asked: Asked) -> dict[str, Any]:
     c = asked.campaign
     which: Mapping[str, Any] = {"seed": c.seed or 0} if c.backend == "sim" else {"links": list(asked.request.links)}
     return {
-        "schema": 1, "name": c.name, "rig": {"name": asked.rig.name, "sha256": asked.rig.digest},
+        "schema": 2, "name": c.name, "rig": {"name": asked.rig.name, "sha256": asked.rig.digest},
         "backend": c.backend, **({"first_seed": c.virtual.first_seed} if c.virtual else which), "truth": dict(c.truth),
         "steps": [
             {"procedure": s.procedure.name, "plan": s.plan.model_dump(mode="json"), "adopt": s.adopt,

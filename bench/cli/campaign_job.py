@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import gc
 import importlib
+import logging
 import math
 import os
 import shutil
@@ -56,6 +57,7 @@ class _Line:
     steps: list[dict[str, Any]] = field(default_factory=list)
     values: list[dict[str, Any]] = field(default_factory=list)
     findings: list[dict[str, Any]] = field(default_factory=list)
+    cannot: list[dict[str, Any]] = field(default_factory=list)
     stopped: str | None = None
     kept: list[str] = field(default_factory=list)
 
@@ -69,6 +71,9 @@ def settle_in(procedures: Sequence[Any]) -> None:
     from bench import catalogue
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    logging.getLogger().addHandler(
+        logging.NullHandler()
+    )  # what stops a rig is in its line; the terminal is the parent's
     parent = parent_process()
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
@@ -99,6 +104,8 @@ def run_rig(task: RigTask, seed: int) -> dict[str, Any]:
         for number, step in enumerate(task.steps, 1):
             if all(need in known for need in step.needs):
                 _run_step(task, step, number, work, known, line)
+            elif lacking := _unable(task, step, line):
+                line.cannot.append({"step": number, "why": f"needs {lacking}, which this machine cannot do"})
         _refuse_another_rig(task)
         _keep(task, work, line)
     finally:
@@ -129,11 +136,13 @@ def _run_step(
     began = time.time()
     path = work / f"{number}-{step.procedure}.mcap"
     try:
-        truth, results, calibration = simulated_step(task, step, line.seed, path, known)
-        findings = [r for r in results if isinstance(r, Finding)]
-        line.values += _values(number, [r for r in results if not isinstance(r, Finding)], truth, line.seed)
-        if step.adopt and all(f.effect is Effect.NOTE for f in findings):
-            known[step.procedure] = calibration()
+        done = simulated_step(task, step, line.seed, path, known)
+        findings = [r for r in done.results if isinstance(r, Finding)]
+        line.values += _values(number, [r for r in done.results if not isinstance(r, Finding)], done.truth, line.seed)
+        if done.cannot:
+            line.cannot.append({"step": number, "why": done.cannot})
+        if step.adopt and done.calibration is not None and all(f.effect is Effect.NOTE for f in findings):
+            known[step.procedure] = done.calibration()
     except BenchError as error:
         findings = [Finding(_code(error), str(error), "", Effect.ERROR)]
     except Exception as error:  # a mistake of ours on one rig is that rig's result, not the campaign's end
@@ -143,6 +152,12 @@ def _run_step(
     bad = [f.code for f in findings if f.effect is not Effect.NOTE]
     if bad:
         line.stopped = line.stopped or f"{step.procedure}: {bad[0]}"
+
+
+def _unable(task: RigTask, step: StepTask, line: _Line) -> str:
+    """The procedure that a step needs and that this machine cannot do."""
+    unable = [task.steps[c["step"] - 1].procedure for c in line.cannot]
+    return next((need for need in step.needs if need in unable), "")
 
 
 def _code(error: Exception) -> str:
@@ -164,7 +179,7 @@ def _values(number: int, measured: Iterable[Any], truth: Mapping[str, float], se
         found.append({
             "step": number, "name": m.quantity.name, "where": m.where, "unit": m.quantity.unit,
             "value": m.estimate.value, "low": bounds.low, "high": bounds.high, "U": bounds.U,
-            "method": bounds.method, "truth": true,
+            "method": bounds.method, "tails": list(bounds.tails), "truth": true,
         })  # fmt: skip
     return found
 

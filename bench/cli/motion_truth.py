@@ -100,7 +100,6 @@ def _balance(done: Simulated) -> Found:
 
 
 def _sensitivity(done: Simulated) -> Found:
-    from bench.cli.virtual import SUBSTEPS
     from procedures.estimators.sensitivity_data import RPM
     from procedures.injecting import AXES
     from procedures.sensitivity import CODES
@@ -109,13 +108,13 @@ def _sensitivity(done: Simulated) -> Found:
     plan: Any = done.recording.plan
     plant, settings = done.drawn.plant, _settings(done, {"law": CODES[plan.law]})
     for speed in plan.speeds_rad_s:
-        loop = None if speed else amb_sensitivity.loop(plant, settings, 0.0, SUBSTEPS)
+        loop = None if speed else amb_sensitivity.loop(plant, settings)
         for axis in plan.axes:
             k, where = AXES.index(axis), f"{axis}, {f'{speed * RPM:.0f} r/min' if speed else 'at rest'}"
             if loop is not None:
                 value, hz = loop.peak(k, plan.low_hz, plan.high_hz)
             else:
-                value, hz = amb_sensitivity.quiet_peak(plant, settings, k, speed, SUBSTEPS)
+                value, hz = amb_sensitivity.quiet_peak(plant, settings, k, speed)
             yield "s_max", where, value
             yield "s_max_hz", where, hz
 

@@ -34,9 +34,11 @@ if TYPE_CHECKING:
     from drivers.live_link import LiveLink
     from drivers.modbus import ModbusLine
     from drivers.operator import LineOperator
+    from sim_backend.truth import Truth
 
 logger = logging.getLogger("bench.opening")
 LIVE_SLICE_S = 0.02
+SUBSTEPS, SLICE_S = 2, 0.1  # of a simulated rig
 SIMULATED = Session(1, 1_767_225_600, "simulation")
 
 
@@ -54,12 +56,25 @@ def simulated(
     Raises:
         ConfigError: an override names nothing.
     """
-    from sim_backend.endpoint import SimulatedRig
     from sim_backend.truth import draw
 
-    truth = draw(rig, seed, overrides, settings)
+    return of_truth(rig, draw(rig, seed, overrides, settings), operator, injected, asking)
+
+
+def of_truth(
+    rig: RigFile, truth: Truth, operator: str, injected: Sequence[Fault] = (), asking: console.Asking = console.quietly,
+    *, substeps: int = SUBSTEPS, slice_s: float = SLICE_S,
+) -> Connect:  # fmt: skip
+    """How to open the simulated rig of a truth.
+
+    Args:
+        substeps: integration steps of the plant in a tick.
+        slice_s: the longest sleep in one piece; links, envelope and supervisor are looked at after each.
+    """
+    from sim_backend.endpoint import SimulatedRig
+
     facts = {
-        "schema": 1, "seed": seed, "quantities": dict(truth.quantities), "values": dict(truth.values),
+        "schema": 1, "seed": truth.seed, "quantities": dict(truth.quantities), "values": dict(truth.values),
         "defects": dict(truth.defects),
     }  # fmt: skip
 
@@ -70,10 +85,10 @@ def simulated(
         from drivers.operator import LineOperator
         from sim_backend.registers import Followed, RegisterBank
 
-        machine = SimulatedRig(rig, truth, SIMULATED.number, injected)
+        machine = SimulatedRig(rig, truth, SIMULATED.number, injected, substeps)
         bank = RegisterBank(rig, truth, machine.device.plant)
         base = WatchedClock(Followed(machine, bank), machine.link.renew_lease, supervisor.check)
-        controller = Controller(rig, machine.link, base, SIMULATED)
+        controller = Controller(rig, machine.link, base, SIMULATED, slice_s)
         line = LineOperator(machine.request, controller.clock, controller.envelope)
         try:
             controller.connect()

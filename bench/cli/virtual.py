@@ -1,44 +1,48 @@
-"""One virtual rig through the whole path without the trappings of a run: for campaigns over many seeds, and for tests."""
+"""One virtual rig through a run without its directory, record and report: for campaigns over many seeds, and for tests.
+
+The run itself is `bench run`'s: the same opening, the same acquisition under a supervisor, the same analysis.
+"""
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bench import catalogue
+from bench.acquisition import Acquired, acquired
 from bench.adoption import calibration_of
 from bench.calibration import Calibration, Need, facts_of, settings_differ
-from bench.calibrationfile import attachment
-from bench.cli.opening import SIMULATED
-from bench.cli.safety import may_touch
+from bench.cli import opening
+from bench.cli.compose import load_procedure
 from bench.errors import ConfigError
+from bench.evaluation import yielded
 from bench.findings import Finding
-from bench.linkhealth import Health
+from bench.opened import Job
 from bench.procedure import Measured, Procedure
-from bench.recorder import Recorder, RunHeader
+from bench.progress import Silent
 from bench.recording import Recording
-from bench.rig import Rig
-from bench.rigfile import RigFile, load_rig
-from bench.roles import RigState
-from bench.states import transition
-from drivers.controller import Controller
-from drivers.fieldbus import Fieldbus, open_devices
-from drivers.operator import LineOperator
-from sim_backend.endpoint import SimulatedRig
-from sim_backend.registers import Followed, RegisterBank
+from bench.rigfile import load_rig
+from bench.supervisor import Supervisor
 from sim_backend.truth import Truth, draw
 
-SUBSTEPS = 1
-SLICE_S = 0.5  # five times the live bench's: each slice costs a round of Python
+
+@dataclass(frozen=True)
+class Knobs:
+    """What costs time in a run, as `bench run` has it: see `bench.cli.opening.of_truth` and `bench.recorder.Recorder`."""
+
+    substeps: int = opening.SUBSTEPS
+    slice_s: float = opening.SLICE_S
+    plain: bool = False
+
+
+QUICK = Knobs(plain=True)
+"""What may be saved without moving a result by a tenth of its standard uncertainty."""
 
 
 @dataclass(frozen=True)
 class Simulated:
-    """One finished run on one virtual rig: what was drawn, and what `analyse` yields."""
+    """One finished run on one virtual rig: what was drawn, and what its end and its analysis yield."""
 
     procedure: Procedure
     recording: Recording[Any]
@@ -77,6 +81,49 @@ def simulate(
     return done.truth, done.results
 
 
+@dataclass(frozen=True)
+class Flown:
+    """The machine's part of a run on one virtual rig, its recording closed."""
+
+    job: Job
+    drawn: Truth
+    machine: Acquired
+    path: Path
+
+    def analysed(self) -> Simulated:
+        """What the recording says, after what the end of the run says."""
+        procedure, seed = self.job.procedure, self.drawn.seed
+        recording: Recording[Any] = Recording.open(self.path, procedure.plan)
+        found = [*self.machine.ending.findings, *yielded(procedure, recording)]
+        return Simulated(procedure, recording, seed, self.drawn, found)
+
+
+def flown(
+    procedure: str,
+    rig: str,
+    seed: int,
+    plan: Mapping[str, Any],
+    path: Path,
+    truth: Mapping[str, float] | None = None,
+    calibrations: Mapping[str, Calibration] | None = None,
+    knobs: Knobs = QUICK,
+) -> Flown:
+    """Draw a rig and take it through the machine's part of a run; what ended that early is in it.
+
+    Raises:
+        ConfigError: a calibration that is needed is not given, or was made at other settings.
+    """
+    chosen, file = load_procedure(procedure), load_rig(rig)
+    settings = chosen.plan.model_validate({**file.plans.get(procedure, {}), **plan})
+    used = given(chosen.needs(settings), calibrations or {})
+    drawn = draw(file, seed, truth, chosen.settings(settings))
+    job = Job(chosen, file, settings, {}, "sim", seed, calibrations=tuple(used))
+    supervisor = Supervisor()
+    with opening.of_truth(file, drawn, "auto", substeps=knobs.substeps, slice_s=knobs.slice_s)(supervisor) as live:
+        machine = acquired(job, path, live, supervisor, Silent(), plain=knobs.plain)
+    return Flown(job, drawn, machine, path)
+
+
 def simulated_run(
     procedure: str,
     rig: str,
@@ -85,69 +132,19 @@ def simulated_run(
     path: Path,
     truth: Mapping[str, float] | None = None,
     calibrations: Mapping[str, Calibration] | None = None,
+    knobs: Knobs = QUICK,
 ) -> Simulated:
-    """As `simulate`; the result can also be adopted. `calibrations` are by procedure; those that are needed are used.
+    """As `simulate`; the result can also be adopted. `calibrations` are by procedure; those that are needed are used. What
+    ends a run early is raised, after the machine was made safe.
 
     Raises:
-        ConfigError: one that is needed is not given, or was made at other settings.
+        ConfigError: a calibration that is needed is not given, or was made at other settings.
+        BenchError: what ended the run early.
     """
-    chosen: Procedure = importlib.import_module(catalogue.entry(procedure).module).procedure
-    file = load_rig(rig)
-    settings = chosen.plan.model_validate({**file.plans.get(procedure, {}), **plan})
-    used = given(chosen.needs(settings), calibrations or {})
-    drawn = draw(file, seed, truth, chosen.settings(settings))
-    simulated = SimulatedRig(file, drawn, substeps=SUBSTEPS)
-    bank = None if drawn.machine.turns else RegisterBank(file, drawn, simulated.device.plant)
-    base = simulated if bank is None else Followed(simulated, bank)
-    controller = Controller(file, simulated.link, base, SIMULATED, SLICE_S)
-    operator = LineOperator(simulated.request, controller.clock, controller.envelope)
-    counters = controller.telemetry.counters
-    header = RunHeader(
-        {"run": {"procedure": procedure, "seed": str(seed), "backend": "sim"}, "versions": {}},
-        {
-            "rig.toml": file.toml_text.encode(),
-            "rig.dbc": file.dbc_text.encode(),
-            "plan.json": settings.model_dump_json().encode(),
-            "calibrations.json": attachment(used).encode(),
-        },
-    )
-    with (
-        _driven(file, drawn, controller, bank) as bus,
-        Recorder(path, clock=controller.clock, streams=[controller.telemetry.layout, *(bus.layouts if bus else ())],
-                 header=header, plain=True) as recorder,
-    ):  # fmt: skip
-        live = Rig(file, controller.clock, controller, controller, operator, counters,
-                   lambda: Health(counters, simulated.link.stats, None, 0), simulated.link.close,
-                   bus.drive if bus else None, capture=controller.capture)  # fmt: skip
-        controller.recorder = operator.recorder = recorder
-        operator.may_touch = may_touch(controller, bus.drive if bus else None)
-        if bus is not None:
-            bus.recorder = recorder
-        controller.clock.sleep(0.1)
-        transition(live, RigState.READY)
-        for name, value in chosen.settings(settings).items():
-            controller.set(name, value)
-        transition(live, chosen.state)
-        chosen.acquire(live, settings, recorder)
-        transition(live, RigState.OFF)
-    recording: Recording[Any] = Recording.open(path, chosen.plan)
-    return Simulated(chosen, recording, seed, drawn, list(chosen.analyse(recording)))
-
-
-@contextmanager
-def _driven(
-    file: RigFile, drawn: Truth, controller: Controller, bank: RegisterBank | None
-) -> Iterator[Fieldbus | None]:
-    """The register devices, where the controller cannot turn its shaft by itself; they cost time, and others need none."""
-    if bank is None:
-        yield None
-        return
-    controller.clock.sleep(0.1)
-    with open_devices(file, bank.port, controller.clock, controller.envelope) as bus:
-        controller.companions.append(bus.pump)
-        if bus.drive is not None:
-            bus.drive.may_run = controller.require_levitated
-        yield bus
+    done = flown(procedure, rig, seed, plan, path, truth, calibrations, knobs)
+    if done.machine.cause is not None:
+        raise done.machine.cause
+    return done.analysed()
 
 
 def given(needs: Sequence[Need], calibrations: Mapping[str, Calibration]) -> list[Calibration]:

@@ -13,6 +13,7 @@ from scipy.special import ndtri, stdtrit
 
 from bench.errors import AnalysisError
 from bench.uncertainty.estimate import Array, Estimate, Influence
+from bench.uncertainty.tails import Tails, tails_of_draws, tails_of_t
 
 PROBABILITY = 0.95
 DRAWS = 200_000
@@ -31,7 +32,8 @@ class Interval:
 
     `u` is the standard uncertainty by the same method: of the linear model, or the standard deviation of the draws. It and k
     are None where the interval alone is stated: with two degrees of freedom or fewer, and where the distribution has no
-    standard deviation.
+    standard deviation. `tails` are the probabilities of an error beyond multiples of the half width
+    (`bench.uncertainty.tails`).
     """
 
     low: float
@@ -42,6 +44,7 @@ class Interval:
     method: Literal["gum", "monte-carlo"]
     why: str
     u: float | None
+    tails: Tails
 
 
 def welch_satterthwaite(estimate: Estimate) -> float:
@@ -93,24 +96,26 @@ def interval(estimate: Estimate, seed: int = 0) -> Interval:
     dof = welch_satterthwaite(estimate)
     reason = _against_gum(estimate)
     if not reason:
-        wide = coverage_factor(dof) * estimate.u
+        k = coverage_factor(dof)
+        wide = k * estimate.u
         u = estimate.u if dof > FEW else None
         why = "normal or many comparable components, linear model"
-        return _stated(estimate.value - wide, estimate.value + wide, dof, "gum", why, u)
+        return _stated(estimate.value - wide, estimate.value + wide, dof, "gum", why, u, tails_of_t(k, dof))
     drawn = _sampled(estimate, seed)
     low, high = (float(q) for q in np.quantile(drawn, [0.025, 0.975]))
     if not (math.isfinite(low) and math.isfinite(high)):
         raise AnalysisError("the model does not give finite numbers over the spread of its inputs")
     u = None if _few(estimate) else _standard_deviation(drawn)
-    return _stated(low, high, dof, "monte-carlo", reason if u is not None else f"{reason}; {NO_U}", u)
+    beyond = tails_of_draws(drawn, estimate.value, low, high)
+    return _stated(low, high, dof, "monte-carlo", reason if u is not None else f"{reason}; {NO_U}", u, beyond)
 
 
 def _stated(
-    low: float, high: float, dof: float, method: Literal["gum", "monte-carlo"], why: str, u: float | None
+    low: float, high: float, dof: float, method: Literal["gum", "monte-carlo"], why: str, u: float | None, tails: Tails
 ) -> Interval:
     half = (high - low) / 2
     k = None if u is None else half / u if u > 0 else 0.0
-    return Interval(low, high, k, half, dof, method, why, u)
+    return Interval(low, high, k, half, dof, method, why, u, tails)
 
 
 def _few(estimate: Estimate) -> bool:

@@ -51,8 +51,8 @@ def test_a_sound_rig_is_recovered_within_its_intervals(sound: Simulated) -> None
     for name in ("B", "B_high", "T_c"):
         assert abs(found[name].value - run.truth[name]) < 3 * found[name].u, name
         assert interval(found[name]).method == "monte-carlo"
-    by_motor = run.recording.plan.model_copy(update={"run_up": "motor"})  # this rig has no drive
-    assert len(run.recording.all_steps()) == run.procedure.step_count(by_motor)
+    assert len(run.recording.all_steps()) == run.procedure.step_count(run.recording.plan)
+    assert {step.labels["by"] for step in run.recording.steps("coast")} == {"drive"}
     assert correlation(found["B"], found["B_high"]) > 0.95
     assert found["T_c"].contributions["machine/drive_drag"] ** 2 > 0.9 * found["T_c"].u ** 2
     limits = load_spec("tsbs12", "spindown")
@@ -82,25 +82,29 @@ def test_the_ring_measures_the_inertia_and_takes_its_tolerance_out(tmp_path: Pat
 
 
 def test_the_result_follows_the_truth(tmp_path: Path) -> None:
-    """Printed values are no input: with the drag 20 % off it is 20 % off, and the limit says so."""
-    run = run_down(tmp_path, 11, {"viscous": 1.2 * 0.081})
+    """Printed values are no input: with the drag 20 % off it is 20 % off, and the limit says so. It is more than the drive can
+    give, so that the motor turns it."""
+    run = run_down(tmp_path, 11, {"viscous": 1.2 * 0.081}, run_up="motor")
     found = results(run)["B"]
     assert abs(found.value - 0.0972) < 3 * found.u
     assert judge(interval(found), load_spec("tsbs12", "spindown")["B"]) is Verdict.FAIL
 
 
 @pytest.mark.parametrize(
-    ("defect", "said"),
+    ("defect", "said", "run_up"),
     [
-        ({"encoder_sign": -1}, {"encoder-direction": "backwards", "speed-not-reached": "did not reach"}),
-        ({"drive_brakes": 0.15}, {"braked": "brake"}),
-        pytest.param({"drop_fraction": 0.005}, {"missing-samples": "missing"}, marks=pytest.mark.long),
-        ({"detent": 3}, {"drag-not-linear": "another shape"}),
-        ({"segment_drift_1": 0.003}, {"constant-torque": "forward"}),
+        ({"encoder_sign": -1}, {"encoder-direction": "backwards"}, "drive"),
+        ({"encoder_sign": -1}, {"encoder-direction": "backwards", "speed-not-reached": "did not reach"}, "motor"),
+        ({"drive_brakes": 0.15}, {"braked": "brake"}, "drive"),
+        pytest.param({"drop_fraction": 0.005}, {"missing-samples": "missing"}, "drive", marks=pytest.mark.long),
+        ({"detent": 3}, {"drag-not-linear": "another shape"}, "drive"),
+        ({"segment_drift_1": 0.003}, {"constant-torque": "forward"}, "drive"),
     ],
 )
-def test_a_defect_is_named_and_does_not_pass(tmp_path: Path, defect: dict[str, float], said: dict[str, str]) -> None:
-    found = serious(run_down(tmp_path, 3, defect))
+def test_a_defect_is_named_and_does_not_pass(
+    tmp_path: Path, defect: dict[str, float], said: dict[str, str], run_up: str
+) -> None:
+    found = serious(run_down(tmp_path, 3, defect, run_up=run_up))
     for code, named in said.items():
         assert code in found, found
         assert named in found[code].text

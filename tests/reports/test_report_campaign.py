@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.campaign_bands import Failure, Quantity, Sample, coverage
+from bench.campaign_bands import Failure, Quantity, Sample, Unable, coverage, tails
 from bench.campaign_model import Constant, Given, Matrix, Model, StatedEquation, Term
 from bench.campaign_speed import Speed
 from bench.errors import BenchError
@@ -49,11 +49,15 @@ def chain(names: tuple[str, ...] = ("K_i", "alpha_x_prime", "B@by speed"), outco
 
 def many(n: int = 100, judged: bool = True) -> CoverageContent:
     errors = np.random.default_rng(1).standard_normal(n)
-    samples = tuple(Sample(float(e), float(e) - 1.96, float(e) + 1.96, 1.96) for e in errors)
-    quantity = Quantity(1, "p", "K_i", "N/A", NASTY, judged, coverage(samples, n), tuple(range(n)), samples, 3)
-    empty = dataclasses.replace(quantity, name="alpha_d", coverage=coverage((), n), seeds=(), samples=())
+    samples = tuple(Sample(float(e), float(e) - 1.96, float(e) + 1.96, 1.96, (8.9e-5, 4e-9, 0.0)) for e in errors)
+    seeds = tuple(range(n))
+    quantity = Quantity(1, "p", "K_i", "N/A", NASTY, judged, coverage(samples, n), tails(samples, 2), seeds, samples, 3)
+    empty = dataclasses.replace(
+        quantity, name="alpha_d", coverage=coverage((), n), tails=tails((), 2), seeds=(), samples=()
+    )
     return CoverageContent(
         "c.campaign-x", NASTY, "r", n, 0, DATE, "fail", (quantity, empty), (Failure(1, "p", "code", "error", 2, 7, NASTY),),
+        (Unable(1, "p", n, ((1, NASTY),)),),
         (("p", NASTY, 1.2),), 1.2, Speed(80, 2, 60.0, 1.1, 0.9, 0.97, 0.95, 0.93),
     )  # fmt: skip
 
