@@ -83,7 +83,7 @@ def run(
             write_record(directory.record, record)
             stack.enter_context(runlog.to_file(directory.log))
             logger.info("run %s on rig %s, backend %s, seed %s", directory.run_id, job.rig.name, job.backend, job.seed)
-            progress.line(f"{job.procedure.name} on {job.rig.name} ({job.backend}), run {directory.run_id}")
+            progress.stage(f"{job.procedure.name} on {job.rig.name} ({job.backend}), run {directory.run_id}")
             wall = partial(provenance.wall, directory, started, job.rig.path)
             machine = acquired(job, directory.recording, live, supervisor, progress, wall=wall)
         release()  # a disk that is full by now still takes the record

@@ -65,11 +65,11 @@ class _Way:
     def at_once(self) -> None:
         """What is safe at any speed: no torque from the drive nor the motor; of a machine that nobody sees, its own way."""
         c = self.controller
-        self.patience = Patience(c, self.base, self.drive)
         if self.drive is not None:
             self.driven = self.drive.running
             self.drive.let_go()
         c.sight.forget()
+        self.patience = Patience(c, self.base, self.drive)  # what was forgotten is no progress
         c.clock.sleep(0.02)  # a command may have been sent whose effect nobody has seen yet
         mode = c.sight.mode
         if mode in (*UNTOLD, "LIFTING"):
