@@ -9,13 +9,13 @@ READY := .venv/.ready
 # Tests start hundreds of processes: without its bytecode every one of them would compile the project again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check format ci-long fuzz campaigns bench clean lock setup
+.PHONY: demo test check format ci-long faults fuzz campaigns plants sound moved bench clean lock setup
 
 demo: setup
 	$(BIN)/bench run amb-calibration --rig tsbs12 --seed 1
 
 test: setup
-	$(BIN)/python -m pytest -q -m "not long" -n 2 --dist loadgroup
+	$(BIN)/python -m pytest -q -m "not long and not faults" -n 2 --dist loadgroup
 
 check: setup
 	$(BIN)/ruff format --check .
@@ -27,12 +27,31 @@ check: setup
 ci-long: setup
 	$(BIN)/python -m pytest -q -m long tests
 
+faults: setup
+	$(BIN)/python -m pytest -q -m faults tests/firmware/test_misbehaviours.py
+
 fuzz: setup
 	$(BIN)/python -m pytest -q -m "hypothesis and not long" -n 2 --hypothesis-profile=search --timeout 600
 
 campaigns: setup
 	$(BIN)/bench campaign tsbs-identification --count 1000 --keep none
 	$(BIN)/bench campaign tsbs-identification --count 1000 --first-seed 1000000 --keep none
+
+# Default plans of all procedures on 60 sound rigs, each choice of a plan on 20. It takes hours, goes on by itself, and the
+# same command goes on where it was stopped; FIRST is the first seed.
+FIRST ?= 0
+sound: setup
+	mkdir -p runs
+	nohup nice $(BIN)/python benchmarks/sound.py runs/sound-$(FIRST).jsonl --first $(FIRST) --count 60 --choices 20 --jobs 2 > runs/sound-$(FIRST).log 2>&1 &
+	@echo "look at it with: $(BIN)/python benchmarks/sound.py runs/sound-$(FIRST).jsonl --report"
+
+# Every drawn number moved by three half widths, for every procedure: caught, harmless, in the budget, or listed on the report.
+moved: setup
+	mkdir -p runs
+	$(BIN)/python -m benchmarks.moved --all runs/moved.jsonl
+
+plants: setup
+	$(BIN)/python benchmarks/plants.py spindown step --seeds 60
 
 bench: setup
 	$(BIN)/python benchmarks/analysis.py

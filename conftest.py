@@ -1,8 +1,9 @@
 """`pytest procedures --rig RIG`: the procedures as tests of a machine. A composition root.
 
-One item per procedure, collected only when `--rig` is given. FAIL and INDETERMINATE fail the item, ERROR and ABORTED
-are errors (the run happens in the item's set-up, so that pytest counts them as such). Measured quantities become
-JUnit properties of the item, provenance becomes properties of the suite.
+One item per procedure, collected only when `--rig` is given. PASS and DONE pass the item, FAIL and INDETERMINATE fail it,
+ERROR and ABORTED are errors (the run happens in the item's set-up, so that pytest counts them as such); a procedure that the
+rig cannot run at all is skipped. Measured quantities become JUnit properties of the item, provenance those of the suite.
+`bench.cli.suite` sees to the calibrations.
 
 The fixture `inject` runs a procedure while faults happen to the link or the controller.
 """
@@ -10,6 +11,7 @@ The fixture `inject` runs a procedure while faults happen to the link or the con
 from __future__ import annotations
 
 import sys
+import tempfile
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -18,12 +20,14 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from bench import __version__, catalogue
-from bench.errors import BenchError
+from bench.errors import BenchError, ConfigError
 
 if TYPE_CHECKING:
+    from bench.cli.suite import Suite
     from bench.runner import RunResult
 
 ROOT = Path(__file__).resolve().parent
+SUITE: pytest.StashKey[Suite] = pytest.StashKey()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -31,15 +35,16 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--rig", metavar="RIG", help="a rig file, or its name in rigs/")
     group.addoption("--backend", choices=("sim", "live"), default="sim", help="the simulated rig, or the real one")
     group.addoption("--seed", type=int, help="which virtual rig (simulation only)")
-    group.addoption("--plan", action="append", default=[], metavar="KEY=VALUE", help="a setting; repeatable")
+    group.addoption("--plan", action="append", default=[], metavar="[PROCEDURE:]KEY=VALUE",
+                    help="a setting, of one procedure or of each that has it; repeatable")  # fmt: skip
     group.addoption("--fault", action="append", default=[], metavar="FAULT", help="a fault to inject; repeatable")
     group.addoption("--no-report", action="store_true", help="leave the reports out")
     group.addoption(
         "--calibrations", type=Path, metavar="DIR", help="folder of calibrations; default beside the rig file"
     )
-    group.addoption(
-        "--adopt", action="store_true", help="what passes becomes a calibration for the procedures after it"
-    )
+    group.addoption("--adopt", action="store_true", help="what ends PASS or DONE becomes the rig's calibration")
+    group.addoption("--spec", type=Path, metavar="FILE", help="acceptance limits; default specs/<rig>.toml")
+    group.addoption("--require-verdict", action="store_true", help="a run that no limit judged is an error")
     group.addoption("--out", type=Path, default=Path("runs"), help="folder of the run directories")
 
 
@@ -59,17 +64,49 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Provenance into the JUnit file, if one is written."""
+    """The machine under test; provenance into the JUnit file, if one is written.
+
+    Raises:
+        UsageError: the rig file or a setting of the command line.
+    """
     config = session.config
     if config.getoption("--rig") is None:
         return
     from _pytest.junitxml import xml_key  # pytest offers suite properties to fixtures only
 
+    folder = tempfile.TemporaryDirectory(prefix="levbench-")
+    config.add_cleanup(folder.cleanup)
+    try:
+        suite = config.stash[SUITE] = _suite(config, Path(folder.name))
+    except ConfigError as error:
+        raise pytest.UsageError(str(error)) from error
     if (xml := config.stash.get(xml_key, None)) is not None:
-        for name in ("rig", "backend", "seed"):
+        for name in ("rig", "backend"):
             xml.add_global_property(f"levbench.{name}", str(config.getoption(f"--{name}")))
+        if suite.seed is not None:
+            xml.add_global_property("levbench.seed", str(suite.seed))
         xml.add_global_property("levbench.version", __version__)
         xml.add_global_property("python", sys.version.split()[0])
+
+
+def _suite(config: pytest.Config, folder: Path) -> Suite:
+    from bench.cli.compose import Request
+    from bench.cli.suite import Suite
+
+    option = config.getoption
+    asked = Request(
+        procedure="",
+        rig=option("--rig"),
+        backend=option("--backend"),
+        seed=option("--seed"),
+        faults=tuple(option("--fault")),
+        out=option("--out"),
+        report=not option("--no-report"),
+        calibrations=option("--calibrations"),
+        spec=option("--spec"),
+        require_verdict=option("--require-verdict"),
+    )
+    return Suite(asked, folder, tuple(option("--plan")), option("--adopt"))
 
 
 @pytest.fixture
@@ -109,65 +146,33 @@ class ProcedureItem(pytest.Item):
         self.add_marker(pytest.mark.timeout(0))  # a calibration takes as long as it takes
 
     def setup(self) -> None:
-        from bench.cli.compose import Request
-        from bench.cli.run import execute
-        from bench.records import Outcome
+        from bench.cli.suite import properties
 
-        option = self.config.getoption
-        request = Request(
-            procedure=self.name,
-            rig=option("--rig"),
-            backend=option("--backend"),
-            seed=option("--seed"),
-            plan=tuple(option("--plan")),
-            faults=tuple(option("--fault")),
-            out=option("--out"),
-            report=not option("--no-report"),
-            calibrations=option("--calibrations"),
-        )
-        with warnings.catch_warnings():
-            warnings.simplefilter("default")  # the machine is on trial here, not the software
-            self.result = execute(request)
-        self._note(self.result)
+        suite = self.config.stash[SUITE]
+        try:
+            if lacking := suite.lacking(self.name):
+                pytest.skip(f"{self.config.getoption('--rig')} cannot run it: {'; '.join(lacking)}")
+            with warnings.catch_warnings():
+                warnings.simplefilter("default")  # the machine is on trial here, not the software
+                self.result = suite.run(self.name)
+        except BenchError as error:
+            pytest.fail(str(error), pytrace=False)  # in the set-up: an error
+        self.user_properties += properties(self.result, suite.seed)
+        self.user_properties += [(f"needs.{name}", str(run)) for name, run in suite.made_for(self.name).items()]
         if self.result.stopped_by_signal:
             self.session.shouldstop = self.result.reason
-        if self.result.outcome in (Outcome.ERROR, Outcome.ABORTED):
-            raise NotMeasured(self.result)
-        if option("--adopt") and self.result.outcome is Outcome.PASS:
-            from bench.cli.adopt import adopt
-
-            adopt(self.result.directory, option("--rig"), option("--calibrations"))
+        if self.result.outcome.value in ("ERROR", "ABORTED"):
+            pytest.fail(_told(self.result), pytrace=False)
 
     def runtest(self) -> None:
-        from bench.records import Outcome
-
         assert self.result is not None
-        if self.result.outcome is not Outcome.PASS:
-            raise NotPassed(self.result)
-
-    def _note(self, result: RunResult) -> None:
-        self.user_properties.append(("run", str(result.directory)))
-        self.user_properties.append(("outcome", str(result.outcome)))
-        for m in result.record.measurements:
-            for field in ("value", "expanded_uncertainty", "unit", "verdict"):
-                self.user_properties.append((f"{m.name}.{field}", str(getattr(m, field))))
-
-    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        """A sentence instead of a traceback, for what Levbench raises on purpose."""
-        if isinstance(excinfo.value, BenchError):
-            return str(excinfo.value)
-        return super().repr_failure(excinfo, style)
+        if not self.result.outcome.sound:
+            pytest.fail(_told(self.result), pytrace=False)
 
     def reportinfo(self) -> tuple[Path, int, str]:
         return self.path, 0, f"{self.name} on {self.config.getoption('--rig')}"
 
 
-class NotPassed(BenchError):
-    """FAIL or INDETERMINATE."""
-
-    def __init__(self, result: RunResult) -> None:
-        super().__init__(f"{result.outcome}: {result.reason}\n{result.directory}")
-
-
-class NotMeasured(NotPassed):
-    """ERROR or ABORTED."""
+def _told(result: RunResult) -> str:
+    """Outcome, what decided, and where to look."""
+    return f"{result.outcome}: {result.reason}\n{result.directory}"

@@ -13,30 +13,47 @@ from bench import provenance, runlog
 from bench.described import described
 from bench.errors import (
     Aborted,
+    AnotherHost,
     BenchError,
+    BytesUnreadable,
     DeviceFault,
+    DeviceUnreadable,
+    DriveFault,
+    FrozenError,
     InterlockError,
     LinkError,
+    NoReply,
     OperatorAbort,
+    OperatorRefused,
+    OperatorSilent,
     RecordingError,
+    Refused,
+    RotorNotArrived,
     SignalAbort,
+    StateNotReached,
 )
 from bench.evaluation import Ending
 from bench.findings import Effect, Finding
 from bench.opened import Job, OpenRig
+from bench.outcomes import Outcome
 from bench.progress import Progress
 from bench.recorder import Recorder
-from bench.records import Outcome
+from bench.registers import RegisterRefused
 from bench.roles import RigState
 from bench.states import transition
 from bench.supervisor import SafeStep, Supervisor
 
 logger = logging.getLogger("bench.runner")
 CODES: tuple[tuple[type[BaseException], str], ...] = (
-    (SignalAbort, "signal"), (OperatorAbort, "operator-stop"), (DeviceFault, "controller-fault"),
-    (InterlockError, "interlock"), (LinkError, "link-lost"), (RecordingError, "recording-failed"),
+    (SignalAbort, "signal"), (OperatorAbort, "operator-stop"), (DriveFault, "drive-fault"),
+    (DeviceFault, "controller-fault"), (AnotherHost, "another-host"), (InterlockError, "interlock"),
+    (RegisterRefused, "device-refused"), (DeviceUnreadable, "device-unreadable"), (NoReply, "no-reply"),
+    (BytesUnreadable, "bytes-unreadable"), (OperatorSilent, "operator-silent"), (FrozenError, "telemetry-frozen"),
+    (LinkError, "link-lost"), (StateNotReached, "state-not-reached"), (RotorNotArrived, "rotor-not-arrived"),
+    (OperatorRefused, "operator-refused"), (Refused, "controller-refused"), (RecordingError, "recording-failed"),
     (BenchError, "run-failed"),
 )  # fmt: skip
+"""The finding of an error that ends a run: the first kind that it is."""
 
 
 @dataclass(frozen=True)

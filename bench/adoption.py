@@ -21,7 +21,7 @@ from bench.evaluation import Ending
 from bench.findings import SIMULATED_CONTROLLER
 from bench.procedure import Procedure
 from bench.recording import Recording
-from bench.records import Outcome, Record, read_record
+from bench.records import Record, read_record
 from bench.rigfile import RigFile
 from bench.rundir import RunDirectory
 from bench.uncertainty import Estimate
@@ -91,17 +91,17 @@ class Adoption:
         return cls(run, record, recording, digest)
 
     def calibration(self, procedure: Procedure, anyway: bool = False) -> Calibration:
-        """The run's facts as a calibration. `anyway` takes a run that did not PASS, as long as it has results.
+        """The run's facts as a calibration. `anyway` takes a run that ended neither PASS nor DONE, as long as it has results.
 
         Raises:
             ConfigError: its outcome, or numbers that are not those of the record.
             BenchError: the analysis fails.
         """
         record, where = self.record, self.run.path
-        if record.outcome is not Outcome.PASS and not anyway:
+        if not record.outcome.sound and not anyway:
             raise ConfigError(
-                f"{where}: found outcome {record.outcome.value}; expected PASS. Next: look at its report, or adopt it with "
-                "--anyway, and the calibration says so"
+                f"{where}: found outcome {record.outcome.value}; expected PASS or DONE. Next: look at its report, or adopt it "
+                "with --anyway, and the calibration says so"
             )
         if Ending.read(self.recording).stopped is not None:
             raise ConfigError(f"{where}: the run was stopped before its end; expected a completed one")

@@ -6,7 +6,7 @@ What is left out has the names of docs/reference/protocol.md. A controller whose
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
@@ -91,6 +91,26 @@ def problems_of(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
     yield from _protocol(rig, messages)
     yield from _channels(rig, messages)
     yield from _states(rig, messages)
+    yield from _multiplexed(rig, messages)
+
+
+def _multiplexed(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
+    """Messages that the bench reads or sends hold all their signals in every frame; others may do as they like."""
+    b = rig.binding
+    used = [(f"{KEY}.telemetry", m) for m in b.telemetry] + [(f"{KEY}.heartbeat", b.heartbeat)]
+    used += [(f"{KEY}.commands.{n}", path.partition(".")[0])
+             for n in dict.fromkeys((*NEEDED, *b.commands)) for path in b.command(n)]  # fmt: skip
+    used += [(f"parameters.{n}.signal", p.signal.partition(".")[0]) for n, p in rig.parameters.items() if p.signal]
+    used += [(f"message {m}", m) for m in PROTOCOL]
+    yield from multiplexed(used, messages)
+
+
+def multiplexed(used: Iterable[tuple[str, str]], messages: MessageMap) -> Iterator[Found]:
+    """Of keys and the messages that they use, those that are multiplexed; each message once."""
+    first = {name: key for key, name in reversed([*used])}
+    for name, key in first.items():
+        if name in messages.messages and messages[name].multiplexed:
+            yield key, f"{name}, which is multiplexed", "a message that holds all of its signals in every frame"
 
 
 def signal_at(messages: MessageMap, path: str) -> Signal | None:

@@ -6,7 +6,6 @@ the procedures are known (`bench.cli.campaign_steps`).
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -15,6 +14,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 
 from bench import catalogue
 from bench.errors import ConfigError, Problem
+from bench.inputfile import TomlError, parse_toml
 from bench.schema import expected_of
 from bench.toleranced import Toleranced, simulated
 
@@ -108,9 +108,9 @@ def load(campaign: str) -> tuple[Campaign, Path]:
 
 def _toml(text: str, path: str) -> dict[str, Any]:
     try:
-        data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise ConfigError(f"campaign file {path}: not TOML: {error or 'nested too deep'}") from error
+        data = parse_toml(text)
+    except TomlError as error:
+        raise ConfigError(f"campaign file {path}: {error}") from error
     schema = data.get("schema")
     if type(schema) is not int or schema != SCHEMA:
         newer = " It was written for a newer Levbench" if type(schema) is int and schema > SCHEMA else ""

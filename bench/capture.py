@@ -15,7 +15,7 @@ import numpy.typing as npt
 from pydantic import Field
 
 from bench import units
-from bench.binding import Found
+from bench.binding import Found, multiplexed
 from bench.errors import BenchError
 from bench.messages import MessageMap
 from bench.part import Part
@@ -157,6 +157,7 @@ def problems_of(spec: CaptureSpec, messages: MessageMap) -> Iterator[Found]:
     """Key, found and expected of what is wrong with the table `capture`."""
     if missing := [name for name in MESSAGES if name not in messages.messages]:
         yield "capture", f"no message {', '.join(missing)} in the DBC", "the messages of docs/reference/captures.md"
+    yield from multiplexed((("capture", name) for name in MESSAGES), messages)
     taken: dict[int, str] = {}
     for name, c in spec.channels.items():
         key = f"capture.channels.{name}"

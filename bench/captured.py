@@ -65,10 +65,12 @@ class Captured:
 
         Raises:
             AnalysisError: a channel that was not captured, or samples are missing from the file.
+            RecordingError: more numbers than the limits allow.
         """
         chosen = channels or self.channels
         if missing := [name for name in chosen if name not in self.channels]:
             raise AnalysisError(f"{self.stream}: found no {', '.join(missing)}; it holds {', '.join(self.channels)}")
+        self.recording.limit_samples(self.samples * (len(chosen) + 3))
         blocks = list(self.recording.blocks(self.stream))
         if sum(b.count for b in blocks) != self.samples:
             raise AnalysisError(f"{self.stream}: found {sum(b.count for b in blocks)} samples; expected {self.samples}")

@@ -141,5 +141,5 @@ def _unknown(kind: str, name: str, known: list[str]) -> str:
 def _title(path: Path) -> str:
     try:
         return str(tomllib.loads(path.read_text(encoding="utf-8")).get("title", ""))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return "(cannot be read; see `bench check`)"

@@ -3,13 +3,25 @@
 BenchError
   ConfigError        rig, plan, spec or usage is wrong; nothing was started      exit 2
   LinkError          a link is lost, silent or corrupt                           exit 3
+    NoReply          a request was not answered, though it was repeated
+    BytesUnreadable  bytes come, but no telemetry can be made of them
+    FrozenError      telemetry comes, but its counters stand
+    DeviceUnreadable a register device says what is no number
+    OperatorSilent   the operator does not answer
+  NotReached         what was told to move did not get there                     exit 3
+    StateNotReached  a device took a command and did not go into its state
+    RotorNotArrived  the rotor did not reach an angle or a speed
+  Refused            a device answers that it will not                           exit 3
+    OperatorRefused  the operator answers that it cannot be done
   RecordingError     a recording cannot be written or read                       exit 3
   AnalysisError      the data do not allow the number                            exit 3
   Aborted            the run was stopped on purpose                              exit 4
     InterlockError   the envelope refused a command or tripped on telemetry
     DeviceFault      the controller reported a fault
+      DriveFault     the drive reported one
+    AnotherHost      heartbeats of another host came in
     OperatorAbort    the operator said stop
-    SignalAbort      SIGINT or SIGTERM
+    SignalAbort      SIGINT, SIGTERM or SIGHUP
 """
 
 from __future__ import annotations
@@ -46,6 +58,46 @@ class LinkError(BenchError):
     """A link is lost, silent past its timeout, or delivers bytes that cannot be right."""
 
 
+class NoReply(LinkError):
+    """A request was not answered, though it was repeated; telemetry may go on."""
+
+
+class BytesUnreadable(LinkError):
+    """Bytes come, but no telemetry can be made of them."""
+
+
+class DeviceUnreadable(LinkError):
+    """A register device answers with words that are no number."""
+
+
+class OperatorSilent(LinkError):
+    """The operator at the other end of a line does not answer."""
+
+
+class NotReached(BenchError):
+    """What was told to move did not get there; the links are sound."""
+
+
+class StateNotReached(NotReached):
+    """A device took a command and did not go into the state that it leads to."""
+
+
+class RotorNotArrived(NotReached):
+    """The rotor did not reach an angle or a speed."""
+
+
+class Refused(BenchError):
+    """A device answers that it will not do what it was asked for."""
+
+
+class OperatorRefused(Refused):
+    """The operator answers that what was asked for cannot be done."""
+
+
+class FrozenError(LinkError):
+    """Telemetry comes, but its tick or its sequence stands: nobody knows what the machine does."""
+
+
 class RecordingError(BenchError):
     """A recording cannot be written, or what is read is not one, is newer, or fails its CRC."""
 
@@ -66,9 +118,17 @@ class DeviceFault(Aborted):
     """The controller reported a fault."""
 
 
+class DriveFault(DeviceFault):
+    """The drive reported a fault."""
+
+
+class AnotherHost(Aborted):
+    """Another host's heartbeats reach the controller."""
+
+
 class OperatorAbort(Aborted):
     """The operator said stop."""
 
 
 class SignalAbort(Aborted):
-    """SIGINT or SIGTERM arrived."""
+    """SIGINT, SIGTERM or SIGHUP arrived."""

@@ -8,11 +8,13 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
+from itertools import chain
 from typing import Any
 
 from bench.errors import AnalysisError, BenchError, RecordingError, SignalAbort
 from bench.findings import Effect, Finding
 from bench.limits import Limit
+from bench.outcomes import SOUND, Outcome, outcome_of, unjudged
 from bench.procedure import Measured, Procedure
 from bench.recorder import Recorder
 from bench.recording import Recording
@@ -20,16 +22,15 @@ from bench.records import (
     Correlations,
     LinkCounts,
     Measurement,
-    Outcome,
     Record,
     RecordingFile,
     correlations_of,
     findings_of,
     measurement,
     missing,
-    outcome_of,
 )
-from bench.stepgaps import incomplete_steps
+from bench.specs import applied
+from bench.stepgaps import incomplete_steps, missing_steps
 
 logger = logging.getLogger("bench.evaluation")
 RUN_END = "run-end"
@@ -65,7 +66,8 @@ class Ending:
             return cls(Outcome.ERROR, (Finding("recording-truncated", text, recording.path.name, Effect.ERROR),))
         try:
             e = events[-1]
-            found = tuple(Finding(f["code"], f["text"], f["where"], Effect(f["effect"])) for f in e["findings"])
+            found = tuple(Finding(f["code"], f["text"], f["where"], Effect(f["effect"]), tuple(f.get("concerns", ())))
+                          for f in e["findings"])  # fmt: skip
             return cls(Outcome(e["stopped"]) if e["stopped"] else None, found, LinkCounts(**e["link"]))
         except (KeyError, TypeError, ValueError) as error:
             raise RecordingError(f"{recording.path}: its event {RUN_END} cannot be read: {error!r}") from error
@@ -81,7 +83,10 @@ class Evaluation:
 
     def finish(self, record: Record, ending: Ending, ended: str, recording: RecordingFile | None) -> Record:
         """An unfinished record with its end; the outcome follows from what it holds."""
-        findings = (*ending.findings, *self.findings)
+        known = {
+            (f.code, f.where) for f in ending.findings
+        }  # a channel that stood is seen while it does, and in its steps
+        findings = (*ending.findings, *(f for f in self.findings if (f.code, f.where) not in known))
         return replace(
             record, ended=ended, recording=recording, link=ending.link, findings=findings_of(findings),
             measurements=self.measurements, correlations=self.correlations,
@@ -95,15 +100,17 @@ def evaluate(
     """Run `analyse` on the file and judge what it yields; what was declared and not yielded is missing.
 
     A run that was stopped early is not analysed: its recording is kept, its quantities are missing. An analysis that
-    fails is a finding, not an exception.
+    fails is a finding, not an exception. A limit that does not hold for the plan judges nothing, and a note says so.
+    A run that was to give a verdict (`bench run --require-verdict`, `--spec`) and gave none is an error.
 
     Raises:
         SignalAbort: the user stops it.
     """
     if stopped:
         return Evaluation(_in_order(procedure, {}, limits), Correlations((), ()), ())
+    stated, (limits, notes) = limits, applied(limits, recording.plan)
     measured: dict[tuple[str, str], Measured] = {}
-    findings = []
+    findings = [*notes]
     entries: dict[tuple[str, str], Measurement] = {}
     correlations = Correlations((), ())
     try:
@@ -120,15 +127,21 @@ def evaluate(
     except Exception as error:
         findings.append(_failed(error))
         entries, correlations = {}, Correlations((), ())
-    return Evaluation(_in_order(procedure, entries, limits), correlations, tuple(findings))
+    measurements = _in_order(procedure, entries, limits)
+    if recording.verdict_required and (nothing := unjudged(measurements, len(stated))) is not None:
+        findings.append(nothing)
+    return Evaluation(measurements, correlations, tuple(findings))
 
 
 def yielded(procedure: Procedure, recording: Recording[Any]) -> Iterator[Measured | Finding]:
-    """What a closed recording says: of the calibrations that the run used, of steps that lack samples, and what `analyse`
-    yields."""
-    yield from _calibrations(recording)
-    yield from incomplete_steps(recording)
-    yield from procedure.analyse(recording)
+    """What a closed recording says: of the calibrations that the run used, of steps that lack samples, what `analyse` yields,
+    and of steps that are missing."""
+    explained = False
+    for item in chain(_calibrations(recording), incomplete_steps(recording), procedure.analyse(recording)):
+        explained = explained or (isinstance(item, Finding) and item.effect is not Effect.NOTE)
+        yield item
+    if not explained:  # else a procedure that ended early has said why
+        yield from missing_steps(procedure, recording)
 
 
 def _calibrations(recording: Recording[Any]) -> Iterator[Finding]:
@@ -146,7 +159,7 @@ def _calibrations(recording: Recording[Any]) -> Iterator[Finding]:
             if here.get(used.procedure, used.run_id) != used.run_id:
                 text = f"{name} rests on {used.run_id}; this run uses {here[used.procedure]} beside it"
                 yield Finding("calibrations-of-two-runs", text, c.run_id)
-        if c.outcome != Outcome.PASS:
+        if c.outcome not in SOUND:
             yield Finding(
                 "calibration-not-passed", f"{name} was adopted although its outcome was {c.outcome}", c.run_id
             )

@@ -20,6 +20,8 @@ from bench.samples import StreamLayout
 
 Tabular = Literal["parquet", "csv"]
 Format = Literal[Tabular, "mcap"]
+ROW_GROUP: Final = 1 << 16
+"""Rows of a Parquet row group: a minute at 1 kHz."""
 EVENTS: Final = pa.schema([("t_ns", pa.int64()), ("kind", pa.string()), ("data", pa.string())])
 
 
@@ -44,14 +46,18 @@ def export(run: Path, to: Format, out: Path | None = None) -> tuple[Path, ...]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if to == "mcap":
-            return (_whole(folder / "samples.mcap", lambda part: _write_mcap(part, recording)),)
+            return (whole_file(folder / "samples.mcap", lambda part: _write_mcap(part, recording)),)
         return tuple(_tables(folder, to, recording))
     except OSError as error:
         raise BenchError(f"{folder}: cannot be written: {error.strerror or error}; the run is untouched") from error
 
 
-def _whole(path: Path, write: Callable[[Path], None]) -> Path:
-    """A file that is there only once it is complete."""
+def whole_file(path: Path, write: Callable[[Path], object]) -> Path:
+    """A file that is there only once it is complete.
+
+    Raises:
+        OSError: it cannot be written.
+    """
     part = path.with_name(path.name + ".part")
     try:
         write(part)
@@ -78,14 +84,31 @@ def _tables(folder: Path, to: Tabular, recording: Recording[Any]) -> Iterator[Pa
 
 
 def _table(path: Path, to: Tabular, schema: pa.Schema, batches: Iterator[pa.RecordBatch]) -> Path:
-    """In memory of one block at a time."""
+    """In memory of one block at a time, or of one row group."""
 
     def write(part: Path) -> None:
-        with csv.CSVWriter(part, schema) if to == "csv" else parquet.ParquetWriter(part, schema) as writer:
-            for batch in batches:
-                writer.write_batch(batch)
+        if to == "csv":
+            with csv.CSVWriter(part, schema) as lines:
+                for batch in batches:
+                    lines.write_batch(batch)
+            return
+        with parquet.ParquetWriter(part, schema) as groups:
+            for table in _row_groups(batches):
+                groups.write_table(table, row_group_size=max(table.num_rows, 1))
 
-    return _whole(path, write)
+    return whole_file(path, write)
+
+
+def _row_groups(batches: Iterator[pa.RecordBatch]) -> Iterator[pa.Table]:
+    """Batches put together to ROW_GROUP rows: each row group repeats a description of every column."""
+    waiting: list[pa.RecordBatch] = []
+    for batch in batches:
+        waiting.append(batch)
+        if sum(b.num_rows for b in waiting) >= ROW_GROUP:
+            yield pa.Table.from_batches(waiting)
+            waiting = []
+    if waiting:
+        yield pa.Table.from_batches(waiting)
 
 
 def _schema(stream: StreamLayout, *, with_units: bool) -> pa.Schema:

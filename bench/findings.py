@@ -9,7 +9,7 @@ SIMULATED_CONTROLLER = "simulated-controller"  # a live run whose controller say
 
 
 class Effect(StrEnum):
-    """What a finding does to the outcome of its run. PASS is only possible when every finding is a NOTE."""
+    """What a finding does to the outcome of its run. PASS and DONE are only possible when every finding is a NOTE."""
 
     NOTE = "note"
     INDETERMINATE = "indeterminate"
@@ -18,9 +18,15 @@ class Effect(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """A code (kebab-case, stable), a sentence for the reader, where it was seen, and its effect on the outcome."""
+    """A code (kebab-case, stable), a sentence for the reader, where it was seen, and its effect on the outcome.
+
+    `concerns` are the quantities whose data or influences it puts in doubt: `name`, `name@place` or `@place` (all that is
+    measured there); empty is all of the run. Their verdict of fail is no statement of non-conformity. A finding that says of
+    a quantity what a limit says too does not put that quantity in doubt.
+    """
 
     code: str
     text: str
     where: str = ""
     effect: Effect = Effect.NOTE
+    concerns: tuple[str, ...] = ()

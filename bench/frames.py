@@ -14,7 +14,7 @@ FRAME: Final = np.dtype(
         ("t_ns", "<i8"),  # host time of receipt or sending, UNIX ns (virtual in simulation)
         ("hw_ns", "<i8"),  # the interface's own timestamp, ns on a clock of its own; 0 where it has none
         ("id", "<u4"),  # CAN identifier; bit 31 set for extended identifiers
-        ("flags", "u1"),  # bit 0: sent by the host; bit 1: CAN FD; bit 2: error frame
+        ("flags", "u1"),  # bit 0: sent by the host; 1: CAN FD; 2: error frame; 3: bit rate switched; 4: remote frame
         ("length", "u1"),  # payload bytes, 0..64
         ("data", "u1", (64,)),
     ]
@@ -24,6 +24,10 @@ _RECORD: Final = struct.Struct("<qqIBB64s")
 SENT: Final = 1
 FD: Final = 2
 ERROR: Final = 4
+SWITCHED: Final = 8
+"""Of a CAN FD frame that came: its data phase was at the data bit rate. Not every link tells."""
+REMOTE: Final = 16
+"""A request for a frame: `length` is that of the frame asked for, and there is no data. Only python-can's side sees one."""
 EXTENDED: Final = 1 << 31
 """Bit of `id`: an identifier of 29 bits."""
 

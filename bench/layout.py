@@ -30,6 +30,8 @@ HEAD: Final = (
     ("sample_period_ns", "TYPE_FIXED64"),
 )
 _HEAD_BYTES: Final = struct.Struct("<BQBIBIBQBQ")
+LAST_INDEX: Final = 1 << 53
+MOST_FIELDS: Final = 4096
 TICKS, TIMES, FIRST_COLUMN = 6, 7, 16
 """Field numbers of the device ticks, the sample times and the first channel."""
 
@@ -229,12 +231,19 @@ class DecodedBlock:
             raise RecordingError(f"a block of stream {layout.name} cannot be read: {error}") from error
         if any(len(x) != self.count for x in (self.ticks, self.t_ns, *self.columns.values())):
             raise RecordingError(f"a block of stream {layout.name} has columns of different lengths")
+        if self.first + self.count > LAST_INDEX or self.lost > LAST_INDEX:
+            raise RecordingError(
+                f"a block of stream {layout.name} has index {self.first}; expected one that time allows"
+            )
 
 
 def _fields(data: bytes) -> list[tuple[int, Any]]:
     """Top-level protobuf fields: number, and an integer or the bytes."""
-    out, at = [], 0
+    out: list[tuple[int, Any]] = []
+    at = 0
     while at < len(data):
+        if len(out) > MOST_FIELDS:
+            raise RecordingError(f"a message of more than {MOST_FIELDS} fields; expected fewer")
         tag, at = data[at], at + 1
         if tag > 0x7F:  # most numbers of fields take one byte
             tag, at = _read_varint(data, at - 1)
@@ -272,4 +281,7 @@ def _read_varint(data: bytes, at: int) -> tuple[int, int]:
 def decode_frames(data: bytes) -> tuple[int, bytes]:
     """Host time and frame records of a `Frames` message."""
     fields = dict(_fields(data))
-    return int(fields.get(1, 0)), bytes(fields.get(3, b""))
+    records = fields.get(3, b"")
+    if isinstance(records, int):
+        raise RecordingError("a batch of frames holds a number where its records should be")
+    return int(fields.get(1, 0)), bytes(records)

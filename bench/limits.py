@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Any
 
 from bench.errors import ConfigError
 from bench.uncertainty import Interval
+
+Setting = float | str | list[Any] | Mapping[str, float]
+"""What a setting of the plan must be for a limit to hold: a value, one of a list, or a range with `low`, `high`."""
 
 
 class Verdict(StrEnum):
@@ -22,6 +27,7 @@ class Verdict(StrEnum):
 @dataclass(frozen=True, slots=True)
 class Limit:
     """An acceptance range, inclusive, in `unit`; None is open. `verified`: checked against `source` itself.
+    `at` are the settings of the plan that it was stated for, by name; at others it says nothing.
 
     Raises:
         ConfigError: neither end is given, one is not a number, or they are in the wrong order.
@@ -32,6 +38,7 @@ class Limit:
     unit: str
     source: str
     verified: bool
+    at: Mapping[str, Setting] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         ends = [x for x in (self.low, self.high) if x is not None]

@@ -25,6 +25,7 @@ class LinkStats:
     reconnects: int = 0
     heartbeats: int = 0
     longest_heartbeat_gap_ns: int = 0
+    octets: int = 0  # bytes that came, where the link is a stream of bytes, without an adapter's own answers
 
 
 class Link(Protocol):

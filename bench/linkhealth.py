@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 
 from bench.findings import Effect, Finding
 from bench.hosttime import Drift
 from bench.link import LinkStats
 from bench.records import LinkCounts
+from bench.stillness import STILL_S
 from bench.telemetry import Counters
 
 LATE_S = 0.04  # telemetry that comes later than this is worth a word
@@ -30,7 +31,9 @@ class Health:
     others: Mapping[str, LinkStats] = field(default_factory=dict)  # of the rig's further links
     cut_ns: int = 0  # by so much telemetry had not reached the end of a step when the run went on
     beyond_drift: int = 0  # the last windows in a row in which telemetry was further behind than by drift
+    repeats: int = 0  # requests that were sent again because no reply had come
     replies_wrong_length: int = 0  # frames of a wrong length that are no telemetry (Dialogue.wrong_length)
+    stuck: Collection[str] = ()  # channels that read the same for a second while the rotor was held
 
     @property
     def wrong_length(self) -> int:
@@ -40,10 +43,11 @@ class Health:
     def counts(self, frames: int) -> LinkCounts:
         """As the record has it; `frames` is how many were recorded, in both directions."""
         c, s = self.counters, self.stats
-        named = {**asdict(c), **asdict(s), "wrong_length": self.wrong_length}
+        named = {**asdict(c), **asdict(s), "wrong_length": self.wrong_length, "repeats": self.repeats}
         errors = self.wrong_length + c.lost + c.late + c.misplaced + c.duplicates + c.reordered + c.unknown + c.reboots
+        errors += c.sequence_leaps + c.tick_leaps
         errors += s.crc_errors + s.malformed + s.packets_lost + s.error_frames + s.refused + s.adapter_overruns
-        errors += s.overflows + s.bus_off + s.reconnects
+        errors += s.overflows + s.bus_off + s.reconnects + self.repeats
         drift = self.drift
         return LinkCounts(frames, c.gaps, errors, named, drift.ppm if drift else None,
                           drift.expanded_ppm if drift else None, self.latest_ns * 1e-6,
@@ -59,10 +63,16 @@ class Health:
             (c.reordered, "frames-reordered", f"{c.reordered} samples came out of order and were put back", Effect.NOTE),
             (c.misplaced, "messages-misplaced", f"{c.misplaced} telemetry messages came too late or too early to tell "
              "their samples and were left out. Does the controller send those of a sample together?", Effect.NOTE),
+            (c.sequence_leaps, "sequence-leapt", f"the sequence of the telemetry leapt {c.sequence_leaps} times while its tick "
+             "went on; no sample is missing by the tick", Effect.NOTE),
+            (c.tick_leaps, "tick-leapt", f"the controller's tick leapt {c.tick_leaps} times while its sequence went on: times "
+             "within those steps are wrong. Does the tick count by itself?", Effect.INDETERMINATE),
             (self.wrong_length, "wrong-length", f"{self.wrong_length} frames do not have the length of the DBC; they were "
              "left out. Does the firmware's message map match the rig file's?", Effect.INDETERMINATE),
             (c.unknown, "unknown-frames", f"{c.unknown} frames have identifiers that the DBC does not know", Effect.NOTE),
             (c.reboots, "controller-restarted", f"the controller restarted {c.reboots} times", Effect.ERROR),
+            (self.repeats, "requests-repeated", f"{self.repeats} requests were sent again because no reply had come; the "
+             "controller executes each once", Effect.NOTE),
             (s.crc_errors, "packets-corrupt", f"{s.crc_errors} packets failed their CRC and were dropped", Effect.NOTE),
             (s.malformed, "bytes-malformed", f"{s.malformed} pieces of the byte stream could not be taken apart",
              Effect.NOTE),
@@ -82,6 +92,9 @@ class Health:
         if gap > PERIODS * PERIOD_S:
             yield Finding("heartbeat-late", f"two heartbeats were {gap * 1e3:.0f} ms apart; the watchdog ends a run at "
                           "80 ms by default. Was the host busy?", "link")  # fmt: skip
+        for channel in sorted(self.stuck):
+            text = f"{channel} read the same for {STILL_S:g} s or more while the rotor was held and the tick went on"
+            yield Finding("stuck-channel", f"{text}; a live sensor has noise.", channel, Effect.ERROR)
         yield from self._clock()
         if (self.round_trip_ns or 0) > LATE_S * 1e9:
             yield Finding("link-slow", f"answers take at least {(self.round_trip_ns or 0) * 1e-6:.0f} ms: telemetry may "

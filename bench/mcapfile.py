@@ -1,52 +1,39 @@
 """Reading MCAP for `bench.recording`: one sequential pass that checks every CRC and indexes the chunks, whole or not.
 
-A file that was cut off is read up to its last complete chunk and says so; one way of reading serves both.
+A file that was cut off is read up to its last complete chunk and says so; one way of reading serves both. What is kept
+in memory is bounded, whatever the file holds.
 """
 
 from __future__ import annotations
 
-import struct
 import zlib
-from collections import OrderedDict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from io import BytesIO
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO, Final
 
-import lz4.frame
+import numpy as np
+import numpy.typing as npt
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Header, Metadata
+from mcap.records import Attachment, Channel, DataEnd, Footer, Header, Metadata
 
 from bench import layout
 from bench.errors import RecordingError
+from bench.kept import Kept
+from bench.mcapchunk import DAMAGED, MAX_CHUNK, ChunkPlace, decompressed, place_of, records_in, sound
+from bench.readlimits import ReadLimits, read_limits
 
-MAX_CHUNK = 64 << 20
-KEPT = 160  # decoded chunks of half a second: an analysis goes over its steps more than once
+KEPT: Final = 160  # decoded chunks of half a second: an analysis goes over its steps more than once
+KEPT_BYTES: Final = 64 << 20
+OVERHEAD: Final = 160  # bytes that Python adds to each message
+MAX_HEADER: Final = 48 << 20
+"""Bytes of all attachments, metadata and channels: what a file says of itself."""
 RAW = layout.raw_topic("")
 MAGIC = b"\x89MCAP0\r\n"
-DAMAGED = "the file was damaged after it was written"
-RECORDS: dict[int, Any] = {
-    Opcode.HEADER: Header, Opcode.METADATA: Metadata, Opcode.ATTACHMENT: Attachment, Opcode.CHANNEL: Channel,
-    Opcode.CHUNK: Chunk,
-}  # fmt: skip
-"""Those that are kept; schemas and indexes are not needed to read."""
-_MESSAGE = struct.Struct("<HIQQ")
-
-
-@dataclass(frozen=True, slots=True)
-class ChunkPlace:
-    """Where a chunk's compressed records lie, and what they span."""
-
-    offset: int
-    length: int
-    size: int
-    crc: int
-    compression: str
-    start_ns: int
-    end_ns: int
+Messages = list[tuple[str, int, bytes]]
 
 
 @dataclass
@@ -54,88 +41,117 @@ class McapFile:
     """An indexed file. `messages` is the only way to its content."""
 
     path: Path
+    limits: ReadLimits = field(default_factory=read_limits)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     attachments: dict[str, bytes] = field(default_factory=dict)
     topics: dict[int, tuple[str, dict[str, str]]] = field(default_factory=dict)
     chunks: list[ChunkPlace] = field(default_factory=list)
     profile: str = ""
     truncated: bool = True
-    _cache: OrderedDict[int, list[tuple[str, int, bytes]]] = field(default_factory=OrderedDict)
+    _header: int = 0
+    _kept: Kept[Messages] = field(default_factory=lambda: Kept(KEPT, KEPT_BYTES))
 
     def messages(self, topic: str, start_ns: int = 0, end_ns: int = 1 << 63) -> Iterator[tuple[int, bytes]]:
-        """Log time and data of a topic's messages with start <= log time < end, in file order."""
-        for number, chunk in enumerate(self.chunks):
-            if chunk.end_ns >= start_ns and chunk.start_ns < end_ns:
-                for name, t_ns, data in self._read(number) if topic.startswith(RAW) else self._decoded(number):
-                    if name == topic and start_ns <= t_ns < end_ns:
-                        yield t_ns, data
+        """Log time and data of a topic's messages with start <= log time < end, in file order.
 
-    def _decoded(self, number: int) -> list[tuple[str, int, bytes]]:
+        Raises:
+            RecordingError: a chunk is damaged, or holds what cannot be right.
+        """
+        first, last = self._spans
+        for number in np.flatnonzero((last >= start_ns) & (first < end_ns)).tolist():
+            for name, t_ns, data in self._read(number) if topic.startswith(RAW) else self._decoded(number):
+                if name == topic and start_ns <= t_ns < end_ns:
+                    yield t_ns, data
+
+    @cached_property
+    def _spans(self) -> tuple[npt.NDArray[np.uint64], npt.NDArray[np.uint64]]:
+        """First and last time of every chunk, ns."""
+        return (np.array([c.start_ns for c in self.chunks], np.uint64),
+                np.array([c.end_ns for c in self.chunks], np.uint64))  # fmt: skip
+
+    def _decoded(self, number: int) -> Messages:
         """The messages of a chunk but its raw frames, which are most of it and of no use to an analysis. Kept."""
-        if number in self._cache:
-            self._cache.move_to_end(number)
-            return self._cache[number]
-        out = self._cache[number] = [m for m in self._read(number) if not m[0].startswith(RAW)]
-        if len(self._cache) > KEPT:
-            self._cache.popitem(last=False)
-        return out
+        found = self._kept.get(number)
+        if found is None:
+            found = [m for m in self._read(number) if not m[0].startswith(RAW)]
+            self._kept.put(number, found, sum(len(data) + OVERHEAD for _, _, data in found))
+        return found
 
-    def _read(self, number: int) -> list[tuple[str, int, bytes]]:
+    def _read(self, number: int) -> Messages:
         place = self.chunks[number]
         with self.path.open("rb") as file:
             file.seek(place.offset)
-            records = _decompressed(self.path, place, file.read(place.length))
-        out = []
-        for channel, t_ns, data in self._parse(records):
-            if channel in self.topics:
+            records = decompressed(self.path, place, file.read(place.length))
+        out: Messages = []
+        for channel, t_ns, data in records_in(self.path, records):
+            if channel < 0:
+                self._learn(data)
+            elif channel in self.topics:
                 out.append((self.topics[channel][0], t_ns, data))
         return out
 
-    def _parse(self, records: bytes) -> Iterator[tuple[int, int, bytes]]:
-        at = 0
-        while at + 9 <= len(records):
-            opcode, length = records[at], int.from_bytes(records[at + 1 : at + 9], "little")
-            at += 9
-            if at + length > len(records):
-                raise RecordingError(f"recording {self.path}: a chunk ends in the middle of a record")
-            if opcode == 0x05:
-                channel, _, t_ns, _ = _MESSAGE.unpack_from(records, at)
-                yield channel, t_ns, records[at + _MESSAGE.size : at + length]
-            elif opcode == 0x04:
-                self._learn(records[at : at + length])
-            at += length
-
     def _learn(self, data: bytes) -> None:
-        c = Channel.read(ReadDataStream(BytesIO(data)))
-        self.topics[c.id] = (c.topic, dict(c.metadata))
+        """A channel's description: it may come again, but only the same."""
+        with sound(self.path):
+            c = Channel.read(ReadDataStream(BytesIO(data)))
+            described = (c.topic, dict(c.metadata))
+        before = self.topics.setdefault(c.id, described)
+        if before is described:
+            self.count(len(data))
+        elif before != described:
+            raise RecordingError(f"recording {self.path}: channel {c.id} is described twice, and not alike")
+
+    def count(self, size: int) -> None:
+        """Add to what the file says of itself.
+
+        Raises:
+            RecordingError: it is too much.
+        """
+        self._header += size
+        if self._header > MAX_HEADER:
+            raise RecordingError(
+                f"recording {self.path}: more than {MAX_HEADER} bytes of attachments, metadata and channels; expected fewer"
+            )
 
     def learn_channels(self) -> None:
         """Find the channels of a file without a summary: they stand in its chunks."""
         for number in range(len(self.chunks)):
-            self._decoded(number)
-        self._cache.clear()
+            self._read(number)
 
+    def take(self, opcode: int, data: bytes, after: int) -> None:
+        """Keep a record that ends at byte `after`; schemas and indexes are not needed to read.
 
-def _decompressed(path: Path, place: ChunkPlace, data: bytes) -> bytes:
-    if place.size > MAX_CHUNK:
-        raise RecordingError(f"recording {path}: a chunk of {place.size} bytes; expected at most {MAX_CHUNK}")
-    try:
-        if place.compression == "lz4":
-            data = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=place.size + 1)
-        elif place.compression:
-            raise RecordingError(f"recording {path}: compression {place.compression!r}; expected lz4")
-    except RuntimeError as error:
-        raise RecordingError(f"recording {path}: a chunk cannot be decompressed: {error}") from error
-    if len(data) != place.size or zlib.crc32(data) != place.crc:
-        raise RecordingError(f"recording {path}: a chunk fails its CRC; {DAMAGED}")
-    return data
+        Raises:
+            RecordingError: it is one too many, or cannot be right.
+        """
+        if opcode == Opcode.CHUNK:
+            place = place_of(data, after)
+            if place.size:  # an empty one holds nothing to come back for
+                self.chunks.append(place)
+            return
+        if opcode == Opcode.CHANNEL:
+            self._learn(data)
+            return
+        stream = ReadDataStream(BytesIO(data))
+        if opcode == Opcode.HEADER:
+            self.profile = Header.read(stream).profile or "none"
+        elif opcode == Opcode.METADATA:
+            self.count(len(data))
+            record = Metadata.read(stream)
+            self.metadata[record.name] = dict(record.metadata)
+        elif opcode == Opcode.ATTACHMENT:
+            self.count(len(data))
+            attached = Attachment.read(stream)
+            self.attachments[attached.name] = attached.data
 
 
 def index(path: Path) -> McapFile:
     """Read a file once, checking the CRCs of its data section and of its summary.
 
     Raises:
-        RecordingError: it cannot be read, is no MCAP file, or is damaged. A file that was cut off is no error.
+        RecordingError: it cannot be read, is no MCAP file, is damaged, or larger than the limits allow. A file that was
+            cut off is no error.
+        ConfigError: the environment states no limit.
     """
     out = McapFile(path)
     try:
@@ -144,18 +160,17 @@ def index(path: Path) -> McapFile:
             file.seek(0)
             if file.read(len(MAGIC)) != MAGIC:
                 raise RecordingError(f"{path} is not an MCAP recording: it does not begin as one")
-            out.truncated = not _scan(out, file, size)
+            with sound(path):
+                out.truncated = not _scan(out, file, size)
             file.seek(-len(MAGIC), 2)
             closed = size > 2 * len(MAGIC) and file.read() == MAGIC
     except OSError as error:
         raise RecordingError(f"recording {path}: cannot be read: {error.strerror or error}") from error
-    except (McapError, ValueError, KeyError, IndexError, struct.error, OverflowError) as error:
-        raise RecordingError(f"recording {path}: holds a record that cannot be right: {error}") from error
     if not out.profile:
         raise RecordingError(f"{path} is not an MCAP recording: it ends before a header")
     if out.truncated and closed:
         raise RecordingError(f"recording {path}: its records do not lead to its end; {DAMAGED}")
-    if out.truncated:
+    if out.truncated or not out.topics:
         out.learn_channels()
     return out
 
@@ -166,51 +181,36 @@ def _scan(out: McapFile, file: BinaryIO, size: int) -> bool:
     A length is held against the size of the file before anything is read: a cut is told from damage, and damage takes
     no memory.
     """
-    crc = zlib.crc32(MAGIC)
+    crc, at = zlib.crc32(MAGIC), len(MAGIC)
+    inflated = chunks = 0
+    where = f"recording {out.path}"
     while True:
         head = file.read(9)
         length = int.from_bytes(head[1:], "little")
-        if len(head) < 9 or length > size - file.tell():
+        at += 9 + length
+        if len(head) < 9 or at > size:
             return False
         if length > MAX_CHUNK:
-            raise RecordingError(f"recording {out.path}: a record of {length} bytes; expected at most {MAX_CHUNK}")
+            raise RecordingError(f"{where}: a record of {length} bytes; expected at most {MAX_CHUNK}")
         data = file.read(length)
-        stream = ReadDataStream(BytesIO(data))
         if head[0] == Opcode.DATA_END:
-            if DataEnd.read(stream).data_section_crc not in (0, crc):
-                raise RecordingError(f"recording {out.path}: fails its CRC; {DAMAGED}")
+            if DataEnd.read(ReadDataStream(BytesIO(data))).data_section_crc not in (0, crc):
+                raise RecordingError(f"{where}: fails its CRC; {DAMAGED}")
             crc = 0  # that of the summary begins here
         elif head[0] == Opcode.FOOTER:
             crc = zlib.crc32(data[:16], zlib.crc32(head, crc))
-            if Footer.read(stream).summary_crc not in (0, crc):
-                raise RecordingError(f"recording {out.path}: its summary fails its CRC; {DAMAGED}")
+            if Footer.read(ReadDataStream(BytesIO(data))).summary_crc not in (0, crc):
+                raise RecordingError(f"{where}: its summary fails its CRC; {DAMAGED}")
             return file.read() == MAGIC
         else:
             crc = zlib.crc32(data, zlib.crc32(head, crc))
             if head[0] == Opcode.ATTACHMENT and int.from_bytes(data[-4:], "little") not in (0, zlib.crc32(data[:-4])):
-                raise RecordingError(f"recording {out.path}: an attachment fails its CRC; {DAMAGED}")
-            if head[0] in RECORDS:
-                _take(out, RECORDS[head[0]].read(stream), file.tell())
-
-
-def _take(out: McapFile, record: object, after: int) -> None:
-    if isinstance(record, Header):
-        out.profile = record.profile or "none"
-    elif isinstance(record, Metadata):
-        out.metadata[record.name] = dict(record.metadata)
-    elif isinstance(record, Attachment):
-        out.attachments[record.name] = record.data
-    elif isinstance(record, Channel):
-        out.topics[record.id] = (record.topic, dict(record.metadata))
-    elif isinstance(record, Chunk):
-        out.chunks.append(
-            ChunkPlace(
-                after - len(record.data),
-                len(record.data),
-                record.uncompressed_size,
-                record.uncompressed_crc,
-                record.compression,
-                record.message_start_time,
-                record.message_end_time,
-            )
-        )
+                raise RecordingError(f"{where}: an attachment fails its CRC; {DAMAGED}")
+            if head[0] == Opcode.CHUNK:
+                chunks += 1
+                inflated += int.from_bytes(data[16:24], "little")
+                out.limits.check("chunks", chunks, where, "chunks")
+                out.limits.check(
+                    "inflation", (inflated - MAX_CHUNK) / size, where, "bytes in its chunks for each byte of the file"
+                )
+            out.take(head[0], data, at)

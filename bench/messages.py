@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
 
 import cantools
+import cantools.database.errors
 
 from bench.errors import ConfigError
+
+_PLACE = re.compile(r"line \d+, column \d+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +45,8 @@ class Message:
     sender: str
     signals: tuple[Signal, ...]
     comment: str
+    multiplexed: bool = False
+    """Which signals a frame holds depends on another of them: nothing here reads or writes such a message."""
 
     def signal(self, name: str) -> Signal:
         """The signal of that name (KeyError when there is none)."""
@@ -77,8 +83,19 @@ def load_messages(dbc: str, name: str = "dbc") -> MessageMap:
     try:
         database = _database(dbc)
     except Exception as error:  # cantools raises a dozen kinds, all meaning this
-        raise ConfigError(f"{name}: not a usable DBC: {error}") from error
+        raise ConfigError(f"{name}: not a usable DBC: {_why(error)}") from error
     return MessageMap({m.name: _message(m) for m in database.messages})
+
+
+def _why(error: Exception) -> str:
+    """What is wrong, without the line that is: the file may be any that the rig file names. What was read as a DBC and
+    contradicts itself is told by the names of its signals."""
+    cause = getattr(error, "e_dbc", None) or error
+    if found := _PLACE.search(str(cause)):
+        return f"wrong syntax at {found[0]}"
+    return (
+        str(cause) if isinstance(cause, cantools.database.errors.Error) else "it breaks off, or holds what no DBC does"
+    )
 
 
 @lru_cache(maxsize=8)
@@ -92,8 +109,9 @@ def _message(m: Any) -> Message:
     fd = bool(m.is_fd) or m.length > 8
     period = (m.cycle_time or 0) * 1e-3
     sender = m.senders[0] if m.senders else ""
+    signals = tuple(_signal(s) for s in m.signals)
     return Message(
-        m.name, identifier, m.length, fd, period, sender, tuple(_signal(s) for s in m.signals), _text(m.comment)
+        m.name, identifier, m.length, fd, period, sender, signals, _text(m.comment), multiplexed=m.is_multiplexed()
     )
 
 

@@ -22,7 +22,8 @@ from bench.supervisor import SafeStep, Supervisor
 @dataclass(frozen=True)
 class Job:
     """What is to be run. `seed` is None on a real rig; `lock` is what others must not share, None in simulation;
-    `calibrations` are those that the procedure needs, looked up and found fit."""
+    `calibrations` are those that the procedure needs, looked up and found fit. With `require_verdict` a run
+    that judged nothing is an error."""
 
     procedure: Procedure
     rig: RigFile
@@ -32,6 +33,7 @@ class Job:
     seed: int | None = None
     lock: AbstractContextManager[Any] | None = None
     calibrations: tuple[Calibration, ...] = ()
+    require_verdict: bool = False
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ of the plan is called always comes first.
 from __future__ import annotations
 
 import difflib
-import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -16,6 +15,7 @@ from pydantic import ValidationError
 
 from bench import units
 from bench.errors import ConfigError, Problem
+from bench.inputfile import TomlError, parse_toml
 from bench.procedure import BenchPlan
 from bench.schema import expected_of
 
@@ -71,8 +71,8 @@ def assignment(text: str) -> tuple[str, Any]:
     if not equals or not key:
         raise ConfigError(f"found {text!r}; expected KEY=VALUE")
     try:
-        table = tomllib.loads(f"value = {literal.strip()}")
-    except tomllib.TOMLDecodeError as error:
+        table = parse_toml(f"value = {literal.strip()}")
+    except TomlError as error:
         raise ConfigError(
             f"{key}: found {literal!r}, which is not a TOML value ({error}); expected a number, true or false, "
             f'a quoted string or a list, as in {key}=0.5 or {key}=\'["M1", "M2"]\''
@@ -89,9 +89,11 @@ def plan_file(path: Path) -> dict[str, Any]:
         ConfigError: it cannot be read, is not TOML, or is of another schema.
     """
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        table = parse_toml(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ConfigError(f"plan file {path}: {error.strerror or error}; expected a readable TOML file") from error
+    except TomlError as error:
+        raise ConfigError(f"plan file {path}: {error}") from error
     except ValueError as error:
         raise ConfigError(f"plan file {path}: not TOML: {error}") from error
     schema = table.pop("schema", None)

@@ -33,9 +33,16 @@ def header(job: Job) -> RunHeader:
     """Rig file, plan, limits, calibrations, versions and seed, as they stand first in the file."""
     seed = "" if job.seed is None else str(job.seed)
     limits = {name: asdict(limit) for name, limit in job.limits.items()}
+    asked = {"verdict": "required"} if job.require_verdict else {}
     return RunHeader(
         metadata={
-            "run": {"procedure": job.procedure.name, "rig": job.rig.name, "backend": job.backend, "seed": seed},
+            "run": {
+                "procedure": job.procedure.name,
+                "rig": job.rig.name,
+                "backend": job.backend,
+                "seed": seed,
+                **asked,
+            },
             "versions": versions(),
         },
         attachments={

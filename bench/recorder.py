@@ -7,6 +7,7 @@ but the last second.
 
 from __future__ import annotations
 
+import errno
 import json
 import queue
 import threading
@@ -96,7 +97,7 @@ class Recorder:
         except OSError as error:
             with suppress(OSError):  # closing tries the same bytes again
                 self._file.close()
-            raise RecordingError(f"recording {path}: cannot be written: {error.strerror or error}") from error
+            raise RecordingError(f"recording {path}: cannot be written: {_why(error)}") from error
         self._queue: queue.Queue[tuple[str, tuple[Any, ...]] | None] = queue.Queue(
             LIVE_ITEMS if live else WAITING_ITEMS
         )
@@ -207,8 +208,7 @@ class Recorder:
 
     def _raise(self) -> None:
         if self._failure is not None:
-            why = getattr(self._failure, "strerror", None) or repr(self._failure)
-            raise RecordingError(f"recording {self.path}: cannot be written: {why}") from self._failure
+            raise RecordingError(f"recording {self.path}: cannot be written: {_why(self._failure)}") from self._failure
 
     def _too_slow(self) -> str:
         return f"recording {self.path}: the disk did not keep up with the live link"
@@ -255,6 +255,12 @@ class Recorder:
             getattr(self._writer, what)(*arguments)
         except BaseException as error:
             self._failure = error
+
+
+def _why(failure: BaseException) -> str:
+    full = isinstance(failure, OSError) and failure.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+    why = getattr(failure, "strerror", None) or repr(failure)
+    return f"{why}. Next: free space there, or give another --out" if full else why
 
 
 def _add(counts: dict[str, int], name: str, count: int) -> None:

@@ -6,8 +6,6 @@ Steps are read through the chunk index, block by block, so an hour-long file tak
 from __future__ import annotations
 
 import hashlib
-import json
-from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
@@ -16,17 +14,20 @@ from typing import Any, Generic, TypeVar, cast
 import numpy as np
 import numpy.typing as npt
 
-from bench import layout
+from bench import layout, stored
 from bench.calibration import Calibration
 from bench.calibrationfile import attached
 from bench.captured import CAPTURES, Captured
 from bench.errors import AnalysisError, ConfigError, RecordingError
 from bench.frames import FrameBatch, frames_of
+from bench.kept import Kept
 from bench.layout import DecodedBlock
+from bench.mcapchunk import sound
 from bench.mcapfile import McapFile, index
 from bench.procedure import BenchPlan
-from bench.rigfile import RigFile
-from bench.samples import ChannelInfo, StreamLayout
+from bench.readlimits import MB
+from bench.rigfile import MOST_DBC, MOST_TOML, RigFile
+from bench.samples import StreamLayout
 from bench.steps import Step, Steps
 
 __all__ = ["Captured", "Recording", "Step", "Steps"]
@@ -35,6 +36,8 @@ Q = TypeVar("Q", bound=BenchPlan)
 R = TypeVar("R")
 J = TypeVar("J", dict[str, Any], list[Any])
 KEPT = 160  # decoded blocks: views of the messages, which the file keeps as long
+KEPT_BYTES = 64 << 20
+MOST_JSON = 8 << 20  # bytes of an attachment that is no DBC
 BLOCK_NS = 2_000_000_000  # no block is longer: how far back a block that reaches into an interval can begin
 
 
@@ -43,7 +46,7 @@ class Recording(Generic[P]):
 
     def __init__(self, file: McapFile, plan: type[P] | None) -> None:
         self._file, self._plan_class = file, plan
-        self._kept: OrderedDict[tuple[str, int, int], tuple[bytes, DecodedBlock]] = OrderedDict()
+        self._kept: Kept[tuple[bytes, DecodedBlock]] = Kept(KEPT, KEPT_BYTES)
         self._made: dict[Callable[[Any], Any], Any] = {}
         self.version = int(file.metadata["layout"]["version"])
         self.path = file.path
@@ -60,9 +63,9 @@ class Recording(Generic[P]):
         """
         file = index(path)
         version = file.metadata.get("layout", {}).get("version", "")
-        if file.profile != "levbench" or not version.isascii() or not version.isdigit():
+        if file.profile != "levbench" or not (version.isascii() and version.isdigit() and len(version) < 10):
             raise RecordingError(
-                f"{path} is MCAP but no Levbench recording (profile {file.profile!r}, layout {version!r})"
+                f"{path} is MCAP but no Levbench recording (profile {file.profile[:40]!r}, layout {version[:40]!r})"
             )
         if int(version) > layout.VERSION:
             raise RecordingError(
@@ -73,8 +76,17 @@ class Recording(Generic[P]):
 
     @cached_property
     def rig(self) -> RigFile:
-        """The rig file as it was when the run was made."""
-        return RigFile.parse(self.attachment("rig.toml"), self.attachment("rig.dbc"), "rig.toml (from the recording)")
+        """The rig file as it was when the run was made.
+
+        Raises:
+            RecordingError: it cannot be used.
+        """
+        try:
+            return RigFile.parse(
+                self.attachment("rig.toml"), self.attachment("rig.dbc"), "rig.toml (from the recording)"
+            )
+        except ConfigError as error:
+            raise RecordingError(f"recording {self.path}: {error}") from error
 
     @cached_property
     def plan(self) -> P:
@@ -128,10 +140,7 @@ class Recording(Generic[P]):
         raise AnalysisError(f"{self.path.name}: found calibrations by {used}; expected one by {procedure}")
 
     def _json(self, name: str, kind: type[J]) -> J:
-        try:
-            found = json.loads(self.attachment(name))
-        except ValueError as error:
-            raise RecordingError(f"recording {self.path}: attachment {name!r} is not JSON: {error}") from error
+        found = stored.parsed(self.attachment(name), f"recording {self.path}: attachment {name!r}")
         if not isinstance(found, kind):
             raise RecordingError(
                 f"recording {self.path}: attachment {name!r}: found a {type(found).__name__}; expected a {kind.__name__}"
@@ -153,6 +162,11 @@ class Recording(Generic[P]):
         return self._file.metadata.get("run", {})
 
     @property
+    def verdict_required(self) -> bool:
+        """Whether the run was to give a verdict: one without is an error."""
+        return self.run.get("verdict") == "required"
+
+    @property
     def procedure(self) -> str:
         return self.run.get("procedure", "")
 
@@ -162,16 +176,21 @@ class Recording(Generic[P]):
         try:
             return int(text) if text else None
         except ValueError as error:
-            raise RecordingError(f"recording {self.path}: seed: found {text!r}; expected an integer") from error
+            raise RecordingError(f"recording {self.path}: seed: found {text[:40]!r}; expected an integer") from error
 
     def attachment(self, name: str) -> str:
         """An attached text.
 
         Raises:
-            RecordingError: the recording has none of that name.
+            RecordingError: the recording has none of that name, or a larger one than any of ours.
         """
         try:
-            return self._file.attachments[name].decode("utf-8")
+            data = self._file.attachments[name]
+            if len(data) > (MOST_DBC if name == "rig.dbc" else MOST_TOML if name == "rig.toml" else MOST_JSON):
+                raise RecordingError(
+                    f"recording {self.path}: attachment {name!r} has {len(data)} bytes; expected fewer"
+                )
+            return data.decode("utf-8")
         except (KeyError, UnicodeDecodeError) as error:
             raise RecordingError(f"recording {self.path}: attachment {name!r} is missing or not text") from error
 
@@ -185,11 +204,8 @@ class Recording(Generic[P]):
         out = {}
         for topic, metadata in self._file.topics.values():
             if topic.endswith("/block") and "layout" in metadata:
-                described = json.loads(metadata["layout"])
                 name = topic.removeprefix("/").removesuffix("/block")
-                out[name] = StreamLayout(
-                    name, described["period_ns"], tuple(ChannelInfo(*c) for c in described["channels"])
-                )
+                out[name] = stored.stream_of(name, metadata["layout"], f"recording {self.path}: topic {topic[:80]}")
         return out
 
     @property
@@ -230,9 +246,11 @@ class Recording(Generic[P]):
         key = (stream, t_ns, id(data))
         kept = self._kept.get(key)
         if kept is None or kept[0] is not data:
-            kept = self._kept[key] = (data, DecodedBlock(self._layouts[stream], data))
-            if len(self._kept) > KEPT:
-                self._kept.popitem(last=False)
+            try:
+                kept = (data, DecodedBlock(self._layouts[stream], data))
+            except RecordingError as error:
+                raise RecordingError(f"recording {self.path}: {error}") from error
+            self._kept.put(key, kept, 2 * len(data))
         return kept[1]
 
     def read(self, channels: tuple[str, ...], start_ns: int, end_ns: int) -> dict[str, npt.NDArray[Any]]:
@@ -240,17 +258,30 @@ class Recording(Generic[P]):
 
         Raises:
             AnalysisError: a channel was not recorded, or the channels are of different streams.
+            RecordingError: more numbers than the limits allow.
         """
         stream = self._stream_of(channels)
+        count = 0
         parts: dict[str, list[npt.NDArray[Any]]] = {name: [] for name in (*channels, "t_ns", "index")}
         for block in self.blocks(stream, start_ns, end_ns):
             a, b = np.searchsorted(block.t_ns, [start_ns, end_ns])
+            count += int(b - a) * len(parts)
+            self.limit_samples(count)
             parts["t_ns"].append(block.t_ns[a:b])
             parts["index"].append(np.arange(block.first + a, block.first + b))
             for name in channels:
                 parts[name].append(block.columns[name][a:b].astype(np.float64))
         empty = {"t_ns": np.zeros(0, np.int64), "index": np.zeros(0, np.int64)}
-        return {name: np.concatenate(x) if x else empty.get(name, np.zeros(0)) for name, x in parts.items()}
+        names = tuple(parts)  # each part goes when its whole is there
+        return {n: np.concatenate(x) if (x := parts.pop(n)) else empty.get(n, np.zeros(0)) for n in names}
+
+    def limit_samples(self, count: int) -> None:
+        """See that no more numbers are read at once than the limits allow.
+
+        Raises:
+            RecordingError: `count` is too many.
+        """
+        self._file.limits.check("samples", count, f"recording {self.path}", "numbers to read at once")
 
     def channel(self, name: str, start_ns: int = 0, end_ns: int = 1 << 62) -> dict[str, npt.NDArray[Any]]:
         """One channel with start <= t < end, float64, with `t_ns` and `index`; the whole recording by default."""
@@ -279,7 +310,13 @@ class Recording(Generic[P]):
 
     @cached_property
     def _events(self) -> list[dict[str, Any]]:
-        return [json.loads(data) for _, data in self._file.messages(layout.EVENTS)]
+        out, size, where = [], 0, f"recording {self.path}"
+        for _, data in self._file.messages(layout.EVENTS):
+            size += len(data)
+            self._file.limits.check("event_mb", size / MB, where, "MB of events")
+            out.append(stored.event_of(data, f"{where}: an event"))
+            self._file.limits.check("events", len(out), where, "events")
+        return out
 
     def events(self, kind: str | None = None) -> list[dict[str, Any]]:
         """Events in order: `kind`, `t_ns` and their data."""
@@ -296,7 +333,7 @@ class Recording(Generic[P]):
         for e in self.events("step-corrected"):
             told.setdefault(e["step"], {}).update(e["labels"])
         return Steps(tuple(
-            Step(self, e["name"], {**e["labels"], **told.get(e["step"], {})}, int(e["t_ns"]), int(ends[e["step"]]))
+            Step(self, e["name"], {**e["labels"], **told.get(e["step"], {})}, e["t_ns"], ends[e["step"]])
             for e in self.events("step-begin") if e["step"] in ends
         ))  # fmt: skip
 
@@ -306,11 +343,18 @@ class Recording(Generic[P]):
             self._made[work] = work(self)
         return cast(R, self._made[work])
 
+    @property
+    def links(self) -> tuple[str, ...]:
+        """The links whose frames were recorded."""
+        raw = layout.raw_topic("")
+        return tuple(sorted({t.removeprefix(raw) for t, _ in self._file.topics.values() if t.startswith(raw)}))
+
     def frames(self, link: str) -> Iterator[FrameBatch]:
         """Raw frames, batch by batch as they were recorded."""
-        for _, data in self._file.messages(layout.raw_topic(link)):
-            _, records = layout.decode_frames(data)
-            yield frames_of(records, self.version)
+        with sound(self.path):
+            for _, data in self._file.messages(layout.raw_topic(link)):
+                _, records = layout.decode_frames(data)
+                yield frames_of(records, self.version)
 
     def close(self) -> None:
         """Nothing stays open between reads; here for symmetry with the recorder."""
@@ -318,7 +362,4 @@ class Recording(Generic[P]):
 
 def _integrity(file: McapFile) -> dict[str, Any] | None:
     found = file.metadata.get("integrity")
-    try:
-        return None if found is None else {k: json.loads(v) for k, v in found.items()}
-    except ValueError as error:
-        raise RecordingError(f"recording {file.path}: its integrity record cannot be read: {error}") from error
+    return None if found is None else stored.integrity_of(found, f"recording {file.path}: its integrity record")

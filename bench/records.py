@@ -8,7 +8,6 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -18,24 +17,16 @@ from bench.calibration import Calibration, Used
 from bench.errors import ConfigError
 from bench.findings import Effect, Finding
 from bench.limits import Limit, Verdict, judge
+from bench.outcomes import Outcome
 from bench.procedure import Measured, Quantity
 from bench.schema import require_schema
 from bench.uncertainty import PROBABILITY, Estimate, Interval, budget, correlation_matrix, interval
 from bench.wholefile import write_whole
 
-SCHEMA = 1
+SCHEMA = 2
+"""2: outcome DONE, findings with `concerns`. Records of schema 1 are read as they stand."""
 SCHEMA_FILE = Path(__file__).with_name("record.schema.json")
 _STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
-
-
-class Outcome(StrEnum):
-    """The outcome of a run, strongest first."""
-
-    ABORTED = "ABORTED"
-    ERROR = "ERROR"
-    FAIL = "FAIL"
-    INDETERMINATE = "INDETERMINATE"
-    PASS = "PASS"
 
 
 @dataclass(frozen=True)
@@ -90,13 +81,14 @@ class Measurement:
 
 @dataclass(frozen=True)
 class FindingEntry:
-    """A finding, with its effect on the outcome."""
+    """A finding, with its effect on the outcome and the quantities that it concerns; empty is all."""
 
     __pydantic_config__: ClassVar[ConfigDict] = _STRICT
     code: str
     text: str
     where: str
     effect: Effect
+    concerns: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -142,7 +134,7 @@ class Record:
     """`record.json`. Times are ISO 8601 UTC; `seed` is None for a real rig; `plan` is in SI."""
 
     __pydantic_config__: ClassVar[ConfigDict] = _STRICT
-    schema: Literal[1]
+    schema: Literal[1, 2]
     run_id: str
     procedure: str
     rig: str
@@ -186,7 +178,7 @@ def from_json(text: str, name: str = "record") -> Record:
     Raises:
         ConfigError: not a record, a newer one, unknown or missing keys, NaN.
     """
-    require_schema(text, name, "record", SCHEMA)
+    require_schema(text, name, "record", SCHEMA, oldest=1)
     try:
         return _RECORD.validate_json(text)
     except ValidationError as error:
@@ -221,9 +213,14 @@ def unfinished(
     plan: Mapping[str, Any], versions: Mapping[str, str], calibrations: Sequence[Calibration] = (),
 ) -> Record:  # fmt: skip
     """What is written before anything moves: if the run dies, this is what it says."""
-    said = Finding("unfinished", "The run did not end: its process was killed or lost power.", "", Effect.ERROR)
+    said = Finding(
+        "unfinished",
+        "The run did not end: its process was killed, lost power or could write nothing any more.",
+        "",
+        Effect.ERROR,
+    )
     return Record(
-        schema=1, run_id=run_id, procedure=procedure, rig=rig, uut=uut, outcome=Outcome.ERROR, started=started,
+        schema=2, run_id=run_id, procedure=procedure, rig=rig, uut=uut, outcome=Outcome.ERROR, started=started,
         ended=None, seed=seed, plan=plan, calibrations=tuple(c.summary for c in calibrations), versions=versions,
         recording=None, link=LinkCounts(), findings=findings_of([said]), measurements=(), correlations=Correlations((), ()),
     )  # fmt: skip
@@ -231,7 +228,7 @@ def unfinished(
 
 def findings_of(findings: Iterable[Finding]) -> tuple[FindingEntry, ...]:
     """Findings as a record holds them."""
-    return tuple(FindingEntry(f.code, f.text, f.where, f.effect) for f in findings)
+    return tuple(FindingEntry(f.code, f.text, f.where, f.effect, f.concerns) for f in findings)
 
 
 def measurement(measured: Measured, limit: Limit | None, seed: int | None = 0) -> Measurement:
@@ -280,17 +277,6 @@ def correlations_of(measured: Sequence[Measured]) -> Correlations:
     times = Counter(m.quantity.name for m in finite)
     names = (m.quantity.name if times[m.quantity.name] == 1 else f"{m.quantity.name}@{m.where}" for m in finite)
     return Correlations(tuple(names), tuple(tuple(row) for row in matrix))
-
-
-def outcome_of(
-    measurements: Iterable[Measurement], findings: Iterable[Finding | FindingEntry], stopped: Outcome | None = None
-) -> Outcome:
-    """The strongest of what stopped the run (if anything did), the verdicts and the findings' effects."""
-    by_verdict = {Verdict.MISSING: Outcome.ERROR, Verdict.FAIL: Outcome.FAIL,
-                  Verdict.INDETERMINATE: Outcome.INDETERMINATE}  # fmt: skip
-    by_effect = {Effect.ERROR: Outcome.ERROR, Effect.INDETERMINATE: Outcome.INDETERMINATE}
-    found = {stopped, *(by_verdict.get(m.verdict) for m in measurements), *(by_effect.get(f.effect) for f in findings)}
-    return next((outcome for outcome in Outcome if outcome in found), Outcome.PASS)
 
 
 def _finite(x: float) -> float | None:

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import difflib
-import tomllib
 from collections.abc import Iterator
-from typing import Any
-
-from pydantic import ValidationError
 
 from bench import binding, capture, linkurl, units
 from bench.busload import REFUSE, BusLoad, bus_load
 from bench.errors import ConfigError, Problem
 from bench.messages import MessageMap
-from bench.rigfile import RigFile, RigText, migrated, read_rig
+from bench.rigfile import RigFile, RigText, read_rig
+from bench.rigpossible import impossible
+from bench.rigrest import rest_of
 from bench.units import Unit
 
 GEOMETRY = {
@@ -43,7 +41,7 @@ SOME_GEOMETRY = {
 """Lengths that a rig may have; the procedures that need one say so."""
 MACHINE = {"pole_pairs": "1", "polar_inertia": "kg m^2", "ring_inertia": "kg m^2", "amb_asymmetry": "1",
            "radial_axes": "rad", "runout": "m", "coupling_offset": "m", "mass": "kg", "transverse_inertia": "kg m^2",
-           "weight_mass": "kg", "weight_angle": "rad"}  # fmt: skip
+           "weight_mass": "kg", "weight_angle": "rad", "drive_drag": "N m"}  # fmt: skip
 FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 
 
@@ -68,21 +66,26 @@ def check_rig(rig: str) -> tuple[tuple[Problem, ...], BusLoad | None]:
 
 def _behind(text: RigText, problems: tuple[Problem, ...]) -> Iterator[Problem]:
     """What else is wrong with a file that breaks the types: the entries at fault are left out and the rest checked."""
-    data = migrated(tomllib.loads(text.toml), str(text.path))
-    left_out = {".".join(p.key.split(".")[:2]) for p in problems}
-    for p in problems:
-        table: Any = data
-        keys = p.key.split(".")
-        depth = len(keys) if p.expected == "no such key" else min(2, len(keys))
-        for key in keys[: depth - 1]:
-            table = table.get(key, {}) if isinstance(table, dict) else {}
-        if isinstance(table, dict):
-            table.pop(keys[depth - 1], None)
-    try:
-        rest = RigFile.model_validate({**data, "toml_text": text.toml, "dbc_text": text.dbc, "path": str(text.path)})
-    except ValidationError:  # a table that cannot be missing is at fault; the rest cannot be judged without it
+    if (rest := rest_of(text, problems)) is None:
         return
-    yield from (p for p in problems_of(rest) if ".".join(p.key.split(".")[:2]) not in left_out)
+    told = {p.key for p in problems}
+    entries = {".".join(key.split(".")[:2]) for key in told}
+    for p in problems_of(rest):
+        if p.key not in told and ".".join(p.key.split(".")[:2]) not in entries:
+            yield p
+
+
+def as_far_as_read(rig: str) -> RigFile | None:
+    """A rig file, whatever is wrong with it: entries at fault are left out; None where nothing of it can be told.
+
+    Raises:
+        ConfigError: there is no such rig, or its files cannot be read at all.
+    """
+    text = read_rig(rig)
+    try:
+        return RigFile.parse(text.toml, text.dbc, str(text.path))
+    except ConfigError as error:
+        return rest_of(text, error.problems) if error.problems else None
 
 
 def problems_of(rig: RigFile) -> list[Problem]:
@@ -95,12 +98,14 @@ def problems_of(rig: RigFile) -> list[Problem]:
         *_masses(rig),
         *_envelope(rig),
         *_parameters(rig),
+        *impossible(rig),
     ]
     if not any(p.key.startswith("devices") for p in found):
         try:
             messages = rig.messages
         except ConfigError as error:
-            return [*found, Problem(rig.link.dbc, "(file)", str(error), "a usable DBC")]
+            why = str(error).removeprefix(f"{rig.link.dbc}: not a usable DBC: ")
+            return [*found, Problem(rig.link.dbc, "(file)", why, "a usable DBC")]
         found += [*_bindings(rig, messages), *_bus(rig, messages)]
     return found
 
@@ -153,7 +158,7 @@ def _units(rig: RigFile) -> Iterator[Problem]:
             )
         if symbol not in units.UNITS:
             close = difflib.get_close_matches(symbol, units.UNITS, 1)
-            yield Problem(rig.path, key, repr(symbol), f"a known unit{f', such as {close[0]!r}' if close else ''}")
+            yield Problem(rig.path, key, repr(symbol), units.KNOWN + (f". Did you mean {close[0]!r}?" if close else ""))
     kinds = {f"geometry.{n}": (g, "N/m" if n.endswith("_stiffness") else "m") for n, g in rig.geometry.items()}
     kinds |= {f"masses.{n}": (m, "kg") for n, m in rig.masses.items()}
     kinds |= {f"machine.{n}": (m, MACHINE[n]) for n, m in rig.machine.items() if n in MACHINE}
@@ -212,6 +217,9 @@ def _envelope(rig: RigFile) -> Iterator[Problem]:
         for name in rig.envelope.positions:
             if name not in rig.channels:
                 yield Problem(rig.path, "envelope.positions", name, "a channel of this rig")
+    low, high = rig.envelope.min_supply_V or 0.0, rig.envelope.max_supply_V
+    if high is not None and high <= low:
+        yield Problem(rig.path, "envelope.max_supply_V", f"{high:g}", f"more than min_supply_V = {low:g}")
 
 
 def _parameters(rig: RigFile) -> Iterator[Problem]:
@@ -240,7 +248,7 @@ def _bindings(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
             continue
         dbc_unit = known[signal].unit
         if dbc_unit not in units.UNITS:
-            yield Problem(rig.link.dbc, channel.signal, f"unit {dbc_unit!r}", "a known unit")
+            yield Problem(rig.link.dbc, channel.signal, f"unit {dbc_unit!r}", units.KNOWN)
         elif channel.unit in units.UNITS and units.UNITS[dbc_unit].si != units.UNITS[channel.unit].si:
             yield Problem(rig.path, f"channels.{name}.unit", channel.unit, f"the kind of {dbc_unit} ({channel.signal})")
     yield from _signals_of_parameters(rig, messages)
@@ -266,7 +274,7 @@ def _signals_of_parameters(rig: RigFile, messages: MessageMap) -> Iterator[Probl
         taken.setdefault(p.signal, name)
         unit = units.UNITS.get(signal.unit)
         if unit is None:
-            yield Problem(rig.link.dbc, p.signal, f"unit {signal.unit!r}", "a known unit")
+            yield Problem(rig.link.dbc, p.signal, f"unit {signal.unit!r}", units.KNOWN)
         elif p.unit in units.UNITS and unit.si != units.UNITS[p.unit].si:
             yield Problem(rig.path, f"parameters.{name}.unit", p.unit, f"the kind of {signal.unit} ({p.signal})")
         elif not all(binding.fits(signal, (x - unit.offset) / unit.factor) for x in (p.low, p.high, p.default)):

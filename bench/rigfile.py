@@ -6,7 +6,6 @@ The `[simulation]` table is parsed like the rest and read by the simulated backe
 from __future__ import annotations
 
 import hashlib
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -15,17 +14,21 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
-from bench import catalogue
+from bench import catalogue, units
 from bench.binding import Binding
 from bench.capture import CaptureSpec
 from bench.errors import ConfigError, Problem
+from bench.inputfile import TomlError, decoded, parse_toml, read_regular
 from bench.messages import MessageMap, load_messages
 from bench.part import Part
 from bench.registers import Register
 from bench.schema import expected_of
-from bench.toleranced import Toleranced, simulated
+from bench.toleranced import UNKNOWN_UNIT, Toleranced, simulated
 
 SCHEMA = 1
+MOST_TOML = 1 << 20
+MOST_DBC = 16_000_000
+"""Bytes of a rig file, and of its DBC wherever it lies."""
 MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
 """From an older schema to the next one."""
 
@@ -78,9 +81,12 @@ class Device(Part):
 
 
 class Channel(Part):
+    """`noise`: the least standard deviation of its readings while the rotor is held, SI."""
+
     signal: str
     unit: str
     about: str = ""
+    noise: float | None = Field(None, gt=0)
 
 
 class Parameter(Part):
@@ -102,7 +108,8 @@ class Sensor(Part):
 
 
 class Envelope(Part):
-    """Protection range. `positions` are the channels that `max_levitated_position_m` bounds while the rotor is held."""
+    """Protection range. `positions` are the channels that `max_levitated_position_m` bounds while the rotor is held; the
+    supply's voltage is bounded then too."""
 
     max_hung_kg: float = Field(ge=0)
     max_current_A: float = Field(gt=0)
@@ -111,6 +118,9 @@ class Envelope(Part):
     max_levitated_position_m: float = Field(gt=0)
     max_trial_weight_kg: float = Field(0.0, ge=0)  # in a balancing plane
     max_injection_A: float = Field(0.0, ge=0)  # into the current reference of an axis, greatest value of the sum
+    min_supply_V: float | None = Field(None, gt=0)
+    max_supply_V: float | None = Field(None, gt=0)
+    max_drive_torque_Nm: float | None = Field(None, gt=0)
     positions: tuple[str, ...] = ("pos_xi", "pos_yi", "pos_xo", "pos_yo")
 
 
@@ -192,6 +202,13 @@ class RigFile(Part):
         message, _, signal = self.channels[channel].signal.partition(".")
         return self.messages[message].signal(signal).choices
 
+    def noisy(self, channel: str) -> bool:
+        """Whether the readings of a channel must differ while the rotor is held: its stated noise is above one count."""
+        c = self.channels[channel]
+        message, _, signal = c.signal.partition(".")
+        s = self.messages[message].signal(signal)
+        return c.noise is not None and c.noise > abs(s.scale * units.UNITS[s.unit].factor)
+
     @property
     def link(self) -> LinkSpec:
         """The controller's link."""
@@ -211,9 +228,9 @@ def _parsed(toml_text: str, dbc_text: str, path: str) -> RigFile:
 
 def _toml(text: str, path: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"rig file {path}: not TOML: {error}") from error
+        return parse_toml(text)
+    except TomlError as error:
+        raise ConfigError(f"rig file {path}: {error}") from error
 
 
 def migrated(data: dict[str, Any], path: str) -> dict[str, Any]:
@@ -236,6 +253,8 @@ def migrated(data: dict[str, Any], path: str) -> dict[str, Any]:
 
 def _problem(error: Any, path: str) -> Problem:
     key = ".".join(str(part) for part in error["loc"] if part != "schema_") or "(file)"
+    if error["type"] == UNKNOWN_UNIT:
+        return Problem(path, f"{key}.unit", repr(error["ctx"]["symbol"]), units.KNOWN)
     found = "nothing" if error["type"] == "missing" else repr(error.get("input"))
     if error["type"] != "missing" and isinstance(error.get("input"), dict):
         found = "a table with " + ", ".join(error["input"])
@@ -259,20 +278,38 @@ def read_rig(rig: str) -> RigText:
     """
     path = catalogue.rig_path(rig)
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"rig file {path}: cannot be read: {error}") from error
+        text = decoded(read_regular(path, MOST_TOML), "utf-8")
+    except OSError as error:
+        raise ConfigError(f"rig file {path}: cannot be read: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"rig file {path}: byte {error.start} is not UTF-8; expected TOML, which is UTF-8") from error
     data = _toml(text, str(path))
     links = _table(data, "links")
     used = str(_table(_table(data, "devices"), "controller").get("link", ""))
     mapped = [n for n in (used, *links) if _table(links, n).get("dbc")]  # another's, if the controller's has none
     if not mapped:
         raise ConfigError(f'rig file {path}: links: found no dbc; expected [links.NAME] with dbc = "FILE.dbc"')
-    dbc, encoding = str(links[mapped[0]]["dbc"]), str(links[mapped[0]].get("encoding", "utf-8"))
+    return RigText(path, text, _dbc_text(path, f"links.{mapped[0]}", links[mapped[0]]))
+
+
+def _dbc_text(path: Path, key: str, link: Mapping[str, Any]) -> str:
+    """The DBC of a link; what is wrong with it is told without a word of it: it may be any file."""
+    dbc, encoding = str(link["dbc"]), str(link.get("encoding", "utf-8"))
     try:
-        return RigText(path, text, (path.parent / dbc).read_text(encoding=encoding))
-    except (OSError, UnicodeDecodeError, LookupError) as error:
-        raise ConfigError(f"rig file {path}: dbc: cannot read {path.parent / dbc}: {error}") from error
+        return decoded(read_regular(path.parent / dbc, MOST_DBC), encoding)
+    except OSError as error:
+        why = error.strerror or error
+        raise ConfigError(f"rig file {path}: {key}.dbc: cannot read {path.parent / dbc}: {why}") from error
+    except LookupError as error:
+        raise ConfigError(
+            f"rig file {path}: {key}.encoding: found {encoding!r}; expected a known one, such as cp1252"
+        ) from error
+    except ValueError as error:
+        at = f"byte {error.start} of " if isinstance(error, UnicodeDecodeError) else ""
+        raise ConfigError(
+            f"rig file {path}: {key}.encoding: found {encoding!r}, which {at}{dbc} is not; expected that of the file, such as "
+            'encoding = "cp1252"'
+        ) from error
 
 
 def _table(data: Mapping[str, Any], key: str) -> Mapping[str, Any]:

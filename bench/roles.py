@@ -91,6 +91,7 @@ class Drive(Protocol):
     def run(self) -> None: ...  # it gives torque; the speed follows
     def reach(self, rad_s: float) -> None: ...  # set_speed, run, at its own acceleration; returns at that speed
     def coast(self) -> None: ...  # no torque
+    def brake(self) -> None: ...  # begins to brake; returns when it was told
     def stop(self) -> None: ...  # brakes; returns at standstill
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+SHOWN = "shown"  # attribute of a record that the terminal gets whatever its level
 ROOMS = ("bench", "drivers", "procedures", "reports", "sim_backend")
 
 
@@ -24,10 +25,21 @@ class _Forward(logging.Handler):
             self._sink(record)
 
 
+class _Quiet(logging.FileHandler):
+    """A full disk costs lines of the log, and no tracebacks on the terminal in the middle of a run."""
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        pass
+
+    def close(self) -> None:
+        with suppress(OSError):
+            super().close()
+
+
 @contextmanager
 def to_file(path: Path) -> Iterator[None]:
     """Everything from INFO on goes to `path` within the block, tracebacks included."""
-    handler = logging.FileHandler(path, encoding="utf-8", delay=False)
+    handler = _Quiet(path, encoding="utf-8", delay=False)
     layout = logging.Formatter("%(asctime)s.%(msecs)03dZ %(levelname)-7s %(name)s: %(message)s", "%Y-%m-%dT%H:%M:%S")
     layout.converter = time.gmtime
     handler.setFormatter(layout)
@@ -37,9 +49,22 @@ def to_file(path: Path) -> Iterator[None]:
 
 @contextmanager
 def to_lines(line: Callable[[str], None], level: int = logging.WARNING) -> Iterator[None]:
-    """Within the block `line` gets each message from `level` on, without its traceback."""
-    with _attached(_Forward(level, lambda r: line(f"{r.levelname.lower()}: {r.getMessage()}")), level):
+    """Within the block `line` gets each message from `level` on, without its traceback, and each that is `shown`."""
+
+    def sink(record: logging.LogRecord) -> None:
+        if record.levelno >= level:
+            line(f"{record.levelname.lower()}: {record.getMessage()}")
+        elif hasattr(record, SHOWN):
+            line(record.getMessage())
+
+    lowest = min(level, logging.INFO)
+    with _attached(_Forward(lowest, sink), lowest):
         yield
+
+
+def show(logger: logging.Logger, text: str) -> None:
+    """A line for the terminal and the log that is no warning."""
+    logger.info(text, extra={SHOWN: True})
 
 
 @contextmanager

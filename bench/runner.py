@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack, nullcontext
+from contextlib import ExitStack, nullcontext, suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
@@ -23,10 +23,12 @@ from bench.errors import ConfigError, RecordingError, SignalAbort
 from bench.evaluation import Ending, Evaluation, evaluate
 from bench.findings import SIMULATED_CONTROLLER, Effect, Finding
 from bench.opened import Connect, Job, OpenRig
+from bench.outcomes import Outcome, outcome_of
 from bench.procedure import Procedure
 from bench.progress import Progress
 from bench.recording import Recording
-from bench.records import Outcome, Record, RecordingFile, findings_of, unfinished, write_record
+from bench.records import Record, RecordingFile, findings_of, unfinished, write_record
+from bench.reserve import reserved
 from bench.rundir import RunDirectory
 from bench.supervisor import Supervisor
 
@@ -68,7 +70,6 @@ def run(
         ConfigError: the rig is in use or not the one of the rig file, a link cannot be opened, or the run directory
             cannot be made; nothing was started.
         LinkError: the controller does not talk; nothing was started.
-        OSError: the record cannot be written (a full disk); the one that says unfinished stays.
     """
     started = datetime.now(UTC)
     with ExitStack() as stack:
@@ -77,6 +78,7 @@ def run(
         with connect(supervisor) as live:  # what is wrong with a link is said before anything exists
             _same_kind(job, live)
             directory = rundir.create(out, job.procedure.name, started)
+            release = stack.enter_context(reserved(directory.path))
             record = _unfinished(job, directory, started)
             write_record(directory.record, record)
             stack.enter_context(runlog.to_file(directory.log))
@@ -84,11 +86,13 @@ def run(
             progress.line(f"{job.procedure.name} on {job.rig.name} ({job.backend}), run {directory.run_id}")
             wall = partial(provenance.wall, directory, started, job.rig.path)
             machine = acquired(job, directory.recording, live, supervisor, progress, wall=wall)
+        release()  # a disk that is full by now still takes the record
         with progress.busy("analyse"):
             result, recording = _concluded(job, directory, record, machine, supervisor)
-        write_record(directory.record, result.record)
+        result = _written(directory, result)
         if machine.truth is not None:
-            _write_json(directory.truth, machine.truth)
+            with suppress(OSError):  # what a simulated rig drew is drawn again from its seed
+                _write_json(directory.truth, machine.truth)
         result = _reported(job, directory, result, recording, report, supervisor, progress)
         _indexed(directory)
         logger.info("outcome %s %s", result.outcome, result.reason)
@@ -141,6 +145,21 @@ def _concluded(
     return result, recording if digest else None
 
 
+def _written(directory: RunDirectory, result: RunResult) -> RunResult:
+    """The result once its record is written. Where that cannot be, the one on the disk stays, and what comes back says so."""
+    try:
+        write_record(directory.record, result.record)
+        return result
+    except OSError as error:
+        text = (f"{directory.record}: cannot be written: {error.strerror or error}; what stands there is older. Next: free "
+                f"space there, then `bench analyse {directory.path}`")  # fmt: skip
+        logger.error("%s", text)
+        added = findings_of([Finding("record-not-written", text, "record", Effect.ERROR)])
+        findings = (*result.record.findings, *added)
+        outcome = outcome_of(result.record.measurements, findings, result.record.outcome)
+        return replace(result, record=replace(result.record, findings=findings, outcome=outcome))
+
+
 def _evaluated(job: Job, recording: Recording[Any] | None, ending: Ending) -> Evaluation:
     nothing = recording is None or ending.stopped is not None
     return evaluate(job.procedure, cast(Recording[Any], recording), job.limits, stopped=nothing)
@@ -165,8 +184,7 @@ def _reported(
         logger.debug("traceback", exc_info=error)
         added = findings_of([Finding("report-failed", str(error) or type(error).__name__, "report")])
         record = replace(result.record, findings=(*result.record.findings, *added))
-    write_record(directory.record, record)
-    return replace(result, record=record)
+    return _written(directory, replace(result, record=record))
 
 
 def _indexed(directory: RunDirectory) -> None:

@@ -9,8 +9,9 @@ from typing import Any
 from bench.errors import ConfigError
 
 
-def require_schema(text: str, name: str, kind: str, schema: int) -> None:
-    """See that `text` is JSON without NaN and of this schema; `name` and `kind` (such as "record") stand in the messages.
+def require_schema(text: str, name: str, kind: str, schema: int, oldest: int | None = None) -> None:
+    """See that `text` is JSON without NaN and of this schema, or from the `oldest` that is read on; `name` and `kind` (such as
+    "record") stand in the messages.
 
     Raises:
         ConfigError: it is not, or was written by a newer Levbench.
@@ -23,7 +24,7 @@ def require_schema(text: str, name: str, kind: str, schema: int) -> None:
     found = content.get("schema") if isinstance(content, dict) else None
     if type(found) is not int:
         raise ConfigError(f"{name}: not a {kind}: found no schema number; expected schema = {schema}")
-    if found != schema:
+    if not (oldest or schema) <= found <= schema:
         newer = " It was written by a newer Levbench." if found > schema else ""
         raise ConfigError(f"{name}: schema: found {found}; expected {schema}.{newer}")
 

@@ -1,4 +1,4 @@
-"""The one module that touches POSIX and Windows signals: SIGINT and SIGTERM delivered to a callback, then restored."""
+"""The one module that touches POSIX and Windows signals: SIGINT, SIGTERM and SIGHUP delivered to a callback, then restored."""
 
 from __future__ import annotations
 
@@ -9,14 +9,17 @@ from contextlib import contextmanager
 from types import FrameType
 
 STOPPING = (signal.SIGINT, signal.SIGTERM)
+HANGUP = getattr(signal, "SIGHUP", None)
+"""A terminal that closed, such as a connection over ssh that was lost; Windows has none."""
 
 
 @contextmanager
 def delivered_to(callback: Callable[[str], None]) -> Iterator[None]:
-    """Within the block, SIGINT and SIGTERM call `callback` with the signal's name instead of their usual effect.
+    """Within the block, SIGINT, SIGTERM and SIGHUP call `callback` with the signal's name instead of their usual effect.
 
-    Both are installed explicitly: a process started in the background by a shell inherits SIGINT ignored. Outside of
-    the main thread Python allows no handlers, and the block runs without.
+    The first two are installed explicitly: a process started in the background by a shell inherits SIGINT ignored. A
+    SIGHUP that is ignored at the start stays so: `nohup` asks for that. Outside of the main thread Python allows no
+    handlers, and the block runs without.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -25,7 +28,10 @@ def delivered_to(callback: Callable[[str], None]) -> Iterator[None]:
     def handle(number: int, _: FrameType | None) -> None:
         callback(signal.Signals(number).name)
 
-    before = {number: signal.signal(number, handle) for number in STOPPING}
+    watched = list(STOPPING)
+    if HANGUP is not None and signal.getsignal(HANGUP) != signal.SIG_IGN:
+        watched.append(HANGUP)
+    before = {number: signal.signal(number, handle) for number in watched}
     try:
         yield
     finally:

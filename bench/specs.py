@@ -2,22 +2,37 @@
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Collection, Mapping
+import math
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from bench.errors import ConfigError, Problem
-from bench.limits import Limit
+from bench.findings import Finding
+from bench.inputfile import TomlError, parse_toml
+from bench.limits import Limit, Setting
+from bench.plans import field_of
+from bench.procedure import BenchPlan
 
 SCHEMA = 1
+NOT_APPLIED = "limit-not-applied"  # a note: the limit was stated for other settings
 INSTALLED = Path(__file__).resolve().parent.parent / "specs"
 
 
+_STRICT = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+class _Range(BaseModel):
+    model_config = _STRICT
+
+    low: float | None = None
+    high: float | None = None
+
+
 class _Entry(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+    model_config = _STRICT
 
     low: float | None = None
     high: float | None = None
@@ -26,39 +41,110 @@ class _Entry(BaseModel):
     unit: str
     source: str
     verified: bool
+    at: dict[str, bool | float | str | list[float] | list[str] | _Range] = Field(default_factory=dict)
 
     def limit(self) -> Limit:
+        at: dict[str, Setting] = {k: _setting(k, v) for k, v in self.at.items()}
         if self.nominal is None and self.relative is None:
-            return Limit(self.low, self.high, self.unit, self.source, self.verified)
+            return Limit(self.low, self.high, self.unit, self.source, self.verified, at)
         if self.nominal is None or self.relative is None or not (self.low is None and self.high is None):
             raise ConfigError("low and high, or nominal and relative")
         if self.relative < 0:
             raise ConfigError(f"relative: found {self.relative}; expected 0 or more")
         half = abs(self.nominal) * self.relative
-        return Limit(self.nominal - half, self.nominal + half, self.unit, self.source, self.verified)
+        return Limit(self.nominal - half, self.nominal + half, self.unit, self.source, self.verified, at)
+
+
+def _setting(key: str, value: Any) -> Setting:
+    if not isinstance(value, _Range):
+        if value == []:
+            raise ConfigError(f"at.{key}: found an empty list; expected one value or more")
+        return value  # type: ignore[no-any-return]
+    ends = {k: v for k, v in (("low", value.low), ("high", value.high)) if v is not None}
+    if not ends or list(ends.values()) != sorted(ends.values()):
+        raise ConfigError(f"at.{key}: found {ends}; expected low, high or both, low <= high")
+    return ends
 
 
 def load_spec(
-    rig_name: str, procedure: str, quantities: Collection[str] | None = None, folders: Collection[Path] | None = None
+    rig_name: str,
+    procedure: str,
+    quantities: Collection[str] | None = None,
+    folders: Collection[Path] | None = None,
+    *,
+    file: Path | None = None,
+    settings: Collection[str] | None = None,
 ) -> Mapping[str, Limit]:
     """Limits by quantity name, from `./specs`, else the installed `specs/`; empty if the rig or procedure has none.
+    `file` is one to be read instead.
 
-    With `quantities`, a limit of any other name is refused: a misspelt one would be silently void.
+    With `quantities`, a limit of any other name is refused: a misspelt one would be silently void. So is, with `settings`
+    (those of the procedure's plan), one that is stated at another setting.
 
     Raises:
         ConfigError: the file cannot be used; every problem is named.
     """
-    for folder in (Path("specs"), INSTALLED) if folders is None else folders:
-        path = folder / f"{rig_name}.toml"
-        if path.is_file():
-            try:
-                text = path.read_text(encoding="utf-8")
-            except (OSError, ValueError) as error:
-                raise ConfigError(f"spec {path}: cannot be read: {error}; expected a TOML file") from error
-            limits = parse_spec(text, str(path)).get(procedure, {})
-            _refuse_unknown(limits, quantities, f"{path}: limits.{procedure}")
-            return limits
-    return {}
+    found = [folder / f"{rig_name}.toml" for folder in ((Path("specs"), INSTALLED) if folders is None else folders)]
+    path = file or next((p for p in found if p.is_file()), None)
+    if path is None:
+        return {}
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        raise ConfigError(f"spec {path}: cannot be read: {error}; expected a TOML file") from error
+    limits = parse_spec(text, str(path)).get(procedure, {})
+    _refuse_unknown(limits, quantities, f"{path}: limits.{procedure}")
+    problems = [] if settings is None else list(_unknown_settings(limits, tuple(settings), str(path), procedure))
+    if problems:
+        raise ConfigError(f"spec {path} cannot be used:", tuple(problems))
+    return limits
+
+
+def applied(limits: Mapping[str, Limit], plan: BenchPlan) -> tuple[Mapping[str, Limit], tuple[Finding, ...]]:
+    """The limits that hold for a plan, and a note for those that were stated for other settings, with these."""
+    others: dict[str, list[str]] = {}
+    for name, limit in limits.items():
+        if differ := "; ".join(_differences(limit, plan)):
+            others.setdefault(differ, []).append(name)
+    notes = tuple(
+        Finding(NOT_APPLIED, f"no verdict on {', '.join(names)}: the limit was stated for {differ}", "spec")
+        for differ, names in others.items()
+    )
+    left_out = {name for names in others.values() for name in names}
+    return {name: limit for name, limit in limits.items() if name not in left_out}, notes
+
+
+def _differences(limit: Limit, plan: BenchPlan) -> Iterator[str]:
+    """Settings at which a limit was stated and the plan is not, with both."""
+    for key, stated in limit.at.items():
+        field, scale = field_of(key, tuple(type(plan).model_fields))
+        found = getattr(plan, field)
+        each = found if isinstance(found, tuple | list) else (found,)
+        if not all(_fits(value, stated, scale or 1.0) for value in each):
+            shown = [f"{v / (scale or 1.0):g}" if isinstance(v, int | float) else str(v) for v in each]
+            yield f"{key} {_stated(stated)}, here it is {', '.join(shown)}"
+
+
+def _fits(value: Any, stated: Setting, scale: float) -> bool:
+    if isinstance(stated, list):
+        return any(_fits(value, one, scale) for one in stated)
+    if isinstance(stated, Mapping):
+        if not isinstance(value, int | float):
+            return False
+        low, high = (stated.get(k, default) * scale for k, default in (("low", -math.inf), ("high", math.inf)))
+        slack = 1e-9 * abs(value)  # a speed in r/min is not exactly one in rad/s
+        return bool(low - slack <= value <= high + slack)
+    if isinstance(value, str | bool) or value is None or isinstance(stated, str | bool):
+        return bool(value == stated)
+    return math.isclose(value, stated * scale, rel_tol=1e-9, abs_tol=1e-15)
+
+
+def _stated(setting: Setting) -> str:
+    if isinstance(setting, list):
+        return "of " + ", ".join(f"{x:g}" if isinstance(x, float) else str(x) for x in setting)
+    if isinstance(setting, Mapping):
+        return " to ".join(f"{setting[k]:g}" if k in setting else "any" for k in ("low", "high"))
+    return f"= {setting:g}" if isinstance(setting, float) else f"= {setting}"
 
 
 def parse_spec(text: str, name: str = "spec") -> dict[str, dict[str, Limit]]:
@@ -68,9 +154,9 @@ def parse_spec(text: str, name: str = "spec") -> dict[str, dict[str, Limit]]:
         ConfigError: not TOML, another schema, unknown or missing keys, wrong limits; every problem is named.
     """
     try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"spec {name}: not TOML: {error}") from error
+        table = parse_toml(text)
+    except TomlError as error:
+        raise ConfigError(f"spec {name}: {error}") from error
     schema = table.pop("schema", None)
     if type(schema) is not int or schema != SCHEMA:
         newer = " It was written for a newer Levbench." if isinstance(schema, int) and schema > SCHEMA else ""
@@ -116,3 +202,14 @@ def _refuse_unknown(limits: Mapping[str, Limit], quantities: Collection[str] | N
     unknown = [] if quantities is None else [q for q in limits if q not in quantities]
     if unknown:
         raise ConfigError(f"{key}: found {', '.join(unknown)}; expected one of {', '.join(quantities or ())}")
+
+
+def _unknown_settings(
+    limits: Mapping[str, Limit], settings: tuple[str, ...], path: str, procedure: str
+) -> Iterator[Problem]:
+    for name, limit in limits.items():
+        for key, value in limit.at.items():
+            try:
+                field_of(key, settings)
+            except ConfigError as error:
+                yield Problem(path, f"limits.{procedure}.{name}.at.{key}", repr(value), str(error))

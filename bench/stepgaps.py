@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from bench.described import described
-from bench.findings import Finding
+from bench.findings import Effect, Finding
+from bench.procedure import Procedure
 from bench.recording import Recording
 
 NAMED = 12  # more are counted together
@@ -26,3 +27,11 @@ def incomplete_steps(recording: Recording[Any]) -> Iterator[Finding]:
     yield from (Finding("step-incomplete", text, "acquire") for text in found[:NAMED])
     if len(found) > NAMED:
         yield Finding("step-incomplete", f"{len(found) - NAMED} more steps miss samples", "acquire")
+
+
+def missing_steps(procedure: Procedure, recording: Recording[Any]) -> Iterator[Finding]:
+    """A finding where the recording has fewer steps than its plan asks for: what is concluded holds for another plan."""
+    planned = (procedure.fewest_steps or procedure.step_count)(recording.plan)
+    if (there := len(recording.all_steps())) < planned:
+        text = f"the plan asks for {planned} steps or more; the recording has {there}"
+        yield Finding("steps-missing", text, "acquire", Effect.INDETERMINATE)

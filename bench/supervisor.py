@@ -12,6 +12,7 @@ calls must not block outside of `clock.sleep`; links never do (`receive` never w
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -30,7 +31,7 @@ class SafeStep:
 
     name: str
     action: Callable[[], None]
-    timeout_s: float
+    timeout_s: float = math.inf  # one that watches its own time has no other
 
 
 class _Mode(Enum):
@@ -46,7 +47,10 @@ class Supervisor:
         self._mode = _Mode.AT_ONCE
         self._signal: str | None = None
         self._answered = False  # the signal has ended what it was to end
-        self._ignored: list[str] = []  # handlers do not log: a signal may arrive inside a write to the same stream
+        self._unanswered: list[
+            tuple[str, bool]
+        ] = []  # signals and whether each is the first; handlers do not log: a signal
+        # may arrive inside a write to the same stream
         self._deadline_ns: int | None = None
         self._step = ""
 
@@ -57,10 +61,10 @@ class Supervisor:
 
     @contextmanager
     def watching(self) -> Iterator[Supervisor]:
-        """SIGINT and SIGTERM come here within the block and go where they went before after it."""
+        """SIGINT, SIGTERM and SIGHUP come here within the block and go where they went before after it."""
         with signals.delivered_to(self._received):
             yield self
-        self._log_ignored()
+        self._answer()
 
     @contextmanager
     def moving(self) -> Iterator[None]:
@@ -97,7 +101,7 @@ class Supervisor:
         """What is done within the block must be whole: a signal waits for the next checkpoint."""
         with self._in(_Mode.LATER):
             yield
-        self._log_ignored()
+        self._answer()
 
     @contextmanager
     def _in(self, mode: _Mode) -> Iterator[None]:
@@ -115,7 +119,7 @@ class Supervisor:
             LinkError: the present step of make-safe has run out of time.
         """
         if self._mode is _Mode.LATER:
-            self._log_ignored()
+            self._answer()
             if self._deadline_ns is not None and now_ns > self._deadline_ns:
                 raise LinkError(f"make-safe step {self._step!r} did not end within its time")
             return
@@ -127,7 +131,8 @@ class Supervisor:
         with self.finishing():
             for step in steps:
                 logger.info("make safe: %s", step.name)
-                self._step, self._deadline_ns = step.name, now_ns() + round(step.timeout_s * 1e9)
+                limited = math.isfinite(step.timeout_s)
+                self._step, self._deadline_ns = step.name, now_ns() + round(step.timeout_s * 1e9) if limited else None
                 try:
                     step.action()
                 except Exception as error:
@@ -137,15 +142,17 @@ class Supervisor:
                         logger.warning("make safe: %s failed: %s", step.name, text)
                     failed.setdefault(text, []).append(step.name)
                 finally:
-                    self._deadline_ns = None
+                    self._deadline_ns, self._step = None, ""
         return tuple(
             Finding("make-safe-failed", f"make-safe failed ({', '.join(names)}): {text}", names[0], Effect.ERROR)
             for text, names in failed.items()
         )
 
     def _received(self, name: str) -> None:
-        if self._signal is not None:
-            self._ignored.append(name)
+        first = self._signal is None
+        if not first or self._mode is _Mode.LATER:
+            self._unanswered.append((name, first))
+        if not first:
             return
         self._signal = name
         if self._mode is _Mode.AT_ONCE:
@@ -160,6 +167,16 @@ class Supervisor:
         if self._signal is not None and not self._answered:
             raise SignalAbort(f"stopped by {self._signal}")
 
-    def _log_ignored(self) -> None:
-        while self._ignored:
-            logger.warning("%s ignored: the run is already being stopped", self._ignored.pop(0))
+    def _answer(self) -> None:
+        """A line for each signal that changes nothing now: whoever sent it sees that it came."""
+        while self._unanswered:
+            name, first = self._unanswered.pop(0)
+            doing = (
+                f"the machine is being made safe ({self._step})"
+                if self._step
+                else "what is begun is brought to its end"
+            )
+            if first:
+                logger.warning("%s: %s; the run ends after that", name, doing)
+            else:
+                logger.warning("%s ignored: %s", name, doing if self._step else "the run is already being stopped")

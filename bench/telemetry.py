@@ -14,15 +14,14 @@ from bench.frames import ERROR, FrameBatch
 from bench.hosttime import HostMap
 from bench.rigfile import RigFile
 from bench.samples import ChannelInfo, SampleBlock, StreamLayout
+from bench.stillness import CODES, Stillness
+from bench.unwrapping import Unwrapping, signed
 
 Integers = npt.NDArray[np.int64]
 STREAM = "telemetry"
-CODES = ("state", "fault", "flags")
 REMEMBERED = 2000
 REBOOT_S = 1.0  # a tick so far in the past is a restart, not a late frame
 STALE = 100  # old samples in a row that are no repetition any more
-SLACK, SHARE = 2, 0.02  # samples, and share of an advance, by which sequence and tick may differ
-FAR = 4  # a sequence that went so many times as far as its tick began anew
 
 
 @dataclass
@@ -38,6 +37,8 @@ class Counters:
     unknown: int = 0  # frames whose identifier is not in the DBC
     reboots: int = 0
     misplaced: int = 0  # messages on classic CAN too late or too early to tell their sample
+    sequence_leaps: int = 0  # the sequence went further than its tick
+    tick_leaps: int = 0  # the tick went further than its sequence
 
 
 @dataclass
@@ -59,6 +60,7 @@ class TelemetryDecoder:
     counters: Counters = field(default_factory=Counters)
     latest: dict[str, float] = field(default_factory=dict)
     host: HostMap = field(default_factory=HostMap)
+    stillness: Stillness = field(default_factory=Stillness)
 
     def __post_init__(self) -> None:
         self._assembler = Assembler(self.rig)
@@ -98,7 +100,7 @@ class TelemetryDecoder:
         s = self._segment
         if s is None:
             raise LinkError("no telemetry has come: a tick of the controller has no time yet")
-        whole = s.tick + int(_signed(np.array(tick - s.tick), 32))
+        whole = s.tick + int(signed(np.array(tick - s.tick), 32))
         return whole, s.offset_ns + whole * self._tick_ns
 
     @property
@@ -109,7 +111,7 @@ class TelemetryDecoder:
     def start_counting(self) -> None:
         """The next sample is number 0 of the stream, and what was lost before it does not count."""
         self._index = 0
-        self.counters.gaps = self.counters.lost = 0
+        self.counters.gaps = self.counters.lost = self.counters.sequence_leaps = self.counters.tick_leaps = 0
 
     def decode(self, batch: FrameBatch) -> list[SampleBlock]:
         """Blocks of consecutive samples, in order; a gap starts a new block with `lost_before`."""
@@ -121,7 +123,12 @@ class TelemetryDecoder:
         rows = self._assembler.take(good)
         self.counters.wrong_length = self._assembler.wrong_length
         self.counters.misplaced = self._assembler.misplaced
-        return self._ordered(rows) if len(rows) else []
+        if not len(rows):
+            return []
+        self.stillness.frames(rows.sequence, rows.tick, rows.arrived)
+        blocks = self._ordered(rows)
+        self.stillness.readings(self.latest)
+        return blocks
 
     def _ordered(self, rows: Rows) -> list[SampleBlock]:
         """Unwrap both counters, sort what came out of order, drop what came twice; a tick far in the past is a reboot."""
@@ -139,7 +146,7 @@ class TelemetryDecoder:
             last = raw - 1
         else:
             last = s.sequence
-        steps, went = self._advance(rows.sequence - s.raw, rows.tick - s.tick)
+        steps, went = self._unwrapping.advance(rows.sequence - s.raw, rows.tick - s.tick)
         sequence, ticks = s.sequence + steps, s.tick + went
         self.counters.reordered += int((np.diff(sequence) < 0).sum())
         unique, first = np.unique(sequence, return_index=True)
@@ -155,8 +162,19 @@ class TelemetryDecoder:
         columns = {name: x[keep] for name, x in rows.columns.items()}
         self.latest = {name: float(x[-1]) for name, x in columns.items()}
         self.host.take(s.offset_ns + ticks[keep] * self._tick_ns, rows.arrived[keep])
+        self._count_leaps(np.diff(rows.sequence[keep], prepend=s.raw), np.diff(ticks[keep], prepend=s.tick))
         s.raw, s.sequence, s.tick = int(rows.sequence[keep[-1]]), int(sequence[keep[-1]]), int(ticks[keep[-1]])
         return self._split(sequence[keep], last, ticks[keep], columns, int(rows.arrived.max()))
+
+    @property
+    def _unwrapping(self) -> Unwrapping:
+        return Unwrapping(self._assembler.sequence_bits, self._assembler.tick_bits, self._ticks)
+
+    def _count_leaps(self, sequence: Integers, tick: Integers) -> None:
+        """From the differences of neighbouring samples that are kept."""
+        sequences, ticks = self._unwrapping.leaps(sequence, tick)
+        self.counters.sequence_leaps += sequences
+        self.counters.tick_leaps += ticks
 
     def _regular(self, rows: Rows) -> bool:
         """Whether rows are nothing but the successors of the last sample, each by one sample and its ticks: so it is
@@ -184,32 +202,11 @@ class TelemetryDecoder:
             STREAM, self._index - n, ticks.astype(np.uint64), t_ns, int(rows.arrived.max()), 0, rows.columns, rows.table
         )
 
-    def _advance(self, sequence: Integers, tick: Integers) -> tuple[Integers, Integers]:
-        """By how many samples and ticks rows went on, from differences of counters that come round.
-
-        The sequence alone does not tell a gap from one that is longer by a whole round; the tick does, and the other way
-        about for a tick of few bits. Where the two do not agree, the sequence counts, unless it began anew by its tick.
-        """
-        bits = self._assembler.sequence_bits
-        steps, went = self._shortest(sequence, tick)
-        told = np.round(went / self._ticks).astype(np.int64)
-        whole = told + _signed(steps - told, bits)
-        agree = np.abs(whole - told) <= SLACK + SHARE * np.abs(told)
-        anew = (told > 0) & ((steps <= 0) | (steps > FAR * told + SLACK))
-        return np.where(agree, whole, np.where(anew, told, steps)), went
-
-    def _shortest(self, sequence: Integers, tick: Integers) -> tuple[Integers, Integers]:
-        """Both the short way round, but the tick as far as the sequence went where its bits allow that."""
-        steps = _signed(sequence, self._assembler.sequence_bits)
-        due = np.round(steps * self._ticks).astype(np.int64)
-        off = _signed(tick - due, self._assembler.tick_bits)
-        fits = np.abs(off) <= (SLACK + SHARE * np.abs(steps)) * self._ticks
-        return steps, np.where(fits, due + off, _signed(tick, self._assembler.tick_bits))
-
     def _all_old(self, rows: Rows) -> list[SampleBlock]:
         """Nothing but samples that are there already. Once or twice that is a repetition; time and again, with rising
         ticks, it is a controller that restarted so soon after power-on that its tick did not fall far enough to tell."""
-        self._stale = self._stale + len(rows) if int(rows.tick[-1]) > self._stale_tick else 0
+        before = self._stale_tick if self._stale or len(rows) == 1 else int(rows.tick[0])
+        self._stale = self._stale + len(rows) if int(rows.tick[-1]) > before else 0
         self._stale_tick = int(rows.tick[-1])
         if self._stale < STALE:
             return []
@@ -228,7 +225,7 @@ class TelemetryDecoder:
         s = self._segment
         if s is None:
             return 0
-        _, went = self._shortest(np.diff(rows.sequence, prepend=s.raw), np.diff(rows.tick, prepend=s.tick))
+        _, went = self._unwrapping.shortest(np.diff(rows.sequence, prepend=s.raw), np.diff(rows.tick, prepend=s.tick))
         back = np.flatnonzero(went * self._tick_ns < -REBOOT_S * 1e9)
         if not len(back):
             return 0
@@ -270,13 +267,6 @@ class TelemetryDecoder:
             )
             self._index += int(b - a)
         return out
-
-
-def _signed(difference: Integers, bits: int) -> Integers:
-    """A difference of counters of so many bits, taken the short way round."""
-    half = np.int64(1) << (bits - 1)
-    out: Integers = ((difference + half) & ((np.int64(1) << bits) - 1)) - half
-    return out
 
 
 def _part(rows: Rows, part: slice) -> Rows:

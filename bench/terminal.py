@@ -29,14 +29,17 @@ class TerminalProgress:
         self._bar = self._line_of(redrawn=False)
 
     def start(self) -> None:
-        self._bar.start()
+        with suppress(OSError):  # the terminal was closed; the run goes on
+            self._bar.start()
 
     def stop(self) -> None:
-        self._bar.stop()
+        with suppress(OSError):
+            self._bar.stop()
 
     def stage(self, text: str) -> None:
         self._stage = text
-        self._console.print(text, markup=False, highlight=False)
+        with suppress(OSError):
+            self._console.print(text, markup=False, highlight=False)
         self._draw("")
 
     @contextmanager

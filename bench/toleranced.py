@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
 
 from bench import units
 from bench.errors import ConfigError
 from bench.part import Part
 
 Distribution = Literal["normal", "rectangular", "triangular", "arcsine"]
+UNKNOWN_UNIT: Final = "unknown_unit"
 DIVISOR = {"rectangular": math.sqrt(3), "triangular": math.sqrt(6), "arcsine": math.sqrt(2)}
 
 
@@ -32,8 +34,8 @@ class Toleranced(Part):
         if isinstance(data, dict) and isinstance(data.get("unit"), str):
             try:
                 unit = units.unit(data["unit"])
-            except ConfigError as error:  # a ValueError is reported with its key and next to the other problems
-                raise ValueError(str(error)) from None
+            except ConfigError as error:  # reported with its key and next to the other problems
+                raise PydanticCustomError(UNKNOWN_UNIT, "unknown unit", {"symbol": data["unit"]}) from error
             scaled = {n: data[n] * unit.factor for n in ("u", "half_width") if isinstance(data.get(n), int | float)}
             if isinstance(data.get("value"), int | float):
                 scaled["value"] = data["value"] * unit.factor + unit.offset

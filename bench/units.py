@@ -39,6 +39,9 @@ UNITS: dict[str, Unit] = {
     "N m": Unit("N m"), "N m/A": Unit("N m/A"), "N m s/rad": Unit("N m s/rad"), "N s/m": Unit("N s/m"),
 }  # fmt: skip
 
+KNOWN = f"a known unit: one of {', '.join(symbol for symbol in UNITS if symbol)}"
+"""What is expected where a unit is asked for."""
+
 SUFFIXES: dict[str, str] = {
     "m": "m", "mm": "mm", "um": "um", "s": "s", "ms": "ms", "us": "us", "Hz": "Hz", "kg": "kg", "g": "g", "N": "N",
     "A": "A", "mA": "mA", "V": "V", "K": "K", "degC": "degC", "rad": "rad", "mrad": "mrad", "deg": "deg",
@@ -70,8 +73,7 @@ def unit(symbol: str) -> Unit:
     try:
         return UNITS[symbol]
     except KeyError:
-        known = ", ".join(u for u in UNITS if u)
-        raise ConfigError(f"unknown unit {symbol!r}; expected one of {known}") from None
+        raise ConfigError(f"unknown unit {symbol!r}; expected {KNOWN.removeprefix('a known unit: ')}") from None
 
 
 def to_si(value: float, symbol: str) -> float:

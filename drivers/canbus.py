@@ -58,7 +58,7 @@ class CanBus:
             batch = self.bus.recv_batch(timeout_s)
             stream = self.bus.stream
             self.stats.malformed, self.stats.refused = stream.malformed, stream.refused
-            self.stats.adapter_overruns = stream.overruns
+            self.stats.adapter_overruns, self.stats.octets = stream.overruns, self.bus.octets
         else:
             batch = self._drain(timeout_s)
         self.stats.received += len(batch)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import math
 from collections.abc import Callable, Sequence
@@ -11,7 +10,7 @@ import numpy as np
 
 from bench.capture import LONGEST_DIVIDER, NOW, CaptureData, CaptureSpec, Layout, Trigger
 from bench.clock import Clock
-from bench.errors import BenchError, LinkError
+from bench.errors import BenchError
 from bench.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.samples import ChannelInfo, SampleBlock, StreamLayout
@@ -21,7 +20,6 @@ from drivers.capture_upload import Progress, Upload
 from drivers.dialogue import Dialogue, status_of
 
 LOOK_S, LONG_S = 0.02, 0.5
-ASKED = 3  # times, for a state
 WAITING = 0.2  # of what is left at least, between two looks before the trigger
 _log = logging.getLogger("drivers")
 
@@ -109,7 +107,7 @@ class ControllerCapture:
         """
         begin, (_, trigger, _) = self._clock.now_ns(), self._present()
         while True:
-            reply = self._ask("CaptureAsk", {"code": self._code("STATUS")}, ASKED)
+            reply = self._ask("CaptureAsk", {"code": self._code("STATUS")})
             state = self._checked(reply)
             if state == "DONE":
                 return
@@ -130,7 +128,7 @@ class ControllerCapture:
             LinkError: it does not arrive.
         """
         layout, trigger, number = self._present()
-        status = self._ask("CaptureAsk", {"code": self._code("STATUS")}, ASKED)
+        status = self._ask("CaptureAsk", {"code": self._code("STATUS")})
         state = self._checked(status)
         if state != "DONE":
             raise BenchError(f"capture: it is {state}: nothing to upload yet; wait() returns when there is")
@@ -149,7 +147,7 @@ class ControllerCapture:
 
     def cancel(self) -> None:
         """Give up what is armed or recorded."""
-        self._ask("CaptureAsk", {"code": self._code("CANCEL")}, ASKED)
+        self._ask("CaptureAsk", {"code": self._code("CANCEL")})
         self._armed = None
 
     def _record(
@@ -227,12 +225,8 @@ class ControllerCapture:
             return (length - reply["samples"]) * reply["divider"] * self._tick_s
         return WAITING * (length - min(reply["samples"], reply["trigger"])) * reply["divider"] * self._tick_s
 
-    def _ask(self, message: str, values: dict[str, float], times: int = 1) -> dict[str, float]:
-        """What changes nothing may be asked again where the answer did not come."""
+    def _ask(self, message: str, values: dict[str, float]) -> dict[str, float]:
         full, what = {**values, "session": self._session.number}, "the state of the capture"
-        for _ in range(times - 1):
-            with contextlib.suppress(LinkError):
-                return self._dialogue.ask(message, full, "CaptureStatus", what, self._wait)
         return self._dialogue.ask(message, full, "CaptureStatus", what, self._wait)
 
     def _said(self, reply: dict[str, float]) -> tuple[str, str]:

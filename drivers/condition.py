@@ -1,9 +1,10 @@
-"""What a controller's newest telemetry says of its condition: mode, fault, restarts."""
+"""What a controller's newest telemetry says of its condition: mode, fault, restarts, counters that stand."""
 
 from __future__ import annotations
 
-from bench.errors import DeviceFault
+from bench.errors import DeviceFault, FrozenError
 from bench.rigfile import RigFile
+from bench.stillness import STILL_S
 from bench.telemetry import TelemetryDecoder
 from drivers import advice
 
@@ -15,6 +16,8 @@ class Condition:
         self._binding, self._telemetry = rig.binding, telemetry
         self._states, self._faults = rig.choices("state"), rig.choices("fault")
         self._reboots = 0
+        self._code, self._since_ns = 0, 0  # of the state, and since when it is that
+        self._unknown_ns: int | None = None  # since when its state has no name, by the frames that came
 
     @property
     def mode(self) -> str:
@@ -23,6 +26,18 @@ class Condition:
             return "OFF"
         name = self._states.get(int(self._telemetry.latest.get("state", 0)))
         return (self._binding.mode(name) if name is not None else None) or "UNKNOWN"
+
+    def look(self, now_ns: int) -> None:
+        """Note since when the state is what it is; after each look at the telemetry."""
+        code = int(self._telemetry.latest.get("state", 0))
+        if code != self._code or not self._since_ns:
+            self._code, self._since_ns = code, now_ns
+
+    def described(self, now_ns: int) -> str:
+        """The state by its name in the rig file and in the DBC, and since when: `OFF (aus) since 12.3 s`."""
+        name = self._states.get(self._code, f"code {self._code}, which the DBC does not name")
+        own = "" if name == self.mode else f" ({name})"
+        return f"{self.mode}{own} since {max(0, now_ns - self._since_ns) * 1e-9:.1f} s"
 
     @property
     def fault(self) -> str:
@@ -35,15 +50,30 @@ class Condition:
         """Raise unless all is well.
 
         Raises:
-            DeviceFault: a restart since the last look, a fault, or a state that says so.
+            DeviceFault: a restart since the last look, a fault, a state that says so, or one that nobody knows for a second.
+            FrozenError: tick or sequence have stood for a second while telemetry came.
         """
+        if stands := self._telemetry.stillness.frozen:
+            raise FrozenError(
+                f"telemetry is frozen: frames come, but the controller's {stands} has stood for {STILL_S:g} s or more; "
+                "nobody knows what the machine does"
+            )
         if self._telemetry.counters.reboots > self._reboots:
             self._reboots = self._telemetry.counters.reboots
             raise DeviceFault("the controller restarted during the run: its tick began anew; look at its supply")
         fault = self.fault
         if fault != "NONE":
             raise DeviceFault(f"the controller reports {fault}: {advice.ADVICE.get(fault, 'see its documentation')}")
-        if self.mode in ("FAULT", "UNKNOWN"):
+        if self.mode == "FAULT" or self._lost_its_name():
             code = int(self._telemetry.latest.get("state", 0))
             name = self._states.get(code, f"{code}, which its DBC does not name")
             raise DeviceFault(f"the controller reports no fault, but its state is {name}: see its documentation")
+
+    def _lost_its_name(self) -> bool:
+        """Whether the state has had no name for a second of frames."""
+        now = self._telemetry.stillness.newest_ns
+        if self.mode != "UNKNOWN":
+            self._unknown_ns = None
+        elif self._unknown_ns is None:
+            self._unknown_ns = now
+        return self._unknown_ns is not None and now - self._unknown_ns >= STILL_S * 1e9

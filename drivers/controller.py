@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable
 
 from bench.clock import Clock, PumpedClock
 from bench.envelope import Envelope
-from bench.errors import BenchError, InterlockError, LinkError
+from bench.errors import BenchError, InterlockError, StateNotReached
 from bench.link import Link
 from bench.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.roles import RigState
-from bench.samples import SampleBlock
 from bench.session import Session
 from bench.telemetry import TelemetryDecoder
-from drivers import advice, handshake, waiting
+from drivers import advice, handshake, unheard, waiting
 from drivers.capture import ControllerCapture
 from drivers.capture_upload import Upload
-from drivers.condition import Condition
 from drivers.dialogue import Dialogue, no_reply
 from drivers.orders import Orders
+from drivers.sight import Sight
 from drivers.turning import Turning
+from drivers.watch import Watch
 
 TOUCHED = 0.5  # rad/s, above which a landed shaft is not at rest
-HOST_AGE = "host_age"
 FIRST_S = 1.5  # for the first telemetry, and for the last owner to be gone
 BEHIND_S = 15.0  # a controller further behind the host's clock is not waited for
 STATES = {"OFF": RigState.OFF, "READY": RigState.READY, "LIFTING": RigState.READY, "LEVITATED": RigState.LEVITATED,
@@ -43,17 +43,16 @@ class Controller:
         self.telemetry = TelemetryDecoder(rig)
         self._recorder: Recorder | None = None
         self._dialogue = Dialogue(rig, link, base.now_ns)
-        self._patience_s = waiting.patience_s(rig)
-        self._stall_ns = max(waiting.STALL_NS, round(2e9 * slice_s))
         self.clock = PumpedClock(base, self.poll, slice_s, lambda: self.telemetry.host.lag_ns)
         self.guarded = True
-        self._condition = Condition(rig, self.telemetry)
-        self._last_ns = self._polled_ns = base.now_ns()
+        self.watch = Watch(
+            rig, link, self.telemetry, session.number, base.now_ns, max(waiting.STALL_NS, round(2e9 * slice_s))
+        )
         self.cleared = ""
         self.restored: tuple[str, ...] = ()
         self.serial: int | None = None
-        self._hosts = handshake.HostFrames(rig)
-        self.host_age_s = 0.0  # the greatest while the machine was on
+        self.owned = False  # until then heartbeats mean nothing, and would alarm its owner
+        self.sight = Sight(rig, self.telemetry, lambda: self.mode, base.now_ns)
         self.cut_ns = 0  # the most that a step lacked of its telemetry when it was left
         self.companions: list[Callable[[], None]] = []  # polled with it: other devices of the rig
         self._orders = Orders(rig, self._dialogue, session, self.envelope, lambda: self.mode, self._wait)
@@ -87,34 +86,45 @@ class Controller:
             clear_fault: clear whatever fault there is; else only HEARTBEAT_LOST, which says nothing of the machine.
 
         Raises:
-            LinkError: no telemetry, or no answer.
+            LinkError: no telemetry, or no answer; BytesUnreadable: bytes that are no telemetry.
             ConfigError: another host owns it or talks to it, its protocol or message map is another one, or it has a
                 fault that somebody should look at.
         """
         self.guarded = False
         if not self._dialogue.has("Claim"):
             self.clock.sleep(handshake.LISTEN_S)
-            handshake.alone(self._hosts.seen, self.link.name)
-        self.link.renew_lease()
-        silent = (
-            f"no telemetry within {FIRST_S:g} s. Is the controller on, the port right, the bit rate that of the bus?"
-        )
-        self.wait(lambda: bool(self.telemetry.latest), FIRST_S, LinkError(f"link {self.link.name}: {silent}"))
+            handshake.alone(self.watch.hosts.seen, self.link.name)
+            self._own()
+        begun = unheard.Heard.of(self.link)
+        self.wait(lambda: bool(self.telemetry.latest), FIRST_S, lambda: unheard.error(
+            self.link, begun, FIRST_S,
+            f"no telemetry within {FIRST_S:g} s. Is the controller on, the port right, the bit rate that of the bus?",
+        ))  # fmt: skip
         handshake.claim(self._dialogue, self.rig, self._session, self.clock, self._wait)
+        self._own()
         self.serial = handshake.identify(self._dialogue, self.rig, self._session, self._wait)
         if self.mode == "FAULT":
             advice.may_clear("controller", self.fault, clear_fault)
             self.cleared = self.fault
             self._command("CLEAR_FAULT", "OFF", 1.0)
         self.restored = self._orders.restore()
-        self._last_ns = self._base.now_ns()
+        self.watch.begin()
         self.guarded = True
+
+    def _own(self) -> None:
+        """The controller is ours: heartbeats begin."""
+        self.owned = True
+        self.link.renew_lease()
 
     def catch_up(self) -> None:
         """Let the clock run until telemetry has reached the present, so that what is commanded next cannot act on samples
         of the time before: a controller whose clock has fallen behind gets there later. Silence ends a run by itself."""
-        due, watch = self.clock.now_ns() - self.telemetry.period_ns, waiting.Stopwatch(self._base.now_ns)
-        while self.telemetry.newest_ns < due and self.silent_s < self._patience_s and watch.look() < BEHIND_S * 1e9:
+        due, waited = self.clock.now_ns() - self.telemetry.period_ns, waiting.Stopwatch(self._base.now_ns)
+        while (
+            self.telemetry.newest_ns < due
+            and self.watch.silent_s < self.watch.patience_s
+            and waited.look() < BEHIND_S * 1e9
+        ):
             self.clock.sleep(waiting.SLICE_S)
         self.cut_ns = max(self.cut_ns, due - self.telemetry.newest_ns)
 
@@ -127,32 +137,30 @@ class Controller:
         """Read the link, record, decode, and look after the machine.
 
         Raises:
-            LinkError: no telemetry for half a second (`drivers.waiting.patience_s`).
+            LinkError: no telemetry for half a second (`drivers.waiting.patience_s`); BytesUnreadable where bytes come.
             InterlockError: the envelope tripped.
             DeviceFault: the controller reports a fault, or has restarted.
+            FrozenError, AnotherHost: as `Watch.check` says.
         """
-        now = self._base.now_ns()
-        if now - self._polled_ns > self._stall_ns:  # the bench stood still: the link has had no chance to be heard
-            self._last_ns += now - self._polled_ns
-        self._polled_ns = now
-        batch = self._hosts.marked(self.link.receive())
+        self.watch.polled()
+        batch = self.watch.hosts.marked(self.link.receive())
         if self._recorder is not None:
             self._recorder.frames(self.link.name, batch, lag_ns=self.telemetry.host.lag_ns)
         self._dialogue.take(batch)
+        self.sight.frames(batch)
         if self.capture is not None:
             self.capture.take(batch)
         blocks = self.telemetry.decode(batch)
+        self.sight.samples(blocks)
         for block in blocks:
             if self._recorder is not None:
                 self._recorder.samples(block)
-        if blocks:
-            self._last_ns = self._base.now_ns()
+        self.watch.came(blocks, self._recorder is not None)
         if self.guarded:
             self.link.renew_lease()
             for block in blocks:
                 self.envelope.check_block(block)
-            self._look_at_heartbeat(blocks)
-            self._check()
+            self.watch.check()
         for pump in self.companions:
             pump()
 
@@ -176,22 +184,15 @@ class Controller:
                 f"nobody may touch the shaft in state {self.mode} at {self.speed_rad_s:.1f} rad/s: land it first"
             )
 
-    def _look_at_heartbeat(self, blocks: Sequence[SampleBlock]) -> None:
-        """How old the last heartbeat got in the controller's eyes, where it tells and watches."""
-        if self._recorder is not None and self.mode not in ("OFF", "FAULT"):
-            ages = [float(b.columns[HOST_AGE].max()) for b in blocks if HOST_AGE in b.columns]
-            self.host_age_s = max([self.host_age_s, *ages])
-
-    def _check(self) -> None:
-        if self.silent_s > self._patience_s + (self.rig.link.reconnect_s if self.link.reopening else 0.0):
-            text = f"no telemetry for {self.silent_s:.2f} s; the link or the controller is lost"
-            raise LinkError(f"link {self.link.name}: {text}")
-        self._condition.check()
-
     @property
     def round_trip_ns(self) -> int | None:
         """The least time from a request to its answer."""
         return self._dialogue.round_trip_ns
+
+    @property
+    def repeats(self) -> int:
+        """Requests that were sent again because no reply had come."""
+        return self._dialogue.repeats
 
     @property
     def replies_wrong_length(self) -> int:
@@ -199,20 +200,15 @@ class Controller:
         return self._dialogue.wrong_length
 
     @property
-    def silent_s(self) -> float:
-        """How long no telemetry had come when it was looked for last."""
-        return max(0, self._polled_ns - self._last_ns) * 1e-9
-
-    @property
     def mode(self) -> str:
         """What the controller's state amounts to: one of bench.binding.MODES, or UNKNOWN for a state without a name:
         nobody knows what the machine does in it."""
-        return self._condition.mode
+        return self.watch.condition.mode
 
     @property
     def fault(self) -> str:
         """The latched fault, NONE without one."""
-        return self._condition.fault
+        return self.watch.condition.fault
 
     @property
     def state(self) -> RigState:
@@ -235,9 +231,13 @@ class Controller:
         """READY to OFF."""
         self._command("DISABLE", "OFF", 1.0)
 
-    def make_safe(self) -> None:
-        """Ask the controller to coast, land and switch off by itself."""
-        self._orders.command("MAKE_SAFE")
+    def command(self, name: str) -> None:
+        """Send a command and wait for its reply, not for its effect; `drivers.orders.Orders.command` has the errors."""
+        self._orders.command(name)
+
+    def ask_state(self) -> None:
+        """Ask for a reply, which tells the state, where the controller has one; nothing is waited for."""
+        self._orders.ask_state()
 
     @property
     def _lift_s(self) -> float:
@@ -258,7 +258,7 @@ class Controller:
         """Turn the rotor the shorter way to an angle and wait until it stands there.
 
         Raises:
-            LinkError: it does not arrive in time.
+            RotorNotArrived: it does not arrive in time.
         """
         self._turning.point(angle_rad)
 
@@ -266,7 +266,7 @@ class Controller:
         """Turn the rotor at a speed; returns when it has kept within 2 % or 0.3 rad/s of it for a tenth of a second.
 
         Raises:
-            LinkError: it does not get there in time.
+            RotorNotArrived: it does not get there in time.
         """
         self._turning.spin(rad_s)
 
@@ -274,9 +274,14 @@ class Controller:
         """Brake to a stop, and wait until the rotor is below the landing speed.
 
         Raises:
-            LinkError: it does not get there in time.
+            RotorNotArrived: it does not get there in time.
         """
-        self._turning.stop(self.link.name)
+        self._turning.stop()
+
+    @property
+    def landing_s(self) -> float:
+        """How long a landing takes: until a shaft of which no pulse comes is known to be slow, and until it is down."""
+        return self._lift_s + 2 * math.pi / self.landing_speed
 
     def _default(self, parameter: str) -> float:
         """What a parameter is set to unless a plan says otherwise; 0 where the rig has none."""
@@ -305,15 +310,18 @@ class Controller:
     def _command(self, name: str, goal: str, timeout_s: float, expected_s: float = 0.0) -> None:
         self._orders.command(name)
         self.clock.sleep(expected_s)
-        self._wait(lambda: self.mode == goal, timeout_s, f"state {goal} after {name}")
+        self.wait(lambda: self.mode == goal, timeout_s, lambda: StateNotReached(
+            f"the controller took {name} and is not {goal} after {expected_s + timeout_s:g} s: its state is "
+            f"{self.watch.condition.described(self._base.now_ns())}"
+        ))  # fmt: skip
 
     def _wait(self, done: Callable[[], bool], timeout_s: float, what: str) -> None:
-        self.wait(done, timeout_s, no_reply(self.link.name, what, timeout_s))
+        self.wait(done, timeout_s, lambda: no_reply(self.link.name, what, timeout_s))
 
-    def wait(self, done: Callable[[], bool], timeout_s: float, error: LinkError) -> None:
+    def wait(self, done: Callable[[], bool], timeout_s: float, error: Callable[[], BenchError]) -> None:
         """Let the clock run until something is true.
 
         Raises:
-            LinkError: the given one, when time runs out.
+            BenchError: the given one, when time runs out.
         """
         waiting.until(done, timeout_s, error, self.clock, self._base.now_ns)

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 
 from bench.codec import Decoder, encode
-from bench.errors import LinkError
+from bench.errors import NoReply
 from bench.frames import ERROR, FD, SENT, FrameBatch, frame
 from bench.link import Link
 from bench.messages import Message
@@ -16,6 +16,7 @@ from drivers.waiting import patience_s
 
 REPLIES = ("CommandReply", "ParamReply", "Identity", "Owner", "CaptureStatus")
 KEPT = 256  # replies that nobody waits for: another host may ask too
+ATTEMPTS = 3  # times that one request is sent: a lost request or reply costs a repeat
 
 
 class Dialogue:
@@ -26,11 +27,13 @@ class Dialogue:
         self._decoders = {m.identifier: Decoder(m) for n, m in rig.messages.messages.items() if n in REPLIES}
         self._answers: deque[tuple[str, dict[str, float], int]] = deque(maxlen=KEPT)
         self._held: dict[str, dict[str, float]] = {}
-        self._token = 0
+        self._token, self._tokens = 0, dict[str, int]()  # the last, and that of each kind of request
         self._misfit: dict[str, int] = {}  # length of replies that do not fit, since the last request
         self.wrong_length = 0  # replies that do not have the length of the DBC
         self.recorder: Recorder | None = None
         self.round_trip_ns: int | None = None  # the least so far
+        self.repeats = 0  # requests sent again because no reply had come
+        self.asked = 0  # how often the last request was sent
 
     def has(self, message: str) -> bool:
         """Whether the controller's DBC knows a message."""
@@ -57,18 +60,21 @@ class Dialogue:
     def ask(
         self, message: str, values: Mapping[str, float], reply: str, what: str, wait: Callable[..., None]
     ) -> dict[str, float]:
-        """Send a request and wait for its reply: the one with its token, where the reply has one.
+        """Send a request and wait for its reply: the one with its token, where the reply has one. A request whose reply
+        does not come in time (`drivers.waiting.patience_s`) is sent again, byte for byte, and executed once.
 
         Raises:
-            LinkError: no reply in time (`drivers.waiting.patience_s`).
+            NoReply: no reply to any of them.
         """
-        self._token = (self._token + 1) & 0xFF
+        self._next_token(message)
         self._forget()
         request, answer = self._rig.messages[message], self._rig.messages[reply]
         tokens = _has(request, "token") and _has(answer, "token")
         sent_ns = self._now_ns()
-        self.send(message, {**values, "token": self._token} if tokens else values)
         found: list[tuple[dict[str, float], int]] = []
+
+        def send() -> None:
+            self.send(message, {**values, "token": self._token} if tokens else values)
 
         def arrived() -> bool:
             found.extend(
@@ -76,52 +82,75 @@ class Dialogue:
             )
             return bool(found)
 
-        self._waited(wait, arrived, reply, what)
+        self._waited(send, wait, arrived, reply, what)
         values, t_ns = found[0]
-        took = max(t_ns - sent_ns, 0)
-        self.round_trip_ns = took if self.round_trip_ns is None else min(self.round_trip_ns, took)
+        if self.asked == 1:  # else nobody knows which one is answered
+            took = max(t_ns - sent_ns, 0)
+            self.round_trip_ns = took if self.round_trip_ns is None else min(self.round_trip_ns, took)
         return values
 
     def ask_all(
         self, message: str, requests: Sequence[Mapping[str, float]], reply: str, key: str, wait: Callable[..., None]
     ) -> dict[float, dict[str, float]]:
-        """Send many requests at once and wait for their replies; by the value of their signal `key`.
+        """Send many requests at once and wait for their replies; by the value of their signal `key`. Those without a
+        reply are sent again, as `ask` does.
 
         Raises:
-            LinkError: one does not come in time (`drivers.waiting.patience_s`).
+            NoReply: one is not answered.
         """
         self._forget()
-        for values in requests:
-            self.send(message, values)
         found: dict[float, dict[str, float]] = {}
+
+        def send() -> None:
+            for values in requests:
+                if values[key] not in found:
+                    self.send(message, values)
 
         def arrived() -> bool:
             found.update({v[key]: v for n, v, *_ in self._answers if n == reply})
             return all(values[key] in found for values in requests)
 
-        self._waited(wait, arrived, reply, f"the replies to {message}")
+        self._waited(send, wait, arrived, reply, f"the replies to {message}")
         return found
+
+    def _next_token(self, message: str) -> None:
+        """One up, round after 256; never that of the last request of the kind, which would be taken for a repeat."""
+        step = 2 if self._tokens.get(message) == (self._token + 1) & 0xFF else 1
+        self._token = self._tokens[message] = (self._token + step) & 0xFF
 
     def _forget(self) -> None:
         self._answers.clear()
         self._misfit.clear()
 
-    def _waited(self, wait: Callable[..., None], arrived: Callable[[], bool], reply: str, what: str) -> None:
-        """Wait for a reply. Where it came but did not fit, the error says so."""
-        try:
-            wait(arrived, patience_s(self._rig), what)
-        except LinkError as error:
-            if reply not in self._misfit:
-                raise
+    def _waited(
+        self, send: Callable[[], None], wait: Callable[..., None], arrived: Callable[[], bool], reply: str, what: str
+    ) -> None:
+        """Send, wait for the reply, send again. Where it came but did not fit, the error says so."""
+        for self.asked in range(1, ATTEMPTS + 1):
+            self.repeats += self.asked > 1
+            send()
+            try:
+                return wait(arrived, patience_s(self._rig), what)
+            except NoReply as error:
+                if self.asked == ATTEMPTS:
+                    raise NoReply(f"{error}, though it was asked for {ATTEMPTS} times{self._seen(reply)}") from error
+
+    def _seen(self, reply: str) -> str:
+        """What came in place of a reply."""
+        if reply in self._misfit:
             stated = self._rig.messages[reply].length
-            raise LinkError(
-                f"{error}. A {reply} of {self._misfit[reply]} bytes came, the DBC says {stated}: does the firmware's "
-                "message map match the rig file's?"
-            ) from error
+            return (
+                f". A {reply} of {self._misfit[reply]} bytes came, the DBC says {stated}: does the firmware's message map "
+                "match the rig file's?"
+            )
+        tokens = sorted({int(v["token"]) for n, v, _ in self._answers if n == reply and "token" in v})
+        if tokens:
+            return f". {reply} with token {', '.join(map(str, tokens[:4]))} came; expected {self._token}"
+        return ""
 
     def begin(self, message: str, values: Mapping[str, float]) -> int:
         """Send a request that is answered by something else than a reply, or refused by one; its token."""
-        self._token = (self._token + 1) & 0xFF
+        self._next_token(message)
         self._forget()
         self.send(message, {**values, "token": self._token})
         return self._token
@@ -156,9 +185,9 @@ def status_of(message: Message, reply: Mapping[str, float]) -> str:
     return message.signal("status").choices.get(int(reply["status"]), f"status {reply['status']:g}")
 
 
-def no_reply(link: str, what: str, timeout_s: float) -> LinkError:
+def no_reply(link: str, what: str, timeout_s: float) -> NoReply:
     """Telemetry may go on: the text does not claim that the link is dead."""
-    return LinkError(f"link {link}: waited {timeout_s:g} s for {what}; it did not come")
+    return NoReply(f"link {link}: waited {timeout_s:g} s for {what}; it did not come")
 
 
 def _has(message: Message, signal: str) -> bool:

@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 
 from bench.clock import Clock
 from bench.envelope import Envelope
-from bench.errors import BenchError, ConfigError, DeviceFault, LinkError
+from bench.errors import BenchError, DeviceUnreadable, DriveFault, LinkError
 from bench.recorder import Recorder
 from bench.registers import RegisterPort, RegisterRefused
 from bench.rigfile import RigFile
@@ -29,12 +29,11 @@ from drivers.background import Background
 from drivers.fielddrive import FieldDrive
 from drivers.monitors import FieldSupply, FieldThermal
 from drivers.polling import Poll, PolledStream, Reading
-from drivers.registerdevice import RegisterDevice
+from drivers.registerdevice import RegisterDevice, by_role, register_devices
 from drivers.waiting import STALL_NS, Stopwatch
 
 logger = logging.getLogger("drivers.fieldbus")
 T = TypeVar("T")
-ROLES = ("drive", "supply", "thermal")
 WAIT_SLICE_S = 0.05
 PUMP_S = 0.1  # without a thread nothing is polled faster: a clock calls `pump` that often
 SILENT_POLLS, SILENT_S = 3, 1.0
@@ -66,7 +65,9 @@ class Fieldbus:
         names = register_devices(rig)
         self.devices = {n: RegisterDevice(n, rig.devices[n], port_of(n)) for n in names}
         self.guarded, self.cleared = True, ""
-        self._clock, self._threaded = clock, threaded
+        self._clock, self._threaded, self._envelope = clock, threaded, envelope
+        self.held: Callable[[], bool] = lambda: False  # whether the controller holds the rotor
+        self._held_ns: int | None = None  # since when it does
         self._recorder: Recorder | None = None
         periods = {n: round(max(d.spec.poll_s, 0 if threaded else PUMP_S) * 1e9) for n, d in self.devices.items()}
         self._polls = {n: Poll(d, periods[n], clock) for n, d in self.devices.items()}
@@ -82,7 +83,7 @@ class Fieldbus:
         self._threads: list[threading.Thread] = []
         self._pumped_s, self._looked_ns = time.monotonic(), clock.now_ns()
         self._hands = Background(clock, "requests to register devices") if threaded else None
-        role = _by_role(self.devices)
+        role = by_role(self.devices)
         self.drive = FieldDrive(self, role["drive"], envelope) if "drive" in role else None
         self.supply = FieldSupply(role["supply"], self.latest) if "supply" in role else None
         self.thermal = FieldThermal(role["thermal"], self.latest) if "thermal" in role else None
@@ -111,7 +112,7 @@ class Fieldbus:
         Raises:
             ConfigError: a register that a device does not have, or a drive with a fault that somebody should look at.
             LinkError: a device does not answer.
-            DeviceFault: the drive's fault stays.
+            DriveFault: the drive's fault stays.
         """
         for name, device in self.devices.items():
             self._latest[name] = self.ask(device.check)
@@ -175,10 +176,15 @@ class Fieldbus:
         """Take what polling found; poll what is due where no thread does.
 
         Raises:
-            LinkError: a device is lost, or refuses (while guarded).
-            DeviceFault: the drive reports a fault (while guarded).
+            LinkError: a device is lost, refuses, or says what is no number (DeviceUnreadable), while guarded.
+            DriveFault: the drive reports a fault (while guarded).
+            InterlockError: a reading is outside the envelope (while guarded).
         """
         self._pumped_s = time.monotonic()
+        if not self.held():
+            self._held_ns = None
+        elif self._held_ns is None:
+            self._held_ns = self._clock.now_ns()
         if not self._threaded:
             self._poll(self._polls.values())
         while self._arrived:
@@ -186,16 +192,16 @@ class Fieldbus:
         if self.guarded:
             self._check()
 
-    def wait(self, done: Callable[[], bool], timeout_s: float, what: str) -> None:
+    def wait(self, done: Callable[[], bool], timeout_s: float, error: Callable[[], BenchError]) -> None:
         """Let the clock run until something is true.
 
         Raises:
-            LinkError: time runs out.
+            BenchError: the given one, when time runs out.
         """
         watch = Stopwatch(self._clock.now_ns)
         while not done():
             if watch.look() >= timeout_s * 1e9:
-                raise LinkError(f"waited {timeout_s:g} s for {what}; it did not come")
+                raise error()
             self._clock.sleep(WAIT_SLICE_S)
             self.pump()
 
@@ -248,6 +254,9 @@ class Fieldbus:
         block = self._streams[name].block(reading)
         if self._recorder is not None and block is not None:
             self._recorder.samples(block)
+        if self.guarded:  # a supply that was still off when it was asked may have been switched on for the lift
+            held = self._held_ns is not None and reading.t_ns > self._held_ns
+            self._envelope.check_reading(name, reading.values, held)
 
     def _check(self) -> None:
         for error in self._trouble.values():
@@ -261,26 +270,11 @@ class Fieldbus:
             silent = (now - self._answered[name]) * 1e-9
             if silent > self._patience[name]:
                 why = f": {self._trouble[name]}" if name in self._trouble else ""
-                raise LinkError(f"device {name} on link {device.spec.link}: no reading for {silent:.1f} s{why}")
+                odd = isinstance(self._trouble.get(name), DeviceUnreadable)
+                kind = DeviceUnreadable if odd else LinkError
+                raise kind(f"device {name} on link {device.spec.link}: no reading for {silent:.1f} s{why}")
         if self.drive is not None and self.drive.fault:
-            raise DeviceFault(f"the drive reports {self.drive.fault}; look at it before the next run")
-
-
-def register_devices(rig: RigFile) -> tuple[str, ...]:
-    """Names of the rig's devices in the roles of this module."""
-    return tuple(name for name, d in rig.devices.items() if set(d.roles) & set(ROLES))
-
-
-def _by_role(devices: Mapping[str, RegisterDevice]) -> dict[str, RegisterDevice]:
-    out: dict[str, RegisterDevice] = {}
-    for device in devices.values():
-        for role in device.spec.roles:
-            other = out.setdefault(role, device)
-            if other is not device:
-                raise ConfigError(
-                    f"devices.{device.name}.roles: found {role}, which {other.name} has; expected one device"
-                )
-    return out
+            raise DriveFault(f"the drive reports {self.drive.fault}; look at it before the next run")
 
 
 @contextmanager
@@ -294,7 +288,7 @@ def open_devices(
     Raises:
         ConfigError: a map that cannot be, or a register that a device does not have.
         LinkError: a device does not answer.
-        DeviceFault: the drive has a fault that stays.
+        DriveFault: the drive has a fault that stays.
     """
     bus = Fieldbus(rig, port_of, clock, envelope, threaded=threaded)
     try:

@@ -9,7 +9,7 @@ from typing import Any, Protocol, TypeVar
 
 from bench import units
 from bench.envelope import Envelope
-from bench.errors import BenchError, ConfigError, DeviceFault, InterlockError, LinkError
+from bench.errors import BenchError, ConfigError, DriveFault, InterlockError, Refused, RotorNotArrived, StateNotReached
 from drivers.registerdevice import RegisterDevice
 
 T = TypeVar("T")
@@ -27,7 +27,7 @@ class Surroundings(Protocol):
     def refresh(self, device: str) -> Mapping[str, float]: ...
     def ask(self, request: Callable[..., T], *args: Any) -> T: ...
     def send(self, request: Callable[..., object], *args: Any) -> object: ...
-    def wait(self, done: Callable[[], bool], timeout_s: float, what: str) -> None: ...
+    def wait(self, done: Callable[[], bool], timeout_s: float, error: Callable[[], BenchError]) -> None: ...
     def record(self, kind: str, **data: Any) -> None: ...
     def unguarded(self) -> AbstractContextManager[None]: ...
 
@@ -90,7 +90,7 @@ class FieldDrive:
         Raises:
             InterlockError: beyond the envelope; nothing was sent.
             LinkError: the drive does not answer, or refuses.
-            BenchError: it reads back something else.
+            Refused: it reads back something else.
         """
         limit = self._envelope.rig.envelope.max_speed_rad_s
         if not abs(rad_s) <= limit:  # NaN is refused too
@@ -121,21 +121,20 @@ class FieldDrive:
         back, step = self._bus.refresh(self.name)[name], abs(r.scale * unit.factor)
         near = 1e-6 * abs(value) if r.type == "f32" else step
         if not math.isclose(back, value, rel_tol=0, abs_tol=max(near, 1e-12)):
-            raise BenchError(
-                f"drive {self.name}: wrote {what} of {value:g} {unit.si}, it reads back {back:g} {unit.si}"
-            )
+            raise Refused(f"drive {self.name}: wrote {what} of {value:g} {unit.si}, it reads back {back:g} {unit.si}")
 
     def run(self) -> None:
         """Let it give torque.
 
         Raises:
-            DeviceFault: it is in fault, or goes into it.
-            LinkError: it does not answer, refuses, or does not start.
+            DriveFault: it is in fault, or goes into it.
+            LinkError: it does not answer, or refuses.
+            StateNotReached: it does not start.
         """
         self.may_run()
         fault = self.fault_of(self._bus.refresh(self.name))
         if fault:
-            raise DeviceFault(f"the drive reports {fault}; it was not started")
+            raise DriveFault(f"the drive reports {fault}; it was not started")
         self._command("run")
         self._until_running(True)
 
@@ -144,57 +143,69 @@ class FieldDrive:
 
         Raises:
             InterlockError: beyond the envelope; nothing was sent.
-            DeviceFault: the drive is or goes into fault.
-            LinkError: it does not answer, or the shaft does not get there in a minute.
+            DriveFault: the drive is or goes into fault.
+            LinkError: it does not answer, or refuses.
+            StateNotReached: it does not start.
+            RotorNotArrived: the shaft does not get there in a minute.
         """
         if self._bus.latest(self.name).get(ACCELERATION):
             self.set_acceleration(0.0)
         self.set_speed(rad_s)
         self.run()
         near = max(STANDSTILL_RAD_S, 0.01 * abs(rad_s))
-        try:
-            self._bus.wait(lambda: abs(self.speed_rad_s - rad_s) <= near, REACH_S, f"a speed of {rad_s:g} rad/s")
-        except LinkError as error:
-            raise LinkError(
-                f"{error}; the shaft turns at {self.speed_rad_s:.1f} rad/s. Does something else hold it?"
-            ) from error
+        self._bus.wait(lambda: abs(self.speed_rad_s - rad_s) <= near, REACH_S, lambda: RotorNotArrived(
+            f"the shaft did not reach {rad_s:g} rad/s within {REACH_S:g} s: it turns at {self.speed_rad_s:.1f} rad/s. "
+            "Does something else hold it?"
+        ))  # fmt: skip
 
     def coast(self) -> None:
         """Take the torque away.
 
         Raises:
-            LinkError: the drive does not answer, refuses, or goes on.
+            LinkError: the drive does not answer, or refuses.
+            StateNotReached: it goes on.
         """
         self._command("coast")
         self._until_running(False)
+
+    def brake(self) -> None:
+        """Begin to brake; nothing is waited for but that the drive takes it.
+
+        Raises:
+            LinkError: the drive does not answer, or refuses.
+        """
+        self._command("stop")
 
     def stop(self) -> None:
         """Brake, and return when the shaft stands.
 
         Raises:
-            LinkError: the drive does not answer, refuses, or the shaft goes on turning.
+            LinkError: the drive does not answer, or refuses.
+            RotorNotArrived: the shaft goes on turning.
         """
-        self._command("stop")
-        self._bus.wait(lambda: abs(self.speed_rad_s) < STANDSTILL_RAD_S, STOP_S, "the drive to stop the shaft")
+        self.brake()
+        self._bus.wait(lambda: abs(self.speed_rad_s) < STANDSTILL_RAD_S, STOP_S, lambda: RotorNotArrived(
+            f"the drive did not stop the shaft within {STOP_S:g} s: it turns at {self.speed_rad_s:.1f} rad/s"
+        ))  # fmt: skip
 
     def reset(self) -> None:
         """Clear a latched fault.
 
         Raises:
-            DeviceFault: it stays, or the rig file states no command for it.
+            DriveFault: it stays, or the rig file states no command for it.
             LinkError: the drive does not answer, or refuses.
         """
         fault = self.fault_of(self._bus.refresh(self.name))
         if not fault:
             return
         if "reset" not in self._device.spec.commands:
-            raise DeviceFault(f"the drive reports {fault}; the rig file states no command to reset it")
+            raise DriveFault(f"the drive reports {fault}; the rig file states no command to reset it")
         with self._bus.unguarded():
             self._command("reset")
-            try:
-                self._bus.wait(lambda: not self.fault_of(self._bus.refresh(self.name)), TAKEN_S, "the reset")
-            except LinkError as error:
-                raise DeviceFault(f"the drive reports {fault}, and its reset did not clear it") from error
+            self._bus.wait(
+                lambda: not self.fault_of(self._bus.refresh(self.name)), TAKEN_S,
+                lambda: DriveFault(f"the drive reports {fault}, and its reset did not clear it"),
+            )  # fmt: skip
 
     def _command(self, name: str) -> None:
         self._bus.record("drive", device=self.name, command=name)
@@ -203,13 +214,15 @@ class FieldDrive:
     def _until_running(self, running: bool) -> None:
         if "running" not in self._device.spec.registers:
             return
-        what = f"the drive to {'run' if running else 'coast'}"
 
         def done() -> bool:
             values = self._bus.refresh(self.name)
             fault = self.fault_of(values)
             if running and fault:
-                raise DeviceFault(f"the drive reports {fault}; it did not start")
+                raise DriveFault(f"the drive reports {fault}; it did not start")
             return bool(values["running"]) == running
 
-        self._bus.wait(done, TAKEN_S, what)
+        told, is_so = ("run", "it gives no torque") if running else ("coast", "it still gives torque")
+        self._bus.wait(done, TAKEN_S, lambda: StateNotReached(
+            f"the drive took the command {told}, and says after {TAKEN_S:g} s that {is_so}"
+        ))  # fmt: skip

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 
-import numpy as np
-
-from bench.binding import COMMANDS
 from bench.clock import Clock
 from bench.errors import ConfigError
-from bench.frames import SENT, FrameBatch
 from bench.rigfile import RigFile
 from bench.session import Session
 from drivers.dialogue import Dialogue
@@ -78,33 +74,3 @@ def alone(others: Collection[str], link: str) -> None:
             f"link {link}: another host talks to this controller ({', '.join(sorted(others))}); expected one bench per "
             "rig. Next: end that one"
         )
-
-
-def host_messages(rig: RigFile) -> set[str]:
-    """Names of the messages that a host sends."""
-    b = rig.binding
-    paths = [path for name in COMMANDS for path in b.command(name)]
-    paths += [p.signal for p in rig.parameters.values() if p.signal]
-    named = {b.heartbeat, "Claim", "ParamSet", "ParamGet", *(path.partition(".")[0] for path in paths)}
-    return named & set(rig.messages.messages)
-
-
-class HostFrames:
-    """Frames that came in and that a host sent: another host's, or our own heartbeats that the bus brings back.
-
-    Attributes:
-        seen: names of the host messages that came in.
-    """
-
-    def __init__(self, rig: RigFile) -> None:
-        self._names = {rig.messages[name].identifier: name for name in host_messages(rig)}
-        self.seen: set[str] = set()
-
-    def marked(self, batch: FrameBatch) -> FrameBatch:
-        """The batch with them marked as sent."""
-        if not self._names.keys().isdisjoint(batch["id"].tolist()):
-            theirs = np.isin(batch["id"], list(self._names))
-            batch = batch.copy()
-            batch["flags"][theirs] |= SENT
-            self.seen |= {self._names[int(i)] for i in batch["id"][theirs]}
-        return batch

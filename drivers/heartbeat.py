@@ -53,6 +53,8 @@ class HeartbeatProcess:
         self._takes_lines = writer.format == "slcan"
         self._lock = threading.Lock()
         self._fault: str | None = None
+        self.unpreferred = ""
+        """Why the system does not grant it real-time priority; "" where it does."""
         self._closed = False
         self._process: subprocess.Popen[bytes] | None = None
         self._data, theirs = portable.message_pair(QUEUE_BYTES)
@@ -197,6 +199,7 @@ class HeartbeatProcess:
                 if "failed" in message:
                     raise LinkError(message["failed"])
                 if key in message:
+                    self.unpreferred = message.get("refused", self.unpreferred)
                     return
             portable.wait([self._lines.fileno()], [], left)
         raise LinkError(f"the heartbeat process does not answer within {timeout_s} s")

@@ -199,11 +199,11 @@ def serve(lines: portable.Lines) -> None:
     except (ConfigError, OSError) as error:
         lines.send({"failed": str(error)})
         return
-    portable.prefer_this_process()
+    refused = portable.prefer_this_thread(nice=True)
     gc.collect()
     gc.freeze()
     gc.disable()  # nothing here makes cycles
-    lines.send({"ready": True})
+    lines.send({"ready": True, "refused": refused})
     Session(lines, socket.socket(fileno=data), pacemaker, open_port).run(order["bench"])
 
 

@@ -9,6 +9,7 @@ from typing import Final
 
 from bench.errors import LinkError
 from bench.frames import SENT, FrameBatch, frame
+from drivers import portable
 from drivers.beat import Beat, Schedule
 
 CHUNK: Final = 16  # frames written between two looks at the clock
@@ -34,6 +35,8 @@ class HeartbeatThread:
         self._renewed = self._frames = 0
         self._closed = threading.Event()
         self.fault: str | None = None
+        self.unpreferred = ""
+        """As HeartbeatProcess.unpreferred, once it has begun."""
         self._thread = threading.Thread(target=self._run, name="heartbeat", daemon=True)
         self._thread.start()
 
@@ -80,7 +83,7 @@ class HeartbeatThread:
             raise LinkError("the link is closed")
 
     def _run(self) -> None:
-        wait_s = 0.0
+        wait_s, self.unpreferred = 0.0, portable.prefer_this_thread()
         while not self._closed.wait(wait_s):
             with self._lock:
                 wait_ns = self._pulse()

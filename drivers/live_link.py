@@ -124,6 +124,11 @@ class LiveLink:
             return empty_batch()
         return batches[0] if len(batches) == 1 else np.concatenate(batches)
 
+    @property
+    def unpreferred(self) -> str:
+        """Why the system does not grant its heartbeats real-time priority; "" where it does."""
+        return self._heartbeat.unpreferred
+
     def renew_lease(self) -> None:
         """As bench.link.Link says."""
         self._heartbeat.renew_lease()

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from bench import units
+from bench.envelope import AMBIENT
 from drivers.registerdevice import RegisterDevice
 
 Latest = Callable[[str], Mapping[str, float]]
-AMBIENT = "ambient"
 
 
 class FieldSupply:

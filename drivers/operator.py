@@ -7,7 +7,7 @@ from typing import Any
 
 from bench.clock import Clock
 from bench.envelope import Envelope
-from bench.errors import BenchError
+from bench.errors import OperatorRefused
 from bench.recorder import Recorder
 from bench.roles import Load, Plane, Side
 
@@ -27,7 +27,7 @@ class LineOperator:
 
         Raises:
             InterlockError: the mass is beyond the envelope.
-            BenchError: the other end cannot do it.
+            OperatorRefused: the other end cannot do it.
         """
         self._envelope.check_load(load.label)
         self._do(f"hang {load.label or '-'}", f"hang {load.label or 'nothing'}")
@@ -39,7 +39,7 @@ class LineOperator:
 
         Raises:
             InterlockError: the mass is beyond the envelope.
-            BenchError: the other end cannot do it.
+            OperatorRefused: the other end cannot do it.
         """
         self._envelope.check_load(load.label)
         self._do(f"lever {side} {load.label or '-'}", f"hang {load.label or 'nothing'} on the lever's {side}")
@@ -50,7 +50,7 @@ class LineOperator:
         """Have a part put on the shaft, or with "" what is on it taken off.
 
         Raises:
-            BenchError: the other end cannot do it.
+            OperatorRefused: the other end cannot do it.
         """
         self._do(f"mount {part or '-'}", f"mount {part or 'nothing'}")
         self._note(action="mount", part=part)
@@ -60,7 +60,7 @@ class LineOperator:
 
         Raises:
             InterlockError: the weight is beyond the envelope, or the shaft is not landed.
-            BenchError: the other end cannot do it.
+            OperatorRefused: the other end cannot do it.
         """
         self._envelope.check_weight(mass_kg)
         self.may_touch()
@@ -73,7 +73,7 @@ class LineOperator:
 
         Raises:
             InterlockError: the shaft is not landed.
-            BenchError: the other end cannot do it.
+            OperatorRefused: the other end cannot do it.
         """
         self.may_touch()
         self._do(f"detach {plane}", f"take the weights off the {plane} plane")
@@ -82,7 +82,8 @@ class LineOperator:
     def _do(self, line: str, what: str) -> None:
         answer = self._request(line).split()
         if not answer or answer[0] != "ok":
-            raise BenchError(f"the operator cannot {what}: {' '.join(answer)}")
+            told = " ".join(answer) or "an empty line"
+            raise OperatorRefused(f"the operator was asked to {what} and answers {told!r}; expected ok")
         self._clock.sleep(float(answer[1]) if len(answer) > 1 else 0.0)
 
     def _note(self, **fields: Any) -> None:

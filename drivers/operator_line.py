@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from bench import linkurl
-from bench.errors import ConfigError, LinkError
+from bench.errors import ConfigError, LinkError, OperatorSilent
 
 CONNECT_S, ANSWER_S = 3.0, 10.0
 LONGEST = 4096  # bytes of an answer
@@ -47,7 +47,8 @@ class OperatorLine:
         the next question.
 
         Raises:
-            LinkError: the line is lost, stays silent, or says something unasked.
+            OperatorSilent: no answer in time.
+            LinkError: the line is lost, or says something unasked.
         """
         if self._lost:
             raise LinkError(f"link operator: {self._where}: {self._lost}")
@@ -55,6 +56,9 @@ class OperatorLine:
             return self._ask(line)
         except OSError as error:
             self._lost = str(error.strerror or error)
+            if isinstance(error, TimeoutError) and error.errno is None:  # ours, not that of a dead connection
+                self._lost = f"no answer to {line!r} within {ANSWER_S:g} s"
+                raise OperatorSilent(f"link operator: {self._where}: {self._lost}; the line is open") from error
         except LinkError as error:
             self._lost = str(error)
         raise LinkError(f"link operator: {self._where}: {self._lost}")

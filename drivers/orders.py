@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 
 from bench import units
 from bench.envelope import Envelope
-from bench.errors import BenchError
+from bench.errors import BenchError, Refused
 from bench.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.session import Session
 from drivers.dialogue import Dialogue, commanded, status_of
 
+logger = logging.getLogger("drivers.orders")
 STANDING = {"OFF": "DISABLE", "READY": "ENABLE"}
 """Commands that keep a state as it is."""
 
@@ -37,7 +39,9 @@ class Orders:
 
         Raises:
             InterlockError: the envelope refuses; nothing was sent.
-            BenchError: the controller refuses, or reads back something else.
+            Refused: the controller refuses, or reads back something else.
+            BenchError: the controller cannot be told now.
+            NoReply: it does not answer.
         """
         self._envelope.check_parameter(parameter, value)
         p = self.rig.parameters[parameter]
@@ -55,20 +59,20 @@ class Orders:
         reply = self._dialogue.ask("ParamSet", values, "ParamReply", f"the reply to {parameter}", self._wait)
         status = status_of(self.rig.messages["ParamReply"], reply)
         if status != "OK":
-            raise BenchError(
+            raise Refused(
                 f"the controller refuses {parameter} = {value:g} {p.unit}: {status} in state {self._mode()}; in force is "
                 f"{reply['value']:g} {p.unit}"
             )
         if not _reads_back(reply["value"], value):
-            raise BenchError(f"{parameter}: wrote {value!r}, the controller reads back {reply['value']!r}")
+            raise Refused(f"{parameter}: wrote {value!r}, the controller reads back {reply['value']!r}")
 
     def restore(self) -> tuple[str, ...]:
         """Set every parameter that another host left elsewhere to the rig file's value, at rest; the names of those.
         A controller that cannot be asked is taken at its word.
 
         Raises:
-            LinkError: it does not answer.
-            BenchError: it refuses.
+            NoReply: it does not answer.
+            Refused: it refuses.
         """
         if not self._dialogue.has("ParamGet") or self._mode() not in STANDING:
             return ()
@@ -89,7 +93,8 @@ class Orders:
         """Read a parameter, SI.
 
         Raises:
-            BenchError: the controller does not know it, or it is one that can only be written.
+            BenchError: the controller does not know it (Refused), or it is one that can only be written.
+            NoReply: it does not answer.
         """
         p = self.rig.parameters[parameter]
         if p.index is None:
@@ -100,7 +105,7 @@ class Orders:
             "ParamGet", {"index": p.index}, "ParamReply", f"the value of {parameter}", self._wait
         )
         if status_of(self.rig.messages["ParamReply"], reply) != "OK":
-            raise BenchError(f"the controller does not know parameter {parameter} (index {p.index})")
+            raise Refused(f"the controller does not know parameter {parameter} (index {p.index})")
         return reply["value"]
 
     def _raw(self, path: str, value: float) -> float:
@@ -113,8 +118,8 @@ class Orders:
         """Ask for a command.
 
         Raises:
-            BenchError: the controller has none of that name, or refuses.
-            LinkError: no reply.
+            BenchError: the controller has none of that name, or refuses (Refused).
+            NoReply: no reply.
         """
         messages = self.rig.messages
         if not self.rig.binding.knows(name, messages):
@@ -134,9 +139,26 @@ class Orders:
             reply = self._dialogue.ask(message, values, "CommandReply", f"the reply to {name}", self._wait)
             status = status_of(messages["CommandReply"], reply)
             if status == "WRONG_SESSION":
-                raise BenchError(f"the controller refuses {name}: another host owns it")
-            if status != "OK":
-                raise BenchError(f"the controller refuses {name}: {status} in state {self._mode()}")
+                raise Refused(f"the controller refuses {name}: another host owns it")
+            if status == "WRONG_STATE" and self._dialogue.asked > 1:
+                # A firmware that executes a repeat again: it has obeyed the first one. What the state becomes is waited for.
+                logger.warning("%s was answered when it was repeated, with WRONG_STATE: taken as obeyed", name)
+            elif status != "OK":
+                raise Refused(f"the controller refuses {name}: {status} in state {self._mode()}")
+
+    def ask_state(self) -> None:
+        """Send what changes nothing and is answered by the state (IDENTIFY), where the controller has that; whoever takes
+        its frames sees the answer.
+
+        Raises:
+            LinkError: the link is lost.
+        """
+        if not self._dialogue.has("CommandReply") or not self.rig.binding.knows("IDENTIFY", self.rig.messages):
+            return
+        for message, values in commanded(self.rig, "IDENTIFY").items():
+            if any(s.name == "session" for s in self.rig.messages[message].signals):
+                values["session"] = self._session.number
+            self._dialogue.begin(message, values)
 
     def _send_held(self, message: str, values: dict[str, float]) -> None:
         owned = any(s.name == "session" for s in self.rig.messages[message].signals)

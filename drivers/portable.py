@@ -45,13 +45,22 @@ def unsent(fileno: int) -> int:
         return 0
 
 
-def prefer_this_process() -> None:
-    """Ask to be scheduled before others: real time at the lowest priority, else a better nice value. May fail."""
-    with contextlib.suppress(OSError, AttributeError):
+def prefer_this_thread(nice: bool = False) -> str:
+    """Ask for the calling thread to be scheduled before others: real time at the lowest priority; else, with `nice`, a
+    better nice value of its process.
+
+    Returns:
+        Why the system does not grant real time; "" where it does.
+    """
+    try:
         os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(1))
-        return
-    with contextlib.suppress(OSError, AttributeError):
-        os.nice(-10)
+        return ""
+    except (OSError, AttributeError) as error:
+        why = error.strerror if isinstance(error, OSError) else "the system knows none"
+    if nice:
+        with contextlib.suppress(OSError, AttributeError):
+            os.nice(-10)
+    return why or "refused"
 
 
 def ignore_stop_signals() -> None:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from bench.errors import ConfigError, LinkError
+from collections.abc import Mapping
+
+from bench.errors import ConfigError, DeviceUnreadable
 from bench.registers import GAP, Register, RegisterPort, RegisterRefused, Words, grouped, values_of
-from bench.rigfile import Device
+from bench.rigfile import Device, RigFile
 
 NOT_THERE = (1, 2, 3)  # illegal function, data address, data value: devices differ in what they say
+
+
+ROLES = ("drive", "supply", "thermal")
 
 
 class RegisterDevice:
@@ -70,7 +75,8 @@ class RegisterDevice:
         """All values in SI, in as few requests as the map allows.
 
         Raises:
-            LinkError: no answer, an exception response, or words that are no number; the text names the registers.
+            LinkError: no answer, an exception response, or words that are no number (DeviceUnreadable); the text names the
+                registers.
         """
         out: dict[str, float] = {}
         for block in self._blocks:
@@ -81,7 +87,7 @@ class RegisterDevice:
                 where = f"{self.name} ({', '.join(block.names)}): {error.where}"
                 raise RegisterRefused(error.code, where) from error
             except ValueError as error:
-                raise LinkError(f"device {self.name}: {error}") from error
+                raise DeviceUnreadable(f"device {self.name}: {error}") from error
         return out
 
     def write(self, register: str, value: float) -> None:
@@ -133,3 +139,25 @@ class RegisterDevice:
             self._port.write(self.spec.registers[register].address, words)
         except RegisterRefused as error:
             raise RegisterRefused(error.code, f"{self.name} ({register}): {error.where}") from error
+
+
+def register_devices(rig: RigFile) -> tuple[str, ...]:
+    """Names of the rig's devices in the roles of this module."""
+    return tuple(name for name, d in rig.devices.items() if set(d.roles) & set(ROLES))
+
+
+def by_role(devices: Mapping[str, RegisterDevice]) -> dict[str, RegisterDevice]:
+    """The device of each role.
+
+    Raises:
+        ConfigError: two devices have one role.
+    """
+    out: dict[str, RegisterDevice] = {}
+    for device in devices.values():
+        for role in device.spec.roles:
+            other = out.setdefault(role, device)
+            if other is not device:
+                raise ConfigError(
+                    f"devices.{device.name}.roles: found {role}, which {other.name} has; expected one device"
+                )
+    return out

@@ -21,7 +21,7 @@ import numpy as np
 
 from bench.clock import WallClock
 from bench.errors import BenchError, ConfigError, LinkError
-from bench.frames import EXTENDED, FrameBatch, empty_batch
+from bench.frames import EXTENDED, REMOTE, FrameBatch, empty_batch
 from bench.wire import slcan
 from bench.wire.slcanstream import SlcanStream, encode
 from drivers.byteport import BytePort
@@ -29,6 +29,7 @@ from drivers.canframes import messages_of
 
 ANSWER_S = 0.3  # for each of the adapter's answers while it is set up; one that does not know V or F gives none
 POLL_S = 1.0  # between requests for the status
+STRANGE = 3  # pieces that fit nothing, before anything else: the remainder of one line, and the noise of plugging in
 SILENT_S = 0.1  # without frames the status is asked for so often: silence may mean that the bus is off
 
 
@@ -44,6 +45,7 @@ class SlcanBatchBus(can.BusABC):
         timestamp: bool = False,
         tty_baudrate: int | None = None,
         can_filters: Any = None,
+        receive_own_messages: bool = False,
         now_ns: Callable[[], int] | None = None,
         **kwargs: Any,
     ) -> None:
@@ -55,17 +57,24 @@ class SlcanBatchBus(can.BusABC):
             fd: CAN FD; as `data_bitrate` says when left out.
             timestamp: have the adapter stamp frames, in ms (`hw_ns`).
             tty_baudrate: of the serial port; USB adapters do not care.
+            receive_own_messages: refused: an adapter does not send back what it sent.
             now_ns: host clock, UNIX ns.
 
         Raises:
+            can.CanInterfaceNotImplementedError: own messages are asked for.
             can.CanInitializationError: the port cannot be opened, the adapter refuses, or it reports bus errors.
         """
+        if receive_own_messages:
+            self._is_shutdown = True  # nothing was opened
+            raise can.CanInterfaceNotImplementedError("slcan_batch: an SLCAN adapter does not send back what it sent")
         self._now_ns = now_ns or WallClock().now_ns
         self._writing = threading.Lock()
         self._ask: Callable[[bytes], None] = self._write
         self._waiting: deque[can.Message] = deque()
+        self.octets = 0  # that came since it was set up, without what the adapter itself answers
+        self._came = 0  # frames while it was set up
         self._filter: Callable[[FrameBatch], Any] | None = None
-        self.stream = SlcanStream(timestamp=timestamp)
+        self.stream = SlcanStream(timestamp=timestamp, remotes=True)
         self.brs = data_bitrate is not None and fd is not False
         self.channel_info = f"SLCAN on {channel}"
         try:
@@ -98,6 +107,11 @@ class SlcanBatchBus(can.BusABC):
         """
         self._write(b"\r\r" + slcan.CLOSE + slcan.VERSION)  # CRs end whatever an earlier user left half written
         self._await(lambda s: bool(s.replies))
+        if self.stream.malformed > STRANGE and not self._came:
+            raise ConfigError(
+                f"port {channel}: {self.stream.malformed} pieces came that are no SLCAN, and no frame; expected an SLCAN "
+                "adapter. Next: is it another device, or a controller that sends packets (serial: in place of slcan:)?"
+            )
         self.stream.refused = 0
         self.stream.replies.clear()
         self._write(self._setup + slcan.VERSION)
@@ -124,15 +138,21 @@ class SlcanBatchBus(can.BusABC):
         """Read until the answer came, or the time for it is over."""
         deadline = time.monotonic() + ANSWER_S
         while not came(self.stream) and (left := deadline - time.monotonic()) > 0:
-            self.stream.feed(self.port.read(left), self._now_ns())
+            self._came += len(self.stream.feed(self.port.read(left), self._now_ns()))
 
     def recv_batch(self, timeout_s: float | None) -> FrameBatch:
-        """Frames that came, after waiting for the next bytes no longer than `timeout_s` and 0.1 s. May be empty
+        """Data frames that came, after waiting for the next bytes no longer than `timeout_s` and 0.1 s. May be empty
         earlier, when what came was no frame.
 
         Raises:
             LinkError: the port is lost.
         """
+        batch = self._frames(timeout_s)
+        remote = batch["flags"] & REMOTE != 0
+        return batch[~remote] if remote.any() else batch
+
+    def _frames(self, timeout_s: float | None) -> FrameBatch:
+        """As `recv_batch`, remote frames too."""
         now = time.monotonic()
         due = SILENT_S if now - self._heard > SILENT_S else POLL_S
         if self._knows_status and now - self._polled >= due:
@@ -141,7 +161,9 @@ class SlcanBatchBus(can.BusABC):
         data = self.port.read(SILENT_S if timeout_s is None else min(timeout_s, SILENT_S))
         if not data:
             return empty_batch()
+        answered = self.stream.answered
         batch = self.stream.feed(data, self._now_ns())
+        self.octets += len(data) - (self.stream.answered - answered)
         if len(batch):
             self._heard = time.monotonic()
         return batch if self._filter is None else batch[self._filter(batch)]
@@ -182,11 +204,11 @@ class SlcanBatchBus(can.BusABC):
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
         if not self._waiting:
             try:
-                batch = self.recv_batch(timeout)
+                batch = self._frames(timeout)
             except LinkError as error:
                 raise can.CanOperationError(str(error)) from error
             if len(batch):
-                self._waiting.extend(messages_of(batch, brs=self.brs))
+                self._waiting.extend(messages_of(batch))
         return (self._waiting.popleft(), True) if self._waiting else (None, False)
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:

@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable
 
 from bench.clock import Clock
+from bench.errors import RotorNotArrived
 from bench.rigfile import RigFile
 from bench.telemetry import TelemetryDecoder
 from drivers import waiting
-from drivers.dialogue import no_reply
 from drivers.orders import Orders
 
 SPIN_S, STOP_S = 60.0, 60.0
@@ -63,12 +63,13 @@ class Turning:
                    lambda: f"the rotor did not reach {rad_s:.1f} rad/s within {SPIN_S:g} s: it turns at "
                    f"{self.speed_rad_s:.1f} rad/s")  # fmt: skip
 
-    def stop(self, link: str) -> None:
-        """`Controller.stop`, over the link of that name."""
+    def stop(self) -> None:
+        """`Controller.stop`."""
         self._orders.command("STOP")
         limit = self.landing_speed
-        error = no_reply(link, f"speed below {limit:g} rad/s", STOP_S)
-        waiting.until(lambda: abs(self.speed_rad_s) < limit, STOP_S, error, self._clock, self._now_ns)
+        waiting.until(lambda: abs(self.speed_rad_s) < limit, STOP_S, lambda: RotorNotArrived(
+            f"the rotor did not slow to {limit:g} rad/s within {STOP_S:g} s: it turns at {self.speed_rad_s:.1f} rad/s"
+        ), self._clock, self._now_ns)  # fmt: skip
 
     def _keep(self, ok: Callable[[], bool], expected_s: float, timeout_s: float, text: Callable[[], str]) -> None:
         waiting.keep(ok, expected_s, timeout_s, text, self._clock, self._now_ns)

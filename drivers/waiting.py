@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from bench.clock import Clock
-from bench.errors import LinkError
+from bench.errors import BenchError, RotorNotArrived
 from bench.rigfile import RigFile
 
 SLICE_S, LONG_SLICE_S, PATIENCE = 0.01, 0.1, 0.2  # a wait looks again after a fifth of how long it has waited
@@ -36,17 +36,19 @@ class Stopwatch:
         return self._ns
 
 
-def until(done: Callable[[], bool], timeout_s: float, error: LinkError, clock: Clock, now_ns: Now) -> None:
+def until(
+    done: Callable[[], bool], timeout_s: float, error: Callable[[], BenchError], clock: Clock, now_ns: Now
+) -> None:
     """Let the clock run until something is true; `now_ns` is looked at without letting it run.
 
     Raises:
-        LinkError: the given one, when time runs out.
+        BenchError: the given one, when time runs out.
     """
     watch = Stopwatch(now_ns)
     while not done():
         waited = watch.look()
         if waited >= timeout_s * 1e9:
-            raise error
+            raise error()
         clock.sleep(min(_pause(waited), max(timeout_s - waited * 1e-9, 1e-3)))
 
 
@@ -56,7 +58,7 @@ def keep(
     """Let the clock run for the time that it should take, and on until something has been true for a tenth of a second.
 
     Raises:
-        LinkError: `text`, when time runs out.
+        RotorNotArrived: with `text`, when time runs out.
     """
     since, expected = None, min(expected_s, timeout_s)
     clock.sleep(expected)
@@ -70,7 +72,7 @@ def keep(
         elif now - since >= KEPT_S * 1e9:
             return
         if now > (timeout_s - expected) * 1e9:
-            raise LinkError(text())
+            raise RotorNotArrived(text())
         clock.sleep(_pause(now + round(expected * 1e9)) if since is None else KEPT_SLICE_S)
 
 

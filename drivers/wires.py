@@ -79,6 +79,7 @@ class PacketWire:
         batch = self._stream.feed(data, self._now_ns())
         s = self._stream
         self.stats.received += len(batch)
+        self.stats.octets += len(data)
         self.stats.crc_errors, self.stats.malformed, self.stats.packets_lost = s.crc_errors, s.malformed, s.packets_lost
         return batch
 

@@ -20,14 +20,18 @@ from bench.findings import Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recorder import Recorder
 from bench.recording import Recording
+from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import NOTHING, Load, RigState
-from bench.uncertainty import Estimate, Influence, propagate
+from bench.uncertainty import Estimate, propagate
 from procedures import amb_calibration_figures as drawn
-from procedures.estimators import angle_facts, consistency, mass_hanging
-from procedures.estimators.hanging_data import CHANNELS, COILS, HangingData, read_hangings
+from procedures import assumed
+from procedures.estimators import angle_facts, consistency, load_hypotheses, mass_hanging
+from procedures.estimators.hanging_data import CHANNELS, COILS, LEVERS, HangingData, read_hangings
+from procedures.estimators.hanging_estimates import less_sure, turning_point, unresolved_angles
 from procedures.estimators.inputs import certified
+from procedures.estimators.load_hypotheses import Contradiction
 from procedures.estimators.mass_hanging import Fit
 from procedures.estimators.repeatability import OUTPUTS, Scatter, covariance_by_angle, covariance_over_a_turn, scatter
 
@@ -37,8 +41,8 @@ K2_I = Quantity("K2_i", "N/A^2", "inboard AMB: (d²F/di²)/2, mean over a turn")
 K2_O = Quantity("K2_o", "N/A^2", "outboard AMB: (d²F/di²)/2, mean over a turn")
 KW_I = Quantity("Kw_i", "N/A", "inboard AMB: dF/di at the current that carries the rotor's own weight")
 KW_O = Quantity("Kw_o", "N/A", "outboard AMB: dF/di at the current that carries the rotor's own weight")
-BEARINGS = {"i": "inboard", "o": "outboard"}
 MEASURES = (K_I, K_O, K2_I, K2_O, KW_I, KW_O)
+CLEAR_A = 0.1  # a change of a control current that is no noise
 
 
 class Plan(BenchPlan):
@@ -75,9 +79,14 @@ def step_count(plan: Plan) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Hang every mass up and down at each angle; the hanger stays on throughout."""
+    before = _controls(rig)
     rig.operator.hang(Load(plan.masses[-1]))  # exercise: the first zero is then reached by unloading, like the others
     rig.clock.sleep(plan.settle_s)
+    changes = {axis: after - before[axis] for axis, after in _controls(rig).items()}
     rig.operator.hang(NOTHING)
+    if max(map(abs, changes.values())) > CLEAR_A and any(consistency.wiring(**changes)):
+        record.event(consistency.WIRED_WRONG, changes=changes)  # an hour of hangings would say no more
+        return
     for turn in range(plan.angles):
         angle = 2 * math.pi * turn / plan.angles
         rig.rotation.point(angle)
@@ -88,23 +97,34 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
                 rig.clock.sleep(plan.average_s)
 
 
+def _controls(rig: Rig) -> dict[str, float]:
+    """The control currents by axis as they are now, A."""
+    at = rig.levitation.reading
+    return {axis: (at(f"i_{axis}_p") - at(f"i_{axis}_n")) / 2 for axis in consistency.AXES}
+
+
 @dataclass(frozen=True)
 class Analysis:
     """Everything the measurements, findings, facts and figures are made of.
 
-    `estimates` are without Type A, means over a turn and values by angle; `spread` (A, 6, 6) is the Type A covariance at
-    each angle."""
+    `estimates` are without the scatter of the hangings, means over a turn and values by angle; `spread` (A, 6, 6) is its
+    covariance at each angle. `loads` is what the masses say against each other, `beyond` (relative) what that adds to each."""
 
     data: HangingData
     inputs: dict[str, Estimate]
     fit: Fit
     scatter: Scatter
+    loads: Contradiction
+    beyond: float
     spread: np.ndarray
     estimates: dict[str, Estimate]
 
 
 def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     """Findings first (they decide what the numbers are worth), then the six quantities."""
+    if first := list(consistency.of_first(recording)):
+        yield from first
+        return
     data = hangings(recording)
     findings = list(consistency.of_signals(data, recording.plan))
     yield from findings
@@ -112,7 +132,13 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
         return
     result = evaluate(recording)
     values = {name: e.value for name, e in result.inputs.items()}
-    yield from consistency.of_fit(data, result.fit, result.scatter, values, recording.plan, masses_u(recording))
+    findings = list(
+        consistency.of_fit(data, result.fit, result.scatter, result.loads, result.beyond, values, recording.plan,
+                           masses_u(recording))
+    )  # fmt: skip
+    yield from findings
+    if any(f.code in consistency.FATAL for f in findings):
+        return
     scattered = angle_facts.scatter_terms("scatter", covariance_over_a_turn(result.spread), result.scatter.dof)
     for quantity in MEASURES:
         yield quantity.measured(result.estimates[quantity.name] + scattered[quantity.name])
@@ -149,13 +175,16 @@ def evaluate(recording: Recording[Plan]) -> Analysis:
     share = np.array(mass_hanging.hung_shares(values["hook_to_outboard"], values["amb_span"]))
     hanger = mass_hanging.weight(values["hanger"], values["gravity"], values["air_density"], values["mass_density"])
     covariance = covariance_by_angle(fitted, spread, -share * float(hanger))
-    estimates = propagate(model, inputs)
+    loads = load_hypotheses.contradiction(fitted, data.hangings, spread, values, masses_u(recording))
+    beyond = load_hypotheses.scatter_of_set(loads)
+    hung = {label: recording.rig.masses[label].value for label in plan.masses}
+    estimates = {name: less_sure(e, hung, beyond) for name, e in propagate(model, inputs).items()}
     half_branch = model(values, top_branch=0.0)
     for name, estimate in estimates.items():
-        estimates[name] = estimate + _turning_point(name, half_branch[name] - estimate.value)
+        estimates[name] = estimate + turning_point(name, half_branch[name] - estimate.value)
         if name in OUTPUTS:
-            estimates[name] += _unresolved_angles(name, fitted, plan, values)
-    return Analysis(data, inputs, fitted, spread, covariance, estimates)
+            estimates[name] += unresolved_angles(name, fitted, plan.bias_A, values["amb_gap"])
+    return Analysis(data, inputs, fitted, spread, loads, beyond, covariance, estimates)
 
 
 def fit_inputs(rig: RigFile, plan: Plan) -> dict[str, Estimate]:
@@ -187,33 +216,6 @@ def fit_inputs(rig: RigFile, plan: Plan) -> dict[str, Estimate]:
     return inputs
 
 
-def _turning_point(name: str, shift: float) -> Estimate:
-    """The heaviest load is where loading turns: it counts as loading, and at most half of that could be wrong, at all
-    angles alike."""
-    bearing = name.partition("@")[0][-1]
-    influence = Influence(id=f"hysteresis/{bearing}", name=f"hysteresis at the turning point, {BEARINGS[bearing]} AMB",
-                          u=1 / math.sqrt(3), unit="1", kind="B", distribution="rectangular",
-                          source="branch of the heaviest load set to zero")  # fmt: skip
-    return Estimate.of(0.0, influence) * shift
-
-
-def _unresolved_angles(name: str, f: Fit, plan: Plan, p: dict[str, float]) -> Estimate:
-    """What a mean over equally spaced angles can miss: orders of K(angle) that are multiples of their number.
-
-    The zero-load current shows the eccentricity of the journal by order (i = xi b / gap). K grows with the square of
-    xi / gap (T 2.4: factor 1 + 3 (xi/gap)^2), so order n of K needs products of eccentricity orders that add to n; the
-    orders above half of the number of angles are bounded by the smallest that is resolved.
-    """
-    bearing = 0 if name.endswith("i") else 1
-    current = f.control[bearing][:, [0, -1]].mean(axis=1)
-    orders = np.abs(np.fft.rfft(current)) * 2 / plan.angles * p["amb_gap"] / plan.bias_A
-    ratio = 3 * float(orders[1:].max() * orders[1:].min()) / p["amb_gap"] ** 2
-    scale = abs(float(f.terms[bearing, :, 1].mean())) / (plan.bias_A if name.startswith("K2") else 1.0)
-    influence = Influence(id=f"angle/{name}", name="angle dependence not resolved", u=ratio * scale / math.sqrt(3),
-                          unit="1", kind="B", distribution="rectangular", source="orders of the zero-load current")  # fmt: skip
-    return Estimate.of(0.0, influence)
-
-
 def masses_u(recording: Recording[Plan]) -> np.ndarray:
     """Standard uncertainty in kg of the hanger (nothing hung) and of each mass."""
     rig = recording.rig
@@ -223,11 +225,6 @@ def masses_u(recording: Recording[Plan]) -> np.ndarray:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    needed = (("sensors", [c for c in COILS if c.startswith("i_y")], rig.sensors), ("channels", CHANNELS, rig.channels),
-              ("parameters", ("bias_i", "bias_o", "angle_ref"), rig.parameters))  # fmt: skip
-    for table, names, found in needed:
-        if missing := [n for n in names if n not in found]:
-            yield f"{table}: found no {', '.join(missing)}; the calibration needs {'it' if len(missing) == 1 else 'them'}"
     unknown = [m for m in plan.masses if m not in rig.masses]
     if unknown:
         yield f"masses: found {', '.join(unknown)}; the rig file certifies {', '.join(rig.masses)}"
@@ -239,6 +236,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(recording: Recording[Plan]) -> Iterable[Figure]:
     """Fit, residuals, one step over time, and both polar plots; empty when the data carry no fit."""
+    if any(consistency.of_first(recording)):
+        return ()
     data = hangings(recording)
     if any(f.code in consistency.FATAL for f in consistency.of_signals(data, recording.plan)):
         return ()
@@ -257,9 +256,6 @@ At each angle F = F0 + K i + K2 i² is fitted per bearing by least squares, in a
 sum is not exactly twice the bias, with a term for the direction of loading that takes hysteresis and drift out of K.
 Forces are referred to the sensors' zero by the residual displacement times the stiffness. The reported values are means
 over the angles. The vertical axis is calibrated; the horizontal one is not loaded and not reported.
-
-What no data can show: an error common to all masses, to gravity or to the ratio of the spans scales K by itself. It is
-in the budget as far as the certificates state it, and nowhere else.
 """
 
 procedure = Procedure(
@@ -271,10 +267,20 @@ procedure = Procedure(
     acquire=acquire,
     analyse=analyse,
     figures=figures,
+    requires=Requires(
+        roles=("levitation", "rotation"),
+        channels=CHANNELS,
+        sensors=tuple(c for c in COILS if c.startswith("i_y")),
+        parameters=("bias_i", "bias_o", "angle_ref"),
+        geometry=("hook_to_outboard", "amb_span", "amb_gap", "com_to_motor", "motor_stiffness", *LEVERS),
+        masses=True,
+    ),
     check=check,
     settings=settings,
     step_count=step_count,
     facts=facts,
     holds_for=lambda plan: {"bias_A": plan.bias_A, "angles": plan.angles},
+    reached=("masses/*", "!masses/hanger", "!masses/density"),
+    assumes=assumed.AMB_CALIBRATION,
     method=METHOD,
 )

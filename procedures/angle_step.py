@@ -18,6 +18,7 @@ from bench.findings import Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recorder import Recorder
 from bench.recording import Recording
+from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
@@ -139,18 +140,13 @@ def _loop(rig: RigFile, plan: Plan, case: Case) -> Loop:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts, and speeds that the envelope does not allow."""
-    lacking = [
-        *rotor.missing(rig, (*CHANNELS, *wiring.CHANNELS), (*wiring.PARAMETERS, *NEEDED), POSITIONS),
-        *(f"machine: found no {n}; needed to predict the speed" for n in ("polar_inertia",) if n not in rig.machine),
-    ]
-    yield from lacking
     if len(set(plan.allocations)) < len(plan.allocations) or len(set(plan.filters_hz)) < len(plan.filters_hz):
         yield "allocations, filters_hz: found one twice; expected each once"
     if any(not 4 * math.pi / plan.encoder_counts < s <= math.pi / 2 for s in plan.steps_rad):
         least = 720 / plan.encoder_counts
         yield f"steps_rad: found {min(plan.steps_rad):g} to {max(plan.steps_rad):g}; expected above two encoder counts " \
               f"({least:.2g} deg), up to a quarter turn"  # fmt: skip
-    elif not lacking:
+    else:
         yield from _too_fast(rig, plan)
 
 
@@ -198,6 +194,13 @@ procedure = Procedure(
     acquire=acquire,
     analyse=analyse,
     figures=figures,
+    requires=Requires(
+        roles=("levitation", "rotation"),
+        channels=(*CHANNELS, *wiring.CHANNELS),
+        sensors=POSITIONS,
+        parameters=(*rotor.PARAMETERS, *wiring.PARAMETERS, *NEEDED),
+        machine=("polar_inertia",),
+    ),
     check=check,
     settings=settings,
     step_count=step_count,

@@ -133,6 +133,11 @@ def step_count(plan: Plan) -> int:
     return probing.STEPS + (plan.slow_rad_s > 0) + runs * (len(plan.speeds_rad_s) + plan.repeat) + mounts
 
 
+def fewest_steps(plan: Plan) -> int:
+    """A rotor that is balanced as it stands takes one run."""
+    return probing.STEPS + (plan.slow_rad_s > 0) + len(plan.speeds_rad_s)
+
+
 def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     """Findings first, then the quantities."""
     found = recording.once(balance_checks.evaluated)
@@ -194,9 +199,11 @@ procedure = Procedure(
     acquire=balancing.acquire,
     analyse=analyse,
     figures=figures,
+    requires=balance_checks.REQUIRES,
     check=check,
     settings=settings,
     step_count=step_count,
+    fewest_steps=fewest_steps,
     needs=unbalance.needs,
     method=METHOD,
 )

@@ -56,7 +56,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     if not _rolled(work) or not _run(work, BASE):
         return
     for p, side in enumerate(SIDES):
-        if (allowed := balance_decision.refused(rig.file, plan, work.runs, p)) is not None:
+        if (allowed := balance_decision.refused(rig.file, plan, work.runs[-1 if plan.leave else 0], p)) is not None:
             record.event(REFUSED, plane=side, kg=plan.trial_kg[p], allowed_kg=allowed)
             return
         _mount(work, p, plan.trial_kg[p], plan.trial_angle_rad[p], "trial")
@@ -122,7 +122,7 @@ def _dwell(
     touched = int(rig.levitation.reading("flags")) & CONTACT
     data = rig.capture.upload(run=name, speed_rad_s=speed)
     try:
-        return None if touched else read_capture(data)
+        return None if touched else read_capture(data, kind == SLOW)
     except AnalysisError:
         return None  # of the pulses; the analysis says what is wrong with them
 

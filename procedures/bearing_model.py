@@ -19,6 +19,7 @@ from bench.findings import Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recorder import Recorder
 from bench.recording import Recording
+from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
@@ -198,10 +199,6 @@ def _of_data(recording: Recording[Plan], held: Held, tilted: Held) -> Iterator[F
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    lacking = list(_missing(rig))
-    yield from lacking
-    if lacking:
-        return
     places = len(grid(plan))
     if places < 9:
         yield f"spacing_m, radius_m: found {places} positions; expected nine or more"
@@ -226,18 +223,6 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
                 f"biases_A: found {bias:g} A; parameter and amplifiers, which have to give twice that, leave {low:g} to "
                 f"{high:g} A"
             )
-
-
-def _missing(rig: RigFile) -> Iterator[str]:
-    for table, names, found in (
-        ("sensors", (*POSITIONS, *CURRENTS), rig.sensors),
-        ("channels", (*POSITIONS, *CURRENTS, "flags"), rig.channels),
-        ("parameters", PARAMETERS, rig.parameters),
-        ("geometry", GEOMETRY, rig.geometry),
-        ("machine", MACHINE, rig.machine),
-    ):
-        if lacking := [n for n in names if n not in found]:
-            yield f"{table}: found no {', '.join(lacking)}; needed {'it is' if len(lacking) == 1 else 'all of them are'}"
 
 
 def figures(recording: Recording[Plan]) -> Iterable[Figure]:
@@ -288,6 +273,13 @@ procedure = Procedure(
     acquire=acquire,
     analyse=analyse,
     figures=figures,
+    requires=Requires(
+        channels=(*POSITIONS, *CURRENTS, "flags"),
+        sensors=(*POSITIONS, *CURRENTS),
+        parameters=PARAMETERS,
+        geometry=GEOMETRY,
+        machine=MACHINE,
+    ),
     check=check,
     settings=settings,
     step_count=step_count,

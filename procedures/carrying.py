@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
-from bench.errors import LinkError
+from bench.errors import RotorNotArrived
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from procedures import rotor
@@ -21,13 +21,13 @@ def home(rig: Rig) -> None:
     """Turn the rotor to its home angle.
 
     Raises:
-        LinkError: it does not arrive; the text names what an angle loop that runs away points to.
+        RotorNotArrived: it does not arrive; the text names what an angle loop that runs away points to.
     """
     try:
         rig.rotation.point(0.0)
-    except LinkError as error:
+    except RotorNotArrived as error:
         why = "does the encoder count in the direction of the motor's torque, and is the shaft free?"
-        raise LinkError(f"{error}; {why}") from error
+        raise RotorNotArrived(f"{error}; {why}") from error
 
 
 def carry(rig: Rig, settle_s: float) -> None:
@@ -78,17 +78,6 @@ def mirrored(levels: Sequence[float]) -> Iterator[tuple[float, int]]:
 def approach(levels: Sequence[float]) -> list[float]:
     """Where to go first, unrecorded, from zero to the lowest level, so that it is reached from above like in the end."""
     return sorted((x for x in levels if x < 0), reverse=True)[:-1]
-
-
-def missing(rig: RigFile, sensors: Iterable[str], channels: Iterable[str], parameters: Iterable[str],
-            geometry: Iterable[str]) -> Iterator[str]:  # fmt: skip
-    """What a procedure needs and the rig file has not, one line a table."""
-    needed = (("sensors", sensors, rig.sensors), ("channels", channels, rig.channels),
-              ("parameters", parameters, rig.parameters), ("geometry", geometry, rig.geometry),
-              ("machine", ("pole_pairs",), rig.machine))  # fmt: skip
-    for table, names, found in needed:
-        if lacking := [n for n in names if n not in found]:
-            yield f"{table}: found no {', '.join(lacking)}; needed {'it is' if len(lacking) == 1 else 'they are'}"
 
 
 def gravity_share_N(rig: RigFile) -> float:

@@ -53,6 +53,7 @@ procedure = Procedure(
     acquire=acquire,
     analyse=runup.analyse,
     figures=runup.figures,
+    requires=unbalance.REQUIRES,
     check=runup.check,
     settings=runup.settings,
     step_count=runup.step_count,

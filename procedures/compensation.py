@@ -7,6 +7,7 @@ the switch; what is left of mean and amplitude in steady state.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 from pydantic import Field
 
@@ -24,7 +25,7 @@ from procedures import probing, turning, unbalance, unbalance_figures
 from procedures.estimators import compensation_checks, switching
 from procedures.estimators.switching import SWITCH
 from procedures.estimators.unbalance_data import RPM
-from procedures.turning import Law, Variant
+from procedures.turning import SETTINGS, Law, Variant
 
 REDUCTION = Quantity(
     "reduction",
@@ -164,6 +165,7 @@ procedure = Procedure(
     acquire=acquire,
     analyse=analyse,
     figures=figures,
+    requires=replace(unbalance.REQUIRES, parameters=(*unbalance.REQUIRES.parameters, *SETTINGS["corrected"])),
     check=check,
     settings=settings,
     step_count=step_count,

@@ -27,12 +27,13 @@ from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
 from bench.uncertainty import Estimate
+from procedures import assumed
 from procedures import force_constant_figures as drawn
 from procedures.estimators import force_estimates, force_findings, force_rows
 from procedures.estimators.force_estimates import AxisResult
 from procedures.estimators.force_rows import TIME
 from procedures.estimators.ramp_data import STEP, RampData, read_ramps
-from procedures.force_constant_check import check
+from procedures.force_constant_check import REQUIRES, check
 
 Array = npt.NDArray[np.float64]
 
@@ -291,9 +292,11 @@ procedure = Procedure(
     acquire=acquire,
     analyse=analyse,
     figures=figures,
+    requires=REQUIRES,
     check=check,
     settings=settings,
     step_count=step_count,
+    assumes=assumed.FORCE_CONSTANT,
     method=METHOD,
     needs=needs,
     facts=facts,

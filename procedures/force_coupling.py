@@ -20,10 +20,11 @@ from bench.findings import Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recorder import Recorder
 from bench.recording import Recording
+from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
-from procedures import carrying
+from procedures import assumed, carrying
 from procedures import force_coupling_figures as drawn
 from procedures.estimators import carried_checks, coupling_findings
 from procedures.estimators.carried_data import CHANNELS, POSITIONS, SEGMENTS, StepMeans, read_steps
@@ -122,11 +123,6 @@ def _of_signals(data: StepMeans, plan: Plan) -> Iterator[Finding]:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    parameters = (*carrying.PARAMETERS, "gamma", "segment_max")
-    lacking = list(carrying.missing(rig, (*SEGMENTS, *POSITIONS), CHANNELS, parameters, GEOMETRY))
-    yield from lacking
-    if lacking:
-        return
     gammas = plan.gamma_rad
     if list(gammas) != sorted(set(gammas)) or gammas[0] >= 0 or gammas[-1] <= 0:
         yield f"gamma_rad: found {gammas}; expected different angles in ascending order, on both sides of zero"
@@ -179,8 +175,6 @@ The thesis fits differences of the same equations linearly, with gamma_0 = 0 (T 
 
 At the home angle the ripple of the force over the rotor's angle (T 5.25, terms 2 and 3) has the same effect as the constants
 themselves; what is measured is alpha_d - alpha_2 over alpha_c + alpha_3.
-
-What no data here can show: an error common to both axes' currents, and gamma itself counted in wrong units by the controller.
 """
 
 procedure = Procedure(
@@ -192,8 +186,17 @@ procedure = Procedure(
     acquire=acquire,
     analyse=analyse,
     figures=figures,
+    requires=Requires(
+        roles=("levitation", "rotation"),
+        channels=CHANNELS,
+        sensors=(*SEGMENTS, *POSITIONS),
+        parameters=(*carrying.PARAMETERS, "gamma", "segment_max"),
+        geometry=GEOMETRY,
+        machine=("pole_pairs",),
+    ),
     check=check,
     step_count=step_count,
     needs=needs,
+    assumes=assumed.FORCE_COUPLING,
     method=METHOD,
 )

@@ -22,6 +22,7 @@ from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recorder import Recorder
 from bench.recording import Recording
+from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import NOTHING, Load, RigState
@@ -203,18 +204,8 @@ def _notes(result: Result) -> Iterator[Finding]:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    lacking = [
-        *rotor.missing(
-            rig, (*CHANNELS, *wiring.CHANNELS), (*wiring.PARAMETERS, *NEEDED), (*COILS, *SEGMENTS, *POSITIONS)
-        ),
-        *(f"geometry: found no {n}; the map needs it" for n in GEOMETRY if n not in rig.geometry),
-        *("machine: found no pole_pairs; the map needs it" for _ in [0] if "pole_pairs" not in rig.machine),
-    ]
-    yield from lacking
     if plan.mass not in rig.masses:
         yield f"mass: found {plan.mass}; the rig file certifies {', '.join(rig.masses)}"
-    if lacking:
-        return
     g = rig.geometry
     out = 1 + g["motor_to_outboard_amb"].value / g["amb_span"].value
     for i, d in ((plan.current_A, plan.offset_m), (plan.loaded_current_A, plan.loaded_offset_m)):
@@ -261,6 +252,15 @@ procedure = Procedure(
     acquire=acquire,
     analyse=analyse,
     figures=figures,
+    requires=Requires(
+        roles=("levitation", "rotation"),
+        channels=(*CHANNELS, *wiring.CHANNELS),
+        sensors=(*COILS, *SEGMENTS, *POSITIONS),
+        parameters=(*rotor.PARAMETERS, *wiring.PARAMETERS, *NEEDED),
+        geometry=GEOMETRY,
+        machine=("pole_pairs",),
+        masses=True,
+    ),
     check=check,
     settings=settings,
     step_count=step_count,

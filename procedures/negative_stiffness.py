@@ -19,6 +19,7 @@ from bench.findings import Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recorder import Recorder
 from bench.recording import Recording
+from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
@@ -170,12 +171,6 @@ def _of_signals(recording: Recording[Plan], motor: StepMeans, ambs: StepMeans) -
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    sensors = (*SEGMENTS, *COILS, *POSITIONS)
-    parameters = (*carrying.PARAMETERS, "ref_yo", "bias_i", "bias_o", "segment_max")
-    lacking = list(carrying.missing(rig, sensors, CHANNELS, parameters, GEOMETRY))
-    yield from lacking
-    if lacking:
-        return
     levels = plan.levels_m
     if list(levels) != sorted(set(levels)) or levels[0] >= 0 or levels[-1] <= 0:
         yield f"levels_m: found {levels}; expected different levels in ascending order, on both sides of zero"
@@ -260,6 +255,14 @@ procedure = Procedure(
     acquire=acquire,
     analyse=analyse,
     figures=figures,
+    requires=Requires(
+        roles=("levitation", "rotation"),
+        channels=CHANNELS,
+        sensors=(*SEGMENTS, *COILS, *POSITIONS),
+        parameters=(*carrying.PARAMETERS, "ref_yo", "bias_i", "bias_o", "segment_max"),
+        geometry=GEOMETRY,
+        machine=("pole_pairs",),
+    ),
     check=check,
     settings=settings,
     step_count=step_count,

@@ -5,7 +5,7 @@ What is recorded here is judged by `procedures.estimators.tracking_wiring.before
 
 from __future__ import annotations
 
-from bench.errors import DeviceFault, LinkError
+from bench.errors import DeviceFault, NotReached
 from bench.recorder import Recorder
 from bench.rig import Rig
 from bench.roles import RigState
@@ -32,9 +32,9 @@ def turned(rig: Rig, record: Recorder, rad_s: float, settle_s: float) -> bool:
     """Bring the shaft to a speed; False where it does not get there, which the analysis tells."""
     try:
         if rig.drive is None:
-            raise LinkError("the rig has no drive")
+            raise NotReached("the rig has no drive")
         rig.drive.reach(rad_s)
-    except LinkError as error:
+    except NotReached as error:
         record.event(NO_SPEED, wanted=rad_s, why=str(error))
         return False
     rig.clock.sleep(settle_s)

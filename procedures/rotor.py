@@ -7,11 +7,9 @@ ready to take over where the rotor is.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 
 from bench.recorder import Recorder
 from bench.rig import Rig
-from bench.rigfile import RigFile
 
 GAINS = ("kp_theta", "kd_theta", "ki_theta")
 PARAMETERS = (*GAINS, "angle_ref")
@@ -49,17 +47,6 @@ def probe(rig: Rig, record: Recorder) -> None:
             rig.clock.sleep(PROBE_S)
         release(rig)
     rig.levitation.set("angle_ref", 0.0)
-
-
-def missing(
-    rig: RigFile, channels: Iterable[str], parameters: Iterable[str], sensors: Iterable[str] = ()
-) -> Iterable[str]:
-    """What a procedure needs and the rig file has not, one line a table."""
-    needed = (("sensors", sensors, rig.sensors), ("channels", channels, rig.channels),
-              ("parameters", (*PARAMETERS, *parameters), rig.parameters))  # fmt: skip
-    for table, names, found in needed:
-        if lacking := [n for n in names if n not in found]:
-            yield f"{table}: found no {', '.join(lacking)}; needed are {'it' if len(lacking) == 1 else 'all of them'}"
 
 
 def within_a_turn(angle: float) -> float:

@@ -247,11 +247,8 @@ def measured(run: Run) -> Iterator[Measured]:
 
 def check(rig: RigFile, plan: Passing) -> Iterable[str]:
     """What cannot work before anything starts."""
-    lacking = list(unbalance.lacking(rig))
-    lacking += [f"parameters: the rig has no {name}" for name in plan.parameters if name not in rig.parameters]
-    yield from lacking
-    if not lacking:
-        yield from runup_checks.of_plan(rig, plan)
+    lacking = [f"parameters: the rig has no {name}" for name in plan.parameters if name not in rig.parameters]
+    yield from lacking or runup_checks.of_plan(rig, plan)
 
 
 def figures(recording: Recording[Any]) -> Iterable[Shown]:
@@ -293,6 +290,7 @@ procedure = Procedure(
     acquire=acquire,
     analyse=analyse,
     figures=figures,
+    requires=unbalance.REQUIRES,
     check=check,
     settings=settings,
     step_count=step_count,

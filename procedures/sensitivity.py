@@ -21,6 +21,7 @@ from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recorder import Recorder
 from bench.recording import Recording
+from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
@@ -28,12 +29,16 @@ from procedures import probing
 from procedures import sensitivity_figures as drawn
 from procedures.estimators import sensitivity_checks, sensitivity_estimates, sensitivity_plan, tracking_wiring
 from procedures.estimators.sensitivity_data import (
+    CURRENTS,
     HALF,
     INJECT,
+    LOOP,
     MODE,
+    PULSED,
     REFINED,
     RPM,
     SURVEY,
+    TOLD,
     WIRING,
     Taken,
     channels,
@@ -43,7 +48,7 @@ from procedures.estimators.sensitivity_data import (
     sensitivity,
 )
 from procedures.estimators.sensitivity_estimates import Candidate, Result
-from procedures.injecting import Comb, combs, injected
+from procedures.injecting import PARAMETERS, Comb, combs, injected
 
 Law = Literal["PID", "CCS"]
 Axis = Literal["yi", "zi", "yo", "zo", "x"]
@@ -271,6 +276,7 @@ procedure = Procedure(
     acquire=acquire,
     analyse=analyse,
     figures=figures,
+    requires=Requires(channels=TOLD, parameters=(*PARAMETERS, "law"), capture=(*LOOP, *PULSED, *CURRENTS)),
     check=check,
     settings=settings,
     step_count=step_count,

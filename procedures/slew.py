@@ -18,6 +18,7 @@ from bench.findings import Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recorder import Recorder
 from bench.recording import Recording
+from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
@@ -133,13 +134,6 @@ def gains(plan: Plan) -> Gains:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts, and movements that the envelope or the torque do not allow."""
-    lacking = [
-        *rotor.missing(rig, (*CHANNELS, *wiring.CHANNELS), (*wiring.PARAMETERS, *NEEDED)),
-        *(f"machine: found no {n}; needed to predict the torque" for n in ("polar_inertia",) if n not in rig.machine),
-    ]
-    yield from lacking
-    if lacking:
-        return
     if plan.amplitude_rad * plan.detent_order < math.pi:
         yield (f"amplitude_rad: found {plan.amplitude_rad:g}; expected {math.pi / plan.detent_order:.3g} or more: the swing "
                f"must cover one of {plan.detent_order} periods per turn")  # fmt: skip
@@ -190,6 +184,12 @@ procedure = Procedure(
     acquire=acquire,
     analyse=analyse,
     figures=figures,
+    requires=Requires(
+        roles=("levitation", "rotation"),
+        channels=(*CHANNELS, *wiring.CHANNELS),
+        parameters=(*rotor.PARAMETERS, *wiring.PARAMETERS, *NEEDED, "segment_max"),
+        machine=("polar_inertia",),
+    ),
     check=check,
     settings=settings,
     step_count=step_count,

@@ -13,18 +13,19 @@ from typing import Literal
 
 from pydantic import Field
 
-from bench.errors import LinkError
+from bench.errors import NotReached
 from bench.figures import Figure
 from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recorder import Recorder
 from bench.recording import Recording
+from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
 from bench.states import transition
 from bench.uncertainty import Estimate
-from procedures import rotor
+from procedures import assumed, rotor
 from procedures import spindown_figures as drawn
 from procedures.estimators import drag, spindown_checks
 from procedures.estimators.drag import Drag
@@ -32,11 +33,11 @@ from procedures.estimators.spindown_data import CHANNELS, COILS, RunDown, read_r
 
 B = Quantity("B", "N m s/rad", "viscous drag at the bias of the plan, mean over both directions")
 B_HIGH = Quantity("B_high", "N m s/rad", "viscous drag at the higher bias, mean over both directions")
-T_C = Quantity("T_c", "N m", "Coulomb torque at the bias of the plan, mean over both directions")
+T_C = Quantity("T_c", "N m", "Coulomb torque of the rotor alone at the bias of the plan, mean over both directions")
 J_Z = Quantity("J_z", "kg m^2", "polar inertia: by the ring where one was mounted, else the rig file's as used")
 MEASURES = (B, B_HIGH, T_C, J_Z)
 RAMP_S = 0.25  # what is left of the run-up's ramp when the speed is nearly there
-SLOW = 4  # the drive also holds a speed so many times slower: both tell its constant torque
+SLOW = (0.1, 0.15, 0.2, 0.25, 0.3)  # shares of the speed that the drive also holds: they tell its constant torque
 
 
 class Plan(BenchPlan):
@@ -70,8 +71,13 @@ def groups(plan: Plan) -> tuple[tuple[str, float], ...]:
 
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records, for the progress display; with a drive, once more in each direction, slowly."""
-    slowly = 0 if plan.run_up == "motor" else 2
-    return 2 + (4 * plan.repeats + slowly) * len(groups(plan))
+    slowly = 0 if plan.run_up == "motor" else 2 * len(SLOW)
+    return 2 + 4 * plan.repeats * len(groups(plan)) + slowly
+
+
+def fewest_steps(plan: Plan) -> int:
+    """Without a drive `auto` runs up by the motor."""
+    return step_count(plan) - (2 * len(groups(plan)) if plan.run_up == "auto" else 0)
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
@@ -107,10 +113,8 @@ def _run_down(rig: Rig, plan: Plan, record: Recorder, labels: Mapping[str, objec
     """Run up, hold the speed, let go and wait for the end speed; False if the speed is not reached."""
     direction = 1 if labels["direction"] == 1 else -1
     wanted = direction * plan.speed_rad_s
-    if labels["by"] == "drive" and labels["repeat"] == 0 and _run_up(rig, wanted / SLOW, "drive"):
-        rig.clock.sleep(RAMP_S)
-        with record.step("spin", speed_rad_s=wanted / SLOW, **labels):
-            rig.clock.sleep(plan.steady_s)
+    if labels["by"] == "drive" and labels["group"] == "low" and labels["repeat"] == 0:
+        _hold_slowly(rig, plan, record, labels, wanted)
     if not _run_up(rig, wanted, str(labels["by"])):
         record.event("not-reached", wanted=wanted, reached=rig.rotation.speed_rad_s, by=labels["by"])
         _let_go(rig, str(labels["by"]))
@@ -131,6 +135,14 @@ def _run_down(rig: Rig, plan: Plan, record: Recorder, labels: Mapping[str, objec
     return True
 
 
+def _hold_slowly(rig: Rig, plan: Plan, record: Recorder, labels: Mapping[str, object], wanted: float) -> None:
+    for share in SLOW:
+        if _run_up(rig, share * wanted, "drive"):
+            rig.clock.sleep(RAMP_S)
+            with record.step("spin", speed_rad_s=share * wanted, **labels):
+                rig.clock.sleep(plan.steady_s)
+
+
 def _run_up(rig: Rig, wanted: float, by: str) -> bool:
     """To a speed, by the drive with the motor released or by the motor; False if the shaft does not get there."""
     try:
@@ -140,8 +152,7 @@ def _run_up(rig: Rig, wanted: float, by: str) -> bool:
         else:
             rotor.hold(rig)
             rig.rotation.spin(wanted)
-    except LinkError:
-        rig.clock.sleep(0.1)  # a link that is lost says so again by itself
+    except NotReached:
         return False
     return True
 
@@ -181,7 +192,8 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     plan, a = recording.plan, evaluate(recording)
     yield from spindown_checks.of_runs(a.runs, plan)
     yield from spindown_checks.of_result(a.runs, a.angle, a.speed, plan)
-    yield from spindown_checks.of_drive(recording, a.angle.estimates["T_c"])
+    yield from spindown_checks.of_drive(recording, a.angle)
+    yield from spindown_checks.of_inertia(recording.rig, a.angle)
     estimates = {**a.angle.estimates, "J_z": _inertia(a.angle, recording.rig)}
     if not plan.added_inertia:
         text = "J_z is the rig file's value, not measured here; B and T_c carry its tolerance. The ring measures it"
@@ -210,7 +222,6 @@ def holds_for(plan: Plan) -> dict[str, float]:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    yield from rotor.missing(rig, CHANNELS, ("bias_i", "bias_o", "speed_ref"), COILS)
     needed = ["ring_inertia"] if plan.added_inertia else ["polar_inertia"]
     for name in needed:
         if name not in rig.machine:
@@ -247,10 +258,11 @@ gain and offset as far as the certificates state them, say what the mean square 
 gives B at exactly the nominal ones.
 
 b and c become B and T_c through the polar inertia, whose tolerance in the rig file dominates both. With a ring of known
-inertia on the shaft the decay is slower, and J = J_ring b_ring / (b - b_ring) is measured instead.
+inertia on the shaft the decay is slower, and J = J_ring b_ring / (b - b_ring) is measured instead; the rig file's must agree.
 
-What no data can show: a constant torque that acts against either direction alike, such as a seal or a brake that drags, is
-Coulomb friction as far as a run-down can tell. An error of the inertia scales B and T_c by itself.
+A drive that holds the rotor at several speeds says how much constant torque that takes: by the mean over both directions, in
+which what drives the released motor one way drops out, extrapolated to no speed. What the run-downs show beyond it acts only
+while the rotor coasts. The drive's own drag does, and is taken off as the rig file states it; more is a finding.
 """
 
 procedure = Procedure(
@@ -262,10 +274,18 @@ procedure = Procedure(
     acquire=acquire,
     analyse=analyse,
     figures=figures,
+    requires=Requires(
+        roles=("levitation", "rotation"),
+        channels=CHANNELS,
+        sensors=COILS,
+        parameters=(*rotor.PARAMETERS, "bias_i", "bias_o", "speed_ref"),
+    ),
     check=check,
     settings=settings,
     step_count=step_count,
+    fewest_steps=fewest_steps,
     facts=facts,
     holds_for=holds_for,
+    assumes=assumed.SPINDOWN,
     method=METHOD,
 )

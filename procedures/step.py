@@ -11,12 +11,13 @@ from typing import Literal
 
 from pydantic import Field
 
-from bench.errors import LinkError
+from bench.errors import NotReached
 from bench.figures import Figure
 from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recorder import Recorder
 from bench.recording import Recording
+from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
@@ -134,7 +135,7 @@ def _at(rig: Rig, plan: Plan, record: Recorder, speed: float) -> bool:
         return True
     try:
         rig.drive.reach(speed)
-    except LinkError:
+    except NotReached:
         record.event("not-reached", wanted=speed, reached=rig.rotation.speed_rad_s)
         return False
     rig.clock.sleep(SETTLED_S)
@@ -180,16 +181,13 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    lacking = [n for n in CHANNELS if n not in rig.channels]
-    if lacking:
-        yield f"channels: found no {', '.join(lacking)}; the steps are read from all of them"
     needed = ["slew", *(f"ref_{a}" for a in plan.axes), *model_names(plan), *plan.a, *plan.b, *plan.warm]
     for name in dict.fromkeys(needed):
         if name not in rig.parameters:
             yield f"parameters: found no {name}; needed are the set points, slew and those of the plan's settings"
         elif rig.parameters[name].when == "resting":
             yield f"{name}: can be written at rest only; a setting is changed while the shaft levitates"
-    if "clearance" in rig.geometry and 2 * max(plan.sizes_m) > MARGIN * rig.geometry["clearance"].value:
+    if 2 * max(plan.sizes_m) > MARGIN * rig.geometry["clearance"].value:
         yield (f"sizes_m: found {max(plan.sizes_m) * 1e6:g} um; with its overshoot that needs more than {MARGIN:.0%} of the "
                f"clearance, {rig.geometry['clearance'].value * 1e6:g} um")  # fmt: skip
     if min(plan.sizes_m) <= 0 or len({*plan.sizes_m}) < len(plan.sizes_m) or len({*plan.axes}) < len(plan.axes):
@@ -229,7 +227,10 @@ centre of mass as the controller makes it of both sensor planes, from where it r
 Where the shaft turns, orders 1 to 4 of its angle are fitted before the step and at the end of the record and taken away; what
 is left is averaged over one revolution for settling (over 6 ms where it does not turn). The settling time holds that
 averaging, and is that of the mean of the repeats. The band is the plan's share of the step, or five times the noise of the
-averaged position where that is more, which the report says.
+averaged position where that is more, which the report says. The time is read from a curve fitted to all steps of a setting, an
+axis and a speed: level, slow decays and the swing, each with what size and beginning of the step change. Draws of that curve
+say which times are possible; each extreme of the swing within three standard uncertainties of the band's edge may touch it or
+not, so that the interval holds either time.
 
 From 3.5 ms after the step on, filters and current loops have died away, and position and tilt share two oscillations that lie
 close together. They are fitted to both, as means over a telemetry period. The overshoot is the top of that curve. Either pole
@@ -257,6 +258,12 @@ procedure = Procedure(
     acquire=acquire,
     analyse=analyse,
     figures=figures,
+    requires=Requires(
+        channels=CHANNELS,
+        sensors=tuple(n for n in CHANNELS if n.startswith(("pos_", "i_"))),
+        parameters=("slew", "model_rate", "model_l_is", "model_l_os"),
+        geometry=("clearance",),
+    ),
     check=check,
     step_count=step_count,
     method=METHOD,

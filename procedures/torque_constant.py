@@ -13,17 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import Field
 
-from bench.errors import LinkError
+from bench.errors import RotorNotArrived
 from bench.figures import Figure
 from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recorder import Recorder
 from bench.recording import Recording
+from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import NOTHING, Load, RigState
 from bench.uncertainty import Estimate, Influence, propagate
-from procedures import rotor
+from procedures import assumed, rotor
 from procedures import torque_constant_figures as drawn
 from procedures.estimators import torque_balance, torque_checks
 from procedures.estimators.direction import SEGMENTS, of_probe
@@ -105,8 +106,7 @@ def _at_home(rig: Rig, record: Recorder, angle: float) -> bool:
     """Turn to an angle and wait until the rotor stands there; a rotor that does not is told in the recording."""
     try:
         rig.rotation.point(angle)
-    except LinkError as error:
-        rig.clock.sleep(0.1)  # a link that is lost says so again by itself
+    except RotorNotArrived as error:
         record.event("not-held", angle=angle, text=str(error))
         rotor.release(rig)
         return False
@@ -235,14 +235,6 @@ def arms_u(rig: RigFile) -> float:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    yield from rotor.missing(rig, CHANNELS, ("gamma", "i_x", "i_y", "i_ramp", "bias_i", "bias_o"), SEGMENTS)
-    for table, names, found in (
-        ("geometry", [f"lever_{s}" for s in SIDES], rig.geometry),
-        ("machine", ["pole_pairs"], rig.machine),
-    ):
-        if lacking := [n for n in names if n not in found]:
-            yield f"{table}: found no {', '.join(lacking)}; the torque of the loads needs it"
-            return
     unknown = [m for m in plan.masses if m not in rig.masses]
     if unknown:
         yield f"masses: found {', '.join(unknown)}; the rig file certifies {', '.join(rig.masses)}"
@@ -278,9 +270,6 @@ time at each gamma. Detent, offsets of the sensors and any other constant torque
 detent makes where the rotor stands a count of the encoder off home is taken off by the detent measured before.
 
 Sideways currents and the outboard AMB's answer show that the segments are wired as they are called.
-
-What no data can show: an error common to all masses, to gravity or to both arms scales alpha_tau by itself, and so does a
-common gain error of the four current sensors. A lever that is not level by 1 deg takes 0.015 % off every torque.
 """
 
 procedure = Procedure(
@@ -292,8 +281,19 @@ procedure = Procedure(
     acquire=acquire,
     analyse=analyse,
     figures=figures,
+    requires=Requires(
+        roles=("levitation", "rotation"),
+        channels=CHANNELS,
+        sensors=SEGMENTS,
+        parameters=(*rotor.PARAMETERS, "gamma", "i_x", "i_y", "i_ramp", "bias_i", "bias_o"),
+        geometry=tuple(f"lever_{s}" for s in SIDES),
+        machine=("pole_pairs",),
+        masses=True,
+    ),
     check=check,
     settings=settings,
     step_count=step_count,
+    reached=("masses/*", "!masses/density", "geometry/lever_*"),
+    assumes=assumed.TORQUE_CONSTANT,
     method=METHOD,
 )

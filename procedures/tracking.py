@@ -17,6 +17,7 @@ from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recorder import Recorder
 from bench.recording import Recording
+from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
@@ -179,20 +180,8 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    lacking = [
-        f"{table}: found no {', '.join(missing)}; expected them all"
-        for table, names, found in (
-            ("channels", CHANNELS, rig.channels),
-            ("parameters", PARAMETERS, rig.parameters),
-            ("sensors", POSITIONS, rig.sensors),
-            ("geometry", LENGTHS, rig.geometry),
-            ("parameters", tuple(OBSERVED) if plan.observed else (), rig.parameters),
-        )
-        if (missing := [n for n in names if n not in found])
-    ]
-    yield from lacking
-    if lacking:
-        return
+    if missing := [n for n in OBSERVED if plan.observed and n not in rig.parameters]:
+        yield f"observer: the rig has no parameters {', '.join(missing)}; expected observer = false"
     if len(set(plan.order)) < len(plan.laws) + len(plan.compare):
         yield "laws, compare: found one twice; expected each once"
     ring = NEAR * rig.geometry["clearance"].value
@@ -251,6 +240,7 @@ procedure = Procedure(
     acquire=acquire,
     analyse=analyse,
     figures=figures,
+    requires=Requires(channels=CHANNELS, sensors=POSITIONS, parameters=PARAMETERS, geometry=LENGTHS),
     check=check,
     settings=settings,
     step_count=step_count,

@@ -18,6 +18,7 @@ from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recorder import Recorder
 from bench.recording import Recording
+from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
@@ -31,8 +32,8 @@ from procedures.estimators import (
     unbalance_plan,
 )
 from procedures.estimators.coil_peaks import uncertified
-from procedures.estimators.unbalance_bearings import BEARING_MODEL, adopted_bearings
-from procedures.estimators.unbalance_data import RPM, TOLD, read_dwells
+from procedures.estimators.unbalance_bearings import BEARING_MODEL, STATED, adopted_bearings
+from procedures.estimators.unbalance_data import RECORDED, RPM, TOLD, read_dwells
 from procedures.estimators.unbalance_estimates import Results
 from procedures.turning import CODES, POLES, SETTINGS, Law, Variant
 
@@ -176,26 +177,20 @@ def measured(results: Results) -> Iterator[Measured]:
                 yield known[name].measured(estimate, f"{place}, {result.dwell.where}" if place else result.dwell.where)
 
 
-def lacking(rig: RigFile) -> Iterator[str]:
-    """What the rig file does not state and a turning shaft needs."""
-    yield from (
-        f"{table}: found no {', '.join(missing)}; expected them all"
-        for table, names, found in (
-            ("channels", TOLD, rig.channels),
-            ("parameters", (*PARAMETERS, *SETTINGS["off"], *POLES), rig.parameters),
-            ("sensors", [n for n in TOLD if n.startswith(("pos_", "i_"))], rig.sensors),
-            ("geometry", LENGTHS, rig.geometry),
-        )
-        if (missing := [n for n in names if n not in found])
-    )
-    if not any("drive" in d.roles for d in rig.devices.values()):
-        yield "devices: found none in the role drive; nothing turns the shaft"
+REQUIRES = Requires(
+    roles=("levitation", "drive"),
+    channels=TOLD,
+    sensors=tuple(n for n in TOLD if n.startswith(("pos_", "i_"))),
+    parameters=(*PARAMETERS, *SETTINGS["off"], *POLES, *STATED),
+    geometry=LENGTHS,
+    machine=("mass", "transverse_inertia", "polar_inertia", "radial_axes", "runout"),
+    capture=RECORDED,
+)
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    missing = list(lacking(rig))
-    yield from missing or unbalance_plan.of_plan(rig, plan)
+    yield from unbalance_plan.of_plan(rig, plan)
 
 
 def figures(recording: Recording[Plan]) -> Iterable[Shown]:
@@ -237,6 +232,7 @@ procedure = Procedure(
     acquire=acquire,
     analyse=analyse,
     figures=figures,
+    requires=REQUIRES,
     check=check,
     settings=settings,
     step_count=step_count,

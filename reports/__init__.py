@@ -36,12 +36,14 @@ def build(
     title: str,
     method: str = "",
     measures: Sequence[Quantity] = (),
+    reached: Sequence[str] = (),
+    assumes: Sequence[str] = (),
     conditions: Mapping[str, str] | None = None,
 ) -> ReportPaths:
     """Writes `report.html` and `report.pdf` into `run_dir`, replacing older ones; touches nothing else.
 
-    `record` is the content of record.json; `recording` is None where there is none to read; `title`, `method` and
-    `measures` are the procedure's; `conditions` are measured ones as label and text with unit.
+    `record` is the content of record.json; `recording` is None where there is none to read; `title`, `method`, `measures`,
+    `reached` and `assumes` are the procedure's; `conditions` are measured ones as label and text with unit.
 
     Raises:
         BenchError: a figure, a page or a file cannot be made. Record and verdict are not affected.
@@ -53,6 +55,8 @@ def build(
     around = compose.Surroundings(
         title=title,
         method=method,
+        reached=reached,
+        assumes=assumes,
         definitions={q.name: q.about for q in measures},
         titles={q.name: q.title for q in measures if q.title},
         rig={} if recording is None else recording.rig.model_dump(mode="json", exclude_none=True),

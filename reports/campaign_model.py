@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -82,10 +83,11 @@ def _tone(outcome: str) -> Tone:
 
 
 def _said(c: ChainContent) -> str:
-    done = sum(s.outcome == "PASS" for s in c.steps)
+    counts = Counter(s.outcome for s in c.steps)
     if c.model.complete:
-        return f"All {done} steps passed; {len(c.model.constants)} constants."
-    bad = next((s for s in c.steps if s.outcome != "PASS"), None)
+        unjudged = f"; {counts['DONE']} of them without a limit" if counts["DONE"] else ""
+        return f"All {len(c.steps)} steps were done as asked{unjudged}; {len(c.model.constants)} constants."
+    bad = next((s for s in c.steps if s.outcome not in ("PASS", "DONE")), None)
     return "" if bad is None else f"{bad.procedure}: {bad.reason or 'not run'}"
 
 

@@ -7,10 +7,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from bench.figures import Sheet
-from reports import budgets, front, habit, many, tables, text, vectors
+from reports import budgets, front, habit, many, tables, text, unseen, vectors
 from reports.counts import counts, words
 from reports.figures import Drawn
 from reports.linktable import clean, link_table
+from reports.outcome import outcome_text
 from reports.view import (
     ABOUT_MANY,
     ABOUT_UNCERTAINTY,
@@ -53,6 +54,8 @@ class Surroundings:
 
     title: str
     method: str = ""
+    reached: Sequence[str] = ()  # patterns of influences that a check of the procedure reaches
+    assumes: Sequence[str] = ()  # what is in no budget and no data can show
     definitions: Mapping[str, str] = dataclasses.field(default_factory=dict)  # quantity name -> definition
     titles: Mapping[str, str] = dataclasses.field(default_factory=dict)  # quantity name -> what readers call it
     rig: Content = dataclasses.field(default_factory=dict)  # the rig file's content
@@ -85,7 +88,7 @@ def view_of(record: Content, around: Surroundings, shown: Sequence[Drawn | Sheet
         expired=EXPIRED if _expired(record) else "",
         outcome=outcome,
         tone=_TONES.get(outcome.lower(), "none"),
-        outcome_text=_outcome_text(outcome, rows, findings),
+        outcome_text=outcome_text(record, rows, findings),
         identification=_identification(record, around, rig_name),
         decided=tuple(f for f in findings if f.loud),
         judged=judged,
@@ -98,6 +101,9 @@ def view_of(record: Content, around: Surroundings, shown: Sequence[Drawn | Sheet
         no_results="" if rows else NO_RESULTS,
         about_uncertainty=ABOUT_UNCERTAINTY,
         decision_rule=DECISION_RULE,
+        unseen=unseen.unseen(measurements, around.reached, around.titles),
+        about_unseen=unseen.ABOUT,
+        assumed=tuple(around.assumes) if rows else (),
         notes=tuple(f for f in findings if not f.loud),
         figures=front.entries(shown),
         budgets=tuple(table for told, table in budgeted if told),
@@ -186,31 +192,6 @@ def _findings(record: Content, around: Surroundings) -> Iterable[FindingRow]:
         same.setdefault(said_of, []).append(str(f.get("where") or ""))
     for (code, said, effect), places in same.items():
         yield FindingRow(code, said, "; ".join(dict.fromkeys(filter(None, places))), effect, effect != "note")
-
-
-def _outcome_text(outcome: str, rows: Sequence[ResultRow], findings: Sequence[FindingRow]) -> str:
-    named = {tone: ", ".join(r.symbol.plain for r in rows if r.tone == tone) for tone in _TONES.values()}
-    said = [f for f in findings if f.effect]  # all but our own remark on a truncated recording
-    affecting = [f for f in said if f.loud]
-    # A limit that is crossed explains itself; only where nothing else does may a note be the reason.
-    told = affecting or ([] if outcome == "INDETERMINATE" and named["indeterminate"] else said)
-    loud = ", ".join(dict.fromkeys(f.code for f in told))
-    match outcome:
-        case "PASS" if any(r.tone == "pass" for r in rows):
-            return "Every declared quantity was measured, and every limit is met by the whole 95 % interval."
-        case "PASS":
-            return "Every declared quantity was measured. No acceptance limit was applied."
-        case "FAIL":
-            return f"Outside the limits with the whole 95 % interval: {named['fail']}." if named["fail"] else ""
-        case "INDETERMINATE":
-            undecided = (
-                f"The 95 % interval crosses a limit: {named['indeterminate']}. " if named["indeterminate"] else ""
-            )
-            return (undecided + (f"Findings that prevent a decision: {loud}." if loud else "")).strip()
-        case "ABORTED":
-            return "The run was stopped before its end." + (f" See the finding {loud}." if loud else "")
-        case _:
-            return "The bench could not tell." + (f" See the finding {loud}." if loud else "")
 
 
 def _uut(uut: Any) -> str:

@@ -16,6 +16,7 @@ COUNTS = {
     "crc_errors": "Packets with a wrong CRC", "malformed": "Malformed packets or lines", "packets_lost": "Packets lost",
     "error_frames": "Error frames", "refused": "Frames refused by the interface", "overflows": "Frames dropped, buffer full",
     "misplaced": "Messages too late to tell their sample", "adapter_overruns": "Times that the adapter lost frames",
+    "sequence_leaps": "Leaps of the sequence", "tick_leaps": "Leaps of the tick",
     "bus_off": "Times bus-off", "reconnects": "Times reconnected", "heartbeats": "Heartbeats sent",
     "longest_heartbeat_gap_ns": "Longest time between heartbeats",
 }  # fmt: skip

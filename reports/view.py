@@ -22,8 +22,10 @@ DECISION_RULE = (
     "Decision rule (JCGM 106:2012, guarded by the expanded uncertainty): a result passes if its whole 95 % coverage "
     "interval lies inside the limits, fails if the whole interval lies outside them, and is indeterminate otherwise. "
     "For a stated pass the probability that the true value lies beyond a given limit is at most 2.5 %. A result "
-    "without a limit is reported without a verdict. The outcome is PASS only if every declared quantity was measured, "
-    "no verdict is fail or indeterminate, and no finding affects the outcome."
+    "without a limit, or with one that was stated for other settings, is reported without a verdict. The outcome is PASS "
+    "only if every declared quantity was measured, at least one was judged, no verdict is fail or indeterminate, and no "
+    "finding affects the outcome; it is DONE if nothing was judged. Data that contradict each other support no statement of "
+    "non-conformity: where a finding concerns a quantity that fails, the outcome is INDETERMINATE."
 )
 STATEMENTS = (
     "The results relate only to the item tested, in the state and under the conditions given above.",
@@ -210,6 +212,9 @@ class ReportView:
     no_results: str
     about_uncertainty: str
     decision_rule: str  # 7.8.6
+    unseen: Table  # influences that no check can reach, and below what is assumed besides
+    about_unseen: str
+    assumed: tuple[str, ...]
     notes: tuple[FindingRow, ...]  # 7.8.2.1 n: what the bench itself noticed and what did not affect the outcome
     figures: tuple[FigureEntry, ...]
     budgets: tuple[BudgetTable, ...]  # 7.8.4.1 a

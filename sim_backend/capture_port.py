@@ -59,7 +59,9 @@ class CapturePort:
         elif not owner.takes(int(v["session"]), tick, resting):
             self._status(v["token"], "WRONG_SESSION", tell)
         elif name == "CaptureArm":
-            self._status(v["token"], self._arm(v), tell)
+            status = owner.repeated(name, v) or self._arm(v)
+            owner.answered(name, v, status)
+            self._status(v["token"], status, tell)
         else:
             code = self._map["CaptureAsk"].signal("code").choices.get(int(v["code"]))
             if code == "CANCEL":

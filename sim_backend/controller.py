@@ -157,8 +157,10 @@ class SimulatedController:
             status = "UNKNOWN"
         elif not self._owner.takes(int(v["session"]), self.plant.tick, self.state in AT_REST):
             status = "WRONG_SESSION"
-        else:
+        elif name == "IDENTIFY" or not (status := self._owner.repeated("Command", v)):
             status = "OK" if self.states.obey(name) else "WRONG_STATE"
+            if name not in ("IDENTIFY", "RELEASE"):  # which is answered whole each time, and which ends the owner
+                self._owner.answered("Command", v, status)
         if name == "IDENTIFY" and status == "OK":
             self._send("Identity", {"protocol": 1, "map_version": MAP_VERSION, "serial": 0}, clock)
         reply = {"code": code, "token": v["token"], "status": self._status(status),

@@ -21,6 +21,17 @@ class Ownership:
     heartbeat: int = 0
     counter: int = -1
     armed: bool = False
+    obeyed: dict[str, tuple[Mapping[str, float], str]] = field(default_factory=dict)
+    """The owner's last request of a kind, and the status that it was answered with: one that comes again is not executed."""
+
+    def repeated(self, message: str, values: Mapping[str, float]) -> str:
+        """The status of the owner's last request of that kind, if this one is the same, token and all; else nothing."""
+        last, status = self.obeyed.get(message, ({}, ""))
+        return status if last == values else ""
+
+    def answered(self, message: str, values: Mapping[str, float], status: str) -> None:
+        """Keep what a request of the owner was answered with."""
+        self.obeyed[message] = values, status
 
     def takes(self, session: int, tick: int, resting: bool) -> bool:
         """Whether a session may command. A free controller is taken by the first that asks; one whose owner has been
@@ -55,4 +66,4 @@ class Ownership:
 
     def release(self) -> None:
         """Nobody owns the controller."""
-        self.session, self.since, self.name, self.counter, self.armed = 0, 0, {}, -1, False
+        self.session, self.since, self.name, self.counter, self.armed, self.obeyed = 0, 0, {}, -1, False, {}

@@ -56,7 +56,11 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
         out[f"position_offset_{axis}"] = certified.offset if certified else rig.simulation["position_offset"]
     for k in range(4):
         out |= {f"segment_gain_{k}": rig.simulation["segment_gain"], f"segment_drift_{k}": rig.simulation["drift"]}
-    out |= {name: t for name, t in rig.machine.items() if name in ("pole_pairs", "polar_inertia", "ring_inertia")}
+    out |= {
+        name: t
+        for name, t in rig.machine.items()
+        if name in ("pole_pairs", "polar_inertia", "ring_inertia", "drive_drag")
+    }
     for axis in "xy":
         out[f"motor_offset_{axis}"] = rig.simulation["motor_offset"]
     shared = {"drift", "position_gain", "position_offset", "segment_gain", "motor_offset"}
@@ -97,7 +101,7 @@ def _carried(v: Mapping[str, float], d: Mapping[str, float]) -> PlantParams:
         viscous=v["viscous"],
         drag_share=v["drag_share"],
         coulomb=v["coulomb"],
-        brake=d["drive_brakes"],
+        brake=v.get("drive_drag", 0.0) + d["drive_brakes"],
         lever_slip=d["lever_slip"],
         clearance=v["geometry.clearance"],
         coil_limit=tuple(limit),

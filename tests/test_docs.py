@@ -143,7 +143,22 @@ def test_commands_are_understood(page: Path) -> None:
         procedure, rig = compose.load_procedure(asked["procedure"]), load_rig(asked["rig"])
         defaults = ("rig", rig.plans.get(procedure.name, {}))
         plan = plans.assemble(procedure.plan, defaults, None, tuple(asked["plan"] or ()))
-        assert list(procedure.check(rig, plan)) == []
+        assert procedure.problems(rig, plan) == ()
+
+
+def test_the_workflow_for_ci_is_understood() -> None:
+    """Its steps are targets of the Makefile, and a session of pytest that finds every procedure."""
+    page = (ROOT / "docs/how-to/use-in-ci.md").read_text(encoding="utf-8")
+    (workflow,) = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)
+    steps = [shlex.split(line) for line in re.findall(r"- run: (.*)", workflow)]
+    targets = [words[1:] for words in steps if words[0] == "make"]
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    assert all(re.search(rf"^{name}:", makefile, re.MULTILINE) for names in targets for name in names)
+    (session,) = ([sys.executable, *words[1:]] for words in steps if words[0] == ".venv/bin/python")
+    done = subprocess.run([*session, "--collect-only", "-q", "-p", "no:cacheprovider", "--junitxml="], cwd=ROOT,
+                          capture_output=True, text=True, check=False)  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "18 tests collected" in done.stdout
 
 
 def test_links_lead_somewhere() -> None:

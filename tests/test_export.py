@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from pyarrow import parquet
-from recordings import START_NS, gapped, record
+from recordings import HEADER, START_NS, STREAM, SetClock, block, gapped, record
 from test_recorder import messages_of
 
 from bench import rundir
 from bench.errors import BenchError, ConfigError, RecordingError
 from bench.export import export
+from bench.recorder import Recorder
 from bench.recording import Recording
 
 
@@ -103,3 +104,16 @@ def test_what_cannot_be_exported_is_said(run: Path, tmp_path: Path) -> None:
         export(run, "csv", tmp_path / "file")
     assert (tmp_path / "file").read_text() == "precious"
     assert rundir.existing(run).recording.is_file()
+
+
+def test_parquet_has_few_row_groups(tmp_path: Path) -> None:
+    """Not one for each block: every row group repeats a description of every column."""
+    path = tmp_path / "amb-calibration-20260101T000000Z-0001"
+    path.mkdir()
+    clock = SetClock()
+    with Recorder(path / "recording.mcap", clock=clock, streams=[STREAM], header=HEADER, plain=True) as recorder:
+        for first in range(0, 150_000, 500):
+            recorder.samples(block(first, 500))
+    table = parquet.ParquetFile(export(path, "parquet")[0])
+    assert table.metadata.num_rows == 150_000
+    assert [table.metadata.row_group(k).num_rows for k in range(table.num_row_groups)] == [66000, 66000, 18000]

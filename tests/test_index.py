@@ -10,7 +10,8 @@ import pytest
 
 from bench import index
 from bench.errors import ConfigError
-from bench.records import Outcome, unfinished, write_record
+from bench.outcomes import Outcome
+from bench.records import unfinished, write_record
 
 
 def run(root: Path, second: int, outcome: Outcome = Outcome.PASS) -> Path:

@@ -15,9 +15,9 @@ from bench.telemetry import Counters
 CLEAN = LinkStats(received=100_000, sent=5_000, heartbeats=4_000, longest_heartbeat_gap_ns=21_000_000)
 TROUBLES = [f.name for f in fields(Counters) if f.name != "gaps"]
 TROUBLES += [f.name for f in fields(LinkStats) if f.name not in
-             ("received", "sent", "heartbeats", "longest_heartbeat_gap_ns")]  # fmt: skip
+             ("received", "sent", "octets", "heartbeats", "longest_heartbeat_gap_ns")]  # fmt: skip
 STOPPING = {"wrong_length": Effect.INDETERMINATE, "reboots": Effect.ERROR, "overflows": Effect.ERROR,
-            "bus_off": Effect.ERROR, "reconnects": Effect.INDETERMINATE}  # fmt: skip
+            "bus_off": Effect.ERROR, "reconnects": Effect.INDETERMINATE, "tick_leaps": Effect.INDETERMINATE}  # fmt: skip
 
 
 def test_a_clean_link_has_no_findings() -> None:
@@ -43,11 +43,25 @@ def test_each_trouble_is_counted_and_named(trouble: str) -> None:
     assert counts.errors == 37
 
 
+def test_channels_that_stood_are_named_each() -> None:
+    found = list(Health(Counters(), CLEAN, None, 0, stuck={"pos_yi", "i_yo_p"}).findings())
+    assert [(f.code, f.where, f.effect) for f in found] == [
+        ("stuck-channel", "i_yo_p", Effect.ERROR), ("stuck-channel", "pos_yi", Effect.ERROR)]  # fmt: skip
+
+
 def test_every_finding_has_a_code_of_its_own() -> None:
     counters = Counters(**{f.name: 1 for f in fields(Counters)})
     stats = LinkStats(**{f.name: 10**9 for f in fields(LinkStats)})
     codes = [f.code for f in Health(counters, stats, Drift(1.0, 2.0, 9), 10**9).findings()]
     assert len(set(codes)) == len(codes) == len(TROUBLES) + 2
+
+
+def test_requests_that_had_to_be_repeated_are_counted_and_named() -> None:
+    health = Health(Counters(), CLEAN, None, 0, repeats=2)
+    (finding,) = health.findings()
+    assert (finding.code, finding.effect) == ("requests-repeated", Effect.NOTE)
+    assert "2 requests were sent again" in finding.text
+    assert health.counts(0).counts["repeats"] == health.counts(0).errors == 2
 
 
 @pytest.mark.parametrize(("latest_ns", "count"), [(39_000_000, 0), (41_000_000, 1)])

@@ -4,6 +4,7 @@ commands the simulated controller, and its C functions work."""
 from __future__ import annotations
 
 import ctypes
+import itertools
 import os
 import re
 import shutil
@@ -25,7 +26,7 @@ from bench.messages import Message
 from bench.rigfile import load_rig
 from bench.session import Session
 from bench.wire import captureblock, isotp, packet, slcan
-from drivers import controller, handshake, slcan_bus, waiting
+from drivers import controller, dialogue, handshake, slcan_bus, waiting
 from sim_backend import ownership
 from sim_backend.controller import MAP_VERSION, SimulatedController
 from sim_backend.truth import draw
@@ -152,7 +153,7 @@ def test_worked_frames(name: str, block: str) -> None:
     assert {signal: column[0] for signal, column in decoded.items()} == pytest.approx(values, rel=1e-12, abs=1e-12)
     written = re.sub(r" \((\d+) digits 0\)", lambda m: "0" * int(m[1]), line)
     assert slcan.line(message.identifier, payload, fd=True, brs=True) == written.encode() + b"\r"
-    assert slcan.parse(written.encode()) == (message.identifier, payload, True, -1)
+    assert slcan.parse(written.encode()) == (message.identifier, payload, True, -1, True)
 
 
 @pytest.mark.parametrize(("names", "block"), PACKETS, ids=["crc16", "crc32"])
@@ -272,9 +273,12 @@ def test_commands_are_allowed_where_the_page_says(device: SimulatedController, c
         assert after == state
 
 
+TOKENS = itertools.cycle(range(256))
+
+
 def ask(device: SimulatedController, command: str) -> dict[str, float]:
     code = MESSAGES.code("Command", "code", command)
-    payload = encode(MESSAGES["Command"], {"session": 0x11, "code": code, "token": 1})
+    payload = encode(MESSAGES["Command"], {"session": 0x11, "code": code, "token": next(TOKENS)})
     out = device.advance(0, frame(MESSAGES["Command"].identifier, payload, flags=FD), 0)
     values, _ = Decoder(MESSAGES["CommandReply"]).decode(out if len(out) else empty_batch())
     return {name: float(column[0]) for name, column in values.items()}
@@ -305,6 +309,7 @@ def test_numbers_of_the_host_and_of_the_rig() -> None:
         rows["telemetry missing: the link is lost"] == f"{waiting.SILENCE_S:g} s, or `watchdog_s` where that is longer"
     )
     assert rows["first telemetry after opening"] == f"within {controller.FIRST_S:g} s"
+    assert rows["a request without a reply"] == f"is sent {dialogue.ATTEMPTS} times in all"
     assert rows["silent owner at rest may be replaced"] == f"after {ownership.TAKEOVER_S:g} s"
     assert rows["the host keeps asking for ownership"] == f"{handshake.TAKEOVER_S:g} s"
     known = RIG.devices["controller"]

@@ -190,7 +190,8 @@ def test_a_full_disk_is_one_clear_error_and_what_was_written_stays(tmp_path: Pat
     code = FULL_DISK.format(root=str(ROOT), tests=str(ROOT / "tests"), limit=limit, path=str(path))
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.returncode == 3, done.stderr
-    assert done.stdout == f"recording {path}: cannot be written: File too large\n"
+    why = "File too large. Next: free space there, or give another --out"
+    assert done.stdout == f"recording {path}: cannot be written: {why}\n"
     assert done.stderr == ""
     assert path.stat().st_size <= limit
 

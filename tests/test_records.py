@@ -15,11 +15,11 @@ from bench.cli.run import summary
 from bench.errors import ConfigError
 from bench.findings import Effect, Finding
 from bench.limits import Limit, Verdict
+from bench.outcomes import Outcome, outcome_of, outranking, unjudged
 from bench.procedure import Measured, Quantity
 from bench.records import (
     SCHEMA_FILE,
     LinkCounts,
-    Outcome,
     Record,
     RecordingFile,
     correlations_of,
@@ -28,7 +28,6 @@ from bench.records import (
     json_schema,
     measurement,
     missing,
-    outcome_of,
     read_record,
     to_json,
     unfinished,
@@ -63,7 +62,7 @@ def full() -> Record:
     return dataclasses.replace(
         start(), outcome=Outcome.ERROR, ended="2026-01-01T00:10:00Z", measurements=made,
         recording=RecordingFile("recording.mcap", "a3" * 32), link=LinkCounts(9, 1, 0),
-        findings=findings_of([Finding("drift", "0.1 mA — µ", "inboard", Effect.INDETERMINATE)]),
+        findings=findings_of([Finding("drift", "0.1 mA — µ", "inboard", Effect.INDETERMINATE, ("K_i",))]),
         correlations=correlations_of([measured(), measured(quantity=K_O)]),
     )  # fmt: skip
 
@@ -157,7 +156,8 @@ def change(*keys: str | int, to: Any) -> str:
         ("[1]", "no schema"),
         ("{}", "no schema"),
         ('{"schema": 1}', "run_id"),
-        (change("schema", to=2), "newer"),
+        (change("schema", to=3), "newer"),
+        (change("schema", to=0), "schema: found 0"),
         (change("schema", to=True), "no schema"),
         (change("extra", to=1), "extra"),
         (change("findings", 0, "extra", to=1), "extra"),
@@ -187,10 +187,14 @@ def of_verdict(verdict: str) -> Any:
     ("verdicts", "effects", "stopped", "outcome"),
     [
         (["pass", "none"], ["note"], None, "PASS"),
-        (["none"], [], None, "PASS"),
+        (["none"], ["note"], None, "DONE"),
+        ([], [], None, "DONE"),
+        (["none"], ["indeterminate"], None, "INDETERMINATE"),
         (["pass", "indeterminate"], [], None, "INDETERMINATE"),
         (["pass"], ["indeterminate"], None, "INDETERMINATE"),
-        (["fail", "indeterminate"], ["indeterminate"], None, "FAIL"),
+        (["fail", "indeterminate"], [], None, "FAIL"),
+        (["fail"], ["note"], None, "FAIL"),
+        (["fail"], ["indeterminate"], None, "INDETERMINATE"),
         (["fail", "missing"], [], None, "ERROR"),
         (["fail"], ["error"], None, "ERROR"),
         (["pass"], [], Outcome.ERROR, "ERROR"),
@@ -200,6 +204,50 @@ def of_verdict(verdict: str) -> Any:
 def test_the_strongest_wins(verdicts: list[str], effects: list[str], stopped: Outcome | None, outcome: str) -> None:
     findings = [Finding("c", "t", "", Effect(e)) for e in effects]
     assert outcome_of(map(of_verdict, verdicts), findings, stopped) == outcome
+
+
+@pytest.mark.parametrize(
+    ("concerns", "outcome", "outranked"),
+    [
+        ((), "INDETERMINATE", ["c"]),
+        (("K_i",), "INDETERMINATE", ["c"]),
+        (("K_i@inboard",), "INDETERMINATE", ["c"]),
+        (("@inboard",), "INDETERMINATE", ["c"]),
+        (("K_o", "K_i@outboard", "@outboard"), "FAIL", []),
+    ],
+)
+def test_a_finding_outranks_the_fail_of_the_quantities_that_it_concerns(
+    concerns: tuple[str, ...], outcome: str, outranked: list[str]
+) -> None:
+    """A quantity that no finding touches fails the run all the same."""
+    failed = dataclasses.replace(missing(K_I, where="inboard"), verdict=Verdict.FAIL)
+    finding = Finding("c", "t", "", Effect.INDETERMINATE, concerns)
+    assert outcome_of([failed], [finding]) == outcome
+    assert list(outranking(failed, [finding])) == outranked
+    other = dataclasses.replace(missing(K_O), verdict=Verdict.FAIL)
+    assert outcome_of([failed, other], [dataclasses.replace(finding, concerns=("K_i",))]) == Outcome.FAIL
+
+
+def test_a_verdict_that_was_asked_for_and_not_given() -> None:
+    assert unjudged([of_verdict("none"), of_verdict("pass")], 1) is None
+    found = unjudged([of_verdict("none")], 0)
+    assert found is not None
+    assert (found.code, found.effect) == ("nothing-judged", Effect.ERROR)
+    assert "no limit" in found.text
+    assert "none of its limits holds" in getattr(unjudged([of_verdict("none")], 2), "text", "")
+
+
+def test_a_record_of_schema_1_is_read_as_it_stands(tmp_path: Path) -> None:
+    """Its PASS may be one that nothing was judged for; its findings concern all quantities."""
+    content = json.loads(to_json(full()))
+    content |= {"schema": 1, "outcome": "PASS"}
+    del content["findings"][0]["concerns"]
+    path = tmp_path / "record.json"
+    path.write_text(json.dumps(content))
+    old = read_record(path)
+    assert (old.schema, old.outcome, old.findings[0].concerns) == (1, Outcome.PASS, ())
+    assert old.measurements == full().measurements
+    jsonschema.validate(content, json.loads(SCHEMA_FILE.read_text()))
 
 
 def test_a_failed_replacement_leaves_nothing_behind(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from bench.envelope import Envelope
 from bench.errors import ConfigError, InterlockError, Problem
 from bench.rigcheck import check_rig
 from bench.rigfile import RigFile, load_rig
+from bench.rigpossible import normal_gravity
 from bench.samples import SampleBlock
 
 RIGS = Path(__file__).resolve().parent.parent / "rigs"
@@ -105,7 +106,8 @@ def test_protected_positions_are_those_that_the_rig_file_names(tmp_path: Path) -
     assert check_rig(written(tmp_path, named))[0] == ()
     rig = RigFile.parse(named, DBC)
     levitated = next(code for code, name in rig.choices("state").items() if name == "LEVITATED")
-    columns = {name: np.zeros(1) for name in rig.channels} | {"state": np.array([float(levitated)])}
+    columns = {name: np.zeros(1) for name in rig.channels}
+    columns |= {"state": np.array([float(levitated)]), "supply": np.array([148.0])}
     for name, refused in (("pos_z", True), ("pos_yi", False)):
         block = SampleBlock("x", 0, np.array([10], np.uint64), np.array([0]), 0, 0, columns | {name: np.array([2e-4])})
         with pytest.raises(InterlockError, match="pos_z") if refused else nullcontext():
@@ -146,7 +148,7 @@ def test_a_rig_file_is_frozen() -> None:
          'u = 0.05, distribution = "rectangular", source = "x"', "geometry.amb_span", "goes with half_width"),
         ('half_width = 0.02, distribution = "rectangular", source = "groove',
          'half_width = 0, distribution = "normal", source = "groove', "hook_seat", "goes with u"),
-        ('125.0, unit = "mm"', '125.0, unit = "furlong"', "geometry.amb_span", "unknown unit 'furlong'"),
+        ('125.0, unit = "mm"', '125.0, unit = "furlong"', "geometry.amb_span.unit", "a known unit: one of 1, %"),
         ('125.0, unit = "mm"', '125.0, unit = "kg"', "geometry.amb_span.unit", "the kind of m"),
         ("125.0, unit", "nan, unit", "geometry.amb_span.value", "finite number"),
         ("amb_span =", "amb_spam =", "geometry.amb_span", "AMB plane to AMB plane, with its certificate"),
@@ -245,7 +247,7 @@ def test_several_mistakes_of_all_kinds_are_listed_at_once(tmp_path: Path) -> Non
     dbc = changed(DBC, (" SG_ pos_xi : 48|16@1-", " SG_ pos_xj : 48|16@1-"))
     found = problems(tmp_path, toml, dbc)
     assert set(found) == {
-        "uut.colour", "masses.M3.source", "geometry.hook_to_outboard", "geometry.clearance.value", "masses.M4.value",
+        "uut.colour", "masses.M3.source", "geometry.hook_to_outboard.unit", "geometry.clearance.value", "masses.M4.value",
         "parameters.bias_i.default", "links.controller", "channels.pos_xi.signal",
     }  # fmt: skip
 
@@ -277,6 +279,24 @@ def test_another_schema_is_refused(tmp_path: Path, schema: str, message: str) ->
     found, load = check_rig(path)
     assert len(found) == 1
     assert load is None
+
+
+def test_what_is_missing_hides_nothing_else(tmp_path: Path) -> None:
+    """Tables and entries that cannot be left out are stood in for, so that one pass names every problem."""
+    toml = changed(
+        TOML,
+        ("max_temperature_K", "max_temp_K"),
+        ("model = ", "modell = "),
+        ('roles = ["levitation", "rotation"]', ""),
+        ("gravity = {", "gravty = {"),
+        ("clearance = { value = 0.25", "clearance = { value = 0.6"),
+        ("default = 3, low = 0, high = 5", "default = 6, low = 0, high = 5"),
+    )
+    dbc = changed(DBC, (" SG_ pos_xi : 48|16@1-", " SG_ pos_xj : 48|16@1-"))
+    assert set(problems(tmp_path, toml, dbc)) == {
+        "envelope.max_temp_K", "envelope.max_temperature_K", "uut.model", "uut.modell", "devices.controller.roles",
+        "site.gravty", "site.gravity", "geometry.clearance.value", "parameters.bias_i.default", "channels.pos_xi.signal",
+    }  # fmt: skip
 
 
 def test_an_older_schema_is_migrated_step_by_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -315,5 +335,39 @@ def test_files_that_cannot_be_read_are_one_clear_error(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"rig\.toml: not TOML: .*line 1"):
         check_rig(str(path))
     path.write_bytes(b"name = '\xff'")
-    with pytest.raises(ConfigError, match=r"rig\.toml: cannot be read: 'utf-8' codec"):
+    with pytest.raises(ConfigError, match=r"rig\.toml: byte 8 is not UTF-8"):
         check_rig(str(path))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "found", "expected"),
+    [
+        ("gravity = { value = 9.81175", "gravity = { value = 9.5", "site.gravity.value", "9.5", "9.81175"),
+        ("gravity = { value = 9.81175", "gravity = { value = 0", "site.gravity.value", "0", "9.81175"),
+        ("gravity = { value = 9.81175", "gravity = { value = -9.81175", "site.gravity.value", "-9.81", "9.81175"),
+        ("latitude_deg = 53.527", "latitude_deg = -10", "site.gravity.value", "9.81175", "latitude -10"),
+        ("elevation_m = 668", "elevation_m = 66800", "site.elevation_m", "66800", "9000"),
+        ("air_density = { value = 1.11", "air_density = { value = 7950", "site.air_density.value", "7950", "1.5"),
+        ("mass_density = { value = 7950", "mass_density = { value = 1.1", "mass_density.value", "1.1", "not of the air"),
+        ("i_yi_p = { gain = { value = 1,", "i_yi_p = { gain = { value = 0,", "sensors.i_yi_p.gain.value", "0", "5%"),
+        ("i_yi_p = { gain = { value = 1,", "i_yi_p = { gain = { value = 1.06,", "sensors.i_yi_p.gain.value", "1.06", "1 wit"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_refused(tmp_path: Path, old: str, new: str, key: str, found: str, expected: str) -> None:
+    """Gravity against place and elevation, gains and densities against what there is: nothing else is wrong then."""
+    p = problems(tmp_path, changed(TOML, (old, new)))
+    assert list(p) == [key]
+    assert found in p[key].found
+    assert expected in p[key].expected
+
+
+def test_gravity_is_the_formula_of_the_rig_file() -> None:
+    """Equator and pole at sea level by hand: 9.780327 and 9.780327 * 1.0053024; the free-air term is 0.3086 mGal a metre."""
+    assert normal_gravity(0, 0) == pytest.approx(9.780327, rel=1e-9)
+    assert normal_gravity(-90, 0) == pytest.approx(9.8321862, rel=1e-7)
+    assert normal_gravity(53.527, 668) == pytest.approx(9.81175, abs=5e-6)
+
+
+def test_a_sensor_that_its_certificate_corrects_is_right(tmp_path: Path) -> None:
+    path = written(tmp_path, changed(TOML, ("i_yi_p = { gain = { value = 1,", "i_yi_p = { gain = { value = 1.012,")))
+    assert check_rig(path)[0] == ()

@@ -26,10 +26,11 @@ from bench.cli.compose import simulated
 from bench.errors import BenchError
 from bench.limits import Limit, Verdict
 from bench.opened import Job
+from bench.outcomes import Outcome
 from bench.procedure import Procedure
 from bench.progress import PlainProgress
 from bench.recording import Recording
-from bench.records import SCHEMA_FILE, Outcome, Record
+from bench.records import SCHEMA_FILE, Record
 from bench.rigfile import RigFile, load_rig
 from bench.runner import RunResult
 from bench.supervisor import Supervisor
@@ -78,7 +79,7 @@ def last_state(result: RunResult, rig: RigFile) -> str:
 
 def test_a_run_leaves_a_recording_a_record_a_truth_and_a_log(run: Run, rig: RigFile) -> None:
     result = run()
-    assert result.outcome is Outcome.PASS
+    assert result.outcome is Outcome.DONE
     files = {p.name for p in result.directory.iterdir()}
     assert files == {"recording.mcap", "record.json", "truth.json", "run.log"}
     stored = json.loads((result.directory / "record.json").read_text())
@@ -97,7 +98,7 @@ def test_a_run_leaves_a_recording_a_record_a_truth_and_a_log(run: Run, rig: RigF
 
 def test_a_levitated_run_lands_and_switches_off(run: Run, rig: RigFile) -> None:
     result = run(procedure=tiny_procedures.levitated)
-    assert result.outcome is Outcome.PASS
+    assert result.outcome is Outcome.DONE
     recording: Recording[Any] = Recording.open(result.directory / "recording.mcap")
     commands = [e["name"] for e in recording.events("command")]
     assert commands == ["ENABLE", "LEVITATE", "LAND", "DISABLE"]
@@ -165,6 +166,16 @@ def test_an_interlock_on_telemetry_ends_in_make_safe(run: Run, rig: RigFile) -> 
     assert last_state(result, rig) == "OFF"
 
 
+def test_a_supply_outside_its_range_while_the_rotor_is_held_ends_in_make_safe(run: Run, rig: RigFile) -> None:
+    text = rig.toml_text.replace("min_supply_V = 130.0", "min_supply_V = 150.0")
+    assert text != rig.toml_text
+    result = run(on=RigFile.parse(text, rig.dbc_text), procedure=tiny_procedures.levitated)
+    assert result.outcome is Outcome.ABORTED
+    assert codes(result) == ["interlock"]
+    assert "supply" in result.reason
+    assert last_state(result, rig) == "OFF"
+
+
 def test_a_fault_of_the_controller_is_an_abort(run: Run) -> None:
     result = run(truth={"fault_after_s": 0.6})
     assert result.outcome is Outcome.ABORTED
@@ -176,20 +187,18 @@ def test_a_dead_link_is_an_error_and_every_step_of_make_safe_is_tried(run: Run) 
     assert result.outcome is Outcome.ERROR
     assert codes(result)[0] == "link-lost"
     tried = [line for line in (result.directory / "run.log").read_text().splitlines() if "make safe: " in line]
-    begun = [line.split("make safe: ")[1] for line in tried if "failed" not in line]
+    begun = [line.split("make safe: ")[1] for line in tried if "failed" not in line and "waiting" not in line]
     assert begun == [
-        "see where the machine stands",
-        "stop the drive",
-        "stop the rotor",
+        "take the torque away",
+        "wait for the rotor to be slow",
         "land the rotor",
         "switch the amplifiers off",
         "the controller's own make-safe",
         "the controller's watchdog",
     ]
     failed = [f.text for f in result.record.findings if f.code == "make-safe-failed"]
-    assert failed[0].startswith("make-safe failed (land the rotor, the controller's own make-safe): ")
-    assert failed[1].startswith("make-safe failed (the controller's watchdog): the machine cannot be seen")
-    assert len(failed) == 2
+    assert failed[-1].startswith("make-safe failed (the controller's watchdog): the machine cannot be seen")
+    assert not [text for text in failed if "LAND" in text]
     assert not Recording.open(result.directory / "recording.mcap").truncated
 
 
@@ -263,6 +272,20 @@ def test_limits_decide(run: Run, low: float, high: float, outcome: Outcome) -> N
     assert run(limits={"supply": Limit(low, high, "V", "test", True)}).outcome is outcome
 
 
+@pytest.mark.parametrize(
+    ("least", "outcome"), [(10**9, Outcome.INDETERMINATE), (3, Outcome.INDETERMINATE), (2, Outcome.PASS)]
+)
+def test_a_recording_that_lacks_steps_of_its_plan_is_no_pass(run: Run, least: int, outcome: Outcome) -> None:
+    limits = {"supply": Limit(140, 160, "V", "test", True)}
+    counted = dataclasses.replace(tiny_procedures.resting, step_count=lambda _: least)
+    result = run(procedure=counted, limits=limits)
+    assert (result.outcome, "steps-missing" in codes(result)) == (outcome, outcome is not Outcome.PASS)
+    ends_early = dataclasses.replace(counted, fewest_steps=lambda _: 2)
+    assert run(procedure=ends_early, limits=limits).outcome is Outcome.PASS
+    doubtful = run(Plan(then="doubt"), procedure=counted)
+    assert codes(doubtful) == ["doubt"]  # whose reason is said already
+
+
 def test_an_undeclared_quantity_is_an_error(run: Run) -> None:
     odd = dataclasses.replace(tiny_procedures.resting, measures=())
     result = run(procedure=odd)
@@ -275,7 +298,7 @@ def test_a_failing_report_is_a_finding_and_keeps_the_verdict(run: Run) -> None:
         raise BenchError("no ink")
 
     result = run(report=broken)
-    assert result.outcome is Outcome.PASS
+    assert result.outcome is Outcome.DONE
     assert codes(result) == ["report-failed"]
     assert "no ink" in (result.directory / "record.json").read_text()
 
@@ -355,7 +378,7 @@ def test_a_display_that_nobody_reads_does_not_stop_a_run(tmp_path: Path, rig: Ri
         result = runner.run(job, tmp_path, connect, supervisor, PlainProgress(stream), None)
     with contextlib.suppress(BrokenPipeError):
         stream.close()
-    assert result.outcome is Outcome.PASS
+    assert result.outcome is Outcome.DONE
 
 
 def test_warnings_are_events(run: Run) -> None:

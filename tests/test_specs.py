@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import json
+import math
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 
+from bench import catalogue
+from bench.cli.compose import load_procedure
 from bench.errors import ConfigError
 from bench.limits import Limit
-from bench.specs import INSTALLED, load_spec, parse_spec
+from bench.procedure import BenchPlan
+from bench.specs import INSTALLED, applied, load_spec, parse_spec
 
 ENTRY = 'unit = "N/A", source = "house", verified = false'
 
@@ -56,6 +62,10 @@ def test_a_limit_of_an_undeclared_quantity_is_refused() -> None:
         (f"schema = 1\n[limits.p]\nq = {{ nominal = 3, relative = 0.1, low = 1, {ENTRY} }}", "nominal and relative"),
         (f"schema = 1\n[limits.p]\nq = {{ nominal = 3, relative = -0.1, {ENTRY} }}", "relative"),
         ("schema = 1\n[limits.p]\nq = { low = 3 }", "limits.p.q.source"),
+        (f"schema = 1\n[limits.p]\nq = {{ low = 3, at = 3, {ENTRY} }}", "limits.p.q.at"),
+        (f"schema = 1\n[limits.p]\nq = {{ low = 3, at = {{ a = [] }}, {ENTRY} }}", "empty list"),
+        (f"schema = 1\n[limits.p]\nq = {{ low = 3, at = {{ a = {{ low = 2, high = 1 }} }}, {ENTRY} }}", "low <= high"),
+        (f"schema = 1\n[limits.p]\nq = {{ low = 3, at = {{ a = {{ lwo = 2 }} }}, {ENTRY} }}", "limits.p.q.at"),
     ],
 )
 def test_refused(text: str, said: str) -> None:
@@ -67,3 +77,75 @@ def test_every_problem_is_named_at_once() -> None:
     with pytest.raises(ConfigError) as caught:
         parse_spec("schema = 1\nx = 1\n[limits.p]\nq = { low = 3 }\nr = 4")
     assert len(caught.value.problems) == 5
+
+
+class Settings(BenchPlan):
+    """Of the kinds that plans have."""
+
+    bias_A: float = 3.0
+    speeds_rad_s: tuple[float, ...] = (math.pi * 2000 / 30, math.pi * 10000 / 30)
+    law: str = "CCS"
+    repeat: bool = True
+    observer: bool | None = None
+
+
+@pytest.mark.parametrize(
+    ("at", "holds"),
+    [
+        ("bias_A = 3", True),
+        ("bias_A = 3.0", True),
+        ("bias_A = 2", False),
+        ("bias_A = { low = 2, high = 3 }", True),
+        ("bias_A = { high = 2.9 }", False),
+        ("bias_mA = 3000", True),
+        ("speeds_rpm = { low = 2000, high = 10000 }", True),
+        ("speeds_rpm = { low = 2001 }", False),
+        ("speeds_rpm = [2000, 10000]", True),
+        ("speeds_rpm = 2000", False),
+        ('law = "CCS"', True),
+        ('law = ["CAC", "CCS"]', True),
+        ('law = ["CAC"]', False),
+        ("law = { high = 1 }", False),
+        ("repeat = true", True),
+        ("repeat = false", False),
+        ("observer = true", False),
+        ('law = "CCS", bias_A = 2', False),
+    ],
+)
+def test_a_limit_holds_at_the_settings_that_it_was_stated_for(at: str, holds: bool) -> None:
+    limits = parse_spec(f"schema = 1\n[limits.p]\nq = {{ low = 3, at = {{ {at} }}, {ENTRY} }}")["p"]
+    found, notes = applied(limits, Settings())
+    assert (set(found), [f.code for f in notes]) == (({"q"}, []) if holds else (set(), ["limit-not-applied"]))
+
+
+@pytest.mark.parametrize("bias", [2.0, 4.0])
+def test_the_slopes_of_3_A_do_not_judge_another_bias(bias: float) -> None:
+    """A sound machine has 49 or 98 N/A there."""
+    limits = load_spec("tsbs12", "amb-calibration", folders=(INSTALLED,))
+    found, (note,) = applied(limits, load_procedure("amb-calibration").plan(bias_A=bias))
+    assert found == {}
+    assert note.text == f"no verdict on K_i, K_o: the limit was stated for bias_A = 3, here it is {bias:g}"
+
+
+def test_limits_are_kept_with_a_run_as_they_are() -> None:
+    """A recording holds them as JSON; the analysis of a stored run judges by these."""
+    at = 'bias_A = 3, law = ["CAC"], speeds_rpm = { low = 2000 }'
+    limit = parse_spec(f"schema = 1\n[limits.p]\nq = {{ low = 3, at = {{ {at} }}, {ENTRY} }}")["p"]["q"]
+    assert Limit(**json.loads(json.dumps(asdict(limit)))) == limit
+
+
+def test_a_setting_that_the_plan_does_not_have_is_refused(tmp_path: Path) -> None:
+    """A misspelt one would void the limit in silence."""
+    (tmp_path / "r.toml").write_text(f"schema = 1\n[limits.p]\nq = {{ low = 3, at = {{ baist_A = 3 }}, {ENTRY} }}")
+    with pytest.raises(ConfigError, match=r"limits\.p\.q\.at\.baist_A.*Did you mean bias_A"):
+        load_spec("r", "p", folders=(tmp_path,), settings=tuple(Settings.model_fields))
+
+
+@pytest.mark.parametrize("entry", catalogue.PROCEDURES, ids=lambda e: e.name)
+@pytest.mark.parametrize("rig", ["tsbs12", "amb5dof"])
+def test_the_shipped_limits_suit_their_procedures(rig: str, entry: catalogue.Entry) -> None:
+    procedure = load_procedure(entry.name)
+    names = [q.name for q in procedure.measures]
+    limits = load_spec(rig, entry.name, names, (INSTALLED,), settings=tuple(procedure.plan.model_fields))
+    found, notes = applied(limits, procedure.plan())
+    assert (set(found), notes) == (set(limits), ())  # by default they judge

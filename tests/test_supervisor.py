@@ -96,6 +96,23 @@ def test_a_signal_inherited_as_ignored_stops_the_run() -> None:
         signal.signal(signal.SIGINT, before)
 
 
+def test_a_terminal_that_closes_stops_the_run(supervisor: Supervisor) -> None:
+    with pytest.raises(SignalAbort, match="SIGHUP"), supervisor.moving():
+        os.kill(os.getpid(), signal.SIGHUP)
+    assert supervisor.stopped_by == "SIGHUP"
+
+
+def test_a_hangup_ignored_at_the_start_stays_ignored() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with Supervisor().watching() as watching, watching.moving():
+            os.kill(os.getpid(), signal.SIGHUP)
+        assert watching.stopped_by is None
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
 def test_make_safe_does_every_step_in_order_although_some_fail(supervisor: Supervisor) -> None:
     done: list[str] = []
 

@@ -23,7 +23,7 @@ T0 = 10_000_000_000_000
 def one(sequence: int, tick: int | None = None, **values: float) -> FrameBatch:
     tick = sequence * 10 if tick is None else tick
     payload = encode(MESSAGE, {"seq": sequence & 0xFFFF, "tick": tick & 0xFFFFFFFF, "temp_i": 295, "temp_o": 295,
-                               "temp_m": 295, **values})  # fmt: skip
+                               "temp_m": 295, "supply": 148, **values})  # fmt: skip
     return frame(MESSAGE.identifier, payload, t_ns=T0 + sequence * 1_000_000)
 
 
@@ -100,8 +100,36 @@ def test_sequence_and_tick_that_do_not_fit_count_nothing_that_is_not_missing(kin
     decoder = TelemetryDecoder(RIG)
     frames = [one(*MISMATCHES[kind](k)) for k in range(300)]
     blocks = [b for k in range(0, 300, size) for b in decoder.decode(np.concatenate(frames[k : k + size]))]
-    assert counted(decoder) == {}
+    leap = "sequence_leaps" if "sequence" in kind else "tick_leaps"
+    assert counted(decoder) == ({leap: 1} if "jumps" in kind or "anew" in kind else {})
     assert sum(len(b) for b in blocks) == 300
+
+
+@pytest.mark.parametrize("size", [1, 7, 300])
+@pytest.mark.parametrize("leap", [3, 5000, 40_000, -5])
+def test_a_leap_of_the_sequence_is_no_loss(leap: int, size: int) -> None:
+    decoder = TelemetryDecoder(RIG)
+    frames = [one(1000 + k + (leap if k >= 150 else 0), 10 * k) for k in range(300)]
+    blocks = [b for k in range(0, 300, size) for b in decoder.decode(np.concatenate(frames[k : k + size]))]
+    assert counted(decoder) == {"sequence_leaps": 1}
+    assert blocks[-1].first_index + len(blocks[-1]) == sum(len(b) for b in blocks) == 300
+    assert blocks[-1].t_ns[-1] - blocks[0].t_ns[0] == 299 * 1_000_000
+
+
+@pytest.mark.parametrize("size", [1, 7, 300])
+def test_a_leap_of_the_tick_by_three_samples_is_counted(size: int) -> None:
+    decoder = TelemetryDecoder(RIG)
+    frames = [one(k, 10 * k + (30 if k >= 150 else 0)) for k in range(300)]
+    blocks = [b for k in range(0, 300, size) for b in decoder.decode(np.concatenate(frames[k : k + size]))]
+    assert counted(decoder) == {"tick_leaps": 1}
+    assert sum(len(b) for b in blocks) == 300
+
+
+def test_a_loss_beside_a_leap_of_the_sequence_is_still_counted() -> None:
+    decoder = TelemetryDecoder(RIG)
+    numbers = [k for k in range(300) if not 100 <= k < 110]
+    decoder.decode(np.concatenate([one(k + (5000 if k >= 150 else 0), 10 * k) for k in numbers]))
+    assert counted(decoder) == {"lost": 10, "gaps": 1, "sequence_leaps": 1}
 
 
 def test_a_tick_of_few_bits_does_not_make_a_restart_of_a_gap() -> None:
@@ -135,7 +163,8 @@ def block(**values: float) -> SampleBlock:
 @pytest.mark.parametrize(
     ("values", "name"),
     [({"speed": 76.0}, "speed"), ({"i_yo_p": 13.0}, "i_yo_p"), ({"temp_m": 360.0}, "temp_m"),
-     ({"pos_yi": 1.6e-4, "state": 3}, "pos_yi"), ({"pos_xo": -1.6e-4, "state": 4}, "pos_xo")],
+     ({"pos_yi": 1.6e-4, "state": 3}, "pos_yi"), ({"pos_xo": -1.6e-4, "state": 4}, "pos_xo"),
+     ({"supply": 100.0, "state": 3}, "supply fell to 100 V"), ({"supply": 170.0, "state": 4}, "supply reached 170 V")],
 )  # fmt: skip
 def test_the_envelope_trips_and_names_the_channel(values: dict[str, float], name: str) -> None:
     with pytest.raises(InterlockError, match=name):
@@ -143,7 +172,7 @@ def test_the_envelope_trips_and_names_the_channel(values: dict[str, float], name
 
 
 def test_the_envelope_lets_a_resting_rotor_rest() -> None:
-    Envelope(RIG).check_block(block(pos_yi=-2.5e-4, state=0, speed=74.9))
+    Envelope(RIG).check_block(block(pos_yi=-2.5e-4, state=0, speed=74.9, supply=0))
 
 
 @pytest.mark.parametrize(

@@ -50,11 +50,14 @@ def list_() -> int:
 
 
 @app.command()
-def check(rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig file, or its name in rigs/.")]) -> int:
-    """Validate a rig file and name every error at once."""
+def check(
+    rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig file, or its name in rigs/.")],
+    procedure: Annotated[str, typer.Argument(metavar="PROCEDURE", help="Say all that it lacks for this one.")] = "",
+) -> int:
+    """Validate a rig file, name every error at once, and say what it can run."""
     from bench.cli.check import check_rig_file
 
-    return check_rig_file(rig)
+    return check_rig_file(rig, procedure)
 
 
 @app.command()
@@ -86,6 +89,12 @@ def run(
     allow_expired: Annotated[
         bool, typer.Option("--allow-expired", help="Use calibrations that are overdue; the report says so.")
     ] = False,
+    spec: Annotated[
+        Path | None, typer.Option("--spec", metavar="FILE", help="Acceptance limits; default specs/<rig>.toml.")
+    ] = None,
+    require_verdict: Annotated[
+        bool, typer.Option("--require-verdict", help="A run that no limit judged is an ERROR, not DONE.")
+    ] = False,
     verbose: Verbose = False,
 ) -> int:
     """Run a procedure on a rig. The last line on standard output is the run directory."""
@@ -109,6 +118,8 @@ def run(
             report=not no_report,
             calibrations=calibrations,
             allow_expired=allow_expired,
+            spec=spec,
+            require_verdict=require_verdict,
         ),
         verbose,
     )
@@ -130,7 +141,9 @@ def campaign(
     operator: Annotated[OperatorKind | None, typer.Option(help="One rig: as for `run`.")] = None,
     no_report: Annotated[bool, typer.Option("--no-report", help="Leave reports and summary out.")] = False,
     keep: Annotated[Keep | None, typer.Option(help="Many: whose recordings stay; default missed.")] = None,
-    go_on: Annotated[bool, typer.Option("--go-on", help="One rig: go on after a step that is not PASS.")] = False,
+    go_on: Annotated[
+        bool, typer.Option("--go-on", help="One rig: go on after a step that is neither PASS nor DONE.")
+    ] = False,
     new: Annotated[bool, typer.Option("--new", help="Start anew, whatever is unfinished.")] = False,
     short: Annotated[bool, typer.Option("--short", help="One virtual rig: with the short plans of many.")] = False,
     scheduler: Annotated[
@@ -170,7 +183,9 @@ def adopt(
     run: RunArgument,
     rig: Annotated[str, typer.Option("--rig", metavar="RIG", help="Default: the rig file the run was made with.")] = "",
     calibrations: Calibrations = None,
-    anyway: Annotated[bool, typer.Option("--anyway", help="Also a run that did not PASS; the file says so.")] = False,
+    anyway: Annotated[
+        bool, typer.Option("--anyway", help="Also a run that is neither PASS nor DONE; the file says so.")
+    ] = False,
 ) -> int:
     """Make a run's results the rig's current calibration.
 

@@ -12,7 +12,7 @@ from bench.adoption import Adoption, due, refuse_other_rig
 from bench.calibration import Calibration
 from bench.calibrationstore import Store, named
 from bench.cli.compose import load_procedure
-from bench.records import Outcome
+from bench.outcomes import SOUND
 from bench.rigfile import load_rig
 from bench.uncertainty import interval, stated
 
@@ -48,7 +48,7 @@ def said(c: Calibration) -> str:
     """What became current, as lines of text."""
     seed = f", {named(c.seed)}" if c.seed is not None else ""
     lines = [f"{c.procedure} of {c.rig}{seed}: current from now on, due {c.due}"]
-    if c.outcome != Outcome.PASS:
+    if c.outcome not in SOUND:
         lines.append(f"  adopted although its outcome was {c.outcome}")
     lines += [f"  adopted although {u.procedure} had expired on {u.due}" for u in c.used if u.state == "expired"]
     lines += [f"  {line}" for line in values(c)]

@@ -13,6 +13,7 @@ from bench.calibration import Calibration, changed_certificates, number
 from bench.calibrationstore import Store, base_of, machine, stores_of
 from bench.cli.adopt import values
 from bench.errors import ConfigError
+from bench.outcomes import SOUND
 from bench.rigfile import RigFile, load_rig
 from bench.specs import load_spec
 
@@ -66,7 +67,7 @@ def rows_of(store: Store, rig: RigFile, now: datetime) -> Iterator[Row]:
 
 def row(c: Calibration, store: Store, rig: RigFile, now: datetime, current: bool) -> Row:
     """One calibration and its state: current, expired, superseded, other rig, other certificates."""
-    notes = [f"adopted although its outcome was {c.outcome}"] if c.outcome != "PASS" else []
+    notes = [f"adopted although its outcome was {c.outcome}"] if c.outcome not in SOUND else []
     notes += [f"rests on {u.procedure}, which had expired on {u.due}" for u in c.used if u.state == "expired"]
     state = "current"
     if foreign := store.foreign(c):

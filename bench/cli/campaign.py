@@ -18,8 +18,8 @@ from bench.cli.compose import with_links
 from bench.cli.run import STATUS
 from bench.errors import ConfigError
 from bench.limits import Verdict
+from bench.outcomes import Outcome
 from bench.progress import Progress, shown_on
-from bench.records import Outcome
 from bench.rigfile import RigFile, load_rig
 
 ABORTED = STATUS[Outcome.ABORTED]
@@ -187,6 +187,6 @@ def _one(asked: Asked, directory: CampaignDirectory, progress: Progress) -> tupl
     done = campaign_chain.run_chain(asked, directory, progress)
     progress.stage("summary")
     campaign_model.write(directory, asked, done, asked.request.report)
-    if all(d.outcome is Outcome.PASS for d in done):
+    if all(d.passed for d in done):
         directory.journal.append({"kind": "done"})
     return campaign_chain.text(done), STATUS[campaign_chain.outcome_of(done)]

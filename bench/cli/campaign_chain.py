@@ -16,8 +16,8 @@ from bench.cli.campaign_facts import adopt, request_of
 from bench.cli.campaign_steps import Planned
 from bench.cli.compose import prepare
 from bench.errors import BenchError, ConfigError
+from bench.outcomes import Outcome
 from bench.progress import Progress
-from bench.records import Outcome
 from bench.runner import RunResult
 from bench.supervisor import Supervisor
 
@@ -35,6 +35,11 @@ class Done:
     reason: str = ""
     wall_s: float = 0.0
     adopted: bool = False
+
+    @property
+    def passed(self) -> bool:
+        """PASS or DONE: the steps that need it may go on."""
+        return self.outcome is not None and self.outcome.sound
 
     def entry(self) -> dict[str, Any]:
         """The journal's line."""
@@ -91,7 +96,7 @@ def run_chain(asked: Asked, directory: CampaignDirectory, progress: Progress) ->
                 done = _blocked(step, found) or _run(asked, directory, step, supervisor, progress)
                 directory.journal.append(done.entry())
             found.append(done)
-            if done.outcome is not Outcome.PASS and not (asked.request.go_on and done.outcome is not Outcome.ABORTED):
+            if not done.passed and not (asked.request.go_on and done.outcome is not Outcome.ABORTED):
                 break
     return found
 
@@ -100,15 +105,18 @@ def _passed(asked: Asked, directory: CampaignDirectory) -> dict[int, Done]:
     steps = {s.number: s for s in asked.steps}
     found = {}
     for e in directory.journal.entries():
-        if e["kind"] == "step" and e["outcome"] == Outcome.PASS and (directory.path / e["run"]).is_dir():
-            found[e["step"]] = Done(steps[e["step"]], Outcome.PASS, e["run"], "", e["wall_s"], e["adopted"])
+        if e["kind"] != "step" or e["outcome"] is None or not (directory.path / e["run"]).is_dir():
+            continue
+        done = Done(steps[e["step"]], Outcome(e["outcome"]), e["run"], "", e["wall_s"], e["adopted"])
+        if done.passed:
+            found[e["step"]] = done
     return found
 
 
 def _blocked(step: Planned, before: Sequence[Done]) -> Done | None:
     """The step left out, if one that it needs did not pass."""
     needed = {need.procedure for need in step.needs}
-    bad = [d.step.procedure.name for d in before if d.outcome is not Outcome.PASS]
+    bad = [d.step.procedure.name for d in before if not d.passed]
     bad = [name for name in bad if name in needed]
     return Done(step, None, reason=f"left out: needs {', '.join(bad)}, which did not pass") if bad else None
 
@@ -127,7 +135,7 @@ def _run(
             raise
         return Done(step, Outcome.ERROR, reason=f"refused: {error}")
     done = _noted(directory, step, result, time.monotonic() - began)
-    if done.outcome is not Outcome.PASS or not step.adopt:
+    if not done.passed or not step.adopt:
         return done
     try:
         adopt(asked, directory, result.directory)
@@ -138,14 +146,14 @@ def _run(
 
 def _noted(directory: CampaignDirectory, step: Planned, result: RunResult, wall_s: float) -> Done:
     run = Path(result.directory).relative_to(directory.path)
-    reason = "" if result.outcome is Outcome.PASS else result.reason
+    reason = "" if result.outcome.sound else result.reason
     return Done(step, result.outcome, run.as_posix(), reason, wall_s)
 
 
 def outcome_of(done: Sequence[Done]) -> Outcome:
     """The strongest of the steps' outcomes."""
     outcomes = {d.outcome for d in done}
-    return next((o for o in Outcome if o in outcomes), Outcome.PASS)
+    return next((o for o in Outcome if o in outcomes), Outcome.DONE)
 
 
 def text(done: Sequence[Done]) -> str:

@@ -39,10 +39,11 @@ def packed(rig: RigFile) -> Luggage:
     """The luggage of a rig.
 
     Raises:
-        ConfigError: its DBC does not lie in its own folder or below.
+        ConfigError: its DBC does not lie in its own folder or below, by its name or by where a link leads.
     """
     path, name = Path(rig.path), PurePosixPath(rig.link.dbc)
-    if name.is_absolute() or ".." in name.parts:
+    inside = (path.parent / name).resolve().is_relative_to(path.parent.resolve())
+    if name.is_absolute() or ".." in name.parts or not inside:
         raise ConfigError(
             f"rig file {path}: dbc: found {name}; expected, for --scheduler, a file in the rig file's folder"
         )

@@ -14,7 +14,7 @@ from bench.cli.campaign_chain import Done, outcome_of
 from bench.errors import BenchError
 from bench.figures import Figure
 from bench.recording import Recording
-from bench.records import Outcome, Record, read_record
+from bench.records import Record, read_record
 from bench.rundir import RunDirectory
 from bench.toleranced import Toleranced
 from bench.wholefile import write_whole
@@ -35,7 +35,7 @@ def write(directory: CampaignDirectory, asked: Asked, done: Sequence[Done], repo
     sources = [
         Source(r, {q.name: q.about for q in d.step.procedure.measures}, d.step.procedure.holds_for(d.step.plan))
         for d, r in records
-        if d.outcome is Outcome.PASS
+        if d.passed
     ]
     model = _model(asked, sources, [r for _, r in records], done)
     text = json.dumps(campaign_model.to_content(model), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
@@ -53,7 +53,7 @@ def _model(asked: Asked, sources: Sequence[Source], records: Sequence[Record], d
     return Model(
         schema=1, name=c.name, title=c.title, rig=rig.name, uut=rig.uut.model_dump(), rig_sha256=rig.digest,
         simulated=c.backend == "sim" or told, seed=c.seed or 0 if c.backend == "sim" else None, created=provenance.now(),
-        complete=len(done) == len(asked.steps) and all(d.outcome is Outcome.PASS for d in done),
+        complete=len(done) == len(asked.steps) and all(d.passed for d in done),
         constants=campaign_model.constants_of(sources, c.equations),
         correlations=campaign_model.correlations_of(sources), given=campaign_model.given(tables),
     )  # fmt: skip
@@ -95,7 +95,7 @@ def _line(directory: CampaignDirectory, d: Done, record: Record | None) -> Any:
 def _figures(directory: CampaignDirectory, d: Done) -> tuple[Figure, ...]:
     """The first figures of a run; none where its recording gives none."""
     run = RunDirectory(directory.path / d.run)
-    if d.outcome is not Outcome.PASS or not run.recording.is_file():
+    if not d.passed or not run.recording.is_file():
         return ()
     try:
         recording: Recording[Any] = Recording.open(run.recording, d.step.procedure.plan)

@@ -8,7 +8,11 @@ from typing import TYPE_CHECKING
 from bench import catalogue
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from bench.busload import BusLoad
+    from bench.errors import Problem
+    from bench.rigfile import RigFile
 
 PASS, USAGE = 0, 2
 
@@ -38,12 +42,18 @@ def _load_line(load: BusLoad) -> str:
     return f"{text}, high: above {WARN:.0%}\n" if load.total > WARN else f"{text}\n"
 
 
-def check_rig_file(rig: str) -> int:
-    """Every problem of a rig file with file, key, found and expected, on standard error; 2 if there is one."""
-    from bench.rigcheck import check_rig
+def check_rig_file(rig: str, procedure: str = "") -> int:
+    """Every problem of a rig file with file, key, found and expected, on standard error, and which procedures it can run;
+    2 if there is a problem, or if it cannot run the one that is asked for."""
+    from bench.cli.abilities import Ability, abilities, told, unknown_plans
+    from bench.rigcheck import as_far_as_read, check_rig
 
     path = catalogue.rig_path(rig)
     problems, load = check_rig(rig)
+    file, able = as_far_as_read(rig), list[Ability]()
+    if file is not None:
+        able = abilities(file, procedure)
+        problems += (*unknown_plans(file), *(p for a in able for p in a.problems), *_of_simulation(file))
     for problem in problems:
         sys.stderr.write(f"{problem}\n")
     if load is not None:
@@ -51,6 +61,27 @@ def check_rig_file(rig: str) -> int:
     if problems:
         noun = "problem" if len(problems) == 1 else "problems"
         sys.stderr.write(f"bench: {path}: {len(problems)} {noun}\n")
-        return USAGE
-    sys.stdout.write(f"{path}: no problems\n")
-    return PASS
+    else:
+        sys.stdout.write(f"{path}: no problems\n")
+    if procedure:
+        lines = [line for a in able for line in (*a.lacking, *a.unfit)]
+        sys.stdout.write("\n  ".join([f"{path} {'cannot' if lines else 'can'} run {procedure}", *lines]) + "\n")
+        return USAGE if problems or lines else PASS
+    sys.stdout.write(told(able, rig) if able else "")
+    return USAGE if problems else PASS
+
+
+def _of_simulation(rig: RigFile) -> Iterator[Problem]:
+    """What the simulated backend would object to, where the rig file has something to simulate."""
+    from bench.errors import ConfigError, Problem
+
+    if not rig.simulation:
+        return
+    from sim_backend.machine import machine_of
+
+    try:
+        machine_of(rig)
+    except ConfigError as error:
+        place, _, said = str(error).partition(": found ")
+        found, _, expected = said.partition("; expected ")
+        yield Problem(rig.path, place.rpartition(" ")[2], found, expected)

@@ -26,7 +26,7 @@ from bench.errors import ConfigError
 from bench.lock import rig_lock
 from bench.needs import Lookup
 from bench.opened import Connect, Job
-from bench.procedure import Procedure
+from bench.procedure import BenchPlan, Procedure
 from bench.rigfile import RigFile, load_rig
 from bench.specs import load_spec
 
@@ -50,6 +50,8 @@ class Request:
     report: bool = True
     calibrations: Path | None = None
     allow_expired: bool = False
+    spec: Path | None = None
+    require_verdict: bool = False
 
 
 def load_procedure(name: str) -> Procedure:
@@ -62,21 +64,35 @@ def load_procedure(name: str) -> Procedure:
     return found
 
 
-def prepare(request: Request, asking: Asking = quietly) -> tuple[Job, Connect]:
-    """Everything that can be wrong before a machine is touched, found out. `asking` shows a question while a person answers it.
+def planned(request: Request) -> tuple[Procedure, RigFile, BenchPlan]:
+    """The procedure, the rig, and the plan, of which the rig can do what it asks.
 
     Raises:
-        ConfigError: usage, rig file, plan or spec; every problem of the first of them that has one.
+        ConfigError: usage, rig file or plan; every problem of the first of them that has one.
     """
     _refuse_mixed_backends(request)
     procedure = load_procedure(request.procedure)
     rig = with_links(load_rig(request.rig), request.links)
+    if lacking := procedure.requires.lacking(rig):
+        raise ConfigError("\n  ".join([f"{rig.name} cannot run {procedure.name}; nothing was started:", *lacking]))
     defaults = (f"{rig.path} [plans.{procedure.name}]", rig.plans.get(procedure.name, {}))
     plan = plans.assemble(procedure.plan, defaults, request.plan_file, request.plan)
     problems = [*procedure.check(rig, plan), *Envelope(rig).problems_of(dict(procedure.settings(plan)))]
     if problems:
         raise ConfigError("\n  ".join(["the plan does not fit the rig; nothing was started:", *problems]))
-    limits = load_spec(rig.name, procedure.name, [q.name for q in procedure.measures])
+    return procedure, rig, plan
+
+
+def prepare(request: Request, asking: Asking = quietly) -> tuple[Job, Connect]:
+    """Everything that can be wrong before a machine is touched, found out. `asking` shows a question while a person answers it.
+
+    Raises:
+        ConfigError: usage, rig file, plan, spec or calibrations; every problem of the first of them that has one.
+    """
+    procedure, rig, plan = planned(request)
+    measures, settings = [q.name for q in procedure.measures], tuple(procedure.plan.model_fields)
+    limits = load_spec(rig.name, procedure.name, measures, file=request.spec, settings=settings)
+    judged = request.require_verdict or request.spec is not None
     seed = None if request.backend == "live" else request.seed or 0
     lookup = Lookup(
         Store.of(rig, seed, request.calibrations),
@@ -89,12 +105,13 @@ def prepare(request: Request, asking: Asking = quietly) -> tuple[Job, Connect]:
     injected = [faults.parse(text) for text in request.faults]
     if seed is None:
         kind = request.operator or ("console" if sys.stdin.isatty() else "auto")
-        job = Job(procedure, rig, plan, limits, "live", None, rig_lock(rig.link.url.partition("?")[0]), used)
+        job = Job(procedure, rig, plan, limits, "live", None, rig_lock(rig.link.url.partition("?")[0]), used,
+                  judged)  # fmt: skip
         return job, live(rig, kind, injected, request.clear_fault, asking)
     overrides = dict(plans.assignment(text) for text in request.truth)
     _refuse_words(overrides)
     connect = simulated(rig, seed, overrides, request.operator or "auto", procedure.settings(plan), injected, asking)
-    return Job(procedure, rig, plan, limits, request.backend, seed, calibrations=used), connect
+    return Job(procedure, rig, plan, limits, request.backend, seed, None, used, judged), connect
 
 
 def remedy(request: Request, need: Need) -> str:

@@ -4,34 +4,57 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, cast
 
 from bench import rundir
 from bench.cli.compose import load_procedure
 from bench.cli.reporting import figures
-from bench.errors import BenchError
-from bench.export import Format, Tabular, export
+from bench.errors import BenchError, RecordingError
+from bench.export import Format, Tabular, export, whole_file
 from bench.products import products
 from bench.recording import Recording
 from bench.records import read_record
 
+Log = Literal["blf", "asc", "candump"]
 
-def export_command(run: Path, to: Format) -> int:
-    """Write a run's streams and events, its results and its figures' data into `RUN/export` and say where.
+
+def export_command(run: Path, to: Format | Log) -> int:
+    """Write a run's streams and events, its results and its figures' data into `RUN/export` and say where; or its raw frames,
+    as a log of CAN.
 
     Raises:
         ConfigError: it is no run directory.
-        RecordingError: the recording cannot be read.
+        RecordingError: the recording cannot be read, or holds no frames where they are asked for.
         BenchError: a file cannot be written.
     """
     directory = rundir.existing(run)
-    folder = export(run, to)[0].parent
+    folder = _logs(directory, to) if to in ("blf", "asc", "candump") else export(run, cast(Format, to))[0].parent
     if Recording.open(directory.recording).truncated:
         sys.stderr.write("bench: the recording is truncated: the files hold what was written before it was cut off\n")
-    if to != "mcap":
+    if to in ("parquet", "csv"):
         _found(directory, folder, to)
     sys.stdout.write(f"{folder}\n")
     return 0
+
+
+def _logs(directory: rundir.RunDirectory, to: Log) -> Path:
+    """The raw frames of every link as a file of their own."""
+    from drivers.canlog import SUFFIXES, write_log
+
+    recording: Recording[Any] = Recording.open(directory.recording)
+    if not recording.links:
+        raise RecordingError(
+            f"{recording.path}: holds no frames; expected those of a link. It was recorded without a bus"
+        )
+    folder = directory.path / "export"
+    try:
+        folder.mkdir(exist_ok=True)
+        for link in recording.links:  # the frames are read as the file is written, one batch at a time
+            frames = recording.frames(link)
+            whole_file(folder / f"{link.replace('/', '-')}{SUFFIXES[to]}", lambda part: write_log(part, to, frames))  # noqa: B023
+    except OSError as error:
+        raise BenchError(f"{folder}: cannot be written: {error.strerror or error}; the run is untouched") from error
+    return folder
 
 
 def _found(directory: rundir.RunDirectory, folder: Path, to: Tabular) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ from bench import faults, linkurl
 from bench.cli import console
 from bench.cli.safety import may_touch, safe_steps
 from bench.clock import Clock, WallClock
+from bench.envelope import HELD
 from bench.errors import BenchError, ConfigError
 from bench.faults import Fault
 from bench.findings import SIMULATED_CONTROLLER, Finding
@@ -29,6 +31,7 @@ from bench.supervisor import Supervisor
 if TYPE_CHECKING:
     from drivers.controller import Controller
     from drivers.fieldbus import Fieldbus
+    from drivers.live_link import LiveLink
     from drivers.modbus import ModbusLine
     from drivers.operator import LineOperator
     from sim_backend.truth import Truth
@@ -128,9 +131,15 @@ def live(
         with ExitStack() as stack:
             stack.enter_context(supervisor.finishing())
             wall = WallClock()
-            link = _live_link(rig, session, wall, injected)
+            real = _live_link(rig, session, wall)
+            link = _with_faults(rig, real, wall, injected)
             stack.callback(link.close)
-            base = WatchedClock(wall, link.renew_lease, supervisor.check)
+
+            def renew() -> None:
+                if controller.owned:
+                    link.renew_lease()
+
+            base = WatchedClock(wall, renew, supervisor.check)
             controller = Controller(rig, link, base, session, LIVE_SLICE_S)
             controller.connect(clear_fault)
             stack.callback(_released, controller)
@@ -146,26 +155,43 @@ def live(
                 )
             )
             people = _operators(operator, hands, controller, lambda clock: console.attentive(clock, asking))
-            yield _opened(controller, base, bus, people, None, injected, lines)
+            opened = _opened(controller, base, bus, people, None, injected, lines)
+            yield replace(opened, findings=[*opened.findings, *_priority(real)])
 
     return connect
 
 
-def _live_link(rig: RigFile, session: Session, wall: Clock, injected: Sequence[Fault]) -> Link:
-    """The controller's link with its heartbeat, and with the faults that are to happen on it."""
-    from drivers.faulty_link import FaultyLink
+def _live_link(rig: RigFile, session: Session, wall: Clock) -> LiveLink:
+    """The controller's link with its heartbeat."""
     from drivers.live_link import LiveLink
     from drivers.wires import open_wire
 
     spec, name = rig.link, rig.devices["controller"].link
     identifiers = [m.identifier for m in rig.messages.messages.values()]
-    real = LiveLink(name, lambda: open_wire(spec, name, identifiers, wall.now_ns), beat_of(rig, session),
+    return LiveLink(name, lambda: open_wire(spec, name, identifiers, wall.now_ns), beat_of(rig, session),
                     heartbeat=spec.heartbeat, reconnect_s=spec.reconnect_s)  # fmt: skip
+
+
+def _with_faults(rig: RigFile, real: LiveLink, wall: Clock, injected: Sequence[Fault]) -> Link:
+    """The link with the faults that are to happen on it."""
+    from drivers.faulty_link import FaultyLink
+
     if not injected:
         return real
     telemetry = [rig.messages[m].identifier for m in rig.binding.telemetry]
     return FaultyLink(real, injected, 0, wall, telemetry=telemetry, hush=real.hush,
-                      reconnect_s=spec.reconnect_s)  # fmt: skip
+                      reconnect_s=rig.link.reconnect_s)  # fmt: skip
+
+
+def _priority(link: LiveLink) -> list[Finding]:
+    """What the record says where heartbeats run like any other program."""
+    if not link.unpreferred:
+        return []
+    text = (
+        f"heartbeats run without real-time priority ({link.unpreferred}): on a busy host they may be late. Next: let this "
+        "user have it (`ulimit -r`, CAP_SYS_NICE)"
+    )
+    return [Finding("heartbeat-unprioritised", text, link.name)]
 
 
 def _operator_on_a_line(rig: RigFile, controller: Controller, stack: ExitStack) -> LineOperator | None:
@@ -229,6 +255,7 @@ def _opened(
 ) -> OpenRig:  # fmt: skip
     recording: list[Any] = [controller, bus, *operators]
     controller.companions.append(bus.pump)
+    bus.held = lambda: controller.mode in HELD
     if bus.drive is not None:
         bus.drive.may_run = controller.require_levitated
 
@@ -246,9 +273,9 @@ def _opened(
         telemetry = controller.telemetry
         others = {name: line.stats for name, line in lines.items()}
         return Health(telemetry.counters, controller.link.stats, telemetry.host.drift(), telemetry.host.latest_ns,
-                      controller.host_age_s, controller.round_trip_ns, others,
-                      cut_ns=controller.cut_ns, beyond_drift=telemetry.host.beyond,
-                      replies_wrong_length=controller.replies_wrong_length)  # fmt: skip
+                      controller.watch.host_age_s, controller.round_trip_ns, others,
+                      repeats=controller.repeats, cut_ns=controller.cut_ns, beyond_drift=telemetry.host.beyond,
+                      replies_wrong_length=controller.replies_wrong_length, stuck=controller.watch.stuck.found)  # fmt: skip
 
     rig = Rig(controller.rig, controller.clock, controller, controller, operators[0], controller.telemetry.counters,
               health, controller.link.close, bus.drive, bus.supply, bus.thermal, controller.capture)  # fmt: skip

@@ -29,6 +29,9 @@ class Table(StrEnum):
     PARQUET = "parquet"
     CSV = "csv"
     MCAP = "mcap"
+    BLF = "blf"
+    ASC = "asc"
+    CANDUMP = "candump"
 
 
 class Keep(StrEnum):

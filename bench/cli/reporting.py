@@ -35,6 +35,8 @@ def build(directory: Path, record: Record, procedure: Procedure, recording: Reco
         title=procedure.title,
         method=procedure.method,
         measures=procedure.measures,
+        reached=procedure.reached,
+        assumes=procedure.assumes,
         conditions={} if recording is None else conditions(recording),
     )
 

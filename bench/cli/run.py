@@ -9,12 +9,13 @@ from bench import runlog, runner
 from bench.cli import reporting
 from bench.cli.compose import Request, prepare
 from bench.cli.summary import summary
+from bench.outcomes import Outcome
 from bench.progress import columns, shown_on
-from bench.records import Outcome
 from bench.runner import RunResult
 from bench.supervisor import Supervisor
 
-STATUS = {Outcome.PASS: 0, Outcome.FAIL: 1, Outcome.ERROR: 3, Outcome.ABORTED: 4, Outcome.INDETERMINATE: 5}
+STATUS = {Outcome.PASS: 0, Outcome.DONE: 0, Outcome.FAIL: 1, Outcome.ERROR: 3, Outcome.ABORTED: 4,
+          Outcome.INDETERMINATE: 5}  # fmt: skip
 
 
 def execute(request: Request, supervisor: Supervisor | None = None) -> RunResult:
@@ -34,7 +35,7 @@ def run_command(request: Request, whole: bool = False) -> int:
     """Run, say the outcome on standard error and the run directory on standard output; the outcome's exit status. `whole` is
     for every result and finding."""
     result = execute(request)
-    with suppress(BrokenPipeError):  # nobody reads any more; the outcome stands all the same
+    with suppress(OSError):  # nobody reads any more, or the terminal is closed; the outcome stands all the same
         sys.stderr.write(summary(result.record, result.directory, whole=whole, width=columns()))
         sys.stdout.write(f"{result.directory}\n")
         sys.stdout.flush()

@@ -1,17 +1,22 @@
-"""The ordered make-safe of a rig: stop what turns the rotor, land it, switch the amplifiers off; if that fails, leave it
-to the controller, first by command and at last by withholding the heartbeat.
+"""The ordered make-safe of a rig: stop what turns the rotor, land it, switch the amplifiers off; where that cannot be, leave
+it to the controller, first by command and at last by withholding the heartbeat.
 
-Levitation is not released while the rotor turns above the landing speed: the controller refuses.
+What is safe at any speed goes at once. LAND goes only when a source that still changes says that the shaft is below the
+landing speed, and OFF only to a controller that says READY. There is one measure of time: how long nothing has gone forward.
+A speed that falls, a state that changes and a command that is accepted are progress. Without any, the controller is told to
+make itself safe after GIVE_UP_S, the heartbeat is withheld after twice and make-safe ends after three times as long.
 """
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from bench.clock import Clock
-from bench.errors import InterlockError, LinkError
+from bench import runlog
+from bench.cli.patience import Patience
+from bench.errors import BenchError, InterlockError, LinkError
 from bench.opened import WatchedClock
 from bench.roles import Drive
 from bench.supervisor import SafeStep
@@ -19,48 +24,58 @@ from bench.supervisor import SafeStep
 if TYPE_CHECKING:
     from drivers.controller import Controller
 
+logger = logging.getLogger("bench.make-safe")
 RESTING = ("OFF", "READY", "FAULT")
 SAFE = ("OFF", "FAULT")
-LAND_S, STOP_S, COMMAND_S = 20.0, 90.0, 5.0
-ALONE_S = STOP_S + LAND_S - 5.0  # a little less than the supervisor gives it
-BLIND_S = 5.0  # the heartbeat's lease, the watchdog and a landing take less
+UNTOLD = ("UNSEEN", "UNKNOWN")
+ENDING = ("LANDING", "COASTING", "LIFTING")  # movements that end by themselves
+GIVE_UP_S = 10.0  # without progress, until the next means
+END_S = 3 * GIVE_UP_S  # and until nothing more is waited for
+LOOK_S, ASK_S = 0.05, 0.5
+LANDED_S = 3.0  # beyond its own time, for a landing to show
 
 
 def safe_steps(controller: Controller, base: WatchedClock, drive: Drive | None = None) -> tuple[SafeStep, ...]:
     """The steps for a controller whose heartbeat `base` renews, and an external drive on its shaft."""
     way = _Way(controller, base, drive)
     return (
-        SafeStep("see where the machine stands", way.look, COMMAND_S),
-        *([SafeStep("stop the drive", way.brake, STOP_S)] if drive is not None else []),
-        SafeStep("stop the rotor", way.then(way.stop), STOP_S),
-        SafeStep("land the rotor", way.then(way.land), LAND_S),
-        SafeStep("switch the amplifiers off", way.then(way.disable), COMMAND_S),
-        SafeStep("the controller's own make-safe", way.then(way.own), STOP_S + LAND_S),
-        SafeStep("the controller's watchdog", way.then(way.watchdog), STOP_S + LAND_S),
+        SafeStep("take the torque away", way.at_once),
+        SafeStep("wait for the rotor to be slow", way.then(way.slow)),
+        SafeStep("land the rotor", way.then(way.land)),
+        SafeStep("switch the amplifiers off", way.then(way.disable)),
+        SafeStep("the controller's own make-safe", way.then(way.own)),
+        SafeStep("the controller's watchdog", way.then(way.watchdog)),
     )
 
 
 @dataclass
 class _Way:
-    """What each step does; `off`: whether the drive has been seen off."""
+    """What each step does. `off`: the drive has been seen off; `driven`: it ran when make-safe began; `asked`: the controller
+    has been told to make itself safe; `heard`: it answered that."""
 
     controller: Controller
     base: WatchedClock
     drive: Drive | None
     off: bool = False
+    driven: bool = False
+    asked: bool = False
+    heard: bool = True
+    patience: Patience = field(init=False)
 
-    def look(self) -> None:
-        self.controller.clock.sleep(0.02)  # a command may have been sent whose effect nobody has seen yet
-
-    def brake(self) -> None:
-        if self.drive is None or self.drive.confirm_off():  # the last poll may be from before a run command
-            self.off = True
-            return
-        try:
-            self.drive.stop()
-        finally:
-            self.drive.coast()
-        self.off = self.drive.confirm_off()
+    def at_once(self) -> None:
+        """What is safe at any speed: no torque from the drive nor the motor; of a machine that nobody sees, its own way."""
+        c = self.controller
+        self.patience = Patience(c, self.base, self.drive)
+        if self.drive is not None:
+            self.driven = self.drive.running
+            self.drive.let_go()
+        c.sight.forget()
+        c.clock.sleep(0.02)  # a command may have been sent whose effect nobody has seen yet
+        mode = c.sight.mode
+        if mode in (*UNTOLD, "LIFTING"):
+            self._own_way()
+        elif mode == "SPINNING" or (mode == "LEVITATED" and self.patience.fast):
+            self._send("STOP")
 
     def then(self, do: Callable[[], None]) -> Callable[[], None]:
         """A later step. A drive that nobody saw off is told again: its line may be there again."""
@@ -72,46 +87,105 @@ class _Way:
 
         return step
 
-    def stop(self) -> None:
-        if self.controller.mode == "SPINNING":
-            self.controller.stop()
+    def slow(self) -> None:
+        """Brake with the drive where it answers, and wait."""
+        c, p = self.controller, self.patience
+        if self.asked or c.sight.mode in (*RESTING, "LANDING"):
+            return
+        if self.drive is not None:
+            if self.driven and p.fast:
+                self._brake(self.drive)
+            self.off = self.drive.confirm_off()
+        limit = c.landing_speed
+        self._until(lambda: p.slow or c.sight.mode in RESTING, GIVE_UP_S, f"under {limit:g} rad/s")
+
+    def _brake(self, drive: Drive) -> None:
+        try:
+            drive.brake()
+            self._until(lambda: abs(drive.speed_rad_s) < 1.0 or self.patience.slow, GIVE_UP_S, "the drive's brake")
+        except BenchError as error:
+            logger.warning("make safe: the drive does not brake: %s", error)
+        finally:
+            drive.let_go()
 
     def land(self) -> None:
-        c = self.controller
-        _until(lambda: c.mode != "SPINNING", c.clock)  # it says so a while after the shaft was stopped
-        if c.mode == "LEVITATED":
-            c.land()
-        elif c.mode == "LIFTING":
-            c.make_safe()
-        _until(lambda: c.mode in RESTING, c.clock)
+        """LAND, if something that changes says that the shaft is slow; and the time that a landing takes."""
+        c, p = self.controller, self.patience
+        mode = c.sight.mode
+        if self.asked or mode in RESTING or not (p.slow or mode in ("LANDING", "COASTING")):
+            return
+        if mode not in ("LANDING", "COASTING"):
+            self._send("LAND")
+        self._until(lambda: c.sight.mode in RESTING, max(GIVE_UP_S, c.landing_s + LANDED_S), "the landing")
 
     def disable(self) -> None:
-        if self.controller.mode == "READY":
-            self.controller.disable()
+        c = self.controller
+        if c.sight.mode == "READY":
+            self._send("DISABLE")
+            self._until(lambda: c.sight.mode in SAFE, GIVE_UP_S, "amplifiers off")
 
     def own(self) -> None:
+        """The controller's own way, in as long as it goes forward."""
         c = self.controller
-        if c.mode not in SAFE:
-            c.make_safe()
-            _until(lambda: c.mode in SAFE, c.clock)
+        if c.sight.mode in SAFE:
+            return
+        if not self.asked:
+            self._own_way()
+        if self.heard:
+            self._until(lambda: c.sight.mode in SAFE, 2 * GIVE_UP_S, "its own landing")
 
     def watchdog(self) -> None:
         c = self.controller
-        if c.mode in SAFE:
+        if c.sight.mode in SAFE:
             return
         self.base.renewing = False
-        end_ns = c.clock.now_ns() + round(ALONE_S * 1e9)
-        _until(lambda: c.mode in SAFE or _blind(c) or c.clock.now_ns() > end_ns, c.clock)
-        if c.mode not in SAFE and _blind(c):
+        try:
+            self._until(lambda: c.sight.mode in SAFE, END_S, "its watchdog")
+        except LinkError as error:
+            if c.sight.mode in UNTOLD:
+                raise LinkError(
+                    "the machine cannot be seen. No heartbeat goes out any more, so that its controller lands it by itself; "
+                    "look at it before going near"
+                ) from error
             raise LinkError(
-                "the machine cannot be seen. No heartbeat goes out any more, so that its controller lands it by itself; "
-                "look at it before going near"
-            )
-        if c.mode not in SAFE:
-            raise LinkError(
-                f"the controller still says {c.mode}: the rotor is up, and the controller does not take it to be slow. "
+                f"the controller still says {c.sight.mode}: the rotor is up, and the controller does not take it to be slow. "
                 "Switch the amplifiers off by hand once you see that the shaft stands"
-            )
+            ) from error
+
+    def _own_way(self) -> None:
+        self.asked = True
+        try:
+            self._send("MAKE_SAFE")
+        except BenchError:
+            self.heard = False
+            raise
+
+    def _send(self, name: str) -> None:
+        """A command. One that was answered and accepted is progress, however long that took."""
+        sight = self.controller.sight
+        before = sight.answered_ns
+        self.controller.command(name)
+        if sight.answered_ns != before:
+            self.patience.went_on()
+
+    def _until(self, done: Callable[[], bool], limit_s: float, what: str) -> None:
+        """Wait, and say for what, while something goes forward.
+
+        Raises:
+            LinkError: nothing has for so long, or the link is dead.
+        """
+        c, p = self.controller, self.patience
+        while True:
+            p.look()
+            if done():
+                return
+            if (still := p.still_s) >= limit_s:
+                raise LinkError(f"waited {still:.0f} s for {what}; nothing went forward")
+            if (line := p.line(what, limit_s)) is not None:
+                runlog.show(logger, line)
+            if not c.sight.told:
+                p.every(ASK_S, c.ask_state)
+            c.clock.sleep(LOOK_S)
 
 
 def may_touch(controller: Controller, drive: Drive | None) -> Callable[[], None]:
@@ -123,18 +197,3 @@ def may_touch(controller: Controller, drive: Drive | None) -> Callable[[], None]
             raise InterlockError("nobody may touch the shaft: its drive does not say that it is off")
 
     return check
-
-
-def _blind(controller: Controller) -> bool:
-    """Nothing comes from the controller, and nothing will."""
-    try:
-        controller.poll()
-    except LinkError:
-        return True
-    return controller.silent_s > BLIND_S
-
-
-def _until(done: Callable[[], bool], clock: Clock) -> None:
-    """Wait; the supervisor ends it when the step runs out of time."""
-    while not done():
-        clock.sleep(0.05)

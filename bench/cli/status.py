@@ -1,10 +1,11 @@
 """From what a command returns or raises to the exit status and a line for the user.
 
-0 PASS    1 FAIL    2 usage or configuration    3 ERROR    4 ABORTED    5 INDETERMINATE
+0 PASS, DONE    1 FAIL    2 usage or configuration    3 ERROR    4 ABORTED    5 INDETERMINATE
 """
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 import traceback
@@ -17,6 +18,7 @@ from bench.errors import Aborted, BenchError, ConfigError
 
 USAGE, ERROR, ABORTED = 2, 3, 4
 INTERRUPTED = 130  # what the library makes of Ctrl-C
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def run_app(app: typer.Typer, arguments: list[str]) -> int:
@@ -42,7 +44,8 @@ def _status(app: typer.Typer, arguments: list[str]) -> int:
     except BrokenPipeError:
         return ERROR
     except OSError as error:
-        return _told(f"{error.filename or 'a file'}: {error.strerror or error}", ERROR)
+        next_step = ". Next: free space there, and try again" if error.errno in FULL else ""
+        return _told(f"{error.filename or 'a file'}: {error.strerror or error}{next_step}", ERROR)
     except Exception as error:
         where = traceback.extract_tb(error.__traceback__)[-1]
         place = f"{Path(where.filename).name}:{where.lineno}"

@@ -10,7 +10,9 @@ from pathlib import Path
 from bench import units
 from bench.findings import Effect
 from bench.limits import Verdict
-from bench.records import FindingEntry, LimitEntry, Measurement, Outcome, Record
+from bench.outcomes import Outcome, outranking
+from bench.records import FindingEntry, LimitEntry, Measurement, Record
+from bench.specs import NOT_APPLIED
 from bench.uncertainty import stated
 
 SHOWN = 12  # results, unless all are asked for
@@ -48,14 +50,23 @@ def _first(results: Sequence[Measurement]) -> Sequence[Measurement]:
 
 
 def _decided(record: Record, deciding: Sequence[FindingEntry]) -> list[str]:
-    """Why the outcome is what it is."""
-    lines = [_finding(f) for f in deciding]
-    for verdict, words in ((Verdict.FAIL, "outside its limit"), (Verdict.INDETERMINATE, "crosses a limit")):
-        names = [_name(m) for m in record.measurements if m.verdict is verdict]
-        if names:
-            more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-            lines.append(f"{words}: {'; '.join(names[:3])}{more}")
+    """Why the outcome is what it is. What lies outside its limit stands first, also where a finding outranks that."""
+    failed: dict[tuple[str, ...], list[str]] = {}
+    for m in record.measurements:
+        if m.verdict is Verdict.FAIL:
+            failed.setdefault(outranking(m, record.findings), []).append(_name(m))
+    lines = [_some("outside its limit" + (f", but outranked by {', '.join(codes)}" if codes else ""), names)
+             for codes, names in sorted(failed.items())]  # fmt: skip
+    lines += [_finding(f) for f in deciding]
+    crossing = [_name(m) for m in record.measurements if m.verdict is Verdict.INDETERMINATE]
+    lines += [_some("crosses a limit", crossing)] if crossing else []
+    if record.outcome is Outcome.DONE:
+        lines = ["no acceptance limit was applied", *(f.text for f in record.findings if f.code == NOT_APPLIED)]
     return lines
+
+
+def _some(words: str, names: Sequence[str]) -> str:
+    return f"{words}: {'; '.join(names[:3])}" + (f" and {len(names) - 3} more" if len(names) > 3 else "")
 
 
 def _table(results: Sequence[Measurement]) -> list[str]:

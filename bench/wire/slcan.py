@@ -62,12 +62,13 @@ class _Kind(NamedTuple):
     limit: int
     extended: int
     fd: bool
+    brs: bool
 
 
 _KINDS: Final = {
-    ord(letter): _Kind(b"0", 5, lengths, 0x1FFF_FFFF, EXTENDED, fd)
+    ord(letter): _Kind(b"0", 5, lengths, 0x1FFF_FFFF, EXTENDED, fd, letter == "B")
     if letter.isupper()
-    else _Kind(b"", 2, lengths, 0x7FF, 0, fd)
+    else _Kind(b"", 2, lengths, 0x7FF, 0, fd, letter == "b")
     for letters, lengths, fd in (("tT", _CLASSIC, False), ("dDbB", LENGTHS, True))
     for letter in letters
 }
@@ -126,12 +127,13 @@ def _rate_code(rate: int, codes: dict[int, str], what: str) -> str:
 
 
 class Parsed(NamedTuple):
-    """A data frame taken from a line. `ms` is the adapter's timestamp, -1 without one."""
+    """A data frame taken from a line. `ms` is the adapter's timestamp, -1 without one; `brs`: the bit rate was switched."""
 
     identifier: int
     payload: bytes
     fd: bool
     ms: int
+    brs: bool = False
 
 
 def parse(text: bytes, *, timestamp: bool = False) -> Parsed | None:
@@ -144,7 +146,7 @@ def parse(text: bytes, *, timestamp: bool = False) -> Parsed | None:
     kind = _KINDS.get(text[0]) if text else None
     if kind is None or len(text) > LONGEST_LINE:
         return None
-    prefix, first, lengths, limit, extended, fd = kind
+    prefix, first, lengths, limit, extended, fd, brs = kind
     try:
         raw = unhexlify(prefix + text[1:])
     except Error:
@@ -154,4 +156,4 @@ def parse(text: bytes, *, timestamp: bool = False) -> Parsed | None:
     if (start >> 4) > limit or end < first or len(raw) != end + (2 if timestamp else 0):
         return None
     ms = int.from_bytes(raw[end:], "big") if timestamp else -1
-    return Parsed((start >> 4) | extended, raw[first:end], fd, ms) if ms < WRAP_MS else None
+    return Parsed((start >> 4) | extended, raw[first:end], fd, ms, brs) if ms < WRAP_MS else None

@@ -9,8 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from bench.frames import ERROR, FD, FRAME, FrameBatch, empty_batch
-from bench.wire.slcan import BEL, CR, FRAME_LETTERS, LENGTHS, LONGEST_LINE, LOSSES, WRAP_MS, head, parse
+from bench.frames import ERROR, FD, FRAME, REMOTE, SWITCHED, FrameBatch, empty_batch
+from bench.wire.slcan import BEL, CR, EXTENDED, FRAME_LETTERS, LENGTHS, LONGEST_LINE, LOSSES, WRAP_MS, head, parse
 
 REPLIES: Final = 256
 """Lines kept for the caller; older ones are dropped."""
@@ -22,6 +22,7 @@ _STATUS: Final = re.compile(rb"F([0-9A-Fa-f]{2})")
 _REMOTE: Final = tuple(
     re.compile(rb"(r[0-7][0-9A-Fa-f]{2}|R[01][0-9A-Fa-f]{7})[0-8]" + end) for end in (b"", b"[0-9A-Fa-f]{4}")
 )
+_FLAGS: Final = {(False, False): 0, (True, False): FD, (True, True): FD | SWITCHED}
 _ACKS: Final = frozenset((b"", b"z", b"Z"))
 
 
@@ -58,18 +59,25 @@ def _head(identifier: int, length: int, fd: bool, *, brs: bool) -> bytes:
 class SlcanStream:
     """Takes bytes as they come and gives the frames of the lines that they complete. Never raises, whatever comes.
 
-    A line is an acknowledgement (ignored), a data frame, a remote frame (counted: nobody sent its bytes), the answer
+    A line is an acknowledgement (ignored), a data frame, a remote frame (counted: it has no bytes), the answer
     to F, another printable line that starts like a command or an answer (kept in `replies`), or malformed.
     """
 
-    def __init__(self, *, timestamp: bool = False) -> None:
-        """`timestamp`: the adapter was told Z1; its milliseconds go to `hw_ns`, unwrapped with the help of `t_ns`."""
+    def __init__(self, *, timestamp: bool = False, remotes: bool = False) -> None:
+        """
+        Args:
+            timestamp: the adapter was told Z1; its milliseconds go to `hw_ns`, unwrapped with the help of `t_ns`.
+            remotes: remote frames are among those that `feed` gives.
+        """
+        self._remotes = remotes
         self.malformed = 0
         """Lines that fit nothing."""
         self.refused = 0
         """BEL: the adapter did not take a command or a frame."""
         self.remote = 0
         """Remote frames."""
+        self.answered = 0
+        """Bytes of lines that are no frames and that the adapter may say: acknowledgements, answers."""
         self.status: int | None = None
         """The last answer to F: bits as in bench.wire.slcan."""
         self.overruns = 0
@@ -101,22 +109,27 @@ class SlcanStream:
         for text in lines:
             parsed = parse(text, timestamp=self._timestamp)
             if parsed is None:
-                if text not in _ACKS:
-                    self._other(text)
+                before = self.malformed
+                if text not in _ACKS and (row := self._other(text, t_ns)):
+                    rows.append(row)
+                else:
+                    self.answered += (len(text) + (text[-1:] != BEL)) * (self.malformed == before)
                 continue
-            identifier, payload, fd, ms = parsed
+            identifier, payload, fd, ms, brs = parsed
             hw_ns = 0 if ms < 0 else self._unwrapped(ms * 1_000_000, t_ns)
-            rows.append(_ROW.pack(t_ns, hw_ns, identifier, FD if fd else 0, len(payload), payload))
+            rows.append(_ROW.pack(t_ns, hw_ns, identifier, _FLAGS[fd, brs], len(payload), payload))
         # A bytearray, because callers may write into the batch.
         return np.frombuffer(bytearray(b"".join(rows)), FRAME) if rows else empty_batch()
 
-    def _other(self, text: bytes) -> None:
-        """A line that is no data frame."""
+    def _other(self, text: bytes, t_ns: int) -> bytes:
+        """A line that is no data frame; the record of a remote frame, where they are wanted."""
         if text.endswith(BEL):
             self.refused += 1
             self.malformed += text != BEL
         elif _REMOTE[self._timestamp].fullmatch(text):
             self.remote += 1
+            if self._remotes:
+                return self._remote_frame(text, t_ns)
         elif found := _STATUS.fullmatch(text):
             self.status = int(found[1], 16)
             self.overruns += bool(self.status & LOSSES)
@@ -125,6 +138,13 @@ class SlcanStream:
             del self.replies[:-REPLIES]
         else:
             self.malformed += 1
+        return b""
+
+    def _remote_frame(self, text: bytes, t_ns: int) -> bytes:
+        digits = 8 if text[:1] == b"R" else 3
+        identifier = int(text[1 : 1 + digits], 16) | (EXTENDED if digits == 8 else 0)
+        hw_ns = self._unwrapped(int(text[2 + digits :], 16) * 1_000_000, t_ns) if self._timestamp else 0
+        return _ROW.pack(t_ns, hw_ns, identifier, REMOTE, int(text[1 + digits : 2 + digits], 16), b"")
 
     def _unwrapped(self, ns: int, t_ns: int) -> int:
         """The adapter's time that fits the host time passed since the last frame best; starts at 60 s, never 0."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import cmath
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from bench.analysis.orders import synchronous
+from bench.analysis.orders import Track, synchronous
 from bench.analysis.sampling import Sampling
 from bench.analysis.tachometer import Tachometer, counted, tachometer
 from bench.analysis.vectors import Vectors
@@ -44,18 +44,20 @@ class Weight:
 @dataclass(frozen=True)
 class Read:
     """One dwell: mean `speed` rad/s, `means` (12,) and `vectors` (12,) of four probes and eight coils; its pulses `sound`;
-    `folds` (4,) m, by how much a higher order that shows as order 1 may move the probes' vectors."""
+    `folds` (4,) m, by how much a higher order that shows as order 1 may move the probes' vectors; `higher` by order, the
+    vectors (12,) of higher orders."""
 
     speed: float
     means: Array
     vectors: Vectors
     sound: bool = True
     folds: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    higher: Mapping[float, npt.NDArray[np.complex128]] = field(default_factory=dict)
 
     @property
     def turning(self) -> Turning:
         """For the balance of forces."""
-        return Turning(self.speed, self.means, self.vectors.values)
+        return Turning(self.speed, self.means, self.vectors.values, self.higher)
 
     @property
     def farthest(self) -> float:
@@ -78,8 +80,8 @@ class Run:
         return self.reads[-1]
 
 
-def read_capture(data: CaptureData) -> Read:
-    """Vectors of a capture that was just uploaded.
+def read_capture(data: CaptureData, slow: bool = False) -> Read:
+    """Vectors of a capture that was just uploaded. At slow roll the higher orders are the runout's: they are left out.
 
     Raises:
         AnalysisError: too few pulses or turns.
@@ -88,12 +90,18 @@ def read_capture(data: CaptureData) -> Read:
     t = np.arange(len(c["pulses"])) / data.rate_hz
     tacho: Tachometer = tachometer(*counted(t, c["pulses"], c["pulse_age"]))
     track = synchronous(t, np.array([c[n] for n in (*POSITIONS, *CURRENTS)]), tacho, Sampling(1 / data.rate_hz))
-    return Read(float(track.speed[0]), np.asarray(track.means[0]), track.vectors(0, range(12)), tacho.sound)
+    return Read(float(track.speed[0]), np.asarray(track.means[0]), track.vectors(0, range(12)), tacho.sound,
+                higher={} if slow else _higher(track))  # fmt: skip
 
 
 def read_dwell(d: Dwell) -> Read:
     """Vectors of a dwell's telemetry."""
-    return Read(d.speed, d.means, d.both(), d.tacho.sound, tuple(folds(d)[1].tolist()))
+    higher = {} if d.kind == SLOW else _higher(d.track)
+    return Read(d.speed, d.means, d.both(), d.tacho.sound, tuple(folds(d)[1].tolist()), higher)
+
+
+def _higher(track: Track) -> dict[float, npt.NDArray[np.complex128]]:
+    return {n: track.vectors(0, range(12), n).values for n in track.orders if n > 1}
 
 
 @dataclass(frozen=True)

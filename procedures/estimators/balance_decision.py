@@ -73,9 +73,10 @@ def allowed_kg(rig: RigFile, plan: Settings, plane: int, before: float = 0.0) ->
     return float(min(max(room, 0.0) / gain(rig, plan, plane) / radius, rig.envelope.max_trial_weight_kg))
 
 
-def refused(rig: RigFile, plan: Settings, runs: Sequence[Run], plane: int) -> float | None:
-    """The allowed trial weight in kg where the planned one is too heavy beside what the last run showed, else None."""
-    before = max(r.farthest for r in (*runs[-1].reads, *([runs[-1].again] if runs[-1].again else [])))
+def refused(rig: RigFile, plan: Settings, present: Run, plane: int) -> float | None:
+    """The allowed trial weight in kg where the planned one is too heavy beside what a run with the weights that are on the
+    shaft now showed, else None."""
+    before = max(r.farthest for r in (*present.reads, *([present.again] if present.again else [])))
     allowed = allowed_kg(rig, plan, plane, before)
     return allowed if plan.trial_kg[plane] > allowed else None
 

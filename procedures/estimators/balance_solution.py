@@ -67,10 +67,10 @@ def solved(s: Stand, slow: Turning | None, trials: Sequence[Trial], base: Sequen
     influence, moved = np.zeros((count, 4, 2), complex), np.zeros((2, 2), complex)
     for p, (u, before, having) in enumerate(trials):
         for k, (a, b) in enumerate(zip(before, having, strict=True)):
-            change = b.vectors - a.vectors
-            influence[k, :, p] = change[:4] / s.gain / u
+            influence[k, :, p] = (b.vectors - a.vectors)[:4] / s.gain / u
             if k == count - 1:
-                moved[p] = runout.unbalances(s, Turning(b.speed, b.means, change), np.zeros(4, complex))[0] / u
+                none = np.zeros(4, complex)
+                moved[p] = (runout.unbalances(s, b, none)[0] - runout.unbalances(s, a, none)[0]) / u
     mark = float(np.angle(moved[0, 0] + moved[1, 1]))
     return Solved(influence, moved * np.exp(-1j * mark), mark, found, taken(s, base, found, mark))
 

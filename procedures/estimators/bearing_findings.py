@@ -92,8 +92,8 @@ def of_results(a: Analysis, plan: Tolerances) -> Iterator[Finding]:
                 "read zero; this stand's offsets are above it, towards the coils that carry. Either the stand was "
                 "changed, or a sign is wrong (T Table 2.2 prints one that goes with gravity above zero)."
             )
-            yield Finding("offset-against-load", text, axis, Effect.INDETERMINATE)
-    for where in BEARINGS.values():
+            yield Finding("offset-against-load", text, axis, Effect.INDETERMINATE, (f"beta_{axis}", f"offset_{axis}"))
+    for end, where in BEARINGS.items():
         ratio = min(a.estimates[f"{k}_{where}"].value for k in ("misfit_ratio", "misfit_ratio_means"))
         if ratio < plan.min_ratio:
             text = (
@@ -101,7 +101,9 @@ def of_results(a: Analysis, plan: Tolerances) -> Iterator[Finding]:
                 f"{plan.min_ratio:g} is expected: the offset does not show at this bias, or the nonlinear model fits no "
                 "better."
             )
-            yield Finding("linear-suffices", text, where, Effect.INDETERMINATE)
+            axes = [a for a in AXES if a.endswith(end)]
+            doubted = tuple(f"{q}_{a}" for q in ("beta", "offset") for a in axes)  # the ratio itself is what it is
+            yield Finding("linear-suffices", text, where, Effect.INDETERMINATE, doubted)
     yield _compared(a)
 
 
@@ -144,7 +146,9 @@ def _adjustments(a: Analysis, plan: Tolerances) -> Iterator[Finding]:
                 f"adjusted ({plan.max_misfit:.1%} allowed), at {a.held.where(left)}. A position that was disturbed, or a "
                 "reading that is not proportional."
             )
-            yield Finding("misfit", text, axis, Effect.INDETERMINATE)
+            place = BEARINGS[axis[-1]]
+            doubted = (f"beta_{axis}", f"offset_{axis}", f"misfit_ratio@{place}", f"misfit_ratio_means@{place}")
+            yield Finding("misfit", text, axis, Effect.INDETERMINATE, doubted)
     gap, drawing = a.adjusted.estimates["gap"], a.inputs["gap"]
     left = 1e3 * float(np.sqrt((a.adjusted.residuals**2).mean()))
     text = (

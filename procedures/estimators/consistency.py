@@ -7,23 +7,28 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import partial
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special
 
 from bench.findings import Effect, Finding
-from procedures.estimators import mass_hanging, signals
+from bench.recording import Recording
+from bench.uncertainty.coverage import coverage_factor
+from procedures.estimators import load_hypotheses, signals
 from procedures.estimators.hanging_data import COILS, POSITIONS, HangingData
+from procedures.estimators.load_hypotheses import CHANCE, Contradiction, Suspect
 from procedures.estimators.mass_hanging import Fit
-from procedures.estimators.repeatability import Scatter, misfit
+from procedures.estimators.repeatability import Scatter
 
 Array = npt.NDArray[np.float64]
 
-FATAL = ("stuck-channel", "no-response", "axes-exchanged", "bearings-exchanged", "wrong-sign")
+FATAL = ("stuck-channel", "no-response", "axes-exchanged", "bearings-exchanged", "wrong-sign", "masses-exchanged")
 """Findings after which a fit means nothing and is not attempted."""
 NAMES = ("inboard", "outboard")
+AXES = ("yi", "yo", "xi", "xo")
+WIRED_WRONG = "wired-wrong"  # event: changes of the control currents under the first mass, A
+MOST_WRONG = 0.03  # relative: a set of masses that is off by more would be seen by eye
 
 
 class Tolerances(Protocol):
@@ -35,6 +40,8 @@ class Tolerances(Protocol):
     def max_drift_A(self) -> float: ...
     @property
     def max_lost(self) -> float: ...
+    @property
+    def bias_A(self) -> float: ...
 
 
 def of_signals(data: HangingData, plan: Tolerances) -> Iterator[Finding]:
@@ -54,7 +61,8 @@ def _worst(data: HangingData, values: Array) -> str:
 
 def _wiring(data: HangingData) -> Iterator[Finding]:
     """Signs and axes, from how the control currents answer the load: the outboard AMB pulls more (positive), the
-    inboard one less (negative), the horizontal axes hardly at all (the axes stand within a few mrad of the plumb)."""
+    inboard one less (negative), the horizontal axes hardly at all (the axes stand within a few mrad of the plumb).
+    `acquire` asks the same after the first hanging."""
     load = data.hangings.load
     heavy, light = load == load.max(), load < 0
 
@@ -62,7 +70,17 @@ def _wiring(data: HangingData) -> Iterator[Finding]:
         control = (data.mean[f"i_{axis}_p"] - data.mean[f"i_{axis}_n"]) / 2
         return float(control[heavy].mean() - control[light].mean())
 
-    yi, yo, xi, xo = (answer(axis) for axis in ("yi", "yo", "xi", "xo"))
+    yield from wiring(*(answer(axis) for axis in AXES))
+
+
+def of_first(recording: Recording[Any]) -> Iterator[Finding]:
+    """What the first hanging showed, where the run ended by it."""
+    for event in recording.events(WIRED_WRONG):
+        yield from wiring(*(float(event["changes"][axis]) for axis in AXES))
+
+
+def wiring(yi: float, yo: float, xi: float, xo: float) -> Iterator[Finding]:
+    """Findings by the changes of the four control currents in A under the heaviest mass."""
     exchanged = [name for name, y, x in (("inboard", yi, xi), ("outboard", yo, xo)) if abs(x) > 0.5 * abs(y)]
     if exchanged:
         yield Finding(
@@ -93,10 +111,24 @@ def _wiring(data: HangingData) -> Iterator[Finding]:
 
 
 def of_fit(
-    data: HangingData, f: Fit, s: Scatter, p: Mapping[str, float], plan: Tolerances, u_mass: Array
+    data: HangingData,
+    f: Fit,
+    s: Scatter,
+    c: Contradiction,
+    beyond: float,
+    p: Mapping[str, float],
+    plan: Tolerances,
+    u_mass: Array,
 ) -> Iterator[Finding]:
-    """Checks of the fit: loads that contradict each other, single hangings that stand out, hysteresis."""
-    yield from _loads(data, f, s, p, u_mass)
+    """Checks of the fit: loads that contradict each other, single hangings that stand out, hysteresis. `beyond` is what each
+    mass is less sure by than its certificate says (`load_hypotheses.scatter_of_set`)."""
+    yield from _loads(data, c, p, plan, u_mass)
+    if beyond > 0:
+        text = (
+            f"the loads agree worse than certificates and scatter say (by chance with a probability of {c.probability:.1g}): "
+            f"{beyond:.2%} of each mass, from the data, is in the budget beside its certificate."
+        )
+        yield Finding("loads-scatter", text, "masses")
     yield from _outliers(data, f, s)
     span = np.ptp(f.forces, axis=(1, 2))
     hysteresis = np.abs(f.terms[:, :, 3].mean(axis=1)) / span
@@ -110,29 +142,56 @@ def of_fit(
             )
 
 
-def _loads(data: HangingData, f: Fit, s: Scatter, p: Mapping[str, float], u_mass: Array) -> Iterator[Finding]:
-    shares = np.array(mass_hanging.hung_shares(p["hook_to_outboard"], p["amb_span"]))
-    total, suspects = misfit(f, data.hangings, s, shares * p["gravity"], u_mass)
-    if total < special.chdtri(2 * (len(u_mass) - 3), 1e-6):
+def _loads(
+    data: HangingData, c: Contradiction, p: Mapping[str, float], plan: Tolerances, u_mass: Array
+) -> Iterator[Finding]:  # fmt: skip
+    if c.probability > CHANCE:
         return
-    best = suspects[0]
-    plausible = [x for x in suspects if x.misfit < best.misfit + 10]
-    text = " or ".join(_suspicion(data.masses, x.load, x.extra_kg, x.u_kg, p) for x in plausible)
+    said = f"the loads contradict each other (chi-squared {c.total:.0f} of {len(c.seen)})"
+    pair = load_hypotheses.exchanged(data.hangings, p, plan.bias_A, u_mass)
+    if pair is not None:
+        a, b = (data.masses[k] for k in pair)
+        text = f"{said}; they agree if {a} and {b} are exchanged: each hung where the other was asked for. Look at the labels."
+        yield Finding("masses-exchanged", text, f"{a}, {b}", Effect.ERROR)
+        return
+    found = load_hypotheses.suspects(c)
+    plausible = [x for x in found if x.misfit < found[0].misfit + 10 and x.chance > CHANCE]
+    if not plausible:
+        text = f"{said}; no single mass that is wrong would make them agree, nor would two that are exchanged."
+        yield Finding("load-inconsistent", text, "masses", Effect.INDETERMINATE)
+        return
+    k = coverage_factor(c.dof)
+    text = " or ".join(_suspicion(data.masses, x.load, x.extra_kg, k * x.u_kg, p) for x in plausible)
     yield Finding(
         "load-inconsistent",
-        f"the loads contradict each other (chi-squared {total:.0f}); the data agree if {text}.",
+        f"{said}; the data agree if {text}.{_all_others(data.masses, plausible[0], p)}",
         ", ".join(data.masses[x.load] if x.load >= 0 else "no load" for x in plausible),
         Effect.INDETERMINATE,
     )
 
 
+def _all_others(masses: tuple[str, ...], x: Suspect, p: Mapping[str, float]) -> str:
+    """The same data with the suspect as stated: errors of the others that go with the square of the load, which K2 takes."""
+    if x.load < 0:
+        return ""
+    per_kg = -x.extra_kg / p[f"mass_{x.load}"] ** 2
+    rest = [(masses[k], per_kg * p[f"mass_{k}"]) for k in range(len(masses)) if k != x.load]
+    if max(abs(share) for _, share in rest) > MOST_WRONG:
+        return ""
+    text = ", ".join(f"{label} by {share:+.2%}" for label, share in rest)
+    return (
+        f" They agree as well if {masses[x.load]} is right and the others are off with the square of the load: {text}."
+    )
+
+
 def _suspicion(masses: tuple[str, ...], load: int, extra: float, u: float, p: Mapping[str, float]) -> str:
+    """`u` kg is the expanded uncertainty."""
     if load >= 0:
         stated = p[f"mass_{load}"]
-        return f"{masses[load]} is {stated + extra:.4f} kg ± {2 * u:.4f} kg instead of {stated:.4f} kg"
-    if abs(extra + p["hanger"]) < max(5 * u, 0.05 * p["hanger"]):
-        return f"the hanger ({p['hanger']:.3f} kg) was off when nothing hung (missing {-extra:.4f} kg ± {2 * u:.4f} kg)"
-    return f"{extra:+.4f} kg ± {2 * u:.4f} kg hung at no load"
+        return f"{masses[load]} is {stated + extra:.4f} kg ± {u:.4f} kg instead of {stated:.4f} kg"
+    if abs(extra + p["hanger"]) < max(2.5 * u, 0.05 * p["hanger"]):
+        return f"the hanger ({p['hanger']:.3f} kg) was off when nothing hung (missing {-extra:.4f} kg ± {u:.4f} kg)"
+    return f"{extra:+.4f} kg ± {u:.4f} kg hung at no load"
 
 
 def _outliers(data: HangingData, f: Fit, s: Scatter) -> Iterator[Finding]:

@@ -49,6 +49,7 @@ class Drag:
     estimates: Mapping[str, Estimate]
     rates: Mapping[str, Rates]
     torque: Estimate  # constant torque in the forward direction, N m
+    seen: Estimate  # Coulomb torque as the run-downs show it, the drive's drag in it, N m
 
 
 def grouped(runs: Sequence[RunDown], bias_A: float) -> dict[str, list[RunDown]]:
@@ -120,12 +121,12 @@ def evaluate(runs: Sequence[RunDown], rig: RigFile, method: str, bias_A: float, 
             k: inertia * (p["b_low"] + slope * (bias**2 - q["low"]))
             for k, bias in (("B", bias_A), ("B_high", bias_high_A))
         }
-        return {**at, "T_c": inertia * c, **out, "torque": inertia * p["torque"]}
+        return {**at, "T_c": inertia * c - p["drag"], "seen": inertia * c, **out, "torque": inertia * p["torque"]}
 
     inputs["torque"] = Estimate.exact(float(found["low"].by_direction[-1][1] - found["low"].by_direction[1][1]) / 2)
     out = propagate(model, inputs)
-    torque = out.pop("torque")
-    return Drag(out, found, torque)
+    torque, seen = out.pop("torque"), out.pop("seen")
+    return Drag(out, found, torque, seen)
 
 
 def stated_inertia(rig: RigFile) -> Estimate:
@@ -133,8 +134,15 @@ def stated_inertia(rig: RigFile) -> Estimate:
     return certified("machine/polar_inertia", rig.machine["polar_inertia"], "polar inertia of the rotor")
 
 
+def drive_drag(rig: RigFile) -> Estimate:
+    """What the external drive's own bearings take from a rotor that coasts, N m; nothing where the rig file says nothing."""
+    if "drive_drag" not in rig.machine:
+        return Estimate.exact(0.0, "N m")
+    return certified("machine/drive_drag", rig.machine["drive_drag"], "drag of the external drive")
+
+
 def _inputs(rig: RigFile, ring: bool) -> dict[str, Estimate]:
-    out = {}
+    out = {"drag": drive_drag(rig)}
     if ring:
         out["ring"] = certified("machine/ring_inertia", rig.machine["ring_inertia"], "inertia of the ring")
     else:

@@ -22,6 +22,7 @@ from procedures.estimators.ramp_data import SEGMENTS as SEGMENT_CHANNELS
 
 Array = npt.NDArray[np.float64]
 
+ALONG = {"y": ("alpha_d",), "x": ("alpha_dx",)}  # what is measured along an axis
 FATAL = ("stuck-channel", "segment-sign", "segment-current")
 """Findings after which a fit means nothing and is not attempted."""
 AXES = ("yi", "yo", "xi", "xo")
@@ -150,6 +151,7 @@ def lack_of_fit(axis: str, bent: bool, worst_N: float, suspect: str) -> Iterator
             f"the calibration and the scatter allow: {hint}.",
             axis,
             Effect.INDETERMINATE,
+            ALONG[axis],
         )
 
 
@@ -170,4 +172,5 @@ def wander(axis: str, drift: Array, u: Array, data: RampData, plan: Tolerances) 
         f"row) over the {data.duration_s:.0f} s of the run, {plan.max_wander_N:g} N allowed; {what}.",
         axis,
         Effect.INDETERMINATE,
+        ALONG[axis],
     )

@@ -38,7 +38,7 @@ def scatter(f: Fit, h: Hangings, masses: int) -> Scatter:
     residuals = f.residuals.reshape(2, -1)
     rest = residuals - residuals @ averaging.T @ membership.T
     common = np.eye(angles * points) - membership @ averaging
-    maps = np.stack([common @ _residual_maker(f, b) for b in (0, 1)])
+    maps = np.stack([common @ residual_maker(f, b) for b in (0, 1)])
     weight = (f.forces[1].reshape(-1) / np.abs(f.forces[1]).max()) ** 2  # relative load squared, about 0..1
     basis = np.stack([np.ones_like(weight), weight])  # (2, A P)
     covariance = np.zeros((2, 2, angles * points))
@@ -58,7 +58,7 @@ def scatter(f: Fit, h: Hangings, masses: int) -> Scatter:
     return Scatter(rest.reshape(shape), residuals @ averaging.T, covariance.reshape(2, *shape), dof)
 
 
-def _residual_maker(f: Fit, b: int) -> Array:
+def residual_maker(f: Fit, b: int) -> Array:
     """Block-diagonal (A P, A P) map from force errors to residuals of bearing b."""
     angles, points = f.residuals.shape[1:]
     out = np.zeros((angles * points, angles * points))
@@ -96,39 +96,3 @@ def _term_gradients(terms: Array, own: float) -> Array:
     out[:, 2, 1] = k / slope
     out[:, 2, 2] = 2 * (own - f0) / slope
     return out
-
-
-@dataclass(frozen=True)
-class Suspect:
-    """A load that would make the others consistent: index (-1 nothing), the mass to add to it and its u, kg;
-    `misfit` is what remains (chi-squared with three degrees of freedom)."""
-
-    load: int
-    extra_kg: float
-    u_kg: float
-    misfit: float
-
-
-def misfit(f: Fit, h: Hangings, s: Scatter, newton_per_kg: Array, u_mass: Array) -> tuple[float, list[Suspect]]:
-    """Chi-squared (four degrees of freedom) of the load means against what the masses' certificates and the scatter
-    allow, and for each load what extra mass explains it best; most plausible first.
-
-    `newton_per_kg` (2,) is the force per hung kg at each bearing; `u_mass` (L,) kg, nothing (the hanger) first.
-    """
-    membership = np.eye(len(u_mass))[h.load.reshape(-1) + 1]
-    averaging = (membership / membership.sum(axis=0)).T
-    maps = [averaging @ _residual_maker(f, b) for b in (0, 1)]  # (L, A P) each
-    effect = np.concatenate([maps[b] @ membership * newton_per_kg[b] for b in (0, 1)])  # (2L, L): N per kg
-    noise = np.block([[(maps[b] * s.covariance[b, c].reshape(-1)) @ maps[c].T for c in (0, 1)] for b in (0, 1)])
-    covariance = effect @ np.diag(u_mass**2) @ effect.T + noise
-    # F_0, K and K2 take three of the five means at each bearing; what is left of those directions is not information.
-    weights = np.linalg.pinv(covariance, rcond=1e-3, hermitian=True)
-    seen = s.level_means.reshape(-1)
-    total = float(seen @ weights @ seen)
-    suspects = []
-    for k in range(len(u_mass)):
-        information = float(effect[:, k] @ weights @ effect[:, k])
-        extra = float(effect[:, k] @ weights @ seen) / information
-        # A load heavier than stated has a force assumed too small: its residual (assumed less fitted) is negative.
-        suspects.append(Suspect(k - 1, -extra, information**-0.5, total - extra**2 * information))
-    return total, sorted(suspects, key=lambda x: x.misfit)

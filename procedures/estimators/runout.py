@@ -16,7 +16,7 @@ forces are not linear: that is put right by the whole of T (2.4b) over the turn.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -67,11 +67,16 @@ class Stand:
 
 @dataclass(frozen=True)
 class Turning:
-    """Mean readings (12,) and vectors of one order (12,), four probes and eight coils (p, n by axis), at a speed in rad/s."""
+    """Mean readings (12,) and vectors of one order (12,), four probes and eight coils (p, n by axis), at a speed in rad/s.
+
+    `higher` has those of higher orders by order, beside an order 1 whose force is to be that of the whole of T (2.4b): where
+    a law lets the coils of an axis pull in turns, order 2 makes a quarter of it.
+    """
 
     speed: float
     means: Array
     vectors: Complex
+    higher: Mapping[float, Complex] = field(default_factory=dict)
 
 
 def arms(inboard: float, outboard: float) -> Array:
@@ -113,7 +118,12 @@ def pushed(s: Stand, turning: Turning) -> tuple[Complex, Array]:
     """Forces and moments (4,) of the control currents, and K_x (4,)."""
     k_p, k_n, k_x = slopes(s, turning.means)
     i = turning.vectors[4:] / s.i_gain
-    return np.asarray(arms(s.l_ia, s.l_oa).T @ (k_p * i[::2] + k_n * i[1::2])), k_x
+    force = k_p * i[::2] + k_n * i[1::2]
+    if turning.higher:
+        orders = {1.0: turning.vectors, **turning.higher}
+        at = {n: Turning(turning.speed, turning.means, v) for n, v in orders.items()}
+        force = force + bent(s, at, {n: v[:4] / s.gain for n, v in orders.items()})[1.0]
+    return np.asarray(arms(s.l_ia, s.l_oa).T @ force), k_x
 
 
 def unbalances(s: Stand, turning: Turning, runout: Complex, more: Complex | None = None) -> tuple[Complex, float]:

@@ -101,16 +101,20 @@ def _limits(t: Taken) -> Iterator[Finding]:
         (VOLTAGE_LIMIT, "voltage-saturated", "an amplifier's voltage was at its limit: this is not S of small motions."),
     ):  # fmt: skip
         if t.flags & bits:
-            yield Finding(code, text, t.where, Effect.INDETERMINATE)
+            yield Finding(code, text, t.where, Effect.INDETERMINATE, (f"@{t.where}",))
     if t.clipped > SAME:
         text = f"`after` is not `before` plus `inject` ({t.clipped * 1e3:.2g} mA at worst): the reference was cut at a limit."
-        yield Finding("injection-clipped", text, t.where, Effect.INDETERMINATE)
+        yield Finding("injection-clipped", text, t.where, Effect.INDETERMINATE, (f"@{t.where}",))
 
 
 def _injected(t: Taken) -> Iterator[Finding]:
     if not t.injected.size:
         yield Finding(
-            "all-excluded", "every line is beside an order of the shaft's speed.", t.where, Effect.INDETERMINATE
+            "all-excluded",
+            "every line is beside an order of the shaft's speed.",
+            t.where,
+            Effect.INDETERMINATE,
+            (f"@{t.where}",),
         )
         return
     off = float(np.abs(t.injected / t.grid.amplitude - 1).max())
@@ -144,7 +148,11 @@ def _turning(t: Taken, plan: Settings) -> Iterator[Finding]:
     off = abs(t.turning / t.speed - 1) if t.speed else 0.0
     if off > plan.max_speed_error:
         yield Finding(
-            "speed-off", f"the pulses say {t.turning * RPM:.0f} r/min, {off:.1%} off.", t.where, Effect.INDETERMINATE
+            "speed-off",
+            f"the pulses say {t.turning * RPM:.0f} r/min, {off:.1%} off.",
+            t.where,
+            Effect.INDETERMINATE,
+            (f"@{t.where}",),
         )
 
 
@@ -153,7 +161,7 @@ def of_results(results: Sequence[Result], plan: Settings) -> Iterator[Finding]:
     for r in results:
         if not r.peaks:
             text = "no maximum was refined: the survey found none."
-            yield Finding("peak-not-refined", text, r.where, Effect.INDETERMINATE)
+            yield Finding("peak-not-refined", text, r.where, Effect.INDETERMINATE, (f"@{r.where}",))
             continue
         yield from _covered(r)
         for p in r.peaks:
@@ -177,7 +185,7 @@ def _covered(r: Result) -> Iterator[Finding]:
             else f"|S| still rises at {best.at:.4g} Hz, the end"
         )
         text = f"{place} of where the grid was refined: the greatest value was not found. Survey with a finer grid."
-        yield Finding("peak-not-refined", text, r.where, Effect.INDETERMINATE)
+        yield Finding("peak-not-refined", text, r.where, Effect.INDETERMINATE, (f"@{r.where}",))
 
 
 def _of_peak(p: Peak, plan: Settings) -> Iterator[Finding]:
@@ -185,19 +193,19 @@ def _of_peak(p: Peak, plan: Settings) -> Iterator[Finding]:
     if p.taken.grid.step > half:
         text = (f"lines stand {p.taken.grid.step:g} Hz apart at {p.top.at:.4g} Hz; half of the half-power width there is "
                 f"{half:.2g} Hz: the maximum may lie between them.")  # fmt: skip
-        yield Finding("grid-too-coarse", text, where, Effect.INDETERMINATE)
+        yield Finding("grid-too-coarse", text, where, Effect.INDETERMINATE, (f"@{where}",))
     if p.model.probability < UNEXPLAINED:
         text = (f"no model of up to four resonances explains the lines about {p.top.at:.4g} Hz (misfit "
                 f"{p.model.misfit:.1f}): the loop changed while it was measured, or something else shakes it.")  # fmt: skip
-        yield Finding("not-explained", text, where, Effect.INDETERMINATE)
+        yield Finding("not-explained", text, where, Effect.INDETERMINATE, (f"@{where}",))
     if p.coherence < plan.min_coherence:
         text = (f"coherence falls to {p.coherence:.2f} at the peak ({plan.min_coherence:g} is wanted): the injection is too "
                 "small for what else moves the loop. Inject more, or longer.")  # fmt: skip
-        yield Finding("coherence-low", text, where, Effect.INDETERMINATE)
+        yield Finding("coherence-low", text, where, Effect.INDETERMINATE, (f"@{where}",))
     if abs(p.change) > plan.max_change and abs(p.change) > 3 * p.u_change:
         text = (f"|S| at the peak changes by {p.change:+.1%} at half the amplitude ({plan.max_change:.0%} is "
                 "allowed): the loop is not linear at this injection. Inject less.")  # fmt: skip
-        yield Finding("not-linear", text, where, Effect.INDETERMINATE)
+        yield Finding("not-linear", text, where, Effect.INDETERMINATE, (f"@{where}",))
 
 
 def _notes(results: Sequence[Result], plan: Settings) -> Iterator[Finding]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from bench.findings import Effect, Finding
 from bench.recording import Recording
-from bench.uncertainty import Estimate, coverage_factor
+from bench.uncertainty import Estimate, interval
 from procedures.estimators import signals
 from procedures.estimators.setpoint_data import CLIPPED, COIL_LIMIT, CONTACT, STEP, VOLTAGE_LIMIT, Case, Done
 from procedures.estimators.setpoint_estimates import Result
@@ -160,7 +160,11 @@ def of_results(
 ) -> Iterator[Finding]:
     """Steps that do not settle, bands that noise has widened, responses without an oscillation."""
     for case, result in results.items():
-        if not math.isfinite(result.settled.time):
+        if result.settled.open:
+            yield Finding("not-settled", f"the position runs along the edge of the band ({result.settled.within:.1%}), so that "
+                          "its noise hides whether it has settled at the end of the record: record longer, repeat more often, "
+                          "take larger steps.", case.where, Effect.INDETERMINATE)  # fmt: skip
+        elif not math.isfinite(result.settled.time):
             yield Finding("not-settled", f"still {abs(result.error):.1%} of the step off at the end of the record "
                           f"({plan.band:.1%} is the band): {_longer(result)}.", case.where, Effect.INDETERMINATE)  # fmt: skip
         widest = result.settled.within
@@ -210,7 +214,5 @@ def _against(quantity: str, unit: str, scale: float, a: Result, b: Result, names
         if e is None:
             texts.append(f"not within the record with {name}")
         else:
-            texts.append(
-                f"{scale * e.value:.3g} ± {scale * coverage_factor(len(r.ones) - 1) * e.u:.2g} {unit} with {name}"
-            )
+            texts.append(f"{scale * e.value:.3g} ± {scale * interval(e).U:.2g} {unit} with {name}")
     return f"{label} {', '.join(texts)}"

@@ -8,15 +8,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.special import ndtr
 
 from bench.errors import AnalysisError
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
-from procedures.estimators import setpoint_data, stepmodel
+from bench.uncertainty.estimate import Deviations
+from procedures.estimators import setpoint_data, setpoint_settling, stepmodel
 from procedures.estimators.inputs import certified
 from procedures.estimators.setpoint_data import Case, Done
+from procedures.estimators.setpoint_settling import Curve, Settling
 from procedures.estimators.setpoint_swing import One, Swing, swing
-from procedures.estimators.stepmodel import Settling
 
 Array = npt.NDArray[np.float64]
 RISE_SHARE = 0.012  # of a period: what the spline leaves of a crossing, over all phases of the step in its period
@@ -68,11 +70,13 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
         "overshoot": _jackknifed("1", fits, ones, lambda s, _: s.peak - 1),
         "bandwidth": _jackknifed("Hz", fits, ones, lambda s, o: stepmodel.bandwidth(o, s)),
     }
+    curves = {group: _curve(of) for group, of in setpoint_data.by_group(steps).items()}
     out = {}
     for case, all_of in done.items():
-        settled = _settled(all_of, band)
+        settled = setpoint_settling.settling(curves[case.group], case, all_of, band)
         found = {name: _estimate(name, case, s) for name, s in seen.items() if case in s.values}
-        found |= _settling(case, all_of, settled)
+        if math.isfinite(settled.time):
+            found["settling_time"] = settling_estimate(case, settled)
         found["rise_time"] += bound(f"sampling/rise/{case.where}", "sampling", RISE_SHARE * _period(all_of[0]), "s")
         found["steady_error"] += _gained(case, rig)
         other = seen["overshoot"].values.get(replace(case, way=-case.way))
@@ -180,32 +184,33 @@ def _estimate(name: str, case: Case, seen: _Seen) -> Estimate:
     return Estimate(seen.values[case], seen.unit, {influence: u})
 
 
-def _settled(done: Sequence[Done], band: float) -> Settling:
-    n = min(int((d.t >= 0).sum()) for d in done)
-    steps = np.array([(d.y / d.case.size)[d.t >= 0][:n] for d in done])
-    noise = float(np.sqrt(np.mean([d.noise**2 for d in done]))) / done[0].case.size
-    return stepmodel.settling(
-        done[0].t[done[0].t >= 0][:n], steps, band, noise, float(np.mean([d.samples for d in done]))
-    )
+def _curve(done: Sequence[Done]) -> Curve:
+    try:
+        poles = swing([_one(d) for d in done]).poles
+    except AnalysisError:
+        poles = np.zeros(0, complex)
+    return setpoint_settling.fit(done, poles)
 
 
-def _settling(case: Case, done: Sequence[Done], settled: Settling) -> dict[str, Estimate]:
-    if not math.isfinite(settled.time):
-        return {}
-    where, count = case.where, len(done)
-    scatter = Influence(
-        id=f"scatter/settling_time/{where}",
-        name="scatter of the repeats",
-        u=settled.u,
+def settling_estimate(case: Case, settled: Settling) -> Estimate:
+    """The expected time with all that are possible: a distribution of its own (JCGM 101, 6.5)."""
+    noise = Influence(
+        id=f"scatter/settling_time/{case.where}",
+        name="noise of the mean response",
+        u=float(settled.times.std()),
         unit="s",
         kind="A",
         distribution="normal",
-        dof=float(count - 1),
-        source=f"{count} steps, one left out in turn",
+        source="noise of the steps, and extremes of the swing that may touch the band",
     )
-    made = Estimate.of(settled.time, scatter) + bound(f"start/{where}", "start of the step", START_S, "s")
-    made += bound(f"period/{where}", "sampling", _period(done[0]) / 4, "s")
-    return {"settling_time": made + bound(f"edge/{where}", "noise at the edge of the band", settled.edge, "s")}
+
+    def sampled(deviations: Deviations) -> Array:
+        share = ndtr(deviations[noise.id] / noise.u) * len(settled.times) - 0.5
+        times: Array = np.interp(share, np.arange(len(settled.times)), settled.times)
+        return times
+
+    made = Estimate(settled.time, "s", {noise: 1.0}, sampled if noise.u else None)
+    return made + bound(f"start/{case.where}", "start of the step", START_S, "s")
 
 
 def by_group(steps: list[Done], results: Mapping[Case, Result]) -> dict[str, dict[str, Estimate]]:

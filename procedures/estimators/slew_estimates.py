@@ -20,6 +20,7 @@ from procedures.estimators.slewing import Gains, Passes, Swing, Tracking, passes
 Array = npt.NDArray[np.float64]
 DESIGN_NM_A, DESIGN_SHARE = 2.87, 0.1  # T Table 6.2, and how far a machine may be from it
 RIPPLE_NM_A = 0.02  # T Table 5.3, beta_4: ripple of the torque constant that one angle's calibration does not show
+FOLLOWING = ("error_rms", "error_peak", "amplitude_ratio", "lag")  # what a detent or a friction gets into
 COUNTED = 0.1  # share of the counts' variance that the assumption of evenly spread counts may be wrong by
 
 
@@ -143,7 +144,7 @@ def findings(result: Result, plan: Plan) -> Iterator[Finding]:
             "large-detent",
             f"{detent.value:.3f} N m of torque goes with {plan.detent_order} times the angle ({plan.max_detent_N_m:g} N m "
             "allowed): the rotor catches. Look for iron where there should be none, or a segment that is out.",
-            "detent", Effect.INDETERMINATE,
+            "detent", Effect.INDETERMINATE, FOLLOWING,
         )  # fmt: skip
     elif detent.value < 3 * detent.u:
         text = f"the detent of {detent.value * 1e3:.1f} mN m is within three standard uncertainties of nothing."
@@ -153,5 +154,5 @@ def findings(result: Result, plan: Plan) -> Iterator[Finding]:
             "friction",
             f"moving takes {friction.value:.3f} N m ({plan.max_friction_N_m:g} N m allowed): something rubs or brakes, or a "
             "backwards torque sensor makes it negative.",
-            "friction", Effect.INDETERMINATE,
+            "friction", Effect.INDETERMINATE, (*FOLLOWING, "detent"),
         )  # fmt: skip

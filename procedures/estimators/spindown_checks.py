@@ -15,9 +15,10 @@ from scipy import special
 
 from bench.findings import Effect, Finding
 from bench.recording import Recording
+from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from procedures.estimators.direction import SEGMENTS, of_probe
-from procedures.estimators.drag import Drag
+from procedures.estimators.drag import Drag, drive_drag, stated_inertia
 from procedures.estimators.leastsquares import linear
 from procedures.estimators.spindown_data import RunDown
 
@@ -27,6 +28,8 @@ RELEASED_A = 0.02  # the certificates allow 4 mA of offset each, noise averages 
 SAME_SPEED = 5e-3
 LARGEST_OFFSET_N_m = 0.02  # 4 mA of every segment's sensor are a little over 11 mN m
 LARGEST_WAVE_RAD = 1.5e-3  # a sound run-down leaves 0.45 mrad rms, the counts of the encoder
+COUNT_N_m = 0.01  # of the drive's torque
+SURE = 3.0  # standard uncertainties beyond what is stated
 TICK_S = 0.45e-3  # the speed is a mean over a sample, the angle its last value
 
 
@@ -122,6 +125,7 @@ def of_result(runs: Sequence[RunDown], angle: Drag, speed: Drag, plan: Plan) -> 
             "braked",
             f"a constant torque of {coulomb.value:.3f} N m slows the rotor; a levitated one has at most "
             f"{plan.max_coulomb_N_m:g} N m. A drive or brake that still holds, or something rubs.", "T_c", Effect.INDETERMINATE,
+            ("B", "B_high", "J_z"),
         )  # fmt: skip
     elif coulomb.value < -3 * coulomb.u - 1e-3:
         yield Finding("driven", f"a constant torque of {-coulomb.value:.3f} N m drives the coasting rotor in both directions.",
@@ -185,9 +189,9 @@ def _shape(runs: Sequence[RunDown]) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def of_drive(recording: Recording[Any], friction: Estimate) -> Iterator[Finding]:
-    """What the drive's own stream says: off while coasting, and as much constant torque at two held speeds as the run-downs
-    find. The inertia is not in the drive's torque, and the viscous part drops out: T_d = (T_1 w_2 - T_2 w_1)/(w_2 - w_1)."""
+def of_drive(recording: Recording[Any], drag: Drag) -> Iterator[Finding]:
+    """What the drive's own stream says: off while coasting, and as much constant torque at held speeds as the run-downs find,
+    but for its own drag. The inertia is not in the drive's torque; the viscous part drops out of the line over the speed."""
     name = next((n for n, d in recording.rig.devices.items() if "drive" in d.roles), "")
     if name not in recording.streams:
         return
@@ -197,26 +201,60 @@ def of_drive(recording: Recording[Any], friction: Estimate) -> Iterator[Finding]
     if torque is None:
         return
     steps = [s for s in recording.steps("spin") if s.labels["by"] == "drive" and s.labels["group"] == "low"]
-    held = [(abs(float(s.labels["speed_rad_s"])), np.abs(s.read(torque)[torque])) for s in steps]
-    points = [(w, float(x.mean())) for w, x in held if len(x) >= 2]
-    if len({w for w, _ in points}) < 2:
+    held = [(float(s.labels["speed_rad_s"]), s.read(torque)[torque]) for s in steps]
+    found = constant_torque([(w, float(x.mean())) for w, x in held if len(x) >= 2])
+    if found is None:
         return
-    w, t = np.array(points).T
-    constant, u = _constant_part(w, t)
-    apart = friction.value - constant
-    if abs(apart) > 5 * math.hypot(friction.u, u):
+    own, u = drive_drag(recording.rig), math.hypot(found[1], drag.seen.u)
+    reach = stated_reach(own)
+    apart = drag.seen.value - found[0] - own.value
+    if abs(apart) > reach + SURE * u:
         yield Finding(
             "drive-brakes",
-            f"the drive needs {constant:.3f} N m of constant torque to hold the rotor at two speeds, the run-downs from it "
-            f"show {friction.value:.3f} N m: {apart:+.3f} N m act only while it coasts.", name, Effect.INDETERMINATE,
+            f"the drive gives {found[0] * 1e3:.1f} mN m of constant torque to hold the rotor at its speeds, the run-downs show "
+            f"{drag.seen.value * 1e3:.1f} mN m: {(apart + own.value) * 1e3:+.1f} mN m act only while it coasts "
+            f"({own.value * 1e3:g} ± {reach * 1e3:g} mN m of drag are stated for the drive).", name, Effect.INDETERMINATE,
         )  # fmt: skip
 
 
-def _constant_part(w: Array, t: Array) -> tuple[float, float]:
-    """Torque at no speed on the line through held speeds, and its u with no less than half a count of 0.01 N m each."""
-    fit = linear(np.column_stack([np.ones_like(w), w]), t, np.full(len(t), 0.005**2))
-    scatter = math.sqrt(max(fit.chi2 / max(fit.dof, 1), 1.0))
-    return float(fit.terms[0]), float(fit.u[0]) * scatter
+def constant_torque(held: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
+    """Torque at no speed and its u, N m, from held speeds (signed, rad/s) and torques; None without two speeds both ways.
+
+    The mean over both directions at each speed is free of a constant torque of the released motor, which drives one way and
+    brakes the other; u is that of the drive's resolution, COUNT_N_m (rectangular, each direction by itself).
+    """
+    ways: dict[float, dict[bool, list[float]]] = {}
+    for w, t in held:
+        ways.setdefault(round(abs(w), 3), {True: [], False: []})[w > 0].append(math.copysign(1, w) * t)
+    both = {w: (np.mean(of[True]) + np.mean(of[False])) / 2 for w, of in ways.items() if of[True] and of[False]}
+    if len(both) < 2:
+        return None
+    speeds = np.array(list(both))
+    variance = np.full(len(both), COUNT_N_m**2 / 12 / 2)
+    fit = linear(np.column_stack([np.ones_like(speeds), speeds]), np.array(list(both.values())), variance)
+    return float(fit.terms[0]), float(fit.u[0])
+
+
+def of_inertia(rig: RigFile, drag: Drag) -> Iterator[Finding]:
+    """The inertia by the ring against the rig file's: a wrong ring scales everything, and nothing else shows it."""
+    measured = drag.estimates.get("J_z")
+    if measured is None or "polar_inertia" not in rig.machine:
+        return
+    stated = stated_inertia(rig)
+    apart, reach = measured.value - stated.value, stated_reach(stated)
+    if abs(apart) > reach + SURE * measured.u:
+        yield Finding(
+            "inertia-contradicted",
+            f"the ring gives {measured.value:.5g} kg m^2, the rig file {stated.value:.5g} ± {reach:.2g} kg m^2: they "
+            "contradict each other. Weigh and measure the ring; compare polar_inertia with the drawing.",
+            "J_z", Effect.INDETERMINATE,
+        )  # fmt: skip
+
+
+def stated_reach(stated: Estimate) -> float:
+    """How far a stated value may be off: half the width of its interval, all of it where that has ends."""
+    rectangular = all(i.distribution == "rectangular" for i in stated.sensitivities)
+    return stated.u * math.sqrt(3) if rectangular else 2 * stated.u
 
 
 def _drive_off(recording: Recording[Any], names: set[str]) -> Iterator[Finding]:

@@ -75,10 +75,7 @@ def _read(step: Step, delay_s: float, end: float) -> RunDown:
     speed, angle = direction * data["speed"], direction * np.unwrap(data["angle"])
     used = _span(t, speed, delay_s, end)
     if used.stop - used.start < SMALLEST_SAMPLES:
-        raise AnalysisError(
-            f"run-down {name}: found {used.stop - used.start} samples between {delay_s:g} s after the release and "
-            f"{end:g} rad/s; expected {SMALLEST_SAMPLES} or more"
-        )
+        raise AnalysisError(_too_short(name, t, used, delay_s, end))
     t, speed, angle = t[used] - t[used.start], speed[used], angle[used]
     return RunDown(
         bias_A=float(labels["bias_A"]), direction=direction, repeat=int(labels["repeat"]), ring=bool(labels["ring"]),
@@ -88,6 +85,23 @@ def _read(step: Step, delay_s: float, end: float) -> RunDown:
         segments=np.array([float(data[c][used].mean()) for c in SEGMENTS]),
         lost=step.lost(), expected=step.expected(), flags=int(np.bitwise_or.reduce(data["flags"].astype(np.int64))),
     )  # fmt: skip
+
+
+def _too_short(name: str, t: Array, used: slice, delay_s: float, end: float) -> str:
+    """Why a run-down cannot be fitted, and what to do: the rotor stops too soon, or samples are missing."""
+    found = used.stop - used.start
+    lasted = float(t[used.stop - 1] - t[used.start]) if found else 0.0
+    start = (
+        f"run-down {name}: found {found} samples between {delay_s:g} s after the release and {end:g} rad/s; expected "
+        f"{SMALLEST_SAMPLES} or more"
+    )
+    if used.stop >= len(t):
+        return f"{start}. The recording ends there: look for a run that was stopped, or give a longer coast_s"
+    return (
+        f"{start}. The rotor stops too soon: it falls to {end:g} rad/s within {lasted + delay_s:.2f} s. Give a higher "
+        "speed_rad_s, a lower end_speed_rad_s or a shorter start_delay_s; if it ran longer before, look for a brake, a rub or "
+        "a bearing current that drags"
+    )
 
 
 def _span(t: Array, speed: Array, delay_s: float, end: float) -> slice:

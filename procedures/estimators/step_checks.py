@@ -52,7 +52,9 @@ def of_signals(moves: Sequence[Done], plan: Tolerances) -> Iterator[Finding]:
     ):  # fmt: skip
         hit = [d for d in moves if getattr(d, of) & bits]
         if hit:
-            yield Finding(code, f"{text} in {len(hit)} of {len(moves)} steps", hit[0].case.where, Effect.INDETERMINATE)
+            places = tuple(dict.fromkeys(f"@{d.case.where}" for d in hit))
+            said = f"{text} in {len(hit)} of {len(moves)} steps"
+            yield Finding(code, said, hit[0].case.where, Effect.INDETERMINATE, places)
 
 
 def of_responses(results: Mapping[Case, Result], plan: Tolerances, loops: Mapping[Case, Loop]) -> Iterator[Finding]:
@@ -70,7 +72,7 @@ def of_responses(results: Mapping[Case, Result], plan: Tolerances, loops: Mappin
                 "saturated-small-step",
                 f"a segment was at its limit for {longest * 1e3:.0f} ms in a step that should ask for {demand:.1f} A of "
                 f"{loops[case].limit_A:g} A: the motor carries more than it should, or its gains are not those of the plan.",
-                case.where, Effect.INDETERMINATE,
+                case.where, Effect.INDETERMINATE, (f"@{case.where}",),
             )  # fmt: skip
 
 

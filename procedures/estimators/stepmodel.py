@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +19,6 @@ from procedures.estimators.setpoint_swing import One, Swing
 
 Array = npt.NDArray[np.float64]
 FINE = 20  # points of the curve in a telemetry period
-BAND_NOISE = 5.0  # of settling, at least: the largest of a record's noise stays within it
 RAW_S = 8e-3  # until then the bandwidth is that of the samples, from then on of the oscillation that was fitted to them
 LENGTH_S = 0.12  # of the response that makes the bandwidth
 SCAN_HZ = np.arange(20.0, 480.0, 2.0)
@@ -63,47 +61,6 @@ def trailing(y: Array, samples: float) -> Array:
     kernel = np.concatenate((np.ones(whole), [samples - whole]))
     count = np.convolve(np.ones(len(y)), kernel)[: len(y)]
     return np.asarray(np.convolve(y, kernel)[: len(y)] / count)
-
-
-def settling_time(t: Array, y: Array, within: float, samples: float) -> float:
-    """Until the mean over `samples` stays within the band about 1; infinite where it does not before the end."""
-    off = np.abs(trailing(y, samples) - 1)
-    outside = np.flatnonzero(off > within)
-    if not len(outside):
-        return 0.0
-    last = int(outside[-1])
-    if last >= len(y) - max(20, round(2 * samples)):
-        return math.inf
-    return float(np.interp(-within, -off[last : last + 2], t[last : last + 2]))
-
-
-@dataclass(frozen=True)
-class Settling:
-    """Of the mean of several steps: `time` s (infinite: not within the record), the band `within`, how far leaving out one
-    step moves it (`u`, jackknife), and how far noise moves the band's edge (`edge`, half width)."""
-
-    time: float
-    within: float
-    u: float
-    edge: float
-
-
-def settling(t: Array, steps: Array, band: float, noise: float, samples: float) -> Settling:
-    """Of steps (m, n) at `t` from the control's answer; `noise` is one step's. The band is five times the mean's at least: the
-    largest of thousands of noisy values would leave a narrower one again and again."""
-    m = len(steps)
-    sigma = noise / math.sqrt(m)
-    within = max(band, BAND_NOISE * sigma)
-    whole = settling_time(t, steps.mean(axis=0), within, samples)
-    if not math.isfinite(whole):
-        return Settling(whole, within, 0.0, 0.0)
-    wider = max(within, BAND_NOISE * noise / math.sqrt(m - 1))
-    left = [settling_time(t, np.delete(steps, k, axis=0).mean(axis=0), wider, samples) for k in range(m)]
-    edges = [settling_time(t, steps.mean(axis=0), within + k * sigma, samples) for k in (-1, 1)]
-    last = float(t[-1])
-    finite = np.minimum(left, last)
-    u = math.sqrt((m - 1) / m * float(((finite - finite.mean()) ** 2).sum()))
-    return Settling(whole, within, u, (min(edges[0], last) - min(edges[1], last)) / 2 * math.sqrt(3))
 
 
 def bandwidth(steps: Sequence[One], swing: Swing) -> float:

@@ -81,7 +81,7 @@ NO_DETENT = Detent(0.0, 0.0, 0.0, 1.0)
 class Balance:
     """`alpha` N m/A, `gamma_0` rad, their `covariance` (2, 2) from the residuals; `ripple` r; `current` (n,) A the torque
     current freed of sensors and detent, `base` (n,) A without load, `torque` (n,) N m of the loads; `fit` has residuals (n,) A;
-    `u` (n,) how far each step may scatter, relative to the others."""
+    `u` (n,) how far each step may scatter, relative to the others; M, the `pole_pairs`."""
 
     alpha: float
     gamma_0: float
@@ -92,6 +92,7 @@ class Balance:
     torque: Array
     fit: Fit
     u: Array
+    pole_pairs: float
 
     @property
     def scale(self) -> float:
@@ -198,7 +199,9 @@ def balance(
     fit = nonlinear(model, current, np.concatenate([[1 / start[0], 0.0, 0.0], start[1:]]), relative, slopes)
     alpha, gamma_0, ripple = (float(x) for x in fit.terms[:3])
     covariance = fit.covariance[:2, :2] * fit.chi2 / fit.dof
-    return Balance(alpha, gamma_0, ripple, covariance, current, lines @ fit.terms[3:], torque, fit, relative)
+    return Balance(
+        alpha, gamma_0, ripple, covariance, current, lines @ fit.terms[3:], torque, fit, relative, pole_pairs
+    )
 
 
 @dataclass(frozen=True)
@@ -243,20 +246,29 @@ def of_load(b: Balance, s: Steps, load: int) -> Extra:
 
 
 def shape_over_gamma(b: Balance, s: Steps) -> tuple[float, float]:
-    """Whether the torque follows the cosine: probability of the misfit by chance (F test of free slopes at every gamma),
-    and the largest relative deviation of a slope."""
+    """Whether the torque follows the cosine: probability of the misfit by chance (F test), and the largest relative deviation
+    of a torque per current that the data show at a phase angle.
+
+    Tried are the relative deviations over gamma that neither alpha_tau (the same at each) nor gamma_0 (tan(M (gamma -
+    gamma_0)), to first order) can make. What the arms and each mass are off by is fitted along: it is no matter of gamma.
+    """
     angles, index = np.unique(s.gamma, return_inverse=True)
-    jacobian, residuals = b.fit.jacobian / b.u[:, None], b.fit.residuals / b.u
-    columns = np.column_stack([loaded(b) * (index == k) / b.u for k in range(len(angles))])
-    apart = columns - jacobian @ np.linalg.lstsq(jacobian, columns, rcond=None)[0]
-    terms = np.linalg.lstsq(apart, residuals, rcond=1e-8)[0]
-    total = float((residuals**2).sum())
-    rest = float(((residuals - apart @ terms) ** 2).sum())
-    more = len(angles) - 2
-    dof = b.fit.dof - more
+    taken = np.column_stack([np.ones_like(angles), np.tan(b.pole_pairs * (angles - b.gamma_0))])
+    shapes = np.linalg.svd(taken)[0][:, 2:]  # (angles, angles - 2), orthonormal, at right angles to both
+    carried = loaded(b) / b.u
+    beside = [carried * s.side, *(carried * (s.load == k) for k in range(1, s.load.max() + 1))]
+    known = np.column_stack([b.fit.jacobian / b.u[:, None], *beside])
+    tried, residuals = carried[:, None] * shapes[index], b.fit.residuals / b.u
+    design = np.column_stack([known, tried])
+    dof = len(residuals) - np.linalg.matrix_rank(design)
+    terms = np.linalg.lstsq(design, residuals, rcond=None)[0]
+    rest = float(((residuals - design @ terms) ** 2).sum())
+    without = residuals - known @ np.linalg.lstsq(known, residuals, rcond=None)[0]
     if dof < 1 or rest <= 0:
         return 1.0, 0.0
-    return float(special.fdtrc(more, dof, (total - rest) / more / (rest / dof))), float(np.abs(terms).max())
+    more = shapes.shape[1]
+    excess = max(float((without**2).sum()) - rest, 0.0) / more / (rest / dof)
+    return float(special.fdtrc(more, dof, excess)), float(np.abs(shapes @ terms[-more:]).max())
 
 
 def slopes_over_gamma(b: Balance, s: Steps, side: int) -> tuple[Array, Array, Array]:

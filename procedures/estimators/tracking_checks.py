@@ -77,6 +77,7 @@ def of_signals(orbits: Sequence[Orbit], plan: Settings) -> Iterator[Finding]:
                     f"the speed is up to {off:.1%} off {plan.speed_rad_s * 30 / math.pi:.0f} r/min.",
                     o.where,
                     Effect.INDETERMINATE,
+                    (f"@{o.where}",),
                 )
 
 
@@ -152,6 +153,7 @@ def of_results(
                     f"{text} was at its limit in {share:.2%} of the samples.",
                     o.where,
                     Effect.INDETERMINATE if bad else Effect.NOTE,
+                    (f"@{o.where}",),
                 )
         low = results[o.law]["lower_current"]
         if o.law == "CAC" and not o.path.turn_s and low.value - 2 * low.u > plan.max_lower_A:
@@ -161,6 +163,7 @@ def of_results(
                 "allowed): they should be off.",
                 o.where,
                 Effect.INDETERMINATE,
+                (f"@{o.where}",),
             )
     yield Finding("laws-compared", "; ".join(_said(o, results[o.law]) for o in orbits) + ".")
 
@@ -175,6 +178,7 @@ def _of_contact(o: Orbit, left: Estimate, effect: Effect) -> Iterator[Finding]:
             f"{left.value * 1e6:.1f} ± {2 * left.u * 1e6:.1f} µm are left to it.",
             o.where,
             effect,
+            (f"@{o.where}",),
         )
         if left.value > 3 * left.u:
             yield Finding(
@@ -184,6 +188,7 @@ def _of_contact(o: Orbit, left: Estimate, effect: Effect) -> Iterator[Finding]:
                 "and zero, or at what lies between rotor and ring.",
                 o.where,
                 Effect.INDETERMINATE,
+                (f"@{o.where}",),
             )
     elif o.ring_distance(nominal(o.step.recording.rig, o.t_0)) < 0:
         yield Finding(
@@ -192,6 +197,7 @@ def _of_contact(o: Orbit, left: Estimate, effect: Effect) -> Iterator[Finding]:
             f"{2 * left.u * 1e6:.1f} µm are left), but the controller reports no contact.",
             o.where,
             Effect.INDETERMINATE,
+            (f"@{o.where}",),
         )
 
 

@@ -52,6 +52,10 @@ def told(model: Calibration | None, plan: Settings) -> Finding:
     return Finding("bearings", text, "", Effect.NOTE)
 
 
+STATED = tuple(f"model_{what}_{a}" for what in ("beta", "offset") for a in AXES)
+"""Parameters that say what the controller knows of the bearings, where no calibration does."""
+
+
 def stated(rig: RigFile, plan: Settings, model: Calibration | None = None) -> dict[str, Estimate]:
     """What the rig file and the plan, or the bearings' calibration, say of the stand (`runout.Stand`)."""
     g = rig.geometry

@@ -174,7 +174,7 @@ def _beside(results: Results) -> Iterator[Finding]:
             text = (f"{plane} the shaft moves by up to {far * 1e6:.1f} µm that does not turn with it ({far / clearance:.0%} of "
                     f"the clearance; {BESIDE:.0%} is allowed): D_max holds what that may add to the orbit. Suspect a loop near "
                     "its limit of stability, a rub, or a shaker: see the spectrum.")  # fmt: skip
-            yield Finding("not-synchronous", text, r.dwell.where, Effect.INDETERMINATE)
+            yield Finding("not-synchronous", text, r.dwell.where, Effect.INDETERMINATE, (f"@{r.dwell.where}",))
 
 
 def _folded(results: Results) -> Iterator[Finding]:
@@ -189,7 +189,8 @@ def _folded(results: Results) -> Iterator[Finding]:
             text = (f"at {r.dwell.speed * RPM:.0f} r/min the telemetry, a sample every {period * 1e3:g} ms, shows order {n} as "
                     f"order 1: the vector of {AXES[k]} may be off by {off[k] * 1e6:.2f} µm, which its interval holds. "
                     "Dwell at a speed that is a percent away.")  # fmt: skip
-            yield Finding("aliasing", text, r.dwell.where, Effect.INDETERMINATE)
+            doubted = (f"@{r.dwell.where}", "reduction")
+            yield Finding("aliasing", text, r.dwell.where, Effect.INDETERMINATE, doubted)
 
 
 def _repeats(results: Results) -> Iterator[Finding]:

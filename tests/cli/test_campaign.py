@@ -75,7 +75,7 @@ def test_one_rig_step_by_step_ends_in_a_model(bench: Bench, tmp_path: Path) -> N
     folder = tmp_path / out.strip()
     lines = journal(tmp_path / out.strip())
     assert [(e["kind"], e.get("outcome"), e.get("adopted")) for e in lines] == [
-        ("step", "PASS", True), ("step", "PASS", False), ("done", None, None),
+        ("step", "DONE", True), ("step", "DONE", False), ("done", None, None),
     ]  # fmt: skip
     for e in lines[:2]:
         assert (folder / e["run"] / "report.html").is_file()
@@ -120,7 +120,7 @@ def test_going_on_leaves_out_what_needs_the_step_that_failed(bench: Bench, tmp_p
     steps = TWO.replace('"tiny-levitated"\n', '"tiny-levitated"\nplan = { then = "raise" }\n', 1)
     status, out, err = bench(HEAD + steps + '[[step]]\nprocedure = "tiny-resting"\n', "--no-report", "--go-on")
     assert status == 3
-    assert [e["outcome"] for e in journal(tmp_path / out.strip())] == ["ERROR", None, "PASS"]
+    assert [e["outcome"] for e in journal(tmp_path / out.strip())] == ["ERROR", None, "DONE"]
     assert "left out: needs tiny-levitated" in err
 
 

@@ -15,6 +15,7 @@ from bench import catalogue
 from bench.cli.__main__ import main
 
 Bench = Callable[..., tuple[int, str, str]]
+SHIPPED = catalogue.PROCEDURES
 
 
 @pytest.fixture
@@ -36,12 +37,18 @@ def run(*extra: str) -> tuple[str, ...]:
     return ("run", "tiny-levitated", "--rig", "tsbs12", "--no-report", *extra)
 
 
-def spec(tmp_path: Path, low: float, high: float) -> None:
+def spec(tmp_path: Path, low: float, high: float, at: str = "") -> None:
     (tmp_path / "specs").mkdir()
     (tmp_path / "specs" / "tsbs12.toml").write_text(
         f'schema = 1\n[limits.tiny-levitated]\nsupply = {{ low = {low}, high = {high}, unit = "V", source = "test", '
-        "verified = true }\n"
+        f"verified = true{at} }}\n"
     )
+
+
+def outcome_of(out: str) -> tuple[str, list[str]]:
+    """Outcome and codes of the findings of the run or analysis whose directory a command printed last."""
+    record = json.loads((Path(out.splitlines()[-1]) / "record.json").read_text())
+    return record["outcome"], [f["code"] for f in record["findings"]]
 
 
 @pytest.mark.parametrize(
@@ -61,6 +68,44 @@ def test_verdicts_are_exit_statuses(
     found, out, _ = bench("analyse", str(directory))
     assert found == status
     assert (Path(out.splitlines()[-1]) / "record.json").is_file()
+
+
+def test_a_run_that_nothing_judged_is_done(bench: Bench) -> None:
+    """It passes nothing and fails nothing; who needs a verdict asks for one, and so does a spec that is named."""
+    status, out, err = bench(*run())
+    assert (status, outcome_of(out)) == (0, ("DONE", []))
+    assert "DONE: tiny-levitated on tsbs12\n  decided  no acceptance limit was applied\n" in err
+    status, out, err = bench(*run("--require-verdict"))
+    assert (status, outcome_of(out)) == (3, ("ERROR", ["nothing-judged"]))
+    assert "there is no limit for this procedure" in " ".join(err.split())
+    status, out, _ = bench("analyse", out.splitlines()[-1])
+    assert (status, outcome_of(out)) == (3, ("ERROR", ["nothing-judged"]))
+    Path("mine.toml").write_text("schema = 1\n[limits.other]\n")
+    status, out, _ = bench(*run("--spec", "mine.toml"))
+    assert (status, outcome_of(out)) == (3, ("ERROR", ["nothing-judged"]))
+
+
+def test_a_limit_judges_at_the_settings_that_it_was_stated_for(bench: Bench, tmp_path: Path) -> None:
+    spec(tmp_path, 160.0, 180.0, ", at = { bias_A = 3.0 }")
+    status, out, _ = bench(*run("--require-verdict"))
+    assert (status, outcome_of(out)) == (1, ("FAIL", []))
+    status, out, err = bench(*run("--plan", "bias_A=2.0"))
+    assert (status, outcome_of(out)) == (0, ("DONE", ["limit-not-applied"]))
+    assert "no verdict on supply: the limit was stated for bias_A = 3, here it is 2" in " ".join(err.split())
+    status, out, _ = bench("analyse", out.splitlines()[-1])
+    assert (status, outcome_of(out)) == (0, ("DONE", ["limit-not-applied"]))
+    status, out, err = bench(*run("--plan", "bias_A=2.0", "--require-verdict"))
+    assert (status, outcome_of(out)) == (3, ("ERROR", ["limit-not-applied", "nothing-judged"]))
+    assert "none of its limits holds for this plan" in " ".join(err.split())
+
+
+def test_a_fail_stands_first_and_a_finding_outranks_it(bench: Bench, tmp_path: Path) -> None:
+    spec(tmp_path, 160.0, 180.0)
+    status, out, err = bench(*run("--plan", 'then="doubt"'))
+    assert (status, outcome_of(out)[0]) == (5, "INDETERMINATE")
+    head, first = err[err.index("INDETERMINATE: ") :].splitlines()[:2]
+    assert head == "INDETERMINATE: tiny-levitated on tsbs12"
+    assert first == "  decided  outside its limit, but outranked by doubt: supply"
 
 
 @pytest.mark.parametrize(("act", "status"), [("raise", 3), ("refuse", 4), ("stop", 4)])
@@ -92,6 +137,7 @@ USAGE = [
     (run("--truth", "K_x=70"), "K_x"),
     (run("--truth", 'K_i="much"'), "a number"),
     (run("--plan", "secunds=1"), "secunds"),
+    (run("--spec", "absent.toml"), "absent.toml"),
     (run("--plan", "seconds"), "KEY=VALUE"),
     (run("--plan", "bias_A=7"), "the envelope allows"),
     (run("--plan-file", "absent.toml"), "absent.toml"),
@@ -152,19 +198,22 @@ def test_list_and_help_name_what_there_is(bench: Bench) -> None:
         assert f"  {command} " in out
 
 
-def test_check_says_the_bus_load(bench: Bench) -> None:
+def test_check_says_the_bus_load(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(catalogue, "PROCEDURES", SHIPPED)  # the rig file has default plans of theirs
     status, out, _ = bench("check", "tsbs12")
     assert status == 0
     assert "bus load" in out
 
 
-def test_check_names_every_problem_at_once(bench: Bench, tmp_path: Path) -> None:
+def test_check_names_every_problem_at_once(bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     source = catalogue.rig_path("tsbs12")
     text = source.read_text(encoding="utf-8")
     text = text.replace("latitude_deg = 53.527", "latitude_deg = 153").replace("max_speed_rad_s = ", "max_sped = ")
     (tmp_path / "bad.toml").write_text(text, encoding="utf-8")
     (tmp_path / "tsbs12.dbc").write_text((source.parent / "tsbs12.dbc").read_text(encoding="utf-8"), encoding="utf-8")
-    status, _, err = bench("check", "bad.toml")
+    with monkeypatch.context() as shipped:
+        shipped.setattr(catalogue, "PROCEDURES", SHIPPED)
+        status, _, err = bench("check", "bad.toml")
     assert status == 2
     for said in ("site.latitude_deg", "max_sped", "max_speed_rad_s", "bad.toml", "3 problems"):
         assert said in err
@@ -192,7 +241,7 @@ def test_runs_lists_them_and_rebuilds_a_lost_index(bench: Bench, tmp_path: Path)
     for _ in range(2):
         status, out, _ = bench("runs")
         assert status == 0
-        assert out.startswith("PASS")
+        assert out.startswith("DONE")
         assert "seed 7" in out
         assert directory in out
         (tmp_path / "runs" / "index.sqlite").unlink()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import pty
 import resource
 import signal
 import subprocess
@@ -46,7 +47,26 @@ def record_in(tmp_path: Path) -> tuple[Path, dict[str, Any]]:
     return path.parent, json.loads(path.read_text())
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_terminal_that_closes_makes_the_rig_safe(tmp_path: Path) -> None:
+    """As a connection over ssh that is lost: SIGHUP, and nothing that is written goes anywhere any more."""
+    code = [sys.executable, "-m", "tiny_catalogue", *RUN, "--plan", "seconds=3600.0"]
+    child, terminal = pty.fork()
+    if child == 0:
+        os.chdir(tmp_path)
+        os.execve(sys.executable, code, environment())
+    seen = b""
+    while b"acquire" not in seen:
+        seen += os.read(terminal, 4096)
+    os.close(terminal)
+    _, status = os.waitpid(child, 0)
+    assert os.waitstatus_to_exitcode(status) == 4, seen
+    directory, record = record_in(tmp_path)
+    assert [f["text"] for f in record["findings"]] == ["stopped by SIGHUP"]
+    recording: Recording[Any] = Recording.open(directory / "recording.mcap")
+    assert [e["name"] for e in recording.events("command")][-2:] == ["LAND", "DISABLE"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_lands_the_rotor_and_a_second_one_changes_nothing(tmp_path: Path, number: signal.Signals) -> None:
     with start(tmp_path, *RUN, "--plan", 'act="count"') as child:
         read_to(child, "at ")

@@ -35,7 +35,7 @@ class Host:
 
     def __init__(self, **truth: float) -> None:
         self.device = SimulatedController(RIG, draw(RIG, 5, truth), substeps=1)
-        self.now, self.count, self.session = 10**12, 0, 7
+        self.now, self.count, self.session, self.token = 10**12, 0, 7, 0
 
     def run(self, seconds: float, *sent: FrameBatch) -> FrameBatch:
         self.count += 1
@@ -49,7 +49,8 @@ class Host:
         return frame(MESSAGES[name].identifier, encode(MESSAGES[name], values), t_ns=self.now, flags=FD | SENT)
 
     def ask(self, name: str, seconds: float = 1e-3, **values: float) -> dict[str, float | str]:
-        out, _ = STATUS.decode(self.run(seconds, self.message(name, token=3, **values)))
+        self.token = (self.token + 1) % 256
+        out, _ = STATUS.decode(self.run(seconds, self.message(name, **{"token": self.token, **values})))
         assert len(out["token"]) == 1
         told = {k: float(v[0]) for k, v in out.items()}
         names = {k: MESSAGES["CaptureStatus"].signal(k).choices[int(told[k])] for k in ("status", "state")}
@@ -83,11 +84,19 @@ class Host:
         return None
 
 
+def test_a_capture_that_is_asked_for_twice_by_the_same_request_is_armed_once() -> None:
+    host = Host()
+    first = host.arm(length=200, token=9)
+    again = host.arm(length=200, token=9)
+    assert [(r["status"], r["number"], r["token"]) for r in (first, again)] == [("OK", 1, 9)] * 2
+    assert host.arm(length=200, token=10)["status"] == "WRONG_STATE"  # another request
+
+
 def test_now_without_a_wait() -> None:
     host = Host()
     armed = host.arm(length=200)
     assert (armed["status"], armed["state"], armed["number"]) == ("OK", "ARMED", 1)
-    assert (armed["memory"], armed["size"], armed["token"]) == (1 << 20, 200 * 8, 3)
+    assert (armed["memory"], armed["size"], armed["token"]) == (1 << 20, 200 * 8, host.token)
     begun = host.device.plant.tick - 10  # armed at the first tick of that millisecond
     done = host.status(0.025)
     assert (done["state"], done["samples"]) == ("TRIGGERED", 10)  # of the millisecond before it asked

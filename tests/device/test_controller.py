@@ -26,7 +26,7 @@ class Host:
 
     def __init__(self, rig: RigFile = RIG, **defects: float) -> None:
         self.rig, self.device = rig, SimulatedController(rig, draw(rig, 5, defects))
-        self.now, self.beating, self.session, self.count = T0, True, 7, 0
+        self.now, self.beating, self.session, self.count, self.token = T0, True, 7, 0, 0
         self.seen: list[FrameBatch] = []
         self.run(0.02)  # the first heartbeat makes this host the owner
 
@@ -49,9 +49,11 @@ class Host:
             self.rig.messages[name].identifier, encode(self.rig.messages[name], values), t_ns=self.now, flags=FD | SENT
         )
 
-    def command(self, name: str, session: int | None = None) -> str:
+    def command(self, name: str, session: int | None = None, again: bool = False) -> str:
+        """Ask for a command, or send the last one `again` with its token."""
+        self.token = (self.token + (not again)) % 256
         code = self.rig.messages.code("Command", "code", name)
-        batch = self.run(0.02, self.message("Command", session=session or self.session, code=code, token=9))
+        batch = self.run(0.02, self.message("Command", session=session or self.session, code=code, token=self.token))
         return status(batch, "CommandReply")
 
     def set(self, name: str, value: float) -> tuple[str, float]:
@@ -272,3 +274,33 @@ def test_no_bytes_upset_the_device(frames: list[tuple[int, bytes]]) -> None:
 
 
 FUZZED = Host()
+
+
+def test_a_command_that_comes_again_is_answered_again_and_executed_once() -> None:
+    host = Host()
+    assert [host.command("ENABLE"), host.command("ENABLE", again=True)] == ["OK", "OK"]
+    assert host.command("ENABLE") == "WRONG_STATE"  # with another token it is another command
+    assert [host.command("LEVITATE"), host.command("LEVITATE", again=True)] == ["OK", "OK"]
+    host.run(2.0)
+    assert host.device.state == "LEVITATED"
+    assert [host.command("LAND"), host.command("LEVITATE")] == ["OK", "WRONG_STATE"]
+
+
+def test_a_fault_of_its_own_is_not_cleared_by_a_repeat() -> None:
+    host = Host()
+    host.levitate()
+    host.device.states.fail("LEVITATION_LOST")
+    assert host.command("CLEAR_FAULT") == "OK"
+    host.device.states.fail("LEVITATION_LOST")
+    assert host.command("CLEAR_FAULT", again=True) == "OK"
+    assert host.device.state == "FAULT"
+
+
+def test_what_an_owner_asked_for_is_forgotten_with_it() -> None:
+    host = Host()
+    assert host.command("ENABLE") == "OK"
+    token = host.token
+    assert [host.command("DISABLE"), host.command("RELEASE")] == ["OK", "OK"]
+    host.token = token
+    assert host.command("ENABLE", again=True) == "OK"
+    assert host.device.state == "READY"

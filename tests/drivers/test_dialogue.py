@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.codec import Decoder, encode
-from bench.errors import ConfigError, LinkError
+from bench.errors import ConfigError, NoReply
 from bench.frames import ERROR, FD, SENT, FrameBatch, empty_batch, frame, payload
 from bench.link import LinkStats
 from bench.rigfile import RigFile, load_rig
@@ -69,7 +69,7 @@ class Conversation:
         end = self.now + round(timeout_s * 1e9)
         while not done():
             if self.now >= end:
-                raise LinkError(f"waited for {what}")
+                raise NoReply(f"waited for {what}")
             self.sleep(0.01)
             self.dialogue.take(self.receive())
 
@@ -90,7 +90,7 @@ def test_the_reply_is_the_one_with_the_token() -> None:
 
 
 @pytest.mark.parametrize("wrong", ["nothing", "token", "kind", "length"])
-def test_without_its_reply_a_request_ends_after_half_a_second(wrong: str) -> None:
+def test_without_its_reply_a_request_ends_after_three_times_half_a_second(wrong: str) -> None:
     def answer(name: str, v: dict[str, float]) -> list[FrameBatch]:
         reply = message("ParamReply", index=1, token=(int(v["token"]) + (wrong == "token")) % 256)
         if wrong == "length":
@@ -98,9 +98,68 @@ def test_without_its_reply_a_request_ends_after_half_a_second(wrong: str) -> Non
         return {"nothing": [], "kind": [message("CommandReply", token=v["token"])]}.get(wrong, [reply])
 
     talk = Conversation(answer)
-    with pytest.raises(LinkError, match="the reply"):
+    with pytest.raises(NoReply, match="the reply, though it was asked for 3 times"):
         talk.set(1.0)
-    assert talk.now == pytest.approx(0.5e9, abs=2e7)
+    assert talk.now == pytest.approx(1.5e9, abs=6e7)
+    assert len({payload(b[0]) for b in talk.sent}) == 1
+    assert len(talk.sent) == 3
+
+
+def test_replies_with_another_token_are_told() -> None:
+    talk = Conversation(lambda name, v: [message("ParamReply", index=1, token=77)])
+    with pytest.raises(NoReply, match=r"3 times\. ParamReply with token 77 came; expected 1$"):
+        talk.set(1.0)
+
+
+@pytest.mark.parametrize("lost", [1, 2])
+def test_a_lost_reply_costs_a_repeat_with_the_same_token(lost: int) -> None:
+    asked = 0
+
+    def answer(name: str, v: dict[str, float]) -> list[FrameBatch]:
+        nonlocal asked
+        asked += 1
+        return [message("ParamReply", index=1, token=v["token"], value=v["value"])] if asked > lost else []
+
+    talk = Conversation(answer)
+    assert talk.set(2.0)["value"] == 2.0
+    assert [payload(b[0]) for b in talk.sent] == [payload(talk.sent[0][0])] * (lost + 1)
+    assert talk.dialogue.repeats == lost
+    assert talk.dialogue.round_trip_ns is None  # nobody knows which one was answered
+    talk.set(3.0)
+    assert payload(talk.sent[-1][0])[6] == 2  # the next request has the next token
+    assert talk.dialogue.round_trip_ns is not None
+
+
+@pytest.mark.parametrize("between", [254, 255, 256, 511])
+def test_two_equal_commands_never_have_one_token(between: int) -> None:
+    """Whatever else was asked for between them: the second would be taken for a repeat, and not be executed."""
+
+    def answer(name: str, v: dict[str, float]) -> list[FrameBatch]:
+        reply = {"Command": "CommandReply", "ParamGet": "ParamReply"}[name]
+        return [message(reply, token=v["token"])]
+
+    talk, commands = Conversation(answer), []
+    for _ in range(2):
+        talk.dialogue.ask("Command", {"code": 4}, "CommandReply", "the reply", talk.wait)
+        commands.append(payload(talk.sent[-1][0]))
+        for _ in range(between):
+            talk.dialogue.ask("ParamGet", {"index": 1}, "ParamReply", "the reply", talk.wait)
+    assert commands[0] != commands[1]
+
+
+def test_of_many_requests_only_the_lost_ones_are_sent_again() -> None:
+    seen: list[int] = []
+
+    def answer(name: str, v: dict[str, float]) -> list[FrameBatch]:
+        seen.append(int(v["index"]))
+        lost = v["index"] in (3, 5) and seen.count(int(v["index"])) < 2
+        return [] if lost else [message("ParamReply", index=v["index"], value=v["index"])]
+
+    talk = Conversation(answer)
+    found = talk.dialogue.ask_all("ParamGet", [{"index": float(k)} for k in range(7)], "ParamReply", "index", talk.wait)
+    assert {k: v["value"] for k, v in found.items()} == {float(k): float(k) for k in range(7)}
+    assert seen == [0, 1, 2, 3, 4, 5, 6, 3, 5]
+    assert talk.dialogue.repeats == 1
 
 
 @pytest.mark.parametrize("length", [3, 5])
@@ -111,13 +170,13 @@ def test_a_reply_of_a_wrong_length_is_counted_and_named(length: int) -> None:
         return [reply]
 
     talk = Conversation(answer)
-    says = f"waited for the reply to ENABLE. A CommandReply of {length} bytes came, the DBC says 4: .*message map"
-    with pytest.raises(LinkError, match=says):
+    says = f"waited for the reply to ENABLE, .* 3 times. A CommandReply of {length} bytes came, the DBC says 4: .*message map"
+    with pytest.raises(NoReply, match=says):
         talk.dialogue.ask("Command", {"code": 1}, "CommandReply", "the reply to ENABLE", talk.wait)
-    assert talk.dialogue.wrong_length == 1
-    with pytest.raises(LinkError, match=r"the reply$"):  # of another kind: it does not explain this one
+    assert talk.dialogue.wrong_length == 3
+    with pytest.raises(NoReply, match=r"the reply, .* times$"):  # of another kind: it does not explain this one
         talk.set(1.0)
-    assert talk.dialogue.wrong_length == 2
+    assert talk.dialogue.wrong_length == 6
 
 
 def test_a_wrong_length_of_an_earlier_request_is_not_named() -> None:
@@ -125,7 +184,7 @@ def test_a_wrong_length_of_an_earlier_request_is_not_named() -> None:
     short = message("ParamReply", index=1)
     short["length"] = 7
     talk.dialogue.take(np.concatenate([short, short]))
-    with pytest.raises(LinkError, match=r"the reply$"):
+    with pytest.raises(NoReply, match=r"the reply, .* times$"):
         talk.set(1.0)
     assert talk.dialogue.wrong_length == 2
 
@@ -171,7 +230,7 @@ def test_replies_to_others_do_not_pile_up() -> None:
 def test_arbitrary_bytes_never_crash(frames: list[tuple[int, bytes]]) -> None:
     talk = Conversation(lambda name, v: [])
     talk.dialogue.take(np.concatenate([empty_batch(), *(frame(i, d) for i, d in frames)]))
-    with pytest.raises(LinkError):
+    with pytest.raises(NoReply):
         talk.set(1.0)
 
 

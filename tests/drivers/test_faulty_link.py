@@ -9,7 +9,7 @@ import pytest
 
 from bench import faults
 from bench.codec import Decoder, encode
-from bench.errors import BenchError, ConfigError, DeviceFault, LinkError
+from bench.errors import BenchError, ConfigError, DeviceFault, LinkError, NoReply
 from bench.frames import ERROR, FD, SENT, FrameBatch, empty_batch, frame
 from bench.rigfile import RigFile, load_rig
 from bench.session import Session
@@ -191,5 +191,5 @@ def test_the_driver_names_what_it_notices(text: str, error: type[BenchError], sa
 def test_the_driver_names_the_reply_that_does_not_come() -> None:
     driver = controller(Bench("mute@1"))
     driver.clock.sleep(1.0)
-    with pytest.raises(LinkError, match="the reply to ENABLE; it did not come"):
+    with pytest.raises(NoReply, match="the reply to ENABLE; it did not come, though it was asked for 3 times"):
         driver.enable()

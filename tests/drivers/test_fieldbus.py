@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from fieldbus_bench import Bench, go, opened, rig
 
-from bench.errors import BenchError, DeviceFault, InterlockError, LinkError
+from bench.errors import BenchError, DeviceFault, DeviceUnreadable, InterlockError, LinkError
 from bench.recorder import Recorder, RunHeader
 from bench.recording import Recording
 from bench.registers import RegisterRefused
@@ -229,7 +229,9 @@ def test_a_word_that_is_no_number_is_a_lost_sample_too() -> None:
         assert bus.thermal is not None
         before = bus.thermal.ambient_K
         bench.lines["thermal"].changed = lambda t, address, words: (0x7FC0, 0) if address == 8 else words
-        with pytest.raises(LinkError, match=r"no reading for .*register ambient: registers 7fc0 0000 hold no finite"):
+        with pytest.raises(
+            DeviceUnreadable, match=r"no reading for .*register ambient: registers 7fc0 0000 hold no finite"
+        ):
             go(bench, bus, 8.0)
         assert bus.thermal.ambient_K == before
 

@@ -92,7 +92,7 @@ def test_frames_come_and_go_and_heartbeats_beat(tcp: bool) -> None:
         s = link.stats
         assert (s.received, s.sent - s.heartbeats) == (1000, 2)
         assert s.longest_heartbeat_gap_ns > 0
-        assert s == LinkStats(s.received, s.sent, heartbeats=s.heartbeats,
+        assert s == LinkStats(s.received, s.sent, octets=14000, heartbeats=s.heartbeats,
                               longest_heartbeat_gap_ns=s.longest_heartbeat_gap_ns)  # fmt: skip
 
 

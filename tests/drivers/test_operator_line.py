@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 
 import pytest
 
-from bench.errors import ConfigError, LinkError
+from bench.errors import ConfigError, LinkError, OperatorSilent
 from drivers import operator_line
 from drivers.operator_line import OperatorLine
 
@@ -73,7 +73,7 @@ def test_bytes_that_are_no_text_are_shown_all_the_same() -> None:
     ("answer", "says"),
     [
         (None, "closed|reset"),
-        (b"half an answ", "timed out"),
+        (b"half an answ", "no answer to 'hang M1' within 0.2 s"),
         (b"ok\nok\n", "one line for each"),
         (b"x" * 9000, "answer of over"),
     ],
@@ -86,6 +86,12 @@ def test_a_line_that_is_lost_stays_lost(monkeypatch: pytest.MonkeyPatch, answer:
         with pytest.raises(LinkError, match=says):
             line.request("hang M2")
     assert b"hang M2\n" not in peer.asked
+
+
+def test_an_operator_that_says_nothing_is_called_silent(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(operator_line, "ANSWER_S", 0.2)
+    with opened(b"") as (line, _), pytest.raises(OperatorSilent, match=r"no answer .* the line is open"):
+        line.request("hang M1")
 
 
 def test_what_comes_unasked_is_no_answer() -> None:

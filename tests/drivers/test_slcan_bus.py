@@ -12,7 +12,7 @@ import pytest
 from far_end import Adapter, FarEnd, descriptors, far_end, until
 
 from bench.errors import LinkError
-from bench.frames import ERROR, EXTENDED, FD, FrameBatch, empty_batch, frame, payload
+from bench.frames import ERROR, EXTENDED, FD, SWITCHED, FrameBatch, empty_batch, frame, payload
 from drivers import slcan_bus
 from drivers.slcan_bus import SlcanBatchBus
 
@@ -69,7 +69,7 @@ def test_lines_become_frames(end: FarEnd, bus: SlcanBatchBus) -> None:
     end.write(b"t1232ABCD\rT1ABCDEF01FF\rd0214DEADBEEF\rb1009" + b"0102030405060708090A0B0C" + b"\rz\rnonsense!\r")
     batch = batch_from(bus, 4)
     assert batch["id"].tolist() == [0x123, 0x1ABCDEF0 | EXTENDED, 0x021, 0x100]
-    assert batch["flags"].tolist() == [0, 0, FD, FD]
+    assert batch["flags"].tolist() == [0, 0, FD, FD | SWITCHED]
     assert [payload(f) for f in batch] == [b"\xab\xcd", b"\xff", b"\xde\xad\xbe\xef", bytes(range(1, 13))]
     assert (batch["t_ns"] > 0).all()
     assert not batch["hw_ns"].any()

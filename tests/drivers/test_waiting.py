@@ -6,10 +6,12 @@ from collections.abc import Callable
 
 import pytest
 
-from bench.errors import LinkError
+from bench.errors import LinkError, RotorNotArrived
 from drivers import waiting
 
-LATE = LinkError("late")
+
+def late() -> LinkError:
+    return LinkError("late")
 
 
 class Clock:
@@ -34,16 +36,16 @@ def after(clock: Clock, seconds: float) -> Callable[[], bool]:
 
 def test_a_pause_of_the_bench_counts_for_a_fifth_of_a_second() -> None:
     clock = Clock({2: 30.0})
-    waiting.until(after(clock, 0.25), 0.5, LATE, clock, clock.now_ns)
+    waiting.until(after(clock, 0.25), 0.5, late, clock, clock.now_ns)
     clock = Clock({2: 30.0})
     with pytest.raises(LinkError, match="late"):
-        waiting.until(after(clock, 0.45), 0.5, LATE, clock, clock.now_ns)
+        waiting.until(after(clock, 0.45), 0.5, late, clock, clock.now_ns)
 
 
 def test_without_a_pause_the_limit_is_what_it_says() -> None:
     clock = Clock({})
     with pytest.raises(LinkError, match="late"):
-        waiting.until(lambda: False, 0.5, LATE, clock, clock.now_ns)
+        waiting.until(lambda: False, 0.5, late, clock, clock.now_ns)
     assert clock.slept == pytest.approx(0.5, abs=0.002)
 
 
@@ -51,7 +53,7 @@ def test_what_is_to_keep_true_is_waited_for_over_a_pause() -> None:
     clock = Clock({3: 30.0})
     waiting.keep(after(clock, 1.2), 1.0, 2.0, lambda: "late", clock, clock.now_ns)
     clock = Clock({})
-    with pytest.raises(LinkError, match="late"):
+    with pytest.raises(RotorNotArrived, match="late"):
         waiting.keep(lambda: False, 1.0, 2.0, lambda: "late", clock, clock.now_ns)
     assert clock.slept == pytest.approx(2.0, abs=0.11)
 
@@ -59,4 +61,4 @@ def test_what_is_to_keep_true_is_waited_for_over_a_pause() -> None:
 def test_a_bench_that_hardly_runs_gives_up_all_the_same() -> None:
     clock = Clock(dict.fromkeys(range(1000), 1.0))
     with pytest.raises(LinkError, match="late"):
-        waiting.until(lambda: False, 0.5, LATE, clock, clock.now_ns)
+        waiting.until(lambda: False, 0.5, late, clock, clock.now_ns)

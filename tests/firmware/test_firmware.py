@@ -45,6 +45,8 @@ CONVERSATION = [
     ("nor for reading", (0x013, "02 01 06 00"), [(0x022, "02 01 01 06 00 00 00 00")]),
     ("LEVITATE in OFF", (0x011, f"{MINE} 02 08 00 00"), [(0x021, "02 08 03 00")]),
     ("ENABLE", (0x011, f"{MINE} 01 09 00 00"), [(0x021, "01 09 00 01")]),
+    ("ENABLE again, byte for byte: answered again, executed once", (0x011, f"{MINE} 01 09 00 00"), [(0x021, "01 09 00 01")]),
+    ("ENABLE with another token", (0x011, f"{MINE} 01 0A 00 00"), [(0x021, "01 0A 03 01")]),
     ("the second commands", (0x011, f"{OTHER} 02 0A 00 00"), [(0x021, "02 0A 04 01")]),
     ("session 0 commands", (0x011, "00 00 00 00 07 0A 00 00"), [(0x021, "07 0A 04 01")]),
     ("code 10 does not exist", (0x011, f"{OTHER} 0A 0B 00 00"), [(0x021, "0A 0B 01 01")]),
@@ -52,7 +54,13 @@ CONVERSATION = [
     ("an identifier of somebody else", (0x7FF, "00"), []),
     ("a Heartbeat is not answered", (0x010, f"{MINE} 01 00 00 00"), []),
     ("MAKE_SAFE", (0x011, f"{MINE} 07 0C 00 00"), [(0x021, "07 0C 00 00")]),
+    ("MAKE_SAFE in OFF", (0x011, f"{MINE} 07 0D 00 00"), [(0x021, "07 0D 00 00")]),
     ("RELEASE", (0x011, f"{MINE} 09 0D 00 00"), [(0x021, "09 0D 00 00")]),
+    ("RELEASE again", (0x011, f"{MINE} 09 0D 00 00"), [(0x021, "09 0D 00 00")]),
+    ("a Command with an unknown code takes nothing", (0x011, f"{OTHER} 0A 0E 00 00"), [(0x021, "0A 0E 01 00")]),
+    ("one in a wrong state takes it", (0x011, f"{OTHER} 02 0F 00 00"), [(0x021, "02 0F 03 00")]),
+    ("and it obeys that session", (0x014, f"{MINE} {BEGUN} {NAME} 00 00"), [(0x024, f"{OTHER} " + "00 " * 60)]),
+    ("which lets it go", (0x011, f"{OTHER} 09 10 00 00"), [(0x021, "09 10 00 00")]),
     ("session 0 claims: there is nobody", (0x014, "00 " * 64), [(0x024, "00 " * 64)]),
 ]  # fmt: skip
 

@@ -8,15 +8,17 @@ from pathlib import Path
 import pytest
 from identified import calibrated, serious
 
-from bench.cli.virtual import simulate
+from bench.cli.virtual import simulate, simulated_run
 from bench.errors import DeviceFault, InterlockError
 from bench.findings import Effect, Finding
 from bench.limits import Verdict, judge
+from bench.outcomes import Outcome, outcome_of
 from bench.procedure import Measured
+from bench.records import measurement
 from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import interval
-from procedures.amb_calibration import Plan, check
+from procedures.amb_calibration import Plan, check, procedure
 from sim_backend.truth import draw
 
 SHORT = {"settle_s": 0.3, "average_s": 0.2}
@@ -54,6 +56,16 @@ def test_the_result_follows_the_truth(tmp_path: Path, factor: float) -> None:
         assert true[name] == pytest.approx(value, rel=1e-9)
         assert abs(measured[name].estimate.value - value) < 3 * measured[name].estimate.u
         assert judge(interval(measured[name].estimate), limits[name]) is Verdict.FAIL
+
+
+def test_loads_that_contradict_each_other_support_no_statement_of_non_conformity(tmp_path: Path) -> None:
+    """The reading lies outside the limit; with a wrong mass that says nothing of the machine."""
+    _, measured, findings = calibrate(tmp_path, 11, {"mass_error_M2": 0.05, "K_o": 0.8 * 74.4})
+    limits = load_spec("tsbs12", "amb-calibration")
+    judged = [measurement(m, limits.get(name)) for name, m in measured.items()]
+    assert [m.name for m in judged if m.verdict is Verdict.FAIL] == ["K_o"]
+    assert outcome_of(judged, findings) is Outcome.INDETERMINATE
+    assert outcome_of(judged, [f for f in findings if f.effect is Effect.NOTE]) is Outcome.FAIL
 
 
 def test_the_constants_hold_for_the_bias_of_the_plan(tmp_path: Path) -> None:
@@ -106,6 +118,39 @@ def test_what_the_rig_file_lacks_is_told_before_anything_starts(kind: str) -> No
     rig = load_rig("tsbs12")
     name = {"sensors": "i_yi_p", "channels": "flags", "parameters": "angle_ref"}[kind]
     table = {k: v for k, v in getattr(rig, kind).items() if k != name}
-    found = list(check(rig.model_copy(update={kind: table}), Plan()))
-    assert found == [f"{kind}: found no {name}; the calibration needs it"]
+    assert procedure.problems(rig.model_copy(update={kind: table}), Plan()) == (f"{kind}: found no {name}",)
     assert list(check(rig, Plan())) == []
+
+
+@pytest.mark.parametrize(("a", "b"), [(1, 2), pytest.param(3, 4, marks=pytest.mark.long)])
+def test_two_exchanged_masses_are_named_and_give_no_number(tmp_path: Path, a: int, b: int) -> None:
+    """The labels of two masses exchanged: each is wrong by what the other weighs more or less."""
+    kg = {k: load_rig("tsbs12").masses[f"M{k}"].value for k in (a, b)}
+    swapped = {f"mass_error_M{a}": kg[b] / kg[a] - 1, f"mass_error_M{b}": kg[a] / kg[b] - 1}
+    _, measured, findings = calibrate(tmp_path, 5, swapped)
+    serious = [f for f in findings if f.effect is not Effect.NOTE]
+    assert [(f.code, f.where, f.effect) for f in serious] == [("masses-exchanged", f"M{a}, M{b}", Effect.ERROR)]
+    assert f"M{a} and M{b} are exchanged" in serious[0].text
+    assert not measured
+
+
+def test_a_set_whose_errors_go_with_the_load_is_not_put_on_its_one_sound_mass_alone(tmp_path: Path) -> None:
+    """Three masses off with the square of the load leave the same data as a first one that is off."""
+    _, _, findings = calibrate(
+        tmp_path, 5, {"mass_error_M2": 0.004, "mass_error_M3": 0.008, "mass_error_M4": 0.012})  # fmt: skip
+    found = next(f for f in findings if f.code == "load-inconsistent")
+    assert "M1" in found.where
+    assert "M1 is right and the others are off with the square of the load" in found.text
+    shares = {m: float(found.text.split(f"{m} by ")[1].split("%")[0]) for m in ("M2", "M3", "M4")}
+    for label, share in (("M2", 0.4), ("M3", 0.8), ("M4", 1.2)):
+        assert shares[label] == pytest.approx(share, rel=0.25)
+
+
+def test_the_first_hanging_tells_exchanged_wires(tmp_path: Path) -> None:
+    """No second mass is asked for: an hour of hangings would say no more."""
+    run = simulated_run("amb-calibration", "tsbs12", 3, SHORT, tmp_path / "recording.mcap", {"current_sign_i": -1})
+    assert [f.code for f in run.results if isinstance(f, Finding)] == ["wrong-sign"]
+    assert not run.recording.all_steps()
+    hung = [e for e in run.recording.events("operator") if e.get("load")]
+    assert len(hung) <= 1
+    assert not list(run.procedure.figures(run.recording))

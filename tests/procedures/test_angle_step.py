@@ -19,7 +19,7 @@ from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate
-from procedures.angle_step import MEASURES, Plan, check, figures, planned, step_count
+from procedures.angle_step import MEASURES, Plan, check, figures, planned, procedure, step_count
 from procedures.estimators import stepresponse
 from procedures.estimators.stepresponse import Loop, Move
 from reports.figures import draw as draw_figure
@@ -141,7 +141,7 @@ def test_plans_that_cannot_work_are_refused() -> None:
     slow = rig.model_copy(update={"envelope": rig.envelope.model_copy(update={"max_speed_rad_s": 8.0})})
     assert "the envelope" in next(iter(check(slow, Plan())))
     bare = rig.model_copy(update={"parameters": {k: v for k, v in rig.parameters.items() if k != "allocation"}})
-    assert "allocation" in next(iter(check(bare, Plan())))
+    assert "allocation" in procedure.problems(bare, Plan())[0]
     assert [c.where for c in planned(Plan())] == ["static, 2°, 200 Hz", "priority, 2°, 200 Hz", "static, 12°, 200 Hz",
                                                   "priority, 12°, 200 Hz"]  # fmt: skip
 

@@ -19,7 +19,7 @@ from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import Estimate, interval
-from procedures.bearing_model import MEASURES, Plan, check, figures, grid, read, step_count
+from procedures.bearing_model import MEASURES, Plan, check, figures, grid, procedure, read, step_count
 from procedures.estimators import bearing_findings, bearing_wiring
 from procedures.estimators.bearing import AXES
 from procedures.estimators.bearing_data import Held
@@ -206,7 +206,7 @@ def test_what_cannot_work_is_told_before_anything_starts(plan: dict[str, float],
     assert any(said in text for text in check(rig, Plan(**plan)))  # type: ignore[arg-type]
     assert list(check(rig, Plan())) == []
     bare = rig.model_copy(update={"machine": {k: v for k, v in rig.machine.items() if k != "runout"}})
-    assert "runout" in next(iter(check(bare, Plan())))
+    assert "runout" in procedure.problems(bare, Plan())[0]
 
 
 def test_figures_show_the_data(sound: Simulated) -> None:

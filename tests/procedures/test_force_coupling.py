@@ -12,7 +12,7 @@ from reanalysed import reanalysed
 
 from bench.calibration import Calibration
 from bench.cli.virtual import Simulated, simulated_run
-from bench.errors import ConfigError, DeviceFault, InterlockError, LinkError
+from bench.errors import ConfigError, DeviceFault, InterlockError, RotorNotArrived
 from bench.limits import Verdict, judge
 from bench.rigfile import load_rig
 from bench.specs import load_spec
@@ -145,7 +145,7 @@ def test_a_position_gain_does_not_matter_here(known: dict[str, Calibration], sou
 def test_a_rotor_that_cannot_be_held_stops_the_run(
     known: dict[str, Calibration], tmp_path: Path, defect: dict[str, float], named: str
 ) -> None:
-    with pytest.raises((DeviceFault, InterlockError, LinkError), match=named):
+    with pytest.raises((DeviceFault, InterlockError, RotorNotArrived), match=named):
         measure(tmp_path, known, defect)
 
 

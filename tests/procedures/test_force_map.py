@@ -16,7 +16,7 @@ from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import ConfigError
 from bench.findings import Effect, Finding
 from bench.rigfile import load_rig
-from procedures.force_map import MEASURES, Plan, check, figures, loaded_points, points, step_count
+from procedures.force_map import MEASURES, Plan, check, figures, loaded_points, points, procedure, step_count
 from reports.figures import draw as draw_figure
 from sim_backend.truth import draw
 
@@ -120,7 +120,7 @@ def test_plans_that_cannot_work_are_refused() -> None:
     assert "certifies" in next(iter(check(rig, Plan(mass="M9"))))
     assert any("off centre" in p for p in check(rig, Plan(current_A=0.1, loaded_current_A=0.1, offset_m=8e-5)))
     bare = rig.model_copy(update={"geometry": {k: v for k, v in rig.geometry.items() if k != "motor_to_outboard_amb"}})
-    assert "motor_to_outboard_amb" in next(iter(check(bare, Plan())))
+    assert "motor_to_outboard_amb" in procedure.problems(bare, Plan())[0]
     for visited in (points(Plan()), loaded_points(Plan())):
         for name in ("i_y", "i_x", "y", "x"):
             assert sum(getattr(p, name) for p in visited) == 0

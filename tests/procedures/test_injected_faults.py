@@ -14,8 +14,9 @@ from bench.cli.compose import load_procedure
 from bench.cli.opening import simulated
 from bench.faults import Fault
 from bench.opened import Job
+from bench.outcomes import Outcome
 from bench.progress import PlainProgress
-from bench.records import FindingEntry, Outcome
+from bench.records import FindingEntry
 from bench.rigfile import RigFile, load_rig
 from bench.runner import RunResult
 from bench.specs import load_spec
@@ -79,7 +80,7 @@ CASES = (
     Case("stall@12", Outcome.ERROR, ("link-lost",), AT_ONCE),
     Case("disconnect@12", Outcome.ERROR, ("link-lost",), AT_ONCE),
     Case("bus-off@12", Outcome.ERROR, ("link-lost", "bus-off"), AT_ONCE),
-    Case("mute@12", Outcome.ERROR, ("link-lost",), 10.0),
+    Case("mute@12", Outcome.ERROR, ("no-reply",), 10.0),
     Case("reboot@12", Outcome.ABORTED, ("controller-fault", "controller-restarted"), 0.0),
     Case("stuck-heartbeat@12", Outcome.ABORTED, ("controller-fault",), AT_ONCE),
 )  # fmt: skip

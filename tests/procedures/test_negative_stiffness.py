@@ -13,14 +13,14 @@ from reanalysed import reanalysed
 
 from bench.calibration import Calibration
 from bench.cli.virtual import Simulated, simulated_run
-from bench.errors import ConfigError, DeviceFault, InterlockError, LinkError
+from bench.errors import ConfigError, DeviceFault, InterlockError, RotorNotArrived
 from bench.limits import Verdict, judge
 from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import interval
 from procedures import carrying, negative_stiffness
 from procedures.estimators.stiffness_estimates import evaluate
-from procedures.negative_stiffness import Plan, check, figures, read
+from procedures.negative_stiffness import Plan, check, figures, procedure, read
 
 NAME = "negative-stiffness"
 QUICK = {"levels_m": [-40e-6, -20e-6, 0.0, 20e-6, 40e-6], "settle_s": 0.5, "average_s": 0.3}
@@ -145,7 +145,7 @@ def test_a_wrong_force_constant_is_seen_by_the_second_way(
 def test_a_rotor_that_cannot_be_held_stops_the_run(
     known: dict[str, Calibration], tmp_path: Path, defect: dict[str, float], named: str
 ) -> None:
-    with pytest.raises((DeviceFault, InterlockError, LinkError), match=named):
+    with pytest.raises((DeviceFault, InterlockError, RotorNotArrived), match=named):
         measure(tmp_path, known, defect)
 
 
@@ -179,7 +179,7 @@ def test_what_the_rig_file_lacks_is_told(kind: str) -> None:
     rig = load_rig("tsbs12")
     name = {"sensors": "i_m1", "channels": "i_m1", "parameters": "motor_share", "geometry": "amb_gap"}[kind]
     table = {k: v for k, v in getattr(rig, kind).items() if k != name}
-    assert list(check(rig.model_copy(update={kind: table}), Plan())) == [f"{kind}: found no {name}; needed it is"]
+    assert procedure.problems(rig.model_copy(update={kind: table}), Plan()) == (f"{kind}: found no {name}",)
 
 
 def test_figures_show_the_data_with_the_fit(sound: Simulated) -> None:

@@ -25,7 +25,7 @@ from procedures import sensitivity
 from procedures.estimators import sensitivity_checks, sensitivity_estimates
 from procedures.estimators.sensitivity_data import AXES, REFINED, RPM, WIRING, Taken, read_taken
 from procedures.injecting import Comb, combs
-from procedures.sensitivity import CODES, Plan, check
+from procedures.sensitivity import CODES, Plan, check, procedure
 from reports.figures import draw as draw_figure
 from sim_backend import amb_sensitivity
 from sim_backend.truth import draw
@@ -195,7 +195,7 @@ def test_plans_that_cannot_work_are_refused() -> None:
     assert "power of two" in why(low_hz=3.0)
     assert "memory" in why(periods=40)
     assert "each once" in why(axes=("yi", "yi"))
-    assert "found none" in "; ".join(check(rig.model_copy(update={"capture": None}), Plan()))
+    assert "found none" in "; ".join(procedure.problems(rig.model_copy(update={"capture": None}), Plan()))
     bare = rig.model_copy(update={"devices": {k: d for k, d in rig.devices.items() if k != "drive"}})
     assert "nothing turns" in next(iter(check(bare, Plan())))
 

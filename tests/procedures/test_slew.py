@@ -18,13 +18,17 @@ from bench.calibration import Calibration
 from bench.cli.virtual import simulate, simulated_run
 from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
+from bench.limits import Verdict
+from bench.outcomes import Outcome, outcome_of
 from bench.procedure import Measured
 from bench.recording import Recording
+from bench.records import measurement
 from bench.rigfile import load_rig
+from bench.specs import load_spec
 from bench.uncertainty import Estimate, Influence
 from procedures.estimators import slewing
 from procedures.estimators.slewing import Gains, Swing
-from procedures.slew import MEASURES, Plan, check, figures, needs, step_count
+from procedures.slew import MEASURES, Plan, check, figures, needs, procedure, step_count
 from reports.figures import draw as draw_figure
 from sim_backend.truth import draw
 
@@ -94,6 +98,15 @@ def test_a_planted_defect_is_named_and_never_passes(
     assert named in found[0].text
 
 
+def test_a_detent_beyond_its_limit_fails_the_run(tmp_path: Path) -> None:
+    """The finding says of the detent what its limit says too: it puts what follows the angle in doubt, not the detent."""
+    measured, findings = slewed(tmp_path, 1, {"detent": 0.2})
+    (detent,) = (q for q in MEASURES if q.name == "detent")
+    judged = measurement(detent.measured(measured["detent", ""]), load_spec("tsbs12", "slew")["detent"])
+    assert judged.verdict is Verdict.FAIL
+    assert outcome_of([judged], findings) is Outcome.FAIL
+
+
 def test_no_detent_is_not_resolved(tmp_path: Path) -> None:
     measured, findings = slewed(tmp_path, 3, {"detent": 0.0})
     assert [f.code for f in findings] == ["detent-not-resolved"]
@@ -126,7 +139,7 @@ def test_plans_that_cannot_work_are_refused() -> None:
     slow = rig.model_copy(update={"envelope": rig.envelope.model_copy(update={"max_speed_rad_s": 5.0})})
     assert "the envelope" in next(iter(check(slow, Plan())))
     bare = rig.model_copy(update={"machine": {}})
-    assert "polar_inertia" in next(iter(check(bare, Plan())))
+    assert "polar_inertia" in procedure.problems(bare, Plan())[0]
 
 
 COUNT = 2 * math.pi / 4096

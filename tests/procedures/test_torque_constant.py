@@ -14,7 +14,7 @@ from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import Estimate, interval
-from procedures.torque_constant import Plan, check
+from procedures.torque_constant import Plan, check, procedure
 
 QUICK = {"masses": ["M2", "M3"], "settle_s": 0.7, "average_s": 0.3}
 THREE = {**QUICK, "masses": ["M1", "M2", "M3"]}
@@ -113,4 +113,4 @@ def test_what_the_rig_file_lacks_is_told(kind: str) -> None:
     rig = load_rig("tsbs12")
     name = {"geometry": "lever_left", "machine": "pole_pairs", "sensors": "i_m2", "parameters": "gamma"}[kind]
     table = {k: v for k, v in getattr(rig, kind).items() if k != name}
-    assert any(name in line for line in check(rig.model_copy(update={kind: table}), Plan()))
+    assert any(name in line for line in procedure.problems(rig.model_copy(update={kind: table}), Plan()))

@@ -24,7 +24,7 @@ from procedures.estimators import tracking as estimator
 from procedures.estimators import tracking_estimates, unbalance_bearings
 from procedures.estimators.tracking import Facts, Wave
 from procedures.estimators.tracking import Path as Orbit
-from procedures.tracking import CODES, MEASURES, OBSERVED, Plan, check, figures, step_count
+from procedures.tracking import CODES, MEASURES, OBSERVED, Plan, check, figures, procedure, step_count
 from reports.figures import draw as draw_figure
 from sim_backend import amb_track
 from sim_backend.truth import draw
@@ -157,7 +157,7 @@ def test_plans_that_cannot_work_are_refused() -> None:
     assert "twice" in next(iter(check(rig, Plan(laws=("CCS",), compare=("CCS",)))))
     assert "role drive" in next(iter(check(rig.model_copy(update={"devices": {"controller": rig.devices["controller"]}}),
                                            Plan(speed_rad_s=1000.0))))  # fmt: skip
-    assert list(check(load_rig("tsbs12"), Plan()))
+    assert procedure.problems(load_rig("tsbs12"), Plan())
 
 
 FACTS = Facts((1.0,) * 4, (0.0,) * 4, 0.078, 0.1, 0.0123, 1e-4)

@@ -29,7 +29,7 @@ import reports
 from bench.errors import BenchError
 from bench.figures import Sheet
 from bench.procedure import Quantity
-from reports import budgets, compose, html, pdf, text
+from reports import budgets, compose, html, pdf, text, unseen
 from reports.figures import draw
 from reports.view import SIMULATED, FigureEntry, ReportView
 
@@ -158,6 +158,36 @@ def test_what_only_the_simulator_knows_is_not_printed_and_like_sensors_share_a_r
     assert certificate in [row[:3] for row in rows]
 
 
+def test_what_no_data_can_show_is_made_from_the_budget() -> None:
+    """What carries most comes first, with the result that it carries most of; what a check reaches and Type A is left out."""
+    entries = [
+        ("sensors/a/gain", "B", 3.0),
+        ("masses/M1", "B", 2.0),
+        ("scatter/1", "A", 1.0),
+        ("site/gravity", "B", 0.1),
+    ]
+    budget = [
+        {"name": f"the {i}", "influence": i, "type": kind, "contribution": c, "sensitivity": -7.0, "distribution": "normal",
+         "dof": None}
+        for i, kind, c in entries
+    ]  # fmt: skip
+    made = view(around(reached=("masses/*",), assumes=("All masses alike: K by that share.",)), measurements=[
+        measurement(budget=budget), measurement(name="K_o", budget=budget[2:])])  # fmt: skip
+    rows = made.unseen.rows
+    assert [row[0] for row in rows] == ["the sensors/a/gain", "1 further influence"]
+    assert rows[0][1:] == ("64\u202f%", "K_i", "3.0\u202fN/A", "−7.00")
+    page = Page(html.render(made)).text
+    places = [page.index(w) for w in ("Decision rule", "What no data can show", "All masses alike", "Notes")]
+    assert places == sorted(places)
+
+
+def test_a_pattern_takes_away_again() -> None:
+    reached = ("masses/*", "!masses/hanger")
+    assert unseen.is_reached("masses/M1", reached)
+    assert not unseen.is_reached("masses/hanger", reached)
+    assert not unseen.is_reached("sensors/i_yo_p/gain", reached)
+
+
 def test_every_required_field_is_in_the_page_in_order() -> None:
     page = Page(html.render(view())).text
     wanted = [
@@ -223,6 +253,28 @@ def test_findings_that_affect_the_outcome_are_loud() -> None:
     assert made.decided[0].loud
     assert "mass-suspect" in made.outcome_text
     assert 'class="finding loud"' in html.render(made)
+
+
+def test_a_fail_stands_first_and_says_where_a_finding_outranks_it() -> None:
+    doubt = {"code": "load-inconsistent", "text": "The loads contradict each other.", "where": "M2",
+             "effect": "indeterminate", "concerns": []}  # fmt: skip
+    failed = [measurement("K_o", verdict="fail"), measurement("K_i")]
+    made = view(outcome="INDETERMINATE", findings=[doubt], measurements=failed, correlations=None)
+    assert made.outcome_text.startswith("Outside the limits with the whole 95 % interval: K_o.")
+    assert "no statement of non-conformity: the data are contradicted (load-inconsistent)" in made.outcome_text
+    assert made.judged[0].verdict == "fail"
+    touched = view(outcome="FAIL", findings=[doubt | {"concerns": ["K_i"]}], measurements=failed, correlations=None)
+    assert touched.outcome_text == (
+        "Outside the limits with the whole 95 % interval: K_o. Findings that prevent other decisions: load-inconsistent."
+    )
+
+
+def test_a_run_that_nothing_judged_has_a_neutral_box() -> None:
+    made = view(outcome="DONE", measurements=[measurement(verdict="none", limit=None)], correlations=None)
+    assert (made.tone, made.outcome) == ("none", "DONE")
+    assert made.outcome_text == "Every declared quantity was measured. No acceptance limit was applied."
+    assert 'class="outcome none"' in html.render(made)
+    assert pdf.render(made, None).startswith(b"%PDF")
 
 
 def test_pass_without_limits_claims_no_conformity() -> None:
@@ -324,7 +376,7 @@ def test_the_pdf_has_the_sections_of_the_page_in_the_same_order() -> None:
     asked = typst.query(pdf.sources(made), "heading.where(level: 1)", field="body", ignore_system_fonts=True)
     in_pdf = [heading["text"] for heading in json.loads(asked)]
     assert in_pdf == in_page
-    assert len(in_pdf) == 15
+    assert len(in_pdf) == 16
 
 
 def test_the_page_fetches_nothing() -> None:

@@ -89,7 +89,7 @@ def test_drag_is_for_the_bias(bias: float, name: str) -> None:
     s[11] = 1.0
     coil = np.array([*(bias,) * 8, 0.0, 0.0])
     slow = 1.0 / p.coulomb_speed
-    dry = p.coulomb * slow / math.sqrt(1 + slow**2) + p.detent * math.sin(p.detent_phase)
+    dry = (p.coulomb + p.brake) * slow / math.sqrt(1 + slow**2) + p.detent * math.sin(p.detent_phase)
     found = -derivative(p, s, coil, np.zeros(4))[THETA] * p.polar_inertia - dry
     assert found == pytest.approx(truth.quantities[name], rel=1e-9)
     assert draw(rig(), 4, settings={"bias_i": 4.0, "bias_o": 4.0}).quantities["B"] == truth.quantities["B_high"]
@@ -139,7 +139,9 @@ def test_weights_on_the_lever() -> None:
     ],
 )
 def test_defects_reach_the_plant(name: str, value: float, field: str, expected: object) -> None:
-    found = getattr(draw(rig(), 6, {name: value}).plant, field)
+    found = getattr(
+        draw(rig(), 6, {"drive_drag": 0.0, name: value}).plant, field
+    )  # the brake is beside the drive's drag
     if isinstance(expected, tuple):
         assert all(a is ... or a == b for a, b in zip(expected, found, strict=True))
     else:

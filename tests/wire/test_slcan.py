@@ -30,8 +30,8 @@ GOLDEN = [
 @pytest.mark.parametrize(("identifier", "payload", "fd", "brs", "expected"), GOLDEN)
 def test_golden_lines_both_ways(identifier: int, payload: bytes, fd: bool, brs: bool, expected: bytes) -> None:
     assert line(identifier, payload, fd=fd, brs=brs) == expected
-    assert parse(expected[:-1]) == Parsed(identifier, payload, fd, -1)
-    assert parse(expected[:1] + expected[1:-1].lower()) == Parsed(identifier, payload, fd, -1)
+    assert parse(expected[:-1]) == Parsed(identifier, payload, fd, -1, fd and brs)
+    assert parse(expected[:1] + expected[1:-1].lower()) == Parsed(identifier, payload, fd, -1, fd and brs)
 
 
 @pytest.mark.parametrize(
@@ -126,7 +126,7 @@ def test_timestamps_only_where_they_are_expected() -> None:
 )
 def test_what_is_written_is_read_back(identifier: int, payload: bytes, brs: bool) -> None:
     for fd in {True, len(payload) > 8}:
-        assert parse(line(identifier, payload, fd=fd, brs=brs)[:-1]) == Parsed(identifier, payload, fd, -1)
+        assert parse(line(identifier, payload, fd=fd, brs=brs)[:-1]) == Parsed(identifier, payload, fd, -1, fd and brs)
 
 
 @given(st.binary(max_size=20), st.booleans())

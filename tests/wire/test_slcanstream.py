@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from bench.frames import ERROR, EXTENDED, FD, FRAME, FrameBatch, frame, payload
+from bench.frames import ERROR, EXTENDED, FD, FRAME, REMOTE, SWITCHED, FrameBatch, frame, payload
 from bench.wire.slcan import BUS_ERROR, LENGTHS
 from bench.wire.slcanstream import REPLIES, SlcanStream, encode
 
@@ -36,7 +36,7 @@ def rows(batch: FrameBatch) -> list[tuple[int, bytes, int]]:
 def test_golden_stream() -> None:
     stream = SlcanStream()
     batch = stream.feed(b"\rz\rt0102BEEF\r\aF80\rB1FFFFFFF9000102030405060708090A0B\rV1013\r", T)
-    assert rows(batch) == [(0x010, b"\xbe\xef", 0), (EXTENDED | 0x1FFFFFFF, bytes(range(12)), FD)]
+    assert rows(batch) == [(0x010, b"\xbe\xef", 0), (EXTENDED | 0x1FFFFFFF, bytes(range(12)), FD | SWITCHED)]
     assert batch["t_ns"].tolist() == [T, T]
     assert batch["hw_ns"].tolist() == [0, 0]
     assert (stream.refused, stream.status, stream.replies, stream.malformed) == (1, BUS_ERROR, [b"V1013"], 0)
@@ -76,7 +76,8 @@ def test_an_impossible_length_byte_is_not_sent() -> None:
 def test_round_trip(frames: list[FrameBatch], brs: bool) -> None:
     batch = np.concatenate([np.empty(0, FRAME), *frames])
     stream = SlcanStream()
-    assert rows(stream.feed(encode(batch, brs=brs), T)) == rows(batch)
+    came = rows(stream.feed(encode(batch, brs=brs), T))
+    assert came == [(i, data, flags | SWITCHED if brs and flags & FD else flags) for i, data, flags in rows(batch)]
     assert state(stream) == (0, 0, 0, None, [], 0)
 
 
@@ -174,3 +175,17 @@ def test_frames_that_the_adapter_lost_itself_are_counted() -> None:
     for answer in (b"F00\r", b"F04\r", b"F08\r", b"F00\r", b"F02\r", b"F81\r"):
         stream.feed(answer, 0)
     assert stream.overruns == 3
+
+
+@given(st.booleans(), st.integers(0, 0x1FFF_FFFF), st.integers(0, 8), st.booleans())
+def test_remote_frames_are_given_where_they_are_wanted(extended: bool, number: int, dlc: int, timestamp: bool) -> None:
+    number = number if extended else number & 0x7FF
+    line = (f"R{number:08X}{dlc}" if extended else f"r{number:03X}{dlc}") + ("0010" if timestamp else "")
+    wanted, counted = SlcanStream(timestamp=timestamp, remotes=True), SlcanStream(timestamp=timestamp)
+    batch = wanted.feed(f"{line}\r".encode(), T)
+    assert (batch["id"].tolist(), batch["flags"].tolist(), batch["length"].tolist()) == (
+        [number | (EXTENDED if extended else 0)], [REMOTE], [dlc],
+    )  # fmt: skip
+    assert bool(batch["hw_ns"][0]) == timestamp
+    assert len(counted.feed(f"{line}\r".encode(), T)) == 0
+    assert (wanted.remote, counted.remote, wanted.malformed) == (1, 1, 0)

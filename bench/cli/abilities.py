@@ -1,0 +1,102 @@
+"""What a rig can run: each procedure against the rig file, its default plan and its acceptance limits."""
+
+from __future__ import annotations
+
+import difflib
+import textwrap
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from bench import catalogue
+from bench.cli.compose import load_procedure
+from bench.envelope import Envelope
+from bench.errors import ConfigError, Problem
+from bench.plans import assemble
+from bench.procedure import BenchPlan, Procedure
+from bench.rigfile import RigFile
+from bench.specs import load_spec
+
+WIDTH = 80
+NAMED = 3  # names of a table, where all procedures are listed
+
+
+@dataclass(frozen=True)
+class Ability:
+    """A procedure on a rig: `lacking` is what the rig has not, `unfit` what its default plan asks too much of; `problems` are
+    wrong entries of the rig file and of the spec."""
+
+    procedure: str
+    lacking: tuple[str, ...] = ()
+    unfit: tuple[str, ...] = ()
+    problems: tuple[Problem, ...] = ()
+
+    @property
+    def able(self) -> bool:
+        return not self.lacking and not self.unfit and not self.problems
+
+
+def abilities(rig: RigFile, only: str = "") -> list[Ability]:
+    """Of every procedure of the catalogue, or of one.
+
+    Raises:
+        ConfigError: there is no such procedure.
+    """
+    names = [catalogue.entry(only).name] if only else [entry.name for entry in catalogue.PROCEDURES]
+    return [_ability(rig, load_procedure(name)) for name in names]
+
+
+def _ability(rig: RigFile, procedure: Procedure) -> Ability:
+    if lacking := procedure.requires.lacking(rig):
+        return Ability(procedure.name, lacking)
+    problems: list[Problem] = []
+    plan: BenchPlan | None = None
+    defaults = f"{rig.path} [plans.{procedure.name}]"
+    try:
+        plan = assemble(procedure.plan, (defaults, rig.plans.get(procedure.name, {})))
+    except ConfigError as error:
+        problems += error.problems or (Problem(rig.path, f"plans.{procedure.name}", str(error), "a plan"),)
+    try:
+        measures = [q.name for q in procedure.measures]
+        load_spec(rig.name, procedure.name, measures, settings=tuple(procedure.plan.model_fields))
+    except ConfigError as error:
+        problems += error.problems or (Problem("specs", f"limits.{procedure.name}", str(error), "limits"),)
+    if plan is None:
+        return Ability(procedure.name, problems=tuple(problems))
+    unfit = (*procedure.check(rig, plan), *Envelope(rig).problems_of(dict(procedure.settings(plan))))
+    return Ability(procedure.name, unfit=unfit, problems=tuple(problems))
+
+
+def unknown_plans(rig: RigFile) -> Iterator[Problem]:
+    """Tables of default plans that are no procedure's."""
+    for name in rig.plans:
+        names = [entry.name for entry in catalogue.PROCEDURES]
+        if name not in names:
+            close = difflib.get_close_matches(name, names, 1)
+            hint = f", such as {close[0]}" if close else ""
+            yield Problem(rig.path, f"plans.{name}", name, f"the name of a procedure{hint}")
+
+
+def told(found: list[Ability], rig: str) -> str:
+    """What the rig can run and what it cannot and why, in short, as lines of at most 80 columns."""
+    able = [a.procedure for a in found if a.able]
+    lines = textwrap.wrap(f"can run: {', '.join(able) or 'nothing'}", WIDTH, subsequent_indent="  ",
+                          break_on_hyphens=False)  # fmt: skip
+    unable = [a for a in found if not a.able]
+    lines += ["cannot run:"] if unable else []
+    for a in unable:
+        said = [*_short(a.lacking), *a.unfit, *(str(p) for p in a.problems)]
+        lines += textwrap.wrap(f"{a.procedure}: {'; '.join(said)}", WIDTH, initial_indent="  ",
+                               subsequent_indent="    ", break_on_hyphens=False)  # fmt: skip
+    if any(a.lacking for a in unable):
+        lines.append(f"all that a procedure lacks: `bench check {rig} PROCEDURE`")
+    return "\n".join(lines) + "\n"
+
+
+def _short(lacking: tuple[str, ...]) -> tuple[str, ...]:
+    """The first line with its first names, and the tables of the others."""
+    if not lacking:
+        return ()
+    names = lacking[0].split(", ")
+    some = ", ".join(names) if len(names) <= NAMED + 1 else f"{', '.join(names[:NAMED])} and {len(names) - NAMED} more"
+    others = [line.partition(":")[0] for line in lacking[1:]]
+    return (f"{some}; also {', '.join(others)}" if others else some,)

@@ -1,0 +1,51 @@
+"""What a rig must have for a procedure, whatever the plan: declared as data, held against the rig file before the start."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from bench.rigfile import RigFile
+
+
+@dataclass(frozen=True)
+class Requires:
+    """Names that the rig file must have: roles of its devices, channels, sensors with certificates, parameters of the
+    controller, lengths and stiffnesses of `geometry`, numbers of `machine`, channels that the controller can `capture` in its
+    own memory, and, with `masses`, certified ones to hang."""
+
+    roles: tuple[str, ...] = ("levitation",)
+    channels: tuple[str, ...] = ()
+    sensors: tuple[str, ...] = ()
+    parameters: tuple[str, ...] = ()
+    geometry: tuple[str, ...] = ()
+    machine: tuple[str, ...] = ()
+    capture: tuple[str, ...] = ()
+    masses: bool = False
+
+    def lacking(self, rig: RigFile) -> tuple[str, ...]:
+        """What the rig does not have, one line a table; nothing where it can run the procedure."""
+        return tuple(self._lacking(rig))
+
+    def _lacking(self, rig: RigFile) -> Iterator[str]:
+        roles = {role for device in rig.devices.values() for role in device.roles}
+        if missing := [r for r in self.roles if r not in roles]:
+            yield f"devices: found none in the role {' and none in the role '.join(missing)}"
+        captured = () if rig.capture is None else rig.capture.channels
+        tables: tuple[tuple[str, tuple[str, ...], Collection[str]], ...] = (
+            ("channels", self.channels, rig.channels),
+            ("sensors", self.sensors, rig.sensors),
+            ("parameters", self.parameters, rig.parameters),
+            ("geometry", self.geometry, rig.geometry),
+            ("machine", self.machine, rig.machine),
+            ("capture.channels", self.capture, captured),
+        )
+        for table, names, found in tables:
+            if names and table == "capture.channels" and rig.capture is None:
+                yield "capture: found none; expected a controller that records at its full rate"
+            elif missing := [n for n in dict.fromkeys(names) if n not in found]:
+                yield f"{table}: found no {', '.join(missing)}"
+        if self.masses and not rig.masses:
+            yield "masses: found none; expected certified masses to hang"

@@ -1,0 +1,197 @@
+"""Every drawn number of the simulator's truth moved by three half widths, one at a time: what becomes of the results.
+
+    python -m benchmarks.moved torque-constant --seed 5
+    python -m benchmarks.moved --all runs/moved.jsonl
+
+Each must be caught (a finding above a note, or a run that is stopped), or do nothing that matters (2 U), or be covered by its
+share of the budget, or stand in the report's list of what no data can show. What is none of these is printed last and makes
+the exit status 1. Shifts are of value less truth, against the run of the same seed with nothing moved, in U of that run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from bench.calibration import Calibration
+from bench.cli.motion_truth import truth_of_motion
+from bench.cli.virtual import Simulated, simulated_run
+from bench.errors import BenchError
+from bench.findings import Effect, Finding
+from bench.procedure import Measured
+from bench.rigfile import RigFile, load_rig
+from bench.toleranced import Toleranced
+from bench.uncertainty import interval
+from benchmarks.sound import RIGS, load, needed_by
+from reports.unseen import is_reached
+from sim_backend.machine import machine_of
+
+HALF_WIDTHS = 3.0
+MATTERS = 2.0  # U
+LINEAR = 1.5  # how far a shift may exceed the linear share of three half widths, beside the scatter of two runs
+RPM = math.pi / 30
+QUICK: Mapping[str, Mapping[str, Any]] = {
+    "amb-calibration": {"settle_s": 0.3, "average_s": 0.2},
+    "force-constant": {"levels_A": (-1.5, -0.75, 0.0, 0.75, 1.5), "ramp_A_s": 5, "settle_s": 0.15, "average_s": 0.2},
+    "negative-stiffness": {"levels_m": (-40e-6, -20e-6, 0.0, 20e-6, 40e-6), "settle_s": 0.3, "average_s": 0.3},
+    "force-coupling": {"settle_s": 0.3, "average_s": 0.2},
+    "torque-constant": {"masses": ("M2", "M3"), "wiring_A": 0.5, "settle_s": 0.5, "average_s": 0.2},
+    "spindown": {"repeats": 2, "speed_rad_s": 50},
+    "balance": {"slow_s": 4.2, "dwell_s": 0.5, "capture_s": 0.3, "settle_s": 0.8, "speeds_rad_s": (10000 * RPM,)},
+}
+"""Short plans; the others run with their defaults."""
+KINDS = {"position_gain_": "sensors/pos_{}/gain", "position_offset_": "sensors/pos_{}/offset", "amb_gap_": "geometry/amb_gap",
+         "asymmetry_": "machine/amb_asymmetry/{}", "coupling_offset_": "machine/coupling_offset"}  # fmt: skip
+NAMES = {"hanger": "masses/hanger", "mass_density": "masses/density", "polar_inertia": "machine/polar_inertia",
+         "ring_inertia": "machine/ring_inertia", "roll": "machine/radial_axes"}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Moved:
+    """What became of one number: `shift` U of the result that moved most, `end` caught, nothing, budget, listed or FAILS."""
+
+    procedure: str
+    name: str
+    end: str
+    shift: float
+    result: str
+    told: str
+
+
+def identity(name: str) -> str:
+    """The identity that the influence of a drawn number has in budgets, if it is in one."""
+    if name in NAMES:
+        return NAMES[name]
+    for start, kind in KINDS.items():
+        if name.startswith(start):
+            return kind.format(name.removeprefix(start))
+    table, _, rest = name.partition(".")
+    return f"sensors/{table}/{rest}" if rest in ("gain", "offset") else name.replace(".", "/")
+
+
+def numbers(rig: RigFile) -> dict[str, float]:
+    """Every drawn number of a rig that has a width, at its stated value and three half widths."""
+
+    def width(t: Toleranced) -> float:
+        return t.half_width if t.half_width is not None else 2 * t.standard_uncertainty
+
+    return {name: t.value + HALF_WIDTHS * width(t) for name, t in machine_of(rig).stated(rig).items() if width(t) > 0}
+
+
+def attempt(procedure: str, rig: str, seed: int, truth: Mapping[str, float], folder: Path) -> Simulated:
+    """The run with what it needs before it, all on the same machine.
+
+    Raises:
+        BenchError: one of them is stopped.
+    """
+    known: dict[str, Calibration] = {}
+    path = folder / "recording.mcap"
+    for name in (*needed_by(procedure), procedure):
+        path.unlink(missing_ok=True)
+        done = simulated_run(name, rig, seed, QUICK.get(name, {}), path, truth, known)
+        if name != procedure:
+            if serious(done):
+                raise BenchError(f"{name}: {', '.join(serious(done))}")
+            known[name] = done.calibration()
+    return done
+
+
+def serious(done: Simulated) -> list[str]:
+    """Codes of the findings above a note."""
+    return [f.code for f in done.results if isinstance(f, Finding) and f.effect is not Effect.NOTE]
+
+
+def errors(done: Simulated) -> dict[str, tuple[float, Measured]]:
+    """Value less truth by result, of those that have one."""
+    truth = {**done.truth, **truth_of_motion(done)}
+    out = {}
+    for m in done.results:
+        if isinstance(m, Measured):
+            true = truth.get(f"{m.quantity.name}@{m.where}", truth.get(m.quantity.name))
+            if true is not None and math.isfinite(m.estimate.value):
+                out[f"{m.quantity.name} {m.where}".strip()] = (m.estimate.value - true, m)
+    return out
+
+
+def moved(procedure: str, rig: str, seed: int, names: Mapping[str, float], folder: Path) -> Iterator[Moved]:
+    """What becomes of each of `names` at its moved value."""
+    sound = attempt(procedure, rig, seed, {}, folder)
+    base = errors(sound)
+    wide = {key: interval(m.estimate, seed).U for key, (_, m) in base.items()}
+    for name, value in names.items():
+        try:
+            done = attempt(procedure, rig, seed, {name: value}, folder)
+        except BenchError as error:
+            yield Moved(procedure, name, "caught", 0.0, "", str(error))
+            continue
+        if found := serious(done):
+            yield Moved(procedure, name, "caught", 0.0, "", ", ".join(found))
+            continue
+        shifts = {key: abs(e - base[key][0]) / wide[key] for key, (e, _) in errors(done).items() if key in base}
+        worst = max(shifts, key=lambda key: shifts[key], default="")
+        shift = shifts.get(worst, 0.0)
+        yield Moved(procedure, name, judged(sound, base, wide, shifts, name), round(shift, 2), worst, "")
+
+
+def judged(
+    sound: Simulated, base: Mapping[str, tuple[float, Measured]], wide: Mapping[str, float], shifts: Mapping[str, float],
+    name: str,
+) -> str:  # fmt: skip
+    """nothing, budget, listed or FAILS: the worst of the results."""
+    order = ("nothing", "budget", "listed", "FAILS")
+    ends = ["nothing"]
+    for key, shift in shifts.items():
+        if shift > MATTERS:
+            shares = [(i, c) for i, c in base[key][1].estimate.sensitivities.items() if i.id == identity(name)]
+            linear = sum(
+                abs(c) * i.u * HALF_WIDTHS * (2.0 if i.distribution == "normal" else math.sqrt(3)) for i, c in shares
+            )
+            covered = shift * wide[key] <= LINEAR * linear + wide[key]
+            out_of_reach = shares and not is_reached(identity(name), sound.procedure.reached)
+            ends.append("listed" if out_of_reach else "budget" if covered and shares else "FAILS")
+    return max(ends, key=order.index)
+
+
+def main() -> int:
+    """Print a line for each number, what fails last."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("procedures", nargs="*")
+    parser.add_argument(
+        "--all", type=Path, metavar="FILE", help="every procedure; the lines go to a file and are not done again"
+    )
+    parser.add_argument("--seed", type=int, default=5)
+    asked = parser.parse_args()
+    lines = [json.loads(x) for x in asked.all.read_text().splitlines()] if asked.all and asked.all.exists() else []
+    done = {(e["procedure"], e["name"]) for e in lines}
+    for rig, procedures in RIGS.items():
+        for procedure in procedures:
+            if asked.all is None and procedure not in asked.procedures:
+                continue
+            load(procedure)
+            left = {n: v for n, v in numbers(load_rig(rig)).items() if (procedure, n) not in done}
+            with tempfile.TemporaryDirectory() as folder:
+                for line in moved(procedure, rig, asked.seed, left, Path(folder)) if left else ():
+                    lines.append(asdict(line))
+                    print(
+                        f"{line.procedure:18} {line.name:34} {line.end:8} {line.shift:6.2f} U {line.result} {line.told[:90]}"
+                    )
+                    if asked.all:
+                        with asked.all.open("a", encoding="utf-8") as out:
+                            out.write(json.dumps(asdict(line)) + "\n")
+    failed = [e for e in lines if e["end"] == "FAILS"]
+    for e in failed:
+        print(
+            f"FAILS: {e['procedure']} {e['name']}: {e['result']} by {e['shift']} U, quiet, in no budget and in no list"
+        )
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,264 @@
+"""Sound virtual rigs with the plans that people run: each default plan alone and in the chain, and each choice of a plan.
+
+    python benchmarks/sound.py runs/sound.jsonl --first 0 --count 60 --choices 20 --jobs 2
+
+Cases that the file holds already are left out, so that the same command goes on where it was stopped. `--report` prints what
+the file holds: how many runs of each case ended how, and every one that is not PASS or DONE with what is wrong about it.
+"Off" is a value further from its truth than 3 U.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import math
+import tempfile
+import time
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, get_args, get_origin
+
+from bench import catalogue
+from bench.calibration import Calibration
+from bench.cli.motion_truth import truth_of_motion
+from bench.cli.virtual import Simulated, simulated_run
+from bench.errors import BenchError, ConfigError
+from bench.findings import Effect, Finding
+from bench.procedure import Measured, Procedure
+from bench.records import measurement, missing, outcome_of
+from bench.rigfile import load_rig
+from bench.specs import load_spec
+from bench.uncertainty import interval
+
+RPM = math.pi / 30
+RIGS = {
+    "tsbs12": ("amb-calibration", "force-constant", "negative-stiffness", "force-coupling", "torque-constant", "spindown",
+               "angle-step", "slew", "force-map"),
+    "amb5dof": ("bearing-model", "step", "tracking", "unbalance", "compensation", "balance", "run-up", "coast-down",
+                "sensitivity"),
+}  # fmt: skip
+ENDS: Mapping[str, tuple[Mapping[str, Any], ...]] = {
+    "amb-calibration": ({"bias_A": 2.0}, {"bias_A": 4.0}),
+    "torque-constant": ({"bias_A": 2.0}, {"bias_A": 4.0}),
+    "spindown": ({"speed_rad_s": 30.0}, {"speed_rad_s": 70.0}),
+    "step": ({"speeds_rad_s": (3000 * RPM,)}, {"speeds_rad_s": (10000 * RPM,)}),
+    "unbalance": ({"speeds_rad_s": (2000 * RPM,)}, {"speeds_rad_s": (14000 * RPM,)}),
+    "compensation": ({"speeds_rad_s": (3000 * RPM,)}, {"speeds_rad_s": (14000 * RPM,)}),
+    "balance": ({"speeds_rad_s": (3000 * RPM,)}, {"positions": 12}),
+    "run-up": ({"acceleration_rad_s2": 10.0}, {"acceleration_rad_s2": 50.0}, {"law": "CAC", "top_rad_s": 8000 * RPM}),
+    "coast-down": ({"deceleration_rad_s2": 24.5},),
+    "sensitivity": ({"speeds_rad_s": (10000 * RPM,)},),
+}
+"""Biases, speeds and rates at both ends; choices among words are read from the plans themselves."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A procedure with what differs from its default plan; `chain`: with every calibration that it can use."""
+
+    rig: str
+    procedure: str
+    changes: str  # JSON
+    chain: bool
+
+    @property
+    def name(self) -> str:
+        return f"{self.procedure} {self.changes if self.changes != '{}' else ''}{' in the chain' if self.chain else ''}"
+
+
+def main() -> None:
+    """Run what is missing, or print what there is."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("file", type=Path)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--count", type=int, default=60, help="rigs of each default plan")
+    parser.add_argument("--choices", type=int, default=20, help="rigs of each choice of a plan")
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--only", action="append", default=[], metavar="PROCEDURE")
+    parser.add_argument("--report", action="store_true")
+    asked = parser.parse_args()
+    if not asked.report:
+        asked.file.parent.mkdir(parents=True, exist_ok=True)
+        run_missing(asked)
+    report(read(asked.file))
+
+
+def run_missing(asked: argparse.Namespace) -> None:
+    """Every seed of both rigs through its cases, one line for each run as it ends."""
+    known = {(e["rig"], e["case"], e["seed"]) for e in read(asked.file)}
+    seeds = range(asked.first, asked.first + max(asked.count, asked.choices))
+    waiting = []
+    with ProcessPoolExecutor(asked.jobs) as pool:
+        for seed in seeds:
+            for rig in RIGS:
+                cases = [c for c in cases_of(rig, asked.only) if seed - asked.first < limit_of(c, asked)]
+                left = [c for c in cases if (rig, c.name, seed) not in known]
+                if left:
+                    waiting.append(pool.submit(run_rig, rig, seed, left, asked.file))
+        for job in as_completed(waiting):
+            job.result()
+
+
+def limit_of(case: Case, asked: argparse.Namespace) -> int:
+    """How many seeds a case is run on."""
+    return int(asked.count if case.changes == "{}" else asked.choices)
+
+
+def cases_of(rig: str, only: list[str]) -> Iterator[Case]:
+    """Default plans alone and in the chain, then each choice, of a rig's procedures."""
+    for name in RIGS[rig]:
+        if only and name not in only:
+            continue
+        procedure = load(name)
+        needs = procedure.needs(procedure.plan())
+        if all(n.optional for n in needs):
+            yield Case(rig, name, "{}", False)
+        if needs:
+            yield Case(rig, name, "{}", True)
+        for changes in (*choices(procedure), *ENDS.get(name, ())):
+            yield Case(rig, name, json.dumps(changes), bool(needs))
+
+
+def choices(procedure: Procedure) -> Iterator[dict[str, Any]]:
+    """Every other choice that the plan offers among words, and every switch the other way."""
+    for key, field in procedure.plan.model_fields.items():
+        usual, kind = field.get_default(call_default_factory=True), field.annotation
+        if kind is bool:
+            yield {key: not usual}
+        elif get_origin(kind) is Literal:
+            yield from ({key: value} for value in get_args(kind) if value != usual)
+        elif get_origin(kind) is tuple and get_origin(get_args(kind)[0]) is Literal:
+            yield from ({key: [value]} for value in get_args(get_args(kind)[0]) if (value,) != usual)
+
+
+def load(name: str) -> Procedure:
+    """A procedure by its name."""
+    found: Procedure = importlib.import_module(catalogue.entry(name).module).procedure
+    return found
+
+
+def run_rig(rig: str, seed: int, cases: list[Case], file: Path) -> None:
+    """The cases on one virtual rig; the calibrations that any of them uses are made first, with default plans. Each is a line
+    of the file as soon as it has ended: one write, so that processes do not mix theirs."""
+    known: dict[str, Calibration] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "recording.mcap"
+        for name in needed(cases):
+            try:
+                known[name] = attempt(rig, name, seed, {}, path, known).calibration()
+            except BenchError:
+                continue  # the cases that need it say so
+        for case in cases:
+            line = run_case(case, seed, path, known if case.chain else {})
+            with file.open("ab", buffering=0) as out:
+                out.write(json.dumps(line).encode() + b"\n")
+
+
+def needed(cases: list[Case]) -> list[str]:
+    """Procedures whose calibrations the cases use, in the order in which they can be made."""
+    return list(dict.fromkeys(name for case in cases if case.chain for name in needed_by(case.procedure)))
+
+
+def needed_by(procedure: str) -> list[str]:
+    """Procedures whose calibrations one uses, in the order in which they can be made."""
+    out: list[str] = []
+
+    def add(name: str) -> None:
+        procedure = load(name)
+        for need in procedure.needs(procedure.plan()):
+            if need.procedure not in out:
+                add(need.procedure)
+                out.append(need.procedure)
+
+    add(procedure)
+    return out
+
+
+def attempt(
+    rig: str, name: str, seed: int, changes: Mapping[str, Any], path: Path, known: Mapping[str, Calibration]
+) -> Simulated:
+    """A run as `bench run` makes it.
+
+    Raises:
+        BenchError: it cannot be made.
+    """
+    path.unlink(missing_ok=True)
+    file = load_rig(rig)
+    procedure = load(name)
+    plan = procedure.plan.model_validate({**file.plans.get(name, {}), **changes})
+    if problems := list(procedure.check(file, plan)):
+        raise ConfigError("; ".join(problems))
+    return simulated_run(name, rig, seed, changes, path, None, known)
+
+
+def run_case(case: Case, seed: int, path: Path, known: Mapping[str, Calibration]) -> dict[str, Any]:
+    """One line: how the run ended and what is wrong about it."""
+    began = time.process_time()
+    line: dict[str, Any] = {"rig": case.rig, "case": case.name, "seed": seed}
+    try:
+        done = attempt(case.rig, case.procedure, seed, json.loads(case.changes), path, known)
+        line |= judged(done, case.rig)
+    except ConfigError as error:
+        line |= {"outcome": "REFUSED", "wrong": [str(error)]}
+    except Exception as error:  # a mistake of ours on one rig is that rig's result
+        line |= {"outcome": "ERROR", "wrong": [f"{type(error).__name__}: {error}"]}
+    return line | {"cpu_s": round(time.process_time() - began, 2)}
+
+
+def judged(done: Simulated, rig: str) -> dict[str, Any]:
+    """Outcome by the rig's limits, findings that are no notes, verdicts that are not pass, values that are off."""
+    limits = load_spec(rig, done.procedure.name)
+    findings = [r for r in done.results if isinstance(r, Finding)]
+    measured = [r for r in done.results if isinstance(r, Measured)]
+    entries = [measurement(m, limits.get(m.quantity.name), done.seed) for m in measured]
+    names = {m.quantity.name for m in measured}
+    lacking = [q for q in done.procedure.measures if q.name not in names and q not in done.procedure.optional]
+    entries += [missing(q, limits.get(q.name)) for q in lacking]
+    wrong = [f"{f.code} ({f.where}): {f.text}" for f in findings if f.effect is not Effect.NOTE]
+    wrong += [f"{e.name} {e.where} {e.verdict}" for e in entries if str(e.verdict) not in ("pass", "none")]
+    outcome = outcome_of(entries, findings, None)
+    return {"outcome": str(outcome), "wrong": wrong, "off": list(off(done, measured))}
+
+
+def off(done: Simulated, measured: list[Measured]) -> Iterator[str]:
+    """Values further than 3 U from their truth."""
+    truth = {**done.truth, **truth_of_motion(done)}
+    for m in measured:
+        true = truth.get(f"{m.quantity.name}@{m.where}", truth.get(m.quantity.name))
+        if true is not None and math.isfinite(m.estimate.value):
+            far = abs(m.estimate.value - true) / max(interval(m.estimate, done.seed).U, 1e-300)
+            if far > 3:
+                yield f"{m.quantity.name} {m.where}: {far:.1f} U"
+
+
+def read(file: Path) -> list[dict[str, Any]]:
+    """The lines of a file; a last one that was cut off is left out."""
+    if not file.exists():
+        return []
+    lines = file.read_text(encoding="utf-8").split("\n")
+    return [json.loads(line) for line in lines[:-1]]
+
+
+def report(lines: list[dict[str, Any]]) -> None:
+    """A line for each case, then one for each run that needs a look."""
+    ends: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
+    spent: dict[tuple[str, str], float] = defaultdict(float)
+    for e in lines:
+        ends[e["rig"], e["case"]][e["outcome"]] += 1
+        spent[e["rig"], e["case"]] += e["cpu_s"]
+    for key, counts in ends.items():
+        told = ", ".join(f"{n} {end}" for end, n in counts.most_common())
+        print(f"{key[0]:8} {key[1]:58} {told}  ({spent[key] / counts.total():.1f} s each)")
+    for e in lines:
+        if e["outcome"] not in ("PASS", "DONE") or e.get("off"):
+            print(f"{e['rig']} {e['case']} seed {e['seed']}: {e['outcome']}")
+            for text in [*e["wrong"], *e.get("off", ())]:
+                print(f"    {text}")
+
+
+if __name__ == "__main__":
+    main()

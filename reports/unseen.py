@@ -1,0 +1,70 @@
+"""What no data of a run can show: influences of its budgets that no check of the procedure reaches."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from fnmatch import fnmatchcase
+from typing import Any
+
+from reports import tables, text
+from reports.view import Table
+
+SHOWN = 0.01  # of a variance; what carries less of every result is summed up
+MOST = 15  # rows
+ABOUT = (
+    "No check of this procedure can reach these influences. Each is in the uncertainty as far as its source states it, and "
+    "nowhere else: an error beyond that moves the result without a finding. Stated is the result that it carries most of."
+)
+Content = Mapping[str, Any]
+
+
+def is_reached(identity: str, reached: Sequence[str]) -> bool:
+    """Whether a pattern names an influence; one that begins with "!" takes away again. What came with a calibration of
+    another run was out of reach there, and is here."""
+    found = False
+    for pattern in reached:
+        if fnmatchcase(identity, pattern.removeprefix("!")):
+            found = not pattern.startswith("!")
+    return found
+
+
+def unseen(
+    measurements: Iterable[Content], reached: Sequence[str], titles: Mapping[str, str] | None = None
+) -> Table:  # fmt: skip
+    """The influences of Type B that are out of reach, largest share first, each with the result that it carries most of."""
+    best: dict[str, tuple[float, Content, Content]] = {}
+    for m in measurements:
+        entries = m.get("budget") or ()
+        variance = math.fsum(float(e.get("contribution") or 0.0) ** 2 for e in entries)
+        for e in entries if variance > 0 else ():
+            name, share = (
+                str(e.get("influence") or e.get("name") or ""),
+                float(e.get("contribution") or 0.0) ** 2 / variance,
+            )
+            if e.get("type") == "B" and not is_reached(name, reached) and share > best.get(name, (0.0, m, e))[0]:
+                best[name] = (share, m, e)
+    ranked = sorted(best.values(), key=lambda found: -found[0])
+    shown = [found for found in ranked if found[0] >= SHOWN][:MOST]
+    rows = [_row(*found, titles or {}) for found in shown]
+    if left := ranked[len(shown) :]:
+        noun = "influence" if len(left) == 1 else "influences"
+        rows.append((f"{len(left)} further {noun}", f"below {_share(left[0][0])} each", "", "", ""))
+    header = ("Influence", "Share of the variance", "Result", "Moved by one u", "Sensitivity")
+    return Table("", header, tuple(rows), (1, 3, 4))
+
+
+def _row(share: float, measurement: Content, entry: Content, titles: Mapping[str, str]) -> tuple[str, ...]:
+    where = tables.place(measurement)
+    unit = str(measurement.get("unit") or "")
+    return (
+        str(entry.get("name") or entry.get("influence")),
+        _share(share),
+        tables.symbol_of(str(measurement.get("name", "")), titles).plain + (f" ({where})" if where else ""),
+        text.with_unit(text.significant(abs(float(entry.get("contribution") or 0.0))), unit),
+        text.significant(entry.get("sensitivity"), 3),
+    )
+
+
+def _share(share: float) -> str:
+    return f"{max(100 * share, 0.1):.1f}{text.NARROW}%" if share < 0.1 else f"{100 * share:.0f}{text.NARROW}%"

@@ -1,0 +1,69 @@
+"""`bench check RIG [PROCEDURE]`: every problem in one pass, and what the rig can run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from bench.cli.__main__ import main
+
+RIGS = Path(__file__).resolve().parents[2] / "rigs"
+
+
+def check(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    status = main(("check", *arguments))
+    return status, *capsys.readouterr()
+
+
+def test_a_rig_is_told_what_it_can_run(capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, err = check(capsys, "tsbs12")
+    assert (status, err) == (0, "")
+    able, _, unable = out.partition("cannot run:\n")
+    assert "can run: amb-calibration, force-constant" in able
+    assert "  step: channels: found no pos_zi, pos_zo, pos_x and 6 more; also sensors,\n    parameters\n" in unable
+    assert "amb-calibration" not in unable
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_one_procedure_is_told_whole(capsys: pytest.CaptureFixture[str]) -> None:
+    assert check(capsys, "amb5dof", "step")[0] == 0
+    status, out, _ = check(capsys, "tsbs12", "step")
+    assert status == 2
+    assert "tsbs12.toml cannot run step" in out
+    assert "parameters: found no slew, model_rate, model_l_is, model_l_os" in out
+    status, _, err = check(capsys, "tsbs12", "stepp")
+    assert status == 2
+    assert "Did you mean step?" in err
+
+
+def test_plans_limits_and_the_simulated_machine_are_checked_too(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What `bench run` would refuse is said by `bench check`, with all the rest."""
+    text = (RIGS / "tsbs12.toml").read_text(encoding="utf-8")
+    for old, new in (
+        ("[plans.amb-calibration]\n", "[plans.amb-calibraton]\nangles = 9\n[plans.amb-calibration]\nangels = 9\n"),
+        ("[simulation]\n", '[simulation]\nmachine = "mine"\n'),
+        ("clearance = { value = 0.25", "clearance = { value = 0.6"),
+    ):
+        assert old in text
+        text = text.replace(old, new, 1)
+    (tmp_path / "rig.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "tsbs12.dbc").write_bytes((RIGS / "tsbs12.dbc").read_bytes())
+    (tmp_path / "specs").mkdir()
+    (tmp_path / "specs" / "tsbs12.toml").write_text(
+        'schema = 1\n[limits.spindown]\nB = { low = 0, unit = "N m s/rad", source = "x", verified = false, '
+        "at = { bias = 3 } }\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    status, _, err = check(capsys, "rig.toml")
+    assert status == 2
+    for said in (
+        "plans.amb-calibraton: found amb-calibraton; expected the name of a procedure, such as amb-calibration",
+        "angels: found 9",
+        "simulation.machine: found 'mine'; expected one of tsbs, amb5dof",
+        "geometry.clearance.value",
+        "limits.spindown.B.at.bias",
+    ):
+        assert said in err

@@ -1,0 +1,49 @@
+"""Every drawn number of the truth moved by three half widths: caught, harmless, in the budget, or listed on the report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from bench.rigfile import load_rig
+from benchmarks.moved import identity, moved, numbers
+
+SEED = 5
+
+
+def wanted(prefixes: tuple[str, ...]) -> dict[str, float]:
+    return {name: value for name, value in numbers(load_rig("tsbs12")).items() if name.startswith(prefixes)}
+
+
+@pytest.mark.long
+@pytest.mark.timeout(1500)
+@pytest.mark.parametrize(
+    ("procedure", "prefixes"),
+    [
+        (
+            "amb-calibration",
+            ("site", "geometry", "masses", "hanger", "mass_", "i_y", "pos_y", "amb_gap", "tilt", "hyst"),
+        ),
+        (
+            "torque-constant",
+            ("site", "geometry.lever", "masses", "mass_", "i_m", "beta_4", "detent", "gamma", "segment"),
+        ),
+        ("spindown", ("polar", "ring", "viscous", "coulomb", "detent", "i_m", "drive", "tilt")),
+    ],
+)
+def test_nothing_that_moves_a_result_is_kept_quiet(tmp_path: Path, procedure: str, prefixes: tuple[str, ...]) -> None:
+    found = list(moved(procedure, "tsbs12", SEED, wanted(prefixes), tmp_path))
+    assert len(found) >= 8
+    assert [f for f in found if f.end == "FAILS"] == []
+
+
+def test_drawn_numbers_are_known_by_their_influences() -> None:
+    """A name that leads to no influence would make everything fail, or nothing."""
+    assert identity("i_yi_p.gain") == "sensors/i_yi_p/gain"
+    assert identity("position_gain_yo") == "sensors/pos_yo/gain"
+    assert identity("geometry.lever_left") == "geometry/lever_left"
+    assert identity("asymmetry_o") == "machine/amb_asymmetry/o"
+    assert identity("hanger") == "masses/hanger"
+    assert numbers(load_rig("tsbs12"))["i_yi_p.gain"] == pytest.approx(1.009)
+    assert numbers(load_rig("tsbs12"))["geometry.lever_left"] == pytest.approx(0.2303)

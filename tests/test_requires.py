@@ -1,0 +1,82 @@
+"""What procedures require of a rig: declared as data, complete, and told when it is not there."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import pytest
+
+from bench import catalogue
+from bench.cli.compose import load_procedure
+from bench.procedure import Procedure
+from bench.rigfile import RigFile, load_rig
+
+OF = {
+    "tsbs12": ("amb-calibration", "force-constant", "negative-stiffness", "force-coupling", "torque-constant", "spindown",
+               "angle-step", "slew", "force-map"),
+    "amb5dof": ("step", "bearing-model", "tracking", "unbalance", "compensation", "balance", "run-up", "coast-down",
+                "sensitivity"),
+}  # fmt: skip
+PAIRS = [(rig, name) for rig, names in OF.items() for name in names]
+TABLES = ("channels", "sensors", "parameters", "geometry", "machine")
+
+
+@pytest.mark.parametrize("rig", OF)
+def test_each_rig_can_run_its_procedures_and_no_others(rig: str) -> None:
+    procedures = {entry.name: load_procedure(entry.name) for entry in catalogue.PROCEDURES}
+    assert set(OF["tsbs12"]) | set(OF["amb5dof"]) == set(procedures)
+    assert tuple(n for n, p in procedures.items() if not p.requires.lacking(load_rig(rig))) == OF[rig]
+
+
+def without(rig: RigFile, table: str, name: str) -> RigFile:
+    """The rig without one entry of a table of its file."""
+    if table == "roles":
+        devices = {
+            k: d.model_copy(update={"roles": tuple(r for r in d.roles if r != name)}) for k, d in rig.devices.items()
+        }
+        return rig.model_copy(update={"devices": devices})
+    if table == "capture":
+        assert rig.capture is not None
+        left = {k: v for k, v in rig.capture.channels.items() if k != name}
+        return rig.model_copy(update={"capture": rig.capture.model_copy(update={"channels": left})})
+    return rig.model_copy(update={table: {k: v for k, v in getattr(rig, table).items() if k != name}})
+
+
+@pytest.mark.parametrize(("rig", "name"), PAIRS)
+def test_whatever_is_taken_away_is_named(rig: str, name: str) -> None:
+    requires, whole = load_procedure(name).requires, load_rig(rig)
+    assert requires.channels
+    for table in (f.name for f in fields(requires) if f.name != "masses"):
+        for one in getattr(requires, table):
+            (said,) = requires.lacking(without(whole, table, one))
+            assert one in said
+    if requires.masses:
+        (said,) = requires.lacking(whole.model_copy(update={"masses": {}}))
+        assert said.startswith("masses")
+    if requires.capture:
+        (said,) = requires.lacking(whole.model_copy(update={"capture": None}))
+        assert said.startswith("capture")
+
+
+@pytest.mark.parametrize(("rig", "name"), PAIRS)
+def test_a_plan_can_be_checked_with_what_is_declared(rig: str, name: str) -> None:
+    """The declaration is complete: no more is looked up before a run, but parameters that the plan names."""
+    procedure, whole = load_procedure(name), load_rig(rig)
+    plan = procedure.plan()
+    named = {*procedure.settings(plan), *plan_parameters(procedure)}
+    by_plan = {
+        "parameters": named,
+        "machine": {"polar_inertia"} if name == "spindown" else set(),
+    }  # else that of a ring
+    kept = {t: {*getattr(procedure.requires, t), *by_plan.get(t, ())} for t in TABLES}
+    bare = {t: {k: v for k, v in getattr(whole, t).items() if k in kept[t]} for t in TABLES}
+    assert procedure.problems(whole.model_copy(update=bare), plan) == ()
+
+
+def plan_parameters(procedure: Procedure) -> set[str]:
+    """Parameters that the default plan of the set-point steps names."""
+    plan = procedure.plan()
+    if procedure.name != "step":
+        return set()
+    return {*getattr(plan, "a", {}), *getattr(plan, "b", {}), *getattr(plan, "warm", {}),
+            *(f"ref_{a}" for a in getattr(plan, "axes", ()))}  # fmt: skip
