@@ -25,7 +25,7 @@ check: setup
 	$(MAKE) test
 
 ci-long: setup
-	$(BIN)/python -m pytest -q -m long tests
+	$(BIN)/python -m pytest -q -m long -n 2 --dist loadgroup tests
 
 faults: setup
 	$(BIN)/python -m pytest -q -m faults tests/firmware/test_misbehaviours.py

@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
+from itertools import chain
 from typing import Any
 
 from bench.errors import AnalysisError, BenchError, RecordingError, SignalAbort
@@ -121,8 +122,6 @@ def evaluate(
         for key, item in measured.items():
             entries[key] = measurement(item, limits.get(item.quantity.name), recording.seed)
         correlations = correlations_of(list(measured.values()))
-        if all(f.effect is Effect.NOTE for f in findings):  # else a procedure that ended early has said why
-            findings += missing_steps(procedure, recording)
     except SignalAbort:
         raise
     except Exception as error:
@@ -135,11 +134,14 @@ def evaluate(
 
 
 def yielded(procedure: Procedure, recording: Recording[Any]) -> Iterator[Measured | Finding]:
-    """What a closed recording says: of the calibrations that the run used, of steps that lack samples, and what `analyse`
-    yields."""
-    yield from _calibrations(recording)
-    yield from incomplete_steps(recording)
-    yield from procedure.analyse(recording)
+    """What a closed recording says: of the calibrations that the run used, of steps that lack samples, what `analyse` yields,
+    and of steps that are missing."""
+    explained = False
+    for item in chain(_calibrations(recording), incomplete_steps(recording), procedure.analyse(recording)):
+        explained = explained or (isinstance(item, Finding) and item.effect is not Effect.NOTE)
+        yield item
+    if not explained:  # else a procedure that ended early has said why
+        yield from missing_steps(procedure, recording)
 
 
 def _calibrations(recording: Recording[Any]) -> Iterator[Finding]:

@@ -146,7 +146,7 @@ def test_a_wrong_ring_contradicts_the_drawing(tmp_path: Path) -> None:
 
 def test_a_rotor_that_stops_too_soon_is_told_so(tmp_path: Path) -> None:
     with pytest.raises(AnalysisError, match="stops too soon: it falls to 3 rad/s"):
-        run_down(tmp_path, 1, {"viscous": 3 * 0.081})
+        run_down(tmp_path, 1, {"viscous": 3 * 0.081}, run_up="motor")
 
 
 def test_what_is_adopted_holds_for_its_biases(sound: Simulated) -> None:
