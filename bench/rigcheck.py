@@ -71,7 +71,9 @@ def _behind(text: RigText, problems: tuple[Problem, ...]) -> Iterator[Problem]:
     told = {p.key for p in problems}
     entries = {".".join(key.split(".")[:2]) for key in told}
     for p in problems_of(rest):
-        if p.key not in told and ".".join(p.key.split(".")[:2]) not in entries:
+        first, *_ = p.key.split(".")
+        judged_by_another = first == "site" and any(key.startswith("site.") for key in told)  # gravity by the latitude
+        if p.key not in told and ".".join(p.key.split(".")[:2]) not in entries and not judged_by_another:
             yield p
 
 

@@ -28,8 +28,9 @@ from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import BenchError, ConfigError
 from bench.findings import Effect, Finding
+from bench.outcomes import outcome_of
 from bench.procedure import Measured, Procedure
-from bench.records import measurement, missing, outcome_of
+from bench.records import measurement, missing
 from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import interval
