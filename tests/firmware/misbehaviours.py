@@ -10,9 +10,16 @@ from dataclasses import dataclass
 PASS, INDETERMINATE, ERROR, ABORTED, NO_RUN = "PASS", "INDETERMINATE", "ERROR", "ABORTED", "no run"
 STATUS = {PASS: {0}, INDETERMINATE: {5}, ERROR: {3}, ABORTED: {4}, NO_RUN: {2, 3}}
 NOISE = frozenset(
-    {"parameters-restored", "telemetry-late", "heartbeat-late", "heartbeat-unprioritised", "step-incomplete"}
+    {
+        "parameters-restored",
+        "telemetry-late",
+        "heartbeat-late",
+        "heartbeat-unprioritised",
+        "step-incomplete",
+        "loads-scatter",
+    }
 )
-"""Findings of a busy machine, or that say no more than another one."""
+"""Findings of a busy machine, that one sound set of loads in twenty has, or that say no more than another one."""
 
 
 @dataclass(frozen=True)
