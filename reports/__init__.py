@@ -61,7 +61,6 @@ def build(
         titles={q.name: q.title for q in measures if q.title},
         rig={} if recording is None else recording.rig.model_dump(mode="json", exclude_none=True),
         integrity=None if recording is None else recording.integrity,
-        events=() if recording is None else tuple(recording.events()),
         conditions=conditions or {},
         truncated=recording is not None and recording.truncated,
         readable=recording is not None,

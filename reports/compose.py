@@ -60,7 +60,6 @@ class Surroundings:
     titles: Mapping[str, str] = dataclasses.field(default_factory=dict)  # quantity name -> what readers call it
     rig: Content = dataclasses.field(default_factory=dict)  # the rig file's content
     integrity: Any = None
-    events: Sequence[Any] = ()
     conditions: Mapping[str, str] = dataclasses.field(default_factory=dict)  # measured ones: label -> text
     truncated: bool = False
     readable: bool = True  # False: there is no recording that could be read

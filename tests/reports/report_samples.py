@@ -128,9 +128,6 @@ class SampleRecording:
         default_factory=lambda: {"telemetry": {"samples": 872000, "lost": 0, "duplicates": 0, "reordered": 0}}
     )
 
-    def events(self) -> list[dict[str, Any]]:
-        return [{"kind": "step"}] * 80 + [{"kind": "operator-answer"}] * 80
-
 
 def figures() -> list[Figure]:
     """Fit, residuals, one step and a turn, twice."""

@@ -45,7 +45,6 @@ def around(**changes: Any) -> compose.Surroundings:
         definitions={"K_i": K_I.about},
         rig=rig_content(),
         integrity=sample.integrity,
-        events=sample.events(),
     )
     return dataclasses.replace(made, **changes)
 
@@ -285,7 +284,7 @@ def test_pass_without_limits_claims_no_conformity() -> None:
 def test_an_error_without_measurements_says_that_it_says_nothing() -> None:
     lost = {"code": "link-lost", "text": "No frame for 0.5 s.", "where": "can0", "effect": "error"}
     made = view(
-        around(rig={}, integrity=None, events=(), readable=False),
+        around(rig={}, integrity=None, readable=False),
         outcome="ERROR", measurements=[], correlations=[], ended=None, recording=None, findings=[lost],
     )  # fmt: skip
     page = Page(html.render(made)).text
