@@ -27,6 +27,7 @@ ANSWER = 2  # ticks from a set point's write to the amplifiers: computed one lat
 DECIMATED, ROWS, ORDER = 4, 60, 12  # of the identification: every fourth tick, rows of the Hankel matrix, states
 SLOW_HZ, FAST_HZ, DAMPED = 15.0, 250.0, 0.95  # of the rigid modes: slower are integrators, faster filters and bending
 SWING = 800  # ticks of the first swing
+PHASES = 3  # of the revolution, at which steps begin: what goes with one or two a turn has no mean
 RADIAL = [TRACE.index(f"pos_{a}") for a in ("yi", "zi", "yo", "zo")]
 AXIAL = TRACE.index("pos_x")
 
@@ -119,23 +120,57 @@ class Shown:
 
 
 def steps(
-    plant: AmbPlant, settings: Mapping[str, float], axis: str, size: float, rest_s: float, record_s: float
+    plant: AmbPlant,
+    settings: Mapping[str, float],
+    axis: str,
+    size: float,
+    rest_s: float,
+    record_s: float,
+    turn_s: float = 0.0,
 ) -> dict[int, Shown]:
-    """Up, back, down and back: by way (1 up, -1 down) what they show together."""
-    k, p = "yzx".index(axis), plant.params
+    """Up, back, down and back: by way (1 up, -1 down) what they show together; `turn_s` of a revolution, 0 at rest. Where the
+    shaft turns, the mean of steps at PHASES of its revolution, since unbalance makes the bearings' slopes go with it."""
     responses: dict[int, list[Array]] = {1: [], -1: []}
     errors: dict[int, list[float]] = {1: [], -1: []}
     for begin, end in ((0.0, size), (size, 0.0), (0.0, -size), (-size, 0.0)):
         way = 1 if end > begin else -1
         before = plant.run(round(rest_s / TICK_S), 1)[1]
+        for phase in range(PHASES if turn_s else 1):
+            begun = plant.twin()
+            begun.run(round(phase * turn_s / PHASES / TICK_S))
+            moved, at_end = _moved(begun, settings, axis, end, before, record_s, turn_s)
+            responses[way].append(way * moved / size)
+            errors[way].append(at_end - way * size)
         plant.set(f"ref_{axis}", end)
-        after = plant.run(round(record_s / TICK_S), 1)[1]
-        rest = [positions(p, settings, before, true)[k].mean() for true in (False, True)]
-        responses[way].append(way * (positions(p, settings, after)[k] - rest[0]) / size)
-        tail = positions(p, settings, after, True)[k][-round(min(0.2, record_s / 4) / TICK_S) :]
-        errors[way].append(float(tail.mean() - rest[1] - way * size))
+        plant.run(round(record_s / TICK_S))
     t = np.asarray(np.arange(round(record_s / TICK_S)) * TICK_S, np.float64)
     return {w: Shown(t, np.mean(y, axis=0), float(np.mean(errors[w]))) for w, y in responses.items()}
+
+
+def _moved(
+    plant: AmbPlant, settings: Mapping[str, float], axis: str, end: float, before: Array, record_s: float, turn_s: float
+) -> tuple[Array, float]:
+    """Along an axis, from where it rested `before`: the position as read (n,) m, and where the shaft itself is in the end. What
+    turns with the shaft is taken away, as a twin that makes no step shows it."""
+    k, p, many = "yzx".index(axis), plant.params, round(record_s / TICK_S)
+    still = plant.twin()
+    plant.set(f"ref_{axis}", end)
+    after, beside = plant.run(many, 1)[1], still.run(many, 1)[1]
+    out = []
+    for true in (False, True):
+        x, twin, rest = (positions(p, settings, trace, true)[k] for trace in (after, beside, before))
+        out.append(x - (twin - _drift(twin, turn_s)) - float(_drift(rest, turn_s).mean()))
+    return out[0], float(out[1][-round(min(0.2, record_s / 4) / TICK_S) :].mean())
+
+
+def _drift(x: Array, turn_s: float) -> Array:
+    """`x` (n,) without what goes with the revolution: its means over whole ones, with straight lines between their middles."""
+    if not turn_s:
+        return x
+    edges = np.arange(0, len(x) + 1e-9, turn_s / TICK_S)
+    total = np.interp(edges, np.arange(len(x) + 1), np.concatenate(([0.0], np.cumsum(x))))
+    middles = (edges[1:] + edges[:-1]) / 2
+    return np.asarray(np.interp(np.arange(len(x)) + 0.5, middles, np.diff(total) / np.diff(edges)))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -194,14 +229,13 @@ def truth(
     p: AmbParams, settings: Mapping[str, float], axis: str, sizes: Sequence[float], *, speed: float = 0.0, rest_s: float = 0.3,
     record_s: float = 0.5,
 ) -> tuple[Small, dict[tuple[float, int], Shown]]:  # fmt: skip
-    """Of one axis: small motions, and by size and way the steps. What turns with the shaft
-    is left out; at rest runout stays, since it shifts where the shaft floats, and with it the bearings' slopes."""
-    even = dataclasses.replace(p, runout=(0.0,) * 16, unbalance=(0.0,) * 2)
-    alike = even if speed else p
-    of_small = small(floating(unrounded(alike), settings, speed, noise=1), settings, axis)
-    plant = floating(alike, settings, speed)
+    """Of one axis: small motions, and by size and way the steps, of the machine with its runout and, where it turns, its
+    unbalance: where the shaft floats and how far it whirls, there are the bearings' slopes."""
+    of_small = small(floating(unrounded(p), settings, speed, noise=1), settings, axis)
+    plant = floating(p, settings, speed)
     out: dict[tuple[float, int], Shown] = {}
     for size in sorted(sizes):
-        for way, shown in steps(plant, settings, axis, size, rest_s, record_s).items():
+        turn = 2 * math.pi / speed if speed else 0.0
+        for way, shown in steps(plant, settings, axis, size, rest_s, record_s, turn).items():
             out[size, way] = shown
     return of_small, out

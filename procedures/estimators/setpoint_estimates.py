@@ -186,10 +186,10 @@ def _estimate(name: str, case: Case, seen: _Seen) -> Estimate:
 
 def _curve(done: Sequence[Done]) -> Curve:
     try:
-        poles = swing([_one(d) for d in done]).poles
+        found = swing([_one(d) for d in done])
     except AnalysisError:
-        poles = np.zeros(0, complex)
-    return setpoint_settling.fit(done, poles)
+        return setpoint_settling.fit(done, np.zeros(0, complex))
+    return setpoint_settling.fit(done, found.poles, found.pole)
 
 
 def settling_estimate(case: Case, settled: Settling) -> Estimate:

@@ -31,7 +31,7 @@ FADES_S, APART = 0.1, 2.5  # shortest time constant of what fades without swingi
 HARD_S = (0.01, 0.03)  # such constants too where nothing swings
 BAND_NOISE = 5.0  # of settling, at least, over the noise of the averaged position
 NEAR = 3.0  # standard uncertainties from the band's edge within which an extreme is not told from one that touches it
-DRAWS, FEW = 1000, 20
+DRAWS, FEW, PARTS = 1000, 20, 20  # PARTS: of the draws, of which one is in memory at a time
 PER_SWING, DEAD = 100.0, 1e-4  # times looked at in a period, until the swing is that small
 SLOW_S = 5e-3  # between the times that are looked at from then on
 FIRST, SECOND, PLAIN = (
@@ -44,11 +44,12 @@ END_S = 0.02  # before the record's end, within which nothing can be said to hav
 
 @dataclass(frozen=True)
 class Curve:
-    """Fitted to steps (shares of each): `poles` 1/s, `fades` s, `terms` (SECOND, n) over the `_regressors` of a step, its sizes
+    """Fitted to steps (shares of each): `poles` 1/s and their `middle`, `fades` s, `terms` (SECOND, n) over the `_regressors` of a step, its sizes
     over `largest` m. `covariances` of one of the largest steps, of what fades and what swings, with `dof`; `spreads`
     (SECOND, SECOND) what a case's mean has of them."""
 
     poles: Complex
+    middle: complex
     fades: tuple[float, ...]
     terms: Array
     covariances: tuple[Array, Array]
@@ -68,8 +69,8 @@ class Settling:
     open: bool = False
 
 
-def columns(t: Array, poles: Complex, fades: Sequence[float], window: float) -> Array:
-    """Means over `window` s before t (m,) of what the curve is made of, (m, n)."""
+def columns(t: Array, poles: Complex, middle: complex, fades: Sequence[float], window: float) -> Array:
+    """Means over `window` s before t (m,) of what the curve is made of, (m, n); `middle`: of the poles, each with its part."""
 
     def means(p: Complex) -> Complex:
         return np.asarray(np.exp(np.outer(t, p)) * shrinks(p, window))
@@ -77,15 +78,22 @@ def columns(t: Array, poles: Complex, fades: Sequence[float], window: float) -> 
     slow = [means(np.array([-1 / tau + 0j]))[:, 0].real for tau in fades]
     out = [np.ones_like(t), *slow]
     if len(poles):
-        middle = np.array([poles.mean()])
-        later = (means(middle + 1) - means(middle - 1))[:, 0] / 2 * abs(middle[0])  # its derivative
+        near = np.array([middle])
+        later = (means(near + 1) - means(near - 1))[:, 0] / 2 * abs(middle)  # its derivative
         both = [*means(poles).T, later]
         out += [part for z in both for part in (z.real, z.imag)]
     return np.array(out).T
 
 
-def fit(steps: Sequence[Done], poles: Complex) -> Curve:
-    """Of steps of one setting, axis and speed; `poles` of their swing, none where nothing swings.
+def lasting(poles: Complex) -> Complex:
+    """Poles as they can be over a whole record. The part of an oscillation that position hardly has is noise, and so is its
+    pole: over the first swings it may grow, over the record nothing did. It is then one that does not die away."""
+    return np.asarray(np.minimum(poles.real, 0.0) + 1j * poles.imag)
+
+
+def fit(steps: Sequence[Done], poles: Complex, middle: complex | None = None) -> Curve:
+    """Of steps of one setting, axis and speed; `poles` of their swing, none where nothing swings, and the `middle` of these,
+    each with its part in the swing (their mean where none is given).
 
     Each step is fitted alone, then its terms over size and beginning. Noise that swings is taken from what the fits leave,
     over all times; what fades from the scatter of its terms, since a level's noise is slower than a record.
@@ -96,13 +104,15 @@ def fit(steps: Sequence[Done], poles: Complex) -> Curve:
     last = min(float(d.t[-1]) for d in steps)
     fades = tuple(float(f) for f in FADES_S * APART ** np.arange(8) if f <= last)
     fades = fades if len(poles) else (*HARD_S, *fades)
+    poles = lasting(poles)
+    middle = middle if middle is not None else complex(poles.mean()) if len(poles) else 0j
     count, period = min(int((d.t > FROM_S).sum()) for d in steps), float(steps[0].t[1] - steps[0].t[0])
     terms, left, made = [], [], np.zeros((0, 0))
     largest = max(d.case.size for d in steps)
     weight = np.array([d.case.size / largest for d in steps])
     for d in steps:
         after = np.flatnonzero(d.t > FROM_S)[:count]
-        made = columns(d.t[after], poles, fades, period)
+        made = columns(d.t[after], poles, middle, fades, period)
         if len(after) < 2 * made.shape[1]:
             raise AnalysisError(
                 f"{d.case.where}: found {len(after)} samples after the step; expected {2 * made.shape[1]}"
@@ -122,7 +132,9 @@ def fit(steps: Sequence[Done], poles: Complex) -> Curve:
     found[:FIRST, fading:] = np.linalg.lstsq(first, scaled[:, fading:], rcond=None)[0]
     apart = scaled[:, :fading] - fade @ found[: fade.shape[1], :fading]
     noise = _propagated(np.array(left) * weight[:, None], made)[fading:, fading:]
-    return Curve(poles, fades, found, (apart.T @ apart / dof, noise), (_spread(fade), _spread(first)), dof, largest)
+    return Curve(
+        poles, middle, fades, found, (apart.T @ apart / dof, noise), (_spread(fade), _spread(first)), dof, largest
+    )
 
 
 def _spread(design: Array) -> Array:
@@ -166,7 +178,7 @@ def settling(curve: Curve, case: Case, steps: Sequence[Done], band: float, seed:
     noise = math.sqrt(float(np.mean([d.noise**2 for d in steps]))) / case.size / math.sqrt(len(steps))
     within = max(band, BAND_NOISE * noise)
     t = _looked_at(curve, min(float(d.t[-1]) for d in steps))
-    made = columns(t, curve.poles, curve.fades, window)
+    made = columns(t, curve.poles, curve.middle, curve.fades, window)
     of = np.array(_regressors(case, -case.way * case.size / 2, curve.largest))
     off = made @ (of @ curve.terms) - 1
     parts = (c * float(of @ s @ of) for c, s in zip(curve.covariances, curve.spreads, strict=True))
@@ -181,7 +193,8 @@ def settling(curve: Curve, case: Case, steps: Sequence[Done], band: float, seed:
         return Settling(FROM_S / 2, within, np.linspace(0, FROM_S, DRAWS))
     rng = np.random.default_rng(seed)
     drawn = rng.standard_normal((DRAWS, len(values))) * np.sqrt(curve.dof / rng.chisquare(curve.dof, (DRAWS, 1)))
-    times = _possible(t, off, crossings(t, off + drawn @ shapes.T, within), touching)
+    ended = np.concatenate([crossings(t, off + few @ shapes.T, within) for few in np.array_split(drawn, PARTS)])
+    times = _possible(t, off, ended, touching)
     return Settling(float(times.mean()), within, times)
 
 

@@ -54,8 +54,8 @@ def made(
     return out
 
 
-def settled(steps: list[Done], size: float = 10e-6) -> Settling:
-    curve = setpoint_settling.fit(steps, np.array([POLE * 1.003, POLE * 0.997]))
+def settled(steps: list[Done], size: float = 10e-6, other: complex = POLE * 0.997) -> Settling:
+    curve = setpoint_settling.fit(steps, np.array([POLE * 1.003, other]), POLE)
     of = [d for d in steps if d.case == Case("A", 0.0, "y", size, 1)]
     return setpoint_settling.settling(curve, of[0].case, of, 0.02)
 
@@ -112,6 +112,22 @@ def test_a_tail_along_the_bands_edge_is_told_where_it_crosses_and_left_open_wher
     never = settled(made(0.6, level=0.03))
     assert math.isinf(never.time)
     assert not never.open
+
+
+@pytest.mark.parametrize("other", [34 + 583j, 9 + 565j, 62 + 598j])
+def test_an_oscillation_that_noise_makes_grow_hides_nothing(other: complex) -> None:
+    """Position hardly has the second oscillation of some machines, so that noise makes its pole: to e^50 within the record."""
+    swing = touching(0.026)
+    bounds = interval(settling_estimate(Case("A", 0.0, "y", 10e-6, 1), settled(made(swing, record=1.5), other=other)))
+    assert bounds.low < true_time(swing) < bounds.high
+    assert bounds.U < 0.6e-3
+
+
+def test_an_oscillation_that_does_not_die_away_has_not_settled() -> None:
+    steps = made(0.6, record=1.5)
+    for d in steps:
+        d.y[d.t > 0] += 0.05 * d.case.size * np.sin(500 * d.t[d.t > 0])
+    assert math.isinf(settled(steps, other=9 + 500j).time)
 
 
 def test_noise_widens_the_band() -> None:
