@@ -60,7 +60,6 @@ ENDS: Mapping[str, tuple[Mapping[str, Any], ...]] = {
     "compensation": (
         {"speeds_rad_s": (3000 * RPM,)},
         {"speeds_rad_s": (14000 * RPM,)},
-        {"variants": ["off", "literal"]},
     ),
     "balance": ({"speeds_rad_s": (3000 * RPM,)}, {"positions": 12}),
     "run-up": ({"acceleration_rad_s2": 10.0}, {"acceleration_rad_s2": 50.0}, {"law": "CAC", "top_rad_s": 8000 * RPM}),
