@@ -24,3 +24,7 @@ FORCE_COUPLING = (
     "A controller that turns its currents by 1.02 times the phase angle changes gamma_0 and alpha_c by 2 %, and the model "
     "fits nearly as well.",
 )
+STEP = (
+    "A set point that the controller scales is measured as the step that it makes: 1 % of it is 1 % of the step in "
+    "steady_error, 1.5 % in overshoot, and half a swing or more in settling_time.",
+)

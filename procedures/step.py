@@ -21,6 +21,7 @@ from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
+from procedures import assumed
 from procedures import step_figures as drawn
 from procedures.estimators import setpoint_checks, setpoint_estimates
 from procedures.estimators.setpoint_data import CHANNELS, STEP, TURNING_RAD_S, cases, read_steps
@@ -266,5 +267,6 @@ procedure = Procedure(
     ),
     check=check,
     step_count=step_count,
+    assumes=assumed.STEP,
     method=METHOD,
 )

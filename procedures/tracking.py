@@ -68,7 +68,7 @@ class Plan(BenchPlan):
     """Settings of the tracking test, SI."""
 
     laws: tuple[Law, ...] = Field(("CCS", "CAC"), min_length=1)  # judged
-    compare: tuple[Law, ...] = ("PID",)  # only reported beside them
+    compare: tuple[Law, ...] = ("PID",)  # only reported beside them; one that is judged is there already
     hz: float = Field(10.0, gt=0, le=50)
     y_m: float = Field(50e-6, gt=0)
     z_m: float = Field(80e-6, gt=0)
@@ -182,8 +182,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
     if missing := [n for n in OBSERVED if plan.observed and n not in rig.parameters]:
         yield f"observer: the rig has no parameters {', '.join(missing)}; expected observer = false"
-    if len(set(plan.order)) < len(plan.laws) + len(plan.compare):
-        yield "laws, compare: found one twice; expected each once"
+    for key, laws in (("laws", plan.laws), ("compare", plan.compare)):
+        if len(set(laws)) < len(laws):
+            yield f"{key}: found one twice; expected each once"
     ring = NEAR * rig.geometry["clearance"].value
     far = max(plan.y_m, plan.z_m)
     if far > ring:

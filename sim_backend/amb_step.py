@@ -126,10 +126,13 @@ def steps(
     size: float,
     rest_s: float,
     record_s: float,
+    *,
     turn_s: float = 0.0,
+    told: float = 1.0,
 ) -> dict[int, Shown]:
-    """Up, back, down and back: by way (1 up, -1 down) what they show together; `turn_s` of a revolution, 0 at rest. Where the
-    shaft turns, the mean of steps at PHASES of its revolution, since unbalance makes the bearings' slopes go with it."""
+    """Up, back, down and back: by way (1 up, -1 down) what they show together; `turn_s` of a revolution, 0 at rest; `told`:
+    what the controller makes of a set point, as a share of it. Where the shaft turns, the mean of steps at PHASES of its
+    revolution, since unbalance makes the bearings' slopes go with it."""
     responses: dict[int, list[Array]] = {1: [], -1: []}
     errors: dict[int, list[float]] = {1: [], -1: []}
     for begin, end in ((0.0, size), (size, 0.0), (0.0, -size), (-size, 0.0)):
@@ -138,10 +141,10 @@ def steps(
         for phase in range(PHASES if turn_s else 1):
             begun = plant.twin()
             begun.run(round(phase * turn_s / PHASES / TICK_S))
-            moved, at_end = _moved(begun, settings, axis, end, before, record_s, turn_s)
+            moved, at_end = _moved(begun, settings, axis, told * end, before, record_s, turn_s)
             responses[way].append(way * moved / size)
             errors[way].append(at_end - way * size)
-        plant.set(f"ref_{axis}", end)
+        plant.set(f"ref_{axis}", told * end)
         plant.run(round(record_s / TICK_S))
     t = np.asarray(np.arange(round(record_s / TICK_S)) * TICK_S, np.float64)
     return {w: Shown(t, np.mean(y, axis=0), float(np.mean(errors[w]))) for w, y in responses.items()}
@@ -227,7 +230,7 @@ def _eigenvalues(y: Array) -> Complex:
 
 def truth(
     p: AmbParams, settings: Mapping[str, float], axis: str, sizes: Sequence[float], *, speed: float = 0.0, rest_s: float = 0.3,
-    record_s: float = 0.5,
+    record_s: float = 0.5, told: float = 1.0,
 ) -> tuple[Small, dict[tuple[float, int], Shown]]:  # fmt: skip
     """Of one axis: small motions, and by size and way the steps, of the machine with its runout and, where it turns, its
     unbalance: where the shaft floats and how far it whirls, there are the bearings' slopes."""
@@ -236,6 +239,6 @@ def truth(
     out: dict[tuple[float, int], Shown] = {}
     for size in sorted(sizes):
         turn = 2 * math.pi / speed if speed else 0.0
-        for way, shown in steps(plant, settings, axis, size, rest_s, record_s, turn).items():
+        for way, shown in steps(plant, settings, axis, size, rest_s, record_s, turn_s=turn, told=told).items():
             out[size, way] = shown
     return of_small, out

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from bench.errors import BenchError
 from bench.findings import Finding
+from bench.procedure import Measured
 
 if TYPE_CHECKING:
     from bench.cli.virtual import Simulated
@@ -23,7 +24,9 @@ def truth_of_motion(done: Simulated) -> dict[str, float]:
     """By `name@where`; nothing for a procedure whose quantities are the machine's, and where a run gave nothing to compare."""
     of = TRUTHS.get(done.procedure.name)
     try:
-        return {} if of is None else {f"{name}@{where}": value for name, where, value in of(done)}
+        if of is None or not any(isinstance(r, Measured) for r in done.results):
+            return {}
+        return {f"{name}@{where}": value for name, where, value in of(done)}
     except BenchError:
         return {}
 
@@ -57,6 +60,7 @@ def _step(done: Simulated) -> Found:
                     speed=speed,
                     rest_s=plan.rest_s,
                     record_s=plan.record_s,
+                    told=done.drawn.defects.get(f"factor_ref_{axis}", 1.0),
                 )
                 cases = {key: Case(setting, speed, axis, *key) for key in shown}
                 group = next(iter(cases.values())).group
@@ -67,6 +71,23 @@ def _step(done: Simulated) -> Found:
                         yield name, cases[key].where, getattr(of, name)
                     if cases[key].where not in other_band:
                         yield "settling_time", cases[key].where, of.settling_time(plan.band, window)
+
+
+def _tracking(done: Simulated) -> Found:
+    from procedures.estimators.tracking_data import read_orbits
+    from procedures.tracking import CODES
+    from sim_backend import amb_track
+
+    plan: Any = done.recording.plan
+    for orbit in read_orbits(done.recording):
+        if orbit.law in plan.laws:
+            settings = _settings(done, {"law": CODES[orbit.law]})  # type: ignore[index]
+            true = amb_track.truth(
+                done.drawn.plant, settings, hz=plan.hz, y=plan.y_m, z=plan.z_m, ratio=plan.ratio, speed=plan.speed_rad_s,
+                settle_s=plan.settle_s,
+            )  # fmt: skip
+            for name, value in true.items():
+                yield name, orbit.where, value
 
 
 def _unbalance(done: Simulated) -> Found:
@@ -121,6 +142,7 @@ def _sensitivity(done: Simulated) -> Found:
 
 TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "step": _step,
+    "tracking": _tracking,
     "unbalance": _unbalance,
     "compensation": _unbalance,
     "balance": _balance,

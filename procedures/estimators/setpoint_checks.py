@@ -82,7 +82,16 @@ def _signals(steps: Sequence[Done], plan: Tolerances) -> Iterator[Finding]:
     ):  # fmt: skip
         hit = [d for d in steps if d.flags & bits]
         if hit:
-            yield Finding(code, f"{text}, in {len(hit)} of {len(steps)} steps.", hit[0].case.where, effect)
+            yield Finding(
+                code, f"{text}, in {len(hit)} of {len(steps)} steps.", hit[0].case.where, effect, touched(hit, steps)
+            )
+
+
+def touched(hit: Sequence[Done], steps: Sequence[Done]) -> tuple[str, ...]:
+    """What steps put in doubt: all of their setting, axis and speed, whose swing, scatter and curve are fitted together."""
+    groups = {d.case.group for d in hit}
+    places = (place for d in steps if d.case.group in groups for place in (d.case.group, d.case.where))
+    return tuple(dict.fromkeys(f"@{place}" for place in places))
 
 
 def _speed(steps: Sequence[Done], plan: Tolerances) -> Iterator[Finding]:
@@ -100,12 +109,12 @@ def _speed(steps: Sequence[Done], plan: Tolerances) -> Iterator[Finding]:
         fastest = max(abs(d.slope) for d in moving) * 1e6
         yield Finding("not-at-rest", f"before {len(moving)} of {len(steps)} steps the position still moved, by {fastest:.2f} "
                       "µm/s: wait longer (record_s between steps, settle_s before the first), or start warm.",
-                      moving[0].case.where, Effect.INDETERMINATE)  # fmt: skip
+                      moving[0].case.where, Effect.INDETERMINATE, touched(moving, steps))  # fmt: skip
     yield from _kicks(steps)
     for d in steps:
         if d.case.speed == 0 and d.speeds[1] > 2:
             yield Finding("turns-at-rest", f"the shaft turned at {d.speeds[1]:.1f} rad/s in a step that was to be done at rest",
-                          d.case.where, Effect.INDETERMINATE)  # fmt: skip
+                          d.case.where, Effect.INDETERMINATE, touched([d], steps))  # fmt: skip
             return
 
 
@@ -163,10 +172,11 @@ def of_results(
         if result.settled.open:
             yield Finding("not-settled", f"the position runs along the edge of the band ({result.settled.within:.1%}), so that "
                           "its noise hides whether it has settled at the end of the record: record longer, repeat more often, "
-                          "take larger steps.", case.where, Effect.INDETERMINATE)  # fmt: skip
+                          "take larger steps.", case.where, Effect.INDETERMINATE, (f"settling_time@{case.where}",))  # fmt: skip
         elif not math.isfinite(result.settled.time):
             yield Finding("not-settled", f"still {abs(result.error):.1%} of the step off at the end of the record "
-                          f"({plan.band:.1%} is the band): {_longer(result)}.", case.where, Effect.INDETERMINATE)  # fmt: skip
+                          f"({plan.band:.1%} is the band): {_longer(result)}.", case.where, Effect.INDETERMINATE,
+                          (f"settling_time@{case.where}",))  # fmt: skip
         widest = result.settled.within
         if widest > plan.band:
             yield Finding("band-widened", f"five times the noise of the averaged position is {widest:.1%} of the "

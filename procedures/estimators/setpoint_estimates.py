@@ -77,7 +77,8 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
         found = {name: _estimate(name, case, s) for name, s in seen.items() if case in s.values}
         if math.isfinite(settled.time):
             found["settling_time"] = settling_estimate(case, settled)
-        found["rise_time"] += bound(f"sampling/rise/{case.where}", "sampling", RISE_SHARE * _period(all_of[0]), "s")
+        period = float(all_of[0].t[1] - all_of[0].t[0])
+        found["rise_time"] += bound(f"sampling/rise/{case.where}", "sampling", RISE_SHARE * period, "s")
         found["steady_error"] += _gained(case, rig)
         other = seen["overshoot"].values.get(replace(case, way=-case.way))
         if "overshoot" in found and other is not None:
@@ -90,10 +91,6 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
         error = float(np.mean([_late(o) - 1 for o in ones[case]]))
         out[case] = Result(case, ones[case], fits[case][0] if fits[case] else None, settled, error, found)
     return out
-
-
-def _period(d: Done) -> float:
-    return float(d.t[1] - d.t[0])
 
 
 def _one(d: Done) -> One:

@@ -44,9 +44,9 @@ END_S = 0.02  # before the record's end, within which nothing can be said to hav
 
 @dataclass(frozen=True)
 class Curve:
-    """Fitted to steps (shares of each): `poles` 1/s and their `middle`, `fades` s, `terms` (SECOND, n) over the `_regressors` of a step, its sizes
-    over `largest` m. `covariances` of one of the largest steps, of what fades and what swings, with `dof`; `spreads`
-    (SECOND, SECOND) what a case's mean has of them."""
+    """Fitted to steps (shares of each): `poles` 1/s, their `middle`, `fades` s, `terms` (SECOND, n) over the `_regressors` of a
+    step, its sizes over `largest` m. `covariances` of one of the largest steps, of what fades and what swings, with `dof`;
+    `spreads` (SECOND, SECOND) what a case's mean has of them."""
 
     poles: Complex
     middle: complex

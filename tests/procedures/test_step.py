@@ -161,6 +161,33 @@ def test_a_planted_defect_is_named_and_never_passes(
     assert list(figures(Recording.open(tmp_path / "recording.mcap", Plan)))
 
 
+def test_a_finding_about_one_axis_leaves_the_other_alone(tmp_path: Path) -> None:
+    """The tail of one axis's case says nothing of its overshoot, and contact in one axis nothing of the other."""
+    _, findings = stepped(tmp_path, 1, axes=("y", "z"), a={"law": 0.0})
+    open_ones = [f for f in findings if f.code == "not-settled"]
+    assert open_ones
+    assert all(f.concerns == (f"settling_time@{f.where}",) for f in open_ones)
+    recording = Recording.open(tmp_path / "recording.mcap", Plan)
+    steps = setpoint_data.read_steps(recording)
+    hit = [dataclasses.replace(d, flags=setpoint_data.CONTACT if d.case.axis == "z" else 0) for d in steps]
+    (touch,) = (f for f in setpoint_checks.of_steps(hit, recording.plan) if f.code == "contact")
+    sizes = [f"{um} µm {way}" for um in (10, 20) for way in ("up", "down")]
+    assert {*touch.concerns} == {"@A, z, 0 r/min", *(f"@A, z, 0 r/min, {size}" for size in sizes)}
+
+
+@pytest.mark.parametrize("told", [0.99, 0.997])
+def test_a_set_point_that_is_scaled_is_no_error_of_what_is_measured(tmp_path: Path, told: float) -> None:
+    """The shaft truly ends a little short, and settles as it does; position alone does not say why, and the run is right."""
+    plan = {**SHORT, "record_s": 0.5}
+    run = simulated_run("step", "amb5dof", 0, plan, tmp_path / "recording.mcap", {"factor_ref_y": told})
+    true = truth_of_motion(run)
+    assert true["steady_error@A, y, 0 r/min, 20 µm up"] == pytest.approx((told - 1) * 20e-6, abs=8e-8)
+    for m in run.results:
+        if isinstance(m, Measured) and m.quantity.name in ("settling_time", "steady_error", "overshoot"):
+            bounds = interval(m.estimate)
+            assert bounds.low - bounds.U < true[f"{m.quantity.name}@{m.where}"] < bounds.high + bounds.U, m.where
+
+
 @pytest.mark.parametrize(
     ("defect", "named"),
     [

@@ -12,7 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bench.cli.virtual import simulate
+from bench.cli.motion_truth import truth_of_motion
+from bench.cli.virtual import simulate, simulated_run
 from bench.errors import AnalysisError, BenchError
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
@@ -49,6 +50,16 @@ def agree(
     for name, value in amb_track.truth(draw(rig, seed).plant, settings, settle_s=1.5, **orbit).items():
         e = measured[name, law]
         assert e.value == pytest.approx(value, abs=3.5 * e.u), (name, law)
+
+
+def test_what_a_gain_truly_changes_is_in_the_truth(tmp_path: Path) -> None:
+    """A rotor whose probe reads 0.8 % too much follows a smaller ellipse at that probe: no error of the run."""
+    run = simulated_run("tracking", "amb5dof", 1, {**QUICK, **ONE}, tmp_path / "recording.mcap", {"pos_yi.gain": 1.008})
+    true = truth_of_motion(run)
+    found = {f"{m.quantity.name}@{m.where}": m.estimate for m in run.results if isinstance(m, Measured)}
+    assert {name.split("@")[0] for name in found.keys() - true.keys()} == {"ring_distance"}
+    for name, value in true.items():
+        assert found[name].value == pytest.approx(value, abs=3.5 * found[name].u), name
 
 
 def test_a4_flatness_follows_and_the_pid_touches(tmp_path: Path) -> None:
@@ -154,7 +165,10 @@ def test_plans_that_cannot_work_are_refused() -> None:
     assert "jump" in next(iter(check(rig, Plan(z_m=10e-6))))
     assert "envelope" in next(iter(check(rig, Plan(speed_rad_s=1600.0))))
     assert "ten times" in next(iter(check(rig, Plan(speed_rad_s=500.0))))
-    assert "twice" in next(iter(check(rig, Plan(laws=("CCS",), compare=("CCS",)))))
+    assert "laws: found one twice" in next(iter(check(rig, Plan(laws=("CCS", "CCS")))))
+    assert "compare: found one twice" in next(iter(check(rig, Plan(compare=("PID", "PID")))))
+    assert list(check(rig, Plan(laws=("PID",)))) == []  # what is judged is beside the others already
+    assert Plan(laws=("PID",)).order == ("PID",)
     assert "role drive" in next(iter(check(rig.model_copy(update={"devices": {"controller": rig.devices["controller"]}}),
                                            Plan(speed_rad_s=1000.0))))  # fmt: skip
     assert procedure.problems(load_rig("tsbs12"), Plan())
