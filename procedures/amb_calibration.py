@@ -27,7 +27,7 @@ from bench.roles import NOTHING, Load, RigState
 from bench.uncertainty import Estimate, propagate
 from procedures import amb_calibration_figures as drawn
 from procedures import assumed
-from procedures.estimators import angle_facts, consistency, load_hypotheses, mass_hanging
+from procedures.estimators import angle_facts, both_coils, consistency, load_hypotheses, mass_hanging
 from procedures.estimators.hanging_data import CHANNELS, COILS, LEVERS, HangingData, read_hangings
 from procedures.estimators.hanging_estimates import less_sure, turning_point, unresolved_angles
 from procedures.estimators.inputs import certified
@@ -87,12 +87,17 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     if max(map(abs, changes.values())) > CLEAR_A and any(consistency.wiring(**changes)):
         record.event(consistency.WIRED_WRONG, changes=changes)  # an hour of hangings would say no more
         return
+    first = True  # the first hanging is of nothing: what the rotor's own weight leaves to the lower coils
     for turn in range(plan.angles):
         angle = 2 * math.pi * turn / plan.angles
         rig.rotation.point(angle)
         for load, branch in sequence(plan):
             hanging = rig.operator.hang(load)
             rig.clock.sleep(plan.settle_s)
+            if first and (needed := both_coils.at_no_load(rig.levitation.reading, plan.bias_A)):
+                record.event(both_coils.ONE_SIDED, needed=needed)
+                return
+            first = False
             with record.step("hang", angle_rad=angle, load=hanging.label, branch=branch):
                 rig.clock.sleep(plan.average_s)
 
@@ -132,6 +137,9 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
         return
     result = evaluate(recording)
     values = {name: e.value for name, e in result.inputs.items()}
+    if tied := list(both_coils.of_fit(_scattered(result), data.hangings)):
+        yield from tied
+        return
     findings = list(
         consistency.of_fit(data, result.fit, result.scatter, result.loads, result.beyond, values, recording.plan,
                            masses_u(recording))
@@ -139,9 +147,15 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     yield from findings
     if any(f.code in consistency.FATAL for f in findings):
         return
-    scattered = angle_facts.scatter_terms("scatter", covariance_over_a_turn(result.spread), result.scatter.dof)
+    estimates = _scattered(result)
     for quantity in MEASURES:
-        yield quantity.measured(result.estimates[quantity.name] + scattered[quantity.name])
+        yield quantity.measured(estimates[quantity.name])
+
+
+def _scattered(a: Analysis) -> dict[str, Estimate]:
+    """The six quantities with the scatter of the hangings."""
+    terms = angle_facts.scatter_terms("scatter", covariance_over_a_turn(a.spread), a.scatter.dof)
+    return {q.name: a.estimates[q.name] + terms[q.name] for q in MEASURES}
 
 
 def facts(recording: Recording[Plan]) -> dict[str, Estimate]:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.uncertainty.coverage import coverage_factor
-from procedures.estimators import load_hypotheses, signals
+from procedures.estimators import both_coils, load_hypotheses, signals
 from procedures.estimators.hanging_data import COILS, POSITIONS, HangingData
 from procedures.estimators.load_hypotheses import CHANCE, Contradiction, Suspect
 from procedures.estimators.mass_hanging import Fit
@@ -77,6 +77,7 @@ def of_first(recording: Recording[Any]) -> Iterator[Finding]:
     """What the first hanging showed, where the run ended by it."""
     for event in recording.events(WIRED_WRONG):
         yield from wiring(*(float(event["changes"][axis]) for axis in AXES))
+    yield from both_coils.of_first(recording)
 
 
 def wiring(yi: float, yo: float, xi: float, xo: float) -> Iterator[Finding]:

@@ -30,6 +30,7 @@ LARGEST_OFFSET_N_m = 0.02  # 4 mA of every segment's sensor are a little over 11
 LARGEST_WAVE_RAD = 1.5e-3  # a sound run-down leaves 0.45 mrad rms, the counts of the encoder
 COUNT_N_m = 0.01  # of the drive's torque
 SURE = 3.0  # standard uncertainties beyond what is stated
+LOWERED = "lowered"  # event: the drive did not bring the shaft to the speed asked for
 TICK_S = 0.45e-3  # the speed is a mean over a sample, the angle its last value
 
 
@@ -53,6 +54,12 @@ class Plan(Protocol):
 def before_fits(recording: Recording[Any]) -> Iterator[Finding]:
     """Checks that need no run-down: the encoder's direction, and whether the speed was reached."""
     yield from of_probe(recording)
+    for bias, event in {e["bias_A"]: e for e in recording.events(LOWERED)}.items():
+        text = (
+            f"at {bias:g} A the drive brings the shaft to {abs(event['held']):.1f} rad/s and little further, of "
+            f"{abs(event['wanted']):.1f} rad/s asked for: run-downs start there."
+        )
+        yield Finding("speed-lowered", text, f"{bias:g} A")
     for event in recording.events("not-reached"):
         yield Finding(
             "speed-not-reached",
