@@ -87,17 +87,15 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     if max(map(abs, changes.values())) > CLEAR_A and any(consistency.wiring(**changes)):
         record.event(consistency.WIRED_WRONG, changes=changes)  # an hour of hangings would say no more
         return
-    first = True  # the first hanging is of nothing: what the rotor's own weight leaves to the lower coils
     for turn in range(plan.angles):
         angle = 2 * math.pi * turn / plan.angles
         rig.rotation.point(angle)
-        for load, branch in sequence(plan):
+        for k, (load, branch) in enumerate(sequence(plan)):
             hanging = rig.operator.hang(load)
             rig.clock.sleep(plan.settle_s)
-            if first and (needed := both_coils.at_no_load(rig.levitation.reading, plan.bias_A)):
+            if turn == k == 0 and (needed := both_coils.at_no_load(rig.levitation.reading, plan.bias_A)):
                 record.event(both_coils.ONE_SIDED, needed=needed)
                 return
-            first = False
             with record.step("hang", angle_rad=angle, load=hanging.label, branch=branch):
                 rig.clock.sleep(plan.average_s)
 
@@ -137,17 +135,17 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
         return
     result = evaluate(recording)
     values = {name: e.value for name, e in result.inputs.items()}
-    if tied := list(both_coils.of_fit(_scattered(result), data.hangings)):
-        yield from tied
-        return
     findings = list(
         consistency.of_fit(data, result.fit, result.scatter, result.loads, result.beyond, values, recording.plan,
                            masses_u(recording))
     )  # fmt: skip
     yield from findings
-    if any(f.code in consistency.FATAL for f in findings):
+    if any(f.code in consistency.FATAL for f in findings) or load_hypotheses.mistaken(result.loads, result.beyond):
         return
     estimates = _scattered(result)
+    if tied := list(both_coils.of_fit(estimates, data.hangings, recording.plan.bias_A)):
+        yield from tied
+        return
     for quantity in MEASURES:
         yield quantity.measured(estimates[quantity.name])
 

@@ -49,12 +49,13 @@ def of_first(recording: Recording[Any]) -> Iterator[Finding]:
         yield from (one_sided(b, float(needed)) for b, needed in event["needed"].items())
 
 
-def of_fit(estimates: Mapping[str, Estimate], h: Hangings) -> Iterator[Finding]:
-    """Bearings of which the data do not separate K and K2."""
+def of_fit(estimates: Mapping[str, Estimate], h: Hangings, bias_A: float) -> Iterator[Finding]:
+    """Bearings of which the data do not separate K and K2, because the heaviest mass leaves the lower coil without current."""
     for k, b in enumerate(NAMES):
-        if abs(correlation(estimates[f"K_{b}"], estimates[f"K2_{b}"])) > TIED:
-            strong, weak = h.currents[k].max(axis=0), h.currents[k].min(axis=0)
-            most = np.unravel_index(int(np.argmax(strong)), strong.shape)
+        strong, weak = h.currents[k].max(axis=0), h.currents[k].min(axis=0)
+        most = np.unravel_index(int(np.argmax(strong)), strong.shape)
+        tied = abs(correlation(estimates[f"K_{b}"], estimates[f"K2_{b}"])) > TIED
+        if tied and weak[most] < ROOM * bias_A:
             yield one_sided(b, enough(float(strong[most]), float(weak[most])))
 
 

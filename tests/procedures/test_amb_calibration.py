@@ -62,12 +62,23 @@ def test_the_result_follows_the_truth(tmp_path: Path, factor: float) -> None:
 def test_loads_that_contradict_each_other_support_no_statement_of_non_conformity(tmp_path: Path) -> None:
     """The reading lies outside the limit; with a wrong mass that says nothing of the machine: the contradiction is in the
     interval, and the finding puts whatever is judged in doubt."""
-    _, measured, findings = calibrate(tmp_path, 11, {"mass_error_M2": 0.05, "K_o": 0.8 * 74.4})
+    _, measured, findings = calibrate(tmp_path, 11, {"mass_error_M2": 0.003, "K_o": 0.8 * 74.4})
     limits = load_spec("tsbs12", "amb-calibration")
     judged = [measurement(m, limits.get(name)) for name, m in measured.items()]
     assert {m.name: m.verdict for m in judged}["K_o"] in (Verdict.FAIL, Verdict.INDETERMINATE)
     assert "load-inconsistent" in {f.code for f in findings if f.effect is Effect.INDETERMINATE}
     assert outcome_of(judged, findings) is Outcome.INDETERMINATE
+
+
+def test_loads_that_are_far_off_give_no_value(tmp_path: Path) -> None:
+    """A mass that is 2 % off would leave K_o known to 50 %: the finding names it, and nothing is stated."""
+    _, measured, findings = calibrate(tmp_path, 11, {"mass_error_M1": 0.02})
+    (found,) = (f for f in findings if f.effect is not Effect.NOTE)
+    assert found.code == "load-inconsistent"
+    assert "M1" in found.where
+    assert "No value is stated" in found.text
+    assert "loads-scatter" not in {f.code for f in findings}
+    assert not measured
 
 
 def test_the_constants_hold_for_the_bias_of_the_plan(tmp_path: Path) -> None:
