@@ -220,7 +220,8 @@ def of_drive(recording: Recording[Any], drag: Drag) -> Iterator[Finding]:
             "drive-brakes",
             f"the drive gives {found[0] * 1e3:.1f} mN m of constant torque to hold the rotor at its speeds, the run-downs show "
             f"{drag.seen.value * 1e3:.1f} mN m: {(apart + own.value) * 1e3:+.1f} mN m act only while it coasts "
-            f"({own.value * 1e3:g} ± {reach * 1e3:g} mN m of drag are stated for the drive).", name, Effect.INDETERMINATE,
+            f"({own.value * 1e3:g} ± {reach * 1e3:g} mN m of drag are stated for the drive). "
+            "The drive brakes, or a detent holds the rotor at the slow ones of these speeds.", name, Effect.INDETERMINATE,
         )  # fmt: skip
 
 
