@@ -96,7 +96,7 @@ def contradiction(f: Fit, h: Hangings, s: Scatter, p: Mapping[str, float], u_mas
 
 def mistaken(c: Contradiction, beyond: float) -> bool:
     """Whether no value can be stated: an interval that holds whatever `beyond` (`scatter_of_set`) of such a size may be, with
-    the two degrees of freedom that four masses leave, would be a fifth of K and more."""
+    the two degrees of freedom that four masses leave, would be a tenth of K_o and more."""
     return c.probability <= CHANCE and beyond > MISTAKE
 
 
