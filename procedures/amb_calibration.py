@@ -27,7 +27,7 @@ from bench.roles import NOTHING, Load, RigState
 from bench.uncertainty import Estimate, propagate
 from procedures import amb_calibration_figures as drawn
 from procedures import assumed
-from procedures.estimators import angle_facts, consistency, load_hypotheses, mass_hanging
+from procedures.estimators import angle_facts, both_coils, consistency, load_hypotheses, mass_hanging
 from procedures.estimators.hanging_data import CHANNELS, COILS, LEVERS, HangingData, read_hangings
 from procedures.estimators.hanging_estimates import less_sure, turning_point, unresolved_angles
 from procedures.estimators.inputs import certified
@@ -90,9 +90,12 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     for turn in range(plan.angles):
         angle = 2 * math.pi * turn / plan.angles
         rig.rotation.point(angle)
-        for load, branch in sequence(plan):
+        for k, (load, branch) in enumerate(sequence(plan)):
             hanging = rig.operator.hang(load)
             rig.clock.sleep(plan.settle_s)
+            if turn == k == 0 and (needed := both_coils.at_no_load(rig.levitation.reading, plan.bias_A)):
+                record.event(both_coils.ONE_SIDED, needed=needed)
+                return
             with record.step("hang", angle_rad=angle, load=hanging.label, branch=branch):
                 rig.clock.sleep(plan.average_s)
 
@@ -137,11 +140,20 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
                            masses_u(recording))
     )  # fmt: skip
     yield from findings
-    if any(f.code in consistency.FATAL for f in findings):
+    if any(f.code in consistency.FATAL for f in findings) or load_hypotheses.mistaken(result.loads, result.beyond):
         return
-    scattered = angle_facts.scatter_terms("scatter", covariance_over_a_turn(result.spread), result.scatter.dof)
+    estimates = _scattered(result)
+    if tied := list(both_coils.of_fit(estimates, data.hangings, recording.plan.bias_A)):
+        yield from tied
+        return
     for quantity in MEASURES:
-        yield quantity.measured(result.estimates[quantity.name] + scattered[quantity.name])
+        yield quantity.measured(estimates[quantity.name])
+
+
+def _scattered(a: Analysis) -> dict[str, Estimate]:
+    """The six quantities with the scatter of the hangings."""
+    terms = angle_facts.scatter_terms("scatter", covariance_over_a_turn(a.spread), a.scatter.dof)
+    return {q.name: a.estimates[q.name] + terms[q.name] for q in MEASURES}
 
 
 def facts(recording: Recording[Plan]) -> dict[str, Estimate]:

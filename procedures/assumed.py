@@ -15,6 +15,8 @@ TORQUE_CONSTANT = (
 SPINDOWN = (
     "A constant torque that acts against either direction alike, such as a seal or a brake that drags whatever turns the "
     "rotor, is in T_c with its whole amount.",
+    "A drag of the drive that acts only while the rotor coasts is in T_c with what it is more or less than stated; it is seen "
+    "from some 4 mN m beyond the stated range on.",
     "With the ring an error of its inertia changes J_z, B and T_c by its share, until J_z leaves the drawing's tolerance.",
 )
 FORCE_CONSTANT = (

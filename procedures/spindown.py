@@ -13,7 +13,6 @@ from typing import Literal
 
 from pydantic import Field
 
-from bench.errors import NotReached
 from bench.figures import Figure
 from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
@@ -30,6 +29,7 @@ from procedures import spindown_figures as drawn
 from procedures.estimators import drag, spindown_checks
 from procedures.estimators.drag import Drag
 from procedures.estimators.spindown_data import CHANNELS, COILS, RunDown, read_run_downs
+from procedures.running_up import let_go, run_up
 
 B = Quantity("B", "N m s/rad", "viscous drag at the bias of the plan, mean over both directions")
 B_HIGH = Quantity("B_high", "N m s/rad", "viscous drag at the higher bias, mean over both directions")
@@ -87,10 +87,12 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     for group, bias in groups(plan):
         if group != "low":
             _at_rest(rig, bias, "ring" if group == "ring" else "")
+        top = plan.speed_rad_s
         for repeat in range(plan.repeats):
             for direction in (1, -1):
                 labels = {"group": group, "bias_A": bias, "direction": direction, "repeat": repeat, "by": by}
-                if not _run_down(rig, plan, record, labels):
+                top = _run_down(rig, plan, record, labels, top)
+                if not top:
                     return
     if plan.added_inertia:
         transition(rig, RigState.READY)
@@ -109,21 +111,24 @@ def _at_rest(rig: Rig, bias: float, part: str) -> None:
     transition(rig, RigState.LEVITATED)
 
 
-def _run_down(rig: Rig, plan: Plan, record: Recorder, labels: Mapping[str, object]) -> bool:
-    """Run up, hold the speed, let go and wait for the end speed; False if the speed is not reached."""
-    direction = 1 if labels["direction"] == 1 else -1
-    wanted = direction * plan.speed_rad_s
-    if labels["by"] == "drive" and labels["group"] == "low" and labels["repeat"] == 0:
+def _run_down(rig: Rig, plan: Plan, record: Recorder, labels: Mapping[str, object], top: float) -> float:
+    """Run up to `top`, hold it, let go and wait for the end speed. The speed it was let go from; 0 if that was not reached."""
+    direction, by = 1 if labels["direction"] == 1 else -1, str(labels["by"])
+    wanted = direction * top
+    if by == "drive" and labels["group"] == "low" and labels["repeat"] == 0:
         _hold_slowly(rig, plan, record, labels, wanted)
-    if not _run_up(rig, wanted, str(labels["by"])):
-        record.event("not-reached", wanted=wanted, reached=rig.rotation.speed_rad_s, by=labels["by"])
-        _let_go(rig, str(labels["by"]))
+    reached = run_up(rig, wanted, by)
+    if not reached:
+        record.event("not-reached", wanted=wanted, reached=rig.rotation.speed_rad_s, by=by)
+        let_go(rig, by)
         rig.rotation.stop()
-        return False
+        return 0.0
+    if reached != wanted:
+        record.event(spindown_checks.LOWERED, wanted=wanted, held=reached, bias_A=labels["bias_A"])
     rig.clock.sleep(RAMP_S)
-    with record.step("spin", speed_rad_s=wanted, **labels):
+    with record.step("spin", speed_rad_s=reached, **labels):
         rig.clock.sleep(plan.steady_s)
-    _let_go(rig, str(labels["by"]))
+    let_go(rig, by)
     with record.step("coast", ring=labels["group"] == "ring", **labels):
         begun = rig.clock.now_ns()
         rig.clock.sleep(plan.start_delay_s + 0.5)
@@ -132,37 +137,15 @@ def _run_down(rig: Rig, plan: Plan, record: Recorder, labels: Mapping[str, objec
                 break
             rig.clock.sleep(0.05)
     rig.rotation.stop()  # the speed reference that SPIN set is gone before the gains come back
-    return True
+    return abs(reached)
 
 
 def _hold_slowly(rig: Rig, plan: Plan, record: Recorder, labels: Mapping[str, object], wanted: float) -> None:
     for share in SLOW:
-        if _run_up(rig, share * wanted, "drive"):
+        if reached := run_up(rig, share * wanted, "drive"):
             rig.clock.sleep(RAMP_S)
-            with record.step("spin", speed_rad_s=share * wanted, **labels):
+            with record.step("spin", speed_rad_s=reached, **labels):
                 rig.clock.sleep(plan.steady_s)
-
-
-def _run_up(rig: Rig, wanted: float, by: str) -> bool:
-    """To a speed, by the drive with the motor released or by the motor; False if the shaft does not get there."""
-    try:
-        if by == "drive":
-            assert rig.drive is not None
-            rig.drive.reach(wanted)
-        else:
-            rotor.hold(rig)
-            rig.rotation.spin(wanted)
-    except NotReached:
-        return False
-    return True
-
-
-def _let_go(rig: Rig, by: str) -> None:
-    if by == "drive":
-        assert rig.drive is not None
-        rig.drive.coast()
-    else:
-        rotor.release(rig)
 
 
 @dataclass(frozen=True)

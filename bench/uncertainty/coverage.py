@@ -13,10 +13,13 @@ from scipy.special import ndtri, stdtrit
 
 from bench.errors import AnalysisError
 from bench.uncertainty.estimate import Array, Estimate, Influence
+from bench.uncertainty.propagation import BATCH, ManyDraws
 from bench.uncertainty.tails import Tails, tails_of_draws, tails_of_t
 
 PROBABILITY = 0.95
 DRAWS = 200_000
+MOST_ASKED = 20_000  # draws for which a model itself is asked, in batches: some seconds for a fit
+ENDS_KNOWN = 0.025  # of U: what its ends may be unsure by, 5 % of u: between one and two digits of u (JCGM 101, 7.9.2)
 DOMINANT = 0.5  # share of the variance beyond which one non-normal component decides the shape
 KEPT = 12  # drawn influences, 1.6 MB each
 FEW = 2  # degrees of freedom at which a t distribution has no standard deviation, and fewer
@@ -86,7 +89,8 @@ def interval(estimate: Estimate, seed: int = 0) -> Interval:
     """The 95 % interval: value -+ k u, or probabilistically symmetric from Monte Carlo (JCGM 101, 7.7).
 
     Monte Carlo takes over where one non-normal component carries more than half of the variance (the central limit
-    does not help, GUM G.2.2) or the model is not linear over the spread of its inputs (5.1.2 note).
+    does not help, GUM G.2.2) or the model is not linear over the spread of its inputs (5.1.2 note). A model that has to be
+    asked for each draw is asked in batches until the ends are known (JCGM 101, 7.9), MOST_ASKED times at most; `why` says so.
 
     Raises:
         AnalysisError: value or uncertainty is not finite, or the model fails for drawn inputs.
@@ -101,7 +105,11 @@ def interval(estimate: Estimate, seed: int = 0) -> Interval:
         u = estimate.u if dof > FEW else None
         why = "normal or many comparable components, linear model"
         return _stated(estimate.value - wide, estimate.value + wide, dof, "gum", why, u, tails_of_t(k, dof))
-    drawn = _sampled(estimate, seed)
+    try:
+        drawn = _sampled(estimate, seed)
+    except ManyDraws:
+        drawn, unsure = _in_batches(estimate, seed)
+        reason += f"; the model was asked for {len(drawn)} draws, which leave {unsure:.1%} of U open at its ends"
     low, high = (float(q) for q in np.quantile(drawn, [0.025, 0.975]))
     if not (math.isfinite(low) and math.isfinite(high)):
         raise AnalysisError("the model does not give finite numbers over the spread of its inputs")
@@ -157,6 +165,25 @@ def _sampled(estimate: Estimate, seed: int) -> Array:
     if variance > 0:
         apart[Influence("", "the others", math.sqrt(variance), estimate.unit, "B", "normal")] = 1.0
     return Estimate(estimate.value, estimate.unit, apart).sampled({i.id: draw(i, seed, DRAWS) for i in apart})
+
+
+def _in_batches(estimate: Estimate, seed: int) -> tuple[Array, float]:
+    """Draws of a model that is asked for each of them, until twice the standard deviation of either end's mean over the batches
+    is small beside U (JCGM 101, 7.9.4, for the ends alone: where there is no u it would never end), and that over U."""
+    drawn = {i.id: draw(i, seed, MOST_ASKED) for i in estimate.sensitivities}
+    parts: list[Array] = []
+    ends: list[Array] = []
+    unsure = math.inf
+    for start in range(0, MOST_ASKED, BATCH):
+        parts.append(estimate.sampled({key: v[start : start + BATCH] for key, v in drawn.items()}))
+        ends.append(np.quantile(parts[-1], [0.025, 0.975]))
+        if len(parts) > 2:
+            low, high = np.mean(ends, axis=0)
+            apart = 2 * float(np.std(ends, axis=0, ddof=1).max()) / math.sqrt(len(ends))
+            unsure = 2 * apart / float(high - low) if high > low else 0.0
+            if unsure <= ENDS_KNOWN:
+                break
+    return np.concatenate(parts), unsure
 
 
 def _against_gum(estimate: Estimate) -> str:

@@ -13,9 +13,14 @@ from bench.uncertainty.curvature import expanded
 from bench.uncertainty.estimate import NONLINEAR, Array, Deviations, Estimate, Influence, Sampler, merged
 
 DIRECTIONS = 4  # along which influences are moved together
+BATCH = 2_000  # draws for which a model itself is asked at a time: 100/(1 - 0.95), JCGM 101, 7.9.4 b
 Inputs = Mapping[str, Estimate]
 Shares = Mapping[str, tuple[float, Mapping[str, float]]]  # value and contributions by influence
 _ONE = ""  # name of the output of a model that returns one number
+
+
+class ManyDraws(Exception):
+    """A model whose expansion does not hold is to be asked for each of more than BATCH draws: ask for a batch at a time."""
 
 
 @overload
@@ -30,6 +35,7 @@ def propagate(
     The step is the influence's u, carried to every input that shares it (GUM 5.1.3 note 2). An output whose second
     difference exceeds a tenth of its combined u for any influence is `nonlinear` and keeps the model for Monte Carlo.
     So is one that bends as much between influences (a product of two values near zero). Units are left empty.
+    Its `sampled` raises ManyDraws for more than BATCH draws where the expansion to second order does not hold.
 
     Raises:
         AnalysisError: an output is not finite, or one id stands for two different influences.
@@ -109,10 +115,12 @@ def _sampler(
         return _named(f(_moved(shares, by)))[name]
 
     def sampled(deviations: Deviations) -> Array:
-        if not any(e.nonlinear for e in inputs.values()):
-            quick = expanded(shifted, {i.id: i.u for i in influences}, deviations)
-            if quick is not None:
-                return quick
+        if max((len(v) for v in deviations.values()), default=1) > BATCH:  # for fewer the expansion asks as often
+            curved = any(e.nonlinear for e in inputs.values())
+            quick = None if curved else expanded(shifted, {i.id: i.u for i in influences}, deviations)
+            if quick is None:
+                raise ManyDraws
+            return quick
         drawn = {key: e.sampled(deviations) for key, e in inputs.items()}
         count = max((len(v) for v in drawn.values()), default=1)
         full = {key: np.broadcast_to(v, (count,)) for key, v in drawn.items()}

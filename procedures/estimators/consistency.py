@@ -6,6 +6,7 @@ Thresholds are chosen so that a sound rig trips one in fewer than one run in a t
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any, Protocol
 
@@ -15,7 +16,7 @@ import numpy.typing as npt
 from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.uncertainty.coverage import coverage_factor
-from procedures.estimators import load_hypotheses, signals
+from procedures.estimators import both_coils, load_hypotheses, signals
 from procedures.estimators.hanging_data import COILS, POSITIONS, HangingData
 from procedures.estimators.load_hypotheses import CHANCE, Contradiction, Suspect
 from procedures.estimators.mass_hanging import Fit
@@ -77,6 +78,7 @@ def of_first(recording: Recording[Any]) -> Iterator[Finding]:
     """What the first hanging showed, where the run ended by it."""
     for event in recording.events(WIRED_WRONG):
         yield from wiring(*(float(event["changes"][axis]) for axis in AXES))
+    yield from both_coils.of_first(recording)
 
 
 def wiring(yi: float, yo: float, xi: float, xo: float) -> Iterator[Finding]:
@@ -122,8 +124,11 @@ def of_fit(
 ) -> Iterator[Finding]:
     """Checks of the fit: loads that contradict each other, single hangings that stand out, hysteresis. `beyond` is what each
     mass is less sure by than its certificate says (`load_hypotheses.scatter_of_set`)."""
-    yield from _loads(data, c, p, plan, u_mass)
-    if beyond > 0:
+    mistaken = load_hypotheses.mistaken(c, beyond)
+    for found in _loads(data, c, p, plan, u_mass):
+        text = f"{found.text} No value is stated: {beyond:.1%} of each mass is no scatter of a set."
+        yield replace(found, text=text, effect=Effect.ERROR) if mistaken else found
+    if beyond > 0 and not mistaken:
         text = (
             f"the loads agree worse than certificates and scatter say (by chance with a probability of {c.probability:.1g}): "
             f"{beyond:.2%} of each mass, from the data, is in the budget beside its certificate."

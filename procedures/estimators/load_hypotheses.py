@@ -20,6 +20,7 @@ from procedures.estimators.repeatability import Scatter, residual_maker, scatter
 
 Array = npt.NDArray[np.float64]
 CHANCE = 5e-4  # of a sound set and hangings: below it the loads contradict each other
+MISTAKE = 3e-3  # of each mass: more is no scatter of a set but a mistake, of which no distribution is known
 DOUBT = 0.05  # of the same: below it each mass is taken for less sure than its certificate says
 
 
@@ -91,6 +92,12 @@ def contradiction(f: Fit, h: Hangings, s: Scatter, p: Mapping[str, float], u_mas
     return Contradiction(
         ways.T @ s.level_means.reshape(-1), ways.T @ covariance @ ways, ways.T @ effect, kg, s.dof
     )  # fmt: skip
+
+
+def mistaken(c: Contradiction, beyond: float) -> bool:
+    """Whether no value can be stated: an interval that holds whatever `beyond` (`scatter_of_set`) of such a size may be, with
+    the two degrees of freedom that four masses leave, would be a tenth of K_o and more."""
+    return c.probability <= CHANCE and beyond > MISTAKE
 
 
 def suspects(c: Contradiction) -> list[Suspect]:

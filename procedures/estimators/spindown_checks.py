@@ -30,6 +30,7 @@ LARGEST_OFFSET_N_m = 0.02  # 4 mA of every segment's sensor are a little over 11
 LARGEST_WAVE_RAD = 1.5e-3  # a sound run-down leaves 0.45 mrad rms, the counts of the encoder
 COUNT_N_m = 0.01  # of the drive's torque
 SURE = 3.0  # standard uncertainties beyond what is stated
+LOWERED = "lowered"  # event: the drive did not bring the shaft to the speed asked for
 TICK_S = 0.45e-3  # the speed is a mean over a sample, the angle its last value
 
 
@@ -53,6 +54,12 @@ class Plan(Protocol):
 def before_fits(recording: Recording[Any]) -> Iterator[Finding]:
     """Checks that need no run-down: the encoder's direction, and whether the speed was reached."""
     yield from of_probe(recording)
+    for bias, event in {e["bias_A"]: e for e in recording.events(LOWERED)}.items():
+        text = (
+            f"at {bias:g} A the drive brings the shaft to {abs(event['held']):.1f} rad/s and little further, of "
+            f"{abs(event['wanted']):.1f} rad/s asked for: run-downs start there."
+        )
+        yield Finding("speed-lowered", text, f"{bias:g} A")
     for event in recording.events("not-reached"):
         yield Finding(
             "speed-not-reached",
@@ -213,7 +220,8 @@ def of_drive(recording: Recording[Any], drag: Drag) -> Iterator[Finding]:
             "drive-brakes",
             f"the drive gives {found[0] * 1e3:.1f} mN m of constant torque to hold the rotor at its speeds, the run-downs show "
             f"{drag.seen.value * 1e3:.1f} mN m: {(apart + own.value) * 1e3:+.1f} mN m act only while it coasts "
-            f"({own.value * 1e3:g} ± {reach * 1e3:g} mN m of drag are stated for the drive).", name, Effect.INDETERMINATE,
+            f"({own.value * 1e3:g} ± {reach * 1e3:g} mN m of drag are stated for the drive). "
+            "The drive brakes, or a detent holds the rotor at the slow ones of these speeds.", name, Effect.INDETERMINATE,
         )  # fmt: skip
 
 

@@ -19,6 +19,7 @@ from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import interval
 from procedures.amb_calibration import Plan, check, procedure
+from procedures.estimators import both_coils
 from sim_backend.truth import draw
 
 SHORT = {"settle_s": 0.3, "average_s": 0.2}
@@ -61,12 +62,23 @@ def test_the_result_follows_the_truth(tmp_path: Path, factor: float) -> None:
 def test_loads_that_contradict_each_other_support_no_statement_of_non_conformity(tmp_path: Path) -> None:
     """The reading lies outside the limit; with a wrong mass that says nothing of the machine: the contradiction is in the
     interval, and the finding puts whatever is judged in doubt."""
-    _, measured, findings = calibrate(tmp_path, 11, {"mass_error_M2": 0.05, "K_o": 0.8 * 74.4})
+    _, measured, findings = calibrate(tmp_path, 11, {"mass_error_M2": 0.003, "K_o": 0.8 * 74.4})
     limits = load_spec("tsbs12", "amb-calibration")
     judged = [measurement(m, limits.get(name)) for name, m in measured.items()]
     assert {m.name: m.verdict for m in judged}["K_o"] in (Verdict.FAIL, Verdict.INDETERMINATE)
     assert "load-inconsistent" in {f.code for f in findings if f.effect is Effect.INDETERMINATE}
     assert outcome_of(judged, findings) is Outcome.INDETERMINATE
+
+
+def test_loads_that_are_far_off_give_no_value(tmp_path: Path) -> None:
+    """A mass that is 2 % off would leave K_o known to 50 %: the finding names it, and nothing is stated."""
+    _, measured, findings = calibrate(tmp_path, 11, {"mass_error_M1": 0.02})
+    (found,) = (f for f in findings if f.effect is not Effect.NOTE)
+    assert found.code == "load-inconsistent"
+    assert "M1" in found.where
+    assert "No value is stated" in found.text
+    assert "loads-scatter" not in {f.code for f in findings}
+    assert not measured
 
 
 def test_the_constants_hold_for_the_bias_of_the_plan(tmp_path: Path) -> None:
@@ -155,3 +167,23 @@ def test_the_first_hanging_tells_exchanged_wires(tmp_path: Path) -> None:
     hung = [e for e in run.recording.events("operator") if e.get("load")]
     assert len(hung) <= 1
     assert not list(run.procedure.figures(run.recording))
+
+
+def test_a_bearing_that_carries_the_rotor_by_one_coil_is_named_before_anything_is_recorded(tmp_path: Path) -> None:
+    """At 2 A this rotor's own weight takes the whole bias of the lower outboard coil: K and K2 are one number there."""
+    run = simulated_run("amb-calibration", "tsbs12", 0, {**SHORT, "bias_A": 2.0}, tmp_path / "recording.mcap")
+    (found,) = (f for f in run.results if isinstance(f, Finding))
+    assert (found.code, found.where, found.effect) == ("one-sided", "outboard", Effect.ERROR)
+    assert "2.2 A or more" in found.text
+    assert not run.recording.all_steps()
+    assert not list(run.procedure.figures(run.recording))
+
+
+def test_what_the_loads_leave_one_number_is_not_reported_as_two(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same rotor without the look at the first hanging: the correlation of K and K2 says it."""
+    monkeypatch.setattr(both_coils, "LEAST", 0.0)
+    run = simulated_run("amb-calibration", "tsbs12", 0, {**SHORT, "bias_A": 2.05}, tmp_path / "recording.mcap")
+    assert [(f.code, f.where) for f in run.results if isinstance(f, Finding)] == [("one-sided", "outboard")]
+    assert not any(isinstance(m, Measured) for m in run.results)

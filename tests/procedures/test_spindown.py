@@ -149,6 +149,24 @@ def test_a_rotor_that_stops_too_soon_is_told_so(tmp_path: Path) -> None:
         run_down(tmp_path, 1, {"viscous": 3 * 0.081}, run_up="motor")
 
 
+def test_a_drive_that_can_do_no_more_lets_go_a_little_below(tmp_path: Path) -> None:
+    """70 rad/s take more than its 8 N m at the higher bias: it would trip at its limit, and B_high needs no such speed."""
+    run = run_down(tmp_path, 0, speed_rad_s=70)
+    assert serious(run) == {}
+    (lowered,) = (f for f in run.results if isinstance(f, Finding) and f.code == "speed-lowered")
+    assert lowered.where == "4 A"
+    tops = {s.labels["bias_A"]: abs(s.labels["speed_rad_s"]) for s in run.recording.steps("spin")}
+    assert tops[3.0] == 70
+    assert 60 < tops[4.0] < 66
+    for name, e in results(run).items():
+        assert name == "J_z" or abs(e.value - run.truth[name]) < 3 * e.u, name
+
+
+def test_a_drive_far_too_weak_is_an_error(tmp_path: Path) -> None:
+    found = serious(run_down(tmp_path, 0, {"drive_limit": 3.0}))
+    assert "speed-not-reached" in found
+
+
 def test_what_is_adopted_holds_for_its_biases(sound: Simulated) -> None:
     calibration = sound.calibration()
     assert {"B", "B_high", "T_c", "J_z"} <= set(calibration.values)

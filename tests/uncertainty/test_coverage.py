@@ -118,6 +118,21 @@ def test_a_square_gets_the_interval_of_chi_squared() -> None:
     assert found.high == pytest.approx(6.0239, abs=0.08)
 
 
+def test_a_model_without_an_expansion_is_asked_for_a_bounded_number_of_draws() -> None:
+    """JCGM 101, 7.9: until the ends are known, with a stated end. The positive part of a normal is known in closed form."""
+    calls = [0]
+
+    def positive(p: dict[str, float]) -> float:
+        calls[0] += 1
+        return max(p["x"], 0.0)
+
+    found = interval(propagate(positive, {"x": estimate("x", 0.0, 1.0)}) + estimate("z", 0.0, 1e-3))
+    assert found.method == "monte-carlo"
+    assert "draws" in found.why
+    assert found.high == pytest.approx(1.95996, rel=0.04)
+    assert calls[0] < 21_000
+
+
 @pytest.mark.parametrize("distribution", ["normal", "rectangular", "triangular", "arcsine"])
 def test_draws_have_the_stated_standard_uncertainty(distribution: str) -> None:
     drawn = draw(Influence("x", "x", 0.3, "", "B", distribution), 1, 100_000)  # type: ignore[arg-type]
