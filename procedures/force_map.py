@@ -185,7 +185,7 @@ def _contradictions(result: Result, plan: Plan) -> Iterator[Finding]:
         text = (f"the model leaves {rms:.2f} N rms ({plan.max_residual_N:g} N allowed): the calibration is of another angle or "
                 "rotor, or a point was disturbed.")  # fmt: skip
         yield Finding("misfit", text, "", Effect.INDETERMINATE)
-    if np.ptp(result.i_theta) < LEAST_TORQUE_A:
+    if np.ptp(result.points.i_theta) < LEAST_TORQUE_A:
         text = "the load on the lever made no torque current: was it hung, and does the lever hold?"
         yield Finding("no-torque-current", text, "i_theta", Effect.ERROR)
 
@@ -220,7 +220,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 
 def figures(recording: Recording[Plan]) -> Iterable[Figure]:
-    """Residuals, selection, and how well each term is told; empty without points."""
+    """The greatest terms, residuals and selection; empty without points."""
     if not len(recording.steps(STEP)):
         return ()
     return force_map_figures.rig_figures(*evaluate(recording))

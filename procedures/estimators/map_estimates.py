@@ -39,7 +39,8 @@ EXCITED = 0.02
 @dataclass(frozen=True)
 class Result:
     """`terms` that the points can tell, their estimates, the force of every point less its group's mean, (n,) N, the part
-    of it that the fit leaves, and how each term fares when points are left out."""
+    of it that the fit leaves, how each term fares when points are left
+    out, and the points as the fit used them."""
 
     terms: tuple[str, ...]
     told: Identifiability
@@ -47,7 +48,7 @@ class Result:
     force: Array
     residuals: Array
     selection: Selection
-    i_theta: Array
+    points: Points
 
 
 def inputs_of(rig: RigFile, facts: Mapping[str, Estimate], angles: int) -> dict[str, Estimate]:
@@ -56,7 +57,7 @@ def inputs_of(rig: RigFile, facts: Mapping[str, Estimate], angles: int) -> dict[
     out = {f"{name}@{k}": facts[f"{name}@{k}"] for name in ("K_i", "K2_i") for k in range(angles)}
     for key in ("amb_span", "motor_to_outboard_amb", "amb_gap", "com_to_inboard_sensor", "com_to_outboard_sensor",
                 "com_to_outboard_amb"):  # fmt: skip
-        out[key] = certified(f"geometry/{key}", g[key], key.replace("_", " "))
+        out[key] = certified(f"geometry/{key}", g[key])
     for channel in (*COILS, *SEGMENTS):
         sensor = rig.sensors[channel]
         out[f"gain/{channel}"] = certified(f"sensors/{channel}/gain", sensor.gain, f"gain of {channel}")
@@ -144,9 +145,7 @@ def evaluate(data: MapData, inputs: Mapping[str, Estimate], bias_A: float, angle
     spread = typea.scatter(fit, gradients, "map", "scatter of the points")
     force = _centred(motor_force(data, values, bias_A), data.group)
     selection = termselection.select(whole[:, None, columns], force[:, None], None, terms)
-    return Result(
-        terms, told, {n: estimates[n] + spread[n] for n in terms}, force, fit.residuals, selection, points.i_theta
-    )
+    return Result(terms, told, {n: estimates[n] + spread[n] for n in terms}, force, fit.residuals, selection, points)
 
 
 def _excited(design: Array, points: Points) -> Array:

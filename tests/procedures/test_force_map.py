@@ -78,7 +78,7 @@ def test_the_term_that_nothing_excites_is_named(sound: Simulated) -> None:
 
 def test_figures_and_steps(sound: Simulated) -> None:
     drawn = list(figures(sound.recording))
-    assert [f.key for f in drawn] == ["residuals", "selection", "resolved"]
+    assert [f.key for f in drawn] == ["force-current", "force-displacement", "residuals", "selection"]
     for figure in drawn:
         draw_figure(figure)
     assert len(sound.recording.all_steps()) == step_count(sound.recording.plan)
