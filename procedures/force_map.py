@@ -26,7 +26,7 @@ from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import NOTHING, Load, RigState
-from procedures import carrying, force_map_figures, rotor, wiring
+from procedures import assumed, carrying, force_map_figures, rotor, wiring
 from procedures.estimators import map_data, map_estimates, motor_wiring
 from procedures.estimators.direction import of_probe
 from procedures.estimators.force_map import ABOUT, UNITS
@@ -159,7 +159,8 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     yield from signals
     if any(f.code == "stuck-channel" for f in signals):
         return
-    _, result = evaluate(recording)
+    data, result = evaluate(recording)
+    yield from map_data.drifts(data, result.force, result.points.i_theta)
     yield from _contradictions(result, recording.plan)
     yield from _notes(result)
     for quantity in MEASURES:
@@ -264,6 +265,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    assumes=assumed.FORCE_MAP,
     method=METHOD,
     needs=needs,
 )
