@@ -55,6 +55,8 @@ class Figure:
     notes: tuple[tuple[str, float, float], ...] = field(default=())  # small texts beside a point: text, x, y
     grid: Grid | None = None
     log_x: bool = False
+    log_y: bool = False
+    ticks: tuple[tuple[str, float], ...] = field(default=())  # names in place of numbers on the x axis: text, x
     downward: bool = False  # y grows downwards, as phase lags are drawn
     closer: tuple[float, float, float] | None = None  # of a plane: beside it the same, about x, y and so far each way
     below: Figure | None = None  # a second panel on the same x axis, of which labels, series and the like are drawn

@@ -23,7 +23,7 @@ from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
 from procedures import angle_step_figures as drawn
-from procedures import carrying, rotor, wiring
+from procedures import assumed, carrying, rotor, wiring
 from procedures.estimators import motor_wiring, step_checks, step_estimates, stepresponse
 from procedures.estimators.direction import of_probe
 from procedures.estimators.step_data import CHANNELS, POSITIONS, STEP, Case, cases, read_moves
@@ -204,5 +204,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    reached=("noise/*", "sampling/*"),  # both are read from the recording itself
+    assumes=assumed.ANGLE_STEP,
     method=METHOD,
 )

@@ -20,11 +20,26 @@ SPINDOWN = (
     "With the ring an error of its inertia changes J_z, B and T_c by its share, until J_z leaves the drawing's tolerance.",
 )
 FORCE_CONSTANT = (
+    "A coil's current sensor whose gain changed since the AMBs' calibration by 0.3 % changes alpha_d by 0.7 %; by 0.9 % the "
+    "rows disagree.",
     "An asymmetry K_x/K_y that is common to both AMBs changes alpha_dx by the same share: both rows move together.",
 )
 FORCE_COUPLING = (
-    "A controller that turns its currents by 1.02 times the phase angle changes gamma_0 and alpha_c by 2 %, and the model "
-    "fits nearly as well.",
+    "An encoder that was moved by 1.5° since force-constant changes alpha_c by 2 %; 2.3° are found.",
+    "A controller that turns its currents by 1.02 times the phase angle changes gamma_0, the ratio and alpha_c by 2 %, and "
+    "the model fits nearly as well.",
+)
+FORCE_MAP = (
+    "A coil's current sensor of the inboard AMB whose gain changed since its calibration changes alpha_1 and alpha_5 by that "
+    "share.",
+)
+SLEW = (
+    "A controller whose reference swings by another amplitude than it was told changes the amplitude ratio by that share, and "
+    "the errors of tracking by as much of the amplitude.",
+)
+ANGLE_STEP = (
+    "A controller with other gains of the angle than the plan's, or with another torque constant, gives another response: it "
+    "is what was measured, and no finding.",
 )
 STEP = (
     "A set point that the controller scales is measured as the step that it makes: 1 % of it is 1 % of the step in "

@@ -38,7 +38,7 @@ def _forces(axis: str, r: AxisResult) -> Figure:
                   f"Force from the AMBs by the force row and by the moment row against i_{axis}, all angles, freed of each "
                   "angle's constant, of the other axis' current, of branch and drift. What scatters at one current is the "
                   "ripple over the angle; residuals are drawn apart.",
-                  f"i_{axis} (A)", "force (N)", tuple(series))  # fmt: skip
+                  f"motor current i_{axis} (A)", "force (N)", tuple(series))  # fmt: skip
 
 
 def _residuals(axis: str, r: AxisResult) -> Figure:
@@ -49,7 +49,7 @@ def _residuals(axis: str, r: AxisResult) -> Figure:
     return Figure(f"residuals-{axis}", f"Residuals of the {NAMES[axis]} fits",
                   "Force less fitted force at each step, all angles. A parabola common to all angles would be a wrong "
                   "curvature of an AMB, one that changes with the angle a calibration of other angles.",
-                  f"i_{axis} (A)", "residual (mN)", series, lines=(("zero", 0.0),))  # fmt: skip
+                  f"motor current i_{axis} (A)", "residual (mN)", series, lines=(("zero", 0.0),))  # fmt: skip
 
 
 def _over_angle(axis: str, r: AxisResult, angles: Array) -> Figure:
@@ -88,9 +88,9 @@ def _sharing(y: AxisResult, alone: AxisResult) -> Figure:
         return Series(label, np.arange(1.0, 4.0) + shift, values, "points", np.array([COVERAGE * e.u for e in shown]))
 
     return Figure("sharing", "What the calibration shares with this run",
-                  "95 % intervals of alpha_d by 1 the force row, 2 the moment row, 3 both. Shared: current sensors, spans, "
+                  "95 % intervals of alpha_d by each row and by both. Shared: current sensors, spans, "
                   "masses and gravity are one influence in calibration and run. Alone: only the calibration's values and "
                   f"uncertainties were passed on. The force row has the weight {y.weight:.2f} and would have "
                   f"{alone.weight:.2f}.",
-                  "1 force row, 2 moment row, 3 both", "alpha_d (N/A)",
-                  (intervals(y, -0.05, "shared"), intervals(alone, 0.05, "alone")))  # fmt: skip
+                  "", "force constant (N/A)", (intervals(y, -0.08, "shared"), intervals(alone, 0.08, "alone")),
+                  ticks=(("force row", 1.0), ("moment row", 2.0), ("both rows", 3.0)))  # fmt: skip

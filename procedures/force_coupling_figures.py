@@ -28,25 +28,25 @@ def all_figures(data: StepMeans, a: Analysis, pole_pairs: float) -> list[Figure]
         Figure("currents", "Motor currents over the phase angle",
                "Currents that hold the outboard end at the sensors' zero. Gravity asks for i_y; with the phase angle the "
                "force turns and i_x with it.",
-               "gamma (degrees)", "current (A)",
+               "phase angle (°)", "current (A)",
                (Series("i_y", degrees, a.fit.i_y, "points"), Series("i_y model", np.degrees(grid), y, "line"),
                 Series("i_x", degrees, a.fit.i_x, "points"), Series("i_x model", np.degrees(grid), x, "line"))),
         Figure("turn", "How far the current turns",
                "Direction of the current vector; its slope at the zero is M alpha_c/alpha_d.",
-               "gamma (degrees)", "direction of the current (degrees)",
+               "phase angle (°)", "direction of the current (°)",
                (Series("measured", degrees, turned, "points"), Series("model", np.degrees(grid), model_turn, "line"))),
         Figure("residuals", "Residuals over the phase angle",
                "Current measured less current modelled. A pattern would be a model that does not describe the machine.",
-               "gamma (degrees)", "residual (mA)",
+               "phase angle (°)", "residual (mA)",
                tuple(Series(f"{name} {way}", degrees[use], part[use], "points")
-                     for name, part in (("i_x", left[:n]), ("i_y", left[n:])) for way, use in (("up", up), ("down", ~up))),
+                     for name, part in (("i_y", left[n:]), ("i_x", left[:n])) for way, use in (("up", up), ("down", ~up))),
                lines=(("zero", 0.0),)),
         Figure("residuals-as-printed", "Residuals of the thesis' own fit",
                f"The same with the linear fit of T (6.15), gamma_0 = 0: alpha_d/alpha_c = {a.printed:.4f} instead of "
                f"{a.fit.term('r'):.4f}. The pattern is the zero of the commutation, {np.degrees(a.fit.term('gamma_0')):+.3f}°.",
-               "gamma (degrees)", "residual (mA)",
-               (Series("i_x", degrees, 1e3 * (a.fit.i_x - xt), "points"),
-                Series("i_y", degrees, 1e3 * (a.fit.i_y - yt), "points")),
+               "phase angle (°)", "residual (mA)",
+               (Series("i_y", degrees, 1e3 * (a.fit.i_y - yt), "points"),
+                Series("i_x", degrees, 1e3 * (a.fit.i_x - xt), "points")),
                lines=(("zero", 0.0),)),
     ]  # fmt: skip
 

@@ -26,7 +26,7 @@ from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import NOTHING, Load, RigState
-from procedures import carrying, force_map_figures, rotor, wiring
+from procedures import assumed, carrying, force_map_figures, rotor, wiring
 from procedures.estimators import map_data, map_estimates, motor_wiring
 from procedures.estimators.direction import of_probe
 from procedures.estimators.force_map import ABOUT, UNITS
@@ -159,7 +159,8 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     yield from signals
     if any(f.code == "stuck-channel" for f in signals):
         return
-    _, result = evaluate(recording)
+    data, result = evaluate(recording)
+    yield from map_data.drifts(data, result.force, result.points.i_theta)
     yield from _contradictions(result, recording.plan)
     yield from _notes(result)
     for quantity in MEASURES:
@@ -185,7 +186,7 @@ def _contradictions(result: Result, plan: Plan) -> Iterator[Finding]:
         text = (f"the model leaves {rms:.2f} N rms ({plan.max_residual_N:g} N allowed): the calibration is of another angle or "
                 "rotor, or a point was disturbed.")  # fmt: skip
         yield Finding("misfit", text, "", Effect.INDETERMINATE)
-    if np.ptp(result.i_theta) < LEAST_TORQUE_A:
+    if np.ptp(result.points.i_theta) < LEAST_TORQUE_A:
         text = "the load on the lever made no torque current: was it hung, and does the lever hold?"
         yield Finding("no-torque-current", text, "i_theta", Effect.ERROR)
 
@@ -220,7 +221,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 
 def figures(recording: Recording[Plan]) -> Iterable[Figure]:
-    """Residuals, selection, and how well each term is told; empty without points."""
+    """The greatest terms, residuals and selection; empty without points."""
     if not len(recording.steps(STEP)):
         return ()
     return force_map_figures.rig_figures(*evaluate(recording))
@@ -264,6 +265,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    assumes=assumed.FORCE_MAP,
     method=METHOD,
     needs=needs,
 )

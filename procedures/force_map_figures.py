@@ -1,18 +1,19 @@
-"""What a force map draws: residuals over what was measured, and how the prediction improves with each term."""
+"""What a force map draws: its greatest terms, residuals, and how the prediction improves with each term."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from bench.figures import Figure, Series
-from bench.uncertainty import coverage_factor
-from procedures.estimators import map_estimates
 from procedures.estimators.map_data import MapData
 from procedures.estimators.map_estimates import Result
 from procedures.estimators.mapping import Part
 
+Array = npt.NDArray[np.float64]
 ROWS = {"force": ("F_x", "F_y"), "torque": ("torque",)}
 
 
@@ -39,15 +40,16 @@ def selection(part: Part) -> list[Figure]:
     if not path or part.selection.chosen is None:
         return []
     size = np.array([float(len(c.terms)) for c in path])
-    loss = np.log10([c.loss for c in path]) / 2
+    loss = np.sqrt([c.loss for c in path])
     chosen = part.selection.chosen
     return [
         Figure(f"selection-{part.name}", f"Terms of the {part.name} model",
                "Root mean square error in predicting a point from the others, for the best model of each size; chosen is the "
                "smallest that is not worse than the best by more than one standard error.",
-               "number of terms", f"log10 of prediction error ({part.unit})",
+               "number of terms", f"prediction error ({part.unit})",
                (Series("best of its size", size, loss, "both"),
-                Series("chosen", np.array([float(len(chosen.terms))]), np.array([np.log10(chosen.loss) / 2]), "points")))
+                Series("chosen", np.array([float(len(chosen.terms))]), np.array([math.sqrt(chosen.loss)]), "points")),
+               log_y=True)
     ]  # fmt: skip
 
 
@@ -57,29 +59,37 @@ def _listed(terms: Sequence[str]) -> str:
 
 
 def rig_figures(data: MapData, result: Result) -> list[Figure]:
-    """Residuals by load, the selection, and constants over their uncertainties."""
+    """Force over current and over displacement, residuals by load, and the selection."""
     fitted = result.force - result.residuals
     where = np.array(data.loads)[data.group]
-    clouds = tuple(
-        Series(load or "no load", fitted[where == load], result.residuals[where == load], "points")
-        for load in dict.fromkeys(data.loads)
-    )
+    loads = {load: where == load for load in dict.fromkeys(data.loads)}
+    clouds = tuple(Series(load or "no load", fitted[m], result.residuals[m], "points") for load, m in loads.items())
+    points = result.points
     out = [
+        *_share(result, "alpha_1", points.i_y, 1.0, "current", "motor current i_y (A)", loads),
+        *_share(result, "alpha_5", points.y, 1e6, "displacement", "displacement y at the motor (µm)", loads),
         Figure("residuals", "Residuals of the force map", "Vertical force of the motor, from the inboard AMB, less the model "
                "with every term that can be told; means of each angle and load taken off.", "force (N)", "residual (N)", clouds,
-               lines=(("zero", 0.0),))
+               lines=(("zero", 0.0),)),
     ]  # fmt: skip
     if path := result.selection.path:
-        size, loss = np.array([float(len(c.terms)) for c in path]), np.array([np.log10(c.loss) / 2 for c in path])
+        size, loss = np.array([float(len(c.terms)) for c in path]), np.array([math.sqrt(c.loss) for c in path])
         out.append(Figure("selection", "Terms that the rig shows", "Root mean square error in predicting a point from the "
-                          "others, for the best model of each size.", "number of terms", "log10 of prediction error (N)",
-                          (Series("best of its size", size, loss, "both"),)))  # fmt: skip
-    k = coverage_factor(max(len(result.residuals) - len(result.terms), 1))
-    shown = [n for n in result.terms if n not in map_estimates.QUADRATURE]
-    number = np.array([float(map_estimates.TERMS.index(n) + 1) for n in shown])
-    ratio = [abs(e.value) / max(k * e.u, 1e-300) for e in (result.estimates[n] for n in shown)]
-    out.append(Figure("resolved", "How well each term is told", "Constant over its expanded uncertainty (95 %), as a power of "
-                      "ten; below nought the interval holds zero. 1 to 9 are terms of (5.25), 10 the cross force.", "term",
-                      "log10 of value over U", (Series("terms", number, np.log10(np.maximum(ratio, 1e-2)), "points"),),
-                      lines=(("U", 0.0),)))  # fmt: skip
+                          "others, for the best model of each size.", "number of terms", "prediction error (N)",
+                          (Series("best of its size", size, loss, "both"),), log_y=True))  # fmt: skip
     return out
+
+
+def _share(
+    result: Result, term: str, over: Array, scale: float, name: str, label: str, loads: Mapping[str, npt.NDArray[np.bool_]]
+) -> Iterator[Figure]:  # fmt: skip
+    """What one term makes of the force, with what the whole model leaves: its line, and the points about it."""
+    if term not in result.estimates:
+        return
+    slope = result.estimates[term].value
+    own = slope * over + result.residuals
+    ends = np.array([over.min(), over.max()])
+    yield Figure(f"force-{name}", f"Vertical force of the motor over its {name}", "All points, freed of the model's other "
+                 "terms; what is left of them about the line is drawn apart.", label, "force (N)",
+                 (*(Series(load or "no load", scale * over[m], own[m], "points") for load, m in loads.items()),
+                  Series("by the force map", scale * ends, slope * ends)))  # fmt: skip

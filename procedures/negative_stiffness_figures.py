@@ -48,7 +48,7 @@ def _motor(a: Analysed) -> Iterator[Figure]:
     yield Figure("current", "Current of the motor over displacement",
                  "Vertical motor current that holds the outboard end, the outboard AMB being off. At the top the magnets pull "
                  "up by themselves and the motor needs less.",
-                 "outboard position (µm)", "i_y (A)",
+                 "outboard position (µm)", "motor current i_y (A)",
                  (line, Series("going up", y[up], i[up], "points"),
                   Series("going down", y[~up], i[~up], "points")))  # fmt: skip
     vertical, horizontal = 1e3 * a.by_motor.fit.residuals[:n], 1e3 * a.by_motor.fit.residuals[n:]

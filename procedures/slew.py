@@ -22,7 +22,7 @@ from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
-from procedures import carrying, rotor, wiring
+from procedures import assumed, carrying, rotor, wiring
 from procedures import slew_figures as drawn
 from procedures.estimators import motor_wiring, slew_data, slew_estimates, slewing
 from procedures.estimators.direction import of_probe
@@ -193,6 +193,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    assumes=assumed.SLEW,
     method=METHOD,
     needs=needs,
 )

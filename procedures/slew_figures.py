@@ -64,9 +64,9 @@ def _ways(s: Swing, t_0: float, values: np.ndarray, scale: float) -> tuple[Serie
 
 def _over_angle(result: Result) -> Figure:
     slow = sorted(result.swings, key=lambda pair: pair[0].hz)[:2]
-    series = [line for s, t_0 in slow for line in _ways(s, t_0, reference(s, t_0) - s.angle, 1e3)]
+    series = [line for s, t_0 in slow for line in _ways(s, t_0, np.degrees(reference(s, t_0) - s.angle), 1.0)]
     return Figure("error-angle", "Tracking error over the angle", "Means over all periods in sixty bins, for the two slowest "
-                  "frequencies: what catches the rotor does so at the same angles.", "angle (°)", "error (mrad)",
+                  "frequencies: what catches the rotor does so at the same angles.", "angle (°)", "error (°)",
                   tuple(series))  # fmt: skip
 
 
@@ -78,11 +78,10 @@ def _growth(result: Result) -> Figure:
         found = [result.tracking[f][name] for f in hz]
         values = np.array([e.value for e in found])
         k = coverage_factor(periods - 1)
-        safe = np.maximum(values, 1e-6)
-        u = np.array([k * e.u for e in found]) / (safe * np.log(10))
-        series.append(Series(label, np.log10(hz), np.log10(1e3 * safe), "both", np.minimum(u, 1.0)))
-    return Figure("growth", "Tracking error over frequency", "Powers of ten on both axes, 95 % intervals (as T Fig. 8.1c).",
-                  "log10 of frequency (Hz)", "log10 of error (mrad)", tuple(series))  # fmt: skip
+        u = np.minimum([k * e.u for e in found], 0.9 * values)  # a logarithmic axis has no room below zero
+        series.append(Series(label, hz, np.degrees(values), "both", np.degrees(u)))
+    return Figure("growth", "Tracking error over frequency", "With 95 % intervals (as T Fig. 8.1c); those that reach below "
+                  "zero are cut.", "frequency (Hz)", "error (°)", tuple(series), log_x=True, log_y=True)  # fmt: skip
 
 
 def _torque(s: Swing, t_0: float) -> Figure:

@@ -18,12 +18,13 @@ from procedures.estimators.torque_data import TorqueData
 
 Array = npt.NDArray[np.float64]
 SIDES = ((1, "left"), (-1, "right"))
+SHOWN_S = 0.06
 
 
 def all_figures(recording: Recording[Any], data: TorqueData, b: Balance, held: Detent, pairs: float) -> list[Figure]:
     """In the order of the report."""
     return [_torque(data, b, pairs), *_over_gamma(data, b, pairs), _residuals(data, b), _detent(data, b, held),
-            *_one_step(recording)]  # fmt: skip
+            _one_step(recording)]  # fmt: skip
 
 
 def _torque(data: TorqueData, b: Balance, pairs: float) -> Figure:
@@ -54,12 +55,12 @@ def _over_gamma(data: TorqueData, b: Balance, pairs: float) -> Iterator[Figure]:
     grid = np.linspace(data.steps.gamma.min(), data.steps.gamma.max(), 120)
     points.append(Series("fit", np.degrees(grid), b.alpha * np.cos(pairs * (grid - b.gamma_0))))
     yield Figure("constant", "Torque per current over the phase angle", "One slope at each phase angle and side, and the "
-                 "fitted cosine, whose peak is the torque constant.", "phase angle (deg)", "torque per current (N m/A)",
+                 "fitted cosine, whose peak is the torque constant.", "phase angle (°)", "torque per current (N m/A)",
                  tuple(points))  # fmt: skip
     yield Figure("constant-residuals", "Torque per current, departure from the cosine", "The same slopes against the fit, with "
                  "95 % intervals by the scatter of the steps. One side above the other would be an arm, a bend "
                  "would be no cosine.",
-                 "phase angle (deg)", "departure (%)", tuple(apart), lines=(("fit", 0.0),))  # fmt: skip
+                 "phase angle (°)", "departure (%)", tuple(apart), lines=(("fit", 0.0),))  # fmt: skip
 
 
 def _residuals(data: TorqueData, b: Balance) -> Figure:
@@ -68,7 +69,7 @@ def _residuals(data: TorqueData, b: Balance) -> Figure:
         mine = s.side == side
         series.append(Series(label, np.degrees(s.gamma[mine]), 1e3 * b.fit.residuals[mine], "points"))
     return Figure("residuals", "Residuals of the fit", "Torque current less the fit, every step; a pattern over the phase "
-                  "angle would be no cosine, one by side an arm.", "phase angle (deg)", "residual (mA)", tuple(series),
+                  "angle would be no cosine, one by side an arm.", "phase angle (°)", "residual (mA)", tuple(series),
                   lines=(("zero", 0.0),))  # fmt: skip
 
 
@@ -76,21 +77,19 @@ def _detent(data: TorqueData, b: Balance, held: Detent) -> Figure:
     grid = np.linspace(0, 2 * math.pi / held.order, 100)
     curve = held.constant + held.cosine * np.cos(held.order * grid) + held.sine * np.sin(held.order * grid)
     return Figure("detent", "Torque that holds the rotor without load", "Over one period of the detent; the constant part also "
-                  "has the offsets of the current sensors.", "rotor angle (deg)", "torque (mN m)",
+                  "has the offsets of the current sensors.", "rotor angle (°)", "torque (mN m)",
                   (Series("held", np.degrees(data.detent_angle), 1e3 * b.alpha * data.detent_current, "points"),
                    Series("fit", np.degrees(grid), 1e3 * b.alpha * curve)))  # fmt: skip
 
 
-def _one_step(recording: Recording[Any]) -> Iterator[Figure]:
+def _one_step(recording: Recording[Any]) -> Figure:
+    """The end of a step close by: over its whole second, which is what is averaged, the swing would be a solid block."""
     heaviest = recording.plan.masses[-1]
     step = next(s for s in recording.steps("lever") if s.labels["load"] == heaviest)
-    before = round(1.5e9)
-    data = recording.read(("angle", *SEGMENTS), step.start_ns - before, step.end_ns)
-    t = (data["t_ns"] - step.start_ns).astype(np.float64) * 1e-9
+    data = recording.read(SEGMENTS, step.end_ns - round(1e9 * SHOWN_S), step.end_ns)
+    t = (data["t_ns"] - step.end_ns).astype(np.float64) * 1e-6
     current = np.mean([data[c] for c in SEGMENTS], axis=0)
-    smooth = np.convolve(current, np.ones(20) / 20, "same")[10:-10]
-    yield Figure("step-current", f"Torque current about one step ({heaviest})", "Running mean over 20 ms; the step begins at "
-                 "zero. The current steps between two counts of the encoder until the rotor rests on one.", "time (s)",
-                 "torque current (A)", (Series("mean of the segments", t[10:-10], smooth),))  # fmt: skip
-    yield Figure("step-angle", f"Angle about one step ({heaviest})", "The encoder's counts in the same span.", "time (s)",
-                 "angle (mrad)", (Series("angle", t, 1e3 * data["angle"]),), lines=(("home", 0.0),))  # fmt: skip
+    return Figure("step-current", f"Torque current at the end of a step ({heaviest})", "Between two counts of the "
+                  "encoder the rotor is not held: it swings, and the current with it. What counts is the current's mean over "
+                  "the step.", "time to the end of the step (ms)", "torque current (A)",
+                  (Series("mean of the segments", t, current),))  # fmt: skip

@@ -120,7 +120,7 @@ def _input(entry: Content, unit: str, inputs: Mapping[str, Content]) -> tuple[st
     if not c:
         return text.DASH, text.DASH, text.DASH
     size, si = contribution / abs(c), str(entry.get("unit") or "")
-    stored = inputs.get(tables.RENAMED.get(str(entry.get("influence")), str(entry.get("influence"))))
+    stored = _stored(str(entry.get("influence")), inputs)
     symbol, one = tables.written(si, abs(float(stored["value"])) or size if stored else size)
     ratio = units_over(unit, symbol)
     slope = text.with_unit(text.significant(float(c) * one, 3), ratio)
@@ -128,6 +128,17 @@ def _input(entry: Content, unit: str, inputs: Mapping[str, Content]) -> tuple[st
         return text.DASH, text.with_unit(text.significant(size / one), symbol), slope
     value = text.with_unit(text.plain(float(f"{stored['value'] / one:.12g}")), symbol)
     return value, text.with_unit(text.significant(size / one), symbol), slope
+
+
+def sensitivity(entry: Content, unit: str) -> str:
+    """The sensitivity of a result in `unit` to an influence, with its unit."""
+    return _input(entry, unit, {})[2]
+
+
+def _stored(identity: str, inputs: Mapping[str, Content]) -> Content | None:
+    """The rig file's number behind an influence; one that holds for several places has the place behind its own name."""
+    name = tables.RENAMED.get(identity, identity)
+    return inputs.get(name) or inputs.get(name.rpartition("/")[0])
 
 
 def units_over(unit: str, by: str) -> str:

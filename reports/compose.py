@@ -102,11 +102,11 @@ def view_of(record: Content, around: Surroundings, shown: Sequence[Drawn | Sheet
         decision_rule=DECISION_RULE,
         unseen=unseen.unseen(measurements, around.reached, around.titles),
         about_unseen=unseen.ABOUT,
-        assumed=tuple(around.assumes) if rows else (),
+        assumed=tuple(tables.called(a, around.titles) for a in around.assumes) if rows else (),
         notes=tuple(f for f in findings if not f.loud),
         figures=front.entries(shown),
         budgets=tuple(table for told, table in budgeted if told),
-        method=_paragraphs(around.method),
+        method=tuple(tables.called(p, around.titles) for p in _paragraphs(around.method)),
         conditions=_conditions(around),
         traceability=tables.traceability(around.rig, budgets.identities(measurements)),
         calibrations=tables.calibrations(record.get("calibrations")),
@@ -190,7 +190,10 @@ def _findings(record: Content, around: Surroundings) -> Iterable[FindingRow]:
         said_of = (str(f.get("code", "")), str(f.get("text", "")), str(f.get("effect") or "note"))
         same.setdefault(said_of, []).append(str(f.get("where") or ""))
     for (code, said, effect), places in same.items():
-        yield FindingRow(code, said, "; ".join(dict.fromkeys(filter(None, places))), effect, effect != "note")
+        where = "; ".join(dict.fromkeys(filter(None, places)))
+        yield FindingRow(
+            code, tables.called(said, around.titles), tables.called(where, around.titles), effect, effect != "note"
+        )
 
 
 def _uut(uut: Any) -> str:

@@ -251,11 +251,14 @@ def _plain_axes(axes: Axes, figure: Figure) -> list[Artist]:
         axes.set_xscale("log")
     if figure.downward:
         axes.invert_yaxis()
-    for axis in (axes.yaxis,) if figure.log_x else (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 2.5, 5, 10]))
+    if figure.log_y:
+        axes.set_yscale("log")
+    for axis, log in ((axes.xaxis, figure.log_x), (axes.yaxis, figure.log_y)):
+        if not log:
+            axis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 2.5, 5, 10]))
         axis.set_major_formatter(tick_text())
-    if figure.log_x:
-        axes.xaxis.set_major_formatter(tick_text())
+    if figure.ticks:
+        axes.set_xticks([x for _, x in figure.ticks], [label for label, _ in figure.ticks])
     if figure.below is not None and figure.below.downward:
         axes.set_ylim(bottom=0)  # the amplitude over its lag
     for axis, label in ((axes.xaxis, figure.x_label), (axes.yaxis, figure.y_label)):

@@ -8,6 +8,7 @@ from typing import Any
 from bench import units
 
 Content = Mapping[str, Any]
+LIMIT_DIGITS = 5
 
 
 def told(measurement: Content) -> Content:
@@ -28,7 +29,12 @@ def told(measurement: Content) -> Content:
 
 
 def _limit(limit: Content | None, symbol: str, one: float) -> Content | None:
-    return None if limit is None else {**limit, "unit": symbol, **_divided(limit, ("low", "high"), one)}
+    """Without the last digits that the division makes: a limit is a number that was stated."""
+    if limit is None:
+        return None
+    divided = _divided(limit, ("low", "high"), one)
+    told = {k: None if x is None else float(f"{x:.{LIMIT_DIGITS}g}") for k, x in divided.items()}
+    return {**limit, "unit": symbol, **told}
 
 
 def _divided(entry: Content, names: tuple[str, ...], one: float) -> dict[str, float | None]:

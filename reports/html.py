@@ -6,9 +6,10 @@ from functools import cache
 from importlib.resources import files
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template, TemplateError
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from bench.errors import BenchError
+from reports import text
 from reports.view import ReportView
 
 
@@ -21,7 +22,16 @@ def _template() -> Template:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["prose"] = _prose
     return environment.get_template("report.html.j2")
+
+
+def _prose(said: str) -> Markup:
+    """A text with its symbols set as such, everything escaped."""
+    return Markup("").join(
+        Markup("<i>{}</i><sub>{}</sub>").format(part, below) if below else escape(part)
+        for part, below in text.symbols(said)
+    )
 
 
 @cache

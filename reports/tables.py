@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
@@ -35,6 +36,14 @@ def symbol_of(name: str, titles: Mapping[str, str] = MappingProxyType({})) -> Sy
     return (
         Symbol(name, letter, subscript) if subscript else Symbol(name.replace("_", " "), letter.replace("_", " "), "")
     )
+
+
+def called(said: str, titles: Mapping[str, str]) -> str:
+    """A text with the titles of quantities in place of names that are no words: those with a stroke in them."""
+    names = sorted((n for n in titles if "_" in n), key=len, reverse=True)
+    if not names:
+        return said
+    return re.sub(rf"\b({'|'.join(map(re.escape, names))})\b", lambda m: titles[m[0]], said)
 
 
 def place(measurement: Content) -> str:

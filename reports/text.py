@@ -17,7 +17,9 @@ MINUS = "\u2212"
 TIMES = "\u00d7"
 DASH = "\u2013"
 _SUPERSCRIPTS = str.maketrans("0123456789-+", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺")
-_GREEK = {"alpha": "α", "beta": "β", "gamma": "γ", "tau": "τ"}
+_GREEK = {"alpha": "α", "beta": "β", "gamma": "γ", "rho": "ρ", "tau": "τ"}
+SYMBOL = re.compile(r"\b(alpha|beta|gamma|rho|[αβγρ]′?|d?[A-Z]|d?i)_([A-Za-z0-9]{1,3})\b")
+"""A symbol as prose writes it, `alpha_dx`, `K_i`, `dF_y`: letter and subscript. The PDF's template has the same."""
 _UNIT_WORDS = {
     "um": "µm",
     "us": "µs",
@@ -182,6 +184,17 @@ def moment(text: str | None) -> str:
     offset = at.utcoffset()
     zone = "" if offset is None else " UTC" if not offset else at.strftime(" UTC%z")
     return at.strftime("%Y-%m-%d %H:%M:%S") + zone
+
+
+def symbols(said: str) -> list[tuple[str, str]]:
+    """A text in parts, each with the subscript that stands behind it: `by K_i` -> (`by `, ``), (`K`, `i`)."""
+    parts: list[tuple[str, str]] = []
+    end = 0
+    for found in SYMBOL.finditer(said):
+        parts += [(said[end : found.start()], "")] if found.start() > end else []
+        parts.append((_GREEK.get(found[1], found[1]), _GREEK.get(found[2], found[2])))
+        end = found.end()
+    return [*parts, (said[end:], "")] if end < len(said) else parts
 
 
 def symbol(name: str) -> tuple[str, str]:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from typing import Any
 
-from reports import tables, text
+from reports import budgets, tables, text
 from reports.view import Table
 
 SHOWN = 0.01  # of a variance; what carries less of every result is summed up
@@ -32,18 +32,19 @@ def is_reached(identity: str, reached: Sequence[str]) -> bool:
 def unseen(
     measurements: Iterable[Content], reached: Sequence[str], titles: Mapping[str, str] | None = None
 ) -> Table:  # fmt: skip
-    """The influences of Type B that are out of reach, largest share first, each with the result that it carries most of."""
+    """The influences of Type B that are out of reach, largest share first, each with the result that it carries most of; those
+    of one name (the encoder's count in every result) are one row."""
     best: dict[str, tuple[float, Content, Content]] = {}
     for m in measurements:
         entries = m.get("budget") or ()
         variance = math.fsum(float(e.get("contribution") or 0.0) ** 2 for e in entries)
         for e in entries if variance > 0 else ():
-            name, share = (
-                str(e.get("influence") or e.get("name") or ""),
-                float(e.get("contribution") or 0.0) ** 2 / variance,
-            )
-            if e.get("type") == "B" and not is_reached(name, reached) and share > best.get(name, (0.0, m, e))[0]:
-                best[name] = (share, m, e)
+            identity, name = (str(e.get(key) or "") for key in ("influence", "name"))
+            share = float(e.get("contribution") or 0.0) ** 2 / variance
+            if e.get("type") != "B" or is_reached(identity or name, reached):
+                continue
+            if share > best.get(name or identity, (0.0, m, e))[0]:
+                best[name or identity] = (share, m, e)
     ranked = sorted(best.values(), key=lambda found: -found[0])
     shown = [found for found in ranked if found[0] >= SHOWN][:MOST]
     rows = [_row(*found, titles or {}) for found in shown]
@@ -62,7 +63,7 @@ def _row(share: float, measurement: Content, entry: Content, titles: Mapping[str
         _share(share),
         tables.symbol_of(str(measurement.get("name", "")), titles).plain + (f" ({where})" if where else ""),
         text.with_unit(text.significant(abs(float(entry.get("contribution") or 0.0))), unit),
-        text.significant(entry.get("sensitivity"), 3),
+        budgets.sensitivity(entry, unit),
     )
 
 

@@ -31,9 +31,11 @@ DEFECTS = {
     "stuck_current_yo_p": 0.0, "coil_limit_yo_p": 0.0, "mass_error_M1": 0.0, "mass_error_M2": 0.0, "mass_error_M3": 0.0,
     "mass_error_M4": 0.0, "hanger_off_at_zero": 0.0, "drop_fraction": 0.0, "integrator_factor": 1.0, "dead_after_s": 0.0,
     "fault_after_s": 0.0, "drive_fault_after_s": 0.0, "exchange_segments": 0.0, "segment_sign_1": 1.0,
-    "encoder_sign": 1.0, "lever_slip": 0.0, "drive_brakes": 0.0,
+    "encoder_sign": 1.0, "lever_slip": 0.0, "drive_brakes": 0.0, "factor_gamma": 1.0, "factor_kp_theta": 1.0,
+    "factor_kd_theta": 1.0, "factor_sine_amplitude": 1.0, "factor_angle_ref": 1.0,
 }  # fmt: skip
-"""Planted defects and their harmless values. Mass errors are relative."""
+"""Planted defects and their harmless values. Mass errors are relative; `factor_...` is what the
+controller makes of a parameter, over what it was told."""
 
 
 def stated(rig: RigFile) -> dict[str, Toleranced]:

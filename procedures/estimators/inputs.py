@@ -5,13 +5,20 @@ from __future__ import annotations
 from bench.toleranced import Toleranced
 from bench.uncertainty import Estimate, Influence
 
+WORDS = {"com": "centre of mass", "amb": "AMB"}
+
+
+def spelled(key: str) -> str:
+    """A key of the rig file in words: `com_to_outboard_amb` is "centre of mass to outboard AMB"."""
+    return " ".join(WORDS.get(part, part) for part in key.split("_"))
+
 
 def certified(identity: str, t: Toleranced, name: str = "") -> Estimate:
     """The certified value as an Estimate with one Type B influence known by `identity` (stable along the chain); `name` is what
-    a budget calls it, else the last part of its identity."""
+    a budget calls it, else the last part of its identity in words."""
     influence = Influence(
         id=identity,
-        name=name or identity.rpartition("/")[2].replace("_", " "),
+        name=name or spelled(identity.rpartition("/")[2]),
         u=t.standard_uncertainty,
         unit=t.unit,
         kind="B",

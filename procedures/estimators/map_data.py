@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -22,6 +23,11 @@ CHANNELS = (*COILS, *POSITIONS, *SEGMENTS, "flags")
 LIMITS = ((1, "saturated", "an AMB amplifier was at its limit"), (2, "saturated", "a segment of the motor was at its limit"),
           (12, "contact", "the rotor touched a touchdown bearing"))  # fmt: skip
 """Bits of the telemetry signal `flags`."""
+WANDER_N = (
+    0.05  # of the motor's force between two points of an angle at which nothing is set; constants then move by half a U
+)
+SLIP = 0.1  # of the torque current of a load; friction makes 2 %
+SIGNIFICANT = 6.0  # standard uncertainties
 
 
 class Tolerances(Protocol):
@@ -108,3 +114,21 @@ def of_signals(data: MapData, plan: Tolerances) -> Iterator[Finding]:
     if worst > plan.max_drift_A:
         yield Finding("unsettled", f"the inboard control current drifts by {worst * 1e3:.1f} mA within a point "
                       f"({plan.max_drift_A * 1e3:g} mA allowed): settle longer.", "", Effect.INDETERMINATE)  # fmt: skip
+
+
+def drifts(data: MapData, force: Array, i_theta: Array) -> Iterator[Finding]:
+    """Each angle and load begins and ends with nothing set: what differs then has drifted meanwhile, and is no constant's.
+    `force` of the motor, N, and torque current, A, of every point."""
+    first, last = np.array([np.flatnonzero(data.group == g)[[0, -1]] for g in np.unique(data.group)]).T
+    apart = force[last] - force[first]
+    mean, u = float(apart.mean()), float(apart.std(ddof=1)) / math.sqrt(len(apart))
+    if abs(mean) > max(WANDER_N, SIGNIFICANT * u):
+        text = (f"with nothing set the motor's force is {mean:+.3g} N more at the end of an angle than at its start "
+                f"({WANDER_N:g} N allowed): a coil sensor of the inboard AMB's vertical axis drifts, or that of segment 1 or 3."
+                )  # fmt: skip
+        yield Finding("drifting-sensor", text, "i_yi", Effect.INDETERMINATE)
+    for a, b in zip(first, last, strict=True):
+        if data.loads[data.group[a]] and abs(i_theta[b] - i_theta[a]) > SLIP * abs(i_theta[a]):
+            took = f"{i_theta[a]:+.3f} A of torque current at first and {i_theta[b]:+.3f} A in the end"
+            text = f"the load took {took}: does it slip?"
+            yield Finding("lever-slips", text, data.loads[data.group[a]], Effect.INDETERMINATE)

@@ -13,7 +13,7 @@ sin(P theta) i_y and cos(P theta) i_x. Without the last two, which are small, te
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -34,12 +34,14 @@ TERMS = (*FORCE_TERMS, CROSS, *QUADRATURE)
 SCALE = dict.fromkeys(TERMS, 1.0) | {"alpha_4": 1e3, "alpha_5": 1e5, "alpha_8": 1e2, "alpha_9": 1e2}
 Y_ROW = 1  # of `force_map.force_design`
 EXCITED = 0.02
+MINOR = 0.1  # of a term's standard uncertainty
 
 
 @dataclass(frozen=True)
 class Result:
     """`terms` that the points can tell, their estimates, the force of every point less its group's mean, (n,) N, the part
-    of it that the fit leaves, and how each term fares when points are left out."""
+    of it that the fit leaves, how each term fares when points are left
+    out, and the points as the fit used them."""
 
     terms: tuple[str, ...]
     told: Identifiability
@@ -47,7 +49,7 @@ class Result:
     force: Array
     residuals: Array
     selection: Selection
-    i_theta: Array
+    points: Points
 
 
 def inputs_of(rig: RigFile, facts: Mapping[str, Estimate], angles: int) -> dict[str, Estimate]:
@@ -56,7 +58,7 @@ def inputs_of(rig: RigFile, facts: Mapping[str, Estimate], angles: int) -> dict[
     out = {f"{name}@{k}": facts[f"{name}@{k}"] for name in ("K_i", "K2_i") for k in range(angles)}
     for key in ("amb_span", "motor_to_outboard_amb", "amb_gap", "com_to_inboard_sensor", "com_to_outboard_sensor",
                 "com_to_outboard_amb"):  # fmt: skip
-        out[key] = certified(f"geometry/{key}", g[key], key.replace("_", " "))
+        out[key] = certified(f"geometry/{key}", g[key])
     for channel in (*COILS, *SEGMENTS):
         sensor = rig.sensors[channel]
         out[f"gain/{channel}"] = certified(f"sensors/{channel}/gain", sensor.gain, f"gain of {channel}")
@@ -142,11 +144,16 @@ def evaluate(data: MapData, inputs: Mapping[str, Estimate], bias_A: float, angle
     estimates = chainrule.by_inputs(model, inputs)
     gradients = {n: np.eye(len(terms))[k] * SCALE[n] for k, n in enumerate(terms)}
     spread = typea.scatter(fit, gradients, "map", "scatter of the points")
+    sums = {n: _straight(estimates[n], estimates[n] + spread[n]) for n in terms}
     force = _centred(motor_force(data, values, bias_A), data.group)
     selection = termselection.select(whole[:, None, columns], force[:, None], None, terms)
-    return Result(
-        terms, told, {n: estimates[n] + spread[n] for n in terms}, force, fit.residuals, selection, points.i_theta
-    )
+    return Result(terms, told, sums, force, fit.residuals, selection, points)
+
+
+def _straight(certified: Estimate, whole: Estimate) -> Estimate:
+    """The whole estimate of a term, without its Monte Carlo where certificates and calibration, which alone go through a model
+    that may bend, carry under a tenth of its u: a hundred thousand fits would draw what the scatter hides."""
+    return replace(whole, sampler=None) if certified.u < MINOR * whole.u else whole
 
 
 def _excited(design: Array, points: Points) -> Array:

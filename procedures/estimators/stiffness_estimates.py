@@ -100,7 +100,7 @@ def fit_inputs(recording: Recording[Any]) -> dict[str, Estimate]:
     }
     for key, name in (("l_is", "com_to_inboard_sensor"), ("l_os", "com_to_outboard_sensor"), ("z_oa", "com_to_outboard_amb"),
                       ("motor_to_outboard", "motor_to_outboard_amb"), ("amb_span", "amb_span")):  # fmt: skip
-        inputs[key] = certified(f"geometry/{name}", g[name], name.replace("_", " "))
+        inputs[key] = certified(f"geometry/{name}", g[name])
     inputs["amb_gap"] = Estimate.exact(g["amb_gap"].value)  # where the iteration starts, and nothing else
     for axis in ("yi", "yo", "xi", "xo"):
         channel = f"pos_{axis}"

@@ -174,10 +174,42 @@ def test_what_no_data_can_show_is_made_from_the_budget() -> None:
         measurement(budget=budget), measurement(name="K_o", budget=budget[2:])])  # fmt: skip
     rows = made.unseen.rows
     assert [row[0] for row in rows] == ["the sensors/a/gain", "1 further influence"]
-    assert rows[0][1:] == ("64\u202f%", "K_i", "3.0\u202fN/A", "−7.00")
+    assert rows[0][1:] == ("64\u202f%", "K_i", "3.0\u202fN/A", "−7.00\u202fN/A")
     page = Page(html.render(made)).text
-    places = [page.index(w) for w in ("Decision rule", "What no data can show", "All masses alike", "Notes")]
+    places = [page.index(w) for w in ("What no data can show", "All masses alike", "Results", "Decision rule", "Notes")]
     assert places == sorted(places)
+
+
+def test_what_is_in_every_result_is_one_row_of_what_no_data_can_show() -> None:
+    made = view(measurements=[
+        measurement(name=f"K_{b}", budget=[{**budget()[0], "name": "encoder count", "influence": f"run/{b}/count"}])
+        for b in "io"
+    ])  # fmt: skip
+    assert [row[0] for row in made.unseen.rows] == ["encoder count"]
+
+
+def test_an_influence_of_one_place_has_the_estimate_of_the_rig_files_number() -> None:
+    rig = {"machine": {"amb_asymmetry": {"value": 0.0, "unit": "1", "half_width": 0.03, "distribution": "rectangular"}}}
+    entry = {
+        **budget()[0],
+        "influence": "machine/amb_asymmetry/o",
+        "sensitivity": 6.0,
+        "contribution": 0.1,
+        "unit": "1",
+    }
+    assert [row.estimate for row in budgets.budget_table(measurement(budget=[entry]), rig).rows] == ["0"]
+
+
+def test_prose_has_symbols_for_names_and_escapes_the_rest() -> None:
+    """What a finding says of `alpha_dx` is of the quantity that the table calls by its symbol."""
+    said = "alpha_x_prime and dF_y/di_y <b>, i_yi_p: K_i"
+    finding = {"code": "c", "text": said, "where": "alpha_x_prime", "effect": "note"}
+    page = html.render(view(around(titles={"alpha_x_prime": "α′_x"}), findings=[finding]))
+    assert (
+        "<i>α′</i><sub>x</sub> and <i>dF</i><sub>y</sub>/<i>di</i><sub>y</sub> &lt;b&gt;, i_yi_p: <i>K</i><sub>i</sub>"
+        in page
+    )
+    assert "alpha_x_prime" not in page
 
 
 def test_a_pattern_takes_away_again() -> None:

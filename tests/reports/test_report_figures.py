@@ -87,3 +87,12 @@ def test_a_plane_with_a_closer_view_is_one_drawing_with_equal_bytes() -> None:
     made = Figure("o", "t", "c", "x (µm)", "y (µm)", some, "plane", closer=(0.0, 0.0, 1.25))
     assert draw(made).svg == draw(made).svg
     assert draw(made).svg.count("axes_") > draw(dataclasses.replace(made, closer=None)).svg.count("axes_")
+
+
+def test_a_logarithmic_axis_has_equal_steps_for_equal_ratios_and_names_stand_for_numbers() -> None:
+    series = Series("a", np.array([1.0, 2.0, 3.0]), np.array([0.01, 0.1, 1.0]))
+    axes = Canvas().subplots()
+    drawing._panel(axes, one(series, log_y=True, ticks=(("force row", 1.0), ("both", 3.0))))
+    pixels = axes.transData.transform([(1.0, 0.01), (1.0, 0.1), (1.0, 1.0)])[:, 1]
+    assert pixels[1] - pixels[0] == pytest.approx(pixels[2] - pixels[1])
+    assert [t.get_text() for t in axes.get_xticklabels()] == ["force row", "both"]

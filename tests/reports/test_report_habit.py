@@ -42,3 +42,10 @@ def test_motion_is_told_in_um_below_a_millimetre_and_other_units_stay() -> None:
     assert habit.told(same) is same
     missing = habit.told({"name": "d", "unit": "m", "value": None, "expanded_uncertainty": None})
     assert (missing["value"], missing["interval"]) == (None, [None, None])
+
+
+def test_a_limit_has_no_digits_of_the_division_by_its_unit() -> None:
+    """0.0175 rad, "one degree of commutation error", was told as 1.002 676 141 48°."""
+    limit = {"low": -0.0175, "high": 0.0175, "unit": "rad"}
+    assert habit.told({"name": "gamma_0", "unit": "rad", "value": 0.0026, "limit": limit})["limit"] == {
+        "low": -1.0027, "high": 1.0027, "unit": "deg"}  # fmt: skip
