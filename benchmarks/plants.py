@@ -1,35 +1,42 @@
 """Planted defects by size: from which size on a procedure says that something is wrong, and how far a smaller one shifts it.
 
-    nohup python benchmarks/plants.py spindown step --seeds 60 --folder plants &
-    python benchmarks/plants.py spindown --folder plants --table
+    nohup python benchmarks/plants.py spindown step --seeds 20 --jobs 2 &
+    python benchmarks/plants.py spindown --table
 
-Every run is that of `bench run`, with the short plan of plants.toml. What is done is appended to FOLDER/PROCEDURE.jsonl; the
-same command goes on from there. Caught is a run with a finding above a note, or one that ended before it had results; a shift
-is that of a quiet run's results against the same rig without the plant, in the latter's U.
+What is planted in PROCEDURE, and the short plan that it runs with, is in planted/PROCEDURE.toml; a run is that of `bench run`.
+Each size is tried on a few seeds first; then the sizes that may be the smallest one caught go on to all seeds. What is done is
+appended to FOLDER/PROCEDURE.jsonl, and the same command goes on from there. Caught is a run with a finding above a note, one
+that ended early, or one that lacks a result it declares. A shift is the error (value less truth) of a quiet run less that of
+the same rig without the plant, in the latter's U: what a plant truly changes is no error.
 """
 
 from __future__ import annotations
 
 import argparse
-import contextlib
 import json
-import os
 import tempfile
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bench.cli.adopt import adopt
-from bench.cli.compose import Request
-from bench.cli.run import execute
-from bench.errors import BenchError
-from bench.findings import Effect
-from bench.records import Outcome
+from bench.calibration import Calibration
+from bench.cli.campaign_fleet import pool
+from bench.cli.compose import load_procedure
+from bench.cli.motion_truth import truth_of_motion
+from bench.cli.virtual import Simulated, flown
+from bench.errors import BenchError, ConfigError
+from bench.findings import Effect, Finding
+from bench.plans import assemble
+from bench.procedure import Measured
+from bench.rigfile import load_rig
+from bench.uncertainty import interval
 
 SURE = 0.95  # of the seeds
-STOPPED = (Outcome.ERROR, Outcome.ABORTED)
+FEW = 10  # seeds that every size is tried on
+PLANTED = Path(__file__).with_name("planted")
 Line = dict[str, Any]
 
 
@@ -47,129 +54,183 @@ class Plant:
         """The same without what is planted."""
         return Plant("", 0.0, self.plan, self.truth)
 
+    @property
+    def overrides(self) -> dict[str, float]:
+        """What is told to the simulator's truth."""
+        told = {name: float(value) for name, value in (text.split("=") for text in self.truth)}
+        return told | ({self.name: self.size} if self.name else {})
+
     def key(self, seed: int) -> str:
         """By which a line is found again."""
         return json.dumps([self.name, self.size, self.plan, self.truth, seed])
 
 
-def plants_of(section: Mapping[str, Any]) -> list[Plant]:
-    """Every plant of a procedure, in the file's order."""
-    return [
-        Plant(p["name"], float(size), tuple(p.get("plan", ())), tuple(p.get("truth", ())))
-        for p in section["plant"] for size in p["sizes"]
-    ]  # fmt: skip
+@dataclass(frozen=True)
+class Bed:
+    """What a procedure's plants are planted in: rig, short plan, and the procedures before it with theirs."""
+
+    procedure: str
+    rig: str
+    plan: tuple[str, ...]
+    chain: Mapping[str, Sequence[str]]
+    plants: tuple[tuple[Plant, ...], ...]  # by defect, from harmless to gross
+    units: Mapping[str, str]
 
 
-def run_one(procedure: str, section: Mapping[str, Any], plant: Plant, seed: int) -> Line:
-    """One run: its outcome, the findings above a note, and value and U by `name@where`."""
-    rig, truth = section["rig"], (*plant.truth, *((f"{plant.name}={plant.size!r}",) if plant.name else ()))
-    with tempfile.TemporaryDirectory() as folder:
-        out, calibrations = Path(folder) / "runs", Path(folder) / "calibrations"
+def bed_of(procedure: str) -> Bed:
+    """Read from its file."""
+    found = tomllib.loads((PLANTED / f"{procedure}.toml").read_text(encoding="utf-8"))
+    plants = tuple(
+        tuple(Plant(p["name"], float(s), tuple(p.get("plan", ())), tuple(p.get("truth", ()))) for s in p["sizes"])
+        for p in found["plant"]
+    )
+    units = {p["name"]: "" if p["unit"] == "1" else f" {p['unit']}" for p in found["plant"]}
+    return Bed(procedure, found["rig"], tuple(found["plan"]), found.get("chain", {}), plants, units)
+
+
+def fly(bed: Bed, procedure: str, plan: Sequence[str], seed: int, truth: Mapping[str, float],
+        known: Mapping[str, Calibration], folder: Path) -> Simulated | Line:  # fmt: skip
+    """A run, or the line of one that ended early.
+
+    Raises:
+        ConfigError: the plan, the truth or the chain cannot be used.
+    """
+    path = folder / "recording.mcap"
+    path.unlink(missing_ok=True)
+    rig = load_rig(bed.rig)
+    settings = assemble(load_procedure(procedure).plan, (rig.name, rig.plans.get(procedure, {})), None, plan)
+    done = flown(procedure, bed.rig, seed, settings.model_dump(), path, truth, known)
+    if done.machine.cause is None:
         try:
-            for before in section.get("chain", ()):
-                done = execute(Request(before, rig, seed=seed, out=out, report=False, calibrations=calibrations))
-                adopt(done.directory, calibrations=calibrations, anyway=True)
-            request = Request(procedure, rig, seed=seed, plan=(*section["plan"], *plant.plan), truth=truth, out=out,
-                              report=False, calibrations=calibrations)  # fmt: skip
-            record = execute(request).record
+            return done.analysed()
         except BenchError as error:
-            return {"outcome": Outcome.ERROR.value, "codes": [str(error)[:80]], "values": {}}
-    values = {
-        f"{m.name}@{m.where}": [m.value, m.expanded_uncertainty] for m in record.measurements if m.value is not None
-    }
-    codes = sorted({f.code for f in record.findings if f.effect is not Effect.NOTE})
-    return {"outcome": record.outcome.value, "codes": codes, "values": values}
+            return {"codes": [type(error).__name__], "values": {}}
+    if not isinstance(done.machine.cause, BenchError):
+        raise done.machine.cause
+    codes = sorted({f.code for f in done.machine.ending.findings if f.effect is not Effect.NOTE})
+    return {"codes": codes or [type(done.machine.cause).__name__], "values": {}}
 
 
-def done_before(path: Path) -> dict[str, Line]:
-    """Lines of a file by their keys; half a line, of a run that was killed, is none."""
-    out = {}
-    for text in path.read_text().splitlines() if path.is_file() else ():
-        with contextlib.suppress(json.JSONDecodeError):
-            line = json.loads(text)
-            out[line["key"]] = line
+def run_seed(bed: Bed, seed: int, todo: Sequence[Plant]) -> list[Line]:
+    """The plants on one rig: codes of the findings above a note, and error and U by `name@where`."""
+    known: dict[str, Calibration] = {}
+    out = []
+    with tempfile.TemporaryDirectory() as folder:
+        for before, plan in bed.chain.items():
+            done = fly(bed, before, plan, seed, {}, known, Path(folder))
+            if isinstance(done, Simulated):
+                known[before] = done.calibration()
+        for plant in todo:
+            try:
+                done = fly(bed, bed.procedure, (*bed.plan, *plant.plan), seed, plant.overrides, known, Path(folder))
+            except ConfigError as error:  # the chain of this seed, or a mistake in the file
+                done = {"codes": [str(error)[:80]], "values": {}, "refused": True}
+            line = line_of(done) if isinstance(done, Simulated) else done
+            out.append({"key": plant.key(seed), "plant": plant.name, "size": plant.size, "seed": seed, **line})
     return out
 
 
-def run_all(procedure: str, section: Mapping[str, Any], seeds: Sequence[int], path: Path) -> None:
-    """Seed by seed, the sound rig first; what is in the file is left out."""
-    known, planted = done_before(path), plants_of(section)
-    todo = list(dict.fromkeys([*(p.sound for p in planted), *planted]))
+def line_of(done: Simulated) -> Line:
+    """What a run that reached its end is noted with."""
+    truth = {**done.truth, **truth_of_motion(done)}
+    measured = [r for r in done.results if isinstance(r, Measured)]
+    codes = {r.code for r in done.results if isinstance(r, Finding) and r.effect is not Effect.NOTE}
+    lacking = {q.name for q in done.procedure.measures if q not in done.procedure.optional}
+    codes |= {f"no {name}" for name in lacking - {m.quantity.name for m in measured}}
+    values = {}
+    for m in measured:
+        name = f"{m.quantity.name}@{m.where}"
+        true = truth.get(name, truth.get(m.quantity.name, 0.0))
+        values[name] = [m.estimate.value - true, interval(m.estimate, done.seed).U]
+    return {"codes": sorted(codes), "values": values}
+
+
+def read(path: Path) -> dict[str, Line]:
+    """Lines of a file by their keys; half a line, of a run that was killed, is none."""
+    lines = path.read_text(encoding="utf-8").split("\n")[:-1] if path.is_file() else []
+    return {line["key"]: line for line in map(json.loads, lines)}
+
+
+def run_all(bed: Bed, seeds: Sequence[int], path: Path, workers: Executor) -> None:
+    """Every size on the first few seeds, then what may be the smallest one caught on the others."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    for seed in seeds:
-        for plant in todo:
-            key = plant.key(seed)
-            if key in known:
-                continue
-            with open(os.devnull, "w") as nowhere, contextlib.redirect_stderr(nowhere):
-                line = run_one(procedure, section, plant, seed)
-            if "signal" in line["codes"]:  # the run was stopped with this script: it says nothing, and is done again
-                return
-            with path.open("a") as file:
-                file.write(
-                    json.dumps({"key": key, "plant": plant.name, "size": plant.size, "seed": seed, **line}) + "\n"
-                )
+    everything = [p for sizes in bed.plants for p in sizes]
+    do(bed, seeds[:FEW], everything, path, workers)
+    for start in range(FEW, len(seeds), FEW):
+        do(bed, seeds[start : start + FEW], edges(bed, len(seeds), read(path)), path, workers)
 
 
-def caught(line: Line) -> bool:
-    """A finding above a note, or no results."""
-    return bool(line["codes"]) or line["outcome"] in [o.value for o in STOPPED]
+def edges(bed: Bed, many: int, known: Mapping[str, Line]) -> list[Plant]:
+    """Of each defect the smallest size that may still prove to be caught."""
+    allowed = int((1 - SURE) * many + 1e-9)
+    quiet = {(line["plant"], line["size"]): 0 for line in known.values()}
+    for line in known.values():
+        quiet[line["plant"], line["size"]] += not line["codes"]
+    found = (next((p for p in sizes if quiet[p.name, p.size] <= allowed), None) for sizes in bed.plants)
+    return [p for p in found if p is not None]
+
+
+def do(bed: Bed, seeds: Sequence[int], plants: Sequence[Plant], path: Path, workers: Executor) -> None:
+    """What the file lacks, the sound rig first; a seed is a job."""
+    known, wanted = read(path), list(dict.fromkeys([*(p.sound for p in plants), *plants]))
+    left = {seed: [p for p in wanted if p.key(seed) not in known] for seed in seeds}
+    for job in [workers.submit(run_seed, bed, seed, todo) for seed, todo in left.items() if todo]:
+        with path.open("a", encoding="utf-8") as file:
+            file.writelines(json.dumps(line) + "\n" for line in job.result())
 
 
 def shift(line: Line, sound: Line) -> tuple[float, str]:
-    """The greatest of a quiet run's results against the sound one's, in U, and which it is."""
+    """The greatest of a quiet run's errors against the sound one's, in U, and which it is."""
     both = [k for k in line["values"] if k in sound["values"] and sound["values"][k][1]]
     moved = [(abs(line["values"][k][0] - sound["values"][k][0]) / sound["values"][k][1], k) for k in both]
     return max(moved, default=(0.0, ""))
 
 
-def rows(section: Mapping[str, Any], known: Mapping[str, Line]) -> Iterator[str]:
-    """The table's lines: each size's share of seeds that are caught, and what the quiet ones are shifted by."""
-    yield "| plant | size: caught | smallest caught | largest quiet shift |"
+def rows(bed: Bed, known: Mapping[str, Line]) -> Iterator[str]:
+    """The table's lines: how many of the seeds each size is caught on, and what the quiet ones are shifted by."""
+    yield "| plant | size: caught of runs | smallest caught | largest quiet shift |"
     yield "|---|---|---|---|"
     seeds = sorted({line["seed"] for line in known.values()})
-    by_name: dict[str, list[Plant]] = {}
-    for plant in plants_of(section):
-        by_name.setdefault(plant.name, []).append(plant)
-    units = {p["name"]: "" if p["unit"] == "1" else f" {p['unit']}" for p in section["plant"]}
-    for name, sizes in by_name.items():
+    for sizes in bed.plants:
         shares, smallest, worst = [], "none", (0.0, "", 0.0)
         for plant in sizes:
-            lines = [(known[plant.key(s)], known.get(plant.sound.key(s))) for s in seeds if plant.key(s) in known]
+            lines = [(known[plant.key(s)], known[plant.sound.key(s)]) for s in seeds if plant.key(s) in known]
             if not lines:
                 continue
-            share = sum(caught(line) for line, _ in lines) / len(lines)
-            shares.append(f"{plant.size:g}: {share:.0%}")
-            smallest = (
-                smallest if share >= SURE and smallest != "none" else f"{plant.size:g}" if share >= SURE else "none"
-            )
-            quiet = [shift(a, b) for a, b in lines if b is not None and not caught(a) and not caught(b)]
+            caught = sum(bool(line["codes"]) for line, _ in lines)
+            shares.append(f"{plant.size:g}: {caught}/{len(lines)}")
+            if caught < SURE * len(lines):
+                smallest = "none"
+            elif smallest == "none":
+                smallest = f"{plant.size:g}"
+            quiet = [shift(line, sound) for line, sound in lines if not line["codes"] and not sound["codes"]]
             worst = max([worst, *((by, what, plant.size) for by, what in quiet)])
-        text = (
-            f"{worst[0]:.1f} U ({worst[1].rstrip('@').replace('@', ', ')}, {worst[2]:g})" if worst[1] else "none quiet"
-        )
-        yield f"| `{name}`{units[name]} | {', '.join(shares)} | {smallest} | {text} |"
+        what = worst[1].rstrip("@").replace("@", ", ")
+        text = f"{worst[0]:.1f} U ({what}, {worst[2]:g})" if what else "none quiet"
+        yield f"| `{sizes[0].name}`{bed.units[sizes[0].name]} | {', '.join(shares)} | {smallest} | {text} |"
 
 
 def main() -> None:
     """Run, or print the tables of what was run."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("procedures", nargs="+")
-    parser.add_argument("--seeds", type=int, default=60)
+    parser.add_argument("procedures", nargs="*", help="by default every one that has a file")
+    parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--folder", type=Path, default=Path("plants"))
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--folder", type=Path, default=Path("runs/plants"))
     parser.add_argument("--table", action="store_true", help="print what is there, run nothing")
-    args = parser.parse_args()
-    known = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-    for procedure in args.procedures:
-        path = args.folder / f"{procedure}.jsonl"
-        if not args.table:
-            run_all(procedure, known[procedure], range(args.first, args.first + args.seeds), path)
-        lines = done_before(path)
+    asked = parser.parse_args()
+    for procedure in asked.procedures or sorted(p.stem for p in PLANTED.glob("*.toml")):
+        bed, path = bed_of(procedure), asked.folder / f"{procedure}.jsonl"
+        if not asked.table:
+            with pool(asked.jobs) as (workers, _):
+                run_all(bed, range(asked.first, asked.first + asked.seeds), path, workers)
+        lines = read(path)
         many, sound = len({line["seed"] for line in lines.values()}), [x for x in lines.values() if not x["plant"]]
-        loud = sum(map(caught, sound))
-        print(f"{procedure}: {many} seeds, {loud} of {len(sound)} sound runs with a finding", end="\n\n")
-        print("\n".join(rows(known[procedure], lines)), end="\n\n")
+        loud = [x for x in sound if x["codes"]]
+        print(f"{procedure}: {many} seeds, {len(loud)} of {len(sound)} sound runs with a finding", end="\n\n")
+        told = [f"sound, seed {x['seed']}: {', '.join(x['codes'])}" for x in loud]
+        print("\n".join([*told, *rows(bed, lines)]), end="\n\n")
 
 
 if __name__ == "__main__":

@@ -17,22 +17,25 @@ import tempfile
 import time
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
+from pydantic import ValidationError
+
 from bench import catalogue
 from bench.calibration import Calibration
+from bench.cli.campaign_fleet import pool
 from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import BenchError, ConfigError
 from bench.findings import Effect, Finding
 from bench.outcomes import outcome_of
-from bench.procedure import Measured, Procedure
+from bench.procedure import BenchPlan, Measured, Procedure
 from bench.records import measurement, missing
 from bench.rigfile import load_rig
-from bench.specs import load_spec
+from bench.specs import applied, load_spec
 from bench.uncertainty import interval
 
 RPM = math.pi / 30
@@ -46,9 +49,18 @@ ENDS: Mapping[str, tuple[Mapping[str, Any], ...]] = {
     "amb-calibration": ({"bias_A": 2.0}, {"bias_A": 4.0}),
     "torque-constant": ({"bias_A": 2.0}, {"bias_A": 4.0}),
     "spindown": ({"speed_rad_s": 30.0}, {"speed_rad_s": 70.0}),
-    "step": ({"speeds_rad_s": (3000 * RPM,)}, {"speeds_rad_s": (10000 * RPM,)}),
+    "step": (
+        {"speeds_rad_s": (3000 * RPM,)},
+        {"speeds_rad_s": (10000 * RPM,)},
+        {"a": {"law": 0}},
+        {"a": {"law": 1}},
+        {"a": {"law": 2}},
+    ),
     "unbalance": ({"speeds_rad_s": (2000 * RPM,)}, {"speeds_rad_s": (14000 * RPM,)}),
-    "compensation": ({"speeds_rad_s": (3000 * RPM,)}, {"speeds_rad_s": (14000 * RPM,)}),
+    "compensation": (
+        {"speeds_rad_s": (3000 * RPM,)},
+        {"speeds_rad_s": (14000 * RPM,)},
+    ),
     "balance": ({"speeds_rad_s": (3000 * RPM,)}, {"positions": 12}),
     "run-up": ({"acceleration_rad_s2": 10.0}, {"acceleration_rad_s2": 50.0}, {"law": "CAC", "top_rad_s": 8000 * RPM}),
     "coast-down": ({"deceleration_rad_s2": 24.5},),
@@ -93,13 +105,13 @@ def run_missing(asked: argparse.Namespace) -> None:
     known = {(e["rig"], e["case"], e["seed"]) for e in read(asked.file)}
     seeds = range(asked.first, asked.first + max(asked.count, asked.choices))
     waiting = []
-    with ProcessPoolExecutor(asked.jobs) as pool:
+    with pool(asked.jobs) as (workers, _):
         for seed in seeds:
             for rig in RIGS:
                 cases = [c for c in cases_of(rig, asked.only) if seed - asked.first < limit_of(c, asked)]
                 left = [c for c in cases if (rig, c.name, seed) not in known]
                 if left:
-                    waiting.append(pool.submit(run_rig, rig, seed, left, asked.file))
+                    waiting.append(workers.submit(run_rig, rig, seed, left, asked.file))
         for job in as_completed(waiting):
             job.result()
 
@@ -121,7 +133,19 @@ def cases_of(rig: str, only: list[str]) -> Iterator[Case]:
         if needs:
             yield Case(rig, name, "{}", True)
         for changes in (*choices(procedure), *ENDS.get(name, ())):
-            yield Case(rig, name, json.dumps(changes), bool(needs))
+            if (plan := plan_of(rig, procedure, changes)) is not None:
+                yield Case(rig, name, json.dumps(changes), bool(procedure.needs(plan)))
+
+
+def plan_of(rig: str, procedure: Procedure, changes: Mapping[str, Any]) -> BenchPlan | None:
+    """The rig's plan with `changes`, as JSON has them; nothing for a choice that is refused before anything turns, as it goes
+    with another one only."""
+    file = load_rig(rig)
+    try:
+        plan = procedure.plan.model_validate({**file.plans.get(procedure.name, {}), **changes})
+    except ValidationError:
+        return None
+    return None if list(procedure.check(file, plan)) else plan
 
 
 def choices(procedure: Procedure) -> Iterator[dict[str, Any]]:
@@ -161,21 +185,22 @@ def run_rig(rig: str, seed: int, cases: list[Case], file: Path) -> None:
 
 def needed(cases: list[Case]) -> list[str]:
     """Procedures whose calibrations the cases use, in the order in which they can be made."""
-    return list(dict.fromkeys(name for case in cases if case.chain for name in needed_by(case.procedure)))
+    used = (needed_by(case.procedure, json.loads(case.changes)) for case in cases if case.chain)
+    return list(dict.fromkeys(name for names in used for name in names))
 
 
-def needed_by(procedure: str) -> list[str]:
+def needed_by(procedure: str, changes: Mapping[str, Any] | None = None) -> list[str]:
     """Procedures whose calibrations one uses, in the order in which they can be made."""
     out: list[str] = []
 
-    def add(name: str) -> None:
+    def add(name: str, changes: Mapping[str, Any]) -> None:
         procedure = load(name)
-        for need in procedure.needs(procedure.plan()):
+        for need in procedure.needs(procedure.plan.model_validate(changes)):
             if need.procedure not in out:
-                add(need.procedure)
+                add(need.procedure, {})
                 out.append(need.procedure)
 
-    add(procedure)
+    add(procedure, changes or {})
     return out
 
 
@@ -212,7 +237,7 @@ def run_case(case: Case, seed: int, path: Path, known: Mapping[str, Calibration]
 
 def judged(done: Simulated, rig: str) -> dict[str, Any]:
     """Outcome by the rig's limits, findings that are no notes, verdicts that are not pass, values that are off."""
-    limits = load_spec(rig, done.procedure.name)
+    limits, _ = applied(load_spec(rig, done.procedure.name), done.recording.plan)
     findings = [r for r in done.results if isinstance(r, Finding)]
     measured = [r for r in done.results if isinstance(r, Measured)]
     entries = [measurement(m, limits.get(m.quantity.name), done.seed) for m in measured]
