@@ -41,13 +41,10 @@ class Curves:
 def curves(p: AmbParams, settings: Mapping[str, float], low: float, high: float) -> Curves:
     """Of the machine under the controller's settings (SI, by name), between two speeds in rad/s."""
     speeds = np.linspace(low, high, POINTS)
-    little = dataclasses.replace(p, unbalance=_less(p.unbalance), runout=_less(p.runout))
+    i, o = p.unbalance
+    little = dataclasses.replace(p, unbalance=(SMALL * i, SMALL * o), runout=tuple(SMALL * x for x in p.runout))
     large, small = (amb_unbalance.response(one, settings, speeds) for one in (p, little))
     return Curves(speeds, large, small)
-
-
-def _less(numbers: tuple[float, ...]) -> tuple[float, ...]:
-    return tuple(SMALL * x for x in numbers)
 
 
 def greatest(speeds: Array, values: Complex, near: float) -> tuple[float, float, float]:
