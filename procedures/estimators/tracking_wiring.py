@@ -131,7 +131,7 @@ def _of_coils(recording: Recording[Any]) -> Iterator[Finding]:
             answer = (after.mean(p) - before.mean(p) - after.mean(n) + before.mean(n)) / 2
             if moved > OWN * float(after.labels["value"]) and answer > ANSWERS_A:
                 text = (
-                    f"nearer by {moved * 1e6:.1f} µm to the upper magnet of {axis}, the shaft asks {answer * 1e3:+.1f} mA of it, "
-                    "as if it pulled the other way: suspect the two coils or their current sensors exchanged."
+                    f"nearer by {moved * 1e6:.1f} µm to the upper magnet of {axis}, the shaft asks {answer * 1e3:+.1f} mA of "
+                    "it, as if it pulled the other way: suspect the two coils or their current sensors exchanged."
                 )
                 yield Finding("coils-exchanged", text, axis, Effect.ERROR)
