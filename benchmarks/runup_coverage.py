@@ -9,7 +9,6 @@ or not.
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import math
 import tempfile
 from collections import defaultdict
@@ -17,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from bench.analysis.vectors import contains
 from bench.cli.virtual import simulated_run
@@ -28,11 +26,10 @@ from bench.uncertainty import interval
 from procedures.estimators.unbalance_data import AXES, RPM
 from procedures.runup import evaluated
 from procedures.turning import CODES, SETTINGS
-from sim_backend import amb_unbalance
+from sim_backend import amb_passage, amb_unbalance
 from sim_backend.truth import draw
 
 RIG = "amb5dof"
-SMALL = 0.02
 PLAN: dict[str, Any] = {"slow_s": 5.0, "settle_s": 1.0, "capture_s": 0.2}
 NARROW: dict[str, Any] = {
     "top_rad_s": 7000 / RPM,
@@ -74,44 +71,20 @@ def one(name: str, seed: int, plan: dict[str, Any], folder: Path, hits: Hits) ->
 
 def _peaks(run: Any, plant: Any, settings: dict[str, float], hits: Hits) -> None:
     """The greatest amplitudes of each probe."""
-    speeds = _grid(run)
-    small = dataclasses.replace(plant, unbalance=_less(plant.unbalance), runout=_less(plant.runout))
-    large, little = (amb_unbalance.response(p, settings, speeds) for p in (plant, small))
-    for p in run.peaks:
-        k = AXES.index(p.axis)
-        true, as_it_is = (_greatest(speeds, curves[:, k], p.speed.value) for curves in (little, large))
-        if not abs(true[0] / p.speed.value - 1) < 0.1:
-            hits["unmatched"].append((False, 0.0, math.nan))
-            continue
-        _add(hits, "peak speed, r/min", p.speed, true[0], RPM)
-        _add(hits, "peak amplitude, um", p.amplitude, as_it_is[1], 1e6)
-        if p.factor is not None and math.isfinite(true[2]):
-            _add(hits, "factor", p.factor, true[2], 1.0)
-        hits["speed with lag"].append((True, RPM * abs(p.speed.value + p.lagged - true[0]), math.nan))
-        hits["speed with bend"].append((True, RPM * abs(p.speed.value + p.bent - true[0]), math.nan))
-
-
-def _less(numbers: Any) -> Any:
-    return tuple(SMALL * x for x in numbers)
-
-
-def _greatest(speeds: Any, values: Any, near: float) -> tuple[float, float, float]:
-    """Speed, size and factor of the greatest of a curve without noise next to `near`."""
-    fine = np.linspace(speeds[0], speeds[-1], 20001)
-    size = np.abs(CubicSpline(speeds, values)(fine))
-    tops = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
-    if not tops.size:
-        return math.nan, math.nan, math.nan
-    k = min(tops, key=lambda k: abs(fine[k] - near))
-    left, right = (np.flatnonzero(part < size[k] / math.sqrt(2)) for part in (size[:k], size[k:]))
-    whole = left.size and right.size
-    return fine[k], size[k], fine[k] / (fine[k + right[0]] - fine[left[-1]]) if whole else math.nan
-
-
-def _grid(run: Any) -> np.ndarray:
     low = min(p.low if math.isfinite(p.low) else p.speed.value for p in run.peaks)
     high = max(p.high if math.isfinite(p.high) else p.speed.value for p in run.peaks)
-    return np.linspace(0.85 * low, 1.1 * high, 60)
+    held = amb_passage.curves(plant, settings, 0.85 * low, 1.1 * high)
+    for p in run.peaks:
+        speed, amplitude, factor = held.critical(AXES.index(p.axis), p.speed.value)
+        if not abs(speed / p.speed.value - 1) < 0.1:
+            hits["unmatched"].append((False, 0.0, math.nan))
+            continue
+        _add(hits, "peak speed, r/min", p.speed, speed, RPM)
+        _add(hits, "peak amplitude, um", p.amplitude, amplitude, 1e6)
+        if p.factor is not None and math.isfinite(factor):
+            _add(hits, "factor", p.factor, factor, 1.0)
+        hits["speed with lag"].append((True, RPM * abs(p.speed.value + p.lagged - speed), math.nan))
+        hits["speed with bend"].append((True, RPM * abs(p.speed.value + p.bent - speed), math.nan))
 
 
 def _add(hits: Hits, name: str, e: Any, true: float, scale: float) -> None:

@@ -12,6 +12,22 @@ TORQUE_CONSTANT = (
     "An error that is common to all masses or to both arms, the same share of each, changes alpha_tau by that share.",
     "A lever that is not level by 1° takes 0.015 % off every torque, and off alpha_tau.",
 )
+BEARING_MODEL = (
+    "An axis that is reversed as a whole, coils, probe and gravity, is the same machine seen from below: only the sign of its "
+    "offset differs.",
+    "A coupling that turns the shaft, besides its spring's pull: a moment of 1 N mm changes the force of either AMB by 5.6 mN, "
+    "0.2 % of its load, and beta by that share.",
+)
+PASSAGE = (
+    "Runout that changes with the speed or the temperature: 1 µm of it is 1 µm in every vector.",
+    "The mark of the once-per-turn pulse: phases count from where it is taken to be; 1° turns every vector by 1°, 1.7 % of it.",
+    "A weight that slips or a machine that warms on the way: what is measured after it is another machine's than what was "
+    "measured before. A run-up and a coast-down beside each other show it.",
+)
+SENSITIVITY = (
+    "The loop of another day: an open loop whose gain is 1 % greater, as by the temperature of amplifiers and probes, changes "
+    "S by (S - 1) of 1 %, up to 4 % of itself where it is 3.",
+)
 SPINDOWN = (
     "A constant torque that acts against either direction alike, such as a seal or a brake that drags whatever turns the "
     "rotor, is in T_c with its whole amount.",

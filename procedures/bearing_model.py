@@ -24,6 +24,7 @@ from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
 from bench.states import transition
+from procedures import assumed
 from procedures import bearing_model_figures as drawn
 from procedures.estimators import bearing_findings, bearing_rest, bearing_wiring
 from procedures.estimators.bearing import AXES
@@ -57,6 +58,10 @@ PARAMETERS = ("law", "bias", "integral", "ref_y", "ref_z", "ref_psi", "ref_theta
 GEOMETRY = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_outboard_amb", "amb_span", "amb_gap", "clearance",
             "com_to_coupling", "coupling_stiffness")  # fmt: skip
 MACHINE = ("mass", "radial_axes", "runout", "coupling_offset")
+REACHED = ("sensors/*", "!sensors/pos_*/offset", "!sensors/i_?o_p/gain", "geometry/amb_gap", "geometry/coupling_stiffness",
+           "geometry/com_to_coupling", "geometry/com_to_*_sensor")  # fmt: skip
+"""Certificates that the adjustment contradicts before an error of theirs moves a result by 2 U: where what one carries of a
+result's standard uncertainty is less than what the positions say of it, both as shares (docs/reference/bearing-model.md)."""
 ASKED = "Is the motor's coupling taken off the shaft, so that nothing but the AMBs holds it?"
 
 
@@ -283,5 +288,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    reached=REACHED,
+    assumes=assumed.BEARING_MODEL,
     method=METHOD,
 )

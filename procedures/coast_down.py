@@ -11,7 +11,7 @@ from bench.procedure import Procedure
 from bench.recorder import Recorder
 from bench.rig import Rig
 from bench.roles import RigState
-from procedures import probing, runup, turning, unbalance
+from procedures import assumed, probing, runup, turning, unbalance
 from procedures.runup import Passing, ended, passed
 from procedures.turning import put
 
@@ -59,5 +59,6 @@ procedure = Procedure(
     step_count=runup.step_count,
     needs=unbalance.needs,
     optional=runup.CRITICAL,
+    assumes=assumed.PASSAGE,
     method=METHOD,
 )

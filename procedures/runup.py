@@ -21,7 +21,7 @@ from bench.recording import Recording
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
-from procedures import probing, turning, unbalance
+from procedures import assumed, probing, turning, unbalance
 from procedures import runup_figures as drawn
 from procedures.estimators import runup_checks, runup_estimates, tracking_wiring, unbalance_bearings, unbalance_checks
 from procedures.estimators.coil_peaks import uncertified
@@ -38,12 +38,8 @@ SPEED = Quantity("critical_speed", "rad/s", "where the amplitude of a probe is g
 FACTOR = Quantity("amplification_factor", "1", "that speed over the width at 0.707 of the amplitude (API 617, half power); "
                   "of small orbits")  # fmt: skip
 AMPLITUDE = Quantity("critical_amplitude", "m", "of the shaft's centre where it was greatest, 0-pk")
-MARGIN = Quantity(
-    "separation",
-    "1",
-    "distance of the critical speed from the running speed, over the running speed",
-    title="separation margin",
-)
+MARGIN = Quantity("separation", "1", "distance of the critical speed from the running speed, over the running speed",
+                  title="separation margin")  # fmt: skip
 CRITICAL = (SPEED, FACTOR, AMPLITUDE, MARGIN)  # which a well damped shaft does not have
 MEASURES = (COSINE, SINE, MAJOR, D_MAX, SHARE, READ, CURRENT, VOLTAGE, *CRITICAL)
 LOOK_S = 0.2
@@ -296,5 +292,6 @@ procedure = Procedure(
     step_count=step_count,
     needs=unbalance.needs,
     optional=CRITICAL,
+    assumes=assumed.PASSAGE,
     method=METHOD,
 )

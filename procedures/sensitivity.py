@@ -25,7 +25,7 @@ from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
-from procedures import probing
+from procedures import assumed, probing
 from procedures import sensitivity_figures as drawn
 from procedures.estimators import sensitivity_checks, sensitivity_estimates, sensitivity_plan, tracking_wiring
 from procedures.estimators.sensitivity_data import (
@@ -281,5 +281,6 @@ procedure = Procedure(
     settings=settings,
     step_count=step_count,
     optional=(PHASE, FALL, RISE),  # a margin that the survey does not resolve is not told
+    assumes=assumed.SENSITIVITY,
     method=METHOD,
 )

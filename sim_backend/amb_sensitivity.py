@@ -100,7 +100,8 @@ def quiet_peak(
 ) -> tuple[float, float]:
     """Greatest abs(S_jj) and where, Hz, of the quiet machine that turns with its unbalance and its runout, by lines of SMALL_A
     about the peak of its linearised loop, apart from what its orbit makes of them: n times the speed, and images of the lines
-    about it. There is no noise, so that a spline through the lines has the peak."""
+    about it. There is no noise, so that a spline through the lines has the peak; and no pulse is missing or doubled."""
+    p = dataclasses.replace(p, pulse_missing=0.0, pulse_doubled=0.0)
     near, turn = loop(p, settings, speed, substeps).peak(axis, 2.0, 2000.0)[1], speed / (2 * math.pi)
     hz = _about(near, max(SHARES, key=lambda share: image_distance(share, turn / STEP_HZ, ORDERS)))
     hz = hz[np.abs(hz[:, None] - turn * np.array(ORDERS)).min(axis=1) > CLEAR_HZ] if speed else hz

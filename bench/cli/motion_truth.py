@@ -17,6 +17,7 @@ from bench.procedure import Measured
 if TYPE_CHECKING:
     from bench.cli.virtual import Simulated
 
+MARGIN_POINTS = 20000
 Found = Iterator[tuple[str, str, float]]  # name, where, value in SI
 
 
@@ -120,8 +121,47 @@ def _balance(done: Simulated) -> Found:
             yield f"{name}_sin", side, float(value.imag)
 
 
+def _passage(done: Simulated) -> Found:
+    """Vectors, orbits and D_max where the speed stands; what is critical at the speeds where the run found it."""
+    from procedures.estimators.unbalance_data import AXES, PLANES
+    from procedures.runup import evaluated
+    from procedures.turning import CODES, SETTINGS
+    from sim_backend import amb_passage, amb_unbalance
+
+    plan: Any = done.recording.plan
+    run = done.recording.once(evaluated)[1]
+    if run is None or run.near is None:
+        return
+    plant = done.drawn.plant
+    settings = _settings(done, SETTINGS["off"], plan.parameters, {"law": CODES[plan.law]})
+    for result in run.near.dwells:
+        true, where = amb_unbalance.motion(plant, settings, result.dwell.speed), result.dwell.where
+        for axis, vector in zip(AXES, true.shaft, strict=True):
+            yield "vector_cos", f"{axis}, {where}", float(vector.real)
+            yield "vector_sin", f"{axis}, {where}", float(-vector.imag)
+        for (plane, (y, z)), far in zip(PLANES.items(), true.d_max, strict=True):
+            a, b = true.shaft[y], true.shaft[z]
+            yield "major_half_axis", f"{plane}, {where}", float(abs(a + 1j * b) + abs(a - 1j * b)) / 2
+            yield "d_max", f"{plane}, {where}", far
+            yield "d_max_share", f"{plane}, {where}", far / plant.clearance
+    peaks = [p for p in run.peaks if p.critical]
+    if not peaks:
+        return
+    ends = [x for p in run.peaks for x in (p.low, p.speed.value, p.high) if math.isfinite(x)]
+    held = amb_passage.curves(plant, settings, 0.85 * min(ends), 1.1 * max(ends))
+    for p in peaks:
+        speed, amplitude, factor = held.critical(AXES.index(p.axis), p.speed.value)
+        yield "critical_speed", p.where, speed
+        yield "critical_amplitude", p.where, amplitude
+        yield "amplification_factor", p.where, factor
+        yield "separation", p.where, abs(speed - plan.running_rad_s) / plan.running_rad_s
+
+
 def _sensitivity(done: Simulated) -> Found:
+    import numpy as np
+
     from procedures.estimators.sensitivity_data import RPM
+    from procedures.estimators.sensitivity_estimates import fall, phase, rise
     from procedures.injecting import AXES
     from procedures.sensitivity import CODES
     from sim_backend import amb_sensitivity
@@ -138,6 +178,10 @@ def _sensitivity(done: Simulated) -> Found:
                 value, hz = amb_sensitivity.quiet_peak(plant, settings, k, speed)
             yield "s_max", where, value
             yield "s_max_hz", where, hz
+            if loop is not None:
+                open_loop = 1 / loop.sensitivity(np.geomspace(plan.low_hz, plan.high_hz, MARGIN_POINTS))[:, k] - 1
+                for name, of in (("phase_margin", phase), ("gain_reduction", fall), ("gain_increase", rise)):
+                    yield name, where, of(open_loop)
 
 
 TRUTHS: Mapping[str, Callable[[Any], Found]] = {
@@ -146,5 +190,7 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "unbalance": _unbalance,
     "compensation": _unbalance,
     "balance": _balance,
+    "run-up": _passage,
+    "coast-down": _passage,
     "sensitivity": _sensitivity,
 }

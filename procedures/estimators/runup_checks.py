@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from bench.analysis.peaks import WINDOW
 from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.rigfile import RigFile
@@ -29,6 +30,8 @@ COASTING = 100.0  # rad/s^2: what a shaft that coasts slows down by at most
 UPLOAD_S = 1.2
 LARGE = 0.5  # of the clearance
 INBOARD, OUTBOARD, AXIAL = 4, 8, 32
+BESIDE = 0.05  # of a speed: what happens there may be in its turns
+OF_CRITICALS = ("critical_speed", "amplification_factor", "critical_amplitude", "separation")
 
 
 class Settings(unbalance_plan.Settings, Protocol):
@@ -40,6 +43,8 @@ class Settings(unbalance_plan.Settings, Protocol):
     def bottom_rad_s(self) -> float: ...
     @property
     def running_rad_s(self) -> float: ...
+    @property
+    def blocks(self) -> int: ...
     @property
     def rate_rad_s2(self) -> float: ...
 
@@ -84,17 +89,17 @@ def of_passage(p: Passage, recording: Recording[Any], plan: Settings) -> Iterato
     for name in p.stuck:
         yield Finding("stuck-channel", f"{name} does not move at all; a live sensor has noise.", name, Effect.ERROR)
     yield from _pulses(p)
-    yield from _limits(p)
+    yield from _limits(p, plan)
     for event in recording.events(MISSED):
         text = f"no capture at {event['wanted'] * RPM:.0f} r/min: {event['why']}"
-        yield Finding("capture-missed", text, p.name, Effect.INDETERMINATE)
+        yield Finding("capture-missed", text, p.name, Effect.INDETERMINATE, (_at(p, event["wanted"], plan),))
     top = float(np.nanmax(p.speeds))
     bottom = float(np.nanmin(p.speeds))
     goal, got = (plan.top_rad_s, top) if p.direction == "up" else (plan.bottom_rad_s, bottom)
     missed = got < (1 - SHORT) * goal if p.direction == "up" else got > (1 + 2 * SHORT) * goal
     if missed:
         text = f"it ended at {got * RPM:.0f} instead of {goal * RPM:.0f} r/min: the speeds beyond were not seen."
-        yield Finding("passage-short", text, p.name, Effect.INDETERMINATE)
+        yield Finding("passage-short", text, p.name, Effect.INDETERMINATE, OF_CRITICALS)
 
 
 def _pulses(p: Passage) -> Iterator[Finding]:
@@ -122,7 +127,24 @@ def _speed_at(p: Passage, t: float) -> float:
     return float(np.interp(t, *p.driven))
 
 
-def _limits(p: Passage) -> Iterator[Finding]:
+def _at(p: Passage, speed: float, plan: Settings) -> str:
+    """What is measured at a speed, as findings name it."""
+    return f"@{speed * RPM:.0f} r/min, {p.direction}, {plan.law}"
+
+
+def _doubted(p: Passage, bits: int, plan: Settings) -> tuple[str, ...]:
+    """What flags put in doubt: what is read off the curve, and what is measured beside the speeds at which they were set, in
+    its turns or in the local models that take the lag off. All, where the fastest of these is among them: the runout rests on
+    it."""
+    hit, block = p.speeds[(p.flags & bits) != 0], float(np.ptp(p.speeds[np.isfinite(p.speeds)])) / plan.blocks
+    if not np.isfinite(hit).all():
+        return ()
+    off = {s: np.abs(hit - s).min() for s in plan.speeds_rad_s}
+    near = [s for s in plan.speeds_rad_s if off[s] < max(BESIDE * s, WINDOW * block)]
+    return () if max(plan.speeds_rad_s) in near else (*(_at(p, s, plan) for s in sorted(near)), *OF_CRITICALS)
+
+
+def _limits(p: Passage, plan: Settings) -> Iterator[Finding]:
     if p.clips >= HELD or (p.flags & RANGE).any():
         text = (
             f"a position sensor stood at the end of its range{_when(p, RANGE)}: what it shows of the orbit is cut off."
@@ -132,13 +154,13 @@ def _limits(p: Passage) -> Iterator[Finding]:
         rings = [name for bit, name in ((INBOARD, "the inboard ring"), (OUTBOARD, "the outboard ring"),
                                         (AXIAL, "the axial stop")) if (p.flags & bit).any()]  # fmt: skip
         text = f"the shaft touched {' and '.join(rings)}{_when(p, CONTACT)}: this is not its response to unbalance."
-        yield Finding("contact", text, p.name, Effect.INDETERMINATE)
+        yield Finding("contact", text, p.name, Effect.INDETERMINATE, _doubted(p, CONTACT, plan))
     if (p.flags & CURRENT_LIMIT).any():
         text = f"a coil current was at its limit{_when(p, CURRENT_LIMIT)}: the response is not linear."
-        yield Finding("current-saturated", text, p.name, Effect.INDETERMINATE)
+        yield Finding("current-saturated", text, p.name, Effect.INDETERMINATE, _doubted(p, CURRENT_LIMIT, plan))
     if (p.flags & VOLTAGE_LIMIT).any():
         text = f"an amplifier's voltage was at its limit{_when(p, VOLTAGE_LIMIT)}: the currents slewed (T Fig. 2.9)."
-        yield Finding("voltage-saturated", text, p.name, Effect.INDETERMINATE)
+        yield Finding("voltage-saturated", text, p.name, Effect.INDETERMINATE, _doubted(p, VOLTAGE_LIMIT, plan))
 
 
 def _when(p: Passage, bits: int) -> str:

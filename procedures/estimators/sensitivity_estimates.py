@@ -19,7 +19,10 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 FINEST, COARSEST = 1.0, 4.0  # Hz, of a refined grid: four periods must fit into the controller's memory
 IN_WIDTH = 6  # lines in the half-power width of a refined peak, at least
-LEAST = 6  # steps to either side of it
+REACH = (
+    2 / 3
+)  # of that width, to either side: farther out the next resonance bends the curve, and few poles do not follow
+LEAST = 6  # steps to either side of it, at least
 RIVAL = 0.85  # of the greatest: another maximum that is refined too
 CANDIDATES = 3
 NEAR = 0.3  # of a frequency: how far the lines reach that a first look is fitted to
@@ -37,10 +40,10 @@ class Candidate:
     width: float
 
     def lines(self, speed: float) -> tuple[float, float, int]:
-        """First line, step and number of a grid over twice its width, six lines or more in the width. Where the shaft turns the
+        """First line, step and number of a grid about it, six lines or more in its width. Where the shaft turns the
         grid is shifted away from what its orbit makes of the injection, lines at n times the speed less the line's own."""
         step = min(max(binary(self.width / IN_WIDTH), FINEST), COARSEST)
-        reach = max(self.width, LEAST * step)
+        reach = max(REACH * self.width, LEAST * step)
         first = max(step * math.floor((self.hz - reach) / step), step)
         if speed and step >= COARSEST:
             turns = speed / (2 * math.pi * step)

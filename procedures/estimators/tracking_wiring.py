@@ -16,6 +16,7 @@ from procedures.estimators.tracking_estimates import nominal
 
 OWN, OTHER = 0.5, 0.3  # shares of a nudge
 UNEVEN = 0.6  # of the rise
+ANSWERS_A = 5e-3  # a nudge of 10 µm takes some 20 mA, and noise leaves 0.2 mA in a step
 
 
 def before_orbits(recording: Recording[Any]) -> Iterator[Finding]:
@@ -29,6 +30,7 @@ def before_orbits(recording: Recording[Any]) -> Iterator[Finding]:
         yield from _of_lift(recording, str(lost[0]["fault"]))
         return
     yield from _of_nudges(recording)
+    yield from _of_coils(recording)
     for event in recording.events(NO_SPEED):
         text = f"the shaft does not reach {event['wanted'] * 30 / math.pi:.0f} r/min: {event['why']}"
         yield Finding("speed-not-reached", text, "drive", Effect.ERROR)
@@ -113,3 +115,23 @@ def _of_nudges(recording: Recording[Any]) -> Iterator[Finding]:
                 "readings of y and z exchanged, or a set point that does not act."
             )
             yield Finding("axes-exchanged", text, name, Effect.ERROR)
+
+
+def _of_coils(recording: Recording[Any]) -> Iterator[Finding]:
+    """A shaft that is held nearer to a magnet is pulled more by it, so that its coil carries less. That tells the coils of an
+    axis apart even where the mean currents do not: where the magnetic offset carries the weight they are nearly alike."""
+    told = {c.name for stream in recording.streams.values() for c in stream.channels}
+    steps = [s for s in recording.steps(PROBE) if s.labels["name"] == "ref_y"]
+    for before, after in zip(steps[::2], steps[1::2], strict=False):
+        for axis in ("yi", "yo"):
+            p, n, place = f"i_{axis}_p", f"i_{axis}_n", f"pos_{axis}"
+            if not {p, n} <= told:
+                continue
+            moved = after.mean(place) - before.mean(place)
+            answer = (after.mean(p) - before.mean(p) - after.mean(n) + before.mean(n)) / 2
+            if moved > OWN * float(after.labels["value"]) and answer > ANSWERS_A:
+                text = (
+                    f"nearer by {moved * 1e6:.1f} µm to the upper magnet of {axis}, the shaft asks {answer * 1e3:+.1f} mA of "
+                    "it, as if it pulled the other way: suspect the two coils or their current sensors exchanged."
+                )
+                yield Finding("coils-exchanged", text, axis, Effect.ERROR)

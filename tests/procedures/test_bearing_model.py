@@ -20,10 +20,12 @@ from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import Estimate, interval
 from procedures.bearing_model import MEASURES, Plan, check, figures, grid, procedure, read, step_count
-from procedures.estimators import bearing_findings, bearing_wiring
+from procedures.estimators import bearing_adjusted, bearing_findings, bearing_wiring
 from procedures.estimators.bearing import AXES
 from procedures.estimators.bearing_data import Held
+from procedures.estimators.bearing_estimates import evaluate
 from reports.figures import draw as draw_figure
+from reports.unseen import is_reached
 from sim_backend.truth import nominal
 
 NAME, RIG, SEED = "bearing-model", "amb5dof", 2026
@@ -123,6 +125,30 @@ def test_without_the_coupling_and_with_it_forgotten(tmp_path: Path, sound: Simul
     assert all(abs(e.value - run.truth[n]) < 3 * e.u for n, e in found(run).items() if n in run.truth)
     forgotten = serious(reanalysed(sound, coupled=False))
     assert "is it?" in forgotten["certificate-contradicted"]
+
+
+def test_what_is_said_to_be_reached_is_contradicted_before_it_matters(sound: Simulated) -> None:
+    """An error e of a certificate pulls its adjustment by e/u times the share that the positions know of it. Where that comes
+    to be contradicted, no result may have moved by more than 2 U, but by noise; the mass is known to nobody else."""
+    a = evaluate(sound.recording, read(sound.recording)[0])
+    known = {_id(a.inputs[n]): a.adjusted.moved[n] / pull for n, pull in a.adjusted.pulls.items()}
+    worst: dict[str, float] = {}
+    for name in (f"{what}_{axis}" for what in ("beta", "offset") for axis in AXES):
+        e = a.estimates[name]
+        for i, c in e.sensitivities.items():
+            if i.kind == "B":
+                share = abs(c) * i.u / (2 * e.u)
+                quiet = bearing_findings.CONTRADICTED * share / known.get(i.id, bearing_adjusted.TOLD)
+                worst[i.id] = max(worst.get(i.id, 0.0), quiet)
+    reached = {i: shift for i, shift in worst.items() if is_reached(i, procedure.reached)}
+    assert len(reached) > 20
+    assert {i: shift for i, shift in reached.items() if shift > 2.2} == {}
+    assert worst["machine/mass"] > 4
+    assert not is_reached("machine/mass", procedure.reached)
+
+
+def _id(e: Estimate) -> str:
+    return next(iter(e.sensitivities)).id
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,8 @@ from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import DeviceFault
 from bench.figures import Figure, Sheet
 from bench.findings import Effect, Finding
+from bench.limits import Verdict
+from bench.outcomes import outranking
 from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
@@ -295,6 +297,12 @@ def test_a_planted_defect_is_named_and_never_passes(
     list(runup.figures(run.recording))  # what can be drawn is drawn
 
 
+def test_exchanged_current_sensors_are_told_where_the_offset_carries_the_weight(tmp_path: Path) -> None:
+    """On this rig the exchanged coils seem to carry 0.60 and 0.65 of their share of the weight, which passes as a tolerance."""
+    run = simulated_run("run-up", "amb5dof", 0, ONE, tmp_path / "recording.mcap", {"current_sign_i": -1.0})
+    assert {(f.code, f.where) for f in run.results if isinstance(f, Finding)} == {("coils-exchanged", "yi")}
+
+
 def test_intervals_of_a_peak_are_not_nothing(found: Run) -> None:
     for p in found.peaks:
         assert p.factor is not None
@@ -332,3 +340,41 @@ def test_a_criticals_scatter_is_its_covariance() -> None:
     covariance[:2, :2] = c.covariance[:2, :2]
     without = runup_estimates.scatter_of(dataclasses.replace(c, factor=math.nan, covariance=covariance), "yi/1", 40.0)
     assert set(without) == {"speed", "amplitude"}
+
+
+@dataclasses.dataclass(frozen=True)
+class Judged:
+    name: str
+    where: str
+    verdict: Verdict = Verdict.FAIL
+
+
+@pytest.mark.parametrize(
+    ("rpm", "doubted", "stands"),
+    [
+        (5500, [("critical_speed", "yi, peak 1")],
+         [("d_max_share", f"inboard, {s} r/min, up, CCS") for s in (3000, 8000, 13000)]),
+        (3100, [("separation", "yi, peak 1"), ("d_max_share", "inboard, 3000 r/min, up, CCS")],
+         [("d_max_share", "inboard, 8000 r/min, up, CCS")]),
+        (13000, [("d_max_share", "inboard, 3000 r/min, up, CCS")], []),
+    ],
+)  # fmt: skip
+def test_a_limit_puts_in_doubt_what_was_measured_beside_it(
+    up: Simulated, passage: Passage, rpm: float, doubted: list[tuple[str, str]], stands: list[tuple[str, str]]
+) -> None:
+    """An amplifier at its voltage at one speed excuses no D_max at another; beside the fastest, which tells the runout, all."""
+    flags = passage.flags.copy()
+    k = passage.moving.start + int(np.nanargmin(np.abs(passage.speeds[passage.moving] - rpm / RPM)))
+    flags[k : k + 5] |= 2
+    p = dataclasses.replace(passage, flags=flags)
+    found = list(runup_checks.of_passage(p, up.recording, up.recording.plan))
+    assert [f.code for f in found] == ["voltage-saturated"]
+    assert [outranking(Judged(*m), found) for m in doubted] == [("voltage-saturated",)] * len(doubted)
+    assert [outranking(Judged(*m), found) for m in stands] == [()] * len(stands)
+
+
+def test_a_passage_that_ends_early_excuses_no_orbit(up: Simulated, passage: Passage) -> None:
+    plan = up.recording.plan.model_copy(update={"top_rad_s": 15000 / RPM})
+    (found,) = runup_checks.of_passage(passage, up.recording, plan)
+    assert outranking(Judged("d_max_share", "inboard, 8000 r/min, up, CCS"), [found]) == ()
+    assert outranking(Judged("critical_speed", "yi, peak 1"), [found]) == ("passage-short",)

@@ -201,7 +201,7 @@ def test_a2_at_14000(tmp_path: Path, law: str) -> None:
         ({"position_sign_yi": -1.0}, {}, "probe-polarity", Effect.ERROR),
         ({"told_planes": 1.0}, {}, "planes-exchanged", Effect.ERROR),
         ({"told_axes": 1.0}, {}, "axes-exchanged", Effect.ERROR),
-        ({"current_sign_i": -1.0}, {}, "weight-not-carried", Effect.ERROR),
+        ({"current_sign_i": -1.0}, {}, "coils-exchanged", Effect.ERROR),
         ({"pulse_missing": 3.0}, {}, "pulse-missing", Effect.ERROR),
         pytest.param({"pulse_missing": 2.0}, {}, "pulse-missing", Effect.ERROR, marks=pytest.mark.long),
         ({"pulse_doubled": 2.0}, {}, "pulse-doubled", Effect.ERROR),
