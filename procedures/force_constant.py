@@ -249,9 +249,11 @@ def _notes(rig: RigFile, a: Analysis) -> Iterator[Finding]:
 
 
 def facts(recording: Recording[Plan]) -> dict[str, Estimate]:
-    """What later procedures use: both constants, and the vertical one at each angle (home is 0)."""
+    """What later procedures use: both constants, the vertical one at each angle (home is 0), and the vertical force per
+    horizontal current at home, which says where the encoder's zero is."""
     a = evaluate(recording)
     found = {"alpha_d": a.y.mean, "alpha_dx": a.x.mean, **{f"alpha_d@{k}": e for k, e in enumerate(a.y.angles)}}
+    found["alpha_cross@0"] = a.y.cross
     return {name: replace(e, unit=ALPHA_D.unit) for name, e in found.items()}
 
 

@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from bench.recording import Recording
 from bench.rigfile import RigFile
-from bench.uncertainty import Estimate
+from bench.uncertainty import Estimate, Influence
 from procedures.estimators import coupling
 from procedures.estimators.carried_data import SEGMENTS, StepMeans
-from procedures.estimators.chainrule import by_inputs
+from procedures.estimators.chainrule import by_inputs, linearised
 from procedures.estimators.coupling import CouplingFit, Sweep
 from procedures.estimators.inputs import certified
 from procedures.estimators.typea import scatter
@@ -25,12 +25,15 @@ Array = npt.NDArray[np.float64]
 @dataclass(frozen=True)
 class Analysis:
     """Everything the measurements, findings and figures are made of. `printed` is r as T (6.15) means it, `successive` the
-    same from step to step."""
+    same from step to step. `turn`: by how much the force turns for the gamma that was told. `moved` rad: gamma_0 less what
+    the force constant's calibration found of it, where it did."""
 
     fit: CouplingFit
     estimates: dict[str, Estimate]
     printed: float
     successive: float
+    turn: Estimate
+    moved: Estimate | None
 
 
 def evaluate(recording: Recording[Any], data: StepMeans, count_rad: float) -> Analysis:
@@ -52,7 +55,25 @@ def evaluate(recording: Recording[Any], data: StepMeans, count_rad: float) -> An
         coupling.as_printed(sweep.gamma[once], fit.i_x[once], fit.i_y[once], values["pole_pairs"], successive=way)
         for way in (False, True)
     ]
-    return Analysis(fit, estimates, *ratios)
+    by_sensors = linearised(lambda p: {"turn": coupling.fit_sweep(sweep, p).turn[0]}, inputs)["turn"]
+    left = Influence(id="scatter/turn", name="scatter of the steps", u=fit.turn[1], unit="1", kind="A",
+                     distribution="normal", dof=float(fit.fit.dof - 1), source="residuals of the fit")  # fmt: skip
+    turn = by_sensors + Estimate.of(0.0, left)
+    return Analysis(fit, estimates, *ratios, turn, _moved(recording, fit, estimates))
+
+
+def _moved(recording: Recording[Any], fit: CouplingFit, estimates: dict[str, Estimate]) -> Estimate | None:
+    """gamma_0 less that of the force constant's calibration: there the other axis' current gave -a alpha_c sin(M gamma_0)."""
+    cross = recording.calibration("force-constant").values.get("alpha_cross@0")
+    if cross is None:  # a calibration of before it was handed on
+        return None
+    poles, zero = recording.rig.machine["pole_pairs"].value, estimates["gamma_0"]
+    across = fit.term("a") * estimates["alpha_c"].value
+    sine = -cross.value / across
+    if not abs(sine) < 1:  # signs and windings are wrong, and named
+        return None
+    cosine = math.sqrt(1 - sine**2)
+    return zero + (cross - cross.value) * (1 / (poles * across * cosine)) - math.asin(sine) / poles
 
 
 def outputs(fit: CouplingFit, p: dict[str, float]) -> dict[str, float]:

@@ -14,6 +14,7 @@ from procedures.estimators.coupling import TERMS, CouplingFit
 from procedures.estimators.coupling_estimates import Analysis
 
 ZERO_RAD = math.radians(2.0)  # four times what a commutation set with care is off
+SURE = 5  # standard uncertainties
 WINDING = 0.1  # segments differ by 1 %
 
 
@@ -31,6 +32,7 @@ def of_fit(data: StepMeans, f: CouplingFit, plan: carried_checks.Tolerances) -> 
 def of_results(a: Analysis, pole_pairs: float) -> Iterator[Finding]:
     """Signs, a zero far off, unequal windings; and T's own way beside ours."""
     ratio, zero, winding = a.fit.term("r"), a.fit.term("gamma_0"), a.fit.term("a")
+    yield from _commutation(a)
     if ratio <= 0 or winding <= 0 or a.estimates["alpha_c"].value <= 0:
         yield Finding(
             "wrong-sign",
@@ -73,3 +75,27 @@ def of_results(a: Analysis, pole_pairs: float) -> Iterator[Finding]:
         f"{winding:.4f} of the y winding ({pole_pairs:g} pole pairs)",
         "alpha_ratio",
     )
+
+
+def _commutation(a: Analysis) -> Iterator[Finding]:
+    """The angle by which the force turns against gamma, and the encoder against the force constant's run."""
+    apart = a.turn.value - 1
+    if abs(apart) > SURE * a.turn.u:
+        yield Finding(
+            "gamma-scaled",
+            f"the currents turn as if gamma were {a.turn.value:.4f} ± {2 * a.turn.u:.4f} of what was told: the controller "
+            "turns its currents by another angle than it was told, its pole pairs are not the machine's, or a current does not "
+            "stand for a force in proportion.",
+            "gamma",
+            Effect.INDETERMINATE,
+        )
+    if a.moved is not None and abs(a.moved.value) > SURE * a.moved.u:
+        yield Finding(
+            "zero-moved",
+            f"the zero of the commutation is {math.degrees(a.moved.value):+.3f}° ± {math.degrees(2 * a.moved.u):.3f}° from "
+            "where force-constant found it by the force that the other axis' current gave: the encoder was moved since, and "
+            "alpha_d at the home angle is that of another place. Run force-constant again.",
+            "gamma_0",
+            Effect.INDETERMINATE,
+            ("alpha_c",),
+        )

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate
 from procedures.estimators import force_rows
-from procedures.estimators.force_rows import DIRECT, FORCE, MOMENT, Constants, Fit, Ramps
+from procedures.estimators.force_rows import CROSS, DIRECT, FORCE, MOMENT, Constants, Fit, Ramps
 from procedures.estimators.inputs import certified
 
 Array = npt.NDArray[np.float64]
@@ -25,7 +25,8 @@ CONSTANTS = ("K_i", "K2_i", "K_o", "K2_o")
 @dataclass(frozen=True)
 class AxisResult:
     """One axis. `rows` [row][angle] N/A; `bends` N, what the rows have of the current's square and cube, in the order row,
-    angle, power; `weight` of the force row; `angles` the rows' mean at each angle and `mean` over a turn, N/A."""
+    angle, power; `weight` of the force row; `angles` the rows' mean at each angle and `mean` over a turn, N/A; `cross` N/A
+    what the other axis' current gives at the home angle."""
 
     fit: Fit
     rows: tuple[tuple[Estimate, ...], tuple[Estimate, ...]]
@@ -33,6 +34,7 @@ class AxisResult:
     weight: float
     angles: tuple[Estimate, ...]
     mean: Estimate
+    cross: Estimate
 
     @property
     def row_means(self) -> tuple[Estimate, Estimate]:
@@ -113,12 +115,24 @@ def axis_result(r: Ramps, inputs: Facts, bias_A: float) -> AxisResult:
     shift = (loose.terms - fitted.terms)[:, :, DIRECT].mean(axis=1) @ [weight, 1 - weight]
     play = _turning_point(r.axis, float(shift))
     angles = tuple(f * weight + m * (1 - weight) + play for f, m in zip(force, moment, strict=True))
-    return AxisResult(fitted, (force, moment), bends, weight, angles, mean_of(angles))
+    cross = _cross(r.axis, fitted, found, weight)
+    return AxisResult(fitted, (force, moment), bends, weight, angles, mean_of(angles), cross)
+
+
+def _cross(axis: str, f: Fit, found: Facts, weight: float) -> Estimate:
+    """The rows' mean of what the other axis' current gives at the home angle, with the scatter of the steps."""
+    w = np.array([weight, 1 - weight])
+    steps, dof = force_rows.scatter(f)
+    u = math.sqrt(float(w @ steps @ w) * float((f.solvers[0, CROSS] ** 2).sum()))
+    left = Influence(id=f"scatter/{axis}/cross", name=f"scatter of the steps, cross, {axis}", u=u, unit="N/A", kind="A",
+                     distribution="normal", dof=float(dof), source="residuals of the fits")  # fmt: skip
+    return found["force/cross"] * weight + found["moment/cross"] * (1 - weight) + Estimate.of(0.0, left)
 
 
 def _named(f: Fit) -> dict[str, float]:
     out = {}
     for row, name in enumerate(ROWS):
+        out[f"{name}/cross"] = f.terms[row, 0, CROSS]
         for k in range(f.terms.shape[1]):
             out[f"{name}@{k}"] = f.terms[row, k, DIRECT]
             out |= {f"{name}/{power}@{k}": f.bends[row, k, j] for j, power in enumerate(POWERS)}

@@ -15,11 +15,12 @@ from bench.recording import Recording
 from bench.uncertainty import Estimate, Influence
 from procedures.estimators.inputs import certified
 from procedures.estimators.motor_wiring import SEGMENTS
-from procedures.estimators.slewing import Gains, Passes, Swing, Tracking, passes, starts, tracking
+from procedures.estimators.slewing import Gains, Passes, Swing, Tracking, answered, passes, starts, tracking
 
 Array = npt.NDArray[np.float64]
 DESIGN_NM_A, DESIGN_SHARE = 2.87, 0.1  # T Table 6.2, and how far a machine may be from it
 RIPPLE_NM_A = 0.02  # T Table 5.3, beta_4: ripple of the torque constant that one angle's calibration does not show
+SURE = 5  # standard uncertainties
 FOLLOWING = ("error_rms", "error_peak", "amplitude_ratio", "lag")  # what a detent or a friction gets into
 COUNTED = 0.1  # share of the counts' variance that the assumption of evenly spread counts may be wrong by
 
@@ -34,6 +35,8 @@ class Plan(Protocol):
     @property
     def torque_constant(self) -> str: ...
     @property
+    def kp_theta(self) -> float: ...
+    @property
     def max_detent_N_m(self) -> float: ...
     @property
     def max_friction_N_m(self) -> float: ...
@@ -41,13 +44,15 @@ class Plan(Protocol):
 
 @dataclass(frozen=True)
 class Result:
-    """Swings with their starts, estimates by frequency, and what the slowest swing says of the torque."""
+    """Swings with their starts, estimates by frequency, and what the slowest swing says of the torque; `torque` A is the
+    amplitude of its torque current at its frequency."""
 
     swings: tuple[tuple[Swing, float], ...]
     tracking: Mapping[float, Mapping[str, Estimate]]
     passes: Passes
     detent: Estimate
     friction: Estimate
+    torque: float
 
 
 def evaluate(recording: Recording[Any], swings: Sequence[Swing], gains: Gains) -> Result:
@@ -64,7 +69,8 @@ def evaluate(recording: Recording[Any], swings: Sequence[Swing], gains: Gains) -
     slowest, t_0 = min(started, key=lambda pair: pair[0].hz)
     through = passes(slowest, t_0, plan.detent_order)
     torque = _torque_constant(recording) * _segment_gain(recording)
-    return Result(started, found, through, _detent(through, torque), _friction(through, torque))
+    detent, friction = _detent(through, torque), _friction(through, torque)
+    return Result(started, found, through, detent, friction, answered(slowest, t_0))
 
 
 def _tracking(s: Swing, t_0: float, half: float, count: float) -> dict[str, Estimate]:
@@ -137,8 +143,10 @@ def _friction(p: Passes, torque: Estimate) -> Estimate:
 
 
 def findings(result: Result, plan: Plan) -> Iterator[Finding]:
-    """A detent or a friction that is larger than the plan allows; a detent that is lost in the noise."""
+    """A swing of another size than was told; a detent or a friction that is larger than the plan allows; a detent that is lost
+    in the noise."""
     detent, friction = result.detent, result.friction
+    yield from _scaled(result, plan.kp_theta)
     if detent.value > plan.max_detent_N_m:
         yield Finding(
             "large-detent",
@@ -155,4 +163,23 @@ def findings(result: Result, plan: Plan) -> Iterator[Finding]:
             f"moving takes {friction.value:.3f} N m ({plan.max_friction_N_m:g} N m allowed): something rubs or brakes, or a "
             "backwards torque sensor makes it negative.",
             "friction", Effect.INDETERMINATE, (*FOLLOWING, "detent"),
+        )  # fmt: skip
+
+
+def _scaled(result: Result, kp: float) -> Iterator[Finding]:
+    """The slowest swing against the amplitude that was told.
+
+    The real part of k_p + k_i / (j w) + k_d j w / (1 + j w T) is k_p or more, so that the error which the controller acts on is
+    at most the torque current over k_p: the angle's amplitude is nearer than that to the reference's.
+    """
+    slowest = min((s for s, _ in result.swings), key=lambda s: s.hz)
+    ratio = result.tracking[slowest.hz]["amplitude_ratio"]
+    allowed = result.torque / (kp * slowest.amplitude) + SURE * ratio.u
+    if abs(ratio.value - 1) > allowed:
+        yield Finding(
+            "reference-scaled",
+            f"at {slowest.hz:g} Hz the angle swings by {ratio.value:.4f} of what the reference was told, where by its torque "
+            f"current the controller sees an error of {allowed:.2%} at most: its reference swings by another amplitude than it "
+            "was told, or k_p is less than the plan's.",
+            f"{slowest.hz:g} Hz", Effect.INDETERMINATE, FOLLOWING,
         )  # fmt: skip

@@ -148,6 +148,12 @@ def smooth(s: Swing, t_0: float) -> Array:
     return known_frequency(s.t[use], s.angle[use], s.hz).at(s.t)
 
 
+def answered(s: Swing, t_0: float) -> float:
+    """Amplitude of the torque current at the swing's frequency, A."""
+    use = np.logical_or.reduce(steady(s, t_0))
+    return known_frequency(s.t[use], s.torque[use], s.hz).amplitude
+
+
 @dataclass(frozen=True)
 class Passes:
     """Per period (p,): `cosine`, `sine` A of the torque current's part that goes with n times the angle, both ways

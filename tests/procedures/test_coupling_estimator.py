@@ -26,6 +26,15 @@ def test_exact_currents_give_exact_terms(gamma_0: float, winding: float) -> None
     assert np.abs(fit.fit.residuals).max() < 1e-9
 
 
+@pytest.mark.parametrize("factor", [0.98, 1.0, 1.01])
+def test_a_gamma_that_is_not_what_was_told_is_found(factor: float) -> None:
+    """One step of Gauss and Newton: what is left goes with the square of the factor's distance from one."""
+    shaft = Shaft(gamma_0=np.radians(0.4))
+    turned = sweep_data(shaft, DEGREES * factor)
+    fit = coupling.fit_sweep(replace(turned, gamma=turned.gamma / factor), parameters(shaft))
+    assert fit.turn[0] == pytest.approx(factor, abs=max(3 * (factor - 1) ** 2, 1e-7))
+
+
 def test_an_error_of_all_gains_does_not_reach_the_ratio() -> None:
     """A common gain scales the forces, one of the x axis the winding's constant; r stays to first order."""
     shaft = Shaft(gamma_0=np.radians(0.3))

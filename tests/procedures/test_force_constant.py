@@ -88,7 +88,7 @@ def test_the_ripple_is_seen_over_the_angle(tmp_path: Path, calibration: Calibrat
     run = measure(tmp_path, calibration, {"alpha_2": 0.28, "alpha_3": 0.0})
     known = facts(run.recording)
     home, mean = known["alpha_d@0"], known["alpha_d"]
-    assert set(known) == {"alpha_d", "alpha_dx", *(f"alpha_d@{k}" for k in range(9))}
+    assert set(known) == {"alpha_d", "alpha_dx", "alpha_cross@0", *(f"alpha_d@{k}" for k in range(9))}
     assert mean.value - home.value == pytest.approx(0.28, abs=0.02)
     assert abs(mean.value - run.truth["alpha_d"]) < 3 * mean.u
     assert serious(run) == []

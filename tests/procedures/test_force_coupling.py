@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -110,6 +111,9 @@ def test_a_count_of_the_wrong_size_is_named(known: dict[str, Calibration], tmp_p
         ({"segment_drift_0": 1e-3}, "drifting-sensor", "segments 1 and 3"),
         pytest.param({"segment_drift_3": -1e-3}, "drifting-sensor", "segments 2 and 4", marks=pytest.mark.long),
         ({"gamma_zero": 0.04}, "commutation-off", "zero"),
+        ({"gamma_zero": 0.012}, "zero-moved", "force-constant"),
+        ({"factor_gamma": 1.015}, "gamma-scaled", "another angle"),
+        pytest.param({"factor_gamma": 0.985}, "gamma-scaled", "another angle", marks=pytest.mark.long),
         ({"segment_gain_1": 0.7, "segment_gain_3": 0.7}, "windings-differ", "i_m2"),
         ({"integrator_factor": 0.02}, "unsettled", "integrator"),
         pytest.param({"drop_fraction": 0.005}, "missing-samples", "missing", marks=pytest.mark.long),
@@ -120,6 +124,17 @@ def test_a_defect_is_named_and_does_not_pass(
 ) -> None:
     fatal = serious(measure(tmp_path, known, defect))
     assert any(f.code == code and named in f"{f.text} {f.where}" for f in fatal), fatal
+
+
+def test_a_calibration_that_does_not_say_where_the_zero_was_is_used_as_it_is(
+    known: dict[str, Calibration], sound: Simulated
+) -> None:
+    own = known["force-constant"]
+    before = replace(own, values={name: e for name, e in own.values.items() if name != "alpha_cross@0"})
+    assert len(before.values) == len(own.values) - 1
+    run = reanalysed(sound, {**known, "force-constant": before})
+    assert serious(run) == []
+    assert estimates(run) == estimates(sound)
 
 
 def test_a_force_constant_of_the_wrong_sign_is_named(known: dict[str, Calibration], sound: Simulated) -> None:

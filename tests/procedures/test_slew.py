@@ -85,6 +85,8 @@ def test_figures_and_steps(tmp_path: Path) -> None:
         ({"segment_sign_1": -1}, "segment-sign", "segment 1"),
         ({"detent": 0.2}, "large-detent", "catches"),
         ({"coulomb": 0.5}, "friction", "rubs"),
+        ({"factor_sine_amplitude": 0.997}, "reference-scaled", "another amplitude"),
+        pytest.param({"factor_sine_amplitude": 1.003}, "reference-scaled", "another amplitude", marks=pytest.mark.long),
         pytest.param({"drop_fraction": 0.005}, "missing-samples", "missing", marks=pytest.mark.long),
     ],
 )
