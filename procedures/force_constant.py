@@ -137,7 +137,7 @@ class Analysis:
 
 @lru_cache(maxsize=1)
 def ramps_of(recording: Recording[Plan]) -> RampData:
-    """The steps of a recording. Kept, because findings and fits both need them."""
+    """The steps. Kept, because findings and fits both need them."""
     return read_ramps(recording)
 
 
@@ -212,9 +212,8 @@ def _axes(a: Analysis) -> Iterator[Finding]:
             "axes-disagree",
             f"alpha_d is {a.y.mean.value:.3f} N/A vertically and {a.x.mean.value:.3f} N/A horizontally; {allowed:.2f} N/A of "
             "difference is allowed. Is a winding or an AMB of one axis different?",
-            "alpha_dx",
-            Effect.INDETERMINATE,
-        )
+            "alpha_dx", Effect.INDETERMINATE,
+        )  # fmt: skip
 
 
 def _ripple(rig: RigFile, plan: Plan) -> Iterator[Finding]:
@@ -225,9 +224,8 @@ def _ripple(rig: RigFile, plan: Plan) -> Iterator[Finding]:
             f"{plan.angles} equally spaced angles all stand at one electrical phase of the force ripple (order {2 * pairs}): "
             "what was measured is alpha_d at that phase, not its mean over a turn, and no data of this run says how far "
             "apart they are. Calibrate and measure at nine angles.",
-            "alpha_d",
-            Effect.INDETERMINATE,
-        )
+            "alpha_d", Effect.INDETERMINATE,
+        )  # fmt: skip
 
 
 def _notes(rig: RigFile, a: Analysis) -> Iterator[Finding]:
@@ -249,11 +247,10 @@ def _notes(rig: RigFile, a: Analysis) -> Iterator[Finding]:
 
 
 def facts(recording: Recording[Plan]) -> dict[str, Estimate]:
-    """What later procedures use: both constants, the vertical one at each angle (home is 0), and the vertical force per
-    horizontal current at home, which says where the encoder's zero is."""
+    """What later procedures use: both constants, the vertical one at each angle, and at home (0) the force across."""
     a = evaluate(recording)
-    found = {"alpha_d": a.y.mean, "alpha_dx": a.x.mean, **{f"alpha_d@{k}": e for k, e in enumerate(a.y.angles)}}
-    found["alpha_cross@0"] = a.y.cross
+    found = {"alpha_d": a.y.mean, "alpha_dx": a.x.mean, "alpha_cross@0": a.y.cross}
+    found |= {f"alpha_d@{k}": e for k, e in enumerate(a.y.angles)}
     return {name: replace(e, unit=ALPHA_D.unit) for name, e in found.items()}
 
 
