@@ -17,8 +17,8 @@ from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.roles import RigState
-from procedures import balance_figures as drawn
 from procedures import assumed, balancing, probing, turning, unbalance
+from procedures import balance_figures as drawn
 from procedures.estimators import balance_checks, balance_estimates
 from procedures.estimators.balance_data import BASE, SIDES
 from procedures.estimators.unbalance_data import RPM

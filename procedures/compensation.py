@@ -20,8 +20,8 @@ from bench.recording import Recording
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
-from procedures import compensation_figures as drawn
 from procedures import assumed, probing, turning, unbalance, unbalance_figures
+from procedures import compensation_figures as drawn
 from procedures.estimators import compensation_checks, switching
 from procedures.estimators.switching import SWITCH
 from procedures.estimators.unbalance_data import RPM
