@@ -59,7 +59,7 @@ ENDS: Mapping[str, tuple[Mapping[str, Any], ...]] = {
     "unbalance": ({"speeds_rad_s": (2000 * RPM,)}, {"speeds_rad_s": (14000 * RPM,)}),
     "compensation": (
         {"speeds_rad_s": (3000 * RPM,)},
-        {"speeds_rad_s": (14000 * RPM,)},
+        {"speeds_rad_s": (14000 * RPM,), "judged_to_rad_s": 14000 * RPM},
     ),
     "balance": ({"speeds_rad_s": (3000 * RPM,)}, {"positions": 12}),
     "run-up": (
