@@ -34,8 +34,8 @@ class Patience:
         self._done_ns: dict[Callable[[], None], int] = {}
 
     def look(self) -> None:
-        """See whether there is a state that was not seen before, or the shaft has become slower. A state that comes and goes is no
-        progress: bytes so rare that the machine is seen now and then would be waited for without end."""
+        """See whether there is a state that was not seen before, or the shaft has become slower. A state that comes and goes is
+        no progress: a machine that is seen now and then would be waited for without end."""
         now, mode = self._clock.now_ns(), self._controller.sight.mode
         reading = self._reading()
         if reading != self._drive_rad_s:
