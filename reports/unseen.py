@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from typing import Any
@@ -11,7 +12,7 @@ from reports import budgets, tables, text
 from reports.view import Table
 
 SHOWN = 0.01  # of a variance; what carries less of every result is summed up
-MOST = 15  # rows
+MOST = 6  # rows, which leave room for them on page 1
 ABOUT = (
     "No check of this procedure can reach these influences. Each is in the uncertainty as far as its source states it, and "
     "nowhere else: an error beyond that moves the result without a finding. Stated is the result that it carries most of."
@@ -33,8 +34,9 @@ def unseen(
     measurements: Iterable[Content], reached: Sequence[str], titles: Mapping[str, str] | None = None
 ) -> Table:  # fmt: skip
     """The influences of Type B that are out of reach, largest share first, each with the result that it carries most of; those
-    of one name (the encoder's count in every result) are one row."""
+    of one kind (the gains of all probes, the encoder's count in every result) are one row, named by the largest."""
     best: dict[str, tuple[float, Content, Content]] = {}
+    alike: dict[str, set[str]] = defaultdict(set)
     for m in measurements:
         entries = m.get("budget") or ()
         variance = math.fsum(float(e.get("contribution") or 0.0) ** 2 for e in entries)
@@ -43,11 +45,13 @@ def unseen(
             share = float(e.get("contribution") or 0.0) ** 2 / variance
             if e.get("type") != "B" or is_reached(identity or name, reached):
                 continue
-            if share > best.get(name or identity, (0.0, m, e))[0]:
-                best[name or identity] = (share, m, e)
+            kind = _kind(name or identity)
+            alike[kind].add(name or identity)
+            if share > best.get(kind, (0.0, m, e))[0]:
+                best[kind] = (share, m, e)
     ranked = sorted(best.values(), key=lambda found: -found[0])
     shown = [found for found in ranked if found[0] >= SHOWN][:MOST]
-    rows = [_row(*found, titles or {}) for found in shown]
+    rows = [_row(*found, titles or {}, alike) for found in shown]
     if left := ranked[len(shown) :]:
         noun = "influence" if len(left) == 1 else "influences"
         rows.append((f"{len(left)} further {noun}", f"below {_share(left[0][0])} each", "", "", ""))
@@ -55,11 +59,22 @@ def unseen(
     return Table("", header, tuple(rows), (1, 3, 4))
 
 
-def _row(share: float, measurement: Content, entry: Content, titles: Mapping[str, str]) -> tuple[str, ...]:
+def _kind(name: str) -> str:
+    """What influences of several channels, axes or places have in common: "gain of pos_yi" is one of "gain of pos"."""
+    about, _, last = name.partition(", ")[0].rpartition(" ")
+    stem = last.partition("_")[0] if "_" in last else "" if len(last) <= 2 else last
+    return f"{about} {stem}"
+
+
+def _row(
+    share: float, measurement: Content, entry: Content, titles: Mapping[str, str], alike: Mapping[str, set[str]]
+) -> tuple[str, ...]:
     where = tables.place(measurement)
     unit = str(measurement.get("unit") or "")
+    name = str(entry.get("name") or entry.get("influence"))
+    others = len(alike[_kind(name)]) - 1
     return (
-        str(entry.get("name") or entry.get("influence")),
+        name + (f" and {others} more of its kind" if others else ""),
         _share(share),
         tables.symbol_of(str(measurement.get("name", "")), titles).plain + (f" ({where})" if where else ""),
         text.with_unit(text.significant(abs(float(entry.get("contribution") or 0.0))), unit),

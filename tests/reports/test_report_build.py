@@ -188,6 +188,26 @@ def test_what_is_in_every_result_is_one_row_of_what_no_data_can_show() -> None:
     assert [row[0] for row in made.unseen.rows] == ["encoder count"]
 
 
+def test_the_gains_of_all_probes_are_one_row_and_those_of_currents_another() -> None:
+    names = (
+        "gain of pos_yi",
+        "gain of pos_zo",
+        "gain of i_yi_p",
+        "offset of zi",
+        "offset of yi",
+        "mass of the shaft",
+        "mass of the disc",
+    )
+    entries = [
+        {**budget()[0], "name": name, "influence": name.replace(" ", "/"), "type": "B", "contribution": c}
+        for c, name in zip((9.0, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0), names, strict=True)
+    ]
+    rows = view(measurements=[measurement(budget=entries)]).unseen.rows
+    assert [row[0] for row in rows] == [
+        "gain of pos_yi and 1 more of its kind", "gain of i_yi_p", "offset of zi and 1 more of its kind", "mass of the shaft",
+        "mass of the disc"]  # fmt: skip
+
+
 def test_an_influence_of_one_place_has_the_estimate_of_the_rig_files_number() -> None:
     rig = {"machine": {"amb_asymmetry": {"value": 0.0, "unit": "1", "half_width": 0.03, "distribution": "rectangular"}}}
     entry = {
