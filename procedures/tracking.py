@@ -26,6 +26,7 @@ from procedures import tracking_figures as drawn
 from procedures.estimators import tracking_checks, tracking_estimates, tracking_wiring
 from procedures.estimators.tracking_data import (
     CHANNELS,
+    GROWN,
     ORBIT,
     POSITIONS,
     START,
@@ -99,7 +100,7 @@ def settings(plan: Plan) -> dict[str, float]:
 
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records, for the progress display."""
-    return probing.STEPS + 1 + len(plan.order)
+    return probing.STEPS + 1 + 2 * len(plan.order)
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
@@ -145,7 +146,8 @@ def _orbit(rig: Rig, plan: Plan, record: Recorder, law: Law) -> None:
     rig.clock.sleep(plan.settle_s)
     for part in range(1, GROW + 1):
         _size(rig, plan, part / GROW)
-    rig.clock.sleep(plan.settle_s)
+    with record.step(GROWN, law=law):  # the longer, the better it tells the reference's frequency
+        rig.clock.sleep(plan.settle_s)
     labels = {"hz": plan.hz, "y_m": plan.y_m, "z_m": plan.z_m, "speed_rad_s": plan.speed_rad_s, "ratio": plan.ratio}
     with record.step(ORBIT, law=law, judged=law in plan.laws, **labels):
         rig.clock.sleep(plan.revolutions / plan.hz + 0.05)
