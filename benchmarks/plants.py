@@ -7,7 +7,8 @@ What is planted in PROCEDURE, and the short plan that it runs with, is in plante
 Each size is tried on a few seeds first; then the sizes that may be the smallest one caught go on to all seeds. What is done is
 appended to FOLDER/PROCEDURE.jsonl, and the same command goes on from there. Caught is a run with a finding above a note, one
 that ended early, or one that lacks a result it declares. A shift is the error (value less truth) of a quiet run less that of
-the same rig without the plant, in the latter's U: what a plant truly changes is no error.
+the same rig without the plant, in the latter's U: what a plant truly changes is no error, and what has no truth is not
+counted. Beside it stands that result's error in the U that the run itself states.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from bench.cli.campaign_fleet import pool
 from bench.cli.compose import load_procedure
 from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import Simulated, flown
-from bench.errors import BenchError, ConfigError
+from bench.errors import BenchError
 from bench.findings import Effect, Finding
 from bench.plans import assemble
 from bench.procedure import Measured
@@ -118,13 +119,11 @@ def run_seed(bed: Bed, seed: int, todo: Sequence[Plant]) -> list[Line]:
     with tempfile.TemporaryDirectory() as folder:
         for before, plan in bed.chain.items():
             done = fly(bed, before, plan, seed, {}, known, Path(folder))
-            if isinstance(done, Simulated):
-                known[before] = done.calibration()
+            if not isinstance(done, Simulated):
+                raise BenchError(f"{before} on the sound rig of seed {seed}: {', '.join(done['codes'])}")
+            known[before] = done.calibration()
         for plant in todo:
-            try:
-                done = fly(bed, bed.procedure, (*bed.plan, *plant.plan), seed, plant.overrides, known, Path(folder))
-            except ConfigError as error:  # the chain of this seed, or a mistake in the file
-                done = {"codes": [str(error)[:80]], "values": {}, "refused": True}
+            done = fly(bed, bed.procedure, (*bed.plan, *plant.plan), seed, plant.overrides, known, Path(folder))
             line = line_of(done) if isinstance(done, Simulated) else done
             out.append({"key": plant.key(seed), "plant": plant.name, "size": plant.size, "seed": seed, **line})
     return out
@@ -140,8 +139,9 @@ def line_of(done: Simulated) -> Line:
     values = {}
     for m in measured:
         name = f"{m.quantity.name}@{m.where}"
-        true = truth.get(name, truth.get(m.quantity.name, 0.0))
-        values[name] = [m.estimate.value - true, interval(m.estimate, done.seed).U]
+        true = truth.get(name, truth.get(m.quantity.name))
+        if true is not None:
+            values[name] = [m.estimate.value - true, interval(m.estimate, done.seed).U]
     return {"codes": sorted(codes), "values": values}
 
 
@@ -179,20 +179,22 @@ def do(bed: Bed, seeds: Sequence[int], plants: Sequence[Plant], path: Path, work
             file.writelines(json.dumps(line) + "\n" for line in job.result())
 
 
-def shift(line: Line, sound: Line) -> tuple[float, str]:
-    """The greatest of a quiet run's errors against the sound one's, in U, and which it is."""
-    both = [k for k in line["values"] if k in sound["values"] and sound["values"][k][1]]
-    moved = [(abs(line["values"][k][0] - sound["values"][k][0]) / sound["values"][k][1], k) for k in both]
-    return max(moved, default=(0.0, ""))
+def shift(line: Line, sound: Line) -> tuple[float, float, str]:
+    """The greatest of a quiet run's errors against the sound one's, in U of that, then its error in its own U, and which
+    result it is."""
+    new, old = line["values"], sound["values"]
+    both = [k for k in new if k in old and old[k][1] and new[k][1]]
+    moved = [(abs(new[k][0] - old[k][0]) / old[k][1], abs(new[k][0]) / new[k][1], k) for k in both]
+    return max(moved, default=(0.0, 0.0, ""))
 
 
 def rows(bed: Bed, known: Mapping[str, Line]) -> Iterator[str]:
     """The table's lines: how many of the seeds each size is caught on, and what the quiet ones are shifted by."""
-    yield "| plant | size: caught of runs | smallest caught | largest quiet shift |"
-    yield "|---|---|---|---|"
+    yield "| plant | size: caught of runs | smallest caught | largest quiet shift | error in its own U |"
+    yield "|---|---|---|---|---|"
     seeds = sorted({line["seed"] for line in known.values()})
     for sizes in bed.plants:
-        shares, smallest, worst = [], "none", (0.0, "", 0.0)
+        shares, smallest, worst = [], "none", (0.0, 0.0, "", 0.0)
         for plant in sizes:
             lines = [(known[plant.key(s)], known[plant.sound.key(s)]) for s in seeds if plant.key(s) in known]
             if not lines:
@@ -204,9 +206,10 @@ def rows(bed: Bed, known: Mapping[str, Line]) -> Iterator[str]:
             elif smallest == "none":
                 smallest = f"{plant.size:g}"
             quiet = [shift(line, sound) for line, sound in lines if not line["codes"] and not sound["codes"]]
-            worst = max([worst, *((by, what, plant.size) for by, what in quiet)])
-        what = worst[1].rstrip("@").replace("@", ", ")
-        text = f"{worst[0]:.1f} U ({what}, {worst[2]:g})" if what else "none quiet"
+            worst = max([worst, *((*found, plant.size) for found in quiet)])
+        by, own, what, size = worst
+        what = what.rstrip("@").replace("@", ", ")
+        text = f"{by:.1f} U ({what}, {size:g}) | {own:.1f}" if what else "none quiet | "
         yield f"| `{sizes[0].name}`{bed.units[sizes[0].name]} | {', '.join(shares)} | {smallest} | {text} |"
 
 

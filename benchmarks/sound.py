@@ -46,7 +46,7 @@ RIGS = {
                 "sensitivity"),
 }  # fmt: skip
 ENDS: Mapping[str, tuple[Mapping[str, Any], ...]] = {
-    "amb-calibration": ({"bias_A": 2.0}, {"bias_A": 4.0}),
+    "amb-calibration": ({"bias_A": 2.5}, {"bias_A": 4.0}),
     "torque-constant": ({"bias_A": 2.0}, {"bias_A": 4.0}),
     "spindown": ({"speed_rad_s": 30.0}, {"speed_rad_s": 70.0}),
     "step": (
@@ -59,14 +59,20 @@ ENDS: Mapping[str, tuple[Mapping[str, Any], ...]] = {
     "unbalance": ({"speeds_rad_s": (2000 * RPM,)}, {"speeds_rad_s": (14000 * RPM,)}),
     "compensation": (
         {"speeds_rad_s": (3000 * RPM,)},
-        {"speeds_rad_s": (14000 * RPM,)},
+        {"speeds_rad_s": (14000 * RPM,), "judged_to_rad_s": 14000 * RPM},
     ),
     "balance": ({"speeds_rad_s": (3000 * RPM,)}, {"positions": 12}),
-    "run-up": ({"acceleration_rad_s2": 10.0}, {"acceleration_rad_s2": 50.0}, {"law": "CAC", "top_rad_s": 8000 * RPM}),
+    "run-up": (
+        {"acceleration_rad_s2": 10.0},
+        {"acceleration_rad_s2": 50.0},
+        {"law": "CAC", "top_rad_s": 8000 * RPM, "speeds_rad_s": (3000 * RPM, 6000 * RPM)},
+    ),
     "coast-down": ({"deceleration_rad_s2": 24.5},),
     "sensitivity": ({"speeds_rad_s": (10000 * RPM,)},),
 }
 """Biases, speeds and rates at both ends; choices among words are read from the plans themselves."""
+TRUTH: Mapping[str, Mapping[str, float]] = {'bearing-model {"coupled": false}': {"geometry.coupling_stiffness": 0.0}}
+"""What the operator has done to the machine for a plan, by the case's name."""
 
 
 @dataclass(frozen=True)
@@ -205,7 +211,13 @@ def needed_by(procedure: str, changes: Mapping[str, Any] | None = None) -> list[
 
 
 def attempt(
-    rig: str, name: str, seed: int, changes: Mapping[str, Any], path: Path, known: Mapping[str, Calibration]
+    rig: str,
+    name: str,
+    seed: int,
+    changes: Mapping[str, Any],
+    path: Path,
+    known: Mapping[str, Calibration],
+    truth: Mapping[str, float] | None = None,
 ) -> Simulated:
     """A run as `bench run` makes it.
 
@@ -218,7 +230,7 @@ def attempt(
     plan = procedure.plan.model_validate({**file.plans.get(name, {}), **changes})
     if problems := list(procedure.check(file, plan)):
         raise ConfigError("; ".join(problems))
-    return simulated_run(name, rig, seed, changes, path, None, known)
+    return simulated_run(name, rig, seed, changes, path, truth, known)
 
 
 def run_case(case: Case, seed: int, path: Path, known: Mapping[str, Calibration]) -> dict[str, Any]:
@@ -226,7 +238,7 @@ def run_case(case: Case, seed: int, path: Path, known: Mapping[str, Calibration]
     began = time.process_time()
     line: dict[str, Any] = {"rig": case.rig, "case": case.name, "seed": seed}
     try:
-        done = attempt(case.rig, case.procedure, seed, json.loads(case.changes), path, known)
+        done = attempt(case.rig, case.procedure, seed, json.loads(case.changes), path, known, TRUTH.get(case.name))
         line |= judged(done, case.rig)
     except ConfigError as error:
         line |= {"outcome": "REFUSED", "wrong": [str(error)]}

@@ -107,15 +107,12 @@ class SlcanBatchBus(can.BusABC):
         """
         self._write(b"\r\r" + slcan.CLOSE + slcan.VERSION)  # CRs end whatever an earlier user left half written
         self._await(lambda s: bool(s.replies))
-        if self.stream.malformed > STRANGE and not self._came:
-            raise ConfigError(
-                f"port {channel}: {self.stream.malformed} pieces came that are no SLCAN, and no frame; expected an SLCAN "
-                "adapter. Next: is it another device, or a controller that sends packets (serial: in place of slcan:)?"
-            )
+        self._refuse_noise(channel)
         self.stream.refused = 0
         self.stream.replies.clear()
         self._write(self._setup + slcan.VERSION)
         self._await(lambda s: bool(s.replies))
+        self._refuse_noise(channel)  # a byte of it may look like a refusal
         if self.stream.refused:
             lines = ", ".join(line.decode() for line in self._setup.split())
             raise ConfigError(
@@ -133,6 +130,14 @@ class SlcanBatchBus(can.BusABC):
                 "the bit rates of the bus, and a bus that is connected and terminated"
             )
         return status is not None
+
+    def _refuse_noise(self, channel: str) -> None:
+        """More that is no SLCAN than frames: now and then noise has the form of a frame, or of an answer."""
+        if (strange := self.stream.malformed) > STRANGE and strange > self._came:
+            raise ConfigError(
+                f"port {channel}: {strange} pieces came that are no SLCAN, and {self._came or 'no'} frames; expected an SLCAN "
+                "adapter. Next: is it another device, or a controller that sends packets (serial: in place of slcan:)?"
+            )
 
     def _await(self, came: Callable[[SlcanStream], bool]) -> None:
         """Read until the answer came, or the time for it is over."""

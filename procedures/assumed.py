@@ -61,3 +61,14 @@ STEP = (
     "A set point that the controller scales is measured as the step that it makes: 1 % of it is 1 % of the step in "
     "steady_error, 1.5 % in overshoot, and half a swing or more in settling_time.",
 )
+UNBALANCE = (
+    "Runout that changes with speed (a shaft that grows, probes that see its material) is in the vectors, half axes and D_max "
+    "with its whole amount: the slow roll sees it at its own speed only.",
+    "Motion that turns with the shaft at order 4 or above is taken for runout: D_max may lack its whole amount.",
+)
+BALANCE = (
+    "Both trial weights at the same wrong angle turn the unbalance by it: corrections by that scale are right all the same.",
+    "A laboratory balance that weighs every weight wrong by one share changes the unbalance by that share; corrections that "
+    "are weighed on it are right all the same.",
+    "Runout that changes with speed reads as unbalance: 2 µm at 10 000 r/min as some 1 g mm, as found and as left.",
+)

@@ -17,8 +17,8 @@ from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.roles import RigState
+from procedures import assumed, balancing, probing, turning, unbalance
 from procedures import balance_figures as drawn
-from procedures import balancing, probing, turning, unbalance
 from procedures.estimators import balance_checks, balance_estimates
 from procedures.estimators.balance_data import BASE, SIDES
 from procedures.estimators.unbalance_data import RPM
@@ -205,5 +205,6 @@ procedure = Procedure(
     step_count=step_count,
     fewest_steps=fewest_steps,
     needs=unbalance.needs,
+    assumes=assumed.BALANCE,
     method=METHOD,
 )

@@ -16,6 +16,7 @@ from procedures.estimators.balance_data import (
     BASE,
     CAPTURED,
     DECISION,
+    LIGHTER,
     MOUNT,
     REFUSED,
     SIDES,
@@ -56,10 +57,12 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     if not _rolled(work) or not _run(work, BASE):
         return
     for p, side in enumerate(SIDES):
-        if (allowed := balance_decision.refused(rig.file, plan, work.runs[-1 if plan.leave else 0], p)) is not None:
-            record.event(REFUSED, plane=side, kg=plan.trial_kg[p], allowed_kg=allowed)
+        kg, allowed = balance_decision.trial_kg(rig.file, plan, work.runs[-1 if plan.leave else 0], p)
+        if kg < plan.trial_kg[p]:
+            record.event(LIGHTER if kg else REFUSED, plane=side, kg=plan.trial_kg[p], allowed_kg=kg or allowed)
+        if not kg:
             return
-        _mount(work, p, plan.trial_kg[p], plan.trial_angle_rad[p], "trial")
+        _mount(work, p, kg, plan.trial_angle_rad[p], "trial")
         if not _run(work, f"trial {side}") or not _acted(work, p):
             return
         if not plan.leave:
@@ -151,8 +154,9 @@ def _acted(work: Work, plane: int) -> bool:
     """Whether the trial weight of the last run did what it should."""
     base, last = work.runs[0], work.runs[-1]
     before = work.runs[-2] if work.plan.leave else base
-    added = balance_decision.shown(before, last, last.weights[-1], work.rig.file, work.plan)
-    return not list(balance_decision.of_trial(added, last.weights[-1]))
+    bearings = unbalance_bearings.adopted_bearings(work.record)
+    shown = balance_decision.shown(before, last, last.weights[-1], work.rig.file, work.plan, bearings)
+    return not list(balance_decision.of_trial(shown))
 
 
 def _correct(work: Work) -> None:
@@ -160,11 +164,12 @@ def _correct(work: Work) -> None:
     rig, plan = work.rig.file, work.plan
     trials = balance_decision.trials_of(work.runs, rig, plan.leave)
     assert trials is not None
-    shown = [balance_decision.shown(trials.before[p], trials.having[p], trials.weights[p], rig, plan) for p in (0, 1)]
-    if list(balance_decision.of_trials(shown[0], shown[1])):
+    bearings = unbalance_bearings.adopted_bearings(work.record)
+    by_plane = zip(trials.before, trials.having, trials.weights, strict=True)
+    inboard, outboard = (balance_decision.shown(*of, rig, plan, bearings) for of in by_plane)
+    if list(balance_decision.of_trials(inboard, outboard)):
         return
     present = work.runs[-1] if plan.leave else trials.base
-    bearings = unbalance_bearings.adopted_bearings(work.record)
     for n in range(plan.corrections):
         found = balance_estimates.balanced(work.slow, [present], trials, rig, plan, bearings)
         needed = balance_decision.correction(found, present.name, rig, plan)

@@ -20,8 +20,8 @@ from bench.recording import Recording
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
+from procedures import assumed, probing, turning, unbalance, unbalance_figures
 from procedures import compensation_figures as drawn
-from procedures import probing, turning, unbalance, unbalance_figures
 from procedures.estimators import compensation_checks, switching
 from procedures.estimators.switching import SWITCH
 from procedures.estimators.unbalance_data import RPM
@@ -128,6 +128,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     yield from unbalance.check(rig, plan)
     if plan.variants[:2] != ("off", "corrected") or plan.law == "PID":
         yield "variants: expected off, then corrected, with law CCS or CAC; something must be compared"
+    if min(plan.speeds_rad_s) > plan.judged_to_rad_s:
+        yield (f"judged_to_rad_s: found {plan.judged_to_rad_s * RPM:.0f} r/min; every speed of the plan is above it, and no "
+               f"reduction would be measured: set it above {min(plan.speeds_rad_s) * RPM:.0f} r/min")  # fmt: skip
     most = rig.envelope.max_speed_rad_s
     if plan.switch_rad_s > most:
         yield f"switch_rad_s: found {plan.switch_rad_s * RPM:.0f} r/min; the envelope allows {most * RPM:.0f} r/min"
@@ -170,5 +173,6 @@ procedure = Procedure(
     settings=settings,
     step_count=step_count,
     needs=unbalance.needs,
+    assumes=assumed.UNBALANCE,
     method=METHOD,
 )

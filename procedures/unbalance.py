@@ -22,7 +22,7 @@ from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
-from procedures import probing, turning
+from procedures import assumed, probing, turning
 from procedures import unbalance_figures as drawn
 from procedures.estimators import (
     tracking_wiring,
@@ -63,6 +63,7 @@ READ = Quantity(
 CURRENT = Quantity("current_peak", "A", "coil current of a plane that is exceeded for 1 % of the time")
 VOLTAGE = Quantity("voltage_peak", "V", "coil voltage of a plane that is exceeded for 1 % of the time, either way")
 MEASURES = (COSINE, SINE, MAJOR, D_MAX, SHARE, READ, CURRENT, VOLTAGE)
+LESS_RUNOUT = tuple(q.name for q in (COSINE, SINE, MAJOR, D_MAX, SHARE))
 PARAMETERS = ("law", "ref_y", "ref_theta")
 LENGTHS = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_inboard_amb", "com_to_outboard_amb", "com_to_coupling",
            "com_to_inboard_balance", "com_to_outboard_balance", "coupling_stiffness", "amb_gap", "clearance")  # fmt: skip
@@ -159,7 +160,7 @@ def evaluated(recording: Recording[Any]) -> Evaluated:
     if any(f.effect is Effect.ERROR for f in found):
         return Evaluated(tuple(found), None)
     dwells, plan = read_dwells(recording), recording.plan
-    found += unbalance_checks.of_signals(dwells, plan)
+    found += unbalance_checks.of_signals(dwells, plan, runout=LESS_RUNOUT)
     if any(f.effect is Effect.ERROR for f in found):
         return Evaluated(tuple(found), None)
     model = adopted_bearings(recording)
@@ -237,5 +238,6 @@ procedure = Procedure(
     settings=settings,
     step_count=step_count,
     needs=needs,
+    assumes=assumed.UNBALANCE,
     method=METHOD,
 )

@@ -27,20 +27,22 @@ class Patience:
     def __init__(self, controller: Controller, clock: Clock, drive: Drive | None) -> None:
         self._controller, self._clock, self._drive = controller, clock, drive
         self._progress_ns = clock.now_ns()
-        self._mode = controller.sight.mode
+        self._modes = {"UNSEEN", "UNKNOWN", controller.sight.mode}
         self._least: float | None = None
         self._drive_rad_s, self._drive_ns = self._reading(), -1
         self._waits, self._begun_ns, self._told_s = "", 0, 0.0
         self._done_ns: dict[Callable[[], None], int] = {}
 
     def look(self) -> None:
-        """See whether a state has changed or the shaft has become slower."""
+        """See whether there is a state that was not seen before, or the shaft has become slower. A state that comes and goes is
+        no progress: a machine that is seen now and then would be waited for without end."""
         now, mode = self._clock.now_ns(), self._controller.sight.mode
         reading = self._reading()
         if reading != self._drive_rad_s:
             self._drive_rad_s, self._drive_ns = reading, now
-        if mode != self._mode:
-            self._mode, self._progress_ns = mode, now
+        if mode not in self._modes:
+            self._modes.add(mode)
+            self._progress_ns = now
         speed = self.speed_rad_s
         if speed is not None and (self._least is None or speed < self._least - max(FALL_RAD_S, FALL * self._least)):
             self._progress_ns = self._progress_ns if self._least is None else now

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from bench.analysis.balance import G_MM, bound
+from bench.calibration import Calibration
 from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.requires import Requires
@@ -29,6 +30,7 @@ from procedures.estimators.balance_data import (
     BASE,
     CAPTURED,
     DECISION,
+    LIGHTER,
     REFUSED,
     SIDES,
     Recorded,
@@ -37,7 +39,7 @@ from procedures.estimators.balance_data import (
     read_runs,
 )
 from procedures.estimators.balance_estimates import Balanced, Forces
-from procedures.estimators.unbalance_data import AXES, CURRENTS, POSITIONS, RPM, SLOW, TOLD, Complex, Dwell
+from procedures.estimators.unbalance_data import AXES, CURRENTS, POSITIONS, RPM, SLOW, TOLD, Dwell
 
 MOST_RPM = 10000.0  # influence runs
 WORST_CONDITION = 50.0  # of the influence coefficients
@@ -125,8 +127,9 @@ def evaluated(recording: Recording[Any]) -> Evaluated:
         return Evaluated(tuple(found))
     plan, rig = recording.plan, recording.rig
     recorded = read_runs(recording, plan.speeds_rad_s)
-    found += unbalance_checks.of_signals(recorded.dwells, plan)
-    found += of_runs(recorded, rig, plan)
+    found += unbalance_checks.of_signals(recorded.dwells, plan, doubts=lambda _: ())  # every run is in all results
+    model = unbalance_bearings.adopted_bearings(recording)
+    found += of_runs(recorded, rig, plan, model)
     trials = balance_decision.trials_of(recorded.runs, rig, plan.leave)
     if trials is None and not any(f.effect is Effect.ERROR for f in found):
         text = "the runs with trial weights were not completed: no influence coefficients."
@@ -135,7 +138,6 @@ def evaluated(recording: Recording[Any]) -> Evaluated:
         return Evaluated((*found, *sheet(recorded, "still-mounted", rig, plan)))
     checks = [r for r in recorded.runs if r.name.startswith("check")]
     shown = [trials.base, *([trials.having[1]] if plan.leave else []), *checks]
-    model = unbalance_bearings.adopted_bearings(recording)
     balance = balance_estimates.balanced(recorded.slow, shown, trials, rig, plan, model)
     last = shown[-1].name
     found.append(unbalance_bearings.told(model, plan))
@@ -144,10 +146,15 @@ def evaluated(recording: Recording[Any]) -> Evaluated:
 
 
 def _refusals(recording: Recording[Any]) -> Iterator[Finding]:
+    for e in recording.events(LIGHTER):
+        text = (f"{e['allowed_kg'] * 1e3:.3g} g was fixed in place of {e['kg'] * 1e3:g} g: beside what the shaft does already, "
+                "more would leave the plan's share of the clearance.")  # fmt: skip
+        yield Finding(LIGHTER, text, str(e["plane"]))
     for e in recording.events(REFUSED):
         text = (
             f"the trial weight of {e['kg'] * 1e3:g} g {e['plane']} was refused: beside what the shaft does already its "
-            f"predicted response would leave the plan's share of the clearance. Allowed are {e['allowed_kg'] * 1e3:.3g} g."
+            f"predicted response would leave the plan's share of the clearance. Allowed are {e['allowed_kg'] * 1e3:.3g} g, too "
+            "little to tell its effect by. Begin at a speed, or under a law, where the shaft moves less."
         )
         yield Finding("trial-refused", text, str(e["plane"]), Effect.ERROR)
     for e in recording.events(DECISION):
@@ -157,7 +164,7 @@ def _refusals(recording: Recording[Any]) -> Iterator[Finding]:
             yield Finding("correction-refused", text, str(e["run"]), Effect.ERROR)
 
 
-def of_runs(recorded: Recorded, rig: RigFile, plan: Settings) -> Iterator[Finding]:
+def of_runs(recorded: Recorded, rig: RigFile, plan: Settings, model: Calibration | None = None) -> Iterator[Finding]:
     """Loose parts, forces, trial weights."""
     for run in recorded.runs:
         yield from balance_decision.slipped(run)
@@ -165,25 +172,25 @@ def of_runs(recorded: Recorded, rig: RigFile, plan: Settings) -> Iterator[Findin
     if base is None:
         return
     yield from _speeds(recorded)
-    off = balance_decision.slow_runout(recorded.slow, base, rig, plan)
+    off = balance_decision.slow_runout(recorded.slow, base, rig, plan, model)
     looked = []
     for d in recorded.dwells:
         if d.kind != SLOW:
-            f: Forces = balance_estimates.forces(read_dwell(d), off, rig, plan)
+            f: Forces = balance_estimates.forces(read_dwell(d), off, rig, plan, model)
             looked.append(Looked(d, f.misfit, f.carried))
     yield from unbalance_checks.channels(looked)
     yield from unbalance_checks.weight(looked)
-    added: list[Complex] = []
+    shown: list[balance_decision.Shown] = []
     named = {r.name: r for r in recorded.runs}
     before = base
     for side in SIDES:
         having = named.get(f"trial {side}")
         if having is None or not having.weights:
             return
-        added.append(balance_decision.shown(before, having, having.weights[-1], rig, plan))
-        yield from balance_decision.of_trial(added[-1], having.weights[-1])
+        shown.append(balance_decision.shown(before, having, having.weights[-1], rig, plan, model))
+        yield from balance_decision.of_trial(shown[-1])
         before = having if plan.leave else base
-    yield from balance_decision.of_trials(added[0], added[1])
+    yield from balance_decision.of_trials(shown[0], shown[1])
 
 
 def _speeds(recorded: Recorded) -> Iterator[Finding]:

@@ -21,7 +21,7 @@ from procedures.estimators.unbalance_beside import folds
 from procedures.estimators.unbalance_data import CURRENTS, POSITIONS, SLOW, Dwell, read_dwells
 
 Array = npt.NDArray[np.float64]
-MOUNT, UNMOUNT, DECISION, REFUSED = "mount", "unmount", "decision", "trial-refused"
+MOUNT, UNMOUNT, DECISION, REFUSED, LIGHTER = "mount", "unmount", "decision", "trial-refused", "trial-lighter"
 BASE = "base"
 SIDES = ("inboard", "outboard")
 CAPTURED = (*POSITIONS, *CURRENTS, "pulses", "pulse_age")

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -14,8 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.analysis.balance import bound, split
+from bench.calibration import Calibration
 from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
+from bench.uncertainty import propagate
 from procedures.estimators import balance_estimates, runout, unbalance_bearings
 from procedures.estimators.balance_data import SIDES, Read, Run, Weight
 from procedures.estimators.balance_estimates import Balanced
@@ -28,7 +30,10 @@ Complex = npt.NDArray[np.complex128]
 LEAST = 0.5  # of what it should do, by the forces: less, and a trial weight moved nothing
 OFF, ASTRAY = 0.25, 0.25  # of a weight: size, and what shows in the other plane
 TURNED_RAD, SLIPPED_RAD = math.radians(12), math.radians(15)
+SURE = 3.0  # of its u: a turn that what is known of the stand does not make
 JUST_RAD = 1e-6
+LIGHTER = 0.25  # of the planned trial weight: what is allowed beside a shaft that moves far; u = 1 mg is 4 % of 25 mg
+MILLIGRAM = 1e-6  # kg
 LIGHTEST_KG = 1e-6  # what a laboratory balance still tells from nothing
 
 
@@ -73,34 +78,66 @@ def allowed_kg(rig: RigFile, plan: Settings, plane: int, before: float = 0.0) ->
     return float(min(max(room, 0.0) / gain(rig, plan, plane) / radius, rig.envelope.max_trial_weight_kg))
 
 
-def refused(rig: RigFile, plan: Settings, present: Run, plane: int) -> float | None:
-    """The allowed trial weight in kg where the planned one is too heavy beside what a run with the weights that are on the
-    shaft now showed, else None."""
+def trial_kg(rig: RigFile, plan: Settings, present: Run, plane: int) -> tuple[float, float]:
+    """The trial weight to fix beside what a run with the weights that are on the shaft now showed, kg, and the heaviest that is
+    allowed: the planned one, else the allowed one in whole milligrams; 0 where that is too light to tell anything by."""
     before = max(r.farthest for r in (*present.reads, *([present.again] if present.again else [])))
-    allowed = allowed_kg(rig, plan, plane, before)
-    return allowed if plan.trial_kg[plane] > allowed else None
+    planned, allowed = plan.trial_kg[plane], allowed_kg(rig, plan, plane, before)
+    if planned <= allowed:
+        return planned, allowed
+    lighter = math.floor(allowed / MILLIGRAM) * MILLIGRAM
+    return (lighter if lighter >= LIGHTER * planned else 0.0), allowed
 
 
-def slow_runout(slow: Read | None, base: Run, rig: RigFile, plan: Settings) -> Complex:
-    """Runout (4,) m by the slow roll and the forces; none without one."""
+def slow_runout(
+    slow: Read | None, base: Run, rig: RigFile, plan: Settings, model: Calibration | None = None
+) -> Complex:  # fmt: skip
+    """Runout (4,) m by the slow roll and the forces; none without one. `model` is the bearings' adopted calibration."""
     if slow is None:
         return np.zeros(4, complex)
-    stand = Stand.of({n: e.value for n, e in unbalance_bearings.stated(rig, plan).items()})
+    stand = Stand.of({n: e.value for n, e in unbalance_bearings.stated(rig, plan, model).items()})
     return runout.found(stand, {1.0: slow.turning}, base.fastest.turning).runout[1.0]
 
 
-def shown(before: Run, having: Run, weight: Weight, rig: RigFile, plan: Settings) -> Complex:
-    """By speed and plane (s, 2), what the forces say that a weight added, over what it should; the angle from the mark to the
-    scale's zero is still in it. Runout cancels."""
+@dataclass(frozen=True)
+class Shown:
+    """A trial `weight`, and by speed and plane (s, 2) what the forces say that it `added`, over what it should; the angle from
+    the mark to the scale's zero is still in it. `turn_u` (s,) rad: of the angle at a speed against that at the highest."""
+
+    weight: Weight
+    added: Complex
+    turn_u: Callable[[int], float]
+
+
+def shown(
+    before: Run, having: Run, weight: Weight, rig: RigFile, plan: Settings, model: Calibration | None = None
+) -> Shown:  # fmt: skip
+    """What the forces say of a weight; runout cancels. `model` is the bearings' adopted calibration."""
     u = weight.unbalance(rig.geometry["balance_radius"].value)
-    none = np.zeros(4, complex)
-    pairs = zip(before.reads, having.reads, strict=True)
-    return np.array([(balance_estimates.forces(b, none, rig, plan).unbalance
-                      - balance_estimates.forces(a, none, rig, plan).unbalance) / u for a, b in pairs])  # fmt: skip
+    pairs = list(zip(before.reads, having.reads, strict=True))
+    inputs = unbalance_bearings.stated(rig, plan, model)
+
+    def added(s: Stand, k: int) -> Complex:
+        none = np.zeros(4, complex)
+        a, b = (runout.unbalances(s, read.turning, none)[0] for read in pairs[k])
+        return np.asarray((b - a) / u)
+
+    def turn_u(k: int) -> float:
+        """Near the rigid modes a share of the forces counts several times: at 4000 r/min gap, offsets and betas make 9°."""
+
+        def turn(v: Mapping[str, float]) -> float:
+            s = Stand.of(v)
+            return float(np.angle(added(s, k)[weight.plane] / added(s, -1)[weight.plane]))
+
+        return propagate(turn, inputs).u
+
+    nominal = Stand.of({name: e.value for name, e in inputs.items()})
+    return Shown(weight, np.array([added(nominal, k) for k in range(len(pairs))]), turn_u)
 
 
-def of_trial(added: Complex, weight: Weight) -> Iterator[Finding]:
-    """Did a trial weight do what it should, in its own plane, at every speed alike? `added` as by `shown`."""
+def of_trial(trial: Shown) -> Iterator[Finding]:
+    """Did a trial weight do what it should, in its own plane, at every speed alike?"""
+    weight, added = trial.weight, trial.added
     p, where, name = (
         weight.plane,
         f"trial {SIDES[weight.plane]}",
@@ -119,15 +156,17 @@ def of_trial(added: Complex, weight: Weight) -> Iterator[Finding]:
         text = (f"by the forces the trial weight of {name} acts as {own:.0%} of itself there and as {other:.0%} in the other "
                 "plane: suspect its mass or its place, or an unbalance that changed as it was mounted.")  # fmt: skip
         yield Finding("weight-not-as-stated", text, where, Effect.ERROR)
-    turn = float(np.abs(np.angle(added[:, p] / added[-1, p])).max()) if own >= LEAST else 0.0
-    if turn > SLIPPED_RAD:
+    turns = np.abs(np.angle(added[:, p] / added[-1, p])) if own >= LEAST else np.zeros(1)
+    k, turn = int(np.argmax(turns)), float(turns.max())
+    if turn > SLIPPED_RAD and turn > SURE * trial.turn_u(k):
         text = (f"what the trial weight of {name} adds is turned by {math.degrees(turn):.0f}° from one speed to another: it is "
                 "loose.")  # fmt: skip
         yield Finding("weight-loose", text, where, Effect.ERROR)
 
 
-def of_trials(first: Complex, second: Complex) -> Iterator[Finding]:
+def of_trials(inboard: Shown, outboard: Shown) -> Iterator[Finding]:
     """Both weights sit on one scale: the same angle from the mark."""
+    first, second = inboard.added, outboard.added
     turn = float(np.angle(second[-1, 1] / first[-1, 0]))
     if abs(turn) > TURNED_RAD and min(abs(first[-1, 0]), abs(second[-1, 1])) >= LEAST:
         text = (f"by the forces the trial weights' scales are turned against each other by {math.degrees(turn):+.0f}°: one of "

@@ -241,11 +241,10 @@ class Forces:
 
     misfit: float
     carried: Array
-    unbalance: Complex
 
 
-def forces(read: Read, off: Complex, rig: RigFile, plan: Settings) -> Forces:
-    """The balance of forces of one dwell, with a runout (4,) m."""
-    s = Stand.of({name: e.value for name, e in unbalance_bearings.stated(rig, plan).items()})
-    u, misfit = runout.unbalances(s, read.turning, off)
-    return Forces(misfit, runout.carried(s, read.means) / unbalance_estimates.shares(rig, s), u)
+def forces(read: Read, off: Complex, rig: RigFile, plan: Settings, model: Calibration | None = None) -> Forces:
+    """The balance of forces of one dwell, with a runout (4,) m; `model` is the bearings' adopted calibration."""
+    s = Stand.of({name: e.value for name, e in unbalance_bearings.stated(rig, plan, model).items()})
+    _, misfit = runout.unbalances(s, read.turning, off)
+    return Forces(misfit, runout.carried(s, read.means) / unbalance_estimates.shares(rig, s))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -49,22 +50,34 @@ def before(recording: Recording[Any]) -> Iterator[Finding]:
         yield Finding("no-dwells", "no dwell was recorded", "", Effect.ERROR)
 
 
-def of_signals(dwells: Sequence[Dwell], plan: Settings) -> Iterator[Finding]:
-    """Lost samples, pulses, probes that clip or stand still, contact, limits, sampling, speed."""
+Doubts = Callable[[Dwell], tuple[str, ...]]
+
+
+def its_own(d: Dwell) -> tuple[str, ...]:
+    """What rests on a dwell alone: what is measured there, and the reduction at its speed. On a slow roll all vectors rest."""
+    return () if d.kind == SLOW else (f"@{d.where}", f"reduction@{d.wanted * RPM:.0f} r/min")
+
+
+def of_signals(
+    dwells: Sequence[Dwell], plan: Settings, doubts: Doubts = its_own, runout: tuple[str, ...] = ()
+) -> Iterator[Finding]:
+    """Lost samples, pulses, probes that clip or stand still, contact, limits, sampling, speed. `doubts` are the quantities
+    that a dwell's data are in, `runout` those that the slow roll is in; none is all of them."""
     lost, expected = np.array([(d.lost, d.expected) for d in dwells], dtype=float).T
-    yield from signals.losses(lost, expected, plan.max_lost, lambda share: dwells[int(np.argmax(share))].where)
+    for f in signals.losses(lost, expected, plan.max_lost, lambda share: dwells[int(np.argmax(share))].where):
+        hit = [doubts(d) for d in dwells if d.lost > plan.max_lost * max(d.expected, 1)]
+        yield replace(f, concerns=tuple(q for some in hit for q in some) if all(hit) else ())
     for d in dwells:
         for name in d.stuck:
             yield Finding("stuck-channel", f"{name} does not move at all; a live sensor has noise.", name, Effect.ERROR)
         yield from _pulses(d)
-        yield from _limits(d)
+        yield from _limits(d, doubts)
         off = abs(d.speed / d.wanted - 1)
         if off > plan.max_speed_error:
-            yield Finding(
-                "speed-off", f"the pulses say {d.speed * RPM:.0f} r/min, {off:.1%} off.", d.where, Effect.INDETERMINATE
-            )
+            text = f"the pulses say {d.speed * RPM:.0f} r/min, {off:.1%} off."
+            yield Finding("speed-off", text, d.where, Effect.INDETERMINATE, doubts(d))
     yield from sampling(dwells, plan)
-    yield from slow_roll(dwells, plan)
+    yield from slow_roll(dwells, plan, runout)
 
 
 def _pulses(d: Dwell) -> Iterator[Finding]:
@@ -78,7 +91,7 @@ def _pulses(d: Dwell) -> Iterator[Finding]:
             yield Finding(f"pulse-{kind}", text, d.where, Effect.ERROR)
 
 
-def _limits(d: Dwell) -> Iterator[Finding]:
+def _limits(d: Dwell, doubts: Doubts) -> Iterator[Finding]:
     if d.flags & RANGE or d.clips >= HELD:
         text = "a position sensor stood at the end of its range: what it shows of the orbit is cut off."
         yield Finding("sensor-clipped", text, d.where, Effect.ERROR)
@@ -92,7 +105,7 @@ def _limits(d: Dwell) -> Iterator[Finding]:
         ),
     ):
         if d.flags & bits:
-            yield Finding(code, text, d.where, Effect.INDETERMINATE)
+            yield Finding(code, text, d.where, Effect.INDETERMINATE, doubts(d))
 
 
 def sampling(dwells: Sequence[Dwell], plan: Settings) -> Iterator[Finding]:
@@ -107,16 +120,16 @@ def sampling(dwells: Sequence[Dwell], plan: Settings) -> Iterator[Finding]:
             yield Finding("aliasing", text, d.where, Effect.ERROR)
 
 
-def slow_roll(dwells: Sequence[Dwell], plan: Settings) -> Iterator[Finding]:
-    """Is there a slow roll, and was it slow?"""
+def slow_roll(dwells: Sequence[Dwell], plan: Settings, runout: tuple[str, ...] = ()) -> Iterator[Finding]:
+    """Is there a slow roll, and was it slow? `runout` are the quantities that it is in."""
     slow = [d for d in dwells if d.kind == SLOW]
     if not slow:
         text = "no slow roll: what the probes read of the journals' runout is in every vector, as if it were unbalance."
-        yield Finding("no-slow-roll", text, "", Effect.INDETERMINATE)
+        yield Finding("no-slow-roll", text, "", Effect.INDETERMINATE, runout)
     elif slow[0].speed > 1.02 * too_fast(plan):
         text = (f"the slow roll was made at {slow[0].speed * RPM:.0f} r/min; above {too_fast(plan) * RPM:.0f} r/min unbalance "
                 "and the loop's own response are in it.")  # fmt: skip
-        yield Finding("slow-roll-too-fast", text, slow[0].where, Effect.INDETERMINATE)
+        yield Finding("slow-roll-too-fast", text, slow[0].where, Effect.INDETERMINATE, runout)
 
 
 def of_results(results: Results, plan: Settings) -> Iterator[Finding]:
@@ -189,8 +202,7 @@ def _folded(results: Results) -> Iterator[Finding]:
             text = (f"at {r.dwell.speed * RPM:.0f} r/min the telemetry, a sample every {period * 1e3:g} ms, shows order {n} as "
                     f"order 1: the vector of {AXES[k]} may be off by {off[k] * 1e6:.2f} µm, which its interval holds. "
                     "Dwell at a speed that is a percent away.")  # fmt: skip
-            doubted = (f"@{r.dwell.where}", "reduction")
-            yield Finding("aliasing", text, r.dwell.where, Effect.INDETERMINATE, doubted)
+            yield Finding("aliasing", text, r.dwell.where, Effect.INDETERMINATE, its_own(r.dwell))
 
 
 def _repeats(results: Results) -> Iterator[Finding]:

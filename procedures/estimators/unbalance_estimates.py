@@ -221,8 +221,9 @@ def _with_rest(far: Estimate, beside: float, where: str) -> Estimate:
 
 def covariance(parts: Sequence[Estimate]) -> Array:
     """Joint covariance of estimates by their shared influences."""
-    ids = sorted({i for e in parts for i in e.contributions})
-    rows = np.array([[e.contributions.get(i, 0.0) for i in ids] for e in parts])
+    each = [e.contributions for e in parts]
+    ids = sorted({i for some in each for i in some})
+    rows = np.array([[some.get(i, 0.0) for i in ids] for some in each])
     return np.asarray(rows @ rows.T)
 
 

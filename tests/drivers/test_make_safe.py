@@ -57,6 +57,21 @@ def test_a_machine_of_which_nothing_tells_is_left_to_itself(speed: float) -> Non
     assert bench.state in ("OFF", "FAULT")
 
 
+def test_a_machine_that_is_seen_now_and_then_is_not_waited_for_without_end() -> None:
+    """Bytes that dribble: replies are lost, and a piece of telemetry comes every ten seconds."""
+    bench = Bench(AMB)
+    up = next(code for code, name in AMB.choices("state").items() if name == "LEVITATED")
+    deaf = Telemetry(AMB, {"state": up}, frozen=(), lost=("CommandReply",), stuck=False)
+
+    def dribble(batch: FrameBatch) -> FrameBatch:
+        shown = bench.machine.now_ns() % 10_000_000_000 < 500_000_000
+        return deaf(batch) if shown else batch[:0]
+
+    found, took_s = bench.made_safe(dribble)
+    assert [f.code for f in found] == ["make-safe-failed"] * 2  # nothing answered, and it is left to itself
+    assert took_s < 2 * END_S + 5.0  # it may be seen once more than when make-safe began
+
+
 def test_readings_that_stand_at_rest_do_not_say_that_the_shaft_is_slow() -> None:
     """The tick runs on; everything else is that of a rotor that stood."""
     bench = Bench()

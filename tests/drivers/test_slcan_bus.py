@@ -225,6 +225,13 @@ def test_an_adapter_without_can_fd_is_named(end: FarEnd) -> None:
     assert "refuses one of S8, Y5, O; expected one that knows these bit rates and CAN FD" in refused(end)
 
 
+def test_noise_that_looks_like_a_refusal_is_called_noise(end: FarEnd) -> None:
+    """Random bytes hold a bell now and then, and a piece that has the form of an answer."""
+    noise = b"\x81\r?\r\x90\x90\r!\r;;\r\aV1013\r"
+    end.answer = lambda data: noise if b"O\r" in data else Adapter()(data)
+    assert "5 pieces came that are no SLCAN, and no frames; expected an SLCAN adapter" in refused(end)
+
+
 def test_a_rate_without_a_code_is_named_before_anything_is_opened(end: FarEnd) -> None:
     assert "SLCAN has no code for a bit rate of 750000 bit/s" in refused(end, bitrate=750_000)
     assert end.received == b""

@@ -57,7 +57,7 @@ HARMLESS = (
     Kind("noise-between", "huge2k=0.01@1", PASS, ("bytes-malformed",), "2 kB of noise behind 1 packet in 100"),
     Kind("strangers", "unknown=0.05", PASS, ("unknown-frames",), "messages that the DBC does not know"),
     Kind("double-replies", "dupreply", PASS, (), "every reply comes twice"),
-    Kind("lost-replies", "lostreply=0.05", PASS, ("requests-repeated",), "1 reply in 20 is lost", long=True),
+    Kind("lost-replies", "lostreply=10", PASS, ("requests-repeated",), "each tenth reply is lost", long=True),
     Kind("lost-levitate", "lostlevitate", PASS, ("requests-repeated",), "LEVITATE is executed, its reply lost"),
     Kind(
         "forgetful",
@@ -235,7 +235,8 @@ AT_START = (
     Kind("silent", "silent", NO_RUN, (), "nothing comes", "no telemetry within 1.5 s. Is the controller on"),
     Kind("deaf-and-dumb", "halfopen", NO_RUN, (), "a connection, and nothing else", "no telemetry within 1.5 s"),
     Kind("noise-at-start", "garbage=200", NO_RUN, (), "200 kB/s of noise", r"\d+ bytes came in .* kB/s\), but no message can"),
-    Kind("noise-on-slcan", "garbage=200", NO_RUN, (), "the same where an adapter is expected", "pieces came that are no SLCAN",
+    Kind("noise-on-slcan", "garbage=200", NO_RUN, (), "the same where an adapter is expected",
+         "pieces came that are no SLCAN|bytes came .* no message can be made",
          wire="slcan"),
     Kind("slow-bytes-at-start", "slowloris=10", NO_RUN, (), "10 bytes a second", r"bytes came .* no message can be made"),
     Kind("no-claim", "noclaim", NO_RUN, (), "Claim is not answered", "the answer to Claim; it did not come, though .* 3 times"),

@@ -150,7 +150,8 @@ void say_message(int identifier, const uint8_t *payload, int length) {
     memcpy(m, payload, (size_t)length);
     if (identifier == TELEMETRY) { say_telemetry(m); return; }
     spoil_reply(identifier, m);
-    if (now_and_then("lostreply")) return;
+    static unsigned replies;
+    if (on("lostreply") && ++replies % (unsigned)*on("lostreply") == 0) return; /* each so many */
     if (identifier == COMMAND_REPLY && m[0] == LEVITATE && once("lostlevitate")) return; /* executed, and not answered */
     if (on("slowreply")) {
         for (int k = 0; k < HELD; k++) if (!held[k].length) {

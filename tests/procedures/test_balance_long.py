@@ -112,7 +112,7 @@ def test_corrections_under_way_rest_on_the_adopted_bearings(tmp_path: Path) -> N
         ({"pulse_missing": 2.0}, ONE, "pulse-missing", Effect.ERROR),
         ({"pulse_doubled": 2.0}, {**ONE, "speeds_rad_s": (3000 * RPM,)}, "pulse-doubled", Effect.ERROR),
         ({"geometry.clearance": 20e-6}, {**ONE, "speeds_rad_s": (4000 * RPM,)}, "contact", Effect.INDETERMINATE),
-        (HEAVY, {**ONE, "max_share": 0.3}, "trial-refused", Effect.ERROR),
+        (HEAVY, {**ONE, "max_share": 0.24}, "trial-refused", Effect.ERROR),
         ({}, {**ONE, "slow_rad_s": 0.0}, "no-slow-roll", Effect.INDETERMINATE),
         ({}, {**ONE, "corrections": 0}, "not-reached", Effect.INDETERMINATE),
     ],

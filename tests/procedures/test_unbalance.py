@@ -17,14 +17,18 @@ from bench.cli.virtual import given, simulated_run
 from bench.errors import BenchError
 from bench.figures import Figure
 from bench.findings import Effect, Finding
+from bench.limits import Limit
+from bench.outcomes import outranking
 from bench.procedure import Measured
 from bench.recording import Recording
+from bench.records import measurement
 from bench.rigfile import load_rig
+from bench.specs import applied, load_spec
 from bench.uncertainty import Estimate, Influence, interval
 from procedures import compensation, unbalance
 from procedures.estimators import reach, runout, unbalance_bearings, unbalance_checks, unbalance_estimates
 from procedures.estimators.coil_peaks import blocks, uncertified
-from procedures.estimators.unbalance_data import AXES, read_dwells
+from procedures.estimators.unbalance_data import AXES, SLOW, read_dwells
 from procedures.estimators.unbalance_estimates import Results
 from procedures.turning import CODES, POLES, SETTINGS
 from procedures.unbalance import check
@@ -238,6 +242,39 @@ def test_a_clipping_probe_shows_in_the_capture_where_the_controller_does_not_tel
     assert any(f.code == "sensor-clipped" for f in run.results if isinstance(f, Finding))
 
 
+def test_a_finding_of_one_speed_leaves_the_others_alone(tmp_path: Path) -> None:
+    """The shaft touches at 4000 r/min: what was measured at 2000 r/min stands, and so would a verdict of fail on it."""
+    plan, truth = {**ONE, "speeds_rad_s": (2000 * RPM, 4000 * RPM)}, {"geometry.clearance": 25e-6}
+    run = done(tmp_path, "unbalance", plan, truth)
+    touched = [f for f in run.findings if f.code == "contact"]
+    assert [f.where for f in touched] == ["4000 r/min, off"]
+    share = next(q for q in unbalance.MEASURES if q.name == "d_max_share")
+    failed = {
+        where: measurement(share.measured(e, where), Limit(None, 0.0, "1", "", verified=False), SEED)
+        for (name, where), e in run.measured.items()
+        if name == share.name
+    }
+    assert len(failed) == 4
+    for where, m in failed.items():
+        assert outranking(m, run.findings) == (("contact",) if "4000" in where else ())
+
+
+def test_without_a_slow_roll_readings_and_currents_stand(compared: Run) -> None:
+    slow = [d for d in read_dwells(compared.recording) if d.kind != SLOW]
+    found = list(unbalance_checks.slow_roll(slow, compared.recording.plan, unbalance.LESS_RUNOUT))
+    assert [f.code for f in found] == ["no-slow-roll"]
+    assert set(found[0].concerns) == {"vector_cos", "vector_sin", "major_half_axis", "d_max", "d_max_share"}
+
+
+def test_the_limit_of_the_steady_state_is_that_of_the_law_it_was_printed_for() -> None:
+    """T Fig. 3.7 is CCS; under CAC a sound stand is left with 1.5 to 2.2 µm of mean and order 1."""
+    limits = load_spec("amb5dof", "compensation")
+    assert "residual" in applied(limits, compensation.Plan())[0]
+    held, notes = applied(limits, compensation.Plan(law="CAC"))
+    assert set(limits) - set(held) == {"residual"}
+    assert "law = CCS" in notes[0].text
+
+
 def test_an_ellipse_has_the_degrees_of_freedom_of_all_its_influences(compared: Run) -> None:
     """Certificates and runout carry it, not the fourteen of the dwell's batches: k = 2.45 within a few percent, not 2.86."""
     for r in compared.results.dwells:
@@ -305,6 +342,10 @@ def test_plans_that_cannot_work_are_refused() -> None:
     assert list(compensation.check(rig, compensation.Plan())) == []
     assert "something must be compared" in "; ".join(compensation.check(rig, compensation.Plan(law="PID")))
     assert "envelope" in "; ".join(compensation.check(rig, compensation.Plan(switch_rad_s=1600.0)))
+    beyond = compensation.Plan(speeds_rad_s=(14000 * RPM,))
+    assert "no reduction would be measured" in "; ".join(compensation.check(rig, beyond))
+    raised = compensation.Plan(speeds_rad_s=(14000 * RPM,), judged_to_rad_s=14001 * RPM)
+    assert list(compensation.check(rig, raised)) == []
 
 
 def test_runout_by_forces_is_exact_on_its_own_model() -> None:
