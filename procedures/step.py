@@ -255,6 +255,9 @@ Rise is read from the curve of which the telemetry's samples are the means: the 
 sum. Bandwidth is that of the Fourier transform of the response's derivative, from the samples and, after 8 ms, the fitted
 curve, freed of what a mean over 1 ms takes away; telemetry ends at 500 Hz.
 
+While the shaft rests before a step, each bearing's currents are mostly the controller's answer to its own plane's readings.
+Which plane they answer is looked at by the share of their variance that follows from either: so exchanged planes show.
+
 Overshoot, rise, settling, error and bandwidth belong to steps of their size and direction. Scatter is that of the repeats that
 begin alike; noise is the same for all steps of a setting, an axis and a speed.
 Lengths are those of the position sensors, within their gains.

@@ -230,6 +230,10 @@ noise does not make peaks; blocks of revolutions are left out in turn for the sc
 of the reference's frequency, fitted to each revolution. The distance to the rings is from single samples: it holds vibration
 and runout.
 
+The phase counts from that start, so that the reference's frequency has to be what was told. Whether it is shows in the delays
+of all revolutions from where the reference has grown: they drift where it is not. A drift beyond chance (one in 10 000 sound
+orbits) that makes more than the half tick since the start is a finding.
+
 Before the lift the rotor lies on its rings, below the middle on both axes. The set points of y and of the tilt about z are
 then moved a little, which shows whether the readings belong to where they are taken.
 """
