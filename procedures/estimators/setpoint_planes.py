@@ -6,7 +6,7 @@ probes see: of a plane's samples (this one and the two before it) some 60 to 70 
 current follows by least squares, and some 0 to 13 % of the other bearing's. The excess of the own over the other, of both
 bearings together, is found for each step alone from fits to all of them; steps are independent. Its mean over its standard
 uncertainty is held against Student's t: where neither plane is nearer to either bearing, a finding comes by chance with
-FALSE_ALARM, and with a sound stand, which is some fifty standard uncertainties from there, never.
+FALSE_ALARM, and with a sound stand, which is 25 standard uncertainties and more from there, never.
 """
 
 from __future__ import annotations
