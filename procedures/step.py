@@ -23,9 +23,10 @@ from bench.rigfile import RigFile
 from bench.roles import RigState
 from procedures import assumed
 from procedures import step_figures as drawn
-from procedures.estimators import setpoint_checks, setpoint_estimates
+from procedures.estimators import setpoint_checks, setpoint_estimates, setpoint_planes
 from procedures.estimators.setpoint_data import CHANNELS, STEP, TURNING_RAD_S, cases, read_steps
 from procedures.estimators.unbalance_data import RPM
+from procedures.step_record import enough_s
 
 OVERSHOOT = Quantity("overshoot", "1", "greatest position beyond the step, as a share of it")
 RISE = Quantity("rise_time", "s", "10 to 90 % of the step")
@@ -71,7 +72,7 @@ class Plan(BenchPlan):
         0.0, gt=-0.5, lt=1.0
     )  # share by which the controller's betas and offsets are made too large
     rest_s: float = Field(0.3, ge=0.1)  # before each step
-    record_s: float = Field(1.5, ge=0.2)  # after it
+    record_s: float | None = Field(None, ge=0.2)  # after it; by default until the law's integrator has arrived
     band: float = Field(0.02, gt=0)  # of settling, as a share of the step
     max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
     max_speed_error: float = Field(0.02, gt=0)  # share of the speed
@@ -89,6 +90,14 @@ def model(rig: RigFile, plan: Plan) -> dict[str, float]:
     return {n: rig.parameters[n].default * (1 + plan.model_error) for n in names} if plan.model_error else {}
 
 
+def recorded_s(rig: RigFile, plan: Plan) -> float:
+    """How long each step is recorded, s: what the plan says, or as long as the slowest of its laws takes."""
+    if plan.record_s is not None:
+        return plan.record_s
+    usual = {name: p.default for name, p in rig.parameters.items()}
+    return enough_s([{**usual, **s} for s in chosen(plan).values()], plan.axes, plan.band)
+
+
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records, for the progress display."""
     return 4 * plan.repeats * len(list(cases(tuple(chosen(plan)), plan.speeds_rad_s, plan.axes, plan.sizes_m)))
@@ -98,6 +107,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Up, back, down and back for every case; the shaft stands and the controller has its own settings again in the end."""
     write, settings = rig.levitation.set, chosen(plan)
     used: dict[str, float] = {}
+    record_s = recorded_s(rig.file, plan)
     for name, value in model(rig.file, plan).items():
         write(name, value)
     write("slew", 0.0)
@@ -121,7 +131,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
                 ):
                     rig.clock.sleep(plan.rest_s)
                     write(f"ref_{axis}", end)
-                    rig.clock.sleep(plan.record_s)
+                    rig.clock.sleep(record_s)
     if rig.drive is not None and max(plan.speeds_rad_s) > 0:
         rig.drive.stop()
         rig.drive.coast()
@@ -159,6 +169,7 @@ def _put(rig: Rig, plan: Plan, setting: Mapping[str, float], used: dict[str, flo
 def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
     """Findings first, then the quantities of each case, then those over sizes and directions."""
     early = list(setpoint_checks.before(recording))
+    early += () if early else setpoint_planes.exchanged(recording)
     yield from early
     if any(f.effect is Effect.ERROR for f in early):
         return
@@ -243,6 +254,9 @@ frequency, which it can only lower).
 Rise is read from the curve of which the telemetry's samples are the means: the derivative of a spline through their running
 sum. Bandwidth is that of the Fourier transform of the response's derivative, from the samples and, after 8 ms, the fitted
 curve, freed of what a mean over 1 ms takes away; telemetry ends at 500 Hz.
+
+While the shaft rests before a step, each bearing's currents are mostly the controller's answer to its own plane's readings.
+Which plane they answer is looked at by the share of their variance that follows from either: so exchanged planes show.
 
 Overshoot, rise, settling, error and bandwidth belong to steps of their size and direction. Scatter is that of the repeats that
 begin alike; noise is the same for all steps of a setting, an axis and a speed.

@@ -26,6 +26,7 @@ from procedures import tracking_figures as drawn
 from procedures.estimators import tracking_checks, tracking_estimates, tracking_wiring
 from procedures.estimators.tracking_data import (
     CHANNELS,
+    GROWN,
     ORBIT,
     POSITIONS,
     START,
@@ -99,7 +100,7 @@ def settings(plan: Plan) -> dict[str, float]:
 
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records, for the progress display."""
-    return probing.STEPS + 1 + len(plan.order)
+    return probing.STEPS + 1 + 2 * len(plan.order)
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
@@ -145,7 +146,8 @@ def _orbit(rig: Rig, plan: Plan, record: Recorder, law: Law) -> None:
     rig.clock.sleep(plan.settle_s)
     for part in range(1, GROW + 1):
         _size(rig, plan, part / GROW)
-    rig.clock.sleep(plan.settle_s)
+    with record.step(GROWN, law=law):  # the longer, the better it tells the reference's frequency
+        rig.clock.sleep(plan.settle_s)
     labels = {"hz": plan.hz, "y_m": plan.y_m, "z_m": plan.z_m, "speed_rad_s": plan.speed_rad_s, "ratio": plan.ratio}
     with record.step(ORBIT, law=law, judged=law in plan.laws, **labels):
         rig.clock.sleep(plan.revolutions / plan.hz + 0.05)
@@ -227,6 +229,10 @@ The error is averaged over a turn of the shaft, at rest over 3 ms, and then over
 noise does not make peaks; blocks of revolutions are left out in turn for the scatter. Amplitude and phase are those of a sine
 of the reference's frequency, fitted to each revolution. The distance to the rings is from single samples: it holds vibration
 and runout.
+
+The phase counts from that start, so that the reference's frequency has to be what was told. Whether it is shows in the delays
+of all revolutions from where the reference has grown: they drift where it is not. A drift beyond chance (one in 10 000 sound
+orbits) that makes more than the half tick since the start is a finding.
 
 Before the lift the rotor lies on its rings, below the middle on both axes. The set points of y and of the tilt about z are
 then moved a little, which shows whether the readings belong to where they are taken.

@@ -151,7 +151,7 @@ class Turns:
 def turns(path: Path, f: Facts) -> Turns:
     """The revolutions of a path."""
     per = revolutions(path)
-    q, radius = centre(path.readings, f), distances(path.readings, f)
+    radius = distances(path.readings, f)
     both = np.concatenate([errors(path, f), plane_errors(path, f)])
     period = path.wave.tick * path.wave.ticks
     parts = np.arange(round(1 / path.wave.hz / period)) * period
@@ -160,9 +160,20 @@ def turns(path: Path, f: Facts) -> Turns:
     return Turns(
         folded[:, :4],
         folded[:, 4:],
-        np.array([[_follows(path, f, q[k, m], m, axis) for k, axis in enumerate(path.wave.axes)] for m in per]),
+        followed(path, f)[1],
         np.array([f.clearance - float(radius[:, m].max()) for m in per]),
     )
+
+
+def followed(path: Path, f: Facts) -> tuple[Array, npt.NDArray[np.complex128]]:
+    """Of each whole revolution of the reference: its middle (m,) s, and what y and z do over what they should (m, 2).
+
+    Raises:
+        AnalysisError: there are fewer than four.
+    """
+    per, q = revolutions(path), centre(path.readings, f)
+    follows = [[_follows(path, f, q[k, m], m, axis) for k, axis in enumerate(path.wave.axes)] for m in per]
+    return np.array([path.t[m].mean() for m in per]), np.array(follows)
 
 
 def _follows(path: Path, f: Facts, x: Array, m: npt.NDArray[np.bool_], axis: tuple[float, float, float]) -> complex:

@@ -24,7 +24,8 @@ from procedures.estimators.tracking_data import (
     VOLTAGE_LIMIT,
     Orbit,
 )
-from procedures.estimators.tracking_estimates import nominal
+from procedures.estimators.tracking_drift import Drift, drift
+from procedures.estimators.tracking_estimates import TIMING_TICKS, nominal
 
 FATAL = (
     "stuck-channel",
@@ -68,7 +69,7 @@ def of_signals(orbits: Sequence[Orbit], plan: Settings) -> Iterator[Finding]:
             if np.ptp(values) == 0:
                 yield Finding("stuck-channel", f"{name} does not move at all during an orbit.", name, Effect.ERROR)
         yield from _clipping(o)
-        yield from _of_reference(o)
+        yield from _of_reference(o, o.law in plan.laws)
         if plan.speed_rad_s:
             off = float(np.abs(o.speed - plan.speed_rad_s).max()) / plan.speed_rad_s
             if off > STEADY:
@@ -100,7 +101,7 @@ def _clipping(o: Orbit) -> Iterator[Finding]:
         )
 
 
-def _of_reference(o: Orbit) -> Iterator[Finding]:
+def _of_reference(o: Orbit, judged: bool) -> Iterator[Finding]:
     facts, wave = nominal(o.step.recording.rig, o.t_0), o.path.wave
     q = centre(o.path.readings, facts)[:2]
     t, sizes = o.path.t - o.path.t[0], (wave.y, wave.z)
@@ -135,6 +136,20 @@ def _of_reference(o: Orbit) -> Iterator[Finding]:
             o.where,
             Effect.ERROR,
         )
+    elif judged and not (o.flags & CONTACT).any():
+        yield from _of_drift(o, drift(o.whole, facts))
+
+
+def _of_drift(o: Orbit, found: Drift | None) -> Iterator[Finding]:
+    """A frequency that is a little off: its phase, which counts from the start, runs away by more than the budget has of it."""
+    if found is None or not found.plain or abs(found.ahead_s) <= TIMING_TICKS * o.path.wave.tick:
+        return
+    text = (
+        f"the rotor's phase drifts as if the reference ran at {o.path.wave.hz * (1 + found.off):.8g} Hz, not at "
+        f"{o.path.wave.hz:g} Hz: since its start it is {abs(found.ahead_s) * 1e3:.2g} ms "
+        f"{'ahead' if found.off > 0 else 'behind'}."
+    )
+    yield Finding("reference-frequency", text, o.where, Effect.ERROR)
 
 
 def of_results(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from procedures.estimators.setpoint_onset import onset
 from procedures.estimators.tracking import Facts, Path, Wave, distances
 
 Array = npt.NDArray[np.float64]
-REST, LIFT, PROBE, START, ORBIT = "rest", "lift", "probe", "start", "orbit"
+REST, LIFT, PROBE, START, GROWN, ORBIT = "rest", "lift", "probe", "start", "grown", "orbit"
 STARTED, LIFT_LOST, NO_SPEED = "reference-started", "lift-lost", "no-speed"
 AXES = ("yi", "zi", "yo", "zo")
 POSITIONS = tuple(f"pos_{axis}" for axis in AXES)
@@ -26,11 +26,13 @@ CURRENT_LIMIT, VOLTAGE_LIMIT, CONTACT, RANGE = 1, 2, 12, 64  # bits of the telem
 
 @dataclass(frozen=True)
 class Orbit:
-    """One law's orbit: its path, coil currents (4, n) A of both sides, flags (n,), speed (n,) rad/s, the reference's zero of
-    phase in s on the path's time, and the start's jump of current over its noise."""
+    """One law's orbit: its path, the `whole` one from where the reference had grown, coil currents (4, n) A of both sides,
+    flags (n,), speed (n,) rad/s, the reference's zero of phase in s on the path's time, and the start's jump of current over
+    its noise."""
 
     law: str
     path: Path
+    whole: Path
     upper: Array
     lower: Array
     flags: npt.NDArray[np.int64]
@@ -69,7 +71,8 @@ def read_orbits(recording: Recording[Any]) -> list[Orbit]:
         raise AnalysisError("found no orbits; expected those of the plan (was the run stopped early?)")
     origin = starts[0].start_ns
     t_0, clear = _start(recording, starts[0], _wave(recording, orbits[0]))
-    return [_read(recording, step, origin, t_0, clear) for step in orbits]
+    grown = {str(step.labels["law"]): step for step in recording.steps(GROWN)}  # none in recordings of old
+    return [_read(recording, step, grown.get(str(step.labels["law"])), origin, t_0, clear) for step in orbits]
 
 
 def _wave(recording: Recording[Any], step: Step) -> Wave:
@@ -93,7 +96,7 @@ def _start(recording: Recording[Any], start: Step, wave: Wave) -> tuple[float, f
     return onset(at, current, earliest, latest, tick=wave.tick, ticks=wave.ticks, lag_s=lag)
 
 
-def _read(recording: Recording[Any], step: Step, origin: int, t_0: float, clear: float) -> Orbit:
+def _read(recording: Recording[Any], step: Step, grown: Step | None, origin: int, t_0: float, clear: float) -> Orbit:
     labels, data = step.labels, step.read(*CHANNELS)
     if len(data["t_ns"]) < 20:
         raise AnalysisError(f"{labels['law']}: found {len(data['t_ns'])} samples; expected a whole orbit")
@@ -105,5 +108,13 @@ def _read(recording: Recording[Any], step: Step, origin: int, t_0: float, clear:
         np.array([data[c] for c in POSITIONS]),
         2 * np.pi / float(np.median(speed)) if turning else 0.0,
     )
+    whole = path if grown is None else _joined(grown, path, origin)
     upper, lower = (np.array([data[c] for c in names]) for names in (UPPER, LOWER))
-    return Orbit(str(labels["law"]), path, upper, lower, data["flags"].astype(np.int64), speed, t_0, clear, step)
+    return Orbit(str(labels["law"]), path, whole, upper, lower, data["flags"].astype(np.int64), speed, t_0, clear, step)
+
+
+def _joined(grown: Step, path: Path, origin: int) -> Path:
+    """A path with what was recorded before it."""
+    data = grown.read(*POSITIONS)
+    t = np.concatenate([(data["t_ns"] - origin) * 1e-9, path.t])
+    return replace(path, t=t, readings=np.concatenate([np.array([data[c] for c in POSITIONS]), path.readings], axis=1))

@@ -25,12 +25,13 @@ from procedures.estimators import (
     setpoint_checks,
     setpoint_data,
     setpoint_estimates,
+    setpoint_planes,
     setpoint_settling,
     setpoint_swing,
     stepmodel,
 )
 from procedures.estimators.setpoint_onset import onset
-from procedures.step import MEASURES, Plan, check, figures, step_count
+from procedures.step import MEASURES, Plan, check, figures, recorded_s, step_count
 from reports.figures import draw as draw_figure
 
 SHORT = {"axes": ("y",), "sizes_m": (10e-6, 20e-6), "record_s": 0.4, "settle_s": 3.0}
@@ -56,7 +57,7 @@ def stepped(folder: Path, seed: int = 1, truth: Mapping[str, float] | None = Non
 @pytest.mark.parametrize(
     ("seed", "plan"),
     [
-        (4, {**SHORT, "a": {"law": 0.0}, "settle_s": 5.0, "record_s": 2.5}),  # PID's integrator needs it
+        (4, {**SHORT, "a": {"law": 0.0}, "settle_s": 5.0, "record_s": None}),  # as long as PID's integrator takes
         (4, {**SHORT, "a": {"law": 1.0}, "settle_s": 5.0}),
         (4, {**SHORT, "a": {"law": 2.0}, "settle_s": 5.0}),
         (0, {"axes": ("z",), "speeds_rad_s": (10000 * math.pi / 30,)}),  # its second oscillation is below the noise
@@ -144,6 +145,8 @@ def test_sizes_and_ways_are_compared(tmp_path: Path) -> None:
         pytest.param({"factor_ref_y": 0.5}, {}, "wrong-size", marks=pytest.mark.long),
         ({"factor_ref_y": -1.0}, {}, "wrong-way"),
         ({"current_sign_i": -1.0}, {}, "current-sign"),
+        ({"told_planes": 1.0}, {}, "planes-exchanged"),
+        ({"told_planes": 1.0}, {"speeds_rad_s": (FAST,)}, "planes-exchanged"),
         ({"position_range": 30e-6}, {}, "sensor-clipped"),
         ({"geometry.clearance": 26e-6}, {}, "contact"),
         ({"supply_V": 12.0, "inductance": 60e-3}, {}, "voltage-saturated"),
@@ -216,6 +219,36 @@ def test_plans_that_cannot_work_are_refused() -> None:
     assert "twice" in next(iter(check(rig, Plan(names=("A", "A")))))
     bare = rig.model_copy(update={"devices": {k: d for k, d in rig.devices.items() if k != "drive"}})
     assert "nothing turns" in next(iter(check(bare, Plan(speeds_rad_s=(FAST,)))))
+
+
+@pytest.mark.parametrize(
+    ("plan", "seconds"),
+    [
+        ({}, 1.5),
+        ({"a": {"law": 2.0}}, 1.5),
+        ({"a": {"law": 0.0}}, 2.5),  # 0.58 s to 1/e, from 0.375 of the step into a third of 2 %: 2.34 s
+        ({"b": {"law": 0.0}}, 2.5),
+        ({"a": {"law": 0.0, "ki": 5000.0}}, 5.0),  # half the integrator: 4.69 s
+        ({"a": {"law": 0.0, "ki": 0.0}}, 10.0),
+        ({"a": {"law": 0.0}, "record_s": 0.4}, 0.4),
+    ],
+)
+def test_a_record_is_as_long_as_the_slowest_law_takes(plan: Mapping[str, Any], seconds: float) -> None:
+    assert recorded_s(load_rig("amb5dof"), Plan(**plan)) == seconds
+
+
+def test_planes_that_answer_alike_are_called_exchanged_by_chance_only() -> None:
+    """Where neither plane is nearer, one in ten thousand; where the currents answer their own, or the other's, as it is."""
+    rng = np.random.default_rng(3)
+
+    def steps(own: float, other: float) -> list[np.ndarray]:
+        x = rng.normal(size=(8, 2, 60))
+        return [np.concatenate([a, own * a + other * a[::-1] + rng.normal(size=(2, 60))]) for a in x]
+
+    assert not any(setpoint_planes.crossed(steps(1.0, 1.0)) for _ in range(300))
+    assert not setpoint_planes.crossed(steps(1.0, 0.2))
+    assert setpoint_planes.crossed(steps(0.2, 1.0))
+    assert not setpoint_planes.crossed([x[:, :20] for x in steps(0.2, 1.0)])
 
 
 def second_order(w: float, z: float, shift: float, seconds: float = 0.4) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,41 @@
+"""How long a step of the set point is recorded where the plan does not say: until the integrator of the law has arrived.
+
+With the PID a step of r is first one of r K_i k_p/(K_i k_p - K_s), since the magnets' negative stiffness K_s helps the new
+place along; what is beyond r the integrator takes away with the time constant (k_p - K_s/K_i)/k_I. By the bearings' law
+F = beta (i_p²/(kappa - o)² - i_n²/(kappa + o)²) at the bias i_b, K_s/K_i is
+i_b ((kappa - o)^-3 + (kappa + o)^-3)/((kappa - o)^-2 + (kappa + o)^-2): beta does not matter, nor does what carries the weight.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+LEAST_S = 1.5  # the flatness laws know the negative stiffness: little is left to their integrators
+MOST_S = 10.0  # a slower integrator is for `warm`, or for `record_s`
+LEFT = 1 / 3  # of the band that may be left at the end
+ROUNDED_S = 0.5
+PID = 0.0
+
+
+def enough_s(settings: Iterable[Mapping[str, float]], axes: Iterable[str], band: float) -> float:
+    """For the slowest of `settings`, each with all parameters of the controller; s."""
+    slowest = max((_arrived_s(s, axis, band) for axis in axes for s in settings), default=LEAST_S)
+    return math.ceil(min(max(slowest, LEAST_S), MOST_S) / ROUNDED_S - 1e-9) * ROUNDED_S
+
+
+def _arrived_s(of: Mapping[str, float], axis: str, band: float) -> float:
+    if of.get("law") != PID or any(n not in of for n in ("kp", "ki", "bias")):
+        return LEAST_S
+    softer = of["bias"] * max(_stiffness(of, plane) for plane in ((axis,) if axis == "x" else (f"{axis}i", f"{axis}o")))
+    if not 0 < softer < of["kp"]:
+        return LEAST_S
+    beyond, constant = softer / (of["kp"] - softer), (of["kp"] - softer) / of["ki"] if of["ki"] else math.inf
+    return constant * max(math.log(beyond / (LEFT * band)), 0.0)
+
+
+def _stiffness(of: Mapping[str, float], plane: str) -> float:
+    """K_s/K_i of a bearing over its bias, 1/m."""
+    gap = of.get("model_gap_x" if plane == "x" else "model_gap", math.inf)
+    near, far = (gap - sign * of.get(f"model_offset_{plane}", 0.0) for sign in (1, -1))
+    return (near**-3 + far**-3) / (near**-2 + far**-2) if min(near, far) > 0 and math.isfinite(gap) else 0.0
