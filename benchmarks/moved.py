@@ -5,12 +5,13 @@
 
 Each must be caught (a finding above a note, or a run that is stopped), or do nothing that matters (2 U), or be covered by its
 share of the budget, or stand in the report's list of what no data can show. What is none of these is printed last and makes
-the exit status 1. Shifts are of value less truth, against the run of the same seed with nothing moved, in the greater U of
-both: a result that the moved machine gives less well says so.
+the exit status 1. Shifts are of value less truth, against the run of the same seed with nothing moved, in U of that run. Beside
+them stands the moved run's own error, in its own U: a result that the moved machine gives less well and says so is no quiet
+wrong one, and fails only beyond 1.5 of them.
 
 A moved machine is another one for the noise too, and a phase that is moved turns an error that was there: the difference of two
 errors is beyond 2 U once in 200 results by chance. What would fail is moved on two more seeds, and fails where the root mean
-square of that result's three shifts is beyond 2 U (by chance once in 40 000).
+squares of that result's three shifts and of its own errors are beyond both (by chance once in 40 000).
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ from reports.unseen import is_reached
 from sim_backend.machine import machine_of
 
 HALF_WIDTHS = 3.0
-MATTERS = 2.0  # U
+MATTERS = 2.0  # U of the run with nothing moved
+ITSELF = 1.5  # of its own U: how far the moved run's result may be off its truth
 MORE_SEEDS = (1, 2)  # beside the first, for what would fail on it
 ORDER = ("nothing", "budget", "listed", "FAILS")
 LINEAR = 1.5  # how far a shift may exceed the linear share of three half widths, beside the scatter of two runs
@@ -62,7 +64,8 @@ NAMES = {"hanger": "masses/hanger", "mass_density": "masses/density", "polar_ine
 
 @dataclass(frozen=True)
 class Moved:
-    """What became of one number: `shift` U of the result that moved most, `end` caught, nothing, budget, listed or FAILS."""
+    """What became of one number: `shift` of the result that moved most, in U of the run with nothing moved; `own`, the moved
+    run's error of it in its own U; `end` caught, nothing, budget, listed or FAILS."""
 
     procedure: str
     name: str
@@ -70,6 +73,7 @@ class Moved:
     shift: float
     result: str
     told: str
+    own: float = 0.0
 
 
 def identity(name: str) -> str:
@@ -142,8 +146,8 @@ class Sound:
         base = errors(run)
         return cls(run, base, {key: interval(m.estimate, seed).U for key, (_, m) in base.items()})
 
-    def shifts(self, name: str, value: float, folder: Path) -> dict[str, float] | str:
-        """In U by result with a number moved, or what caught it."""
+    def shifts(self, name: str, value: float, folder: Path) -> dict[str, tuple[float, float]] | str:
+        """By result with a number moved its shift in U of this run and its error in its own U, or what caught it."""
         try:
             done = attempt(self.run.procedure.name, self.run.recording.rig.name, self.run.seed, {name: value}, folder)
         except BenchError as error:
@@ -151,12 +155,17 @@ class Sound:
         if found := serious(done):
             return ", ".join(found)
         return {
-            key: abs(e - self.base[key][0]) / self.wide[key] for key, (e, _) in errors(done).items() if key in self.base
+            key: (
+                abs(e - self.base[key][0]) / self.wide[key],
+                abs(e) / max(interval(m.estimate, self.run.seed).U, 1e-300),
+            )
+            for key, (e, m) in errors(done).items()
+            if key in self.base
         }
 
-    def end(self, name: str, key: str, shift: float) -> str:
-        """nothing, budget, listed or FAILS: a result's shift by a number."""
-        if shift <= MATTERS:
+    def end(self, name: str, key: str, shift: float, own: float) -> str:
+        """nothing, budget, listed or FAILS: a result's shift by a number, and its error in its own U."""
+        if shift <= MATTERS or own <= ITSELF:
             return "nothing"
         shares = [(i, c) for i, c in self.base[key][1].estimate.sensitivities.items() if i.id == identity(name)]
         if shares and not is_reached(identity(name), self.run.procedure.reached):
@@ -175,21 +184,20 @@ def moved(procedure: str, rig: str, seed: int, names: Mapping[str, float], folde
         if isinstance(shifts, str):
             yield Moved(procedure, name, "caught", 0.0, "", shifts)
             continue
-        worst = max(
-            shifts, key=lambda key: (ORDER.index(rigs[seed].end(name, key, shifts[key])), shifts[key]), default=""
-        )
-        shift = shifts.get(worst, 0.0)
-        end = rigs[seed].end(name, worst, shift) if worst else "nothing"
+        ends = {key: rigs[seed].end(name, key, *both) for key, both in shifts.items()}
+        worst = max(shifts, key=lambda key: (ORDER.index(ends[key]), shifts[key]), default="")
+        shift, own = shifts.get(worst, (0.0, 0.0))
+        end = ends.get(worst, "nothing")
         if end == "FAILS":
-            several = [shift]
+            several = [(shift, own)]
             for more in (seed + k for k in MORE_SEEDS):
                 if more not in rigs:
                     rigs[more] = Sound.of(procedure, rig, more, folder)
                 again = rigs[more].shifts(name, value, folder)
                 several += [again[worst]] if not isinstance(again, str) and worst in again else []
-            shift = math.sqrt(sum(x * x for x in several) / len(several))
-            end = "FAILS" if shift > MATTERS else "nothing"
-        yield Moved(procedure, name, end, round(shift, 2), worst, "")
+            shift, own = (math.sqrt(sum(x * x for x in xs) / len(xs)) for xs in zip(*several, strict=True))
+            end = "FAILS" if shift > MATTERS and own > ITSELF else "nothing"
+        yield Moved(procedure, name, end, round(shift, 2), worst, "", round(own, 2))
 
 
 def main() -> int:
@@ -213,7 +221,8 @@ def main() -> int:
                 for line in moved(procedure, rig, asked.seed, left, Path(folder)) if left else ():
                     lines.append(asdict(line))
                     print(
-                        f"{line.procedure:18} {line.name:34} {line.end:8} {line.shift:6.2f} U {line.result} {line.told[:90]}"
+                        f"{line.procedure:18} {line.name:34} {line.end:8} {line.shift:6.2f} U, {line.own:5.2f} of its own "
+                        f"{line.result} {line.told[:90]}"
                     )
                     if asked.all:
                         with asked.all.open("a", encoding="utf-8") as out:
@@ -221,7 +230,8 @@ def main() -> int:
     failed = [e for e in lines if e["end"] == "FAILS"]
     for e in failed:
         print(
-            f"FAILS: {e['procedure']} {e['name']}: {e['result']} by {e['shift']} U, quiet, in no budget and in no list"
+            f"FAILS: {e['procedure']} {e['name']}: {e['result']} by {e['shift']} U, {e.get('own', 0.0)} of its own, quiet, in "
+            "no budget and in no list"
         )
     return 1 if failed else 0
 

@@ -10,6 +10,7 @@ from bench.recorder import Recorder
 from bench.rig import Rig
 from bench.roles import RigState
 from bench.states import transition
+from procedures.estimators import bearing_rest
 from procedures.estimators.tracking_data import LIFT, LIFT_LOST, NO_SPEED, POSITIONS, PROBE, REST
 
 NUDGES = (("ref_y", 10e-6), ("ref_theta", 100e-6))
@@ -20,8 +21,8 @@ def probed(rig: Rig, record: Recorder) -> bool:
     """Lift the shaft from its rings and nudge it; False where it must not or cannot be lifted, which the analysis tells."""
     with record.step(REST):
         rig.clock.sleep(0.3)
-    if any(rig.levitation.reading(name) > 0 for name in POSITIONS):
-        return False  # it lies below: a probe that says otherwise would close a loop the wrong way round
+    if any(bearing_rest.of_readings({name: rig.levitation.reading(name) for name in POSITIONS}, rig.file)):
+        return False  # it lies below, on its rings: a probe that says otherwise may close a loop the wrong way round
     if not _lifted(rig, record):
         return False
     _nudged(rig, record)

@@ -222,7 +222,10 @@ def evaluated(recording: Recording[Any]) -> tuple[tuple[Finding, ...], Run | Non
     if any(f.effect is Effect.ERROR for f in found):
         return tuple(found), None
     model = unbalance_bearings.adopted_bearings(recording)
-    run = runup_estimates.run(passage, slow, recording, plan, model)
+    try:
+        run = runup_estimates.run(passage, slow, recording, plan, model)
+    except AnalysisError as error:  # a drive that was faster than it was told: too few turns for a curve
+        return (*found, Finding("no-passage", str(error), passage.name, Effect.ERROR)), None
     told = (unbalance_bearings.told(model, plan), *uncertified(recording.rig))
     return (*found, *told, *runup_checks.of_run(run, plan)), run
 

@@ -41,6 +41,14 @@ def room(rig: RigFile) -> float:
     return ring - math.sqrt(2) * zero - 2 * rig.machine["runout"].standard_uncertainty
 
 
+def farthest(rig: RigFile) -> float:
+    """How far from the sensors' zero a shaft on its rings lies at most, m: as `room`, the other way, and the sensors' gain."""
+    clear = rig.geometry["clearance"]
+    gains = [rig.sensors[name].gain for name in POSITIONS]
+    gain = max(t.half_width or 3 * t.standard_uncertainty for t in gains)
+    return (2 + gain) * clear.value - room(rig)
+
+
 def of_readings(readings: Mapping[str, float], rig: RigFile) -> Iterator[Finding]:
     """Readings (m) of a shaft that lies on its rings: what forbids to lift it."""
     for axis in "yz":
@@ -55,15 +63,27 @@ def of_readings(readings: Mapping[str, float], rig: RigFile) -> Iterator[Finding
                 "180°, or the polarity of both its probes is wrong. The shaft was not lifted."
             )
             yield Finding("gravity-reversed", text, f"axis {axis}", Effect.ERROR)
+    yield from of_rings(readings, rig)
+
+
+def of_rings(readings: Mapping[str, float], rig: RigFile) -> Iterator[Finding]:
+    """Readings (m) of a shaft that lies on its rings, below the middle: is it where they and the sensors' zeros can have it?
+    Nothing where the rig states none of them."""
+    if "clearance" not in rig.geometry or "runout" not in rig.machine or not set(POSITIONS) <= set(rig.sensors):
+        return
     for b, where in (("i", "inboard"), ("o", "outboard")):
         y, z = readings[f"pos_y{b}"], readings[f"pos_z{b}"]
-        if max(y, z) <= 0 and math.hypot(y, z) < room(rig):
-            text = (
-                f"{where}, the shaft lies {math.hypot(y, z) * 1e6:.0f} µm off the sensors' zero on its ring "
-                f"({y * 1e6:+.0f}, {z * 1e6:+.0f} µm), at least {room(rig) * 1e6:.0f} µm are expected: the ring is too near, "
-                "a sensor's zero or gain is off, or a sensor is beyond its range. The shaft was not lifted."
-            )
-            yield Finding("ring-too-near", text, where, Effect.ERROR)
+        far = math.hypot(y, z)
+        if max(y, z) > 0 or room(rig) <= far <= farthest(rig):
+            continue
+        near = far < room(rig)
+        bound = f"at least {room(rig) * 1e6:.0f}" if near else f"at most {farthest(rig) * 1e6:.0f}"
+        text = (
+            f"{where}, the shaft lies {far * 1e6:.0f} µm off the sensors' zero on its ring "
+            f"({y * 1e6:+.0f}, {z * 1e6:+.0f} µm), {bound} µm are expected: the ring is too {'near' if near else 'far'}, "
+            "a sensor's zero or gain is off, or a sensor is beyond its range. The shaft was not lifted."
+        )
+        yield Finding("ring-too-near" if near else "ring-too-far", text, where, Effect.ERROR)
 
 
 def before(recording: Recording[Any]) -> list[Finding]:

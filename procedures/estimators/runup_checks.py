@@ -15,20 +15,23 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.uncertainty import interval
 from procedures.estimators import signals, unbalance_checks, unbalance_plan
-from procedures.estimators.runup_data import MISSED, PASSAGE, Passage
+from procedures.estimators.runup_data import LEAST_TURNS, MISSED, PASSAGE, Passage
 from procedures.estimators.runup_estimates import DAMPED, Peak, Run, asked_margin
 from procedures.estimators.unbalance_checks import HELD
-from procedures.estimators.unbalance_data import AXES, CONTACT, CURRENT_LIMIT, RANGE, RPM, VOLTAGE_LIMIT
+from procedures.estimators.unbalance_data import AXES, CONTACT, CURRENT_LIMIT, PLANES, RANGE, RPM, VOLTAGE_LIMIT
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 APART = 0.1  # of the drive's speed: how far that of the pulses may be off
 OFTEN = 0.01  # of the samples: pulses that are off for less were a poll's delay
 SHORT = 0.02  # of the speed that the passage should end at
 RATES = (1.0, 250.0)  # rad/s^2
 IN_A_TURN = 0.1  # of the speed: how far it may change within a turn, so that pulses can be told from missing ones
 COASTING = 100.0  # rad/s^2: what a shaft that coasts slows down by at most
+FEWEST_TURNS = (WINDOW + 1) * LEAST_TURNS  # the local models of the curve take so many blocks
 UPLOAD_S = 1.2
 LARGE = 0.5  # of the clearance
+BY_THE_RING = 0.95  # of the clearance: probes, whose zeros are known to 5 µm, tell no more whether the shaft touches
 INBOARD, OUTBOARD, AXIAL = 4, 8, 32
 BESIDE = 0.05  # of a speed: what happens there may be in its turns
 OF_CRITICALS = ("critical_speed", "amplification_factor", "critical_amplitude", "separation")
@@ -71,6 +74,10 @@ def of_plan(rig: RigFile, plan: Settings) -> Iterable[str]:
     if plan.bottom_rad_s < steady:
         yield (f"bottom_rad_s: found {plan.bottom_rad_s * RPM:.0f} r/min; at {plan.rate_rad_s2:g} rad/s^2 expected "
                f"{steady * RPM:.0f} r/min or more: below, the speed changes by over {IN_A_TURN:.0%} within a turn")  # fmt: skip
+    turns = max(plan.top_rad_s**2 - plan.bottom_rad_s**2, 0.0) / (4 * math.pi)  # times the rate
+    if turns < FEWEST_TURNS * plan.rate_rad_s2:
+        yield (f"top_rad_s, bottom_rad_s: between them the shaft makes {turns / plan.rate_rad_s2:.0f} turns; expected "
+               f"{FEWEST_TURNS} or more, {WINDOW} blocks of {LEAST_TURNS} and the ends: ramp more slowly")  # fmt: skip
     drives = [d for d in rig.devices.values() if "drive" in d.roles]
     if plan.rate_rad_s2 and not any("acceleration" in d.registers for d in drives):
         yield "devices: found a drive without a register acceleration; a ramp needs one"
@@ -90,6 +97,7 @@ def of_passage(p: Passage, recording: Recording[Any], plan: Settings) -> Iterato
         yield Finding("stuck-channel", f"{name} does not move at all; a live sensor has noise.", name, Effect.ERROR)
     yield from _pulses(p)
     yield from _limits(p, plan)
+    yield from _silent(p, recording.rig, plan)
     for event in recording.events(MISSED):
         text = f"no capture at {event['wanted'] * RPM:.0f} r/min: {event['why']}"
         yield Finding("capture-missed", text, p.name, Effect.INDETERMINATE, (_at(p, event["wanted"], plan),))
@@ -132,11 +140,11 @@ def _at(p: Passage, speed: float, plan: Settings) -> str:
     return f"@{speed * RPM:.0f} r/min, {p.direction}, {plan.law}"
 
 
-def _doubted(p: Passage, bits: int, plan: Settings) -> tuple[str, ...]:
-    """What flags put in doubt: what is read off the curve, and what is measured beside the speeds at which they were set, in
-    its turns or in the local models that take the lag off. All, where the fastest of these is among them: the runout rests on
-    it."""
-    hit, block = p.speeds[(p.flags & bits) != 0], float(np.ptp(p.speeds[np.isfinite(p.speeds)])) / plan.blocks
+def _doubted(p: Passage, samples: Mask, plan: Settings) -> tuple[str, ...]:
+    """What `samples` (n,) put in doubt: what is read off the curve, and what is measured beside the speeds at which they were
+    read, in its turns or in the local models that take the lag off. All, where the fastest of these is among them: the runout
+    rests on it."""
+    hit, block = p.speeds[samples], float(np.ptp(p.speeds[np.isfinite(p.speeds)])) / plan.blocks
     if not np.isfinite(hit).all():
         return ()
     off = {s: np.abs(hit - s).min() for s in plan.speeds_rad_s}
@@ -145,27 +153,43 @@ def _doubted(p: Passage, bits: int, plan: Settings) -> tuple[str, ...]:
 
 
 def _limits(p: Passage, plan: Settings) -> Iterator[Finding]:
-    if p.clips >= HELD or (p.flags & RANGE).any():
+    beyond, touched, current, voltage = (
+        (p.flags & bits) != 0 for bits in (RANGE, CONTACT, CURRENT_LIMIT, VOLTAGE_LIMIT)
+    )
+    if p.clips >= HELD or beyond.any():
         text = (
-            f"a position sensor stood at the end of its range{_when(p, RANGE)}: what it shows of the orbit is cut off."
+            f"a position sensor stood at the end of its range{_when(p, beyond)}: what it shows of the orbit is cut off."
         )
         yield Finding("sensor-clipped", text, p.name, Effect.ERROR)
-    if (p.flags & CONTACT).any():
+    if touched.any():
         rings = [name for bit, name in ((INBOARD, "the inboard ring"), (OUTBOARD, "the outboard ring"),
                                         (AXIAL, "the axial stop")) if (p.flags & bit).any()]  # fmt: skip
-        text = f"the shaft touched {' and '.join(rings)}{_when(p, CONTACT)}: this is not its response to unbalance."
-        yield Finding("contact", text, p.name, Effect.INDETERMINATE, _doubted(p, CONTACT, plan))
-    if (p.flags & CURRENT_LIMIT).any():
-        text = f"a coil current was at its limit{_when(p, CURRENT_LIMIT)}: the response is not linear."
-        yield Finding("current-saturated", text, p.name, Effect.INDETERMINATE, _doubted(p, CURRENT_LIMIT, plan))
-    if (p.flags & VOLTAGE_LIMIT).any():
-        text = f"an amplifier's voltage was at its limit{_when(p, VOLTAGE_LIMIT)}: the currents slewed (T Fig. 2.9)."
-        yield Finding("voltage-saturated", text, p.name, Effect.INDETERMINATE, _doubted(p, VOLTAGE_LIMIT, plan))
+        text = f"the shaft touched {' and '.join(rings)}{_when(p, touched)}: this is not its response to unbalance."
+        yield Finding("contact", text, p.name, Effect.INDETERMINATE, _doubted(p, touched, plan))
+    if current.any():
+        text = f"a coil current was at its limit{_when(p, current)}: the response is not linear."
+        yield Finding("current-saturated", text, p.name, Effect.INDETERMINATE, _doubted(p, current, plan))
+    if voltage.any():
+        text = f"an amplifier's voltage was at its limit{_when(p, voltage)}: the currents slewed (T Fig. 2.9)."
+        yield Finding("voltage-saturated", text, p.name, Effect.INDETERMINATE, _doubted(p, voltage, plan))
 
 
-def _when(p: Passage, bits: int) -> str:
+def _silent(p: Passage, rig: RigFile, plan: Settings) -> Iterator[Finding]:
+    """A controller may not tell of contact; the probes show where the shaft went."""
+    clear = rig.geometry["clearance"].value
+    far = np.max([np.hypot(p.data[y], p.data[z]) for y, z in PLANES.values()], axis=0)
+    near = far > BY_THE_RING * clear
+    if near.any() and not (p.flags & CONTACT).any():
+        text = (
+            f"the probes show the shaft up to {far.max() * 1e6:.0f} µm off their zero{_when(p, near)}, with rings at "
+            f"{clear * 1e6:.0f} µm: it may have touched, though the controller tells of no contact. Balance first."
+        )
+        yield Finding("contact-unreported", text, p.name, Effect.INDETERMINATE, _doubted(p, near, plan))
+
+
+def _when(p: Passage, samples: Mask) -> str:
     """From which speed to which, first to last."""
-    hit = np.flatnonzero(p.flags & bits)
+    hit = np.flatnonzero(samples)
     if not hit.size:
         return ""
     first, last = (_speed_at(p, float(p.t[k])) * RPM for k in (hit[0], hit[-1]))

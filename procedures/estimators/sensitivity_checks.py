@@ -35,6 +35,7 @@ SCOPE = ("ISO 14839-3 is for machines above 15 kW and leaves small rotors out; i
          "checked against the standard.")  # fmt: skip
 HELD = 8  # samples in a row at an extreme: a probe that clips
 OFF = 0.05  # share of the amplitude asked for by which that found may differ
+NOTHING = 0.1  # of a line's amplitude: less, and there is no line to divide by
 SAME = 1e-5  # A: what single precision makes of after - before - inject
 FOLLOWS = (0.4, 1.6)  # shares of `after` that the injected axis' coils may follow below 200 Hz, lag and delay included
 UNEXPLAINED = 1e-3  # probability below which no model explains the lines about a peak
@@ -57,7 +58,7 @@ class Settings(Protocol):
 
 
 def before(recording: Recording[Any]) -> Iterator[Finding]:
-    """Nothing to evaluate, or captures too slow for their lines."""
+    """Nothing to evaluate, captures too slow for their lines, or none of the injection in them."""
     steps = list(recording.steps(INJECT))
     if not steps:
         yield Finding("no-injection", "no injection was recorded", "", Effect.ERROR)
@@ -72,6 +73,12 @@ def before(recording: Recording[Any]) -> Iterator[Finding]:
             text = (f"captured at {rate:g} Hz; lines up to {grid.hz.max():g} Hz that repeat after {grid.period:g} s need "
                     f"{grid.hz.max() / 0.45:.0f} Hz or more: what is above half of it appears elsewhere.")  # fmt: skip
             yield Finding("aliasing", text, where, Effect.ERROR)
+            return
+        most = float(np.abs(captured[0].arrays("inject")["inject"]).max())
+        if most < NOTHING * grid.amplitude:
+            text = (f"nothing was injected: at most {most * 1e3:.2g} mA; asked for were {grid.amplitude * 1e3:.3g} mA in each "
+                    f"of {grid.hz.size} lines.")  # fmt: skip
+            yield Finding("injection-wrong", text, where, Effect.ERROR)
             return
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from bench.findings import Effect, Finding
 from bench.recording import Recording
+from procedures.estimators import bearing_rest
 from procedures.estimators.tracking import centre
 from procedures.estimators.tracking_data import LIFT, LIFT_LOST, NO_SPEED, POSITIONS, PROBE, RANGE, REST
 from procedures.estimators.tracking_estimates import nominal
@@ -21,7 +22,7 @@ ANSWERS_A = 5e-3  # a nudge of 10 µm takes some 20 mA, and noise leaves 0.2 mA 
 
 def before_orbits(recording: Recording[Any]) -> Iterator[Finding]:
     """Probes at rest, the lift, nudges, the speed; what is an error leaves nothing to evaluate."""
-    wrong = list(_at_rest(recording))
+    wrong = list(_at_rest(recording)) or list(_on_rings(recording))
     yield from wrong
     if wrong:
         return
@@ -60,6 +61,12 @@ def _at_rest(recording: Recording[Any]) -> Iterator[Finding]:
                     name,
                     Effect.ERROR,
                 )
+
+
+def _on_rings(recording: Recording[Any]) -> Iterator[Finding]:
+    """D_max and its share of the clearance rest on the sensors' zeros and on the rings, which show here alone."""
+    for step in recording.steps(REST):
+        yield from bearing_rest.of_rings({name: step.mean(name) for name in POSITIONS}, recording.rig)
 
 
 def _of_lift(recording: Recording[Any], fault: str) -> Iterator[Finding]:

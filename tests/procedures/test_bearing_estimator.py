@@ -210,6 +210,8 @@ def test_readings_on_the_rings_forbid_the_lift() -> None:
     assert [(f.code, f.where) for f in of_readings(on_rings(zo=70e-6), rig)] == [("sensor-polarity", "pos_zo")]
     near = on_rings(yi=-57e-6, zi=-57e-6)
     assert [(f.code, f.where) for f in of_readings(near, rig)] == [("ring-too-near", "inboard")]
+    far = on_rings(yo=-121e-6)
+    assert [(f.code, f.where) for f in of_readings(far, rig)] == [("ring-too-far", "outboard")]
 
 
 def test_where_a_failed_lift_presses_the_shaft_tells_the_exchange() -> None:

@@ -43,6 +43,7 @@ SHORT: dict[str, Any] = {
 }  # fmt: skip
 ONE: dict[str, Any] = {**SHORT, "top_rad_s": 4000 / RPM, "speeds_rad_s": (2500 / RPM,)}
 A3: dict[str, Any] = {**SHORT, "law": "CAC", "top_rad_s": 6000 / RPM, "speeds_rad_s": (2000 / RPM, 4800 / RPM)}
+HEAVY = {"unbalance_i": 1.4e-5, "unbalance_o": 1.4e-5}  # at which the inboard ring is touched
 A3_TRUTH = {
     "inductance": 20e-3, "unbalance_i": 10.7e-6, "unbalance_o": 10.7e-6, "unbalance_phase_i": 0.0,
     "unbalance_phase_o": math.pi / 3,
@@ -194,6 +195,7 @@ def test_plans_that_cannot_work_are_refused() -> None:
     assert "landing" in why(bottom_rad_s=35.0)
     assert "within a turn" in why(acceleration_rad_s2=200.0)
     assert "expected 1 to 250" in why(acceleration_rad_s2=400.0, bottom_rad_s=200.0)
+    assert "shaft makes 22 turns; expected 40" in why(**{**SHORT, "top_rad_s": 260.0, "speeds_rad_s": (200.0,)})
     assert "come through" in why(speeds_rad_s=(1465.0,))
     assert "recorded and uploaded" in why(speeds_rad_s=(500.0, 510.0))
     assert "bytes" in why(capture_s=3.0)
@@ -283,7 +285,11 @@ def test_a3_twelve_volts_lose_where_forty_eight_hold(tmp_path: Path) -> None:
         ({}, {"slow_rad_s": 0.0}, "no-slow-roll", Effect.INDETERMINATE),
         ({}, {"rate_hz": 500.0}, "aliasing", Effect.ERROR),
         ({"position_range": 78e-6, "unbalance_i": 1.05e-5, "unbalance_o": 1.05e-5}, {}, "sensor-clipped", Effect.ERROR),
-        ({"geometry.clearance": 20e-6}, {}, "contact", Effect.INDETERMINATE),
+        ({"geometry.clearance": 50e-6}, {}, "ring-too-near", Effect.ERROR),
+        ({"pos_yi.offset": 50e-6}, {}, "ring-too-near", Effect.ERROR),
+        ({"pos_yi.offset": -50e-6}, {}, "ring-too-far", Effect.ERROR),
+        (HEAVY, {}, "contact", Effect.INDETERMINATE),
+        ({**HEAVY, "contact_silent": 1.0}, {}, "contact-unreported", Effect.INDETERMINATE),
         ({"drop_fraction": 0.01}, {}, "missing-samples", Effect.INDETERMINATE),
     ],
 )

@@ -32,13 +32,16 @@ from reports.figures import draw as draw_figure
 from sim_backend import amb_track
 from sim_backend.truth import draw
 
+RIGS = Path(__file__).parents[2] / "rigs"
 QUICK = {"revolutions": 8, "settle_s": 1.5}
 ONE = {"laws": ("CCS",), "compare": ()}
 Found = tuple[dict[tuple[str, str], Estimate], list[Finding]]
 
 
-def tracked(folder: Path, seed: int = 1, truth: Mapping[str, float] | None = None, **plan: Any) -> Found:
-    _, results = simulate("tracking", "amb5dof", seed, {**QUICK, **plan}, folder / "recording.mcap", truth)
+def tracked(
+    folder: Path, seed: int = 1, truth: Mapping[str, float] | None = None, rig: str = "amb5dof", **plan: Any
+) -> Found:
+    _, results = simulate("tracking", rig, seed, {**QUICK, **plan}, folder / "recording.mcap", truth)
     measured = {(m.quantity.name, m.where.split(",")[0]): m.estimate for m in results if isinstance(m, Measured)}
     return measured, [f for f in results if isinstance(f, Finding)]
 
@@ -90,8 +93,12 @@ def test_a4_flatness_follows_and_the_pid_touches(tmp_path: Path) -> None:
 
 
 def test_a_wide_ring_shows_the_pids_error_without_contact(tmp_path: Path) -> None:
-    wide = {"geometry.clearance": 150e-6}
-    measured, findings = tracked(tmp_path, 1, wide, laws=("PID",), compare=())
+    for kind in ("toml", "dbc"):
+        text = (
+            (RIGS / f"amb5dof.{kind}").read_text().replace("clearance = { value = 0.1,", "clearance = { value = 0.15,")
+        )
+        (tmp_path / f"wide.{kind}").write_text(text.replace("amb5dof.dbc", "wide.dbc"))
+    measured, findings = tracked(tmp_path, 1, rig=str(tmp_path / "wide.toml"), laws=("PID",), compare=())
     assert max(measured[f"error_peak_{axis}", "PID"].value for axis in "yz") > 20e-6
     assert "contact" not in {f.code for f in findings}
 
