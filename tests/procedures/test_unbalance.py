@@ -246,7 +246,7 @@ def test_a_clipping_probe_shows_in_the_capture_where_the_controller_does_not_tel
 
 def test_a_finding_of_one_speed_leaves_the_others_alone(tmp_path: Path) -> None:
     """The shaft touches at 4000 r/min: what was measured at 2000 r/min stands, and so would a verdict of fail on it."""
-    plan, truth = {**ONE, "speeds_rad_s": (2000 * RPM, 4000 * RPM)}, {"geometry.clearance": 25e-6}
+    plan, truth = {**ONE, "speeds_rad_s": (2000 * RPM, 4000 * RPM)}, {"unbalance_i": 1.3e-5, "unbalance_o": 1.3e-5}
     run = done(tmp_path, "unbalance", plan, truth)
     touched = [f for f in run.findings if f.code == "contact"]
     assert [f.where for f in touched] == ["4000 r/min, off"]
