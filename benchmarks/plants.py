@@ -200,16 +200,16 @@ def rows(bed: Bed, known: Mapping[str, Line]) -> Iterator[str]:
             if not lines:
                 continue
             caught = sum(bool(line["codes"]) for line, _ in lines)
-            shares.append(f"{plant.size:g}: {caught}/{len(lines)}")
+            shares.append(f"{plant.size:.10g}: {caught}/{len(lines)}")
             if caught < SURE * len(lines):
                 smallest = "none"
             elif smallest == "none":
-                smallest = f"{plant.size:g}"
+                smallest = f"{plant.size:.10g}"
             quiet = [shift(line, sound) for line, sound in lines if not line["codes"] and not sound["codes"]]
             worst = max([worst, *((*found, plant.size) for found in quiet)])
         by, own, what, size = worst
         what = what.rstrip("@").replace("@", ", ")
-        text = f"{by:.1f} U ({what}, {size:g}) | {own:.1f}" if what else "none quiet | "
+        text = f"{by:.1f} U ({what}, {size:.10g}) | {own:.1f}" if what else "none quiet | "
         yield f"| `{sizes[0].name}`{bed.units[sizes[0].name]} | {', '.join(shares)} | {smallest} | {text} |"
 
 

@@ -71,8 +71,8 @@ ENDS: Mapping[str, tuple[Mapping[str, Any], ...]] = {
     "sensitivity": ({"speeds_rad_s": (10000 * RPM,)},),
 }
 """Biases, speeds and rates at both ends; choices among words are read from the plans themselves."""
+# what the operator has done to the machine for a plan, by the case's name
 TRUTH: Mapping[str, Mapping[str, float]] = {'bearing-model {"coupled": false}': {"geometry.coupling_stiffness": 0.0}}
-"""What the operator has done to the machine for a plan, by the case's name."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,6 @@ def run_missing(asked: argparse.Namespace) -> None:
 
 
 def limit_of(case: Case, asked: argparse.Namespace) -> int:
-    """How many seeds a case is run on."""
     return int(asked.count if case.changes == "{}" else asked.choices)
 
 
@@ -167,7 +166,6 @@ def choices(procedure: Procedure) -> Iterator[dict[str, Any]]:
 
 
 def load(name: str) -> Procedure:
-    """A procedure by its name."""
     found: Procedure = importlib.import_module(catalogue.entry(name).module).procedure
     return found
 
@@ -190,7 +188,7 @@ def run_rig(rig: str, seed: int, cases: list[Case], file: Path) -> None:
 
 
 def needed(cases: list[Case]) -> list[str]:
-    """Procedures whose calibrations the cases use, in the order in which they can be made."""
+    """As needed_by, for all of them."""
     used = (needed_by(case.procedure, json.loads(case.changes)) for case in cases if case.chain)
     return list(dict.fromkeys(name for names in used for name in names))
 
