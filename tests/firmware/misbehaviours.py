@@ -162,7 +162,7 @@ READINGS = (
     Kind("hot-telemetry", "hotwinding=400@1", ABORTED, ("interlock",), "telemetry says 400 K of a winding"),
     Kind("glitches", "glitch_i=0.004@1", INDETERMINATE, ("load-inconsistent",), "a current of 0 A now and then"),
     Kind("gain", "gain_yo_p=1.1@8", INDETERMINATE, ("outlier",), "a current sensor reads 10 % more from then on"),
-    Kind("wrong-mass", "wrongmass=1.02", INDETERMINATE, ("load-inconsistent",), "M2 weighs 2 % more", long=True),
+    Kind("wrong-mass", "wrongmass=1.02", ERROR, ("load-inconsistent",), "M2 weighs 2 % more", long=True),
     Kind("contact", "badflags=12@1", INDETERMINATE, ("contact",), "flags say that the shaft touches its rings"),
     Kind("all-flags", "badflags=65535@1", INDETERMINATE, ("contact",), "every flag is set"),
     Kind(

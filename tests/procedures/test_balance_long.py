@@ -80,9 +80,10 @@ def test_weights_fixed_roughly_take_a_second_correction_at_positions(tmp_path: P
 
 
 def test_corrections_under_way_rest_on_the_adopted_bearings(tmp_path: Path) -> None:
-    """What is mounted is what the analysis finds with them, not what it would find without: here they are 0.1 mm off."""
+    """What is mounted is what the analysis finds with them, not what it would find without: here they are 50 µm off, nearly
+    as far as the check of what the coils carry lets pass."""
     plant = draw(RIG, 1).plant
-    model = bearings(RIG, dataclasses.replace(plant, offset=tuple(x - 1e-4 for x in plant.offset)))
+    model = bearings(RIG, dataclasses.replace(plant, offset=tuple(x - 5e-5 for x in plant.offset)))
     run = done(tmp_path, ONE, known={"bearing-model": model})
     b, recorded = run.found.balance, run.found.recorded
     assert b is not None
@@ -91,8 +92,8 @@ def test_corrections_under_way_rest_on_the_adopted_bearings(tmp_path: Path) -> N
     plain = balance_estimates.balanced(
         recorded.slow, [b.trials.base], b.trials, run.recording.rig, run.recording.plan)  # fmt: skip
     apart = [float(np.abs(mounted + x.unbalance[BASE].values).max()) / G_MM for x in (b, plain)]
-    assert apart[0] < 0.1
-    assert apart[1] > 2 * 0.1
+    assert apart[0] < 0.07
+    assert apart[1] > 2 * 0.07
     assert any(f.code == "bearings" and model.run_id in f.text for f in run.findings)
 
 
