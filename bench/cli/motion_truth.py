@@ -7,7 +7,7 @@ campaign's table names them.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from bench.errors import BenchError
@@ -91,8 +91,16 @@ def _tracking(done: Simulated) -> Found:
                 yield name, orbit.where, value
 
 
+def _vectors(shaft: Iterable[complex], where: str) -> Found:
+    from procedures.estimators.unbalance_data import AXES
+
+    for axis, vector in zip(AXES, shaft, strict=True):
+        yield "vector_cos", f"{axis}, {where}", float(vector.real)
+        yield "vector_sin", f"{axis}, {where}", float(-vector.imag)
+
+
 def _unbalance(done: Simulated) -> Found:
-    from procedures.estimators.unbalance_data import AXES, DWELL, PLANES, read_dwells
+    from procedures.estimators.unbalance_data import DWELL, PLANES, read_dwells
     from procedures.turning import CODES, POLES, SETTINGS
     from sim_backend import amb_unbalance
 
@@ -103,9 +111,7 @@ def _unbalance(done: Simulated) -> Found:
             continue
         settings = _settings(done, law, SETTINGS[dwell.variant])  # type: ignore[index]
         true = amb_unbalance.motion(done.drawn.plant, settings, dwell.speed)
-        for axis, vector in zip(AXES, true.shaft, strict=True):
-            yield "vector_cos", f"{axis}, {dwell.where}", float(vector.real)
-            yield "vector_sin", f"{axis}, {dwell.where}", float(-vector.imag)
+        yield from _vectors(true.shaft, dwell.where)
         for plane, value in zip(PLANES, true.d_max, strict=True):
             yield "d_max", f"{plane}, {dwell.where}", value
 
@@ -136,9 +142,7 @@ def _passage(done: Simulated) -> Found:
     settings = _settings(done, SETTINGS["off"], plan.parameters, {"law": CODES[plan.law]})
     for result in run.near.dwells:
         true, where = amb_unbalance.motion(plant, settings, result.dwell.speed), result.dwell.where
-        for axis, vector in zip(AXES, true.shaft, strict=True):
-            yield "vector_cos", f"{axis}, {where}", float(vector.real)
-            yield "vector_sin", f"{axis}, {where}", float(-vector.imag)
+        yield from _vectors(true.shaft, where)
         for (plane, (y, z)), far in zip(PLANES.items(), true.d_max, strict=True):
             a, b = true.shaft[y], true.shaft[z]
             yield "major_half_axis", f"{plane}, {where}", float(abs(a + 1j * b) + abs(a - 1j * b)) / 2

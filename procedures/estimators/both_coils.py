@@ -18,9 +18,8 @@ from bench.recording import Recording
 from bench.uncertainty import Estimate, correlation
 from procedures.estimators.mass_hanging import Hangings
 
-ONE_SIDED = (
-    "one-sided"  # finding, and event: no-load current of the lower coils A, and by bearing the bias that would do
-)
+# finding, and event: no-load current of the lower coils A, and by bearing the bias that would do
+ONE_SIDED = "one-sided"
 LEAST = 0.05  # share of the bias: with less in a lower coil at no load, what it adds under the masses cannot be told
 ROOM = 0.1  # share of the bias that the lower coil keeps under the heaviest mass at the bias that is recommended
 TIED = 0.99  # correlation of two numbers that the data do not separate
