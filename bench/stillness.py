@@ -58,6 +58,8 @@ class Stillness:
 
 def _last(counter: npt.NDArray[np.int64], before: int) -> int | None:
     """Index of the last row in which a counter differs from the one before."""
+    if counter[-1] != (counter[-2] if len(counter) > 1 else before):  # as nearly always
+        return len(counter) - 1
     moved = np.flatnonzero(np.diff(counter, prepend=before))
     return int(moved[-1]) if len(moved) else None
 
@@ -68,9 +70,9 @@ class StuckChannels:
 
     def __init__(self, rig: RigFile) -> None:
         self._names = [name for name in rig.channels if rig.noisy(name)]
-        self._held = [
+        self._held = {
             c for c, name in rig.choices("state").items() if rig.binding.mode(name) in ("LEVITATED", "SPINNING")
-        ]
+        }
         self._last: npt.NDArray[np.float64] | None = None  # of the block before, while the rotor is held
         self._moved_ns = np.zeros(len(self._names), np.int64)
         self.found: set[str] = set()
@@ -79,14 +81,18 @@ class StuckChannels:
         """The next samples."""
         if not self._names:
             return
-        if not np.isin(block.columns["state"], self._held).all():
+        if not set(block.columns["state"].tolist()) <= self._held:
             self._last = None
             return
-        x = np.array([block.columns[name] for name in self._names])
+        readings = [block.columns[name] for name in self._names]
         if self._last is None:
-            self._last = x[:, 0]
+            self._last = np.array([r[0] for r in readings])
             self._moved_ns[:] = block.t_ns[0]
-        self._moved_ns[(x != self._last[:, None]).any(axis=1)] = block.t_ns[-1]
-        self._last = x[:, -1]
+        newest = np.array([r[-1] for r in readings])
+        moved = newest != self._last
+        for k in np.flatnonzero(~moved):  # few, as noise is above a count: went and came back?
+            moved[k] = bool((readings[k] != self._last[k]).any())
+        self._moved_ns[moved] = block.t_ns[-1]
+        self._last = newest
         still = block.t_ns[-1] - self._moved_ns >= STILL_S * 1e9
         self.found.update(name for name, stands in zip(self._names, still, strict=True) if stands)

@@ -12,8 +12,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.special import ndtr
-from scipy.stats import ncx2
+from scipy.special import chndtr, ndtr
 
 from bench.uncertainty import Estimate
 from bench.uncertainty.estimate import Array, Deviations, merged
@@ -32,7 +31,7 @@ def amount(x: Estimate, y: Estimate) -> Estimate:
     if not (s and along.u):
         return Estimate(r, x.unit, along.sensitivities)
     lengths = np.linspace(0, r + REACH * s, STEPS)
-    confidence = np.maximum.accumulate(ncx2.sf((max(r, s) / s) ** 2, 2, (lengths / s) ** 2))
+    confidence = np.maximum.accumulate(1 - chndtr((max(r, s) / s) ** 2, 2, (lengths / s) ** 2))
 
     def sampler(deviations: Deviations) -> Array:
         drawn = ndtr(along.sampled(deviations) / along.u)

@@ -12,7 +12,7 @@ from itertools import combinations
 
 import numpy as np
 import numpy.typing as npt
-from scipy import optimize, special
+from scipy import special
 
 from procedures.estimators import mass_hanging
 from procedures.estimators.mass_hanging import Fit, Hangings
@@ -146,4 +146,6 @@ def scatter_of_set(c: Contradiction) -> float:
 
     if excess(0.0) <= 0 or special.fdtrc(count, c.dof, float(pulls @ pulls) / count) >= DOUBT:
         return 0.0
+    from scipy import optimize  # slow to import, and sound loads do not need it
+
     return float(optimize.brentq(excess, 0.0, float(np.abs(pulls).max() * np.sqrt(count) / spread.min())))

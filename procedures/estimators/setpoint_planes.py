@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy.special import stdtrit
 
 from bench.findings import Effect, Finding
 from bench.recording import Recording, Step
@@ -73,7 +73,7 @@ def crossed(steps: Sequence[Array]) -> bool:
         own, other = (_left(used, currents, plane) for plane in (bearing, 1 - bearing))
         excess += (other - own) / total / 2
     u = float(excess.std(ddof=1)) / len(used) ** 0.5
-    return bool(excess.mean() < -float(stats.t.ppf(1 - FALSE_ALARM, len(used) - 1)) * u)
+    return bool(excess.mean() < -float(stdtrit(len(used) - 1, 1 - FALSE_ALARM)) * u)
 
 
 def _left(steps: Sequence[Array], currents: Sequence[Array], plane: int) -> Array:

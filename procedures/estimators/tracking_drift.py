@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy.special import stdtrit
 
 from bench.errors import AnalysisError
 from procedures.estimators.leastsquares import linear
@@ -37,7 +37,7 @@ class Drift:
     @property
     def plain(self) -> bool:
         """Whether scatter explains it less often than FALSE_ALARM."""
-        return abs(self.off) > float(stats.t.ppf(1 - FALSE_ALARM / 2, self.dof)) * self.u
+        return abs(self.off) > float(stdtrit(self.dof, 1 - FALSE_ALARM / 2)) * self.u
 
 
 def drift(path: Path, facts: Facts) -> Drift | None:
