@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from typing import TYPE_CHECKING
 
@@ -53,7 +54,8 @@ def check_rig_file(rig: str, procedure: str = "") -> int:
     file, able = as_far_as_read(rig), list[Ability]()
     if file is not None:
         able = abilities(file, procedure)
-        problems += (*unknown_plans(file), *(p for a in able for p in a.problems), *_of_simulation(file))
+        of_procedures = dict.fromkeys(p for a in able for p in a.problems)  # a spec that cannot be read is each one's
+        problems += (*unknown_plans(file), *_of_spec(file.name), *of_procedures, *_of_simulation(file))
     for problem in problems:
         sys.stderr.write(f"{problem}\n")
     if load is not None:
@@ -69,6 +71,15 @@ def check_rig_file(rig: str, procedure: str = "") -> int:
         return USAGE if problems or lines else PASS
     sys.stdout.write(told(able, rig) if able else "")
     return USAGE if problems else PASS
+
+
+def _of_spec(rig: str) -> Iterator[Problem]:
+    """Limits of no procedure; a spec that cannot be read is told of by the procedures."""
+    from bench.errors import ConfigError
+    from bench.specs import misnamed
+
+    with contextlib.suppress(ConfigError):
+        yield from misnamed(rig)
 
 
 def _of_simulation(rig: RigFile) -> Iterator[Problem]:
