@@ -43,8 +43,9 @@ def scatter_terms(identity: str, covariance: Array, dof: int, where: str = "", a
 def with_scatter(estimates: Mapping[str, Estimate], spread: Array, dof: int) -> dict[str, Estimate]:
     """Values by angle (`name@k`) with the scatter of their angle, means over a turn with the mean of all; others as they are.
 
-    `spread` (A, 6, 6) is the covariance at each angle, in the order of OUTPUTS; (A, 8, 8) with that of CARRIED. All of them are one estimate with `dof` degrees
-    of freedom, pooled over the angles, and so have one identity with running numbers: no mean over angles has more.
+    `spread` (A, 6, 6) is the covariance at each angle, in the order of OUTPUTS; (A, 8, 8) with that of CARRIED. All of
+    them are one estimate with `dof` degrees of freedom, pooled over the angles, and so have one identity with running numbers:
+    no mean over angles has more.
     """
     turn, six = len(spread), len(OUTPUTS)
     terms = [
