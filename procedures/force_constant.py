@@ -267,6 +267,9 @@ angles, which averages the ripple of the motor's force.
 The calibration and this run share current sensors, spans, masses and gravity. Each is one influence in both, so that what
 cancels in the physics cancels in the budget. The report states the uncertainty with and without that.
 
+Without a current in the motor the AMBs carry the shaft as at their calibration at the same angles. What their currents say of
+that load is compared with what the calibration handed on: a sensor that has changed since is seen by it.
+
 The AMBs' horizontal constants are not measured; no weight pulls sideways. They are taken as the vertical ones within a stated
 asymmetry, corrected for where the journal stands in the bearing, and alpha_dx carries that in its budget.
 """
