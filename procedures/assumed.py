@@ -36,8 +36,8 @@ SPINDOWN = (
     "With the ring an error of its inertia changes J_z, B and T_c by its share, until J_z leaves the drawing's tolerance.",
 )
 FORCE_CONSTANT = (
-    "A coil's current sensor whose gain changed since the AMBs' calibration by 0.3 % changes alpha_d by 0.7 %; by 0.9 % the "
-    "rows disagree.",
+    "Current sensors of both AMBs whose gains changed since the calibration, each by its own share, look like probes whose "
+    "zeros moved: 0.3 % of the upper outboard coil's changes alpha_d by 0.7 %. One that changed alone is found by the load.",
     "An asymmetry K_x/K_y that is common to both AMBs changes alpha_dx by the same share: both rows move together.",
 )
 FORCE_COUPLING = (
