@@ -89,9 +89,10 @@ def _of_simulation(rig: RigFile) -> Iterator[Problem]:
     if not rig.simulation:
         return
     from sim_backend.machine import machine_of
+    from sim_backend.unspoken import unspoken
 
     try:
-        machine_of(rig)
+        yield from unspoken(rig, machine_of(rig))
     except ConfigError as error:
         place, _, said = str(error).partition(": found ")
         found, _, expected = said.partition("; expected ")
