@@ -16,7 +16,7 @@ BEARING_MODEL = (
     "An axis that is reversed as a whole, coils, probe and gravity, is the same machine seen from below: only the sign of its "
     "offset differs.",
     "A coupling that turns the shaft, besides its spring's pull: a moment of 1 N mm changes the force of either AMB by 5.6 mN, "
-    "0.2 % of its load, and beta by that share.",
+    "0.2 % of its load, and β by that share.",
 )
 PASSAGE = (
     "Runout that changes with the speed or the temperature: 1 µm of it is 1 µm in every vector.",

@@ -69,7 +69,7 @@ def _kind(name: str) -> str:
 def _row(
     share: float, measurement: Content, entry: Content, titles: Mapping[str, str], alike: Mapping[str, set[str]]
 ) -> tuple[str, ...]:
-    where = tables.place(measurement)
+    where = text.prose(tables.place(measurement))
     unit = str(measurement.get("unit") or "")
     name = str(entry.get("name") or entry.get("influence"))
     others = len(alike[_kind(name)]) - 1
