@@ -25,6 +25,7 @@ from bench.uncertainty import Distribution, Estimate, Influence
 from bench.wholefile import write_whole
 
 SCHEMA = 1
+SHOWN = 12  # digits of a digest in a message
 
 
 @dataclass(frozen=True)
@@ -159,11 +160,9 @@ def from_json(text: str, name: str = "calibration") -> Calibration:
 def _require_digest(carried: str, found: str, run_id: str, name: str) -> None:
     """Raises ConfigError where the content is not that which the digest was taken of."""
     if carried != found:
-        problem = Problem(name, "digest", f"content with sha256 {found}", f"{carried}, which the file carries")
-        raise ConfigError(
-            f"{name}: the file was changed since it was adopted; it is not used. Next: adopt run {run_id} again",
-            (problem,),
-        )
+        expected = f"sha256 {carried[:SHOWN]}..., which the file carries; adopt run {run_id} again"
+        problem = Problem(name, "digest", f"content with sha256 {found[:SHOWN]}...", expected)
+        raise ConfigError(f"{name}: the file was changed since it was adopted; it is not used", (problem,))
 
 
 def _calibration(file: _File, name: str) -> Calibration:

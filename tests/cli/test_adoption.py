@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -11,10 +12,11 @@ import pytest
 from chained import FILE, RIG, Bench, adopted, chained, edit, opened, run
 
 from bench.adoption import Adoption
-from bench.calibrationfile import digest_of
+from bench.calibrationfile import digest_of, from_json
 from bench.errors import ConfigError
 from tests.tiny_procedures import procedure
 
+ROOT = Path(__file__).resolve().parents[2]
 SPEC = """schema = 1
 [limits.tiny-levitated]
 supply = { high = 1.0, unit = "V", source = "a test", verified = false }
@@ -176,3 +178,11 @@ def test_a_calibration_by_hand_carries_no_digest_and_the_run_says_so(bench: Benc
     edit(FILE)  # with the digest that `bench calibrations` told
     record = json.loads((Path(chained(bench, status=0)) / "record.json").read_text(encoding="utf-8"))
     assert record["findings"] == []
+
+
+def test_the_certificate_of_the_guide_is_a_calibration() -> None:
+    page = (ROOT / "docs" / "how-to" / "adopt-a-calibration.md").read_text(encoding="utf-8")
+    (text,) = re.findall(r"```json\n(.*?)```", page, re.DOTALL)
+    c = from_json(text)
+    assert not c.sealed
+    assert c.values["alpha_d"].u == pytest.approx(0.05)
