@@ -29,7 +29,7 @@ from bench.records import (
     measurement,
     missing,
 )
-from bench.specs import applied
+from bench.specs import applied, in_unit
 from bench.stepgaps import incomplete_steps, missing_steps
 
 logger = logging.getLogger("bench.evaluation")
@@ -109,8 +109,9 @@ def evaluate(
     if stopped:
         return Evaluation(_in_order(procedure, {}, limits), Correlations((), ()), ())
     stated, (limits, notes) = limits, applied(limits, recording.plan)
+    limits, mistaken = in_unit(limits, procedure.measures)
     measured: dict[tuple[str, str], Measured] = {}
-    findings = list(notes)
+    findings = [*notes, *mistaken]
     entries: dict[tuple[str, str], Measurement] = {}
     correlations = Correlations((), ())
     try:
