@@ -13,7 +13,9 @@ from chained import FILE, RIG, Bench, adopted, chained, edit, opened, run
 
 from bench.adoption import Adoption
 from bench.calibrationfile import digest_of, from_json
+from bench.calibrationstore import Store
 from bench.errors import ConfigError
+from bench.rigfile import load_rig
 from tests.tiny_procedures import procedure
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -185,4 +187,5 @@ def test_the_certificate_of_the_guide_is_a_calibration() -> None:
     (text,) = re.findall(r"```json\n(.*?)```", page, re.DOTALL)
     c = from_json(text)
     assert not c.sealed
+    assert Store.of(load_rig("tsbs12"), None).foreign(c) == ""
     assert c.values["alpha_d"].u == pytest.approx(0.05)
