@@ -70,9 +70,14 @@ def rows_of(store: Store, rig: RigFile, now: datetime) -> Iterator[Row]:
 
 
 def row(c: Calibration, store: Store, rig: RigFile, now: datetime, current: bool) -> Row:
-    """One calibration and its state: current, expired, superseded, other rig, other certificates."""
+    """One calibration and its state: current, expired, superseded, other rig, other certificates, in the future."""
     notes = [f"adopted although its outcome was {c.outcome}"] if c.outcome not in SOUND else []
     notes += [f"rests on {u.procedure}, which had expired on {u.due}" for u in c.used if u.state == "expired"]
+    notes += (
+        []
+        if c.sealed
+        else [f"carries no digest; its content has {calibrationfile.digest_of(calibrationfile.content(c))}"]
+    )
     state = "current"
     if foreign := store.foreign(c):
         state, notes = "other rig", [foreign]
@@ -80,6 +85,8 @@ def row(c: Calibration, store: Store, rig: RigFile, now: datetime, current: bool
         state = "superseded"
     elif changed := changed_certificates(c.certificates, rig):
         state, notes = "other certificates", [*notes, *changed]
+    elif c.ahead(now):
+        state = "in the future"
     elif c.overdue(now):
         state = "expired"
     notes += _outlived(c, store) if state == "current" else []
