@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
@@ -39,7 +38,7 @@ def unseen(
     alike: dict[str, set[str]] = defaultdict(set)
     for m in measurements:
         entries = m.get("budget") or ()
-        variance = math.fsum(float(e.get("contribution") or 0.0) ** 2 for e in entries)
+        variance = budgets.variance(m)
         for e in entries if variance > 0 else ():
             identity, name = (str(e.get(key) or "") for key in ("influence", "name"))
             share = float(e.get("contribution") or 0.0) ** 2 / variance
