@@ -25,6 +25,7 @@ from bench.roles import RigState
 from procedures import assumed, probing, turning
 from procedures import unbalance_figures as drawn
 from procedures.estimators import (
+    hum,
     tracking_wiring,
     unbalance_bearings,
     unbalance_checks,
@@ -166,7 +167,8 @@ def evaluated(recording: Recording[Any]) -> Evaluated:
     model = adopted_bearings(recording)
     results = unbalance_estimates.results(dwells, recording.rig, plan, model)
     told = (unbalance_bearings.told(model, plan), *uncertified(recording.rig))
-    return Evaluated((*found, *told, *unbalance_checks.of_results(results, plan)), results)
+    hums = hum.of_dwells(hum.heard(recording, results.slow), results.dwells)
+    return Evaluated((*found, *told, *hums, *unbalance_checks.of_results(results, plan)), results)
 
 
 def measured(results: Results) -> Iterator[Measured]:
