@@ -214,6 +214,9 @@ offsets, with the plan's uncertainty; a note says which). What the orders make o
 is put right; the unbalance's small share is found by the same balance at the highest speed. The runout is the reading less
 that motion, and is subtracted from every vector. Reading, motion and runout are in a note, with the date.
 
+Hum of the mains in the probes at the frequency of a speed would be in its vectors unseen. Lines at slow roll that do not turn
+with the shaft are looked for there; one that may move a vector by more than its U is a finding.
+
 D_max is the greatest distance of the shaft's centre from the clearance's centre over a turn: mean place and orders 1 to 3,
 runout subtracted (order 3 where the telemetry sees it). Where the probes read zero is known within their certificates only,
 and that carries the budget. Wherever the shaft may be within them, it is farther from the centre than where they read zero:

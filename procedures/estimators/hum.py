@@ -30,9 +30,7 @@ from procedures.estimators.unbalance_data import AXES, POSITIONS, SLOW, Array, C
 from procedures.estimators.unbalance_estimates import Result
 
 FINER = 8  # points of the spectrum within a line of the slow roll, at least
-CLEAR = (
-    7.0  # of the noise's standard deviation per component: exp(-7^2/2) for each of some thousand points, 1e-7 in a run
-)
+CLEAR = 7.0  # of the noise's standard deviation per component: exp(-7^2/2) of some thousand points, 1e-7 in a run
 ABOUT_HZ = 8.0  # to either side: where the noise is looked at
 MEDIAN = math.sqrt(2 * math.log(2))  # of the amplitude of noise, over that standard deviation
 REACH = 2.0  # lines of a dwell: what is farther off scatters from batch to batch, and is in the interval

@@ -69,6 +69,16 @@ def test_hum_at_the_speed_of_a_capture_is_found_in_a_passage(tmp_path: Path) -> 
 
 
 @pytest.mark.long
+def test_hum_within_the_peak_of_a_critical_concerns_it(tmp_path: Path) -> None:
+    """65 Hz is 3900 r/min. At 2500 r/min it is told apart."""
+    plan = {**PASSED, "law": "PID", "parameters": {"kd": 10.0}, "acceleration_rad_s2": 100.0, "bottom_rad_s": 1000 * RPM,
+            "top_rad_s": 7000 * RPM, "speeds_rad_s": (2500 * RPM,)}  # fmt: skip
+    hums = found(tmp_path, "run-up", plan, {"hum": 6e-7, "hum_hz": 65.0})
+    assert {f.where for f in hums} >= {"zi, peak 1", "zo, peak 1"}
+    assert all(f.concerns == (f"@{f.where}",) and "peak" in f.where for f in hums)
+
+
+@pytest.mark.long
 def test_hum_at_the_speed_of_the_switch_concerns_drop_and_residual(tmp_path: Path) -> None:
     hums = found(tmp_path, "compensation", SWITCHED, {"hum": 3e-7, "hum_hz": 150.0})
     assert {q for f in hums for q in f.concerns} == {"drop@9000 r/min", "residual@9000 r/min"}
