@@ -30,8 +30,8 @@ from procedures.estimators.unbalance_data import AXES, POSITIONS, SLOW, Array, C
 from procedures.estimators.unbalance_estimates import Result
 
 FINER = 8  # points of the spectrum within a line of the slow roll, at least
-CLEAR = 7.0  # of the noise's standard deviation per component: exp(-7^2/2) of some thousand points, 1e-7 in a run
-ABOUT_HZ = 8.0  # to either side: where the noise is looked at
+CLEAR = 7.0  # standard deviations of a component of the noise: exp(-7^2/2) for each of some thousand points, 1e-7 a run
+ABOUT_HZ = 5.0  # to either side: where the noise is looked at; over more it is not the same
 MEDIAN = math.sqrt(2 * math.log(2))  # of the amplitude of noise, over that standard deviation
 REACH = 2.0  # lines of a dwell: what is farther off scatters from batch to batch, and is in the interval
 ORDERLY = 3.0  # lines of the slow roll, by which its orders are as wide (Hann's window: 2, and a speed that wanders)
@@ -64,14 +64,15 @@ class Heard:
 
     def lines(self, low: float, high: float) -> Iterator[Line]:
         """What stands out of the noise between two frequencies in Hz, and is no order of the slow roll."""
-        about = slice(*np.searchsorted(self.hz, [low - ABOUT_HZ, high + ABOUT_HZ]))
-        for k, row in enumerate(np.abs(self.values[:, about])):
-            noise, hz = float(np.median(row)) / MEDIAN, self.hz[about]
-            top = np.flatnonzero((row[1:-1] > row[:-2]) & (row[1:-1] >= row[2:]) & (row[1:-1] > CLEAR * noise)) + 1
-            for i in top[(hz[top] >= low) & (hz[top] <= high)]:
-                size = self._less_order(k, float(hz[i]), float(row[i]))
+        first, last = np.searchsorted(self.hz, [low, high])
+        beside = round(ABOUT_HZ / float(self.hz[1]))
+        for k, row in enumerate(np.abs(self.values)):
+            part = row[first - 1 : last + 1]
+            for i in first + np.flatnonzero((part[1:-1] > part[:-2]) & (part[1:-1] >= part[2:])):
+                noise = float(np.median(row[max(i - beside, 0) : i + beside])) / MEDIAN
+                size = self._less_order(k, float(self.hz[i]), float(row[i])) if row[i] > CLEAR * noise else 0.0
                 if size:
-                    yield Line(k, float(hz[i]), size, noise)
+                    yield Line(k, float(self.hz[i]), size, noise)
 
     def at(self, hz: float) -> Complex:
         """What the four probes read at a frequency, (4,) m, 0-pk; their phases against each other hold at any time."""
