@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
@@ -9,15 +10,18 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from bench import catalogue
 from bench.errors import ConfigError, Problem
-from bench.findings import Finding
+from bench.findings import Effect, Finding
 from bench.inputfile import TomlError, parse_toml
 from bench.limits import Limit, Setting
 from bench.plans import field_of
-from bench.procedure import BenchPlan
+from bench.procedure import BenchPlan, Procedure, Quantity
+from bench.speccheck import wrong_limits
 
 SCHEMA = 1
 NOT_APPLIED = "limit-not-applied"  # a note: the limit was stated for other settings
+LIMIT_UNIT = "limit-unit"
 INSTALLED = Path(__file__).resolve().parent.parent / "specs"
 
 
@@ -51,6 +55,10 @@ class _Entry(BaseModel):
             raise ConfigError("low and high, or nominal and relative")
         if self.relative < 0:
             raise ConfigError(f"relative: found {self.relative}; expected 0 or more")
+        if not self.nominal:
+            raise ConfigError(
+                f"relative: found {self.relative} of a nominal 0; expected low and high, as that is no range"
+            )
         half = abs(self.nominal) * self.relative
         return Limit(self.nominal - half, self.nominal + half, self.unit, self.source, self.verified, at)
 
@@ -69,35 +77,54 @@ def _setting(key: str, value: Any) -> Setting:
 def load_spec(
     rig_name: str,
     procedure: str,
-    quantities: Collection[str] | None = None,
+    of: Procedure | None = None,
     folders: Collection[Path] | None = None,
     *,
     file: Path | None = None,
-    settings: Collection[str] | None = None,
 ) -> Mapping[str, Limit]:
     """Limits by quantity name, from `./specs`, else the installed `specs/`; empty if the rig or procedure has none.
     `file` is one to be read instead.
 
-    With `quantities`, a limit of any other name is refused: a misspelt one would be silently void. So is, with `settings`
-    (those of the procedure's plan), one that is stated at another setting.
+    With `of`, the procedure itself, what would judge nothing or be found out after the run only is refused: other names than
+    those of its quantities, other units, settings that its plan does not have, and values that such a setting cannot take.
 
     Raises:
         ConfigError: the file cannot be used; every problem is named.
     """
+    path, found = _read(rig_name, folders, file)
+    limits = found.get(procedure, {})
+    if of is not None and (problems := tuple(wrong_limits(limits, of, str(path)))):
+        raise ConfigError(f"spec {path} cannot be used:", problems)
+    return limits
+
+
+def misnamed(rig_name: str, folders: Collection[Path] | None = None, *, file: Path | None = None) -> Iterator[Problem]:
+    """Tables of limits whose name is nearly a procedure's: each would be void in silence. What is like none of them may be for
+    a procedure of another laboratory.
+
+    Raises:
+        ConfigError: the file cannot be used.
+    """
+    path, found = _read(rig_name, folders, file)
+    names = [entry.name for entry in catalogue.PROCEDURES]
+    for name in found:
+        if name not in names and (close := difflib.get_close_matches(name, names, 1)):
+            yield Problem(str(path), f"limits.{name}", name, f"the name of a procedure, such as {close[0]}")
+
+
+def _read(
+    rig_name: str, folders: Collection[Path] | None, file: Path | None
+) -> tuple[Path | None, Mapping[str, Mapping[str, Limit]]]:
+    """A rig's spec file and its limits by procedure and quantity; without any where there is no file."""
     found = [folder / f"{rig_name}.toml" for folder in ((Path("specs"), INSTALLED) if folders is None else folders)]
     path = file or next((p for p in found if p.is_file()), None)
     if path is None:
-        return {}
+        return None, {}
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, ValueError) as error:
         raise ConfigError(f"spec {path}: cannot be read: {error}; expected a TOML file") from error
-    limits = parse_spec(text, str(path)).get(procedure, {})
-    _refuse_unknown(limits, quantities, f"{path}: limits.{procedure}")
-    problems = [] if settings is None else list(_unknown_settings(limits, tuple(settings), str(path), procedure))
-    if problems:
-        raise ConfigError(f"spec {path} cannot be used:", tuple(problems))
-    return limits
+    return path, parse_spec(text, str(path))
 
 
 def applied(limits: Mapping[str, Limit], plan: BenchPlan) -> tuple[Mapping[str, Limit], tuple[Finding, ...]]:
@@ -112,6 +139,23 @@ def applied(limits: Mapping[str, Limit], plan: BenchPlan) -> tuple[Mapping[str, 
     )
     left_out = {name for names in others.values() for name in names}
     return {name: limit for name, limit in limits.items() if name not in left_out}, notes
+
+
+def in_unit(
+    limits: Mapping[str, Limit], quantities: Collection[Quantity]
+) -> tuple[Mapping[str, Limit], tuple[Finding, ...]]:
+    """The limits that are in the unit of their quantity, and a finding for each other: a recording keeps the spec of its day,
+    and a mistake in that is no reason to withhold what was measured."""
+    units = {q.name: q.unit for q in quantities}
+    wrong = [name for name, limit in limits.items() if limit.unit != units.get(name, limit.unit)]
+    found = (
+        f"the limit of {name} is in {limits[name].unit!r}, the quantity in {units[name]!r}: it was not judged"
+        for name in wrong
+    )
+    findings = tuple(
+        Finding(LIMIT_UNIT, text, "spec", Effect.ERROR, (name,)) for text, name in zip(found, wrong, strict=True)
+    )
+    return {name: limit for name, limit in limits.items() if name not in wrong}, findings
 
 
 def _differences(limit: Limit, plan: BenchPlan) -> Iterator[str]:
@@ -190,26 +234,13 @@ def _limit(entry: Any, name: str, key: str, problems: list[Problem]) -> Limit | 
     except ConfigError as error:
         problems.append(Problem(name, key, repr(entry), str(error)))
     except ValidationError as error:
+        told: dict[str, Problem] = {}
         for e in error.errors(include_url=False):
-            place = ".".join([key, *(str(x) for x in e["loc"])])
+            place = ".".join([key, *(str(x) for x in e["loc"][:2])])  # beyond are the kinds that a setting may be of
             found = "nothing" if e["type"] == "missing" else repr(e["input"])
             expected = f"one of {', '.join(_Entry.model_fields)}" if e["type"] == "extra_forbidden" else str(e["msg"])
-            problems.append(Problem(name, place, found, expected))
+            if len(e["loc"]) > 1:
+                expected = "finite numbers, words, true or false, a list of these, or { low, high }"
+            told.setdefault(place, Problem(name, place, found, expected))
+        problems += told.values()
     return None
-
-
-def _refuse_unknown(limits: Mapping[str, Limit], quantities: Collection[str] | None, key: str) -> None:
-    unknown = [] if quantities is None else [q for q in limits if q not in quantities]
-    if unknown:
-        raise ConfigError(f"{key}: found {', '.join(unknown)}; expected one of {', '.join(quantities or ())}")
-
-
-def _unknown_settings(
-    limits: Mapping[str, Limit], settings: tuple[str, ...], path: str, procedure: str
-) -> Iterator[Problem]:
-    for name, limit in limits.items():
-        for key, value in limit.at.items():
-            try:
-                field_of(key, settings)
-            except ConfigError as error:
-                yield Problem(path, f"limits.{procedure}.{name}.at.{key}", repr(value), str(error))

@@ -110,7 +110,7 @@ def _controls(rig: Rig) -> dict[str, float]:
 class Analysis:
     """Everything the measurements, findings, facts and figures are made of.
 
-    `estimates` are without the scatter of the hangings, means over a turn and values by angle; `spread` (A, 6, 6) is its
+    `estimates` are without the scatter of the hangings, means over a turn and values by angle; `spread` (A, 8, 8) is its
     covariance at each angle. `loads` is what the masses say against each other, `beyond` (relative) what that adds to each."""
 
     data: HangingData
@@ -157,7 +157,7 @@ def _scattered(a: Analysis) -> dict[str, Estimate]:
 
 
 def facts(recording: Recording[Plan]) -> dict[str, Estimate]:
-    """The six quantities, and K and K2 of each bearing at each angle, all with one scatter for each angle: what a later
+    """The six quantities, and K, K2 and F0 of each bearing at each angle, all with one scatter for each angle: what a later
     procedure takes at one angle and what it takes over a turn then stay correlated as they are."""
     result = evaluate(recording)
     return angle_facts.with_scatter(result.estimates, result.spread, result.scatter.dof)
@@ -179,7 +179,8 @@ def evaluate(recording: Recording[Plan]) -> Analysis:
 
     def model(p: Mapping[str, float], top_branch: float = 1.0) -> dict[str, float]:
         fitted = mass_hanging.fit(data.hangings, p, plan.bias_A, count, top_branch=top_branch)
-        return mass_hanging.over_a_turn(fitted, p) | mass_hanging.by_angle(fitted)
+        by_angle = mass_hanging.by_angle(fitted) | mass_hanging.carried(fitted, p)
+        return mass_hanging.over_a_turn(fitted, p) | by_angle
 
     values = {name: e.value for name, e in inputs.items()}
     fitted = mass_hanging.fit(data.hangings, values, plan.bias_A, count)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 AMB_CALIBRATION = (
-    "An error that is common to all masses, the same share of each, changes K, K2 and Kw by that share.",
-    "Errors of the masses that go with the square of the load change K2 by K² over the bearing's force per kg, for each kg "
+    "An error that is common to all masses, the same share of each, changes K, K_2 and K_w by that share.",
+    "Errors of the masses that go with the square of the load change K_2 by K² over the bearing's force per kg, for each kg "
     "per kg². Masses of 1, 2 and 3 kg off by 0.2, 0.4 and 0.6 % leave the data that one of 0.5 kg off by -0.1 % leaves.",
-    "A hanger that is off throughout changes F0, and Kw by 2 K2/Kw for each N that it weighs at the bearing.",
+    "A hanger that is off throughout changes F_0, and K_w by 2 K_2/K_w for each N that it weighs at the bearing.",
 )
 TORQUE_CONSTANT = (
     "An error that is common to all masses or to both arms, the same share of each, changes alpha_tau by that share.",
@@ -16,7 +16,7 @@ BEARING_MODEL = (
     "An axis that is reversed as a whole, coils, probe and gravity, is the same machine seen from below: only the sign of its "
     "offset differs.",
     "A coupling that turns the shaft, besides its spring's pull: a moment of 1 N mm changes the force of either AMB by 5.6 mN, "
-    "0.2 % of its load, and beta by that share.",
+    "0.2 % of its load, and β by that share.",
 )
 PASSAGE = (
     "Runout that changes with the speed or the temperature: 1 µm of it is 1 µm in every vector.",
@@ -36,8 +36,8 @@ SPINDOWN = (
     "With the ring an error of its inertia changes J_z, B and T_c by its share, until J_z leaves the drawing's tolerance.",
 )
 FORCE_CONSTANT = (
-    "A coil's current sensor whose gain changed since the AMBs' calibration by 0.3 % changes alpha_d by 0.7 %; by 0.9 % the "
-    "rows disagree.",
+    "Current sensors of both AMBs whose gains changed since the calibration, each by its own share, look like probes whose "
+    "zeros moved: 0.3 % of the upper outboard coil's changes alpha_d by 0.7 %. One that changed alone is found by the load.",
     "An asymmetry K_x/K_y that is common to both AMBs changes alpha_dx by the same share: both rows move together.",
 )
 FORCE_COUPLING = (

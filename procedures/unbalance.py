@@ -51,7 +51,10 @@ SINE = Quantity(
 )
 MAJOR = Quantity("major_half_axis", "m", "of the order-1 orbit of the shaft's centre in a sensor plane, 0-pk")
 D_MAX = Quantity(
-    "d_max", "m", "greatest distance of the shaft's centre from the clearance's, static offset included (ISO 14839-2)"
+    "d_max",
+    "m",
+    "greatest distance of the shaft's centre from the clearance's, static offset included (ISO 14839-2)",
+    title="D_max",
 )
 SHARE = Quantity("d_max_share", "1", "D_max over the least clearance", title="D_max / clearance")
 READ = Quantity(

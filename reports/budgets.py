@@ -14,12 +14,27 @@ from reports import tables, text
 from reports.view import BudgetRow, BudgetTable
 
 SMALL_SHARE = 0.01  # of the variance; smaller influences are summed in one line, all of them are in record.json
+_WORDS = ((re.compile(r"\bamb\b(?!-)"), "AMB"), (re.compile(r"\bcom to\b"), "centre of mass to"))
 Content = Mapping[str, Any]
 
 
 def identities(measurements: Iterable[Content]) -> frozenset[str]:
     """Of every influence of every result."""
     return frozenset(str(e.get("influence") or "") for m in measurements for e in m.get("budget") or ())
+
+
+def named(measurement: Content) -> Content:
+    """A measurement with the names of its influences in readers' words: a sensor's with its channel."""
+    return {**measurement, "budget": [{**e, "name": _name(e)} for e in measurement.get("budget") or ()]}
+
+
+def _name(entry: Content) -> str:
+    said = str(entry.get("name") or "")
+    for pattern, words in _WORDS:
+        said = pattern.sub(words, said)
+    kind, _, rest = str(entry.get("influence") or "").partition("/")
+    channel = rest.partition("/")[0]
+    return f"{said} of {channel}" if kind == "sensors" and channel and said in ("gain", "offset") else said
 
 
 def budget_table(

@@ -147,6 +147,10 @@ def copper_W(plant: AmbPlant) -> float:
     return plant.params.resistance * sum(i * i for i in plant.currents)
 
 
+NEEDED = (*(f"pos_{a}" for a in AXES), *(f"i_{c}" for c in COILS), "angle", "speed", "pulses", "flags")
+"""Of the channels of the core, those that its telemetry is nothing without."""
+
+
 def places(defects: Numbers, at: Mapping[str, int]) -> tuple[list[int], list[int]]:
     """Which channels of the core are told, and where each goes among the signals; a bearing whose current sensors are
     exchanged has the currents of its coils the other way round."""

@@ -43,7 +43,7 @@ def quantities(p: PlantParams, bias_A: tuple[float, ...]) -> dict[str, float]:
     beta, gap, bias = (np.array(x)[:, None] for x in (p.beta, p.gap, bias_A))
     near, far = beta / (gap - xi) ** 2, beta / (gap + xi) ** 2
     k, k2 = 2 * bias * (near + far), near - far
-    force = _own_weight(p, angles)
+    force = own_weight(p, angles)
     slope = np.sqrt(k**2 - 4 * k2 * (k2 * bias**2 - force))  # on F = K2 (b^2 + i^2) + K i
     out: dict[str, float] = {}
     for b, name in enumerate("io"):
@@ -83,7 +83,7 @@ def motor_quantities(p: PlantParams, bias_A: tuple[float, ...]) -> dict[str, flo
     }
 
 
-def _own_weight(p: PlantParams, angles: Array) -> Array:
+def own_weight(p: PlantParams, angles: Array) -> Array:
     """Vertical force (2, n) N of each AMB that carries the bare rotor at the sensors' zero (T 6.11, corrected)."""
     n = np.arange(1, 5)[:, None]
     sensed = []

@@ -4,23 +4,59 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict
+from collections.abc import Iterator
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Literal
 
 import pytest
 
 from bench import catalogue
 from bench.cli.compose import load_procedure
 from bench.errors import ConfigError
+from bench.findings import Effect
 from bench.limits import Limit
-from bench.procedure import BenchPlan
-from bench.specs import INSTALLED, applied, load_spec, parse_spec
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity
+from bench.roles import RigState
+from bench.specs import INSTALLED, applied, in_unit, load_spec, misnamed, parse_spec
 
 ENTRY = 'unit = "N/A", source = "house", verified = false'
 
 
+class Settings(BenchPlan):
+    """Of the kinds that plans have."""
+
+    bias_A: float = 3.0
+    speeds_rad_s: tuple[float, ...] = (math.pi * 2000 / 30, math.pi * 10000 / 30)
+    law: Literal["PID", "CCS", "CAC"] = "CCS"
+    repeat: bool = True
+    observer: bool | None = None
+
+
+def of_settings(unit: str) -> Procedure:
+    """A procedure `p` with these settings, that measures q."""
+
+    def acquire(*_: object) -> None: ...
+
+    def analyse(*_: object) -> Iterator[Measured]:
+        yield from ()
+
+    return Procedure(
+        "p", "A test", (Quantity("q", unit, "what is limited"),), RigState.READY, Settings, acquire, analyse
+    )
+
+
+P, P_IN_N = of_settings("N/A"), of_settings("N")
+
+
+def spec_of(folder: Path, entries: str) -> Path:
+    """The folder, with limits of procedure p for rig r."""
+    (folder / "r.toml").write_text(f"schema = 1\n[limits.p]\n{entries}")
+    return folder
+
+
 def test_the_shipped_spec() -> None:
-    limits = load_spec("tsbs12", "amb-calibration", ("K_i", "K_o"), (INSTALLED,))
+    limits = load_spec("tsbs12", "amb-calibration", load_procedure("amb-calibration"), (INSTALLED,))
     assert set(limits) == {"K_i", "K_o"}
     assert (limits["K_i"].low, limits["K_i"].high) == pytest.approx((65.88, 80.52))
     assert (limits["K_o"].low, limits["K_o"].high) == pytest.approx((66.96, 81.84))
@@ -38,9 +74,30 @@ def test_one_sided() -> None:
     assert spec == {"p": {"q": Limit(None, 3.0, "N/A", "house", False)}}
 
 
-def test_a_limit_of_an_undeclared_quantity_is_refused() -> None:
-    with pytest.raises(ConfigError, match="K_o"):
-        load_spec("tsbs12", "amb-calibration", ("K_i",), (INSTALLED,))
+def test_a_limit_of_an_undeclared_quantity_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"limits\.p\.K_o: found K_o; expected one of q"):
+        load_spec("r", "p", P, (spec_of(tmp_path, f"K_o = {{ low = 3, {ENTRY} }}"),))
+
+
+def test_a_limit_in_another_unit_is_refused_before_anything_is_measured(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"limits\.p\.q\.unit: found 'N/A'; expected 'N', the unit of q"):
+        load_spec("r", "p", P_IN_N, (spec_of(tmp_path, f"q = {{ low = 3, {ENTRY} }}"),))
+
+
+def test_a_limit_in_another_unit_in_an_old_recording_costs_no_result() -> None:
+    """It came with the recording; its own quantity alone is not judged."""
+    limit = parse_spec(f"schema = 1\n[limits.p]\nq = {{ low = 3, {ENTRY} }}")["p"]
+    left, (found,) = in_unit({**limit, "r": replace(limit["q"], unit="N")}, P_IN_N.measures)
+    assert (set(left), found.code, found.effect, found.concerns) == ({"r"}, "limit-unit", Effect.ERROR, ("q",))
+
+
+def test_limits_of_a_misspelt_procedure_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "r.toml").write_text(f"schema = 1\n[limits.amb-calibratoin]\nK_i = {{ low = 3, {ENTRY} }}")
+    (problem,) = misnamed("r", (tmp_path,))
+    assert (problem.key, problem.expected) == (
+        "limits.amb-calibratoin",
+        "the name of a procedure, such as amb-calibration",
+    )
 
 
 @pytest.mark.parametrize(
@@ -77,16 +134,6 @@ def test_every_problem_is_named_at_once() -> None:
     with pytest.raises(ConfigError) as caught:
         parse_spec("schema = 1\nx = 1\n[limits.p]\nq = { low = 3 }\nr = 4")
     assert len(caught.value.problems) == 5
-
-
-class Settings(BenchPlan):
-    """Of the kinds that plans have."""
-
-    bias_A: float = 3.0
-    speeds_rad_s: tuple[float, ...] = (math.pi * 2000 / 30, math.pi * 10000 / 30)
-    law: str = "CCS"
-    repeat: bool = True
-    observer: bool | None = None
 
 
 @pytest.mark.parametrize(
@@ -138,14 +185,46 @@ def test_a_setting_that_the_plan_does_not_have_is_refused(tmp_path: Path) -> Non
     """A misspelt one would void the limit in silence."""
     (tmp_path / "r.toml").write_text(f"schema = 1\n[limits.p]\nq = {{ low = 3, at = {{ baist_A = 3 }}, {ENTRY} }}")
     with pytest.raises(ConfigError, match=r"limits\.p\.q\.at\.baist_A.*Did you mean bias_A"):
-        load_spec("r", "p", folders=(tmp_path,), settings=tuple(Settings.model_fields))
+        load_spec("r", "p", P, (tmp_path,))
+
+
+@pytest.mark.parametrize(
+    ("at", "expected"),
+    [
+        ('bias_A = "3"', "a number"),
+        ("bias_A = true", "a number"),
+        ("repeat = 1", "true or false"),
+        ('law = "CCC"', "one of CAC, CCS, PID"),
+        ("law = { low = 1 }", "one of CAC, CCS, PID: it has no range"),
+    ],
+)
+def test_a_setting_that_can_never_be_is_refused(tmp_path: Path, at: str, expected: str) -> None:
+    with pytest.raises(ConfigError, match=rf"limits\.p\.q\.at\.\w+: found .*; expected {expected}"):
+        load_spec("r", "p", P, (spec_of(tmp_path, f"q = {{ low = 3, at = {{ {at} }}, {ENTRY} }}"),))
+
+
+@pytest.mark.parametrize(
+    ("entry", "said"),
+    [
+        (
+            f"{{ low = 3, at = {{ bias_A = nan }}, {ENTRY} }}",
+            "at.bias_A: found nan; expected finite numbers, words, true",
+        ),
+        (f"{{ nominal = 0, relative = 0.1, {ENTRY} }}", "expected low and high"),
+    ],
+)
+def test_a_limit_that_cannot_be_met_is_told_of_once(entry: str, said: str) -> None:
+    with pytest.raises(ConfigError) as told:
+        parse_spec(f"schema = 1\n[limits.p]\nq = {entry}")
+    assert said in str(told.value)
+    assert len(told.value.problems) == 1
 
 
 @pytest.mark.parametrize("entry", catalogue.PROCEDURES, ids=lambda e: e.name)
 @pytest.mark.parametrize("rig", ["tsbs12", "amb5dof"])
 def test_the_shipped_limits_suit_their_procedures(rig: str, entry: catalogue.Entry) -> None:
     procedure = load_procedure(entry.name)
-    names = [q.name for q in procedure.measures]
-    limits = load_spec(rig, entry.name, names, (INSTALLED,), settings=tuple(procedure.plan.model_fields))
+    limits = load_spec(rig, entry.name, procedure, (INSTALLED,))
+    assert list(misnamed(rig, (INSTALLED,))) == []
     found, notes = applied(limits, procedure.plan())
     assert (set(found), notes) == (set(limits), ())  # by default they judge

@@ -56,8 +56,7 @@ def _ability(rig: RigFile, procedure: Procedure) -> Ability:
     except ConfigError as error:
         problems += error.problems or (Problem(rig.path, f"plans.{procedure.name}", str(error), "a plan"),)
     try:
-        measures = [q.name for q in procedure.measures]
-        load_spec(rig.name, procedure.name, measures, settings=tuple(procedure.plan.model_fields))
+        load_spec(rig.name, procedure.name, procedure)
     except ConfigError as error:
         problems += error.problems or (Problem("specs", f"limits.{procedure.name}", str(error), "limits"),)
     if plan is None:

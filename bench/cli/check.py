@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from typing import TYPE_CHECKING
 
@@ -53,7 +54,9 @@ def check_rig_file(rig: str, procedure: str = "") -> int:
     file, able = as_far_as_read(rig), list[Ability]()
     if file is not None:
         able = abilities(file, procedure)
-        problems += (*unknown_plans(file), *(p for a in able for p in a.problems), *_of_simulation(file))
+        of_procedures = dict.fromkeys(p for a in able for p in a.problems)  # a spec that cannot be read is each one's
+        of_files = (*_of_spec(file.name), *of_procedures, *_of_simulation(file), *_of_calibrations(file))
+        problems += (*unknown_plans(file), *of_files)
     for problem in problems:
         sys.stderr.write(f"{problem}\n")
     if load is not None:
@@ -71,6 +74,35 @@ def check_rig_file(rig: str, procedure: str = "") -> int:
     return USAGE if problems else PASS
 
 
+def _of_calibrations(rig: RigFile) -> Iterator[Problem]:
+    """The current calibrations beside the rig file that no run would take: not to be read, changed, or of the future."""
+    from datetime import UTC, datetime
+
+    from bench.calibrationfile import read
+    from bench.calibrationstore import stores_of
+    from bench.errors import ConfigError, Problem
+
+    now = datetime.now(UTC)
+    for path in (p for store in stores_of(rig) for p in store.current_files()):
+        try:
+            c = read(path)
+        except ConfigError as error:
+            first, *_ = str(error).removeprefix(f"{path}: ").splitlines()
+            yield from error.problems or [Problem(str(path), "calibration", first.rstrip(":"), "one that can be read")]
+            continue
+        if c.ahead(now):
+            yield Problem(str(path), "date", c.date, f"one that is past; the clock says {now:%Y-%m-%dT%H:%M:%S+00:00}")
+
+
+def _of_spec(rig: str) -> Iterator[Problem]:
+    """Limits of no procedure; a spec that cannot be read is told of by the procedures."""
+    from bench.errors import ConfigError
+    from bench.specs import misnamed
+
+    with contextlib.suppress(ConfigError):
+        yield from misnamed(rig)
+
+
 def _of_simulation(rig: RigFile) -> Iterator[Problem]:
     """What the simulated backend would object to, where the rig file has something to simulate."""
     from bench.errors import ConfigError, Problem
@@ -78,9 +110,10 @@ def _of_simulation(rig: RigFile) -> Iterator[Problem]:
     if not rig.simulation:
         return
     from sim_backend.machine import machine_of
+    from sim_backend.unspoken import unspoken
 
     try:
-        machine_of(rig)
+        yield from unspoken(rig, machine_of(rig))
     except ConfigError as error:
         place, _, said = str(error).partition(": found ")
         found, _, expected = said.partition("; expected ")

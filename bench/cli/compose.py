@@ -28,7 +28,7 @@ from bench.needs import Lookup
 from bench.opened import Connect, Job
 from bench.procedure import BenchPlan, Procedure
 from bench.rigfile import RigFile, load_rig
-from bench.specs import load_spec
+from bench.specs import load_spec, misnamed
 
 
 @dataclass(frozen=True)
@@ -90,8 +90,9 @@ def prepare(request: Request, asking: Asking = quietly) -> tuple[Job, Connect]:
         ConfigError: usage, rig file, plan, spec or calibrations; every problem of the first of them that has one.
     """
     procedure, rig, plan = planned(request)
-    measures, settings = [q.name for q in procedure.measures], tuple(procedure.plan.model_fields)
-    limits = load_spec(rig.name, procedure.name, measures, file=request.spec, settings=settings)
+    if unknown := tuple(misnamed(rig.name, file=request.spec)):
+        raise ConfigError("the spec cannot be used; nothing was started:", unknown)
+    limits = load_spec(rig.name, procedure.name, procedure, file=request.spec)
     judged = request.require_verdict or request.spec is not None
     seed = None if request.backend == "live" else request.seed or 0
     lookup = Lookup(

@@ -15,8 +15,10 @@ import numpy.typing as npt
 from scipy import special
 
 from bench.findings import Effect, Finding
-from procedures.estimators import signals
+from bench.uncertainty import Estimate
+from procedures.estimators import load_at_rest, signals
 from procedures.estimators.force_rows import CROSS, DIRECT, FORCE, SEGMENTS
+from procedures.estimators.load_at_rest import Cause, Rest
 from procedures.estimators.ramp_data import COILS, POSITIONS, RampData
 from procedures.estimators.ramp_data import SEGMENTS as SEGMENT_CHANNELS
 
@@ -153,6 +155,52 @@ def lack_of_fit(axis: str, bent: bool, worst_N: float, suspect: str) -> Iterator
             Effect.INDETERMINATE,
             ALONG[axis],
         )
+
+
+def axes_disagree(y: Estimate, x: Estimate) -> Iterator[Finding]:
+    """alpha_d and alpha_dx differ by the segments' gains in the machine only: 3 % and five standard uncertainties."""
+    apart = y - x
+    allowed = 5 * apart.u + 0.03 * abs(y.value)
+    if abs(apart.value) > allowed:
+        yield Finding(
+            "axes-disagree",
+            f"alpha_d is {y.value:.3f} N/A vertically and {x.value:.3f} N/A horizontally; {allowed:.2f} N/A of "
+            "difference is allowed. Is a winding or an AMB of one axis different?",
+            "alpha_dx",
+            Effect.INDETERMINATE,
+        )
+
+
+def load_moved(rest: Rest | None, expanded: float) -> Iterator[Finding]:
+    """Another load at rest than at the calibration, beyond five standard uncertainties. A note where all that would explain it
+    leaves alpha_d within its own `expanded` uncertainty, N/A: a probe's zero wanders by half a micrometre in a warm room."""
+    if rest is None or not rest.beyond.any():
+        return
+    names = [name for name, beyond in zip(("inboard", "outboard"), rest.beyond, strict=True) if beyond]
+    carried = " and ".join(
+        f"the {name} AMB {moved:+.3f} N ({abs(moved) / u:.0f} standard uncertainties)"
+        for name, moved, u, beyond in zip(("inboard", "outboard"), rest.moved, rest.u, rest.beyond, strict=True)
+        if beyond
+    )
+    worst = max(abs(c.shift) for c in rest.causes)
+    text = (
+        f"with no current in the motor the AMBs' currents carry another load than at their calibration: {carried}. "
+        f"It would be {', or '.join(_cause(c) for c in rest.causes)}."
+    )
+    if worst <= expanded:
+        yield Finding("load-moved", f"{text} alpha_d is moved by less than its uncertainty.", "/".join(names))
+        return
+    more = "Look at the sensors, and that shaft and probes are as they were; calibrate the AMBs again."
+    yield Finding("load-moved", f"{text} {more}", "/".join(names), Effect.INDETERMINATE, ALONG["y"])
+
+
+def _cause(c: Cause) -> str:
+    off = f"then off by {c.shift:+.3f} N/A"
+    if len(c.sensors) > 1:
+        zeros = " and ".join(f"{s} by {1e6 * x:+.2f} µm" for s, x in zip(c.sensors, c.amounts, strict=True))
+        return f"another shaft, or moved zeros of {zeros} (alpha_d {off})"
+    which = "all four vertical coils' sensors" if c.sensors[0] == load_at_rest.ALL else c.sensors[0]
+    return f"a gain of {which} changed by {c.amounts[0]:+.2%}, or its offset (alpha_d {off})"
 
 
 def wander(axis: str, drift: Array, u: Array, data: RampData, plan: Tolerances) -> Iterator[Finding]:

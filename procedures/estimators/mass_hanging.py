@@ -159,3 +159,19 @@ def by_angle(f: Fit) -> dict[str, float]:
         for name, term in (("K", 1), ("K2", 2))
         for k in range(f.terms.shape[1])
     }
+
+
+def carried(f: Fit, p: Mapping[str, float]) -> dict[str, float]:
+    """F_0 of each bearing at each angle k, N, as `F0_i@k` and `F0_o@k`, with the shaft alone as the zero of force; and what the
+    hanger adds to each, N, as `hanger_i` and `hanger_o`.
+
+    The fit's zero of force has the hanger on, so that F_0 + K u + K2 v = -hanger without it (see `tangents`). With F0 = F_0 +
+    hanger the shaft alone, at rest at the sensors' zero, is carried by currents of F0 + K u + K2 v = 0: the rotor's weight, the
+    motor's pull and the journal's place in the magnet are in F0, each as it is at that angle and that bias.
+    """
+    hanger = float(weight(p["hanger"], p["gravity"], p["air_density"], p["mass_density"]))
+    out: dict[str, float] = {}
+    for b, share in enumerate(hung_shares(p["hook_to_outboard"], p["amb_span"])):
+        out |= {f"F0_{'io'[b]}@{k}": float(f0) + share * hanger for k, f0 in enumerate(f.terms[b, :, 0])}
+        out[f"hanger_{'io'[b]}"] = share * hanger
+    return out

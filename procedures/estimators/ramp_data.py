@@ -81,7 +81,7 @@ def read_ramps(recording: Recording[Any]) -> RampData:
             axis,
             np.stack([np.stack([mean[f"i_{axis}{b}_{c}"] for c in "pn"]) for b in "io"]),
             np.stack([mean[c] for c in SEGMENTS]),
-            *_planes(recording.rig, mean[f"pos_{axis}i"], mean[f"pos_{axis}o"]),
+            *planes(recording.rig, mean[f"pos_{axis}i"], mean[f"pos_{axis}o"]),
             branch,
             np.isin(level, (level.min(), level.max())).astype(np.float64),
             time,
@@ -97,7 +97,7 @@ def read_ramps(recording: Recording[Any]) -> RampData:
     )  # fmt: skip
 
 
-def _planes(rig: RigFile, inboard: Array, outboard: Array) -> tuple[Array, Array]:
+def planes(rig: RigFile, inboard: Array, outboard: Array) -> tuple[Array, Array]:
     """Displacement at the AMB planes (2, A, P) and at the motor (A, P) from both sensor planes (T 6.7)."""
     g = rig.geometry
     l_is, l_os = g["com_to_inboard_sensor"].value, g["com_to_outboard_sensor"].value

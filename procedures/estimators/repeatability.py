@@ -11,6 +11,9 @@ from procedures.estimators.mass_hanging import Fit, Hangings
 
 Array = npt.NDArray[np.float64]
 OUTPUTS = ("K_i", "K2_i", "Kw_i", "K_o", "K2_o", "Kw_o")
+CARRIED = ("F0_i", "F0_o")
+"""By angle only: F_0 of each bearing (see `mass_hanging.carried`)."""
+ORDER = (0, 1, 2, 4, 5, 6, 3, 7)  # from K, K2, Kw, F_0 of one bearing and of the other to OUTPUTS and CARRIED
 
 
 @dataclass(frozen=True)
@@ -69,30 +72,32 @@ def residual_maker(f: Fit, b: int) -> Array:
 
 
 def covariance_by_angle(f: Fit, s: Scatter, own_load: Array) -> Array:
-    """Type A covariance (A, 6, 6) of the terms at each angle, in the order of OUTPUTS.
+    """Type A covariance (A, 8, 8) of the terms at each angle, in the order of OUTPUTS and CARRIED.
 
     `own_load` (2,) N is the force at own weight in the fit's frame (see `mass_hanging.tangents`). Hangings are
     independent of each other; the two bearings of one hanging are not (a load that seats badly moves both).
     """
-    maps = np.stack([_term_gradients(f.terms[b], own_load[b]) @ f.solvers[b] for b in (0, 1)])  # (2, A, 3, P)
+    maps = np.stack([_term_gradients(f.terms[b], own_load[b]) @ f.solvers[b] for b in (0, 1)])  # (2, A, 4, P)
     blocks: Array = np.einsum("bamp,canp,bcap->abmcn", maps, maps, s.covariance)
-    return blocks.reshape(-1, 6, 6)
+    ordered: Array = blocks.reshape(-1, 8, 8)[np.ix_(range(len(blocks)), ORDER, ORDER)]
+    return ordered
 
 
 def covariance_over_a_turn(by_angle: Array) -> Array:
-    """Type A covariance (6, 6) of the means over a turn; angles share no hanging."""
+    """Type A covariance (8, 8) of the means over a turn; angles share no hanging."""
     covariance: Array = by_angle.sum(axis=0) / len(by_angle) ** 2
     return covariance
 
 
 def _term_gradients(terms: Array, own: float) -> Array:
-    """d(K, K2, Kw)/d(F_0, K, K2, H) at each angle, (A, 3, 4)."""
+    """d(K, K2, Kw, F_0)/d(F_0, K, K2, H) at each angle, (A, 4, 4)."""
     f0, k, k2 = terms[:, 0], terms[:, 1], terms[:, 2]
     slope = np.sign(k) * np.sqrt(np.maximum(k**2 + 4 * k2 * (own - f0), 1e-9))
-    out = np.zeros((len(terms), 3, 4))
+    out = np.zeros((len(terms), 4, 4))
     out[:, 0, 1] = 1
     out[:, 1, 2] = 1
     out[:, 2, 0] = -2 * k2 / slope
     out[:, 2, 1] = k / slope
     out[:, 2, 2] = 2 * (own - f0) / slope
+    out[:, 3, 0] = 1
     return out

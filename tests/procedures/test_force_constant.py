@@ -104,6 +104,22 @@ def test_the_result_follows_the_truth(tmp_path: Path, calibration: Calibration, 
     assert judge(interval(e), limits["alpha_d"]) is Verdict.FAIL
 
 
+def test_a_current_sensor_that_changed_since_the_calibration_is_found_by_the_load_at_rest(
+    tmp_path: Path, calibration: Calibration, sound: Simulated
+) -> None:
+    """0.3 %, the certificate's half width: alpha_d moves by up to 3 U, and both rows agree."""
+    assert not any(f.code == "load-moved" for f in sound.results if isinstance(f, Finding))
+    changed = sound.drawn.values["i_yo_p.gain"] + 0.003
+    run = measure(tmp_path, calibration, {"i_yo_p.gain": changed})
+    (found,) = (f for f in serious(run) if f.code == "load-moved")
+    assert (found.where, found.effect, found.concerns) == ("outboard", Effect.INDETERMINATE, ("alpha_d",))
+    assert "i_yo_p changed by +0.30%" in found.text
+    before = {n: e for n, e in calibration.values.items() if not n.startswith(("F0", "hanger"))}
+    assert "load-moved" not in {
+        f.code for f in serious(reanalysed(run, {CALIBRATION: replace(calibration, values=before)}))
+    }
+
+
 @pytest.mark.parametrize(
     ("defect", "code", "named"),
     [
