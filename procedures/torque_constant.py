@@ -52,7 +52,7 @@ class Plan(BenchPlan):
     max_angle_rad: float = Field(1e-2, gt=0)  # held: mean angle off home (beyond 2 A the integrator ends, kp holds)
     max_drift_A: float = Field(0.03, gt=0)  # settled: drift of the torque current within a step
     max_baseline_drift_A_s: float = Field(5e-5, gt=0)  # of the current without load, over the run
-    max_scale_drift: float = Field(1e-3, gt=0)  # relative, of the torque per current, from the first load to the last
+    max_scale_drift: float = Field(7e-4, gt=0)  # relative, of the torque per current, from the first load to the last
     count_rad: float = Field(2 * math.pi / 4096, gt=0)  # of the rotor's encoder
     max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 
