@@ -42,8 +42,8 @@ campaigns: setup
 FIRST ?= 0
 sound: setup
 	mkdir -p runs
-	nohup nice $(BIN)/python benchmarks/sound.py runs/sound-$(FIRST).jsonl --first $(FIRST) --count 60 --choices 20 --jobs 2 > runs/sound-$(FIRST).log 2>&1 &
-	@echo "look at it with: $(BIN)/python benchmarks/sound.py runs/sound-$(FIRST).jsonl --report"
+	nohup nice $(BIN)/python -m benchmarks.sound runs/sound-$(FIRST).jsonl --first $(FIRST) --count 60 --choices 20 --jobs 2 > runs/sound-$(FIRST).log 2>&1 &
+	@echo "look at it with: $(BIN)/python -m benchmarks.sound runs/sound-$(FIRST).jsonl --report"
 
 # Every drawn number moved by three half widths, for every procedure: caught, harmless, in the budget, or listed on the report.
 moved: setup

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
+from bench.errors import Problem
 from bench.messages import Message, MessageMap
+from bench.rigfile import RigFile
 
 REFUSE, WARN = 0.90, 0.70
+FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 ON_DEMAND_HZ = 50.0  # allowance for commands and their replies, per message without a period
 
 
@@ -62,3 +66,22 @@ def net_bytes_per_second(messages: MessageMap, bitrate: float, data_bitrate: flo
     m = messages["CaptureBlock"]
     busy = sum(frame_seconds(x, bitrate, data_bitrate) / x.period_s for x in messages.messages.values() if x.period_s)
     return m.length * (1 - busy) / frame_seconds(m, bitrate, data_bitrate)
+
+
+def problems_of(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
+    """Identifiers that two messages share, lengths that no frame has, a bus that cannot carry it all."""
+    owner: dict[int, str] = {}
+    for m in messages.messages.values():
+        if m.identifier in owner:
+            shown = f"identifier {m.identifier & ~(1 << 31):#x}, which {owner[m.identifier]} has too"
+            yield Problem(rig.link.dbc, f"BO_ {m.name}", shown, "one of its own: nobody could tell the two apart")
+        owner.setdefault(m.identifier, m.name)
+        if m.length not in FD_LENGTHS:
+            yield Problem(rig.link.dbc, m.name, f"{m.length} bytes", f"a CAN FD length: {FD_LENGTHS}")
+    if rig.link.bitrate is None:
+        return  # no CAN bus
+    load = bus_load(messages, rig.link.bitrate, rig.link.data_bitrate)
+    if load.total > REFUSE:
+        worst = max(load.by_message, key=lambda name: load.by_message[name])
+        yield Problem(rig.path, f"links.{rig.devices['controller'].link}", f"a bus load of {load.total:.0%}",
+                      f"at most {REFUSE:.0%}; {worst} takes {load.by_message[worst]:.0%}")  # fmt: skip

@@ -6,8 +6,8 @@ import contextlib
 import difflib
 from collections.abc import Iterator
 
-from bench import binding, capture, linkurl, units
-from bench.busload import REFUSE, BusLoad, bus_load
+from bench import binding, busload, capture, linkurl, units
+from bench.busload import BusLoad, bus_load
 from bench.errors import ConfigError, Problem
 from bench.messages import MessageMap
 from bench.rigfile import RigFile, RigText, read_rig
@@ -42,7 +42,6 @@ SOME_GEOMETRY = {
 MACHINE = {"pole_pairs": "1", "polar_inertia": "kg m^2", "ring_inertia": "kg m^2", "amb_asymmetry": "1",
            "radial_axes": "rad", "runout": "m", "coupling_offset": "m", "mass": "kg", "transverse_inertia": "kg m^2",
            "weight_mass": "kg", "weight_angle": "rad", "drive_drag": "N m"}  # fmt: skip
-FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 
 
 def check_rig(rig: str) -> tuple[tuple[Problem, ...], BusLoad | None]:
@@ -108,7 +107,7 @@ def problems_of(rig: RigFile) -> list[Problem]:
         except ConfigError as error:
             why = str(error).removeprefix(f"{rig.link.dbc}: not a usable DBC: ")
             return [*found, Problem(rig.link.dbc, "(file)", why, "a usable DBC")]
-        found += [*_bindings(rig, messages), *_bus(rig, messages)]
+        found += [*_bindings(rig, messages), *busload.problems_of(rig, messages)]
     return found
 
 
@@ -286,21 +285,3 @@ def _signals_of_parameters(rig: RigFile, messages: MessageMap) -> Iterator[Probl
             yield Problem(
                 rig.path, f"parameters.{name}", f"{p.low:g} to {p.high:g} {p.unit}", f"a range that {p.signal} can hold"
             )
-
-
-def _bus(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
-    owner: dict[int, str] = {}
-    for m in messages.messages.values():
-        if m.identifier in owner:
-            shown = f"identifier {m.identifier & ~(1 << 31):#x}, which {owner[m.identifier]} has too"
-            yield Problem(rig.link.dbc, f"BO_ {m.name}", shown, "one of its own: nobody could tell the two apart")
-        owner.setdefault(m.identifier, m.name)
-        if m.length not in FD_LENGTHS:
-            yield Problem(rig.link.dbc, m.name, f"{m.length} bytes", f"a CAN FD length: {FD_LENGTHS}")
-    if rig.link.bitrate is None:
-        return  # no CAN bus
-    load = bus_load(messages, rig.link.bitrate, rig.link.data_bitrate)
-    if load.total > REFUSE:
-        worst = max(load.by_message, key=lambda name: load.by_message[name])
-        yield Problem(rig.path, f"links.{rig.devices['controller'].link}", f"a bus load of {load.total:.0%}",
-                      f"at most {REFUSE:.0%}; {worst} takes {load.by_message[worst]:.0%}")  # fmt: skip

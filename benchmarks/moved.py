@@ -35,7 +35,7 @@ from bench.procedure import Measured
 from bench.rigfile import RigFile, load_rig
 from bench.toleranced import Toleranced
 from bench.uncertainty import interval
-from benchmarks.sound import RIGS, load, needed_by
+from benchmarks.cases import RIGS, load, needed_by
 from reports.unseen import is_reached
 from sim_backend.machine import machine_of
 

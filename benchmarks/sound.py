@@ -1,6 +1,6 @@
 """Sound virtual rigs with the plans that people run: each default plan alone and in the chain, and each choice of a plan.
 
-    python benchmarks/sound.py runs/sound.jsonl --first 0 --count 60 --choices 20 --jobs 2
+    python -m benchmarks.sound runs/sound.jsonl --first 0 --count 60 --choices 20 --jobs 2
 
 Cases that the file holds already are left out, so that the same command goes on where it was stopped. `--report` prints what
 the file holds: how many runs of each case ended how, and every one that is not PASS or DONE with what is wrong about it.
@@ -10,7 +10,6 @@ the file holds: how many runs of each case ended how, and every one that is not 
 from __future__ import annotations
 
 import argparse
-import importlib
 import json
 import math
 import tempfile
@@ -18,13 +17,9 @@ import time
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import as_completed
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args, get_origin
+from typing import Any
 
-from pydantic import ValidationError
-
-from bench import catalogue
 from bench.calibration import Calibration
 from bench.cli.campaign_fleet import pool
 from bench.cli.motion_truth import truth_of_motion
@@ -33,63 +28,11 @@ from bench.errors import BenchError, ConfigError
 from bench.findings import Effect, Finding
 from bench.limits import Verdict
 from bench.outcomes import outcome_of
-from bench.procedure import BenchPlan, Measured, Procedure
+from bench.procedure import Measured
 from bench.records import Measurement, measurement, missing
 from bench.rigfile import load_rig
 from bench.specs import applied, load_spec
-
-RPM = math.pi / 30
-RIGS = {
-    "tsbs12": ("amb-calibration", "force-constant", "negative-stiffness", "force-coupling", "torque-constant", "spindown",
-               "angle-step", "slew", "force-map"),
-    "amb5dof": ("bearing-model", "step", "tracking", "unbalance", "compensation", "balance", "run-up", "coast-down",
-                "sensitivity"),
-}  # fmt: skip
-ENDS: Mapping[str, tuple[Mapping[str, Any], ...]] = {
-    "amb-calibration": ({"bias_A": 2.5}, {"bias_A": 4.0}),
-    "torque-constant": ({"bias_A": 2.0}, {"bias_A": 4.0}),
-    "spindown": ({"speed_rad_s": 30.0}, {"speed_rad_s": 70.0}),
-    "step": (
-        {"speeds_rad_s": (3000 * RPM,)},
-        {"speeds_rad_s": (10000 * RPM,)},
-        {"a": {"law": 0}},
-        {"a": {"law": 1}},
-        {"a": {"law": 2}},
-    ),
-    "unbalance": ({"speeds_rad_s": (2000 * RPM,)}, {"speeds_rad_s": (14000 * RPM,)}),
-    "compensation": (
-        {"speeds_rad_s": (3000 * RPM,)},
-        {"speeds_rad_s": (14000 * RPM,), "judged_to_rad_s": 14000 * RPM},
-    ),
-    "balance": ({"speeds_rad_s": (3000 * RPM,)}, {"positions": 12}),
-    "run-up": (
-        {"acceleration_rad_s2": 10.0},
-        {"acceleration_rad_s2": 50.0},
-        {"law": "CAC", "top_rad_s": 8000 * RPM, "speeds_rad_s": (3000 * RPM, 6000 * RPM)},
-    ),
-    "coast-down": ({"deceleration_rad_s2": 24.5},),
-    "tracking": ({"laws": ["PID"], "y_m": 20e-6, "z_m": 20e-6},),
-    "sensitivity": ({"speeds_rad_s": (10000 * RPM,)},),
-}
-"""Biases, speeds and rates at both ends; choices among words are read from the plans themselves."""
-# a choice that truly touches the rings with the plan's own ellipse, as the procedure's page says: tried with a smaller one
-TOUCHING = {("tracking", '{"laws": ["PID"]}')}
-# what the operator has done to the machine for a plan, by the case's name
-TRUTH: Mapping[str, Mapping[str, float]] = {'bearing-model {"coupled": false}': {"geometry.coupling_stiffness": 0.0}}
-
-
-@dataclass(frozen=True)
-class Case:
-    """A procedure with what differs from its default plan; `chain`: with every calibration that it can use."""
-
-    rig: str
-    procedure: str
-    changes: str  # JSON
-    chain: bool
-
-    @property
-    def name(self) -> str:
-        return f"{self.procedure} {self.changes if self.changes != '{}' else ''}{' in the chain' if self.chain else ''}"
+from benchmarks.cases import RIGS, TRUTH, Case, cases_of, load, needed
 
 
 def main() -> None:
@@ -129,52 +72,6 @@ def limit_of(case: Case, asked: argparse.Namespace) -> int:
     return int(asked.count if case.changes == "{}" else asked.choices)
 
 
-def cases_of(rig: str, only: list[str]) -> Iterator[Case]:
-    """Default plans alone and in the chain, then each choice, of a rig's procedures."""
-    for name in RIGS[rig]:
-        if only and name not in only:
-            continue
-        procedure = load(name)
-        needs = procedure.needs(procedure.plan())
-        if all(n.optional for n in needs):
-            yield Case(rig, name, "{}", False)
-        if needs:
-            yield Case(rig, name, "{}", True)
-        for changes in (*choices(procedure), *ENDS.get(name, ())):
-            if (name, json.dumps(changes)) in TOUCHING:
-                continue
-            if (plan := plan_of(rig, procedure, changes)) is not None:
-                yield Case(rig, name, json.dumps(changes), bool(procedure.needs(plan)))
-
-
-def plan_of(rig: str, procedure: Procedure, changes: Mapping[str, Any]) -> BenchPlan | None:
-    """The rig's plan with `changes`, as JSON has them; nothing for a choice that is refused before anything turns, as it goes
-    with another one only."""
-    file = load_rig(rig)
-    try:
-        plan = procedure.plan.model_validate({**file.plans.get(procedure.name, {}), **changes})
-    except ValidationError:
-        return None
-    return None if list(procedure.check(file, plan)) else plan
-
-
-def choices(procedure: Procedure) -> Iterator[dict[str, Any]]:
-    """Every other choice that the plan offers among words, and every switch the other way."""
-    for key, field in procedure.plan.model_fields.items():
-        usual, kind = field.get_default(call_default_factory=True), field.annotation
-        if kind is bool:
-            yield {key: not usual}
-        elif get_origin(kind) is Literal:
-            yield from ({key: value} for value in get_args(kind) if value != usual)
-        elif get_origin(kind) is tuple and get_origin(get_args(kind)[0]) is Literal:
-            yield from ({key: [value]} for value in get_args(get_args(kind)[0]) if (value,) != usual)
-
-
-def load(name: str) -> Procedure:
-    found: Procedure = importlib.import_module(catalogue.entry(name).module).procedure
-    return found
-
-
 def run_rig(rig: str, seed: int, cases: list[Case], file: Path) -> None:
     """The cases on one virtual rig; the calibrations that any of them uses are made first, with default plans. Each is a line
     of the file as soon as it has ended: one write, so that processes do not mix theirs."""
@@ -190,27 +87,6 @@ def run_rig(rig: str, seed: int, cases: list[Case], file: Path) -> None:
             line = run_case(case, seed, path, known if case.chain else {})
             with file.open("ab", buffering=0) as out:
                 out.write(json.dumps(line).encode() + b"\n")
-
-
-def needed(cases: list[Case]) -> list[str]:
-    """As needed_by, for all of them."""
-    used = (needed_by(case.procedure, json.loads(case.changes)) for case in cases if case.chain)
-    return list(dict.fromkeys(name for names in used for name in names))
-
-
-def needed_by(procedure: str, changes: Mapping[str, Any] | None = None) -> list[str]:
-    """Procedures whose calibrations one uses, in the order in which they can be made."""
-    out: list[str] = []
-
-    def add(name: str, changes: Mapping[str, Any]) -> None:
-        procedure = load(name)
-        for need in procedure.needs(procedure.plan.model_validate(changes)):
-            if need.procedure not in out:
-                add(need.procedure, {})
-                out.append(need.procedure)
-
-    add(procedure, changes or {})
-    return out
 
 
 def attempt(

@@ -1,0 +1,136 @@
+"""The cases of the sound rigs: each procedure with its default plan, alone and in the chain, and with each choice of it."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic import ValidationError
+
+from bench import catalogue
+from bench.procedure import BenchPlan, Procedure
+from bench.rigfile import load_rig
+
+RPM = math.pi / 30
+RIGS = {
+    "tsbs12": ("amb-calibration", "force-constant", "negative-stiffness", "force-coupling", "torque-constant", "spindown",
+               "angle-step", "slew", "force-map"),
+    "amb5dof": ("bearing-model", "step", "tracking", "unbalance", "compensation", "balance", "run-up", "coast-down",
+                "sensitivity"),
+}  # fmt: skip
+ENDS: Mapping[str, tuple[Mapping[str, Any], ...]] = {
+    "amb-calibration": ({"bias_A": 2.5}, {"bias_A": 4.0}),
+    "torque-constant": ({"bias_A": 2.0}, {"bias_A": 4.0}),
+    "spindown": ({"speed_rad_s": 30.0}, {"speed_rad_s": 70.0}),
+    "step": (
+        {"speeds_rad_s": (3000 * RPM,)},
+        {"speeds_rad_s": (10000 * RPM,)},
+        {"a": {"law": 0}},
+        {"a": {"law": 1}},
+        {"a": {"law": 2}},
+    ),
+    "unbalance": ({"speeds_rad_s": (2000 * RPM,)}, {"speeds_rad_s": (14000 * RPM,)}),
+    "compensation": (
+        {"speeds_rad_s": (3000 * RPM,)},
+        {"speeds_rad_s": (14000 * RPM,), "judged_to_rad_s": 14000 * RPM},
+    ),
+    "balance": ({"speeds_rad_s": (3000 * RPM,)}, {"positions": 12}),
+    "run-up": (
+        {"acceleration_rad_s2": 10.0},
+        {"acceleration_rad_s2": 50.0},
+        {"law": "CAC", "top_rad_s": 8000 * RPM, "speeds_rad_s": (3000 * RPM, 6000 * RPM)},
+    ),
+    "coast-down": ({"deceleration_rad_s2": 24.5},),
+    "tracking": ({"laws": ["PID"], "y_m": 20e-6, "z_m": 20e-6},),
+    "sensitivity": ({"speeds_rad_s": (10000 * RPM,)},),
+}
+"""Biases, speeds and rates at both ends; choices among words are read from the plans themselves."""
+# a choice that truly touches the rings with the plan's own ellipse, as the procedure's page says: tried with a smaller one
+TOUCHING = {("tracking", '{"laws": ["PID"]}')}
+# what the operator has done to the machine for a plan, by the case's name
+TRUTH: Mapping[str, Mapping[str, float]] = {'bearing-model {"coupled": false}': {"geometry.coupling_stiffness": 0.0}}
+
+
+@dataclass(frozen=True)
+class Case:
+    """A procedure with what differs from its default plan; `chain`: with every calibration that it can use."""
+
+    rig: str
+    procedure: str
+    changes: str  # JSON
+    chain: bool
+
+    @property
+    def name(self) -> str:
+        return f"{self.procedure} {self.changes if self.changes != '{}' else ''}{' in the chain' if self.chain else ''}"
+
+
+def cases_of(rig: str, only: list[str]) -> Iterator[Case]:
+    """Default plans alone and in the chain, then each choice, of a rig's procedures."""
+    for name in RIGS[rig]:
+        if only and name not in only:
+            continue
+        procedure = load(name)
+        needs = procedure.needs(procedure.plan())
+        if all(n.optional for n in needs):
+            yield Case(rig, name, "{}", False)
+        if needs:
+            yield Case(rig, name, "{}", True)
+        for changes in (*choices(procedure), *ENDS.get(name, ())):
+            if (name, json.dumps(changes)) in TOUCHING:
+                continue
+            if (plan := plan_of(rig, procedure, changes)) is not None:
+                yield Case(rig, name, json.dumps(changes), bool(procedure.needs(plan)))
+
+
+def plan_of(rig: str, procedure: Procedure, changes: Mapping[str, Any]) -> BenchPlan | None:
+    """The rig's plan with `changes`, as JSON has them; nothing for a choice that is refused before anything turns, as it goes
+    with another one only."""
+    file = load_rig(rig)
+    try:
+        plan = procedure.plan.model_validate({**file.plans.get(procedure.name, {}), **changes})
+    except ValidationError:
+        return None
+    return None if list(procedure.check(file, plan)) else plan
+
+
+def choices(procedure: Procedure) -> Iterator[dict[str, Any]]:
+    """Every other choice that the plan offers among words, and every switch the other way."""
+    for key, field in procedure.plan.model_fields.items():
+        usual, kind = field.get_default(call_default_factory=True), field.annotation
+        if kind is bool:
+            yield {key: not usual}
+        elif get_origin(kind) is Literal:
+            yield from ({key: value} for value in get_args(kind) if value != usual)
+        elif get_origin(kind) is tuple and get_origin(get_args(kind)[0]) is Literal:
+            yield from ({key: [value]} for value in get_args(get_args(kind)[0]) if (value,) != usual)
+
+
+def load(name: str) -> Procedure:
+    found: Procedure = importlib.import_module(catalogue.entry(name).module).procedure
+    return found
+
+
+def needed(cases: list[Case]) -> list[str]:
+    """As needed_by, for all of them."""
+    used = (needed_by(case.procedure, json.loads(case.changes)) for case in cases if case.chain)
+    return list(dict.fromkeys(name for names in used for name in names))
+
+
+def needed_by(procedure: str, changes: Mapping[str, Any] | None = None) -> list[str]:
+    """Procedures whose calibrations one uses, in the order in which they can be made."""
+    out: list[str] = []
+
+    def add(name: str, changes: Mapping[str, Any]) -> None:
+        procedure = load(name)
+        for need in procedure.needs(procedure.plan.model_validate(changes)):
+            if need.procedure not in out:
+                add(need.procedure, {})
+                out.append(need.procedure)
+
+    add(procedure, changes or {})
+    return out
