@@ -52,7 +52,9 @@ PATTERNS = (clean, stalls, bursts, noisy, first, backlog)
 FACTORS = (0.1, 0.5, 0.8, 0.98, 0.99, 0.995, 1.005, 1.01, 1.011, 1.02, 1.1, 2.0, 10.0)
 
 
-def fed(factor: float, pattern: Callable[..., Floats], seed: int, seconds: float = 30.0) -> tuple[HostMap, float | None]:
+def fed(
+    factor: float, pattern: Callable[..., Floats], seed: int, seconds: float = 30.0
+) -> tuple[HostMap, float | None]:
     """A device whose clock runs `factor` times as fast, read every 20 ms; and when the clock was certainly wrong, s."""
     random, host, certain = np.random.default_rng(seed), HostMap(), None
     sent = np.arange(0, seconds, 0.02) + random.uniform(0, 0.004, round(seconds / 0.02))
