@@ -13,7 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 SLICE_NS = 500_000_000
-TIGHT_NS = 5_000_000  # so near the line the least of a slice is; a computer that is too slow does not keep to it
+TIGHT_NS, CERTAIN_NS = (
+    5e6,
+    3e6,
+)  # so near the line the least of a slice is; a computer that is too slow does not keep to it
 LOOSE = 0.001  # and by this share of what the clock is off in all: crystals warm up
 GROSS = 0.005  # less is for bench.hosttime, by windows of a second
 CERTAIN = 0.01  # a clock that is further off ends a run
@@ -89,18 +92,20 @@ class ClockRate:
         """What most of all points lie on and hardly any comes before; None where there is no such line."""
         if len(self._points) < FEWEST_SLOW - 1:
             return None
-        found = _line(np.array(self._points[:: -(-len(self._points) // MOST)], float), LOOSE)
+        found = _line(np.array(self._points[:: -(-len(self._points) // MOST)], float), TIGHT_NS, LOOSE)
         return found if found.on >= ON and found.early <= EARLY else None
 
     def _judge(self) -> None:
         """A clock that is slow shows at once; one that is fast by getting ever earlier since the first sample."""
         if len(self._points) < FEWEST_SLOW:
             return
-        slow = _line(np.array(self._points[-FEWEST_SLOW:], float), 0.0)
+        slow = _line(np.array(self._points[-FEWEST_SLOW:], float), CERTAIN_NS)
         if slow.slope > 0:
             self._conclude(slow)
         elif len(self._points) >= FEWEST_FAST:
-            self._conclude(_line(np.array(self._points[:: -(-len(self._points) // (2 * FEWEST_FAST))], float), 0.0))
+            self._conclude(
+                _line(np.array(self._points[:: -(-len(self._points) // (2 * FEWEST_FAST))], float), CERTAIN_NS)
+            )
 
     def _conclude(self, line: Line) -> None:
         off = abs(1 / (1 + line.slope) - 1)
@@ -108,13 +113,13 @@ class ClockRate:
         self.certain_ppm = line.slope * 1e6 if sure and off >= CERTAIN else None
 
 
-def _line(points: Floats, loose: float) -> Line:
+def _line(points: Floats, tight_ns: float, loose: float = 0.0) -> Line:
     """Slope by the median of the slopes between all pairs (Theil and Sen), over points of sample time and lateness, ns."""
     x, y = points[:, 0] - points[0, 0], points[:, 1] - points[0, 1]
     slope, _ = _theil_sen(x, y)
     rest = y - slope * x
     rest -= np.median(rest)
-    tolerance = TIGHT_NS + loose * abs(slope) * x[-1]
+    tolerance = tight_ns + loose * abs(slope) * x[-1]
     near = np.abs(rest) <= tolerance
     if near.sum() < 3:
         return Line(slope, np.inf, len(x), float(near.mean()), float((rest < -tolerance).mean()))

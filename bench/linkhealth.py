@@ -17,7 +17,10 @@ LATE_S = 0.04  # telemetry that comes later than this is worth a word
 DRIFT_PPM, WRONG_PPM = 200.0, 1000.0  # bench.hosttime follows no more; no crystal is as wrong as that
 BEYOND = 5  # windows of a second in a row
 UNKNOWN_S, GAINED_S = 6.0, 0.02  # a rate is known by then; no drift gains that much in five seconds
-CHECK = "Steps and samples drift apart. Check tick_s in the rig file and the controller's crystal"
+CHECK = (
+    "Steps and samples drift apart. Check tick_s in the rig file and the controller's crystal, or, of a served rig, whether "
+    "its computer keeps up"
+)
 PERIODS, PERIOD_S = 3, 0.02  # of a heartbeat; a longer gap comes near the watchdog
 
 
