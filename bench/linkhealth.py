@@ -120,14 +120,18 @@ class Health:
         sent, heard = self.stats.longest_heartbeat_gap_ns * 1e-9, self.host_age_s
         if max(sent, heard) <= PERIODS * PERIOD_S:
             return
-        both = f"the longest time between two sent was {sent * 1e3:.0f} ms, the oldest that the controller had to go by was "
-        both += f"{heard * 1e3:.0f} ms old"
-        if sent > PERIODS * PERIOD_S:
+        both = (
+            f"{sent * 1e3:.0f} ms was the longest time between two sent, {heard * 1e3:.0f} ms the oldest that the controller "
+            "had to go by; its watchdog ends a run at 80 ms by default"
+        )
+        link = "Look at the link, its adapter or server, and how often the controller reads what came"
+        if sent <= PERIODS * PERIOD_S:
+            text = f"heartbeats were sent in time and heard late: {both}. {link}"
+        elif heard <= sent + PERIODS * PERIOD_S:
             text = f"heartbeats were sent late by this host: {both}. Was the host busy?"
         else:
-            text = f"heartbeats were sent in time and heard late: {both}. Look at the link, its adapter or server, and how "
-            text += "often the controller reads what came"
-        yield Finding("heartbeat-late", f"{text}; the watchdog ends a run at 80 ms by default", "link")
+            text = f"heartbeats were sent late by this host, and heard later still: {both}. Was the host busy? {link}"
+        yield Finding("heartbeat-late", text, "link")
 
     def _clock(self) -> Iterator[Finding]:
         """Host times follow the samples up to 200 ppm; beyond that steps and events slide along the samples."""

@@ -91,7 +91,10 @@ def test_a_heartbeat_gap_near_the_watchdog_is_named(gap_ns: int, count: int) -> 
 
 def test_heartbeats_that_were_sent_late_are_this_hosts_and_those_heard_late_are_not() -> None:
     (sent,) = Health(Counters(), LinkStats(longest_heartbeat_gap_ns=280_000_000), None, 0, host_age_s=0.285).findings()
-    assert sent.text.startswith("heartbeats were sent late by this host")
+    assert sent.text.startswith("heartbeats were sent late by this host: ")
+    assert "link" not in sent.text
+    (both,) = Health(Counters(), LinkStats(longest_heartbeat_gap_ns=65_000_000), None, 0, host_age_s=0.28).findings()
+    assert "heard later still" in both.text
     (heard,) = Health(Counters(), CLEAN, None, 0, host_age_s=0.28).findings()
     assert heard.text.startswith("heartbeats were sent in time and heard late")
     assert "busy" not in heard.text
