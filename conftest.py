@@ -174,5 +174,7 @@ class ProcedureItem(pytest.Item):
 
 
 def _told(result: RunResult) -> str:
-    """Outcome, what decided, and where to look."""
-    return f"{result.outcome}: {result.reason}\n{result.directory}"
+    """As the command line sums a run up: outcome, what decided, values with their places and limits, where to look."""
+    from bench.cli.summary import summary
+
+    return f"{summary(result.record, result.directory)}{result.directory}"

@@ -1,7 +1,7 @@
 """From a run to a calibration: what its results state as facts, of which machine, from when until when.
 
-A run is adopted only if its recording is the one that its record was made from, if this version finds the same numbers in it,
-and if the rig file still has the certificates that they rest on.
+A run is adopted only if its recording is the one that its record was made from, if this version finds in it the outcome,
+the times and the numbers of the record, and if the rig file still has the certificates that they rest on.
 """
 
 from __future__ import annotations
@@ -14,12 +14,14 @@ from pathlib import Path
 from typing import Any
 
 from bench import __version__, rundir
+from bench.agreement import outcome_of_both, require_agreement
 from bench.calibration import Backend, Calibration, adopted, certificates_of, changed_certificates, facts_of
 from bench.calibrationstore import Store
 from bench.errors import ConfigError
 from bench.evaluation import Ending
 from bench.findings import SIMULATED_CONTROLLER
 from bench.procedure import Procedure
+from bench.reanalysis import reanalysed
 from bench.recording import Recording
 from bench.records import Record, read_record
 from bench.rigfile import RigFile
@@ -27,7 +29,6 @@ from bench.rundir import RunDirectory
 from bench.uncertainty import Estimate
 
 INTERVAL_DAYS = 365
-SAME = 1e-3  # of the standard uncertainty: other processors round differently
 EPOCH = datetime(2026, 1, 1, tzinfo=UTC)  # when the virtual clock begins
 
 
@@ -90,44 +91,42 @@ class Adoption:
             )
         return cls(run, record, recording, digest)
 
-    def calibration(self, procedure: Procedure, anyway: bool = False) -> Calibration:
-        """The run's facts as a calibration. `anyway` takes a run that ended neither PASS nor DONE, as long as it has results.
+    def calibration(self, procedure: Procedure, anyway: bool = False, now: datetime | None = None) -> Calibration:
+        """The run's facts as a calibration, by what its recording gives; `now` is the time of the adoption, by default the
+        host's. `anyway` takes a run that ended neither PASS nor DONE, as long as it has results.
 
         Raises:
-            ConfigError: its outcome, or numbers that are not those of the record.
+            ConfigError: its outcome, a record that contradicts its recording, or a date in the future.
             BenchError: the analysis fails.
         """
-        record, where = self.record, self.run.path
-        if not record.outcome.sound and not anyway:
+        where = self.run.path
+        recording: Recording[Any] = Recording.open(self.run.recording, procedure.plan)
+        again = reanalysed(self.run, procedure, recording, self.record)
+        require_agreement(where, self.record, again, recording.versions.get("levbench", "of that time"))
+        outcome = outcome_of_both(self.record, again)
+        if not outcome.sound and not anyway:
             raise ConfigError(
-                f"{where}: found outcome {record.outcome.value}; expected PASS or DONE. Next: look at its report, or adopt it "
+                f"{where}: found outcome {outcome.value}; expected PASS or DONE. Next: look at its report, or adopt it "
                 "with --anyway, and the calibration says so"
             )
-        if Ending.read(self.recording).stopped is not None:
+        if Ending.read(recording).stopped is not None:
             raise ConfigError(f"{where}: the run was stopped before its end; expected a completed one")
-        recording: Recording[Any] = Recording.open(self.run.recording, procedure.plan)
-        facts = facts_of(procedure, recording)
-        served = any(f.code == SIMULATED_CONTROLLER for f in record.findings)
+        served = any(f.code == SIMULATED_CONTROLLER for f in again.findings)
         made = calibration_of(
-            procedure, recording, facts, run_id=record.run_id, began=datetime.fromisoformat(record.started),
-            outcome=record.outcome.value, sha256=self.digest, served=served,
+            procedure, recording, facts_of(procedure, recording), run_id=again.run_id,
+            began=datetime.fromisoformat(again.started), outcome=outcome.value, sha256=self.digest, served=served,
         )  # fmt: skip
-        self._same_numbers(facts)
+        refuse_the_future(where, made, now or datetime.now(UTC))
         return made
 
-    def _same_numbers(self, facts: Mapping[str, Estimate]) -> None:
-        """Raises ConfigError where the facts are not what the record's verdict was about."""
-        for m in self.record.measurements:
-            fact = facts.get(m.name + (f"@{m.where}" if m.where else ""))
-            uncertainty = m.standard_uncertainty or m.expanded_uncertainty
-            if fact is None or m.value is None or not uncertainty:
-                continue
-            if abs(fact.value - m.value) > SAME * uncertainty:
-                raise ConfigError(
-                    f"{self.run.path}: {m.name}: this version finds {fact.value:.8g}; the record has {m.value:.8g}. "
-                    f"Next: `bench run {self.record.procedure}` again, or adopt it with Levbench "
-                    f"{self.record.versions.get('levbench', 'of that time')}"
-                )
+
+def refuse_the_future(where: Path, made: Calibration, now: datetime) -> None:
+    """Raises ConfigError if a run began after `now`: its due date would be too late."""
+    if made.ahead(now):
+        raise ConfigError(
+            f"{where}: the run began on {made.date}; this computer's clock says {now.astimezone(UTC):%Y-%m-%dT%H:%M:%S+00:00}; "
+            f"expected a date that is past. Next: set the clock, and if it was wrong then, `bench run {made.procedure}` again"
+        )
 
 
 def refuse_other_rig(calibration: Calibration, rig: RigFile, store: Store) -> None:

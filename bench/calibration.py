@@ -11,7 +11,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
-from datetime import UTC, date, datetime
+from datetime import UTC, date, datetime, timedelta
 from typing import Any, ClassVar, Literal
 
 from pydantic import ConfigDict
@@ -23,6 +23,7 @@ from bench.uncertainty import Estimate, Influence
 Backend = Literal["sim", "live", "served"]  # served: a live link with a simulated controller behind it
 State = Literal["current", "expired"]
 STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+CLOCK = timedelta(minutes=1)  # by so much two clocks may differ
 RIG_TABLES = ("site", "geometry", "masses", "sensors", "machine", "hook")
 """First parts of the identities of influences that stand in the rig file."""
 
@@ -78,7 +79,8 @@ class Calibration:
     `values` by name, SI, with influences by identity. `settings` are those they hold for. `date` is when the run began
     (ISO 8601, UTC), `due` the last day on which it may be used. A virtual rig is named by its `seed`: seed n + 1 is another
     machine. `sha256` is the recording's digest. `used` are the calibrations that the run itself used.
-    `expired` is not of the file: it says that the calibration was overdue in the run that used it.
+    `sealed`: its file carries the digest of its content, as every adopted one does; a file that was written by hand may
+    have none. `expired` is not of the file: it says that the calibration was overdue in the run that used it.
     """
 
     procedure: str
@@ -96,6 +98,7 @@ class Calibration:
     levbench: str = ""
     used: tuple[Used, ...] = ()
     certificates: Mapping[str, Certificate] = field(default_factory=dict)
+    sealed: bool = True
     expired: bool = False
 
     @property
@@ -115,6 +118,10 @@ class Calibration:
     def overdue(self, now: datetime) -> bool:
         """Whether the due day is over."""
         return now.astimezone(UTC).date() > date.fromisoformat(self.due)
+
+    def ahead(self, now: datetime) -> bool:
+        """Whether it is dated in the future, by more than clocks differ: one of the two clocks is wrong, or the date is."""
+        return datetime.fromisoformat(self.date) > now + CLOCK
 
     def used_at(self, now: datetime) -> Calibration:
         """This calibration as a run that begins now uses it: `expired` says whether it is overdue."""

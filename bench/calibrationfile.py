@@ -1,8 +1,13 @@
-"""Calibrations as JSON: the file beside the rig, and the attachment of a recording. Read strictly, written whole."""
+"""Calibrations as JSON: the file beside the rig, and the attachment of a recording. Read strictly, written whole.
+
+An adopted one carries the SHA-256 of its content. It tells a slip (an edited number, a bad merge) and no forgery: whoever
+changes the content can compute the digest again.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
 import math
 from collections.abc import Iterable, Mapping
@@ -14,12 +19,13 @@ from typing import Any, ClassVar, Literal
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from bench.calibration import STRICT, Backend, Calibration, Certificate, Used
-from bench.errors import ConfigError
+from bench.errors import ConfigError, Problem
 from bench.schema import require_schema
 from bench.uncertainty import Distribution, Estimate, Influence
 from bench.wholefile import write_whole
 
 SCHEMA = 1
+SHOWN = 12  # digits of a digest in a message
 
 
 @dataclass(frozen=True)
@@ -48,7 +54,7 @@ class _Value:
 
 @dataclass(frozen=True)
 class _File:
-    """The file, schema 1."""
+    """The file, schema 1. `digest` is None where it has none."""
 
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
     schema: Literal[1]
@@ -68,6 +74,7 @@ class _File:
     certificates: Mapping[str, Certificate]
     influences: Mapping[str, _Influence]
     values: Mapping[str, _Value]
+    digest: str | None = None
 
 
 _FILE: TypeAdapter[_File] = TypeAdapter(_File)
@@ -83,7 +90,11 @@ def to_json(calibration: Calibration) -> str:
 
 
 def content(calibration: Calibration) -> dict[str, Any]:
-    """The calibration as plain data."""
+    """The calibration as plain data, with its digest where it is sealed.
+
+    Raises:
+        ValueError: it is sealed, and a number is NaN or infinite.
+    """
     c = calibration
     influences = {
         i.id: _Influence(i.name, i.u, i.unit, i.kind, i.distribution, None if math.isinf(i.dof) else i.dof, i.source)
@@ -98,7 +109,32 @@ def content(calibration: Calibration) -> dict[str, Any]:
         due=c.due, outcome=c.outcome, sha256=c.sha256, levbench=c.levbench, settings=dict(c.settings), used=c.used,
         certificates=dict(c.certificates), influences=influences, values=values,
     )  # fmt: skip
-    return dataclasses.asdict(file)
+    found = dataclasses.asdict(file)
+    del found["digest"]
+    return found | ({"digest": digest_of(found)} if c.sealed else {})
+
+
+def digest_of(content: Mapping[str, Any]) -> str:
+    """SHA-256 of a file's content without its digest: JSON with sorted keys, no spaces, other than ASCII as escapes, every
+    number as a float, so that it does not depend on how the file is set.
+
+    Raises:
+        ValueError: a number is NaN or infinite.
+    """
+    bare = _canonical({key: value for key, value in content.items() if key != "digest"})
+    text = json.dumps(bare, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode("ascii")).hexdigest()
+
+
+def _canonical(value: Any) -> Any:
+    """Plain data with its numbers as floats; 3 and 3.0 are the same, -0.0 and 0 too."""
+    if isinstance(value, Mapping):
+        return {key: _canonical(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_canonical(part) for part in value]
+    if isinstance(value, float) or (type(value) is int and abs(value) < 1 << 53):
+        return float(value) + 0.0
+    return value
 
 
 def from_json(text: str, name: str = "calibration") -> Calibration:
@@ -115,7 +151,18 @@ def from_json(text: str, name: str = "calibration") -> Calibration:
         if isinstance(error, ValidationError):
             listed = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors(include_url=False)]
         raise ConfigError("\n  ".join([f"{name}: not a calibration of schema {SCHEMA}:", *listed])) from error
-    return _calibration(file, name)
+    made = _calibration(file, name)
+    if file.digest is not None:
+        _require_digest(file.digest, digest_of(json.loads(text)), file.run_id, name)
+    return made
+
+
+def _require_digest(carried: str, found: str, run_id: str, name: str) -> None:
+    """Raises ConfigError where the content is not that which the digest was taken of."""
+    if carried != found:
+        expected = f"sha256 {carried[:SHOWN]}..., which the file carries; adopt run {run_id} again"
+        problem = Problem(name, "digest", f"content with sha256 {found[:SHOWN]}...", expected)
+        raise ConfigError(f"{name}: the file was changed since it was adopted; it is not used", (problem,))
 
 
 def _calibration(file: _File, name: str) -> Calibration:
@@ -143,6 +190,7 @@ def _calibration(file: _File, name: str) -> Calibration:
         procedure=file.procedure, values=values, settings=file.settings, run_id=file.run_id, date=file.date, due=file.due,
         rig=file.rig, uut=file.uut, backend=file.backend, seed=file.seed, outcome=file.outcome, sha256=file.sha256,
         levbench=file.levbench, used=file.used, certificates=file.certificates,
+        sealed=file.digest is not None,
     )  # fmt: skip
 
 

@@ -8,6 +8,7 @@ rigs/tsbs12.calibrations/sim-3/amb-calibration-20261121T101500Z.json    supersed
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime
@@ -21,6 +22,7 @@ from bench.rundir import stamp
 from bench.wholefile import write_whole
 
 SUFFIX = ".calibrations"
+SUPERSEDED = re.compile(r"-\d{8}T\d{6}Z(-\d+)?$")
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,10 @@ class Store:
         """
         path = self.path(procedure)
         return calibrationfile.read(path) if path.exists() else None
+
+    def current_files(self) -> list[Path]:
+        """The files of the current calibrations; the superseded ones have a date in their names."""
+        return [p for p in sorted(self.folder.glob("*.json")) if not SUPERSEDED.search(p.stem)]
 
     def foreign(self, c: Calibration) -> str:
         """Whose calibration it is, if not this machine's; else nothing."""

@@ -17,7 +17,7 @@ from pydantic import ConfigDict, TypeAdapter
 
 from bench.calibration import of_the_rig
 from bench.campaign import Equation
-from bench.records import BudgetEntry, Measurement, Record
+from bench.records import Measurement, Record
 from bench.rundir import NAME
 from bench.toleranced import Toleranced
 
@@ -157,7 +157,7 @@ def _constant(m: Measurement, source: Source, equation: Equation | None) -> Cons
     assert m.expanded_uncertainty is not None
     assert m.interval is not None
     assert m.method is not None
-    variance = math.fsum(e.contribution**2 for e in m.budget)
+    variance = m.variance
     largest = sorted(m.budget, key=lambda e: -e.contribution)
     terms = tuple(
         Term(e.name, e.influence, e.contribution, e.contribution**2 / variance if variance > 0 else 0.0)
@@ -172,7 +172,7 @@ def _constant(m: Measurement, source: Source, equation: Equation | None) -> Cons
         equation=None if equation is None else StatedEquation(equation.text, equation.source),
         holds_for=dict(source.holds_for), procedure=source.record.procedure, run_id=source.record.run_id,
         date=source.record.started, terms=terms,
-        rest=math.sqrt(math.fsum(e.contribution**2 for e in largest[LARGEST:])),
+        rest=math.hypot(m.together, *(e.contribution for e in largest[LARGEST:])),
     )  # fmt: skip
 
 
@@ -182,9 +182,7 @@ def correlations_of(sources: Sequence[Source]) -> Matrix:
     for source in sources:
         for m in source.record.measurements:
             if m.value is not None:
-                parts[label(m)] = {
-                    identity(e.influence, source.record): math.copysign(e.contribution, e.sensitivity) for e in m.budget
-                }
+                parts[label(m)] = {identity(e.influence, source.record): e.linear for e in m.budget}
     names = tuple(parts)
     matrix = tuple(tuple(_coefficient(parts[a], parts[b]) if a != b else 1.0 for b in names) for a in names)
     return Matrix(names, matrix)
@@ -216,11 +214,11 @@ def to_content(model: Model) -> dict[str, Any]:
     return dataclasses.asdict(model)
 
 
-def shares_by_kind(entries: Sequence[BudgetEntry]) -> dict[str, float]:
+def shares_by_kind(m: Measurement) -> dict[str, float]:
     """Share of the variance by what an influence is: the first part of its identity, `run` for what a run invents."""
-    variance = math.fsum(e.contribution**2 for e in entries)
+    variance = m.variance
     found: dict[str, float] = {}
-    for e in entries:
+    for e in m.budget:
         kind = e.influence.partition("/")[0] if of_the_rig(e.influence) else "run"
         found[kind] = found.get(kind, 0.0) + (e.contribution**2 / variance if variance > 0 else 0.0)
     return found

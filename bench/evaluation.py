@@ -146,8 +146,8 @@ def yielded(procedure: Procedure, recording: Recording[Any]) -> Iterator[Measure
 
 
 def _calibrations(recording: Recording[Any]) -> Iterator[Finding]:
-    """Calibrations that the run used though they were overdue (only --allow-expired lets it), that rest on such, or that were
-    adopted although their run did not pass."""
+    """Calibrations that the run used though they were overdue (only --allow-expired lets it), that rest on such, that carry
+    no digest, or that were adopted although their run did not pass."""
     for c in recording.calibrations:
         name = f"the calibration {c.procedure} of {c.date[:10]}"
         if c.expired:
@@ -160,6 +160,9 @@ def _calibrations(recording: Recording[Any]) -> Iterator[Finding]:
             if here.get(used.procedure, used.run_id) != used.run_id:
                 text = f"{name} rests on {used.run_id}; this run uses {here[used.procedure]} beside it"
                 yield Finding("calibrations-of-two-runs", text, c.run_id)
+        if not c.sealed:
+            text = f"{name} carries no digest: whether its file is as it was written cannot be told"
+            yield Finding("calibration-without-digest", text, c.run_id)
         if c.outcome not in SOUND:
             yield Finding(
                 "calibration-not-passed", f"{name} was adopted although its outcome was {c.outcome}", c.run_id

@@ -26,8 +26,8 @@ class Lookup:
         """The current calibrations that a procedure needs, in the order of its needs.
 
         Raises:
-            ConfigError: one is missing, expired (unless that is allowed), of another machine, made at other settings or with
-                other certificates; every problem is in it, with the commands that help.
+            ConfigError: one is missing, expired (unless that is allowed), dated in the future, of another machine, made at
+                other settings or with other certificates; every problem is in it, with the commands that help.
         """
         found: list[Calibration] = []
         problems: list[str] = []
@@ -70,5 +70,7 @@ class Lookup:
             yield "made at other settings: " + "; ".join(differ)
         elif changed := changed_certificates(c.certificates, self.rig):
             yield "made with other certificates than the rig file has now:\n      " + "\n      ".join(changed)
+        elif c.ahead(self.now):
+            yield f"dated {c.date}, which is in the future; see that this computer's clock is right"
         elif c.overdue(self.now) and not self.allow_expired:
             yield f"expired on {c.due}; --allow-expired uses it all the same, and the report says so"

@@ -19,8 +19,10 @@ from bench.records import Record, RecordingFile, read_record, unfinished, write_
 from bench.rundir import RunDirectory
 from bench.runner import RunResult
 
+Procedures = Callable[[str], Procedure]
 
-def analyse(path: Path, load_procedure: Callable[[str], Procedure]) -> RunResult:
+
+def analyse(path: Path, load_procedure: Procedures) -> RunResult:
     """Analyse the recording in a run directory and write `analyses/<UTC>/record.json`.
 
     Only the recording is an input; from the run's own record come, if it can be read, the times of a run whose
@@ -35,23 +37,30 @@ def analyse(path: Path, load_procedure: Callable[[str], Procedure]) -> RunResult
         raise RecordingError(f"{run.path}: holds no recording.mcap; expected one. The run ended before it could record")
     recording: Recording[Any] = Recording.open(run.recording)
     procedure = load_procedure(recording.procedure)
-    recording = Recording.open(run.recording, procedure.plan)
-    ending = Ending.read(recording)
-    evaluation = evaluate(procedure, recording, _limits(recording), stopped=ending.stopped is not None)
-    original = _original(run)
-    wall = recording.wall
-    record = unfinished(
-        run_id=run.run_id, procedure=procedure.name, rig=recording.rig.name, uut=recording.rig.uut.model_dump(),
-        started=wall.get("started") or (original.started if original else ""), seed=recording.seed,
-        plan=recording.plan_dict, versions=versions(),
-        calibrations=recording.calibrations,
-    )  # fmt: skip
-    ended = wall.get("ended") or (original.ended if original else None) or record.started
-    file = RecordingFile(run.recording.name, recording.digest())
-    record = evaluation.finish(record, ending, ended, file)
+    record = reanalysed(run, procedure, Recording.open(run.recording, procedure.plan), _original(run))
     folder = rundir.create_analysis(run, datetime.now(UTC))
     write_record(folder / "record.json", record)
     return RunResult(folder, record)
+
+
+def reanalysed(run: RunDirectory, procedure: Procedure, recording: Recording[Any], original: Record | None) -> Record:
+    """The record that the recording of a run gives today, judged by the limits in it. From the `original` come the times
+    that a recording which was cut off does not have.
+
+    Raises:
+        RecordingError: the recording's end, limits or rig file cannot be read.
+    """
+    ending = Ending.read(recording)
+    evaluation = evaluate(procedure, recording, _limits(recording), stopped=ending.stopped is not None)
+    wall = recording.wall
+    record = unfinished(
+        run_id=wall.get("run_id") or run.run_id, procedure=procedure.name, rig=recording.rig.name,
+        uut=recording.rig.uut.model_dump(), started=wall.get("started") or (original.started if original else ""),
+        seed=recording.seed, plan=recording.plan_dict, versions=versions(), calibrations=recording.calibrations,
+    )  # fmt: skip
+    ended = wall.get("ended") or (original.ended if original else None) or record.started
+    file = RecordingFile(run.recording.name, recording.digest())
+    return evaluation.finish(record, ending, ended, file)
 
 
 def _limits(recording: Recording[Any]) -> dict[str, Limit]:

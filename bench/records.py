@@ -31,7 +31,8 @@ _STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 @dataclass(frozen=True)
 class BudgetEntry:
-    """One influence of a measurement; `contribution` in the measurement's unit, `dof` None is infinite."""
+    """One influence of a measurement; `contribution` in the measurement's unit, `dof` None is infinite. `sensitivity` is the
+    derivative at the inputs' values; records of before 2026-11-23 do not say the influence's `standard_uncertainty`."""
 
     __pydantic_config__: ClassVar[ConfigDict] = _STRICT
     name: str
@@ -42,6 +43,13 @@ class BudgetEntry:
     distribution: str
     dof: float | None
     unit: str = ""  # of the influence
+    standard_uncertainty: float | None = None  # of the influence, in its unit
+
+    @property
+    def linear(self) -> float:
+        """Signed contribution c u to the linear model: what results that share the influence have in common by it."""
+        u = self.standard_uncertainty
+        return math.copysign(self.contribution, self.sensitivity) if u is None else self.sensitivity * u
 
 
 @dataclass(frozen=True)
@@ -77,6 +85,17 @@ class Measurement:
     interval: tuple[float, float] | None
     coverage_probability: float | None
     budget: tuple[BudgetEntry, ...]
+
+    @property
+    def variance(self) -> float:
+        """What squares of contributions are shares of: their sum; by Monte Carlo u², of which they may fall short."""
+        whole = math.fsum(e.contribution**2 for e in self.budget)
+        return max(whole, (self.standard_uncertainty or 0.0) ** 2) if self.method == "monte-carlo" else whole
+
+    @property
+    def together(self) -> float:
+        """What no influence contributes by itself, in the unit."""
+        return math.sqrt(self.variance - math.fsum(e.contribution**2 for e in self.budget))
 
 
 @dataclass(frozen=True)
@@ -213,12 +232,8 @@ def unfinished(
     plan: Mapping[str, Any], versions: Mapping[str, str], calibrations: Sequence[Calibration] = (),
 ) -> Record:  # fmt: skip
     """What is written before anything moves: if the run dies, this is what it says."""
-    said = Finding(
-        "unfinished",
-        "The run did not end: its process was killed, lost power or could write nothing any more.",
-        "",
-        Effect.ERROR,
-    )
+    text = "The run did not end: its process was killed, lost power or could write nothing any more."
+    said = Finding("unfinished", text, "", Effect.ERROR)
     return Record(
         schema=2, run_id=run_id, procedure=procedure, rig=rig, uut=uut, outcome=Outcome.ERROR, started=started,
         ended=None, seed=seed, plan=plan, calibrations=tuple(c.summary for c in calibrations), versions=versions,
@@ -248,8 +263,8 @@ def measurement(measured: Measured, limit: Limit | None, seed: int | None = 0) -
         missing(quantity, limit, measured.where), value=estimate.value, standard_uncertainty=found.u,
         dof=_finite(found.dof), coverage_factor=found.k, expanded_uncertainty=found.U, method=found.method,
         verdict=_judged(estimate, found, limit), interval=(found.low, found.high), coverage_probability=PROBABILITY,
-        budget=tuple(BudgetEntry(r.name, r.id, r.contribution, r.sensitivity, r.kind, r.distribution, _finite(r.dof), r.unit)
-                     for r in budget(estimate)),
+        budget=tuple(BudgetEntry(r.name, r.id, r.contribution, r.sensitivity, r.kind, r.distribution, _finite(r.dof), r.unit,
+                                 r.u) for r in budget(estimate, found)),
     )  # fmt: skip
 
 

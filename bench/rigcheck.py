@@ -125,8 +125,11 @@ def _devices(rig: RigFile) -> Iterator[Problem]:
         yield Problem(rig.path, f"devices.controller.link: links.{controller.link}.dbc", "nothing", 'dbc = "FILE.dbc"')
 
 
-SCHEMES = {"controller": linkurl.CONTROLLER_SCHEMES, "operator": ("line",)}
-"""URL schemes that a device can be on; the others' are Modbus."""
+def _schemes(rig: RigFile, device: str) -> tuple[str, ...]:
+    """URL schemes that a device can be on: the controller, the operator's line; the others' are Modbus."""
+    if device == "controller":
+        return linkurl.CONTROLLER_SCHEMES
+    return ("line",) if "operator" in rig.devices[device].roles else linkurl.MODBUS_SCHEMES
 
 
 def _links(rig: RigFile) -> Iterator[Problem]:
@@ -141,7 +144,7 @@ def _links(rig: RigFile) -> Iterator[Problem]:
             yield Problem(rig.path, f"{key}.url", repr(link.url), str(error))
             continue
         for device in (n for n, d in rig.devices.items() if d.link == name):
-            fit = SCHEMES.get(device, linkurl.MODBUS_SCHEMES)
+            fit = _schemes(rig, device)
             if url.scheme not in fit:
                 such = ", ".join(linkurl.EXAMPLES[x] for x in fit)
                 yield Problem(rig.path, f"{key}.url", link.url, f"a URL for the {device}, such as {such}")
@@ -286,7 +289,12 @@ def _signals_of_parameters(rig: RigFile, messages: MessageMap) -> Iterator[Probl
 
 
 def _bus(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
+    owner: dict[int, str] = {}
     for m in messages.messages.values():
+        if m.identifier in owner:
+            shown = f"identifier {m.identifier & ~(1 << 31):#x}, which {owner[m.identifier]} has too"
+            yield Problem(rig.link.dbc, f"BO_ {m.name}", shown, "one of its own: nobody could tell the two apart")
+        owner.setdefault(m.identifier, m.name)
         if m.length not in FD_LENGTHS:
             yield Problem(rig.link.dbc, m.name, f"{m.length} bytes", f"a CAN FD length: {FD_LENGTHS}")
     if rig.link.bitrate is None:

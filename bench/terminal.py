@@ -3,6 +3,7 @@ time left; what a step does is cut where the line ends."""
 
 from __future__ import annotations
 
+import textwrap
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -65,8 +66,9 @@ class TerminalProgress:
         self._draw(text)
 
     def line(self, text: str) -> None:
+        told = textwrap.fill(text, columns(), break_long_words=False, break_on_hyphens=False) if text else text
         with suppress(OSError):
-            self._console.print(text, markup=False, highlight=False, soft_wrap=True)
+            self._console.print(told, markup=False, highlight=False, soft_wrap=True)
 
     @contextmanager
     def asking(self, question: str) -> Iterator[None]:
@@ -92,7 +94,7 @@ class TerminalProgress:
             console=self._console, auto_refresh=redrawn, refresh_per_second=REDRAWN_HZ, redirect_stdout=False,
             redirect_stderr=False, transient=True, expand=True,
         )  # fmt: skip
-        bar.add_task("", total=None, stage="", count="", left="")
+        bar.add_task("", total=None, visible=False, stage="", count="", left="")
         return bar
 
     def _draw(self, text: str) -> None:
@@ -102,7 +104,7 @@ class TerminalProgress:
         with suppress(OSError):  # the terminal was closed; the run goes on
             self._bar.update(
                 progress.TaskID(0), total=self._total or None, completed=done, description=text, stage=_short(self._stage),
-                count=count, left=left, refresh=True,
+                count=count, left=left, visible=bool(self._stage), refresh=True,
             )  # fmt: skip
 
 

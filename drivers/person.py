@@ -69,7 +69,7 @@ class ConsoleOperator:
             OperatorAbort: the person answered stop.
         """
         what = f"Mount the {part} on the shaft" if part else "Take the ring off the shaft"
-        self._confirmed(f"{what}.", "it sits", None, _Other())
+        self._confirmed(f"{what}.", "it sits" if part else "it is off", None, _Other())
         if self._then is not None:
             self._then.mount(part)
 
@@ -126,10 +126,11 @@ class ConsoleOperator:
         """What hangs after the person was asked for `load`."""
         labels = ", ".join(self._envelope.rig.masses)
         more = (
-            f"Another mass hangs: type its label ({labels}, - for none). Another hung in the step before: type was and "
-            "its label."
+            f"Another mass hangs: type its label ({labels}, - for none). Another hung in the step before: type was before "
+            f"its label, as was {next(iter(self._envelope.rig.masses), '-')}."
         )
-        return self._confirmed(f"{what}.", "it hangs still", load, _Other(more, self._mass))
+        when = "it hangs still" if load.label else "all is still"
+        return self._confirmed(f"{what}.", when, load, _Other(more, self._mass))
 
     def _mass(self, answer: str) -> Load | None:
         """The load of an answer, None where it names none. One that hung before is put into the recording, and asks again.

@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 AMB_CALIBRATION = (
-    "An error that is common to all masses, the same share of each, changes K, K2 and Kw by that share.",
-    "Errors of the masses that go with the square of the load change K2 by K² over the bearing's force per kg, for each kg "
+    "An error that is common to all masses, the same share of each, changes K, K_2 and K_w by that share.",
+    "Errors of the masses that go with the square of the load change K_2 by K² over the bearing's force per kg, for each kg "
     "per kg². Masses of 1, 2 and 3 kg off by 0.2, 0.4 and 0.6 % leave the data that one of 0.5 kg off by -0.1 % leaves.",
-    "A hanger that is off throughout changes F0, and Kw by 2 K2/Kw for each N that it weighs at the bearing.",
+    "A hanger that is off throughout changes F_0, and K_w by 2 K_2/K_w for each N that it weighs at the bearing.",
+    "Coil current sensors whose readings bend over the current; certificates state gain and offset only. If the positive one "
+    "of a bearing reads 12 mA too much at 3 A to either side of the bias (0.1 % of 12 A, growing with the square) and the "
+    "negative one as much too little, K_2 changes by -K/750 A and K_w by -K/375 A for each ampere of control current that "
+    "carries the rotor: 0.1 N/A² and 0.2 N/A where K is 75 N/A.",
+    "Bent both the same way by as much, they change K_2 outboard by up to 0.2 N/A² and K outboard by 0.4 N/A; readings 12 mA "
+    "too high at 3 A that go with the cube of the current change K by -1.6 % and K_2 outboard by -0.7 N/A². 36 mA of the "
+    "latter are found. Ask for the sensors' linearity, or compare them with a reference at five currents.",
 )
 TORQUE_CONSTANT = (
     "An error that is common to all masses or to both arms, the same share of each, changes alpha_tau by that share.",
@@ -16,7 +23,7 @@ BEARING_MODEL = (
     "An axis that is reversed as a whole, coils, probe and gravity, is the same machine seen from below: only the sign of its "
     "offset differs.",
     "A coupling that turns the shaft, besides its spring's pull: a moment of 1 N mm changes the force of either AMB by 5.6 mN, "
-    "0.2 % of its load, and beta by that share.",
+    "0.2 % of its load, and β by that share.",
 )
 PASSAGE = (
     "Runout that changes with the speed or the temperature: 1 µm of it is 1 µm in every vector.",
@@ -38,11 +45,18 @@ SPINDOWN = (
 FORCE_CONSTANT = (
     "Current sensors of both AMBs whose gains changed since the calibration, each by its own share, look like probes whose "
     "zeros moved: 0.3 % of the upper outboard coil's changes alpha_d by 0.7 %. One that changed alone is found by the load.",
+    "Segment current sensors whose readings bend: 12 mA too high at 3 A, growing with the cube of the current, change alpha_d "
+    "by -0.2 %. Coil current sensors that bend as they did in the AMBs' calibration hardly count: its constants fit their "
+    "readings.",
     "An asymmetry K_x/K_y that is common to both AMBs changes alpha_dx by the same share: both rows move together.",
 )
 FORCE_COUPLING = (
     "A controller that turns its currents by 1 % more than the phase angle it was told changes the ratio by -0.7 %, alpha_c by "
     "0.7 % and gamma_0 by 0.02°. The current sensors' offsets hide as much; about 1.2 % are found.",
+    "Segment current sensors whose readings bend; certificates state gain and offset only. 6 mA too high at 3 A, growing with "
+    "the cube of the current, change alpha_ratio by -0.1 to -0.3 %; about 12 mA (0.1 % of 12 A) are found. 12 mA that grow "
+    "with the square, up on one segment of a pair and down on the other, change it by -0.2 % and gamma_0 by 0.02°; 24 mA are "
+    "found.",
 )
 FORCE_MAP = (
     "A coil's current sensor of the inboard AMB whose gain changed since its calibration changes alpha_1 and alpha_5 by that "

@@ -22,7 +22,7 @@ from bench.rigfile import RigFile
 from bench.roles import RigState
 from procedures import assumed, probing, turning, unbalance, unbalance_figures
 from procedures import compensation_figures as drawn
-from procedures.estimators import compensation_checks, switching
+from procedures.estimators import compensation_checks, hum, switching
 from procedures.estimators.switching import SWITCH
 from procedures.estimators.unbalance_data import RPM
 from procedures.turning import SETTINGS, Law, Variant
@@ -114,11 +114,13 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
         if result.dwell.variant == "corrected" and result.dwell.speed <= recording.plan.judged_to_rad_s:
             yield REDUCTION.measured(estimate, f"{result.dwell.wanted * RPM:.0f} r/min")
     try:
-        switched = switching.of_switch(switching.read_switch(recording), recording.rig)
+        captured = switching.read_switch(recording)
+        switched = switching.of_switch(captured, recording.rig)
     except AnalysisError as error:
         yield Finding("no-switch", str(error), "", Effect.ERROR)
         return
     where = f"{recording.plan.switch_rad_s * RPM:.0f} r/min"
+    yield from hum.of_switch(hum.heard(recording, found.results.slow), captured, switched, where)
     yield DROP.measured(switched["drop"], where)
     yield RESIDUAL.measured(switched["residual"], where)
 

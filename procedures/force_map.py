@@ -193,7 +193,7 @@ def _contradictions(result: Result, plan: Plan) -> Iterator[Finding]:
 
 def _notes(result: Result) -> Iterator[Finding]:
     if "alpha_7" in result.told.unidentifiable:
-        text = ("force term 7 needs torque current where sin(P theta) is not zero, and the lever is level at home only. Torque "
+        text = ("force term 7 needs torque current where sin(P θ) is not zero, and the lever is level at home only. Torque "
                 "terms are not mapped: Coulomb friction hides them (beta_1 is torque-constant's).")  # fmt: skip
         yield Finding("term-not-identified", text, "alpha_7")
     chosen = result.selection.chosen

@@ -227,7 +227,7 @@ def evaluated(recording: Recording[Any]) -> tuple[tuple[Finding, ...], Run | Non
     except AnalysisError as error:  # a drive that was faster than it was told: too few turns for a curve
         return (*found, Finding("no-passage", str(error), passage.name, Effect.ERROR)), None
     told = (unbalance_bearings.told(model, plan), *uncertified(recording.rig))
-    return (*found, *told, *runup_checks.of_run(run, plan)), run
+    return (*found, *told, *runup_checks.of_run(run, recording, plan)), run
 
 
 def measured(run: Run) -> Iterator[Measured]:

@@ -53,7 +53,7 @@ from procedures.injecting import PARAMETERS, Comb, combs, injected
 Law = Literal["PID", "CCS"]
 Axis = Literal["yi", "zi", "yo", "zo", "x"]
 CODES: dict[Law, float] = {"PID": 0.0, "CCS": 1.0}
-S_MAX = Quantity("s_max", "1", "greatest |V1/E| of an axis, all other loops closed (ISO 14839-3)")
+S_MAX = Quantity("s_max", "1", "greatest |V1/E| of an axis, all other loops closed (ISO 14839-3)", title="S_max")
 AT = Quantity("s_max_hz", "Hz", "frequency of the greatest |V1/E|", title="frequency of S_max")
 PHASE = Quantity("phase_margin", "rad", "least angle of the open loop L = 1/S - 1 from -1 where |L| = 1, either way")
 FALL = Quantity("gain_reduction", "1", "factor to which the loop's gain may fall before it is unstable")

@@ -77,7 +77,7 @@ def step_count(plan: Plan) -> int:
 
 def fewest_steps(plan: Plan) -> int:
     """Without a drive `auto` runs up by the motor."""
-    return step_count(plan) - (2 * len(groups(plan)) if plan.run_up == "auto" else 0)
+    return step_count(plan) - (2 * len(SLOW) if plan.run_up == "auto" else 0)
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:

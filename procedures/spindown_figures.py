@@ -89,7 +89,7 @@ def _deceleration(runs: Sequence[RunDown], result: Drag, top: float) -> Iterator
             Series(f"{bias:g} A, 95 %", grid[8::12], loss[8::12], "points", 2 * u),
         ]
     yield Figure("deceleration", "Deceleration over speed", "From parabolas through stretches of the angle, mean over all "
-                 "run-downs at a bias, with b w + c of the fits.", "speed (rad/s)", "deceleration (rad/s²)",
+                 "run-downs at a bias, with b ω + c of the fits.", "speed (rad/s)", "deceleration (rad/s²)",
                  tuple(slow))  # fmt: skip
     yield Figure("loss-power", "Loss power over speed", "B w² + T_c w with its 95 % intervals: what the motor must give to "
                  "hold a speed.", "speed (rad/s)", "power (W)", tuple(power))  # fmt: skip

@@ -28,14 +28,13 @@ from procedures import assumed, rotor
 from procedures import torque_constant_figures as drawn
 from procedures.estimators import torque_balance, torque_checks
 from procedures.estimators.direction import SEGMENTS, of_probe
-from procedures.estimators.inputs import certified
 from procedures.estimators.torque_balance import NO_DETENT, Balance, Detent
 from procedures.estimators.torque_data import CHANNELS, TorqueData, read_torques
+from procedures.estimators.torque_inputs import SIDES, arms_u, fit_inputs, masses_u
 
 ALPHA_TAU = Quantity("alpha_tau", "N m/A", "torque per mean true segment current at the home angle, peak over gamma")
 GAMMA_0T = Quantity("gamma_0t", "rad", "phase angle at which the torque per current is largest")
 MEASURES = (ALPHA_TAU, GAMMA_0T)
-SIDES = ("left", "right")
 
 
 class Plan(BenchPlan):
@@ -53,6 +52,7 @@ class Plan(BenchPlan):
     max_angle_rad: float = Field(1e-2, gt=0)  # held: mean angle off home (beyond 2 A the integrator ends, kp holds)
     max_drift_A: float = Field(0.03, gt=0)  # settled: drift of the torque current within a step
     max_baseline_drift_A_s: float = Field(5e-5, gt=0)  # of the current without load, over the run
+    max_scale_drift: float = Field(7e-4, gt=0)  # relative, of the torque per current, from the first load to the last
     count_rad: float = Field(2 * math.pi / 4096, gt=0)  # of the rotor's encoder
     max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 
@@ -62,9 +62,17 @@ def settings(plan: Plan) -> dict[str, float]:
     return {"bias_i": plan.bias_A, "bias_o": plan.bias_A, **rotor.RELEASED}
 
 
-def phase_angles(plan: Plan) -> list[float]:
-    """The phase angles in rad, ascending."""
-    return [float(g) for g in np.linspace(-plan.gamma_max_rad, plan.gamma_max_rad, plan.gammas)]
+def visits(plan: Plan) -> list[float]:
+    """The phase angles in rad in the order in which they are visited: outwards on alternating sides, then back on the others.
+
+    So gamma and -gamma lie evenly about the middle. A scale (magnets, current sensors) that drifts evenly in time is at right
+    angles to all that is alike at gamma and -gamma (alpha_tau, a bent cosine), and moves gamma_0t by at most 19 % (five
+    angles) of what it would in ascending order; fitted along, it costs u(gamma_0t) 2 % at most.
+    """
+    half = plan.gammas // 2
+    ascending = [float(g) for g in np.linspace(-plan.gamma_max_rad, plan.gamma_max_rad, plan.gammas)]
+    outwards = [g if k % 2 == 0 else -g for k, g in enumerate(ascending[plan.gammas - half :])]
+    return [*outwards, *ascending[half : plan.gammas - half], *(-g for g in reversed(outwards))]
 
 
 def sequence(plan: Plan) -> list[tuple[str, Load]]:
@@ -95,7 +103,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
             rig.clock.sleep(plan.average_s)
     if not _at_home(rig, record, 0.0):
         return
-    for gamma in phase_angles(plan):
+    for gamma in visits(plan):
         rig.levitation.set("gamma", gamma)
         _loads(rig, plan, record, gamma)
     rig.levitation.set("gamma", 0.0)
@@ -168,9 +176,8 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
         return
     a = evaluate(recording, data)
     values = {name: e.value for name, e in a.inputs.items()}
-    yield from torque_checks.of_fit(
-        data, a.balance, a.detent, values, masses_u(recording), arms_u(recording.rig), recording.plan
-    )
+    mass_u = masses_u(recording.rig, recording.plan.masses)
+    yield from torque_checks.of_fit(data, a.balance, a.detent, values, mass_u, arms_u(recording.rig), recording.plan)
     for quantity in MEASURES:
         yield quantity.measured(a.estimates[quantity.name])
 
@@ -178,7 +185,7 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
 def evaluate(recording: Recording[Plan], data: TorqueData) -> Analysis:
     """Fit and estimates with their influences."""
     plan, rig = recording.plan, recording.rig
-    inputs, pairs, count = fit_inputs(rig, plan), rig.machine["pole_pairs"].value, len(plan.masses)
+    inputs, pairs, count = fit_inputs(rig, plan.masses), rig.machine["pole_pairs"].value, len(plan.masses)
     held = NO_DETENT
     if len(data.detent_angle):
         held = torque_balance.detent(data.detent_angle, data.detent_current, detent_order(rig))
@@ -202,35 +209,6 @@ def evaluate(recording: Recording[Plan], data: TorqueData) -> Analysis:
         for k in range(row + 1):
             estimates[name] = estimates[name] + Estimate.of(0.0, parts[k]) * float(root[row, k])
     return Analysis(data, inputs, held, found, estimates)
-
-
-def fit_inputs(rig: RigFile, plan: Plan) -> dict[str, Estimate]:
-    """What the fit needs besides the recording: certificates of the rig file, each as an influence by identity."""
-    inputs = {
-        "gravity": certified("site/gravity", rig.site.gravity, "local gravity"),
-        "air_density": certified("site/air_density", rig.site.air_density, "air density (buoyancy)"),
-        "mass_density": certified("masses/density", rig.mass_density, "density of the masses (buoyancy)"),
-    }
-    for side in SIDES:
-        name = f"lever_{side}"
-        inputs[name] = certified(f"geometry/{name}", rig.geometry[name], f"arm of the lever, {side}")
-    for k, label in enumerate(plan.masses):
-        inputs[f"mass_{k}"] = certified(f"masses/{label}", rig.masses[label], f"mass {label}")
-    for k, channel in enumerate(SEGMENTS, 1):
-        inputs[f"gain_{k}"] = certified(f"sensors/{channel}/gain", rig.sensors[channel].gain, f"gain of {channel}")
-    return inputs
-
-
-def masses_u(recording: Recording[Plan]) -> list[float]:
-    """Relative standard uncertainty of each mass."""
-    masses = [recording.rig.masses[m] for m in recording.plan.masses]
-    return [m.standard_uncertainty / m.value for m in masses]
-
-
-def arms_u(rig: RigFile) -> float:
-    """Relative standard uncertainty of the ratio of the arms."""
-    arms = [rig.geometry[f"lever_{side}"] for side in SIDES]
-    return math.hypot(*(a.standard_uncertainty / a.value for a in arms))
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
@@ -268,6 +246,9 @@ At all phase angles together, alpha_tau cos(M (gamma - gamma_0)) (i - i_base) = 
 squares on the current. W is the conventional mass times local gravity, corrected for buoyancy; i_base is a straight line in
 time at each gamma. Detent, offsets of the sensors and any other constant torque are in i_base; the small difference that
 detent makes where the rotor stands a count of the encoder off home is taken off by the detent measured before.
+
+The phase angles are visited outwards, on sides that alternate, and back on the others. A drift of magnets or current sensors
+that is even in time is then told from gamma_0; it is fitted along, and alpha_tau is that of the loads' mean time.
 
 Sideways currents and the outboard AMB's answer show that the segments are wired as they are called.
 """

@@ -11,9 +11,8 @@ import numpy.typing as npt
 
 from bench.figures import Figure, Series
 from bench.recording import Recording
-from procedures.estimators import torque_balance
 from procedures.estimators.direction import SEGMENTS
-from procedures.estimators.torque_balance import Balance, Detent
+from procedures.estimators.torque_balance import Balance, Detent, Steps
 from procedures.estimators.torque_data import TorqueData
 
 Array = npt.NDArray[np.float64]
@@ -46,7 +45,7 @@ def _torque(data: TorqueData, b: Balance, pairs: float) -> Figure:
 def _over_gamma(data: TorqueData, b: Balance, pairs: float) -> Iterator[Figure]:
     points, apart = [], []
     for side, label in SIDES:
-        angles, slopes, u = torque_balance.slopes_over_gamma(b, data.steps, side)
+        angles, slopes, u = _slopes(b, data.steps, side)
         fitted = b.alpha * np.cos(pairs * (angles - b.gamma_0))
         points.append(Series(label, np.degrees(angles), slopes, "points", 2 * u))
         apart.append(
@@ -61,6 +60,20 @@ def _over_gamma(data: TorqueData, b: Balance, pairs: float) -> Iterator[Figure]:
                  "95 % intervals by the scatter of the steps. One side above the other would be an arm, a bend "
                  "would be no cosine.",
                  "phase angle (°)", "departure (%)", tuple(apart), lines=(("fit", 0.0),))  # fmt: skip
+
+
+def _slopes(b: Balance, s: Steps, side: int) -> tuple[Array, Array, Array]:
+    """Phase angles (k,) rad, torque per current N m/A of one side's loads at each, and its u from the residuals."""
+    angles = np.unique(s.gamma)
+    slopes, u = [], []
+    for gamma in angles:
+        mine = (s.gamma == gamma) & (s.side == side)
+        torque, current = b.torque[mine] / b.u[mine], (b.current - b.base)[mine] / b.u[mine]
+        size = float(torque @ torque)
+        slope = -float(torque @ current) / size  # A per N m
+        slopes.append(1 / slope)
+        u.append(b.scale / math.sqrt(size) / slope**2)
+    return angles, np.array(slopes), np.array(u)
 
 
 def _residuals(data: TorqueData, b: Balance) -> Figure:

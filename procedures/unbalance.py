@@ -25,6 +25,7 @@ from bench.roles import RigState
 from procedures import assumed, probing, turning
 from procedures import unbalance_figures as drawn
 from procedures.estimators import (
+    hum,
     tracking_wiring,
     unbalance_bearings,
     unbalance_checks,
@@ -51,7 +52,10 @@ SINE = Quantity(
 )
 MAJOR = Quantity("major_half_axis", "m", "of the order-1 orbit of the shaft's centre in a sensor plane, 0-pk")
 D_MAX = Quantity(
-    "d_max", "m", "greatest distance of the shaft's centre from the clearance's, static offset included (ISO 14839-2)"
+    "d_max",
+    "m",
+    "greatest distance of the shaft's centre from the clearance's, static offset included (ISO 14839-2)",
+    title="D_max",
 )
 SHARE = Quantity("d_max_share", "1", "D_max over the least clearance", title="D_max / clearance")
 READ = Quantity(
@@ -166,7 +170,8 @@ def evaluated(recording: Recording[Any]) -> Evaluated:
     model = adopted_bearings(recording)
     results = unbalance_estimates.results(dwells, recording.rig, plan, model)
     told = (unbalance_bearings.told(model, plan), *uncertified(recording.rig))
-    return Evaluated((*found, *told, *unbalance_checks.of_results(results, plan)), results)
+    hums = hum.of_dwells(hum.heard(recording, results.slow), results.dwells)
+    return Evaluated((*found, *told, *hums, *unbalance_checks.of_results(results, plan)), results)
 
 
 def measured(results: Results) -> Iterator[Measured]:
@@ -211,6 +216,9 @@ an adopted calibration bearing-model, or without one on the controller's own ide
 offsets, with the plan's uncertainty; a note says which). What the orders make of each other in forces that are not linear
 is put right; the unbalance's small share is found by the same balance at the highest speed. The runout is the reading less
 that motion, and is subtracted from every vector. Reading, motion and runout are in a note, with the date.
+
+Hum of the mains in the probes at the frequency of a speed would be in its vectors unseen. Lines at slow roll that do not turn
+with the shaft are looked for there; one that may move a vector by more than its U is a finding.
 
 D_max is the greatest distance of the shaft's centre from the clearance's centre over a turn: mean place and orders 1 to 3,
 runout subtracted (order 3 where the telemetry sees it). Where the probes read zero is known within their certificates only,

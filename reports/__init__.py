@@ -48,9 +48,7 @@ def build(
     Raises:
         BenchError: a figure, a page or a file cannot be made. Record and verdict are not affected.
     """
-    from bench.figures import Sheet
-    from reports import compose, html, pdf  # heavy: only who builds a report pays
-    from reports import figures as drawing
+    from reports import compose, front, html, pdf  # heavy: only who builds a report pays
 
     around = compose.Surroundings(
         title=title,
@@ -66,7 +64,7 @@ def build(
         readable=recording is not None,
     )
     try:
-        shown = [f if isinstance(f, Sheet) else drawing.draw(f) for f in figures]
+        shown = list(front.drawn(figures))
         view = compose.view_of(record, around, shown)
         page, document = html.render(view), pdf.render(view, record.get("ended"))
     except BenchError:

@@ -14,12 +14,47 @@ from reports import tables, text
 from reports.view import BudgetRow, BudgetTable
 
 SMALL_SHARE = 0.01  # of the variance; smaller influences are summed in one line, all of them are in record.json
+_WORDS = ((re.compile(r"\bamb\b(?!-)"), "AMB"), (re.compile(r"\bcom to\b"), "centre of mass to"))
+LINEAR = (
+    0.05  # by which a contribution may differ from |c| u, of one that is drawn from a t distribution from that of it
+)
+NOT_LINEAR = "not linear"
+TOGETHER = "several influences together"
 Content = Mapping[str, Any]
+
+
+def variance(measurement: Content) -> float:
+    """What the squares of a result's contributions are shares of: their sum. By Monte Carlo it is the square of the standard
+    uncertainty, of which influences that act together only leave the sum short."""
+    whole = math.fsum(float(e.get("contribution") or 0.0) ** 2 for e in measurement.get("budget") or ())
+    drawn = measurement.get("method") == "monte-carlo" and whole > 0
+    return max(whole, float(measurement.get("standard_uncertainty") or 0.0) ** 2) if drawn else whole
+
+
+def together(measurement: Content) -> float:
+    """The share of a variance that no influence has by itself, 0..1."""
+    whole = variance(measurement)
+    alone = math.fsum(float(e.get("contribution") or 0.0) ** 2 for e in measurement.get("budget") or ())
+    return 1 - alone / whole if whole > 0 else 0.0
 
 
 def identities(measurements: Iterable[Content]) -> frozenset[str]:
     """Of every influence of every result."""
     return frozenset(str(e.get("influence") or "") for m in measurements for e in m.get("budget") or ())
+
+
+def named(measurement: Content) -> Content:
+    """A measurement with the names of its influences in readers' words: a sensor's with its channel."""
+    return {**measurement, "budget": [{**e, "name": _name(e)} for e in measurement.get("budget") or ()]}
+
+
+def _name(entry: Content) -> str:
+    said = str(entry.get("name") or "")
+    for pattern, words in _WORDS:
+        said = pattern.sub(words, said)
+    kind, _, rest = str(entry.get("influence") or "").partition("/")
+    channel = rest.partition("/")[0]
+    return f"{said} of {channel}" if kind == "sensors" and channel and said in ("gain", "offset") else said
 
 
 def budget_table(
@@ -29,8 +64,8 @@ def budget_table(
     inputs = {"/".join(path): entry for path, entry in tables.toleranced(rig)}
     unit = str(measurement.get("unit") or "")
     entries = sorted(grouped(measurement.get("budget") or ()), key=lambda e: -abs(float(e.get("contribution") or 0.0)))
-    variance = math.fsum(float(e.get("contribution") or 0.0) ** 2 for e in entries)
-    shares = [float(e.get("contribution") or 0.0) ** 2 / variance if variance > 0 else 0.0 for e in entries]
+    whole = variance(measurement)
+    shares = [float(e.get("contribution") or 0.0) ** 2 / whole if whole > 0 else 0.0 for e in entries]
     shown = [i for i, share in enumerate(shares) if share >= SMALL_SHARE]
     rest = [e for i, e in enumerate(entries) if shares[i] < SMALL_SHARE]
     method = "Monte Carlo (JCGM 101)" if measurement.get("method") == "monte-carlo" else "GUM (JCGM 100)"
@@ -45,9 +80,24 @@ def budget_table(
         rows=tuple(
             _budget_row(entry, shares[i], unit, inputs)
             for i, entry in zip(shown, _apart([entries[i] for i in shown]), strict=True)
-        ),
+        )
+        + _acting_together(measurement),
         rest=_rest(rest, unit),
     )
+
+
+def _acting_together(measurement: Content) -> tuple[BudgetRow, ...]:
+    """The row of what no influence has by itself, if that is much."""
+    share = together(measurement)
+    if share < SMALL_SHARE:
+        return ()
+    return (
+        BudgetRow(
+            name=TOGETHER, estimate=text.DASH, u=text.DASH, kind=text.DASH, distribution=text.DASH, dof=text.DASH,
+            sensitivity=text.DASH, contribution=text.significant(math.sqrt(share * variance(measurement))),
+            share=f"{100 * share:.1f}{text.NARROW}%", percent=round(100 * share, 2),
+        ),
+    )  # fmt: skip
 
 
 def _standard_uncertainty(measurement: Content, unit: str) -> str:
@@ -115,19 +165,34 @@ def _budget_row(entry: Content, share: float, unit: str, inputs: Mapping[str, Co
 
 
 def _input(entry: Content, unit: str, inputs: Mapping[str, Content]) -> tuple[str, str, str]:
-    """Estimate, standard uncertainty and sensitivity of an influence, with their units; dashes where a budget does not say."""
+    """Estimate, standard uncertainty and sensitivity of an influence, with their units; dashes where a budget does not say.
+    One whose contribution is not its sensitivity times its uncertainty is called not linear."""
     c, contribution = entry.get("sensitivity"), abs(float(entry.get("contribution") or 0.0))
-    if not c:
+    curved = c is not None and _not_linear(entry)
+    if not c and not curved:
         return text.DASH, text.DASH, text.DASH
-    size, si = contribution / abs(c), str(entry.get("unit") or "")
+    c = float(c or 0.0)
+    size, si = float(entry["standard_uncertainty"]) if curved else contribution / abs(c), str(entry.get("unit") or "")
     stored = _stored(str(entry.get("influence")), inputs)
     symbol, one = tables.written(si, abs(float(stored["value"])) or size if stored else size)
     ratio = units_over(unit, symbol)
-    slope = text.with_unit(text.significant(float(c) * one, 3), ratio)
+    slope = NOT_LINEAR if curved else text.with_unit(text.significant(c * one, 3), ratio)
     if stored is None:
         return text.DASH, text.with_unit(text.significant(size / one), symbol), slope
     value = text.with_unit(text.plain(float(f"{stored['value'] / one:.12g}")), symbol)
     return value, text.with_unit(text.significant(size / one), symbol), slope
+
+
+def _not_linear(entry: Content) -> bool:
+    """Whether what an influence contributes is something else than |c| u; by Monte Carlo one with few degrees of freedom is
+    drawn wider than its u (JCGM 101, 6.4.9.4). Records that do not say u know nothing else."""
+    u, dof = entry.get("standard_uncertainty"), entry.get("dof") or math.inf
+    if u is None:
+        return False
+    contribution, linear = (abs(float(x or 0.0)) for x in (entry.get("contribution"), entry.get("sensitivity")))
+    linear *= float(u)
+    wider = math.sqrt(dof / (dof - 2)) if 2 < dof < math.inf else 1.0
+    return all(abs(contribution - linear * w) > LINEAR * contribution for w in (1.0, wider))
 
 
 def sensitivity(entry: Content, unit: str) -> str:

@@ -14,7 +14,7 @@ from reports import campaign_figures, text
 from reports.campaign_model import _Numbers
 from reports.campaign_symbols import symbol
 from reports.campaign_view import Cell, Grid, Section, SummaryView
-from reports.compose import _TONES
+from reports.resultrows import TONES
 from reports.view import Fact
 
 NAMED = 6  # quantities in the box with the outcome
@@ -79,7 +79,7 @@ def view_of(c: CoverageContent) -> SummaryView:
         "INDETERMINATE": f"More rigs are needed to decide: {_named(out)}." if out else untold,
     }[outcome]
     return SummaryView(
-        title=c.title, campaign=c.campaign, simulated=SIMULATED, outcome=outcome, tone=_TONES.get(c.verdict, "none"),
+        title=c.title, campaign=c.campaign, simulated=SIMULATED, outcome=outcome, tone=TONES.get(c.verdict, "none"),
         outcome_text=said,
         identification=(
             Fact("Rig", c.rig), Fact("Virtual rigs", f"{c.rigs}, from seed {c.first_seed}"), Fact("Made", text.moment(c.date)),
@@ -136,7 +136,7 @@ def _table(quantities: Sequence[Quantity]) -> Grid:
             Cell(", ".join(str(t.found) for t in q.tails), "at most " + ", ".join(str(t.most) for t in q.tails)),
             Cell(text.with_unit(text.significant(mean), unit)),
             Cell("–" if c.bias is None else f"{c.bias:+.3f}".replace("-", text.MINUS)),
-            Cell(verdict, tone=_TONES.get(verdict, "none")) if q.judged else Cell("not judged", f"({verdict})"),
+            Cell(verdict, tone=TONES.get(verdict, "none")) if q.judged else Cell("not judged", f"({verdict})"),
         ))  # fmt: skip
     header = ("Quantity", "Coverage", "Width", "Beyond 2 U, 3 U, 10 U", "Mean U", "Mean error / s.d.", "")
     return Grid(header, (3.0, 1.3, 1.4, 1.2, 1.4, 1.1, 1.6), tuple(rows), (1, 2, 3, 4, 5))

@@ -11,8 +11,8 @@ from bench.figures import Figure
 from reports import campaign_figures, figures, text
 from reports.campaign_symbols import place, symbol
 from reports.campaign_view import Cell, Grid, Picture, Section, SummaryView
-from reports.compose import _TONES
 from reports.figures import Drawn
+from reports.resultrows import TONES
 from reports.view import SIMULATED, Fact, FigureEntry, Tone
 
 NAMED, LEAST = 3, 0.005  # largest influences that a row of the table names, and the least share worth naming
@@ -79,7 +79,7 @@ class _Numbers:
 
 
 def _tone(outcome: str) -> Tone:
-    return _TONES.get(outcome.lower(), "none")
+    return TONES.get(outcome.lower(), "none")
 
 
 def _said(c: ChainContent) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from bench.figures import Sheet
-from reports import budgets, front, habit, many, tables, text, unseen, vectors
+from reports import budgets, front, habit, many, resultrows, tables, text, unseen, vectors
 from reports.counts import counts, words
 from reports.figures import Drawn
 from reports.linktable import clean, link_table
@@ -26,14 +26,10 @@ from reports.view import (
     Fact,
     FindingRow,
     ReportView,
-    ResultRow,
     Table,
-    Tone,
 )
 
 Content = Mapping[str, Any]
-_TONES: dict[str, Tone] = {"pass": "pass", "fail": "fail", "indeterminate": "indeterminate", "error": "error"}
-_TONES |= {"aborted": "error", "missing": "error"}
 # What only people know: key in [laboratory] of the rig file, label, clause letter of 7.8.2.1.
 _PEOPLE = (
     ("name", "Laboratory"),  # b
@@ -68,9 +64,10 @@ class Surroundings:
 def view_of(record: Content, around: Surroundings, shown: Sequence[Drawn | Sheet] = ()) -> ReportView:
     """The report of one record. Equal inputs give an equal view: nothing here asks for the time."""
     outcome = str(record.get("outcome", "ERROR"))
-    measurements = front.main_first([habit.told(m) for m in record.get("measurements") or () if isinstance(m, Mapping)])
+    told = [habit.told(m) for m in record.get("measurements") or () if isinstance(m, Mapping)]
+    measurements = front.main_first([budgets.named(m) for m in told])
     findings = tuple(_findings(record, around))
-    rows = tuple(_result(m, around) for m in measurements)
+    rows = tuple(resultrows.row(m, around.definitions, around.titles) for m in measurements)
     judged_title, judged, judged_note = front.judged(rows)
     like = many.names(measurements)
     few = [m for m in measurements if m.get("budget") and m.get("name") not in like]
@@ -86,7 +83,7 @@ def view_of(record: Content, around: Surroundings, shown: Sequence[Drawn | Sheet
         simulated=SIMULATED if _simulated(record) else "",
         expired=EXPIRED if _expired(record) else "",
         outcome=outcome,
-        tone=_TONES.get(outcome.lower(), "none"),
+        tone=resultrows.TONES.get(outcome.lower(), "none"),
         outcome_text=outcome_text(record, rows, findings),
         identification=_identification(record, around, rig_name),
         decided=tuple(f for f in findings if f.loud),
@@ -94,7 +91,9 @@ def view_of(record: Content, around: Surroundings, shown: Sequence[Drawn | Sheet
         judged_title=judged_title,
         judged_note=judged_note,
         sheets=front.sheets(shown),
-        results=tuple(r for m, r in zip(measurements, rows, strict=True) if str(m.get("name", "")) not in like),
+        results=resultrows.told_once(
+            [r for m, r in zip(measurements, rows, strict=True) if str(m.get("name", "")) not in like]
+        ),
         vectors=vectors.table(record),
         about_vectors=ABOUT_VECTORS,
         no_results="" if rows else NO_RESULTS,
@@ -102,11 +101,11 @@ def view_of(record: Content, around: Surroundings, shown: Sequence[Drawn | Sheet
         decision_rule=DECISION_RULE,
         unseen=unseen.unseen(measurements, around.reached, around.titles),
         about_unseen=unseen.ABOUT,
-        assumed=tuple(tables.called(a, around.titles) for a in around.assumes) if rows else (),
+        assumed=tuple(_prose(a, around) for a in around.assumes) if rows else (),
         notes=tuple(f for f in findings if not f.loud),
         figures=front.entries(shown),
         budgets=tuple(table for told, table in budgeted if told),
-        method=tuple(tables.called(p, around.titles) for p in _paragraphs(around.method)),
+        method=tuple(_prose(p, around) for p in _paragraphs(around.method)),
         conditions=_conditions(around),
         traceability=tables.traceability(around.rig, budgets.identities(measurements)),
         calibrations=tables.calibrations(record.get("calibrations")),
@@ -126,58 +125,9 @@ def view_of(record: Content, around: Surroundings, shown: Sequence[Drawn | Sheet
     )
 
 
-def _result(m: Content, around: Surroundings) -> ResultRow:
-    name, unit = str(m.get("name", "")), str(m.get("unit") or "")
-    expanded, verdict = m.get("expanded_uncertainty"), str(m.get("verdict") or "none")
-    limit = m.get("limit")
-    return ResultRow(
-        symbol=tables.symbol_of(name, around.titles),
-        about=around.definitions.get(name, ""),
-        where=tables.place(m),
-        result=text.result(m.get("value"), expanded, unit),
-        interval=_telling_interval(m, unit),
-        k=text.factor(m.get("coverage_factor")),
-        dof=text.DASH if m.get("method") == "monte-carlo" else text.degrees_of_freedom(m.get("dof")),
-        probability=text.probability(m.get("coverage_probability")),
-        limit=_limit(limit, unit, text.shift_of(m.get("value"), expanded)),
-        limit_source=_limit_source(limit),
-        verdict="no limit" if verdict.lower() == "none" else verdict.lower(),
-        tone=_TONES.get(verdict.lower(), "none"),
-    )
-
-
-def _telling_interval(m: Content, unit: str) -> str:
-    """The interval where it came from Monte Carlo or is not value ± U to the printed digits."""
-    low, high = m.get("interval") or (None, None)
-    value, expanded = m.get("value"), m.get("expanded_uncertainty")
-    if low is None or high is None or value is None:
-        return ""
-    middle = abs((low + high) / 2 - value) > 0.05 * (high - low)
-    if not middle and m.get("method") != "monte-carlo":
-        return ""
-    how = " by Monte Carlo (JCGM 101)" if m.get("method") == "monte-carlo" else ""
-    return (
-        f"{text.probability(m.get('coverage_probability'))} interval{how}: {text.interval(low, high, expanded, unit)}"
-    )
-
-
-def _limit(limit: Content | None, unit: str, shift: int) -> str:
-    """The range, with the power of ten of the result that it is held against."""
-    if not limit:
-        return text.DASH
-    low, high = limit.get("low"), limit.get("high")
-    if low is not None and high is not None:
-        return text.at_power(f"{text.shifted(low, shift)} to {text.shifted(high, shift)}", shift, unit)
-    if low is not None:
-        return f"≥ {text.at_power(text.shifted(low, shift), shift, unit)}"
-    return text.DASH if high is None else f"≤ {text.at_power(text.shifted(high, shift), shift, unit)}"
-
-
-def _limit_source(limit: Content | None) -> str:
-    if not limit:
-        return ""
-    source = str(limit.get("source") or "source not stated")
-    return source if limit.get("verified") else f"{source} (limit not verified against its source)"
+def _prose(said: str, around: Surroundings) -> str:
+    """A text for readers: quantities by their titles, signs and units as print has them."""
+    return text.prose(tables.called(said, around.titles, around.definitions))
 
 
 def _findings(record: Content, around: Surroundings) -> Iterable[FindingRow]:
@@ -191,9 +141,7 @@ def _findings(record: Content, around: Surroundings) -> Iterable[FindingRow]:
         same.setdefault(said_of, []).append(str(f.get("where") or ""))
     for (code, said, effect), places in same.items():
         where = "; ".join(dict.fromkeys(filter(None, places)))
-        yield FindingRow(
-            code, tables.called(said, around.titles), tables.called(where, around.titles), effect, effect != "note"
-        )
+        yield FindingRow(code, _prose(said, around), _prose(where, around), effect, effect != "note")
 
 
 def _uut(uut: Any) -> str:
@@ -206,7 +154,7 @@ def _uut(uut: Any) -> str:
 
 
 def _identification(record: Content, around: Surroundings, rig_name: str) -> tuple[Fact, ...]:
-    started, ended = text.moment(record.get("started")), text.moment(record.get("ended"))
+    performed = text.span(record.get("started"), record.get("ended"))
     rig_title = str(around.rig.get("title") or "")
     site = around.rig.get("site")
     site_name = str(site.get("place") or "") if isinstance(site, Mapping) else ""
@@ -215,7 +163,7 @@ def _identification(record: Content, around: Surroundings, rig_name: str) -> tup
         Fact("Item under test", _uut(record.get("uut"))),
         Fact("Rig", f"{rig_name} – {rig_title}" if rig_title else rig_name),
         Fact("Procedure", str(record.get("procedure") or text.DASH)),
-        Fact("Performed", f"{started} to {ended}" if record.get("ended") else f"{started}, end not recorded"),
+        Fact("Performed", performed),
         Fact("Location", site_name, blank=not site_name),  # 7.8.2.1 c
     ]
     if seed is not None:

@@ -1,6 +1,7 @@
 """Draws `bench.figures.Figure` as SVG, for both outputs, at the width it is printed (half of an A4 text block).
 
-No pyplot (it costs half a second and keeps global state) and no mathtext: labels are plain text, so `$` is a dollar.
+No pyplot (it costs half a second and keeps global state). Labels are plain text, so `$` is a dollar; only symbols with a
+subscript are set as such.
 Equal figures give equal bytes.
 """
 
@@ -9,8 +10,8 @@ from __future__ import annotations
 import io
 import re
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from textwrap import shorten
 from typing import Any
 
 import matplotlib as mpl
@@ -19,12 +20,15 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure as Canvas
-from matplotlib.ticker import MaxNLocator, MultipleLocator
+from matplotlib.text import Text
+from matplotlib.ticker import MaxNLocator
 
 from bench.errors import BenchError
 from bench.figures import Array, Figure, Series
+from reports import figureaxes as axes_of
 from reports import figurekinds as kinds
-from reports.figurestyle import GRID, INK, MARKERS, PALETTE, STYLE, tick_text
+from reports import text
+from reports.figurestyle import DASHES, INK, MARKERS, PALETTE, STYLE
 
 WIDTH_IN, HEIGHT_IN = 3.42, 2.75  # 87 mm: half of the A4 text block
 MAX_LINE_POINTS = 1200  # about three per printed dot column at 300 dpi; beyond, min and max per bin
@@ -40,8 +44,8 @@ class Drawn:
     svg: str
 
 
-def draw(figure: Figure) -> Drawn:
-    """The figure as SVG.
+def draw(figure: Figure, height: float = 1.0) -> Drawn:
+    """The figure as SVG; `height` is that of its panels over the usual one, with letters as large.
 
     Raises:
         BenchError: a series has x, y or u of different lengths, or cannot be drawn.
@@ -52,7 +56,7 @@ def draw(figure: Figure) -> Drawn:
     with warnings.catch_warnings(), mpl.rc_context(STYLE):
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")  # a box in a label, not a failed report
         try:
-            svg = _svg(figure)
+            svg = _svg(figure, height)
         except (ValueError, TypeError, OverflowError) as error:
             raise BenchError(f"figure {figure.key!r} cannot be drawn: {error}") from error
     return Drawn(figure.key, figure.title, figure.caption, _with_own_ids(svg, figure.key))
@@ -73,12 +77,12 @@ def _panels(figure: Figure) -> list[Figure]:
     return [figure, *(_panels(figure.below) if figure.below else [])]
 
 
-def _svg(figure: Figure) -> str:
+def _svg(figure: Figure, height: float) -> str:
     panels = _panels(figure)
     around = figure.kind in ("polar", "vectors")
     if figure.closer is not None:
-        return _beside(figure, figure.closer)
-    size = (WIDTH_IN, HEIGHT_IN * (1 + 0.45 * (len(panels) - 1)) + (0.45 if around else 0.0))
+        return _beside(figure, figure.closer, height)
+    size = (WIDTH_IN, height * HEIGHT_IN * (1 + 0.45 * (len(panels) - 1)) + (0.45 if around else 0.0))
     canvas = Canvas(figsize=size, layout="constrained")
     FigureCanvasSVG(canvas)
     every = [
@@ -100,9 +104,9 @@ def _svg(figure: Figure) -> str:
     return _saved(canvas)
 
 
-def _beside(figure: Figure, closer: tuple[float, float, float]) -> str:
+def _beside(figure: Figure, closer: tuple[float, float, float], height: float) -> str:
     """A plane, and beside it the part of it that is too small to be seen there."""
-    canvas = Canvas(figsize=(WIDTH_IN, 0.8 * HEIGHT_IN), layout="constrained")
+    canvas = Canvas(figsize=(WIDTH_IN, 0.8 * max(height, 0.9) * HEIGHT_IN), layout="constrained")
     FigureCanvasSVG(canvas)
     whole, near = canvas.add_subplot(1, 2, 1), canvas.add_subplot(1, 2, 2)
     drawn = _panel(whole, figure)
@@ -120,9 +124,22 @@ def _beside(figure: Figure, closer: tuple[float, float, float]) -> str:
 
 
 def _saved(canvas: Canvas) -> str:
+    for said in canvas.findobj(Text):
+        _set_symbols(said)
     out = io.StringIO()
     canvas.savefig(out, format="svg", dpi=220, metadata={"Date": None, "Creator": None})
     return out.getvalue()
+
+
+def _set_symbols(said: Any) -> None:
+    """A letter with its subscript in place of `D_max`; everything else of a text stays as it is."""
+    parts = text.symbols(said.get_text())
+    if not any(below for _, below in parts):
+        return
+    said.set_parse_math(True)
+    said.set_text(
+        "".join(f"${part}_\\mathrm{{{below}}}$" if below else part.replace("$", r"\$") for part, below in parts)
+    )
 
 
 def _panel(axes: Axes, figure: Figure) -> list[Artist]:
@@ -137,32 +154,46 @@ def _panel(axes: Axes, figure: Figure) -> list[Artist]:
     if figure.grid is not None:
         kinds.grid(axes, figure.grid)
     if polar:
-        drawn += _polar_axes(axes, figure, dense)
+        drawn += axes_of.polar(axes, figure, dense)
     elif figure.kind == "vectors":
         kinds.vector_axes(axes, figure, dense)
     else:
-        drawn += _plain_axes(axes, figure)
+        drawn += axes_of.plain(axes, figure)
         drawn += kinds.bands(axes, figure)
     kinds.notes(axes, figure)
     if not any(s.x.size for s in dense) and figure.grid is None:
         axes.text(0.5, 0.5, "no data", transform=axes.transAxes, ha="center", va="center", color=INK)
-    return [d for s, d in zip(dense, drawn, strict=False) if s.style != "ridge"] + drawn[len(dense) :]
+    shown = [d for s, look, d in zip(dense, looks, drawn, strict=False) if s.style != "ridge" and "fit" not in look]
+    return shown + drawn[len(dense) :]
 
 
 def _looks(dense: list[Series]) -> list[dict[str, Any]]:
     """Of each series: curves take the colours in turn, marks that of the curve before, guides and ridges ink."""
-    curves = [s for s in dense if s.style not in kinds.SPECIAL]
+    curves = [s for s in dense if s.style not in kinds.SPECIAL and _fitted(s, dense) is None]
     looks: list[dict[str, Any]] = []
     taken = 0
     for series in dense:
+        of = _fitted(series, dense[: len(looks)])
         if series.style in ("faint", "guide", "ridge"):
             looks.append({"color": INK, "marker": ""})
+        elif of is not None:
+            looks.append({**looks[of], "fit": True})
         elif series.style == "mark":
             looks.append({**_look(max(taken - 1, 0), len(curves)), "marker": "o"})
         else:
             looks.append(_look(taken, len(curves)))
             taken += 1
+    lines = [look for series, look in zip(dense, looks, strict=True) if series.style == "line" and "fit" not in look]
+    for k, look in enumerate(lines if len(curves) <= len(PALETTE) else ()):
+        look["dashes"] = DASHES[k % len(DASHES)]  # colours alone look alike in grey print
     return looks
+
+
+def _fitted(series: Series, before: Sequence[Series]) -> int | None:
+    """Of the points that a line was fitted to, by labels: `3 A` and `3 A, fit`. It looks like them and needs no legend."""
+    labels = [s.label if s.style == "points" else None for s in before]
+    stem = series.label.removesuffix(" fit").removesuffix(",")
+    return labels.index(stem) if series.style == "line" and stem != series.label and stem in labels else None
 
 
 def _look(position: int, count: int) -> dict[str, Any]:
@@ -214,88 +245,19 @@ def _closed(series: Series) -> Series:
 def _plot(axes: Axes, series: Series, look: dict[str, Any], position: int = 0) -> Artist:
     """Draws one series and returns what stands for it in the legend."""
     if series.style in kinds.SPECIAL:
-        return kinds.special(axes, series, look, position, _short(series.label))
+        return kinds.special(axes, series, look, position, axes_of.named(series.label))
     face = {} if series.style == "line" else {"markerfacecolor": "white", "markeredgewidth": 0.9}
     style = {
-        "linestyle": "none" if series.style == "points" else "-",
+        "linestyle": "none" if series.style == "points" else look.get("dashes", "-"),
         "marker": "" if series.style == "line" else look["marker"],
         "color": look["color"],
-        "label": _short(series.label),
+        "label": axes_of.named(series.label),
         **face,
     }
     if series.u is None:
         return axes.plot(series.x, series.y, **style)[0]
     u = np.where(np.isfinite(series.u), np.abs(series.u), 0.0)
     return axes.errorbar(series.x, series.y, yerr=u, elinewidth=0.8, capsize=2.0, capthick=0.8, **style)  # type: ignore[return-value]
-
-
-def _short(label: str) -> str:
-    """A label that fits its legend line; a leading underscore would hide it from the legend."""
-    return shorten(label, 48, placeholder="…").lstrip("_") or "series"
-
-
-def _line_style(position: int) -> dict[str, Any]:
-    return {"color": INK, "linestyle": ("--", ":", "-.")[position % 3], "linewidth": 0.8}
-
-
-def _plain_axes(axes: Axes, figure: Figure) -> list[Artist]:
-    axes.set_xlabel(shorten(figure.x_label, 56, placeholder="…"))
-    axes.set_ylabel(shorten(figure.y_label, 40, placeholder="…"))
-    axes.grid(True, color=GRID, linewidth=0.5)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.margins(x=0.04, y=0.08)
-    if figure.kind == "plane":
-        axes.set_aspect("equal", adjustable="datalim")
-    if figure.log_x:
-        axes.set_xscale("log")
-    if figure.downward:
-        axes.invert_yaxis()
-    if figure.log_y:
-        axes.set_yscale("log")
-    for axis, log in ((axes.xaxis, figure.log_x), (axes.yaxis, figure.log_y)):
-        if not log:
-            axis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 2.5, 5, 10]))
-        axis.set_major_formatter(tick_text())
-    if figure.ticks:
-        axes.set_xticks([x for _, x in figure.ticks], [label for label, _ in figure.ticks])
-    if figure.below is not None and figure.below.downward:
-        axes.set_ylim(bottom=0)  # the amplitude over its lag
-    for axis, label in ((axes.xaxis, figure.x_label), (axes.yaxis, figure.y_label)):
-        _degrees(axis, label)
-    return [
-        axes.axhline(level, label=_short(label), **_line_style(position))
-        for position, (label, level) in enumerate(figure.lines)
-    ]
-
-
-def _degrees(axis: Any, label: str) -> None:
-    """Angles over half a turn and more have their ticks at quarters of it."""
-    span = float(np.ptp(axis.get_view_interval()))
-    if label.endswith("(°)") and span >= 150:
-        axis.set_major_locator(MultipleLocator(45 if span < 200 else 90 if span < 600 else 180))
-
-
-def _polar_axes(axes: Any, figure: Figure, dense: list[Series]) -> list[Artist]:
-    """The radial axis spans the data, not zero: what matters around a turn is the variation."""
-    ys = [y for s in dense for u in (0.0 if s.u is None else s.u,) for y in (s.y - u, s.y + u) if s.y.size]
-    values = np.concatenate([*ys, [level for _, level in figure.lines]]) if ys or figure.lines else np.zeros(1)
-    low, high = float(np.min(values)), float(np.max(values))
-    span = (high - low) or abs(high) or 1.0
-    axes.set_rlim(low - 0.6 * span, high + 0.1 * span)
-    axes.yaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10]))
-    axes.yaxis.set_major_formatter(tick_text())
-    axes.set_rlabel_position(67.5)
-    for text in axes.get_yticklabels():  # readable where a curve passes behind
-        text.set_bbox({"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.6})
-    axes.set_xlabel(f"angle: {figure.x_label}\nradius: {figure.y_label}")
-    axes.grid(True, color=GRID, linewidth=0.5)
-    axes.spines["polar"].set_color(GRID)
-    turn = np.linspace(0, 2 * np.pi, 181)
-    return [
-        axes.plot(turn, np.full(turn.size, level), label=_short(label), **_line_style(position))[0]
-        for position, (label, level) in enumerate(figure.lines)
-    ]
 
 
 def _legend(canvas: Canvas, drawn: list[Artist]) -> None:

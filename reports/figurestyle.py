@@ -9,6 +9,7 @@ from matplotlib.ticker import ScalarFormatter
 # Okabe and Ito (2008), told apart with any colour vision; the yellow is left out: too pale on white.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+DASHES: tuple[Any, ...] = ("-", (0, (6, 1.4)), (0, (2, 1)), (0, (6, 1.4, 1.5, 1.4)))
 INK, GRID = "#30363d", "#d9dde2"
 STYLE: Any = {
     "font.family": ["DejaVu Sans"],

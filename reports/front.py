@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from bench.figures import Sheet
-from reports.figures import Drawn
+from bench.figures import Figure, Sheet
+from reports import text
+from reports.figures import Drawn, draw
 from reports.view import FigureEntry, ResultRow, Table, Tone
 
 Content = Mapping[str, Any]
 SHOWN, BUDGETS, FIGURES = 10, 6, 2
+FLAT = 0.8  # of the usual height: figures of page 1, which leave room for what no data can show
 WORST_FIRST: tuple[Tone, ...] = ("error", "fail", "indeterminate", "pass", "none")
 JUDGED, MEASURED = "What was judged", "What was measured"
 
@@ -40,10 +42,24 @@ def budgeted(measurements: Sequence[Content]) -> Sequence[Content]:
     return (found or list(measurements))[:BUDGETS]
 
 
+def drawn(shown: Iterable[Figure | Sheet]) -> Iterator[Drawn | Sheet]:
+    """What a procedure shows, with its figures drawn, those of page 1 flatter than the others."""
+    number = 0
+    for one in shown:
+        if isinstance(one, Sheet):
+            yield one
+        else:
+            number += 1
+            yield draw(one, FLAT if number <= FIGURES else 1.0)
+
+
 def entries(shown: Iterable[Drawn | Sheet]) -> tuple[FigureEntry, ...]:
     """Figures with their numbers; the first ones stand on page 1."""
-    drawn = (s for s in shown if isinstance(s, Drawn))
-    return tuple(FigureEntry(n, f.key, f.title, f.caption, f.svg, n <= FIGURES) for n, f in enumerate(drawn, 1))
+    figures = (s for s in shown if isinstance(s, Drawn))
+    return tuple(
+        FigureEntry(n, f.key, text.prose(f.title), text.prose(f.caption), f.svg, n <= FIGURES)
+        for n, f in enumerate(figures, 1)
+    )
 
 
 def sheets(shown: Iterable[Drawn | Sheet]) -> tuple[Table, ...]:

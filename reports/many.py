@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -56,12 +55,14 @@ def carried(measurement: Content) -> str:
     squares = sorted(
         ((float(e.get("contribution") or 0.0) ** 2, str(e.get("name", ""))) for e in entries), reverse=True
     )
-    whole = math.fsum(s for s, _ in squares)
+    whole = budgets.variance(measurement)
     if whole <= 0:
         return text.DASH
     told = [(s / whole, name) for s, name in squares[:TOLD] if s / whole >= SMALL] or [
         (squares[0][0] / whole, squares[0][1])
     ]
     parts = [f"{name} {100 * share:.0f}{text.NARROW}%" for share, name in told]
+    if (share := budgets.together(measurement)) >= SMALL:
+        parts.append(f"{budgets.TOGETHER} {100 * share:.0f}{text.NARROW}%")
     left = len(squares) - len(told)
     return ", ".join(parts) + (f"; {left} more" if left else "")

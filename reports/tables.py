@@ -38,12 +38,14 @@ def symbol_of(name: str, titles: Mapping[str, str] = MappingProxyType({})) -> Sy
     )
 
 
-def called(said: str, titles: Mapping[str, str]) -> str:
-    """A text with the titles of quantities in place of names that are no words: those with a stroke in them."""
-    names = sorted((n for n in titles if "_" in n), key=len, reverse=True)
-    if not names:
+def called(said: str, titles: Mapping[str, str], names: Collection[str] = ()) -> str:
+    """A text with the titles of quantities in place of names that are no words: those with a stroke in them. Other `names`
+    that are no symbols are told in words."""
+    words = {n: n.replace("_", " ") for n in names if not text.SYMBOL.fullmatch(n)} | dict(titles)
+    found = sorted((n for n in words if "_" in n), key=len, reverse=True)
+    if not found:
         return said
-    return re.sub(rf"\b({'|'.join(map(re.escape, names))})\b", lambda m: titles[m[0]], said)
+    return re.sub(rf"\b({'|'.join(map(re.escape, found))})\b", lambda m: words[m[0]], said)
 
 
 def place(measurement: Content) -> str:

@@ -18,8 +18,18 @@ TIMES = "\u00d7"
 DASH = "\u2013"
 _SUPERSCRIPTS = str.maketrans("0123456789-+", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺")
 _GREEK = {"alpha": "α", "beta": "β", "gamma": "γ", "rho": "ρ", "tau": "τ"}
-SYMBOL = re.compile(r"\b(alpha|beta|gamma|rho|[αβγρ]′?|d?[A-Z]|d?i)_([A-Za-z0-9]{1,3})\b")
+SYMBOL = re.compile(r"\b(alpha|beta|gamma|rho|[αβγρ]′?|d?[A-Z]|d?i)_([A-Za-z0-9]{1,3}(?:,[A-Za-z])?)\b")
 """A symbol as prose writes it, `alpha_dx`, `K_i`, `dF_y`: letter and subscript. The PDF's template has the same."""
+_UNIT = r"(?:[mµukM]?(?:rad|Hz|min|kg|m|N|A|V|g|s|W|T)|°C|r/min|%)(?:[²³]|\b|(?<=%))"
+_AMOUNT = re.compile(rf"(?<=\d) {_UNIT}(?:[ /·]{_UNIT})*")
+_WRITTEN: tuple[tuple[re.Pattern[str], str], ...] = (
+    (re.compile(r"\+-"), "±"),
+    (re.compile(r"(?<=\d )u(?=(?:m|s|A|rad)\b)"), "µ"),
+    (re.compile(r"(?<![\w)\]-])-(?=\d)"), MINUS),
+    (re.compile(rf"(?<=\S) = (?=[\d{MINUS}])"), f"{NARROW}={NARROW}"),
+    (re.compile(r"(?<=\d) × (?=\d)"), f"{NARROW}{TIMES}{NARROW}"),
+)
+_EXPONENT = re.compile(r"(?<=\d)e([+-]\d{2})\b")
 _UNIT_WORDS = {
     "um": "µm",
     "us": "µs",
@@ -124,7 +134,7 @@ def interval(low: float | None, high: float | None, expanded: float | None, unit
     if low is None or high is None:
         return DASH
     (a, b), _, shift = rounded_together([low, high], expanded or (high - low) / 2)
-    return with_unit(f"[{a}, {b}]" + (power_of_ten(shift) if shift else ""), unit)
+    return with_unit(f"[{a},\u00a0{b}]" + (power_of_ten(shift) if shift else ""), unit)
 
 
 def significant(number: float | None, digits: int = 2) -> str:
@@ -184,6 +194,26 @@ def moment(text: str | None) -> str:
     offset = at.utcoffset()
     zone = "" if offset is None else " UTC" if not offset else at.strftime(" UTC%z")
     return at.strftime("%Y-%m-%d %H:%M:%S") + zone
+
+
+def span(started: str | None, ended: str | None) -> str:
+    """From one moment to another, the day said once."""
+    begun, end = moment(started), moment(ended)
+    if not ended:
+        return f"{begun}, end not recorded"
+    day, _, clock = end.partition(" ")
+    return f"{begun.removesuffix(' UTC') if begun.endswith(' UTC') and end.endswith(' UTC') else begun} to " + (
+        clock if clock and begun.startswith(f"{day} ") else end
+    )
+
+
+def prose(said: str) -> str:
+    """A text as print has it: true minus signs, `±`, `µ` and powers of ten for what a keyboard gives, and no line that ends
+    between a number and its unit."""
+    for pattern, instead in _WRITTEN:
+        said = pattern.sub(instead, said)
+    said = _EXPONENT.sub(lambda m: power_of_ten(int(m[1])), said)
+    return _AMOUNT.sub(lambda m: m[0].replace(" ", NARROW), said)
 
 
 def symbols(said: str) -> list[tuple[str, str]]:

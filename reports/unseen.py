@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from typing import Any
 
 from reports import budgets, tables, text
-from reports.view import Table
+from reports.view import Symbol, Table
 
 SHOWN = 0.01  # of a variance; what carries less of every result is summed up
 MOST = 6  # rows, which leave room for them on page 1
@@ -39,7 +38,7 @@ def unseen(
     alike: dict[str, set[str]] = defaultdict(set)
     for m in measurements:
         entries = m.get("budget") or ()
-        variance = math.fsum(float(e.get("contribution") or 0.0) ** 2 for e in entries)
+        variance = budgets.variance(m)
         for e in entries if variance > 0 else ():
             identity, name = (str(e.get(key) or "") for key in ("influence", "name"))
             share = float(e.get("contribution") or 0.0) ** 2 / variance
@@ -55,7 +54,7 @@ def unseen(
     if left := ranked[len(shown) :]:
         noun = "influence" if len(left) == 1 else "influences"
         rows.append((f"{len(left)} further {noun}", f"below {_share(left[0][0])} each", "", "", ""))
-    header = ("Influence", "Share of the variance", "Result", "Moved by one u", "Sensitivity")
+    header = ("Influence", "Share of variance", "Result", "Moved by one u", "Sensitivity")
     return Table("", header, tuple(rows), (1, 3, 4))
 
 
@@ -69,17 +68,23 @@ def _kind(name: str) -> str:
 def _row(
     share: float, measurement: Content, entry: Content, titles: Mapping[str, str], alike: Mapping[str, set[str]]
 ) -> tuple[str, ...]:
-    where = tables.place(measurement)
+    where = text.prose(tables.place(measurement))
     unit = str(measurement.get("unit") or "")
     name = str(entry.get("name") or entry.get("influence"))
     others = len(alike[_kind(name)]) - 1
     return (
-        name + (f" and {others} more of its kind" if others else ""),
+        name + (f" (and {others} alike)" if others else ""),
         _share(share),
-        tables.symbol_of(str(measurement.get("name", "")), titles).plain + (f" ({where})" if where else ""),
+        _called(tables.symbol_of(str(measurement.get("name", "")), titles)) + (f" ({where})" if where else ""),
         text.with_unit(text.significant(abs(float(entry.get("contribution") or 0.0))), unit),
         budgets.sensitivity(entry, unit),
     )
+
+
+def _called(symbol: Symbol) -> str:
+    """A symbol as prose writes it, which print sets as such."""
+    written = f"{symbol.letter}_{symbol.subscript}"
+    return written if text.SYMBOL.fullmatch(written) else symbol.plain
 
 
 def _share(share: float) -> str:

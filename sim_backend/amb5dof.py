@@ -31,10 +31,12 @@ DEFECTS = {
     "pulse_doubled": 0.0, "pulse_last": 0.0, "loose_speed": 0.0, "loose_shift": 0.0, "loose_weight": 0.0,
     "drop_fraction": 0.0, "integrator_factor": 1.0,
     "dead_after_s": 0.0, "fault_after_s": 0.0, "drive_fault_after_s": 0.0, "weight_lost": 0.0, "weight_astray": 0.0,
+    "hum": 0.0, "hum_hz": 50.0, "hum_probe": 0.0,
     "weight_turned": 0.0, "weight_turned_rad": 0.0, "weight_heavy": 0.0, "weight_heavy_by": 0.0,
 }  # fmt: skip
 """Planted defects and their harmless values. Current signs act on what is told of a bearing's y and z axes,
 `told_*` on the telemetry and captures alone; `factor_*` scales a parameter that the controller is told before it acts;
+`hum` m (0-pk) at `hum_hz` is on the readings of all radial probes in phase, or of the `hum_probe`-th alone (1 to 4);
 `weight_astray`, `weight_turned` and `weight_heavy` are the numbers of weights, as they are fixed, that go wrong."""
 SHARED = {
     "beta": tuple(f"beta_{a}" for a in RADIAL),
@@ -120,6 +122,8 @@ def params(v: Numbers, d: Numbers) -> AmbParams:
         exchange_axes=d["exchange_axes"],
         loose_speed=d["loose_speed"],
         loose_shift=d["loose_shift"],
+        hum=(*(d["hum"] * (d["hum_probe"] in (0, k)) for k in (1, 2, 3, 4)), 0.0),
+        hum_hz=d["hum_hz"] if d["hum"] else 0.0,
         runout=seen["runout"],
         runout_phase=seen["runout_phase"],
     )
@@ -145,6 +149,10 @@ def operator(rig: RigFile, plant: AmbPlant, truth: Truth) -> Balancer:
 def copper_W(plant: AmbPlant) -> float:
     """What its windings dissipate."""
     return plant.params.resistance * sum(i * i for i in plant.currents)
+
+
+NEEDED = (*(f"pos_{a}" for a in AXES), *(f"i_{c}" for c in COILS), "angle", "speed", "pulses", "flags")
+"""Of the channels of the core, those that its telemetry is nothing without."""
 
 
 def places(defects: Numbers, at: Mapping[str, int]) -> tuple[list[int], list[int]]:

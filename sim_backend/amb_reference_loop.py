@@ -17,7 +17,7 @@ from sim_backend.core import LEVITATE, LIFT, DriveLaw
 from sim_backend.core.amb_params import AmbControl, AmbParams
 
 
-def read_positions(p: AmbParams, s: Vector) -> list[float]:
+def read_positions(p: AmbParams, s: Vector, now: float = 0.0) -> list[float]:
     """What the sensors yi, zi, yo, zo, x read (2.17), without noise and quantisation."""
     planes = [displacement(s, place - s[0], p.shape_sensor[b::2]) for b, place in enumerate((-p.l_is, p.l_os))]
     radial = [value for plane in (planes[::-1] if p.exchange_planes else planes) for value in plane]
@@ -26,8 +26,10 @@ def read_positions(p: AmbParams, s: Vector) -> list[float]:
         radial[k] += sum(p.runout[n] * math.cos((n % 4 + 1) * s[5] + p.runout_phase[n]) for n in orders)
     if p.exchange_axes:
         radial = [radial[k] for k in (1, 0, 3, 2)]
-    rows = zip([*radial, s[0]], p.position_sign, p.position_gain, p.position_offset, strict=True)
-    return [clip(sign * (gain * y + off), -p.position_range, p.position_range) for y, sign, gain, off in rows]
+    wave = math.sin(2 * math.pi * p.hum_hz * now)
+    rows = zip([*radial, s[0]], p.position_sign, p.position_gain, p.position_offset, p.hum, strict=True)
+    read = [sign * (gain * y + off) + hum * wave for y, sign, gain, off, hum in rows]
+    return [clip(y, -p.position_range, p.position_range) for y in read]
 
 
 class Tachometer:
@@ -196,7 +198,7 @@ def simulate(
     states, currents, drive_speed = [s], [coil], s[11]
     for tick in range(ticks):
         applied = following  # one sample of delay
-        following = law(read_positions(p, s), tacho.speed(tick * TICK_S))
+        following = law(read_positions(p, s, tick * TICK_S), tacho.speed(tick * TICK_S))
         to = np.maximum((np.clip(applied, 0, p.coil_limit) - offsets) / gains, 0)
         torque = -p.coulomb * s[11] / math.hypot(s[11], p.coulomb_speed)
         if drive:

@@ -39,7 +39,7 @@ def unrounded(p: AmbParams) -> AmbParams:
 
 def quiet(p: AmbParams) -> AmbParams:
     """Without noise and quantisation."""
-    return dataclasses.replace(unrounded(p), position_noise=0.0, current_noise=0.0)
+    return dataclasses.replace(unrounded(p), position_noise=0.0, current_noise=0.0, hum_hz=0.0)
 
 
 def floating(

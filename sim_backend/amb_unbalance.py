@@ -64,8 +64,8 @@ def response(
 
 
 def _turning(p: AmbParams, settings: Mapping[str, float], speed: float) -> AmbPlant:
-    """Lifted and turning at `speed` rad/s; no pulse is missing or doubled."""
-    p = dataclasses.replace(p, pulse_missing=0.0, pulse_doubled=0.0)
+    """Lifted and turning at `speed` rad/s; no pulse is missing or doubled, and no probe hums."""
+    p = dataclasses.replace(p, pulse_missing=0.0, pulse_doubled=0.0, hum_hz=0.0)
     known = AmbControl.__dataclass_fields__
     control = AmbControl(**{k: v for k, v in settings.items() if k in known} | {"law": 0.0, "observer": 0.0})
     plant = AmbPlant(p, 0, control=control)

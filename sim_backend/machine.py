@@ -13,7 +13,7 @@ from bench.errors import ConfigError
 from bench.rigfile import RigFile
 from bench.toleranced import Toleranced
 from sim_backend import amb5dof, amb_quantities, tsbs
-from sim_backend.core import DriveLaw
+from sim_backend.core import CHANNELS, DriveLaw
 
 if TYPE_CHECKING:
     from sim_backend.truth import Truth
@@ -75,6 +75,7 @@ class Machine:
         radial: columns of the plant's rows that come to rest at the end of a lift.
         integral_gains: parameters that the defect `integrator_factor` scales.
         turns: whether the controller can turn the rotor by itself.
+        channels: names without which the telemetry of a DBC cannot be filled.
         places: which columns of the rows are told, and where each goes among the signals of the telemetry.
         spoil: puts planted defects of sensors into telemetry (n, signals).
         supply_V: of the amplifiers.
@@ -94,6 +95,7 @@ class Machine:
     radial: slice
     integral_gains: frozenset[str]
     turns: bool
+    channels: tuple[str, ...]
     places: Callable[[Numbers, Mapping[str, int]], tuple[slice | list[int], list[int]]]
     spoil: Callable[[Array, Mapping[str, int], Numbers], None]
     supply_V: float
@@ -106,14 +108,16 @@ class Machine:
 TSBS = Machine(
     name="tsbs", stated=tsbs.stated, defects=tsbs.DEFECTS, params=tsbs.params, quantities=tsbs.quantities,
     targets={"K_i": "slope_i", "K_o": "slope_o"}, make=tsbs.make, radial=slice(0, 4),
-    integral_gains=frozenset(("ki_i", "ki_o", "ki_z", "ki_m")), turns=True, places=tsbs.places, spoil=tsbs.spoil,
+    integral_gains=frozenset(("ki_i", "ki_o", "ki_z", "ki_m")), turns=True,
+    channels=CHANNELS, places=tsbs.places, spoil=tsbs.spoil,
     supply_V=148.0, windings={"temp_i": 0.0, "temp_o": 2.0, "temp_m": -3.0}, copper_W=tsbs.copper_W,
     operator=tsbs.operator,
 )  # fmt: skip
 AMB5DOF = Machine(
     name="amb5dof", stated=amb5dof.stated, defects=amb5dof.DEFECTS, params=amb5dof.params,
     quantities=amb_quantities.quantities, targets={}, make=amb5dof.make, radial=slice(0, 4),
-    integral_gains=frozenset(("ki", "k0")), turns=False, places=amb5dof.places, spoil=amb5dof.spoil, supply_V=48.0,
+    integral_gains=frozenset(("ki", "k0")), turns=False,
+    channels=amb5dof.NEEDED, places=amb5dof.places, spoil=amb5dof.spoil, supply_V=48.0,
     windings={"temp_i": 0.0, "temp_o": 2.0, "temp_x": -3.0}, copper_W=amb5dof.copper_W, operator=amb5dof.operator,
     traced=amb5dof.traced,
 )  # fmt: skip

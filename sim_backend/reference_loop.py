@@ -205,8 +205,9 @@ def settled_currents(p: PlantParams, reference: Sequence[float], now_s: float) -
             reference[:10], p.coil_limit, p.current_offset, p.current_drift, p.current_gain, strict=True
         )
     ]
+    scale = 1 + p.segment_scale_drift * now_s
     return coil + [
-        (clip(r, -p.segment_limit, p.segment_limit) - offset - drift * now_s) / gain
+        (clip(r, -p.segment_limit, p.segment_limit) - offset - drift * now_s) / (gain * scale)
         for r, offset, drift, gain in zip(
             reference[10:], p.segment_offset, p.segment_drift, p.segment_sense, strict=True
         )

@@ -14,6 +14,7 @@ from bench.errors import ConfigError
 from bench.rigfile import RigFile
 from sim_backend.draws import draw_one
 from sim_backend.machine import Machine, machine_of
+from sim_backend.unspoken import unspoken
 
 
 @dataclass(frozen=True)
@@ -81,6 +82,8 @@ def draw(
             f"rig {rig.name}: found no [simulation] table, so that there is nothing to simulate; expected --backend live"
         )
     machine = machine_of(rig)
+    if lacking := tuple(unspoken(rig, machine)):
+        raise ConfigError(f"rig {rig.name} cannot be simulated:", lacking)
     tolerances = machine.stated(rig)
     values = {name: draw_one(t, seed, name) for name, t in tolerances.items()}
     values |= {k: float(v) for k, v in rig.simulation.items() if isinstance(v, int | float)}

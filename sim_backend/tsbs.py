@@ -31,11 +31,11 @@ DEFECTS = {
     "stuck_current_yo_p": 0.0, "coil_limit_yo_p": 0.0, "mass_error_M1": 0.0, "mass_error_M2": 0.0, "mass_error_M3": 0.0,
     "mass_error_M4": 0.0, "hanger_off_at_zero": 0.0, "drop_fraction": 0.0, "integrator_factor": 1.0, "dead_after_s": 0.0,
     "fault_after_s": 0.0, "drive_fault_after_s": 0.0, "exchange_segments": 0.0, "segment_sign_1": 1.0,
-    "encoder_sign": 1.0, "lever_slip": 0.0, "drive_brakes": 0.0, "factor_gamma": 1.0, "factor_kp_theta": 1.0,
-    "factor_kd_theta": 1.0, "factor_sine_amplitude": 1.0, "factor_angle_ref": 1.0,
+    "encoder_sign": 1.0, "lever_slip": 0.0, "segment_scale_drift": 0.0, "drive_brakes": 0.0, "factor_gamma": 1.0,
+    "factor_kp_theta": 1.0, "factor_kd_theta": 1.0, "factor_sine_amplitude": 1.0, "factor_angle_ref": 1.0,
 }  # fmt: skip
-"""Planted defects and their harmless values. Mass errors are relative; `factor_...` is what the
-controller makes of a parameter, over what it was told."""
+"""Planted defects and their harmless values. Mass errors are relative; `factor_...` is what the controller makes of a
+parameter, over what it was told; `segment_scale_drift` is relative, 1/s, of all four segments' sensors."""
 
 
 def stated(rig: RigFile) -> dict[str, Toleranced]:
@@ -151,6 +151,7 @@ def _sensed(plant: PlantParams, v: Mapping[str, float], d: Mapping[str, float]) 
         segment_sense=_four(v, *(f"{c}.gain" for c in SEGMENTS)),
         segment_offset=_four(v, *(f"{c}.offset" for c in SEGMENTS)),
         segment_drift=_four(v, *(f"segment_drift_{k}" for k in range(4))),
+        segment_scale_drift=d["segment_scale_drift"],
         encoder_sign=d["encoder_sign"],
         position_gain=tuple(v[f"position_gain_{a}"] for a in AXES),
         position_offset=tuple(v[f"position_offset_{a}"] for a in AXES),

@@ -11,6 +11,7 @@ from scipy.stats import t as student
 
 from bench.campaign_bands import LEVEL, Quantity, Sample, Unable, band, coverage, tails
 from bench.campaign_speed import speed
+from bench.cli.campaign_coverage import Result
 from bench.limits import Verdict
 from bench.uncertainty import Estimate, Influence, interval
 from bench.uncertainty.tails import tails_of_draws, tails_of_t
@@ -194,6 +195,17 @@ def test_the_verdict_of_a_quantity_has_its_tails_in_it_and_names_the_worst() -> 
                    tuple(planted), 0)  # fmt: skip
     assert row.verdict is Verdict.FAIL
     assert row.farthest[0] == (907, pytest.approx(-12.0))
+
+
+def test_the_table_says_which_step_a_row_is_of() -> None:
+    """The same quantity stands in it once for each step that measures it."""
+    found = samples(60)
+    rows = tuple(
+        Quantity(step, "p", "q", "m", "", True, coverage(found, 60), tails(found, 2), tuple(range(60)), tuple(found), 0)
+        for step in (2, 3)
+    )
+    lines = Result(60, 0, rows, (), (), {}, {}, 1.0, None, Verdict.PASS).text().splitlines()
+    assert [line.split("  ")[0] or line.split()[0] for line in lines[2:6]] == ["step 2, p", "q", "step 3, p", "q"]
 
 
 def test_the_share_of_machines_that_cannot_do_a_step_has_an_interval() -> None:

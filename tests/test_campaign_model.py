@@ -81,7 +81,7 @@ def test_a_constant_says_where_it_comes_from_and_what_limits_it() -> None:
     assert [t.influence for t in k.terms] == ["scatter/1", "site/gravity", "sensors/i_yi_p/gain"]
     assert sum(t.share for t in k.terms) == pytest.approx(1.0)
     assert k.rest == 0.0
-    shares = shares_by_kind(source.record.measurements[0].budget)
+    shares = shares_by_kind(source.record.measurements[0])
     assert set(shares) == {"sensors", "site", "run"}
     assert shares["run"] == pytest.approx(k.terms[0].share)
 

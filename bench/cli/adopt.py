@@ -27,7 +27,7 @@ def adopt(run: Path, rig: str = "", calibrations: Path | None = None, anyway: bo
         BenchError: its recording cannot be read or analysed.
     """
     adoption = Adoption.open(run)
-    made = adoption.calibration(load_procedure(adoption.record.procedure), anyway)
+    made = adoption.calibration(load_procedure(adoption.recording.procedure), anyway)
     then = adoption.recording.wall.get("rig_file", "")
     file = load_rig(rig or (then if Path(then).is_file() else str(catalogue.rig_path(made.rig))))
     store = Store.of(file, made.seed, calibrations)

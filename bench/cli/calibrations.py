@@ -12,10 +12,10 @@ from bench import calibrationfile, catalogue
 from bench.calibration import Calibration, changed_certificates, number
 from bench.calibrationstore import Store, base_of, machine, stores_of
 from bench.cli.adopt import values
+from bench.cli.compose import load_procedure
 from bench.errors import ConfigError
 from bench.outcomes import SOUND
 from bench.rigfile import RigFile, load_rig
-from bench.specs import load_spec
 
 HEADER = ("machine", "procedure", "bias", "date", "age", "due", "state")
 
@@ -35,18 +35,22 @@ def calibrations_command(rig: str, calibrations: Path | None) -> int:
     now = datetime.now(UTC)
     rows = [row for store in stores_of(file, calibrations) for row in rows_of(store, file, now)]
     if not rows:
-        # Procedures of another rig would not start on this one: those with limits for it do.
-        first = next(
-            (p.name for p in catalogue.PROCEDURES if load_spec(file.name, p.name)), catalogue.PROCEDURES[0].name
-        )
+        first = first_to_run(file)
         where = "" if calibrations is None else f" --calibrations {calibrations}"
+        then = f"`bench run {first} --rig {rig}`, then `bench adopt RUN{where}` with the folder that it prints"
         sys.stderr.write(
-            f"no calibrations in {base_of(file, calibrations)}. Next: `bench run {first} --rig {rig}`, then "
-            f"`bench adopt RUN{where}` with the folder that it prints\n"
+            f"no calibrations in {base_of(file, calibrations)}. Next: {then if first else f'`bench check {rig}`'}\n"
         )
         return 0
     sys.stdout.write(table(rows))
     return 2 if any(row.cells[-1] == "unreadable" for row in rows) else 0
+
+
+def first_to_run(rig: RigFile) -> str:
+    """The first procedure that the rig can run and whose calibration another one uses there; else the first that it can run."""
+    able = [p for p in map(load_procedure, (e.name for e in catalogue.PROCEDURES)) if not p.requires.lacking(rig)]
+    used = {need.procedure for p in able for need in p.needs(p.plan())}
+    return next((p.name for p in able if p.name in used), able[0].name if able else "")
 
 
 def rows_of(store: Store, rig: RigFile, now: datetime) -> Iterator[Row]:
@@ -66,9 +70,14 @@ def rows_of(store: Store, rig: RigFile, now: datetime) -> Iterator[Row]:
 
 
 def row(c: Calibration, store: Store, rig: RigFile, now: datetime, current: bool) -> Row:
-    """One calibration and its state: current, expired, superseded, other rig, other certificates."""
+    """One calibration and its state: current, expired, superseded, other rig, other certificates, in the future."""
     notes = [f"adopted although its outcome was {c.outcome}"] if c.outcome not in SOUND else []
     notes += [f"rests on {u.procedure}, which had expired on {u.due}" for u in c.used if u.state == "expired"]
+    notes += (
+        []
+        if c.sealed
+        else [f"carries no digest; its content has {calibrationfile.digest_of(calibrationfile.content(c))}"]
+    )
     state = "current"
     if foreign := store.foreign(c):
         state, notes = "other rig", [foreign]
@@ -76,6 +85,8 @@ def row(c: Calibration, store: Store, rig: RigFile, now: datetime, current: bool
         state = "superseded"
     elif changed := changed_certificates(c.certificates, rig):
         state, notes = "other certificates", [*notes, *changed]
+    elif c.ahead(now):
+        state = "in the future"
     elif c.overdue(now):
         state = "expired"
     notes += _outlived(c, store) if state == "current" else []

@@ -47,7 +47,10 @@ class Result:
         widest = max((len(row.name) for row in self.rows), default=0)
         if self.rows:
             lines.append(f"  {'':{widest}}  coverage  width   >2U   >3U  >10U")
-        lines += [f"  {row.name:{widest}}  {_figures(row)}" for row in self.rows]
+        for row, before in zip(self.rows, (None, *self.rows), strict=False):
+            if before is None or before.step != row.step:
+                lines.append(f"step {row.step}, {row.procedure}")
+            lines.append(f"  {row.name:{widest}}  {_figures(row)}")
         if self.rows:
             low, high = self.rows[0].coverage.band
             lines.append(f"bands: coverage {low:.4f} to {high:.4f}, width 0.80 to 1.25; errors far out: found/at most")
@@ -101,7 +104,7 @@ def _figures(row: Quantity) -> str:
 
 def _farthest(row: Quantity) -> str:
     worst = ", ".join(f"{ratio:+.1f} U on seed {seed}" for seed, ratio in row.farthest[:SHOWN])
-    return f"{row.name}: {worst}"
+    return f"{row.name} in step {row.step}: {worst}"
 
 
 def _unable(u: Unable) -> str:

@@ -66,7 +66,7 @@ def _summary(
     from reports import campaign_model as page
 
     shares = {
-        campaign_model.label(m): campaign_model.shares_by_kind(m.budget)
+        campaign_model.label(m): campaign_model.shares_by_kind(m)
         for r in records.values()
         for m in r.measurements
         if m.value is not None

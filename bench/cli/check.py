@@ -55,7 +55,8 @@ def check_rig_file(rig: str, procedure: str = "") -> int:
     if file is not None:
         able = abilities(file, procedure)
         of_procedures = dict.fromkeys(p for a in able for p in a.problems)  # a spec that cannot be read is each one's
-        problems += (*unknown_plans(file), *_of_spec(file.name), *of_procedures, *_of_simulation(file))
+        of_files = (*_of_spec(file.name), *of_procedures, *_of_simulation(file), *_of_calibrations(file))
+        problems += (*unknown_plans(file), *of_files)
     for problem in problems:
         sys.stderr.write(f"{problem}\n")
     if load is not None:
@@ -71,6 +72,26 @@ def check_rig_file(rig: str, procedure: str = "") -> int:
         return USAGE if problems or lines else PASS
     sys.stdout.write(told(able, rig) if able else "")
     return USAGE if problems else PASS
+
+
+def _of_calibrations(rig: RigFile) -> Iterator[Problem]:
+    """The current calibrations beside the rig file that no run would take: not to be read, changed, or of the future."""
+    from datetime import UTC, datetime
+
+    from bench.calibrationfile import read
+    from bench.calibrationstore import stores_of
+    from bench.errors import ConfigError, Problem
+
+    now = datetime.now(UTC)
+    for path in (p for store in stores_of(rig) for p in store.current_files()):
+        try:
+            c = read(path)
+        except ConfigError as error:
+            first, *_ = str(error).removeprefix(f"{path}: ").splitlines()
+            yield from error.problems or [Problem(str(path), "calibration", first.rstrip(":"), "one that can be read")]
+            continue
+        if c.ahead(now):
+            yield Problem(str(path), "date", c.date, f"one that is past; the clock says {now:%Y-%m-%dT%H:%M:%S+00:00}")
 
 
 def _of_spec(rig: str) -> Iterator[Problem]:
@@ -89,9 +110,10 @@ def _of_simulation(rig: RigFile) -> Iterator[Problem]:
     if not rig.simulation:
         return
     from sim_backend.machine import machine_of
+    from sim_backend.unspoken import unspoken
 
     try:
-        machine_of(rig)
+        yield from unspoken(rig, machine_of(rig))
     except ConfigError as error:
         place, _, said = str(error).partition(": found ")
         found, _, expected = said.partition("; expected ")

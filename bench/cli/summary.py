@@ -33,7 +33,7 @@ def summary(record: Record, directory: Path, *, whole: bool = False, width: int 
     lines += _labelled("decided", _decided(record, deciding), width)
     if missing := len(record.measurements) - len(measured):
         lines += _labelled("missing", [f"nothing was measured of {missing} declared quantities"], width)
-    lines += _labelled("results", _table(shown), None)
+    lines += _labelled("results", _table(shown, width - LABEL - 2), None)
     if whole:
         lines += _labelled("notes", [_finding(f) for f in notes], width)
     left = [_count(len(results) - len(shown), "more result"), "" if whole else _count(len(notes), "note")]
@@ -69,13 +69,22 @@ def _some(words: str, names: Sequence[str]) -> str:
     return f"{words}: {'; '.join(names[:3])}" + (f" and {len(names) - 3} more" if len(names) > 3 else "")
 
 
-def _table(results: Sequence[Measurement]) -> list[str]:
-    """A line each: name with its place, value, verdict, limit."""
+def _table(results: Sequence[Measurement], width: int) -> list[str]:
+    """A line each: name with its place, value, verdict, limit. Where that is wider than `width`, limits that were met are left
+    to the report, and the others stand on lines of their own."""
     rows = [
         (_name(m), _value(m), "" if m.verdict is Verdict.NONE else m.verdict.value, _limit(m.limit)) for m in results
     ]
     widths = [max((len(row[k]) for row in rows), default=0) for k in range(3)]
-    return ["  ".join(text.ljust(w) for text, w in zip(row, [*widths, 0], strict=True)).rstrip() for row in rows]
+    lines = ["  ".join(text.ljust(w) for text, w in zip(row, [*widths, 0], strict=True)).rstrip() for row in rows]
+    if max(map(len, lines), default=0) <= width:
+        return lines
+    told: list[str] = []
+    for m, row in zip(results, rows, strict=True):
+        told.append("  ".join(text.ljust(w) for text, w in zip(row[:3], widths, strict=True)).rstrip())
+        if row[3] and m.verdict is not Verdict.PASS:
+            told.append(f"  {row[3]}")
+    return told
 
 
 def _name(m: Measurement) -> str:

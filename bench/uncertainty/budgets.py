@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from decimal import ROUND_HALF_EVEN, Context, Decimal
 from typing import Literal
 
+from bench.uncertainty.coverage import Interval
 from bench.uncertainty.estimate import Estimate
 
 LONG = Context(prec=700)  # digits between the greatest float and the smallest: quantize refuses what does not fit
@@ -14,7 +15,10 @@ LONG = Context(prec=700)  # digits between the greatest float and the smallest: 
 
 @dataclass(frozen=True, slots=True)
 class BudgetRow:
-    """One influence: contribution |c u| in the estimate's unit, sensitivity c, and its share of the variance, 0..1."""
+    """One influence: its contribution in the estimate's unit, sensitivity c (the derivative at the inputs' values), its
+    share of the variance, 0..1, and its own standard uncertainty u in its unit.
+
+    The contribution is |c| u; in an interval by Monte Carlo it is what the influence has of the draws' standard deviation."""
 
     name: str
     id: str
@@ -25,17 +29,19 @@ class BudgetRow:
     dof: float
     share: float
     unit: str = ""  # of the influence
+    u: float = 0.0
 
 
-def budget(estimate: Estimate) -> list[BudgetRow]:
-    """All influences, the largest contribution first; equal ones by id."""
-    u = estimate.u
-    rows = [
-        BudgetRow(
-            i.name, i.id, abs(c * i.u), c, i.kind, i.distribution, i.dof, (c * i.u / u) ** 2 if u > 0 else 0.0, i.unit
-        )
-        for i, c in estimate.sensitivities.items()
-    ]
+def budget(estimate: Estimate, found: Interval | None = None) -> list[BudgetRow]:
+    """All influences, the largest contribution first; equal ones by id. With `found`, the estimate's interval, they are those
+    of its standard uncertainty: by Monte Carlo the shares add up to less than 1 where influences act together only."""
+    drawn = {} if found is None else found.contributions
+    u = found.u if drawn and found and found.u is not None else estimate.u
+    rows = []
+    for i, c in estimate.sensitivities.items():
+        part = drawn.get(i.id, 0.0) if drawn else abs(c * i.u)
+        share = (part / u) ** 2 if u > 0 else 0.0
+        rows.append(BudgetRow(i.name, i.id, part, c, i.kind, i.distribution, i.dof, share, i.unit, i.u))
     return sorted(rows, key=lambda row: (-row.contribution, row.id))
 
 

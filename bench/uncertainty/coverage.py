@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Literal
 
@@ -13,6 +14,7 @@ from scipy.special import ndtri, stdtrit
 
 from bench.errors import AnalysisError
 from bench.uncertainty.estimate import Array, Estimate, Influence
+from bench.uncertainty.maineffects import FEW, Group, main_effects, straight
 from bench.uncertainty.propagation import BATCH, ManyDraws
 from bench.uncertainty.tails import Tails, tails_of_draws, tails_of_t
 
@@ -22,7 +24,6 @@ MOST_ASKED = 20_000  # draws for which a model itself is asked, in batches: some
 ENDS_KNOWN = 0.025  # of U: what its ends may be unsure by, 5 % of u: between one and two digits of u (JCGM 101, 7.9.2)
 DOMINANT = 0.5  # share of the variance beyond which one non-normal component decides the shape
 KEPT = 12  # drawn influences, 1.6 MB each
-FEW = 2  # degrees of freedom at which a t distribution has no standard deviation, and fewer
 NO_U = "no standard deviation"
 ONE_DRAW = 0.1  # of the sum of squares: of a normal's 200 000 draws the greatest carries 0.0001
 MINOR = 0.01  # share of the variance under which a component's own shape does not show
@@ -36,7 +37,8 @@ class Interval:
     `u` is the standard uncertainty by the same method: of the linear model, or the standard deviation of the draws. It and k
     are None where the interval alone is stated: with two degrees of freedom or fewer, and where the distribution has no
     standard deviation. `tails` are the probabilities of an error beyond multiples of the half width
-    (`bench.uncertainty.tails`).
+    (`bench.uncertainty.tails`). `contributions` are what influences, by id, have of `u`, where that is of the draws
+    (`bench.uncertainty.maineffects`); empty where those of the linear model are.
     """
 
     low: float
@@ -48,6 +50,7 @@ class Interval:
     why: str
     u: float | None
     tails: Tails
+    contributions: Mapping[str, float] = field(default_factory=dict)
 
 
 def welch_satterthwaite(estimate: Estimate) -> float:
@@ -105,17 +108,19 @@ def interval(estimate: Estimate, seed: int = 0) -> Interval:
         u = estimate.u if dof > FEW else None
         why = "normal or many comparable components, linear model"
         return _stated(estimate.value - wide, estimate.value + wide, dof, "gum", why, u, tails_of_t(k, dof))
+    deviations: dict[str, Array] = {}
     try:
-        drawn = _sampled(estimate, seed)
+        drawn = _sampled(estimate, seed, deviations)
     except ManyDraws:
-        drawn, unsure = _in_batches(estimate, seed)
+        drawn, unsure = _in_batches(estimate, seed, deviations)
         reason += f"; the model was asked for {len(drawn)} draws, which leave {unsure:.1%} of U open at its ends"
     low, high = (float(q) for q in np.quantile(drawn, [0.025, 0.975]))
     if not (math.isfinite(low) and math.isfinite(high)):
         raise AnalysisError("the model does not give finite numbers over the spread of its inputs")
     u = None if _few(estimate) else _standard_deviation(drawn)
     beyond = tails_of_draws(drawn, estimate.value, low, high)
-    return _stated(low, high, dof, "monte-carlo", reason if u is not None else f"{reason}; {NO_U}", u, beyond)
+    stated = _stated(low, high, dof, "monte-carlo", reason if u is not None else f"{reason}; {NO_U}", u, beyond)
+    return stated if u is None else replace(stated, contributions=_contributions(estimate, deviations, drawn, u))
 
 
 def _stated(
@@ -124,6 +129,20 @@ def _stated(
     half = (high - low) / 2
     k = None if u is None else half / u if u > 0 else 0.0
     return Interval(low, high, k, half, dof, method, why, u, tails)
+
+
+def _contributions(estimate: Estimate, deviations: Mapping[str, Array], drawn: Array, u: float) -> dict[str, float]:
+    if not estimate.nonlinear:
+        return straight(estimate.sensitivities)
+    return main_effects([members for _, members in _ensembles(estimate)], deviations, drawn, u)
+
+
+def _ensembles(estimate: Estimate) -> list[tuple[float, Group]]:
+    """Influences with their sensitivities, those of one covariance together, each group with its degrees of freedom."""
+    together: dict[tuple[str, float], list[tuple[Influence, float]]] = {}
+    for influence, c in estimate.sensitivities.items():
+        together.setdefault((ensemble(influence), influence.dof), []).append((influence, c))
+    return [(dof, members) for (_, dof), members in together.items()]
 
 
 def _few(estimate: Estimate) -> bool:
@@ -142,19 +161,19 @@ def _standard_deviation(drawn: Array) -> float | None:
     return float(drawn.std(ddof=1))
 
 
-def _sampled(estimate: Estimate, seed: int) -> Array:
-    """Draws of the output. In a linear model what is normal, and what carries under a hundredth of the variance by
+def _sampled(estimate: Estimate, seed: int, deviations: dict[str, Array]) -> Array:
+    """Draws of the output; of a model that is not linear, those of its influences into `deviations`.
+
+    In a linear model what is normal, and what carries under a hundredth of the variance by
     itself, is drawn as one normal of their joint variance, and the roots of one covariance are drawn as one t: a few draws in
     place of some hundred. What the former leaves out of the fourth moment is under a hundredth of it, and moves the interval by
     less than the draws scatter."""
     if estimate.nonlinear:
-        return estimate.sampled({i.id: draw(i, seed, DRAWS) for i in estimate.sensitivities})
-    together: dict[tuple[str, float], list[tuple[Influence, float]]] = {}
-    for influence, c in estimate.sensitivities.items():
-        together.setdefault((ensemble(influence), influence.dof), []).append((influence, c))
+        deviations.update({i.id: draw(i, seed, DRAWS) for i in estimate.sensitivities})
+        return estimate.sampled(deviations)
     small, variance = MINOR * estimate.u**2, 0.0
     apart: dict[Influence, float] = {}
-    for (_, dof), members in together.items():
+    for dof, members in _ensembles(estimate):
         own = math.fsum((c * i.u) ** 2 for i, c in members)
         if (math.isinf(dof) and members[0][0].distribution == "normal") or (own < small and dof > 4):
             variance += own if math.isinf(dof) else own * dof / (dof - 2)
@@ -167,15 +186,16 @@ def _sampled(estimate: Estimate, seed: int) -> Array:
     return Estimate(estimate.value, estimate.unit, apart).sampled({i.id: draw(i, seed, DRAWS) for i in apart})
 
 
-def _in_batches(estimate: Estimate, seed: int) -> tuple[Array, float]:
-    """Draws of a model that is asked for each of them, until twice the standard deviation of either end's mean over the batches
-    is small beside U (JCGM 101, 7.9.4, for the ends alone: where there is no u it would never end), and that over U."""
-    drawn = {i.id: draw(i, seed, MOST_ASKED) for i in estimate.sensitivities}
+def _in_batches(estimate: Estimate, seed: int, deviations: dict[str, Array]) -> tuple[Array, float]:
+    """Draws of a model that is asked for each of them (those of its influences into `deviations`), until twice the standard
+    deviation of either end's mean over the batches is small beside U (JCGM 101, 7.9.4, for the ends alone: where there is no
+    u it would never end), and that over U."""
+    deviations.update({i.id: draw(i, seed, MOST_ASKED) for i in estimate.sensitivities})
     parts: list[Array] = []
     ends: list[Array] = []
     unsure = math.inf
     for start in range(0, MOST_ASKED, BATCH):
-        parts.append(estimate.sampled({key: v[start : start + BATCH] for key, v in drawn.items()}))
+        parts.append(estimate.sampled({key: v[start : start + BATCH] for key, v in deviations.items()}))
         ends.append(np.quantile(parts[-1], [0.025, 0.975]))
         if len(parts) > 2:
             low, high = np.mean(ends, axis=0)

@@ -21,6 +21,8 @@ from bench.uncertainty import Estimate
 from procedures.estimators import (
     balance_decision,
     balance_estimates,
+    balance_hum,
+    hum,
     tracking_wiring,
     unbalance_bearings,
     unbalance_checks,
@@ -142,7 +144,10 @@ def evaluated(recording: Recording[Any]) -> Evaluated:
     last = shown[-1].name
     found.append(unbalance_bearings.told(model, plan))
     found += _of_result(balance, recorded, shown, plan, rig)
-    return Evaluated(tuple(found), balance, recorded, last, balance_estimates.influences(balance, rig))
+    influences = balance_estimates.influences(balance, rig)
+    slow = next((d for d in recorded.dwells if d.kind == SLOW), None)
+    found += balance_hum.of_balance(hum.heard(recording, slow), recorded, balance, (BASE, last), influences)
+    return Evaluated(tuple(found), balance, recorded, last, influences)
 
 
 def _refusals(recording: Recording[Any]) -> Iterator[Finding]:

@@ -14,7 +14,7 @@ from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.uncertainty import interval
-from procedures.estimators import signals, unbalance_checks, unbalance_plan
+from procedures.estimators import hum, signals, unbalance_checks, unbalance_plan
 from procedures.estimators.runup_data import LEAST_TURNS, MISSED, PASSAGE, Passage
 from procedures.estimators.runup_estimates import DAMPED, Peak, Run, asked_margin
 from procedures.estimators.unbalance_checks import HELD
@@ -196,7 +196,7 @@ def _when(p: Passage, samples: Mask) -> str:
     return f", first at {first:.0f} and last at {last:.0f} r/min"
 
 
-def of_run(run: Run, plan: Settings) -> Iterator[Finding]:
+def of_run(run: Run, recording: Recording[Any], plan: Settings) -> Iterator[Finding]:
     """What the turns about the captures say of wiring and zones; then the criticals, as notes."""
     if run.near is None:
         text = "the shaft came through none of the speeds at which vectors were asked for."
@@ -204,6 +204,9 @@ def of_run(run: Run, plan: Settings) -> Iterator[Finding]:
         return
     yield from unbalance_checks.sampling([r.dwell for r in run.near.dwells], plan)
     yield from unbalance_checks.of_results(run.near, plan)
+    sound = hum.heard(recording, run.slow)
+    yield from hum.of_dwells(sound, run.near.dwells)
+    yield from hum.of_peaks(sound, [p for p in run.peaks if p.critical])
     yield from _criticals(run, plan)
     yield from _passed(run)
 

@@ -7,7 +7,16 @@ right end; with gamma_0 the error of the encoder's zero and M pole pairs
 
 T prints m l = alpha_tau cos(M gamma) i: gravity is missing, and the current without load too, which holds detent, the
 sensors' offsets and any constant torque. At each gamma i_base is a straight line in time through the loads' own steps and
-those without load, fitted together with alpha_tau and gamma_0, so that linear drift drops out as well.
+those without load, fitted together with alpha_tau and gamma_0, so that a linear drift of offsets drops out as well.
+
+A scale that drifts (current sensors, magnets, amplifiers that warm up) is another matter: to the loads, torque per current
+that changes by a share D over their time is
+
+    alpha_tau (1 + D (t - t_mean)/span)
+
+with which gamma_0 would be confused if gamma went in one direction: a turn by gamma_0 changes it by M gamma_0 tan(M gamma).
+The procedure visits the phase angles in an order in which tan(M gamma) and time are nearly orthogonal, and D is fitted along:
+it costs gamma_0 next to nothing. alpha_tau is that of the loads' mean time.
 
 A loaded rotor comes to rest where its encoder changes between two counts, half a count beside the ones that the integrator
 ignores: theta = +-1.5 counts. There the torque's ripple (T 5.25, third harmonic of the poles) has turned a little:
@@ -78,14 +87,28 @@ NO_DETENT = Detent(0.0, 0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
+class Extra:
+    """One more term: its `value`, standard uncertainty `u` (from the residuals), and t = value / u."""
+
+    value: float
+    u: float
+
+    @property
+    def t(self) -> float:
+        return self.value / self.u if self.u > 0 else 0.0
+
+
+@dataclass(frozen=True)
 class Balance:
-    """`alpha` N m/A, `gamma_0` rad, their `covariance` (2, 2) from the residuals; `ripple` r; `current` (n,) A the torque
-    current freed of sensors and detent, `base` (n,) A without load, `torque` (n,) N m of the loads; `fit` has residuals (n,) A;
-    `u` (n,) how far each step may scatter, relative to the others; M, the `pole_pairs`."""
+    """`alpha` N m/A, `gamma_0` rad, their `covariance` (2, 2) from the residuals; `ripple` r; `drift` D of the torque per
+    current over the loads' time, relative; `current` (n,) A the torque current freed of sensors and detent, `base` (n,) A
+    without load, `torque` (n,) N m of the loads; `fit` has residuals (n,) A; `u` (n,) how far each step may scatter, relative
+    to the others; M, the `pole_pairs`."""
 
     alpha: float
     gamma_0: float
     ripple: float
+    drift: Extra
     covariance: Array
     current: Array
     base: Array
@@ -176,44 +199,45 @@ def balance(
         lines[mine, 2 * k + 1] = s.time[mine] - s.time[mine].mean()
 
     off = 6 * pole_pairs * s.angle * (s.side != 0)
+    late = (s.time - np.average(s.time, weights=torque**2)) / np.ptp(s.time)
 
-    def pull(
-        q: Array,
-    ) -> tuple[Array, Array, Array]:  # torque per current over alpha, and its derivatives by turn and r
+    def pull(q: Array) -> tuple[Array, Array, Array]:
+        """Torque per current over alpha before it drifts, and its derivatives by turn and r."""
         turn = pole_pairs * (s.gamma - q[1])
         ripple = np.cos(turn + off) - np.cos(turn)
         by_turn = -np.sin(turn) - q[2] * (np.sin(turn + off) - np.sin(turn))
         return np.cos(turn) + q[2] * ripple, by_turn, ripple
 
     def model(q: Array) -> Array:
-        out: Array = -torque / (q[0] * pull(q)[0]) + lines @ q[3:]
+        out: Array = -torque / (q[0] * pull(q)[0] * (1 + q[3] * late)) + lines @ q[4:]
         return out
 
     def slopes(q: Array) -> Array:
-        per, by_turn, ripple = pull(q)
-        part = -torque / (q[0] * per)
-        return np.column_stack([-part / q[0], part * by_turn * pole_pairs / per, -part * ripple / per, lines])
+        (per, by_turn, ripple), drifted = pull(q), 1 + q[3] * late
+        part = -torque / (q[0] * per * drifted)
+        return np.column_stack(
+            [-part / q[0], part * by_turn * pole_pairs / per, -part * ripple / per, -part * late / drifted, lines]
+        )
 
     start = linear(np.column_stack([-torque / np.cos(pole_pairs * s.gamma), lines]), current).terms
     relative = np.ones_like(current) if u is None else u / np.sqrt(np.mean(u**2))
-    fit = nonlinear(model, current, np.concatenate([[1 / start[0], 0.0, 0.0], start[1:]]), relative, slopes)
+    fit = nonlinear(model, current, np.concatenate([[1 / start[0], 0.0, 0.0, 0.0], start[1:]]), relative, slopes)
     alpha, gamma_0, ripple = (float(x) for x in fit.terms[:3])
-    covariance = fit.covariance[:2, :2] * fit.chi2 / fit.dof
+    covariance = fit.covariance[:4, :4] * fit.chi2 / fit.dof
+    drift = Extra(float(fit.terms[3]), math.sqrt(covariance[3, 3]))
     return Balance(
-        alpha, gamma_0, ripple, covariance, current, lines @ fit.terms[3:], torque, fit, relative, pole_pairs
+        alpha,
+        gamma_0,
+        ripple,
+        drift,
+        covariance[:2, :2],
+        current,
+        lines @ fit.terms[4:],
+        torque,
+        fit,
+        relative,
+        pole_pairs,
     )
-
-
-@dataclass(frozen=True)
-class Extra:
-    """What one more term would explain: its `value`, standard uncertainty `u` (from the residuals), and t = value / u."""
-
-    value: float
-    u: float
-
-    @property
-    def t(self) -> float:
-        return self.value / self.u if self.u > 0 else 0.0
 
 
 def extra(b: Balance, column: Array) -> Extra:
@@ -250,11 +274,13 @@ def shape_over_gamma(b: Balance, s: Steps) -> tuple[float, float]:
     of a torque per current that the data show at a phase angle.
 
     Tried are the relative deviations over gamma that neither alpha_tau (the same at each) nor gamma_0 (tan(M (gamma -
-    gamma_0)), to first order) can make. What the arms and each mass are off by is fitted along: it is no matter of gamma.
+    gamma_0)), to first order) nor a drift of the scale (the time of each) can make. What the arms and each mass are off by
+    is fitted along: it is no matter of gamma.
     """
     angles, index = np.unique(s.gamma, return_inverse=True)
-    taken = np.column_stack([np.ones_like(angles), np.tan(b.pole_pairs * (angles - b.gamma_0))])
-    shapes = np.linalg.svd(taken)[0][:, 2:]  # (angles, angles - 2), orthonormal, at right angles to both
+    when = np.array([s.time[index == k].mean() for k in range(len(angles))])
+    taken = np.column_stack([np.ones_like(angles), np.tan(b.pole_pairs * (angles - b.gamma_0)), when - when.mean()])
+    shapes = np.linalg.svd(taken)[0][:, 3:]  # (angles, angles - 3), orthonormal, at right angles to these
     carried = loaded(b) / b.u
     beside = [carried * s.side, *(carried * (s.load == k) for k in range(1, s.load.max() + 1))]
     known = np.column_stack([b.fit.jacobian / b.u[:, None], *beside])
@@ -269,17 +295,3 @@ def shape_over_gamma(b: Balance, s: Steps) -> tuple[float, float]:
     more = shapes.shape[1]
     excess = max(float((without**2).sum()) - rest, 0.0) / more / (rest / dof)
     return float(special.fdtrc(more, dof, excess)), float(np.abs(shapes @ terms[-more:]).max())
-
-
-def slopes_over_gamma(b: Balance, s: Steps, side: int) -> tuple[Array, Array, Array]:
-    """Phase angles (k,) rad, torque per current N m/A of one side's loads at each, and its u from the residuals."""
-    angles = np.unique(s.gamma)
-    slopes, u = [], []
-    for gamma in angles:
-        mine = (s.gamma == gamma) & (s.side == side)
-        torque, current = b.torque[mine] / b.u[mine], (b.current - b.base)[mine] / b.u[mine]
-        size = float(torque @ torque)
-        slope = -float(torque @ current) / size  # A per N m
-        slopes.append(1 / slope)
-        u.append(b.scale / math.sqrt(size) / slope**2)
-    return angles, np.array(slopes), np.array(u)

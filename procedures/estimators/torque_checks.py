@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from bench.findings import Effect, Finding
 from bench.recording import Recording
-from procedures.estimators import torque_balance
+from procedures.estimators import torque_balance, torque_drifts
 from procedures.estimators.direction import SEGMENTS
 from procedures.estimators.torque_balance import Balance, Detent
 from procedures.estimators.torque_data import TorqueData
@@ -34,6 +34,8 @@ class Tolerances(Protocol):
     def max_drift_A(self) -> float: ...
     @property
     def max_baseline_drift_A_s(self) -> float: ...
+    @property
+    def max_scale_drift(self) -> float: ...
     @property
     def max_lost(self) -> float: ...
 
@@ -163,10 +165,11 @@ def of_fit(
     arm_u: float,
     plan: Tolerances,
 ) -> Iterator[Finding]:
-    """Checks of the fit: slip, drift, detent, arms, masses, the cosine."""
+    """Checks of the fit: slip, drifts, detent, arms, masses, the cosine."""
     slips = list(_slip(data, b))
     yield from slips
-    yield from _baseline(data, b, plan, held.order / 2)
+    yield from torque_drifts.baseline(data, b, plan)
+    yield from torque_drifts.scale(b, plan)
     yield from _detent(b, held)
     yield from _arms(data, b, arm_u)
     if not slips:  # a lever that slips makes heavy loads light: that is no mass's fault
@@ -191,44 +194,6 @@ def _slip(data: TorqueData, b: Balance) -> Iterator[Finding]:
             f"under the heaviest load the torque falls by {-value:.2%} a second within a step, and is back when the load is "
             f"hung again ({SLIP_RATE:.1%} allowed): the lever slips on the shaft.", "lever", Effect.INDETERMINATE,
         )  # fmt: skip
-
-
-def _baseline(data: TorqueData, b: Balance, plan: Tolerances, pairs: float) -> Iterator[Finding]:
-    """Drift of the current without load. The amplifier closes on its own sensor, so that a drifting sensor moves the true
-    current of its segment, all references follow to hold the angle, and the outboard AMB answers the pull to the side."""
-    zero = data.steps.side == 0
-    t = data.steps.time[zero] - data.steps.time[zero].mean()
-    slope, constant = np.polyfit(t, b.current[zero], 1)
-    rest = float((b.current[zero] - constant - slope * t).std(ddof=2))
-    if abs(slope) <= max(plan.max_baseline_drift_A_s, SIGNIFICANT * rest / math.sqrt(float(t @ t))):
-        return
-    channel = _drifting(data, zero, t, 4 * float(slope), pairs)
-    yield Finding(
-        "current-drift",
-        f"the torque current without load drifts by {slope * 1e3:+.3f} mA/s over the run "
-        f"({plan.max_baseline_drift_A_s * 1e3:.3f} mA/s allowed): a segment's current sensor drifts"
-        + (f"; the pull to the side points to {channel}." if channel else "."),
-        channel or "segments", Effect.INDETERMINATE,
-    )  # fmt: skip
-
-
-def _drifting(data: TorqueData, zero: npt.NDArray[np.bool_], t: Array, drift: float, pairs: float) -> str:
-    """The segment whose drift explains the pull to the side: one whose sensor drifts by d lowers its true current by d, which
-    is a drift of i_x or i_y by d/2; the phase angle turns the pull by M gamma, as nearly as both force constants are alike."""
-    turn = pairs * data.steps.gamma[zero]
-    c, q = np.cos(turn), np.sin(turn)
-    rows = []
-    for to_x, to_y in data.wiring:  # control current over the true i_x and i_y at this phase angle
-        pull = np.column_stack([to_x * c + to_y * q, to_y * c - to_x * q])
-        rows.append(np.column_stack([pull * t[:, None], pull]))
-    nothing, one = np.zeros_like(t), np.ones_like(t)
-    design = np.vstack([np.column_stack([rows[0], one, nothing]), np.column_stack([rows[1], nothing, one])])
-    seen = np.concatenate([data.side_x[zero], data.side_y[zero]])
-    found = np.linalg.lstsq(design, seen, rcond=None)[0][:2]  # A/s of i_x, i_y
-    expected = np.array([[0.0, -drift / 2], [drift / 2, 0.0], [0.0, drift / 2], [-drift / 2, 0.0]])
-    apart = np.linalg.norm(expected - found, axis=1)
-    best = int(np.argmin(apart))
-    return SEGMENTS[best] if apart[best] < 0.3 * abs(drift) else ""
 
 
 def _detent(b: Balance, held: Detent) -> Iterator[Finding]:

@@ -26,6 +26,7 @@ typedef struct {
     /* position sensors yi zi yo zo x; runout of orders 1..4 of each radial one */
     double position_gain[5], position_offset[5], position_sign[5], position_noise, position_lsb, position_range;
     double runout[16], runout_phase[16];
+    double hum[5], hum_hz; /* what is not motion: a sine on each reading, at one frequency, all in phase */
     /* once-per-turn pulse, when the shaft's angle + pulse_angle is a whole turn; defects */
     double pulse_angle, pulse_missing, pulse_doubled, pulse_last, exchange_planes, exchange_axes, loose_speed, loose_shift;
     double lost_radius, lost_time, trip_current, trip_speed;

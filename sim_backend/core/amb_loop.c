@@ -33,9 +33,10 @@ void amb_sense(const amb_params *p, amb_derived *d, amb_state *st, amb_reading *
         double y = raw[k];
         raw[k] = raw[k + 1], raw[k + 1] = y;
     }
+    double wave = p->hum_hz > 0 ? sin(TWO_PI * fmod(p->hum_hz * TICK * st->tick, 1)) : 0;
     for (int k = 0; k < 5; k++) {
         double noise = p->position_noise > 0 ? p->position_noise * tsbs_normal(&st->noise) : 0;
-        double y = p->position_sign[k] * (p->position_gain[k] * raw[k] + p->position_offset[k]) + noise;
+        double y = p->position_sign[k] * (p->position_gain[k] * raw[k] + p->position_offset[k]) + noise + p->hum[k] * wave;
         if (fabs(y) > p->position_range) st->flags |= CLIPPED;
         y = least(most(y, -p->position_range), p->position_range);
         r->position[k] = quantise(y, p->position_lsb, d->per_position_lsb);

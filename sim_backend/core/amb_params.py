@@ -99,6 +99,8 @@ class AmbParams:
     position_range: float = 2.5e-4  # stand-in
     runout: Many = (0.0,) * 16  # yi, zi, yo, zo, orders 1..4 each; see `runout`
     runout_phase: Many = (0.0,) * 16
+    hum: Many = (0.0,) * 5  # of each probe's reading, in phase, amplitude 0-pk, m: mains or the like, no motion
+    hum_hz: float = 0.0  # 0: none
     pulse_angle: float = 0.0
     pulse_missing: float = 0.0  # every how manieth pulse does not come; 0: none is missing
     pulse_doubled: float = 0.0  # how far after the mark there is a second one, rad; 0: there is none

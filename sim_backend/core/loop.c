@@ -42,9 +42,10 @@ void tsbs_sense(const tsbs_params *p, tsbs_derived *d, tsbs_state *st, tsbs_read
         double i = p->current_gain[k] * st->coil[k] + p->current_offset[k] + p->current_drift[k] * now + noise;
         coil[k] = quantise(i, p->current_lsb, d->per_current_lsb);
     }
+    double scale = 1 + p->segment_scale_drift * now; /* of what the four sensors share */
     for (int k = 0; k < 4; k++) {
         double noise = p->current_noise * normal[15 + k];
-        double i = p->segment_sense[k] * st->segment[k] + p->segment_offset[k] + p->segment_drift[k] * now + noise;
+        double i = scale * p->segment_sense[k] * st->segment[k] + p->segment_offset[k] + p->segment_drift[k] * now + noise;
         segment[k] = quantise(i, p->current_lsb, d->per_current_lsb);
     }
     double angle = p->encoder_sign * (s[5] + p->encoder_offset);
@@ -64,9 +65,10 @@ static void amplifiers(const tsbs_params *p, const tsbs_derived *d, tsbs_state *
         double ref = enabled ? least(most(st->applied.coil[k], 0), p->coil_limit[k]) : 0;
         coil[k] = enabled ? most((ref - p->current_offset[k] - p->current_drift[k] * now) * d->per_gain[k], 0) : 0;
     }
+    double per_scale = 1 / (1 + p->segment_scale_drift * now);
     for (int k = 0; k < 4; k++) {
         double ref = least(most(st->applied.segment[k], -p->segment_limit), p->segment_limit);
-        segment[k] = enabled ? (ref - p->segment_offset[k] - p->segment_drift[k] * now) * d->per_sense[k] : 0;
+        segment[k] = enabled ? (ref - p->segment_offset[k] - p->segment_drift[k] * now) * d->per_sense[k] * per_scale : 0;
     }
 }
 

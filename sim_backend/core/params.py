@@ -88,6 +88,7 @@ class PlantParams:
     segment_sense: Four = (1.0, 1.0, 1.0, 1.0)
     segment_offset: Four = (0.0, 0.0, 0.0, 0.0)
     segment_drift: Four = (0.0, 0.0, 0.0, 0.0)
+    segment_scale_drift: float = 0.0
     position_gain: Five = (1.0,) * 5
     position_offset: Five = (0.0,) * 5
     position_sign: Five = (1.0,) * 5

@@ -25,7 +25,7 @@ typedef struct {
     /* amplifiers and current sensors, per coil and per segment */
     double amplifier_rate, segment_rate, segment_limit, coil_limit[10];
     double current_gain[10], current_offset[10], current_drift[10], current_noise, current_lsb;
-    double segment_sense[4], segment_offset[4], segment_drift[4];
+    double segment_sense[4], segment_offset[4], segment_drift[4], segment_scale_drift;
     /* position sensors xi yi xo yo z; a stuck sensor reads stuck_value; runout of the sensor targets */
     double position_gain[5], position_offset[5], position_sign[5], position_noise, position_lsb;
     double stuck[5], stuck_value, target[8], target_phase[8], exchange_axes[2];

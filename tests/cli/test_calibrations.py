@@ -6,67 +6,17 @@ import json
 import re
 import shlex
 import shutil
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
+from chained import FILE, RIG, Bench, adopted, chained, edit, opened, run
 
-from bench import catalogue
-from bench.cli.__main__ import main
 from bench.recording import Recording
-
-Bench = Callable[..., tuple[int, str, str]]
-CHAIN = (
-    catalogue.Entry("tiny-levitated", "tests.tiny_procedures", "A look at the supply"),
-    catalogue.Entry("tiny-chained", "tests.tiny_chain", "What differs from it"),
-)
 
 
 @pytest.fixture
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Bench:
-    """`bench` in a directory with a rig file of its own: exit status, standard output, standard error."""
-    source = catalogue.rig_path("tsbs12")
-    (tmp_path / "rigs").mkdir()
-    for suffix in (".toml", ".dbc"):
-        shutil.copy(source.with_suffix(suffix), tmp_path / "rigs")
-    monkeypatch.setattr(catalogue, "PROCEDURES", CHAIN)
-    monkeypatch.chdir(tmp_path)
-
-    def command(*arguments: str) -> tuple[int, str, str]:
-        status = main(arguments)
-        out, err = capsys.readouterr()
-        assert "Traceback" not in out + err
-        return status, out, err
-
-    return command
-
-
-FILE = Path("rigs/tsbs12.calibrations/sim-0/tiny-levitated.json")
-RIG = Path("rigs/tsbs12.toml")
-
-
-def run(bench: Bench, *extra: str, procedure: str = "tiny-levitated", status: int = 0) -> str:
-    found, out, err = bench("run", procedure, "--rig", "tsbs12", "--no-report", *extra)
-    assert found == status, err
-    return out.splitlines()[-1] if status == 0 or out else err
-
-
-def adopted(bench: Bench, *extra: str) -> str:
-    directory = run(bench, *extra)
-    status, out, err = bench("adopt", directory)
-    assert status == 0, err
-    assert Path(out.splitlines()[-1]).is_file()
-    return directory
-
-
-def chained(bench: Bench, *extra: str, status: int = 2) -> str:
-    """What `bench run tiny-chained` says, or its run directory; nothing is made where it is refused."""
-    before = set(Path("runs").glob("*"))
-    said = run(bench, *extra, procedure="tiny-chained", status=status)
-    if status == 2:
-        assert set(Path("runs").glob("*")) == before
-    return said
+    return opened(tmp_path, monkeypatch, capsys)
 
 
 def remedies(said: str) -> list[list[str]]:
@@ -81,10 +31,6 @@ def follow(bench: Bench, said: str) -> None:
     assert status == 0, err
     status, _, err = bench(*[out.splitlines()[-1] if word == "RUN" else word for word in then])
     assert status == 0, err
-
-
-def edit(path: Path, **changes: Any) -> None:
-    path.write_text(json.dumps(json.loads(path.read_text(encoding="utf-8")) | changes), encoding="utf-8")
 
 
 def test_what_is_needed_is_run_adopted_and_used(bench: Bench) -> None:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
 from bench.cli.__main__ import main
+from bench.errors import ConfigError
+from bench.rigfile import load_rig
+from sim_backend.truth import draw
 
 RIGS = Path(__file__).resolve().parents[2] / "rigs"
 
@@ -35,6 +39,34 @@ def test_one_procedure_is_told_whole(capsys: pytest.CaptureFixture[str]) -> None
     status, _, err = check(capsys, "tsbs12", "stepp")
     assert status == 2
     assert "Did you mean step?" in err
+
+
+@pytest.mark.parametrize(
+    ("rig", "old", "new", "said"),
+    [
+        ("tsbs12", "pos_yi", "lage_yi", "BO_ Telemetry: found no signal pos_yi; expected those names"),
+        ("amb5dof", "pulses", "marks", "BO_ Telemetry: found no signal pulses; expected those names"),
+        ("tsbs12", "Telemetry", "Messwerte", "BO_: found no message Telemetry; expected those names"),
+        (
+            "tsbs12",
+            "BO_ 16 Heartbeat",
+            "BO_ 256 Heartbeat",
+            "BO_ Heartbeat: found identifier 0x100, which Telemetry has too",
+        ),
+    ],
+)
+def test_a_dbc_that_nothing_can_be_simulated_over_is_told(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, rig: str, old: str, new: str, said: str
+) -> None:
+    for kind in ("toml", "dbc"):
+        text = (RIGS / f"{rig}.{kind}").read_text(encoding="utf-8")
+        (tmp_path / f"{rig}.{kind}").write_text(re.sub(rf"\b{old}\b", new, text), encoding="utf-8")
+    status, _, err = check(capsys, str(tmp_path / f"{rig}.toml"))
+    assert status == 2
+    assert said in err
+    if "no signal" in said:
+        with pytest.raises(ConfigError, match="cannot be simulated"):
+            draw(load_rig(str(tmp_path / f"{rig}.toml")), 1)
 
 
 def test_plans_limits_and_the_simulated_machine_are_checked_too(

@@ -73,3 +73,12 @@ def test_a_long_finding_is_broken_between_words(tmp_path: Path) -> None:
     lines = summary(record(Outcome.INDETERMINATE, findings=(long,)), tmp_path).splitlines()
     assert len(lines) > 3
     assert all(len(line) <= 80 for line in lines[:-1])
+
+
+def test_results_that_are_too_wide_leave_limits_that_were_met_to_the_report(tmp_path: Path) -> None:
+    results = [result("d_max_share", Verdict.PASS, where="outboard, 10000 r/min, with"),
+               result("d_max_share", Verdict.FAIL, 40e-6, "inboard, 10000 r/min, with")]  # fmt: skip
+    lines = summary(record(Outcome.FAIL, *results), tmp_path, width=80).splitlines()
+    shown = [line for line in lines if "±" in line or line.strip().startswith("at most")]
+    assert max(map(len, shown)) <= 80
+    assert [line.split()[-1] for line in shown] == ["fail", "µm", "pass"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from bench.uncertainty import Estimate, correlation, interval
 from procedures.spindown import Plan, check
 from sim_backend.truth import draw
 
+RIGS = Path(__file__).parents[2] / "rigs"
 QUICK = {"repeats": 2, "steady_s": 0.2}
 
 
@@ -165,6 +167,19 @@ def test_a_drive_that_can_do_no_more_lets_go_a_little_below(tmp_path: Path) -> N
 def test_a_drive_far_too_weak_is_an_error(tmp_path: Path) -> None:
     found = serious(run_down(tmp_path, 0, {"drive_limit": 3.0}))
     assert "speed-not-reached" in found
+
+
+def test_a_rig_without_a_drive_is_run_up_by_its_motor_and_lacks_nothing(tmp_path: Path) -> None:
+    """By default, as the first user without a drive runs it."""
+    for name in ("tsbs12.toml", "tsbs12.dbc"):
+        (tmp_path / name).write_bytes((RIGS / name).read_bytes())
+    text = re.sub(
+        r"\[devices\.drive\].*?(?=\n\[(?!devices\.drive))", "", (tmp_path / "tsbs12.toml").read_text(), flags=re.DOTALL
+    )
+    (tmp_path / "tsbs12.toml").write_text(text)
+    done = simulated_run("spindown", str(tmp_path / "tsbs12.toml"), 3, QUICK, tmp_path / "r.mcap")
+    assert {step.labels["by"] for step in done.recording.steps("coast")} == {"motor"}
+    assert serious(done) == {}
 
 
 def test_what_is_adopted_holds_for_its_biases(sound: Simulated) -> None:

@@ -65,6 +65,7 @@ def test_the_result_follows_the_truth(tmp_path: Path) -> None:
         pytest.param({"segment_sign_1": -1}, "segment-sign", "i_m1", marks=pytest.mark.long),
         ({"lever_slip": 0.05}, "lever-slips", "slips"),
         pytest.param({"segment_drift_2": 0.001}, "current-drift", "i_m3", marks=pytest.mark.long),
+        ({"segment_scale_drift": 1e-4}, "drifting-scale", "-0.46%"),
         ({"detent": 3}, "detent-large", "detent"),
         ({"geometry.lever_left": 0.231}, "arms-disagree", "arm"),
         pytest.param({"drop_fraction": 0.005}, "missing-samples", "missing", marks=pytest.mark.long),
@@ -74,6 +75,18 @@ def test_a_defect_is_named_and_does_not_pass(tmp_path: Path, defect: dict[str, f
     found = serious(calibrate(tmp_path, 3, defect))
     assert code in found, found
     assert named in found[code].text
+
+
+@pytest.mark.long
+def test_a_scale_that_drifts_unseen_moves_nothing(tmp_path: Path) -> None:
+    """Default plan: 0.06 % over the loads (145 s) moved gamma_0t by 3 to 7 U as long as gamma went in one direction."""
+    runs = []
+    for size in (0.0, 4e-6):
+        (tmp_path / f"{size}").mkdir()
+        runs.append(calibrate(tmp_path / f"{size}", 42, {"segment_scale_drift": size}, {}))
+        assert serious(runs[-1]) == {}
+    sound, drifted = (results(run)["gamma_0t"] for run in runs)
+    assert abs(drifted.value - sound.value) < 2 * sound.u
 
 
 @pytest.mark.parametrize(("mass", "error"), [("M1", -0.02), pytest.param("M3", 0.01, marks=pytest.mark.long)])

@@ -19,7 +19,7 @@ from bench.figures import Figure
 from bench.findings import Effect, Finding
 from bench.limits import Limit
 from bench.outcomes import outranking
-from bench.procedure import Measured
+from bench.procedure import Measured, Quantity
 from bench.recording import Recording
 from bench.records import measurement
 from bench.rigfile import load_rig
@@ -405,6 +405,29 @@ def test_d_max_is_greater_wherever_the_centre_may_be() -> None:
     found = interval(e)
     assert found.low == pytest.approx(np.quantile(true, 0.025), rel=0.02)
     assert found.high == pytest.approx(np.quantile(true, 0.975), rel=0.02)
+
+
+def test_both_zeros_of_a_plane_carry_d_max_alike() -> None:
+    """About the centre of a circle neither axis has a slope and both have the same share; each alone would make more."""
+    means = [Estimate.of(0.0, Influence(a, a, 5e-6 / math.sqrt(3), "m", "B", "rectangular")) for a in "yz"]
+    orbit = [Estimate.exact(x, "m") for x in (5e-6, 0.0, 0.0, -5e-6)]
+    e = reach.farthest(means, {1.0: orbit}, "a place")
+    off = np.random.default_rng(3).uniform(-5e-6, 5e-6, (2, 400, 400))
+    off[0], off[1] = off[0, :, :1], off[1, :1, :]  # every z with every y
+    true = np.hypot(*off)
+    shares = [true.mean(axis=k).var() / true.var() for k in (1, 0)]
+    stated = measurement(Measured(unbalance.D_MAX, e), None)
+    found = {b.influence: (b.contribution / (stated.standard_uncertainty or 0)) ** 2 for b in stated.budget}
+    assert [found["y"], found["z"]] == pytest.approx(shares, abs=0.02)
+
+
+def test_no_budget_by_monte_carlo_says_more_than_its_result(compared: Run) -> None:
+    """The squares of its contributions come to u^2 at most; those of D_max at the kink came to four times as much."""
+    stated = [measurement(Measured(Quantity(*key, ""), e), None) for key, e in compared.measured.items()]
+    drawn = [m for m in stated if m.method == "monte-carlo" and m.standard_uncertainty]
+    for m in drawn:
+        assert math.hypot(*(b.contribution for b in m.budget)) <= 1.01 * (m.standard_uncertainty or 0)
+    assert {"d_max", "vector_cos"} <= {m.name for m in drawn}
 
 
 def test_adopted_bearings_take_the_plan_s_place(compared: Run) -> None:

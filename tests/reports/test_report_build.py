@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import json
+import math
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -29,7 +30,7 @@ import reports
 from bench.errors import BenchError
 from bench.figures import Sheet
 from bench.procedure import Quantity
-from reports import budgets, compose, html, pdf, text, unseen
+from reports import budgets, compose, html, many, pdf, text, unseen
 from reports.figures import draw
 from reports.view import SIMULATED, FigureEntry, ReportView
 
@@ -84,7 +85,7 @@ def test_an_unverified_limit_and_an_unsymmetric_interval_say_so() -> None:
     row = view(measurements=[lopsided]).results[0]
     assert row.limit_source == "ISO 14839-3 (limit not verified against its source)"
     assert "Monte Carlo" in row.interval
-    assert "[23.300, 23.550]" in row.interval
+    assert "[23.300,\u00a023.550]" in row.interval
 
 
 def test_each_method_prints_what_it_has() -> None:
@@ -204,7 +205,7 @@ def test_the_gains_of_all_probes_are_one_row_and_those_of_currents_another() -> 
     ]
     rows = view(measurements=[measurement(budget=entries)]).unseen.rows
     assert [row[0] for row in rows] == [
-        "gain of pos_yi and 1 more of its kind", "gain of i_yi_p", "offset of zi and 1 more of its kind", "mass of the shaft",
+        "gain of pos_yi (and 1 alike)", "gain of i_yi_p", "offset of zi (and 1 alike)", "mass of the shaft",
         "mass of the disc"]  # fmt: skip
 
 
@@ -246,7 +247,7 @@ def test_every_required_field_is_in_the_page_in_order() -> None:
         RUN_ID,
         "TSBS-12-001",
         "tsbs12",
-        "2026-01-01 00:00:00 UTC",
+        "2026-01-01 00:00:00 to",
         "Edmonton",
         "PASS",
         "What was judged",
@@ -475,6 +476,25 @@ def test_the_parts_of_one_scatter_are_one_row() -> None:
         ("scatter, 2 parts [run-1]", "0.50", "43"), ("scatter (1)", "0.20", "7"), ("scatter (1) [run-2]", "0.10", "43"),
         ("mass M1", "0.10", "43"), ("mass M2", "0.10", "43"),
     ]  # fmt: skip
+
+
+def test_a_budget_by_monte_carlo_is_one_of_its_standard_uncertainty() -> None:
+    """Two zeros at a kink, the slope of one of which is nought: 0.6 and 0.6 of u = 1; 24 % is of both together."""
+    entries = [
+        {"influence": f"sensors/pos_{a}/offset", "name": f"zero of pos_{a}", "contribution": 0.6, "sensitivity": c, "type": "B",
+         "distribution": "rectangular", "dof": None, "unit": "m", "standard_uncertainty": 1.2}
+        for a, c in (("y", 0.0), ("z", -1.0))
+    ] + [{"influence": "gain", "name": "gain", "contribution": 0.2, "sensitivity": 2.0, "type": "A", "distribution": "normal",
+          "dof": 5, "unit": "1", "standard_uncertainty": 0.1 / math.sqrt(5 / 3)}]  # fmt: skip
+    made = measurement(budget=entries, method="monte-carlo", standard_uncertainty=1.0)
+    table = budgets.budget_table(made)
+    assert [(r.name, r.sensitivity, r.share) for r in table.rows] == [
+        ("zero of pos_y", "not linear", "36.0\u202f%"), ("zero of pos_z", "not linear", "36.0\u202f%"),
+        ("gain", "2.00\u202fN/A", "4.0\u202f%"), ("several influences together", "\u2013", "24.0\u202f%"),
+    ]  # fmt: skip
+    (row,) = view(around(reached=()), measurements=[made]).unseen.rows
+    assert (row[1], row[4]) == ("36\u202f%", "not linear")
+    assert many.carried(made).endswith("several influences together 24\u202f%; 1 more")
 
 
 def test_the_calibrations_used_are_named_and_an_expired_one_stands_on_every_page() -> None:

@@ -96,3 +96,29 @@ def test_a_logarithmic_axis_has_equal_steps_for_equal_ratios_and_names_stand_for
     pixels = axes.transData.transform([(1.0, 0.01), (1.0, 0.1), (1.0, 1.0)])[:, 1]
     assert pixels[1] - pixels[0] == pytest.approx(pixels[2] - pixels[1])
     assert [t.get_text() for t in axes.get_xticklabels()] == ["force row", "both"]
+
+
+def test_a_logarithmic_axis_of_a_decade_has_plain_numbers() -> None:
+    """Minor numbers were drawn as the text of their mathematics, one over the other."""
+    x = np.array([0.2, 2.0])
+    svg = draw(one(Series("a", x, x), log_x=True, log_y=True)).svg
+    assert "mathdefault" not in svg
+    assert "<!-- 0.5 -->" in svg
+
+
+def test_two_curves_differ_in_grey_and_a_fit_looks_like_its_points() -> None:
+    x = np.arange(5.0)
+    assert draw(one(Series("a", x, x))).svg.count("stroke-dasharray") == 0
+    two = dataclasses.replace(one(Series("a", x, x)), series=(Series("a", x, x), Series("b", x, -x)))
+    assert "stroke-dasharray" in draw(two).svg
+    fitted = (Series("3 A", x, x, "points"), Series("3 A, fit", x, x), Series("4 A", x, -x, "points"))
+    svg = draw(dataclasses.replace(two, series=fitted)).svg
+    assert "<!-- 4 A -->" in svg
+    assert "fit -->" not in svg
+
+
+def test_symbols_of_labels_are_set_and_dollars_stay() -> None:
+    x = np.arange(3.0)
+    svg = draw(one(Series("a", x, x), x_label="D_max in $")).svg
+    assert "D_max" not in svg
+    assert "\\$" in svg

@@ -19,7 +19,7 @@ SHARES = f"current sensor gain, inboard 88{PERCENT}; 8 more"
 
 def view_of(count: int, **changes: object) -> ReportView:
     """`count` results of d_max beside one of K_i."""
-    some = [measurement("d_max", 0.1 * n, where=f"{1000 * n} r/min", **changes) for n in range(1, count + 1)]
+    some = [measurement("d_max", 0.1 * n, where=f"{1000 * n}\u202fr/min", **changes) for n in range(1, count + 1)]
     return compose.view_of(record(measurements=[*some, measurement()], correlations=None), around())
 
 
@@ -34,7 +34,7 @@ def test_many_results_get_a_line_each() -> None:
     view = view_of(many.MANY + 1)
     assert [r.symbol.plain for r in view.results] == [b.symbol.plain for b in view.budgets] == ["K_i"]
     (group,) = view.many
-    assert [m.row.where for m in group.rows] == [f"{1000 * n} r/min" for n in range(1, many.MANY + 2)]
+    assert [m.row.where for m in group.rows] == [f"{1000 * n}\u202fr/min" for n in range(1, many.MANY + 2)]
     assert {m.carried for m in group.rows} == {SHARES}
     assert group.judged
     assert f"{many.MANY + 1} results, p = 95" in group.note

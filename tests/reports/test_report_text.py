@@ -68,7 +68,7 @@ def test_degrees_of_freedom_are_truncated(dof: float | None, expected: str) -> N
 
 
 def test_interval_is_rounded_like_its_result() -> None:
-    assert text.interval(1.1e-6, 1.35e-6, 6.7e-8, "m") == f"[1.100, 1.350]{N}×{N}10⁻⁶{N}m"
+    assert text.interval(1.1e-6, 1.35e-6, 6.7e-8, "m") == f"[1.100,\u00a01.350]{N}×{N}10⁻⁶{N}m"
 
 
 def test_plain_keeps_what_was_written() -> None:

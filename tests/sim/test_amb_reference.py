@@ -103,6 +103,7 @@ OBSERVED = {"observer": 1.0, "compensate": 3.0, "integral": 0.0}
         (0, {}, {}, None),
         (1, {}, {}, 15000 * RPM),
         (2, {}, {}, None),
+        (1, {}, {"hum": (2e-6, 1e-6, 0.0, 3e-6, 0.0), "hum_hz": 170.0}, None),
         (1, OBSERVED, {}, None),
         (2, OBSERVED, {}, 9000 * RPM),
         (1, {"observer": 2.0, "compensate": 3.0}, {}, None),
@@ -110,7 +111,7 @@ OBSERVED = {"observer": 1.0, "compensate": 3.0, "integral": 0.0}
          {"mode_on": (1.0, 1.0), "pulse_missing": 3.0}, None),
         (0, NOTCHED, {"mode_on": (1.0, 0.0), "pulse_doubled": 2.0, "pulse_last": 12.0}, None),
     ],
-    ids=["PID", "CCS", "CAC", "CCS observer", "CAC observer", "literal observer", "CAC flexible", "PID flexible"],
+    ids=["PID", "CCS", "CAC", "hum", "CCS observer", "CAC observer", "literal observer", "CAC flexible", "PID flexible"],
 )  # fmt: skip
 def test_core_equals_the_reference_in_closed_loop(
     law: int, settings: dict[str, float], change: dict[str, Any], drive: float | None

@@ -48,6 +48,7 @@ def blemished() -> PlantParams:
         segment_sense=tuple(1 + 0.003 * rng.uniform(-1, 1, 4)),
         segment_offset=tuple(0.004 * rng.uniform(-1, 1, 4)),
         segment_drift=tuple(0.01 * rng.uniform(-1, 1, 4)),
+        segment_scale_drift=0.02,
         asymmetry=(0.03, -0.02),
         alpha_2=0.3,
         alpha_3=-0.2,

@@ -136,6 +136,7 @@ def test_weights_on_the_lever() -> None:
         ("lever_slip", 0.05, "lever_slip", 0.05),
         ("drive_brakes", 0.2, "brake", 0.2),
         ("segment_drift_2", 1e-3, "segment_drift", (..., ..., 1e-3, ...)),
+        ("segment_scale_drift", 1e-5, "segment_scale_drift", 1e-5),
     ],
 )
 def test_defects_reach_the_plant(name: str, value: float, field: str, expected: object) -> None:
