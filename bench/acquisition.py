@@ -16,6 +16,7 @@ from bench.errors import (
     AnotherHost,
     BenchError,
     BytesUnreadable,
+    ClockWrong,
     DeviceFault,
     DeviceUnreadable,
     DriveFault,
@@ -49,6 +50,7 @@ CODES: tuple[tuple[type[BaseException], str], ...] = (
     (DeviceFault, "controller-fault"), (AnotherHost, "another-host"), (InterlockError, "interlock"),
     (RegisterRefused, "device-refused"), (DeviceUnreadable, "device-unreadable"), (NoReply, "no-reply"),
     (BytesUnreadable, "bytes-unreadable"), (OperatorSilent, "operator-silent"), (FrozenError, "telemetry-frozen"),
+    (ClockWrong, "clock-drift"),
     (LinkError, "link-lost"), (StateNotReached, "state-not-reached"), (RotorNotArrived, "rotor-not-arrived"),
     (OperatorRefused, "operator-refused"), (Refused, "controller-refused"), (RecordingError, "recording-failed"),
     (BenchError, "run-failed"),
@@ -178,11 +180,11 @@ class WatchedSteps:
 def _ending(cause: BaseException | None, findings: tuple[Finding, ...], live: OpenRig, recorder: Recorder) -> Ending:
     health = live.rig.health()
     link = health.counts(sum(recorder.integrity.frames.values()))
-    findings = (*live.findings, *findings, *health.findings())
+    findings, told = (*live.findings, *findings), tuple(health.findings())
     if cause is None:
-        return Ending(None, findings, link)
+        return Ending(None, (*findings, *told), link)
     stopped, finding = cause_of(cause)
-    return Ending(stopped, (finding, *findings), link)
+    return Ending(stopped, (finding, *findings, *(f for f in told if f.code != finding.code)), link)
 
 
 def cause_of(error: BaseException) -> tuple[Outcome, Finding]:

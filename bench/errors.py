@@ -6,6 +6,7 @@ BenchError
     NoReply          a request was not answered, though it was repeated
     BytesUnreadable  bytes come, but no telemetry can be made of them
     FrozenError      telemetry comes, but its counters stand
+    ClockWrong       telemetry comes, but by a clock that is off by a per cent or more
     DeviceUnreadable a register device says what is no number
     OperatorSilent   the operator does not answer
   NotReached         what was told to move did not get there                     exit 3
@@ -96,6 +97,10 @@ class OperatorRefused(Refused):
 
 class FrozenError(LinkError):
     """Telemetry comes, but its tick or its sequence stands: nobody knows what the machine does."""
+
+
+class ClockWrong(LinkError):
+    """Telemetry comes, but by a clock that is off by a per cent or more: every rate and every time would be wrong."""
 
 
 class RecordingError(BenchError):

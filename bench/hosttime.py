@@ -12,11 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from bench.clockrate import GROSS, ClockRate
+
 WINDOW_NS = 1_000_000_000
 MAX_DRIFT = 200e-6  # two crystals differ by less; what goes faster is latency
 JITTER_NS = 2_000_000
 FEWEST, MOST = 8, 600  # windows for a slope
-FASTEST = 0.01  # no clock that is read for its drift gains more; lateness that goes faster than that was latency
+FASTEST = 0.01  # no clock that is read for its drift by windows gains more; bench.clockrate sees those that do
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +41,7 @@ class HostMap:
         self._least: tuple[int, int] | None = None
         self.latest_ns = latest_ns  # greatest lateness beyond drift
         self.lag_ns = 0  # host time less this is sample time
+        self.rate = ClockRate()
         self.beyond = 0  # the last windows in a row that are later than drift can make, and do not catch up
 
     def take(self, samples_ns: npt.NDArray[np.int64], hosts_ns: npt.NDArray[np.int64]) -> None:
@@ -46,6 +49,7 @@ class HostMap:
         lateness = hosts_ns - samples_ns
         best = int(lateness.argmin())
         sample_ns, late = int(samples_ns[best]), int(lateness[best])
+        self.rate.take(sample_ns, int(hosts_ns[best]))
         if self._first_ns is None:
             self._first_ns = sample_ns
         window = (sample_ns - self._first_ns) // WINDOW_NS
@@ -72,9 +76,18 @@ class HostMap:
         self.beyond = self.beyond + 1 if least[1] > self._bound(least[0]) and not gains else 0
         self._minima.append(least)
 
+    @property
+    def unknown_s(self) -> float:
+        """How long telemetry has come, where nothing tells the rate of the device's clock; else 0."""
+        return 0.0 if self.rate.line() is not None or self.drift() is not None else self.rate.seconds
+
     def drift(self) -> Drift | None:
         """Slope of the windows' minima (Theil and Sen: no latency of a few windows moves it) but of those that a later,
-        much earlier one proves late; None with too few windows, or where nothing varies (simulation)."""
+        much earlier one proves late; None with too few windows, or where nothing varies (simulation). A clock that is off
+        by half a per cent or more is read from the line of `bench.clockrate`."""
+        line = self.rate.line()
+        if line is not None and abs(line.slope) - line.expanded > GROSS:
+            return Drift(line.slope * 1e6, line.expanded * 1e6, line.points)
         points = np.array(self._minima[1:], float).reshape(-1, 2)  # the first window may be short
         least = points[:, 1] + FASTEST * points[:, 0]
         points = points[least <= np.minimum.accumulate(least[::-1])[::-1] + JITTER_NS]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 
+from bench.clockrate import described
 from bench.findings import Effect, Finding
 from bench.hosttime import Drift
 from bench.link import LinkStats
@@ -15,6 +16,11 @@ from bench.telemetry import Counters
 LATE_S = 0.04  # telemetry that comes later than this is worth a word
 DRIFT_PPM, WRONG_PPM = 200.0, 1000.0  # bench.hosttime follows no more; no crystal is as wrong as that
 BEYOND = 5  # windows of a second in a row
+UNKNOWN_S, GAINED_S = 6.0, 0.02  # a rate is known by then; no drift gains that much in five seconds
+CHECK = (
+    "Steps and samples drift apart. Check tick_s in the rig file and the controller's crystal, or, of a served rig, whether "
+    "its computer keeps up"
+)
 PERIODS, PERIOD_S = 3, 0.02  # of a heartbeat; a longer gap comes near the watchdog
 
 
@@ -31,6 +37,8 @@ class Health:
     others: Mapping[str, LinkStats] = field(default_factory=dict)  # of the rig's further links
     cut_ns: int = 0  # by so much telemetry had not reached the end of a step when the run went on
     beyond_drift: int = 0  # the last windows in a row in which telemetry was further behind than by drift
+    unknown_s: float = 0.0  # so long telemetry came, and the rate of the controller's clock is not known
+    gained_ns: int = 0  # so much earlier than ever telemetry came in the last five seconds
     repeats: int = 0  # requests that were sent again because no reply had come
     replies_wrong_length: int = 0  # frames of a wrong length that are no telemetry (Dialogue.wrong_length)
     stuck: Collection[str] = ()  # channels that read the same for a second while the rotor was held
@@ -88,10 +96,7 @@ class Health:
              Effect.INDETERMINATE),
         )  # fmt: skip
         yield from (Finding(code, text, "link", effect) for count, code, text, effect in told if count)
-        gap = max(s.longest_heartbeat_gap_ns * 1e-9, self.host_age_s)
-        if gap > PERIODS * PERIOD_S:
-            yield Finding("heartbeat-late", f"two heartbeats were {gap * 1e3:.0f} ms apart; the watchdog ends a run at "
-                          "80 ms by default. Was the host busy?", "link")  # fmt: skip
+        yield from self._heartbeats()
         for channel in sorted(self.stuck):
             text = f"{channel} read the same for {STILL_S:g} s or more while the rotor was held and the tick went on"
             yield Finding("stuck-channel", f"{text}; a live sensor has noise.", channel, Effect.ERROR)
@@ -110,16 +115,37 @@ class Health:
             yield Finding("step-cut", f"a step ended {self.cut_ns * 1e-9:.2f} s before its telemetry had come: what was "
                           "commanded next may act within it", "link", Effect.INDETERMINATE)  # fmt: skip
 
+    def _heartbeats(self) -> Iterator[Finding]:
+        """Those that left late are this host's doing; those that left in time and were heard late that of what lies between."""
+        sent, heard = self.stats.longest_heartbeat_gap_ns * 1e-9, self.host_age_s
+        if max(sent, heard) <= PERIODS * PERIOD_S:
+            return
+        both = (
+            f"{sent * 1e3:.0f} ms was the longest time between two sent, {heard * 1e3:.0f} ms the oldest that the controller "
+            "had to go by; its watchdog ends a run at 80 ms by default"
+        )
+        link = "Look at the link, its adapter or server, and how often the controller reads what came"
+        if sent <= PERIODS * PERIOD_S:
+            text = f"heartbeats were sent in time and heard late: {both}. {link}"
+        elif heard <= sent + PERIODS * PERIOD_S:
+            text = f"heartbeats were sent late by this host: {both}. Was the host busy?"
+        else:
+            text = f"heartbeats were sent late by this host, and heard later still: {both}. Was the host busy? {link}"
+        yield Finding("heartbeat-late", text, "link")
+
     def _clock(self) -> Iterator[Finding]:
         """Host times follow the samples up to 200 ppm; beyond that steps and events slide along the samples."""
-        check = "Steps and samples drift apart. Check tick_s in the rig file and the controller's crystal"
-        d = self.drift
+        d, text = self.drift, ""
         if d is not None and abs(d.ppm) - d.expanded_ppm > DRIFT_PPM:
             effect = Effect.ERROR if abs(d.ppm) - d.expanded_ppm > WRONG_PPM else Effect.INDETERMINATE
-            way = "slow" if d.ppm > 0 else "fast"
-            text = f"the controller's clock runs {abs(d.ppm):.0f} ppm {way} against the host's"
-            yield Finding("clock-drift", f"{text} (U = {d.expanded_ppm:.1f} ppm); up to {DRIFT_PPM:.0f} ppm is right. "
-                          f"{check}", "link", effect)  # fmt: skip
+            yield Finding("clock-drift", f"{described(d.ppm)} (U = {d.expanded_ppm:.1f} ppm); up to {DRIFT_PPM:.0f} ppm is "
+                          f"right. {CHECK}", "link", effect)  # fmt: skip
         elif d is None and self.beyond_drift >= BEYOND:
             text = f"telemetry fell behind the host's clock by more than {DRIFT_PPM:.0f} ppm for {self.beyond_drift} s"
-            yield Finding("clock-drift", f"{text}. {check}", "link", Effect.INDETERMINATE)
+        elif self.unknown_s > UNKNOWN_S and self.gained_ns > GAINED_S * 1e9:
+            text = f"telemetry gained {self.gained_ns * 1e-6:.0f} ms on the host's clock in the last five seconds"
+        elif self.unknown_s > UNKNOWN_S:
+            yield Finding("clock-unknown", f"telemetry of {self.unknown_s:.0f} s came so unevenly that the rate of the "
+                          "controller's clock cannot be told; times and rates rest on its tick alone", "link")  # fmt: skip
+        if text:
+            yield Finding("clock-drift", f"{text}. {CHECK}", "link", Effect.INDETERMINATE)

@@ -136,8 +136,8 @@ def open_bus(
     Args:
         spec: URL, bit rates, options.
         name: of the link, for messages.
-        identifiers: that shall pass the interface's filters; all when empty or with `filters=off` in the URL. SLCAN
-            adapters have no filters, so there all pass and unknown ones are counted.
+        identifiers: that shall pass the interface's filters; all when empty or with `filters=off` in the URL. Error
+            frames pass whatever they are. SLCAN adapters have no filters, so there all pass and unknown ones are counted.
         now_ns: host clock, UNIX ns.
 
     Raises:
@@ -169,12 +169,20 @@ def _open(name: str, arguments: Mapping[str, Any], now_ns: Callable[[], int]) ->
         if arguments["interface"] == "slcan_batch":
             return SlcanBatchBus(now_ns=now_ns, **{k: v for k, v in arguments.items() if k != "interface"})
         # A can.conf of the user must not change what the rig file says.
-        return can.Bus(ignore_config=True, **arguments)
+        return _with_error_frames(can.Bus(ignore_config=True, **arguments))
     except Exception as error:  # a missing driver or an option that is not theirs: every vendor's module has its own
         if isinstance(error.__cause__, ConfigError):  # our own interface says where by itself
             raise ConfigError(f"link {name}: {error}") from error
         where = f"{arguments['interface']}:{arguments['channel']}"
         raise ConfigError(f"link {name}: the CAN interface {where} cannot be opened: {error}") from error
+
+
+def _with_error_frames(bus: can.BusABC) -> can.BusABC:
+    """python-can's own filters, which all but a few interfaces use, ask error frames for an identifier too; SocketCAN lets
+    them pass whatever its filters are, and so it shall be everywhere: they are counted."""
+    matches = bus._matches_filters
+    setattr(bus, "_matches_filters", lambda message: message.is_error_frame or matches(message))  # noqa: B010
+    return bus
 
 
 def _interface(name: str, rest: str) -> dict[str, Any]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 
+import numpy as np
+
 from bench.codec import Decoder, encode
 from bench.errors import NoReply
 from bench.frames import ERROR, FD, SENT, FrameBatch, frame
@@ -15,6 +17,7 @@ from bench.rigfile import RigFile
 from drivers.waiting import patience_s
 
 REPLIES = ("CommandReply", "ParamReply", "Identity", "Owner", "CaptureStatus")
+EARLY = 1000  # frames that are kept until something records
 KEPT = 256  # replies that nobody waits for: another host may ask too
 ATTEMPTS = 3  # times that one request is sent: a lost request or reply costs a repeat
 
@@ -30,10 +33,23 @@ class Dialogue:
         self._token, self._tokens = 0, dict[str, int]()  # the last, and that of each kind of request
         self._misfit: dict[str, int] = {}  # length of replies that do not fit, since the last request
         self.wrong_length = 0  # replies that do not have the length of the DBC
-        self.recorder: Recorder | None = None
+        self._recorder: Recorder | None = None
+        self._early: deque[FrameBatch] = deque(maxlen=EARLY)  # one frame each: what was said before anything recorded
         self.round_trip_ns: int | None = None  # the least so far
         self.repeats = 0  # requests sent again because no reply had come
         self.asked = 0  # how often the last request was sent
+
+    @property
+    def recorder(self) -> Recorder | None:
+        """What records; the first one is given what was asked and answered before it was there."""
+        return self._recorder
+
+    @recorder.setter
+    def recorder(self, recorder: Recorder | None) -> None:
+        self._recorder = recorder
+        if recorder is not None and self._early:
+            recorder.frames(self._link.name, np.concatenate(self._early))
+            self._early.clear()
 
     def has(self, message: str) -> bool:
         """Whether the controller's DBC knows a message."""
@@ -46,6 +62,8 @@ class Dialogue:
         if self._decoders.keys().isdisjoint(identifiers):
             return
         for k, identifier in enumerate(identifiers):
+            if self._recorder is None and identifier in self._decoders:
+                self._early.append(batch[k : k + 1].copy())
             decoder = self._decoders.get(identifier)
             if decoder is None or batch["flags"][k] & ERROR:
                 continue
@@ -164,8 +182,10 @@ class Dialogue:
         m = self._rig.messages[message]
         batch = frame(m.identifier, encode(m, values), flags=SENT | (FD if m.fd else 0), t_ns=self._now_ns())
         self._link.send(batch)
-        if self.recorder is not None:
-            self.recorder.frames(self._link.name, batch)
+        if self._recorder is not None:
+            self._recorder.frames(self._link.name, batch)
+        else:
+            self._early.append(batch)
 
     def send_held(self, message: str, values: Mapping[str, float]) -> None:
         """Send a message whose other signals keep the values that they were last given. A value that the message cannot

@@ -10,7 +10,7 @@ import numpy as np
 from bench.binding import COMMANDS
 from bench.codec import Decoder
 from bench.errors import AnotherHost
-from bench.frames import SENT, FrameBatch, payload
+from bench.frames import ERROR, SENT, FrameBatch, payload
 from bench.rigfile import RigFile
 
 ECHO = 100  # heartbeats of ours that a bus may still bring back
@@ -48,12 +48,12 @@ class HostFrames:
     def marked(self, batch: FrameBatch) -> FrameBatch:
         """The batch with them marked as sent."""
         if not self._names.keys().isdisjoint(batch["id"].tolist()):
-            theirs = np.isin(batch["id"], list(self._names))
+            theirs = np.isin(batch["id"], list(self._names)) & (batch["flags"] & ERROR == 0)
             batch = batch.copy()
             batch["flags"][theirs] |= SENT
             self.seen |= {self._names[int(i)] for i in batch["id"][theirs]}
             if self._heartbeat is not None:
-                for one in batch[batch["id"] == self._heartbeat.identifier]:
+                for one in batch[theirs & (batch["id"] == self._heartbeat.identifier)]:
                     self._beat(payload(one), int(one["t_ns"]))
         return batch
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from bench import clockrate
+from bench.errors import ClockWrong
 from bench.link import Link
+from bench.linkhealth import CHECK
 from bench.rigfile import RigFile
 from bench.samples import SampleBlock
 from bench.stillness import StuckChannels
@@ -81,6 +84,7 @@ class Watch:
             LinkError: no telemetry for half a second (`drivers.waiting.patience_s`); BytesUnreadable where bytes come.
             AnotherHost: `HostFrames.check`.
             DeviceFault, FrozenError: `Condition.check`.
+            ClockWrong: the controller's clock is off by a per cent or more.
         """
         patience_s = self.patience_s + (self._rig.link.reconnect_s if self._link.reopening else 0.0)
         if self.silent_s > patience_s and not self._frames_come:
@@ -88,6 +92,8 @@ class Watch:
             raise unheard.error(self._link, self._heard, self.silent_s, text)
         self.hosts.check()
         self.condition.check()
+        if (ppm := self._telemetry.host.rate.certain_ppm) is not None:
+            raise ClockWrong(f"{clockrate.described(ppm)}. {CHECK}")
 
     @property
     def _frames_come(self) -> bool:

@@ -89,7 +89,7 @@ def test_nothing_varies_in_simulation() -> None:
     assert host.lag_ns == host.latest_ns == 0
 
 
-@pytest.mark.parametrize(("ppm", "beyond"), [(150.0, False), (-20_000.0, False), (3000.0, True), (10_000.0, True)])
+@pytest.mark.parametrize(("ppm", "beyond"), [(150.0, False), (-4000.0, False), (3000.0, True), (4000.0, True)])
 def test_windows_that_drift_cannot_explain_are_counted(ppm: float, beyond: bool) -> None:
     host = fed(ppm, 4, seconds=8)
     assert host.drift() is None

@@ -89,6 +89,19 @@ def test_a_heartbeat_gap_near_the_watchdog_is_named(gap_ns: int, count: int) -> 
     assert [f.code for f in Health(Counters(), stats, None, 0).findings()] == ["heartbeat-late"] * count
 
 
+def test_heartbeats_that_were_sent_late_are_this_hosts_and_those_heard_late_are_not() -> None:
+    (sent,) = Health(Counters(), LinkStats(longest_heartbeat_gap_ns=280_000_000), None, 0, host_age_s=0.285).findings()
+    assert sent.text.startswith("heartbeats were sent late by this host: ")
+    assert "link" not in sent.text
+    (both,) = Health(Counters(), LinkStats(longest_heartbeat_gap_ns=65_000_000), None, 0, host_age_s=0.28).findings()
+    assert "heard later still" in both.text
+    (heard,) = Health(Counters(), CLEAN, None, 0, host_age_s=0.28).findings()
+    assert heard.text.startswith("heartbeats were sent in time and heard late")
+    assert "busy" not in heard.text
+    for text, *figures in ((sent.text, "280 ms", "285 ms"), (heard.text, "21 ms", "280 ms")):
+        assert all(figure in text for figure in figures)
+
+
 @pytest.mark.parametrize(
     ("ppm", "expanded", "effect"),
     [(190.0, 1.0, None), (260.0, 70.0, None), (260.0, 50.0, Effect.INDETERMINATE), (-260.0, 50.0, Effect.INDETERMINATE),
@@ -110,6 +123,23 @@ def test_a_clock_is_judged_before_its_drift_is_known() -> None:
     assert effects(BEYOND - 1) == []
     assert effects(BEYOND) == [("clock-drift", Effect.INDETERMINATE)]
     assert effects(BEYOND, Drift(3.0, 5.0, 9)) == []  # it is latency
+
+
+def test_a_rate_that_nothing_tells_is_said() -> None:
+    def told(unknown_s: float, gained_ns: int = 0, windows: int = 0) -> list[tuple[str, Effect]]:
+        health = Health(Counters(), CLEAN, None, 0, beyond_drift=windows, unknown_s=unknown_s, gained_ns=gained_ns)
+        return [(f.code, f.effect) for f in health.findings()]
+
+    assert told(5.5, 10**9) == []
+    assert told(6.5) == told(6.5, 19_000_000) == [("clock-unknown", Effect.NOTE)]
+    assert told(6.5, 21_000_000) == told(6.5, 0, BEYOND) == [("clock-drift", Effect.INDETERMINATE)]
+
+
+@pytest.mark.parametrize(("ppm", "rate"), [(1e6, "0.500"), (-5e5, "2.000"), (-19_608.0, "1.020")])
+def test_a_gross_error_is_told_as_a_factor(ppm: float, rate: str) -> None:
+    (found,) = Health(Counters(), CLEAN, Drift(ppm, 5.0, 60), 0).findings()
+    assert (found.code, found.effect) == ("clock-drift", Effect.ERROR)
+    assert found.text.startswith(f"the controller's clock runs at {rate} of the rate that the rig file states")
 
 
 def test_replies_of_a_wrong_length_count_with_the_telemetry_of_one() -> None:

@@ -275,6 +275,7 @@ def _opened(
         return Health(telemetry.counters, controller.link.stats, telemetry.host.drift(), telemetry.host.latest_ns,
                       controller.watch.host_age_s, controller.round_trip_ns, others,
                       repeats=controller.repeats, cut_ns=controller.cut_ns, beyond_drift=telemetry.host.beyond,
+                      unknown_s=telemetry.host.unknown_s, gained_ns=telemetry.host.rate.gained_ns,
                       replies_wrong_length=controller.replies_wrong_length, stuck=controller.watch.stuck.found)  # fmt: skip
 
     rig = Rig(controller.rig, controller.clock, controller, controller, operators[0], controller.telemetry.counters,

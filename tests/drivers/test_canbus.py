@@ -121,6 +121,20 @@ def test_filters_let_only_the_rigs_identifiers_pass(peer: can.BusABC) -> None:
         bus.close()
 
 
+@pytest.mark.parametrize("identifier", [0x20, 0x40])
+def test_error_frames_pass_the_filters_and_are_counted(peer: can.BusABC, identifier: int) -> None:
+    bus = open_bus(VIRTUAL, "can0", [0x100, 0x5 | EXTENDED])
+    peer.send(can.Message(is_error_frame=True, is_extended_id=False, arbitration_id=identifier, data=bytes(8)))
+    peer.send(can.Message(is_error_frame=True, arbitration_id=identifier, data=bytes(8)))
+    for other in (0x101, 0x100):
+        peer.send(message(other))
+    batch = frames_from(bus, 3)
+    assert batch["id"][-1] == 0x100
+    assert batch["flags"].tolist() == [ERROR, ERROR, 0]
+    assert bus.stats.error_frames == 2
+    bus.close()
+
+
 def test_a_lost_interface_is_a_link_error(bus: CanBus) -> None:
     bus.bus.shutdown()
     with pytest.raises(LinkError, match="link can0: the CAN interface is lost"):

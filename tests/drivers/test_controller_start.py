@@ -119,3 +119,27 @@ def test_frames_of_a_host_that_come_in_are_marked_as_such() -> None:
     bench.controller.guarded = False
     bench.controller.poll()
     assert [int(f["flags"]) & SENT for b in seen for f in b if f["id"] == 0x010] == [SENT]
+
+
+def test_what_was_said_before_anything_recorded_is_recorded() -> None:
+    """A controller's claim, identity and parameters are part of what came and went."""
+    bench = Bench()
+    bench.controller.connect()
+    seen: list[FrameBatch] = []
+
+    class Listening:
+        def frames(self, link: str, batch: FrameBatch, **_: int) -> None:
+            seen.append(batch)
+
+        def samples(self, block: object) -> None: ...
+
+    bench.controller.recorder = Listening()  # type: ignore[assignment]
+    (early,) = seen
+    names = {m.identifier: name for name, m in RIG.messages.messages.items()}
+    said = [(names[int(f["id"])], bool(f["flags"] & SENT)) for f in early]
+    asked = sum(p.index is not None for p in RIG.parameters.values())
+    assert said[:4] == [("Claim", True), ("Owner", False), ("Command", True), ("Identity", False)]
+    assert (said.count(("ParamGet", True)), said.count(("ParamReply", False))) == (asked, asked)
+    assert (early["t_ns"][1:] >= early["t_ns"][:-1]).all()
+    bench.controller.recorder = Listening()  # type: ignore[assignment]
+    assert len(seen) == 1

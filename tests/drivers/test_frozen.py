@@ -9,7 +9,7 @@ import pytest
 from hostile_controller import AMB, TSBS, Bench, Telemetry, unchanged
 
 from bench.errors import AnotherHost, DeviceFault, FrozenError
-from bench.frames import FrameBatch, frame
+from bench.frames import ERROR, FrameBatch, frame
 from bench.rigfile import RigFile
 from drivers.hosts import ECHO, RATE, HostFrames
 
@@ -105,6 +105,17 @@ def test_stray_heartbeats_are_no_host() -> None:
     for k in range(100):  # one in a fifth of a second
         watch.marked(heartbeat(0, 5000 + k, k * 200_000_000))
         watch.check()
+
+
+def test_destroyed_frames_are_no_hosts_whatever_their_identifier() -> None:
+    """That of an error frame is a class of errors, which may be that of a message."""
+    watch = hosts([1000])
+    for k in range(2 * RATE):
+        destroyed = heartbeat(0, 5000 + k, k * 20_000_000)
+        destroyed["flags"] |= ERROR
+        assert watch.marked(destroyed)["flags"].tolist() == [ERROR]
+    watch.check()
+    assert watch.seen == set()
 
 
 def test_an_echo_counts_once() -> None:

@@ -15,6 +15,7 @@ NOISE = frozenset(
         "telemetry-late",
         "heartbeat-late",
         "heartbeat-unprioritised",
+        "clock-unknown",
         "step-incomplete",
         "loads-scatter",
     }
@@ -130,6 +131,11 @@ SPOILED = (
     ),
     Kind("drift-far", "ppm=5000", ERROR, ("clock-drift",), "the controller's clock is off by half a percent"),
     Kind("drift-absurd", "ppm=-20000", ERROR, ("clock-drift",), "the controller's clock is slow by two percent"),
+    Kind(
+        "drift-fast", "ppm=20000", ERROR, ("clock-drift",), "the controller's clock is fast by two percent", long=True
+    ),
+    Kind("clock-half", "ppm=-500000", ERROR, ("clock-drift",), "the controller's clock runs at half the rate"),
+    Kind("clock-double", "ppm=1000000", ERROR, ("clock-drift",), "the controller's clock runs at twice the rate"),
 )
 COUNTERS = (
     Kind(

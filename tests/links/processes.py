@@ -20,7 +20,7 @@ ANY_PORT = ("--link", "controller=slcan:socket://127.0.0.1:0", "--link", "operat
             "--link", "fieldbus=modbus-tcp:127.0.0.1:0")  # fmt: skip
 LINE_S = 60.0
 PATIENCE_S = 3.0
-EXPECTED = ("simulated-controller", "telemetry-late", "heartbeat-late", "heartbeat-unprioritised")
+EXPECTED = ("simulated-controller", "telemetry-late", "heartbeat-late", "heartbeat-unprioritised", "clock-unknown")
 """Findings of every served rig, and those about the machine that the test runs on."""
 
 
