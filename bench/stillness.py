@@ -77,6 +77,11 @@ class StuckChannels:
         self._moved_ns = np.zeros(len(self._names), np.int64)
         self.found: set[str] = set()
 
+    @property
+    def all_found(self) -> bool:
+        """Whether no channel is left that moves."""
+        return bool(self._names) and len(self.found) == len(self._names)
+
     def take(self, block: SampleBlock) -> None:
         """The next samples."""
         if not self._names:

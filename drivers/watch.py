@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from bench.errors import ReadingsStand
 from bench.link import Link
 from bench.rigfile import RigFile
 from bench.samples import SampleBlock
-from bench.stillness import StuckChannels
+from bench.stillness import STILL_S, StuckChannels
 from bench.telemetry import TelemetryDecoder
 from drivers import unheard, waiting
 from drivers.condition import Condition
@@ -80,7 +81,8 @@ class Watch:
         Raises:
             LinkError: no telemetry for half a second (`drivers.waiting.patience_s`); BytesUnreadable where bytes come.
             AnotherHost: `HostFrames.check`.
-            DeviceFault, FrozenError: `Condition.check`.
+            DeviceFault, FrozenError, StateContradicts: `Condition.check`.
+            ReadingsStand: every reading that has noise has stood for a second.
         """
         patience_s = self.patience_s + (self._rig.link.reconnect_s if self._link.reopening else 0.0)
         if self.silent_s > patience_s and not self._frames_come:
@@ -88,6 +90,11 @@ class Watch:
             raise unheard.error(self._link, self._heard, self.silent_s, text)
         self.hosts.check()
         self.condition.check()
+        if self.stuck.all_found:
+            raise ReadingsStand(
+                f"all readings with noise have stood for {STILL_S:g} s or more while tick and sequence went on; nobody knows "
+                "what the machine does"
+            )
 
     @property
     def _frames_come(self) -> bool:
