@@ -58,10 +58,11 @@ class Approach:
             )
         if now - max(self._told_s, self._progress_s) >= TOLD_S or now - self._told_s >= ALSO_S:
             self._told_s = now
+            told = round(self._speed(), 1) + 0.0  # no negative zero
             left = f"; no nearer for {still_s:.0f} s, {PATIENCE_S - still_s:.0f} s left" if still_s >= TOLD_S else ""
             runlog.show(
                 logger,
-                f"waiting {now:.0f} s for {self._target:.0f} rad/s; the rotor turns at {self._speed():.1f} rad/s{left}",
+                f"waiting {now:.0f} s for {self._target:.0f} rad/s; the rotor turns at {told:.1f} rad/s{left}",
             )
 
     def _compare(self, now: float) -> None:

@@ -131,10 +131,11 @@ class Controller:
         self.cut_ns = max(self.cut_ns, due - self.telemetry.newest_ns)
 
     def release(self) -> None:
-        """Let another bench have the controller, which must be at rest; one that cannot be heard is not asked."""
+        """Let another bench have the controller, at rest with its amplifiers off; one that cannot be heard is not asked."""
         self.guarded, self.companions = False, []  # the rig's other devices are closed by now
         self.recorder = None  # and so is the recording
-        if self._dialogue.has("Claim") and self.watch.silent_s < self.watch.patience_s:
+        heard = self.watch.silent_s < self.watch.patience_s
+        if self._dialogue.has("Claim") and heard and self.mode in ("OFF", "FAULT"):
             self._orders.command("RELEASE")
 
     def poll(self) -> None:

@@ -74,8 +74,8 @@ class _Way:
 
     @property
     def mode(self) -> str:
-        """What the controller is taken to be: a state of rest that something contradicts is none."""
-        return UNKNOWN if self.seen.doubtful(self.patience) else self.controller.sight.mode
+        """What the controller is taken to be: a state of rest that something contradicts is none, until answers say one."""
+        return UNKNOWN if self.seen.doubtful(self.patience) else self.seen.mode
 
     def at_once(self) -> None:
         """What is safe at any speed: no torque from the drive nor the motor; of a machine that nobody sees, its own way."""
@@ -100,7 +100,7 @@ class _Way:
     def _settled(self) -> str:
         """The mode, where one look could be deceived by a single sample looked at again."""
         for _ in range(LOOKS):
-            if (mode := self.mode) == self.controller.sight.mode:
+            if (mode := self.mode) != UNKNOWN or self.controller.sight.mode == UNKNOWN:
                 return mode
             self.controller.clock.sleep(LOOK_S)
         self.seen.believe_not(self.patience)
@@ -221,7 +221,7 @@ class _Way:
                 raise LinkError(f"waited {still:.0f} s for {what}; nothing went forward")
             if (line := p.line(what, limit_s)) is not None:
                 runlog.show(logger, line)
-            if not c.sight.told or self.asked or self.mode != c.sight.mode:
+            if not c.sight.told or self.asked or self.mode == UNKNOWN:
                 p.every(ASK_S, c.ask_state)
             c.clock.sleep(LOOK_S)
 

@@ -47,6 +47,13 @@ class Witness:
         if not self._fault and c.fault != "NONE" and self._renewing():
             self._fault = c.watch.condition.fault_text()
 
+    @property
+    def mode(self) -> str:
+        """What telemetry says; where that was contradicted, what an answer says of a rotor at rest."""
+        sight = self._controller.sight
+        answer = self._doubt and sight.mode in RESTING and sight.answered in RESTING
+        return sight.answered if answer else sight.mode
+
     def doubtful(self, patience: Patience) -> bool:
         """Whether the controller says that the rotor rests, and something says that it does not: a speed that changes, or,
         until an answer of this make-safe says the same, that nobody asked it to."""
