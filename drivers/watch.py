@@ -82,7 +82,7 @@ class Watch:
             LinkError: no telemetry for half a second (`drivers.waiting.patience_s`); BytesUnreadable where bytes come.
             AnotherHost: `HostFrames.check`.
             DeviceFault, FrozenError, StateContradicts: `Condition.check`.
-            ReadingsStand: every reading that has noise has stood for a second.
+            ReadingsStand: readings had noise, and all have stood for a second.
         """
         patience_s = self.patience_s + (self._rig.link.reconnect_s if self._link.reopening else 0.0)
         if self.silent_s > patience_s and not self._frames_come:
@@ -90,7 +90,7 @@ class Watch:
             raise unheard.error(self._link, self._heard, self.silent_s, text)
         self.hosts.check()
         self.condition.check()
-        if self.stuck.all_found:
+        if self.stuck.all_stand:
             raise ReadingsStand(
                 f"all readings with noise have stood for {STILL_S:g} s or more while tick and sequence went on; nobody knows "
                 "what the machine does"
