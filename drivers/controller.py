@@ -135,7 +135,7 @@ class Controller:
         self.guarded, self.companions = False, []  # the rig's other devices are closed by now
         self.recorder = None  # and so is the recording
         heard = self.watch.silent_s < self.watch.patience_s
-        if self._dialogue.has("Claim") and heard and self.mode in ("OFF", "FAULT"):
+        if self._dialogue.has("Claim") and heard and {self.mode, self.sight.answered} & {"OFF", "FAULT"}:
             self._orders.command("RELEASE")
 
     def poll(self) -> None:
