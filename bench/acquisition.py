@@ -27,10 +27,13 @@ from bench.errors import (
     OperatorAbort,
     OperatorRefused,
     OperatorSilent,
+    ReadingsStand,
     RecordingError,
     Refused,
     RotorNotArrived,
     SignalAbort,
+    SpeedContradicts,
+    StateContradicts,
     StateNotReached,
 )
 from bench.evaluation import Ending
@@ -51,6 +54,7 @@ CODES: tuple[tuple[type[BaseException], str], ...] = (
     (RegisterRefused, "device-refused"), (DeviceUnreadable, "device-unreadable"), (NoReply, "no-reply"),
     (BytesUnreadable, "bytes-unreadable"), (OperatorSilent, "operator-silent"), (FrozenError, "telemetry-frozen"),
     (ClockWrong, "clock-drift"),
+    (ReadingsStand, "stuck-channel"), (StateContradicts, "state-contradicts"), (SpeedContradicts, "speed-and-angle-disagree"),
     (LinkError, "link-lost"), (StateNotReached, "state-not-reached"), (RotorNotArrived, "rotor-not-arrived"),
     (OperatorRefused, "operator-refused"), (Refused, "controller-refused"), (RecordingError, "recording-failed"),
     (BenchError, "run-failed"),
@@ -135,6 +139,8 @@ def _moved(
                 _told(cause, progress)
             live.unguard()
             findings = supervisor.make_safe([_recording_or_not(s, live) for s in live.safe_steps], rig.clock.now_ns)
+            known = None if cause is None else cause_of(cause)[1].code
+            findings += tuple(f for f in live.aftermath() if f.code != known)
     return cause, findings, up
 
 

@@ -103,6 +103,18 @@ class ClockWrong(LinkError):
     """Telemetry comes, but by a clock that is off by a per cent or more: every rate and every time would be wrong."""
 
 
+class ReadingsStand(LinkError):
+    """Telemetry goes on, and all its readings that have noise stand: nobody knows what the machine does."""
+
+
+class StateContradicts(BenchError):
+    """The state that a controller tells contradicts what it was asked for, or what else is seen of the machine."""
+
+
+class SpeedContradicts(BenchError):
+    """The speed that is told and the angle's contradict each other."""
+
+
 class RecordingError(BenchError):
     """A recording cannot be written, or what is read is not one, is newer, or fails its CRC."""
 

@@ -44,6 +44,7 @@ class OpenRig:
     checks so that make-safe can talk to a machine that has tripped, `safe_steps` are the ordered make-safe. `truth` is
     what a simulated rig drew, for `truth.json`; `findings` are what was noticed while opening it. `catch_up` lets the
     clock run until telemetry has reached the present: at the end of each step, before anything else is commanded.
+    `aftermath` tells what the machine did while it was made safe.
     """
 
     rig: Rig
@@ -54,6 +55,7 @@ class OpenRig:
     truth: Mapping[str, Any] | None = field(default=None)
     findings: Sequence[Finding] = ()
     catch_up: Callable[[], None] = lambda: None
+    aftermath: Callable[[], tuple[Finding, ...]] = tuple
 
 
 class WatchedClock:

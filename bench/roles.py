@@ -89,7 +89,7 @@ class Drive(Protocol):
     def set_speed(self, rad_s: float) -> None: ...  # passes the envelope; takes effect while it runs
     def set_acceleration(self, rad_s2: float) -> None: ...  # towards a speed; 0: as fast as it does by itself
     def run(self) -> None: ...  # it gives torque; the speed follows
-    def reach(self, rad_s: float, patience_s: float = 60.0) -> None: ...
+    def reach(self, rad_s: float, patience_s: float = 25.0) -> None: ...
     # set_speed, run, at its own acceleration; returns at that speed, gives up where it comes no nearer for so long
     def coast(self) -> None: ...  # no torque
     def brake(self) -> None: ...  # begins to brake; returns when it was told

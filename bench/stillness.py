@@ -66,7 +66,8 @@ def _last(counter: npt.NDArray[np.int64], before: int) -> int | None:
 
 class StuckChannels:
     """Channels whose readings stood for a second while the rotor was held and the tick went on, `found`. Only those are
-    looked at whose noise the rig file states, above one count: others may well read the same."""
+    looked at whose noise the rig file states, above one count: others may well read the same. `all_stand`: noise was seen, and
+    now all of them stand."""
 
     def __init__(self, rig: RigFile) -> None:
         self._names = [name for name in rig.channels if rig.noisy(name)]
@@ -75,14 +76,16 @@ class StuckChannels:
         }
         self._last: npt.NDArray[np.float64] | None = None  # of the block before, while the rotor is held
         self._moved_ns = np.zeros(len(self._names), np.int64)
+        self._noise_seen = False
         self.found: set[str] = set()
+        self.all_stand = False
 
     def take(self, block: SampleBlock) -> None:
         """The next samples."""
         if not self._names:
             return
         if not set(block.columns["state"].tolist()) <= self._held:
-            self._last = None
+            self._last, self.all_stand = None, False
             return
         readings = [block.columns[name] for name in self._names]
         if self._last is None:
@@ -94,5 +97,7 @@ class StuckChannels:
             moved[k] = bool((readings[k] != self._last[k]).any())
         self._moved_ns[moved] = block.t_ns[-1]
         self._last = newest
+        self._noise_seen = self._noise_seen or bool(moved.any())
         still = block.t_ns[-1] - self._moved_ns >= STILL_S * 1e9
+        self.all_stand = self._noise_seen and bool(still.all())
         self.found.update(name for name, stands in zip(self._names, still, strict=True) if stands)

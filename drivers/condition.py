@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from bench.errors import DeviceFault, FrozenError
+from bench.errors import DeviceFault, FrozenError, StateContradicts
 from bench.rigfile import RigFile
 from bench.stillness import STILL_S
 from bench.telemetry import TelemetryDecoder
 from drivers import advice
+
+SET_DOWN = ("LAND", "DISABLE", "MAKE_SAFE")
+UNASKED_S = 0.1  # for which a state that nobody asked for is more than a wrong sample
 
 
 class Condition:
@@ -18,6 +21,8 @@ class Condition:
         self._reboots = 0
         self._code, self._since_ns = 0, 0  # of the state, and since when it is that
         self._unknown_ns: int | None = None  # since when its state has no name, by the frames that came
+        self._held = self._asked_down = False  # it has held the rotor; it was asked to set it down
+        self._unasked_ns: int | None = None  # since when it rests unasked, by the frames that came
 
     @property
     def mode(self) -> str:
@@ -27,11 +32,29 @@ class Condition:
         name = self._states.get(int(self._telemetry.latest.get("state", 0)))
         return (self._binding.mode(name) if name is not None else None) or "UNKNOWN"
 
+    def fault_text(self) -> str:
+        """The latched fault and what to do about it."""
+        return f"the controller reports {self.fault}: {advice.ADVICE.get(self.fault, 'see its documentation')}"
+
     def look(self, now_ns: int) -> None:
         """Note since when the state is what it is; after each look at the telemetry."""
         code = int(self._telemetry.latest.get("state", 0))
         if code != self._code or not self._since_ns:
             self._code, self._since_ns = code, now_ns
+        if not self._asked_down and self.mode in ("LEVITATED", "SPINNING"):
+            self._held = True
+
+    def commanded(self, name: str) -> None:
+        """A command is about to be sent."""
+        if name == "LEVITATE":
+            self._held = self._asked_down = False
+        elif name in SET_DOWN:
+            self._asked_down = True
+
+    @property
+    def unasked(self) -> bool:
+        """Whether it says that the rotor rests, though it held it, told no fault, and nobody asked for that."""
+        return self._held and not self._asked_down and self.mode in ("OFF", "READY") and self.fault == "NONE"
 
     def described(self, now_ns: int) -> str:
         """The state by its name in the rig file and in the DBC, and since when: `OFF (aus) since 12.3 s`."""
@@ -52,6 +75,7 @@ class Condition:
         Raises:
             DeviceFault: a restart since the last look, a fault, a state that says so, or one that nobody knows for a second.
             FrozenError: tick or sequence have stood for a second while telemetry came.
+            StateContradicts: it says that the rotor rests, though it held it and nobody asked for that.
         """
         if stands := self._telemetry.stillness.frozen:
             raise FrozenError(
@@ -60,14 +84,32 @@ class Condition:
             )
         if self._telemetry.counters.reboots > self._reboots:
             self._reboots = self._telemetry.counters.reboots
+            self._held = False
             raise DeviceFault("the controller restarted during the run: its tick began anew; look at its supply")
-        fault = self.fault
-        if fault != "NONE":
-            raise DeviceFault(f"the controller reports {fault}: {advice.ADVICE.get(fault, 'see its documentation')}")
+        if self.fault != "NONE":
+            raise DeviceFault(self.fault_text())
         if self.mode == "FAULT" or self._lost_its_name():
             code = int(self._telemetry.latest.get("state", 0))
             name = self._states.get(code, f"{code}, which its DBC does not name")
             raise DeviceFault(f"the controller reports no fault, but its state is {name}: see its documentation")
+
+        if self._rests_unasked():
+            raise StateContradicts(self.unasked_text(self._telemetry.stillness.newest_ns))
+
+    def unasked_text(self, now_ns: int) -> str:
+        """What is wrong with a state of rest that nobody asked for."""
+        speed = self._telemetry.latest.get("speed")
+        turning = "" if speed is None else f"; its speed channel says {speed:.1f} rad/s"
+        return f"the controller says {self.described(now_ns)}, though it held the rotor and nobody asked it to land{turning}"
+
+    def _rests_unasked(self) -> bool:
+        """Whether it has for longer than a wrong sample takes."""
+        now = self._telemetry.stillness.newest_ns
+        if not self.unasked:
+            self._unasked_ns = None
+        elif self._unasked_ns is None:
+            self._unasked_ns = now
+        return self._unasked_ns is not None and now - self._unasked_ns >= UNASKED_S * 1e9
 
     def _lost_its_name(self) -> bool:
         """Whether the state has had no name for a second of frames."""

@@ -56,7 +56,9 @@ class Controller:
         self.cut_ns = 0  # the most that a step lacked of its telemetry when it was left
         self.companions: list[Callable[[], None]] = []  # polled with it: other devices of the rig
         self._orders = Orders(rig, self._dialogue, session, self.envelope, lambda: self.mode, self._wait)
-        self._turning = Turning(rig, self._orders, self.telemetry, self.clock, base.now_ns)
+        self._turning = Turning(
+            rig, self._orders, self.telemetry, self.clock, base.now_ns, lambda: self.sight.speeds_rad_s()
+        )
         self.capture: ControllerCapture | None = None
         if rig.capture is not None:
             upload = Upload(rig, link, self._dialogue, self.clock)
@@ -129,8 +131,11 @@ class Controller:
         self.cut_ns = max(self.cut_ns, due - self.telemetry.newest_ns)
 
     def release(self) -> None:
-        """Let another bench have the controller, which must be at rest."""
-        if self._dialogue.has("Claim"):
+        """Let another bench have the controller, at rest with its amplifiers off; one that cannot be heard is not asked."""
+        self.guarded, self.companions = False, []  # the rig's other devices are closed by now
+        self.recorder = None  # and so is the recording
+        heard = self.watch.silent_s < self.watch.patience_s
+        if self._dialogue.has("Claim") and heard and {self.mode, self.sight.answered} & {"OFF", "FAULT"}:
             self._orders.command("RELEASE")
 
     def poll(self) -> None:
@@ -140,7 +145,7 @@ class Controller:
             LinkError: no telemetry for half a second (`drivers.waiting.patience_s`); BytesUnreadable where bytes come.
             InterlockError: the envelope tripped.
             DeviceFault: the controller reports a fault, or has restarted.
-            FrozenError, AnotherHost: as `Watch.check` says.
+            FrozenError, ReadingsStand, StateContradicts, AnotherHost: as `Watch.check` says.
         """
         self.watch.polled()
         batch = self.watch.hosts.marked(self.link.receive())
@@ -231,9 +236,20 @@ class Controller:
         """READY to OFF."""
         self._command("DISABLE", "OFF", 1.0)
 
-    def command(self, name: str) -> None:
-        """Send a command and wait for its reply, not for its effect; `drivers.orders.Orders.command` has the errors."""
-        self._orders.command(name)
+    def command(self, name: str, slow: Callable[[], bool] | None = None) -> None:
+        """Send a command and wait for its reply, not for its effect; `drivers.orders.Orders.command` has the errors. LAND and
+        DISABLE are repeated only while what changes says that the shaft is slow, by `slow` where somebody sees more."""
+        self.watch.condition.commanded(name)
+        fit = {"LAND": "LEVITATED", "DISABLE": "READY"}.get(name)
+        if fit is None:
+            self._orders.command(name)
+        else:
+            self._orders.command(name, lambda: self.mode == fit and (slow or self._slow)())
+
+    def _slow(self) -> bool:
+        """Whether something that changes says that the shaft is below the landing speed, and nothing that it is not."""
+        speed = max(self.sight.speeds_rad_s().values(), default=None)
+        return speed is not None and speed < self.landing_speed
 
     def ask_state(self) -> None:
         """Ask for a reply, which tells the state, where the controller has one; nothing is waited for."""
@@ -308,7 +324,7 @@ class Controller:
             raise BenchError(f"the telemetry has no channel {channel}") from None
 
     def _command(self, name: str, goal: str, timeout_s: float, expected_s: float = 0.0) -> None:
-        self._orders.command(name)
+        self.command(name)
         self.clock.sleep(expected_s)
         self.wait(lambda: self.mode == goal, timeout_s, lambda: StateNotReached(
             f"the controller took {name} and is not {goal} after {expected_s + timeout_s:g} s: its state is "

@@ -76,10 +76,12 @@ class Dialogue:
             self._answers.append((name, values, int(batch["t_ns"][k])))
 
     def ask(
-        self, message: str, values: Mapping[str, float], reply: str, what: str, wait: Callable[..., None]
-    ) -> dict[str, float]:
+        self, message: str, values: Mapping[str, float], reply: str, what: str, wait: Callable[..., None],
+        again: Callable[[], bool] = lambda: True,
+    ) -> dict[str, float]:  # fmt: skip
         """Send a request and wait for its reply: the one with its token, where the reply has one. A request whose reply
-        does not come in time (`drivers.waiting.patience_s`) is sent again, byte for byte, and executed once.
+        does not come in time (`drivers.waiting.patience_s`) is sent again, byte for byte, and executed once; where what it
+        was sent for may have changed, `again` looks first.
 
         Raises:
             NoReply: no reply to any of them.
@@ -100,7 +102,7 @@ class Dialogue:
             )
             return bool(found)
 
-        self._waited(send, wait, arrived, reply, what)
+        self._waited(send, wait, arrived, reply, what, again)
         values, t_ns = found[0]
         if self.asked == 1:  # else nobody knows which one is answered
             took = max(t_ns - sent_ns, 0)
@@ -141,8 +143,9 @@ class Dialogue:
         self._misfit.clear()
 
     def _waited(
-        self, send: Callable[[], None], wait: Callable[..., None], arrived: Callable[[], bool], reply: str, what: str
-    ) -> None:
+        self, send: Callable[[], None], wait: Callable[..., None], arrived: Callable[[], bool], reply: str, what: str,
+        again: Callable[[], bool] = lambda: True,
+    ) -> None:  # fmt: skip
         """Send, wait for the reply, send again. Where it came but did not fit, the error says so."""
         for self.asked in range(1, ATTEMPTS + 1):
             self.repeats += self.asked > 1
@@ -150,6 +153,10 @@ class Dialogue:
             try:
                 return wait(arrived, patience_s(self._rig), what)
             except NoReply as error:
+                if self.asked < ATTEMPTS and not again():
+                    raise NoReply(
+                        f"{error}; it was not sent again, as the machine is no longer seen fit for it"
+                    ) from error
                 if self.asked == ATTEMPTS:
                     raise NoReply(f"{error}, though it was asked for {ATTEMPTS} times{self._seen(reply)}") from error
 

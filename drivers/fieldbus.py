@@ -17,6 +17,7 @@ from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
+from bench import runlog
 from bench.clock import Clock
 from bench.envelope import Envelope
 from bench.errors import BenchError, DeviceUnreadable, DriveFault, LinkError
@@ -38,6 +39,7 @@ WAIT_SLICE_S = 0.05
 PUMP_S = 0.1  # without a thread nothing is polled faster: a clock calls `pump` that often
 SILENT_POLLS, SILENT_S = 3, 1.0
 LEASE_S = 1.0  # a bench that has not pumped for so long hangs; polls would keep the drive's own watchdog fed
+TOLD_S = 5.0  # between two lines of a wait for the shaft without progress
 END_S = 2.0  # for the last coast, and for what polls to end
 
 
@@ -192,16 +194,20 @@ class Fieldbus:
         if self.guarded:
             self._check()
 
-    def wait(self, done: Callable[[], bool], timeout_s: float, error: Callable[[], BenchError]) -> None:
-        """Let the clock run until something is true.
+    def wait(self, done: Callable[[], bool], timeout_s: float, error: Callable[[], BenchError], what: str = "") -> None:
+        """Let the clock run until something is true; a wait for `what` that takes long is told every TOLD_S.
 
         Raises:
             BenchError: the given one, when time runs out.
         """
-        watch = Stopwatch(self._clock.now_ns)
+        watch, told_s = Stopwatch(self._clock.now_ns), 0.0
         while not done():
-            if watch.look() >= timeout_s * 1e9:
+            waited_s = watch.look() * 1e-9
+            if waited_s >= timeout_s:
                 raise error()
+            if what and waited_s >= told_s + TOLD_S:
+                told_s = waited_s
+                runlog.show(logger, f"waiting {waited_s:.0f} s for {what}; {timeout_s - waited_s:.0f} s left")
             self._clock.sleep(WAIT_SLICE_S)
             self.pump()
 

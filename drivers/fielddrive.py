@@ -14,7 +14,8 @@ from drivers.registerdevice import RegisterDevice
 
 T = TypeVar("T")
 TAKEN_S = 1.0  # for a drive to do what it was told
-STANDSTILL_RAD_S, STOP_S, REACH_S = 0.5, 90.0, 60.0
+STANDSTILL_RAD_S = 0.5
+STOP_S, REACH_S = 25.0, 25.0  # without progress
 NEEDED = ("target_speed", "actual_speed", "fault")
 COMMANDS = ("run", "coast", "stop")
 ACCELERATION = "acceleration"
@@ -27,7 +28,9 @@ class Surroundings(Protocol):
     def refresh(self, device: str) -> Mapping[str, float]: ...
     def ask(self, request: Callable[..., T], *args: Any) -> T: ...
     def send(self, request: Callable[..., object], *args: Any) -> object: ...
-    def wait(self, done: Callable[[], bool], timeout_s: float, error: Callable[[], BenchError]) -> None: ...
+    def wait(
+        self, done: Callable[[], bool], timeout_s: float, error: Callable[[], BenchError], what: str = ""
+    ) -> None: ...
     def record(self, kind: str, **data: Any) -> None: ...
     def unguarded(self) -> AbstractContextManager[None]: ...
 
@@ -160,7 +163,7 @@ class FieldDrive:
         self._bus.wait(lambda: abs(self.speed_rad_s - rad_s) <= apart, patience_s, lambda: RotorNotArrived(
             f"the shaft did not reach {rad_s:g} rad/s: it turns at {self.speed_rad_s:.1f} rad/s, and came no nearer within "
             f"{patience_s:g} s. Does something else hold it?"
-        ))  # fmt: skip
+        ), f"the drive to turn the shaft at {rad_s:g} rad/s")  # fmt: skip
 
     def coast(self) -> None:
         """Take the torque away.
@@ -185,12 +188,16 @@ class FieldDrive:
 
         Raises:
             LinkError: the drive does not answer, or refuses.
-            RotorNotArrived: the shaft goes on turning.
+            RotorNotArrived: the shaft became no slower for STOP_S.
         """
         self.brake()
-        self._bus.wait(lambda: abs(self.speed_rad_s) < STANDSTILL_RAD_S, STOP_S, lambda: RotorNotArrived(
-            f"the drive did not stop the shaft within {STOP_S:g} s: it turns at {self.speed_rad_s:.1f} rad/s"
-        ))  # fmt: skip
+        while (speed := abs(self.speed_rad_s)) >= STANDSTILL_RAD_S:
+            self._until_below(max(STANDSTILL_RAD_S, 0.99 * speed - 0.1))
+
+    def _until_below(self, rad_s: float) -> None:
+        self._bus.wait(lambda: abs(self.speed_rad_s) < rad_s, STOP_S, lambda: RotorNotArrived(
+            f"the drive did not stop the shaft: it turns at {self.speed_rad_s:.1f} rad/s, no slower for {STOP_S:g} s"
+        ), "the drive to stop the shaft")  # fmt: skip
 
     def reset(self) -> None:
         """Clear a latched fault.

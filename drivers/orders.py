@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from bench import units
 from bench.envelope import Envelope
-from bench.errors import BenchError, Refused
+from bench.errors import BenchError, NoReply, Refused
 from bench.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.session import Session
@@ -16,6 +16,8 @@ from drivers.dialogue import Dialogue, commanded, status_of
 logger = logging.getLogger("drivers.orders")
 STANDING = {"OFF": "DISABLE", "READY": "ENABLE"}
 """Commands that keep a state as it is."""
+EFFECTS = {"LAND": ("LANDING", "COASTING", "READY"), "DISABLE": ("OFF",)}
+"""States that a command leads to; of one that is sent under a condition, and so not repeated once its effect is seen."""
 
 
 class Orders:
@@ -114,8 +116,8 @@ class Orders:
         unit = units.UNITS[self.rig.messages[message].signal(signal).unit]
         return (value - unit.offset) / unit.factor
 
-    def command(self, name: str) -> None:
-        """Ask for a command.
+    def command(self, name: str, again: Callable[[], bool] = lambda: True) -> None:
+        """Ask for a command; `again` looks whether it may be repeated (`Dialogue.ask`).
 
         Raises:
             BenchError: the controller has none of that name, or refuses (Refused).
@@ -136,7 +138,13 @@ class Orders:
                 continue
             if any(s.name == "session" for s in messages[message].signals):
                 values["session"] = self._session.number
-            reply = self._dialogue.ask(message, values, "CommandReply", f"the reply to {name}", self._wait)
+            try:
+                reply = self._dialogue.ask(message, values, "CommandReply", f"the reply to {name}", self._wait, again)
+            except NoReply:
+                if self._mode() not in EFFECTS.get(name, ()):
+                    raise
+                logger.warning("%s was not answered; taken as obeyed, as the state is %s", name, self._mode())
+                continue
             status = status_of(messages["CommandReply"], reply)
             if status == "WRONG_SESSION":
                 raise Refused(f"the controller refuses {name}: another host owns it")

@@ -88,6 +88,16 @@ class Sight:
             return self._answered
         return UNKNOWN if self.alive else UNSEEN
 
+    @property
+    def answers(self) -> bool:
+        """Whether the controller's replies tell its state at all."""
+        return self._reply is not None
+
+    @property
+    def answered(self) -> str:
+        """The state of the newest reply of this make-safe, UNSEEN before the first."""
+        return self._answered
+
     def forget(self) -> None:
         """Replies from before make-safe are no answers of it."""
         self._answered = self._before = UNSEEN

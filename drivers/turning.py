@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from bench.clock import Clock
 from bench.errors import RotorNotArrived
 from bench.rigfile import RigFile
 from bench.telemetry import TelemetryDecoder
 from drivers import waiting
+from drivers.arriving import Approach
 from drivers.orders import Orders
 
-SPIN_S, STOP_S = 60.0, 60.0
+SPIN_S, STOP_S = 60.0, 60.0  # at most; without progress `drivers.arriving` ends a wait before
 SLOWEST_SLEW = 0.2  # rad/s, of a controller that does not say how fast it turns to an angle
 
 
@@ -20,8 +21,10 @@ class Turning:
     """The angle that the rotor has been sent to, over turns, and the ways there. `now_ns` as in `drivers.waiting`."""
 
     def __init__(
-        self, rig: RigFile, orders: Orders, telemetry: TelemetryDecoder, clock: Clock, now_ns: Callable[[], int]
-    ) -> None:
+        self, rig: RigFile, orders: Orders, telemetry: TelemetryDecoder, clock: Clock, now_ns: Callable[[], int],
+        speeds: Callable[[], Mapping[str, float]],
+    ) -> None:  # fmt: skip
+        self._speeds = speeds
         self._rig, self._orders, self._telemetry, self._clock, self._now_ns = rig, orders, telemetry, clock, now_ns
         self._angle = 0.0
 
@@ -59,7 +62,13 @@ class Turning:
         self._orders.set("speed_ref", rad_s)
         self._orders.command("SPIN")
         tolerance = max(0.02 * abs(rad_s), 0.3)
-        self._keep(lambda: abs(self.speed_rad_s - rad_s) < tolerance, 0.0, SPIN_S,
+        approach = self._approach(rad_s)
+
+        def there() -> bool:
+            approach.look()
+            return abs(self.speed_rad_s - rad_s) < tolerance
+
+        self._keep(there, 0.0, SPIN_S,
                    lambda: f"the rotor did not reach {rad_s:.1f} rad/s within {SPIN_S:g} s: it turns at "
                    f"{self.speed_rad_s:.1f} rad/s")  # fmt: skip
 
@@ -67,9 +76,19 @@ class Turning:
         """`Controller.stop`."""
         self._orders.command("STOP")
         limit = self.landing_speed
-        waiting.until(lambda: abs(self.speed_rad_s) < limit, STOP_S, lambda: RotorNotArrived(
+        approach = self._approach(0.0)
+
+        def slow() -> bool:
+            approach.look()
+            return abs(self.speed_rad_s) < limit
+
+        waiting.until(slow, STOP_S, lambda: RotorNotArrived(
             f"the rotor did not slow to {limit:g} rad/s within {STOP_S:g} s: it turns at {self.speed_rad_s:.1f} rad/s"
         ), self._clock, self._now_ns)  # fmt: skip
+
+    def _approach(self, rad_s: float) -> Approach:
+        period_s = self._telemetry.period_ns * 1e-9
+        return Approach(rad_s, lambda: self.speed_rad_s, self._speeds, self.landing_speed, period_s, self._now_ns)
 
     def _keep(self, ok: Callable[[], bool], expected_s: float, timeout_s: float, text: Callable[[], str]) -> None:
         waiting.keep(ok, expected_s, timeout_s, text, self._clock, self._now_ns)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from bench import clockrate
-from bench.errors import ClockWrong
+from bench.errors import ClockWrong, ReadingsStand
 from bench.link import Link
 from bench.linkhealth import CHECK
 from bench.rigfile import RigFile
 from bench.samples import SampleBlock
-from bench.stillness import StuckChannels
+from bench.stillness import STILL_S, StuckChannels
 from bench.telemetry import TelemetryDecoder
 from drivers import unheard, waiting
 from drivers.condition import Condition
@@ -83,8 +83,9 @@ class Watch:
         Raises:
             LinkError: no telemetry for half a second (`drivers.waiting.patience_s`); BytesUnreadable where bytes come.
             AnotherHost: `HostFrames.check`.
-            DeviceFault, FrozenError: `Condition.check`.
             ClockWrong: the controller's clock is off by a per cent or more.
+            DeviceFault, FrozenError, StateContradicts: `Condition.check`.
+            ReadingsStand: readings had noise, and all have stood for a second.
         """
         patience_s = self.patience_s + (self._rig.link.reconnect_s if self._link.reopening else 0.0)
         if self.silent_s > patience_s and not self._frames_come:
@@ -94,6 +95,11 @@ class Watch:
         self.condition.check()
         if (ppm := self._telemetry.host.rate.certain_ppm) is not None:
             raise ClockWrong(f"{clockrate.described(ppm)}. {CHECK}")
+        if self.stuck.all_stand:
+            raise ReadingsStand(
+                f"all readings with noise have stood for {STILL_S:g} s or more while tick and sequence went on; nobody knows "
+                "what the machine does"
+            )
 
     @property
     def _frames_come(self) -> bool:

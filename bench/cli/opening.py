@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from bench import faults, linkurl
 from bench.cli import console
-from bench.cli.safety import may_touch, safe_steps
+from bench.cli.safety import making_safe, may_touch
 from bench.clock import Clock, WallClock
 from bench.envelope import HELD
 from bench.errors import BenchError, ConfigError
@@ -232,7 +232,6 @@ def beat_of(rig: RigFile, session: Session) -> Any:
 
 def _released(controller: Controller) -> None:
     """A bench that ends well lets the next one in at once; one that does not is forgotten after a second."""
-    controller.guarded = False
     with suppress(BenchError):
         controller.release()
 
@@ -294,5 +293,5 @@ def _opened(
     if bus.cleared:
         found.append(Finding("fault-cleared", f"fault {bus.cleared} of an earlier run was cleared", "drive"))
     streams = [controller.telemetry.layout, *bus.layouts]
-    return OpenRig(rig, streams, attach, unguard, safe_steps(controller, base, bus.drive), truth, found,
-                   controller.catch_up)  # fmt: skip
+    steps, aftermath = making_safe(controller, base, bus.drive)
+    return OpenRig(rig, streams, attach, unguard, steps, truth, found, controller.catch_up, aftermath)

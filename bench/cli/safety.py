@@ -16,7 +16,9 @@ from typing import TYPE_CHECKING
 
 from bench import runlog
 from bench.cli.patience import Patience
-from bench.errors import BenchError, InterlockError, LinkError
+from bench.cli.witness import RESTING, UNKNOWN, Witness
+from bench.errors import BenchError, InterlockError, LinkError, Refused
+from bench.findings import Finding
 from bench.opened import WatchedClock
 from bench.roles import Drive
 from bench.supervisor import SafeStep
@@ -25,20 +27,23 @@ if TYPE_CHECKING:
     from drivers.controller import Controller
 
 logger = logging.getLogger("bench.make-safe")
-RESTING = ("OFF", "READY", "FAULT")
 SAFE = ("OFF", "FAULT")
-UNTOLD = ("UNSEEN", "UNKNOWN")
+UNTOLD = ("UNSEEN", UNKNOWN)
 ENDING = ("LANDING", "COASTING", "LIFTING")  # movements that end by themselves
 GIVE_UP_S = 10.0  # without progress, until the next means
 END_S = 3 * GIVE_UP_S  # and until nothing more is waited for
 LOOK_S, ASK_S = 0.05, 0.5
+LOOKS = 3  # at a state of rest that something contradicts, before that is believed
 LANDED_S = 3.0  # beyond its own time, for a landing to show
 
 
-def safe_steps(controller: Controller, base: WatchedClock, drive: Drive | None = None) -> tuple[SafeStep, ...]:
-    """The steps for a controller whose heartbeat `base` renews, and an external drive on its shaft."""
+def making_safe(
+    controller: Controller, base: WatchedClock, drive: Drive | None = None
+) -> tuple[tuple[SafeStep, ...], Callable[[], tuple[Finding, ...]]]:
+    """The steps for a controller whose heartbeat `base` renews, and an external drive on its shaft; and what tells afterwards
+    what the machine did meanwhile: a fault, amplifiers that went off at speed, a state that cannot be believed."""
     way = _Way(controller, base, drive)
-    return (
+    steps = (
         SafeStep("take the torque away", way.at_once),
         SafeStep("wait for the rotor to be slow", way.then(way.slow)),
         SafeStep("land the rotor", way.then(way.land)),
@@ -46,12 +51,13 @@ def safe_steps(controller: Controller, base: WatchedClock, drive: Drive | None =
         SafeStep("the controller's own make-safe", way.then(way.own)),
         SafeStep("the controller's watchdog", way.then(way.watchdog)),
     )
+    return steps, way.seen.findings
 
 
 @dataclass
 class _Way:
     """What each step does. `off`: the drive has been seen off; `driven`: it ran when make-safe began; `asked`: the controller
-    has been told to make itself safe; `heard`: it answered that."""
+    has been told to make itself safe; `heard`: it answered that; `seen`: what the machine does meanwhile."""
 
     controller: Controller
     base: WatchedClock
@@ -61,6 +67,15 @@ class _Way:
     asked: bool = False
     heard: bool = True
     patience: Patience = field(init=False)
+    seen: Witness = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.seen = Witness(self.controller, lambda: self.base.renewing)
+
+    @property
+    def mode(self) -> str:
+        """What the controller is taken to be: a state of rest that something contradicts is none, until answers say one."""
+        return UNKNOWN if self.seen.doubtful(self.patience) else self.seen.mode
 
     def at_once(self) -> None:
         """What is safe at any speed: no torque from the drive nor the motor; of a machine that nobody sees, its own way."""
@@ -70,12 +85,26 @@ class _Way:
             self.drive.let_go()
         c.sight.forget()
         self.patience = Patience(c, self.base, self.drive)  # what was forgotten is no progress
+        self.seen.begin(self.patience)
         c.clock.sleep(0.02)  # a command may have been sent whose effect nobody has seen yet
-        mode = c.sight.mode
-        if mode in (*UNTOLD, "LIFTING"):
+        mode = self._settled()
+        if c.sight.mode in RESTING and mode == UNKNOWN:
+            # It says that it rests, and something says that it does not: a motor that obeys brakes the rotor first.
+            if c.sight.mode == "FAULT" or not (self.patience.fast and self._obeyed("STOP")):
+                self._own_way()
+        elif mode in (*UNTOLD, "LIFTING"):
             self._own_way()
         elif mode == "SPINNING" or (mode == "LEVITATED" and self.patience.fast):
             self._send("STOP")
+
+    def _settled(self) -> str:
+        """The mode, where one look could be deceived by a single sample looked at again."""
+        for _ in range(LOOKS):
+            if (mode := self.mode) != UNKNOWN or self.controller.sight.mode == UNKNOWN:
+                return mode
+            self.controller.clock.sleep(LOOK_S)
+        self.seen.believe_not(self.patience)
+        return self.mode
 
     def then(self, do: Callable[[], None]) -> Callable[[], None]:
         """A later step. A drive that nobody saw off is told again: its line may be there again."""
@@ -90,14 +119,18 @@ class _Way:
     def slow(self) -> None:
         """Brake with the drive where it answers, and wait."""
         c, p = self.controller, self.patience
-        if self.asked or c.sight.mode in (*RESTING, "LANDING"):
+        if self.asked or self.mode in (*RESTING, "LANDING"):
             return
         if self.drive is not None:
             if self.driven and p.fast:
                 self._brake(self.drive)
             self.off = self.drive.confirm_off()
         limit = c.landing_speed
-        self._until(lambda: p.slow or c.sight.mode in RESTING, GIVE_UP_S, f"under {limit:g} rad/s")
+        self._until(lambda: p.slow or self._rests(fast=p.fast), GIVE_UP_S, f"under {limit:g} rad/s")
+
+    def _rests(self, *, fast: bool) -> bool:
+        """Whether nothing is to be waited for before the landing: it rests, or it says so and the shaft is not fast."""
+        return self.mode in RESTING or (self.controller.sight.mode in RESTING and not fast)
 
     def _brake(self, drive: Drive) -> None:
         try:
@@ -111,46 +144,41 @@ class _Way:
     def land(self) -> None:
         """LAND, if something that changes says that the shaft is slow; and the time that a landing takes."""
         c, p = self.controller, self.patience
-        mode = c.sight.mode
+        mode = self.mode
         if self.asked or mode in RESTING or not (p.slow or mode in ("LANDING", "COASTING")):
             return
         if mode not in ("LANDING", "COASTING"):
-            self._send("LAND")
-        self._until(lambda: c.sight.mode in RESTING, max(GIVE_UP_S, c.landing_s + LANDED_S), "the landing")
+            self._send("LAND", lambda: p.speed_rad_s is not None and p.slow)
+        self._until(lambda: self.mode in RESTING, max(GIVE_UP_S, c.landing_s + LANDED_S), "the landing")
 
     def disable(self) -> None:
-        c = self.controller
-        if c.sight.mode == "READY":
-            self._send("DISABLE")
-            self._until(lambda: c.sight.mode in SAFE, GIVE_UP_S, "amplifiers off")
+        if self._settled() == "READY":
+            self._send("DISABLE", lambda: self.mode == "READY")
+            self._until(lambda: self.mode in SAFE, GIVE_UP_S, "amplifiers off")
 
     def own(self) -> None:
         """The controller's own way, in as long as it goes forward."""
-        c = self.controller
-        if c.sight.mode in SAFE:
+        if self._settled() in SAFE:
             return
         if not self.asked:
             self._own_way()
         if self.heard:
-            self._until(lambda: c.sight.mode in SAFE, 2 * GIVE_UP_S, "its own landing")
+            self._until(lambda: self.mode in SAFE, 2 * GIVE_UP_S, "its own landing")
 
     def watchdog(self) -> None:
         c = self.controller
-        if c.sight.mode in SAFE:
+        if self._settled() in SAFE:
             return
         self.base.renewing = False
         try:
-            self._until(lambda: c.sight.mode in SAFE, END_S, "its watchdog")
+            self._until(lambda: self.mode in SAFE, END_S, "its watchdog")
         except LinkError as error:
             if c.sight.mode in UNTOLD:
                 raise LinkError(
                     "the machine cannot be seen. No heartbeat goes out any more, so that its controller lands it by itself; "
                     "look at it before going near"
                 ) from error
-            raise LinkError(
-                f"the controller still says {c.sight.mode}: the rotor is up, and the controller does not take it to be slow. "
-                "Switch the amplifiers off by hand once you see that the shaft stands"
-            ) from error
+            raise LinkError(self.seen.left(self.patience)) from error
 
     def _own_way(self) -> None:
         self.asked = True
@@ -160,11 +188,20 @@ class _Way:
             self.heard = False
             raise
 
-    def _send(self, name: str) -> None:
-        """A command. One that was answered and accepted is progress, however long that took."""
+    def _obeyed(self, name: str) -> bool:
+        """Send a command to a controller that may be in no state for it; whether it was accepted."""
+        try:
+            self._send(name)
+        except (Refused, LinkError) as error:
+            logger.warning("make safe: %s", error)
+            return False
+        return True
+
+    def _send(self, name: str, slow: Callable[[], bool] | None = None) -> None:
+        """A command, which is repeated while `slow`. One that was answered and accepted is progress, however long that took."""
         sight = self.controller.sight
         before = sight.answered_ns
-        self.controller.command(name)
+        self.controller.command(name, slow)
         if sight.answered_ns != before:
             self.patience.went_on()
 
@@ -177,13 +214,14 @@ class _Way:
         c, p = self.controller, self.patience
         while True:
             p.look()
+            self.seen.look(p)
             if done():
                 return
             if (still := p.still_s) >= limit_s:
                 raise LinkError(f"waited {still:.0f} s for {what}; nothing went forward")
             if (line := p.line(what, limit_s)) is not None:
                 runlog.show(logger, line)
-            if not c.sight.told:
+            if not c.sight.told or self.asked or self.mode == UNKNOWN:
                 p.every(ASK_S, c.ask_state)
             c.clock.sleep(LOOK_S)
 

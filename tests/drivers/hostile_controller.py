@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from bench.cli.safety import safe_steps
+from bench.cli.safety import making_safe
 from bench.codec import Decoder, encode
 from bench.findings import Finding
 from bench.frames import FrameBatch, payload
@@ -79,7 +79,8 @@ class Bench:
         self.controller.clock.sleep(before_s)
         self.link.commands.clear()
         begin = self.machine.now_ns()
-        found = self.supervisor.make_safe(safe_steps(self.controller, self.base), self.machine.now_ns)
+        steps, aftermath = making_safe(self.controller, self.base)
+        found = self.supervisor.make_safe(steps, self.machine.now_ns) + aftermath()
         return found, (self.machine.now_ns() - begin) * 1e-9
 
     @property

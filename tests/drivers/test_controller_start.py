@@ -70,7 +70,7 @@ def test_a_state_that_nobody_knows_is_not_taken_for_safe() -> None:
         bench.controller.clock.sleep(0.3)
     bench.controller.guarded = False
     assert bench.machine.device.state == "LEVITATED"
-    found = bench.supervisor.make_safe(safety.safe_steps(bench.controller, bench.base), bench.machine.now_ns)
+    found = bench.supervisor.make_safe(safety.making_safe(bench.controller, bench.base)[0], bench.machine.now_ns)
     assert bench.machine.device.state == "OFF"
     assert found == ()  # its replies told that it landed
 

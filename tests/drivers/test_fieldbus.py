@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 from fieldbus_bench import Bench, go, opened, rig
 
-from bench.errors import BenchError, DeviceFault, DeviceUnreadable, InterlockError, LinkError
+from bench.errors import BenchError, DeviceFault, DeviceUnreadable, InterlockError, LinkError, RotorNotArrived
 from bench.recorder import Recorder, RunHeader
 from bench.recording import Recording
 from bench.registers import RegisterRefused
@@ -38,6 +39,19 @@ def test_the_shaft_reaches_its_speed_coasts_and_stops() -> None:
         assert bench.plant_speed == pytest.approx(-10, abs=0.6)
         drive.stop()
         assert abs(bench.plant_speed) < 0.5
+
+
+def test_a_drive_that_does_not_stop_is_told_and_not_waited_for_long(caplog: pytest.LogCaptureFixture) -> None:
+    with opened() as (bench, bus):
+        assert bus.drive is not None
+        bus.drive.reach(20.0)
+        bench.bank.drives["drive"].obey = lambda command: None  # type: ignore[method-assign]
+        begin = bench.machine.now_ns()
+        with caplog.at_level(logging.INFO, "drivers"), pytest.raises(RotorNotArrived, match="no slower for 25 s"):
+            bus.drive.stop()
+        assert bench.machine.now_ns() - begin < 30e9
+        lines = [r.getMessage() for r in caplog.records if hasattr(r, "shown")]
+        assert lines[0] == "waiting 5 s for the drive to stop the shaft; 20 s left"
 
 
 def test_however_the_block_ends_the_drive_coasts() -> None:

@@ -6,7 +6,8 @@ import threading
 
 from fieldbus_bench import opened, rig
 
-from bench.cli.safety import RESTING, safe_steps
+from bench.cli.safety import making_safe
+from bench.cli.witness import RESTING
 from bench.clock import WallClock
 from bench.envelope import Envelope
 from bench.errors import LinkError
@@ -39,7 +40,7 @@ def test_a_run_command_whose_answer_was_lost_is_taken_back() -> None:
         bus.devices["drive"].command("run")  # and no poll since
         assert not bus.drive.running
         base = WatchedClock(bench.machine, lambda: None, lambda _: None)
-        at_once, wait, land, *_ = safe_steps(bench.controller, base, bus.drive)
+        at_once, wait, land, *_ = making_safe(bench.controller, base, bus.drive)[0]
         bench.lines["drive"].writes.clear()
         at_once.action()
         assert bench.lines["drive"].writes == [COAST]
@@ -56,7 +57,7 @@ def test_a_drive_that_nobody_saw_off_is_told_again_in_later_steps() -> None:
         bus.drive.reach(10.0)
         line = bench.lines["drive"]
         base = WatchedClock(bench.machine, lambda: None, lambda _: None)
-        at_once, wait, land, *_ = safe_steps(bench.controller, base, bus.drive)
+        at_once, wait, land, *_ = making_safe(bench.controller, base, bus.drive)[0]
         bus.guarded = bench.controller.guarded = False
         line.failure = LinkError("no answer")
         line.writes.clear()

@@ -179,6 +179,9 @@ READINGS = (
         "a state that the DBC does not name",
         long=True,
     ),
+    Kind("says-off", "badstate=0@1", ERROR, ("state-contradicts",), "telemetry says OFF of a rotor that is held"),
+    Kind("says-ready", "badstate=1@1", ERROR, ("state-contradicts",), "telemetry says READY of a rotor that is held"),
+    Kind("late-fault", "latefault=5", ERROR, ("controller-fault",), "levitation is lost while the rotor is landed"),
     Kind("unknown-fault", "badfault=77@1", ABORTED, ("controller-fault",), "a fault that the DBC does not name"),
 )
 SILENCE = (

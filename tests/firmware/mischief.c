@@ -64,6 +64,12 @@ void take_message(int identifier, const uint8_t *m, int length) {
         send_message(COMMAND_REPLY, reply, 4);
         return;
     }
+    if (on("latefault") && identifier == COMMAND && m[4] == LAND) { /* levitation is lost on the way down */
+        obey_message(identifier, m, length);
+        fault = (int)*on("latefault");
+        state = FAULT;
+        return;
+    }
     if (on("forgetful") && identifier == COMMAND) { /* spare bytes of its own, so that no Command is the last one again */
         static uint8_t many;
         uint8_t other[8];

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from bench import capture
-from bench.cli.safety import safe_steps
+from bench.cli.safety import making_safe
 from bench.errors import BenchError, DeviceFault, InterlockError, StateNotReached
 from bench.opened import WatchedClock
 from bench.recorder import Recorder, RunHeader
@@ -215,7 +215,7 @@ def test_make_safe_lands_what_the_controller_sees_turning_for_a_while_yet() -> N
     with driven(stand) as bus:
         assert bus.drive is not None
         bus.drive.reach(100.0)
-        at_once, slow, land = safe_steps(stand.controller, stand.base, bus.drive)[:3]
+        at_once, slow, land = making_safe(stand.controller, stand.base, bus.drive)[0][:3]
         begin = stand.machine.now_ns()
         at_once.action()
         assert stand.controller.mode == "SPINNING"
@@ -238,7 +238,9 @@ def test_make_safe_does_not_let_down_a_shaft_whose_pulses_have_ended() -> None:
         with pytest.raises(DeviceFault, match="SENSOR"):
             stand.controller.clock.sleep(4.0)
         stand.controller.guarded = False
-        found = stand.supervisor.make_safe(safe_steps(stand.controller, stand.base, bus.drive), stand.machine.now_ns)
+        found = stand.supervisor.make_safe(
+            making_safe(stand.controller, stand.base, bus.drive)[0], stand.machine.now_ns
+        )
         assert bus.drive.confirm_off()
     assert "the rotor is up" in found[-1].text
     assert stand.controller.mode == "COASTING"
