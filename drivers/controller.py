@@ -179,15 +179,15 @@ class Controller:
             raise InterlockError(f"the shaft must not be driven in state {self.mode}: nothing holds it")
 
     def require_landed(self) -> None:
-        """Raise unless the rotor rests: nobody reaches into the machine else.
+        """Raise unless the rotor rests by state, speed and angle: nobody reaches into the machine else.
 
         Raises:
             InterlockError: it does not.
         """
-        if self.mode not in ("OFF", "READY") or abs(self.speed_rad_s) > TOUCHED:
-            raise InterlockError(
-                f"nobody may touch the shaft in state {self.mode} at {self.speed_rad_s:.1f} rad/s: land it first"
-            )
+        turning = self.sight.speeds_rad_s().get("angle", 0.0)  # within milliseconds: coarser than the speed channel
+        speed = turning if turning >= self.landing_speed else abs(self.speed_rad_s)
+        if self.mode not in ("OFF", "READY") or speed > TOUCHED:
+            raise InterlockError(f"nobody may touch the shaft in state {self.mode} at {speed:.1f} rad/s: land it first")
 
     @property
     def round_trip_ns(self) -> int | None:

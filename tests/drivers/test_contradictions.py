@@ -3,6 +3,7 @@ request is repeated: each is told by its name, and nothing goes out that is safe
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from pathlib import Path
 
@@ -11,7 +12,15 @@ from hostile_controller import TSBS, Bench, Telemetry, unchanged
 
 from bench.acquisition import cause_of
 from bench.cli import opening
-from bench.errors import BenchError, NoReply, ReadingsStand, RotorNotArrived, SpeedContradicts, StateContradicts
+from bench.errors import (
+    BenchError,
+    InterlockError,
+    NoReply,
+    ReadingsStand,
+    RotorNotArrived,
+    SpeedContradicts,
+    StateContradicts,
+)
 from bench.frames import FrameBatch
 from bench.recorder import Recorder, RunHeader
 from sim_backend.core import DriveLaw
@@ -79,6 +88,17 @@ def test_a_run_ends_at_once_when_its_controller_says_that_a_held_rotor_rests(sta
     ):
         bench.controller.clock.sleep(5.0)
     assert bench.machine.now_ns() - begin < 0.5e9
+
+
+def test_nobody_reaches_into_a_machine_whose_angle_turns_though_its_speed_says_nothing() -> None:
+    bench = Bench()
+    bench.controller.spin(FAST_RAD_S)
+    bench.link.change = Telemetry(TSBS, {"state": CODES["READY"], "speed": 0.0}, frozen=(), stuck=False)
+    with contextlib.suppress(StateContradicts):
+        bench.controller.clock.sleep(0.1)
+    assert (bench.controller.mode, bench.controller.speed_rad_s) == ("READY", 0.0)
+    with pytest.raises(InterlockError, match=r"nobody may touch the shaft in state READY at 4\d"):
+        bench.controller.require_landed()
 
 
 def test_a_rotor_that_was_asked_to_land_may_rest() -> None:
