@@ -23,7 +23,7 @@ from bench.uncertainty import Estimate, Influence
 Backend = Literal["sim", "live", "served"]  # served: a live link with a simulated controller behind it
 State = Literal["current", "expired"]
 STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
-CLOCK = timedelta(minutes=1)  # by so much two clocks may differ
+CLOCKS_DIFFER = timedelta(minutes=1)  # at most: the clock of the run's host, and of the one that uses it
 RIG_TABLES = ("site", "geometry", "masses", "sensors", "machine", "hook")
 """First parts of the identities of influences that stand in the rig file."""
 
@@ -121,7 +121,7 @@ class Calibration:
 
     def ahead(self, now: datetime) -> bool:
         """Whether it is dated in the future, by more than clocks differ: one of the two clocks is wrong, or the date is."""
-        return datetime.fromisoformat(self.date) > now + CLOCK
+        return datetime.fromisoformat(self.date) > now + CLOCKS_DIFFER
 
     def used_at(self, now: datetime) -> Calibration:
         """This calibration as a run that begins now uses it: `expired` says whether it is overdue."""

@@ -13,10 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 SLICE_NS = 500_000_000
-TIGHT_NS, CERTAIN_NS = (
-    5e6,
-    3e6,
-)  # so near the line the least of a slice is; a computer that is too slow does not keep to it
+# So near the line the least of a slice is, to be read by it and to end a run by it; a computer that is too slow keeps to none.
+TIGHT_NS, CERTAIN_NS = 5e6, 3e6
 LOOSE = 0.001  # and by this share of what the clock is off in all: crystals warm up
 GROSS = 0.005  # less is for bench.hosttime, by windows of a second
 CERTAIN = 0.01  # a clock that is further off ends a run

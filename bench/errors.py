@@ -7,11 +7,14 @@ BenchError
     BytesUnreadable  bytes come, but no telemetry can be made of them
     FrozenError      telemetry comes, but its counters stand
     ClockWrong       telemetry comes, but by a clock that is off by a per cent or more
+    ReadingsStand    telemetry goes on, but its readings stand
     DeviceUnreadable a register device says what is no number
     OperatorSilent   the operator does not answer
   NotReached         what was told to move did not get there                     exit 3
     StateNotReached  a device took a command and did not go into its state
     RotorNotArrived  the rotor did not reach an angle or a speed
+  StateContradicts   the controller's state is none that can be believed         exit 3
+  SpeedContradicts   speed channel and angle tell different speeds               exit 3
   Refused            a device answers that it will not                           exit 3
     OperatorRefused  the operator answers that it cannot be done
   RecordingError     a recording cannot be written or read                       exit 3

@@ -92,7 +92,6 @@ class Condition:
             code = int(self._telemetry.latest.get("state", 0))
             name = self._states.get(code, f"{code}, which its DBC does not name")
             raise DeviceFault(f"the controller reports no fault, but its state is {name}: see its documentation")
-
         if self._rests_unasked():
             raise StateContradicts(self.unasked_text(self._telemetry.stillness.newest_ns))
 

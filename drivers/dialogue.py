@@ -17,7 +17,7 @@ from bench.rigfile import RigFile
 from drivers.waiting import patience_s
 
 REPLIES = ("CommandReply", "ParamReply", "Identity", "Owner", "CaptureStatus")
-EARLY = 1000  # frames that are kept until something records
+EARLY = 1000  # frames that are kept until something records: 44 parameters asked and answered, and room for repeats
 KEPT = 256  # replies that nobody waits for: another host may ask too
 ATTEMPTS = 3  # times that one request is sent: a lost request or reply costs a repeat
 
@@ -41,7 +41,7 @@ class Dialogue:
 
     @property
     def recorder(self) -> Recorder | None:
-        """What records; the first one is given what was asked and answered before it was there."""
+        """What records; one that begins is given what was asked and answered while none was there."""
         return self._recorder
 
     @recorder.setter

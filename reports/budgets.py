@@ -15,9 +15,8 @@ from reports.view import BudgetRow, BudgetTable
 
 SMALL_SHARE = 0.01  # of the variance; smaller influences are summed in one line, all of them are in record.json
 _WORDS = ((re.compile(r"\bamb\b(?!-)"), "AMB"), (re.compile(r"\bcom to\b"), "centre of mass to"))
-LINEAR = (
-    0.05  # by which a contribution may differ from |c| u, of one that is drawn from a t distribution from that of it
-)
+# By which a contribution may differ from |c| u, or from that of the t distribution that an influence is drawn from.
+LINEAR = 0.05
 NOT_LINEAR = "not linear"
 TOGETHER = "several influences together"
 Content = Mapping[str, Any]

@@ -73,11 +73,8 @@ def row(c: Calibration, store: Store, rig: RigFile, now: datetime, current: bool
     """One calibration and its state: current, expired, superseded, other rig, other certificates, in the future."""
     notes = [f"adopted although its outcome was {c.outcome}"] if c.outcome not in SOUND else []
     notes += [f"rests on {u.procedure}, which had expired on {u.due}" for u in c.used if u.state == "expired"]
-    notes += (
-        []
-        if c.sealed
-        else [f"carries no digest; its content has {calibrationfile.digest_of(calibrationfile.content(c))}"]
-    )
+    if not c.sealed:
+        notes.append(f"carries no digest; its content has {calibrationfile.digest_of(calibrationfile.content(c))}")
     state = "current"
     if foreign := store.foreign(c):
         state, notes = "other rig", [foreign]

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 logger = logging.getLogger("bench.make-safe")
 SAFE = ("OFF", "FAULT")
 UNTOLD = ("UNSEEN", UNKNOWN)
-ENDING = ("LANDING", "COASTING", "LIFTING")  # movements that end by themselves
 GIVE_UP_S = 10.0  # without progress, until the next means
 END_S = 3 * GIVE_UP_S  # and until nothing more is waited for
 LOOK_S, ASK_S = 0.05, 0.5

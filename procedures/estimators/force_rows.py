@@ -143,12 +143,8 @@ def _coil_terms(r: Ramps, sensors: Sensors, bias_A: float) -> tuple[Array, Array
     return (ip**2 - i_n**2) / (4 * bias_A), (ip**2 + i_n**2) / 2 - bias_A**2
 
 
-def motor_currents(r: Ramps, p: Values) -> tuple[Array, Array]:
-    """The axis' own current and the other axis' current (A, P), freed of the segment sensors' offsets and gains."""
-    return _motor_currents(r, _segment_sensors(p))
-
-
 def _motor_currents(r: Ramps, sensors: Sensors) -> tuple[Array, Array]:
+    """The axis' own current and the other axis' current (A, P), freed of the segment sensors' offsets and gains."""
     i = {k: (r.segments[k - 1] - sensors[k - 1]) / sensors[k + 3] for k in (1, 2, 3, 4)}
     own, other = SEGMENTS[r.axis]
     return (i[own[0]] - i[own[1]]) / 2, (i[other[0]] - i[other[1]]) / 2

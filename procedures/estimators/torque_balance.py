@@ -184,20 +184,7 @@ def balance(
     """
     torque = load_torque(s, p, masses)
     current = torque_current(s.segments, p) - held.off_home(s.angle) / np.cos(pole_pairs * s.gamma)
-    angles, index = np.unique(s.gamma, return_inverse=True)
-    if len(angles) < 3:
-        raise AnalysisError(f"found {len(angles)} phase angles; expected three or more (was the run stopped early?)")
-    lines = np.zeros((len(current), 2 * len(angles)))
-    for k in range(len(angles)):
-        mine = index == k
-        if (s.side[mine] == 0).sum() < 2 or not {1, -1} <= set(s.side[mine].tolist()):
-            raise AnalysisError(
-                f"phase angle {angles[k]:.4f} rad: found {int(mine.sum())} steps; expected loads on both sides and two steps "
-                "without load (was the run stopped early?)"
-            )
-        lines[mine, 2 * k] = 1
-        lines[mine, 2 * k + 1] = s.time[mine] - s.time[mine].mean()
-
+    lines = _lines_in_time(s)
     off = 6 * pole_pairs * s.angle * (s.side != 0)
     late = (s.time - np.average(s.time, weights=torque**2)) / np.ptp(s.time)
 
@@ -226,18 +213,30 @@ def balance(
     covariance = fit.covariance[:4, :4] * fit.chi2 / fit.dof
     drift = Extra(float(fit.terms[3]), math.sqrt(covariance[3, 3]))
     return Balance(
-        alpha,
-        gamma_0,
-        ripple,
-        drift,
-        covariance[:2, :2],
-        current,
-        lines @ fit.terms[4:],
-        torque,
-        fit,
-        relative,
-        pole_pairs,
-    )
+        alpha, gamma_0, ripple, drift, covariance[:2, :2], current, lines @ fit.terms[4:], torque, fit, relative, pole_pairs
+    )  # fmt: skip
+
+
+def _lines_in_time(s: Steps) -> Array:
+    """Columns of i_base, (n, 2 k): at each of the k phase angles a constant and a slope in time.
+
+    Raises:
+        AnalysisError: too few phase angles, or one that lacks loads or steps without load.
+    """
+    angles, index = np.unique(s.gamma, return_inverse=True)
+    if len(angles) < 3:
+        raise AnalysisError(f"found {len(angles)} phase angles; expected three or more (was the run stopped early?)")
+    lines = np.zeros((len(s.gamma), 2 * len(angles)))
+    for k in range(len(angles)):
+        mine = index == k
+        if (s.side[mine] == 0).sum() < 2 or not {1, -1} <= set(s.side[mine].tolist()):
+            raise AnalysisError(
+                f"phase angle {angles[k]:.4f} rad: found {int(mine.sum())} steps; expected loads on both sides and two steps "
+                "without load (was the run stopped early?)"
+            )
+        lines[mine, 2 * k] = 1
+        lines[mine, 2 * k + 1] = s.time[mine] - s.time[mine].mean()
+    return lines
 
 
 def extra(b: Balance, column: Array) -> Extra:

@@ -18,24 +18,20 @@ from procedures.estimators import torque_balance, torque_drifts
 from procedures.estimators.direction import SEGMENTS
 from procedures.estimators.torque_balance import Balance, Detent
 from procedures.estimators.torque_data import TorqueData
+from procedures.estimators.torque_drifts import SIGNIFICANT
 
 Array = npt.NDArray[np.float64]
 SATURATED, SEGMENT_SATURATED, CONTACT = 1, 2, 12  # bits of the telemetry signal `flags`
-SIGNIFICANT = 6.0  # standard deviations, of Student's t with some twenty degrees of freedom
 SLIP_RATE = 4e-3  # 1/s, relative, of the heaviest load's torque
 
 
-class Tolerances(Protocol):
+class Tolerances(torque_drifts.Tolerances, Protocol):
     """The part of a plan that these checks need."""
 
     @property
     def max_angle_rad(self) -> float: ...
     @property
     def max_drift_A(self) -> float: ...
-    @property
-    def max_baseline_drift_A_s(self) -> float: ...
-    @property
-    def max_scale_drift(self) -> float: ...
     @property
     def max_lost(self) -> float: ...
 

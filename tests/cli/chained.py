@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from in_process import Bench, bench_in_process
 
 from bench import catalogue
 from bench.calibrationfile import digest_of
-from bench.cli.__main__ import main
 
-Bench = Callable[..., tuple[int, str, str]]
 CHAIN = (
     catalogue.Entry("tiny-levitated", "tests.tiny_procedures", "A look at the supply"),
     catalogue.Entry("tiny-chained", "tests.tiny_chain", "What differs from it"),
@@ -31,14 +29,7 @@ def opened(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
         shutil.copy(source.with_suffix(suffix), folder / "rigs")
     monkeypatch.setattr(catalogue, "PROCEDURES", CHAIN)
     monkeypatch.chdir(folder)
-
-    def command(*arguments: str) -> tuple[int, str, str]:
-        status = main(arguments)
-        out, err = capsys.readouterr()
-        assert "Traceback" not in out + err
-        return status, out, err
-
-    return command
+    return bench_in_process(capsys)
 
 
 def run(bench: Bench, *extra: str, procedure: str = "tiny-levitated", status: int = 0) -> str:

@@ -6,23 +6,21 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import jsonschema
 import pytest
 from campaign_catalogue import SMALL
+from in_process import Bench, bench_in_process
 
 from bench import catalogue
 from bench.campaign_model import SCHEMA_FILE, json_schema
-from bench.cli.__main__ import main
 from bench.cli.campaign_job import RigTask, run_rig
 from bench.errors import ConfigError
 from bench.rigfile import load_rig
 
 ROOT = Path(__file__).resolve().parents[2]
-Bench = Callable[..., tuple[int, str, str]]
 HEAD = 'schema = 1\nname = "small"\nrig = "tsbs12"\n'
 TWO = '[[step]]\nprocedure = "tiny-levitated"\n[[step]]\nprocedure = "tiny-needing"\n'
 
@@ -38,14 +36,13 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captur
     monkeypatch.setattr(catalogue, "PROCEDURES", SMALL)
     monkeypatch.chdir(tmp_path)
 
-    def command(text: str, *arguments: str) -> tuple[int, str, str]:
-        (tmp_path / "c.toml").write_text(text)
-        status = main(("campaign", "c.toml", *arguments))
-        out, err = capsys.readouterr()
-        assert "Traceback" not in out + err
-        return status, out, err
+    command = bench_in_process(capsys)
 
-    return command
+    def campaign(text: str, *arguments: str) -> tuple[int, str, str]:
+        (tmp_path / "c.toml").write_text(text)
+        return command("campaign", "c.toml", *arguments)
+
+    return campaign
 
 
 @pytest.fixture

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from in_process import Bench, bench_in_process
 from pyarrow import parquet
 from tiny_catalogue import TINY
 
 from bench import catalogue
-from bench.cli.__main__ import main
 
-Bench = Callable[..., tuple[int, str, str]]
 SHIPPED = catalogue.PROCEDURES
 
 
@@ -23,14 +21,7 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captur
     """`bench` in an empty directory with the small procedure: exit status, standard output, standard error."""
     monkeypatch.setattr(catalogue, "PROCEDURES", TINY)
     monkeypatch.chdir(tmp_path)
-
-    def command(*arguments: str) -> tuple[int, str, str]:
-        status = main(arguments)
-        out, err = capsys.readouterr()
-        assert "Traceback" not in out + err
-        return status, out, err
-
-    return command
+    return bench_in_process(capsys)
 
 
 def run(*extra: str) -> tuple[str, ...]:

@@ -190,7 +190,7 @@ def test_a_bench_that_ends_lets_the_next_one_in(tmp_path: Path) -> None:
     assert bench.said[-1] == "RELEASE"
 
 
-def test_a_speed_that_stands_at_zero_while_the_angle_turns_is_named(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_speed_that_stands_at_zero_while_the_angle_turns_is_named() -> None:
     bench = Bench()
     bench.link.change = Telemetry(TSBS, {"speed": 0.0}, frozen=(), stuck=False)
     begin = bench.machine.now_ns()
@@ -211,7 +211,7 @@ def test_a_rotor_that_does_not_come_nearer_is_told_and_not_waited_for_long(caplo
     assert len(lines) == 3
 
 
-def test_readings_that_all_stand_end_a_run(caplog: pytest.LogCaptureFixture) -> None:
+def test_readings_that_all_stand_end_a_run() -> None:
     bench = Bench()
     bench.link.change = Telemetry(TSBS, {}, frozen=())
     begin = bench.machine.now_ns()
