@@ -67,7 +67,7 @@ def _last(counter: npt.NDArray[np.int64], before: int) -> int | None:
 class StuckChannels:
     """Channels whose readings stood for a second while the rotor was held and the tick went on, `found`. Only those are
     looked at whose noise the rig file states, above one count: others may well read the same. `all_stand`: noise was seen, and
-    now all of them stand."""
+    now all of them stand, two or more."""
 
     def __init__(self, rig: RigFile) -> None:
         self._names = [name for name in rig.channels if rig.noisy(name)]
@@ -99,5 +99,5 @@ class StuckChannels:
         self._last = newest
         self._noise_seen = self._noise_seen or bool(moved.any())
         still = block.t_ns[-1] - self._moved_ns >= STILL_S * 1e9
-        self.all_stand = self._noise_seen and bool(still.all())
+        self.all_stand = self._noise_seen and len(still) > 1 and bool(still.all())
         self.found.update(name for name, stands in zip(self._names, still, strict=True) if stands)

@@ -21,7 +21,7 @@ class Condition:
         self._reboots = 0
         self._code, self._since_ns = 0, 0  # of the state, and since when it is that
         self._unknown_ns: int | None = None  # since when its state has no name, by the frames that came
-        self._held = self._asked_down = False  # it has held the rotor; it was asked to set it down
+        self._held = self._asked_down = self._asked_before = False  # it has held the rotor; it was asked to set it down
         self._unasked_ns: int | None = None  # since when it rests unasked, by the frames that came
 
     @property
@@ -46,10 +46,20 @@ class Condition:
 
     def commanded(self, name: str) -> None:
         """A command is about to be sent."""
+        self._asked_before = self._asked_down
         if name == "LEVITATE":
             self._held = self._asked_down = False
         elif name in SET_DOWN:
             self._asked_down = True
+
+    def refused(self) -> None:
+        """The last command was refused: what it asked for was not begun."""
+        self._asked_down = self._asked_before
+
+    @property
+    def stands(self) -> str:
+        """What has stood for a second while telemetry came: tick, sequence or both; "" while both go on."""
+        return self._telemetry.stillness.frozen
 
     @property
     def unasked(self) -> bool:
@@ -77,7 +87,7 @@ class Condition:
             FrozenError: tick or sequence have stood for a second while telemetry came.
             StateContradicts: it says that the rotor rests, though it held it and nobody asked for that.
         """
-        if stands := self._telemetry.stillness.frozen:
+        if stands := self.stands:
             raise FrozenError(
                 f"telemetry is frozen: frames come, but the controller's {stands} has stood for {STILL_S:g} s or more; "
                 "nobody knows what the machine does"

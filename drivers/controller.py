@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from bench.clock import Clock, PumpedClock
 from bench.envelope import Envelope
-from bench.errors import BenchError, InterlockError, StateNotReached
+from bench.errors import BenchError, InterlockError, Refused, StateNotReached
 from bench.link import Link
 from bench.recorder import Recorder
 from bench.rigfile import RigFile
@@ -105,6 +105,7 @@ class Controller:
         handshake.claim(self._dialogue, self.rig, self._session, self.clock, self._wait)
         self._own()
         self.serial = handshake.identify(self._dialogue, self.rig, self._session, self._wait)
+        self.watch.simulated = self.serial == 0
         if self.mode == "FAULT":
             advice.may_clear("controller", self.fault, clear_fault)
             self.cleared = self.fault
@@ -241,15 +242,22 @@ class Controller:
         DISABLE are repeated only while what changes says that the shaft is slow, by `slow` where somebody sees more."""
         self.watch.condition.commanded(name)
         fit = {"LAND": "LEVITATED", "DISABLE": "READY"}.get(name)
-        if fit is None:
-            self._orders.command(name)
-        else:
-            self._orders.command(name, lambda: self.mode == fit and (slow or self._slow)())
+        try:
+            if fit is None:
+                self._orders.command(name)
+            else:
+                self._orders.command(name, lambda: self.mode == fit and (slow or self._slow)())
+        except Refused:
+            self.watch.condition.refused()
+            raise
 
     def _slow(self) -> bool:
-        """Whether something that changes says that the shaft is below the landing speed, and nothing that it is not."""
-        speed = max(self.sight.speeds_rad_s().values(), default=None)
-        return speed is not None and speed < self.landing_speed
+        """Whether something that changes says that the shaft is below the landing speed, and nothing that it is not. Readings
+        without noise do not change in READY: there the speed channel counts while its telemetry goes on."""
+        speeds = list(self.sight.speeds_rad_s().values())
+        if not speeds and self.mode == "READY" and not self.watch.condition.stands:
+            speeds = [abs(self.speed_rad_s)]
+        return bool(speeds) and max(speeds) < self.landing_speed
 
     def ask_state(self) -> None:
         """Ask for a reply, which tells the state, where the controller has one; nothing is waited for."""

@@ -93,9 +93,10 @@ class Witness:
                 f"the controller still says {c.sight.mode}: the rotor is up, and the controller does not take it to be slow. "
                 "Switch the amplifiers off by hand once you see that the shaft stands"
             )
-        answer = "nothing was answered" if c.sight.answered == "UNSEEN" else f"the last answer said {c.sight.answered}"
+        answer = "; nothing was answered" if c.sight.answers else ""
+        answer = answer if c.sight.answered == "UNSEEN" else f"; the last answer said {c.sight.answered}"
         return (
-            f"telemetry says {c.sight.mode}{turning}; {answer}. Take the rotor to be up until you see that the shaft stands; "
+            f"telemetry says {c.sight.mode}{turning}{answer}. Take the rotor to be up until you see that the shaft stands; "
             "then switch the amplifiers off by hand"
         )
 

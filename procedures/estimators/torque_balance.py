@@ -280,6 +280,8 @@ def shape_over_gamma(b: Balance, s: Steps) -> tuple[float, float]:
     when = np.array([s.time[index == k].mean() for k in range(len(angles))])
     taken = np.column_stack([np.ones_like(angles), np.tan(b.pole_pairs * (angles - b.gamma_0)), when - when.mean()])
     shapes = np.linalg.svd(taken)[0][:, 3:]  # (angles, angles - 3), orthonormal, at right angles to these
+    if not shapes.shape[1]:
+        return 1.0, 0.0
     carried = loaded(b) / b.u
     beside = [carried * s.side, *(carried * (s.load == k) for k in range(1, s.load.max() + 1))]
     known = np.column_stack([b.fit.jacobian / b.u[:, None], *beside])

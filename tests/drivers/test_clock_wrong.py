@@ -39,9 +39,11 @@ class Host:
 
 
 def connected(rate: float) -> tuple[Host, Controller]:
+    """A controller that does not say that it is a simulated one."""
     host = Host(rate)
     controller = Controller(RIG, host, host, Session(1, 1_767_225_600, "test"))
     controller.connect()
+    controller.watch.simulated = False
     return host, controller
 
 
@@ -51,6 +53,16 @@ def test_a_clock_of_another_rate_ends_the_run(rate: float, within_s: float) -> N
     with pytest.raises(ClockWrong, match=f"runs at {rate:.3f} of the rate that the rig file states.*tick_s"):
         controller.clock.sleep(15.0)
     assert (host.now_ns() - host.begun) * 1e-9 < within_s
+
+
+def test_a_simulated_controller_on_a_slow_computer_ends_none() -> None:
+    """It is told in the end: the computer may give it the rest of the time yet."""
+    _, controller = connected(0.9)
+    controller.watch.simulated = True
+    controller.clock.sleep(15.0)
+    drift = controller.telemetry.host.drift()
+    assert drift is not None
+    assert drift.ppm == pytest.approx(-1e5, rel=0.2) or drift.ppm == pytest.approx(1.1e5, rel=0.2)
 
 
 @pytest.mark.parametrize("rate", [0.9997, 1.0, 1.0003])

@@ -17,6 +17,7 @@ from bench.errors import (
     InterlockError,
     NoReply,
     ReadingsStand,
+    Refused,
     RotorNotArrived,
     SpeedContradicts,
     StateContradicts,
@@ -99,6 +100,16 @@ def test_nobody_reaches_into_a_machine_whose_angle_turns_though_its_speed_says_n
     assert (bench.controller.mode, bench.controller.speed_rad_s) == ("READY", 0.0)
     with pytest.raises(InterlockError, match=r"nobody may touch the shaft in state READY at 4\d"):
         bench.controller.require_landed()
+
+
+def test_a_landing_that_was_refused_is_no_leave_to_rest() -> None:
+    bench = Bench()
+    bench.controller.spin(FAST_RAD_S)
+    with pytest.raises(Refused):
+        bench.controller.command("LAND")
+    bench.link.change = says("READY")
+    with pytest.raises(StateContradicts):
+        bench.controller.clock.sleep(5.0)
 
 
 def test_a_rotor_that_was_asked_to_land_may_rest() -> None:

@@ -208,6 +208,14 @@ def test_a_torque_that_is_no_cosine_over_gamma_is_seen(depth: float) -> None:
     assert largest == pytest.approx(abs(depth), rel=0.6)
 
 
+def test_three_phase_angles_leave_no_shape_to_look_for() -> None:
+    """alpha_tau, gamma_0 and the drift of the scale take one each."""
+    s = made(2.87, 0.003, noise=5e-5)
+    three = np.isin(s.gamma, np.unique(s.gamma)[1:4])
+    part = Steps(*(getattr(s, n)[three] for n in ("segments", "angle", "gamma", "time", "side", "load", "spread")))
+    assert torque_balance.shape_over_gamma(balance(part, P, 3, 8.0), part) == (1.0, 0.0)
+
+
 def test_a_run_that_was_stopped_early_is_told() -> None:
     s = made(2.87, 0.0)
     for keep in (slice(0, 14), slice(0, 40)):
