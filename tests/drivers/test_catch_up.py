@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from host_clock import RIG, HostClock
 
 from bench.acquisition import WatchedSteps
 from bench.errors import LinkError
@@ -12,28 +13,16 @@ from bench.frames import FrameBatch
 from bench.progress import Silent
 from bench.recorder import Recorder, RunHeader
 from bench.recording import Recording
-from bench.rigfile import load_rig
 from bench.session import Session
 from drivers.controller import Controller
-from sim_backend.endpoint import SimulatedRig
-from sim_backend.truth import draw
-
-RIG = load_rig("tsbs12")
 
 
-class Host:
-    """The host's clock and link. The machine's time is `behind_ns` behind the host's."""
+class Host(HostClock):
+    """The machine's time is `behind_ns` behind the host's."""
 
     def __init__(self) -> None:
-        self.machine = SimulatedRig(RIG, draw(RIG, 2), 1)
-        self._now = self._least = self.machine.now_ns()
+        super().__init__()
         self.behind_ns = 0
-        self.name, self.stats, self.reopening = self.machine.link.name, self.machine.link.stats, False
-        self.send, self.close = self.machine.link.send, self.machine.link.close
-        self.renew_lease = self.machine.link.renew_lease
-
-    def now_ns(self) -> int:
-        return self._now
 
     def sleep(self, seconds: float) -> None:
         self._now += round(seconds * 1e9)

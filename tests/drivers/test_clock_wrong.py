@@ -3,30 +3,20 @@
 from __future__ import annotations
 
 import pytest
+from host_clock import RIG, HostClock
 
 from bench.errors import ClockWrong
 from bench.frames import FrameBatch
-from bench.rigfile import load_rig
 from bench.session import Session
 from drivers.controller import Controller
-from sim_backend.endpoint import SimulatedRig
-from sim_backend.truth import draw
-
-RIG = load_rig("tsbs12")
 
 
-class Host:
-    """The host's clock and link; the machine's clock runs `rate` times as fast."""
+class Host(HostClock):
+    """The machine's clock runs `rate` times as fast."""
 
     def __init__(self, rate: float) -> None:
-        self.machine, self.rate = SimulatedRig(RIG, draw(RIG, 2), 1), rate
-        self.begun = self._now = self.machine.now_ns()
-        self.name, self.stats, self.reopening = self.machine.link.name, self.machine.link.stats, False
-        self.send, self.close = self.machine.link.send, self.machine.link.close
-        self.renew_lease = self.machine.link.renew_lease
-
-    def now_ns(self) -> int:
-        return self._now
+        super().__init__()
+        self.rate, self.begun = rate, self._now
 
     def sleep(self, seconds: float) -> None:
         self._now += round(seconds * 1e9)

@@ -102,20 +102,25 @@ def test_a_fault_of_the_machine_is_looked_at_before_it_is_cleared() -> None:
     assert bench.controller.cleared == "HEARTBEAT_LOST"
 
 
+class Listening:
+    """Stands for the recorder: frames go to `seen`."""
+
+    def __init__(self, seen: list[FrameBatch]) -> None:
+        self._seen = seen
+
+    def frames(self, link: str, batch: FrameBatch, **_: int) -> None:
+        self._seen.append(batch)
+
+    def samples(self, block: object) -> None: ...
+
+
 def test_frames_of_a_host_that_come_in_are_marked_as_such() -> None:
     bench = Bench()
     bench.controller.connect()
     heartbeat = frame(0x010, bytes(8))
     bench.machine.link._arrived.append(heartbeat)
     seen: list[FrameBatch] = []
-
-    class Listening:
-        def frames(self, link: str, batch: FrameBatch, **_: int) -> None:
-            seen.append(batch)
-
-        def samples(self, block: object) -> None: ...
-
-    bench.controller._recorder = Listening()  # type: ignore[assignment]
+    bench.controller._recorder = Listening(seen)  # type: ignore[assignment]
     bench.controller.guarded = False
     bench.controller.poll()
     assert [int(f["flags"]) & SENT for b in seen for f in b if f["id"] == 0x010] == [SENT]
@@ -126,14 +131,7 @@ def test_what_was_said_before_anything_recorded_is_recorded() -> None:
     bench = Bench()
     bench.controller.connect()
     seen: list[FrameBatch] = []
-
-    class Listening:
-        def frames(self, link: str, batch: FrameBatch, **_: int) -> None:
-            seen.append(batch)
-
-        def samples(self, block: object) -> None: ...
-
-    bench.controller.recorder = Listening()  # type: ignore[assignment]
+    bench.controller.recorder = Listening(seen)  # type: ignore[assignment]
     (early,) = seen
     names = {m.identifier: name for name, m in RIG.messages.messages.items()}
     said = [(names[int(f["id"])], bool(f["flags"] & SENT)) for f in early]
@@ -141,5 +139,5 @@ def test_what_was_said_before_anything_recorded_is_recorded() -> None:
     assert said[:4] == [("Claim", True), ("Owner", False), ("Command", True), ("Identity", False)]
     assert (said.count(("ParamGet", True)), said.count(("ParamReply", False))) == (asked, asked)
     assert (early["t_ns"][1:] >= early["t_ns"][:-1]).all()
-    bench.controller.recorder = Listening()  # type: ignore[assignment]
+    bench.controller.recorder = Listening(seen)  # type: ignore[assignment]
     assert len(seen) == 1
