@@ -202,7 +202,7 @@ def evaluate(recording: Recording[Plan], data: TorqueData) -> Analysis:
     root = np.linalg.cholesky(found.covariance)
     parts = [
         Influence(id=f"scatter/{k + 1}", name=f"scatter of the steps ({k + 1})", u=1.0, unit="1", kind="A",
-                  distribution="normal", dof=float(found.fit.dof), source="residuals of the fit")
+                  distribution="normal", dof=float(found.dof), source="residuals of the fit")
         for k in range(2)
     ]  # fmt: skip
     for row, name in enumerate(("alpha_tau", "gamma_0t")):

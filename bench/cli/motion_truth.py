@@ -99,8 +99,16 @@ def _vectors(shaft: Iterable[complex], where: str) -> Found:
         yield "vector_sin", f"{axis}, {where}", float(-vector.imag)
 
 
+def _distances(d_max: Iterable[float], clearance: float, where: str) -> Found:
+    from procedures.estimators.unbalance_data import PLANES
+
+    for plane, far in zip(PLANES, d_max, strict=True):
+        yield "d_max", f"{plane}, {where}", far
+        yield "d_max_share", f"{plane}, {where}", far / clearance
+
+
 def _unbalance(done: Simulated) -> Found:
-    from procedures.estimators.unbalance_data import DWELL, PLANES, read_dwells
+    from procedures.estimators.unbalance_data import DWELL, read_dwells
     from procedures.turning import CODES, POLES, SETTINGS
     from sim_backend import amb_unbalance
 
@@ -112,8 +120,7 @@ def _unbalance(done: Simulated) -> Found:
         settings = _settings(done, law, SETTINGS[dwell.variant])  # type: ignore[index]
         true = amb_unbalance.motion(done.drawn.plant, settings, dwell.speed)
         yield from _vectors(true.shaft, dwell.where)
-        for plane, value in zip(PLANES, true.d_max, strict=True):
-            yield "d_max", f"{plane}, {dwell.where}", value
+        yield from _distances(true.d_max, done.drawn.plant.clearance, dwell.where)
 
 
 def _balance(done: Simulated) -> Found:
@@ -143,11 +150,10 @@ def _passage(done: Simulated) -> Found:
     for result in run.near.dwells:
         true, where = amb_unbalance.motion(plant, settings, result.dwell.speed), result.dwell.where
         yield from _vectors(true.shaft, where)
-        for (plane, (y, z)), far in zip(PLANES.items(), true.d_max, strict=True):
+        yield from _distances(true.d_max, plant.clearance, where)
+        for plane, (y, z) in PLANES.items():
             a, b = true.shaft[y], true.shaft[z]
             yield "major_half_axis", f"{plane}, {where}", float(abs(a + 1j * b) + abs(a - 1j * b)) / 2
-            yield "d_max", f"{plane}, {where}", far
-            yield "d_max_share", f"{plane}, {where}", far / plant.clearance
     peaks = [p for p in run.peaks if p.critical]
     if not peaks:
         return

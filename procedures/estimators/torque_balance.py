@@ -103,7 +103,7 @@ class Balance:
     """`alpha` N m/A, `gamma_0` rad, their `covariance` (2, 2) from the residuals; `ripple` r; `drift` D of the torque per
     current over the loads' time, relative; `current` (n,) A the torque current freed of sensors and detent, `base` (n,) A
     without load, `torque` (n,) N m of the loads; `fit` has residuals (n,) A; `u` (n,) how far each step may scatter, relative
-    to the others; M, the `pole_pairs`."""
+    to the others; `dof` of the scatter; M, the `pole_pairs`."""
 
     alpha: float
     gamma_0: float
@@ -115,12 +115,13 @@ class Balance:
     torque: Array
     fit: Fit
     u: Array
+    dof: int
     pole_pairs: float
 
     @property
     def scale(self) -> float:
         """A per unit of `u`, from the residuals."""
-        return math.sqrt(self.fit.chi2 / self.fit.dof)
+        return math.sqrt(self.fit.chi2 / self.dof)
 
 
 def resting(reading: Array, count: float) -> Array:
@@ -164,11 +165,15 @@ def load_torque(s: Steps, p: Mapping[str, float], masses: int) -> Array:
 def uneven(b: Balance, s: Steps) -> Array:
     """How far each step may scatter (n,) A: variance a + g spread^2, both from the residuals, g not negative.
 
-    The mean of a current that jumps between the counts of the encoder is worse than that of one that rests.
+    The mean of a current that jumps between the counts of the encoder is worse than that of one that rests. A residual's
+    variance is 1 - h of its step's, h the leverage; near 1 the fit follows the step and says nothing of its scatter
+    (MacKinnon and White, J. Econometrics 29, 305 (1985), HC2).
     """
+    q, _ = np.linalg.qr(b.fit.jacobian / b.u[:, None])
+    scatter = b.fit.residuals**2 / np.maximum(1 - (q**2).sum(axis=1), 0.1)
     square = s.spread**2
-    (a, g), _ = optimize.nnls(np.column_stack([np.ones_like(square), square]), b.fit.residuals**2)
-    typical = float((b.fit.residuals**2).mean())
+    (a, g), _ = optimize.nnls(np.column_stack([np.ones_like(square), square]), scatter)
+    typical = float(scatter.mean())
     out: Array = np.sqrt(np.maximum(a, 0.05 * typical) + g * square)
     return out
 
@@ -177,7 +182,8 @@ def balance(
     s: Steps, p: Mapping[str, float], masses: int, pole_pairs: float, held: Detent = NO_DETENT, u: Array | None = None
 ) -> Balance:
     """Fit alpha_tau, gamma_0 and the current without load to all steps, weighted by `u` (n,) (all alike without it). The
-    scale of the scatter always comes from the residuals.
+    scale of the scatter always comes from the residuals; where their ratios do too (`uneven`), they cost one more degree of
+    freedom.
 
     Raises:
         AnalysisError: a phase angle lacks loads or steps without load, or the fit does not converge.
@@ -210,10 +216,14 @@ def balance(
     relative = np.ones_like(current) if u is None else u / np.sqrt(np.mean(u**2))
     fit = nonlinear(model, current, np.concatenate([[1 / start[0], 0.0, 0.0, 0.0], start[1:]]), relative, slopes)
     alpha, gamma_0, ripple = (float(x) for x in fit.terms[:3])
-    covariance = fit.covariance[:4, :4] * fit.chi2 / fit.dof
+    dof = fit.dof - (u is not None)
+    if dof < 1:
+        raise AnalysisError(f"fit: {len(current)} steps leave no residual to tell the scatter")
+    covariance = fit.covariance[:4, :4] * fit.chi2 / dof
     drift = Extra(float(fit.terms[3]), math.sqrt(covariance[3, 3]))
     return Balance(
-        alpha, gamma_0, ripple, drift, covariance[:2, :2], current, lines @ fit.terms[4:], torque, fit, relative, pole_pairs
+        alpha, gamma_0, ripple, drift, covariance[:2, :2], current, lines @ fit.terms[4:], torque, fit, relative, dof,
+        pole_pairs,
     )  # fmt: skip
 
 
@@ -247,7 +257,7 @@ def extra(b: Balance, column: Array) -> Extra:
     if size <= 1e-12 * float(white @ white):
         return Extra(0.0, math.inf)
     value = float(apart @ residuals) / size
-    rest = float(((residuals - value * apart) ** 2).sum()) / max(b.fit.dof - 1, 1)
+    rest = float(((residuals - value * apart) ** 2).sum()) / max(b.dof - 1, 1)
     return Extra(value, math.sqrt(rest / size))
 
 

@@ -109,6 +109,22 @@ def test_steps_that_jump_count_less_and_the_scatter_stays_honest() -> None:
     assert np.mean(u) < 0.7 * np.mean(plain)
 
 
+def test_the_scatter_of_a_step_is_not_that_of_its_residual() -> None:
+    """Fourteen terms follow 45 steps: the squares of the residuals are 31/45 of the steps' own, their leverage says where."""
+    found, s = [], made(2.87, 0.003)
+    for seed in range(200):
+        noise = 2e-4 * np.random.default_rng(seed).normal(size=len(s.side))
+        steps = replace(s, segments=s.segments + noise[:, None])
+        found.append(np.mean((torque_balance.uneven(balance(steps, P, 3, 8.0), steps) / 2e-4) ** 2))
+    assert np.mean(found) == pytest.approx(1.0, abs=0.06)
+
+
+def test_weights_from_the_residuals_cost_a_degree_of_freedom() -> None:
+    s = made(2.87, 0.003, noise=1e-3)
+    plain = balance(s, P, 3, 8.0)
+    assert balance(s, P, 3, 8.0, u=torque_balance.uneven(plain, s)).dof == plain.dof - 1 == len(s.side) - 15
+
+
 def test_gains_and_offsets_of_the_sensors() -> None:
     """A gain of a segment counts a quarter; an offset of any size does nothing."""
     s = made(2.87, 0.0)
