@@ -50,6 +50,8 @@ class McapFile:
     truncated: bool = True
     _header: int = 0
     _kept: Kept[Messages] = field(default_factory=lambda: Kept(KEPT, KEPT_BYTES))
+    _holds: dict[int, frozenset[str]] = field(default_factory=dict)
+    _alike: dict[frozenset[str], frozenset[str]] = field(default_factory=dict)
 
     def messages(self, topic: str, start_ns: int = 0, end_ns: int = 1 << 63) -> Iterator[tuple[int, bytes]]:
         """Log time and data of a topic's messages with start <= log time < end, in file order.
@@ -59,7 +61,10 @@ class McapFile:
         """
         first, last = self._spans
         for number in np.flatnonzero((last >= start_ns) & (first < end_ns)).tolist():
-            for name, t_ns, data in self._read(number) if topic.startswith(RAW) else self._decoded(number):
+            raw = topic.startswith(RAW)
+            if not raw and topic not in self._holds.get(number, (topic,)):
+                continue  # a hundred captures are a hundred topics: without this each goes through the whole file
+            for name, t_ns, data in self._read(number) if raw else self._decoded(number):
                 if name == topic and start_ns <= t_ns < end_ns:
                     yield t_ns, data
 
@@ -75,6 +80,8 @@ class McapFile:
         if found is None:
             found = [m for m in self._read(number) if not m[0].startswith(RAW)]
             self._kept.put(number, found, sum(len(data) + OVERHEAD for _, _, data in found))
+            holds = frozenset(name for name, _, _ in found)
+            self._holds[number] = self._alike.setdefault(holds, holds)
         return found
 
     def _read(self, number: int) -> Messages:

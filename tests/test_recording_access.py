@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import tracemalloc
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from mcap.writer import Writer
+from mcap.writer import CompressionType, Writer
 from recordings import HEADER, PERIOD_NS, START_NS, STREAM, SetClock, block, frames_of, gapped, record
 
 from bench.errors import AnalysisError, RecordingError
+from bench.mcapfile import KEPT, index
 from bench.procedure import BenchPlan
 from bench.recorder import Recorder, RunHeader
 from bench.recording import Recording
@@ -187,3 +189,27 @@ def test_a_stream_is_added_once(tmp_path: Path) -> None:
     with Recorder(tmp_path / "r.mcap", clock=SetClock(), streams=[STREAM], header=HEADER) as recorder:
         with pytest.raises(RecordingError, match="stream telemetry is there already"):
             recorder.stream(STREAM)
+
+
+def test_a_topic_is_looked_for_where_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Seventy captures of a run are seventy topics of one or two chunks each: all of them take little more than one pass."""
+    many, reads = 2 * KEPT, Counter[int]()
+    with (tmp_path / "a.mcap").open("wb") as file:
+        writer = Writer(file, chunk_size=1, compression=CompressionType.LZ4)  # a chunk for each message
+        writer.start(profile="levbench")
+        topics = [writer.register_channel(f"capture/{n % 80}", "", 0) for n in range(80)]
+        for n in range(many):
+            writer.add_message(topics[n % 80], n + 1, bytes(8), n + 1)
+        writer.finish()  # type: ignore[no-untyped-call]
+    found = index(tmp_path / "a.mcap")
+    assert len(found.chunks) == many
+    read = found._read
+
+    def counted(number: int) -> Any:
+        reads[number] += 1
+        return read(number)
+
+    monkeypatch.setattr(found, "_read", counted)
+    for n in range(80):
+        assert [t for t, _ in found.messages(f"capture/{n}")] == list(range(n + 1, many + 1, 80))
+    assert reads.total() <= 2 * many
