@@ -201,6 +201,16 @@ def test_a_bench_that_ends_lets_the_next_one_in(tmp_path: Path) -> None:
     assert bench.said[-1] == "RELEASE"
 
 
+def test_a_doubted_state_keeps_nobody_out_but_a_held_shaft_does() -> None:
+    """Telemetry stuck at LEVITATED beside answers that say OFF: the next bench may in. One that does levitate is not let go."""
+    doubted, held = Bench(), Bench()
+    doubted.made_safe(says("LEVITATED"), 0.05)
+    opening._released(doubted.controller)
+    assert doubted.said[-1] == "RELEASE"
+    opening._released(held.controller)
+    assert "RELEASE" not in held.said
+
+
 def test_a_speed_that_stands_at_zero_while_the_angle_turns_is_named() -> None:
     bench = Bench()
     bench.link.change = Telemetry(TSBS, {"speed": 0.0}, frozen=(), stuck=False)
