@@ -9,7 +9,7 @@ READY := .venv/.ready
 # Tests start hundreds of processes: without its bytecode every one of them would compile the project again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check format ci-long faults fuzz campaigns plants sound moved bench clean lock setup
+.PHONY: demo test check format ci-long faults fuzz campaigns plants sound moved golden bench clean lock setup
 
 demo: setup
 	$(BIN)/bench run amb-calibration --rig tsbs12 --seed 1
@@ -53,6 +53,12 @@ moved: setup
 # Planted defects by size, for every procedure that has a file in benchmarks/planted: hours; the same command goes on where it was stopped.
 plants: setup
 	nice $(BIN)/python benchmarks/plants.py --seeds 60 --jobs 2
+
+# The numbers of two commits beside each other, bit for bit: make golden OLD=main~1
+OLD ?= HEAD~1
+NEW ?= HEAD
+golden: setup
+	$(BIN)/python benchmarks/golden.py $(OLD) $(NEW)
 
 bench: setup
 	$(BIN)/python benchmarks/analysis.py
