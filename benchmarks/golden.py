@@ -5,7 +5,8 @@
 
 Both are checked out into a folder of their own and run by this interpreter: results with their budgets, correlations,
 findings, and every message of the recordings (raw frames, samples, captures, events). NEW also analyses the recordings of OLD.
-The plans are those of planted/. Status 0 where all is equal, 1 with what differs; nothing is kept.
+The plans are those of planted/; calibrations that a procedure needs are made by OLD. The order of sets is another in OLD than
+in NEW, so that no number may depend on it. Status 0 where all is equal, 1 with what differs; nothing is kept.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import subprocess
 import sys
 import tempfile
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import zip_longest
 from pathlib import Path
@@ -36,6 +37,7 @@ OF_THE_RUN = (
     "recording",
     "calibrations",
 )  # which run it was, not what it found
+HASHED = {"old": "1", "new": "2"}
 Numbers = dict[str, Any]
 
 
@@ -71,7 +73,8 @@ def checked_out(path: Path, commit: str) -> Path:
 
 def bench(tree: Path, words: Sequence[str]) -> str:
     """A command of the checked out commit; the last line that it prints. A status other than 0 is a result like another."""
-    env = os.environ | {"PYTHONPATH": str(tree), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    env = os.environ | {"PYTHONPATH": str(tree), "PYTHONHASHSEED": HASHED[tree.name]}
+    env |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     done = subprocess.run(
         [sys.executable, "-m", "bench.cli", *words], cwd=tree, env=env, text=True, capture_output=True
     )
@@ -84,25 +87,20 @@ def bench(tree: Path, words: Sequence[str]) -> str:
 def beside(procedure: str, seed: int, old: Path, new: Path) -> list[str]:
     """What differs between the two for a procedure, and where NEW finds other numbers in a recording of OLD."""
     told = tomllib.loads((PLANTED / f"{procedure}.toml").read_text(encoding="utf-8"))
-    before, after = (ran(tree, procedure, told, seed) for tree in (old, new))
+    common = ["--rig", told["rig"], "--calibrations", str(old / "runs" / procedure / "calibrations")]
+    for name, plan in told.get("chain", {}).items():
+        bench(old, ["adopt", str(ran(old, name, plan, seed, common)), *common])
+    before, after = (ran(tree, procedure, told["plan"], seed, common) for tree in (old, new))
     lines = [*differences(record(before), record(after)), *differences(messages(before), messages(after))]
     bench(new, ["analyse", str(before)])
     again = next((before / "analyses").iterdir())
     return lines + [f"analysed again: {line}" for line in differences(record(before), record(again))]
 
 
-def ran(tree: Path, procedure: str, told: Mapping[str, Any], seed: int) -> Path:
-    """The folder of a run, its calibrations made before."""
-    folder = tree / "runs" / procedure
-    common = ["--calibrations", str(folder / "calibrations")]
-    plans = told.get("chain", {}) | {procedure: told["plan"]}
-    for name, plan in plans.items():
-        settings = [word for text in plan for word in ("--plan", text)]
-        where = ["--rig", told["rig"], "--seed", str(seed), "--out", str(folder), "--no-report"]
-        run = bench(tree, ["run", name, *where, *settings, *common])
-        if name != procedure:
-            bench(tree, ["adopt", run, *common])
-    return tree / run
+def ran(tree: Path, procedure: str, plan: Sequence[str], seed: int, common: Sequence[str]) -> Path:
+    """The folder of a run."""
+    settings = [word for text in plan for word in ("--plan", text)]
+    return tree / bench(tree, ["run", procedure, "--seed", str(seed), "--no-report", *settings, *common])
 
 
 def record(run: Path) -> Numbers:

@@ -155,7 +155,7 @@ def _jackknifed(
 def _alike(kinds: Sequence[Hashable], values: Array) -> tuple[float, int]:
     """Sum of squares of steps of the same kind about their means, and its degrees of freedom."""
     total, dof = 0.0, 0
-    for kind in set(kinds):
+    for kind in dict.fromkeys(kinds):  # in order: a set would add in another one in each process
         of = values[[k == kind for k in kinds]]
         total, dof = total + float(((of - of.mean()) ** 2).sum()), dof + len(of) - 1
     return total, dof
@@ -258,7 +258,7 @@ def _oscillation(group: str, results: Sequence[Result]) -> dict[str, Estimate]:
 
 def _weighed(kinds: Sequence[tuple[Case, float]]) -> float:
     """Degrees of freedom of a scatter to which steps add as the square of their size (Welch-Satterthwaite)."""
-    freedom = {kind: kinds.count(kind) - 1 for kind in set(kinds)}
+    freedom = {kind: kinds.count(kind) - 1 for kind in dict.fromkeys(kinds)}
     parts = [(many, many * case.size**2) for (case, _), many in freedom.items() if many]
     return sum(part for _, part in parts) ** 2 / sum(part**2 / many for many, part in parts)
 
