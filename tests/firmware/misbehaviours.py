@@ -166,7 +166,7 @@ READINGS = (
     Kind("far-position", "posextreme=0.0003@1", ABORTED, ("interlock",), "a position of 0.65 mm now and then"),
     Kind("far-current", "currentneg=0.001@1", ABORTED, ("interlock",), "a current of -16 A now and then"),
     Kind("hot-telemetry", "hotwinding=400@1", ABORTED, ("interlock",), "telemetry says 400 K of a winding"),
-    Kind("glitches", "glitch_i=0.004@1", INDETERMINATE, ("load-inconsistent",), "a current of 0 A now and then"),
+    Kind("glitches", "glitch_i=0.004@1", ERROR, ("load-inconsistent",), "a current of 0 A now and then"),
     Kind("gain", "gain_yo_p=1.1@8", INDETERMINATE, ("outlier",), "a current sensor reads 10 % more from then on"),
     Kind("wrong-mass", "wrongmass=1.02", ERROR, ("load-inconsistent",), "M2 weighs 2 % more", long=True),
     Kind("contact", "badflags=12@1", INDETERMINATE, ("contact",), "flags say that the shaft touches its rings"),
