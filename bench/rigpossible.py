@@ -14,12 +14,18 @@ GAIN = 0.05
 ELEVATION_M = (-500.0, 9000.0)
 AIR = (0.5, 1.5)  # kg/m^3: from 7000 m in summer to sea level in a hard winter
 SOLID = (1500.0, 23000.0)  # kg/m^3: from light alloys with cavities to osmium
+GAPS = ("amb_gap", "axial_gap", "clearance")
+GAP_M, LENGTH_M = (
+    (1e-6, 1e-2),
+    (1e-4, 10.0),
+)  # a slip of three decades leaves them, for machines of some centimetres and more
 
 
 def impossible(rig: RigFile) -> Iterator[Problem]:
-    """Gravity against place and elevation, gains and densities against what there is."""
+    """Gravity against place and elevation, gains, densities and lengths against what there is."""
     yield from _site(rig)
     yield from _densities(rig)
+    yield from _lengths(rig)
     for name, sensor in rig.sensors.items():
         yield from _gain(rig, f"sensors.{name}.gain", sensor.gain)
 
@@ -51,6 +57,15 @@ def _densities(rig: RigFile) -> Iterator[Problem]:
     if rig.masses and not SOLID[0] <= solid <= SOLID[1]:
         yield Problem(path, "mass_density.value", f"{solid:g} kg/m^3",
                       f"{SOLID[0]:g} to {SOLID[1]:g} kg/m^3: the density of the masses, not of the air")  # fmt: skip
+
+
+def _lengths(rig: RigFile) -> Iterator[Problem]:
+    """A length in the wrong unit; what is not positive is another matter."""
+    for name, length in rig.geometry.items():
+        low, high = GAP_M if name in GAPS else LENGTH_M
+        if length.unit == "m" and length.value > 0 and not low <= length.value <= high:
+            text = f"{low:g} to {high:g} m; is the unit right?"
+            yield Problem(str(rig.path), f"geometry.{name}.value", f"{length.value:g} m", text)
 
 
 def _gain(rig: RigFile, key: str, gain: Toleranced) -> Iterator[Problem]:

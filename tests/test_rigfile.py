@@ -93,9 +93,15 @@ def test_a_rig_on_which_nothing_hangs_needs_neither_hook_nor_hanger(tmp_path: Pa
     assert (rig.hanger.value, rig.envelope.max_hung_kg) == (0, 0)
     with pytest.raises(InterlockError):
         Envelope(rig).check_load("M1")
-    motorless = changed(bare, ('"levitation", "rotation"', '"levitation"'), ("com_to_motor =", "axial_gap ="))
+    motorless = changed(
+        bare,
+        ('"levitation", "rotation"', '"levitation"'),
+        ("com_to_motor = { value = 122,", "axial_gap = { value = 0.7,"),
+    )
     assert check_rig(written(tmp_path, motorless))[0] == ()
-    found = check_rig(written(tmp_path, changed(bare, ("com_to_motor =", "axial_gap ="))))[0]
+    found = check_rig(
+        written(tmp_path, changed(bare, ("com_to_motor = { value = 122,", "axial_gap = { value = 0.7,")))
+    )[0]
     assert [p.key for p in found] == ["geometry.com_to_motor"]
 
 
@@ -351,6 +357,9 @@ def test_files_that_cannot_be_read_are_one_clear_error(tmp_path: Path) -> None:
         ("mass_density = { value = 7950", "mass_density = { value = 1.1", "mass_density.value", "1.1", "not of the air"),
         ("i_yi_p = { gain = { value = 1,", "i_yi_p = { gain = { value = 0,", "sensors.i_yi_p.gain.value", "0", "5%"),
         ("i_yi_p = { gain = { value = 1,", "i_yi_p = { gain = { value = 1.06,", "sensors.i_yi_p.gain.value", "1.06", "1 wit"),
+        ("lever_left = { value = 230", "lever_left = { value = 0.023", "geometry.lever_left.value", "2.3e-05", "0.0001"),
+        ("lever_left = { value = 230", "lever_left = { value = 23000", "geometry.lever_left.value", "23 m", "unit right"),
+        ("amb_gap = { value = 0.5, ", "amb_gap = { value = 500, ", "geometry.amb_gap.value", "0.5 m", "unit right"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused(tmp_path: Path, old: str, new: str, key: str, found: str, expected: str) -> None:
