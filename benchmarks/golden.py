@@ -65,8 +65,10 @@ def main() -> int:
 
 def checked_out(path: Path, commit: str) -> Path:
     """A clone of this repository at a commit, its core built."""
+    named = ["git", "-C", str(ROOT), "rev-parse", "--verify", f"{commit}^{{commit}}"]  # a clone knows no other branches
+    digest = subprocess.run(named, check=True, text=True, stdout=subprocess.PIPE).stdout.strip()
     subprocess.run(["git", "clone", "-q", "--shared", str(ROOT), str(path)], check=True)
-    subprocess.run(["git", "-C", str(path), "checkout", "-q", "--detach", commit], check=True)
+    subprocess.run(["git", "-C", str(path), "checkout", "-q", "--detach", digest], check=True)
     bench(path, ["list"])
     return path
 
