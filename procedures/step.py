@@ -26,7 +26,7 @@ from procedures import step_figures as drawn
 from procedures.estimators import setpoint_checks, setpoint_estimates, setpoint_planes
 from procedures.estimators.setpoint_data import CHANNELS, STEP, TURNING_RAD_S, cases, read_steps
 from procedures.estimators.unbalance_data import RPM
-from procedures.step_record import enough_s
+from procedures.step_record import enough_s, faded_s
 
 OVERSHOOT = Quantity("overshoot", "1", "greatest position beyond the step, as a share of it")
 RISE = Quantity("rise_time", "s", "10 to 90 % of the step")
@@ -94,8 +94,17 @@ def recorded_s(rig: RigFile, plan: Plan) -> float:
     """How long each step is recorded, s: what the plan says, or as long as the slowest of its laws takes."""
     if plan.record_s is not None:
         return plan.record_s
-    usual = {name: p.default for name, p in rig.parameters.items()}
-    return enough_s([{**usual, **s} for s in chosen(plan).values()], plan.axes, plan.band)
+    return enough_s([{**_usual(rig), **s} for s in chosen(plan).values()], plan.axes, plan.band)
+
+
+def waited_s(rig: RigFile, plan: Plan, setting: str, axis: str) -> float:
+    """Before the rest of each step, s, until what the one before it leaves is nothing."""
+    needed = faded_s({**_usual(rig), **chosen(plan)[setting]}, axis, plan.band)
+    return max(needed - recorded_s(rig, plan) - plan.rest_s, 0.0)
+
+
+def _usual(rig: RigFile) -> dict[str, float]:
+    return {name: p.default for name, p in rig.parameters.items()}
 
 
 def step_count(plan: Plan) -> int:
@@ -118,8 +127,10 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         if now != (setting, speed):
             _put(rig, plan, settings[setting], used)
             now = (setting, speed)
+        wait_s = waited_s(rig.file, plan, setting, axis)
         for repeat in range(plan.repeats):
             for begin, end in ((0.0, size), (size, 0.0), (0.0, -size), (-size, 0.0)):
+                rig.clock.sleep(wait_s)
                 with record.step(
                     STEP,
                     setting=setting,

@@ -1,4 +1,5 @@
-"""How long a step of the set point is recorded where the plan does not say: until the integrator of the law has arrived.
+"""How long a step of the set point is recorded where the plan does not say, until the integrator of the law has arrived; and
+how long after it the next may begin, when what it leaves is nothing beside the band of the next.
 
 With the PID a step of r is first one of r K_i k_p/(K_i k_p - K_s), since the magnets' negative stiffness K_s helps the new
 place along; what is beyond r the integrator takes away with the time constant (k_p - K_s/K_i)/k_I. By the bearings' law
@@ -14,24 +15,31 @@ from collections.abc import Iterable, Mapping
 LEAST_S = 1.5  # the flatness laws know the negative stiffness: little is left to their integrators
 MOST_S = 10.0  # a slower integrator is for `warm`, or for `record_s`
 LEFT = 1 / 3  # of the band that may be left at the end
+NOTHING = 1e-3  # of the band: with a third of it the next step's level is 0.4 % off, and its settling time by 50 ms
 ROUNDED_S = 0.5
 PID = 0.0
 
 
 def enough_s(settings: Iterable[Mapping[str, float]], axes: Iterable[str], band: float) -> float:
     """For the slowest of `settings`, each with all parameters of the controller; s."""
-    slowest = max((_arrived_s(s, axis, band) for axis in axes for s in settings), default=LEAST_S)
+    slowest = max((_left_s(s, axis, LEFT * band) for axis in axes for s in settings), default=LEAST_S)
     return math.ceil(min(max(slowest, LEAST_S), MOST_S) / ROUNDED_S - 1e-9) * ROUNDED_S
 
 
-def _arrived_s(of: Mapping[str, float], axis: str, band: float) -> float:
+def faded_s(settings: Mapping[str, float], axis: str, band: float) -> float:
+    """From a step to where the next may begin, s: 0 where the law has no slow integrator."""
+    return min(_left_s(settings, axis, NOTHING * band), 2 * MOST_S) if settings.get("ki") else 0.0
+
+
+def _left_s(of: Mapping[str, float], axis: str, share: float) -> float:
+    """Until what the integrator has still to do is that share of the step; 0 where there is nothing to do for it."""
     if of.get("law") != PID or any(n not in of for n in ("kp", "ki", "bias")):
-        return LEAST_S
+        return 0.0
     softer = of["bias"] * max(_stiffness(of, plane) for plane in ((axis,) if axis == "x" else (f"{axis}i", f"{axis}o")))
     if not 0 < softer < of["kp"]:
-        return LEAST_S
+        return 0.0
     beyond, constant = softer / (of["kp"] - softer), (of["kp"] - softer) / of["ki"] if of["ki"] else math.inf
-    return constant * max(math.log(beyond / (LEFT * band)), 0.0)
+    return constant * max(math.log(beyond / share), 0.0)
 
 
 def _stiffness(of: Mapping[str, float], plane: str) -> float:

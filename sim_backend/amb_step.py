@@ -127,16 +127,18 @@ def steps(
     rest_s: float,
     record_s: float,
     *,
+    wait_s: float = 0.0,
     turn_s: float = 0.0,
     told: float = 1.0,
 ) -> dict[int, Shown]:
-    """Up, back, down and back: by way (1 up, -1 down) what they show together; `turn_s` of a revolution, 0 at rest; `told`:
-    what the controller makes of a set point, as a share of it. Where the shaft turns, the mean of steps at PHASES of its
-    revolution, since unbalance makes the bearings' slopes go with it."""
+    """Up, back, down and back, after `wait_s` and `rest_s`: by way (1 up, -1 down) what they show together; `turn_s` of a
+    revolution, 0 at rest; `told`: what the controller makes of a set point, as a share of it. Where the shaft turns, the mean
+    of steps at PHASES of its revolution, since unbalance makes the bearings' slopes go with it."""
     responses: dict[int, list[Array]] = {1: [], -1: []}
     errors: dict[int, list[float]] = {1: [], -1: []}
     for begin, end in ((0.0, size), (size, 0.0), (0.0, -size), (-size, 0.0)):
         way = 1 if end > begin else -1
+        plant.run(round(wait_s / TICK_S))
         before = plant.run(round(rest_s / TICK_S), 1)[1]
         for phase in range(PHASES if turn_s else 1):
             begun = plant.twin()
@@ -230,7 +232,7 @@ def _eigenvalues(y: Array) -> Complex:
 
 def truth(
     p: AmbParams, settings: Mapping[str, float], axis: str, sizes: Sequence[float], *, speed: float = 0.0, rest_s: float = 0.3,
-    record_s: float = 0.5, told: float = 1.0,
+    record_s: float = 0.5, wait_s: float = 0.0, told: float = 1.0,
 ) -> tuple[Small, dict[tuple[float, int], Shown]]:  # fmt: skip
     """Of one axis: small motions, and by size and way the steps, of the machine with its runout and, where it turns, its
     unbalance: where the shaft floats and how far it whirls, there are the bearings' slopes."""
@@ -239,6 +241,8 @@ def truth(
     out: dict[tuple[float, int], Shown] = {}
     for size in sorted(sizes):
         turn = 2 * math.pi / speed if speed else 0.0
-        for way, shown in steps(plant, settings, axis, size, rest_s, record_s, turn_s=turn, told=told).items():
+        for way, shown in steps(
+            plant, settings, axis, size, rest_s, record_s, wait_s=wait_s, turn_s=turn, told=told
+        ).items():
             out[size, way] = shown
     return of_small, out

@@ -43,7 +43,7 @@ def _settings(done: Simulated, *more: Mapping[str, float]) -> dict[str, float]:
 
 def _step(done: Simulated) -> Found:
     from procedures.estimators.setpoint_data import AT_REST_S, Case
-    from procedures.step import chosen, model, recorded_s
+    from procedures.step import chosen, model, recorded_s, waited_s
     from sim_backend import amb_step
 
     plan: Any = done.recording.plan
@@ -61,6 +61,7 @@ def _step(done: Simulated) -> Found:
                     speed=speed,
                     rest_s=plan.rest_s,
                     record_s=recorded_s(done.recording.rig, plan),
+                    wait_s=waited_s(done.recording.rig, plan, setting, axis),
                     told=done.drawn.defects.get(f"factor_ref_{axis}", 1.0),
                 )
                 cases = {key: Case(setting, speed, axis, *key) for key in shown}

@@ -31,7 +31,7 @@ from procedures.estimators import (
     stepmodel,
 )
 from procedures.estimators.setpoint_onset import onset
-from procedures.step import MEASURES, Plan, check, figures, recorded_s, step_count
+from procedures.step import MEASURES, Plan, check, figures, recorded_s, step_count, waited_s
 from reports.figures import draw as draw_figure
 
 SHORT = {"axes": ("y",), "sizes_m": (10e-6, 20e-6), "record_s": 0.4, "settle_s": 3.0}
@@ -76,6 +76,9 @@ def test_the_response_is_that_of_the_machine_without_noise(tmp_path: Path, seed:
             if name == "settling_time":
                 bounds = interval(e)
                 assert bounds.low - bounds.U < true < bounds.high + bounds.U, m.where
+                assert (
+                    plan.get("a") != {"law": 0.0} or bounds.U < 4e-3
+                )  # of 1.7 s: 60e-3 if steps begin in the tails of others
             else:
                 assert e.value == pytest.approx(true, abs=(3.5 if name in NARROW else 4) * e.u), (name, m.where)
             assert name in ("steady_error", "settling_time") or e.u < NARROW.get(name, 0.06) * e.value
@@ -235,6 +238,22 @@ def test_plans_that_cannot_work_are_refused() -> None:
 )
 def test_a_record_is_as_long_as_the_slowest_law_takes(plan: Mapping[str, Any], seconds: float) -> None:
     assert recorded_s(load_rig("amb5dof"), Plan(**plan)) == seconds
+
+
+@pytest.mark.parametrize(
+    ("plan", "seconds"),
+    [
+        ({}, 0.0),
+        ({"a": {"law": 2.0}}, 0.0),
+        ({"a": {"law": 0.0}}, 2.923),  # 0.5816 s times ln(0.3755/2e-5) is 5.723 s, less 2.5 of record and 0.3 of rest
+        ({"a": {"law": 0.0}, "record_s": 1.5}, 3.923),
+        ({"a": {"law": 0.0, "ki": 20000.0}}, 1.062),  # 0.2908 s: 2.862 s, less 1.5 (the least) and 0.3
+        ({"a": {"law": 0.0, "ki": 0.0}}, 0.0),
+        ({"a": {"law": 0.0, "ki": 100.0}}, 9.7),  # 58 s: a record of 10 s, and as much after it at most
+    ],
+)
+def test_a_step_begins_when_nothing_is_left_of_the_one_before(plan: Mapping[str, Any], seconds: float) -> None:
+    assert waited_s(load_rig("amb5dof"), Plan(**plan), "A", "y") == pytest.approx(seconds, abs=0.6e-3)
 
 
 def test_planes_that_answer_alike_are_called_exchanged_by_chance_only() -> None:
