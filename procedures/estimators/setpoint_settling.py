@@ -27,7 +27,10 @@ from procedures.estimators.setpoint_swing import shrinks
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 FROM_S = 8e-3  # filters, current loops and second harmonics of the swing are then below a hundredth of the band
-FADES_S, APART = 0.1, 1.6  # shortest time constant of what fades without swinging, ratio of the next to it: 2.5 apart they
+FADES_S, APART = (
+    0.1,
+    1.6,
+)  # shortest time constant of what fades without swinging, ratio of the next to it: 2.5 apart they
 # miss what a PID leaves by 0.015 % of the step, 4 ms of its settling time
 LONGEST = 12
 HARD_S = (0.01, 0.03)  # such constants too where nothing swings
