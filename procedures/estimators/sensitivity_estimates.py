@@ -29,7 +29,7 @@ NEAR = 0.3  # of a frequency: how far the lines reach that a first look is fitte
 DRAWS = 150  # of the margins
 TOLERATED = 0.05  # share of the draws that may have no crossing
 FAINT = 0.1  # where |L| is less, it is noise that crosses the axis: a gain that may rise tenfold is not told
-NODES = 5  # lines about a crossing
+LOW, NODES, BETWEEN = 12, 4, 20  # lines between which the loop is bent, how many make a curve, points of it in a step
 VAGUE = 0.2  # relative standard uncertainty above which a margin is not told
 
 
@@ -223,7 +223,7 @@ def margins(surveys: Sequence[Taken], where: str) -> dict[str, Estimate]:
     dof = float(min(t.dof for t in surveys))
     for name, unit, of, (seen, mean, drawn) in (
         ("phase_margin", "rad", phase, smoothed),
-        ("gain_reduction", "1", fall, (z, base, noisy)),
+        ("gain_reduction", "1", lambda loop: fall(between(hz, loop)), (z, base, noisy)),
         ("gain_increase", "1", rise, smoothed),
     ):
         found, again = of(1 / seen - 1), of(1 / mean - 1)
@@ -258,22 +258,25 @@ def _real(loop: Complex) -> Array:
 
 
 def fall(loop: Complex) -> float:
-    """Factor to which its gain may fall; NaN where that is not told. Among the lowest lines straight lines from one to the next
-    miss it by 0.5 %: the gain is a polynomial of the angle through the NODES nearest ones (0.1 % or less)."""
-    angle, gain = np.angle(-loop), np.log(np.abs(loop))
-    turns = np.flatnonzero((np.sign(angle[1:]) != np.sign(angle[:-1])) & (np.abs(np.diff(angle)) < math.pi))
-    at = np.array([_at_zero(angle, gain, int(k)) for k in turns])
-    return float(np.exp(-at[at > 0]).max()) if (at > 0).any() else math.nan
+    """Factor to which its gain may fall; NaN where that is not told."""
+    at = _real(loop)
+    return float((1 / at[at > 1]).max()) if (at > 1).any() else math.nan
 
 
-def _at_zero(angle: Array, gain: Array, k: int) -> float:
-    """`gain` where `angle` (m,) passes 0 between k and k + 1: by Lagrange's polynomial, where the lines lie in order."""
-    first = max(min(k - 1, len(angle) - NODES), 0)
-    x, y = angle[first : first + NODES], gain[first : first + NODES]
-    if not (len(x) == NODES and abs(np.sign(np.diff(x)).sum()) == NODES - 1):
-        x, y = angle[k : k + 2], gain[k : k + 2]
-    others = x[:, None] - x + np.eye(len(x))
-    return float(y @ (np.where(np.eye(len(x)), 1.0, -x) / others).prod(axis=1))
+def between(hz: Array, loop: Complex) -> Complex:
+    """The lowest LOW lines of an open loop (m,) at `hz`, and BETWEEN points to each of them. The integrator bends it there, and
+    straight lines would cross the axis 0.5 % beside it: what goes through NODES lines is hz times the loop."""
+    out = []
+    for k in range(min(LOW, len(hz) - NODES)):
+        first = max(k - 1, 0)
+        x = np.linspace(hz[k], hz[k + 1], BETWEEN, endpoint=False)
+        nodes = hz[first : first + NODES]
+        apart = nodes[:, None] - nodes + np.eye(NODES)
+        terms = (np.where(np.eye(NODES)[:, :, None] > 0, 1.0, (x - nodes[:, None])[None]) / apart[:, :, None]).prod(
+            axis=1
+        )
+        out.append((loop[first : first + NODES] * nodes) @ terms / x)
+    return np.concatenate([*out, loop[len(out) :]])
 
 
 def rise(loop: Complex) -> float:
