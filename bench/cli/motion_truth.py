@@ -172,7 +172,7 @@ def _sensitivity(done: Simulated) -> Found:
     import numpy as np
 
     from procedures.estimators.sensitivity_data import RPM
-    from procedures.estimators.sensitivity_estimates import fall, phase, rise
+    from procedures.estimators.sensitivity_margins import fall, phase, rise
     from procedures.injecting import AXES
     from procedures.sensitivity import CODES
     from sim_backend import amb_sensitivity

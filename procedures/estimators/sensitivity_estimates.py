@@ -1,4 +1,4 @@
-"""From the sensitivity at the lines to its greatest value with an interval, and to the margins of the open loop."""
+"""From the sensitivity at the lines to its greatest value with an interval."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from bench.analysis import peaks
 from bench.analysis.rational import Rational, Top, averaged, fitted, orders, top
 from bench.analysis.responses import Response, image_distance
 from bench.uncertainty import Estimate, Influence
 from procedures.estimators.sensitivity_data import HALF, MODE, REFINED, SURVEY, WIRING, Taken, named, shared_noise
+from procedures.estimators.sensitivity_margins import margins, merged
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -26,11 +26,6 @@ LEAST = 6  # steps to either side of it, at least
 RIVAL = 0.85  # of the greatest: another maximum that is refined too
 CANDIDATES = 3
 NEAR = 0.3  # of a frequency: how far the lines reach that a first look is fitted to
-DRAWS = 150  # of the margins
-TOLERATED = 0.05  # share of the draws that may have no crossing
-FAINT = 0.1  # where |L| is less, it is noise that crosses the axis: a gain that may rise tenfold is not told
-LOW, NODES, BETWEEN = 12, 4, 20  # lines between which the loop is bent, how many make a curve, points of it in a step
-VAGUE = 0.2  # relative standard uncertainty above which a margin is not told
 
 
 @dataclass(frozen=True)
@@ -97,7 +92,7 @@ def candidates(seen: Sequence[Response]) -> list[Candidate]:
     """Where a survey peaks, the greatest first, and those that come near it."""
     if not seen:
         return []
-    hz, z, power = _merged([(r, shared_noise(r)) for r in seen])
+    hz, z, power = merged([(r, shared_noise(r)) for r in seen])
     size, free = np.abs(z) - np.sqrt(power), np.ones(hz.size, bool)
     out: list[Candidate] = []
     while free.any() and len(out) < CANDIDATES:
@@ -122,16 +117,6 @@ def _looked(hz: Array, z: Complex, power: Array, k: int) -> Candidate:
     step = float(np.diff(hz[near]).min())
     width = min(max(model.width(at.at), step / 2), 0.6 * at.at)
     return Candidate(at.at, width if math.isfinite(width) else NEAR * at.at)
-
-
-def _merged(parts: Sequence[tuple[Response, Array]]) -> tuple[Array, Complex, Array]:
-    """Lines of several responses in order of frequency, with their noise; of those that coincide the last one counts."""
-    hz = np.concatenate([r.hz for r, _ in parts])
-    z = np.concatenate([r.values for r, _ in parts])
-    power = np.concatenate([p for _, p in parts])
-    kept = {float(f): k for k, f in enumerate(hz)}
-    order = np.array([kept[f] for f in sorted(kept)])
-    return hz[order], z[order], power[order]
 
 
 def results(taken: Sequence[Taken]) -> list[Result]:
@@ -204,83 +189,3 @@ def _curve(taken: Sequence[Taken]) -> Response:
         np.concatenate([getattr(r, n) for r in parts])[order] for n in ("values", "covariance", "coherence")
     )
     return Response(hz[order], values, covariance, coherence, min(r.dof for r in parts))
-
-
-def margins(surveys: Sequence[Taken], where: str) -> dict[str, Estimate]:
-    """Phase margin and both gain margins by the lines of the survey, those that exist. Smoothed, but where the gain may fall:
-    that is among the lowest lines, which bend within a few and carry little noise."""
-    if not surveys:
-        return {}
-    hz, z, power = _merged([(t.response, t.noise) for t in surveys])
-    if hz.size < peaks.WINDOW:
-        return {}
-    covariance = power[:, None, None] / 2 * np.eye(2)
-    smooth = peaks.smoother(hz, z, covariance)
-    base = smooth.at_lines(z)
-    noisy = base + peaks.noise(covariance, 0, DRAWS)
-    smoothed = smooth.everywhere(z), smooth.everywhere(base), smooth.everywhere(noisy)
-    out: dict[str, Estimate] = {}
-    dof = float(min(t.dof for t in surveys))
-    for name, unit, of, (seen, mean, drawn) in (
-        ("phase_margin", "rad", phase, smoothed),
-        ("gain_reduction", "1", lambda loop: fall(between(hz, loop)), (z, base, noisy)),
-        ("gain_increase", "1", rise, smoothed),
-    ):
-        found, again = of(1 / seen - 1), of(1 / mean - 1)
-        values = np.array([of(1 / d - 1) for d in drawn])
-        known = np.isfinite(values)
-        if math.isfinite(found) and math.isfinite(again) and known.mean() > 1 - TOLERATED:
-            bias = float(values[known].mean()) - again
-            u = float(values[known].std())
-            if u > VAGUE * found:
-                continue
-            out[name] = _typed(found - bias, u, unit, f"{where}/{name}", "scatter over the periods", dof)
-    return out
-
-
-def _crossings(level: Array, other: Complex) -> Complex:
-    """A curve where `level` changes its sign, interpolated."""
-    k = np.flatnonzero(np.sign(level[1:]) != np.sign(level[:-1]))
-    share = level[k] / (level[k] - level[k + 1])
-    return np.asarray(other[k] + share * (other[k + 1] - other[k]))
-
-
-def phase(loop: Complex) -> float:
-    """Phase margin of an open loop (m,), rad; NaN where |L| is not 1."""
-    at = _crossings(np.abs(loop) - 1, loop)
-    return float(np.abs(np.angle(-at)).min()) if at.size else math.nan
-
-
-def _real(loop: Complex) -> Array:
-    """Distances from the origin where the loop crosses the negative real axis."""
-    at = _crossings(loop.imag, loop).real
-    return np.asarray(-at[at < 0])
-
-
-def fall(loop: Complex) -> float:
-    """Factor to which its gain may fall; NaN where that is not told."""
-    at = _real(loop)
-    return float((1 / at[at > 1]).max()) if (at > 1).any() else math.nan
-
-
-def between(hz: Array, loop: Complex) -> Complex:
-    """The lowest LOW lines of an open loop (m,) at `hz`, and BETWEEN points to each of them. The integrator bends it there, and
-    straight lines would cross the axis 0.5 % beside it: what goes through NODES lines is hz times the loop."""
-    out = []
-    for k in range(min(LOW, len(hz) - NODES)):
-        first = max(k - 1, 0)
-        x = np.linspace(hz[k], hz[k + 1], BETWEEN, endpoint=False)
-        nodes = hz[first : first + NODES]
-        apart = nodes[:, None] - nodes + np.eye(NODES)
-        terms = (np.where(np.eye(NODES)[:, :, None] > 0, 1.0, (x - nodes[:, None])[None]) / apart[:, :, None]).prod(
-            axis=1
-        )
-        out.append((loop[first : first + NODES] * nodes) @ terms / x)
-    return np.concatenate([*out, loop[len(out) :]])
-
-
-def rise(loop: Complex) -> float:
-    """Factor to which its gain may rise; NaN where that is not told."""
-    at = _real(loop)
-    some = at[(at < 1) & (at > FAINT)]
-    return float((1 / some).min()) if some.size else math.nan
