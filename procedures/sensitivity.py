@@ -82,6 +82,7 @@ class Plan(BenchPlan):
     refined_periods: int = Field(8, ge=4)
     settle_s: float = Field(8.0, ge=0.5)  # under the law, before anything is injected
     start_s: float = Field(0.5, ge=0.1)  # of each injection
+    survey_start_s: float = Field(1.5, ge=0.1)  # of the survey: a slow integrator answers its lowest lines
     rate_hz: float = Field(10000.0, gt=0)  # of the captures
     max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
     max_speed_error: float = Field(0.01, gt=0)  # share of the speed
@@ -182,7 +183,7 @@ def _taken(
         most = rig.capture.memory_bytes / size(rig.file, kind, speed) / plan.rate_hz - pulses
         seconds = comb.period_s * min(plan.refined_periods, math.floor(most / comb.period_s))
     seconds += pulses
-    with injected(rig, axis, comb, plan.start_s):
+    with injected(rig, axis, comb, plan.survey_start_s if kind == SURVEY else plan.start_s):
         with record.step(INJECT, **labels):
             rig.capture.arm(channels(kind, speed), seconds=seconds, rate_hz=plan.rate_hz)
             rig.capture.wait(seconds + 5.0)
