@@ -15,10 +15,8 @@ ELEVATION_M = (-500.0, 9000.0)
 AIR = (0.5, 1.5)  # kg/m^3: from 7000 m in summer to sea level in a hard winter
 SOLID = (1500.0, 23000.0)  # kg/m^3: from light alloys with cavities to osmium
 GAPS = ("amb_gap", "axial_gap", "clearance")
-GAP_M, LENGTH_M = (
-    (1e-6, 1e-2),
-    (1e-4, 10.0),
-)  # a slip of three decades leaves them, for machines of some centimetres and more
+# Slips of three decades leave these, on machines of some centimetres and more.
+GAP_M, LENGTH_M = (1e-6, 1e-2), (1e-4, 10.0)
 
 
 def impossible(rig: RigFile) -> Iterator[Problem]:

@@ -27,12 +27,9 @@ from procedures.estimators.setpoint_swing import shrinks
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 FROM_S = 8e-3  # filters, current loops and second harmonics of the swing are then below a hundredth of the band
-FADES_S, APART = (
-    0.1,
-    1.6,
-)  # shortest time constant of what fades without swinging, ratio of the next to it: 2.5 apart they
-# miss what a PID leaves by 0.015 % of the step, 4 ms of its settling time
-LONGEST = 12
+# Time constants of what fades without swinging: the shortest, the ratio of the next to it, how many. 2.5 apart they miss what a
+# PID leaves by 0.015 % of the step, 4 ms of its settling time.
+FADES_S, APART, FADES = 0.1, 1.6, 12
 HARD_S = (0.01, 0.03)  # such constants too where nothing swings
 BAND_NOISE = 5.0  # of settling, at least, over the noise of the averaged position
 NEAR = 3.0  # standard uncertainties from the band's edge within which an extreme is not told from one that touches it
@@ -107,7 +104,7 @@ def fit(steps: Sequence[Done], poles: Complex, middle: complex | None = None) ->
         AnalysisError: too few steps to tell their scatter, or too few samples of one.
     """
     last = min(float(d.t[-1]) for d in steps)
-    fades = tuple(float(f) for f in FADES_S * APART ** np.arange(LONGEST) if f <= last)
+    fades = tuple(float(f) for f in FADES_S * APART ** np.arange(FADES) if f <= last)
     fades = fades if len(poles) else (*HARD_S, *fades)
     poles = lasting(poles)
     middle = middle if middle is not None else complex(poles.mean()) if len(poles) else 0j
