@@ -23,39 +23,30 @@ class Entry:
     about: str
 
 
+def _room(name: str, about: str) -> Entry:
+    """A procedure of ours: its room is called as it is."""
+    return Entry(name, f"procedures.{name.replace('-', '_')}.procedure", about)
+
+
 PROCEDURES = (
-    Entry("amb-calibration", "procedures.amb_calibration", "AMB force-current constants by hanging known masses"),
-    Entry(
-        "force-constant", "procedures.force_constant", "Direct force constant of the motor, by the AMBs as load cells"
-    ),
-    Entry(
-        "negative-stiffness",
-        "procedures.negative_stiffness",
-        "Negative stiffness of the motor by eccentric positioning",
-    ),
-    Entry("force-coupling", "procedures.force_coupling", "Force coupling of the motor over the phase angle"),
-    Entry("torque-constant", "procedures.torque_constant", "Torque constant of the motor by weights on a lever"),
-    Entry("spindown", "procedures.spindown", "Drag of the levitated rotor by spindown"),
-    Entry(
-        "angle-step", "procedures.angle_step", "Angle step while the motor carries: static against priority currents"
-    ),
-    Entry(
-        "step",
-        "procedures.step",
-        "Set-point steps of the levitated shaft, with two settings of the controller compared",
-    ),
-    Entry("slew", "procedures.slew", "Following a slow sine of the angle, with detent"),
-    Entry("bearing-model", "procedures.bearing_model", "Force constants and magnetic offsets of the radial AMBs"),
-    Entry("tracking", "procedures.tracking", "Following an ellipse with the centre of mass: PID, CCS and CAC"),
-    Entry("unbalance", "procedures.unbalance", "Unbalance response of the turning shaft: vectors, orbits, zones"),
-    Entry("compensation", "procedures.compensation", "Compensation of unbalance: with and without it, and switched on"),
-    Entry("balance", "procedures.balance", "Two-plane balancing by influence coefficients from trial weights"),
-    Entry("run-up", "procedures.runup", "Run-up through the critical speeds: Bode, polar, waterfall, amplification"),
-    Entry("coast-down", "procedures.coast_down", "Coast-down through the critical speeds, analysed as a run-up"),
-    Entry(
-        "sensitivity", "procedures.sensitivity", "Sensitivity of the control loops by injection, with zones and margins"
-    ),
-    Entry("force-map", "procedures.force_map", "Terms of the motor's force over displacement, currents and load"),
+    _room("amb-calibration", "AMB force-current constants by hanging known masses"),
+    _room("force-constant", "Direct force constant of the motor, by the AMBs as load cells"),
+    _room("negative-stiffness", "Negative stiffness of the motor by eccentric positioning"),
+    _room("force-coupling", "Force coupling of the motor over the phase angle"),
+    _room("torque-constant", "Torque constant of the motor by weights on a lever"),
+    _room("spindown", "Drag of the levitated rotor by spindown"),
+    _room("angle-step", "Angle step while the motor carries: static against priority currents"),
+    _room("step", "Set-point steps of the levitated shaft, with two settings of the controller compared"),
+    _room("slew", "Following a slow sine of the angle, with detent"),
+    _room("bearing-model", "Force constants and magnetic offsets of the radial AMBs"),
+    _room("tracking", "Following an ellipse with the centre of mass: PID, CCS and CAC"),
+    _room("unbalance", "Unbalance response of the turning shaft: vectors, orbits, zones"),
+    _room("compensation", "Compensation of unbalance: with and without it, and switched on"),
+    _room("balance", "Two-plane balancing by influence coefficients from trial weights"),
+    _room("run-up", "Run-up through the critical speeds: Bode, polar, waterfall, amplification"),
+    _room("coast-down", "Coast-down through the critical speeds, analysed as a run-up"),
+    _room("sensitivity", "Sensitivity of the control loops by injection, with zones and margins"),
+    _room("force-map", "Terms of the motor's force over displacement, currents and load"),
 )
 
 

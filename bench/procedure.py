@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ConfigDict
@@ -50,6 +51,11 @@ class Measured:
     quantity: Quantity
     estimate: Estimate
     where: str = ""
+
+
+def read_method(file: str) -> str:
+    """The report's method section of a procedure: `method.md` beside its `file`, plain paragraphs parted by empty lines."""
+    return Path(file).with_name("method.md").read_text("utf-8")
 
 
 def _no_figures(_: Recording[Any]) -> Iterable[Shown]:

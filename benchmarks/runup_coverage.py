@@ -23,9 +23,9 @@ from bench.errors import DeviceFault
 from bench.findings import Effect, Finding
 from bench.rigfile import load_rig
 from bench.uncertainty import interval
-from procedures.estimators.unbalance_data import AXES, RPM
-from procedures.runup import evaluated
-from procedures.turning import CODES, SETTINGS
+from procedures.run_up.procedure import evaluated
+from procedures.unbalance.dwelling import CODES, SETTINGS
+from procedures.unbalance.steps import AXES, RPM
 from sim_backend import amb_passage, amb_unbalance
 from sim_backend.truth import draw
 

@@ -23,10 +23,10 @@ from bench.cli.virtual import simulated_run
 from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.uncertainty import coverage_factor, interval
-from procedures.estimators import sensitivity_estimates
-from procedures.estimators.sensitivity_data import REFINED, WIRING, Grid, Taken, channels, sensitivity
-from procedures.injecting import AXES, Comb, wanted
-from procedures.sensitivity import CODES, MARGIN_S, RPM, Plan, refinements, surveys
+from procedures.sensitivity import estimates
+from procedures.sensitivity.injection import AXES, Comb, wanted
+from procedures.sensitivity.procedure import CODES, MARGIN_S, RPM, Plan, refinements, surveys
+from procedures.sensitivity.steps import REFINED, WIRING, Grid, Taken, channels, sensitivity
 from sim_backend import amb_sensitivity
 from sim_backend.amb_step import floating
 from sim_backend.core.amb import TRACE, AmbPlant
@@ -48,11 +48,11 @@ def light(p: AmbParams, settings: Mapping[str, float], plan: Plan, seed: int) ->
         seen = [_taken(plant, plan, axis, kind, 0.0, comb) for kind, _, comb in combs if kind != WIRING]
         refined = [
             _taken(plant, plan, axis, kind, about, comb)
-            for c in sensitivity_estimates.candidates([t.response for t in seen])
+            for c in estimates.candidates([t.response for t in seen])
             for kind, about, comb in refinements(plan, c, plan.speeds_rad_s[0])
             if kind == REFINED
         ]
-        best = max(sensitivity_estimates.found_peaks(refined), key=lambda peak: peak.top.value)
+        best = max(estimates.found_peaks(refined), key=lambda peak: peak.top.value)
         k = coverage_factor(best.taken.dof)
         yield axis, "s_max", best.top.value, k * best.top.u, best.top.u
         yield axis, "s_max_hz", best.top.at, k * best.top.u_at, best.top.u_at

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from procedures.estimators.mass_hanging import hung_shares
+from procedures.amb_calibration.fit import hung_shares
 
 G, MASS = 9.81, 10.2
 L_IA, L_OA, L_D = 0.115, 0.010, 0.160

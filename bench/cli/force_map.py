@@ -16,14 +16,13 @@ import numpy as np
 
 from bench.errors import AnalysisError, ConfigError
 from bench.uncertainty import coverage_factor, stated
-from procedures import force_map_figures
-from procedures.estimators import force_map, mapping
-from procedures.estimators.force_map import UNITS
-from procedures.estimators.force_table import MODEL_SCHEMA, Table, parse_constants, parse_table
-from procedures.estimators.mapping import Part
+from procedures.force_map import figures, fit, terms
+from procedures.force_map.fit import UNITS
+from procedures.force_map.table import MODEL_SCHEMA, Table, parse_constants, parse_table
+from procedures.force_map.terms import Part
 from reports.figures import draw
 
-DATA = "procedures.data"
+DATA = "procedures.force_map.data"
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ def map_command(request: Request) -> int:
     given = _text(request.against, ".json", "model") if request.against else None
     constants = None if given is None else parse_constants(given[1], given[0])
     try:
-        parts = mapping.identify(table, request.poles)
+        parts = terms.identify(table, request.poles)
     except AnalysisError as error:
         raise ConfigError(f"table {name}: {error}") from error
     stem = Path(request.table).stem
@@ -88,10 +87,9 @@ def _constants(part: Part, table: Table, poles: int) -> list[str]:
     values = f"{part.measured.size} values, {part.fit.dof} degrees of freedom, k = {k:.2f} (95 %)"
     lines = [f"{part.name}: {len(part.fit.terms)} of {len(part.terms)} terms; {values}"]
     for term, value, u in zip(part.fit.terms, part.fit.values, part.fit.u, strict=True):
-        lines.append(f"  {term:8} {stated(float(value), float(k * u)):>22} {UNITS[term]:10} {force_map.ABOUT[term]}")
+        lines.append(f"  {term:8} {stated(float(value), float(k * u)):>22} {UNITS[term]:10} {fit.ABOUT[term]}")
     lines += [
-        f"  {term:8} cannot be identified: {force_map.why_unseen(term, table.points, poles)}"
-        for term in part.told.unseen
+        f"  {term:8} cannot be identified: {fit.why_unseen(term, table.points, poles)}" for term in part.told.unseen
     ]
     lines += [
         f"  {', '.join(group)} cannot be identified: these points show only combinations of them"
@@ -125,7 +123,7 @@ def _prediction(parts: Sequence[Part], constants: dict[str, float], model: str) 
     """How well given constants predict the table: in its unit, and relative to the values that are not zero."""
     lines = [f"prediction by {model}"]
     for part in parts:
-        predicted = force_map.predict(part.design, part.terms, constants)
+        predicted = fit.predict(part.design, part.terms, constants)
         error, given = np.abs(predicted - part.measured), part.measured != 0
         relative = 100 * (error[given] / np.abs(part.measured[given])).max(initial=0.0)
         absolute = f"{error.size} values within {error.max():.3g} {part.unit}"
@@ -140,7 +138,7 @@ def _write(out: Path, parts: Sequence[Part], poles: int, name: str, text: str) -
     try:
         out.mkdir(parents=True, exist_ok=True)
         _replace(out / "model.json", json.dumps(model, indent=2) + "\n")
-        for figure in force_map_figures.part_figures(parts):
+        for figure in figures.part_figures(parts):
             _replace(out / f"{figure.key}.svg", draw(figure).svg)
     except OSError as error:
         raise ConfigError(

@@ -42,8 +42,8 @@ def _settings(done: Simulated, *more: Mapping[str, float]) -> dict[str, float]:
 
 
 def _step(done: Simulated) -> Found:
-    from procedures.estimators.setpoint_data import AT_REST_S, Case
-    from procedures.step import chosen, model, recorded_s, waited_s
+    from procedures.step.procedure import chosen, model, recorded_s, waited_s
+    from procedures.step.steps import AT_REST_S, Case
     from sim_backend import amb_step
 
     plan: Any = done.recording.plan
@@ -76,8 +76,8 @@ def _step(done: Simulated) -> Found:
 
 
 def _tracking(done: Simulated) -> Found:
-    from procedures.estimators.tracking_data import read_orbits
-    from procedures.tracking import CODES
+    from procedures.amb_rotor.steps import read_orbits
+    from procedures.tracking.procedure import CODES
     from sim_backend import amb_track
 
     plan: Any = done.recording.plan
@@ -93,7 +93,7 @@ def _tracking(done: Simulated) -> Found:
 
 
 def _vectors(shaft: Iterable[complex], where: str) -> Found:
-    from procedures.estimators.unbalance_data import AXES
+    from procedures.unbalance.steps import AXES
 
     for axis, vector in zip(AXES, shaft, strict=True):
         yield "vector_cos", f"{axis}, {where}", float(vector.real)
@@ -101,7 +101,7 @@ def _vectors(shaft: Iterable[complex], where: str) -> Found:
 
 
 def _distances(d_max: Iterable[float], clearance: float, where: str) -> Found:
-    from procedures.estimators.unbalance_data import PLANES
+    from procedures.unbalance.steps import PLANES
 
     for plane, far in zip(PLANES, d_max, strict=True):
         yield "d_max", f"{plane}, {where}", far
@@ -109,8 +109,8 @@ def _distances(d_max: Iterable[float], clearance: float, where: str) -> Found:
 
 
 def _unbalance(done: Simulated) -> Found:
-    from procedures.estimators.unbalance_data import DWELL, read_dwells
-    from procedures.turning import CODES, POLES, SETTINGS
+    from procedures.unbalance.dwelling import CODES, POLES, SETTINGS
+    from procedures.unbalance.steps import DWELL, read_dwells
     from sim_backend import amb_unbalance
 
     plan: Any = done.recording.plan
@@ -125,7 +125,7 @@ def _unbalance(done: Simulated) -> Found:
 
 
 def _balance(done: Simulated) -> Found:
-    from procedures.estimators.balance_data import SIDES
+    from procedures.balance.steps import SIDES
     from sim_backend import amb_balance
 
     own = amb_balance.left(done.recording.rig, done.drawn, done.recording.events("operator"))
@@ -137,9 +137,9 @@ def _balance(done: Simulated) -> Found:
 
 def _passage(done: Simulated) -> Found:
     """Vectors, orbits and D_max where the speed stands; what is critical at the speeds where the run found it."""
-    from procedures.estimators.unbalance_data import AXES, PLANES
-    from procedures.runup import evaluated
-    from procedures.turning import CODES, SETTINGS
+    from procedures.run_up.procedure import evaluated
+    from procedures.unbalance.dwelling import CODES, SETTINGS
+    from procedures.unbalance.steps import AXES, PLANES
     from sim_backend import amb_passage, amb_unbalance
 
     plan: Any = done.recording.plan
@@ -171,10 +171,10 @@ def _passage(done: Simulated) -> Found:
 def _sensitivity(done: Simulated) -> Found:
     import numpy as np
 
-    from procedures.estimators.sensitivity_data import RPM
-    from procedures.estimators.sensitivity_margins import fall, phase, rise
-    from procedures.injecting import AXES
-    from procedures.sensitivity import CODES
+    from procedures.sensitivity.injection import AXES
+    from procedures.sensitivity.margins import fall, phase, rise
+    from procedures.sensitivity.procedure import CODES
+    from procedures.sensitivity.steps import RPM
     from sim_backend import amb_sensitivity
 
     plan: Any = done.recording.plan

@@ -31,7 +31,7 @@ from bench.states import transition
 from bench.telemetry import TelemetryDecoder
 from drivers.controller import Controller
 from drivers.operator import LineOperator
-from procedures.amb_calibration import Plan, analyse, procedure, settings
+from procedures.amb_calibration.procedure import Plan, analyse, procedure, settings
 from sim_backend.endpoint import SimulatedRig
 from sim_backend.truth import draw
 

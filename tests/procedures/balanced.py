@@ -18,9 +18,9 @@ from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate
-from procedures.estimators import balance_checks
-from procedures.estimators.balance_checks import Evaluated
-from procedures.estimators.balance_data import Run
+from procedures.balance import checks
+from procedures.balance.checks import Evaluated
+from procedures.balance.steps import Run
 from sim_backend import amb_balance
 from sim_backend.truth import draw
 
@@ -60,9 +60,7 @@ def done(
     findings = [f for f in run.results if isinstance(f, Finding)]
     file = load_rig(rig)
     true = amb_balance.left(file, draw(file, seed, truth), run.recording.events("operator"))
-    return Balancing(
-        measured, findings, run.recording, balance_checks.evaluated(run.recording), true, truth_of_motion(run)
-    )
+    return Balancing(measured, findings, run.recording, checks.evaluated(run.recording), true, truth_of_motion(run))
 
 
 def runs_of(b: Balancing) -> dict[str, Run]:

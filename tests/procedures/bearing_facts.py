@@ -7,8 +7,8 @@ import numpy as np
 from bench.calibration import Calibration
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
-from procedures.estimators import runout
-from procedures.estimators.unbalance_data import AXES
+from procedures.unbalance import runout
+from procedures.unbalance.steps import AXES
 from sim_backend.core.amb_params import AmbParams
 
 

@@ -1,4 +1,4 @@
-"""The synthetic operating points that show term selection: the recipe of `procedures/data/tsbs-synthetic.csv`."""
+"""The synthetic operating points that show term selection: the recipe of `procedures/force_map/data/tsbs-synthetic.csv`."""
 
 from __future__ import annotations
 
@@ -6,16 +6,8 @@ from importlib.resources import files
 
 import numpy as np
 
-from procedures.estimators.force_map import (
-    FORCE_TERMS,
-    TORQUE_TERMS,
-    Array,
-    Points,
-    force_design,
-    predict,
-    torque_design,
-)
-from procedures.estimators.force_table import parse_constants
+from procedures.force_map.fit import FORCE_TERMS, TORQUE_TERMS, Array, Points, force_design, predict, torque_design
+from procedures.force_map.table import parse_constants
 
 POLES = 16
 COUNT, SEED = 175, 0
@@ -31,7 +23,9 @@ i_x [A],i_y [A],i_theta [A],x [mm],y [mm],theta [deg],F_x [N],F_y [N],tau [N m]
 
 def table_5_3() -> dict[str, float]:
     """T Table 5.3."""
-    return parse_constants((files("procedures.data") / "tsbs-table-5-3.json").read_text("utf-8"), "tsbs-table-5-3.json")
+    return parse_constants(
+        (files("procedures.force_map.data") / "tsbs-table-5-3.json").read_text("utf-8"), "tsbs-table-5-3.json"
+    )
 
 
 def points(random: np.random.Generator, count: int = COUNT) -> Points:

@@ -18,8 +18,8 @@ from bench.records import measurement
 from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import interval
-from procedures.amb_calibration import Plan, check, procedure
-from procedures.estimators import both_coils
+from procedures.amb_calibration import both_coils
+from procedures.amb_calibration.procedure import Plan, check, procedure
 from sim_backend.truth import draw
 
 SHORT = {"settle_s": 0.3, "average_s": 0.2}

@@ -14,7 +14,7 @@ from bench.cli.virtual import Simulated
 from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, correlation
-from procedures.amb_calibration import evaluate
+from procedures.amb_calibration.procedure import evaluate
 from sim_backend.quantities import eccentricity, own_weight
 from sim_backend.truth import draw
 

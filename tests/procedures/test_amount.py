@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import rice
 
 from bench.uncertainty import Estimate, Influence, interval
-from procedures.estimators.amount import amount
+from procedures.balance.vector_length import amount
 
 
 def measured(x: float, y: float, u: float = 1.0) -> Estimate:

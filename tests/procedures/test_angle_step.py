@@ -19,9 +19,9 @@ from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate
-from procedures.angle_step import MEASURES, Plan, check, figures, planned, procedure, step_count
-from procedures.estimators import stepresponse
-from procedures.estimators.stepresponse import Loop, Move
+from procedures.angle_step import response
+from procedures.angle_step.procedure import MEASURES, Plan, check, figures, planned, procedure, step_count
+from procedures.angle_step.response import Loop, Move
 from reports.figures import draw as draw_figure
 from sim_backend.truth import draw
 
@@ -177,7 +177,7 @@ def test_second_order_step(size: float, sign: float, frequency: float, damping: 
     t = np.arange(1500) * 1e-3
     wd = frequency * math.sqrt(1 - damping**2)
     y = 1 - np.exp(-damping * frequency * t) * (np.cos(wd * t) + damping * frequency / wd * np.sin(wd * t))
-    found = stepresponse.response(move(sign * size, sign * size * y), 0.02 * size)
+    found = response.response(move(sign * size, sign * size * y), 0.02 * size)
     assert found.overshoot == pytest.approx(math.exp(-math.pi * damping / math.sqrt(1 - damping**2)), abs=0.003)
     fine = np.linspace(0, 1.5, 150001)
     exact = 1 - np.exp(-damping * frequency * fine) * (np.cos(wd * fine) + damping * frequency / wd * np.sin(wd * fine))
@@ -195,21 +195,21 @@ def test_a_peak_is_not_read_from_its_noise() -> None:
     for seed in range(60):
         noise = np.random.default_rng(seed).normal(0, 1e-6, (2, 800))
         raw.append(np.hypot(*(bump + noise)).max())
-        read.append(stepresponse.peak_radius(bump + noise)[0])
+        read.append(response.peak_radius(bump + noise)[0])
     assert np.mean(read) - 10e-6 < 0.75 * (np.mean(raw) - 10e-6)
-    floor = stepresponse.noise_floor(np.random.default_rng(1).normal(0, 1e-6, (2, 800)))
+    floor = response.noise_floor(np.random.default_rng(1).normal(0, 1e-6, (2, 800)))
     assert 0 < np.mean(read) - 10e-6 < floor
 
 
 def test_a_rotor_that_does_not_get_there_is_told() -> None:
     with pytest.raises(AnalysisError, match="reaches"):
-        stepresponse.response(move(0.1, np.full(800, 0.05)), 0.002)
+        response.response(move(0.1, np.full(800, 0.05)), 0.002)
 
 
 def test_the_predicted_speed_is_that_of_a_free_rotor() -> None:
     """All the way at the limit: v = sqrt(2 a s) bounds it; a small step stays linear in the step."""
     loop = Loop(50, 0.5, 0, 200, 0.033, 2.87, 10)
-    assert stepresponse.fastest(loop, 1.0) < math.sqrt(2 * 10 * 2.87 / 0.033 * 1.0)
-    small = [stepresponse.fastest(Loop(50, 0.5, 0, 20, 0.033, 2.87, 1e9), s) for s in (0.01, 0.02)]
+    assert response.fastest(loop, 1.0) < math.sqrt(2 * 10 * 2.87 / 0.033 * 1.0)
+    small = [response.fastest(Loop(50, 0.5, 0, 20, 0.033, 2.87, 1e9), s) for s in (0.01, 0.02)]
     assert small[1] == pytest.approx(2 * small[0], rel=1e-6)
-    assert stepresponse.kick_A(loop, 0.1) == pytest.approx(0.1 * (50 + 0.5 * 1256.6 / 1.12566), rel=1e-3)
+    assert response.kick_A(loop, 0.1) == pytest.approx(0.1 * (50 + 0.5 * 1256.6 / 1.12566), rel=1e-3)

@@ -17,11 +17,11 @@ from bench.analysis.vectors import Vectors, contains
 from bench.figures import Figure
 from bench.findings import Effect
 from bench.uncertainty import interval
-from procedures import balance
-from procedures.balance import check
-from procedures.estimators import balance_checks, balance_decision, balance_estimates, runout
-from procedures.estimators.balance_data import BASE, SIDES, Read, Run, Weight
-from procedures.estimators.runout import Stand, Turning
+from procedures.balance import checks, decision, estimates, procedure
+from procedures.balance.procedure import check
+from procedures.balance.steps import BASE, SIDES, Read, Run, Weight
+from procedures.unbalance import runout
+from procedures.unbalance.runout import Stand, Turning
 from reports.figures import draw as draw_figure
 from sim_backend.truth import draw
 
@@ -38,8 +38,8 @@ def test_it_is_reached_with_one_correction(sound: Balancing) -> None:
     assert not sound.serious
     assert {f.code for f in sound.findings} == {"bearings", "verified", "reached", "influence", "correction-sheet"}
     assert list(runs_of(sound)) == ["base", "trial inboard", "trial outboard", "check 1"]
-    assert len(sound.recording.all_steps()) <= balance.step_count(sound.recording.plan)
-    assert {name for name, _ in sound.measured} == {q.name for q in balance.MEASURES}
+    assert len(sound.recording.all_steps()) <= procedure.step_count(sound.recording.plan)
+    assert {name for name, _ in sound.measured} == {q.name for q in procedure.MEASURES}
     for side in SIDES:
         assert interval(sound.measured["residual_share", side]).high < 1
     sheet = [f.text for f in sound.findings if f.code == "correction-sheet"]
@@ -82,7 +82,7 @@ def test_the_forces_tell_what_each_trial_weight_did(sound: Balancing) -> None:
 
 
 def test_figures(sound: Balancing) -> None:
-    drawn = list(balance.figures(sound.recording))
+    drawn = list(procedure.figures(sound.recording))
     assert [f.key for f in drawn] == ["weights", "before-after", "residual-inboard", "residual-outboard", "sheet-inboard",
                                       "sheet-outboard", "vectors-inboard", "vectors-outboard"]  # fmt: skip
     for figure in drawn:
@@ -98,7 +98,7 @@ def test_a_run_says_the_same_of_the_forces_however_large(sound: Balancing) -> No
     rig, plan = sound.recording.rig, sound.recording.plan
 
     def codes(run: Run, w: Weight) -> set[str]:
-        return {f.code for f in balance_decision.of_trial(balance_decision.shown(base, run, w, rig, plan))}
+        return {f.code for f in decision.of_trial(decision.shown(base, run, w, rig, plan))}
 
     assert codes(having, weight) == set()
     assert codes(dataclasses.replace(base, name="trial inboard"), weight) == {"trial-moved-nothing"}
@@ -111,27 +111,25 @@ def test_a_run_says_the_same_of_the_forces_however_large(sound: Balancing) -> No
         low, vectors=dataclasses.replace(low.vectors, values=start + turn * (low.vectors.values - start))
     )
     assert codes(dataclasses.replace(having, reads=(slipped, high)), weight) == {"weight-loose"}
-    assert not list(balance_decision.slipped(having))
-    assert {f.code for f in balance_decision.slipped(dataclasses.replace(having, again=slipped))} == {"weight-loose"}
-    assert {f.code for f in balance_decision.slipped(dataclasses.replace(base, again=low))} == {"response-changed"}
+    assert not list(decision.slipped(having))
+    assert {f.code for f in decision.slipped(dataclasses.replace(having, again=slipped))} == {"weight-loose"}
+    assert {f.code for f in decision.slipped(dataclasses.replace(base, again=low))} == {"response-changed"}
 
 
 def test_scales_that_disagree_and_corrections_that_act_otherwise(sound: Balancing) -> None:
     rig, plan, runs, b = sound.recording.rig, sound.recording.plan, runs_of(sound), sound.found.balance
     assert b is not None
-    shown = [
-        balance_decision.shown(runs[BASE], runs[f"trial {s}"], runs[f"trial {s}"].weights[-1], rig, plan) for s in SIDES
-    ]
-    assert not list(balance_decision.of_trials(*shown))
+    shown = [decision.shown(runs[BASE], runs[f"trial {s}"], runs[f"trial {s}"].weights[-1], rig, plan) for s in SIDES]
+    assert not list(decision.of_trials(*shown))
     turned = dataclasses.replace(shown[1], added=shown[1].added * np.exp(0.3j))
-    assert [f.code for f in balance_decision.of_trials(shown[0], turned)] == ["weight-angle"]
+    assert [f.code for f in decision.of_trials(shown[0], turned)] == ["weight-angle"]
     check_run = runs["check 1"]
-    assert [f.code for f in balance_checks.predicted(b, runs[BASE], check_run, rig)] == ["verified"]
+    assert [f.code for f in checks.predicted(b, runs[BASE], check_run, rig)] == ["verified"]
     for lie in (
         {"angle": check_run.weights[0].angle + 0.12}, {"kg": 1.1 * check_run.weights[0].kg}, {"plane": 1}
     ):  # fmt: skip
         weights = (dataclasses.replace(check_run.weights[0], **lie), *check_run.weights[1:])
-        found = list(balance_checks.predicted(b, runs[BASE], dataclasses.replace(check_run, weights=weights), rig))
+        found = list(checks.predicted(b, runs[BASE], dataclasses.replace(check_run, weights=weights), rig))
         assert [(f.code, f.effect) for f in found] == [("correction-not-as-stated", Effect.INDETERMINATE)], lie
 
 
@@ -141,7 +139,7 @@ def test_refitting_and_speeds_that_differ(sound: Balancing) -> None:
     assert b is not None
     assert found is not None
     rig, plan, runs = sound.recording.rig, sound.recording.plan, runs_of(sound)
-    again = balance_estimates.balanced(
+    again = estimates.balanced(
         found.slow, [runs[BASE]], b.trials, rig, plan.model_copy(update={"refit_u_kg_m": 0.2 * G_MM})
     )
     before, after = (x.unbalance[BASE].u_amplitude for x in (b, again))
@@ -149,15 +147,15 @@ def test_refitting_and_speeds_that_differ(sound: Balancing) -> None:
     fast = dataclasses.replace(runs["check 1"], reads=tuple(
         dataclasses.replace(r, speed=1.003 * r.speed) for r in runs["check 1"].reads))  # fmt: skip
     changed = dataclasses.replace(found, runs=(*found.runs[:-1], fast))
-    assert {f.code for f in balance_checks.of_runs(changed, rig, plan)} == {"speeds-differ"}
-    assert not list(balance_checks.of_runs(found, rig, plan))
+    assert {f.code for f in checks.of_runs(changed, rig, plan)} == {"speeds-differ"}
+    assert not list(checks.of_runs(found, rig, plan))
 
 
 def test_corrections_at_positions_and_those_too_heavy(sound: Balancing) -> None:
     b, rig, plan = sound.found.balance, sound.recording.rig, sound.recording.plan
     assert b is not None
-    whole = balance_decision.correction(b, BASE, rig, plan)
-    parted = balance_decision.correction(b, BASE, rig, plan.model_copy(update={"positions": 12}))
+    whole = decision.correction(b, BASE, rig, plan)
+    parted = decision.correction(b, BASE, rig, plan.model_copy(update={"positions": 12}))
     assert [p for p, _, _ in whole.weights] == [0, 1]
     assert [p for p, _, _ in parted.weights] == [0, 0, 1, 1]
     step = math.pi / 6
@@ -166,15 +164,15 @@ def test_corrections_at_positions_and_those_too_heavy(sound: Balancing) -> None:
         sums = [sum(kg * np.exp(1j * a) for q, kg, a in c.weights if q == p) for c in (whole, parted)]
         assert abs(sums[0] - sums[1]) < 1e-9
         assert abs(sums[0] * b.radius + b.unbalance[BASE].values[p]) < 1e-12
-    assert balance_decision.correction(b, "check 1", rig, plan).reached
+    assert decision.correction(b, "check 1", rig, plan).reached
     u = complex(b.unbalance[BASE].values[0])
     ahead = dataclasses.replace(b, unbalance={BASE: dataclasses.replace(
         b.unbalance[BASE], values=-abs(u) * np.array([np.exp(-1e-12j), 1j]))})  # fmt: skip
     for positions in (0, 12):
-        told = balance_decision.correction(ahead, BASE, rig, plan.model_copy(update={"positions": positions}))
+        told = decision.correction(ahead, BASE, rig, plan.model_copy(update={"positions": positions}))
         assert all(0 <= angle < 2 * math.pi - 1e-6 for _, _, angle in told.weights)  # 0°, not 360°
     light = rig.model_copy(update={"envelope": rig.envelope.model_copy(update={"max_trial_weight_kg": 1e-5})})
-    assert balance_decision.correction(b, BASE, light, plan).too_heavy > 1e-5
+    assert decision.correction(b, BASE, light, plan).too_heavy > 1e-5
 
 
 def test_trial_weights_left_on_say_the_same(sound: Balancing) -> None:
@@ -196,19 +194,17 @@ def test_trial_weights_left_on_say_the_same(sound: Balancing) -> None:
         weights=(*inboard.weights, *outboard.weights),
         reads=tuple(added(g, o) for g, o in zip(grown, outboard.reads, strict=True)),
     )
-    trials = balance_decision.trials_of([base, inboard, both], rig, leave=True)
+    trials = decision.trials_of([base, inboard, both], rig, leave=True)
     assert trials is not None
     assert (trials.before, trials.weights) == ((base, inboard), (inboard.weights[0], outboard.weights[0]))
-    left = balance_estimates.balanced(recorded.slow, [base, both], trials, rig, plan)
+    left = estimates.balanced(recorded.slow, [base, both], trials, rig, plan)
     assert np.abs(left.unbalance[BASE].values - b.unbalance[BASE].values).max() < 0.02 * G_MM
     more = left.unbalance[both.name].values - left.unbalance[BASE].values
-    assert np.abs(more - balance_estimates.fixed(both.weights, left.radius)).max() < 0.02 * G_MM
+    assert np.abs(more - estimates.fixed(both.weights, left.radius)).max() < 0.02 * G_MM
     # taken for a run without the first weight, the second column is wrong by it
-    wrong = balance_decision.trials_of([base, inboard, both], rig, leave=False)
+    wrong = decision.trials_of([base, inboard, both], rig, leave=False)
     assert wrong is not None
-    assert (
-        balance_estimates.balanced(recorded.slow, [base], wrong, rig, plan).solved.condition > 1.3 * b.solved.condition
-    )
+    assert estimates.balanced(recorded.slow, [base], wrong, rig, plan).solved.condition > 1.3 * b.solved.condition
 
 
 def test_bending_and_adopted_bearings_are_in_what_is_left(sound: Balancing) -> None:
@@ -218,13 +214,13 @@ def test_bending_and_adopted_bearings_are_in_what_is_left(sound: Balancing) -> N
     assert recorded is not None
     rig, plan = sound.recording.rig, sound.recording.plan
     last = [runs["check 1"]]
-    rigid = balance_estimates.balanced(
+    rigid = estimates.balanced(
         recorded.slow, last, b.trials, rig, plan.model_copy(update={"bending_hz": 0.0}))  # fmt: skip
     bent, straight = (x.parts["check 1"][0] for x in (b, rigid))
     share = sum(c**2 for i, c in bent.contributions.items() if i.startswith("bending/")) / bent.u**2
     assert 0.002 < share < 0.3
     assert straight.u == pytest.approx(bent.u * math.sqrt(1 - share), rel=1e-3)
-    known = balance_estimates.balanced(
+    known = estimates.balanced(
         recorded.slow, last, b.trials, rig, plan, bearings(rig, draw(rig, SEED).plant))  # fmt: skip
     part = known.parts["check 1"][0]
     assert {"beta-yi", "offset-zo"} <= {i.id for i in part.sensitivities}
@@ -293,7 +289,7 @@ def test_the_trial_weight_that_is_fixed_goes_with_what_the_shaft_does(reads_um: 
     means = np.zeros(12)
     vectors = Vectors(np.full(12, reads_um * 1e-6 + 0j), np.zeros((24, 24)), 10.0)
     present = Run(BASE, (), (Read(400.0, means, vectors),))
-    found, allowed = balance_decision.trial_kg(RIG, balance.Plan(law="CAC"), present, 0)
+    found, allowed = decision.trial_kg(RIG, procedure.Plan(law="CAC"), present, 0)
     assert found == pytest.approx(kg, abs=1e-9)
     assert found <= allowed
 
@@ -326,7 +322,7 @@ def test_a_trial_weight_that_moved_nothing_is_refused(tmp_path: Path) -> None:
 
 def test_plans_that_cannot_work_are_refused() -> None:
     def why(**plan: Any) -> str:
-        return "; ".join(check(RIG, balance.Plan(**plan)))
+        return "; ".join(check(RIG, procedure.Plan(**plan)))
 
     assert why() == ""
     assert "envelope" in why(speeds_rad_s=(1600.0,))
@@ -339,8 +335,8 @@ def test_plans_that_cannot_work_are_refused() -> None:
     assert "allowed are up to 0.5 g" in why(trial_kg=(0.6e-3, 1e-4))
     tight = why(trial_kg=(4e-4, 1e-4), max_share=0.2)
     assert "predicted response" in tight
-    allowed = balance_decision.allowed_kg(RIG, balance.Plan(max_share=0.2), 0)
+    allowed = decision.allowed_kg(RIG, procedure.Plan(max_share=0.2), 0)
     assert f"{allowed * 1e3:.3g} g" in tight
     assert why(trial_kg=(0.99 * allowed, 1e-4), max_share=0.2) == ""
     bare = RIG.model_copy(update={"devices": {k: d for k, d in RIG.devices.items() if k != "drive"}})
-    assert balance.procedure.problems(bare, balance.Plan()) == ("devices: found none in the role drive",)
+    assert procedure.procedure.problems(bare, procedure.Plan()) == ("devices: found none in the role drive",)

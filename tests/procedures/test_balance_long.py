@@ -16,9 +16,8 @@ from bearing_facts import bearings
 from bench.analysis.balance import G_MM
 from bench.analysis.vectors import contains
 from bench.findings import Effect
-from procedures import balance
-from procedures.estimators import balance_estimates
-from procedures.estimators.balance_data import BASE, MOUNT
+from procedures.balance import estimates, procedure
+from procedures.balance.steps import BASE, MOUNT
 from sim_backend.truth import draw
 
 pytestmark = pytest.mark.long
@@ -61,8 +60,8 @@ def second_was_needed_and_right(run: Balancing, leave: bool = False) -> None:
     sheet = [f for f in run.findings if f.code == "correction-sheet"]
     assert len(sheet) == len(mounts) - (0 if leave else 2)
     assert {"correction 1", "correction 2"} <= {f.text.partition(":")[0] for f in sheet}
-    assert len(run.recording.all_steps()) <= balance.step_count(run.recording.plan)
-    assert len(list(balance.figures(run.recording))) == 8
+    assert len(run.recording.all_steps()) <= procedure.step_count(run.recording.plan)
+    assert len(list(procedure.figures(run.recording))) == 8
 
 
 @pytest.mark.parametrize("plan", [FINE, {**FINE, "leave": True, "law": "PID"}], ids=["taken-off", "left-on"])
@@ -88,8 +87,8 @@ def test_corrections_under_way_rest_on_the_adopted_bearings(tmp_path: Path) -> N
     b, recorded = run.found.balance, run.found.recorded
     assert b is not None
     assert recorded is not None
-    mounted = balance_estimates.fixed([w for w, purpose in recorded.fixed if purpose == "correction 1"], b.radius)
-    plain = balance_estimates.balanced(
+    mounted = estimates.fixed([w for w, purpose in recorded.fixed if purpose == "correction 1"], b.radius)
+    plain = estimates.balanced(
         recorded.slow, [b.trials.base], b.trials, run.recording.rig, run.recording.plan)  # fmt: skip
     apart = [float(np.abs(mounted + x.unbalance[BASE].values).max()) / G_MM for x in (b, plain)]
     assert apart[0] < 0.07
@@ -127,4 +126,4 @@ def test_a_planted_defect_is_named_and_never_passes(
     found = [f for f in run.findings if f.code == code]
     assert found, [f.code for f in run.findings]
     assert found[0].effect is effect
-    list(balance.figures(run.recording))  # what can be drawn is drawn
+    list(procedure.figures(run.recording))  # what can be drawn is drawn

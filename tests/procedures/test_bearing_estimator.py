@@ -10,10 +10,10 @@ import pytest
 
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, Influence
-from procedures.estimators import bearing
-from procedures.estimators.bearing import AXES, COILS, Positions
-from procedures.estimators.bearing_adjusted import Adjusted, adjust
-from procedures.estimators.bearing_rest import exchanges, of_readings, unexplained
+from procedures.amb_rotor import magnetics
+from procedures.amb_rotor.magnetics import AXES, COILS, Positions
+from procedures.amb_rotor.rings import exchanges, of_readings, unexplained
+from procedures.bearing_model.adjustment import Adjusted, adjust
 
 GAP, BETA, BIAS = 5.25e-4, 6.95e-7, 1.0
 G = 9.81
@@ -70,7 +70,7 @@ OFFSETS = (115e-6, 100e-6, 130e-6, 90e-6)
 
 def test_exact_data_give_the_truth() -> None:
     d = positions(OFFSETS)
-    fits = bearing.fits(d, SOUND)
+    fits = magnetics.fits(d, SOUND)
     for axis, offset in zip(AXES, OFFSETS, strict=True):
         assert fits[axis].beta == pytest.approx(BETA, rel=1e-7)
         assert fits[axis].offset == pytest.approx(offset, abs=1e-11)
@@ -87,26 +87,26 @@ def test_gains_and_zeros_are_taken_off() -> None:
             p[f"gain_{a}_{s}"], p[f"offset_{a}_{s}"] = 1.004, 3e-3 * (k - 2)
             c[k] = 1.004 * c[k] + 3e-3 * (k - 2)
     for axis, offset in zip(AXES, OFFSETS, strict=True):
-        fit = bearing.fits(d, p)[axis]
+        fit = magnetics.fits(d, p)[axis]
         assert (fit.beta, fit.offset) == (pytest.approx(BETA, rel=1e-3), pytest.approx(offset, abs=1e-7))
 
 
 def test_erratum_the_sign_of_the_offset_goes_with_gravity() -> None:
     """T (2.6) with g_y above zero and an offset of -115 um is g_y below zero with +115 um: the same machine seen from below."""
     down, up = positions((115e-6,) * 4), positions((-115e-6,) * 4, gravity=G)
-    mirrored = bearing.fits(Positions(-down.read, down.n, down.p), SOUND | {"gravity": -G})
+    mirrored = magnetics.fits(Positions(-down.read, down.n, down.p), SOUND | {"gravity": -G})
     for axis in AXES:
-        literal = bearing.fits(up, SOUND | {"gravity": -G})[axis]
+        literal = magnetics.fits(up, SOUND | {"gravity": -G})[axis]
         assert literal.offset == pytest.approx(-115e-6, abs=1e-10)
         assert mirrored[axis].offset == pytest.approx(-115e-6, abs=1e-10)
-        wrong = bearing.fits(down, SOUND | {"gravity": -G})[axis]
+        wrong = magnetics.fits(down, SOUND | {"gravity": -G})[axis]
         assert wrong.beta < 0  # gravity with the wrong sign makes no magnet
 
 
 def test_erratum_the_linear_column_of_table_2_2_is_no_slope() -> None:
     """With the corrected sign the no-intercept model returns five times the bearing's slopes, with the other it does not."""
-    same = bearing.fits(positions((115e-6,) * 4), SOUND)["yi"]
-    k, stiffness = bearing.slopes(same.terms, GAP, BIAS)
+    same = magnetics.fits(positions((115e-6,) * 4), SOUND)["yi"]
+    k, stiffness = magnetics.slopes(same.terms, GAP, BIAS)
     assert (
         pytest.approx(10.1, rel=0.01),
         pytest.approx(1.92e4, rel=0.01),
@@ -114,8 +114,8 @@ def test_erratum_the_linear_column_of_table_2_2_is_no_slope() -> None:
     assert k == pytest.approx(11.7, rel=0.02)  # at the offset they are a little steeper
     assert same.linear.terms[0] > 4 * k
     assert same.linear.terms[1] > 4 * stiffness
-    against = bearing.fits(positions((-115e-6,) * 4), SOUND)["yi"]
-    k, stiffness = bearing.slopes(against.terms, GAP, BIAS)
+    against = magnetics.fits(positions((-115e-6,) * 4), SOUND)["yi"]
+    k, stiffness = magnetics.slopes(against.terms, GAP, BIAS)
     assert against.linear.terms[0] < 1.5 * k
 
 
@@ -126,7 +126,7 @@ def test_what_the_linear_model_misses_is_the_curvature_of_the_control_current() 
         p, n = currents(np.full_like(r, load), 115e-6 + r, bias)
         c, _, a = np.polyfit(r, (p - n) / 2, 2)
         predicted = load * abs(c) * (r**2).std() / math.sqrt(((a + c * r**2) ** 2).mean())
-        left = bearing.linear(r, p, n, np.full_like(r, load)).residuals
+        left = magnetics.linear(r, p, n, np.full_like(r, load)).residuals
         assert math.sqrt((left**2).mean()) == pytest.approx(predicted, rel=0.02)
 
 
@@ -180,7 +180,7 @@ def test_positions_at_two_biases_correct_a_wrong_gap_but_not_the_runout() -> Non
 def test_a_coupling_out_of_line_acts_on_the_force_constants_as_another_weight_would() -> None:
     """K d (l_oa + l_c) / span inboard and K d (l_ia - l_c) / span outboard; the offsets do not take it up."""
     aside = 29e-6
-    found = bearing.fits(positions(OFFSETS, relaxed=(aside, 0.0)), SOUND)
+    found = magnetics.fits(positions(OFFSETS, relaxed=(aside, 0.0)), SOUND)
     weight = 0.98 * G / math.sqrt(2)
     inboard = 1200 * aside * (0.081 + 0.155) / (weight * 0.081)
     outboard = 1200 * aside * (0.097 - 0.155) / (weight * 0.097)

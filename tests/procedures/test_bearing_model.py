@@ -19,11 +19,11 @@ from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import Estimate, interval
-from procedures.bearing_model import MEASURES, Plan, check, figures, grid, procedure, read, step_count
-from procedures.estimators import bearing_adjusted, bearing_findings, bearing_wiring
-from procedures.estimators.bearing import AXES
-from procedures.estimators.bearing_data import Held
-from procedures.estimators.bearing_estimates import evaluate
+from procedures.amb_rotor.magnetics import AXES
+from procedures.amb_rotor.places import Held
+from procedures.bearing_model import adjustment, checks, wiring
+from procedures.bearing_model.estimates import evaluate
+from procedures.bearing_model.procedure import MEASURES, Plan, check, figures, grid, procedure, read, step_count
 from reports.figures import draw as draw_figure
 from reports.unseen import is_reached
 from sim_backend.truth import nominal
@@ -138,7 +138,7 @@ def test_what_is_said_to_be_reached_is_contradicted_before_it_matters(sound: Sim
         for i, c in e.sensitivities.items():
             if i.kind == "B":
                 share = abs(c) * i.u / (2 * e.u)
-                quiet = bearing_findings.CONTRADICTED * share / known.get(i.id, bearing_adjusted.TOLD)
+                quiet = checks.CONTRADICTED * share / known.get(i.id, adjustment.TOLD)
                 worst[i.id] = max(worst.get(i.id, 0.0), quiet)
     reached = {i: shift for i, shift in worst.items() if is_reached(i, procedure.reached)}
     assert len(reached) > 20
@@ -194,7 +194,7 @@ def exchanged(held: Held, a: str, b: str, sign: float = 1.0) -> Held:
 def test_a_wrong_map_of_the_readings_is_named(sound: Simulated, a: str, b: str, sign: float, code: str) -> None:
     """The controller sees them right, the bench does not: the tilts tell the planes apart."""
     held, tilted = (exchanged(x, a, b, sign) for x in read(sound.recording))
-    codes = {f.code for f in bearing_wiring.of_wiring(held, tilted, sound.recording.rig)}
+    codes = {f.code for f in wiring.of_wiring(held, tilted, sound.recording.rig)}
     assert codes == {code}
 
 
@@ -202,12 +202,12 @@ def test_exchanged_coils_of_two_axes_and_flags_are_named(sound: Simulated) -> No
     held, tilted = read(sound.recording)
     for a, b in (("yi", "yo"), ("yi", "zi")):
         other = [exchanged(exchanged(x, f"i_{a}_p", f"i_{b}_p"), f"i_{a}_n", f"i_{b}_n") for x in (held, tilted)]
-        wrong = list(bearing_wiring.of_models(*other, sound.recording.rig, sound.recording.plan))
+        wrong = list(wiring.of_models(*other, sound.recording.rig, sound.recording.plan))
         assert {(f.code, f.where) for f in wrong} == {("coils-exchanged", a), ("coils-exchanged", b)}
         assert f"of {a} and {b}" in wrong[0].text
     for bit, code in ((64, "clipped"), (4, "contact"), (1, "saturated")):
         hit = replace(held, flags=held.flags | bit)
-        assert code in {f.code for f in bearing_findings.of_signals(hit, tilted, sound.recording.plan)}
+        assert code in {f.code for f in checks.of_signals(hit, tilted, sound.recording.plan)}
 
 
 def test_the_grid_stays_in_its_circle_and_moves_little() -> None:

@@ -9,9 +9,10 @@ import pytest
 from scipy import optimize
 from tsbs_statics import Shaft, parameters, sweep_data
 
-from procedures import assumed
-from procedures.estimators import coupling, mass_hanging
-from procedures.estimators.mass_hanging import Hangings, weight
+from procedures.amb_calibration import fit as amb_calibration_fit
+from procedures.amb_calibration.fit import Hangings, weight
+from procedures.force_coupling import fit as force_coupling_fit
+from procedures.shared import assumptions
 
 BIAS, PAIR = 3.0, (1.0, -1.0)
 CERTIFICATES = {
@@ -37,7 +38,7 @@ def hung(bend: tuple[float, float], k: float = 75.0, k2: float = -0.5, f0: float
 
     kg = np.array([*(CERTIFICATES[f"mass_{j}"] for j in range(4)), 0.0])[LOADS]
     newtons = np.asarray(weight(kg, 9.81, 1.2, 8000.0))
-    shares = mass_hanging.hung_shares(0.15, 0.2)
+    shares = amb_calibration_fit.hung_shares(0.15, 0.2)
     control = np.array([[optimize.brentq(lambda i, f=f: force(i) - f, -2.9, 2.9) for f in s * newtons] for s in shares])
     currents = np.stack([BIAS + control, BIAS - control], axis=1)[:, :, None, :]
     nought = np.zeros((1, len(LOADS)))
@@ -49,18 +50,18 @@ def hung(bend: tuple[float, float], k: float = 75.0, k2: float = -0.5, f0: float
 def test_opposite_bends_of_two_coils_are_a_k2(sign: float) -> None:
     """dK2 = -K q and dKw = -2 K q i, and the residuals are what they were to a ten thousandth of the load."""
     straight, bent = (
-        mass_hanging.fit(hung(q), CERTIFICATES, BIAS, 4) for q in ((0.0, 0.0), (sign * BEND, -sign * BEND))
+        amb_calibration_fit.fit(hung(q), CERTIFICATES, BIAS, 4) for q in ((0.0, 0.0), (sign * BEND, -sign * BEND))
     )
     for b in range(2):
         k, k2 = straight.terms[b, 0, 1:3]
         assert (k, k2) == pytest.approx((75.0, -0.5), rel=1e-6)
         assert bent.terms[b, 0, 2] - k2 == pytest.approx(-sign * k / 750, rel=0.1)
         assert np.abs(bent.residuals[b]).max() < 1e-4 * np.abs(bent.forces[b]).max()
-    before, after = (mass_hanging.over_a_turn(f, CERTIFICATES) for f in (straight, bent))
+    before, after = (amb_calibration_fit.over_a_turn(f, CERTIFICATES) for f in (straight, bent))
     current = (before["Kw_o"] - before["K_o"]) / (2 * before["K2_o"])
     assert after["Kw_o"] - before["Kw_o"] == pytest.approx(-sign * 75.0 / 375 * current, rel=0.1)
     assert any(
-        "K_2 changes by -K/750 A and K_w by -K/375 A for each ampere" in text for text in assumed.AMB_CALIBRATION
+        "K_2 changes by -K/750 A and K_w by -K/375 A for each ampere" in text for text in assumptions.AMB_CALIBRATION
     )
 
 
@@ -69,9 +70,9 @@ def test_a_bend_of_the_segments_sensors_is_a_ratio(sign: float) -> None:
     """6 mA at 3 A with the cube of the current: some tenths of a per cent of alpha_ratio, and a gamma that looks scaled."""
     shaft = Shaft(gamma_0=np.radians(0.3))
     data = sweep_data(shaft, np.arange(-2.5, 3.6, 0.5))
-    fit = coupling.fit_sweep(
+    fit = force_coupling_fit.fit_sweep(
         replace(data, segments=data.segments + sign * 6e-3 / 27 * data.segments**3), parameters(shaft)
     )
     assert fit.term("r") / (12.1 / 14.3) - 1 == pytest.approx(-sign * 2e-3, abs=1e-3)
     assert abs(fit.turn[0] - 1) > 1e-4
-    assert any("change alpha_ratio by -0.1 to -0.3 %" in text for text in assumed.FORCE_COUPLING)
+    assert any("change alpha_ratio by -0.1 to -0.3 %" in text for text in assumptions.FORCE_COUPLING)

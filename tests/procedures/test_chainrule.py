@@ -7,7 +7,7 @@ import math
 import pytest
 
 from bench.uncertainty import Estimate, Influence, correlation, propagate
-from procedures.estimators.chainrule import by_inputs
+from procedures.shared.gradients import by_inputs
 
 
 def one(name: str, u: float) -> Influence:

@@ -20,10 +20,10 @@ from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import Estimate, interval
 from bench.uncertainty.coverage import ensemble
-from procedures.estimators import force_findings
-from procedures.estimators.ramp_data import read_ramps
-from procedures.force_constant import Plan, evaluate, facts, figures, procedure
-from procedures.force_constant_check import check, predicted_controls
+from procedures.force_constant import checks
+from procedures.force_constant.fitting import check, predicted_controls
+from procedures.force_constant.procedure import Plan, evaluate, facts, figures, procedure
+from procedures.force_constant.steps import read_ramps
 
 NAME, CALIBRATION = "force-constant", "amb-calibration"
 SHORT = {"settle_s": 0.15}
@@ -151,7 +151,7 @@ def test_a_coil_that_cannot_reach_its_current_does_not_pass(
     data = read_ramps(sound.recording)
     for bit, named in ((1, "AMB"), (2, "motor"), (8, "outboard touchdown")):
         flagged = replace(data, flags=np.where(data.level_y == -2, bit, 0))
-        found = list(force_findings.of_signals(flagged, Plan()))
+        found = list(checks.of_signals(flagged, Plan()))
         assert [(f.code, f.effect) for f in found] == [("contact" if bit == 8 else "saturated", Effect.INDETERMINATE)]
         assert named in found[0].text
         assert "i_y -2 A" in found[0].where

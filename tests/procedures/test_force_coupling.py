@@ -18,10 +18,10 @@ from bench.limits import Verdict, judge
 from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import interval
-from procedures import carrying
-from procedures.estimators.coupling import TERMS
-from procedures.estimators.coupling_estimates import evaluate
-from procedures.force_coupling import Plan, check, figures, read
+from procedures.force_coupling.estimates import evaluate
+from procedures.force_coupling.fit import TERMS
+from procedures.force_coupling.procedure import Plan, check, figures, read
+from procedures.servomotor import carrying
 
 NAME = "force-coupling"
 QUICK = {"settle_s": 0.5, "average_s": 0.3}

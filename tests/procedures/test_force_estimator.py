@@ -8,18 +8,19 @@ import numpy as np
 import pytest
 
 from bench.uncertainty import Estimate, Influence
-from procedures.estimators import force_estimates, force_rows
-from procedures.estimators.force_rows import BRANCH, CROSS, DIRECT, FORCE, MOMENT, TIME
-from procedures.force_constant import Plan, sequence
+from procedures.force_constant import estimates as force_constant_estimates
+from procedures.force_constant import fit
+from procedures.force_constant.fit import BRANCH, CROSS, DIRECT, FORCE, MOMENT, TIME
+from procedures.force_constant.procedure import Plan, sequence
 from tests.procedures.force_statics import BIAS, REACH, SPAN, Machine, changed, facts, parameters, ramps
 
 
-def fitted(m: Machine, axis: str = "y", p: dict[str, float] | None = None, **options: float) -> force_rows.Fit:
+def fitted(m: Machine, axis: str = "y", p: dict[str, float] | None = None, **options: float) -> fit.Fit:
     r, values = ramps(m, axis), p or parameters(m)
-    return force_rows.fit(r, values, force_estimates.constants(r, values, BIAS), BIAS, **options)
+    return fit.fit(r, values, force_constant_estimates.constants(r, values, BIAS), BIAS, **options)
 
 
-def alpha(f: force_rows.Fit) -> np.ndarray:
+def alpha(f: fit.Fit) -> np.ndarray:
     return f.terms[:, :, DIRECT].mean(axis=1)
 
 
@@ -120,7 +121,7 @@ def test_best_weights_undo_it() -> None:
     """By their covariance the rows get the weights that leave the least of those errors."""
     u_i, u_o = 0.044 * 0.896, 0.044 * 1.896  # in the force row, shares of alpha
     v = np.array([[u_i**2 + u_o**2, -(u_i**2) * SPAN / REACH], [-(u_i**2) * SPAN / REACH, (u_i * SPAN / REACH) ** 2]])
-    w = force_rows.best_weights(v)
+    w = fit.best_weights(v)
     assert w.sum() == pytest.approx(1)
     tried = [float(np.array([x, 1 - x]) @ v @ np.array([x, 1 - x])) for x in np.linspace(-1, 2, 301)]
     assert float(w @ v @ w) <= min(tried) + 1e-12
@@ -150,8 +151,10 @@ def test_what_the_calibration_shares_cancels() -> None:
     """Gains of 0.3 %: a calibration that knows them cancels them, one that does not leaves some tenths of a per cent."""
     m = Machine()
     known, inputs = estimates(m, 0.003 / np.sqrt(3))
-    shared = force_estimates.axis_result(ramps(m), inputs, BIAS)
-    alone = force_estimates.axis_result(ramps(m), inputs | force_estimates.taken_alone(known, 9), BIAS)
+    shared = force_constant_estimates.axis_result(ramps(m), inputs, BIAS)
+    alone = force_constant_estimates.axis_result(
+        ramps(m), inputs | force_constant_estimates.taken_alone(known, 9), BIAS
+    )
     force, moment = (e.u / e.value for e in shared.row_means)
     assert max(force, moment) < 1e-5
     force, moment = (e.u / e.value for e in alone.row_means)
@@ -168,8 +171,8 @@ def test_rows_that_contradict_each_other_name_the_suspect() -> None:
 
     def told(values: dict[str, float]) -> tuple[float, str]:
         given = {k: Estimate.exact(values[k]) if "@" in k else e for k, e in inputs.items()}
-        result = force_estimates.axis_result(r, given, BIAS)
-        return force_estimates.misfit(result)[0], force_estimates.suspect(r, given, BIAS, result)
+        result = force_constant_estimates.axis_result(r, given, BIAS)
+        return force_constant_estimates.misfit(result)[0], force_constant_estimates.suspect(r, given, BIAS, result)
 
     exact = parameters(m)
     chi2, text = told(exact)
@@ -185,7 +188,7 @@ def test_rows_that_contradict_each_other_name_the_suspect() -> None:
 
 @pytest.mark.parametrize(("angles", "same"), [(8, True), (9, False), (16, True), (12, False), (4, True)])
 def test_which_angles_share_one_electrical_phase(angles: int, same: bool) -> None:
-    assert force_rows.aliased(angles, 8) is same
+    assert fit.aliased(angles, 8) is same
     phases = np.cos(16 * 2 * np.pi * np.arange(angles) / angles + 0.3)
     assert bool(abs(phases.mean()) > 1e-9) is same
 

@@ -15,10 +15,11 @@ from hypothesis import strategies as st
 
 from bench.cli.__main__ import main
 from bench.errors import AnalysisError, ConfigError
-from procedures.estimators import force_map, mapping
-from procedures.estimators.force_map import FORCE_TERMS, TORQUE_TERMS, Points
-from procedures.estimators.force_table import parse_constants, parse_table
-from procedures.estimators.termselection import left_out_errors, select
+from procedures.force_map import fit
+from procedures.force_map import terms as force_map_terms
+from procedures.force_map.fit import FORCE_TERMS, TORQUE_TERMS, Points
+from procedures.force_map.selection import left_out_errors, select
+from procedures.force_map.table import parse_constants, parse_table
 
 KEPT_FORCE = ("alpha_1", "alpha_2", "alpha_3", "alpha_5", "alpha_6")
 KEPT_TORQUE = ("beta_1", "beta_2", "beta_4")
@@ -26,15 +27,15 @@ HEADING = "i_x [A],i_y [A],i_theta [A],x [mil],y [mil],theta [deg],F_x [N],F_y [
 
 
 def shipped(name: str) -> str:
-    return (files("procedures.data") / name).read_text("utf-8")
+    return (files("procedures.force_map.data") / name).read_text("utf-8")
 
 
 def test_table_5_3_predicts_the_24_values_within_1_3_percent() -> None:
     table = parse_table(shipped("tsbs-finite-element.csv"), "fe")
     assert len(table.points) == 11
     worst, count = 0.0, 0
-    for part in mapping.identify(table, POLES):
-        predicted = force_map.predict(part.design, part.terms, table_5_3())
+    for part in force_map_terms.identify(table, POLES):
+        predicted = fit.predict(part.design, part.terms, table_5_3())
         given = part.measured != 0
         worst = max(worst, float(np.abs(predicted[given] / part.measured[given] - 1).max()))
         count += int(given.sum())
@@ -46,13 +47,13 @@ def test_table_5_3_predicts_the_24_values_within_1_3_percent() -> None:
 def test_a_literal_12_pole_reading_of_the_angle_fails() -> None:
     """P is the number of poles: with pole pairs in its place the point at 11.25 deg would be 7 % off."""
     table = parse_table(shipped("tsbs-finite-element.csv"), "fe")
-    predicted = force_map.predict(force_map.force_design(table.points, POLES // 2), FORCE_TERMS, table_5_3())
+    predicted = fit.predict(fit.force_design(table.points, POLES // 2), FORCE_TERMS, table_5_3())
     assert table.force is not None
     assert abs(predicted[6, 0] / table.force[6, 0] - 1) > 0.05
 
 
 def test_the_eleven_points_cannot_tell_terms_3_7_and_9() -> None:
-    force, torque = mapping.identify(parse_table(shipped("tsbs-finite-element.csv"), "fe"), POLES)
+    force, torque = force_map_terms.identify(parse_table(shipped("tsbs-finite-element.csv"), "fe"), POLES)
     assert force.told.unidentifiable == ("alpha_3", "alpha_7", "alpha_9")
     assert torque.told.unidentifiable == ("beta_3",)
     assert not force.told.entangled
@@ -68,7 +69,7 @@ def test_the_eleven_points_cannot_tell_terms_3_7_and_9() -> None:
 def test_selection_on_175_synthetic_points() -> None:
     text = shipped("tsbs-synthetic.csv")
     assert text == synthetic_csv()
-    force, torque = mapping.identify(parse_table(text, "synthetic"), POLES)
+    force, torque = force_map_terms.identify(parse_table(text, "synthetic"), POLES)
     assert force.fit.terms == KEPT_FORCE
     assert torque.fit.terms == KEPT_TORQUE
     for part in (force, torque):
@@ -83,8 +84,8 @@ def test_selection_finds_the_model_in_nine_of_ten_tables() -> None:
         random = np.random.default_rng(seed)
         p = points(random)
         force, torque = measured(p, table_5_3(), random)
-        chosen = select(force_map.force_design(p, POLES), force, None, FORCE_TERMS).chosen
-        other = select(force_map.torque_design(p, POLES), torque, None, TORQUE_TERMS).chosen
+        chosen = select(fit.force_design(p, POLES), force, None, FORCE_TERMS).chosen
+        other = select(fit.torque_design(p, POLES), torque, None, TORQUE_TERMS).chosen
         assert chosen is not None
         assert other is not None
         assert set(KEPT_FORCE) <= set(chosen.terms)
@@ -98,7 +99,7 @@ def test_selection_finds_the_model_in_nine_of_ten_tables() -> None:
 def test_left_out_errors_are_those_of_a_second_fit(seed: int, stated: bool) -> None:
     random = np.random.default_rng(seed)
     p = points(random, 12)
-    design = force_map.force_design(p, POLES)[:, :, [0, 1, 2, 4, 5]]
+    design = fit.force_design(p, POLES)[:, :, [0, 1, 2, 4, 5]]
     force, _ = measured(p, table_5_3(), random)
     u = random.uniform(0.1, 0.3, force.shape) if stated else None
     errors = left_out_errors(design, force, u)
@@ -118,9 +119,9 @@ def test_the_fit_returns_the_constants_of_exact_forces(values: list[float], seed
     constants = {
         name: v * 10 ** (4 * name.endswith(("4", "5", "8", "9"))) for name, v in zip(FORCE_TERMS, values, strict=True)
     }
-    design = force_map.force_design(p, POLES)
-    exact = force_map.predict(design, FORCE_TERMS, constants)
-    found = force_map.fit(design, exact, None, FORCE_TERMS, FORCE_TERMS)
+    design = fit.force_design(p, POLES)
+    exact = fit.predict(design, FORCE_TERMS, constants)
+    found = fit.fit(design, exact, None, FORCE_TERMS, FORCE_TERMS)
     for name, value in found.constants.items():
         assert value == pytest.approx(constants[name], rel=1e-6)
 
@@ -141,8 +142,8 @@ def test_force_design_against_the_printed_equations() -> None:
     )  # fmt: skip
     tau = b[1] * it + b[2] * (x * iy - y * ix) + b[3] * (x * ix + y * iy) * s + b[4] * math.cos(3 * P * theta) * it
     p = Points(*(np.array([v]) for v in (ix, iy, it, x, y, theta)))
-    np.testing.assert_allclose(force_map.force_design(p, P)[0] @ np.array(list(a.values())), [fx, fy], rtol=1e-12)
-    np.testing.assert_allclose(force_map.torque_design(p, P)[0, 0] @ np.array(list(b.values())), tau, rtol=1e-12)
+    np.testing.assert_allclose(fit.force_design(p, P)[0] @ np.array(list(a.values())), [fx, fy], rtol=1e-12)
+    np.testing.assert_allclose(fit.torque_design(p, P)[0, 0] @ np.array(list(b.values())), tau, rtol=1e-12)
 
 
 def test_terms_that_only_combinations_show() -> None:
@@ -150,21 +151,21 @@ def test_terms_that_only_combinations_show() -> None:
     random = np.random.default_rng(0)
     p = points(random, 30)
     home = Points(p.i_x, p.i_y, p.i_theta, p.x, p.y, np.zeros(30))
-    told = force_map.identifiability(force_map.force_design(home, POLES), FORCE_TERMS)
+    told = fit.identifiability(fit.force_design(home, POLES), FORCE_TERMS)
     assert told.entangled == (("alpha_1", "alpha_2"),)
     assert told.unseen == ("alpha_3", "alpha_7", "alpha_9")
     with pytest.raises(AnalysisError, match="do not determine"):
-        force_map.fit(force_map.force_design(home, POLES), np.zeros((30, 2)), None, FORCE_TERMS, ("alpha_1", "alpha_2"))
+        fit.fit(fit.force_design(home, POLES), np.zeros((30, 2)), None, FORCE_TERMS, ("alpha_1", "alpha_2"))
 
 
 def test_stated_uncertainties_weigh_and_are_widened_by_the_residuals() -> None:
     random = np.random.default_rng(3)
     p = points(random)
-    design = force_map.force_design(p, POLES)
+    design = fit.force_design(p, POLES)
     force, _ = measured(p, table_5_3(), random)
-    right = force_map.fit(design, force, np.full(force.shape, 0.2), FORCE_TERMS, KEPT_FORCE)
-    bold = force_map.fit(design, force, np.full(force.shape, 0.1), FORCE_TERMS, KEPT_FORCE)
-    free = force_map.fit(design, force, None, FORCE_TERMS, KEPT_FORCE)
+    right = fit.fit(design, force, np.full(force.shape, 0.2), FORCE_TERMS, KEPT_FORCE)
+    bold = fit.fit(design, force, np.full(force.shape, 0.1), FORCE_TERMS, KEPT_FORCE)
+    free = fit.fit(design, force, None, FORCE_TERMS, KEPT_FORCE)
     assert right.chi2 / right.dof == pytest.approx(1, abs=0.25)
     np.testing.assert_allclose(bold.u, free.u, rtol=1e-9)
 

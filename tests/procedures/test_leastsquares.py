@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy import optimize
 
 from bench.errors import AnalysisError
-from procedures.estimators.leastsquares import correlated, lack_of_fit, line, linear, nonlinear
+from procedures.shared.leastsquares import correlated, lack_of_fit, line, linear, nonlinear
 
 numbers = st.floats(-100, 100, allow_nan=False)
 

@@ -10,10 +10,10 @@ import pytest
 from bench.findings import Effect
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, Influence
-from procedures.estimators import force_estimates, force_rows, load_at_rest
-from procedures.estimators.force_findings import load_moved
-from procedures.estimators.force_rows import DIRECT, Ramps
-from procedures.estimators.load_at_rest import Rest
+from procedures.force_constant import estimates, fit, load_at_rest
+from procedures.force_constant.checks import load_moved
+from procedures.force_constant.fit import DIRECT, Ramps
+from procedures.force_constant.load_at_rest import Rest
 from tests.procedures.force_statics import BIAS, L_OA, SPAN, WEIGHT, Machine, parameters, ramps
 
 MACHINE = Machine()
@@ -40,7 +40,7 @@ def compared(r: Ramps, known: dict[str, Estimate] | None = None) -> Rest | None:
 
 def constant(r: Ramps) -> float:
     p = parameters(MACHINE)
-    terms = force_rows.fit(r, p, force_estimates.constants(r, p, BIAS), BIAS).terms
+    terms = fit.fit(r, p, estimates.constants(r, p, BIAS), BIAS).terms
     return float(terms[0, :, DIRECT].mean())
 
 

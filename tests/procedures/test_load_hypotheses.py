@@ -10,10 +10,9 @@ from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.recording import Recording
 from bench.uncertainty import Estimate, interval
-from procedures import amb_calibration
-from procedures.estimators import load_hypotheses, mass_hanging
-from procedures.estimators.load_hypotheses import Contradiction
-from procedures.estimators.repeatability import scatter
+from procedures.amb_calibration import fit, hypotheses, procedure
+from procedures.amb_calibration.hypotheses import Contradiction
+from procedures.amb_calibration.scatter import scatter
 
 SHORT = {"settle_s": 0.3, "average_s": 0.2}
 SEEDS = (0, 2)
@@ -27,11 +26,11 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> list[Simulated]:
 
 def stated(run: Simulated, label: str, error: float) -> tuple[dict[str, Estimate], list[Finding]]:
     """Results of the closed recording where the rig file states a mass too heavy by a share."""
-    recording: Recording[amb_calibration.Plan] = Recording.open(run.recording.path, amb_calibration.Plan)
+    recording: Recording[procedure.Plan] = Recording.open(run.recording.path, procedure.Plan)
     masses = dict(recording.rig.masses)
     masses[label] = masses[label].model_copy(update={"value": masses[label].value * (1 + error)})
     recording.rig = recording.rig.model_copy(update={"masses": masses})
-    results = list(amb_calibration.analyse(recording))
+    results = list(procedure.analyse(recording))
     found = {m.quantity.name: m.estimate for m in results if isinstance(m, Measured)}
     return found, [f for f in results if isinstance(f, Finding)]
 
@@ -66,33 +65,33 @@ def contradiction(pulls: np.ndarray) -> Contradiction:
 def test_a_sound_set_is_widened_as_often_as_is_stated() -> None:
     rng = np.random.default_rng(1)
     some = [contradiction(rng.normal(size=4)) for _ in range(400)]
-    widened = sum(load_hypotheses.scatter_of_set(c) > 0 for c in some)
-    assert widened <= 400 * load_hypotheses.DOUBT + 3.3 * (400 * 0.05 * 0.95) ** 0.5
-    assert sum(c.probability < load_hypotheses.CHANCE for c in some) <= 3
+    widened = sum(hypotheses.scatter_of_set(c) > 0 for c in some)
+    assert widened <= 400 * hypotheses.DOUBT + 3.3 * (400 * 0.05 * 0.95) ** 0.5
+    assert sum(c.probability < hypotheses.CHANCE for c in some) <= 3
 
 
 def test_the_scatter_of_a_set_makes_its_contradiction_an_ordinary_one() -> None:
     c = contradiction(np.array([4.0, -3.0, 0.3, 0.1]))
-    beyond = load_hypotheses.scatter_of_set(c)
+    beyond = hypotheses.scatter_of_set(c)
     pulls, spread = c.of_masses()
     assert float((pulls**2 / (1 + (beyond * spread) ** 2)).sum()) == pytest.approx(2.0)
-    assert load_hypotheses.scatter_of_set(contradiction(np.array([0.1, 0.1, 9.0, 9.0]))) == 0.0  # no matter of masses
+    assert hypotheses.scatter_of_set(contradiction(np.array([0.1, 0.1, 9.0, 9.0]))) == 0.0  # no matter of masses
 
 
 def test_the_interval_of_a_suspect_holds_the_mass(sound: list[Simulated]) -> None:
     """95 % of 32 intervals hold the mass that the operator truly hung, of a set that is stated wrong by 0.3 and 2 %."""
     held = 0
     for run in sound:
-        recording: Recording[amb_calibration.Plan] = Recording.open(run.recording.path, amb_calibration.Plan)
-        data = amb_calibration.hangings(recording)
-        true = {k: e.value for k, e in amb_calibration.fit_inputs(recording.rig, recording.plan).items()}
-        u = amb_calibration.masses_u(recording)
+        recording: Recording[procedure.Plan] = Recording.open(run.recording.path, procedure.Plan)
+        data = procedure.hangings(recording)
+        true = {k: e.value for k, e in procedure.fit_inputs(recording.rig, recording.plan).items()}
+        u = procedure.masses_u(recording)
         for k in range(4):
             for error in (-0.02, -0.003, 0.003, 0.02):
                 p = {**true, f"mass_{k}": true[f"mass_{k}"] * (1 + error)}
-                fitted = mass_hanging.fit(data.hangings, p, recording.plan.bias_A, 4)
-                c = load_hypotheses.contradiction(fitted, data.hangings, scatter(fitted, data.hangings, 4), p, u)
-                found = load_hypotheses.suspects(c)
+                fitted = fit.fit(data.hangings, p, recording.plan.bias_A, 4)
+                c = hypotheses.contradiction(fitted, data.hangings, scatter(fitted, data.hangings, 4), p, u)
+                found = hypotheses.suspects(c)
                 mine = next(x for x in found if x.load == k)
                 assert found[0].load == k
                 held += abs(p[f"mass_{k}"] + mine.extra_kg - true[f"mass_{k}"]) < 2.03 * mine.u_kg

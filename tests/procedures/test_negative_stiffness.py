@@ -18,9 +18,10 @@ from bench.limits import Verdict, judge
 from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import interval
-from procedures import carrying, negative_stiffness
-from procedures.estimators.stiffness_estimates import evaluate
-from procedures.negative_stiffness import Plan, check, figures, procedure, read
+from procedures.negative_stiffness import procedure as negative_stiffness
+from procedures.negative_stiffness.estimates import evaluate
+from procedures.negative_stiffness.procedure import Plan, check, figures, procedure, read
+from procedures.servomotor import carrying
 
 NAME = "negative-stiffness"
 QUICK = {"levels_m": [-40e-6, -20e-6, 0.0, 20e-6, 40e-6], "settle_s": 0.5, "average_s": 0.3}

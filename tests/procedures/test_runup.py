@@ -25,12 +25,13 @@ from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, correlation, interval, welch_satterthwaite
-from procedures import coast_down, runup, runup_figures
-from procedures.estimators import runup_checks, runup_estimates
-from procedures.estimators.runup_data import Passage, read_passage
-from procedures.estimators.runup_estimates import Run
-from procedures.estimators.unbalance_data import RPM
-from procedures.turning import CODES, SETTINGS
+from procedures.coast_down import procedure as coast_down
+from procedures.run_up import checks, estimates, figures
+from procedures.run_up import procedure as run_up
+from procedures.run_up.estimates import Run
+from procedures.run_up.steps import Passage, read_passage
+from procedures.unbalance.dwelling import CODES, SETTINGS
+from procedures.unbalance.steps import RPM
 from reports.figures import draw as draw_figure
 from sim_backend import amb_unbalance
 from sim_backend.core.amb_params import AmbParams
@@ -62,7 +63,7 @@ def codes(run: Simulated, *, serious: bool = True) -> set[str]:
 
 
 def evaluated(run: Simulated) -> Run:
-    found = runup.evaluated(run.recording)[1]
+    found = run_up.evaluated(run.recording)[1]
     assert found is not None
     return found
 
@@ -96,9 +97,9 @@ def test_nothing_is_found_on_a_sound_stand(up: Simulated) -> None:
     assert not codes(up)
     notes = {"bearings", "slow-roll", "ellipse", "zone", "no-critical", "critically-damped", "passed"}
     assert codes(up, serious=False) == notes
-    assert len(up.recording.all_steps()) == runup.step_count(up.recording.plan)
+    assert len(up.recording.all_steps()) == run_up.step_count(up.recording.plan)
     names = {m.quantity.name for m in up.results if isinstance(m, Measured)}
-    assert names == {q.name for q in runup.MEASURES if q not in runup.CRITICAL}
+    assert names == {q.name for q in run_up.MEASURES if q not in run_up.CRITICAL}
     assert len(up.recording.captures()) == 3
     assert float(np.max(up.recording.channel("speed")["speed"])) > 0.995 * 14000 / RPM
 
@@ -124,7 +125,7 @@ def test_the_capture_is_taken_as_the_shaft_comes_through_the_speed(up: Simulated
 
 
 def test_figures(up: Simulated, found: Run) -> None:
-    drawn = list(runup_figures.all_figures(found, up.recording.rig, 14000 / RPM))
+    drawn = list(figures.all_figures(found, up.recording.rig, 14000 / RPM))
     keys = [f.key for f in drawn]
     assert len(set(keys)) == len(keys)
     criticals = drawn[0]
@@ -162,7 +163,7 @@ def test_what_a_passage_shows_is_named(
     up: Simulated, passage: Passage, change: dict[str, Any], code: str, effect: Effect
 ) -> None:
     plan, p = up.recording.plan, passage
-    assert list(runup_checks.of_passage(p, up.recording, plan)) == []
+    assert list(checks.of_passage(p, up.recording, plan)) == []
     if "flags" in change:
         flags = p.flags.copy()
         flags[5000:5010] |= change["flags"]
@@ -176,7 +177,7 @@ def test_what_a_passage_shows_is_named(
         plan = plan.model_copy(update={"top_rad_s": change["top"]})
     else:
         p = dataclasses.replace(p, **change)
-    found = [f for f in runup_checks.of_passage(p, up.recording, plan) if f.code == code]
+    found = [f for f in checks.of_passage(p, up.recording, plan) if f.code == code]
     assert found
     assert found[0].effect is effect
     if "flags" in change:
@@ -187,7 +188,7 @@ def test_plans_that_cannot_work_are_refused() -> None:
     rig = load_rig("amb5dof")
 
     def why(**plan: Any) -> str:
-        return "; ".join(runup.check(rig, runup.Plan(**plan)))
+        return "; ".join(run_up.check(rig, run_up.Plan(**plan)))
 
     assert why() == ""
     assert why(**SHORT) == ""
@@ -206,7 +207,7 @@ def test_plans_that_cannot_work_are_refused() -> None:
     bare = {k: v for k, v in drive.registers.items() if k != "acceleration"}
     devices = {**rig.devices, "drive": drive.model_copy(update={"registers": bare})}
     fixed = rig.model_copy(update={"devices": devices})
-    assert "a ramp needs one" in "; ".join(runup.check(fixed, runup.Plan()))
+    assert "a ramp needs one" in "; ".join(run_up.check(fixed, run_up.Plan()))
     assert list(coast_down.procedure.check(fixed, coast_down.Plan())) == []  # it coasts
 
 
@@ -262,7 +263,7 @@ def test_a3_twelve_volts_lose_where_forty_eight_hold(tmp_path: Path) -> None:
     lost.mkdir()
     with pytest.raises(DeviceFault, match="LEVITATION_LOST"):
         done(lost, A3, {**A3_TRUTH, "supply_V": 12.0})
-    recording: Recording[Any] = Recording.open(lost / "recording.mcap", runup.Plan)
+    recording: Recording[Any] = Recording.open(lost / "recording.mcap", run_up.Plan)
     told = recording.channel("speed")["speed"]
     assert 3000 < told.max() * RPM < 5500
     flags = recording.channel("flags")["flags"].astype(int)
@@ -300,7 +301,7 @@ def test_a_planted_defect_is_named_and_never_passes(
     found = [f for f in run.results if isinstance(f, Finding) and f.code == code]
     assert found, codes(run, serious=False)
     assert found[0].effect is effect
-    list(runup.figures(run.recording))  # what can be drawn is drawn
+    list(run_up.figures(run.recording))  # what can be drawn is drawn
 
 
 def test_exchanged_current_sensors_are_told_where_the_offset_carries_the_weight(tmp_path: Path) -> None:
@@ -337,14 +338,14 @@ def test_a_criticals_scatter_is_its_covariance() -> None:
     """Against the covariance it was given; a factor outside the record is left out."""
     root = np.array([[2.0, 0, 0, 0], [1e-7, 2e-7, 0, 0], [0.1, -0.3, 0.4, 0], [0.01, 0.02, 0, 0.02]])
     c = Critical(300.0, 5e-6, 280.0, 320.0, 7.5, 0.066, root @ root.T)
-    found = runup_estimates.scatter_of(c, "yi/1", 40.0)
+    found = estimates.scatter_of(c, "yi/1", 40.0)
     assert [found[n].u for n in ("speed", "amplitude", "factor")] == pytest.approx(np.sqrt(np.diag(c.covariance)[:3]))
     for (i, a), (j, b) in itertools.combinations(enumerate(("speed", "amplitude", "factor")), 2):
         told = c.covariance[i, j] / math.sqrt(c.covariance[i, i] * c.covariance[j, j])
         assert correlation(found[a], found[b]) == pytest.approx(told, abs=1e-9)
     covariance = np.full((4, 4), np.nan)
     covariance[:2, :2] = c.covariance[:2, :2]
-    without = runup_estimates.scatter_of(dataclasses.replace(c, factor=math.nan, covariance=covariance), "yi/1", 40.0)
+    without = estimates.scatter_of(dataclasses.replace(c, factor=math.nan, covariance=covariance), "yi/1", 40.0)
     assert set(without) == {"speed", "amplitude"}
 
 
@@ -373,7 +374,7 @@ def test_a_limit_puts_in_doubt_what_was_measured_beside_it(
     k = passage.moving.start + int(np.nanargmin(np.abs(passage.speeds[passage.moving] - rpm / RPM)))
     flags[k : k + 5] |= 2
     p = dataclasses.replace(passage, flags=flags)
-    found = list(runup_checks.of_passage(p, up.recording, up.recording.plan))
+    found = list(checks.of_passage(p, up.recording, up.recording.plan))
     assert [f.code for f in found] == ["voltage-saturated"]
     assert [outranking(Judged(*m), found) for m in doubted] == [("voltage-saturated",)] * len(doubted)
     assert [outranking(Judged(*m), found) for m in stands] == [()] * len(stands)
@@ -381,6 +382,6 @@ def test_a_limit_puts_in_doubt_what_was_measured_beside_it(
 
 def test_a_passage_that_ends_early_excuses_no_orbit(up: Simulated, passage: Passage) -> None:
     plan = up.recording.plan.model_copy(update={"top_rad_s": 15000 / RPM})
-    (found,) = runup_checks.of_passage(passage, up.recording, plan)
+    (found,) = checks.of_passage(passage, up.recording, plan)
     assert outranking(Judged("d_max_share", "inboard, 8000 r/min, up, CCS"), [found]) == ()
     assert outranking(Judged("critical_speed", "yi, peak 1"), [found]) == ("passage-short",)

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from bench.rigfile import load_rig
-from procedures import runup
-from procedures.estimators.runout import Stand, arms, impedance
-from procedures.estimators.runup_data import Curve
-from procedures.estimators.runup_linear import bend
-from procedures.estimators.unbalance_bearings import stated
+from procedures.run_up import procedure
+from procedures.run_up.linear_model import bend
+from procedures.run_up.steps import Curve
+from procedures.unbalance.bearings import stated
+from procedures.unbalance.runout import Stand, arms, impedance
 
 RIG = load_rig("amb5dof")
 GAINS = {name: p.default for name, p in RIG.parameters.items()}
@@ -22,7 +22,7 @@ W = 450.0
 
 def stand(**changed: object) -> Stand:
     """The nominal one, with magnetic fields that stand about the rings' centre."""
-    s = Stand.of({name: e.value for name, e in stated(RIG, runup.Plan()).items()})
+    s = Stand.of({name: e.value for name, e in stated(RIG, procedure.Plan()).items()})
     return dataclasses.replace(s, offset=np.zeros(4), **changed)  # type: ignore[arg-type]
 
 

@@ -23,11 +23,11 @@ from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate
-from procedures import sensitivity
-from procedures.estimators import sensitivity_checks, sensitivity_estimates, sensitivity_margins
-from procedures.estimators.sensitivity_data import AXES, REFINED, RPM, WIRING, Taken, read_taken
-from procedures.injecting import Comb, combs
-from procedures.sensitivity import CODES, Plan, check, procedure
+from procedures.sensitivity import checks, estimates, margins
+from procedures.sensitivity import procedure as sensitivity
+from procedures.sensitivity.injection import Comb, combs
+from procedures.sensitivity.procedure import CODES, Plan, check, procedure
+from procedures.sensitivity.steps import AXES, REFINED, RPM, WIRING, Taken, read_taken
 from reports.figures import draw as draw_figure
 from sim_backend import amb_sensitivity
 from sim_backend.truth import draw
@@ -90,8 +90,8 @@ def test_margins_are_those_of_the_linearised_loop(sound: Run, settings: Mapping[
     loop = amb_sensitivity.loop(draw(load_rig("amb5dof"), SEED).plant, settings)
     open_loop = 1 / loop.sensitivity(np.geomspace(2.0, 500.0, 4000))[:, 1] - 1
     for name, value in (
-        ("phase_margin", sensitivity_margins.phase(open_loop)),
-        ("gain_reduction", sensitivity_margins.fall(open_loop)),
+        ("phase_margin", margins.phase(open_loop)),
+        ("gain_reduction", margins.fall(open_loop)),
     ):
         e = sound.measured[name, "zi, at rest"]
         assert e.value == pytest.approx(value, abs=4 * e.u + 0.01 * value)
@@ -99,7 +99,7 @@ def test_margins_are_those_of_the_linearised_loop(sound: Run, settings: Mapping[
 
 def test_the_refined_grid_is_fine_and_the_orders_are_left_out(sound: Run) -> None:
     for t in (t for t in sound.taken if t.kind == REFINED):
-        model = next(sensitivity_estimates.found_peaks([t])).model
+        model = next(estimates.found_peaks([t])).model
         assert t.grid.step <= model.width(75.0) / 2
     excluded = {hz for t in sound.taken if t.speed for hz in t.excluded}
     assert {97.0, 101.0, 197.0, 201.0} <= excluded
@@ -139,8 +139,8 @@ def _follow(axis: str, value: complex) -> Any:
 )
 def test_what_is_wrong_with_a_capture_is_named(sound: Run, change: dict[str, Any], code: str, effect: Effect) -> None:
     survey = next(t for t in sound.taken if t.kind == WIRING)
-    assert not list(sensitivity_checks.of_signals([survey], sound.recording.plan))
-    found = list(sensitivity_checks.of_signals([dataclasses.replace(survey, **change)], sound.recording.plan))
+    assert not list(checks.of_signals([survey], sound.recording.plan))
+    found = list(checks.of_signals([dataclasses.replace(survey, **change)], sound.recording.plan))
     assert [(f.code, f.effect) for f in found] == [(code, effect)]
     if code == "wrong-axis":
         assert "those of yo do" in found[0].text
@@ -149,17 +149,17 @@ def test_what_is_wrong_with_a_capture_is_named(sound: Run, change: dict[str, Any
 def test_an_amplitude_that_is_not_the_one_asked_for(sound: Run) -> None:
     survey = sound.taken[0]
     half = dataclasses.replace(survey, injected=survey.injected / 2)
-    assert [f.code for f in sensitivity_checks.of_signals([half], sound.recording.plan)] == ["injection-wrong"]
+    assert [f.code for f in checks.of_signals([half], sound.recording.plan)] == ["injection-wrong"]
 
 
 def test_what_is_wrong_with_a_peak_is_named(sound: Run) -> None:
     """Too coarse a grid, no coherence, another S at half the amplitude, a maximum elsewhere, a machine that changes."""
     plan = sound.recording.plan
-    result = sensitivity_estimates.results([t for t in sound.taken if not t.speed])[0]
+    result = estimates.results([t for t in sound.taken if not t.speed])[0]
     peak = result.peaks[0]
 
     def codes(*peaks: Any) -> set[str]:
-        found = sensitivity_checks.of_results([dataclasses.replace(result, peaks=peaks)], plan)
+        found = checks.of_results([dataclasses.replace(result, peaks=peaks)], plan)
         return {f.code for f in found if f.effect is not Effect.NOTE}
 
     replace = dataclasses.replace
@@ -171,12 +171,12 @@ def test_what_is_wrong_with_a_peak_is_named(sound: Run) -> None:
     assert codes(replace(peak, top=replace(peak.top, inside=False))) == {"peak-not-refined"}
     assert codes(replace(peak, model=replace(peak.model, probability=1e-6))) == {"not-explained"}
     elsewhere = replace(result.curve, values=np.where(result.curve.hz > 300, 9.0, result.curve.values))
-    found = sensitivity_checks.of_results([replace(result, curve=elsewhere)], plan)
+    found = checks.of_results([replace(result, curve=elsewhere)], plan)
     assert "peak-not-refined" in {f.code for f in found}
 
 
 def test_zones() -> None:
-    assert [sensitivity_checks.zone(s) for s in (1.0, 2.99, 3.0, 3.99, 4.5, 5.0)] == list("AABBCD")
+    assert [checks.zone(s) for s in (1.0, 2.99, 3.0, 3.99, 4.5, 5.0)] == list("AABBCD")
 
 
 def test_plans_that_cannot_work_are_refused() -> None:
@@ -265,7 +265,7 @@ def test_how_far_a_gain_may_fall_between_the_lowest_lines(crossing: float) -> No
     hz = np.arange(2, 256, 4.0)
     s = 2j * math.pi * hz
     loop = -gain * (1 + damping * s + integral / s) / (1 - s**2 / pole**2)
-    found = sensitivity_margins.fall(sensitivity_margins.between(hz, loop))
+    found = margins.fall(margins.between(hz, loop))
     assert found == pytest.approx((1 + integral / damping / pole**2) / gain, rel=2.5e-3)
 
 
@@ -282,8 +282,8 @@ def test_how_far_a_gain_may_rise_is_not_where_noise_crosses_the_axis() -> None:
     covariance = power[:, None, None] / 2 * np.eye(2)
     for seed in range(40):
         z = exact + peaks.noise(covariance, seed + 1, 1)[0]
-        drawn, smooth = peaks.noise(covariance, 0, sensitivity_margins.DRAWS), peaks.smoother(hz, z, covariance)
-        found = sensitivity_margins._raised(hz, z, power, drawn, smooth)
+        drawn, smooth = peaks.noise(covariance, 0, margins.DRAWS), peaks.smoother(hz, z, covariance)
+        found = margins._raised(hz, z, power, drawn, smooth)
         assert found is not None
         off.append((found[0] - true) / found[1])
     assert np.abs(off).max() < 4.0

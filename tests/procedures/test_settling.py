@@ -15,11 +15,11 @@ from bench.cli.virtual import simulated_run
 from bench.errors import AnalysisError
 from bench.procedure import Measured
 from bench.uncertainty import interval
-from procedures.estimators import setpoint_settling
-from procedures.estimators.setpoint_data import Case, Done
-from procedures.estimators.setpoint_estimates import settling_estimate
-from procedures.estimators.setpoint_settling import Settling
-from procedures.estimators.setpoint_swing import shrinks
+from procedures.step import settling
+from procedures.step.estimates import settling_estimate
+from procedures.step.oscillation import shrinks
+from procedures.step.settling import Settling
+from procedures.step.steps import Case, Done
 
 POLE = -85 + 425j
 WINDOW = 6.0  # samples of 1 ms
@@ -55,14 +55,14 @@ def made(
 
 
 def settled(steps: list[Done], size: float = 10e-6, other: complex = POLE * 0.997) -> Settling:
-    curve = setpoint_settling.fit(steps, np.array([POLE * 1.003, other]), POLE)
+    curve = settling.fit(steps, np.array([POLE * 1.003, other]), POLE)
     of = [d for d in steps if d.case == Case("A", 0.0, "y", size, 1)]
-    return setpoint_settling.settling(curve, of[0].case, of, 0.02)
+    return settling.settling(curve, of[0].case, of, 0.02)
 
 
 def true_time(swing: float, level: float = 0.0, tail: float = 0.0, constant: float = 1.5) -> float:
     t = np.arange(8e-3, 5.0, 1e-5)
-    return float(setpoint_settling.crossings(t, off(t, swing, level, tail, constant, 6e-3)[None, :], 0.02)[0])
+    return float(settling.crossings(t, off(t, swing, level, tail, constant, 6e-3)[None, :], 0.02)[0])
 
 
 def touching(height: float) -> float:

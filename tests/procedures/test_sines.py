@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.errors import AnalysisError
-from procedures.estimators.sines import known_frequency, unknown_frequency
+from procedures.shared.sines import known_frequency, unknown_frequency
 
 amplitudes, phases, offsets = st.floats(0.01, 100), st.floats(-3.1, 3.1), st.floats(-100, 100)
 

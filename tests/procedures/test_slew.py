@@ -26,9 +26,9 @@ from bench.records import measurement
 from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import Estimate, Influence
-from procedures.estimators import slewing
-from procedures.estimators.slewing import Gains, Swing
-from procedures.slew import MEASURES, Plan, check, figures, needs, procedure, step_count
+from procedures.slew import fit
+from procedures.slew.fit import Gains, Swing
+from procedures.slew.procedure import MEASURES, Plan, check, figures, needs, procedure, step_count
 from reports.figures import draw as draw_figure
 from sim_backend.truth import draw
 
@@ -165,7 +165,7 @@ def swing(hz: float, periods: int, t_0: float, detent: tuple[float, float], coun
 @settings(max_examples=15, deadline=None)
 @given(c=st.floats(-0.02, 0.02), s=st.floats(-0.02, 0.02), counts=st.booleans())
 def test_the_part_that_goes_with_the_angle_is_found(c: float, s: float, counts: bool) -> None:
-    found = slewing.passes(swing(0.2, 3, 0.2, (c, s), counts), 0.2, 16)
+    found = fit.passes(swing(0.2, 3, 0.2, (c, s), counts), 0.2, 16)
     assert found.cosine.mean() == pytest.approx(c, abs=5e-4)
     assert found.sine.mean() == pytest.approx(s, abs=5e-4)
     assert found.friction.mean() == pytest.approx(0.02, abs=2e-3)
@@ -179,17 +179,17 @@ def test_the_start_is_read_from_the_onset(t_0: float, hz: float) -> None:
     slope = 2 * math.pi * hz * 0.4
     onset = slope * (50 * u + 0.5 * (1 - np.exp(-u * 2 * math.pi * 60)))
     begun = Swing(hz, 0.4, s.t, s.angle, s.torque * 0 + onset, 0.199, 0.209, 3, s.shifted, s.shifts)
-    assert slewing.start(begun, GAINS) == pytest.approx(t_0, abs=1e-4)
+    assert fit.start(begun, GAINS) == pytest.approx(t_0, abs=1e-4)
 
 
 def test_counts_are_taken_off_the_error() -> None:
     """A rotor that follows exactly has an error of counts only: 0.44 mrad rms by themselves, hardly anything without."""
     s = swing(0.2, 3, 0.2, (0.0, 0.0), True)
-    found = slewing.tracking(s, 0.2, COUNT)
+    found = fit.tracking(s, 0.2, COUNT)
     assert found.rms.max() < 0.1e-3
     assert found.ratio == pytest.approx(1, abs=1e-4)
     assert np.abs(found.lag).max() < 1e-4
-    uncorrected = slewing.tracking(s, 0.2, 0.0)
+    uncorrected = fit.tracking(s, 0.2, 0.0)
     assert uncorrected.rms.mean() == pytest.approx(COUNT / 12**0.5, rel=0.02)
 
 
@@ -199,6 +199,6 @@ def test_records_that_are_too_short_are_told() -> None:
         s.hz, s.amplitude, s.t[:9000], s.angle[:9000], s.torque[:9000], s.earliest, s.latest, 3, s.shifted, s.shifts
     )
     with pytest.raises(AnalysisError, match="periods"):
-        slewing.tracking(short, 0.2, COUNT)
+        fit.tracking(short, 0.2, COUNT)
     with pytest.raises(AnalysisError, match="covers"):
-        slewing.passes(s, 0.2, 4)
+        fit.passes(s, 0.2, 4)

@@ -20,7 +20,7 @@ from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import Estimate, correlation, interval
-from procedures.spindown import Plan, check
+from procedures.spindown.procedure import Plan, check
 from sim_backend.truth import draw
 
 RIGS = Path(__file__).parents[2] / "rigs"

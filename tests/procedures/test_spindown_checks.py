@@ -9,9 +9,9 @@ import pytest
 
 from bench.findings import Effect
 from bench.rigfile import load_rig
-from procedures.estimators import drag, spindown, spindown_checks
-from procedures.estimators.spindown_data import ANGLE_LAGS, COILS, SPEED_LAGS, RunDown
-from procedures.spindown import Plan
+from procedures.spindown import checks, estimates, fit
+from procedures.spindown.procedure import Plan
+from procedures.spindown.steps import ANGLE_LAGS, COILS, SPEED_LAGS, RunDown
 
 J, COUNT = 0.033, 2 * np.pi / 4096
 
@@ -24,14 +24,12 @@ def made(
     t = np.arange(0, 1.0, 1e-3)
     rng = np.random.default_rng([int(10 * bias), direction + 2, repeat])
     start = 46.0 + rng.uniform(-0.5, 0.5)
-    angle = np.floor((spindown.angle(t, rate, c, start) + rng.uniform(0, COUNT)) / COUNT) * COUNT
+    angle = np.floor((fit.angle(t, rate, c, start) + rng.uniform(0, COUNT)) / COUNT) * COUNT
     scale = 1 / (1 - rate / (2 * np.pi * 20))
-    seen = speed_scale * ((spindown.speed(t, rate, c, start) + c / rate) * scale - c / rate) + 0.01 * rng.normal(
-        size=len(t)
-    )
+    seen = speed_scale * ((fit.speed(t, rate, c, start) + c / rate) * scale - c / rate) + 0.01 * rng.normal(size=len(t))
     return RunDown(
-        bias, direction, repeat, False, t, seen, angle - angle[0], spindown.of_speed(t, seen, SPEED_LAGS),
-        spindown.of_angle(t, angle - angle[0], ANGLE_LAGS), dict.fromkeys(COILS, bias), np.zeros(4), 0, 1000, 0,
+        bias, direction, repeat, False, t, seen, angle - angle[0], fit.of_speed(t, seen, SPEED_LAGS),
+        fit.of_angle(t, angle - angle[0], ANGLE_LAGS), dict.fromkeys(COILS, bias), np.zeros(4), 0, 1000, 0,
     )  # fmt: skip
 
 
@@ -41,14 +39,14 @@ def sound() -> list[RunDown]:
 
 def codes(runs: list[RunDown]) -> set[str]:
     rig, plan = load_rig("tsbs12"), Plan()
-    angle, speed = (drag.evaluate(runs, rig, m, 3.0, 4.0) for m in ("angle", "speed"))
-    found = [*spindown_checks.of_runs(runs, plan), *spindown_checks.of_result(runs, angle, speed, plan)]
+    angle, speed = (estimates.evaluate(runs, rig, m, 3.0, 4.0) for m in ("angle", "speed"))
+    found = [*checks.of_runs(runs, plan), *checks.of_result(runs, angle, speed, plan)]
     return {f.code for f in found if f.effect is not Effect.NOTE}
 
 
 def test_sound_run_downs_are_sound() -> None:
     assert codes(sound()) == set()
-    found = drag.evaluate(sound(), load_rig("tsbs12"), "angle", 3.0, 4.0).estimates
+    found = estimates.evaluate(sound(), load_rig("tsbs12"), "angle", 3.0, 4.0).estimates
     assert found["B"].value == pytest.approx(0.081, rel=1e-3)
     assert found["B_high"].value == pytest.approx(0.13, rel=1e-3)
     assert found["T_c"].value == pytest.approx(0.05 - 0.005, rel=0.01)  # less the drag that the rig file states
@@ -61,7 +59,7 @@ def test_a_speed_of_another_scale_is_told() -> None:
 
 def test_a_constant_torque_drops_out_and_is_told() -> None:
     runs = [made(r.bias_A, r.direction, r.repeat, extra=-r.direction * 0.03 / J) for r in sound()]
-    found = drag.evaluate(runs, load_rig("tsbs12"), "angle", 3.0, 4.0)
+    found = estimates.evaluate(runs, load_rig("tsbs12"), "angle", 3.0, 4.0)
     assert found.seen.value == pytest.approx(0.05, rel=0.02)
     assert found.torque.value == pytest.approx(0.03, rel=0.02)
     assert "constant-torque" in codes(runs)
@@ -75,8 +73,8 @@ def test_a_decay_that_depends_on_the_direction_is_told() -> None:
 def test_repeats_that_differ_are_told() -> None:
     runs = [r if r.repeat == 0 else made(r.bias_A, r.direction, 1, b=1.05 * r.of_angle.b) for r in sound()]
     assert "not-repeatable" in codes(runs)
-    wide = drag.evaluate(runs, load_rig("tsbs12"), "angle", 3.0, 4.0).estimates["B"]
-    assert wide.u > 1.3 * drag.evaluate(sound(), load_rig("tsbs12"), "angle", 3.0, 4.0).estimates["B"].u
+    wide = estimates.evaluate(runs, load_rig("tsbs12"), "angle", 3.0, 4.0).estimates["B"]
+    assert wide.u > 1.3 * estimates.evaluate(sound(), load_rig("tsbs12"), "angle", 3.0, 4.0).estimates["B"].u
 
 
 def test_current_in_a_released_motor_is_told() -> None:
@@ -88,8 +86,8 @@ def test_the_bias_is_what_the_currents_say() -> None:
     """Both sensors of an axis 1 % high: the true bias is lower, and B at exactly 3 A is higher than what coasted."""
     rig = load_rig("tsbs12")
     runs = [replace(r, coils={c: i * 1.01 for c, i in r.coils.items()}) for r in sound()]
-    as_read = drag.evaluate(runs, rig, "angle", 3.0, 4.0).estimates["B"].value
-    assert as_read < drag.evaluate(sound(), rig, "angle", 3.0, 4.0).estimates["B"].value
+    as_read = estimates.evaluate(runs, rig, "angle", 3.0, 4.0).estimates["B"].value
+    assert as_read < estimates.evaluate(sound(), rig, "angle", 3.0, 4.0).estimates["B"].value
 
 
 @pytest.mark.parametrize("motor", [0.0, 0.009, -0.02])
@@ -97,7 +95,7 @@ def test_what_drives_the_released_rotor_drops_out_of_the_drives_torque(motor: fl
     """A constant torque of the motor helps one way and brakes the other: the mean over both is free of it."""
     speeds = [way * share * 50 for way in (1, -1) for share in (0.1, 0.15, 0.2, 0.25, 0.3, 1)]
     held = [(w, round((0.081 * w + np.sign(w) * 0.034 - motor) / 0.01) * 0.01) for w in speeds]
-    found = spindown_checks.constant_torque(held)
+    found = checks.constant_torque(held)
     assert found is not None
     assert found[1] < 2e-3
     assert found[0] == pytest.approx(0.034, abs=3 * found[1])
@@ -105,4 +103,4 @@ def test_what_drives_the_released_rotor_drops_out_of_the_drives_torque(motor: fl
 
 @pytest.mark.parametrize("held", [[], [(50.0, 4.0), (5.0, 0.4)], [(50.0, 4.0), (-50.0, -4.0)]])
 def test_one_way_or_one_speed_says_nothing_of_the_drives_constant_torque(held: list[tuple[float, float]]) -> None:
-    assert spindown_checks.constant_torque(held) is None
+    assert checks.constant_torque(held) is None

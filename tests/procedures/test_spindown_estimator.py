@@ -12,8 +12,8 @@ from scipy.integrate import solve_ivp
 from scipy.signal import lfilter
 
 from bench.errors import AnalysisError
-from procedures.estimators import spindown
-from procedures.estimators.spindown_data import SPEED_LAGS
+from procedures.spindown import fit
+from procedures.spindown.steps import SPEED_LAGS
 
 RPM = math.pi / 30
 J, B, T_C = 0.033, 0.081, 0.1
@@ -22,27 +22,27 @@ J, B, T_C = 0.033, 0.081, 0.1
 @settings(deadline=None)
 @given(st.floats(0, 5), st.floats(0, 10), st.floats(5, 80))
 def test_the_forms_solve_the_equation(b: float, c: float, start: float) -> None:
-    until = 0.9 * min(spindown.stopping_time(b, c, start), 3.0)
+    until = 0.9 * min(fit.stopping_time(b, c, start), 3.0)
     t = np.linspace(0, until, 40)
     exact = solve_ivp(lambda _, y: [y[1], -b * y[1] - c], (0, until), [0.0, start], t_eval=t, rtol=1e-11, atol=1e-12).y
-    np.testing.assert_allclose(spindown.angle(t, b, c, start), exact[0], rtol=1e-7, atol=1e-7)
-    np.testing.assert_allclose(spindown.speed(t, b, c, start), exact[1], rtol=1e-7, atol=1e-7)
+    np.testing.assert_allclose(fit.angle(t, b, c, start), exact[0], rtol=1e-7, atol=1e-7)
+    np.testing.assert_allclose(fit.speed(t, b, c, start), exact[1], rtol=1e-7, atol=1e-7)
 
 
 @settings(deadline=None)
 @given(st.floats(0.01, 5), st.floats(0.01, 10), st.floats(1, 80))
 def test_it_stops_when_it_says(b: float, c: float, start: float) -> None:
-    t = spindown.stopping_time(b, c, start)
-    assert spindown.speed(np.array([t]), b, c, start)[0] == pytest.approx(0, abs=1e-8 * start)
+    t = fit.stopping_time(b, c, start)
+    assert fit.speed(np.array([t]), b, c, start)[0] == pytest.approx(0, abs=1e-8 * start)
 
 
 @settings(deadline=None, max_examples=40)
 @given(st.floats(1.5, 4), st.floats(0.3, 6), st.floats(30, 75))
 def test_both_fits_give_back_what_made_the_data(b: float, c: float, start: float) -> None:
-    t = np.arange(0, 0.8 * spindown.stopping_time(b, c, start), 1e-3)
+    t = np.arange(0, 0.8 * fit.stopping_time(b, c, start), 1e-3)
     for coast in (
-        spindown.of_speed(t, spindown.speed(t, b, c, start), 20),
-        spindown.of_angle(t, 0.3 + spindown.angle(t, b, c, start), 20),
+        fit.of_speed(t, fit.speed(t, b, c, start), 20),
+        fit.of_angle(t, 0.3 + fit.angle(t, b, c, start), 20),
     ):
         assert coast.b == pytest.approx(b, rel=1e-5)
         assert coast.c == pytest.approx(c, rel=1e-4)
@@ -52,16 +52,16 @@ def test_both_fits_give_back_what_made_the_data(b: float, c: float, start: float
 def test_a_filter_on_the_speed_changes_the_start_alone() -> None:
     b, c, start, keep = B / J, T_C / J, 60.0, math.exp(-2 * math.pi * 20 * 1e-4)
     t = np.arange(0, 1.2, 1e-4)
-    w = spindown.speed(t, b, c, start)
+    w = fit.speed(t, b, c, start)
     seen = np.empty_like(w)
     seen[0] = start
     for k in range(1, len(t)):
         seen[k] = keep * seen[k - 1] + (1 - keep) * w[k]
     later = t > 10 / (2 * math.pi * 20)
-    coast = spindown.of_speed(t[later] - t[later][0], seen[later], 10)
+    coast = fit.of_speed(t[later] - t[later][0], seen[later], 10)
     assert coast.b == pytest.approx(b, rel=1e-3)
     assert coast.c == pytest.approx(c, rel=1e-2)
-    early = spindown.of_speed(t, seen, 10)
+    early = fit.of_speed(t, seen, 10)
     assert abs(early.b / b - 1) > 3 * abs(coast.b / b - 1)
 
 
@@ -70,11 +70,11 @@ def test_the_stated_scatter_is_that_of_a_differentiated_angle() -> None:
     frequency is far below that of its first few lags (which, alone, would state twice the true scatter)."""
     rng, keep, step = np.random.default_rng(8), math.exp(-2 * math.pi * 20 * 1e-3), 1e-3
     t = np.arange(0, 0.95, step)
-    w = spindown.speed(t, B / J, T_C / J, 50.0)
+    w = fit.speed(t, B / J, T_C / J, 50.0)
     found = []
     for _ in range(100):
         blue = lfilter([1 - keep], [1, -keep], np.diff(rng.normal(0, 1e-3, len(t) + 201)) / step)[200:]
-        found.append(spindown.of_speed(t, w + blue, SPEED_LAGS))
+        found.append(fit.of_speed(t, w + blue, SPEED_LAGS))
     stated = np.sqrt(np.mean([np.diag(x.covariance) for x in found], axis=0))
     np.testing.assert_allclose(stated, np.std([[x.b, x.c] for x in found], axis=0), rtol=0.3)
 
@@ -83,16 +83,16 @@ def test_the_stated_scatter_is_that_of_a_differentiated_angle() -> None:
 def test_without_coulomb_the_printed_model_is_far_off(rpm: float, bias: float) -> None:
     """Errata of T (6.16): T_c = 0.1 N m; speed sampled evenly from the stated speed to standstill."""
     b, c, start = B / J, T_C / J, rpm * RPM
-    t = np.linspace(0, spindown.stopping_time(b, c, start), 20_001)
-    w = spindown.speed(t, b, c, start)
-    assert spindown.viscous_only(t, w) / b - 1 == pytest.approx(bias, abs=0.006)
-    assert spindown.of_speed(t, w, 10).b == pytest.approx(b, rel=1e-6)
+    t = np.linspace(0, fit.stopping_time(b, c, start), 20_001)
+    w = fit.speed(t, b, c, start)
+    assert fit.viscous_only(t, w) / b - 1 == pytest.approx(bias, abs=0.006)
+    assert fit.of_speed(t, w, 10).b == pytest.approx(b, rel=1e-6)
 
 
 def test_the_transverse_inertia_is_not_the_polar_one() -> None:
     """Errata of T (6.16): with J = 0.116 kg m^2 as printed B would be 0.285, not 0.081 N m s/rad."""
     t = np.arange(0, 1.0, 1e-3)
-    b = spindown.of_speed(t, spindown.speed(t, B / J, 0.05 / J, 60.0), 10).b
+    b = fit.of_speed(t, fit.speed(t, B / J, 0.05 / J, 60.0), 10).b
     assert b * J == pytest.approx(0.081, rel=1e-5)
     assert b * 0.116 == pytest.approx(0.285, abs=0.001)
 
@@ -105,19 +105,19 @@ def test_the_scatter_is_what_the_covariance_says() -> None:
     for _ in range(60):
         start = rng.uniform(58, 62)
         noise = np.convolve(rng.normal(size=len(t) + 20), np.ones(21) / 21, "valid")
-        coast = spindown.of_speed(t, spindown.speed(t, 2.45, 1.5, start) + 0.2 * noise, 80)
+        coast = fit.of_speed(t, fit.speed(t, 2.45, 1.5, start) + 0.2 * noise, 80)
         b.append(coast.b)
         u.append(math.sqrt(coast.covariance[0, 0]))
     assert np.mean(u) == pytest.approx(np.std(b), rel=0.34)
 
 
 def test_a_ring_of_known_inertia_gives_the_inertia() -> None:
-    assert spindown.inertia_from_ring(B / J, B / (J + 0.02), 0.02) == pytest.approx(J, rel=1e-12)
+    assert fit.inertia_from_ring(B / J, B / (J + 0.02), 0.02) == pytest.approx(J, rel=1e-12)
     with pytest.raises(AnalysisError):
-        spindown.inertia_from_ring(1.0, 2.0, 0.02)
+        fit.inertia_from_ring(1.0, 2.0, 0.02)
 
 
 @pytest.mark.parametrize("w", [np.linspace(1, 60, 500), np.full(500, -3.0), np.full(4, 5.0)])
 def test_what_is_no_run_down_is_told(w: np.ndarray) -> None:
     with pytest.raises(AnalysisError):
-        spindown.of_speed(np.arange(len(w)) * 1e-3, w, 10)
+        fit.of_speed(np.arange(len(w)) * 1e-3, w, 10)

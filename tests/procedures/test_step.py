@@ -21,17 +21,10 @@ from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, interval
 from bench.uncertainty.coverage import ensemble
-from procedures.estimators import (
-    setpoint_checks,
-    setpoint_data,
-    setpoint_estimates,
-    setpoint_planes,
-    setpoint_settling,
-    setpoint_swing,
-    stepmodel,
-)
-from procedures.estimators.setpoint_onset import onset
-from procedures.step import MEASURES, Plan, check, figures, recorded_s, step_count, waited_s
+from procedures.amb_rotor.onset import onset
+from procedures.step import checks, estimates, oscillation, planes, response, settling
+from procedures.step import steps as step_steps
+from procedures.step.procedure import MEASURES, Plan, check, figures, recorded_s, step_count, waited_s
 from reports.figures import draw as draw_figure
 
 SHORT = {"axes": ("y",), "sizes_m": (10e-6, 20e-6), "record_s": 0.4, "settle_s": 3.0}
@@ -93,15 +86,13 @@ def test_damping_of_two_oscillations_that_are_almost_one() -> None:
     tilt = np.array([0.05 + 0.02j, -0.05 - 0.02j])
     t = np.arange(-5, 60) * 1e-3
     both = np.array(
-        [1.0 + (np.exp(np.outer(t, poles)) @ (c * setpoint_swing.shrinks(poles, 1e-3))).real for c in (parts, tilt)]
+        [1.0 + (np.exp(np.outer(t, poles)) @ (c * oscillation.shrinks(poles, 1e-3))).real for c in (parts, tilt)]
     )
-    true = setpoint_swing.Swing(poles, parts, 1.0, 0.0, 0.0)
-    exact = setpoint_swing.swing([setpoint_swing.One(t, both)])
+    true = oscillation.Swing(poles, parts, 1.0, 0.0, 0.0)
+    exact = oscillation.swing([oscillation.One(t, both)])
     assert exact.damping == pytest.approx(true.damping, rel=1e-3)
     assert exact.peak == pytest.approx(true.peak, abs=1e-4)
-    found = [
-        setpoint_swing.swing([setpoint_swing.One(t, both + 1e-3 * rng.normal(size=both.shape))]) for _ in range(10)
-    ]
+    found = [oscillation.swing([oscillation.One(t, both + 1e-3 * rng.normal(size=both.shape))]) for _ in range(10)]
     assert np.mean([s.damping for s in found]) == pytest.approx(true.damping, rel=0.015)
     assert np.std([s.damping for s in found]) < 0.03 * true.damping
     later = exact.later(1e-4)
@@ -174,9 +165,9 @@ def test_a_finding_about_one_axis_leaves_the_other_alone(tmp_path: Path) -> None
     assert open_ones
     assert all(f.concerns == (f"settling_time@{f.where}",) for f in open_ones)
     recording = Recording.open(tmp_path / "recording.mcap", Plan)
-    steps = setpoint_data.read_steps(recording)
-    hit = [dataclasses.replace(d, flags=setpoint_data.CONTACT if d.case.axis == "z" else 0) for d in steps]
-    (touch,) = (f for f in setpoint_checks.of_steps(hit, recording.plan) if f.code == "contact")
+    steps = step_steps.read_steps(recording)
+    hit = [dataclasses.replace(d, flags=step_steps.CONTACT if d.case.axis == "z" else 0) for d in steps]
+    (touch,) = (f for f in checks.of_steps(hit, recording.plan) if f.code == "contact")
     sizes = [f"{um} µm {way}" for um in (10, 20) for way in ("up", "down")]
     assert {*touch.concerns} == {"@A, z, 0 r/min", *(f"@A, z, 0 r/min, {size}" for size in sizes)}
 
@@ -264,10 +255,10 @@ def test_planes_that_answer_alike_are_called_exchanged_by_chance_only() -> None:
         x = rng.normal(size=(8, 2, 60))
         return [np.concatenate([a, own * a + other * a[::-1] + rng.normal(size=(2, 60))]) for a in x]
 
-    assert not any(setpoint_planes.crossed(steps(1.0, 1.0)) for _ in range(300))
-    assert not setpoint_planes.crossed(steps(1.0, 0.2))
-    assert setpoint_planes.crossed(steps(0.2, 1.0))
-    assert not setpoint_planes.crossed([x[:, :20] for x in steps(0.2, 1.0)])
+    assert not any(planes.crossed(steps(1.0, 1.0)) for _ in range(300))
+    assert not planes.crossed(steps(1.0, 0.2))
+    assert planes.crossed(steps(0.2, 1.0))
+    assert not planes.crossed([x[:, :20] for x in steps(0.2, 1.0)])
 
 
 def second_order(w: float, z: float, shift: float, seconds: float = 0.4) -> tuple[np.ndarray, np.ndarray]:
@@ -283,11 +274,11 @@ def second_order(w: float, z: float, shift: float, seconds: float = 0.4) -> tupl
 def test_a_second_order_step_from_means(z: float, shift: float) -> None:
     w = 2 * math.pi * 70
     t, y = second_order(w, z, shift)
-    one = setpoint_swing.One(t + shift, np.array([y, 0 * y]))
-    fitted = setpoint_swing.swing([one])
+    one = oscillation.One(t + shift, np.array([y, 0 * y]))
+    fitted = oscillation.swing([one])
     assert fitted.peak - 1 == pytest.approx(math.exp(-math.pi * z / math.sqrt(1 - z * z)), abs=1e-3)
     b = math.sqrt(1 - 2 * z * z + math.sqrt((1 - 2 * z * z) ** 2 + 1))
-    assert stepmodel.bandwidth([one], fitted) == pytest.approx(70 * b, rel=0.005)
+    assert response.bandwidth([one], fitted) == pytest.approx(70 * b, rel=0.005)
     assert fitted.damping == pytest.approx(z, rel=0.003)
     assert fitted.frequency == pytest.approx(70, rel=0.002)
     assert float(y.max()) < fitted.peak  # the largest mean is below the largest value
@@ -311,19 +302,19 @@ def test_a_step_that_has_not_settled_says_what_to_do(constant: float, left: floa
     """PID's integrator, of which a longer record is cured; a pole that no record outlasts."""
     t = np.arange(-20, 400) * 1e-3
     y = np.where(t > 0, 1 + left * np.exp(-t / constant), 0.0)
-    settled = setpoint_settling.Settling(math.inf, 0.02, np.zeros(0))
-    case = setpoint_data.Case("A", 0.0, "y", 10e-6, 1)
-    one = setpoint_swing.One(t, np.array([y, 0 * y]))
-    result = setpoint_estimates.Result(case, (one,), None, settled, float(y[-100:].mean() - 1), {})
-    (finding,) = setpoint_checks.of_results({case: result}, {}, Plan())
+    settled = settling.Settling(math.inf, 0.02, np.zeros(0))
+    case = step_steps.Case("A", 0.0, "y", 10e-6, 1)
+    one = oscillation.One(t, np.array([y, 0 * y]))
+    result = estimates.Result(case, (one,), None, settled, float(y[-100:].mean() - 1), {})
+    (finding,) = checks.of_results({case: result}, {}, Plan())
     assert finding.code == "not-settled"
     assert named in finding.text
     result = dataclasses.replace(result, settled=dataclasses.replace(settled, open=True))
-    (finding,) = setpoint_checks.of_results({case: result}, {}, Plan())
+    (finding,) = checks.of_results({case: result}, {}, Plan())
     assert finding.code == "not-settled"
     assert "along the edge" in finding.text
 
 
 def test_a_position_that_does_not_get_there_is_told() -> None:
     with pytest.raises(AnalysisError, match="90 %"):
-        stepmodel.rise_time(np.arange(50) * 1e-3, np.full(50, 0.3))
+        response.rise_time(np.arange(50) * 1e-3, np.full(50, 0.3))

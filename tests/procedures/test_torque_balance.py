@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.errors import AnalysisError
-from procedures.estimators import torque_balance
-from procedures.estimators.torque_balance import NO_DETENT, Steps, balance, detent
-from procedures.torque_constant import Plan, visits
+from procedures.torque_constant import fit
+from procedures.torque_constant.fit import NO_DETENT, Steps, balance, detent
+from procedures.torque_constant.procedure import Plan, visits
 
 Array = npt.NDArray[np.float64]
 KG = np.array([0.5, 1.0, 2.0, 0.0])
@@ -101,7 +101,7 @@ def test_steps_that_jump_count_less_and_the_scatter_stays_honest() -> None:
         noise = np.where(bad, 2e-3, 2e-4) * rng.normal(size=len(s.side))
         s = Steps(s.segments + noise[:, None], s.angle, s.gamma, s.time, s.side, s.load, np.where(bad, 0.2, 0.01))
         first = balance(s, P, 3, 8.0)
-        found = balance(s, P, 3, 8.0, u=torque_balance.uneven(first, s))
+        found = balance(s, P, 3, 8.0, u=fit.uneven(first, s))
         errors.append(found.gamma_0 - 0.003)
         u.append(math.sqrt(found.covariance[1, 1]))
         plain.append(math.sqrt(first.covariance[1, 1]))
@@ -115,14 +115,14 @@ def test_the_scatter_of_a_step_is_not_that_of_its_residual() -> None:
     for seed in range(200):
         noise = 2e-4 * np.random.default_rng(seed).normal(size=len(s.side))
         steps = replace(s, segments=s.segments + noise[:, None])
-        found.append(np.mean((torque_balance.uneven(balance(steps, P, 3, 8.0), steps) / 2e-4) ** 2))
+        found.append(np.mean((fit.uneven(balance(steps, P, 3, 8.0), steps) / 2e-4) ** 2))
     assert np.mean(found) == pytest.approx(1.0, abs=0.06)
 
 
 def test_weights_from_the_residuals_cost_a_degree_of_freedom() -> None:
     s = made(2.87, 0.003, noise=1e-3)
     plain = balance(s, P, 3, 8.0)
-    assert balance(s, P, 3, 8.0, u=torque_balance.uneven(plain, s)).dof == plain.dof - 1 == len(s.side) - 15
+    assert balance(s, P, 3, 8.0, u=fit.uneven(plain, s)).dof == plain.dof - 1 == len(s.side) - 15
 
 
 def test_gains_and_offsets_of_the_sensors() -> None:
@@ -146,7 +146,7 @@ def test_a_baseline_is_needed_against_detent() -> None:
     """Errata of T 6.6.4: m g l = alpha_tau cos(M gamma) i, fitted to one side as printed, takes 50 mA of offset for load."""
     s = made(2.87, 0.0, base=0.05)
     left = s.side > 0
-    torque = torque_balance.load_torque(s, P, 3)[left]
+    torque = fit.load_torque(s, P, 3)[left]
     current = -s.segments[left, 0] * np.cos(8 * s.gamma[left])
     literal = float(torque @ torque / (torque @ current))
     assert abs(literal / 2.87 - 1) > 0.03
@@ -171,7 +171,7 @@ def test_the_ripple_of_a_rotor_beside_home_is_found(ripple: float) -> None:
 
 def test_where_the_rotor_rests() -> None:
     count = 1.5e-3
-    seen = torque_balance.resting(np.array([0.0, 0.4, 1.0, -1.1, 2.0, -3.0]) * count, count) / count
+    seen = fit.resting(np.array([0.0, 0.4, 1.0, -1.1, 2.0, -3.0]) * count, count) / count
     np.testing.assert_allclose(seen, [0, 0, 1.5, -1.5, 2, -3])
 
 
@@ -190,13 +190,13 @@ def test_detent_is_found_and_taken_off() -> None:
 
 def test_each_extra_term_finds_its_own() -> None:
     s = made(2.87, 0.0, noise=5e-4)
-    assert abs(torque_balance.ratio_of_sides(balance(s, P, 3, 8.0), s).t) < 4
+    assert abs(fit.ratio_of_sides(balance(s, P, 3, 8.0), s).t) < 4
     longer = balance(s, {**P, "lever_left": 0.232}, 3, 8.0)
-    assert torque_balance.ratio_of_sides(longer, s).value == pytest.approx(-0.0087, abs=1e-3)
+    assert fit.ratio_of_sides(longer, s).value == pytest.approx(-0.0087, abs=1e-3)
     heavier = balance(s, {**P, "mass_1": 0.98}, 3, 8.0)
-    assert torque_balance.of_load(heavier, s, 1).value == pytest.approx(0.02, abs=2e-3)
-    assert torque_balance.shape_over_gamma(balance(s, P, 3, 8.0), s)[0] > 1e-4
-    assert torque_balance.shape_over_gamma(balance(s, P, 3, 6.0), s)[0] < 1e-6
+    assert fit.of_load(heavier, s, 1).value == pytest.approx(0.02, abs=2e-3)
+    assert fit.shape_over_gamma(balance(s, P, 3, 8.0), s)[0] > 1e-4
+    assert fit.shape_over_gamma(balance(s, P, 3, 6.0), s)[0] < 1e-6
 
 
 def test_arms_and_masses_within_their_certificates_are_no_departure_from_the_cosine() -> None:
@@ -206,7 +206,7 @@ def test_arms_and_masses_within_their_certificates_are_no_departure_from_the_cos
     for seed in range(200):
         s = made(2.87, 0.008, noise=5e-5, seed=seed, ripple=0.005)
         found = balance(s, {**P, "lever_left": 0.23005, "mass_1": 1.0001}, 3, 8.0)
-        chance, largest = torque_balance.shape_over_gamma(found, s)
+        chance, largest = fit.shape_over_gamma(found, s)
         chances.append(chance)
         assert largest < 1e-3
     assert sum(c < 0.01 for c in chances) <= 8
@@ -219,7 +219,7 @@ def test_a_torque_that_is_no_cosine_over_gamma_is_seen(depth: float) -> None:
     s = made(2.87, 0.003, noise=5e-5)
     turn = 8 * (s.gamma - 0.003)
     bent = replace(s, segments=s.segments * (1 + depth * np.cos(3 * turn) * (s.side != 0))[:, None])
-    chance, largest = torque_balance.shape_over_gamma(balance(bent, P, 3, 8.0), bent)
+    chance, largest = fit.shape_over_gamma(balance(bent, P, 3, 8.0), bent)
     assert chance < 1e-6
     assert largest == pytest.approx(abs(depth), rel=0.6)
 
@@ -229,7 +229,7 @@ def test_three_phase_angles_leave_no_shape_to_look_for() -> None:
     s = made(2.87, 0.003, noise=5e-5)
     three = np.isin(s.gamma, np.unique(s.gamma)[1:4])
     part = Steps(*(getattr(s, n)[three] for n in ("segments", "angle", "gamma", "time", "side", "load", "spread")))
-    assert torque_balance.shape_over_gamma(balance(part, P, 3, 8.0), part) == (1.0, 0.0)
+    assert fit.shape_over_gamma(balance(part, P, 3, 8.0), part) == (1.0, 0.0)
 
 
 def test_a_run_that_was_stopped_early_is_told() -> None:

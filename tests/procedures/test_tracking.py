@@ -22,12 +22,13 @@ from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate
-from procedures import unbalance
-from procedures.estimators import tracking as estimator
-from procedures.estimators import tracking_drift, tracking_estimates, unbalance_bearings
-from procedures.estimators.tracking import Facts, Wave
-from procedures.estimators.tracking import Path as Orbit
-from procedures.tracking import CODES, MEASURES, OBSERVED, Plan, check, figures, procedure, step_count
+from procedures.amb_rotor import geometry as estimator
+from procedures.amb_rotor.geometry import Facts, Wave
+from procedures.amb_rotor.geometry import Path as Orbit
+from procedures.tracking import drift, estimates
+from procedures.tracking.procedure import CODES, MEASURES, OBSERVED, Plan, check, figures, procedure, step_count
+from procedures.unbalance import bearings
+from procedures.unbalance import procedure as unbalance
 from reports.figures import draw as draw_figure
 from sim_backend import amb_track
 from sim_backend.truth import draw
@@ -224,18 +225,18 @@ def test_a_frequency_that_is_off_by_the_least_shows_in_the_drift_of_the_delays()
     """By hand: told 10 Hz, it runs at 10.01 Hz; after 100 revolutions it is 10 ms ahead of what is taken for its phase."""
     true = orbit(10.01)
     told = replace(true, wave=replace(true.wave, hz=10.0))
-    found = tracking_drift.drift(told, FACTS)
+    found = drift.drift(told, FACTS)
     assert found is not None
     assert found.off == pytest.approx(1e-3, rel=1e-3)
     assert found.ahead_s == pytest.approx(1e-3 * (true.t[-1] - FACTS.t_0), rel=1e-3)
     assert found.plain
-    assert tracking_drift.drift(replace(told, t=told.t[:300], readings=told.readings[:, :300]), FACTS) is None
+    assert drift.drift(replace(told, t=told.t[:300], readings=told.readings[:, :300]), FACTS) is None
 
 
 def test_a_drift_of_scatter_alone_is_students_t() -> None:
     """At five levels of alarm, on 4000 draws of ten revolutions; y scatters by what its smaller amplitude makes of it."""
     rng, t = np.random.default_rng(5), np.arange(10) * 0.1
-    drawn = [tracking_drift.line(t, rng.normal(size=(10, 2)) * [1.6e-5, 1e-5], np.array([50.0, 80.0]), 1.0)
+    drawn = [drift.line(t, rng.normal(size=(10, 2)) * [1.6e-5, 1e-5], np.array([50.0, 80.0]), 1.0)
              for _ in range(4000)]  # fmt: skip
     ratios = np.abs([d.off / d.u for d in drawn])
     assert {d.dof for d in drawn} == {17}
@@ -253,7 +254,7 @@ def test_a_record_that_is_too_short_is_told() -> None:
 def test_a_certificate_has_one_name_in_all_procedures() -> None:
     """Else results that share a probe would count as independent."""
     rig = load_rig("amb5dof")
-    here = {i.id for i in tracking_estimates.inputs(rig, 1e-4, 0.0)} - {"timing/start", "geometry/clearance"}
-    there = {i.id for e in unbalance_bearings.stated(rig, unbalance.Plan()).values() for i in e.sensitivities}
+    here = {i.id for i in estimates.inputs(rig, 1e-4, 0.0)} - {"timing/start", "geometry/clearance"}
+    there = {i.id for e in bearings.stated(rig, unbalance.Plan()).values() for i in e.sensitivities}
     assert here
     assert here <= there

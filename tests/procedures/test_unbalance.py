@@ -25,13 +25,16 @@ from bench.records import measurement
 from bench.rigfile import load_rig
 from bench.specs import applied, load_spec
 from bench.uncertainty import Estimate, Influence, interval
-from procedures import compensation, unbalance
-from procedures.estimators import reach, runout, unbalance_bearings, unbalance_checks, unbalance_estimates
-from procedures.estimators.coil_peaks import blocks, uncertified
-from procedures.estimators.unbalance_data import AXES, SLOW, read_dwells
-from procedures.estimators.unbalance_estimates import Results
-from procedures.turning import CODES, POLES, SETTINGS
-from procedures.unbalance import check
+from procedures.compensation import procedure as compensation
+from procedures.unbalance import bearings as unbalance_bearings
+from procedures.unbalance import checks, estimates, runout
+from procedures.unbalance import d_max as unbalance_d_max
+from procedures.unbalance import procedure as unbalance
+from procedures.unbalance.coil_peaks import blocks, uncertified
+from procedures.unbalance.dwelling import CODES, POLES, SETTINGS
+from procedures.unbalance.estimates import Results
+from procedures.unbalance.procedure import check
+from procedures.unbalance.steps import AXES, SLOW, read_dwells
 from reports.figures import draw as draw_figure
 from sim_backend import amb_unbalance
 from sim_backend.core.amb_params import AmbParams
@@ -62,7 +65,7 @@ def done(folder: Path, procedure: str, plan: Mapping[str, Any], truth: Mapping[s
     measured = {(m.quantity.name, m.where): m.estimate for m in run.results if isinstance(m, Measured)}
     findings = [f for f in run.results if isinstance(f, Finding)]
     plan_ = run.recording.plan
-    results = unbalance_estimates.results(read_dwells(run.recording), run.recording.rig, plan_)
+    results = estimates.results(read_dwells(run.recording), run.recording.rig, plan_)
     return Run(measured, findings, run.recording, results, draw(load_rig("amb5dof"), SEED, truth).plant)
 
 
@@ -237,7 +240,7 @@ def test_a_clipping_probe_shows_in_the_capture_where_the_controller_does_not_tel
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """At 4000 r/min a turn is 15 samples of the telemetry: none of them stays at the limit for eight."""
-    monkeypatch.setattr(unbalance_checks, "RANGE", 0)
+    monkeypatch.setattr(checks, "RANGE", 0)
     truth = {"position_range": 78e-6, "unbalance_i": 1.05e-5, "unbalance_o": 1.05e-5}
     plan = {**ONE, "speeds_rad_s": (4000 * RPM,)}
     run = simulated_run("unbalance", "amb5dof", SEED, plan, tmp_path / "recording.mcap", truth)
@@ -263,7 +266,7 @@ def test_a_finding_of_one_speed_leaves_the_others_alone(tmp_path: Path) -> None:
 
 def test_without_a_slow_roll_readings_and_currents_stand(compared: Run) -> None:
     slow = [d for d in read_dwells(compared.recording) if d.kind != SLOW]
-    found = list(unbalance_checks.slow_roll(slow, compared.recording.plan, unbalance.LESS_RUNOUT))
+    found = list(checks.slow_roll(slow, compared.recording.plan, unbalance.LESS_RUNOUT))
     assert [f.code for f in found] == ["no-slow-roll"]
     assert set(found[0].concerns) == {"vector_cos", "vector_sin", "major_half_axis", "d_max", "d_max_share"}
 
@@ -372,10 +375,7 @@ def test_runout_by_forces_is_exact_on_its_own_model() -> None:
     assert found.misfit < 1e-6
     swapped = made[1].vectors.copy()
     swapped[:4] = swapped[[2, 3, 0, 1]]
-    assert (
-        runout.unbalances(stand, runout.Turning(1000.0, means, swapped), found.runout[1.0])[1]
-        > unbalance_checks.UNEXPLAINED
-    )
+    assert runout.unbalances(stand, runout.Turning(1000.0, means, swapped), found.runout[1.0])[1] > checks.UNEXPLAINED
 
 
 def test_orders_mix_in_forces_that_are_not_linear() -> None:
@@ -398,7 +398,7 @@ def test_d_max_is_greater_wherever_the_centre_may_be() -> None:
     """A circle of 5 um about a place known to 5 um (rectangular): the value is the mean over it, inside the interval."""
     means = [Estimate.of(0.0, Influence(a, a, 5e-6 / math.sqrt(3), "m", "B", "rectangular")) for a in "yz"]
     orbit = [Estimate.exact(x, "m") for x in (5e-6, 0.0, 0.0, -5e-6)]
-    e = reach.farthest(means, {1.0: orbit}, "a place")
+    e = unbalance_d_max.farthest(means, {1.0: orbit}, "a place")
     generator = np.random.default_rng(2)
     true = 5e-6 + np.hypot(*generator.uniform(-5e-6, 5e-6, (2, 20000)))
     assert e.value == pytest.approx(true.mean(), rel=5e-3)
@@ -411,7 +411,7 @@ def test_both_zeros_of_a_plane_carry_d_max_alike() -> None:
     """About the centre of a circle neither axis has a slope and both have the same share; each alone would make more."""
     means = [Estimate.of(0.0, Influence(a, a, 5e-6 / math.sqrt(3), "m", "B", "rectangular")) for a in "yz"]
     orbit = [Estimate.exact(x, "m") for x in (5e-6, 0.0, 0.0, -5e-6)]
-    e = reach.farthest(means, {1.0: orbit}, "a place")
+    e = unbalance_d_max.farthest(means, {1.0: orbit}, "a place")
     off = np.random.default_rng(3).uniform(-5e-6, 5e-6, (2, 400, 400))
     off[0], off[1] = off[0, :, :1], off[1, :1, :]  # every z with every y
     true = np.hypot(*off)
@@ -434,7 +434,7 @@ def test_adopted_bearings_take_the_plan_s_place(compared: Run) -> None:
     """The runout is known better, by the calibration's influences and not by the plan's; the probes' zeros drop out of it."""
     rig, model = compared.recording.rig, bearings(compared.recording.rig, compared.plant)
     dwells = read_dwells(compared.recording)
-    found = unbalance_estimates.results(dwells, rig, compared.recording.plan, model).runouts[1.0]
+    found = estimates.results(dwells, rig, compared.recording.plan, model).runouts[1.0]
     before, true = compared.results.runouts[1.0], amb_unbalance.first(compared.plant)
     for k, part in enumerate(found.parts):
         value = true[k // 2].imag if k % 2 else true[k // 2].real
@@ -465,7 +465,7 @@ def test_d_max_between_the_grid_s_places_is_that_of_the_orbit() -> None:
     generator = np.random.default_rng(1)
     placed = [generator.uniform(-5e-6, 5e-6, 400) for _ in range(2)]
     orbit = [np.array([x]) for x in (10e-6, 0.0, 0.0, -4e-6)]
-    found = reach._interpolated(placed, orbit, [1.0])
+    found = unbalance_d_max._interpolated(placed, orbit, [1.0])
     turn = np.linspace(0, 2 * math.pi, 2000)
     true = np.hypot(placed[0][:, None] + 10e-6 * np.cos(turn), placed[1][:, None] + 4e-6 * np.sin(turn)).max(axis=1)
     assert np.abs(found - true).max() < 0.03e-6

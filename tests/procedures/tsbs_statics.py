@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import optimize
 
-from procedures.estimators.coupling import Sweep
-from procedures.estimators.stiffness import ByAmbs, ByMotor
+from procedures.force_coupling.fit import Sweep
+from procedures.negative_stiffness.fit import ByAmbs, ByMotor
 
 Array = npt.NDArray[np.float64]
 

@@ -23,8 +23,8 @@ from bench.uncertainty import (
     welch_satterthwaite,
 )
 from bench.uncertainty.coverage import draw
-from procedures.estimators import leastsquares
-from procedures.estimators.typea import scatter
+from procedures.shared import leastsquares
+from procedures.shared.type_a import scatter
 
 
 def estimate(identity: str, value: float, u: float, dof: float = math.inf, distribution: str = "normal") -> Estimate:

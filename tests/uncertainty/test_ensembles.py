@@ -10,8 +10,8 @@ import pytest
 from bench.calibration import adopted
 from bench.uncertainty import Estimate, Influence, correlation, interval, propagate, welch_satterthwaite
 from bench.uncertainty.coverage import draw
-from procedures.estimators.angle_facts import with_scatter
-from procedures.estimators.repeatability import OUTPUTS
+from procedures.amb_calibration.by_angle import with_scatter
+from procedures.amb_calibration.scatter import OUTPUTS
 
 
 def roots(count: int, dof: float, stem: str = "scatter") -> list[Influence]:

@@ -1,0 +1,102 @@
+"""From the recorded steps of a mass-hanging calibration to arrays: step means, drifts, losses and flags."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.errors import AnalysisError
+from bench.recording import Recording
+from bench.rigfile import RigFile
+from procedures.amb_calibration.fit import Hangings
+from procedures.shared.step_table import reduced
+
+Array = npt.NDArray[np.float64]
+
+COILS = tuple(f"i_{axis}{bearing}_{coil}" for axis in "yx" for bearing in "io" for coil in "pn")
+POSITIONS = ("pos_yi", "pos_yo", "pos_xi", "pos_xo")
+CHANNELS = (*COILS, *POSITIONS, "flags")
+LEVERS = tuple(f"com_to_{b}_{what}" for b in ("inboard", "outboard") for what in ("sensor", "amb"))
+"""Of the geometry, what tells the positions in other planes than the sensors'."""
+
+
+@dataclass(frozen=True)
+class HangingData:
+    """`hangings` for the fit, and per channel and step (A, P): `mean`, `drift` (second half less first half of the
+    step), `spread` (standard deviation of the samples); `lost` and `expected` samples; `flags` ORed over the step."""
+
+    hangings: Hangings
+    mean: dict[str, Array]
+    drift: dict[str, Array]
+    spread: dict[str, Array]
+    lost: Array
+    expected: Array
+    flags: npt.NDArray[np.int64]
+    masses: tuple[str, ...]
+
+    def where(self, turn: int, point: int) -> str:
+        """How a step is named to the reader."""
+        load = self.hangings.load[turn, point]
+        label = self.masses[load] if load >= 0 else "no load"
+        way = "loading" if self.hangings.branch[turn, point] > 0 else "unloading"
+        return f"{np.degrees(self.hangings.angles[turn]):.0f}°, {label}, {way}"
+
+
+def read_hangings(recording: Recording[Any], masses: tuple[str, ...]) -> HangingData:
+    """Read every "hang" step, in the order of its angle and time.
+
+    Raises:
+        AnalysisError: there are no steps, or an angle lacks some.
+    """
+    groups = [(float(angle), list(steps)) for angle, steps in recording.steps("hang").by("angle_rad")]
+    counts = {len(steps) for _, steps in groups}
+    if len(counts) != 1:
+        raise AnalysisError(
+            f"hangings per angle: found {sorted(counts) or 'none'}; expected the same number at each angle "
+            "(was the run stopped early?)"
+        )
+    read = [[reduced(step.read(*CHANNELS), CHANNELS, step.labels) for step in steps] for _, steps in groups]
+
+    def stack(key: str, channel: str) -> Array:
+        return np.array([[one[key][channel] for one in row] for row in read])
+
+    mean = {c: stack("mean", c) for c in CHANNELS}
+    steps = [s for _, s in groups]
+    labels = {"": -1} | {label: k for k, label in enumerate(masses)}
+    hung = [[str(s.labels["load"]) for s in row] for row in steps]
+    if strange := sorted({label for row in hung for label in row} - set(labels)):
+        raise AnalysisError(
+            f"masses: found {', '.join(strange)} on the hanger; expected those of the plan, {', '.join(masses)}"
+        )
+    load = np.array([[labels[label] for label in row] for row in hung])
+    branch = np.array([[float(s.labels["branch"]) for s in row] for row in steps])
+    currents = np.stack([np.stack([mean[f"i_y{b}_{c}"] for c in "pn"]) for b in "io"])
+    inboard, outboard, motor = _plane_positions(recording.rig, mean["pos_yi"], mean["pos_yo"])
+    hangings = Hangings(
+        currents, np.stack([inboard, outboard]), motor, load, branch, np.array([angle for angle, _ in groups])
+    )
+    return HangingData(
+        hangings,
+        mean,
+        {c: stack("drift", c) for c in CHANNELS},
+        {c: stack("spread", c) for c in CHANNELS},
+        np.array([[float(s.lost()) for s in row] for row in steps]),
+        np.array([[float(s.expected()) for s in row] for row in steps]),
+        np.array([[one["flags"] for one in row] for row in read]),
+        masses,
+    )
+
+
+def _plane_positions(rig: RigFile, y_inboard: Array, y_outboard: Array) -> tuple[Array, Array, Array]:
+    """Displacement at the inboard AMB, the outboard AMB and the motor from both sensor planes (T 6.7)."""
+    g = rig.geometry
+    l_is, l_os = g["com_to_inboard_sensor"].value, g["com_to_outboard_sensor"].value
+
+    def at(zeta: float) -> Array:
+        share = (zeta + l_is) / (l_is + l_os)
+        return y_inboard * (1 - share) + y_outboard * share
+
+    return at(-g["com_to_inboard_amb"].value), at(g["com_to_outboard_amb"].value), at(g["com_to_motor"].value)

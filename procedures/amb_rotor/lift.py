@@ -1,0 +1,64 @@
+"""Before the AMB stand turns: how its shaft lies on the rings, its lift, and small nudges that show whose reading is whose.
+
+What is recorded here is judged by `procedures.amb_rotor.wiring.before_orbits`.
+"""
+
+from __future__ import annotations
+
+from bench.errors import DeviceFault, NotReached
+from bench.recorder import Recorder
+from bench.rig import Rig
+from bench.roles import RigState
+from bench.states import transition
+from procedures.amb_rotor import rings
+from procedures.amb_rotor.steps import LIFT, LIFT_LOST, NO_SPEED, POSITIONS, PROBE, REST
+
+NUDGES = (("ref_y", 10e-6), ("ref_theta", 100e-6))
+STEPS = 2 + 2 * len(NUDGES)  # that `probed` records
+
+
+def probed(rig: Rig, record: Recorder) -> bool:
+    """Lift the shaft from its rings and nudge it; False where it must not or cannot be lifted, which the analysis tells."""
+    with record.step(REST):
+        rig.clock.sleep(0.3)
+    if any(rings.of_readings({name: rig.levitation.reading(name) for name in POSITIONS}, rig.file)):
+        return False  # it lies below, on its rings: a probe that says otherwise may close a loop the wrong way round
+    if not _lifted(rig, record):
+        return False
+    _nudged(rig, record)
+    return True
+
+
+def turned(rig: Rig, record: Recorder, rad_s: float, settle_s: float) -> bool:
+    """Bring the shaft to a speed; False where it does not get there, which the analysis tells."""
+    try:
+        if rig.drive is None:
+            raise NotReached("the rig has no drive")
+        rig.drive.reach(rad_s)
+    except NotReached as error:
+        record.event(NO_SPEED, wanted=rad_s, why=str(error))
+        return False
+    rig.clock.sleep(settle_s)
+    return True
+
+
+def _lifted(rig: Rig, record: Recorder) -> bool:
+    with record.step(LIFT):
+        try:
+            transition(rig, RigState.LEVITATED)
+            rig.clock.sleep(0.5)
+        except DeviceFault as fault:
+            record.event(LIFT_LOST, fault=str(fault))
+            return False
+    return True
+
+
+def _nudged(rig: Rig, record: Recorder) -> None:
+    for name, aside in NUDGES:
+        for value in (0.0, aside):
+            rig.levitation.set(name, value)
+            rig.clock.sleep(0.5)
+            with record.step(PROBE, name=name, value=value):
+                rig.clock.sleep(0.2)
+        rig.levitation.set(name, 0.0)
+    rig.clock.sleep(0.5)

@@ -1,0 +1,163 @@
+"""Force constant and magnetic offset of the radial AMBs from eccentric positions (thesis 2.3), beside the linear model.
+
+At rest every radial force follows from gravity and the coupling's spring, by moments about the other AMB's plane:
+
+    F_i = (-m g_a l_oa + K c (l_oa + l_c)) / (l_ia + l_oa)      F_o = (-m g_a l_ia + K c (l_ia - l_c)) / (l_ia + l_oa)
+
+g_a is gravity along the axis, below zero with the positive coils above (T (2.6), corrected), c the displacement at the
+coupling. Nonlinear model, T (2.8) with each coil's own measured current:
+
+    F = beta (ip^2 / (gap - xi)^2 - in^2 / (gap + xi)^2),   xi = offset + r
+
+with r the displacement of the AMB's plane off the sensors' zero. Linear model, T (2.9), without an intercept and so
+without an offset: F = K_i (ip - in)/2 + K_xi r.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from procedures.shared import leastsquares
+from procedures.shared.leastsquares import Fit
+
+Array = npt.NDArray[np.float64]
+Numbers = Mapping[str, float]
+AXES = ("yi", "zi", "yo", "zo")
+COILS = tuple(f"{a}_{c}" for a in AXES for c in "pn")
+
+
+@dataclass(frozen=True)
+class Positions:
+    """Means (4, N) as the sensors read them, of axes yi zi yo zo: `read` m, `p` and `n` A (coils pulling to the positive and
+    the negative side)."""
+
+    read: Array
+    p: Array
+    n: Array
+
+
+@dataclass(frozen=True)
+class Statics:
+    """Freed of gains and offsets, each (4, N): `r` m at the AMBs off the sensors' zero, `p`, `n` A, `force` N that carries."""
+
+    r: Array
+    p: Array
+    n: Array
+    force: Array
+
+
+@dataclass(frozen=True)
+class AxisFit:
+    """One axis: `terms` beta (N m^2/A^2) and offset (m) of the nonlinear model, its `residuals` (N,) in N, model less force;
+    the linear model's fit with K_i (N/A) and K_xi (N/m)."""
+
+    terms: Array
+    residuals: Array
+    linear: Fit
+
+    @property
+    def beta(self) -> float:
+        """N m^2/A^2."""
+        return float(self.terms[0])
+
+    @property
+    def offset(self) -> float:
+        """From the magnetic centre to where the sensors read zero, m."""
+        return float(self.terms[1])
+
+
+def statics(d: Positions, p: Numbers) -> Statics:
+    """From readings to displacements, currents and forces.
+
+    `p` holds mass, gravity, axes (rad to the vertical), l_is, l_os, l_oa, amb_span, l_c, coupling (N/m), relaxed_y and
+    relaxed_z (m, where the coupling does not pull, off the rings' centre); per axis gain_*, zero_* (reading where the shaft
+    is in the rings' centre), runout_*; per coil gain_*, offset_* of its current sensor.
+    """
+    l_is, l_os, l_oa = p["l_is"], p["l_os"], p["l_oa"]
+    l_ia, span = p["amb_span"] - l_oa, l_is + l_os
+    off = np.array([d.read[k] / p[f"gain_{a}"] - p[f"runout_{a}"] for k, a in enumerate(AXES)])
+    zero = np.array([[p[f"zero_{a}"] / p[f"gain_{a}"]] for a in AXES])
+
+    def at(station: float, x: Array) -> Array:
+        share = (station + l_is) / span
+        return x[:2] * (1 - share) + x[2:] * share
+
+    r = np.concatenate([at(-l_ia, off), at(l_oa, off)])
+    relaxed = np.array([[p["relaxed_y"]], [p["relaxed_z"]]])
+    pull = p["coupling"] * (at(-p["l_c"], off - zero) - relaxed)
+    weight = p["mass"] * p["gravity"] * np.array([[math.cos(p["axes"])], [math.sin(p["axes"])]])
+    force = np.concatenate([weight * l_oa + pull * (l_oa + p["l_c"]), weight * l_ia + pull * (l_ia - p["l_c"])])
+    pos, neg = (
+        np.array([(c[k] - p[f"offset_{a}_{s}"]) / p[f"gain_{a}_{s}"] for k, a in enumerate(AXES)])
+        for s, c in (("p", d.p), ("n", d.n))
+    )
+    return Statics(r, pos, neg, force / p["amb_span"])
+
+
+def magnet(beta: float, offset: float, gap: float, r: Array, p: Array, n: Array) -> Array:
+    """Force of one axis, T (2.4b)."""
+    xi = offset + r
+    out: Array = beta * (p**2 / (gap - xi) ** 2 - n**2 / (gap + xi) ** 2)
+    return out
+
+
+def nonlinear(r: Array, p: Array, n: Array, force: Array, gap: float) -> Fit:
+    """T (2.8): beta and offset of one axis.
+
+    Raises:
+        AnalysisError: no convergence.
+    """
+
+    def model(terms: Array) -> Array:
+        return magnet(terms[0], terms[1], gap, r, p, n)
+
+    def jacobian(terms: Array) -> Array:
+        near, far = gap - terms[1] - r, gap + terms[1] + r
+        slope = 2 * terms[0] * (p**2 / near**3 + n**2 / far**3)
+        return np.column_stack([(p / near) ** 2 - (n / far) ** 2, slope])
+
+    return leastsquares.nonlinear(model, force, _start(r, p, n, force, gap), jacobian=jacobian)
+
+
+def _start(r: Array, p: Array, n: Array, force: Array, gap: float) -> Array:
+    """The best of a row of offsets, each with the beta that fits it best: the sum of squares has several valleys where the
+    wiring is wrong."""
+    room = gap - float(np.abs(r).max())
+    offsets = np.linspace(-0.8, 0.8, 33) * room
+    unit = np.array([magnet(1.0, o, gap, r, p, n) for o in offsets])
+    betas = (unit @ force) / (unit**2).sum(axis=1)
+    left = ((force - betas[:, None] * unit) ** 2).sum(axis=1)
+    best = int(np.argmin(left))
+    return np.array([betas[best], offsets[best]])
+
+
+def linear(r: Array, p: Array, n: Array, force: Array) -> Fit:
+    """T (2.9): K_i and K_xi of one axis, without intercept."""
+    return leastsquares.linear(np.column_stack([(p - n) / 2, r]), force)
+
+
+def fits(d: Positions, p: Numbers) -> dict[str, AxisFit]:
+    """Both models of every axis by itself, with the numbers as they are given, of positions at one bias."""
+    s = statics(d, p)
+    out = {}
+    for k, a in enumerate(AXES):
+        of = (s.r[k], s.p[k], s.n[k], s.force[k])
+        fit = nonlinear(*of, p["gap"])
+        out[a] = AxisFit(fit.terms, -fit.residuals, linear(*of))
+    return out
+
+
+def slopes(terms: Array, gap: float, bias: float) -> tuple[float, float]:
+    """dF/di (N/A) and dF/dxi (N/m) of the fitted magnet at the sensors' zero with both coils at the bias: what the
+    linear model is taken for."""
+    beta, xi = terms
+    near, far = gap - xi, gap + xi
+    return (
+        float(2 * beta * bias * (1 / near**2 + 1 / far**2)),
+        float(2 * beta * bias**2 * (1 / near**3 + 1 / far**3)),
+    )

@@ -1,0 +1,134 @@
+"""From the recorded positions of a levitated shaft to arrays: step means, batch means, drifts, losses, flags."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.errors import AnalysisError
+from bench.recording import Recording, Step
+from procedures.amb_rotor.magnetics import AXES, COILS, Positions
+from procedures.shared.step_table import reduced
+
+Array = npt.NDArray[np.float64]
+REST, LIFT, LIFT_LOST, TILT, HOLD = "rest", "lift", "lift-lost", "tilt", "hold"
+POSITIONS = tuple(f"pos_{a}" for a in AXES)
+CURRENTS = tuple(f"i_{c}" for c in COILS)
+CHANNELS = (*POSITIONS, *CURRENTS, "flags")
+
+
+@dataclass(frozen=True)
+class Held:
+    """Steps in time order, N of them, by channel.
+
+    `mean`, `drift`, `spread` (N,); `batches` (N, B), means of B parts of a step; `every` (S,), all samples, step by step,
+    of which `of_step` (S,) says the step; `labels` (N,); `lost` and `expected` samples; `flags` ORed; `names` for the
+    reader.
+    """
+
+    mean: dict[str, Array]
+    drift: dict[str, Array]
+    spread: dict[str, Array]
+    batches: dict[str, Array]
+    every: dict[str, Array]
+    of_step: npt.NDArray[np.int64]
+    labels: dict[str, Array]
+    lost: Array
+    expected: Array
+    flags: npt.NDArray[np.int64]
+    names: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def chosen(self, which: npt.NDArray[np.bool_]) -> Held:
+        """The steps of which `which` (N,) is true."""
+        samples = which[self.of_step]
+        renumbered = np.cumsum(which) - 1
+
+        def steps(of: dict[str, Array]) -> dict[str, Array]:
+            return {name: values[which] for name, values in of.items()}
+
+        return Held(
+            steps(self.mean),
+            steps(self.drift),
+            steps(self.spread),
+            steps(self.batches),
+            {name: values[samples] for name, values in self.every.items()},
+            renumbered[self.of_step[samples]],
+            steps(self.labels),
+            self.lost[which],
+            self.expected[which],
+            self.flags[which],
+            tuple(name for name, use in zip(self.names, which, strict=True) if use),
+        )
+
+    def where(self, values: Array) -> str:
+        """The name of the step with the greatest of `values` (N,)."""
+        return self.names[int(np.argmax(values))]
+
+    def means(self) -> Positions:
+        """One column a step."""
+        return _positions(self.mean)
+
+    def parts(self) -> Positions:
+        """One column a batch, step by step (N B)."""
+        return _positions({k: v.ravel() for k, v in self.batches.items()})
+
+    def samples(self) -> Positions:
+        """One column a sample, step by step (S)."""
+        return _positions(self.every)
+
+
+def _positions(of: dict[str, Array]) -> Positions:
+    p, n = (np.array([of[f"i_{a}_{s}"] for a in AXES]) for s in "pn")
+    return Positions(np.array([of[c] for c in POSITIONS]), p, n)
+
+
+def read_steps(recording: Recording[Any], kind: str, labels: tuple[str, ...], batches: int) -> Held:
+    """Every step of `kind`.
+
+    Raises:
+        AnalysisError: there are none, or one has fewer samples than `batches`.
+    """
+    steps = list(recording.steps(kind))
+    if not steps:
+        raise AnalysisError(f"steps of kind {kind!r}: found none; expected the run's (was it stopped early?)")
+    read = [_read(step, batches) for step in steps]
+    mean, drift, spread, parts = (
+        {c: np.array([r[key][c] for r in read]) for c in CHANNELS} for key in ("mean", "drift", "spread", "batches")
+    )
+    return Held(
+        mean,
+        drift,
+        spread,
+        parts,
+        {c: np.concatenate([r["every"][c] for r in read]) for c in (*POSITIONS, *CURRENTS)},
+        np.repeat(np.arange(len(read)), [r["samples"] for r in read]),
+        {key: np.array([float(s.labels[key]) for s in steps]) for key in labels},
+        np.array([float(s.lost()) for s in steps]),
+        np.array([float(s.expected()) for s in steps]),
+        np.array([r["flags"] for r in read]),
+        tuple(_name(kind, dict(s.labels)) for s in steps),
+    )
+
+
+def _name(kind: str, labels: dict[str, Any]) -> str:
+    if kind == TILT:
+        return f"tilt psi {labels['psi_rad'] * 1e6:+.0f}, theta {labels['theta_rad'] * 1e6:+.0f} µrad"
+    return f"y {labels['y_m'] * 1e6:+.0f}, z {labels['z_m'] * 1e6:+.0f} µm at {labels['bias_A']:g} A"
+
+
+def _read(step: Step, batches: int) -> dict[str, Any]:
+    data = step.read(*CHANNELS)
+    count = len(data["flags"])
+    if count < 2 * batches:
+        raise AnalysisError(f"step {dict(step.labels)}: found {count} samples; expected {2 * batches} or more")
+    out = reduced(data, CHANNELS, step.labels)
+    out["batches"] = {c: np.array([part.mean() for part in np.array_split(data[c], batches)]) for c in CHANNELS}
+    out["every"] = {c: data[c] for c in (*POSITIONS, *CURRENTS)}
+    out["samples"] = count
+    return out

@@ -1,0 +1,120 @@
+"""From the recorded orbits of a tracking test to arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.errors import AnalysisError
+from bench.recording import Recording, Step
+from bench.rigfile import RigFile
+from procedures.amb_rotor.geometry import Facts, Path, Wave, distances
+from procedures.amb_rotor.onset import onset
+
+Array = npt.NDArray[np.float64]
+REST, LIFT, PROBE, START, GROWN, ORBIT = "rest", "lift", "probe", "start", "grown", "orbit"
+STARTED, LIFT_LOST, NO_SPEED = "reference-started", "lift-lost", "no-speed"
+AXES = ("yi", "zi", "yo", "zo")
+POSITIONS = tuple(f"pos_{axis}" for axis in AXES)
+UPPER, LOWER = (tuple(f"i_{axis}_{side}" for axis in AXES) for side in "pn")
+CHANNELS = (*POSITIONS, *UPPER, *LOWER, "speed", "flags")
+CURRENT_LIMIT, VOLTAGE_LIMIT, CONTACT, RANGE = 1, 2, 12, 64  # bits of the telemetry signal `flags`
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """One law's orbit: its path, the `whole` one from where the reference had grown, coil currents (4, n) A of both sides,
+    flags (n,), speed (n,) rad/s, the reference's zero of phase in s on the path's time, and the start's jump of current over
+    its noise."""
+
+    law: str
+    path: Path
+    whole: Path
+    upper: Array
+    lower: Array
+    flags: npt.NDArray[np.int64]
+    speed: Array
+    t_0: float
+    clear: float
+    step: Step
+
+    def ring_distance(self, facts: Facts) -> float:
+        """The least distance to a ring that the readings show, as they stand: m, below zero inside it."""
+        return facts.clearance - float(distances(self.path.readings, facts).max())
+
+    @property
+    def where(self) -> str:
+        """How it is named to the reader."""
+        w, rpm = self.path.wave, float(np.median(self.speed)) * 30 / np.pi
+        turning = f"{rpm:.0f} r/min" if self.path.turn_s else "at rest"
+        figure = f"{w.hz:g} Hz" if w.ratio == 1 else f"{w.hz:g} Hz, {w.ratio} : 1"
+        return f"{self.law}, {figure}, {w.y * 1e6:g} × {w.z * 1e6:g} µm, {turning}"
+
+
+def sampled(rig: RigFile, hz: float, y: float, z: float, period_ns: int, ratio: int = 1) -> Wave:
+    """The reference, as this rig's telemetry samples it."""
+    tick = rig.devices["controller"].tick_s
+    return Wave(hz, y, z, tick, round(period_ns * 1e-9 / tick), ratio)
+
+
+def read_orbits(recording: Recording[Any]) -> list[Orbit]:
+    """Every orbit, in time order.
+
+    Raises:
+        AnalysisError: there are none, or the reference has no start.
+    """
+    starts, orbits = list(recording.steps(START)), list(recording.steps(ORBIT))
+    if not orbits or not starts:
+        raise AnalysisError("found no orbits; expected those of the plan (was the run stopped early?)")
+    origin = starts[0].start_ns
+    t_0, clear = _start(recording, starts[0], _wave(recording, orbits[0]))
+    grown = {str(step.labels["law"]): step for step in recording.steps(GROWN)}  # none in recordings of old
+    return [_read(recording, step, grown.get(str(step.labels["law"])), origin, t_0, clear) for step in orbits]
+
+
+def _wave(recording: Recording[Any], step: Step) -> Wave:
+    labels, period_ns = step.labels, recording.streams["telemetry"].period_ns
+    return sampled(recording.rig, float(labels["hz"]), float(labels["y_m"]), float(labels["z_m"]), period_ns,
+                   int(labels["ratio"]))  # fmt: skip
+
+
+def _start(recording: Recording[Any], start: Step, wave: Wave) -> tuple[float, float]:
+    """When the reference's phase was zero, s from the step's start, and how clear the currents tell it."""
+    begun = start.read(*CHANNELS)
+    inside = [e for e in recording.events() if start.start_ns <= e["t_ns"] < start.end_ns]
+    written = [e["t_ns"] for e in inside if e["kind"] == "parameter" and e["name"] == "ellipse_on"]
+    answered = [e["t_ns"] for e in inside if e["kind"] == STARTED]
+    if not written or not answered or len(begun["t_ns"]) < 20:
+        raise AnalysisError("found no start of the reference; expected its write within the step, and samples about it")
+    current = np.sum([begun[f"i_z{b}_p"] - begun[f"i_z{b}_n"] for b in "io"], axis=0)
+    lag = 1 / recording.rig.parameters["model_rate"].default
+    earliest, latest = ((t - start.start_ns) * 1e-9 for t in (written[0], answered[0]))
+    at = (begun["t_ns"] - start.start_ns) * 1e-9
+    return onset(at, current, earliest, latest, tick=wave.tick, ticks=wave.ticks, lag_s=lag)
+
+
+def _read(recording: Recording[Any], step: Step, grown: Step | None, origin: int, t_0: float, clear: float) -> Orbit:
+    labels, data = step.labels, step.read(*CHANNELS)
+    if len(data["t_ns"]) < 20:
+        raise AnalysisError(f"{labels['law']}: found {len(data['t_ns'])} samples; expected a whole orbit")
+    speed = data["speed"]
+    turning = float(labels["speed_rad_s"]) > 0 and float(np.median(speed)) > 0
+    path = Path(
+        _wave(recording, step),
+        (data["t_ns"] - origin) * 1e-9,
+        np.array([data[c] for c in POSITIONS]),
+        2 * np.pi / float(np.median(speed)) if turning else 0.0,
+    )
+    whole = path if grown is None else _joined(grown, path, origin)
+    upper, lower = (np.array([data[c] for c in names]) for names in (UPPER, LOWER))
+    return Orbit(str(labels["law"]), path, whole, upper, lower, data["flags"].astype(np.int64), speed, t_0, clear, step)
+
+
+def _joined(grown: Step, path: Path, origin: int) -> Path:
+    """A path with what was recorded before it."""
+    data = grown.read(*POSITIONS)
+    t = np.concatenate([(data["t_ns"] - origin) * 1e-9, path.t])
+    return replace(path, t=t, readings=np.concatenate([np.array([data[c] for c in POSITIONS]), path.readings], axis=1))

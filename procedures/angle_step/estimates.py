@@ -1,0 +1,111 @@
+"""From the moves of an angle step to estimates with influences: scatter of the repeats, sensors, sampling, encoder."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bench.rigfile import RigFile
+from bench.uncertainty import Estimate, Influence
+from procedures.angle_step import steps
+from procedures.angle_step.response import Response, response
+from procedures.angle_step.steps import Case, Done
+from procedures.shared.certificates import certified
+
+
+@dataclass(frozen=True)
+class Result:
+    """Responses of the moves of one case, and the mean of each quantity with its influences; no settling time where the angle
+    does not settle."""
+
+    case: Case
+    responses: tuple[Response, ...]
+    estimates: Mapping[str, Estimate]
+
+
+def by_case(moves: list[Done], rig: RigFile, band: float, count_rad: float) -> dict[Case, Result]:
+    """Every case's result; `band` is a share of the step, `count_rad` one encoder count.
+
+    Raises:
+        AnalysisError: a move does not reach its step.
+    """
+    share = steps.motor_share(rig)
+    gains = {c: certified(f"sensors/{c}/gain", rig.sensors[c].gain, f"gain of {c}") for c in steps.POSITIONS}
+    period = _period(moves)
+    out = {}
+    for case, done in steps.by_case(moves).items():
+        within = max(band * case.size, 2 * count_rad)
+        responses = tuple(response(d.move, within) for d in done)
+        out[case] = Result(case, responses, _estimates(case, responses, gains, share, count_rad, period))
+    return out
+
+
+def _period(moves: list[Done]) -> float:
+    t = moves[0].move.t
+    return float(t[1] - t[0])
+
+
+def _estimates(
+    case: Case, r: Sequence[Response], gains: Mapping[str, Estimate], share: float, count: float, period: float
+) -> dict[str, Estimate]:
+    where = case.where
+
+    def mean(name: str, unit: str, of: Callable[[Response], float]) -> Estimate:
+        return _repeated(f"{name}/{where}", unit, [of(x) for x in r])
+
+    slope = 1 / math.sqrt(np.mean([1 / x.slopes[0] ** 2 + 1 / x.slopes[1] ** 2 for x in r]))
+    encoder = _bound(f"encoder/{where}", "encoder count", count / 2, "rad")
+    sampling = _bound(f"sampling/{where}", "sampling", period / 2, "s")
+    floor = _bound(f"noise/{where}", "noise in a peak", max(x.floor for x in r), "m")
+    outboard = _gained(r, lambda x: x.towards, lambda x: x.peak, {"xo": 1.0, "yo": 1.0}, gains)
+    at_rest = _gained(r, lambda x: x.towards, lambda x: x.rest_peak, {"xo": 1.0, "yo": 1.0}, gains)
+    planes = {"xo": share, "yo": share, "xi": 1 - share, "yi": 1 - share}
+    motor = _gained(r, lambda x: x.towards_motor, lambda x: x.peak_motor, planes, gains)
+    out = {
+        "rise_time": mean("rise_time", "s", lambda x: x.rise) + encoder * (1 / slope),
+        "overshoot": mean("overshoot", "1", lambda x: x.overshoot) + encoder * (1 / case.size),
+        "final_error": mean("final_error", "rad", lambda x: x.final_error) + encoder,
+        "peak_outboard": mean("peak_outboard", "m", lambda x: x.peak) + outboard + floor,
+        "peak_motor": mean("peak_motor", "m", lambda x: x.peak_motor) + motor + floor,
+        "excess": mean("excess", "m", lambda x: x.peak - x.rest_peak) + outboard - at_rest + floor,
+        "saturated": mean("saturated", "s", lambda x: x.saturated) + sampling,
+    }
+    if all(math.isfinite(x.settling) for x in r):
+        out["settling_time"] = mean("settling_time", "s", lambda x: x.settling) + sampling
+    return out
+
+
+def _repeated(identity: str, unit: str, values: Sequence[float]) -> Estimate:
+    """Mean of repeats with its Type A uncertainty."""
+    u = float(np.std(values, ddof=1)) / math.sqrt(len(values))
+    influence = Influence(id=f"scatter/{identity}", name="scatter of the repeats", u=u, unit=unit, kind="A",
+                          distribution="normal", dof=float(len(values) - 1), source=f"{len(values)} steps")  # fmt: skip
+    return Estimate.of(float(np.mean(values)), influence)
+
+
+def _bound(identity: str, name: str, half: float, unit: str) -> Estimate:
+    """Zero, within a half width."""
+    influence = Influence(
+        id=identity, name=name, u=half / math.sqrt(3), unit=unit, kind="B", distribution="rectangular"
+    )
+    return Estimate.of(0.0, influence)
+
+
+def _gained(
+    r: Sequence[Response], towards: Callable[[Response], np.ndarray], peak: Callable[[Response], float],
+    share: Mapping[str, float], gains: Mapping[str, Estimate],
+) -> Estimate:  # fmt: skip
+    """Zero, with what the gains of the position sensors do to a peak: dr = -(x^2 dg_x + y^2 dg_y) / r for one plane.
+
+    At the motor each plane's sensors act by the plane's share in the extrapolation, both planes being off by much the same.
+    """
+    out = Estimate.exact(0.0, "m")
+    for sensor, part in share.items():
+        axis = 0 if sensor[0] == "x" else 1
+        weight = float(np.mean([peak(x) * towards(x)[axis] ** 2 for x in r]))
+        gain = gains[f"pos_{sensor}"]
+        out = out + (gain - gain.value) * (-weight * part / gain.value)
+    return Estimate(out.value, "m", out.sensitivities)

@@ -1,0 +1,101 @@
+"""What the angle step draws: the orbits as in T Fig. 6.7b, the angle, the segment currents, and the peaks of every case."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from bench.figures import Figure, Series
+from bench.rigfile import RigFile
+from bench.uncertainty import coverage_factor
+from procedures.angle_step.estimates import Result
+from procedures.angle_step.steps import Case, Done
+
+SHOWN_S = 0.25  # after the step: the angle has swung by then, and the rotor is back
+
+
+def all_figures(moves: Sequence[Done], results: Mapping[Case, Result], rig: RigFile) -> list[Figure]:
+    """In the order of the report."""
+    first = {done.case: done for done in reversed(moves)}  # the first move of each case
+    cases = [c for c in results if c.filter_hz == next(iter(results)).filter_hz]
+    largest = [c for c in cases if c.size == max(x.size for x in cases)]
+    limit = rig.parameters["segment_max"].high
+    return [
+        _orbits([first[c] for c in largest], rig.geometry["clearance"].value),
+        *(_angles([first[c] for c in cases if c.size == size]) for size in sorted({c.size for c in cases})),
+        _radii([first[c] for c in largest]),
+        *(_segments(first[c], limit) for c in largest),
+        *_peaks(results),
+    ]
+
+
+def _orbits(moves: Sequence[Done], clearance: float) -> Figure:
+    turn = np.linspace(0, 2 * np.pi, 181)
+    circle = Series("clearance", 1e6 * clearance * np.cos(turn), 1e6 * clearance * np.sin(turn))
+    series = [Series(d.case.allocation, 1e6 * d.move.orbit[0], 1e6 * d.move.orbit[1]) for d in moves]
+    return Figure("orbit", f"Orbit at the outboard sensor, step of {_deg(moves[0])}",
+                  "Path of the shaft off the sensors' zero after one step, within the circle at which it would touch (as T "
+                  "Fig. 6.7b).", "x (µm)", "y (µm)", (*series, circle), kind="plane")  # fmt: skip
+
+
+def _angles(moves: Sequence[Done]) -> Figure:
+    size = moves[0].case.size
+    series = tuple(
+        Series(d.case.allocation, 1e3 * d.move.t[_shown(d)], np.degrees(d.move.angle[_shown(d)])) for d in moves
+    )
+    return Figure(f"angle-{np.degrees(size):g}".replace(".", "-"), f"Angle after a step of {_deg(moves[0])}",
+                  f"Encoder angle from where the reference stood; derivative on the error, at {moves[0].case.filter_hz:g} Hz. "
+                  "Time runs from the answer of the torque current.", "time (ms)", "angle (°)", series,
+                  lines=(("reference", float(np.degrees(moves[0].move.step))),))  # fmt: skip
+
+
+def _radii(moves: Sequence[Done]) -> Figure:
+    series = tuple(
+        Series(d.case.allocation, 1e3 * d.move.t[_shown(d)], 1e6 * np.hypot(*d.move.orbit[:, _shown(d)])) for d in moves
+    )
+    rest = float(1e6 * max(np.hypot(*d.move.rest_orbit).max() for d in moves))
+    return Figure("radius", f"Distance off centre, step of {_deg(moves[0])}",
+                  "At the outboard sensor, over the time since the step; the line is the greatest at standstill before it.",
+                  "time (ms)", "off centre (µm)", series, lines=(("standstill", rest),))  # fmt: skip
+
+
+def _segments(done: Done, limit: float) -> Figure:
+    shown = _shown(done)
+    series = tuple(Series(f"segment {k + 1}", 1e3 * done.move.t[shown], done.move.segments[k, shown]) for k in range(4))
+    return Figure(f"segments-{done.case.allocation}", f"Segment currents, {done.case.allocation}, step of {_deg(done)}",
+                  "Measured currents of the motor's four segments (as T Fig. 6.7c, d); at a limit force and torque compete.",
+                  "time (ms)", "current (A)", series, lines=(("limit", limit), ("limit, negative", -limit)))  # fmt: skip
+
+
+def _peaks(results: Mapping[Case, Result]) -> Iterator[Figure]:
+    """Excess over the size of the step, and over the filter where there are several."""
+    filters = sorted({c.filter_hz for c in results})
+    sizes = sorted({c.size for c in results})
+    allocations = list(dict.fromkeys(c.allocation for c in results))
+    if len(sizes) > 1:
+        yield Figure("excess-size", "Excursion over the size of the step",
+                     f"Peak at the outboard sensor above that at standstill, mean of the repeats with its 95 % interval; "
+                     f"derivative filtered at {filters[0]:g} Hz.", "step (°)", "excess (µm)",
+                     tuple(_excess(a, [results[Case(a, s, filters[0])] for s in sizes], np.degrees(sizes))
+                           for a in allocations))  # fmt: skip
+    if len(filters) > 1:
+        yield Figure("excess-filter", f"Excursion over the derivative's filter, step of {np.degrees(sizes[0]):g}°",
+                     "Peak at the outboard sensor above that at standstill, mean of the repeats with its 95 % interval.",
+                     "log10 of the filter's frequency (Hz)", "excess (µm)",
+                     tuple(_excess(a, [results[Case(a, sizes[0], f)] for f in filters], np.log10(filters))
+                           for a in allocations))  # fmt: skip
+
+
+def _excess(label: str, results: Sequence[Result], x: np.ndarray) -> Series:
+    found = [r.estimates["excess"] for r in results]
+    u = np.array([coverage_factor(len(r.responses) - 1) * e.u for r, e in zip(results, found, strict=True)])
+    return Series(label, np.asarray(x, np.float64), np.array([1e6 * e.value for e in found]), "both", 1e6 * u)
+
+
+def _shown(done: Done) -> slice:
+    return slice(0, int(np.searchsorted(done.move.t, SHOWN_S)))
+
+
+def _deg(done: Done) -> str:
+    return f"{np.degrees(done.case.size):.3g}°"

@@ -1,0 +1,195 @@
+"""Angle step while the motor carries the shaft: static against priority input transformation (thesis 6.7.1, Fig. 6.7).
+
+Measurands, each as a mean over repeated steps both ways: the response of the angle (rise, overshoot, settling, final error),
+and how far the rotor leaves the sensors' zero meanwhile. Static is T (6.9) with whatever the amplifiers cut; priority is
+T (6.19) with (6.24): force first, and torque with what it leaves.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import Literal
+
+from pydantic import Field
+
+from bench.figures import Figure
+from bench.findings import Finding
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.requires import Requires
+from bench.rig import Rig
+from bench.rigfile import RigFile
+from bench.roles import RigState
+from procedures.angle_step import checks, estimates, response
+from procedures.angle_step import figures as drawn
+from procedures.angle_step.response import Loop
+from procedures.angle_step.steps import CHANNELS, POSITIONS, STEP, Case, cases, read_moves
+from procedures.servomotor import carrying, hold, segments, wiring
+from procedures.servomotor.direction import of_probe
+from procedures.shared import assumptions
+
+RISE = Quantity("rise_time", "s", "10 to 90 % of the step of the angle")
+OVERSHOOT = Quantity("overshoot", "1", "greatest angle beyond the step, as a share of it")
+SETTLING = Quantity("settling_time", "s", "from the answer of the torque current until the angle stays in the band")
+FINAL = Quantity("final_error", "rad", "angle at the end less its reference")
+PEAK = Quantity("peak_outboard", "m", "greatest distance off centre at the outboard sensor during the step")
+PEAK_MOTOR = Quantity("peak_motor", "m", "greatest distance off centre at the motor during the step")
+EXCESS = Quantity("excess", "m", "peak at the outboard sensor above that at standstill", title="excess over standstill")
+SATURATED = Quantity("saturated", "s", "how long an amplifier of the motor cut its demand")
+MEASURES = (RISE, OVERSHOOT, SETTLING, FINAL, PEAK, PEAK_MOTOR, EXCESS, SATURATED)
+TORQUE_CONSTANT = 2.87  # N m/A, T Table 6.2; for predictions before a run, and for nothing that is measured
+NEEDED = (
+    "motor_share",
+    "share_slew",
+    "allocation",
+    "segment_max",
+    "angle_hz",
+    "derivative_on_error",
+    "angle_slew",
+    "i_ramp",
+)
+Allocation = Literal["static", "priority"]
+CODES = {"static": 0.0, "priority": 1.0}
+
+
+class Plan(BenchPlan):
+    """Settings of the angle step, SI."""
+
+    steps_rad: tuple[float, ...] = Field((math.radians(2), math.radians(12)), min_length=1)
+    allocations: tuple[Allocation, ...] = Field(("static", "priority"), min_length=1)
+    filters_hz: tuple[float, ...] = Field((200.0,), min_length=1)  # of the angle's derivative
+    repeats: int = Field(3, ge=2)  # each way
+    kp_theta: float = Field(50.0, gt=0)  # A/rad
+    kd_theta: float = Field(0.5, gt=0)  # A s/rad, on the error
+    ki_theta: float = Field(50.0, ge=0)  # A/(rad s)
+    settle_s: float = Field(2.0, gt=0)  # after the motor has taken the shaft
+    standstill_s: float = Field(0.5, ge=0.1)  # before each step
+    record_s: float = Field(1.5, ge=0.6)  # after it
+    band: float = Field(0.02, gt=0)  # of settling, as a share of the step; at least two encoder counts
+    encoder_counts: int = Field(4096, gt=0)  # per turn
+    max_hold_A: float = Field(0.06, gt=0)  # torque current at rest: drag of a levitated rotor needs half of it
+    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
+
+
+def settings(_: Plan) -> dict[str, float]:
+    """Lifted with the angle released: no loop is closed before the encoder's direction is known."""
+    return dict(hold.RELEASED)
+
+
+def planned(plan: Plan) -> list[Case]:
+    """What is compared, in its order."""
+    return list(cases(plan.steps_rad, plan.allocations, plan.filters_hz))
+
+
+def step_count(plan: Plan) -> int:
+    """How many steps `acquire` records, for the progress display."""
+    return wiring.STEPS + 2 * plan.repeats * len(planned(plan))
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Step to and fro for every case; with the outboard AMB in charge again in the end."""
+    if not wiring.sound(rig, record):
+        return
+    write = rig.levitation.set
+    for name, value in (("kd_theta", plan.kd_theta), ("kp_theta", plan.kp_theta), ("ki_theta", plan.ki_theta),
+                        ("derivative_on_error", 1.0), ("angle_slew", rig.file.parameters["angle_slew"].high)):  # fmt: skip
+        write(name, value)
+    carrying.carry(rig, plan.settle_s)
+    for case in planned(plan):
+        write("allocation", CODES[case.allocation])
+        write("angle_hz", case.filter_hz)
+        rig.clock.sleep(plan.standstill_s)
+        for repeat in range(2 * plan.repeats):
+            step = case.size if repeat % 2 == 0 else -case.size
+            target = case.size if repeat % 2 == 0 else 0.0
+            with record.step(STEP, allocation=case.allocation, size_rad=case.size, filter_hz=case.filter_hz, step_rad=step,
+                             target_rad=target, repeat=repeat):  # fmt: skip
+                rig.clock.sleep(plan.standstill_s)
+                write("angle_ref", target)
+                rig.clock.sleep(plan.record_s)
+    carrying.give_back(rig, 0.2)
+    write("angle_slew", rig.file.parameters["angle_slew"].default)
+
+
+def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
+    """Findings first, then the quantities of each case."""
+    wrong = [*of_probe(recording), *segments.of_nudges(recording)]
+    yield from wrong
+    if wrong:
+        return
+    plan = recording.plan
+    moves = read_moves(recording)
+    signals = list(checks.of_signals(moves, plan))
+    yield from signals
+    if any(f.code in checks.FATAL for f in signals):
+        return
+    results = estimates.by_case(moves, recording.rig, plan.band, 2 * math.pi / plan.encoder_counts)
+    yield from checks.of_responses(results, plan, {c: _loop(recording.rig, plan, c) for c in results})
+    yield from checks.compared(results)
+    for case, result in results.items():
+        for quantity in (q for q in MEASURES if q.name in result.estimates):
+            yield quantity.measured(result.estimates[quantity.name], case.where)
+
+
+def _loop(rig: RigFile, plan: Plan, case: Case) -> Loop:
+    limit = rig.parameters["segment_max"].high
+    inertia = rig.machine["polar_inertia"].value
+    return Loop(plan.kp_theta, plan.kd_theta, plan.ki_theta, case.filter_hz, inertia, TORQUE_CONSTANT, limit)
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts, and speeds that the envelope does not allow."""
+    if len(set(plan.allocations)) < len(plan.allocations) or len(set(plan.filters_hz)) < len(plan.filters_hz):
+        yield "allocations, filters_hz: found one twice; expected each once"
+    if any(not 4 * math.pi / plan.encoder_counts < s <= math.pi / 2 for s in plan.steps_rad):
+        least = 720 / plan.encoder_counts
+        yield f"steps_rad: found {min(plan.steps_rad):g} to {max(plan.steps_rad):g}; expected above two encoder counts " \
+              f"({least:.2g} deg), up to a quarter turn"  # fmt: skip
+    else:
+        yield from _too_fast(rig, plan)
+
+
+def _too_fast(rig: RigFile, plan: Plan) -> Iterator[str]:
+    case = Case("", max(plan.steps_rad), max(plan.filters_hz))
+    speed = response.fastest(_loop(rig, plan, case), case.size)
+    limit = carrying.MARGIN * rig.envelope.max_speed_rad_s
+    if speed > limit:
+        yield (f"steps_rad: a step of {math.degrees(case.size):.3g} deg turns at {speed:.3g} rad/s by prediction; the envelope "
+               f"allows {rig.envelope.max_speed_rad_s:g} rad/s, of which {carrying.MARGIN:.0%} is planned with")  # fmt: skip
+
+
+def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+    """Orbits, angle and segment currents of the largest step, and peaks over the cases; empty without moves."""
+    if not len(recording.steps(STEP)):
+        return ()
+    moves = read_moves(recording)
+    plan = recording.plan
+    results = estimates.by_case(moves, recording.rig, plan.band, 2 * math.pi / plan.encoder_counts)
+    return drawn.all_figures(moves, results, recording.rig)
+
+
+procedure = Procedure(
+    name="angle-step",
+    title="Angle step with the motor carrying the shaft: static and priority input transformation",
+    measures=MEASURES,
+    state=RigState.LEVITATED,
+    plan=Plan,
+    acquire=acquire,
+    analyse=analyse,
+    figures=figures,
+    requires=Requires(
+        roles=("levitation", "rotation"),
+        channels=(*CHANNELS, *wiring.CHANNELS),
+        sensors=POSITIONS,
+        parameters=(*hold.PARAMETERS, *wiring.PARAMETERS, *NEEDED),
+        machine=("polar_inertia",),
+    ),
+    check=check,
+    settings=settings,
+    step_count=step_count,
+    reached=("noise/*", "sampling/*"),  # both are read from the recording itself
+    assumes=assumptions.ANGLE_STEP,
+    method=read_method(__file__),
+)

@@ -1,0 +1,139 @@
+"""From the recorded moves of an angle step to arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.errors import AnalysisError
+from bench.recording import Recording, Step
+from bench.rigfile import RigFile
+from procedures.angle_step.response import Move
+from procedures.servomotor.segments import SEGMENTS
+
+Array = npt.NDArray[np.float64]
+STEP = "move"
+POSITIONS = ("pos_xi", "pos_yi", "pos_xo", "pos_yo")
+CHANNELS = ("angle", *POSITIONS, *SEGMENTS, "flags")
+SATURATED_AMB, SATURATED, CONTACT = 1, 2, 12  # bits of the telemetry signal `flags`
+ANSWER_A = 0.2  # of torque current: well above its noise, a twentieth of the smallest sensible step's
+
+
+@dataclass(frozen=True)
+class Case:
+    """What was done: how segment currents are made, the size of the step in rad, the filter of the derivative in Hz."""
+
+    allocation: str
+    size: float
+    filter_hz: float
+
+    @property
+    def where(self) -> str:
+        """How it is named to the reader."""
+        return f"{self.allocation}, {np.degrees(self.size):g}°, {self.filter_hz:g} Hz"
+
+
+@dataclass(frozen=True)
+class Done:
+    """One recorded move: its case, the move, its flags ORed, the channels that stood still, and lost samples."""
+
+    case: Case
+    move: Move
+    flags: int
+    rest_flags: int
+    stuck: tuple[str, ...]
+    lost: int
+    expected: int
+
+
+def motor_share(rig: RigFile) -> float:
+    """Share of the outboard reading in the motor plane's position; the inboard one's is the rest (T 6.7)."""
+    g = rig.geometry
+    l_is, l_os = g["com_to_inboard_sensor"].value, g["com_to_outboard_sensor"].value
+    return (g["com_to_motor"].value + l_is) / (l_is + l_os)
+
+
+def read_moves(recording: Recording[Any]) -> list[Done]:
+    """Every move, in time order.
+
+    Raises:
+        AnalysisError: there are none, or one does not show its step.
+    """
+    out = [_read(recording, step) for step in recording.steps(STEP)]
+    if not out:
+        raise AnalysisError("found no moves; expected those of the plan (was the run stopped early?)")
+    return out
+
+
+def by_case(moves: list[Done]) -> Mapping[Case, list[Done]]:
+    """Moves of each case, in order of first appearance."""
+    out: dict[Case, list[Done]] = {}
+    for done in moves:
+        out.setdefault(done.case, []).append(done)
+    return out
+
+
+def _read(recording: Recording[Any], step: Step) -> Done:
+    data = step.read(*CHANNELS)
+    written = [e["t_ns"] for e in recording.events("parameter")
+               if e["name"] == "angle_ref" and step.start_ns <= e["t_ns"] < step.end_ns]  # fmt: skip
+    if not written:
+        raise AnalysisError(f"move {dict(step.labels)}: found no write of the angle's reference within it")
+    rest = data["t_ns"] < written[-1]
+    if rest.sum() < 20 or (~rest).sum() < 100:
+        raise AnalysisError(f"move {dict(step.labels)}: found {int(rest.sum())} samples before it and "
+                            f"{int((~rest).sum())} after; expected at least 20 and 100")  # fmt: skip
+    labels = step.labels
+    case = Case(str(labels["allocation"]), float(labels["size_rad"]), float(labels["filter_hz"]))
+    flags = data["flags"].astype(np.int64)
+    return Done(
+        case,
+        _move(data, rest, labels, motor_share(recording.rig)),
+        int(np.bitwise_or.reduce(flags[~rest])),
+        int(np.bitwise_or.reduce(flags[rest])),
+        tuple(c for c in (*POSITIONS, *SEGMENTS) if np.ptp(data[c]) == 0),
+        step.lost(),
+        step.expected(),
+    )
+
+
+def _move(
+    data: Mapping[str, npt.NDArray[Any]], rest: npt.NDArray[np.bool_], labels: Mapping[str, Any], share: float
+) -> Move:
+    step = float(labels["step_rad"])
+    segments = np.array([data[c] for c in SEGMENTS])
+    torque = segments.mean(axis=0)
+    standing = float(torque[rest].mean())
+    answers = np.flatnonzero(~rest & (np.abs(torque - standing) > ANSWER_A))
+    if not len(answers):
+        raise AnalysisError(f"a step of {np.degrees(step):.2f} deg: the torque current never answers")
+    first = max(int(answers[0]) - 1, int(np.flatnonzero(~rest)[0]))
+    after = slice(first, None)
+    angle = np.unwrap(data["angle"]) - (float(labels["target_rad"]) - step)
+    angle -= 2 * np.pi * np.round(angle[rest].mean() / (2 * np.pi))
+    inboard, outboard = (np.array([data[f"pos_x{b}"], data[f"pos_y{b}"]]) for b in "io")
+    motor = inboard * (1 - share) + outboard * share
+    return Move(
+        step=step,
+        t=(data["t_ns"][after] - data["t_ns"][first]).astype(np.float64) * 1e-9,
+        angle=angle[after],
+        orbit=outboard[:, after],
+        motor=motor[:, after],
+        segments=segments[:, after],
+        saturated=(data["flags"][after].astype(np.int64) & SATURATED) != 0,
+        rest_orbit=outboard[:, rest],
+        rest_motor=motor[:, rest],
+        rest_segments=segments[:, rest],
+    )
+
+
+def cases(steps: tuple[float, ...], allocations: tuple[str, ...], filters: tuple[float, ...]) -> Iterator[Case]:
+    """In the order in which they are done: small steps first."""
+    for filter_hz in filters:
+        for size in sorted(steps):
+            for allocation in allocations:
+                yield Case(allocation, size, filter_hz)

@@ -1,0 +1,286 @@
+"""What a balancing's recording says: findings, each naming its suspect, and the result where there is one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from itertools import pairwise
+from typing import Any, Protocol
+
+import numpy as np
+
+from bench.analysis.balance import G_MM, bound
+from bench.calibration import Calibration
+from bench.findings import Effect, Finding
+from bench.recording import Recording
+from bench.requires import Requires
+from bench.rigfile import RigFile
+from bench.uncertainty import Estimate
+from procedures.amb_rotor import wiring
+from procedures.balance import decision, estimates
+from procedures.balance import hum as balance_hum
+from procedures.balance.estimates import Balanced, Forces
+from procedures.balance.steps import (
+    BASE,
+    CAPTURED,
+    DECISION,
+    LIGHTER,
+    REFUSED,
+    SIDES,
+    Recorded,
+    Run,
+    read_dwell,
+    read_runs,
+)
+from procedures.unbalance import bearings, fitting, hum
+from procedures.unbalance import checks as unbalance_checks
+from procedures.unbalance.steps import AXES, CURRENTS, POSITIONS, RPM, SLOW, TOLD, Dwell
+
+MOST_RPM = 10000.0  # influence runs
+WORST_CONDITION = 50.0  # of the influence coefficients
+SPEEDS_APART = 2e-3
+SAME_PLACE_RAD = math.radians(0.1)
+DIFFERS = (
+    0.02  # of what was mounted: how far a verification may be from the prediction, beside three times its uncertainty
+)
+NEEDED = (
+    *(f"com_to_{b}_{what}" for b in ("inboard", "outboard") for what in ("balance", "sensor", "amb")),
+    *("com_to_coupling", "balance_radius", "clearance", "coupling_stiffness", "amb_gap"),
+)
+
+
+class Settings(decision.Settings, fitting.Settings, Protocol):
+    """The plan."""
+
+    @property
+    def leave(self) -> bool: ...
+    @property
+    def corrections(self) -> int: ...
+    @property
+    def repeat(self) -> bool: ...
+    @property
+    def trial_angle_rad(self) -> tuple[float, float]: ...
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """Findings; where there is a result: `balance`, the runs by name, the `last` run, influences by probe and plane."""
+
+    findings: tuple[Finding, ...]
+    balance: Balanced | None = None
+    recorded: Recorded | None = None
+    last: str = BASE
+    influences: Mapping[tuple[str, str], tuple[Estimate, Estimate]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Looked:
+    """A dwell with its balance of forces, as `unbalance_checks` wants it."""
+
+    dwell: Dwell
+    misfit: float
+    carried: np.ndarray
+
+
+REQUIRES = Requires(
+    roles=("levitation", "drive"),
+    channels=TOLD,
+    sensors=(*POSITIONS, *CURRENTS),
+    parameters=("law", "ref_y", "ref_theta", "bias", "kp", "kd", "k1", "k2_ccs", "k2_cac", *bearings.STATED),
+    geometry=NEEDED,
+    machine=("mass", "transverse_inertia", "polar_inertia", "radial_axes", "runout", "weight_mass", "weight_angle"),
+    capture=CAPTURED,
+)
+
+
+def of_plan(rig: RigFile, plan: Settings) -> Iterable[str]:
+    """What cannot work, before anything starts."""
+    yield from fitting.of_plan(rig, plan)
+    if max(plan.speeds_rad_s) * RPM > MOST_RPM + 1:
+        top = max(plan.speeds_rad_s) * RPM
+        yield f"speeds_rad_s: found {top:.0f} r/min; influence runs are made at {MOST_RPM:.0f} r/min or below"
+    if 0 < plan.positions < 3:
+        yield f"positions: found {plan.positions}; expected 0 (any angle), or three or more"
+    elif plan.positions:
+        for side, angle in zip(SIDES, plan.trial_angle_rad, strict=True):
+            step = 2 * math.pi / plan.positions
+            if abs(math.remainder(angle, step)) > SAME_PLACE_RAD:
+                yield (f"trial_angle_rad: found {math.degrees(angle):.4g}° {side}; the {plan.positions} positions are "
+                       f"{math.degrees(step):.4g}° apart, the first at 0°")  # fmt: skip
+    for side, kg, p in zip(SIDES, plan.trial_kg, (0, 1), strict=True):
+        allowed = decision.allowed_kg(rig, plan, p)
+        if not 0 < kg <= allowed:
+            yield (f"trial_kg: found {kg * 1e3:g} g {side}; allowed are up to {allowed * 1e3:.3g} g: by the envelope, "
+                   f"and by the predicted response, which may reach {plan.max_share:.0%} of the least clearance")  # fmt: skip
+
+
+@lru_cache(maxsize=1)
+def evaluated(recording: Recording[Any]) -> Evaluated:
+    """What a recording says. The last one is kept: analysis and figures ask for the same."""
+    found = [*wiring.before_orbits(recording), *unbalance_checks.before(recording), *_refusals(recording)]
+    if any(f.code in ("no-dwells", "probe-polarity", "lift-lost", "stuck-channel") for f in found):
+        return Evaluated(tuple(found))
+    plan, rig = recording.plan, recording.rig
+    recorded = read_runs(recording, plan.speeds_rad_s)
+    found += unbalance_checks.of_signals(recorded.dwells, plan, doubts=lambda _: ())  # every run is in all results
+    model = bearings.adopted_bearings(recording)
+    found += of_runs(recorded, rig, plan, model)
+    trials = decision.trials_of(recorded.runs, rig, plan.leave)
+    if trials is None and not any(f.effect is Effect.ERROR for f in found):
+        text = "the runs with trial weights were not completed: no influence coefficients."
+        found.append(Finding("no-trials", text, "", Effect.ERROR))
+    if trials is None or any(f.effect is Effect.ERROR for f in found):
+        return Evaluated((*found, *sheet(recorded, "still-mounted", rig, plan)))
+    checks = [r for r in recorded.runs if r.name.startswith("check")]
+    shown = [trials.base, *([trials.having[1]] if plan.leave else []), *checks]
+    balance = estimates.balanced(recorded.slow, shown, trials, rig, plan, model)
+    last = shown[-1].name
+    found.append(bearings.told(model, plan))
+    found += _of_result(balance, recorded, shown, plan, rig)
+    influences = estimates.influences(balance, rig)
+    slow = next((d for d in recorded.dwells if d.kind == SLOW), None)
+    found += balance_hum.of_balance(hum.heard(recording, slow), recorded, balance, (BASE, last), influences)
+    return Evaluated(tuple(found), balance, recorded, last, influences)
+
+
+def _refusals(recording: Recording[Any]) -> Iterator[Finding]:
+    for e in recording.events(LIGHTER):
+        text = (f"{e['allowed_kg'] * 1e3:.3g} g was fixed in place of {e['kg'] * 1e3:g} g: beside what the shaft does already, "
+                "more would leave the plan's share of the clearance.")  # fmt: skip
+        yield Finding(LIGHTER, text, str(e["plane"]))
+    for e in recording.events(REFUSED):
+        text = (
+            f"the trial weight of {e['kg'] * 1e3:g} g {e['plane']} was refused: beside what the shaft does already its "
+            f"predicted response would leave the plan's share of the clearance. Allowed are {e['allowed_kg'] * 1e3:.3g} g, too "
+            "little to tell its effect by. Begin at a speed, or under a law, where the shaft moves less."
+        )
+        yield Finding("trial-refused", text, str(e["plane"]), Effect.ERROR)
+    for e in recording.events(DECISION):
+        if e["too_heavy_kg"]:
+            text = (f"the correction needs {e['too_heavy_kg'] * 1e3:.3g} g in one place, more than the envelope allows: it "
+                    "was not mounted.")  # fmt: skip
+            yield Finding("correction-refused", text, str(e["run"]), Effect.ERROR)
+
+
+def of_runs(recorded: Recorded, rig: RigFile, plan: Settings, model: Calibration | None = None) -> Iterator[Finding]:
+    """Loose parts, forces, trial weights."""
+    for run in recorded.runs:
+        yield from decision.slipped(run)
+    base = next((r for r in recorded.runs if r.name == BASE), None)
+    if base is None:
+        return
+    yield from _speeds(recorded)
+    off = decision.slow_runout(recorded.slow, base, rig, plan, model)
+    looked = []
+    for d in recorded.dwells:
+        if d.kind != SLOW:
+            f: Forces = estimates.forces(read_dwell(d), off, rig, plan, model)
+            looked.append(Looked(d, f.misfit, f.carried))
+    yield from unbalance_checks.channels(looked)
+    yield from unbalance_checks.weight(looked)
+    shown: list[decision.Shown] = []
+    named = {r.name: r for r in recorded.runs}
+    before = base
+    for side in SIDES:
+        having = named.get(f"trial {side}")
+        if having is None or not having.weights:
+            return
+        shown.append(decision.shown(before, having, having.weights[-1], rig, plan, model))
+        yield from decision.of_trial(shown[-1])
+        before = having if plan.leave else base
+    yield from decision.of_trials(shown[0], shown[1])
+
+
+def _speeds(recorded: Recorded) -> Iterator[Finding]:
+    """Influence coefficients hold for one speed: differences of readings at two are none."""
+    for k in range(len(recorded.runs[0].reads)):
+        speeds = np.array([r.reads[k].speed for r in recorded.runs])
+        apart = float(np.ptp(speeds) / speeds.mean())
+        if apart > SPEEDS_APART:
+            text = (f"the runs' speeds at {speeds.mean() * RPM:.0f} r/min are {apart:.2%} apart; {SPEEDS_APART:.1%} is "
+                    "allowed: the response to unbalance changes with speed.")  # fmt: skip
+            yield Finding("speeds-differ", text, "", Effect.INDETERMINATE)
+
+
+def _of_result(
+    balance: Balanced, recorded: Recorded, shown: list[Run], plan: Settings, rig: RigFile
+) -> Iterator[Finding]:
+    """Was it reached, did the corrections act as predicted, and the sheet."""
+    if balance.solved.condition > WORST_CONDITION:
+        text = (f"the condition of the influence coefficients is {balance.solved.condition:.0f}: the probes do not tell the "
+                "planes apart.")  # fmt: skip
+        yield Finding("planes-not-told-apart", text, "", Effect.ERROR)
+    for before, after in pairwise(shown):
+        if after.name.startswith("check"):
+            yield from predicted(balance, before, after, rig)
+    name = shown[-1].name
+    values = balance.unbalance[name]
+    for p, side in enumerate(SIDES):
+        size, most, per = abs(values.values[p]), bound(values.one(p)), balance.permissible[p].value
+        text = (f"{side}: U_res {size / G_MM:.2f}, U {(most - size) / G_MM:.2f}, together {most / G_MM:.2f} g mm; U_per "
+                f"{per / G_MM:.2f} g mm (G{plan.grade_m_s * 1e3:g} at {plan.service_rad_s * RPM:.0f} r/min).")  # fmt: skip
+        if most <= per:
+            yield Finding("reached", text, name)
+        else:
+            # The limit on residual_share says so too: a share that fails is not put in doubt by it.
+            yield Finding(
+                "not-reached", text, name, Effect.INDETERMINATE, (f"residual_cos@{side}", f"residual_sin@{side}")
+            )
+    for p, side in enumerate(SIDES):
+        some = ", ".join(
+            f"{axis} {abs(a):.3f} µm ∠{-math.degrees(np.angle(a)) % 360:.0f}°"
+            for axis, a in zip(AXES, balance.solved.influence[-1, :, p], strict=True)
+        )
+        text = (f"1 g mm at the scale's zero of the {side} plane, {max(plan.speeds_rad_s) * RPM:.0f} r/min (0-pk, phase "
+                f"lag): {some}; condition of all {balance.solved.condition:.1f}.")  # fmt: skip
+        yield Finding("influence", text, side)
+    yield from sheet(recorded, "correction-sheet", rig, plan)
+
+
+def predicted(balance: Balanced, before: Run, after: Run, rig: RigFile) -> Iterator[Finding]:
+    """What was measured against what was expected of the weights that were fixed in between."""
+    added = estimates.fixed(after.weights, balance.radius) - estimates.fixed(before.weights, balance.radius)
+    expected = balance.unbalance[before.name].values + added
+    found = balance.unbalance[after.name]
+    off = found.values - expected
+    scale = float(np.abs(added).max())
+    told = ", ".join(
+        f"{side} {abs(e) / G_MM:.2f} g mm, found {abs(v) / G_MM:.2f} g mm"
+        for side, e, v in zip(SIDES, expected, found.values, strict=True)
+    )
+    over = np.abs(off) - DIFFERS * scale - 3 * _between(balance, before, after, rig)
+    if over.max() > 0:
+        worst = SIDES[int(np.argmax(over))]
+        text = (f"predicted {told}: the correction did not act as it should, most {worst}. Suspect a weight of another "
+                "mass, at another angle or in the other plane than the sheet says, or one that came loose.")  # fmt: skip
+        yield Finding("correction-not-as-stated", text, after.name, Effect.INDETERMINATE)
+    else:
+        yield Finding("verified", f"predicted {told}.", after.name)
+
+
+def _between(balance: Balanced, before: Run, after: Run, rig: RigFile) -> np.ndarray:
+    """Standard uncertainty by plane (2,), kg m, of what a correction should have changed and did: the budget of the difference
+    of both runs, and the tolerances of the weights that were fixed in between."""
+    mass, angle = (rig.machine[name].standard_uncertainty for name in ("weight_mass", "weight_angle"))
+    own = np.zeros(2)
+    for w in after.weights:
+        if w not in before.weights:
+            own[w.plane] += (balance.radius * mass) ** 2 + (balance.radius * w.kg * angle) ** 2
+    pairs = zip(balance.parts[after.name], balance.parts[before.name], strict=True)
+    apart = np.array([(a - b).u for a, b in pairs]).reshape(2, 2)
+    return np.asarray(np.sqrt(own + (apart**2).sum(axis=1)))
+
+
+def sheet(recorded: Recorded, code: str, rig: RigFile, plan: Settings) -> Iterator[Finding]:
+    """The weights that stay on the shaft, for the operator."""
+    kept, radius = {w.number for w in recorded.on}, rig.geometry["balance_radius"].value
+    for w, purpose in recorded.fixed:
+        if w.number in kept:
+            degrees = math.degrees(w.angle) % 360
+            place = f" (position {round(degrees / 360 * plan.positions) % plan.positions})" if plan.positions else ""
+            text = (f"{purpose}: {w.kg * 1e3:.3f} g in the {SIDES[w.plane]} plane at {degrees:.1f}°{place} of its scale, "
+                    f"radius {radius * 1e3:g} mm ({w.kg * radius / G_MM:.2f} g mm), added. Angles are counted from y towards "
+                    "z, in the direction of rotation, while the scale's zero faces y.")  # fmt: skip
+            yield Finding(code, text, SIDES[w.plane])

@@ -1,0 +1,246 @@
+"""Deciding within a balancing: may a trial weight turn, did it act as it should, what corrects, is it enough.
+
+`acquire` decides by captures, the analysis says the same of the telemetry. Nothing here moves anything.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.analysis.balance import bound, split
+from bench.calibration import Calibration
+from bench.findings import Effect, Finding
+from bench.rigfile import RigFile
+from bench.uncertainty import propagate
+from procedures.balance import estimates
+from procedures.balance.estimates import Balanced
+from procedures.balance.solution import Trials
+from procedures.balance.steps import SIDES, Read, Run, Weight
+from procedures.unbalance import bearings, runout
+from procedures.unbalance.runout import Stand
+from procedures.unbalance.steps import RPM
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+LEAST = 0.5  # of what it should do, by the forces: less, and a trial weight moved nothing
+OFF, ASTRAY = 0.25, 0.25  # of a weight: size, and what shows in the other plane
+TURNED_RAD, SLIPPED_RAD = math.radians(12), math.radians(15)
+SURE = 3.0  # of its u: a turn that what is known of the stand does not make
+JUST_RAD = 1e-6
+LIGHTER = 0.25  # of the planned trial weight: what is allowed beside a shaft that moves far; u = 1 mg is 4 % of 25 mg
+MILLIGRAM = 1e-6  # kg
+LIGHTEST_KG = 1e-6  # what a laboratory balance still tells from nothing
+
+
+class Settings(estimates.Settings, Protocol):
+    """The part of a plan that decides."""
+
+    @property
+    def law(self) -> str: ...
+    @property
+    def speeds_rad_s(self) -> tuple[float, ...]: ...
+    @property
+    def max_share(self) -> float: ...
+    @property
+    def positions(self) -> int: ...
+    @property
+    def trial_kg(self) -> tuple[float, float]: ...
+
+
+def gain(rig: RigFile, plan: Settings, plane: int) -> float:
+    """Greatest response of a probe to an unbalance in a plane on the way to the highest speed, m/(kg m): a rigid shaft in the
+    loop that the controller's gains are meant to make, s^2 + k2 s + k1 in each degree of freedom."""
+    stand = Stand.of({n: e.value for n, e in bearings.stated(rig, plan).items()})
+    p = {n: q.default for n, q in rig.parameters.items()}
+    if plan.law == "PID":
+        means = np.concatenate([np.zeros(4), np.full(8, p["bias"])])
+        plus, minus, k_x = runout.slopes(stand, means)
+        force = float((plus - minus)[[0, 2]].sum())
+        k1, k2 = (force * p["kp"] - float(k_x[[0, 2]].sum())) / stand.mass, force * p["kd"] / stand.mass
+    else:
+        k1, k2 = p["k1"], p[f"k2_{plan.law.lower()}"]
+    w = np.linspace(1.0, max(plan.speeds_rad_s), 400)
+    most = float((w**2 / np.abs(k1 - w**2 + 1j * w * k2)).max())
+    arm = (-stand.l_iu, stand.l_ou)[plane]
+    return most * max(abs(1 / stand.mass + arm * at / stand.inertia) for at in (-stand.l_is, stand.l_os))
+
+
+def allowed_kg(rig: RigFile, plan: Settings, plane: int, before: float = 0.0) -> float:
+    """The greatest trial weight whose predicted response, beside `before` m that is there, stays within the plan's share of
+    the least clearance and the envelope."""
+    c, radius = rig.geometry["clearance"], rig.geometry["balance_radius"].value
+    room = plan.max_share * (c.value - math.sqrt(3) * c.standard_uncertainty) - before
+    return float(min(max(room, 0.0) / gain(rig, plan, plane) / radius, rig.envelope.max_trial_weight_kg))
+
+
+def trial_kg(rig: RigFile, plan: Settings, present: Run, plane: int) -> tuple[float, float]:
+    """The trial weight to fix beside what a run with the weights that are on the shaft now showed, kg, and the heaviest that is
+    allowed: the planned one, else the allowed one in whole milligrams; 0 where that is too light to tell anything by."""
+    before = max(r.farthest for r in (*present.reads, *([present.again] if present.again else [])))
+    planned, allowed = plan.trial_kg[plane], allowed_kg(rig, plan, plane, before)
+    if planned <= allowed:
+        return planned, allowed
+    lighter = math.floor(allowed / MILLIGRAM) * MILLIGRAM
+    return (lighter if lighter >= LIGHTER * planned else 0.0), allowed
+
+
+def slow_runout(
+    slow: Read | None, base: Run, rig: RigFile, plan: Settings, model: Calibration | None = None
+) -> Complex:  # fmt: skip
+    """Runout (4,) m by the slow roll and the forces; none without one. `model` is the bearings' adopted calibration."""
+    if slow is None:
+        return np.zeros(4, complex)
+    stand = Stand.of({n: e.value for n, e in bearings.stated(rig, plan, model).items()})
+    return runout.found(stand, {1.0: slow.turning}, base.fastest.turning).runout[1.0]
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A trial `weight`, and by speed and plane (s, 2) what the forces say that it `added`, over what it should; the angle from
+    the mark to the scale's zero is still in it. `turn_u` (s,) rad: of the angle at a speed against that at the highest."""
+
+    weight: Weight
+    added: Complex
+    turn_u: Callable[[int], float]
+
+
+def shown(
+    before: Run, having: Run, weight: Weight, rig: RigFile, plan: Settings, model: Calibration | None = None
+) -> Shown:  # fmt: skip
+    """What the forces say of a weight; runout cancels. `model` is the bearings' adopted calibration."""
+    u = weight.unbalance(rig.geometry["balance_radius"].value)
+    pairs = list(zip(before.reads, having.reads, strict=True))
+    inputs = bearings.stated(rig, plan, model)
+
+    def added(s: Stand, k: int) -> Complex:
+        none = np.zeros(4, complex)
+        a, b = (runout.unbalances(s, read.turning, none)[0] for read in pairs[k])
+        return np.asarray((b - a) / u)
+
+    def turn_u(k: int) -> float:
+        """Near the rigid modes a share of the forces counts several times: at 4000 r/min gap, offsets and betas make 9°."""
+
+        def turn(v: Mapping[str, float]) -> float:
+            s = Stand.of(v)
+            return float(np.angle(added(s, k)[weight.plane] / added(s, -1)[weight.plane]))
+
+        return propagate(turn, inputs).u
+
+    nominal = Stand.of({name: e.value for name, e in inputs.items()})
+    return Shown(weight, np.array([added(nominal, k) for k in range(len(pairs))]), turn_u)
+
+
+def of_trial(trial: Shown) -> Iterator[Finding]:
+    """Did a trial weight do what it should, in its own plane, at every speed alike?"""
+    weight, added = trial.weight, trial.added
+    p, where, name = (
+        weight.plane,
+        f"trial {SIDES[weight.plane]}",
+        f"{weight.kg * 1e3:g} g in the {SIDES[weight.plane]} plane",
+    )
+    own, other = float(np.abs(added[-1, p])), float(np.abs(added[-1, 1 - p]))
+    if own < LEAST and other < LEAST:
+        text = (f"the trial weight of {name} moved nothing: by the forces it acts as {own:.0%} of itself. Is it mounted, and "
+                "was it there while the shaft turned? No correction is given.")  # fmt: skip
+        yield Finding("trial-moved-nothing", text, where, Effect.ERROR)
+    elif own < LEAST:
+        text = (f"the trial weight of {name} acts in the {SIDES[1 - p]} plane, as {other:.0%} of itself: it sits in the wrong "
+                "plane.")  # fmt: skip
+        yield Finding("weight-in-other-plane", text, where, Effect.ERROR)
+    elif abs(own - 1) > OFF or other > ASTRAY:
+        text = (f"by the forces the trial weight of {name} acts as {own:.0%} of itself there and as {other:.0%} in the other "
+                "plane: suspect its mass or its place, or an unbalance that changed as it was mounted.")  # fmt: skip
+        yield Finding("weight-not-as-stated", text, where, Effect.ERROR)
+    turns = np.abs(np.angle(added[:, p] / added[-1, p])) if own >= LEAST else np.zeros(1)
+    k, turn = int(np.argmax(turns)), float(turns.max())
+    if turn > SLIPPED_RAD and turn > SURE * trial.turn_u(k):
+        text = (f"what the trial weight of {name} adds is turned by {math.degrees(turn):.0f}° from one speed to another: it is "
+                "loose.")  # fmt: skip
+        yield Finding("weight-loose", text, where, Effect.ERROR)
+
+
+def of_trials(inboard: Shown, outboard: Shown) -> Iterator[Finding]:
+    """Both weights sit on one scale: the same angle from the mark."""
+    first, second = inboard.added, outboard.added
+    turn = float(np.angle(second[-1, 1] / first[-1, 0]))
+    if abs(turn) > TURNED_RAD and min(abs(first[-1, 0]), abs(second[-1, 1])) >= LEAST:
+        text = (f"by the forces the trial weights' scales are turned against each other by {math.degrees(turn):+.0f}°: one of "
+                "the weights sits at another angle than stated, or the planes' scales do not agree.")  # fmt: skip
+        yield Finding("weight-angle", text, "trials", Effect.ERROR)
+
+
+def slipped(run: Run) -> Iterator[Finding]:
+    """The slowest speed again at the end of a run: what turned with the shaft must be the same."""
+    if run.again is None:
+        return
+    a, b = run.reads[0].vectors.values[:4], run.again.vectors.values[:4]
+    noise = 2.5 * np.hypot(run.reads[0].vectors.u_amplitude[:4], run.again.vectors.u_amplitude[:4])
+    over = np.abs(b - a) - noise - np.maximum(0.1 * np.abs(a), 0.3e-6)
+    k = int(np.argmax(over))
+    if over[k] > 0:
+        turn = math.degrees(float(np.angle(b[k] / a[k])))
+        text = (f"between the first and the last dwell at {run.reads[0].speed * RPM:.0f} r/min a vector went from "
+                f"{abs(a[k]) * 1e6:.2f} to {abs(b[k]) * 1e6:.2f} µm 0-pk and turned by {-turn:+.0f}° of lag: ")  # fmt: skip
+        if run.weights:
+            yield Finding("weight-loose", text + "a weight has slipped or come off at speed.", run.name, Effect.ERROR)
+        else:
+            yield Finding("response-changed", text + "suspect a part that came loose, or a shaft that bent.", run.name,
+                          Effect.ERROR)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Correction:
+    """Weights to fix by plane as (plane, kg, angle rad); `reached`: none is needed; `too_heavy` kg, where one is."""
+
+    weights: tuple[tuple[int, float, float], ...]
+    reached: bool
+    too_heavy: float = 0.0
+
+
+def reached(balance: Balanced, name: str) -> tuple[bool, bool]:
+    """Of each plane, whether the farthest point of the 95 % region of a run's unbalance lies within U_per."""
+    found = balance.unbalance[name]
+    inside = [bound(found.one(p)) <= balance.permissible[p].value for p in (0, 1)]
+    return inside[0], inside[1]
+
+
+def correction(balance: Balanced, name: str, rig: RigFile, plan: Settings) -> Correction:
+    """What takes the unbalance of a run away, at the plan's positions where it has some."""
+    if all(reached(balance, name)):
+        return Correction((), reached=True)
+    wanted: list[tuple[int, float, float]] = []
+    for p, u in enumerate(balance.unbalance[name].values):
+        for part in split(-complex(u), plan.positions):
+            kg = abs(part) / balance.radius
+            if kg >= LIGHTEST_KG:
+                wanted.append((p, kg, _told(float(np.angle(part)), plan.positions)))
+    heaviest = max((kg for _, kg, _ in wanted), default=0.0)
+    most = rig.envelope.max_trial_weight_kg
+    return Correction(tuple(wanted), reached=False, too_heavy=heaviest if heaviest > most else 0.0)
+
+
+def _told(angle: float, positions: int) -> float:
+    """As the operator is told it, rad from 0 to below a whole turn, which rounding alone may make of an angle just below 0."""
+    whole = 2 * math.pi
+    if positions:
+        return round(angle / whole * positions) % positions * whole / positions
+    return angle % whole if whole - angle % whole > JUST_RAD else 0.0
+
+
+def trials_of(runs: Sequence[Run], rig: RigFile, leave: bool) -> Trials | None:
+    """The trials among runs in order, None where one is missing."""
+    named = {r.name: r for r in runs}
+    names = ["base", *(f"trial {s}" for s in SIDES)]
+    if any(n not in named for n in names):
+        return None
+    base, i, o = (named[n] for n in names)
+    if not i.weights or not o.weights:
+        return None
+    return Trials(base, (base, i if leave else base), (i, o), (i.weights[-1], o.weights[-1]),
+                  rig.geometry["balance_radius"].value)  # fmt: skip

@@ -1,0 +1,251 @@
+"""Unbalance of the shaft on the scale of its planes, with influences: from trial weights, slow roll and certificates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.analysis.balance import allocated, permissible
+from bench.analysis.vectors import Vectors
+from bench.calibration import Calibration
+from bench.rigfile import RigFile
+from bench.uncertainty import Estimate, Influence, propagate, welch_satterthwaite
+from bench.uncertainty.estimate import merged
+from procedures.balance import scatter as balance_scatter
+from procedures.balance.solution import Solved, Trials, solved, taken
+from procedures.balance.steps import SIDES, Read, Run, Weight
+from procedures.balance.vector_length import amount
+from procedures.shared.certificates import certified
+from procedures.unbalance import bearings, estimates, runout
+from procedures.unbalance.runout import Stand, Turning
+from procedures.unbalance.steps import AXES
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+BENDING = 0.1  # of (omega/omega_1)^2: docs/reference/balance.md, Uncertainty, as the next
+NONLINEAR = 3.0  # of (X/gap)^2
+
+
+class Settings(Protocol):
+    """The part of a plan that the estimates need."""
+
+    @property
+    def beta_share(self) -> float: ...
+    @property
+    def offset_u_m(self) -> float: ...
+    @property
+    def bending_hz(self) -> float: ...
+    @property
+    def refit_u_kg_m(self) -> float: ...
+    @property
+    def grade_m_s(self) -> float: ...
+    @property
+    def service_rad_s(self) -> float: ...
+
+
+@dataclass(frozen=True)
+class Balanced:
+    """Nominal solution; of each run the unbalance by plane as `vectors` (2,) kg m on the scale and its `parts` re, im by plane
+    (4,); U_per of each plane, kg m."""
+
+    trials: Trials
+    solved: Solved
+    unbalance: Mapping[str, Vectors]
+    parts: Mapping[str, tuple[Estimate, ...]]
+    permissible: tuple[Estimate, Estimate]
+    radius: float
+
+
+def fixed(weights: Sequence[Weight], radius: float) -> Complex:
+    """Sum of weights by plane, (2,) kg m."""
+    out = np.zeros(2, complex)
+    for w in weights:
+        out[w.plane] += w.unbalance(radius)
+    return out
+
+
+def balanced(
+    slow: Read | None, runs: Sequence[Run], trials: Trials, rig: RigFile, plan: Settings, model: Calibration | None = None
+) -> Balanced:  # fmt: skip
+    """Unbalance of every run in `runs`, with influences shared by their identity; `model` is the bearings' adopted calibration.
+
+    Certificates and the bearings' model go through the whole model, scatter through its linear part.
+    """
+    radius = rig.geometry["balance_radius"].value
+    known = {
+        **bearings.stated(rig, plan, model),
+        **_weights(trials, rig),
+        **_bending(),
+        **_nonlinear(trials, rig),
+        **(_unmeasured(rig) if slow is None else {}),
+    }
+
+    speeds = np.array([r.speed for r in trials.base.reads])
+    near = (speeds / (2 * math.pi * plan.bending_hz)) ** 2 if plan.bending_hz else 0 * speeds
+
+    def solve(v: Mapping[str, float]) -> tuple[Stand, Solved]:
+        s = Stand.of(v)
+        some = [(complex(v[f"kg_{p}"] * v["radius"] * np.exp(1j * v[f"angle_{p}"])), _turnings(trials.before[p]),
+                 _turnings(trials.having[p])) for p in (0, 1)]  # fmt: skip
+        found = solved(s, None if slow is None else slow.turning, some, _turnings(trials.base))
+        if slow is None:
+            lost = taken(s, _turnings(trials.base), _unknown(v), found.mark)
+            found = replace(found, taken=found.taken + lost)
+        bent = np.array([[v[f"bending_{j}{k}"] for k in (0, 1)] for j in (0, 1)])
+        return s, replace(found, taken=found.taken + near[:, None] * (found.taken @ bent.T))
+
+    def parted(v: dict[str, float]) -> dict[str, float]:
+        s, found = solve(v)
+        out: dict[str, float] = {}
+        for run in runs:
+            u = found.unbalance(_readings(run) / s.gain)
+            whole = replace(found, taken=0 * found.taken).unbalance(_readings(run) / s.gain)
+            u = u + whole * [complex(v[f"nonlinear_re_{p}"], v[f"nonlinear_im_{p}"]) for p in (0, 1)]
+            out |= {f"{run.name}/{k}": float(x) for k, x in enumerate(u.view(np.float64))}
+        return out
+
+    out = propagate(parted, known)
+    stand, nominal = solve({name: e.value for name, e in known.items()})
+    parts = {}
+    for run in runs:
+        scatter = balance_scatter.of_run(stand, nominal, slow, run, trials, plan.refit_u_kg_m)
+        parts[run.name] = tuple(
+            Estimate(e.value, "kg m", merged(((1.0, e), *more)))
+            for e, more in zip((out[f"{run.name}/{k}"] for k in range(4)), scatter, strict=True)
+        )
+    return Balanced(
+        trials, nominal, {name: _vectors(p) for name, p in parts.items()}, parts, permitted(rig, plan), radius
+    )
+
+
+def _turnings(run: Run) -> list[Turning]:
+    return [r.turning for r in run.reads]
+
+
+def _readings(run: Run) -> Complex:
+    return np.array([r.vectors.values[:4] for r in run.reads])
+
+
+def _unmeasured(rig: RigFile) -> dict[str, Estimate]:
+    """Runout that nobody measured, by what the rig file says of it; both probes of a plane see the same journal."""
+    u = rig.machine["runout"].standard_uncertainty
+    names = [f"{part}_{b}" for b in "io" for part in ("re", "im")]
+    return {f"unknown_{n}": Estimate.of(0.0, Influence(f"runout/{n}", "runout, no slow roll", u, "m", "B", "normal"))
+            for n in names}  # fmt: skip
+
+
+def _unknown(v: Mapping[str, float]) -> Complex:
+    i, o = (v[f"unknown_re_{b}"] + 1j * v[f"unknown_im_{b}"] for b in "io")
+    return np.array([i, -1j * i, o, -1j * o])
+
+
+def _bending() -> dict[str, Estimate]:
+    """By how much the shaft's bending changes the unbalance that a runout is taken for, over (omega/omega_1)^2, plane by plane:
+    what the modes add to the rigid shaft's response, over that response, changes with their shapes at probes and planes,
+    which nobody states."""
+    names = [f"{j}{k}" for j in (0, 1) for k in (0, 1)]
+    return {f"bending_{n}": Estimate.of(0.0, Influence(f"bending/{n}", "bending of the shaft", BENDING, "1", "B", "normal"))
+            for n in names}  # fmt: skip
+
+
+def _nonlinear(trials: Trials, rig: RigFile) -> dict[str, Estimate]:
+    """How far influence coefficients may be those of another amplitude: forces go as 1/gap^2, so that what the runs with trial
+    weights say of the slope differs from that of a shaft at rest by some (X/gap)^2, X the greatest amplitude in them."""
+    far = max(float(np.abs(_readings(r)).max()) for r in (*trials.before, *trials.having))
+    u = NONLINEAR * (far / rig.geometry["amb_gap"].value) ** 2
+    return {
+        f"nonlinear_{part}_{p}": Estimate.of(
+            0.0, Influence(f"nonlinear/{side}/{part}", f"response not linear, {side}", u, "1", "B", "normal"))
+        for p, side in enumerate(SIDES) for part in ("re", "im")
+    }  # fmt: skip
+
+
+def _weights(trials: Trials, rig: RigFile) -> dict[str, Estimate]:
+    """Trial weights as the balance says and the scale shows; all sit at one radius."""
+    out = {"radius": certified("geometry/balance_radius", rig.geometry["balance_radius"], "radius of the weights")}
+    for p, w in enumerate(trials.weights):
+        for name, key, value, what in (
+            ("kg", "weight_mass", w.kg, "mass"), ("angle", "weight_angle", w.angle, "angle")
+        ):  # fmt: skip
+            t = rig.machine[key]
+            off = Influence(f"weight/{w.number}/{name}", f"{what} of the trial weight, {SIDES[p]}",
+                            t.standard_uncertainty, t.unit, "B", t.distribution, source=t.source)  # fmt: skip
+            out[f"{name}_{p}"] = Estimate.of(value, off)
+    return out
+
+
+def _linear(e: Estimate) -> Estimate:
+    return Estimate(e.value, "kg m", e.sensitivities)
+
+
+def _vectors(parts: Sequence[Estimate]) -> Vectors:
+    values = np.array([parts[2 * k].value + 1j * parts[2 * k + 1].value for k in range(len(parts) // 2)])
+    return Vectors(values, estimates.covariance(parts), min(welch_satterthwaite(e) for e in parts))
+
+
+def permitted(rig: RigFile, plan: Settings) -> tuple[Estimate, Estimate]:
+    """U_per of each plane (ISO 21940-11), kg m, uncertain by the rotor's mass and the planes' places."""
+    inputs = {"mass": certified("machine/mass", rig.machine["mass"]),
+              "left": certified("geometry/com_to_inboard_balance", rig.geometry["com_to_inboard_balance"]),
+              "right": certified("geometry/com_to_outboard_balance", rig.geometry["com_to_outboard_balance"])}  # fmt: skip
+
+    def model(v: dict[str, float]) -> dict[str, float]:
+        i, o = allocated(permissible(plan.grade_m_s, v["mass"], plan.service_rad_s), v["left"], v["right"])
+        return {"i": i, "o": o}
+
+    out = propagate(model, inputs)
+    return _linear(out["i"]), _linear(out["o"])
+
+
+def share(balance: Balanced, name: str, plane: int) -> Estimate:
+    """Amount of a run's unbalance in a plane over U_per, with all influences of both."""
+    ratio = amount(*balance.parts[name][2 * plane : 2 * plane + 2]) / balance.permissible[plane]
+    return Estimate(ratio.value, "1", ratio.sensitivities, ratio.sampler)
+
+
+def influences(balance: Balanced, rig: RigFile) -> dict[tuple[str, str], tuple[Estimate, Estimate]]:
+    """Influence coefficients at the highest speed by probe and plane, cosine and sine, m/(kg m): scatter of both runs, the
+    trial weight, and the probe's gain."""
+    out = {}
+    radius = certified("geometry/balance_radius", rig.geometry["balance_radius"], "radius of the weights")
+    known = _weights(balance.trials, rig)
+    for p, side in enumerate(SIDES):
+        before, having = balance.trials.before[p], balance.trials.having[p]
+        scatter = [balance_scatter.of_read(f"{r.name}/{len(r.reads) - 1}", r.fastest, 4) for r in (before, having)]
+        for k, axis in enumerate(AXES):
+            parts = [scatter[n][2 * k + j] for n in (0, 1) for j in (0, 1)]
+            inputs = {"a": parts[0], "b": parts[1], "c": parts[2], "d": parts[3], "kg": known[f"kg_{p}"],
+                      "angle": known[f"angle_{p}"], "radius": radius,
+                      "gain": certified(f"sensors/pos_{axis}/gain", rig.sensors[f"pos_{axis}"].gain,
+                                        f"gain of pos_{axis}")}  # fmt: skip
+
+            def model(v: dict[str, float]) -> dict[str, float]:
+                u = v["kg"] * v["radius"] * v["gain"] * np.exp(1j * v["angle"])
+                z = complex((v["c"] - v["a"] + 1j * (v["d"] - v["b"])) / u)
+                return {"cos": z.real, "sin": -z.imag}
+
+            found = propagate(model, inputs)
+            out[axis, side] = tuple(
+                Estimate(found[n].value, "m/(kg m)", found[n].sensitivities) for n in ("cos", "sin")
+            )
+    return out  # type: ignore[return-value]
+
+
+@dataclass(frozen=True)
+class Forces:
+    """Of a dwell, what `unbalance_checks` looks at: share of the forces left over, share of the weight carried (4,)."""
+
+    misfit: float
+    carried: Array
+
+
+def forces(read: Read, off: Complex, rig: RigFile, plan: Settings, model: Calibration | None = None) -> Forces:
+    """The balance of forces of one dwell, with a runout (4,) m; `model` is the bearings' adopted calibration."""
+    s = Stand.of({name: e.value for name, e in bearings.stated(rig, plan, model).items()})
+    _, misfit = runout.unbalances(s, read.turning, off)
+    return Forces(misfit, runout.carried(s, read.means) / estimates.shares(rig, s))

@@ -1,0 +1,129 @@
+"""What a balancing draws: vectors of every run at the probes, weights on the planes' scales, what is left against U_per."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.analysis.balance import G_MM
+from bench.analysis.sampling import lag_deg
+from bench.analysis.vectors import region
+from bench.figures import Figure, Series, Sheet, Shown
+from procedures.balance.checks import Evaluated
+from procedures.balance.estimates import Balanced
+from procedures.balance.steps import BASE, SIDES
+from procedures.unbalance.steps import AXES, RPM
+
+Complex = npt.NDArray[np.complex128]
+UM = 1e6
+FIRST = {"inboard": 0, "outboard": 2}  # probe y of each plane
+TURN = np.linspace(0, 2 * np.pi, 181)
+
+
+def all_figures(found: Evaluated) -> Iterator[Shown]:
+    """In the order of the report."""
+    balance = found.balance
+    if balance is None or found.recorded is None:
+        return
+    yield _weights(found, balance)
+    yield _before_and_after(found, balance)
+    for p, side in enumerate(SIDES):
+        yield _residual(balance, found.last, p, side)
+    for p, side in enumerate(SIDES):
+        yield _sheet(found, balance, p, side)
+    for side, probe in FIRST.items():
+        yield _vectors(found, balance, side, probe)
+
+
+def _weights(found: Evaluated, balance: Balanced) -> Sheet:
+    """What was fixed, in order."""
+    assert found.recorded is not None
+    on = {w.number for w in found.recorded.on}
+    rows = tuple(
+        (purpose, SIDES[w.plane], f"{1e3 * w.kg:.3f}", f"{np.degrees(w.angle) % 360:.1f}",
+         f"{abs(w.unbalance(balance.radius)) / G_MM:.2f}", "on the shaft" if w.number in on else "taken off")
+        for w, purpose in found.recorded.fixed
+    )  # fmt: skip
+    head = ("Weight", "Plane", "mass (g)", "angle (°)", "unbalance (g mm)", "now")
+    return Sheet("weights", "Weights", f"At a radius of {1e3 * balance.radius:.1f} mm, on the scales of the planes: from y "
+                 "towards z, in the direction of rotation.", head, rows, (2, 3, 4))  # fmt: skip
+
+
+def _before_and_after(found: Evaluated, balance: Balanced) -> Sheet:
+    """Unbalance as found and as left, against the permissible one."""
+    rows = []
+    for p, side in enumerate(SIDES):
+        before, after = (abs(complex(balance.unbalance[name].values[p])) / G_MM for name in (BASE, found.last))
+        per = balance.permissible[p].value / G_MM
+        rows.append((side, f"{before:.2f}", f"{after:.2f}", f"{per:.2f}", f"{100 * after / per:.0f} %"))
+    head = ("Plane", "as found (g mm)", "as left (g mm)", "permissible (g mm)", "as left / permissible")
+    return Sheet("before-after", "Unbalance before and after", "Their intervals stand in the results.", head, tuple(rows),
+                 (1, 2, 3, 4))  # fmt: skip
+
+
+def _vectors(found: Evaluated, balance: Balanced, side: str, probe: int) -> Figure:
+    """A probe's vectors at the highest speed, one arrow a run, and the reading that would be left of runout alone."""
+    assert found.recorded is not None
+    runs = found.recorded.runs
+    speed = runs[0].fastest.speed * RPM
+    tips = [(r.name, complex(r.fastest.vectors.values[probe])) for r in runs]
+    alone = complex(balance.solved.influence[-1, probe] @ balance.solved.taken[-1])
+    tips.append(("no unbalance, runout alone", alone))
+    series = [
+        Series(f"{name}, {UM * abs(z):.2f} µm ∠{lag_deg(z):.0f}°", np.array([-np.angle(z)] * 2), np.array([0.0, UM * abs(z)]),
+               "both")
+        for name, z in tips
+    ]  # fmt: skip
+    return Figure(
+        f"vectors-{side}", f"Vectors of order 1 at probe {AXES[probe]}, {speed:.0f} r/min, by run",
+        f"As read, zero to peak, runout included; the angle is the phase lag from the once-per-turn mark, against "
+        f"the rotation. "
+        f"A balanced shaft would read what the runout alone leaves. Probe {AXES[probe + 1]} shows the same a quarter turn "
+        "later.",
+        "phase lag", "µm 0-pk", tuple(series), "vectors",
+    )  # fmt: skip
+
+
+def _residual(balance: Balanced, last: str, p: int, side: str) -> Figure:
+    """What each verified run left, with its 95 % ellipse, in the circle of U_per."""
+    per = balance.permissible[p].value / G_MM
+    names = [name for name in balance.unbalance if name.startswith("check")] or [last]
+    series = [Series("U_per", per * np.cos(TURN), per * np.sin(TURN), "guide")]
+    notes: list[tuple[str, float, float]] = []
+    for name in names:
+        one = balance.unbalance[name].one(p)
+        outline, z = region(one, 121) / G_MM, complex(one.values[0]) / G_MM
+        series.append(Series(f"{name}, 95 %", outline.real, outline.imag))
+        series.append(Series(name, np.array([z.real]), np.array([z.imag]), "mark"))
+        notes.append((f"{name}: {abs(z):.2f} g mm", z.real, z.imag))
+    return Figure(
+        f"residual-{side}", f"Residual unbalance {side} against the permissible one",
+        f"On the scale of the {side} plane: to the right along its zero, upwards a quarter turn on (from y towards z, in the "
+        f"direction of rotation). It is reached where the whole ellipse lies within the circle of U_per = {per:.2f} g mm.",
+        "along the scale's zero (g mm)", "a quarter turn on (g mm)", tuple(series), "plane", notes=tuple(notes),
+    )  # fmt: skip
+
+
+def _sheet(found: Evaluated, balance: Balanced, p: int, side: str) -> Figure:
+    """Unbalance as found and the weights that were fixed, as vectors on the scale."""
+    assert found.recorded is not None
+    points = [("unbalance as found", complex(balance.unbalance[BASE].values[p]))]
+    points += [(purpose, w.unbalance(balance.radius)) for w, purpose in found.recorded.fixed if w.plane == p]
+    points = [(name, z / G_MM) for name, z in points]
+    series = [
+        Series(f"{name}, {abs(z):.2f} g mm ∠{np.degrees(np.angle(z)) % 360:.0f}°", np.array([0.0, z.real]),
+               np.array([0.0, z.imag]), "both")
+        for name, z in points
+    ]  # fmt: skip
+    top = 1.4 * max(abs(z) for _, z in points)
+    series.append(Series("scale", top * np.cos(TURN), top * np.sin(TURN), "guide"))
+    notes = [(f"{k}°", top * np.cos(np.radians(k)), top * np.sin(np.radians(k))) for k in range(0, 360, 90)]
+    return Figure(
+        f"sheet-{side}", f"Unbalance and weights {side}",
+        f"On the scale of the {side} plane: its 0° faces y while the shaft stands with its zero there; angles grow from y "
+        "towards z, in the direction of rotation. Weights are added, at the radius of the plane. A trial weight is on "
+        "the shaft in its own run alone, unless the plan leaves it.",
+        "along the scale's zero (g mm)", "a quarter turn on (g mm)", tuple(series), "plane", notes=tuple(notes),
+    )  # fmt: skip

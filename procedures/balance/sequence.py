@@ -1,0 +1,185 @@
+"""How a balancing goes on: runs with and without weights, decisions in between, weights fixed on the landed shaft."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from bench.errors import AnalysisError
+from bench.recorder import Recorder
+from bench.rig import Rig
+from bench.roles import Plane, RigState
+from bench.states import transition
+from procedures.amb_rotor import lift
+from procedures.balance import decision, estimates
+from procedures.balance.steps import (
+    BASE,
+    CAPTURED,
+    DECISION,
+    LIGHTER,
+    MOUNT,
+    REFUSED,
+    SIDES,
+    UNMOUNT,
+    Read,
+    Run,
+    Weight,
+    read_capture,
+)
+from procedures.unbalance import bearings as unbalance_bearings
+from procedures.unbalance import dwelling
+from procedures.unbalance.steps import CONTACT, DWELL, SLOW
+
+if TYPE_CHECKING:
+    from procedures.balance.procedure import Plan
+
+SLOW_HZ = 500.0  # of the slow roll's capture
+
+
+@dataclass
+class Work:
+    """A balancing under way: what is on the shaft, what was read so far."""
+
+    rig: Rig
+    plan: Plan
+    record: Recorder
+    mounted: list[Weight] = field(default_factory=list)
+    runs: list[Run] = field(default_factory=list)
+    slow: Read | None = None
+    fixed: int = 0
+    dwells: int = 0
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Look, lift and nudge; slow roll and base run; a run with a trial weight in each plane; corrections, each verified."""
+    work = Work(rig, plan, record)
+    if not lift.probed(rig, record):
+        return
+    dwelling.put(rig, {"law": dwelling.CODES[plan.law], **dwelling.SETTINGS["off"]})
+    if not _rolled(work) or not _run(work, BASE):
+        return
+    for p, side in enumerate(SIDES):
+        kg, allowed = decision.trial_kg(rig.file, plan, work.runs[-1 if plan.leave else 0], p)
+        if kg < plan.trial_kg[p]:
+            record.event(LIGHTER if kg else REFUSED, plane=side, kg=plan.trial_kg[p], allowed_kg=kg or allowed)
+        if not kg:
+            return
+        _mount(work, p, kg, plan.trial_angle_rad[p], "trial")
+        if not _run(work, f"trial {side}") or not _acted(work, p):
+            return
+        if not plan.leave:
+            _unmount(work, p)
+    _correct(work)
+
+
+def _rolled(work: Work) -> bool:
+    """The slow roll, where the plan has one."""
+    rig, plan = work.rig, work.plan
+    if not plan.slow_rad_s:
+        return True
+    if not lift.turned(rig, work.record, plan.slow_rad_s, plan.settle_s):
+        dwelling.finished(rig)
+        return False
+    work.slow = _dwell(work, SLOW, BASE, plan.slow_rad_s, plan.slow_s, plan.slow_s, SLOW_HZ)
+    if work.slow is None:
+        dwelling.finished(rig)
+    return work.slow is not None
+
+
+def _run(work: Work, name: str) -> bool:
+    """Levitated, all speeds, the lowest again, stopped and landed; False where it was not completed or not sound."""
+    rig, plan = work.rig, work.plan
+    if rig.levitation.state is RigState.READY:  # the base run goes on from the slow roll
+        transition(rig, RigState.LEVITATED)
+    dwelling.put(rig, {"law": dwelling.CODES[plan.law], **dwelling.SETTINGS["off"]})
+    reads: list[Read] = []
+    speeds = sorted(plan.speeds_rad_s)
+    for speed in (*speeds, *(speeds[:1] if plan.repeat else ())):
+        if not lift.turned(rig, work.record, speed, plan.settle_s):
+            break
+        read = _dwell(work, DWELL, name, speed, plan.dwell_s, plan.capture_s, None, again=len(reads) == len(speeds))
+        if read is None or not read.sound or abs(read.speed / speed - 1) > plan.max_speed_error:
+            break  # the analysis says why
+        reads.append(read)
+    dwelling.finished(rig)
+    transition(rig, RigState.READY)
+    if len(reads) < len(speeds) + plan.repeat:
+        return False
+    run = Run(name, tuple(work.mounted), tuple(reads[: len(speeds)]), reads[-1] if plan.repeat else None)
+    work.runs.append(run)
+    return not list(decision.slipped(run))
+
+
+def _dwell(
+    work: Work, kind: str, name: str, speed: float, seconds: float, capture_s: float, rate_hz: float | None,
+    again: bool = False,
+) -> Read | None:  # fmt: skip
+    """A recorded dwell and what its capture says, None where that cannot be told."""
+    rig, number = work.rig, -1 if again else work.dwells
+    assert rig.capture is not None  # `check` refuses a rig without one
+    driven = rig.drive.speed_rad_s if rig.drive is not None else 0.0
+    labels = {"speed_rad_s": speed, "variant": name, "driven_rad_s": driven, "number": number, "again": again}
+    with work.record.step(kind, **labels):
+        rig.capture.arm(CAPTURED, seconds=capture_s, rate_hz=rate_hz)
+        rig.capture.wait(capture_s + 5.0)
+        rig.clock.sleep(max(seconds - capture_s, dwelling.MARGIN_S))
+    work.dwells += 1
+    touched = int(rig.levitation.reading("flags")) & CONTACT
+    data = rig.capture.upload(run=name, speed_rad_s=speed)
+    try:
+        return None if touched else read_capture(data, kind == SLOW)
+    except AnalysisError:
+        return None  # of the pulses; the analysis says what is wrong with them
+
+
+def _mount(work: Work, plane: int, kg: float, angle: float, purpose: str) -> None:
+    """Have a weight fixed; the shaft is landed."""
+    side: Plane = "inboard" if plane == 0 else "outboard"
+    with work.record.step(MOUNT, plane=side, kg=kg, angle_rad=angle, purpose=purpose):
+        really = work.rig.operator.attach(side, kg, angle)
+        if really != (kg, angle):
+            kg, angle = really
+            work.record.correct(kg=kg, angle_rad=angle)
+    work.fixed += 1
+    work.mounted.append(Weight(plane, kg, angle, work.fixed))
+
+
+def _unmount(work: Work, plane: int) -> None:
+    """Have every weight of a plane taken off."""
+    side: Plane = "inboard" if plane == 0 else "outboard"
+    with work.record.step(UNMOUNT, plane=side):
+        work.rig.operator.detach(side)
+    work.mounted = [w for w in work.mounted if w.plane != plane]
+
+
+def _acted(work: Work, plane: int) -> bool:
+    """Whether the trial weight of the last run did what it should."""
+    base, last = work.runs[0], work.runs[-1]
+    before = work.runs[-2] if work.plan.leave else base
+    bearings = unbalance_bearings.adopted_bearings(work.record)
+    shown = decision.shown(before, last, last.weights[-1], work.rig.file, work.plan, bearings)
+    return not list(decision.of_trial(shown))
+
+
+def _correct(work: Work) -> None:
+    """Corrections, each with its verification run, until it is reached or the plan allows no more."""
+    rig, plan = work.rig.file, work.plan
+    trials = decision.trials_of(work.runs, rig, plan.leave)
+    assert trials is not None
+    bearings = unbalance_bearings.adopted_bearings(work.record)
+    by_plane = zip(trials.before, trials.having, trials.weights, strict=True)
+    inboard, outboard = (decision.shown(*of, rig, plan, bearings) for of in by_plane)
+    if list(decision.of_trials(inboard, outboard)):
+        return
+    present = work.runs[-1] if plan.leave else trials.base
+    for n in range(plan.corrections):
+        found = estimates.balanced(work.slow, [present], trials, rig, plan, bearings)
+        needed = decision.correction(found, present.name, rig, plan)
+        work.record.event(DECISION, run=present.name, reached=needed.reached, too_heavy_kg=needed.too_heavy)
+        if needed.reached or needed.too_heavy or not needed.weights:  # what is missing is not a matter of weights
+            return
+        for plane, kg, angle in needed.weights:
+            _mount(work, plane, kg, angle, f"correction {n + 1}")
+        if not _run(work, f"check {n + 1}"):
+            return
+        present = work.runs[-1]

@@ -1,0 +1,175 @@
+"""One adjustment of everything that the positions depend on: force constants, offsets, and the certificates' numbers.
+
+The positions overdetermine the force constants and offsets: they also say something of the gap, the spring and the sensors,
+and what they say fits the certificates or does not. So all are adjusted together, each certified number t as an observation of
+itself, with its own standard uncertainty u:
+
+    sum over axes and positions of (F_model(beta, offset, t) - F_carries(t))^2 / s^2  +  sum over t of ((t - t_cert) / u)^2
+
+is made least. s is the noise of a position's mean force with what the model is not trusted with, or what the adjustment
+leaves if that is more. The trust is in the weights alone: the scatter that a result is said to have is that of the noise, or of
+what the adjustment leaves. Near the solution the result is linear in what was certified: with the normal matrix H,
+d(result)/d(t_cert) = (H^-1)_t / u^2, so that each certificate is an influence by identity, and a wrong one acts as little
+as the positions let it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import linalg
+
+from bench.errors import AnalysisError
+from bench.uncertainty import Estimate
+from procedures.amb_rotor import magnetics
+from procedures.amb_rotor.magnetics import AXES, Positions
+from procedures.shared.leastsquares import Fit
+from procedures.shared.type_a import scatter
+
+Array = npt.NDArray[np.float64]
+BETA_UNIT, OFFSET_UNIT = 1e-7, 1e-5  # of the terms within the adjustment
+ROUNDS, SMALL = 30, 1e-3  # steps at most; the last one, in standard deviations of what is observed
+TOLD = 0.05  # u of an adjustment over the certificate's, below which the positions say nothing of that number
+STEP = 0.3  # of the numerical slopes, in standard uncertainties
+
+
+@dataclass(frozen=True)
+class Adjusted:
+    """`estimates` of beta_*, offset_* and the gap; `values` of all inputs as adjusted.
+
+    By input, `moved` is the adjustment over the certificate's u, `pulls` over its own, standard normal where the
+    certificates hold. `terms` (4, 2) beta and offset; `residuals` (4, N) N, model less force.
+    """
+
+    estimates: dict[str, Estimate]
+    values: dict[str, float]
+    pulls: dict[str, float]
+    moved: dict[str, float]
+    terms: Array
+    residuals: Array
+
+
+@dataclass(frozen=True)
+class _Problem:
+    means: Positions
+    values: dict[str, float]
+    names: tuple[str, ...]  # inputs that are not exact
+    u: Array
+
+    def inputs(self, t: Array) -> dict[str, float]:
+        shifts = t * self.u
+        return self.values | {n: self.values[n] + float(d) for n, d in zip(self.names, shifts, strict=True)}
+
+    def left(self, x: Array) -> Array:
+        """Model less force (4 N,) of the unknowns `x`: eight terms, then the inputs' shifts over their u."""
+        p = self.inputs(x[8:])
+        s = magnetics.statics(self.means, p)
+        terms = x[:8].reshape(4, 2)
+        rows = [
+            magnetics.magnet(b * BETA_UNIT, o * OFFSET_UNIT, p["gap"], s.r[k], s.p[k], s.n[k]) - s.force[k]
+            for k, (b, o) in enumerate(terms)
+        ]
+        return np.concatenate(rows)
+
+    def slopes(self, x: Array) -> Array:
+        """(4 N, unknowns), by central differences."""
+        out = []
+        for k in range(len(x)):
+            step = np.zeros(len(x))
+            step[k] = STEP if k >= 8 else 1e-3
+            out.append((self.left(x + step) - self.left(x - step)) / (2 * step[k]))
+        return np.array(out).T
+
+
+def adjust(
+    means: Positions, inputs: Mapping[str, Estimate], noise_N: Array, weighed_N: Array, starts: Array
+) -> Adjusted:
+    """`inputs` as `bearing.statics` wants them, and the gap; `noise_N` (4,) of a position's mean, `weighed_N` (4,) the same
+    with what the model is not trusted with; `starts` (4, 2) terms.
+
+    Raises:
+        AnalysisError: no solution.
+    """
+    names = tuple(n for n, e in inputs.items() if e.u > 0)
+    problem = _Problem(means, {n: e.value for n, e in inputs.items()}, names, np.array([inputs[n].u for n in names]))
+    count = means.read.shape[1]
+    x = np.concatenate([(starts / [BETA_UNIT, OFFSET_UNIT]).ravel(), np.zeros(len(names))])
+    x = _least(problem, x, weighed_N)
+    left = problem.left(x).reshape(4, count)
+    spread = np.sqrt((left**2).sum(axis=1) / (count - 2))
+    weighed = np.maximum(weighed_N, spread)
+    if (spread > weighed_N).any():
+        x = _least(problem, x, weighed)
+    return _adjusted(problem, inputs, x, weighed, np.maximum(noise_N, spread))
+
+
+def _least(problem: _Problem, x: Array, noise: Array) -> Array:
+    """By Gauss and Newton's steps, of the stacked problem: its normal matrix would lose half of the digits."""
+    prior = np.eye(len(x))[8:]
+    per = np.repeat(1 / noise, problem.means.read.shape[1])
+    for _ in range(ROUNDS):
+        design = np.vstack([problem.slopes(x) * per[:, None], prior])
+        scale = np.sqrt((design**2).sum(axis=0))
+        step = np.linalg.lstsq(design / scale, -np.concatenate([problem.left(x) * per, x[8:]]), rcond=None)[0] / scale
+        if not np.isfinite(step).all():
+            break
+        x = x + step
+        if float(np.abs(design @ step).max()) < SMALL:
+            return x
+    raise AnalysisError("the positions and the certificates have no solution together")
+
+
+def _inverse(design: Array) -> Array:
+    """(design' design)^-1, by an orthogonal decomposition.
+
+    Raises:
+        AnalysisError: columns that depend on each other.
+    """
+    scale = np.sqrt((design**2).sum(axis=0))
+    r = np.linalg.qr(design / scale, mode="r")
+    if np.abs(np.diag(r)).min() < 1e-9:
+        raise AnalysisError("the positions do not determine the force constants and offsets")
+    upper = linalg.solve_triangular(r, np.eye(len(r)))
+    out: Array = upper @ upper.T / np.outer(scale, scale)
+    return out
+
+
+def _adjusted(problem: _Problem, inputs: Mapping[str, Estimate], x: Array, weighed: Array, noise: Array) -> Adjusted:
+    count, size = problem.means.read.shape[1], len(x)
+    slopes, left = problem.slopes(x), problem.left(x).reshape(4, count)
+    weighted = slopes * np.repeat(1 / weighed, count)[:, None]
+    inverse = _inverse(np.vstack([weighted, np.eye(size)[8:]]))
+    units = np.concatenate([np.tile([BETA_UNIT, OFFSET_UNIT], 4), problem.u])
+    values = problem.inputs(x[8:])
+    rows = {f"{what}_{a}": 2 * k + j for k, a in enumerate(AXES) for j, what in enumerate(("beta", "offset"))}
+    rows["gap"] = 8 + problem.names.index("gap")
+    estimates = {}
+    for name, row in rows.items():
+        value = float(x[row] * units[row]) if row < 8 else values["gap"]
+        shares = inverse[row, 8:] * units[row] / problem.u
+        estimates[name] = Estimate.exact(value) + _certified(problem, inputs, shares)
+    terms = (x[:8] * units[:8]).reshape(4, 2)
+    random = weighted * np.repeat(noise / weighed, count)[:, None]
+    by_noise = inverse @ (random.T @ random) @ inverse * np.outer(units, units)
+    for k, a in enumerate(AXES):
+        of = slice(2 * k, 2 * k + 2)
+        rows_of_k = slopes[k * count : (k + 1) * count, of] / units[of]
+        fit = Fit(terms[k], by_noise[of, of], -left[k], float(left[k] @ left[k]), count - 2, rows_of_k)
+        gradients = {f"beta_{a}": [1, 0], f"offset_{a}": [0, 1]}
+        noisy = scatter(fit, gradients, f"bearing-model/{a}", f"scatter of the positions, {a}")
+        estimates |= {name: estimates[name] + e for name, e in noisy.items()}
+    known = np.sqrt(np.maximum(1 - np.diag(inverse)[8:], 0.0))  # u of an adjustment, over the certificate's
+    moved = {n: float(v) for n, v in zip(problem.names, x[8:], strict=True)}
+    pulls = {n: moved[n] / float(k) for n, k in zip(problem.names, known, strict=True) if k > TOLD}
+    return Adjusted(estimates, values, pulls, moved, terms, left)
+
+
+def _certified(problem: _Problem, inputs: Mapping[str, Estimate], shares: Array) -> Estimate:
+    """What the certificates' errors do to a result that moves by `shares` of them."""
+    total = Estimate.exact(0.0)
+    for name, share in zip(problem.names, shares, strict=True):
+        total = total + (inputs[name] - inputs[name].value) * float(share)
+    return total

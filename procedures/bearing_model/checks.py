@@ -1,0 +1,169 @@
+"""What can be wrong with eccentric positions besides the wiring: signals, and models that do not describe the machine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Protocol
+
+import numpy as np
+
+from bench.findings import Effect, Finding
+from bench.uncertainty import Estimate, Influence, coverage_factor, welch_satterthwaite
+from procedures.amb_rotor import magnetics
+from procedures.amb_rotor.magnetics import AXES
+from procedures.amb_rotor.places import CURRENTS, POSITIONS, Held
+from procedures.bearing_model.comparison import BEARINGS
+from procedures.bearing_model.estimates import Analysis
+from procedures.shared import signals
+
+FATAL = (
+    "stuck-channel",
+    "clipped",
+    "contact",
+    "sensor-polarity",
+    "planes-exchanged",
+    "axes-exchanged",
+    "set-point-not-followed",
+    "coils-exchanged",
+    "gravity-reversed",
+    "model-fails",
+)
+"""Findings after which the numbers mean nothing: none is given."""
+FLAGS = (
+    (1, "saturated", "a coil was at its current limit"),
+    (2, "saturated", "a coil was at its voltage limit"),
+    (4, "contact", "the shaft touched the inboard touchdown ring"),
+    (8, "contact", "the shaft touched the outboard touchdown ring"),
+    (32, "contact", "the shaft touched the axial stop"),
+    (64, "clipped", "a position sensor was beyond its range"),
+)  # bits of the telemetry signal `flags`
+CONTRADICTED = 4.0  # times its u may an adjustment be: one rig in some hundred by chance, of about fifty inputs
+ALIKE = 0.9  # of the greatest: inputs that act alike are suspected together
+
+
+class Tolerances(Protocol):
+    """The part of a plan that these checks need."""
+
+    @property
+    def average_s(self) -> float: ...
+    @property
+    def max_speed_m_s(self) -> float: ...
+    @property
+    def max_misfit(self) -> float: ...
+    @property
+    def min_ratio(self) -> float: ...
+    @property
+    def max_lost(self) -> float: ...
+    @property
+    def coupled(self) -> bool: ...
+
+
+def of_signals(held: Held, tilted: Held, plan: Tolerances) -> Iterator[Finding]:
+    """Lost samples, stuck channels, flags, and a shaft that moves within a step."""
+    yield from signals.losses(held.lost, held.expected, plan.max_lost, held.where)
+    yield from signals.stuck(held.spread, (*POSITIONS, *CURRENTS))
+    yield from _flags(held, tilted)
+    speed = np.abs([held.drift[c] for c in POSITIONS]).max(axis=0) / (plan.average_s / 2)
+    if speed.max() > plan.max_speed_m_s:
+        text = (
+            f"the shaft moves at up to {speed.max() * 1e6:.2g} µm/s within a step, {plan.max_speed_m_s * 1e6:.2g} µm/s "
+            "are allowed: its weight is not what the magnets carry alone. Settle longer."
+        )
+        yield Finding("unsettled", text, held.where(speed), Effect.INDETERMINATE)
+
+
+def _flags(held: Held, tilted: Held) -> Iterator[Finding]:
+    for bit, code, text in FLAGS:
+        effect = Effect.ERROR if code in FATAL else Effect.INDETERMINATE
+        for data in (held, tilted):
+            hit = (data.flags & bit) != 0
+            if hit.any():
+                said = f"{text} in {int(hit.sum())} of {hit.size} positions"
+                yield Finding(code, said, data.where(hit.astype(float)), effect)
+
+
+def of_results(a: Analysis, plan: Tolerances) -> Iterator[Finding]:
+    """The gap that the data ask for, the offset's sign, and the comparison with the linear model."""
+    yield from _adjustments(a, plan)
+    for axis in AXES:
+        offset = a.estimates[f"offset_{axis}"]
+        if offset.value + expanded(offset) < 0:
+            text = (
+                f"axis {axis}: the shaft is {-offset.value * 1e6:.0f} µm below the magnetic centre where the sensors "
+                "read zero; this stand's offsets are above it, towards the coils that carry. Either the stand was "
+                "changed, or a sign is wrong (T Table 2.2 prints one that goes with gravity above zero)."
+            )
+            yield Finding("offset-against-load", text, axis, Effect.INDETERMINATE, (f"beta_{axis}", f"offset_{axis}"))
+    for end, where in BEARINGS.items():
+        ratio = min(a.estimates[f"{k}_{where}"].value for k in ("misfit_ratio", "misfit_ratio_means"))
+        if ratio < plan.min_ratio:
+            text = (
+                f"{where} AMB: the linear model leaves {ratio:.3g} times what the nonlinear one does, at least "
+                f"{plan.min_ratio:g} is expected: the offset does not show at this bias, or the nonlinear model fits no "
+                "better."
+            )
+            axes = [a for a in AXES if a.endswith(end)]
+            doubted = tuple(f"{q}_{a}" for q in ("beta", "offset") for a in axes)  # the ratio itself is what it is
+            yield Finding("linear-suffices", text, where, Effect.INDETERMINATE, doubted)
+    yield _compared(a)
+
+
+def _compared(a: Analysis) -> Finding:
+    """The linear model's two numbers beside the bearing's slopes, and the noise under both residual sums."""
+    said = []
+    for axis, f in a.fits.items():
+        k, stiffness = magnetics.slopes(f.terms, a.adjusted.values["gap"], a.bias_A)
+        one, two = f.linear.terms
+        true = f"true slopes {k:.3g} and {stiffness * 1e-3:.3g}"
+        said.append(f"{axis}: {one:.3g} N/A and {two * 1e-3:.3g} N/mm, {true}")
+    sample, batch = (1e3 * max(x[k] for x in a.noise_N.values()) for k in (0, 1))
+    text = (
+        f"the linear model without intercept (T 2.9) is no model of the slopes: {'; '.join(said)}. Residual sums are "
+        f"over {a.samples} samples with {sample:.2g} mN of noise ({batch:.2g} mN in a batch's mean)."
+    )
+    return Finding("models-compared", text)
+
+
+def expanded(e: Estimate) -> float:
+    """k u for 95 %; for a judgement the shape of the distribution is not worth a Monte Carlo."""
+    return coverage_factor(welch_satterthwaite(e)) * e.u
+
+
+def _adjustments(a: Analysis, plan: Tolerances) -> Iterator[Finding]:
+    """Do the positions fit the certificates, and what is left then?"""
+    pulls = a.adjusted.pulls
+    worst = max(abs(v) for v in pulls.values())
+    if worst > CONTRADICTED:
+        suspects = sorted((n for n, v in pulls.items() if abs(v) >= ALIKE * worst), key=lambda n: -abs(pulls[n]))
+        listed = ", ".join(_told(a, name) for name in suspects[:4])
+        spring = "" if plan.coupled else " The plan says that the coupling is off: is it?"
+        text = f"the positions contradict a certificate by {worst:.1f} standard deviations. Suspect: {listed}.{spring}"
+        yield Finding("certificate-contradicted", text, _influence(a, suspects[0]).id, Effect.INDETERMINATE)
+    for k, axis in enumerate(AXES):
+        load, left = float(np.abs(a.statics.force[k]).mean()), np.abs(a.adjusted.residuals[k])
+        if left.max() > plan.max_misfit * load:
+            text = (
+                f"axis {axis}: one position is {left.max() / load:.1%} of its load off the nonlinear model with everything "
+                f"adjusted ({plan.max_misfit:.1%} allowed), at {a.held.where(left)}. A position that was disturbed, or a "
+                "reading that is not proportional."
+            )
+            place = BEARINGS[axis[-1]]
+            doubted = (f"beta_{axis}", f"offset_{axis}", f"misfit_ratio@{place}", f"misfit_ratio_means@{place}")
+            yield Finding("misfit", text, axis, Effect.INDETERMINATE, doubted)
+    gap, drawing = a.adjusted.estimates["gap"], a.inputs["gap"]
+    left = 1e3 * float(np.sqrt((a.adjusted.residuals**2).mean()))
+    text = (
+        f"gap {gap.value * 1e6:.1f} ± {expanded(gap) * 1e6:.1f} µm (95 %), the drawing has {drawing.value * 1e6:.1f} ± "
+        f"{expanded(drawing) * 1e6:.1f} µm; the adjustment leaves {left:.2g} mN rms; the certificate that is "
+        f"contradicted most is {_told(a, max(pulls, key=lambda n: abs(pulls[n])))}"
+    )
+    yield Finding("adjusted", text)
+
+
+def _told(a: Analysis, name: str) -> str:
+    return f"{_influence(a, name).name} ({a.adjusted.pulls[name]:+.1f})"
+
+
+def _influence(a: Analysis, name: str) -> Influence:
+    """The one that an input has: certificates are influences by themselves."""
+    return next(iter(a.inputs[name].sensitivities))

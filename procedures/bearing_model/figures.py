@@ -1,0 +1,93 @@
+"""What the bearing-model run draws: where the shaft stood, currents over position, both models' residuals, adjustments."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from bench.figures import Figure, Series
+from bench.rigfile import RigFile
+from procedures.amb_rotor import magnetics
+from procedures.amb_rotor.magnetics import AXES
+from procedures.bearing_model.estimates import Analysis
+
+DISPLACEMENT = "displacement at the AMB (µm)"
+
+
+def all_figures(a: Analysis, rig: RigFile) -> list[Figure]:
+    """In the order of the report."""
+    return [_places(a, rig), _currents(a), *_residuals(a), _forces(a), _adjustments(a)]
+
+
+def _places(a: Analysis, rig: RigFile) -> Figure:
+    turn = np.linspace(0, 2 * np.pi, 181)
+    radius = 1e6 * rig.geometry["clearance"].value
+    yi, zi, yo, zo = (1e6 * a.held.mean[f"pos_{axis}"] for axis in AXES)
+    series = (
+        Series("touchdown ring", radius * np.cos(turn), radius * np.sin(turn), "guide"),
+        Series("inboard", yi, zi, "points"),
+        Series("outboard", yo, zo, "points"),
+    )
+    caption = "Where the sensors saw the shaft at each position, within the touchdown ring."
+    return Figure("positions", "Positions of the shaft", caption, "y (µm)", "z (µm)", series, kind="plane")
+
+
+def _currents(a: Analysis) -> Figure:
+    control = (a.statics.p - a.statics.n) / 2
+    series = (Series(axis, 1e6 * a.statics.r[k], control[k], "points") for k, axis in enumerate(AXES))
+    caption = (
+        "Half the difference of both coils' currents that carries the shaft, over the displacement at the AMB. "
+        "It falls towards the upper coils, which pull by themselves; there is one row of points for each bias."
+    )
+    title = "Control current over position"
+    return Figure("currents", title, caption, DISPLACEMENT, "control current (A)", tuple(series))
+
+
+def _residuals(a: Analysis) -> Iterator[Figure]:
+    """As T Table 2.2 in a picture: the same scale would hide the nonlinear model's."""
+    load = 1e3 * float(np.abs(a.statics.force).mean())
+    caption = f"Force that carries less the model's, of each position; the load of an axis is {load:.0f} mN on average."
+    of_linear = {axis: f.linear.residuals for axis, f in a.fits.items()}
+    of_nonlinear = {axis: -f.residuals for axis, f in a.fits.items()}
+    for key, name, at, residuals in (
+        ("residuals-linear", f"linear model without intercept (T 2.9) at {a.bias_A:g} A", a.compared, of_linear),
+        ("residuals-nonlinear", "nonlinear model (T 2.8)", a.statics, of_nonlinear),
+    ):
+        series = tuple(Series(axis, 1e6 * at.r[k], 1e3 * residuals[axis], "points") for k, axis in enumerate(AXES))
+        title = f"Residuals of the {name}"
+        yield Figure(key, title, caption, DISPLACEMENT, "residual (mN)", series, lines=(("zero", 0.0),))
+
+
+def _forces(a: Analysis) -> Figure:
+    """Force of the magnets at equal currents over position: the fit's, and the linear model's line."""
+    axis, bias = "yi", a.bias_A
+    k, f = AXES.index(axis), a.fits[axis]
+    r = np.linspace(float(a.compared.r[k].min()), float(a.compared.r[k].max()), 60)
+    both = np.full_like(r, bias)
+    pull = magnetics.magnet(f.beta, f.offset, a.adjusted.values["gap"], r, both, both)
+    series = (
+        Series("nonlinear, no control current", 1e6 * r, pull),
+        Series("linear, no control current", 1e6 * r, f.linear.terms[1] * r),
+        Series("force that carries", 1e6 * a.compared.r[k], a.compared.force[k], "points"),
+    )
+    caption = (
+        f"Pull of both coils at {bias:g} A over the displacement at the AMB, by both models; the points are what "
+        "gravity and spring need. The offset pulls where the sensors read zero; the linear model has no such pull, "
+        "and its slope is what the rest of its fit makes of that."
+    )
+    return Figure("forces", f"Force of axis {axis} at the bias", caption, DISPLACEMENT, "force (N)", series)
+
+
+def _adjustments(a: Analysis) -> Figure:
+    moved = a.adjusted.moved
+    at = np.arange(1.0, len(moved) + 1)
+    most = sorted(moved, key=lambda name: -abs(moved[name]))[:3]
+    named = ", ".join(f"{name} ({list(moved).index(name) + 1}) {moved[name]:+.1f}" for name in most)
+    caption = (
+        "How far the positions move each certified number, over its standard uncertainty; beyond the lines they contradict "
+        f"the certificate, if they tell of it at all. The most: {named}."
+    )
+    series = (Series("adjustment", at, np.array(list(moved.values())), "points"),)
+    lines = (("+2 u", 2.0), ("−2 u", -2.0))
+    return Figure("adjustments", "Adjustments", caption, "number of the input", "adjustment (u)", series, lines=lines)

@@ -1,0 +1,266 @@
+"""Force constant and magnetic offset of the radial AMBs from eccentric positions (thesis 2.3, Table 2.2).
+
+Measurands, of each radial AMB and axis: beta of T (2.4b), and the offset: how far the shaft is from the
+magnetic centre, at the AMB's plane, where both sensors of that axis read zero (their mean over a turn). Beside them what the
+linear model without intercept, T (2.9), makes of the same data.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Iterator
+
+from pydantic import Field
+
+from bench.errors import DeviceFault, OperatorAbort
+from bench.figures import Figure
+from bench.findings import Finding
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.requires import Requires
+from bench.rig import Rig
+from bench.rigfile import RigFile
+from bench.roles import RigState
+from bench.states import transition
+from procedures.amb_rotor import rings
+from procedures.amb_rotor.magnetics import AXES
+from procedures.amb_rotor.places import CURRENTS, HOLD, LIFT, LIFT_LOST, POSITIONS, REST, TILT, Held, read_steps
+from procedures.bearing_model import checks, wiring
+from procedures.bearing_model import figures as drawn
+from procedures.bearing_model.comparison import BEARINGS, COMPARED
+from procedures.bearing_model.estimates import evaluate
+from procedures.shared import assumptions
+
+BETA = {a: Quantity(f"beta_{a}", "N m^2/A^2", f"force constant of axis {a}, at the same gap for all") for a in AXES}
+OFFSET = {
+    a: Quantity(f"offset_{a}", "m", f"axis {a}: from the magnetic centre to where the sensors read zero") for a in AXES
+}
+OF_LINEAR = {
+    "k_linear": Quantity("k_linear", "N/A", "K_i of the linear model without intercept (not a slope of the bearing)"),
+    "stiffness_linear": Quantity("stiffness_linear", "N/m", "K_xi of the linear model without intercept"),
+    "misfit": Quantity("misfit", "N^2", "sum of squared residuals of the nonlinear model, over all samples"),
+    "misfit_linear": Quantity("misfit_linear", "N^2", "sum of squared residuals of the linear model, over all samples"),
+    "misfit_ratio": Quantity("misfit_ratio", "1", "residual sum of the linear model over that of the nonlinear one"),
+    "misfit_ratio_means": Quantity(
+        "misfit_ratio_means",
+        "1",
+        "the same over batch means, where noise covers less",
+        title="misfit ratio of batch means",
+    ),
+}
+MEASURES = (*BETA.values(), *OFFSET.values(), *OF_LINEAR.values())
+CCS = 1.0
+REST_S = 0.3
+BIAS_STEP_A = 0.1
+MARGIN = 5e-6  # of the radius: noise, and what the controller swings on the way
+PARAMETERS = ("law", "bias", "integral", "ref_y", "ref_z", "ref_psi", "ref_theta", "slew", "current_limit")
+GEOMETRY = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_outboard_amb", "amb_span", "amb_gap", "clearance",
+            "com_to_coupling", "coupling_stiffness")  # fmt: skip
+MACHINE = ("mass", "radial_axes", "runout", "coupling_offset")
+REACHED = ("sensors/*", "!sensors/pos_*/offset", "!sensors/i_?o_p/gain", "geometry/amb_gap", "geometry/coupling_stiffness",
+           "geometry/com_to_coupling", "geometry/com_to_*_sensor")  # fmt: skip
+"""Certificates that the adjustment contradicts before an error of theirs moves a result by 2 U: where what one carries of a
+result's standard uncertainty is less than what the positions say of it, both as shares (docs/reference/bearing-model.md)."""
+ASKED = "Is the motor's coupling taken off the shaft, so that nothing but the AMBs holds it?"
+
+
+class Plan(BenchPlan):
+    """Settings, SI. Positions are a grid of the centre of mass in y and z, within a circle."""
+
+    spacing_m: float = Field(20e-6, gt=0)
+    radius_m: float = Field(82e-6, gt=0)
+    tilt_rad: float = Field(3e-4, gt=0)  # of the check of the wiring
+    biases_A: tuple[float, ...] = Field(
+        (1.15, 0.8), min_length=1
+    )  # of each pass; T Table 2.2 is compared with the first
+    coupled: bool = True  # False: the operator has taken the coupling off
+    settle_s: float = Field(0.6, gt=0)
+    average_s: float = Field(0.5, ge=0.1)
+    batches: int = Field(5, ge=2)  # parts of a step; longer than the loop's swings
+    max_speed_m_s: float = Field(5e-6, gt=0)  # a shaft that moves faster is not at rest
+    max_misfit: float = Field(0.005, gt=0)  # a position's residual over the mean load of its axis
+    min_ratio: float = Field(20.0, gt=1)  # of the residual sums, over samples and over batch means
+    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
+
+
+def settings(plan: Plan) -> dict[str, float]:
+    """Controller parameters that the runner writes before levitation: flatness with constant current sum."""
+    return {"law": CCS, "bias": plan.biases_A[0], "integral": 1.0}
+
+
+def grid(plan: Plan) -> list[tuple[float, float]]:
+    """Positions (y, z) within the circle, row by row to and fro, so that every move is a short one."""
+    n = math.floor(plan.radius_m / plan.spacing_m + 1e-9)
+    levels = [round(k * plan.spacing_m, 9) for k in range(-n, n + 1)]
+    rows = []
+    for k, z in enumerate(levels):
+        row = [(y, z) for y in levels if math.hypot(y, z) <= plan.radius_m * (1 + 1e-9)]
+        rows.append(row if k % 2 == 0 else row[::-1])
+    return list(itertools.chain.from_iterable(rows))
+
+
+def tilts(plan: Plan) -> list[tuple[float, float]]:
+    """(psi, theta) of the check of the wiring."""
+    t = plan.tilt_rad
+    return [(0.0, 0.0), (t, 0.0), (-t, 0.0), (0.0, t), (0.0, -t)]
+
+
+def step_count(plan: Plan) -> int:
+    """How many steps `acquire` records, for the progress display."""
+    return 2 + len(tilts(plan)) + len(plan.biases_A) * len(grid(plan))
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Look at the shaft on its rings, lift it, tilt it a little, then the grid at each bias."""
+    if not plan.coupled and not rig.operator.ask(ASKED):
+        raise OperatorAbort("the coupling is on the shaft; expected it off, or a plan with coupled = true")
+    with record.step(REST):
+        rig.clock.sleep(REST_S)
+    readings = {name: rig.levitation.reading(name) for name in POSITIONS}
+    if any(rings.of_readings(readings, rig.file)) or not _lifted(rig, record):
+        return
+    rig.clock.sleep(3 * plan.settle_s)
+    _tilted(rig, plan, record)
+    for k, bias in enumerate(plan.biases_A):
+        _biased(rig, plan, bias)
+        for y, z in grid(plan) if k % 2 == 0 else reversed(grid(plan)):
+            rig.levitation.set("ref_y", y)
+            rig.levitation.set("ref_z", z)
+            rig.clock.sleep(plan.settle_s)
+            with record.step(HOLD, y_m=y, z_m=z, bias_A=bias):
+                rig.clock.sleep(plan.average_s)
+    rig.levitation.set("ref_y", 0.0)
+    rig.levitation.set("ref_z", 0.0)
+    rig.clock.sleep(plan.settle_s)
+
+
+def _lifted(rig: Rig, record: Recorder) -> bool:
+    with record.step(LIFT):
+        try:
+            transition(rig, RigState.LEVITATED)
+        except DeviceFault as fault:
+            record.event(LIFT_LOST, fault=str(fault))
+            return False
+    return True
+
+
+def _biased(rig: Rig, plan: Plan, bias: float) -> None:
+    """In small steps: each one is a push, until the integrators have taken it up."""
+    before = rig.levitation.get("bias")
+    count = math.ceil(abs(bias - before) / BIAS_STEP_A - 1e-3)
+    for k in range(count):
+        rig.levitation.set("bias", before + (bias - before) * (k + 1) / count)
+        rig.clock.sleep(plan.settle_s / 2)
+    rig.clock.sleep(plan.settle_s if count else 0.0)
+
+
+def _tilted(rig: Rig, plan: Plan, record: Recorder) -> None:
+    write = rig.levitation.set
+    for psi, theta in tilts(plan):
+        write("ref_psi", psi)
+        write("ref_theta", theta)
+        rig.clock.sleep(plan.settle_s)
+        with record.step(TILT, psi_rad=psi, theta_rad=theta):
+            rig.clock.sleep(plan.average_s)
+    write("ref_theta", 0.0)
+
+
+def read(recording: Recording[Plan]) -> tuple[Held, Held]:
+    """The positions, and the tilts before them."""
+    batches = recording.plan.batches
+    return read_steps(recording, HOLD, ("y_m", "z_m", "bias_A"), batches), read_steps(
+        recording, TILT, ("psi_rad", "theta_rad"), batches
+    )
+
+
+def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
+    """Findings first (they decide what the numbers are worth), then each axis."""
+    if early := rings.before(recording):
+        yield from early
+        return
+    held, tilted = read(recording)
+    found = list(_of_data(recording, held, tilted))
+    yield from found
+    if any(f.code in checks.FATAL for f in found):
+        return
+    a = evaluate(recording, held)
+    yield from checks.of_results(a, recording.plan)
+    for axis in AXES:
+        yield BETA[axis].measured(a.estimates[f"beta_{axis}"])
+        yield OFFSET[axis].measured(a.estimates[f"offset_{axis}"])
+    for where in BEARINGS.values():
+        for name in COMPARED:
+            yield OF_LINEAR[name].measured(a.estimates[f"{name}_{where}"], where)
+
+
+def _of_data(recording: Recording[Plan], held: Held, tilted: Held) -> Iterator[Finding]:
+    plan, rig = recording.plan, recording.rig
+    found = [*checks.of_signals(held, tilted, plan), *wiring.of_wiring(held, tilted, rig)]
+    yield from found
+    if not any(f.code in checks.FATAL for f in found):
+        yield from wiring.of_models(held, tilted, rig, plan)
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts."""
+    places = len(grid(plan))
+    if places < 9:
+        yield f"spacing_m, radius_m: found {places} positions; expected nine or more"
+    g = rig.geometry
+    room = min(rings.room(rig), rig.envelope.max_levitated_position_m) - MARGIN
+    if plan.radius_m > room:
+        yield (
+            f"radius_m: found {plan.radius_m * 1e6:.1f} µm; the ring, the sensors' zeros and their runout leave "
+            f"{room * 1e6:.1f} µm"
+        )
+    for name in ("ref_y", "ref_z"):
+        if plan.radius_m > rig.parameters[name].high:
+            yield f"radius_m: found {plan.radius_m * 1e6:.1f} µm; {name} goes to {rig.parameters[name].high * 1e6:.0f} µm"
+    arm = max(g[k].value for k in ("com_to_inboard_sensor", "com_to_outboard_sensor"))
+    if plan.tilt_rad > rig.parameters["ref_psi"].high or plan.tilt_rad * arm > room:
+        yield f"tilt_rad: found {plan.tilt_rad * 1e6:.0f} µrad; reference and ring allow less"
+    allowed = rig.parameters["bias"]
+    low, high = allowed.low, min(allowed.high, rig.parameters["current_limit"].default / 2)
+    for bias in plan.biases_A:
+        if not low <= bias <= high:
+            yield (
+                f"biases_A: found {bias:g} A; parameter and amplifiers, which have to give twice that, leave {low:g} to "
+                f"{high:g} A"
+            )
+
+
+def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+    """Positions, currents, forces by both models and residuals; empty when the data carry no fit."""
+    if rings.before(recording):
+        return ()
+    held, tilted = read(recording)
+    if any(f.code in checks.FATAL for f in _of_data(recording, held, tilted)):
+        return ()
+    return drawn.all_figures(evaluate(recording, held), recording.rig)
+
+
+procedure = Procedure(
+    name="bearing-model",
+    title="Force constants and magnetic offsets of the radial AMBs by eccentric positioning",
+    measures=MEASURES,
+    state=RigState.READY,
+    plan=Plan,
+    acquire=acquire,
+    analyse=analyse,
+    figures=figures,
+    requires=Requires(
+        channels=(*POSITIONS, *CURRENTS, "flags"),
+        sensors=(*POSITIONS, *CURRENTS),
+        parameters=PARAMETERS,
+        geometry=GEOMETRY,
+        machine=MACHINE,
+    ),
+    check=check,
+    settings=settings,
+    step_count=step_count,
+    reached=REACHED,
+    assumes=assumptions.BEARING_MODEL,
+    method=read_method(__file__),
+)

@@ -1,0 +1,174 @@
+"""Compensation of disturbances at speed: vibration with and without it, and as it is switched on (T 3.5, Figs. 3.7 and 3.8).
+
+Measurands besides those of `unbalance`: by speed the reduction of the synchronous amplitude; how far it has fallen 0.15 s after
+the switch; what is left of mean and amplitude in steady state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+from pydantic import Field
+
+from bench.errors import AnalysisError
+from bench.figures import Shown
+from bench.findings import Effect, Finding
+from bench.procedure import Measured, Procedure, Quantity, read_method
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.rig import Rig
+from bench.rigfile import RigFile
+from bench.roles import RigState
+from procedures.amb_rotor import lift
+from procedures.compensation import checks, switching
+from procedures.compensation import figures as drawn
+from procedures.compensation.switching import SWITCH
+from procedures.shared import assumptions
+from procedures.unbalance import dwelling, hum
+from procedures.unbalance import figures as unbalance_figures
+from procedures.unbalance import procedure as unbalance
+from procedures.unbalance.dwelling import SETTINGS, Law, Variant
+from procedures.unbalance.steps import RPM
+
+REDUCTION = Quantity(
+    "reduction",
+    "1",
+    "of order 1 as the probes read it, root mean square of the four, by the compensation",
+    title="reduction of order 1",
+)
+DROP = Quantity("drop", "1", "the same, from before the switch to 0.15 s after it", title="reduction at the switch")
+RESIDUAL = Quantity(
+    "residual",
+    "m",
+    "greatest |mean| + order 1 (0-pk) of a probe's reading, over 50 turns after the switch",
+    title="reading after the switch",
+)
+MEASURES = (*unbalance.MEASURES, REDUCTION, DROP, RESIDUAL)
+WAITING = {"observer": 1.0, "compensate": 0.0, "integral": 0.0}  # the estimates run and do nothing
+AFTER_ARM_S = 0.05
+SAME = 1e-6  # of a speed
+
+
+class Plan(unbalance.Plan):
+    """Settings, SI; those of `unbalance` and some more."""
+
+    law: Law = "CCS"
+    variants: tuple[Variant, ...] = Field(("off", "corrected"), min_length=2)
+    literal_rad_s: tuple[float, ...] = (
+        2000 / RPM,
+        10000 / RPM,
+    )  # of these, where there is a dwell, the observer as printed too
+    judged_to_rad_s: float = Field(10001 / RPM, gt=0)  # the range of T 3.5; above it the reduction is told, not judged
+    switch_rad_s: float = Field(10000 / RPM, gt=0)
+    before_s: float = Field(0.2, ge=0.05)
+    after_s: float = Field(0.8, ge=0.2)
+
+    def at(self, speed: float) -> tuple[Variant, ...]:
+        """With the literal observer where the plan says so."""
+        tried = any(abs(speed / s - 1) < SAME for s in self.literal_rad_s)
+        return (*self.variants, "literal") if tried else self.variants
+
+
+def settings(plan: Plan) -> dict[str, float]:
+    """As for `unbalance`, with the poles of T 3.5."""
+    return unbalance.settings(plan)
+
+
+def step_count(plan: Plan) -> int:
+    """How many steps `acquire` records, for the progress display."""
+    return unbalance.step_count(plan) + 1
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Slow roll, dwells with each setting, the switch, the lowest speed again."""
+    if not dwelling.rolled(rig, plan, record):
+        return
+    if dwelling.dwelt(rig, plan, record) and _switched(rig, plan, record):
+        dwelling.repeated(rig, plan, record)
+    dwelling.finished(rig)
+
+
+def _switched(rig: Rig, plan: Plan, record: Recorder) -> bool:
+    """Switch the compensation on while the controller records."""
+    dwelling.put(rig, dwelling.SETTINGS["off"])
+    if rig.capture is None or not lift.turned(rig, record, plan.switch_rad_s, plan.settle_s):
+        return False
+    dwelling.put(rig, WAITING)
+    rig.clock.sleep(plan.settle_s)
+    with record.step(SWITCH, speed_rad_s=plan.switch_rad_s):
+        rig.capture.arm(switching.RECORDED, seconds=plan.before_s + AFTER_ARM_S + plan.after_s)
+        rig.clock.sleep(plan.before_s)
+        rig.levitation.set("compensate", dwelling.SETTINGS["corrected"]["compensate"])
+        rig.capture.wait(plan.after_s + 5.0)
+    rig.capture.upload(switch=1)
+    return True
+
+
+def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
+    """Findings first, then the quantities of each dwell, reductions, and the switch."""
+    found = recording.once(unbalance.evaluated)
+    yield from found.findings
+    if found.results is None:
+        return
+    reductions = checks.reductions(found.results)
+    yield from checks.told(found.results, reductions, recording.plan.judged_to_rad_s)
+    yield from unbalance.measured(found.results)
+    for result, estimate in reductions:
+        if result.dwell.variant == "corrected" and result.dwell.speed <= recording.plan.judged_to_rad_s:
+            yield REDUCTION.measured(estimate, f"{result.dwell.wanted * RPM:.0f} r/min")
+    try:
+        captured = switching.read_switch(recording)
+        switched = switching.of_switch(captured, recording.rig)
+    except AnalysisError as error:
+        yield Finding("no-switch", str(error), "", Effect.ERROR)
+        return
+    where = f"{recording.plan.switch_rad_s * RPM:.0f} r/min"
+    yield from hum.of_switch(hum.heard(recording, found.results.slow), captured, switched, where)
+    yield DROP.measured(switched["drop"], where)
+    yield RESIDUAL.measured(switched["residual"], where)
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts."""
+    yield from unbalance.check(rig, plan)
+    if plan.variants[:2] != ("off", "corrected") or plan.law == "PID":
+        yield "variants: expected off, then corrected, with law CCS or CAC; something must be compared"
+    if min(plan.speeds_rad_s) > plan.judged_to_rad_s:
+        yield (f"judged_to_rad_s: found {plan.judged_to_rad_s * RPM:.0f} r/min; every speed of the plan is above it, and no "
+               f"reduction would be measured: set it above {min(plan.speeds_rad_s) * RPM:.0f} r/min")  # fmt: skip
+    most = rig.envelope.max_speed_rad_s
+    if plan.switch_rad_s > most:
+        yield f"switch_rad_s: found {plan.switch_rad_s * RPM:.0f} r/min; the envelope allows {most * RPM:.0f} r/min"
+    if (plan.after_s - switching.WITHIN_S) * plan.switch_rad_s < 2 * 3.15 * (switching.TURNS_LEFT + 3):
+        yield f"after_s: found {plan.after_s:g} s; expected {switching.TURNS_LEFT + 3} turns beyond {switching.WITHIN_S} s"
+
+
+def figures(recording: Recording[Plan]) -> Iterable[Shown]:
+    """Those of `unbalance`, the reduction over the speed, and the switch."""
+    results = recording.once(unbalance.evaluated).results
+    if results is None:
+        return
+    yield from drawn.reductions(checks.reductions(results))
+    if recording.captures(switch=1):
+        yield from drawn.switched(switching.read_switch(recording))
+    yield from unbalance_figures.all_figures(results, recording.rig)
+
+
+procedure = Procedure(
+    name="compensation",
+    title="Compensation of unbalance: with and without it, and switched on",
+    measures=MEASURES,
+    state=RigState.READY,
+    plan=Plan,
+    acquire=acquire,
+    analyse=analyse,
+    figures=figures,
+    requires=replace(unbalance.REQUIRES, parameters=(*unbalance.REQUIRES.parameters, *SETTINGS["corrected"])),
+    check=check,
+    settings=settings,
+    step_count=step_count,
+    needs=unbalance.needs,
+    assumes=assumptions.UNBALANCE,
+    method=f"{unbalance.procedure.method}\n{read_method(__file__)}",
+)

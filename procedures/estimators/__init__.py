@@ -1,1 +1,0 @@
-"""Estimators that procedures share: pure functions on arrays, no clock, no file, no random numbers."""

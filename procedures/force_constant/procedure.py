@@ -1,0 +1,272 @@
+"""The motor's direct force constant, with the calibrated AMBs as load cells (thesis 6.6.2; 6.14a with the corrected sign).
+
+Measurand: change of the motor's force along an axis with that axis' current, as commutated at gamma = 0, mean over a full
+turn, rotor at rest at the sensors' zero: alpha_d vertically (dF_y/di_y) and alpha_dx horizontally (dF_x/di_x). The AMBs'
+forces come from the calibration's F(i) at the same rotor angles. The horizontal one rests on K_x = K_y within a stated
+asymmetry.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field
+
+from bench.calibration import Need
+from bench.figures import Figure
+from bench.findings import Effect, Finding
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.rig import Rig
+from bench.rigfile import RigFile
+from bench.roles import RigState
+from bench.uncertainty import Estimate
+from procedures.force_constant import checks, estimates, fit, load_at_rest
+from procedures.force_constant import figures as drawn
+from procedures.force_constant.estimates import AxisResult
+from procedures.force_constant.fit import TIME
+from procedures.force_constant.fitting import REQUIRES, check
+from procedures.force_constant.steps import STEP, RampData, read_ramps
+from procedures.shared import assumptions
+
+Array = npt.NDArray[np.float64]
+
+CALIBRATION = "amb-calibration"
+ALPHA_D = Quantity("alpha_d", "N/A", "motor: dF_y/di_y at gamma = 0, mean over a turn")
+ALPHA_DX = Quantity("alpha_dx", "N/A", "motor: dF_x/di_x at gamma = 0, mean over a turn, with K_x = K_y of the AMBs")
+MEASURES = (ALPHA_D, ALPHA_DX)
+
+
+class Plan(BenchPlan):
+    """Settings of the measurement, SI."""
+
+    levels_A: tuple[float, ...] = (-3.0, -1.5, 0.0, 1.5, 3.0)  # of i_y and i_x, ascending, of both signs
+    angles: int = Field(9, ge=3)  # equally spaced over a turn; those of the calibration
+    bias_A: float = Field(3.0, gt=0)  # that of the calibration
+    ramp_A_s: float = Field(2.0, gt=0)
+    settle_s: float = Field(2.0, gt=0)  # after each ramp
+    average_s: float = Field(1.0, ge=0.1)
+    max_position_m: float = Field(5e-8, gt=0)  # settled: |mean position| and its drift within a step
+    max_drift_A: float = Field(5e-3, gt=0)  # settled: drift of a control current within a step
+    max_wander_N: float = Field(0.3, gt=0)  # drift of the force at constant current over the whole run
+    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
+
+
+def settings(plan: Plan) -> dict[str, float]:
+    """Controller parameters that the runner writes before levitation."""
+    return {"bias_i": plan.bias_A, "bias_o": plan.bias_A, "i_ramp": plan.ramp_A_s}
+
+
+def needs(plan: Plan) -> tuple[Need, ...]:
+    """The AMBs' calibration at this bias and at these angles."""
+    return (Need(CALIBRATION, {"bias_A": plan.bias_A, "angles": float(plan.angles)}),)
+
+
+@dataclass(frozen=True)
+class Level:
+    """Both currents of a step in A, and whether each was reached by raising it (+1) or lowering it (-1)."""
+
+    i_y: float
+    i_x: float
+    branch_y: int
+    branch_x: int
+
+
+def sequence(plan: Plan) -> list[Level]:
+    """The levels at one angle: i_y from its least to its greatest and back, i_x a quarter of that period ahead.
+
+    i_y is mirrored in time, so that linear drift does not touch it, and i_x goes through all its levels between, so that
+    the two are orthogonal and one sequence gives both.
+    """
+    up = list(plan.levels_A)
+    triangle = up + up[-2:0:-1]
+    period, lead = len(triangle), (len(up) - 1) // 2
+
+    def step(k: int) -> tuple[float, int]:
+        now, before = triangle[k % period], triangle[(k - 1) % period]
+        return now, 1 if now > before else -1
+
+    return [Level(y, x, by, bx) for k in range(period + 1) for (y, by), (x, bx) in [(step(k), step(k + lead))]]
+
+
+def step_count(plan: Plan) -> int:
+    """How many steps `acquire` records, for the progress display."""
+    return plan.angles * len(sequence(plan))
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Ramp both currents through their levels at each angle; between the angles the motor gives no force."""
+    now = {"i_x": 0.0, "i_y": 0.0}
+
+    def ramp(**currents: float) -> None:
+        way = max(abs(value - now[name]) for name, value in currents.items())
+        for name, value in currents.items():
+            rig.levitation.set(name, value)
+        now.update(currents)
+        rig.clock.sleep(way / plan.ramp_A_s)
+
+    for turn in range(plan.angles):
+        angle = 2 * math.pi * turn / plan.angles
+        rig.rotation.point(angle)
+        for level in sequence(plan):
+            ramp(i_y=level.i_y, i_x=level.i_x)
+            rig.clock.sleep(plan.settle_s)
+            with record.step(STEP, angle_rad=angle, i_y_A=level.i_y, i_x_A=level.i_x,
+                             branch_y=level.branch_y, branch_x=level.branch_x):  # fmt: skip
+                rig.clock.sleep(plan.average_s)
+        ramp(i_y=0.0, i_x=0.0)
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Everything the measurements, findings and figures are made of. `alone`: the vertical result as if the calibration
+    had passed on nothing but values and uncertainties."""
+
+    data: RampData
+    inputs: Mapping[str, Estimate]
+    y: AxisResult
+    x: AxisResult
+    alone: AxisResult
+
+
+@lru_cache(maxsize=1)
+def ramps_of(recording: Recording[Plan]) -> RampData:
+    """The steps. Kept, because findings and fits both need them."""
+    return read_ramps(recording)
+
+
+@lru_cache(maxsize=1)
+def evaluate(recording: Recording[Plan]) -> Analysis:
+    """Both axes with their influences. Kept, because measurements, facts and figures all need it."""
+    plan, rig, data = recording.plan, recording.rig, ramps_of(recording)
+    facts = recording.calibration(CALIBRATION).values
+    count = len(data.vertical.angles)
+    shared = estimates.fact_inputs(facts, count)
+    y_inputs = {**estimates.rig_inputs(rig, "y"), **shared}
+    x_inputs = {**estimates.rig_inputs(rig, "x"), **shared}
+    y = estimates.axis_result(data.vertical, y_inputs, plan.bias_A)
+    x = estimates.axis_result(data.horizontal, x_inputs, plan.bias_A)
+    unshared = {**y_inputs, **estimates.taken_alone(facts, count)}
+    return Analysis(data, y_inputs, y, x, estimates.axis_result(data.vertical, unshared, plan.bias_A))
+
+
+def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
+    """Findings first (they decide what the numbers are worth), then both constants."""
+    data = ramps_of(recording)
+    found = list(checks.of_signals(data, recording.plan))
+    yield from found
+    if any(f.code in checks.FATAL for f in found):
+        return
+    a = evaluate(recording)
+    if not any(f.code == "unsettled" for f in found):  # or the fit would be blamed for what moves
+        yield from contradictions(recording, a)
+    yield from _ripple(recording.rig, recording.plan)
+    yield from _notes(recording.rig, a)
+    yield ALPHA_D.measured(a.y.mean)
+    yield ALPHA_DX.measured(a.x.mean)
+
+
+def contradictions(recording: Recording[Plan], a: Analysis) -> Iterator[Finding]:
+    """Checks of the fits: the load at rest, wires, rows, levels, drift, axes."""
+    plan, known = recording.plan, recording.calibration(CALIBRATION).values
+    rest = load_at_rest.compared(a.data.vertical, a.inputs, known, recording.rig, a.y.weight, plan.bias_A)
+    yield from checks.load_moved(rest, 2 * a.y.mean.u)
+    vertical: list[Finding] = []
+    for axis, result in (("y", a.y), ("x", a.x)):
+        wrong = list(checks.exchanged(axis, result.fit.terms)) or list(_fits(axis, result, a, plan))
+        drift = list(checks.wander(axis, *_drift(result), a.data, plan))
+        yield from drift
+        if axis == "y" or not vertical:  # the horizontal constants rest on the vertical ones
+            yield from wrong
+        vertical = vertical or wrong
+    yield from checks.axes_disagree(a.y.mean, a.x.mean)
+
+
+def _fits(axis: str, result: AxisResult, a: Analysis, plan: Plan) -> Iterator[Finding]:
+    parts, dof = estimates.differences(result), fit.scatter(result.fit)[1]
+    hint = estimates.suspect(a.data.vertical, a.inputs, plan.bias_A, result) if axis == "y" else ""
+    mean, rows = estimates.mean_of(parts), tuple(e.value for e in result.row_means)
+    apart = checks.beyond(estimates.chi_squared(parts), len(parts), dof)
+    yield from checks.rows_disagree(axis, (rows[0], rows[1]), mean.value / mean.u, apart, hint)
+    bent = checks.beyond(estimates.chi_squared(result.bends), len(result.bends), dof)
+    yield from checks.lack_of_fit(axis, bent, max(abs(e.value) for e in result.bends), hint)
+
+
+def _drift(result: AxisResult) -> tuple[Array, Array]:
+    """Drift of both rows in N/s, mean over the angles, with its standard uncertainty."""
+    steps, _ = fit.scatter(result.fit)
+    spread = np.sqrt((result.fit.solvers[:, TIME] ** 2).sum()) / len(result.fit.solvers)
+    return result.fit.terms[:, :, TIME].mean(axis=1), np.sqrt(np.diag(steps)) * spread
+
+
+def _ripple(rig: RigFile, plan: Plan) -> Iterator[Finding]:
+    pairs = round(rig.machine["pole_pairs"].value)
+    if fit.aliased(plan.angles, pairs):
+        yield Finding(
+            "ripple-unresolved",
+            f"{plan.angles} equally spaced angles all stand at one electrical phase of the force ripple (order {2 * pairs}): "
+            "what was measured is alpha_d at that phase, not its mean over a turn, and no data of this run says how far "
+            "apart they are. Calibrate and measure at nine angles.",
+            "alpha_d", Effect.INDETERMINATE,
+        )  # fmt: skip
+
+
+def _notes(rig: RigFile, a: Analysis) -> Iterator[Finding]:
+    with_, without = a.y.mean, a.alone.mean
+    yield Finding(
+        "shared-influences",
+        f"u(alpha_d) is {with_.u:.4f} N/A ({with_.u / with_.value:.3%}); had the calibration passed on its values and "
+        f"uncertainties alone, it would be {without.u:.4f} N/A ({without.u / without.value:.3%}). What both runs share "
+        "(current sensors, spans, masses, gravity) largely cancels.",
+        "alpha_d",
+    )
+    stated = rig.machine["amb_asymmetry"]
+    yield Finding(
+        "horizontal-assumed",
+        f"the AMBs' horizontal constants were not measured: K_x = K_y, with {stated.standard_uncertainty:.2%} of standard "
+        f"uncertainty for each AMB ({stated.source}).",
+        "alpha_dx",
+    )
+
+
+def facts(recording: Recording[Plan]) -> dict[str, Estimate]:
+    """What later procedures use: both constants, the vertical one at each angle, and at home (0) the force across."""
+    a = evaluate(recording)
+    found = {"alpha_d": a.y.mean, "alpha_dx": a.x.mean, "alpha_cross@0": a.y.cross}
+    found |= {f"alpha_d@{k}": e for k, e in enumerate(a.y.angles)}
+    return {name: replace(e, unit=ALPHA_D.unit) for name, e in found.items()}
+
+
+def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+    """Forces, residuals, constants over the angle, and the budgets; empty when the data carry no fit."""
+    data = ramps_of(recording)
+    if any(f.code in checks.FATAL for f in checks.of_signals(data, recording.plan)):
+        return ()
+    a = evaluate(recording)
+    return drawn.all_figures(a.data, a.y, a.x, a.alone)
+
+
+procedure = Procedure(
+    name="force-constant",
+    title="Direct force constant of the motor, by the AMBs as load cells",
+    measures=MEASURES,
+    state=RigState.LEVITATED,
+    plan=Plan,
+    acquire=acquire,
+    analyse=analyse,
+    figures=figures,
+    requires=REQUIRES,
+    check=check,
+    settings=settings,
+    step_count=step_count,
+    assumes=assumptions.FORCE_CONSTANT,
+    method=read_method(__file__),
+    needs=needs,
+    facts=facts,
+)

@@ -1,0 +1,184 @@
+"""Force coupling of the motor over the phase angle of its commutation (thesis 6.6.3; T 6.15 corrected).
+
+Measurand, at the home angle: alpha_ratio = alpha_d/alpha_c, gamma_0 the phase angle at which the y current gives no x force
+(zero of the encoder), and alpha_c the x force per y current in quadrature. The motor carries the outboard end while gamma is
+stepped; gravity keeps a current of several amperes in it, and how that current turns with gamma tells the constants.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from bench.calibration import Need
+from bench.figures import Figure
+from bench.findings import Finding
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.requires import Requires
+from bench.rig import Rig
+from bench.rigfile import RigFile
+from bench.roles import RigState
+from procedures.force_coupling import checks as force_coupling_checks
+from procedures.force_coupling import figures as drawn
+from procedures.force_coupling.estimates import evaluate
+from procedures.servomotor import carrying, checks
+from procedures.servomotor.steps import CHANNELS, POSITIONS, SEGMENTS, StepMeans, read_steps
+from procedures.shared import assumptions
+
+RATIO = Quantity(
+    "alpha_ratio", "1", "alpha_d/alpha_c, direct over coupled force constant at the home angle", title="α_d/α_c"
+)
+ALPHA_C = Quantity("alpha_c", "N/A", "coupled force constant at the home angle: x force per y current in quadrature")
+GAMMA_0 = Quantity("gamma_0", "rad", "phase angle at which direct and coupled force are apart: zero of the commutation")
+MEASURES = (RATIO, ALPHA_C, GAMMA_0)
+GEOMETRY = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_inboard_amb", "com_to_motor", "motor_stiffness")
+FATAL = (*checks.FATAL, "rotor-off-edge")
+ALPHA_RATIO = 0.85  # T 6.6.3; for predictions before a run, and for nothing that is measured
+STEADY_RAD = (
+    0.7  # electrical: beyond it the motor's force is turned so far from the controller's that levitation is lost
+)
+
+
+class Plan(BenchPlan):
+    """Settings, SI."""
+
+    gamma_rad: tuple[float, ...] = Field(tuple(round(math.radians(d / 2), 9) for d in range(-5, 8)), min_length=5)
+    count_rad: float = Field(2 * math.pi / 4096, gt=0)  # one count of the rotor's encoder
+    settle_s: float = Field(2.0, gt=0)
+    average_s: float = Field(1.0, ge=0.1)
+    max_position_m: float = Field(5e-8, gt=0)  # settled: |mean position|; its drift may be twice that
+    max_drift_A: float = Field(5e-3, gt=0)  # settled: drift of a current within a step
+    max_creep_A: float = Field(2e-3, gt=0)  # drift of i_x, i_y over the sequence
+    max_misfit: float = Field(5e-3, gt=0)  # residual over range
+    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
+
+
+def needs(_: Plan) -> tuple[Need, ...]:
+    """The motor's direct force constant: the ratio alone gives no newtons."""
+    return (Need("force-constant"),)
+
+
+def step_count(plan: Plan) -> int:
+    """How many steps `acquire` records, for the progress display."""
+    return 2 * len(plan.gamma_rad)
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Step gamma up and down while the motor carries the outboard end at the sensors' zero."""
+    carrying.home(rig)
+    carrying.carry(rig, plan.settle_s)
+    for gamma in carrying.approach(plan.gamma_rad):
+        rig.levitation.set("gamma", gamma)
+        rig.clock.sleep(plan.settle_s)
+    for branch, gammas in ((1, plan.gamma_rad), (-1, plan.gamma_rad[::-1])):
+        carrying.to_edge(rig, branch, plan.count_rad)
+        for gamma in gammas:
+            rig.levitation.set("gamma", gamma)
+            rig.clock.sleep(plan.settle_s)
+            with record.step("phase", gamma_rad=gamma, branch=branch):
+                rig.clock.sleep(plan.average_s)
+    carrying.leave_edge(rig)
+    for gamma in (*reversed(carrying.approach(plan.gamma_rad)), 0.0):
+        rig.levitation.set("gamma", gamma)
+        rig.clock.sleep(plan.settle_s)
+    carrying.give_back(rig, plan.settle_s)
+
+
+def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
+    """Findings first (they decide what the numbers are worth), then the three quantities."""
+    data = read(recording)
+    findings = list(_of_signals(data, recording.plan))
+    yield from findings
+    if any(f.code in FATAL for f in findings):
+        return
+    a = evaluate(recording, data, recording.plan.count_rad)
+    yield from force_coupling_checks.of_fit(data, a.fit, recording.plan)
+    yield from force_coupling_checks.of_results(a, recording.rig.machine["pole_pairs"].value)
+    for quantity in MEASURES:
+        yield quantity.measured(a.estimates[quantity.name])
+
+
+def read(recording: Recording[Plan]) -> StepMeans:
+    """The steps, in time order."""
+
+    def name(labels: dict[str, Any]) -> str:
+        return f"gamma {math.degrees(labels['gamma_rad']):+.2f}°"
+
+    return read_steps(recording, "phase", ("gamma_rad", "branch"), name)
+
+
+def _of_signals(data: StepMeans, plan: Plan) -> Iterator[Finding]:
+    yield from checks.of_signals(data, (*SEGMENTS, *POSITIONS), plan)
+    yield from checks.segments(data)
+    yield from checks.at_edge(data, plan.count_rad)
+    d = data.drift
+    currents = {"i_y": (d["i_m1"] - d["i_m3"]) / 2, "i_x": (d["i_m4"] - d["i_m2"]) / 2}
+    yield from checks.settled(data, {c: data.mean[c] for c in POSITIONS}, currents, plan)
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts."""
+    gammas = plan.gamma_rad
+    if list(gammas) != sorted(set(gammas)) or gammas[0] >= 0 or gammas[-1] <= 0:
+        yield f"gamma_rad: found {gammas}; expected different angles in ascending order, on both sides of zero"
+        return
+    low, high = rig.parameters["gamma"].low, rig.parameters["gamma"].high
+    poles = rig.machine["pole_pairs"].value
+    furthest = max(-gammas[0], gammas[-1])
+    limit = min(-low, high, STEADY_RAD / poles)
+    if furthest > limit:
+        yield (
+            f"gamma_rad: found {math.degrees(furthest):.2f}°; the parameter's range and levitation (the force turns by "
+            f"{poles:g} times gamma) allow {math.degrees(limit):.2f}°"
+        )
+    turn = poles * np.array(gammas)
+    c, q = np.cos(turn), np.sin(turn) / ALPHA_RATIO
+    most = float(np.max(np.maximum(np.abs(c), np.abs(q)) / (c**2 + q**2)))
+    off_centre = (
+        rig.geometry["motor_stiffness"].value * 30e-6
+    )  # magnetic centre against the sensors' zero, two tolerances
+    current = most * (carrying.gravity_share_N(rig) + off_centre) / carrying.ALPHA_D
+    allowed = carrying.MARGIN * rig.parameters["segment_max"].default
+    if current > allowed:
+        yield f"gamma_rad: the motor would need {current:.1f} A; expected at most {allowed:.1f} A"
+
+
+def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+    """Currents over gamma with the model, and residuals; empty when the data carry no fit."""
+    data = read(recording)
+    if any(f.code in FATAL for f in _of_signals(data, recording.plan)):
+        return ()
+    return drawn.all_figures(
+        data, evaluate(recording, data, recording.plan.count_rad), recording.rig.machine["pole_pairs"].value
+    )
+
+
+procedure = Procedure(
+    name="force-coupling",
+    title="Force coupling of the motor over the phase angle",
+    measures=MEASURES,
+    state=RigState.LEVITATED,
+    plan=Plan,
+    acquire=acquire,
+    analyse=analyse,
+    figures=figures,
+    requires=Requires(
+        roles=("levitation", "rotation"),
+        channels=CHANNELS,
+        sensors=(*SEGMENTS, *POSITIONS),
+        parameters=(*carrying.PARAMETERS, "gamma", "segment_max"),
+        geometry=GEOMETRY,
+        machine=("pole_pairs",),
+    ),
+    check=check,
+    step_count=step_count,
+    needs=needs,
+    assumes=assumptions.FORCE_COUPLING,
+    method=read_method(__file__),
+)

@@ -1,0 +1,134 @@
+"""From the recorded points of a force map to arrays of step means, and what their signals can say about what is wrong."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.errors import AnalysisError
+from bench.findings import Effect, Finding
+from bench.recording import Recording
+from procedures.servomotor.segments import SEGMENTS
+
+Array = npt.NDArray[np.float64]
+STEP = "point"
+COILS = ("i_yi_p", "i_yi_n")
+POSITIONS = ("pos_xi", "pos_yi", "pos_xo", "pos_yo")
+CHANNELS = (*COILS, *POSITIONS, *SEGMENTS, "flags")
+LIMITS = ((1, "saturated", "an AMB amplifier was at its limit"), (2, "saturated", "a segment of the motor was at its limit"),
+          (12, "contact", "the rotor touched a touchdown bearing"))  # fmt: skip
+"""Bits of the telemetry signal `flags`."""
+WANDER_N = (
+    0.05  # of the motor's force between two points of an angle at which nothing is set; constants then move by half a U
+)
+SLIP = 0.1  # of the torque current of a load; friction makes 2 %
+SIGNIFICANT = 6.0  # standard uncertainties
+
+
+class Tolerances(Protocol):
+    """The part of a plan that these checks need."""
+
+    @property
+    def max_drift_A(self) -> float: ...
+    @property
+    def max_lost(self) -> float: ...
+
+
+@dataclass(frozen=True)
+class MapData:
+    """Points (n,): index of the calibration's `angle`; `group`, equal where angle and load are; `mean` by channel; and
+    per point the drift of the inboard control current in A, the share of lost samples, flags ORed; `still`: in how many points
+    a channel did not move."""
+
+    angle: npt.NDArray[np.int64]
+    group: npt.NDArray[np.int64]
+    loads: tuple[str, ...]
+    mean: dict[str, Array]
+    drift: Array
+    lost: Array
+    flags: npt.NDArray[np.int64]
+    still: dict[str, int]
+
+    def __len__(self) -> int:
+        return len(self.angle)
+
+
+def read_points(recording: Recording[Any]) -> MapData:
+    """Every point, in time order.
+
+    Raises:
+        AnalysisError: there are none, or one holds no samples.
+    """
+    steps = list(recording.steps(STEP))
+    if not steps:
+        raise AnalysisError("found no points; expected those of the plan (was the run stopped early?)")
+    names: list[tuple[int, str]] = []
+    rows, flags, drift, group = [], [], [], []
+    still = dict.fromkeys(CHANNELS[:-1], 0)
+    for step in steps:
+        data = step.read(*CHANNELS)
+        half = len(data["flags"]) // 2
+        if half == 0:
+            raise AnalysisError(f"point {dict(step.labels)}: found no samples")
+        key = (int(step.labels["turn"]), f"{step.labels['side']} {step.labels['load']}".strip())
+        if key not in names:
+            names.append(key)
+        group.append(names.index(key))
+        rows.append([float(data[c].mean()) for c in CHANNELS[:-1]])
+        control = (data["i_yi_p"] - data["i_yi_n"]) / 2
+        drift.append(float(control[half:].mean() - control[:half].mean()))
+        flags.append(int(np.bitwise_or.reduce(data["flags"].astype(np.int64))))
+        for channel in still:
+            still[channel] += int(np.ptp(data[channel]) == 0)
+    table = np.array(rows)
+    return MapData(
+        np.array([int(s.labels["turn"]) for s in steps]),
+        np.array(group),
+        tuple(load for _, load in names),
+        {c: table[:, k] for k, c in enumerate(CHANNELS[:-1])},
+        np.array(drift),
+        np.array([s.lost() / max(s.expected(), 1) for s in steps]),
+        np.array(flags),
+        still,
+    )
+
+
+def of_signals(data: MapData, plan: Tolerances) -> Iterator[Finding]:
+    """Lost samples, stuck channels, limits, contact, points that had not settled."""
+    if data.lost.max() > plan.max_lost:
+        yield Finding("missing-samples", f"{data.lost.max():.2%} of the samples of a point are missing ({plan.max_lost:.2%} is "
+                      "allowed). Look at the link: load, cable, gateway.", "", Effect.INDETERMINATE)  # fmt: skip
+    for channel, count in data.still.items():
+        if count:
+            text = f"{channel} does not move at all in {count} of {len(data)} points; a live sensor has noise."
+            yield Finding("stuck-channel", text, channel, Effect.ERROR)
+    for bits, code, text in LIMITS:
+        if hit := int(((data.flags & bits) != 0).sum()):
+            yield Finding(code, f"{text} in {hit} of {len(data)} points", "", Effect.INDETERMINATE)
+    worst = float(np.abs(data.drift).max())
+    if worst > plan.max_drift_A:
+        yield Finding("unsettled", f"the inboard control current drifts by {worst * 1e3:.1f} mA within a point "
+                      f"({plan.max_drift_A * 1e3:g} mA allowed): settle longer.", "", Effect.INDETERMINATE)  # fmt: skip
+
+
+def drifts(data: MapData, force: Array, i_theta: Array) -> Iterator[Finding]:
+    """Each angle and load begins and ends with nothing set: what differs then has drifted meanwhile, and is no constant's.
+    `force` of the motor, N, and torque current, A, of every point."""
+    first, last = np.array([np.flatnonzero(data.group == g)[[0, -1]] for g in np.unique(data.group)]).T
+    apart = force[last] - force[first]
+    mean, u = float(apart.mean()), float(apart.std(ddof=1)) / math.sqrt(len(apart))
+    if abs(mean) > max(WANDER_N, SIGNIFICANT * u):
+        text = (f"with nothing set the motor's force is {mean:+.3g} N more at the end of an angle than at its start "
+                f"({WANDER_N:g} N allowed): a coil sensor of the inboard AMB's vertical axis drifts, or that of segment 1 or 3."
+                )  # fmt: skip
+        yield Finding("drifting-sensor", text, "i_yi", Effect.INDETERMINATE)
+    for a, b in zip(first, last, strict=True):
+        if data.loads[data.group[a]] and abs(i_theta[b] - i_theta[a]) > SLIP * abs(i_theta[a]):
+            took = f"{i_theta[a]:+.3f} A of torque current at first and {i_theta[b]:+.3f} A in the end"
+            text = f"the load took {took}: does it slip?"
+            yield Finding("lever-slips", text, data.loads[data.group[a]], Effect.INDETERMINATE)

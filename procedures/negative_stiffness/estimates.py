@@ -1,0 +1,113 @@
+"""The two values of the negative stiffness with their influences, from step means, calibrations and certificates."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from bench.recording import Recording
+from bench.uncertainty import Estimate, Influence
+from procedures.negative_stiffness import fit
+from procedures.negative_stiffness.fit import AmbFit, ByAmbs, ByMotor, MotorFit
+from procedures.servomotor.steps import SEGMENTS, StepMeans
+from procedures.shared.certificates import certified
+from procedures.shared.gradients import by_inputs
+from procedures.shared.type_a import scatter
+
+COILS = ("i_yo_p", "i_yo_n")
+
+
+class Biases(Protocol):
+    """The part of a plan that tells the two series of the AMBs apart."""
+
+    @property
+    def bias_A(self) -> float: ...
+    @property
+    def bias_high_A(self) -> float: ...
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Everything the measurements, findings and figures are made of."""
+
+    motor: StepMeans
+    ambs: StepMeans
+    by_motor: MotorFit
+    by_ambs: AmbFit
+    estimates: dict[str, Estimate]
+
+
+def evaluate(recording: Recording[Any], motor: StepMeans, ambs: StepMeans) -> Analysis:
+    """Both fits with their influences; `estimates` motor, ambs, gap and difference."""
+    inputs = fit_inputs(recording)
+    one, two = measured(recording.plan, motor, ambs)
+
+    def model(p: dict[str, float]) -> dict[str, float]:
+        fitted = fit.by_ambs(two, p)
+        return {"motor": fit.by_motor(one, p).stiffness, "ambs": fitted.stiffness, "gap": fitted.gap_m}
+
+    values = {name: e.value for name, e in inputs.items()}
+    by_motor, by_ambs = fit.by_motor(one, values), fit.by_ambs(two, values)
+    estimates = by_inputs(model, inputs)
+    share = by_motor.stiffness / float(by_motor.fit.terms[0])
+    extra = scatter(by_motor.fit, {"motor": [share, 0, 0, 0, 0, 0]}, "motor", "scatter of the steps, motor")
+    gradients = {"ambs": [share, 0, *[0] * 6], "gap": [0, -(by_ambs.gap_m**2), *[0] * 6]}
+    extra |= scatter(by_ambs.fit, gradients, "ambs", "scatter of the steps, AMBs")
+    turned = fit.by_ambs(turning_left_open(two), values)
+    for name, shift in (("ambs", turned.stiffness - by_ambs.stiffness), ("gap", turned.gap_m - by_ambs.gap_m)):
+        extra[name] = extra[name] + _turning_point(name, shift)
+    estimates |= {name: estimates[name] + e for name, e in extra.items()}
+    estimates["difference"] = estimates["motor"] - estimates["ambs"]
+    return Analysis(motor, ambs, by_motor, by_ambs, estimates)
+
+
+def measured(plan: Biases, motor: StepMeans, ambs: StepMeans) -> tuple[ByMotor, ByAmbs]:
+    """What the estimators get."""
+    y = ("pos_yi", "pos_yo")
+    which = (ambs.labels["bias_A"] != plan.bias_A).astype(np.int64)
+    biases, branch = (plan.bias_A, plan.bias_high_A), ambs.labels["branch"]
+    return (
+        ByMotor(motor.stack(SEGMENTS), motor.stack(y), motor.stack(("pos_xi", "pos_xo")), motor.time_s),
+        ByAmbs(ambs.stack(COILS), ambs.stack(y), which, branch, ambs.time_s, biases),
+    )
+
+
+def turning_left_open(d: ByAmbs) -> ByAmbs:
+    """The same data with no branch given to the highest level, where up turns into down."""
+    return replace(d, branch=np.where(d.y[1] > d.y[1].max() - 1e-6, 0.0, d.branch))
+
+
+def _turning_point(name: str, shift: float) -> Estimate:
+    """The highest level is where up turns into down: it counts as up, and at most half of that could be wrong."""
+    influence = Influence(id=f"hysteresis/{name}", name="hysteresis at the turning point", u=abs(shift) / math.sqrt(3),
+                          unit="1", kind="B", distribution="rectangular", source="highest level without a branch")  # fmt: skip
+    return Estimate.of(0.0, influence) if shift else Estimate.exact(0.0)
+
+
+def fit_inputs(recording: Recording[Any]) -> dict[str, Estimate]:
+    """What the fits need besides the steps: calibrations, and certificates of the rig file as influences by identity."""
+    rig, g = recording.rig, recording.rig.geometry
+    amb, motor = recording.calibration("amb-calibration"), recording.calibration("force-constant")
+    inputs = {
+        "alpha_d": motor.values["alpha_d@0"],
+        "chi": motor.values["alpha_dx"] / motor.values["alpha_d"],
+        "K_o": amb.values["K_o@0"],
+        "K2_o": amb.values["K2_o@0"],
+        "bias_K": Estimate.exact(amb.settings["bias_A"]),
+    }
+    for key, name in (("l_is", "com_to_inboard_sensor"), ("l_os", "com_to_outboard_sensor"), ("z_oa", "com_to_outboard_amb"),
+                      ("motor_to_outboard", "motor_to_outboard_amb"), ("amb_span", "amb_span")):  # fmt: skip
+        inputs[key] = certified(f"geometry/{name}", g[name])
+    inputs["amb_gap"] = Estimate.exact(g["amb_gap"].value)  # where the iteration starts, and nothing else
+    for axis in ("yi", "yo", "xi", "xo"):
+        channel = f"pos_{axis}"
+        inputs[f"gain_{axis}"] = certified(f"sensors/{channel}/gain", rig.sensors[channel].gain, f"gain of {channel}")
+    sensors = {f"m{k}": f"i_m{k}" for k in range(1, 5)} | {"op": "i_yo_p", "on": "i_yo_n"}
+    for key, channel in sensors.items():
+        sensor = rig.sensors[channel]
+        inputs[f"gain_{key}"] = certified(f"sensors/{channel}/gain", sensor.gain, f"gain of {channel}")
+        inputs[f"offset_{key}"] = certified(f"sensors/{channel}/offset", sensor.offset, f"offset of {channel}")
+    return inputs

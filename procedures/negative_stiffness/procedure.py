@@ -1,0 +1,248 @@
+"""Negative stiffness of the motor by eccentric positioning (thesis end of 6.6.2; alpha_x' of 6.8), in two ways.
+
+Measurand: alpha_x' = alpha_x (z_m - z_is)/(z_os - z_is): the motor's force per displacement of the outboard sensor's plane
+with the inboard sensor's plane held. First way: the motor itself holds the outboard end, the outboard AMB is off. Second
+way: the AMBs hold, the motor has no current, and the AMB's own stiffness is told apart by a second bias.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from pydantic import Field
+
+from bench.calibration import Need
+from bench.figures import Figure
+from bench.findings import Finding
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.requires import Requires
+from bench.rig import Rig
+from bench.rigfile import RigFile
+from bench.roles import RigState
+from bench.states import transition
+from procedures.negative_stiffness import checks as negative_stiffness_checks
+from procedures.negative_stiffness import figures as drawn
+from procedures.negative_stiffness.estimates import COILS, evaluate
+from procedures.servomotor import carrying, checks
+from procedures.servomotor.steps import CHANNELS, POSITIONS, SEGMENTS, StepMeans, read_steps
+
+ALPHA_X = Quantity(
+    "alpha_x_prime", "N/m", "negative stiffness at the outboard sensor, from the motor's own current", title="α′_x"
+)
+ALPHA_X_AMB = Quantity(
+    "alpha_x_prime_amb",
+    "N/m",
+    "negative stiffness at the outboard sensor, from AMB currents at two biases",
+    title="α′_x by the AMBs",
+)
+MEASURES = (ALPHA_X, ALPHA_X_AMB)
+MARGIN = carrying.MARGIN
+AMB_N_PER_A = 74.4  # T (6.12), K_o; for predictions before a run, and for nothing that is measured
+GEOMETRY = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_inboard_amb", "com_to_outboard_amb", "com_to_motor",
+            "motor_to_outboard_amb", "amb_span", "amb_gap", "motor_stiffness")  # fmt: skip
+
+
+class Plan(BenchPlan):
+    """Settings, SI. Levels are displacements of the outboard sensor's plane, the same in both ways."""
+
+    levels_m: tuple[float, ...] = Field(tuple(round(x * 1e-5, 9) for x in range(-4, 5)), min_length=5)
+    bias_A: float = Field(3.0, gt=0)  # that of the AMBs' calibration
+    bias_high_A: float = Field(4.0, gt=0)
+    count_rad: float = Field(2 * math.pi / 4096, gt=0)  # one count of the rotor's encoder
+    settle_s: float = Field(2.0, gt=0)
+    average_s: float = Field(1.0, ge=0.1)
+    max_position_m: float = Field(5e-8, gt=0)  # settled: |mean position - reference|; its drift may be twice that
+    max_drift_A: float = Field(5e-3, gt=0)  # settled: drift of a current within a step
+    max_creep_A: float = Field(2e-3, gt=0)  # drift of i_x, i_y over the sequence
+    max_misfit: float = Field(5e-3, gt=0)  # residual over range
+    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
+
+
+def settings(plan: Plan) -> dict[str, float]:
+    """Controller parameters that the runner writes before levitation."""
+    return {"bias_i": plan.bias_A, "bias_o": plan.bias_A}
+
+
+def needs(plan: Plan) -> tuple[Need, ...]:
+    """Force constants of the outboard AMB at this bias, and of the motor."""
+    return (Need("amb-calibration", {"bias_A": plan.bias_A}), Need("force-constant"))
+
+
+def step_count(plan: Plan) -> int:
+    """How many steps `acquire` records, for the progress display."""
+    return 3 * (2 * len(plan.levels_m) - 1)
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Displace the outboard end: by the motor, then by the AMBs at both biases. The bias is written at rest."""
+    carrying.home(rig)
+    inboard = _share(rig.file, -rig.file.geometry["com_to_inboard_amb"].value)
+    carrying.carry(rig, plan.settle_s)
+    carrying.to_edge(rig, 1, plan.count_rad)
+    # The inboard AMB's plane goes with the displacement as far as keeps the inboard sensor at zero.
+    _walk(rig, plan, record, "motor", {"ref_ym": 1.0, "ref_yi": inboard}, plan.bias_A)
+    carrying.leave_edge(rig)
+    carrying.give_back(rig, plan.settle_s)
+    for bias in (plan.bias_A, plan.bias_high_A):
+        if bias != plan.bias_A:
+            transition(rig, RigState.READY)
+            rig.levitation.set("bias_i", bias)
+            rig.levitation.set("bias_o", bias)
+            transition(rig, RigState.LEVITATED)
+            carrying.home(rig)
+            rig.clock.sleep(plan.settle_s)
+        _walk(rig, plan, record, "ambs", {"ref_yo": _tilt(rig.file)}, bias)
+
+
+def _walk(rig: Rig, plan: Plan, record: Recorder, kind: str, references: Mapping[str, float], bias: float) -> None:
+    def go(level: float) -> None:
+        for name, factor in references.items():
+            rig.levitation.set(name, factor * level)
+        rig.clock.sleep(plan.settle_s)
+
+    for level in carrying.approach(plan.levels_m):
+        go(level)
+    for level, branch in carrying.mirrored(plan.levels_m):
+        go(level)
+        with record.step(kind, level_m=level, branch=branch, bias_A=bias):
+            rig.clock.sleep(plan.average_s)
+    go(0.0)
+
+
+def _share(rig: RigFile, z: float) -> float:
+    """Share of the outboard sensor in the displacement at plane z, as the controller has it (T 6.7)."""
+    near, far = rig.geometry["com_to_inboard_sensor"].value, rig.geometry["com_to_outboard_sensor"].value
+    return (z + near) / (near + far)
+
+
+def _tilt(rig: RigFile) -> float:
+    """Displacement of the outboard AMB's plane over that of the outboard sensor's while the inboard AMB's plane stays; the
+    inboard sensor, beyond it, goes the other way."""
+    inboard, outboard = (
+        _share(rig, rig.geometry[k].value * s) for k, s in (("com_to_inboard_amb", -1), ("com_to_outboard_amb", 1))
+    )
+    return outboard - (1 - outboard) * inboard / (1 - inboard)
+
+
+def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
+    """Findings first (they decide what the numbers are worth), then both values."""
+    motor, ambs = read(recording)
+    findings = list(_of_signals(recording, motor, ambs))
+    yield from findings
+    if any(f.code in checks.FATAL for f in findings):
+        return
+    a = evaluate(recording, motor, ambs)
+    yield from negative_stiffness_checks.of_fits(a.motor, a.ambs, a.by_motor, a.by_ambs, recording.plan)
+    yield from negative_stiffness_checks.of_results(a.estimates, recording.rig.geometry["amb_gap"])
+    yield ALPHA_X.measured(a.estimates["motor"])
+    yield ALPHA_X_AMB.measured(a.estimates["ambs"])
+
+
+def read(recording: Recording[Plan]) -> tuple[StepMeans, StepMeans]:
+    """The steps of both ways."""
+
+    def name(way: str) -> Any:
+        return lambda x: f"{way}, {x['level_m'] * 1e6:+.0f} µm at {x['bias_A']:g} A"
+
+    labels = ("level_m", "branch", "bias_A")
+    return read_steps(recording, "motor", labels, name("motor")), read_steps(recording, "ambs", labels, name("AMBs"))
+
+
+def _of_signals(recording: Recording[Plan], motor: StepMeans, ambs: StepMeans) -> Iterator[Finding]:
+    plan = recording.plan
+    inboard = _share(recording.rig, -recording.rig.geometry["com_to_inboard_amb"].value)
+    ways = ((motor, (*SEGMENTS, *POSITIONS), 0.0), (ambs, (*COILS, *POSITIONS), -inboard / (1 - inboard)))
+    yield from checks.segments(motor)
+    yield from checks.at_edge(motor, plan.count_rad)
+    for data, channels, follow in ways:
+        yield from checks.of_signals(data, channels, plan)
+        mean, d, level = data.mean, data.drift, data.labels["level_m"]
+        offsets = {"pos_yo": mean["pos_yo"] - level, "pos_yi": mean["pos_yi"] - follow * level,
+                   "pos_xi": mean["pos_xi"], "pos_xo": mean["pos_xo"]}  # fmt: skip
+        currents = {"i_y": (d["i_m1"] - d["i_m3"]) / 2, "i_x": (d["i_m4"] - d["i_m2"]) / 2}
+        if data is ambs:
+            currents = {"i_yo": (d["i_yo_p"] - d["i_yo_n"]) / 2}
+        yield from checks.settled(data, offsets, currents, plan)
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts."""
+    levels = plan.levels_m
+    if list(levels) != sorted(set(levels)) or levels[0] >= 0 or levels[-1] <= 0:
+        yield f"levels_m: found {levels}; expected different levels in ascending order, on both sides of zero"
+        return
+    if not plan.bias_high_A >= 1.15 * plan.bias_A:
+        yield (
+            f"bias_high_A: found {plan.bias_high_A:g} A beside bias_A = {plan.bias_A:g} A; expected at least 15 % more: what "
+            "belongs to the AMB is told from the motor by its growth with the square of the bias"
+        )
+    yield from _ranges(rig, plan, max(-levels[0], levels[-1]))
+
+
+def _ranges(rig: RigFile, plan: Plan, furthest: float) -> Iterator[str]:
+    limit = min(
+        rig.parameters["ref_ym"].high, rig.parameters["ref_yo"].high, MARGIN * rig.envelope.max_levitated_position_m
+    )
+    if furthest > limit:
+        yield f"levels_m: found {furthest * 1e6:.0f} µm; references and envelope allow {limit * 1e6:.0f} µm"
+    for name in ("bias_i", "bias_o"):
+        if plan.bias_high_A > rig.parameters[name].high:
+            yield f"bias_high_A: found {plan.bias_high_A:g} A; {name} goes to {rig.parameters[name].high:g} A"
+    g = rig.geometry
+    share = _share(rig, g["com_to_motor"].value)
+    pull = g["motor_stiffness"].value * share * furthest
+    current, most = (
+        (carrying.gravity_share_N(rig) + pull) / carrying.ALPHA_D,
+        MARGIN * rig.parameters["segment_max"].default,
+    )
+    if current > most:
+        yield f"levels_m: the motor would need {current:.1f} A at {furthest * 1e6:.0f} µm; expected at most {most:.1f} A"
+    span, arm = g["amb_span"].value, g["com_to_inboard_amb"].value
+    carried = carrying.SHAFT_N * arm / span
+    moved = (
+        g["motor_stiffness"].value * ((arm + g["com_to_motor"].value) / span) ** 2
+        + AMB_N_PER_A * plan.bias_A / g["amb_gap"].value
+    )
+    control = (carried + moved * _tilt(rig) * furthest) / AMB_N_PER_A
+    if control > MARGIN * plan.bias_A:
+        yield (
+            f"levels_m: the outboard AMB would need {control:.1f} A of control current at {furthest * 1e6:.0f} µm; "
+            f"expected at most {MARGIN * plan.bias_A:.1f} A at {plan.bias_A:g} A of bias"
+        )
+
+
+def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+    """Force over displacement with residuals, and the AMB's lines at both biases; empty when the data carry no fit."""
+    motor, ambs = read(recording)
+    if any(f.code in checks.FATAL for f in _of_signals(recording, motor, ambs)):
+        return ()
+    return drawn.all_figures(evaluate(recording, motor, ambs), recording.plan)
+
+
+procedure = Procedure(
+    name="negative-stiffness",
+    title="Negative stiffness of the motor by eccentric positioning",
+    measures=MEASURES,
+    state=RigState.LEVITATED,
+    plan=Plan,
+    acquire=acquire,
+    analyse=analyse,
+    figures=figures,
+    requires=Requires(
+        roles=("levitation", "rotation"),
+        channels=CHANNELS,
+        sensors=(*SEGMENTS, *COILS, *POSITIONS),
+        parameters=(*carrying.PARAMETERS, "ref_yo", "bias_i", "bias_o", "segment_max"),
+        geometry=GEOMETRY,
+        machine=("pole_pairs",),
+    ),
+    check=check,
+    settings=settings,
+    step_count=step_count,
+    needs=needs,
+    method=read_method(__file__),
+)

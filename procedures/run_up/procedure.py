@@ -1,0 +1,281 @@
+"""Run-up: the drive takes the levitated shaft through its speeds at a stated acceleration (T 2.6.1, Figs. 2.7 and 2.9).
+
+Measurands: vectors of the shaft's centre of order 1, orbits, D_max, currents and voltages at the speeds of the captures;
+critical speeds, their amplification factors, and how far they stand off the running speed. `coast_down` shares the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any, Literal
+
+from pydantic import Field
+
+from bench.capture import at_speed
+from bench.errors import AnalysisError, BenchError
+from bench.figures import Shown
+from bench.findings import Effect, Finding
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.rig import Rig
+from bench.rigfile import RigFile
+from bench.roles import RigState
+from procedures.amb_rotor import lift, wiring
+from procedures.amb_rotor.steps import NO_SPEED
+from procedures.run_up import checks, estimates
+from procedures.run_up import figures as drawn
+from procedures.run_up.estimates import Run
+from procedures.run_up.steps import MISSED, PASSAGE, read_passage
+from procedures.shared import assumptions
+from procedures.unbalance import bearings as unbalance_bearings
+from procedures.unbalance import checks as unbalance_checks
+from procedures.unbalance import dwelling
+from procedures.unbalance import procedure as unbalance
+from procedures.unbalance.coil_peaks import uncertified
+from procedures.unbalance.dwelling import CODES, Law, put
+from procedures.unbalance.procedure import CURRENT, D_MAX, MAJOR, READ, SHARE, VOLTAGE
+from procedures.unbalance.steps import RECORDED, RPM, SLOW, read_dwell
+
+COSINE, SINE = unbalance.COSINE, unbalance.SINE
+SPEED = Quantity("critical_speed", "rad/s", "where the amplitude of a probe is greatest, with a factor of 2.5 or more; "
+                 "of small orbits")  # fmt: skip
+FACTOR = Quantity("amplification_factor", "1", "that speed over the width at 0.707 of the amplitude (API 617, half power); "
+                  "of small orbits")  # fmt: skip
+AMPLITUDE = Quantity("critical_amplitude", "m", "of the shaft's centre where it was greatest, 0-pk")
+MARGIN = Quantity("separation", "1", "distance of the critical speed from the running speed, over the running speed",
+                  title="separation margin")  # fmt: skip
+CRITICAL = (SPEED, FACTOR, AMPLITUDE, MARGIN)  # which a well damped shaft does not have
+MEASURES = (COSINE, SINE, MAJOR, D_MAX, SHARE, READ, CURRENT, VOLTAGE, *CRITICAL)
+LOOK_S = 0.2
+NEAR_END = 0.004  # of a speed that the drive is asked for: its own control leaves as much
+LATE = 2.0  # of the time that a ramp should take
+COAST_S = 240.0  # a coast-down is given at most
+HOLD_S = 0.5
+AFTER_S = 5.0  # the drive has passed a speed: a capture that has not come by then does not come
+
+
+class Passing(BenchPlan):
+    """Settings of both directions, SI."""
+
+    law: Law = "CCS"
+    parameters: dict[str, float] = Field(default_factory=dict)  # of the controller, while the speeds are passed
+    top_rad_s: float = Field(14000 / RPM, gt=0)
+    bottom_rad_s: float = Field(600 / RPM, gt=0)
+    running_rad_s: float = Field(14000 / RPM, gt=0)  # from which criticals must stand off
+    speeds_rad_s: tuple[float, ...] = Field((3000 / RPM, 8000 / RPM, 13000 / RPM), min_length=1)  # captures, vectors
+    slow_rad_s: float = Field(300 / RPM, ge=0)  # 0: no slow roll
+    slow_s: float = Field(10.0, ge=1)
+    settle_s: float = Field(1.5, ge=0.2)
+    capture_s: float = Field(0.3, ge=0.05)
+    rate_hz: float = Field(10000.0, gt=0)  # of the captures
+    orders: int = Field(4, ge=1, le=10)  # that the full spectrum must show
+    blocks: int = Field(150, ge=30, le=1000)  # of equal width in speed
+    bearings: Literal["adopted", "plan"] = (
+        "adopted"  # what is known of them: the adopted bearing-model, where there is one
+    )
+    beta_share: float = Field(0.05, ge=0)  # half width: how far the controller's betas may be off the bearings'
+    offset_u_m: float = Field(10e-6, ge=0)  # of its magnetic offsets, standard uncertainty
+    max_lost: float = Field(1e-3, ge=0)  # share of the samples
+    max_speed_error: float = Field(0.01, gt=0)  # share of the speed, at slow roll
+
+    @property
+    def observed(self) -> bool:
+        """Nothing is compensated."""
+        return False
+
+    @property
+    def variants(self) -> tuple[str, ...]:
+        """Of the compensation."""
+        return ("off",)
+
+    @property
+    def rate_rad_s2(self) -> float:
+        """Of the drive's ramp; 0 where it coasts."""
+        return 0.0
+
+
+class Plan(Passing):
+    """Settings of the run-up, SI."""
+
+    acceleration_rad_s2: float = Field(24.5, gt=0)  # 14 000 r/min in a minute
+
+    @property
+    def rate_rad_s2(self) -> float:
+        """Of the drive's ramp."""
+        return self.acceleration_rad_s2
+
+
+def settings(plan: Passing) -> dict[str, float]:
+    """Lifted by the PID, which needs no model."""
+    del plan
+    return {"law": CODES["PID"], "observer": 0.0, "compensate": 0.0}
+
+
+def step_count(plan: Passing) -> int:
+    """How many steps `acquire` records, for the progress display."""
+    return lift.STEPS + (plan.slow_rad_s > 0) + 1
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Look at the shaft on its rings, lift it, nudge it, roll it slowly, run it up, and stop it."""
+    if not dwelling.rolled(rig, plan, record):
+        return
+    put(rig, plan.parameters)
+    if lift.turned(rig, record, plan.bottom_rad_s, plan.settle_s):
+        passed(rig, plan, record, "up", plan.top_rad_s)
+    ended(rig, plan)
+
+
+def ended(rig: Rig, plan: Passing) -> None:
+    """Stop the shaft, and give the controller its own settings again."""
+    if rig.drive is not None:
+        rig.drive.stop()
+        rig.drive.coast()
+        if plan.rate_rad_s2:
+            rig.drive.set_acceleration(0.0)
+    put(rig, {name: rig.file.parameters[name].default for name in plan.parameters})
+    dwelling.finished(rig)
+
+
+def passed(rig: Rig, plan: Passing, record: Recorder, direction: str, goal: float) -> None:
+    """Through all speeds to `goal` in rad/s, with captures on the way; the drive coasts where the plan gives no rate."""
+    drive, rate = rig.drive, plan.rate_rad_s2
+    assert drive is not None
+    up = direction == "up"
+    begin = drive.speed_rad_s
+    patience = LATE * abs(goal - begin) / rate + 10 if rate else COAST_S
+    with record.step(PASSAGE, direction=direction, acceleration_rad_s2=rate, from_rad_s=begin, to_rad_s=goal):
+        rig.clock.sleep(HOLD_S)
+        armed = sorted(plan.speeds_rad_s, reverse=not up)
+        _arm(rig, plan, armed[0])
+        if rate:
+            drive.set_acceleration(rate)
+            drive.set_speed(goal)
+        else:
+            drive.coast()
+        started = rig.clock.now_ns()
+
+        def left() -> float:
+            return patience - (rig.clock.now_ns() - started) * 1e-9
+
+        for k, speed in enumerate(armed):
+            if (drive.speed_rad_s > speed) if up else (drive.speed_rad_s < speed):
+                record.event(
+                    MISSED, wanted=speed, why="the shaft was past it before the capture before it was uploaded"
+                )
+                continue
+            if k:
+                _arm(rig, plan, speed)
+            while ((drive.speed_rad_s < speed) if up else (drive.speed_rad_s > speed)) and left() > 0:
+                rig.clock.sleep(LOOK_S)
+            _fetch(rig, plan, record, speed)
+        near = max(0.5, NEAR_END * goal)
+        while (drive.speed_rad_s < goal - near) if up else (drive.speed_rad_s > goal + near):
+            if left() <= 0:
+                why = f"after {patience:.0f} s it turns at {drive.speed_rad_s * RPM:.0f} r/min"
+                record.event(NO_SPEED, wanted=goal, why=why)
+                return
+            rig.clock.sleep(LOOK_S)
+        rig.clock.sleep(HOLD_S if up else 0.0)
+
+
+def _arm(rig: Rig, plan: Passing, speed: float) -> None:
+    if rig.capture is not None:
+        rig.capture.arm(
+            RECORDED, seconds=plan.capture_s, before_s=plan.capture_s / 2, rate_hz=plan.rate_hz, trigger=at_speed(speed)
+        )
+
+
+def _fetch(rig: Rig, plan: Passing, record: Recorder, speed: float) -> None:
+    """The capture at a speed; the analysis tells where there is none."""
+    if rig.capture is None:
+        return
+    try:
+        rig.capture.wait(plan.capture_s + AFTER_S)
+        rig.capture.upload(passed_rad_s=speed)
+    except BenchError as error:
+        if type(error) is not BenchError:  # a fault, a lost link, an interlock: the end of the run
+            raise
+        record.event(MISSED, wanted=speed, why=str(error))
+        rig.capture.cancel()
+
+
+def analyse(recording: Recording[Any]) -> Iterator[Measured | Finding]:
+    """Findings first, then the quantities."""
+    findings, run = recording.once(evaluated)
+    yield from findings
+    if run is not None:
+        yield from measured(run)
+
+
+def evaluated(recording: Recording[Any]) -> tuple[tuple[Finding, ...], Run | None]:
+    """Findings, and the estimates where there are any."""
+    found = [*wiring.before_orbits(recording), *checks.before(recording)]
+    if any(f.effect is Effect.ERROR for f in found):
+        return tuple(found), None
+    plan = recording.plan
+    slow = next((read_dwell(recording, s) for s in recording.steps(SLOW)), None)
+    found += unbalance_checks.of_signals([slow], plan) if slow else unbalance_checks.slow_roll([], plan)
+    if any(f.effect is Effect.ERROR for f in found):  # what a steady speed shows, a changing one may hide
+        return tuple(found), None
+    try:
+        passage = read_passage(recording)
+    except AnalysisError as error:
+        return (*found, Finding("no-passage", str(error), "", Effect.ERROR)), None
+    found += checks.of_passage(passage, recording, plan)
+    if any(f.effect is Effect.ERROR for f in found):
+        return tuple(found), None
+    model = unbalance_bearings.adopted_bearings(recording)
+    try:
+        run = estimates.run(passage, slow, recording, plan, model)
+    except AnalysisError as error:  # a drive that was faster than it was told: too few turns for a curve
+        return (*found, Finding("no-passage", str(error), passage.name, Effect.ERROR)), None
+    told = (unbalance_bearings.told(model, plan), *uncertified(recording.rig))
+    return (*found, *told, *checks.of_run(run, recording, plan)), run
+
+
+def measured(run: Run) -> Iterator[Measured]:
+    """At the captures' speeds, then of every critical."""
+    known = {q.name: q for q in MEASURES}
+    for result in run.near.dwells if run.near else ():
+        for (name, place), estimate in result.estimates.items():
+            yield known[name].measured(estimate, f"{place}, {result.dwell.where}" if place else result.dwell.where)
+    for peak in run.peaks:
+        if peak.critical and peak.factor is not None:
+            yield SPEED.measured(peak.speed, peak.where)
+            yield FACTOR.measured(peak.factor, peak.where)
+            yield AMPLITUDE.measured(peak.amplitude, peak.where)
+            yield MARGIN.measured(peak.margin, peak.where)
+
+
+def check(rig: RigFile, plan: Passing) -> Iterable[str]:
+    """What cannot work before anything starts."""
+    lacking = [f"parameters: the rig has no {name}" for name in plan.parameters if name not in rig.parameters]
+    yield from lacking or checks.of_plan(rig, plan)
+
+
+def figures(recording: Recording[Any]) -> Iterable[Shown]:
+    """Bode pairs, polar plots, waterfall, order map, coil use, orbits; empty where nothing was evaluated."""
+    run = recording.once(evaluated)[1]
+    return () if run is None else drawn.all_figures(run, recording.rig, recording.plan.running_rad_s)
+
+
+procedure = Procedure(
+    name="run-up",
+    title="Run-up of the levitated shaft",
+    measures=MEASURES,
+    state=RigState.READY,
+    plan=Plan,
+    acquire=acquire,
+    analyse=analyse,
+    figures=figures,
+    requires=unbalance.REQUIRES,
+    check=check,
+    settings=settings,
+    step_count=step_count,
+    needs=unbalance.needs,
+    optional=CRITICAL,
+    assumes=assumptions.PASSAGE,
+    method=read_method(__file__),
+)

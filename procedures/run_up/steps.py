@@ -1,0 +1,228 @@
+"""From the recorded passage of a shaft through its speeds to synchronous vectors over speed, and the captures on the way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.analysis import serial
+from bench.analysis.orders import synchronous
+from bench.analysis.sampling import Sampling
+from bench.analysis.tachometer import Tachometer, age, counted, tachometer
+from bench.analysis.vectors import parts
+from bench.errors import AnalysisError
+from bench.recording import Recording
+from procedures.shared.signals import clips
+from procedures.unbalance.steps import CURRENTS, POSITIONS, TOLD, Dwell, full_rate
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+Integers = npt.NDArray[np.int64]
+PASSAGE = "passage"
+MISSED = "capture-missed"
+DRIVEN = "drive_actual_speed"
+VOLTAGES = ("u_i", "u_o")
+LEAST_TURNS = 4  # of a block
+TOGETHER = 8  # blocks of equal turns
+ENDS = 0.004  # of the way, left out at either end: there the drive begins and ends its ramp
+NEAR = 0.012  # of a speed, to either side: the turns that its vectors are of
+NEAR_TURNS = 10  # and at least so many
+
+
+@dataclass(frozen=True)
+class Passage:
+    """The whole passage. `t` (n,) s; `data` (12, n) positions and coil currents; `volts` (2, n) greatest of each bearing;
+    `flags` (n,); `driven` times and speeds of the drive (m,) each; `moving` the samples of the ramp itself."""
+
+    direction: str
+    wanted: float
+    tacho: Tachometer
+    sampling: Sampling
+    t: Array
+    data: Array
+    volts: Array
+    flags: Integers
+    driven: tuple[Array, Array]
+    moving: slice
+    stuck: tuple[str, ...]
+    clips: int
+    lost: int
+    expected: int
+
+    @property
+    def speeds(self) -> Array:
+        """By the pulses, at each sample, rad/s (n,); NaN before the first and after the last."""
+        return self.tacho.speed(self.t)
+
+    @property
+    def name(self) -> str:
+        """As it is named to the reader."""
+        return {"up": "run-up", "down": "coast-down"}[self.direction]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Vectors of order 1 of b blocks by rising speed: `speed` rad/s, `acceleration` rad/s^2, `width` rad/s (b,); `values`
+    (12, b) as read; their scatter `covariance` (12, b, 2, 2) with `dof` (b,); `means` (b, 12); `volts` (b, 2) greatest;
+    `second` (12, b) vectors of order 2, NaN where the telemetry does not see it."""
+
+    speed: Array
+    acceleration: Array
+    width: Array
+    values: Complex
+    covariance: Array
+    means: Array
+    volts: Array
+    second: Complex
+    dof: Array
+
+
+def read_passage(recording: Recording[Any]) -> Passage:
+    """The passage that was recorded.
+
+    Raises:
+        AnalysisError: there is none, it has no turns, or it did not get anywhere.
+    """
+    steps = list(recording.steps(PASSAGE))
+    if not steps:
+        raise AnalysisError("found no passage through the speeds; expected one (was the run stopped early?)")
+    step, tick = steps[0], recording.rig.devices["controller"].tick_s
+    data = step.read(*TOLD, *VOLTAGES)
+    t = (data["t_ns"] - recording.start_ns) * 1e-9
+    if t.size < 100:
+        raise AnalysisError(f"passage: found {t.size} samples; expected 100 or more")
+    ticks = round(recording.streams["telemetry"].period_ns * 1e-9 / tick)
+    tacho = tachometer(*counted(t - tick, data["pulses"], age(data["angle"], data["speed"])))
+    wide = np.array([data[c] for c in (*POSITIONS, *CURRENTS)])
+    drive = recording.channel(DRIVEN, step.start_ns, step.end_ns)
+    labels = step.labels
+    return Passage(
+        str(labels["direction"]),
+        float(labels["acceleration_rad_s2"]),
+        tacho,
+        Sampling(tick, ticks, tick),
+        t,
+        wide,
+        np.array([data[c] for c in VOLTAGES]),
+        data["flags"].astype(np.int64),
+        ((drive["t_ns"] - recording.start_ns) * 1e-9, drive[DRIVEN]),
+        _moving(tacho.speed(t)),
+        tuple(c for c, x in zip((*POSITIONS, *CURRENTS), wide, strict=True) if np.ptp(x) == 0),
+        clips(wide[:4]),
+        step.lost(),
+        step.expected(),
+    )
+
+
+def _moving(speed: Array) -> slice:
+    """From the last sample at the one end of the speeds to the first at the other."""
+    low, high = float(np.nanmin(speed)), float(np.nanmax(speed))
+    if high < 1.2 * low:
+        raise AnalysisError(f"passage: the speed went from {low:.4g} to {high:.4g} rad/s; expected a run through more")
+    margin = ENDS * (high - low)
+    slow, fast = np.flatnonzero(speed < low + margin), np.flatnonzero(speed > high - margin)
+    return slice(int(slow[-1]), int(fast[0])) if slow[0] < fast[0] else slice(int(fast[-1]), int(slow[0]))
+
+
+def curve(p: Passage, blocks: int) -> Curve:
+    """Vectors of blocks that are equally wide in speed, and at least four turns long.
+
+    Raises:
+        AnalysisError: too few turns.
+    """
+    read = p.t - p.sampling.late
+    angle, speed = np.where(read < p.tacho.times[0], -np.inf, p.tacho.angle(read)), p.speeds
+    at, end = p.moving.start, p.moving.stop
+    step = abs(float(speed[end - 1] - speed[at])) / blocks
+    rate = np.abs(np.gradient(speed[at:end], p.t[at:end]))
+    smooth = np.convolve(rate, np.ones(201) / 201, "same") if rate.size > 400 else np.full(rate.size, rate.mean())
+    smooth = np.maximum(smooth, 0.1 * rate.mean())
+    rows: list[tuple[Any, ...]] = []
+    whole = math.ceil(angle[at] / (2 * math.pi))
+    while True:
+        k = int(np.searchsorted(angle[:end], 2 * math.pi * whole))
+        if k >= end:
+            break
+        turns = max(
+            LEAST_TURNS, round(step * speed[k] / (2 * math.pi * smooth[min(max(k - at, 100), smooth.size - 101)]))
+        )
+        left = math.floor(angle[end - 1] / (2 * math.pi)) - whole
+        count = min(TOGETHER, left // turns)
+        if count < 1:
+            break
+        rows.append(_piece(p, angle, whole, whole + count * turns, turns))
+        whole += count * turns
+    if not rows:
+        raise AnalysisError("passage: found no block of four turns")
+    joined = [np.concatenate(parts_, axis=0) for parts_ in zip(*rows, strict=True)]
+    return _ordered(joined)
+
+
+def _piece(p: Passage, angle: Array, first: int, last: int, turns: int) -> tuple[Any, ...]:
+    """Some blocks of equal turns: mean times, speeds, widths, values, moves, means, volts, order 2."""
+    low, high = np.searchsorted(angle[: p.moving.stop], 2 * math.pi * np.array([first, last], dtype=float))
+    part = slice(max(int(low) - 1, 0), int(high) + 1)  # a sample beyond either end
+    fast = float(np.nanmax(p.speeds[part]))
+    orders = (1.0, 2.0) if 2 * fast / (2 * math.pi) < 0.4 / (p.sampling.ticks * p.sampling.tick) else (1.0,)
+    track = synchronous(p.t[part], p.data[:, part], p.tacho, p.sampling, orders=orders, turns=turns)
+    edges = p.tacho.time(2 * math.pi * (first + turns * np.arange(track.speed.size + 1)))
+    places = np.searchsorted(p.t[part], edges)
+    volts = np.maximum.reduceat(p.volts[:, part], np.minimum(places[:-1], p.volts[:, part].shape[1] - 1), axis=1).T
+    moves = track.moves[..., 0]
+    moved = parts(moves[..., None])
+    covariance = np.einsum("bmci,bmcj->bcij", moved, moved)
+    alone, whole = serial.variances(moves)
+    second = track.values[..., 1] if len(orders) > 1 else np.full((track.speed.size, 12), np.nan + 0j)
+    dof = np.full(track.speed.size, track.dof)
+    width = np.abs(np.diff(p.tacho.speed(np.clip(edges, p.tacho.times[0], p.tacho.times[-1]))))
+    return track.t, track.speed, width, track.values[:, :, 0], covariance, alone, whole, track.means, volts, second, dof
+
+
+def _ordered(joined: Sequence[Any]) -> Curve:
+    t, speed, width, values, covariance, alone, whole, means, volts, second, dof = joined
+    for kind in (slice(0, 4), slice(4, 12)):  # positions, currents
+        covariance[:, kind] *= serial.inflation(alone[:, kind], whole[:, kind])[:, None, None, None]
+    acceleration = np.gradient(speed, t)
+    order = np.argsort(speed, kind="stable")
+    rising = order[np.concatenate([[True], np.diff(np.maximum.accumulate(speed[order])) > 0])]
+    return Curve(
+        speed[rising],
+        acceleration[rising],
+        width[rising],
+        values[rising].T,
+        np.swapaxes(covariance[rising], 0, 1),
+        means[rising],
+        volts[rising],
+        second[rising].T,
+        dof[rising],
+    )
+
+
+def near(p: Passage, recording: Recording[Any], speed: float, law: str) -> tuple[Dwell, float] | None:
+    """The turns about a speed as a dwell, with its capture where there is one, and by how much the speed went, rad/s; None
+    where the shaft did not come through it."""
+    angle, w = p.tacho.angle(p.t), p.speeds
+    inside = w[p.moving]
+    if not np.nanmin(inside) < speed < np.nanmax(inside):
+        return None
+    k = p.moving.start + int(np.nanargmin(np.abs(inside - speed)))
+    close = np.flatnonzero(np.abs(inside - speed) < NEAR * speed) + p.moving.start
+    turn = 2 * math.pi
+    half = max(float(angle[close[-1]] - angle[close[0]]) / 2, turn * (NEAR_TURNS / 2 + 0.5))
+    low, high = np.searchsorted(angle[: p.moving.stop], [angle[k] - half, angle[k] + half])
+    part = slice(max(int(low), p.moving.start), min(int(high), p.moving.stop))
+    orders = [n for n in (1.0, 2.0, 3.0) if n == 1 or n * speed / turn < 0.4 / (p.sampling.ticks * p.sampling.tick)]
+    track = synchronous(p.t[part], p.data[:, part], p.tacho, p.sampling, orders=orders)
+    captures = recording.captures(passed_rad_s=speed)
+    driven = float(np.interp(p.t[k], *p.driven))
+    dwell = Dwell(
+        PASSAGE, f"{p.direction}, {law}", speed, driven, False, p.tacho, track, full_rate(captures[0]) if captures else None,
+        int(np.bitwise_or.reduce(p.flags[part])), 0, (), 0, 1, recording.start_ns + round(p.t[k] * 1e9),
+        p.sampling,
+    )  # fmt: skip
+    return dwell, abs(float(w[part.stop - 1] - w[part.start]))

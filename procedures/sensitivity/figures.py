@@ -1,0 +1,70 @@
+"""What the sensitivity draws: |S| over its zones, the Bode pair of S, the open loop about -1, coherence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from bench.analysis import pictures
+from bench.analysis.peaks import Peak
+from bench.analysis.responses import Response, loop
+from bench.figures import Figure, Series
+from bench.uncertainty import interval
+from procedures.sensitivity.checks import ZONES
+from procedures.sensitivity.estimates import Result
+from procedures.sensitivity.steps import SURVEY, named
+
+CLEAR = 0.97  # coherence below which a line is not drawn in the Nyquist plot
+
+
+def all_figures(results: Sequence[Result]) -> Iterator[Figure]:
+    """In the order of the report, by speed."""
+    for speed in dict.fromkeys(r.speed for r in results):
+        some = [r for r in results if r.speed == speed and r.curve.hz.size]
+        if some:
+            key = f"{speed * 30 / np.pi:.0f}"
+            yield _zones(some, key, named(speed))
+            yield _bode(some, key, named(speed))
+            yield pictures.nyquist(
+                f"nyquist-{key}", f"Open loop, {named(speed)}", [(r.axis, loop(_survey(r))) for r in some], ZONES[0]
+            )
+            yield _coherence(some, key, named(speed))
+
+
+def _zones(some: Sequence[Result], key: str, name: str) -> Figure:
+    top = max((r for r in some if r.peaks), key=lambda r: r.peaks[0].top.value, default=None)
+    peak = None
+    if top is not None:
+        e, t = top.estimates["s_max"], top.peaks[0].top
+        i = interval(e)
+        peak = Peak(e.value, i.low, i.high, e.u, t.at, t.u_at, e.value + t.bias, t.bias)
+    return pictures.sensitivity(
+        f"sensitivity-{key}", f"Sensitivity, {name}", [(r.axis, r.curve) for r in some], ZONES, peak
+    )
+
+
+def _bode(some: Sequence[Result], key: str, name: str) -> Figure:
+    """Magnitude in dB over phase in degrees."""
+    size = tuple(Series(r.axis, r.curve.hz, 20 * np.log10(np.maximum(np.abs(r.curve.values), 1e-6))) for r in some)
+    phase = tuple(Series(r.axis, r.curve.hz, np.degrees(np.unwrap(np.angle(r.curve.values[::-1]))[::-1])) for r in some)
+    below = Figure(f"bode-phase-{key}", "", "", "frequency (Hz)", "phase (°)", phase, log_x=True)
+    return Figure(f"bode-{key}", f"Bode plot of the sensitivity, {name}", "S = V1/E: magnitude, and phase lead.",
+                  "frequency (Hz)", "|S| (dB)", size, log_x=True, below=below)  # fmt: skip
+
+
+def _survey(r: Result) -> Response:
+    """The lines of the survey that say something, in order."""
+    some = [t.response for t in r.taken if t.kind == SURVEY]
+    hz = np.concatenate([s.hz for s in some])
+    order = np.argsort(hz)
+    values, covariance, coherence = (
+        np.concatenate([getattr(s, n) for s in some])[order] for n in ("values", "covariance", "coherence")
+    )
+    return Response(hz[order], values, covariance, coherence, some[0].dof).at(coherence > CLEAR)
+
+
+def _coherence(some: Sequence[Result], key: str, name: str) -> Figure:
+    series = tuple(Series(r.axis, r.curve.hz, r.curve.coherence) for r in some)
+    return Figure(f"coherence-{key}", f"Coherence of injection and reference, {name}", "Over the periods of the multisine.",
+                  "frequency (Hz)", "coherence", series, log_x=True)  # fmt: skip

@@ -1,0 +1,91 @@
+"""What a plan of injections asks too much of the rig: said before anything moves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, Protocol
+
+from bench.capture import Layout
+from bench.envelope import Envelope
+from bench.errors import BenchError
+from bench.rigfile import RigFile
+from procedures.sensitivity.injection import Comb, refused
+from procedures.sensitivity.steps import REFINED, RPM, channels
+
+LEAST_S = 4.0  # of a capture of the second grid: four periods of the finest
+
+
+class Settings(Protocol):
+    """The part of a plan that these checks need."""
+
+    @property
+    def axes(self) -> tuple[Any, ...]: ...
+    @property
+    def speeds_rad_s(self) -> tuple[float, ...]: ...
+    @property
+    def rate_hz(self) -> float: ...
+    @property
+    def low_hz(self) -> float: ...
+    @property
+    def high_step_hz(self) -> float: ...
+    @property
+    def periods(self) -> int: ...
+    @property
+    def amplitude_A(self) -> float: ...
+
+
+def of_plan(rig: RigFile, plan: Settings, combs: Sequence[tuple[str, Comb]]) -> Iterator[str]:
+    """What the plan asks too much of: key, found, expected."""
+    if max(plan.speeds_rad_s) > 0 and not any("drive" in d.roles for d in rig.devices.values()):
+        yield "speeds_rad_s: the rig file has no device in the role drive, so that nothing turns the shaft; expected 0"
+        return
+    yield from _injection(rig, plan, combs)
+    yield from _speeds(rig, plan)
+
+
+def _injection(rig: RigFile, plan: Settings, combs: Sequence[tuple[str, Comb]]) -> Iterator[str]:
+    refined = Comb(plan.low_hz, plan.low_hz, 128, plan.amplitude_A)  # at most, in the second pass
+    greatest = max([*(c for _, c in combs), refined], key=lambda c: c.peak)
+    if why := refused(Envelope(rig), greatest):
+        yield f"amplitude_A: found {plan.amplitude_A:g} A for each line; expected less: {why}"
+    for key, value in (("low_hz", plan.low_hz), ("high_step_hz", plan.high_step_hz)):
+        if math.log2(value) % 1:
+            yield f"{key}: found {value:g}; expected a power of two: the lines must repeat after whole samples"
+    if len({*plan.axes}) < len(plan.axes):
+        yield f"axes: found {', '.join(plan.axes)}; expected each once"
+    top = max(hz for _, c in combs for hz in c.hz)
+    if top > 0.45 * plan.rate_hz:
+        yield (f"rate_hz: found {plan.rate_hz:g}; expected {top / 0.45:.0f} Hz or more for lines up to {top:g} Hz: what is "
+               "above half of it folds back")  # fmt: skip
+    yield from _memory(rig, plan, combs)
+
+
+def _memory(rig: RigFile, plan: Settings, combs: Sequence[tuple[str, Comb]]) -> Iterator[str]:
+    assert rig.capture is not None
+    speed = max(plan.speeds_rad_s)
+    slowest = min((s for s in plan.speeds_rad_s if s > 0), default=0.0)
+    extra = 0.1 + 4 * math.pi / slowest if slowest else 0.0
+    for kind, seconds in [*((k, plan.periods * c.period_s) for k, c in combs), (REFINED, LEAST_S)]:
+        try:
+            size = Layout.of(rig.capture, channels(kind, speed)).sample.itemsize * (seconds + extra) * plan.rate_hz
+        except BenchError as error:
+            yield str(error)
+            return
+        if size > rig.capture.memory_bytes:
+            yield (f"periods: found {size:.0f} bytes for the pass {kind!r}; expected {rig.capture.memory_bytes} at most, the "
+                   "controller's memory")  # fmt: skip
+            return
+
+
+def _speeds(rig: RigFile, plan: Settings) -> Iterator[str]:
+    highest, landing = (
+        rig.envelope.max_speed_rad_s,
+        rig.parameters["landing_speed"].default if "landing_speed" in rig.parameters else 0.0,
+    )
+    if max(plan.speeds_rad_s) > highest:
+        yield f"speeds_rad_s: found {max(plan.speeds_rad_s) * RPM:.0f} r/min; the envelope allows {highest * RPM:.0f} r/min"
+    if any(s < 0 or 0 < s < 2 * landing for s in plan.speeds_rad_s) or len({*plan.speeds_rad_s}) < len(
+        plan.speeds_rad_s
+    ):
+        yield f"speeds_rad_s: expected 0 or above {2 * landing * RPM:.0f} r/min, twice the landing speed, and each once"

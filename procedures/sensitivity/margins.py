@@ -1,0 +1,153 @@
+"""Margins of an open loop L = 1/S - 1 by the sensitivity S at the lines of a survey. All functions are pure.
+
+Each is where a curve crosses a line, and noise makes crossings of its own: what is between the lines has to be smooth.
+Where |L| is 1, S is large and its local rational models are that. The gain may fall where the integrator bends the loop
+from one line to the next: hz times L goes through a few of them. It may rise where S is nearly 1 and L is small and noisy:
+many lines to either side make one polynomial of the logarithm of the frequency.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.analysis import peaks
+from bench.analysis.responses import Response
+from bench.uncertainty import Estimate, Influence
+from procedures.sensitivity.steps import Taken
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+DRAWS = 150
+TOLERATED = 0.05  # share of the draws that may have no crossing
+VAGUE = 0.2  # relative standard uncertainty above which a margin is not told
+FAINT = 0.1  # where |L| is less, it is noise that crosses the axis: a gain that may rise tenfold is not told
+LOW, NODES, BETWEEN = 12, 4, 20  # lines between which the loop is bent, how many make a curve, points of it in a step
+REACHES, DEGREE = (1.8, 1.5, 1.3), 3  # of the crossing's frequency, to either side, and of the polynomial of ln f
+MISFIT = 3.0  # standard deviations of its chi-squared over what noise explains: a bending mode is among the lines
+
+
+def margins(surveys: Sequence[Taken], where: str) -> dict[str, Estimate]:
+    """Phase margin and both gain margins by the lines of the survey, those that exist and are told from noise."""
+    if not surveys:
+        return {}
+    hz, z, power = merged([(t.response, t.noise) for t in surveys])
+    if hz.size < peaks.WINDOW:
+        return {}
+    covariance = power[:, None, None] / 2 * np.eye(2)
+    smooth = peaks.smoother(hz, z, covariance)
+    base, drawn = smooth.at_lines(z), peaks.noise(covariance, 0, DRAWS)
+    seen = smooth.everywhere(z), smooth.everywhere(base), smooth.everywhere(base + drawn)
+    found = {
+        "phase_margin": ("rad", _told(seen, lambda s: phase(1 / s - 1))),
+        "gain_reduction": ("1", _told((z, base, base + drawn), lambda s: fall(between(hz, 1 / s - 1)))),
+        "gain_increase": ("1", _raised(hz, z, power, drawn, smooth)),
+    }
+    dof = max(float(min(t.dof for t in surveys)), 1.0)
+    out = {}
+    for name, (unit, of) in found.items():
+        if of is not None:
+            identity = f"scatter/{where}/{name}"
+            out[name] = Estimate.of(
+                of[0], Influence(identity, "scatter over the periods", of[1], unit, "A", "normal", dof)
+            )
+    return out
+
+
+def merged(parts: Sequence[tuple[Response, Array]]) -> tuple[Array, Complex, Array]:
+    """Lines of several responses in order of frequency, with their noise; of those that coincide the last one counts."""
+    hz = np.concatenate([r.hz for r, _ in parts])
+    z = np.concatenate([r.values for r, _ in parts])
+    power = np.concatenate([p for _, p in parts])
+    kept = {float(f): k for k, f in enumerate(hz)}
+    order = np.array([kept[f] for f in sorted(kept)])
+    return hz[order], z[order], power[order]
+
+
+def _told(curves: tuple[Complex, Complex, Complex], of: Callable[[Complex], float]) -> tuple[float, float] | None:
+    """A margin of a curve (m,), freed of the bias that draws (d, m) about its smoothed one (m,) show, and its u."""
+    seen, base, drawn = curves
+    found, again, values = of(seen), of(base), np.array([of(each) for each in drawn])
+    return _freed(found, again, values)
+
+
+def _freed(found: float, again: float, values: Array) -> tuple[float, float] | None:
+    known = np.isfinite(values)
+    if not (math.isfinite(found) and math.isfinite(again) and known.mean() > 1 - TOLERATED):
+        return None
+    u = float(values[known].std())
+    return (found - (float(values[known].mean()) - again), u) if u <= VAGUE * found else None
+
+
+def _crossings(level: Array, other: Complex) -> Complex:
+    """A curve where `level` changes its sign, interpolated."""
+    k = np.flatnonzero(np.sign(level[1:]) != np.sign(level[:-1]))
+    share = level[k] / (level[k] - level[k + 1])
+    return np.asarray(other[k] + share * (other[k + 1] - other[k]))
+
+
+def phase(loop: Complex) -> float:
+    """Phase margin of an open loop (m,), rad; NaN where |L| is not 1."""
+    at = _crossings(np.abs(loop) - 1, loop)
+    return float(np.abs(np.angle(-at)).min()) if at.size else math.nan
+
+
+def _real(loop: Complex) -> Array:
+    """Distances from the origin where the loop crosses the negative real axis."""
+    at = _crossings(loop.imag, loop).real
+    return np.asarray(-at[at < 0])
+
+
+def fall(loop: Complex) -> float:
+    """Factor to which its gain may fall; NaN where that is not told."""
+    at = _real(loop)
+    return float((1 / at[at > 1]).max()) if (at > 1).any() else math.nan
+
+
+def rise(loop: Complex) -> float:
+    """Factor to which its gain may rise; NaN where that is not told."""
+    at = _real(loop)
+    some = at[(at < 1) & (at > FAINT)]
+    return float((1 / some).min()) if some.size else math.nan
+
+
+def between(hz: Array, loop: Complex) -> Complex:
+    """The lowest LOW lines of an open loop (m,) at `hz`, and BETWEEN points to each of them: hz times the loop goes through
+    NODES lines. Straight lines between them would cross the axis 0.4 to 0.9 % beside it."""
+    out = []
+    for k in range(min(LOW, len(hz) - NODES)):
+        first = max(k - 1, 0)
+        x = np.linspace(hz[k], hz[k + 1], BETWEEN, endpoint=False)
+        nodes = hz[first : first + NODES]
+        apart = nodes[:, None] - nodes + np.eye(NODES)
+        factors = np.where(np.eye(NODES)[:, :, None] > 0, 1.0, (x - nodes[:, None])[None]) / apart[:, :, None]
+        out.append((loop[first : first + NODES] * nodes) @ factors.prod(axis=1) / x)
+    return np.concatenate([*out, loop[len(out) :]])
+
+
+def _raised(hz: Array, z: Complex, power: Array, drawn: Complex, smooth: peaks.Smoother) -> tuple[float, float] | None:
+    """How far the gain may rise, and its u, by a polynomial about where a first look sees the crossing."""
+    loop = 1 / smooth.everywhere(z) - 1
+    at = _crossings(loop.imag, loop + 0j).real, _crossings(loop.imag, smooth.x.astype(np.complex128)).real
+    can = (at[0] < -FAINT) & (at[0] > -1)
+    if not can.any():
+        return None
+    middle = float(at[1][can][np.argmin(at[0][can])])
+    for reach in REACHES:
+        near = (hz > middle / reach) & (hz < middle * reach)
+        x, many = np.log(hz[near] / middle), int(near.sum())
+        if many < 3 * (DEGREE + 1):
+            return None
+        terms, weight = np.vander(x, DEGREE + 1), np.abs(z[near]) ** 2 / np.sqrt(power[near])  # d(1/S) = dS/S²
+        inverse = np.linalg.pinv(terms * weight[:, None]) * weight
+        fitted = inverse @ (1 / z[near] - 1)
+        off = float((np.abs((1 / z[near] - 1 - terms @ fitted) * weight) ** 2).sum()) / (many - DEGREE - 1)
+        if off < 1 + MISFIT / math.sqrt(many - DEGREE - 1):
+            fine = np.vander(np.linspace(x[0], x[-1], 20 * many), DEGREE + 1)
+            noisy = 1 / (1 / (1 + terms @ fitted) + drawn[:, near]) - 1
+            found = rise(fine @ fitted)
+            return _freed(found, found, np.array([rise(fine @ (inverse @ each)) for each in noisy]))
+    return None

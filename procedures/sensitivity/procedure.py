@@ -1,0 +1,262 @@
+"""Sensitivity of the control loops by injection (ISO 14839-3 in its sense): S = V1/E at each axis, all other loops closed.
+
+Measurands, by axis and speed: greatest |S| with its frequency, phase margin, and how far the loop's gain may fall and rise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from bench.analysis.responses import Response, image_distance
+from bench.capture import Layout
+from bench.errors import AnalysisError
+from bench.figures import Figure
+from bench.findings import Effect, Finding
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.requires import Requires
+from bench.rig import Rig
+from bench.rigfile import RigFile
+from bench.roles import RigState
+from procedures.amb_rotor import lift, wiring
+from procedures.sensitivity import checks, estimates, fitting
+from procedures.sensitivity import figures as drawn
+from procedures.sensitivity.estimates import Candidate, Result
+from procedures.sensitivity.injection import PARAMETERS, Comb, combs, injected
+from procedures.sensitivity.steps import (
+    CURRENTS,
+    HALF,
+    INJECT,
+    LOOP,
+    MODE,
+    PULSED,
+    REFINED,
+    RPM,
+    SURVEY,
+    TOLD,
+    WIRING,
+    Taken,
+    channels,
+    folds,
+    grid_of,
+    read_taken,
+    sensitivity,
+)
+from procedures.shared import assumptions
+
+Law = Literal["PID", "CCS"]
+Axis = Literal["yi", "zi", "yo", "zo", "x"]
+CODES: dict[Law, float] = {"PID": 0.0, "CCS": 1.0}
+S_MAX = Quantity("s_max", "1", "greatest |V1/E| of an axis, all other loops closed (ISO 14839-3)", title="S_max")
+AT = Quantity("s_max_hz", "Hz", "frequency of the greatest |V1/E|", title="frequency of S_max")
+PHASE = Quantity("phase_margin", "rad", "least angle of the open loop L = 1/S - 1 from -1 where |L| = 1, either way")
+FALL = Quantity("gain_reduction", "1", "factor to which the loop's gain may fall before it is unstable")
+RISE = Quantity("gain_increase", "1", "factor to which the loop's gain may rise before it is unstable")
+MEASURES = (S_MAX, AT, PHASE, FALL, RISE)
+MARGIN_S = 0.1  # of a capture, for the first and last pulse
+FOLLOWED_HZ, FOLLOWED = 8.0, 12  # lines at its odd multiples: below 200 Hz coils follow their references
+STANDS_S = 1.0  # the controller knows half a second after the last pulse that the shaft stands
+
+
+class Plan(BenchPlan):
+    """Settings of the injections, SI."""
+
+    law: Law = "PID"
+    axes: tuple[Axis, ...] = Field(("yi", "zi", "yo", "zo", "x"), min_length=1)
+    speeds_rad_s: tuple[float, ...] = Field((0.0, 10000 / RPM), min_length=1)
+    amplitude_A: float = Field(4e-3, gt=0)  # of each line, 0-pk
+    low_hz: float = Field(2.0, gt=0)
+    middle_hz: float = Field(256.0, gt=0)  # up to here the odd multiples of low_hz; above it every high_step_hz
+    high_step_hz: float = Field(16.0, gt=0)
+    high_hz: float = Field(2000.0, gt=0)
+    modes_hz: tuple[float, ...] = (650.0, 1240.0)  # bending modes, about which a finer grid is laid
+    mode_within_hz: float = Field(26.0, gt=0)  # to either side
+    mode_damping: float = Field(2e-3, gt=0)  # least that is expected of them
+    periods: int = Field(4, ge=3)  # of the survey
+    refined_periods: int = Field(8, ge=4)
+    settle_s: float = Field(8.0, ge=0.5)  # under the law, before anything is injected
+    start_s: float = Field(0.5, ge=0.1)  # of each injection
+    survey_start_s: float = Field(1.5, ge=0.1)  # of the survey: a slow integrator answers its lowest lines
+    rate_hz: float = Field(10000.0, gt=0)  # of the captures
+    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
+    max_speed_error: float = Field(0.01, gt=0)  # share of the speed
+    max_change: float = Field(0.05, gt=0)  # of S_max, at half the amplitude: linear enough
+    min_coherence: float = Field(0.9, gt=0, lt=1)  # at the lines about the peak
+
+
+def surveys(plan: Plan, speed: float) -> list[tuple[str, float, Comb]]:
+    """The combs of the first pass with their kind and what they are about: the whole range, and finer about the modes.
+
+    The lines of the whole range stand half a step off its multiples: what the bearings' curvature makes of two lines, sum
+    and difference, falls between them (Pintelon and Schoukens, System Identification, 2nd ed., 3.4). Where the shaft turns
+    it is a quarter where that keeps them apart from their images by the orbit.
+    """
+    a, step = plan.amplitude_A, 2 * plan.low_hz
+    turns = speed / (2 * math.pi * step)
+    share = max((0.5, 0.25, 0.75), key=lambda share: image_distance(share, turns)) if speed else 0.5
+    high = plan.high_step_hz * (math.floor(plan.middle_hz / plan.high_step_hz) + 0.5)
+    out = [(WIRING, 0.0, Comb(FOLLOWED_HZ, 2 * FOLLOWED_HZ, FOLLOWED, a))]
+    out += [(SURVEY, 0.0, c) for c in combs(share * step, step, min(plan.middle_hz, plan.high_hz), a)]
+    if high < plan.high_hz:
+        out += [(SURVEY, 0.0, c) for c in combs(high, plan.high_step_hz, plan.high_hz, a)]
+    for hz in plan.modes_hz:
+        step = estimates.binary(plan.mode_damping * hz)  # half of the half-power width 2 zeta f
+        low = step * math.floor((hz - plan.mode_within_hz) / step)
+        out += [(MODE, hz, c) for c in combs(low, step, hz + plan.mode_within_hz, a)]
+    return out
+
+
+def refinements(plan: Plan, about: Candidate, speed: float) -> list[tuple[str, float, Comb]]:
+    """The second pass about a peak, at the plan's amplitude and at half of it."""
+    first, step, count = about.lines(speed)
+    return [(k, about.hz, Comb(first, step, count, plan.amplitude_A * f)) for k, f in ((REFINED, 1.0), (HALF, 0.5))]
+
+
+def size(rig: RigFile, kind: str, speed: float) -> int:
+    """Bytes of a sample of what is captured."""
+    assert rig.capture is not None
+    return Layout.of(rig.capture, channels(kind, speed)).sample.itemsize
+
+
+def settings(plan: Plan) -> dict[str, float]:
+    """Lifted by the PID, which needs no model; nothing compensated, nothing injected."""
+    del plan
+    return {"law": CODES["PID"], "observer": 0.0, "compensate": 0.0, "inject_axis": -1.0}
+
+
+def step_count(plan: Plan) -> int:
+    """How many steps `acquire` records at least, for the progress display."""
+    return lift.STEPS + len(plan.speeds_rad_s) * len(plan.axes) * (len(surveys(plan, 0.0)) + 2)
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Lift the shaft, nudge it, and at each speed inject into each axis: the survey, then finer where it peaks."""
+    if not lift.probed(rig, record):
+        return
+    rig.levitation.set("law", CODES[plan.law])
+    rig.clock.sleep(plan.settle_s)
+    number = 0
+    for speed in sorted(plan.speeds_rad_s):
+        if speed and not lift.turned(rig, record, speed, plan.settle_s):
+            break
+        for axis in plan.axes:
+            number = _axis(rig, plan, record, speed, axis, number)
+    if rig.drive is not None and max(plan.speeds_rad_s) > 0:
+        rig.drive.stop()
+        rig.drive.coast()
+        rig.clock.sleep(STANDS_S)
+    rig.levitation.set("law", CODES["PID"])
+
+
+def _axis(rig: Rig, plan: Plan, record: Recorder, speed: float, axis: str, number: int) -> int:
+    """Both passes of an axis; the number of the next capture."""
+    seen: list[Response] = []
+    for kind, about, comb in surveys(plan, speed):
+        found = _taken(rig, plan, record, speed, axis, kind, about, comb, number)
+        seen += [found] if found is not None and kind != WIRING else []
+        number += 1
+    for candidate in estimates.candidates(seen):
+        for kind, about, comb in refinements(plan, candidate, speed):
+            _taken(rig, plan, record, speed, axis, kind, about, comb, number)
+            number += 1
+    return number
+
+
+def _taken(
+    rig: Rig, plan: Plan, record: Recorder, speed: float, axis: str, kind: str, about: float, comb: Comb, number: int
+) -> Response | None:
+    """Inject, capture, upload; what S seems to be, for deciding how to go on; None where that cannot be told."""
+    labels: dict[str, float | str] = {
+        "axis": axis, "speed_rad_s": speed, "pass": kind, "about_hz": about, "number": number, "first_hz": comb.first,
+        "step_hz": comb.step, "lines": comb.count, "period_s": comb.period_s, "amplitude_A": comb.amplitude,
+    }  # fmt: skip
+    assert rig.capture is not None
+    pulses = MARGIN_S + 4 * math.pi / speed if speed else 0.0
+    seconds = comb.period_s * (plan.refined_periods if kind in (REFINED, HALF) else plan.periods)
+    if kind in (REFINED, HALF):  # as many as fit
+        most = rig.capture.memory_bytes / size(rig.file, kind, speed) / plan.rate_hz - pulses
+        seconds = comb.period_s * min(plan.refined_periods, math.floor(most / comb.period_s))
+    seconds += pulses
+    with injected(rig, axis, comb, plan.survey_start_s if kind == SURVEY else plan.start_s):
+        with record.step(INJECT, **labels):
+            rig.capture.arm(channels(kind, speed), seconds=seconds, rate_hz=plan.rate_hz)
+            rig.capture.wait(seconds + 5.0)
+    data, grid = rig.capture.upload(None, **labels), grid_of(labels)
+    if folds(grid, data.rate_hz):
+        return None
+    t = data.start_ns * 1e-9 + np.arange(len(data.columns["inject"])) / data.rate_hz
+    try:
+        return sensitivity(data.columns, t, data.rate_hz, grid)[0]
+    except AnalysisError:
+        return None  # which the analysis tells
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """Findings, what was taken, and the results where there are any."""
+
+    findings: tuple[Finding, ...]
+    taken: tuple[Taken, ...]
+    results: tuple[Result, ...]
+
+
+def evaluated(recording: Recording[Any]) -> Evaluated:
+    """What a recording of injections says."""
+    found = [*wiring.before_orbits(recording), *checks.before(recording)]
+    if any(f.effect is Effect.ERROR for f in found):
+        return Evaluated(tuple(found), (), ())
+    plan, taken = recording.plan, read_taken(recording)
+    found += checks.of_signals(taken, plan)
+    if any(f.effect is Effect.ERROR for f in found):
+        return Evaluated(tuple(found), tuple(taken), ())
+    results = estimates.results(taken)
+    found += checks.of_results(results, plan)
+    return Evaluated(tuple(found), tuple(taken), tuple(results))
+
+
+def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
+    """Findings first, then the quantities of each axis and speed."""
+    done = recording.once(evaluated)
+    yield from done.findings
+    known = {q.name: q for q in MEASURES}
+    for result in done.results:
+        for name, estimate in result.estimates.items():
+            yield known[name].measured(estimate, result.where)
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts."""
+    yield from fitting.of_plan(
+        rig, plan, [(kind, comb) for s in plan.speeds_rad_s for kind, _, comb in surveys(plan, s)]
+    )
+
+
+def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+    """|S| over its zones, Bode pair of S, Nyquist plot and coherence, by speed; empty where nothing was evaluated."""
+    return drawn.all_figures(recording.once(evaluated).results)
+
+
+procedure = Procedure(
+    name="sensitivity",
+    title="Sensitivity of the control loops",
+    measures=MEASURES,
+    state=RigState.READY,
+    plan=Plan,
+    acquire=acquire,
+    analyse=analyse,
+    figures=figures,
+    requires=Requires(channels=TOLD, parameters=(*PARAMETERS, "law"), capture=(*LOOP, *PULSED, *CURRENTS)),
+    check=check,
+    settings=settings,
+    step_count=step_count,
+    optional=(PHASE, FALL, RISE),  # a margin that the survey does not resolve is not told
+    assumes=assumptions.SENSITIVITY,
+    method=read_method(__file__),
+)

@@ -1,0 +1,190 @@
+"""From captures under injection to the sensitivity at each line: S = after/inject, with its scatter over the periods."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.analysis.responses import Response, clear_of_orders, lines, response, without_orders
+from bench.analysis.tachometer import counted, tachometer
+from bench.errors import AnalysisError
+from bench.recording import Recording, Step
+from procedures.shared.signals import clips
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+INJECT, NOT_REACHED = "inject", "not-reached"
+WIRING, SURVEY, MODE, REFINED, HALF = "wiring", "survey", "mode", "refined", "half"
+AXES = ("yi", "zi", "yo", "zo", "x")
+TOLD = (*(f"pos_{a}" for a in AXES), "flags", "speed")
+LOOP = ("inject", "before", "after")
+PULSED = ("pulses", "pulse_age")
+CURRENTS = tuple(f"i_{a}_{side}" for a in AXES for side in "pn")
+ORDERS = (1.0, 2.0, 3.0, 4.0)
+CLEAR_HZ = 3.0  # to either side of an order of the shaft's speed
+CURRENT_LIMIT, VOLTAGE_LIMIT, CONTACT, RANGE = 1, 2, 4 | 8 | 32, 64  # bits of the telemetry signal `flags`
+RPM = 30 / math.pi
+WHOLE = 1e-6  # of the samples of a period: how far they may be from a whole number
+SHARING = 15  # lines to either side that share a noise
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Lines `hz` (m,), `period` s of the whole, `amplitude` A asked of each."""
+
+    hz: Array
+    period: float
+    amplitude: float
+
+    @property
+    def step(self) -> float:
+        """Greatest distance of neighbours, Hz."""
+        return float(np.diff(self.hz).max()) if self.hz.size > 1 else math.inf
+
+
+@dataclass(frozen=True)
+class Taken:
+    """One capture under injection into `axis`: `kind` of pass about `about` Hz; `response`, S at the lines that are clear of
+    the shaft's orders, `excluded` Hz those that are not; `injected` (m,) A found; `peak` A, the greatest; `clipped`, the most
+    of the difference of after from before + inject, A; `follows` (5,), the differential coil currents of all axes per `after`
+    at the lowest lines (None where the currents were not captured); `rate` Hz, `flags` ORed; `clips` of a probe."""
+
+    axis: str
+    speed: float
+    turning: float
+    kind: str
+    about: float
+    grid: Grid
+    response: Response
+    excluded: Array
+    injected: Array
+    peak: float
+    clipped: float
+    follows: Complex | None
+    rate: float
+    flags: int
+    clips: int
+    lost: int
+    expected: int
+
+    @property
+    def where(self) -> str:
+        """How it is named to the reader."""
+        return f"{self.axis}, {named(self.speed)}"
+
+    @property
+    def noise(self) -> Array:
+        """Mean square (m,) of the noise in S at each line: in shares of abs(S) it hardly changes from line to line."""
+        return shared_noise(self.response)
+
+    @property
+    def dof(self) -> float:
+        """Degrees of freedom of `noise`: those of the periods, over the lines that share it; two for each complex value."""
+        return 2 * self.response.dof * min(self.response.hz.size, 2 * SHARING + 1)
+
+
+def shared_noise(r: Response) -> Array:
+    """Mean square (m,) of the noise in a response, its share of abs squared averaged over neighbouring lines."""
+    size = np.maximum(np.abs(r.values) ** 2, 1e-12)
+    share = np.trace(r.covariance, axis1=1, axis2=2) / size
+    near = [share[max(0, k - SHARING) : k + SHARING + 1].mean() for k in range(share.size)]
+    return np.asarray(np.array(near) * size)
+
+
+def named(speed: float) -> str:
+    """A speed, for the reader."""
+    return f"{speed * RPM:.0f} r/min" if speed else "at rest"
+
+
+def channels(kind: str, speed: float) -> tuple[str, ...]:
+    """What is captured: first of all also the coil currents, which tell where the injection goes."""
+    return (*LOOP, *(CURRENTS if kind == WIRING else ()), *(PULSED if speed else ()))
+
+
+def folds(grid: Grid, rate: float) -> bool:
+    """Whether the lines are too high for a capture's rate, or do not lie on its bins."""
+    samples = grid.period * rate
+    return bool(grid.hz.max() > 0.45 * rate or abs(samples - round(samples)) > WHOLE * samples)
+
+
+def sensitivity(columns: Mapping[str, Array], t: Array, rate: float, grid: Grid) -> tuple[Response, Array, Array]:
+    """S at the lines, the amplitudes found there (m,) A, and the excluded lines; with pulses the shaft's orders are taken out.
+
+    Raises:
+        AnalysisError: fewer than three periods, or a line without injection.
+    """
+    data = np.array([columns["inject"], columns["after"]])
+    hz, near = grid.hz, grid.hz[:0]
+    if "pulses" in columns:
+        angle, speed, inside = turned(columns, t)
+        data = np.concatenate([data[:1, inside], without_orders(data[1:, inside], angle[inside], ORDERS)])
+        free = clear_of_orders(hz, speed, CLEAR_HZ, ORDERS)
+        hz, near = hz[free], hz[~free]
+    found = lines(data - data.mean(axis=1, keepdims=True), rate, round(grid.period * rate), hz)
+    return response(found, 1, 0), np.abs(found.values[:, 0]).mean(axis=0), near
+
+
+def turned(columns: Mapping[str, Array], t: Array) -> tuple[Array, float, npt.NDArray[np.bool_]]:
+    """Angle (n,) rad by the pulses, mean speed rad/s, and where the angle is known, (n,)."""
+    tacho = tachometer(*counted(t, columns["pulses"], columns["pulse_age"]))
+    angle = tacho.angle(t)
+    inside = np.isfinite(angle)
+    if inside.sum() < 2:
+        raise AnalysisError("sensitivity: found no turn between pulses in a capture; expected several")
+    known = angle[inside]
+    return angle, float((known[-1] - known[0]) / (t[inside][-1] - t[inside][0])), inside
+
+
+def read_taken(recording: Recording[Any]) -> list[Taken]:
+    """All captures under injection, in time order.
+
+    Raises:
+        AnalysisError: there are none, or one cannot be evaluated.
+    """
+    steps = sorted(recording.steps(INJECT), key=lambda s: s.start_ns)
+    if not steps:
+        raise AnalysisError("found no injection; expected those of the plan (was the run stopped early?)")
+    return [_read(recording, step) for step in steps]
+
+
+def grid_of(labels: Mapping[str, Any]) -> Grid:
+    """As it was asked for."""
+    hz = np.asarray(float(labels["first_hz"]) + float(labels["step_hz"]) * np.arange(int(labels["lines"])), np.float64)
+    return Grid(hz, float(labels["period_s"]), float(labels["amplitude_A"]))
+
+
+def _read(recording: Recording[Any], step: Step) -> Taken:
+    labels, told = step.labels, step.read(*TOLD)
+    captured = recording.captures(number=labels["number"])
+    if not captured:
+        raise AnalysisError(f"injection {dict(labels)}: found no capture")
+    kind, grid, rate = str(labels["pass"]), grid_of(labels), captured[0].rate_hz
+    columns = captured[0].arrays(*captured[0].channels)
+    found, injected, excluded = sensitivity(columns, columns["t_s"], rate, grid)
+    clipped = float(np.abs(columns["after"] - columns["before"] - columns["inject"]).max())
+    follows = _follows(columns, rate, grid) if kind == WIRING else None
+    turning = turned(columns, columns["t_s"])[1] if "pulses" in columns else 0.0
+    flags = int(np.bitwise_or.reduce(told["flags"].astype(np.int64)))
+    return Taken(
+        str(labels["axis"]), float(labels["speed_rad_s"]), turning, kind, float(labels["about_hz"]), grid, found, excluded,
+        injected, float(np.abs(columns["inject"]).max()), clipped, follows, rate, flags,
+        clips([told[f"pos_{a}"] for a in AXES]), step.lost(), step.expected(),
+    )  # fmt: skip
+
+
+def _follows(columns: Mapping[str, Array], rate: float, grid: Grid) -> Complex | None:
+    """Differential current of each axis per `after`, by the whole of the lines: (5,)."""
+    if any(c not in columns for c in CURRENTS):
+        return None
+    pairs = np.array([(columns[f"i_{a}_p"] - columns[f"i_{a}_n"]) / 2 for a in AXES])
+    data = np.concatenate([columns["after"][None], pairs])
+    spectra = lines(data - data.mean(axis=1, keepdims=True), rate, round(grid.period * rate), grid.hz).values.mean(
+        axis=0
+    )
+    after = spectra[0]
+    return np.asarray((spectra[1:] * after.conj()).sum(axis=1) / (np.abs(after) ** 2).sum())

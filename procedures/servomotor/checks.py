@@ -1,0 +1,147 @@
+"""What can be wrong with steps in which the motor or the AMBs hold a displaced shaft. Each check names its suspect.
+
+Thresholds are chosen so that a sound rig trips one in fewer than one run in a thousand; each is stated where it stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.findings import Effect, Finding
+from procedures.servomotor.steps import StepMeans
+from procedures.shared import signals
+
+Array = npt.NDArray[np.float64]
+
+FATAL = ("stuck-channel", "segment-sign")
+"""Findings after which a fit means nothing and is not attempted."""
+UNBALANCED_A = 0.5  # half the sum of opposite segments is the torque current: at rest within 0.1 A
+
+
+class Tolerances(Protocol):
+    """The part of a plan that these checks need."""
+
+    @property
+    def max_position_m(self) -> float: ...
+    @property
+    def max_drift_A(self) -> float: ...
+    @property
+    def max_creep_A(self) -> float: ...
+    @property
+    def max_misfit(self) -> float: ...
+    @property
+    def max_lost(self) -> float: ...
+
+
+def of_signals(data: StepMeans, channels: Sequence[str], plan: Tolerances) -> Iterator[Finding]:
+    """Lost samples, stuck channels, saturation and contact."""
+    yield from signals.losses(data.lost, data.expected, plan.max_lost, data.where)
+    yield from signals.stuck(data.spread, channels)
+    yield from signals.flagged(data.flags, data.where)
+
+
+def segments(data: StepMeans) -> Iterator[Finding]:
+    """Signs of the segments' currents while the motor carries: opposite ones carry opposite currents (T 6.9; at rest there is
+    hardly a torque current), and segment 1 a positive one, because it lifts."""
+    one, two, three, four = (float(data.mean[f"i_m{k}"].mean()) for k in range(1, 5))
+    for a, b, name_a, name_b, lifts in ((one, three, "i_m1", "i_m3", True), (four, two, "i_m4", "i_m2", False)):
+        if abs(a + b) / 2 > UNBALANCED_A:
+            suspect = f"{name_a} or {name_b}" if not lifts else name_a if a < 0 else name_b
+            yield Finding(
+                "segment-sign",
+                f"{name_a} reads {a:+.2f} A and {name_b} {b:+.2f} A: opposite segments that hold a shaft at rest carry "
+                f"opposite currents. Look at the sign of {suspect}, and at whether both segments get their currents.",
+                suspect,
+                Effect.ERROR,
+            )
+    if one < 0 < three:
+        yield Finding(
+            "segment-sign",
+            f"i_m1 reads {one:+.2f} A and i_m3 {three:+.2f} A: the motor pushes down while it lifts. Both sensors have the "
+            "wrong sign, or the segments are exchanged.",
+            "i_m1, i_m3",
+            Effect.ERROR,
+        )
+
+
+def at_edge(data: StepMeans, count_rad: float) -> Iterator[Finding]:
+    """The rotor at the edges it was sent to: its encoder reads now one count and now the other.
+
+    A reading that is 0 or one count c, the latter with probability p, has the mean p c and the variance p (1 - p) c^2: from
+    both follows c.
+    """
+    mean, spread = np.abs(data.mean["angle"]), data.spread["angle"]
+    between = spread > 0.05 * count_rad
+    found = float(np.median((spread**2 + mean**2)[between] / mean[between])) if between.any() else 0.0
+    if between.mean() < 0.8 or abs(found / count_rad - 1) > 0.05:
+        seen = f"two readings {found * 1e3:.3f} mrad apart" if between.any() else "one reading throughout"
+        yield Finding(
+            "rotor-off-edge",
+            f"in {int(between.sum())} of {between.size} steps the rotor stands at an edge of its encoder's count, with {seen}; "
+            f"expected all steps, and {count_rad * 1e3:.3f} mrad. Look at count_rad, and at the friction of the rotor.",
+            data.where(np.where(between, 0.0, 1.0)),
+            Effect.ERROR,
+        )
+
+
+def settled(
+    data: StepMeans, offsets: Mapping[str, Array], drifts: Mapping[str, Array], plan: Tolerances
+) -> Iterator[Finding]:
+    """Settled means where the reference is and standing still. `offsets` (N,) m are mean positions less their
+    references, `drifts` (N,) A the drift of each control current within the step, by name.
+
+    The drift allowed in position is twice the offset allowed, because the noise of a difference of half means is twice
+    that of the mean.
+    """
+    moving = {c: np.abs(data.drift[c]) for c in offsets}
+    for values, limit, what, unit, scale in (
+        (offsets, plan.max_position_m, "mean position off its reference", "µm", 1e6),
+        (moving, 2 * plan.max_position_m, "drift of the position", "µm", 1e6),
+        (drifts, plan.max_drift_A, "drift of the current", "mA", 1e3),
+    ):
+        name = max(values, key=lambda c, v=values: float(np.abs(v[c]).max()))
+        worst = np.abs(values[name])
+        if worst.max() > limit:
+            yield Finding(
+                "unsettled",
+                f"{what} within a step: {worst.max() * scale:.3g} {unit} ({name}) at worst, {limit * scale:.3g} {unit} "
+                f"allowed; {int((worst > limit).sum())} of {worst.size} steps. Settle longer, or look at the integrator.",
+                data.where(worst),
+                Effect.INDETERMINATE,
+            )
+
+
+def creeping(drift_A: Mapping[str, float], u_A: Mapping[str, float], plan: Tolerances) -> Iterator[Finding]:
+    """Currents that change over the sequence at equal positions: more than `max_creep_A` and five standard uncertainties.
+
+    `drift_A` is what a current, i_x, i_y or that of an AMB, changes by from the first step to the last. The amplifiers
+    close their loops on their own sensors, so a sensor that drifts shows as a demand that drifts.
+    """
+    pairs = {"i_x": "segments 2 and 4", "i_y": "segments 1 and 3"}
+    for name, change in drift_A.items():
+        if abs(change) > max(plan.max_creep_A, 5 * u_A[name]):
+            yield Finding(
+                "drifting-sensor",
+                f"{name} changes by {change * 1e3:+.2f} mA over the sequence with the shaft where it was "
+                f"({plan.max_creep_A * 1e3:.2f} mA allowed): a current sensor of {pairs.get(name, 'that AMB')} drifts, or the "
+                "load does. The sequence is mirrored, so that a steady drift does not reach the result; an unsteady one does.",
+                name,
+                Effect.INDETERMINATE,
+            )
+
+
+def misfit(data: StepMeans, residuals: Array, span: float, what: str, plan: Tolerances) -> Iterator[Finding]:
+    """Residuals (N,) beyond `max_misfit` of the range `span`, both in one unit: the model does not describe the machine."""
+    worst = np.abs(residuals)
+    if worst.max() > plan.max_misfit * span:
+        yield Finding(
+            "misfit",
+            f"{what}: one step is {worst.max() / span:.2%} of the range off the model ({plan.max_misfit:.2%} allowed). "
+            "A reading that is not proportional, a step that was disturbed, or a machine that the model does not describe.",
+            data.where(worst),
+            Effect.INDETERMINATE,
+        )

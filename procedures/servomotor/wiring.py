@@ -1,0 +1,73 @@
+"""Before a loop is closed that a wrong wire would drive into the stops: does the motor turn and push the way it should?
+
+The rotor is levitated by both AMBs and released. Each check moves it a little, records the movement as a step that the
+analysis judges (`direction.of_probe`, `motor_wiring.of_nudges`), and says whether to go on.
+"""
+
+from __future__ import annotations
+
+import math
+
+from bench.recorder import Recorder
+from bench.rig import Rig
+from procedures.servomotor import hold
+
+PARAMETERS = ("i_x", "i_y")
+CHANNELS = ("angle", "i_xo_p", "i_xo_n", "i_yo_p", "i_yo_n")
+NUDGE_A, NUDGE_S = 1.0, 0.3
+TURN_RAD, TURN_S = 0.2, 0.12  # a third of a swing at that gain: it is still on its way
+LEAST_RAD, LEAST_A = (
+    0.03,
+    0.05,
+)  # what the analysis calls turned; a sixth of what a sound motor does to the outboard AMB
+STEPS = 4  # that `sound` records
+
+
+def sound(rig: Rig, record: Recorder) -> bool:
+    """Turn the released rotor a little, take up its angle, then push it up and sideways against the AMBs."""
+    if _turned(rig, record) < LEAST_RAD:
+        rig.levitation.set("angle_ref", 0.0)
+        return False
+    rig.levitation.set("angle_ref", 0.0)
+    hold.hold(rig)
+    rig.clock.sleep(1.0)
+    rest = _nudged(rig, record, 0.0, 0.0)
+    up = _nudged(rig, record, 0.0, NUDGE_A)
+    right = _nudged(rig, record, NUDGE_A, 0.0)
+    for name in PARAMETERS:
+        rig.levitation.set(name, 0.0)
+    rig.clock.sleep(_ramp_s(rig) + NUDGE_S)
+    return _along(up[1] - rest[1], up[0] - rest[0]) and _along(right[0] - rest[0], right[1] - rest[1])
+
+
+def _turned(rig: Rig, record: Recorder) -> float:
+    """How far a weak proportional gain turns the released rotor towards a reference ahead of it, rad; it is let go again."""
+    before = rig.levitation.reading("angle")
+    with record.step("probe", reference_rad=before + TURN_RAD):
+        rig.levitation.set("angle_ref", before + TURN_RAD)
+        rig.levitation.set("kp_theta", hold.PROBE_GAIN)
+        rig.clock.sleep(TURN_S)
+        moved = math.remainder(rig.levitation.reading("angle") - before, 2 * math.pi)
+    hold.release(rig)
+    return moved
+
+
+def _along(own: float, across: float) -> bool:
+    """A push by the motor relieves the outboard AMB along its own axis, and along the other one hardly at all."""
+    return own < -LEAST_A and abs(across) < 0.5 * abs(own)
+
+
+def _nudged(rig: Rig, record: Recorder, i_x: float, i_y: float) -> tuple[float, float]:
+    """The outboard AMB's control currents (x, y) in A with open-loop currents in the motor."""
+    rig.levitation.set("i_x", i_x)
+    rig.levitation.set("i_y", i_y)
+    rig.clock.sleep(_ramp_s(rig) + NUDGE_S)
+    with record.step("nudge", i_x_A=i_x, i_y_A=i_y):
+        rig.clock.sleep(NUDGE_S)
+    at = rig.levitation.reading
+    return (at("i_xo_p") - at("i_xo_n")) / 2, (at("i_yo_p") - at("i_yo_n")) / 2
+
+
+def _ramp_s(rig: Rig) -> float:
+    ramp = rig.file.parameters.get("i_ramp")
+    return 2 * NUDGE_A / (ramp.default if ramp else 2.0)

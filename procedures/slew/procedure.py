@@ -1,0 +1,185 @@
+"""Slewing: the rotor's angle follows a slow sine at several frequencies (thesis 8.2.2, Fig. 8.1).
+
+Measurands: rms and peak of the tracking error, amplitude ratio and lag at each frequency, and the detent, the part of the
+torque that goes with 16 times the angle, from the torque current at the slowest one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import Literal
+
+from pydantic import Field
+
+from bench.calibration import Need
+from bench.figures import Figure
+from bench.findings import Finding
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.requires import Requires
+from bench.rig import Rig
+from bench.rigfile import RigFile
+from bench.roles import RigState
+from procedures.servomotor import carrying, hold, segments, wiring
+from procedures.servomotor.direction import of_probe
+from procedures.shared import assumptions
+from procedures.slew import estimates as slew_estimates
+from procedures.slew import figures as drawn
+from procedures.slew import fit, steps
+from procedures.slew.fit import Gains
+from procedures.slew.steps import CHANNELS, STARTED, STEP, read_swings
+
+RMS = Quantity("error_rms", "rad", "root mean square of the tracking error, free of the encoder's counts")
+PEAK = Quantity("error_peak", "rad", "greatest tracking error")
+RATIO = Quantity("amplitude_ratio", "1", "amplitude of the angle over that of the reference")
+LAG = Quantity("lag", "s", "how much later than the reference the angle swings")
+DETENT = Quantity("detent", "N m", "amplitude of the torque that goes with 16 times the angle")
+FRICTION = Quantity("friction", "N m", "torque against the movement at the slowest frequency, mean over the swing")
+MEASURES = (RMS, PEAK, RATIO, LAG, DETENT, FRICTION)
+NEEDED = ("sine_amplitude", "sine_hz", "angle_hz", "derivative_on_error", "i_ramp", "motor_share", "allocation")
+FADE = 20
+DESIGN_NM_A = 2.87  # T Table 6.2; with a tenth of it either way where no calibration is used
+
+
+class Plan(BenchPlan):
+    """Settings of the slewing test, SI."""
+
+    frequencies_hz: tuple[float, ...] = Field((0.1, 0.2, 0.5, 1.0, 2.0), min_length=1)
+    amplitude_rad: float = Field(0.4, gt=0, le=0.5)
+    periods: int = Field(6, ge=3)  # at each frequency, after a first one that settles
+    kp_theta: float = Field(50.0, gt=0)  # A/rad
+    kd_theta: float = Field(0.5, gt=0)  # A s/rad, on the error
+    ki_theta: float = Field(50.0, ge=0)  # A/(rad s)
+    angle_hz: float = Field(60.0, gt=0)  # filter of the derivative
+    motor_carries: bool = False  # the shaft too, in place of the outboard AMB
+    torque_constant: Literal["design", "calibration"] = "design"  # calibration: of `torque-constant`
+    detent_order: int = Field(16, gt=0)  # per turn
+    settle_s: float = Field(1.0, gt=0)  # before each swing
+    encoder_counts: int = Field(4096, gt=0)  # per turn
+    max_detent_N_m: float = Field(0.05, gt=0)  # beyond, it is named
+    max_friction_N_m: float = Field(0.2, gt=0)  # a levitated rotor has no more
+    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
+
+
+def settings(_: Plan) -> dict[str, float]:
+    """Lifted with the angle released: no loop is closed before the encoder's direction is known."""
+    return dict(hold.RELEASED)
+
+
+def needs(plan: Plan) -> tuple[Need, ...]:
+    """The torque constant, where the plan asks for its calibration."""
+    return (Need("torque-constant"),) if plan.torque_constant == "calibration" else ()
+
+
+def step_count(plan: Plan) -> int:
+    """How many steps `acquire` records, for the progress display."""
+    return wiring.STEPS + len(plan.frequencies_hz)
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Swing at each frequency, the slowest first; the reference rests in between, and moves by parts of an encoder count from
+    period to period: else the counts would do the same in every one, and their scatter would tell nothing."""
+    if not wiring.sound(rig, record):
+        return
+    write = rig.levitation.set
+    for name, value in (("derivative_on_error", 1.0), ("angle_hz", plan.angle_hz), ("kd_theta", plan.kd_theta),
+                        ("kp_theta", plan.kp_theta), ("ki_theta", plan.ki_theta)):  # fmt: skip
+        write(name, value)
+    if plan.motor_carries:
+        write("allocation", 1.0)  # force first
+        carrying.carry(rig, 1.0)
+    for hz in sorted(plan.frequencies_hz):
+        rig.clock.sleep(plan.settle_s)
+        write("sine_hz", hz)
+        with record.step(STEP, hz=hz, amplitude_rad=plan.amplitude_rad, periods=plan.periods):
+            rig.clock.sleep(0.2)
+            write("sine_amplitude", plan.amplitude_rad)
+            record.event(STARTED, hz=hz)  # after the answer: with the write itself it brackets the start
+            for shift in fit.shifts(plan.periods, 2 * math.pi / plan.encoder_counts):
+                write("angle_ref", shift)
+                rig.clock.sleep(1 / hz)
+            rig.clock.sleep(0.02)
+        for part in range(FADE - 1, -1, -1):  # a step of the whole would be an angle step
+            write("sine_amplitude", plan.amplitude_rad * part / FADE)
+            rig.clock.sleep(0.02)
+        write("angle_ref", 0.0)
+    rig.clock.sleep(plan.settle_s)  # it stops from full speed
+    if plan.motor_carries:
+        carrying.give_back(rig, 0.2)
+
+
+def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
+    """Findings first, then the quantities of each frequency, then those of the slowest."""
+    wrong = [*of_probe(recording), *segments.of_nudges(recording)]
+    yield from wrong
+    if wrong:
+        return
+    signals = list(steps.of_signals(recording, recording.plan))
+    yield from signals
+    if any(f.code == "stuck-channel" for f in signals):
+        return
+    result = slew_estimates.evaluate(recording, read_swings(recording), gains(recording.plan))
+    yield from slew_estimates.findings(result, recording.plan)
+    for hz, estimates in result.tracking.items():
+        for quantity in (RMS, PEAK, RATIO, LAG):
+            yield quantity.measured(estimates[quantity.name], f"{hz:g} Hz")
+    yield DETENT.measured(result.detent)
+    yield FRICTION.measured(result.friction)
+
+
+def gains(plan: Plan) -> Gains:
+    """The controller's, as the plan sets them."""
+    return Gains(plan.kp_theta, plan.kd_theta, plan.angle_hz)
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts, and movements that the envelope or the torque do not allow."""
+    if plan.amplitude_rad * plan.detent_order < math.pi:
+        yield (f"amplitude_rad: found {plan.amplitude_rad:g}; expected {math.pi / plan.detent_order:.3g} or more: the swing "
+               f"must cover one of {plan.detent_order} periods per turn")  # fmt: skip
+    hz = max(plan.frequencies_hz)
+    if min(plan.frequencies_hz) <= 0 or hz > rig.parameters["sine_hz"].high:
+        yield f"frequencies_hz: found {plan.frequencies_hz}; expected above 0, up to {rig.parameters['sine_hz'].high:g} Hz"
+    speed = 2 * math.pi * hz * plan.amplitude_rad
+    if speed > carrying.MARGIN * rig.envelope.max_speed_rad_s:
+        yield (f"frequencies_hz: {hz:g} Hz turns at up to {speed:.3g} rad/s; the envelope allows "
+               f"{rig.envelope.max_speed_rad_s:g} rad/s")  # fmt: skip
+    most = rig.parameters["segment_max"].high - (4.0 if plan.motor_carries else 0.0)
+    current = rig.machine["polar_inertia"].value * (2 * math.pi * hz) ** 2 * plan.amplitude_rad / DESIGN_NM_A
+    if current > carrying.MARGIN * most:
+        yield (f"frequencies_hz: {hz:g} Hz takes {current:.3g} A of torque current by prediction; {carrying.MARGIN:.0%} of "
+               f"{most:g} A is planned with")  # fmt: skip
+
+
+def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+    """Angle and error over time and over angle, growth with frequency, torque current over angle, its orders."""
+    if not len(recording.steps(STEP)):
+        return ()
+    result = slew_estimates.evaluate(recording, read_swings(recording), gains(recording.plan))
+    return drawn.all_figures(result, recording.plan.detent_order)
+
+
+procedure = Procedure(
+    name="slew",
+    title="Slewing: following a slow sine of the angle, with detent",
+    measures=MEASURES,
+    state=RigState.LEVITATED,
+    plan=Plan,
+    acquire=acquire,
+    analyse=analyse,
+    figures=figures,
+    requires=Requires(
+        roles=("levitation", "rotation"),
+        channels=(*CHANNELS, *wiring.CHANNELS),
+        parameters=(*hold.PARAMETERS, *wiring.PARAMETERS, *NEEDED, "segment_max"),
+        machine=("polar_inertia",),
+    ),
+    check=check,
+    settings=settings,
+    step_count=step_count,
+    assumes=assumptions.SLEW,
+    method=read_method(__file__),
+    needs=needs,
+)

@@ -1,0 +1,90 @@
+"""From the recorded swings of a slewing test to arrays, and what their signals can say about what is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+
+from bench.errors import AnalysisError
+from bench.findings import Effect, Finding
+from bench.recording import Recording, Step
+from procedures.servomotor.segments import SEGMENTS
+from procedures.slew.fit import Swing
+
+STEP, STARTED = "swing", "sine-started"
+CHANNELS = ("angle", *SEGMENTS, "flags")
+SATURATED, CONTACT = 3, 12  # bits of the telemetry signal `flags`
+
+
+class Tolerances(Protocol):
+    """The part of a plan that these checks need."""
+
+    @property
+    def max_lost(self) -> float: ...
+
+
+def read_swings(recording: Recording[Any]) -> list[Swing]:
+    """Every swing, in time order.
+
+    Raises:
+        AnalysisError: there are none, or one has no start.
+    """
+    steps = list(recording.steps(STEP))
+    if not steps:
+        raise AnalysisError("found no swings; expected those of the plan (was the run stopped early?)")
+    return [_read(recording, step) for step in steps]
+
+
+def _read(recording: Recording[Any], step: Step) -> Swing:
+    data = step.read(*CHANNELS)
+    inside = [e for e in recording.events() if step.start_ns <= e["t_ns"] < step.end_ns]
+    written = [
+        e["t_ns"] for e in inside if e["kind"] == "parameter" and e["name"] == "sine_amplitude" and e["value"] > 0
+    ]
+    answered = [e["t_ns"] for e in inside if e["kind"] == STARTED]
+    if not written or not answered or not len(data["t_ns"]):
+        raise AnalysisError(f"swing {dict(step.labels)}: found no start of the sine within it")
+    origin = int(data["t_ns"][0])
+
+    def seconds(t_ns: int) -> float:
+        return (t_ns - origin) * 1e-9
+
+    moved = [e for e in inside if e["kind"] == "parameter" and e["name"] == "angle_ref"]
+    angle = np.unwrap(data["angle"])
+    return Swing(
+        float(step.labels["hz"]),
+        float(step.labels["amplitude_rad"]),
+        (data["t_ns"] - origin).astype(np.float64) * 1e-9,
+        angle - 2 * np.pi * np.round(angle[0] / (2 * np.pi)),
+        np.mean([data[c] for c in SEGMENTS], axis=0),
+        seconds(written[0]),
+        seconds(answered[0]),
+        int(step.labels["periods"]),
+        np.array([seconds(e["t_ns"]) for e in moved]),
+        np.array([float(e["value"]) for e in moved]),
+    )
+
+
+def of_signals(recording: Recording[Any], plan: Tolerances) -> Iterator[Finding]:
+    """Lost samples, channels that stand still, amplifiers at their limits, contact."""
+    steps: Sequence[Step] = list(recording.steps(STEP))
+    for step in steps:
+        where = f"{float(step.labels['hz']):g} Hz"
+        share = step.lost() / max(step.expected(), 1)
+        if share > plan.max_lost:
+            yield Finding(
+                "missing-samples",
+                f"{share:.2%} of the samples of a swing are missing ({plan.max_lost:.2%} is allowed). Look at the link: load, "
+                "cable, gateway.",
+                where, Effect.INDETERMINATE,
+            )  # fmt: skip
+        data = step.read(*CHANNELS)
+        flags = int(np.bitwise_or.reduce(data["flags"].astype(np.int64))) if len(data["flags"]) else 0
+        for channel in (c for c in CHANNELS[:-1] if np.ptp(data[c]) == 0):
+            yield Finding("stuck-channel", f"{channel} does not move at all during a swing.", channel, Effect.ERROR)
+        for bits, code, text in ((SATURATED, "saturated", "an amplifier was at its limit"),
+                                 (CONTACT, "contact", "the rotor touched a touchdown bearing")):  # fmt: skip
+            if flags & bits:
+                yield Finding(code, f"{text} during a swing", where, Effect.INDETERMINATE)

@@ -1,0 +1,260 @@
+"""Drag of the levitated rotor by letting it coast (thesis 6.6.4, (6.16) with the polar inertia and Coulomb friction).
+
+Measurand: the viscous drag coefficient B at two bias currents of the radial AMBs, and the Coulomb torque T_c, of the released
+rotor, mean over both directions of turning: J_z w' = -B w - T_c sgn(w).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal
+
+from pydantic import Field
+
+from bench.figures import Figure
+from bench.findings import Effect, Finding
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.requires import Requires
+from bench.rig import Rig
+from bench.rigfile import RigFile
+from bench.roles import RigState
+from bench.states import transition
+from bench.uncertainty import Estimate
+from procedures.servomotor import hold
+from procedures.shared import assumptions
+from procedures.spindown import checks
+from procedures.spindown import estimates as spindown_estimates
+from procedures.spindown import figures as drawn
+from procedures.spindown.estimates import Drag
+from procedures.spindown.running_up import let_go, run_up
+from procedures.spindown.steps import CHANNELS, COILS, RunDown, read_run_downs
+
+B = Quantity("B", "N m s/rad", "viscous drag at the bias of the plan, mean over both directions")
+B_HIGH = Quantity("B_high", "N m s/rad", "viscous drag at the higher bias, mean over both directions")
+T_C = Quantity("T_c", "N m", "Coulomb torque of the rotor alone at the bias of the plan, mean over both directions")
+J_Z = Quantity("J_z", "kg m^2", "polar inertia: by the ring where one was mounted, else the rig file's as used")
+MEASURES = (B, B_HIGH, T_C, J_Z)
+RAMP_S = 0.25  # what is left of the run-up's ramp when the speed is nearly there
+SLOW = (0.1, 0.15, 0.2, 0.25, 0.3)  # shares of the speed that the drive also holds: they tell its constant torque
+
+
+class Plan(BenchPlan):
+    """Settings of the spindown, SI."""
+
+    speed_rad_s: float = Field(60.0, gt=5)  # where a run-down starts
+    end_speed_rad_s: float = Field(3.0, gt=0.5)  # and where its fit ends
+    repeats: int = Field(3, ge=2)  # each way, at each bias
+    bias_A: float = Field(3.0, gt=0)
+    bias_high_A: float = Field(4.0, gt=0)
+    added_inertia: bool = False  # mount the ring and take the inertia from it
+    run_up: Literal["auto", "drive", "motor"] = "auto"  # auto: the drive if the rig has one
+    steady_s: float = Field(0.5, ge=0.1)  # at speed before it is let go
+    start_delay_s: float = Field(0.1, ge=0)  # for the transient of the speed's filter
+    coast_s: float = Field(15.0, gt=0)  # at most
+    speed_filter_hz: float = Field(20.0, gt=0)  # of the controller's speed channel
+    max_coulomb_N_m: float = Field(0.12, gt=0)  # a levitated rotor has no more
+    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
+
+
+def settings(plan: Plan) -> dict[str, float]:
+    """Lifted at the first bias and with the angle released: no loop is closed before the encoder's direction is known."""
+    return {"bias_i": plan.bias_A, "bias_o": plan.bias_A, **hold.RELEASED}
+
+
+def groups(plan: Plan) -> tuple[tuple[str, float], ...]:
+    """What is run down in which order: name and bias."""
+    ring = (("ring", plan.bias_A),) if plan.added_inertia else ()
+    return (("low", plan.bias_A), ("high", plan.bias_high_A), *ring)
+
+
+def step_count(plan: Plan) -> int:
+    """How many steps `acquire` records, for the progress display; with a drive, once more in each direction, slowly."""
+    slowly = 0 if plan.run_up == "motor" else 2 * len(SLOW)
+    return 2 + 4 * plan.repeats * len(groups(plan)) + slowly
+
+
+def fewest_steps(plan: Plan) -> int:
+    """Without a drive `auto` runs up by the motor."""
+    return step_count(plan) - (2 * len(SLOW) if plan.run_up == "auto" else 0)
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Run down in both directions at both biases, and with the ring; the angle is held again in the end."""
+    hold.probe(rig, record)
+    by = "drive" if plan.run_up == "drive" or (plan.run_up == "auto" and rig.drive is not None) else "motor"
+    for group, bias in groups(plan):
+        if group != "low":
+            _at_rest(rig, bias, "ring" if group == "ring" else "")
+        top = plan.speed_rad_s
+        for repeat in range(plan.repeats):
+            for direction in (1, -1):
+                labels = {"group": group, "bias_A": bias, "direction": direction, "repeat": repeat, "by": by}
+                top = _run_down(rig, plan, record, labels, top)
+                if not top:
+                    return
+    if plan.added_inertia:
+        transition(rig, RigState.READY)
+        rig.operator.mount("")
+        transition(rig, RigState.LEVITATED)
+    hold.hold(rig)
+
+
+def _at_rest(rig: Rig, bias: float, part: str) -> None:
+    """Land, write the bias and have the part mounted, lift again: both are done at rest only."""
+    transition(rig, RigState.READY)
+    for name in ("bias_i", "bias_o"):
+        rig.levitation.set(name, bias)
+    if part:
+        rig.operator.mount(part)
+    transition(rig, RigState.LEVITATED)
+
+
+def _run_down(rig: Rig, plan: Plan, record: Recorder, labels: Mapping[str, object], top: float) -> float:
+    """Run up to `top`, hold it, let go and wait for the end speed. The speed it was let go from; 0 if that was not reached."""
+    direction, by = 1 if labels["direction"] == 1 else -1, str(labels["by"])
+    wanted = direction * top
+    if by == "drive" and labels["group"] == "low" and labels["repeat"] == 0:
+        _hold_slowly(rig, plan, record, labels, wanted)
+    reached = run_up(rig, wanted, by)
+    if not reached:
+        record.event("not-reached", wanted=wanted, reached=rig.rotation.speed_rad_s, by=by)
+        let_go(rig, by)
+        rig.rotation.stop()
+        return 0.0
+    if reached != wanted:
+        record.event(checks.LOWERED, wanted=wanted, held=reached, bias_A=labels["bias_A"])
+    rig.clock.sleep(RAMP_S)
+    with record.step("spin", speed_rad_s=reached, **labels):
+        rig.clock.sleep(plan.steady_s)
+    let_go(rig, by)
+    with record.step("coast", ring=labels["group"] == "ring", **labels):
+        begun = rig.clock.now_ns()
+        rig.clock.sleep(plan.start_delay_s + 0.5)
+        while direction * rig.rotation.speed_rad_s > plan.end_speed_rad_s:
+            if rig.clock.now_ns() - begun > plan.coast_s * 1e9:
+                break
+            rig.clock.sleep(0.05)
+    rig.rotation.stop()  # the speed reference that SPIN set is gone before the gains come back
+    return abs(reached)
+
+
+def _hold_slowly(rig: Rig, plan: Plan, record: Recorder, labels: Mapping[str, object], wanted: float) -> None:
+    for share in SLOW:
+        if reached := run_up(rig, share * wanted, "drive"):
+            rig.clock.sleep(RAMP_S)
+            with record.step("spin", speed_rad_s=reached, **labels):
+                rig.clock.sleep(plan.steady_s)
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Everything the measurements, findings and figures are made of."""
+
+    runs: list[RunDown]
+    angle: Drag
+    speed: Drag
+
+
+@lru_cache(maxsize=1)
+def evaluate(recording: Recording[Plan]) -> Analysis:
+    """Read the run-downs and evaluate them by the angle and by the speed. Kept, because measurements, facts and figures
+    all need it."""
+    plan, runs = recording.plan, read_run_downs(recording)
+    by = {
+        m: spindown_estimates.evaluate(runs, recording.rig, m, plan.bias_A, plan.bias_high_A)
+        for m in spindown_estimates.METHODS
+    }
+    return Analysis(runs, by["angle"], by["speed"])
+
+
+def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
+    """Findings first; then B and T_c by the speed, and all quantities by the angle, which are the results."""
+    early = list(checks.before_fits(recording))
+    yield from early
+    if any(f.effect is Effect.ERROR for f in early):
+        return
+    plan, a = recording.plan, evaluate(recording)
+    yield from checks.of_runs(a.runs, plan)
+    yield from checks.of_result(a.runs, a.angle, a.speed, plan)
+    yield from checks.of_drive(recording, a.angle)
+    yield from checks.of_inertia(recording.rig, a.angle)
+    estimates = {**a.angle.estimates, "J_z": _inertia(a.angle, recording.rig)}
+    if not plan.added_inertia:
+        text = "J_z is the rig file's value, not measured here; B and T_c carry its tolerance. The ring measures it"
+        yield Finding("inertia-as-stated", text, "J_z")
+    yield drawn.stopping(a.runs, a.angle, plan.speed_rad_s)
+    for quantity in (B, T_C):
+        yield quantity.measured(a.speed.estimates[quantity.name], "by the speed channel")
+    for quantity in MEASURES:
+        yield quantity.measured(estimates[quantity.name])
+
+
+def _inertia(result: Drag, rig: RigFile) -> Estimate:
+    return result.estimates.get("J_z") or spindown_estimates.stated_inertia(rig)
+
+
+def facts(recording: Recording[Plan]) -> dict[str, Estimate]:
+    """What a calibration of this rig holds: the results by the angle."""
+    a = evaluate(recording)
+    return {**a.angle.estimates, "J_z": _inertia(a.angle, recording.rig)}
+
+
+def holds_for(plan: Plan) -> dict[str, float]:
+    """B depends on the bias."""
+    return {"bias_A": plan.bias_A, "bias_high_A": plan.bias_high_A}
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts."""
+    needed = ["ring_inertia"] if plan.added_inertia else ["polar_inertia"]
+    for name in needed:
+        if name not in rig.machine:
+            yield f"machine: found no {name}; B is the decay rate times the inertia"
+    if not plan.speed_rad_s < rig.envelope.max_speed_rad_s:
+        yield (f"speed_rad_s: found {plan.speed_rad_s:g} rad/s; expected less than the envelope's "
+               f"{rig.envelope.max_speed_rad_s:g} rad/s")  # fmt: skip
+    if plan.end_speed_rad_s > plan.speed_rad_s / 4:
+        yield (f"end_speed_rad_s: found {plan.end_speed_rad_s:g} rad/s; expected a quarter of {plan.speed_rad_s:g} rad/s or "
+               "less, or viscous and constant drag cannot be told apart")  # fmt: skip
+    if abs(plan.bias_high_A / plan.bias_A - 1) < 0.1:
+        yield f"bias_high_A: found {plan.bias_high_A:g} A; expected at least a tenth off {plan.bias_A:g} A"
+    if plan.run_up == "drive" and not any("drive" in d.roles for d in rig.devices.values()):
+        yield "run_up: found drive; the rig file has no device in that role"
+
+
+def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+    """Speed over time with fit and residuals, deceleration and loss power over speed; empty when there is no fit."""
+    if any(f.effect is Effect.ERROR for f in checks.before_fits(recording)):
+        return ()
+    a = evaluate(recording)
+    return drawn.all_figures(a.runs, a.angle, recording.plan.speed_rad_s)
+
+
+procedure = Procedure(
+    name="spindown",
+    title="Drag of the levitated rotor by spindown",
+    measures=MEASURES,
+    state=RigState.LEVITATED,
+    plan=Plan,
+    acquire=acquire,
+    analyse=analyse,
+    figures=figures,
+    requires=Requires(
+        roles=("levitation", "rotation"),
+        channels=CHANNELS,
+        sensors=COILS,
+        parameters=(*hold.PARAMETERS, "bias_i", "bias_o", "speed_ref"),
+    ),
+    check=check,
+    settings=settings,
+    step_count=step_count,
+    fewest_steps=fewest_steps,
+    facts=facts,
+    holds_for=holds_for,
+    assumes=assumptions.SPINDOWN,
+    method=read_method(__file__),
+)

@@ -1,0 +1,111 @@
+"""From the recorded steps of a spindown to arrays: one coast each, with its fits of speed and of angle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.errors import AnalysisError
+from bench.recording import Recording, Step
+from procedures.servomotor.direction import SEGMENTS
+from procedures.spindown import fit
+from procedures.spindown.fit import Coast
+
+Array = npt.NDArray[np.float64]
+COILS = tuple(f"i_{axis}{bearing}_{coil}" for axis in "xy" for bearing in "io" for coil in "pn")
+CHANNELS = ("angle", "speed", "flags", *SEGMENTS, *COILS)
+ANGLE_LAGS = 60  # samples of 1 ms over which its residuals repeat themselves
+SPEED_LAGS = 200
+"""The speed is the angle differentiated: its noise takes back what it adds, and only far beyond the 8 ms of its filter
+does the sum over the lags come near what is left."""
+SMALLEST_SAMPLES = 400
+
+
+@dataclass(frozen=True)
+class RunDown:
+    """One coast. `t` (n,) s from the first sample used, `speed` (n,) rad/s and `angle` (n,) rad in the direction of turning;
+    fits of both; mean coil currents A by channel; mean segment currents (4,) A; the speed before it was let go."""
+
+    bias_A: float
+    direction: int
+    repeat: int
+    ring: bool
+    t: Array
+    speed: Array
+    angle: Array
+    of_speed: Coast
+    of_angle: Coast
+    coils: Mapping[str, float]
+    segments: Array
+    lost: int
+    expected: int
+    flags: int
+
+    @property
+    def where(self) -> str:
+        """How a coast is named to the reader."""
+        way = "forward" if self.direction > 0 else "backward"
+        return f"{self.bias_A:g} A, {way}, run {self.repeat + 1}{', with the ring' if self.ring else ''}"
+
+
+def read_run_downs(recording: Recording[Any]) -> list[RunDown]:
+    """Every "coast" step, fitted between the filter's transient and the end speed.
+
+    Raises:
+        AnalysisError: there are none, or one is too short to be fitted.
+    """
+    out = [
+        _read(step, recording.plan.start_delay_s, recording.plan.end_speed_rad_s) for step in recording.steps("coast")
+    ]
+    if not out:
+        raise AnalysisError("found no run-down (was the run stopped early?)")
+    return out
+
+
+def _read(step: Step, delay_s: float, end: float) -> RunDown:
+    labels = step.labels
+    direction = int(labels["direction"])
+    data = step.read(*CHANNELS)
+    name = f"{labels['bias_A']:g} A, {'forward' if direction > 0 else 'backward'}, run {int(labels['repeat']) + 1}"
+    t = (data["t_ns"] - data["t_ns"][0]).astype(np.float64) * 1e-9 if len(data["t_ns"]) else np.zeros(0)
+    speed, angle = direction * data["speed"], direction * np.unwrap(data["angle"])
+    used = _span(t, speed, delay_s, end)
+    if used.stop - used.start < SMALLEST_SAMPLES:
+        raise AnalysisError(_too_short(name, t, used, delay_s, end))
+    t, speed, angle = t[used] - t[used.start], speed[used], angle[used]
+    return RunDown(
+        bias_A=float(labels["bias_A"]), direction=direction, repeat=int(labels["repeat"]), ring=bool(labels["ring"]),
+        t=t, speed=speed, angle=angle - angle[0],
+        of_speed=fit.of_speed(t, speed, SPEED_LAGS), of_angle=fit.of_angle(t, angle - angle[0], ANGLE_LAGS),
+        coils={c: float(data[c][used].mean()) for c in COILS},
+        segments=np.array([float(data[c][used].mean()) for c in SEGMENTS]),
+        lost=step.lost(), expected=step.expected(), flags=int(np.bitwise_or.reduce(data["flags"].astype(np.int64))),
+    )  # fmt: skip
+
+
+def _too_short(name: str, t: Array, used: slice, delay_s: float, end: float) -> str:
+    """Why a run-down cannot be fitted, and what to do: the rotor stops too soon, or samples are missing."""
+    found = used.stop - used.start
+    lasted = float(t[used.stop - 1] - t[used.start]) if found else 0.0
+    start = (
+        f"run-down {name}: found {found} samples between {delay_s:g} s after the release and {end:g} rad/s; expected "
+        f"{SMALLEST_SAMPLES} or more"
+    )
+    if used.stop >= len(t):
+        return f"{start}. The recording ends there: look for a run that was stopped, or give a longer coast_s"
+    return (
+        f"{start}. The rotor stops too soon: it falls to {end:g} rad/s within {lasted + delay_s:.2f} s. Give a higher "
+        "speed_rad_s, a lower end_speed_rad_s or a shorter start_delay_s; if it ran longer before, look for a brake, a rub or "
+        "a bearing current that drags"
+    )
+
+
+def _span(t: Array, speed: Array, delay_s: float, end: float) -> slice:
+    """From the end of the filter's transient to the first time that the speed is below the end speed."""
+    first = int(np.searchsorted(t, delay_s))
+    below = np.flatnonzero(speed[first:] < end)
+    return slice(first, first + int(below[0]) if len(below) else len(t))

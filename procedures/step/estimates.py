@@ -1,0 +1,300 @@
+"""From set-point steps to estimates with influences: scatter of the repeats, sampling, size of the steps, sensors' gains."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.special import ndtr
+
+from bench.errors import AnalysisError
+from bench.rigfile import RigFile
+from bench.uncertainty import Estimate, Influence
+from bench.uncertainty.estimate import Deviations
+from procedures.shared.certificates import certified
+from procedures.step import response, settling
+from procedures.step import steps as step_steps
+from procedures.step.oscillation import One, Swing, swing
+from procedures.step.settling import Curve, Settling
+from procedures.step.steps import Case, Done
+
+Array = npt.NDArray[np.float64]
+RISE_SHARE = 0.012  # of a period: what the spline leaves of a crossing, over all phases of the step in its period
+ALIAS = 3e-3  # of the bandwidth: what stands above half the sampling rate
+HARMONIC = 0.1  # of the directions' difference of overshoot: the top's second harmonic, which oscillations leave out
+START_S = 1e-4  # how well the control currents tell when the set point acted
+# Second-order effect of a step's size over the square of its first-order effect: damping either way; frequency from none to
+# less by this much, since what bearings have of quadratic and cubic forces softens them (Landau, Mechanics, section 28).
+SIZE_DAMPING, SIZE_FREQUENCY = (-2.0, 2.0), (-4.0, 0.0)
+TAIL_S = 0.2
+
+
+@dataclass(frozen=True)
+class Result:
+    """The steps of one case, what was fitted to their mean (None: no oscillation), and each quantity with its influences; no
+    settling time where the position does not settle."""
+
+    case: Case
+    ones: tuple[One, ...]
+    swing: Swing | None
+    settled: Settling
+    error: float
+    estimates: Mapping[str, Estimate]
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """Values of a quantity by case with the variance of each mean and its dof; the deviation goes with size to the -`power`."""
+
+    unit: str
+    power: int
+    values: dict[Case, float]
+    variances: dict[Case, float]
+    dof: dict[Case, int]
+
+
+def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
+    """Every case's result.
+
+    Raises:
+        AnalysisError: a step does not get to nine tenths of its size.
+    """
+    done = step_steps.by_case(steps)
+    ones = {case: tuple(_one(d) for d in d_all) for case, d_all in done.items()}
+    fits = {case: _fits(o) for case, o in ones.items()}
+    seen = {
+        "rise_time": _repeated("s", 1, ones, _rise),
+        "steady_error": _repeated("m", 0, ones, lambda case, o: case.way * case.size * (_late(o) - 1)),
+        "overshoot": _jackknifed("1", fits, ones, lambda s, _: s.peak - 1),
+        "bandwidth": _jackknifed("Hz", fits, ones, lambda s, o: response.bandwidth(o, s)),
+    }
+    curves = {group: _curve(of) for group, of in step_steps.by_group(steps).items()}
+    out = {}
+    for case, all_of in done.items():
+        settled = settling.settling(curves[case.group], case, all_of, band)
+        found = {name: _estimate(name, case, s) for name, s in seen.items() if case in s.values}
+        if math.isfinite(settled.time):
+            found["settling_time"] = settling_estimate(case, settled)
+        period = float(all_of[0].t[1] - all_of[0].t[0])
+        found["rise_time"] += bound(f"sampling/rise/{case.where}", "sampling", RISE_SHARE * period, "s")
+        found["steady_error"] += _gained(case, rig)
+        other = seen["overshoot"].values.get(replace(case, way=-case.way))
+        if "overshoot" in found and other is not None:
+            half = HARMONIC * abs(found["overshoot"].value - other)
+            found["overshoot"] += bound(f"harmonic/{case.where}", "second harmonic of the swing", half, "1")
+        if "bandwidth" in found:
+            found["bandwidth"] += bound(
+                f"aliasing/{case.where}", "above half the sampling rate", ALIAS * found["bandwidth"].value, "Hz"
+            )
+        error = float(np.mean([_late(o) - 1 for o in ones[case]]))
+        out[case] = Result(case, ones[case], fits[case][0] if fits[case] else None, settled, error, found)
+    return out
+
+
+def _one(d: Done) -> One:
+    return One(d.t, np.array([d.y, d.tilt]) / d.case.size, d.case.size, d.begin)
+
+
+def _rise(case: Case, o: One) -> float:
+    early = o.t < 0.05
+    try:
+        return response.rise_time(o.t[early], o.both[0, early])
+    except AnalysisError as error:
+        raise AnalysisError(f"{case.where}: {error}") from error
+
+
+def _late(o: One) -> float:
+    return float(o.both[0, o.t > o.t[-1] - min(TAIL_S, 0.25 * o.t[-1])].mean())
+
+
+def _fits(ones: Sequence[One]) -> list[Swing]:
+    """Of all steps of a case, then without each in turn; nothing where one does not fit."""
+    try:
+        whole = swing(ones)
+        return [whole, *(swing([o for j, o in enumerate(ones) if j != k], whole.poles) for k in range(len(ones)))]
+    except AnalysisError:
+        return []
+
+
+def _repeated(unit: str, power: int, ones: Mapping[Case, Sequence[One]], of: Callable[[Case, One], float]) -> _Seen:
+    seen = _Seen(unit, power, {}, {}, {})
+    for case, o in ones.items():
+        values = np.array([of(case, x) for x in o])
+        within, dof = _alike([x.begin for x in o], values)
+        seen.values[case], seen.dof[case] = float(values.mean()), dof
+        seen.variances[case] = within / dof / len(o) if dof else math.nan
+    return seen
+
+
+def _jackknifed(
+    unit: str,
+    fits: Mapping[Case, Sequence[Swing]],
+    ones: Mapping[Case, Sequence[One]],
+    of: Callable[[Swing, Sequence[One]], float],
+) -> _Seen:
+    """With one step after the other left out; those that begin at other set points differ where a bearing is not linear, so
+    that each is held against those that begin where it does."""
+    seen = _Seen(unit, 1, {}, {}, {})
+    for case, all_of in fits.items():
+        if not all_of:
+            continue
+        o, n = ones[case], len(ones[case])
+        value = of(all_of[0], o)
+        left = np.array([of(s, [x for j, x in enumerate(o) if j != k]) for k, s in enumerate(all_of[1:])])
+        if not np.isfinite([value, *left]).all():
+            continue
+        within, dof = _alike([x.begin for x in o], left)
+        if dof:
+            seen.values[case], seen.dof[case] = value, dof
+            seen.variances[case] = (n - 1) ** 2 / n * within / dof
+    return seen
+
+
+def _alike(kinds: Sequence[Hashable], values: Array) -> tuple[float, int]:
+    """Sum of squares of steps of the same kind about their means, and its degrees of freedom."""
+    total, dof = 0.0, 0
+    for kind in dict.fromkeys(kinds):  # in order: a set would add in another one in each process
+        of = values[[k == kind for k in kinds]]
+        total, dof = total + float(((of - of.mean()) ** 2).sum()), dof + len(of) - 1
+    return total, dof
+
+
+def _estimate(name: str, case: Case, seen: _Seen) -> Estimate:
+    """A case's value. Noise is the same for all steps of a setting, an axis and a speed: their scatter is taken together, one
+    estimate whose parts have one identity with running numbers."""
+    alike = [c for c in seen.values if c.group == case.group]
+    dof = float(sum(seen.dof[c] for c in alike))
+    scaled = [seen.dof[c] * seen.variances[c] * (c.size / case.size) ** (2 * seen.power) for c in alike]
+    u = math.sqrt(sum(scaled) / dof)
+    influence = Influence(
+        id=f"scatter/{name}/{case.group}/{alike.index(case) + 1}",
+        name="scatter of the repeats",
+        u=1.0,
+        unit="1",
+        kind="A",
+        distribution="normal",
+        dof=dof,
+        source=f"repeats of {len(alike)} cases together",
+    )
+    return Estimate(seen.values[case], seen.unit, {influence: u})
+
+
+def _curve(done: Sequence[Done]) -> Curve:
+    try:
+        found = swing([_one(d) for d in done])
+    except AnalysisError:
+        return settling.fit(done, np.zeros(0, complex))
+    return settling.fit(done, found.poles, found.pole)
+
+
+def settling_estimate(case: Case, settled: Settling) -> Estimate:
+    """The expected time with all that are possible: a distribution of its own (JCGM 101, 6.5)."""
+    noise = Influence(
+        id=f"scatter/settling_time/{case.where}",
+        name="noise of the mean response",
+        u=float(settled.times.std()),
+        unit="s",
+        kind="A",
+        distribution="normal",
+        source="noise of the steps, and extremes of the swing that may touch the band",
+    )
+
+    def sampled(deviations: Deviations) -> Array:
+        share = ndtr(deviations[noise.id] / noise.u) * len(settled.times) - 0.5
+        times: Array = np.interp(share, np.arange(len(settled.times)), settled.times)
+        return times
+
+    made = Estimate(settled.time, "s", {noise: 1.0}, sampled if noise.u else None)
+    return made + bound(f"start/{case.where}", "start of the step", START_S, "s")
+
+
+def by_group(steps: list[Done], results: Mapping[Case, Result]) -> dict[str, dict[str, Estimate]]:
+    """Of each setting, axis and speed: the oscillation, and how far size and direction matter."""
+    out: dict[str, dict[str, Estimate]] = {}
+    for group in step_steps.by_group(steps):
+        of = [r for c, r in results.items() if c.group == group]
+        out[group] = _oscillation(group, of) | _linearity(of)
+    return out
+
+
+def _oscillation(group: str, results: Sequence[Result]) -> dict[str, Estimate]:
+    """Damping and natural frequency from all steps together, those of large ones weighing more; uncertainty by leaving out
+    one step after the other, among those of its kind. Nothing where there is no oscillation."""
+    ones = [o for r in results for o in r.ones]
+    kinds, n = [(r.case, o.begin) for r in results for o in r.ones], len(ones)
+    try:
+        whole = swing(ones)
+        left = [swing(ones[:k] + ones[k + 1 :], whole.poles) for k in range(n)]
+    except AnalysisError:
+        return {}
+    first = _first_order(results)
+    out = {}
+    made: tuple[tuple[str, str, Callable[[Swing], float], tuple[float, float]], ...] = (
+        ("damping", "1", lambda s: s.damping, SIZE_DAMPING),
+        ("natural_frequency", "Hz", lambda s: s.frequency, SIZE_FREQUENCY),
+    )
+    for name, unit, of, (low, high) in made:
+        value = of(whole)
+        within, dof = _alike(kinds, np.array([of(s) for s in left]))
+        u = (n - 1) * math.sqrt(within / dof / n)
+        jackknife = Influence(
+            id=f"scatter/{name}/{group}",
+            name="scatter of the steps",
+            u=u,
+            unit=unit,
+            kind="A",
+            distribution="normal",
+            dof=_weighed(kinds),
+            source=f"{n} steps, left out in turn",
+        )
+        moved = max(abs(of(whole.later(by)) - value) for by in (START_S, -START_S))
+        out[name] = Estimate.of(value * (1 - (low + high) / 2 * first**2), jackknife)
+        out[name] += bound(f"start/{name}/{group}", "start of the step", moved, unit)
+        out[name] += bound(f"size/{name}/{group}", "size of the steps", (high - low) / 2 * first**2 * value, unit)
+    return out
+
+
+def _weighed(kinds: Sequence[tuple[Case, float]]) -> float:
+    """Degrees of freedom of a scatter to which steps add as the square of their size (Welch-Satterthwaite)."""
+    freedom = {kind: kinds.count(kind) - 1 for kind in dict.fromkeys(kinds)}
+    parts = [(many, many * case.size**2) for (case, _), many in freedom.items() if many]
+    return sum(part for _, part in parts) ** 2 / sum(part**2 / many for many, part in parts)
+
+
+def _first_order(results: Sequence[Result]) -> float:
+    """By how much the frequency of the largest steps differs between the directions: 0 in a linear loop."""
+    largest = max(r.case.size for r in results)
+    both = {r.case.way: r.swing.frequency for r in results if r.case.size == largest and r.swing is not None}
+    return both[1] / both[-1] - 1 if len(both) == 2 else 0.0
+
+
+def _linearity(results: Sequence[Result]) -> dict[str, Estimate]:
+    sizes = sorted({r.case.size for r in results})
+    of = {(r.case.size, r.case.way): r.estimates["overshoot"] for r in results if "overshoot" in r.estimates}
+    if any((s, w) not in of for s in (sizes[0], sizes[-1]) for w in (1, -1)):
+        return {}
+    top = [of[sizes[-1], w] for w in (1, -1)]
+    out = {"way_effect": top[0] - top[1]}
+    if len(sizes) > 1:
+        out["size_effect"] = (top[0] + top[1] - of[sizes[0], 1] - of[sizes[0], -1]) * 0.5
+    return out
+
+
+def bound(identity: str, name: str, half: float, unit: str) -> Estimate:
+    """Zero, within a half width."""
+    influence = Influence(
+        id=identity, name=name, u=half / math.sqrt(3), unit=unit, kind="B", distribution="rectangular"
+    )
+    return Estimate.of(0.0, influence)
+
+
+def _gained(case: Case, rig: RigFile) -> Estimate:
+    """Zero m, with what the gains of the position sensors make of the step's length."""
+    out = Estimate.exact(0.0, "m")
+    for channel, share in step_steps.shares(rig, case.axis).items():
+        gain = certified(f"sensors/{channel}/gain", rig.sensors[channel].gain, f"gain of {channel}")
+        out = out + (gain - gain.value) * (-case.way * case.size * share / gain.value)
+    return replace(out, unit="m")

@@ -1,0 +1,266 @@
+"""Set-point steps of the levitated shaft, at rest and turning, with one or two settings of the controller (thesis 3.5, A7).
+
+Measurands, each by setting, speed, axis, size and direction: overshoot, rise, settling, error at the end and bandwidth; by
+setting, speed and axis: damping ratio and natural frequency, and how far size and direction matter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Literal
+
+from pydantic import Field
+
+from bench.errors import NotReached
+from bench.figures import Figure
+from bench.findings import Effect, Finding
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.requires import Requires
+from bench.rig import Rig
+from bench.rigfile import RigFile
+from bench.roles import RigState
+from procedures.shared import assumptions
+from procedures.step import checks, planes
+from procedures.step import estimates as step_estimates
+from procedures.step import figures as drawn
+from procedures.step.record_length import enough_s, faded_s
+from procedures.step.steps import CHANNELS, STEP, TURNING_RAD_S, cases, read_steps
+from procedures.unbalance.steps import RPM
+
+OVERSHOOT = Quantity("overshoot", "1", "greatest position beyond the step, as a share of it")
+RISE = Quantity("rise_time", "s", "10 to 90 % of the step")
+SETTLING = Quantity("settling_time", "s", "until the averaged position stays in the band")
+ERROR = Quantity("steady_error", "m", "position at the end of the record less its set point, from where it rested")
+BANDWIDTH = Quantity("bandwidth", "Hz", "where the spectrum of the response's derivative is 3 dB down")
+DAMPING = Quantity(
+    "damping", "1", "damping ratio of the swing: its oscillations' mean pole, each with its part in the step"
+)
+FREQUENCY = Quantity("natural_frequency", "Hz", "of the same mean pole")
+SIZE = Quantity(
+    "size_effect",
+    "1",
+    "overshoot of the largest step less that of the smallest, mean of both ways",
+    title="effect of the size",
+)
+WAY = Quantity(
+    "way_effect", "1", "overshoot upwards less that downwards, at the largest step", title="effect of the direction"
+)
+MEASURES = (OVERSHOOT, RISE, SETTLING, ERROR, BANDWIDTH, DAMPING, FREQUENCY, SIZE, WAY)
+Axis = Literal["y", "z", "x"]
+MODEL = ("model_beta_{}", "model_offset_{}")
+RADIAL = ("yi", "zi", "yo", "zo")
+PULSES_S = 1.0  # until the speed by the pulses, and with it the controller's state, says that the shaft stands
+SETTLED_S = 0.5  # after the last ramp of a speed
+MARGIN = 0.8  # of the clearance that a step with its overshoot may use
+
+
+class Plan(BenchPlan):
+    """Settings of the steps, SI."""
+
+    axes: tuple[Axis, ...] = Field(("y", "z"), min_length=1)
+    sizes_m: tuple[float, ...] = Field((10e-6, 20e-6), min_length=2)  # one alone says nothing of linearity
+    speeds_rad_s: tuple[float, ...] = Field((0.0,), min_length=1)
+    repeats: int = Field(2, ge=2)  # of: up, back, down, back
+    a: dict[str, float] = Field(default_factory=lambda: {"law": 1.0})  # parameters of the controller
+    b: dict[str, float] = Field(default_factory=dict)  # the other setting; empty: nothing is compared
+    names: tuple[str, str] = ("A", "B")
+    warm: dict[str, float] = Field(default_factory=dict)  # on top of either setting until it is warm
+    warm_s: float = Field(4.0, ge=0)
+    settle_s: float = Field(5.0, ge=0.1)  # with the setting itself
+    model_error: float = Field(
+        0.0, gt=-0.5, lt=1.0
+    )  # share by which the controller's betas and offsets are made too large
+    rest_s: float = Field(0.3, ge=0.1)  # before each step
+    record_s: float | None = Field(None, ge=0.2)  # after it; by default until the law's integrator has arrived
+    band: float = Field(0.02, gt=0)  # of settling, as a share of the step
+    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
+    max_speed_error: float = Field(0.02, gt=0)  # share of the speed
+
+
+def chosen(plan: Plan) -> dict[str, dict[str, float]]:
+    """The settings by name."""
+    first = {plan.names[0]: plan.a}
+    return first | {plan.names[1]: plan.b} if plan.b else first
+
+
+def model(rig: RigFile, plan: Plan) -> dict[str, float]:
+    """The controller's idea of the bearings, wrong by what the plan says; what the rig file says where that is nothing."""
+    names = [m.format(a) for m in MODEL for a in RADIAL]
+    return {n: rig.parameters[n].default * (1 + plan.model_error) for n in names} if plan.model_error else {}
+
+
+def recorded_s(rig: RigFile, plan: Plan) -> float:
+    """How long each step is recorded, s: what the plan says, or as long as the slowest of its laws takes."""
+    if plan.record_s is not None:
+        return plan.record_s
+    return enough_s([{**_usual(rig), **s} for s in chosen(plan).values()], plan.axes, plan.band)
+
+
+def waited_s(rig: RigFile, plan: Plan, setting: str, axis: str) -> float:
+    """Before the rest of each step, s, until what the one before it leaves is nothing."""
+    needed = faded_s({**_usual(rig), **chosen(plan)[setting]}, axis, plan.band)
+    return max(needed - recorded_s(rig, plan) - plan.rest_s, 0.0)
+
+
+def _usual(rig: RigFile) -> dict[str, float]:
+    return {name: p.default for name, p in rig.parameters.items()}
+
+
+def step_count(plan: Plan) -> int:
+    """How many steps `acquire` records, for the progress display."""
+    return 4 * plan.repeats * len(list(cases(tuple(chosen(plan)), plan.speeds_rad_s, plan.axes, plan.sizes_m)))
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Up, back, down and back for every case; the shaft stands and the controller has its own settings again in the end."""
+    write, settings = rig.levitation.set, chosen(plan)
+    used: dict[str, float] = {}
+    record_s = recorded_s(rig.file, plan)
+    for name, value in model(rig.file, plan).items():
+        write(name, value)
+    write("slew", 0.0)
+    now: tuple[str, float] | None = None
+    for setting, speed, axis, size in cases(tuple(settings), plan.speeds_rad_s, plan.axes, plan.sizes_m):
+        if (now is None or now[1] != speed) and not _at(rig, plan, record, speed):
+            break
+        if now != (setting, speed):
+            _put(rig, plan, settings[setting], used)
+            now = (setting, speed)
+        wait_s = waited_s(rig.file, plan, setting, axis)
+        for repeat in range(plan.repeats):
+            for begin, end in ((0.0, size), (size, 0.0), (0.0, -size), (-size, 0.0)):
+                rig.clock.sleep(wait_s)
+                with record.step(
+                    STEP,
+                    setting=setting,
+                    speed_rad_s=speed,
+                    axis=axis,
+                    begin_m=begin,
+                    step_m=end - begin,
+                    repeat=repeat,
+                ):
+                    rig.clock.sleep(plan.rest_s)
+                    write(f"ref_{axis}", end)
+                    rig.clock.sleep(record_s)
+    if rig.drive is not None and max(plan.speeds_rad_s) > 0:
+        rig.drive.stop()
+        rig.drive.coast()
+        rig.clock.sleep(PULSES_S)
+    for name in ("slew", *sorted({*used} - {"law"}), *model(rig.file, plan)):
+        write(name, rig.file.parameters[name].default)
+
+
+def _at(rig: Rig, plan: Plan, record: Recorder, speed: float) -> bool:
+    """Turn at a speed; False if the shaft does not get there, which the analysis tells."""
+    if rig.drive is None or speed == 0:
+        return True
+    try:
+        rig.drive.reach(speed)
+    except NotReached:
+        record.event("not-reached", wanted=speed, reached=rig.rotation.speed_rad_s)
+        return False
+    rig.clock.sleep(SETTLED_S)
+    return True
+
+
+def _put(rig: Rig, plan: Plan, setting: Mapping[str, float], used: dict[str, float]) -> None:
+    """A setting of the controller: what the other one changed is undone; first warm, if there is anything to be warmed."""
+    before = {n: rig.file.parameters[n].default for n in used if n not in setting}
+    for name, value in {**before, **setting, **plan.warm}.items():
+        rig.levitation.set(name, value)
+        used[name] = value
+    if plan.warm:
+        rig.clock.sleep(plan.warm_s)
+        for name in plan.warm:
+            rig.levitation.set(name, setting.get(name, rig.file.parameters[name].default))
+    rig.clock.sleep(plan.settle_s)
+
+
+def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
+    """Findings first, then the quantities of each case, then those over sizes and directions."""
+    early = list(checks.before(recording))
+    early += () if early else planes.exchanged(recording)
+    yield from early
+    if any(f.effect is Effect.ERROR for f in early):
+        return
+    plan, steps = recording.plan, read_steps(recording)
+    signals = list(checks.of_steps(steps, plan))
+    yield from signals
+    if any(f.code in checks.FATAL for f in signals):
+        return
+    results = step_estimates.by_case(steps, recording.rig, plan.band)
+    groups = step_estimates.by_group(steps, results)
+    yield from checks.of_results(results, groups, plan)
+    yield from checks.compared(results, plan.names)
+    known = {q.name: q for q in MEASURES}
+    for case, result in results.items():
+        for name, estimate in result.estimates.items():
+            yield known[name].measured(estimate, case.where)
+    for where, estimates in groups.items():
+        for name, estimate in estimates.items():
+            yield known[name].measured(estimate, where)
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts."""
+    needed = ["slew", *(f"ref_{a}" for a in plan.axes), *model_names(plan), *plan.a, *plan.b, *plan.warm]
+    for name in dict.fromkeys(needed):
+        if name not in rig.parameters:
+            yield f"parameters: found no {name}; needed are the set points, slew and those of the plan's settings"
+        elif rig.parameters[name].when == "resting":
+            yield f"{name}: can be written at rest only; a setting is changed while the shaft levitates"
+    if 2 * max(plan.sizes_m) > MARGIN * rig.geometry["clearance"].value:
+        yield (f"sizes_m: found {max(plan.sizes_m) * 1e6:g} um; with its overshoot that needs more than {MARGIN:.0%} of the "
+               f"clearance, {rig.geometry['clearance'].value * 1e6:g} um")  # fmt: skip
+    if min(plan.sizes_m) <= 0 or len({*plan.sizes_m}) < len(plan.sizes_m) or len({*plan.axes}) < len(plan.axes):
+        yield "sizes_m, axes: expected sizes above 0, and each once"
+    if plan.names[0] == plan.names[1]:
+        yield f"names: found {plan.names[0]!r} twice; the settings cannot be told apart"
+    if any(0 < s < TURNING_RAD_S or s < 0 for s in plan.speeds_rad_s):
+        least = TURNING_RAD_S * RPM
+        yield f"speeds_rad_s: found {min(plan.speeds_rad_s) * RPM:.0f} r/min; expected 0, or {least:.0f} r/min and more"
+    most = rig.envelope.max_speed_rad_s
+    if max(plan.speeds_rad_s) > most:
+        yield f"speeds_rad_s: found {max(plan.speeds_rad_s) * RPM:.0f} r/min; the envelope allows {most * RPM:.0f} r/min"
+    if max(plan.speeds_rad_s) > 0 and not any("drive" in d.roles for d in rig.devices.values()):
+        yield "speeds_rad_s: the rig file has no device in the role drive, so that nothing turns the shaft"
+
+
+def model_names(plan: Plan) -> list[str]:
+    """Parameters that `model_error` changes."""
+    return [m.format(a) for m in MODEL for a in RADIAL] if plan.model_error else []
+
+
+def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+    """Responses with band and model, control currents, overshoot over the size; empty without steps."""
+    if any(f.effect is Effect.ERROR for f in checks.before(recording)) or not len(recording.steps(STEP)):
+        return ()
+    steps = read_steps(recording)
+    if any(f.code in checks.FATAL for f in checks.of_steps(steps, recording.plan)):
+        return drawn.raw_figures(steps)
+    return drawn.all_figures(steps, step_estimates.by_case(steps, recording.rig, recording.plan.band))
+
+
+procedure = Procedure(
+    name="step",
+    title="Set-point steps of the levitated shaft",
+    measures=MEASURES,
+    optional=(SETTLING,),  # what does not settle is a finding
+    state=RigState.LEVITATED,
+    plan=Plan,
+    acquire=acquire,
+    analyse=analyse,
+    figures=figures,
+    requires=Requires(
+        channels=CHANNELS,
+        sensors=tuple(n for n in CHANNELS if n.startswith(("pos_", "i_"))),
+        parameters=("slew", "model_rate", "model_l_is", "model_l_os"),
+        geometry=("clearance",),
+    ),
+    check=check,
+    step_count=step_count,
+    assumes=assumptions.STEP,
+    method=read_method(__file__),
+)

@@ -1,0 +1,83 @@
+"""The response of a position to a step of its set point, from means over a telemetry period. All functions are pure.
+
+A sample at t is the mean over (t - T, t]. The curve behind the samples is the derivative of a spline through their running
+sum, which gives back every mean exactly. The gain from set point to position is the Fourier transform of the response's
+derivative, in the place of which stand the differences of neighbouring means, freed of what a mean takes away.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+from scipy import interpolate
+
+from bench.errors import AnalysisError
+from procedures.step.oscillation import One, Swing
+
+Array = npt.NDArray[np.float64]
+FINE = 20  # points of the curve in a telemetry period
+RAW_S = 8e-3  # until then the bandwidth is that of the samples, from then on of the oscillation that was fitted to them
+LENGTH_S = 0.12  # of the response that makes the bandwidth
+SCAN_HZ = np.arange(20.0, 480.0, 2.0)
+
+
+def curve(t: Array, y: Array) -> tuple[Array, Array]:
+    """Times and values of the curve of which `y` (n,) at equally spaced `t` are the means over the period before."""
+    period = float(t[1] - t[0])
+    edges = np.concatenate(([t[0] - period], t))
+    total = np.concatenate(([0.0], np.cumsum(y) * period))
+    fine = np.linspace(edges[0], edges[-1], FINE * len(y) + 1)
+    return fine, np.asarray(interpolate.make_interp_spline(edges, total, 3).derivative()(fine))
+
+
+def rise_time(t: Array, y: Array) -> float:
+    """From 10 to 90 % of a step of one.
+
+    Raises:
+        AnalysisError: it does not get there.
+    """
+    fine, x = curve(t, y)
+    above = np.flatnonzero(x >= 0.9)
+    if not len(above):
+        raise AnalysisError(f"the position reaches {x.max():.0%} of the step; expected 90 % at least")
+    last = int(above[0])
+    below = np.flatnonzero(x[: last + 1] < 0.1)
+    first = int(below[-1]) if len(below) else 0
+    step = float(fine[1] - fine[0])
+
+    def crossing(k: int, level: float) -> float:
+        a, b = x[k], x[k + 1]
+        return float(fine[k] + step * (level - a) / (b - a)) if b != a else float(fine[k])
+
+    return crossing(max(last - 1, 0), 0.9) - crossing(first, 0.1)
+
+
+def trailing(y: Array, samples: float) -> Array:
+    """Mean over the last `samples` (a fraction of the oldest one where that is none), (n,); the first ones over fewer."""
+    whole = int(samples)
+    kernel = np.concatenate((np.ones(whole), [samples - whole]))
+    count = np.convolve(np.ones(len(y)), kernel)[: len(y)]
+    return np.asarray(np.convolve(y, kernel)[: len(y)] / count)
+
+
+def bandwidth(steps: Sequence[One], swing: Swing) -> float:
+    """Hz from where on the gain from set point to position is below 0.707, by the steps' mean; infinite beyond the scan."""
+    period = float(steps[0].t[1] - steps[0].t[0])
+    count = round(LENGTH_S / period)
+    turns = np.exp(-2j * np.pi * period * np.outer(SCAN_HZ, np.arange(count)))
+    gain = np.zeros(len(SCAN_HZ), complex)
+    for s in steps:
+        first = int(np.searchsorted(s.t, -2 * period))
+        t = s.t[first] + period * np.arange(count)
+        raw = s.both[0, first : first + count]
+        y = np.where(t < RAW_S, np.append(raw, np.zeros(count - len(raw))), swing.means(t, period))
+        gain += np.exp(-2j * np.pi * SCAN_HZ * t[0]) * (turns @ np.diff(y, prepend=y[0]))
+    whole = np.abs(gain) / len(steps) / np.sinc(SCAN_HZ * period) ** 2
+    above = np.flatnonzero(whole >= math.sqrt(0.5))
+    if not len(above) or above[-1] + 1 >= len(SCAN_HZ):
+        return math.inf
+    k = int(above[-1])
+    return float(np.interp(-math.sqrt(0.5), -whole[k : k + 2], SCAN_HZ[k : k + 2]))

@@ -1,0 +1,224 @@
+"""From the recorded set-point steps to arrays: the shaft along the axis, its tilt, the axis across, freed of what
+turns with it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.errors import AnalysisError
+from bench.recording import Recording, Step
+from bench.rigfile import RigFile
+from procedures.amb_rotor.onset import onset
+from procedures.step.response import trailing
+
+Array = npt.NDArray[np.float64]
+STEP = "set-point"
+PLANES = ("i", "o")
+POSITIONS = ("pos_yi", "pos_zi", "pos_yo", "pos_zo", "pos_x")
+COILS = tuple(f"i_{a}_{s}" for a in ("yi", "zi", "yo", "zo", "x") for s in "pn")
+CHANNELS = (*POSITIONS, *COILS, "angle", "speed", "flags")
+COIL_LIMIT, VOLTAGE_LIMIT, CONTACT, CLIPPED = 1, 2, 4 | 8 | 32, 64  # bits of the telemetry signal `flags`
+ORDERS = (1, 2, 3, 4)  # per turn: unbalance and the runout of the journals
+TURNING_RAD_S = 20.0
+ANSWER = 0.25  # of the greatest change of the control current: where it first gets there, the step began
+AT_REST_S = 6e-3  # what a position is averaged over where the shaft does not turn
+EARLY_TICKS = (
+    1.5  # a sample's last reading is one tick old, and stands for half a tick either way; the law acts at the next
+)
+
+
+@dataclass(frozen=True)
+class Case:
+    """Which setting of the controller, at which speed, along which axis, how far, and which way (1 up, -1 down)."""
+
+    setting: str
+    speed: float
+    axis: str
+    size: float
+    way: int
+
+    @property
+    def where(self) -> str:
+        """How it is named to the reader."""
+        return f"{self.group}, {self.size * 1e6:g} µm {'up' if self.way > 0 else 'down'}"
+
+    @property
+    def group(self) -> str:
+        """The same without size and direction."""
+        return f"{self.setting}, {self.axis}, {self.speed * 30 / math.pi:.0f} r/min"
+
+
+@dataclass(frozen=True)
+class Done:
+    """One recorded step from the set point `begin` m. `t` s from where the set point acts (n,), with some samples before it;
+    `y`, `tilt`, `across` m along the way of the step: from where they rested, what turns with the shaft taken away; `raw` as
+    `y` with it; `rest` m the same before the step; `control` A, difference of the coils, both bearings; `answered`: it did;
+    `kicks` A, of each bearing's at first. `noise` m of the mean over `samples`."""
+
+    case: Case
+    begin: float
+    t: Array
+    y: Array
+    raw: Array
+    tilt: Array
+    across: Array
+    control: Array
+    rest: Array
+    noise: float
+    samples: float
+    synchronous: float
+    slope: float
+    answered: bool
+    kicks: tuple[float, ...]
+    speeds: tuple[float, float]
+    flags: int
+    stuck: tuple[str, ...]
+    lost: int
+    expected: int
+
+
+def read_steps(recording: Recording[Any]) -> list[Done]:
+    """Every step, in time order.
+
+    Raises:
+        AnalysisError: there are none, or one holds too few samples.
+    """
+    out = [_read(recording, step) for step in recording.steps(STEP)]
+    if not out:
+        raise AnalysisError("found no set-point steps; expected those of the plan (was the run stopped early?)")
+    return out
+
+
+def by_case(steps: list[Done]) -> dict[Case, list[Done]]:
+    """Steps of each case, in order of first appearance."""
+    out: dict[Case, list[Done]] = {}
+    for done in steps:
+        out.setdefault(done.case, []).append(done)
+    return out
+
+
+def by_group(steps: list[Done]) -> dict[str, list[Done]]:
+    """Steps of one setting, axis and speed."""
+    out: dict[str, list[Done]] = {}
+    for done in steps:
+        out.setdefault(done.case.group, []).append(done)
+    return out
+
+
+def shares(rig: RigFile, axis: str) -> dict[str, float]:
+    """Of which sensors the position along an axis is made at the centre of mass, and how."""
+    if axis == "x":
+        return {"pos_x": 1.0}
+    l_is, l_os = (rig.parameters[f"model_l_{b}s"].default for b in PLANES)
+    return {f"pos_{axis}i": l_os / (l_is + l_os), f"pos_{axis}o": l_is / (l_is + l_os)}
+
+
+def _read(recording: Recording[Any], step: Step) -> Done:
+    data, labels = _whole(step.read(*CHANNELS)), step.labels
+    axis, signed = str(labels["axis"]), float(labels["step_m"])
+    case = Case(str(labels["setting"]), float(labels["speed_rad_s"]), axis, abs(signed), 1 if signed > 0 else -1)
+    written = [e["t_ns"] for e in recording.events("parameter")
+               if e["name"] == f"ref_{axis}" and step.start_ns <= e["t_ns"] < step.end_ns]  # fmt: skip
+    if not written:
+        raise AnalysisError(f"{case.where}: found no write of the set point within the step")
+    rest = data["t_ns"] <= written[-1]
+    if rest.sum() < 50 or (~rest).sum() < 100:
+        raise AnalysisError(f"{case.where}: found {int(rest.sum())} samples before the step and {int((~rest).sum())} after; "
+                            "expected at least 50 and 100")  # fmt: skip
+    return _done(recording.rig, step, case, data, rest)
+
+
+def _whole(data: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
+    """Samples at every index: lost ones by straight lines, flags and angle by the sample before. How many were lost is told."""
+    index = data["index"]
+    if not len(index) or index[-1] - index[0] + 1 == len(index):
+        return data
+    every = np.arange(index[0], index[-1] + 1)
+    held = np.searchsorted(index, every, "right") - 1
+    out = {c: x[held] if c == "flags" else np.interp(every, index, x) for c, x in data.items()}
+    out["angle"] = np.interp(every, index, np.unwrap(data["angle"]))
+    out["t_ns"] = np.interp(every, index, data["t_ns"] - data["t_ns"][0]).round().astype(np.int64) + data["t_ns"][0]
+    return out
+
+
+def _done(
+    rig: RigFile, step: Step, case: Case, data: Mapping[str, npt.NDArray[Any]], rest: npt.NDArray[np.bool_]
+) -> Done:
+    axis, other = case.axis, {"y": "z", "z": "y", "x": "y"}[case.axis]
+    raw = sum((w * data[c] for c, w in shares(rig, axis).items()), np.zeros(len(rest)))
+    across = sum((w * data[c] for c, w in shares(rig, other).items()), np.zeros(len(rest)))
+    tilt = (data[f"pos_{axis}o"] - data[f"pos_{axis}i"]) / 2 if axis != "x" else np.zeros(len(rest))
+    planes = [f"{axis}{b}" for b in PLANES] if axis != "x" else ["x"]
+    control = sum((data[f"i_{p}_p"] - data[f"i_{p}_n"] for p in planes), np.zeros(len(rest)))
+    t = (data["t_ns"] - data["t_ns"][0]) * 1e-9
+    turning = float(np.median(data["speed"])) > TURNING_RAD_S
+    ones = [data[f"i_{p}_p"] - data[f"i_{p}_n"] for p in planes]
+    signals = np.array([raw, tilt, across, control, *ones])
+    clean, amplitude = _still(t, signals, data["angle"], rest) if turning else (signals, np.zeros(len(signals)))
+    clean = case.way * (clean - clean[:, rest].mean(axis=1, keepdims=True))
+    first, answered = _answer(clean[4:], rest)
+    period = float(np.median(np.diff(t)))
+    samples = 2 * math.pi / float(np.median(data["speed"])) / period if turning else AT_REST_S / period
+    since = t - _acted(rig, t, clean[3], first, period) - EARLY_TICKS * rig.devices["controller"].tick_s
+    keep = slice(max(first - 20, 0), None)
+    quiet = clean[0][rest]
+    slope = float(np.polyfit(t[rest], quiet, 1)[0])
+    level = quiet - slope * (t[rest] - t[rest].mean())
+    flags = data["flags"].astype(np.int64)
+    return Done(
+        case, float(step.labels["begin_m"]), since[keep], clean[0][keep], (case.way * (raw - raw[rest].mean()))[keep],
+        clean[1][keep], clean[2][keep], clean[3][keep], quiet,
+        float(trailing(level, samples)[round(samples) :].std()), samples, float(amplitude[0]), slope, answered,
+        tuple(float(c[first : first + 3].sum()) for c in clean[4:]),
+        (float(data["speed"].min()), float(data["speed"].max())), int(np.bitwise_or.reduce(flags)),
+        tuple(c for c in (*POSITIONS, *COILS) if np.ptp(data[c]) == 0), step.lost(), step.expected(),
+    )  # fmt: skip
+
+
+def _answer(control: Array, rest: npt.NDArray[np.bool_]) -> tuple[int, bool]:
+    """The first sample at which a bearing's control current (k, n) shows the step; the one after the write, where none does."""
+    begin = int(np.flatnonzero(~rest)[0])
+    window = np.abs(control[:, begin : begin + 40]).max(axis=0)
+    noise = float(control[:, rest].std(axis=1).max())
+    if window.max() < 8 * noise:
+        return begin, False
+    return begin + int(np.argmax(window > max(ANSWER * window.max(), 4 * noise))), True
+
+
+def _acted(rig: RigFile, t: Array, control: Array, first: int, period: float) -> float:
+    """When the set point changed, s: finer than a period, by the control currents."""
+    tick = rig.devices["controller"].tick_s
+    ticks, lag = round(period / tick), 1 / rig.parameters["model_rate"].default
+    return onset(t, control, t[first] - 1.8 * period, t[first] - 0.5 * period, tick=tick, ticks=ticks, lag_s=lag)[0]
+
+
+def _still(t: Array, signals: Array, angle: Array, rest: npt.NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Signals (k, n) without what turns with the shaft, and its first order's amplitude (k,): orders of the angle,
+    fitted before
+    the step and in the last third of the record, each with its own straight line."""
+    phase = np.unwrap(angle)
+    turning = [f(n * phase) for n in ORDERS for f in (np.cos, np.sin)]
+    late = t > t[-1] - (t[-1] - t[rest][-1]) / 3
+    lines = [m * c for m in (rest.astype(float), late.astype(float)) for c in (np.ones_like(t), t - t.mean())]
+    a = np.array([*turning, *lines]).T
+    used = rest | late
+    found = np.linalg.lstsq(a[used], signals[:, used].T, rcond=None)[0]
+    n = len(turning)
+    return signals - (a[:, :n] @ found[:n]).T, np.hypot(found[0], found[1])
+
+
+def cases(settings: tuple[str, ...], speeds: tuple[float, ...], axes: tuple[str, ...], sizes: tuple[float, ...]) -> Iterator[
+    tuple[str, float, str, float]
+]:  # fmt: skip
+    """In the order in which they are done: small steps first, every setting at one speed before the next."""
+    for speed in sorted(speeds):
+        for setting in settings:
+            for axis in axes:
+                for size in sorted(sizes):
+                    yield setting, speed, axis, size

@@ -1,0 +1,265 @@
+"""Torque constant of the motor over the phase angle, by known weights on a lever (thesis 6.6.4, gravity added).
+
+Measurand: alpha_tau, torque per mean true current of the four segments at the home angle, peak over the phase angle gamma;
+with it gamma_0t, where over gamma that peak lies.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import Field
+
+from bench.errors import RotorNotArrived
+from bench.figures import Figure
+from bench.findings import Effect, Finding
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.requires import Requires
+from bench.rig import Rig
+from bench.rigfile import RigFile
+from bench.roles import NOTHING, Load, RigState
+from bench.uncertainty import Estimate, Influence, propagate
+from procedures.servomotor import hold
+from procedures.servomotor.direction import SEGMENTS, of_probe
+from procedures.shared import assumptions
+from procedures.torque_constant import checks, fit
+from procedures.torque_constant import figures as drawn
+from procedures.torque_constant.fit import NO_DETENT, Balance, Detent
+from procedures.torque_constant.inputs import SIDES, arms_u, fit_inputs, masses_u
+from procedures.torque_constant.steps import CHANNELS, TorqueData, read_torques
+
+ALPHA_TAU = Quantity("alpha_tau", "N m/A", "torque per mean true segment current at the home angle, peak over gamma")
+GAMMA_0T = Quantity("gamma_0t", "rad", "phase angle at which the torque per current is largest")
+MEASURES = (ALPHA_TAU, GAMMA_0T)
+
+
+class Plan(BenchPlan):
+    """Settings of the calibration, SI."""
+
+    masses: tuple[str, ...] = Field(("M1", "M2", "M3"), min_length=2)  # labels of the rig's masses, ascending
+    gamma_max_rad: float = Field(0.0873, gt=0.01)  # phase angles from minus to plus this
+    gammas: int = Field(5, ge=5)  # equally spaced
+    bias_A: float = Field(3.0, gt=0)
+    settle_s: float = Field(2.0, gt=0)
+    average_s: float = Field(1.0, ge=0.1)
+    ki_theta: float = Field(300.0, gt=0)  # A/(rad s) of the angle's integrator while loads hang
+    detent_angles: int = Field(4, ge=4)  # over one period of the detent, without load
+    wiring_A: float = Field(1.5, gt=0)  # of i_x and i_y, to see which segment is which
+    max_angle_rad: float = Field(1e-2, gt=0)  # held: mean angle off home (beyond 2 A the integrator ends, kp holds)
+    max_drift_A: float = Field(0.03, gt=0)  # settled: drift of the torque current within a step
+    max_baseline_drift_A_s: float = Field(5e-5, gt=0)  # of the current without load, over the run
+    max_scale_drift: float = Field(7e-4, gt=0)  # relative, of the torque per current, from the first load to the last
+    count_rad: float = Field(2 * math.pi / 4096, gt=0)  # of the rotor's encoder
+    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
+
+
+def settings(plan: Plan) -> dict[str, float]:
+    """Lifted with the angle released: no loop is closed before the encoder's direction is known."""
+    return {"bias_i": plan.bias_A, "bias_o": plan.bias_A, **hold.RELEASED}
+
+
+def visits(plan: Plan) -> list[float]:
+    """The phase angles in rad in the order in which they are visited: outwards on alternating sides, then back on the others.
+
+    So gamma and -gamma lie evenly about the middle. A scale (magnets, current sensors) that drifts evenly in time is at right
+    angles to all that is alike at gamma and -gamma (alpha_tau, a bent cosine), and moves gamma_0t by at most 19 % (five
+    angles) of what it would in ascending order; fitted along, it costs u(gamma_0t) 2 % at most.
+    """
+    half = plan.gammas // 2
+    ascending = [float(g) for g in np.linspace(-plan.gamma_max_rad, plan.gamma_max_rad, plan.gammas)]
+    outwards = [g if k % 2 == 0 else -g for k, g in enumerate(ascending[plan.gammas - half :])]
+    return [*outwards, *ascending[half : plan.gammas - half], *(-g for g in reversed(outwards))]
+
+
+def sequence(plan: Plan) -> list[tuple[str, Load]]:
+    """Side and load of the steps at one phase angle: up on the left, up on the right, nothing before, between and after."""
+    up = [Load(label) for label in plan.masses]
+    nothing = ("", NOTHING)
+    return [nothing, *(("left", x) for x in up), nothing, *(("right", x) for x in up), nothing]
+
+
+def step_count(plan: Plan) -> int:
+    """How many steps `acquire` records, for the progress display."""
+    return 2 + 4 + plan.detent_angles + plan.gammas * len(sequence(plan))
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Look at the wiring and the detent without load, then hang every mass on both ends at every phase angle."""
+    hold.probe(rig, record)
+    hold.hold(rig, plan.ki_theta)
+    if not _at_home(rig, record, 0.0):
+        return
+    _wiring(rig, plan, record)
+    for k in range(plan.detent_angles):
+        angle = 2 * math.pi / detent_order(rig.file) * k / plan.detent_angles
+        if not _at_home(rig, record, angle):
+            return
+        rig.clock.sleep(plan.settle_s)
+        with record.step("detent", angle_rad=angle):
+            rig.clock.sleep(plan.average_s)
+    if not _at_home(rig, record, 0.0):
+        return
+    for gamma in visits(plan):
+        rig.levitation.set("gamma", gamma)
+        _loads(rig, plan, record, gamma)
+    rig.levitation.set("gamma", 0.0)
+    hold.hold(rig)
+
+
+def _at_home(rig: Rig, record: Recorder, angle: float) -> bool:
+    """Turn to an angle and wait until the rotor stands there; a rotor that does not is told in the recording."""
+    try:
+        rig.rotation.point(angle)
+    except RotorNotArrived as error:
+        record.event("not-held", angle=angle, text=str(error))
+        hold.release(rig)
+        return False
+    return True
+
+
+def _wiring(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Sideways currents of both signs, to see in the outboard AMB's currents which segment is which."""
+    ramp = rig.file.parameters["i_ramp"].default
+    for name, other in (("i_x", "i_y"), ("i_y", "i_x")):
+        for value in (plan.wiring_A, -plan.wiring_A):
+            rig.levitation.set(name, value)
+            rig.clock.sleep(2 * plan.wiring_A / ramp + min(plan.settle_s, 0.5))
+            with record.step("wiring", **{name: value, other: 0.0}):
+                rig.clock.sleep(0.2)
+        rig.levitation.set(name, 0.0)
+    rig.clock.sleep(plan.wiring_A / ramp + min(plan.settle_s, 0.5))
+
+
+def _loads(rig: Rig, plan: Plan, record: Recorder, gamma: float) -> None:
+    hanging = ""
+    for side, load in sequence(plan):
+        if hanging and hanging != side:
+            rig.operator.lever("left" if hanging == "left" else "right", NOTHING)
+        if side:
+            load = rig.operator.lever("left" if side == "left" else "right", load)
+        hanging = side
+        rig.clock.sleep(plan.settle_s)
+        with record.step("lever", gamma_rad=gamma, side=side, load=load.label):
+            rig.clock.sleep(plan.average_s)
+
+
+def detent_order(rig: RigFile) -> float:
+    """Periods of the detent in a turn: the poles."""
+    return 2 * rig.machine["pole_pairs"].value
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Everything the measurements, findings and figures are made of."""
+
+    data: TorqueData
+    inputs: dict[str, Estimate]
+    detent: Detent
+    balance: Balance
+    estimates: dict[str, Estimate]
+
+
+def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
+    """Findings first (they decide what the numbers are worth), then both quantities."""
+    early = [*of_probe(recording), *checks.of_events(recording)]
+    yield from early
+    if early:
+        return
+    data = read_torques(recording, recording.plan.masses, recording.plan.count_rad)
+    wrong = list(checks.of_signals(data, recording.plan))
+    yield from wrong
+    if any(f.effect is Effect.ERROR for f in wrong):
+        return
+    a = evaluate(recording, data)
+    values = {name: e.value for name, e in a.inputs.items()}
+    mass_u = masses_u(recording.rig, recording.plan.masses)
+    yield from checks.of_fit(data, a.balance, a.detent, values, mass_u, arms_u(recording.rig), recording.plan)
+    for quantity in MEASURES:
+        yield quantity.measured(a.estimates[quantity.name])
+
+
+def evaluate(recording: Recording[Plan], data: TorqueData) -> Analysis:
+    """Fit and estimates with their influences."""
+    plan, rig = recording.plan, recording.rig
+    inputs, pairs, count = fit_inputs(rig, plan.masses), rig.machine["pole_pairs"].value, len(plan.masses)
+    held = NO_DETENT
+    if len(data.detent_angle):
+        held = fit.detent(data.detent_angle, data.detent_current, detent_order(rig))
+
+    values = {name: e.value for name, e in inputs.items()}
+    u = fit.uneven(fit.balance(data.steps, values, count, pairs, held), data.steps)
+
+    def model(p: dict[str, float]) -> dict[str, float]:
+        fitted = fit.balance(data.steps, p, count, pairs, held, u)
+        return {"alpha_tau": fitted.alpha, "gamma_0t": fitted.gamma_0}
+
+    found = fit.balance(data.steps, values, count, pairs, held, u)
+    estimates = propagate(model, inputs)
+    root = np.linalg.cholesky(found.covariance)
+    parts = [
+        Influence(id=f"scatter/{k + 1}", name=f"scatter of the steps ({k + 1})", u=1.0, unit="1", kind="A",
+                  distribution="normal", dof=float(found.dof), source="residuals of the fit")
+        for k in range(2)
+    ]  # fmt: skip
+    for row, name in enumerate(("alpha_tau", "gamma_0t")):
+        for k in range(row + 1):
+            estimates[name] = estimates[name] + Estimate.of(0.0, parts[k]) * float(root[row, k])
+    return Analysis(data, inputs, held, found, estimates)
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts."""
+    unknown = [m for m in plan.masses if m not in rig.masses]
+    if unknown:
+        yield f"masses: found {', '.join(unknown)}; the rig file certifies {', '.join(rig.masses)}"
+        return
+    kg = [rig.masses[m].value for m in plan.masses]
+    if kg != sorted(kg) or len(set(kg)) != len(kg):
+        yield f"masses: found {kg} kg; expected different masses in ascending order"
+    turn = plan.gamma_max_rad * rig.machine["pole_pairs"].value
+    if turn > math.pi / 3:
+        yield (f"gamma_max_rad: found {plan.gamma_max_rad:g} rad, {math.degrees(turn):.0f} deg of the electrical turn; "
+               "expected 60 deg or less, where the motor still has half of its torque")  # fmt: skip
+
+
+def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+    """Torque over current per side, the constant over gamma with residuals, detent, one step; empty without a fit."""
+    if [*of_probe(recording), *checks.of_events(recording)]:
+        return ()
+    data = read_torques(recording, recording.plan.masses, recording.plan.count_rad)
+    if any(f.effect is Effect.ERROR for f in checks.of_signals(data, recording.plan)):
+        return ()
+    a = evaluate(recording, data)
+    return drawn.all_figures(recording, data, a.balance, a.detent, recording.rig.machine["pole_pairs"].value)
+
+
+procedure = Procedure(
+    name="torque-constant",
+    title="Torque constant of the motor over the phase angle by weights on a lever",
+    measures=MEASURES,
+    state=RigState.LEVITATED,
+    plan=Plan,
+    acquire=acquire,
+    analyse=analyse,
+    figures=figures,
+    requires=Requires(
+        roles=("levitation", "rotation"),
+        channels=CHANNELS,
+        sensors=SEGMENTS,
+        parameters=(*hold.PARAMETERS, "gamma", "i_x", "i_y", "i_ramp", "bias_i", "bias_o"),
+        geometry=tuple(f"lever_{s}" for s in SIDES),
+        machine=("pole_pairs",),
+        masses=True,
+    ),
+    check=check,
+    settings=settings,
+    step_count=step_count,
+    reached=("masses/*", "!masses/density", "geometry/lever_*"),
+    assumes=assumptions.TORQUE_CONSTANT,
+    method=read_method(__file__),
+)

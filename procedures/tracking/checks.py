@@ -1,0 +1,218 @@
+"""What can be wrong with a tracking test, and what its data can say about it. Each check names its suspect."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+
+from bench.errors import AnalysisError
+from bench.findings import Effect, Finding
+from bench.uncertainty import Estimate
+from procedures.amb_rotor.geometry import centre
+from procedures.amb_rotor.steps import CONTACT, CURRENT_LIMIT, LOWER, POSITIONS, RANGE, UPPER, VOLTAGE_LIMIT, Orbit
+from procedures.shared import signals
+from procedures.shared.sines import known_frequency, unknown_frequency
+from procedures.tracking.drift import Drift, drift
+from procedures.tracking.estimates import TIMING_TICKS, nominal
+
+FATAL = (
+    "stuck-channel",
+    "reference-missing",
+    "reference-frequency",
+    "axes-exchanged",
+    "sensor-range",
+    "start-not-seen",
+)
+APPLIED, OFF_HZ = 0.3, 2e-3  # share of the amplitude, relative error of the frequency
+CLEAR = 8.0  # jump of the current at the start, over the noise of a sample
+HELD = 5  # samples in a row at an extreme: a sensor that clips
+STEADY = 0.01  # of the speed
+PARTS = 0.02  # share of samples at a limit that a smooth reference does not explain
+
+
+class Settings(Protocol):
+    """The part of a plan that these checks need."""
+
+    @property
+    def laws(self) -> tuple[Any, ...]: ...
+    @property
+    def speed_rad_s(self) -> float: ...
+    @property
+    def max_lower_A(self) -> float: ...
+    @property
+    def max_lost(self) -> float: ...
+
+
+def of_signals(orbits: Sequence[Orbit], plan: Settings) -> Iterator[Finding]:
+    """Lost samples, channels that stand still or clip, a reference that is not what was planned."""
+    lost, expected = np.array([(o.step.lost(), o.step.expected()) for o in orbits], dtype=float).T
+    yield from signals.losses(lost, expected, plan.max_lost, lambda share: orbits[int(np.argmax(share))].where)
+    for o in orbits:
+        rows = (
+            *zip(POSITIONS, o.path.readings, strict=True),
+            *zip(UPPER, o.upper, strict=True),
+            *zip(LOWER, o.lower, strict=True),
+        )
+        for name, values in rows:
+            if np.ptp(values) == 0:
+                yield Finding("stuck-channel", f"{name} does not move at all during an orbit.", name, Effect.ERROR)
+        yield from _clipping(o)
+        yield from _of_reference(o, o.law in plan.laws)
+        if plan.speed_rad_s:
+            off = float(np.abs(o.speed - plan.speed_rad_s).max()) / plan.speed_rad_s
+            if off > STEADY:
+                yield Finding(
+                    "speed-not-steady",
+                    f"the speed is up to {off:.1%} off {plan.speed_rad_s * 30 / math.pi:.0f} r/min.",
+                    o.where,
+                    Effect.INDETERMINATE,
+                    (f"@{o.where}",),
+                )
+
+
+def _clipping(o: Orbit) -> Iterator[Finding]:
+    """A live sensor has noise also where it is greatest; one that clips repeats its limit."""
+    found = False
+    for name, x in zip(POSITIONS, o.path.readings, strict=True):
+        for limit in (x.max(), x.min()):
+            if signals.longest_at(x, limit) >= HELD:
+                found = True
+                yield Finding(
+                    "sensor-range",
+                    f"{name} stays at {limit * 1e6:+.1f} µm for {HELD} samples and more: it clips there.",
+                    name,
+                    Effect.ERROR,
+                )
+    if not found and (o.flags & RANGE).any():
+        yield Finding(
+            "sensor-range", "the controller reports a position sensor beyond its range.", o.where, Effect.ERROR
+        )
+
+
+def _of_reference(o: Orbit, judged: bool) -> Iterator[Finding]:
+    facts, wave = nominal(o.step.recording.rig, o.t_0), o.path.wave
+    q = centre(o.path.readings, facts)[:2]
+    t, sizes = o.path.t - o.path.t[0], (wave.y, wave.z)
+    planned = [hz for hz, _, _ in wave.axes]
+    greater = int(np.argmax(sizes))
+    own = [known_frequency(t, x, hz).amplitude for x, hz in zip(q, planned, strict=True)]
+    if o.clear < CLEAR:
+        yield Finding(
+            "start-not-seen",
+            f"the coil currents show no start of the reference ({o.clear:.1f} times their noise): its phase is not known. "
+            "Either it was not applied, or current sensors of one bearing are exchanged, so that the answers cancel.",
+            o.where,
+            Effect.ERROR,
+        )
+    try:
+        hz = unknown_frequency(t, q[greater]).hz
+    except AnalysisError:
+        hz = math.nan
+    if abs(hz / planned[greater] - 1) > OFF_HZ and np.ptp(q[greater]) > APPLIED * 2 * sizes[greater]:
+        yield Finding(
+            "reference-frequency",
+            f"the rotor moves at {hz:.4g} Hz; the reference should have {planned[greater]:g} Hz.",
+            o.where,
+            Effect.ERROR,
+        )
+    elif max(own) < APPLIED * max(sizes) or not math.isfinite(hz):
+        yield Finding(
+            "reference-missing",
+            f"the rotor moves by {own[0] * 1e6:.2g} and {own[1] * 1e6:.2g} µm at "
+            f"{wave.hz:g} Hz; the "
+            f"reference should have {wave.y * 1e6:g} and {wave.z * 1e6:g} µm: it is not applied.",
+            o.where,
+            Effect.ERROR,
+        )
+    elif judged and not (o.flags & CONTACT).any():
+        yield from _of_drift(o, drift(o.whole, facts))
+
+
+def _of_drift(o: Orbit, found: Drift | None) -> Iterator[Finding]:
+    """A frequency that is a little off: its phase, which counts from the start, runs away by more than the budget has of it."""
+    if found is None or not found.plain or abs(found.ahead_s) <= TIMING_TICKS * o.path.wave.tick:
+        return
+    text = (
+        f"the rotor's phase drifts as if the reference ran at {o.path.wave.hz * (1 + found.off):.8g} Hz, not at "
+        f"{o.path.wave.hz:g} Hz: since its start it is {abs(found.ahead_s) * 1e3:.2g} ms "
+        f"{'ahead' if found.off > 0 else 'behind'}."
+    )
+    yield Finding("reference-frequency", text, o.where, Effect.ERROR)
+
+
+def of_results(
+    orbits: Sequence[Orbit], results: Mapping[str, Mapping[str, Estimate]], plan: Settings
+) -> Iterator[Finding]:
+    """Contact, saturation, coils that should be off, and the laws side by side."""
+    for o in orbits:
+        judged = o.law in plan.laws
+        yield from _of_contact(o, results[o.law]["ring_distance"], Effect.INDETERMINATE if judged else Effect.NOTE)
+        for bit, text in ((CURRENT_LIMIT, "a coil's current"), (VOLTAGE_LIMIT, "a coil's voltage")):
+            share = float((o.flags & bit != 0).mean())
+            if share > 0:
+                bad = judged and share > PARTS
+                yield Finding(
+                    "saturated",
+                    f"{text} was at its limit in {share:.2%} of the samples.",
+                    o.where,
+                    Effect.INDETERMINATE if bad else Effect.NOTE,
+                    (f"@{o.where}",),
+                )
+        low = results[o.law]["lower_current"]
+        if o.law == "CAC" and not o.path.turn_s and low.value - 2 * low.u > plan.max_lower_A:
+            yield Finding(
+                "lower-coils-on",
+                f"the lower coils carry up to {low.value:.3f} A with CAC ({plan.max_lower_A:g} A "
+                "allowed): they should be off.",
+                o.where,
+                Effect.INDETERMINATE,
+                (f"@{o.where}",),
+            )
+    yield Finding("laws-compared", "; ".join(_said(o, results[o.law]) for o in orbits) + ".")
+
+
+def _of_contact(o: Orbit, left: Estimate, effect: Effect) -> Iterator[Finding]:
+    told = float((o.flags & CONTACT != 0).mean())
+    if told > 0:
+        sides = " and ".join(s for bit, s in ((4, "inboard"), (8, "outboard")) if (o.flags & bit).any())
+        yield Finding(
+            "contact",
+            f"the rotor touches the {sides} ring in {told:.1%} of the samples; by its positions "
+            f"{left.value * 1e6:.1f} ± {2 * left.u * 1e6:.1f} µm are left to it.",
+            o.where,
+            effect,
+            (f"@{o.where}",),
+        )
+        if left.value > 3 * left.u:
+            yield Finding(
+                "contact-not-seen",
+                "the controller reports contact, the positions show none: look at the "
+                "sensors' gain "
+                "and zero, or at what lies between rotor and ring.",
+                o.where,
+                Effect.INDETERMINATE,
+                (f"@{o.where}",),
+            )
+    elif o.ring_distance(nominal(o.step.recording.rig, o.t_0)) < 0:
+        yield Finding(
+            "contact-unreported",
+            f"by its positions the rotor is at a ring ({left.value * 1e6:.1f} ± "
+            f"{2 * left.u * 1e6:.1f} µm are left), but the controller reports no contact.",
+            o.where,
+            Effect.INDETERMINATE,
+            (f"@{o.where}",),
+        )
+
+
+def _said(o: Orbit, r: Mapping[str, Estimate]) -> str:
+    y, z, psi, theta = (r[n] for n in ("error_peak_y", "error_peak_z", "tilt_psi", "tilt_theta"))
+    low = r["lower_current"]
+    return (
+        f"{o.law}: peaks {y.value * 1e6:.1f} ± {2 * y.u * 1e6:.1f} µm in y, {z.value * 1e6:.1f} ± "
+        f"{2 * z.u * 1e6:.1f} µm in z, "
+        f"tilts {psi.value * 1e6:.0f} and {theta.value * 1e6:.0f} µrad, lower coils up to {low.value:.2f} A, "
+        f"contact in {float((o.flags & CONTACT != 0).mean()):.0%} of the samples"
+    )

@@ -1,0 +1,204 @@
+"""Quantities of a tracking test with everything that makes them uncertain, by identity."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bench.rigfile import RigFile
+from bench.toleranced import Toleranced
+from bench.uncertainty import Estimate, Influence
+from bench.uncertainty.series import batch_means
+from procedures.amb_rotor.geometry import Facts, Turns, quantities, revolutions, turns
+from procedures.amb_rotor.steps import AXES, LOWER, UPPER, Orbit
+from procedures.shared.certificates import certified
+
+TIMING_TICKS = 0.5  # half width: how the reference's zero of phase stands to the answer of the currents
+UNITS = {"error": "m", "amplitude": "1", "phase": "rad", "tilt": "rad", "ring": "m"}
+BLOCKS = 12  # of revolutions, left out in turn
+Moved = Callable[[Facts, float], Facts]
+
+
+@dataclass(frozen=True)
+class Input:
+    """One influence on the facts: who it is, its certificate, and the facts with it moved."""
+
+    id: str
+    name: str
+    stated: Toleranced
+    moved: Moved
+
+
+def nominal(rig: RigFile, t_0: float) -> Facts:
+    """The facts as the rig file states them."""
+    sensors, g = [rig.sensors[f"pos_{axis}"] for axis in AXES], rig.geometry
+    gains, offsets = [s.gain.value for s in sensors], [s.offset.value for s in sensors]
+    return Facts(
+        (gains[0], gains[1], gains[2], gains[3]),
+        (offsets[0], offsets[1], offsets[2], offsets[3]),
+        g["com_to_inboard_sensor"].value,
+        g["com_to_outboard_sensor"].value,
+        t_0,
+        g["clearance"].value,
+    )
+
+
+def _at(k: int, kind: str) -> Moved:
+    def moved(f: Facts, by: float) -> Facts:
+        values = list(getattr(f, kind))
+        values[k] += by
+        four = (values[0], values[1], values[2], values[3])
+        return replace(f, gains=four) if kind == "gains" else replace(f, offsets=four)
+
+    return moved
+
+
+def _one(kind: str) -> Moved:
+    def moved(f: Facts, by: float) -> Facts:
+        return replace(f, **{kind: getattr(f, kind) + by})
+
+    return moved
+
+
+def inputs(rig: RigFile, tick_s: float, runout_m: float) -> list[Input]:
+    """Everything that the facts are uncertain by."""
+    out = []
+    for k, axis in enumerate(AXES):
+        s = rig.sensors[f"pos_{axis}"]
+        out += [
+            Input(f"sensors/pos_{axis}/gain", f"gain of pos_{axis}", s.gain, _at(k, "gains")),
+            Input(f"sensors/pos_{axis}/offset", f"zero of pos_{axis}", s.offset, _at(k, "offsets")),
+        ]
+        if runout_m > 0:
+            allowed = Toleranced(
+                value=0.0,
+                unit="m",
+                u=None,
+                k=1.0,
+                half_width=runout_m,
+                distribution="rectangular",
+                source="plan: runout_m",
+            )
+            out.append(Input(f"runout/pos_{axis}", f"runout at pos_{axis}", allowed, _at(k, "offsets")))
+    for name, kind in (
+        ("com_to_inboard_sensor", "l_is"),
+        ("com_to_outboard_sensor", "l_os"),
+        ("clearance", "clearance"),
+    ):
+        out.append(Input(f"geometry/{name}", name.replace("_", " "), rig.geometry[name], _one(kind)))
+    clock = Toleranced(
+        value=0.0,
+        unit="s",
+        u=None,
+        k=1.0,
+        half_width=TIMING_TICKS * tick_s,
+        distribution="rectangular",
+        source="half a tick of the controller either way",
+    )
+    out.append(Input("timing/start", "start of the reference", clock, _one("t_0")))
+    return out
+
+
+def by_law(orbits: Sequence[Orbit], rig: RigFile, runout_m: float) -> dict[str, dict[str, Estimate]]:
+    """Every quantity of each law."""
+    return {o.law: {**_of_path(o, rig, runout_m), **_of_coils(o, rig)} for o in orbits}
+
+
+def _of_path(orbit: Orbit, rig: RigFile, runout_m: float) -> dict[str, Estimate]:
+    path, facts = orbit.path, nominal(rig, orbit.t_0)
+    whole = turns(path, facts)
+    least = quantities(whole)
+    moved: list[tuple[Input, dict[str, float], dict[str, float]]] = []
+    for i in inputs(rig, path.wave.tick, runout_m):
+        u = i.stated.standard_uncertainty
+        up, down = (quantities(turns(path, i.moved(facts, by))) for by in (u, -u))
+        moved.append((i, up, down))
+    scatter, out = _scatter(orbit, whole), {}
+    for name, value in least.items():
+        total = Estimate.exact(value, _unit(name))
+        bent = more = 0.0
+        for i, up, down in moved:
+            c = (up[name] - down[name]) / (2 * i.stated.standard_uncertainty)
+            second = (up[name] + down[name]) / 2 - value
+            bent, more = math.hypot(bent, second), more + second
+            total = total + (certified(i.id, i.stated, i.name) - i.stated.value) * c
+        total = total + scatter[name]
+        if (
+            bent > 0
+        ):  # a peak only grows by what the sensors hide: the second order belongs to the value (GUM 5.1.2, note)
+            total = (
+                total
+                + more
+                + _small(f"curvature/{orbit.law}/{name}", "second-order part of all inputs", bent, _unit(name))
+            )
+        out[name] = replace(total, unit=_unit(name))
+    return out
+
+
+def _unit(name: str) -> str:
+    return UNITS[name.split("_")[0]]
+
+
+def _scatter(orbit: Orbit, whole: Turns) -> dict[str, Estimate]:
+    """Zero, with what the revolutions' scatter makes of each quantity: blocks of them left out in turn; the distance to the
+    rings is the least of single samples, and scatters as those of the revolutions do."""
+    count = len(whole.left)
+    blocks = min(BLOCKS, count)
+    left = [quantities(whole.without(np.arange(count) % blocks == b)) for b in range(blocks)]
+    out = {}
+    for name in left[0]:
+        values = np.array([x[name] for x in left])
+        u = math.sqrt((blocks - 1) / blocks * float(((values - values.mean()) ** 2).sum()))
+        if name == "ring_distance":
+            u = float(whole.left.std(ddof=1))
+        out[name] = Estimate.of(
+            0.0,
+            Influence(
+                id=f"scatter/{orbit.law}/{name}",
+                name="scatter over revolutions",
+                u=u,
+                unit=_unit(name),
+                kind="A",
+                distribution="normal",
+                dof=float(blocks - 1),
+                source=f"{blocks} blocks of revolutions of the reference, left out in turn",
+            ),
+        )
+    return out
+
+
+def _small(identity: str, name: str, u: float, unit: str) -> Estimate:
+    return Estimate.of(
+        0.0, Influence(id=identity, name=name, u=u, unit=unit, kind="B", distribution="normal", source="evaluation")
+    )
+
+
+def _of_coils(orbit: Orbit, rig: RigFile) -> dict[str, Estimate]:
+    out, per = {}, revolutions(orbit.path)
+    batches = max(2, min(16, len(per) // 2))
+    for quantity, names, currents in (("lower_current", LOWER, orbit.lower), ("upper_current", UPPER, orbit.upper)):
+        means = currents.mean(axis=1)
+        k = int(np.argmax(means))
+        s = rig.sensors[names[k]]
+        gain, offset = (
+            certified(f"sensors/{names[k]}/{what}", t) for what, t in (("gain", s.gain), ("offset", s.offset))
+        )
+        found = batch_means([currents[k, m].mean() for m in per], batches)
+        seen = Estimate.of(
+            found.value,
+            Influence(
+                id=f"scatter/{orbit.law}/{quantity}",
+                name="scatter of the current",
+                u=found.u,
+                unit="A",
+                kind="A",
+                distribution="normal",
+                dof=found.dof,
+                source=f"{batches} batches of revolutions of the reference",
+            ),
+        )
+        out[quantity] = replace((seen - offset) / gain, unit="A")
+    return out

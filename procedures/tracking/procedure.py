@@ -1,0 +1,223 @@
+"""Tracking: the centre of mass follows an ellipse, at rest (thesis 2.6.2, Fig. 2.10) or turning (thesis 3.5, Fig. 3.6).
+
+Measurands, per law: peak and rms of the error in y and z, ratio of the amplitudes and phase lag at the reference's
+frequency, the tilts psi and theta, what is left to the touchdown rings, and what the coils carry.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import Literal
+
+from pydantic import Field
+
+from bench.figures import Figure
+from bench.findings import Effect, Finding
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.requires import Requires
+from bench.rig import Rig
+from bench.rigfile import RigFile
+from bench.roles import RigState
+from procedures.amb_rotor import lift, wiring
+from procedures.amb_rotor.steps import CHANNELS, GROWN, ORBIT, POSITIONS, START, STARTED, read_orbits
+from procedures.tracking import checks, estimates
+from procedures.tracking import figures as drawn
+from procedures.unbalance.steps import RPM
+
+Law = Literal["PID", "CCS", "CAC"]
+CODES: dict[Law, float] = {"PID": 0.0, "CCS": 1.0, "CAC": 2.0}
+PEAK_Y = Quantity(
+    "error_peak_y", "m", "greatest error of the centre of mass in the mean revolution of the reference, y"
+)
+PEAK_Z = Quantity("error_peak_z", "m", "as error_peak_y, z")
+PLANE = Quantity("error_peak_plane", "m", "as error_peak_y, at the sensor where it is greatest")
+RMS_Y = Quantity("error_rms_y", "m", "root mean square of the error of the centre of mass, y")
+RMS_Z = Quantity("error_rms_z", "m", "as error_rms_y, z")
+RATIO_Y = Quantity("amplitude_ratio_y", "1", "amplitude at the reference's frequency over the reference's, y")
+RATIO_Z = Quantity("amplitude_ratio_z", "1", "as amplitude_ratio_y, z")
+LAG_Y = Quantity("phase_lag_y", "rad", "phase behind the reference at its frequency, y")
+LAG_Z = Quantity("phase_lag_z", "rad", "as phase_lag_y, z")
+PSI = Quantity("tilt_psi", "rad", "greatest tilt about y in the mean revolution of the reference", title="tilt ψ")
+THETA = Quantity("tilt_theta", "rad", "greatest tilt about z in the mean revolution of the reference", title="tilt θ")
+DISTANCE = Quantity("ring_distance", "m", "least distance that is left to a touchdown ring")
+LOW = Quantity("lower_current", "A", "mean current of the lower coil that carries most")
+HIGH = Quantity("upper_current", "A", "mean current of the upper coil that carries most")
+MEASURES = (PEAK_Y, PEAK_Z, PLANE, RMS_Y, RMS_Z, RATIO_Y, RATIO_Z, LAG_Y, LAG_Z, PSI, THETA, DISTANCE, LOW, HIGH)
+OBSERVED = {"observer": 1.0, "compensate": 3.0, "integral": 0.0, "k1": 2e5, "k2_ccs": 400.0, "k2_cac": 400.0}
+REFERENCE = ("ellipse_on", "ellipse_y", "ellipse_z", "ellipse_hz", "ellipse_phase", "ellipse_ramp_s", "ellipse_ratio")
+PARAMETERS = ("law", "ref_y", "ref_theta", "model_rate", *REFERENCE)
+LENGTHS = ("com_to_inboard_sensor", "com_to_outboard_sensor", "clearance")
+UM = 1e6
+MARK_M = 15e-6  # of the jump that the reference starts with
+GROW, GROW_S = 25, 0.02
+STANDS_S = 1.0  # the controller knows half a second after the last pulse that the shaft stands
+NEAR = 0.95  # of the ring's clearance: no reference may go further
+
+
+class Plan(BenchPlan):
+    """Settings of the tracking test, SI."""
+
+    laws: tuple[Law, ...] = Field(("CCS", "CAC"), min_length=1)  # judged
+    compare: tuple[Law, ...] = ("PID",)  # only reported beside them; one that is judged is there already
+    hz: float = Field(10.0, gt=0, le=50)
+    y_m: float = Field(50e-6, gt=0)
+    z_m: float = Field(80e-6, gt=0)
+    ratio: int = Field(1, ge=1, le=5)  # turns of z in one of y: other figures of Lissajous
+    speed_rad_s: float = Field(0.0, ge=0)  # 0: at rest
+    observer: bool | None = None  # disturbance compensation; by default while it turns
+    revolutions: int = Field(24, ge=6)  # of the reference
+    settle_s: float = Field(3.0, gt=0)  # before and after the reference has grown
+    runout_m: float = Field(4e-6, ge=0)  # of the journals, at most: counts against the ring's distance
+    max_lower_A: float = Field(0.05, gt=0)  # of CAC
+    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
+
+    @property
+    def observed(self) -> bool:
+        """Whether disturbances are compensated."""
+        return self.speed_rad_s > 0 if self.observer is None else self.observer
+
+    @property
+    def order(self) -> tuple[Law, ...]:
+        """All laws in the order in which they are done: one that touches comes last."""
+        return (*self.laws, *(law for law in self.compare if law not in self.laws))
+
+
+def settings(plan: Plan) -> dict[str, float]:
+    """Lifted by the PID, which needs no model; with the poles of T 3.5 where disturbances are compensated."""
+    return {"law": CODES["PID"], "ellipse_on": 0.0, **(OBSERVED if plan.observed else {})}
+
+
+def step_count(plan: Plan) -> int:
+    """How many steps `acquire` records, for the progress display."""
+    return lift.STEPS + 1 + 2 * len(plan.order)
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Look at the rotor on its rings, lift it, nudge it, spin it up, and let it follow the reference with each law."""
+    if not lift.probed(rig, record):
+        return
+    _started(rig, plan, record)
+    if plan.speed_rad_s and not lift.turned(rig, record, plan.speed_rad_s, plan.settle_s):
+        return
+    for law in plan.order:
+        _orbit(rig, plan, record, law)
+    rig.levitation.set("ellipse_on", 0.0)
+    if plan.speed_rad_s and rig.drive is not None:
+        rig.drive.stop()
+    rig.levitation.set("law", CODES["PID"])
+    rig.clock.sleep(STANDS_S)
+
+
+def _started(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """The reference starts at rest with a small jump of z, whose time the currents tell. From here on it never stops: its phase
+    is known for every law, at any speed."""
+    write = rig.levitation.set
+    for name, value in (
+        ("ellipse_hz", plan.hz),
+        ("ellipse_ratio", plan.ratio),
+        ("ellipse_phase", 0.0),
+        ("ellipse_ramp_s", 0.0),
+        ("ellipse_y", 0.0),
+        ("ellipse_z", MARK_M),
+    ):
+        write(name, value)
+    rig.clock.sleep(plan.settle_s)
+    with record.step(START):
+        rig.clock.sleep(0.1)
+        write("ellipse_on", 1.0)
+        record.event(STARTED)  # after the answer: with the write itself it brackets the start
+        rig.clock.sleep(0.02)
+
+
+def _orbit(rig: Rig, plan: Plan, record: Recorder, law: Law) -> None:
+    """The reference grows, settles, and shrinks to its mark again."""
+    rig.levitation.set("law", CODES[law])
+    rig.clock.sleep(plan.settle_s)
+    for part in range(1, GROW + 1):
+        _size(rig, plan, part / GROW)
+    with record.step(GROWN, law=law):  # the longer, the better it tells the reference's frequency
+        rig.clock.sleep(plan.settle_s)
+    labels = {"hz": plan.hz, "y_m": plan.y_m, "z_m": plan.z_m, "speed_rad_s": plan.speed_rad_s, "ratio": plan.ratio}
+    with record.step(ORBIT, law=law, judged=law in plan.laws, **labels):
+        rig.clock.sleep(plan.revolutions / plan.hz + 0.05)
+    for part in range(GROW - 1, -1, -1):
+        _size(rig, plan, part / GROW)
+
+
+def _size(rig: Rig, plan: Plan, share: float) -> None:
+    rig.levitation.set("ellipse_y", plan.y_m * share)
+    rig.levitation.set("ellipse_z", max(plan.z_m * share, MARK_M))
+    rig.clock.sleep(GROW_S)
+
+
+def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
+    """Findings first, then the quantities of each law that is judged; the others are in a note."""
+    early = list(wiring.before_orbits(recording))
+    yield from early
+    if any(f.effect is Effect.ERROR for f in early):
+        return
+    orbits = read_orbits(recording)
+    wrong = list(checks.of_signals(orbits, recording.plan))
+    yield from wrong
+    if any(f.code in checks.FATAL for f in wrong):
+        return
+    results = estimates.by_law(orbits, recording.rig, recording.plan.runout_m)
+    yield from checks.of_results(orbits, results, recording.plan)
+    for orbit in orbits:
+        if orbit.law in recording.plan.laws:
+            for quantity in MEASURES:
+                yield quantity.measured(results[orbit.law][quantity.name], orbit.where)
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts."""
+    if missing := [n for n in OBSERVED if plan.observed and n not in rig.parameters]:
+        yield f"observer: the rig has no parameters {', '.join(missing)}; expected observer = false"
+    for key, laws in (("laws", plan.laws), ("compare", plan.compare)):
+        if len(set(laws)) < len(laws):
+            yield f"{key}: found one twice; expected each once"
+    ring = NEAR * rig.geometry["clearance"].value
+    far = max(plan.y_m, plan.z_m)
+    if far > ring:
+        yield f"y_m, z_m: found {far * UM:g} µm; expected at most {ring * UM:g} µm, {NEAR:.0%} of the ring's clearance"
+    if plan.z_m < MARK_M:
+        yield f"z_m: found {plan.z_m * UM:g} µm; expected {MARK_M * UM:g} µm or more, the jump that the reference starts with"
+    most = rig.envelope.max_speed_rad_s
+    if plan.speed_rad_s > most:
+        yield f"speed_rad_s: found {plan.speed_rad_s * RPM:.0f} r/min; the envelope allows {most * RPM:.0f} r/min"
+    if plan.speed_rad_s and "drive" not in {role for d in rig.devices.values() for role in d.roles}:
+        yield f"speed_rad_s: found {plan.speed_rad_s * RPM:.0f} r/min and no device with role drive; expected 0"
+    if 0 < plan.speed_rad_s < 20 * math.pi * plan.hz * plan.ratio:
+        yield (
+            f"speed_rad_s: found {plan.speed_rad_s * RPM:.0f} r/min; expected 0, or ten times the reference's "
+            f"{plan.hz:g} Hz or more: else averaging over a turn takes the reference with it"
+        )
+
+
+def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+    """Orbits with the ring, errors over time and over the reference's revolution, tilts, coil currents."""
+    if not len(recording.steps(ORBIT)):
+        return ()
+    orbits = read_orbits(recording)
+    facts = {o.law: estimates.nominal(recording.rig, o.t_0) for o in orbits}
+    return drawn.all_figures(orbits, facts)
+
+
+procedure = Procedure(
+    name="tracking",
+    title="Tracking: the centre of mass follows an ellipse",
+    measures=MEASURES,
+    state=RigState.READY,
+    plan=Plan,
+    acquire=acquire,
+    analyse=analyse,
+    figures=figures,
+    requires=Requires(channels=CHANNELS, sensors=POSITIONS, parameters=PARAMETERS, geometry=LENGTHS),
+    check=check,
+    settings=settings,
+    step_count=step_count,
+    method=read_method(__file__),
+)

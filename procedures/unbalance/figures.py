@@ -1,0 +1,129 @@
+"""What the dwells draw: orbits with the clearance circle, Bode pair, polar plot, full spectra, what the coils need."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from bench.analysis import pictures
+from bench.analysis.spectra import full
+from bench.figures import Figure, Series, Sheet, Shown
+from bench.rigfile import RigFile
+from bench.uncertainty import coverage_factor, interval
+from procedures.unbalance.checks import ZONES
+from procedures.unbalance.estimates import Result, Results
+from procedures.unbalance.steps import AXES, PLANES, RPM
+
+Y_DEG = 45.0  # both radial axes stand at 45 degrees to the vertical; where y stands, seen along the shaft
+SHOWN_TURNS = 4
+
+
+def all_figures(results: Results, rig: RigFile) -> Iterator[Shown]:
+    """In the order of the report."""
+    clearance = rig.geometry["clearance"].value
+    drawn = [orbits(results.of(variant)[-1], plane, clearance) for plane in PLANES for variant in results.variants]
+    yield _dwells(results)
+    yield drawn[0]
+    yield farthest(results)
+    yield from drawn[1:]
+    for plane in PLANES:
+        yield _bode(results, plane)
+        yield _polar(results, plane)
+    for plane in PLANES:
+        for variant in results.variants:
+            shown = results.of(variant)[-1]
+            if shown.dwell.full is not None:
+                yield spectrum(shown, plane)
+    yield _use(results, "current_peak", "A", "current")
+    yield _use(results, "voltage_peak", "V", "voltage")
+
+
+def _dwells(results: Results) -> Sheet:
+    """What each speed was, and how far the shaft moved there, peak to peak as shops say it."""
+    rows = []
+    for variant in results.variants:
+        for r in results.of(variant):
+            widest = [f"{2e6 * float(np.abs(r.vectors.values[list(PLANES[plane])]).max()):.1f}" for plane in PLANES]
+            rows.append((f"{RPM * r.dwell.wanted:.0f}", f"{RPM * r.dwell.speed:.1f}", variant, *widest))
+    head = ("asked (r/min)", "driven (r/min)", "variant", *(f"{plane} (µm pk-pk)" for plane in PLANES))
+    return Sheet("dwells", "Speeds", "Driven: by the once-per-turn pulses. Order 1 of the shaft's centre at the probe of a "
+                 "plane where it is greatest, runout subtracted.", head, tuple(rows), (0, 1, 3, 4))  # fmt: skip
+
+
+def _key(r: Result) -> str:
+    return f"{r.dwell.variant}-{r.dwell.wanted * RPM:.0f}"
+
+
+def orbits(r: Result, plane: str, clearance: float) -> Figure:
+    """The highest speed: some turns as read, and the shaft's own order 1 about its mean place."""
+    y, z = PLANES[plane]
+    x1 = x2 = None
+    if r.dwell.full is not None:
+        count = round(SHOWN_TURNS * 2 * np.pi / r.dwell.speed * r.dwell.full.rate)
+        x1, x2 = r.dwell.full.positions[y, :count], r.dwell.full.positions[z, :count]
+    shown = pictures.Orbit(
+        f"{SHOWN_TURNS} turns as read", x1, x2, r.orbits[plane], r.centres[plane], "order 1 of the shaft"
+    )
+    return pictures.orbits(f"orbit-{plane}-{_key(r)}", f"Orbit {plane}, {r.dwell.where}", [shown], clearance, Y_DEG)
+
+
+def _bode(results: Results, plane: str) -> Figure:
+    curves = [c for variant in results.variants for c in _curves(results, plane, variant)]
+    return pictures.bode(f"bode-{plane}", f"Bode plot of order 1, {plane}", curves)
+
+
+def _curves(results: Results, plane: str, variant: str) -> Iterator[pictures.Curve]:
+    some = results.of(variant)
+    speed = np.array([r.dwell.speed for r in some])
+    for k in PLANES[plane]:
+        values = np.array([r.vectors.values[k] for r in some])
+        u = np.array([coverage_factor(r.vectors.dof) * r.vectors.u_amplitude[k] for r in some])
+        name = AXES[k] if len(results.variants) == 1 else f"{AXES[k]}, {variant}"
+        yield pictures.Curve(name, speed, values, u)
+
+
+def _polar(results: Results, plane: str) -> Figure:
+    curves = list(_curves(results, plane, results.variants[0]))
+    return pictures.polar(f"polar-{plane}", f"Polar plot of order 1, {plane}, {results.variants[0]}", curves)
+
+
+def spectrum(r: Result, plane: str) -> Figure:
+    y, z = PLANES[plane]
+    assert r.dwell.full is not None
+    found = full(r.dwell.full.positions[y], r.dwell.full.positions[z], r.dwell.full.rate)
+    title = f"Full spectrum {plane}, {r.dwell.where}"
+    return pictures.full_spectrum(f"spectrum-{plane}-{_key(r)}", title, found, r.dwell.speed, 1500.0)
+
+
+def farthest(results: Results) -> Figure:
+    """D_max over the speed within the zones of ISO 14839-2."""
+    series = []
+    for variant in results.variants:
+        for plane in PLANES:
+            some = [r for r in results.of(variant) if ("d_max_share", plane) in r.estimates]
+            found = [r.estimates["d_max_share", plane] for r in some]
+            x = np.array([RPM * r.dwell.speed for r in some])
+            y = np.array([100 * e.value for e in found])
+            u = np.array([50 * (i.high - i.low) for i in map(interval, found)])
+            series.append(Series(f"{plane}, {variant}", x, y, "both", u))
+    edges = [0.0, *(100 * end for _, end in ZONES)]
+    bands = tuple((f"zone {name}", low, high) for (name, _), low, high in zip(ZONES, edges, edges[1:], strict=False))
+    return Figure("d-max", "D_max over the speed", "Greatest distance of the shaft's centre from the clearance's centre over a "
+                  "turn, mean place included, over the least clearance; zones after ISO 14839-2, whose ends were not checked "
+                  "against the standard.", "speed (r/min)", "D_max (% of the clearance)", tuple(series),
+                  bands=bands)  # fmt: skip
+
+
+def _use(results: Results, name: str, unit: str, what: str) -> Figure:
+    series = []
+    for variant in results.variants:
+        for plane in PLANES:
+            some = [r for r in results.of(variant) if (name, plane) in r.estimates]
+            x = np.array([RPM * r.dwell.speed for r in some])
+            series.append(
+                Series(f"{plane}, {variant}", x, np.array([r.estimates[name, plane].value for r in some]), "both")
+            )
+    caption = "What a plane's four coils need at most: exceeded for 1 % of the time within the captures."
+    return Figure(f"use-{what}", f"Greatest coil {what}", caption,
+                  "speed (r/min)", f"{what} ({unit})", tuple(series))  # fmt: skip

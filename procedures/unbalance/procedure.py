@@ -1,0 +1,219 @@
+"""Unbalance response: dwells of the turning shaft at given speeds, with slow roll, orbits and zones (T 2.6.1, Fig. 2.7).
+
+Measurands, by speed and setting: vectors of the shaft's centre of order 1 at each probe, major half axis of each plane's orbit,
+D_max and its share of the clearance (ISO 14839-2), currents and voltages of the coils.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+from pydantic import Field
+
+from bench.calibration import Need
+from bench.figures import Shown
+from bench.findings import Effect, Finding
+from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.recorder import Recorder
+from bench.recording import Recording
+from bench.requires import Requires
+from bench.rig import Rig
+from bench.rigfile import RigFile
+from bench.roles import RigState
+from procedures.amb_rotor import lift, wiring
+from procedures.shared import assumptions
+from procedures.unbalance import bearings as unbalance_bearings
+from procedures.unbalance import checks, dwelling, estimates, fitting, hum
+from procedures.unbalance import figures as drawn
+from procedures.unbalance.bearings import BEARING_MODEL, STATED, adopted_bearings
+from procedures.unbalance.coil_peaks import uncertified
+from procedures.unbalance.dwelling import CODES, POLES, SETTINGS, Law, Variant
+from procedures.unbalance.estimates import Results
+from procedures.unbalance.steps import RECORDED, RPM, TOLD, read_dwells
+
+COSINE = Quantity(
+    "vector_cos",
+    "m",
+    "order 1 of the shaft's centre at a probe's plane, along the probe: cosine component, 0-pk",
+    title="order 1, cos",
+)
+SINE = Quantity(
+    "vector_sin",
+    "m",
+    "as vector_cos: sine component; x = C cos θ + S sin θ, θ from the once-per-turn mark",
+    title="order 1, sin",
+)
+MAJOR = Quantity("major_half_axis", "m", "of the order-1 orbit of the shaft's centre in a sensor plane, 0-pk")
+D_MAX = Quantity(
+    "d_max",
+    "m",
+    "greatest distance of the shaft's centre from the clearance's, static offset included (ISO 14839-2)",
+    title="D_max",
+)
+SHARE = Quantity("d_max_share", "1", "D_max over the least clearance", title="D_max / clearance")
+READ = Quantity(
+    "reading",
+    "m",
+    "order 1 as the probes read it, runout included: root mean square of the four amplitudes, 0-pk",
+    title="order 1 as read",
+)
+CURRENT = Quantity("current_peak", "A", "coil current of a plane that is exceeded for 1 % of the time")
+VOLTAGE = Quantity("voltage_peak", "V", "coil voltage of a plane that is exceeded for 1 % of the time, either way")
+MEASURES = (COSINE, SINE, MAJOR, D_MAX, SHARE, READ, CURRENT, VOLTAGE)
+LESS_RUNOUT = tuple(q.name for q in (COSINE, SINE, MAJOR, D_MAX, SHARE))
+PARAMETERS = ("law", "ref_y", "ref_theta")
+LENGTHS = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_inboard_amb", "com_to_outboard_amb", "com_to_coupling",
+           "com_to_inboard_balance", "com_to_outboard_balance", "coupling_stiffness", "amb_gap", "clearance")  # fmt: skip
+
+
+class Plan(BenchPlan):
+    """Settings of the dwells, SI."""
+
+    law: Law = "CCS"
+    speeds_rad_s: tuple[float, ...] = Field((2000 / RPM, 4000 / RPM, 7000 / RPM, 10000 / RPM), min_length=1)
+    variants: tuple[Variant, ...] = Field(("off",), min_length=1)
+    slow_rad_s: float = Field(300 / RPM, ge=0)  # 0: no slow roll
+    slow_s: float = Field(10.0, ge=1)
+    settle_s: float = Field(1.5, ge=0.2)  # at a speed, and with a setting
+    dwell_s: float = Field(3.0, ge=0.5)
+    capture_s: float = Field(0.3, ge=0.05)
+    rate_hz: float = Field(10000.0, gt=0)  # of the capture
+    orders: int = Field(4, ge=1, le=10)  # that the full spectrum must show
+    repeat: bool = True  # the lowest speed again, at the end
+    bearings: Literal["adopted", "plan"] = (
+        "adopted"  # what is known of them: the adopted bearing-model, where there is one
+    )
+    beta_share: float = Field(0.05, ge=0)  # half width: how far the controller's betas may be off the bearings'
+    offset_u_m: float = Field(10e-6, ge=0)  # of its magnetic offsets, standard uncertainty
+    max_lost: float = Field(1e-3, ge=0)  # share of a dwell's samples
+    max_speed_error: float = Field(0.01, gt=0)  # share of the speed
+
+    @property
+    def observed(self) -> bool:
+        """Whether disturbances are compensated in some variant."""
+        return any(v != "off" for v in self.variants)
+
+    def at(self, speed: float) -> tuple[Variant, ...]:
+        """Variants at a speed in rad/s."""
+        del speed
+        return self.variants
+
+    @property
+    def dwells(self) -> int:
+        """How many there are, the repeat not counted."""
+        return sum(len(self.at(s)) for s in self.speeds_rad_s)
+
+
+class Resting(Protocol):
+    """The part of a plan that says what the forces rest on."""
+
+    @property
+    def bearings(self) -> str: ...
+
+
+def settings(plan: Plan) -> dict[str, float]:
+    """Lifted by the PID, which needs no model."""
+    return {"law": CODES["PID"], "observer": 0.0, "compensate": 0.0, **(POLES if plan.observed else {})}
+
+
+def needs(plan: Resting) -> tuple[Need, ...]:
+    """The bearings' model, where the rig has one and the plan does not say otherwise."""
+    return (Need(BEARING_MODEL, optional=True),) if plan.bearings == "adopted" else ()
+
+
+def step_count(plan: Plan) -> int:
+    """How many steps `acquire` records, for the progress display."""
+    return lift.STEPS + (plan.slow_rad_s > 0) + plan.dwells + plan.repeat
+
+
+def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Look at the shaft on its rings, lift it, nudge it, roll it slowly, and let it dwell at each speed with each setting."""
+    if not dwelling.rolled(rig, plan, record):
+        return
+    if dwelling.dwelt(rig, plan, record):
+        dwelling.repeated(rig, plan, record)
+    dwelling.finished(rig)
+
+
+def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
+    """Findings first, then the quantities of each dwell."""
+    found = recording.once(evaluated)
+    yield from found.findings
+    if found.results is not None:
+        yield from measured(found.results)
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """Findings, and the dwells' results where there are any."""
+
+    findings: tuple[Finding, ...]
+    results: Results | None
+
+
+def evaluated(recording: Recording[Any]) -> Evaluated:
+    """What a recording of dwells says."""
+    found = [*wiring.before_orbits(recording), *checks.before(recording)]
+    if any(f.effect is Effect.ERROR for f in found):
+        return Evaluated(tuple(found), None)
+    dwells, plan = read_dwells(recording), recording.plan
+    found += checks.of_signals(dwells, plan, runout=LESS_RUNOUT)
+    if any(f.effect is Effect.ERROR for f in found):
+        return Evaluated(tuple(found), None)
+    model = adopted_bearings(recording)
+    results = estimates.results(dwells, recording.rig, plan, model)
+    told = (unbalance_bearings.told(model, plan), *uncertified(recording.rig))
+    hums = hum.of_dwells(hum.heard(recording, results.slow), results.dwells)
+    return Evaluated((*found, *told, *hums, *checks.of_results(results, plan)), results)
+
+
+def measured(results: Results) -> Iterator[Measured]:
+    """The quantities of each dwell but the repeat."""
+    known = {q.name: q for q in MEASURES}
+    for result in results.dwells:
+        if not result.dwell.again:
+            for (name, place), estimate in result.estimates.items():
+                yield known[name].measured(estimate, f"{place}, {result.dwell.where}" if place else result.dwell.where)
+
+
+REQUIRES = Requires(
+    roles=("levitation", "drive"),
+    channels=TOLD,
+    sensors=tuple(n for n in TOLD if n.startswith(("pos_", "i_"))),
+    parameters=(*PARAMETERS, *SETTINGS["off"], *POLES, *STATED),
+    geometry=LENGTHS,
+    machine=("mass", "transverse_inertia", "polar_inertia", "radial_axes", "runout"),
+    capture=RECORDED,
+)
+
+
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
+    """What cannot work before anything starts."""
+    yield from fitting.of_plan(rig, plan)
+
+
+def figures(recording: Recording[Plan]) -> Iterable[Shown]:
+    """Orbits of both planes, Bode pair, polar plot, full spectra, what the coils need; empty where nothing was evaluated."""
+    results = recording.once(evaluated).results
+    return () if results is None else drawn.all_figures(results, recording.rig)
+
+
+procedure = Procedure(
+    name="unbalance",
+    title="Unbalance response of the turning shaft",
+    measures=MEASURES,
+    state=RigState.READY,
+    plan=Plan,
+    acquire=acquire,
+    analyse=analyse,
+    figures=figures,
+    requires=REQUIRES,
+    check=check,
+    settings=settings,
+    step_count=step_count,
+    needs=needs,
+    assumes=assumptions.UNBALANCE,
+    method=read_method(__file__),
+)

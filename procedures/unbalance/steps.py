@@ -1,0 +1,158 @@
+"""From the recorded dwells of a turning shaft to synchronous vectors, full-rate orbits and what the coils needed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.analysis.orders import Track, synchronous
+from bench.analysis.sampling import Sampling
+from bench.analysis.tachometer import Tachometer, age, counted, tachometer
+from bench.analysis.vectors import Vectors
+from bench.errors import AnalysisError
+from bench.recording import Captured, Recording, Step
+from procedures.shared.signals import clips
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+DWELL, SLOW, AGAIN = "dwell", "slow-roll", "again"
+AXES = ("yi", "zi", "yo", "zo")
+PLANES = {"inboard": (0, 1), "outboard": (2, 3)}
+POSITIONS = tuple(f"pos_{a}" for a in AXES)
+COILS = tuple(f"{a}_{side}" for a in AXES for side in "pn")
+CURRENTS, VOLTAGES = tuple(f"i_{c}" for c in COILS), tuple(f"u_{c}" for c in COILS)
+TOLD = (*POSITIONS, *CURRENTS, "angle", "speed", "pulses", "flags")
+RECORDED = (*POSITIONS, *CURRENTS, *VOLTAGES, "pulses", "pulse_age")
+CURRENT_LIMIT, VOLTAGE_LIMIT, CONTACT, RANGE = 1, 2, 4 | 8 | 32, 64  # bits of the telemetry signal `flags`
+ORDERS = (1.0, 2.0, 3.0)
+RPM = 30 / math.pi
+
+
+@dataclass(frozen=True)
+class Full:
+    """A capture: times `t` (n,) s, positions (4, n) m, currents and voltages (8, n), its `rate` Hz and pulses; `trigger_s`."""
+
+    t: Array
+    positions: Array
+    currents: Array
+    voltages: Array
+    rate: float
+    tacho: Tachometer
+
+
+@dataclass(frozen=True)
+class Dwell:
+    """The shaft at one speed with one setting of the controller. `wanted` rad/s as planned, `driven` as the drive says, `speed`
+    by the pulses; `track` of the four positions and eight coil currents, `sampling` of these; `flags` ORed; `stuck` channels;
+    `again`: a repeat at the end. `full` None where nothing was captured."""
+
+    kind: str
+    variant: str
+    wanted: float
+    driven: float
+    again: bool
+    tacho: Tachometer
+    track: Track
+    full: Full | None
+    flags: int
+    clips: int
+    stuck: tuple[str, ...]
+    lost: int
+    expected: int
+    start_ns: int
+    sampling: Sampling
+
+    @property
+    def speed(self) -> float:
+        """Mean speed by the pulses, rad/s."""
+        return float(self.track.speed[0])
+
+    @property
+    def where(self) -> str:
+        """How it is named to the reader."""
+        name = f"{self.wanted * RPM:.0f} r/min, {self.variant}"
+        return f"slow roll, {name}" if self.kind == SLOW else f"{name}, again" if self.again else name
+
+    @property
+    def date(self) -> str:
+        """When it began, ISO 8601, UTC."""
+        return datetime.fromtimestamp(self.start_ns * 1e-9, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+    def readings(self, order: float = 1.0) -> Vectors:
+        """Synchronous vectors of the four probes, as they read."""
+        return self.track.vectors(0, range(4), order)
+
+    def both(self, order: float = 1.0) -> Vectors:
+        """Those of the four probes and the eight coils."""
+        return self.track.vectors(0, range(12), order)
+
+    @property
+    def means(self) -> Array:
+        """Of the same twelve channels."""
+        return np.asarray(self.track.means[0])
+
+
+def read_dwells(recording: Recording[Any]) -> list[Dwell]:
+    """Slow roll and dwells in time order.
+
+    Raises:
+        AnalysisError: there are no dwells, or one has no turns.
+    """
+    steps = sorted([*recording.steps(SLOW), *recording.steps(DWELL)], key=lambda s: s.start_ns)
+    if not any(s.kind == DWELL for s in steps):
+        raise AnalysisError("found no dwells; expected those of the plan (was the run stopped early?)")
+    return [read_dwell(recording, step) for step in steps]
+
+
+def read_dwell(recording: Recording[Any], step: Step) -> Dwell:
+    """A slow roll or a dwell.
+
+    Raises:
+        AnalysisError: it has no turns.
+    """
+    tick = recording.rig.devices["controller"].tick_s
+    data = step.read(*TOLD)
+    t = (data["t_ns"] - recording.start_ns) * 1e-9
+    ticks = round(recording.streams["telemetry"].period_ns * 1e-9 / tick)
+    sampling = Sampling(tick, ticks, tick)
+    if len(t) < 100:
+        raise AnalysisError(f"{step.kind} {dict(step.labels)}: found {len(t)} samples; expected 100 or more")
+    tacho = tachometer(*counted(t - tick, data["pulses"], age(data["angle"], data["speed"])))
+    wide = np.array([data[c] for c in (*POSITIONS, *CURRENTS)])
+    track = synchronous(t, wide, tacho, sampling, orders=_seen(ORDERS, float(step.labels["speed_rad_s"]), ticks * tick))
+    labels, flags = step.labels, data["flags"].astype(np.int64)
+    captures = recording.captures(dwell=labels["number"]) if step.kind == DWELL else ()
+    full = full_rate(captures[0]) if captures else None
+    held = max(
+        clips(wide[:4]), clips(full.positions) if full else 0
+    )  # a turn at speed is a few samples of the telemetry
+    return Dwell(
+        step.kind, str(labels["variant"]), float(labels["speed_rad_s"]), float(labels["driven_rad_s"]),
+        bool(labels["again"]), tacho, track, full, int(np.bitwise_or.reduce(flags)), held,
+        tuple(c for c, x in zip((*POSITIONS, *CURRENTS), wide, strict=True) if np.ptp(x) == 0),
+        step.lost(), step.expected(), step.start_ns, sampling,
+    )  # fmt: skip
+
+
+def _seen(orders: Sequence[float], speed: float, period: float) -> tuple[float, ...]:
+    """Orders that the telemetry's period leaves well below half its rate."""
+    return tuple(n for n in orders if n == 1 or n * speed / (2 * math.pi) < 0.4 / period)
+
+
+def full_rate(captured: Captured) -> Full:
+    """A capture as arrays.
+
+    Raises:
+        AnalysisError: it has fewer than four pulses, or samples are missing.
+    """
+    data: Mapping[str, Array] = captured.arrays(*RECORDED)
+    t = data["t_s"]
+    tacho = tachometer(*counted(t, data["pulses"], data["pulse_age"]))
+    three = [np.array([data[c] for c in names]) for names in (POSITIONS, CURRENTS, VOLTAGES)]
+    return Full(t, three[0], three[1], three[2], captured.rate_hz, tacho)
