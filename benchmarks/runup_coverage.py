@@ -24,8 +24,8 @@ from bench.findings import Effect, Finding
 from bench.rigfile import load_rig
 from bench.uncertainty import interval
 from procedures.run_up.procedure import evaluated
-from procedures.unbalance.dwelling import CODES, SETTINGS
-from procedures.unbalance.steps import AXES, RPM
+from procedures.synchronous.dwelling import CODES, SETTINGS
+from procedures.synchronous.dwells import AXES, RPM
 from sim_backend import amb_passage, amb_unbalance
 from sim_backend.truth import draw
 

@@ -93,7 +93,7 @@ def _tracking(done: Simulated) -> Found:
 
 
 def _vectors(shaft: Iterable[complex], where: str) -> Found:
-    from procedures.unbalance.steps import AXES
+    from procedures.synchronous.dwells import AXES
 
     for axis, vector in zip(AXES, shaft, strict=True):
         yield "vector_cos", f"{axis}, {where}", float(vector.real)
@@ -101,7 +101,7 @@ def _vectors(shaft: Iterable[complex], where: str) -> Found:
 
 
 def _distances(d_max: Iterable[float], clearance: float, where: str) -> Found:
-    from procedures.unbalance.steps import PLANES
+    from procedures.synchronous.dwells import PLANES
 
     for plane, far in zip(PLANES, d_max, strict=True):
         yield "d_max", f"{plane}, {where}", far
@@ -109,8 +109,8 @@ def _distances(d_max: Iterable[float], clearance: float, where: str) -> Found:
 
 
 def _unbalance(done: Simulated) -> Found:
-    from procedures.unbalance.dwelling import CODES, POLES, SETTINGS
-    from procedures.unbalance.steps import DWELL, read_dwells
+    from procedures.synchronous.dwelling import CODES, POLES, SETTINGS
+    from procedures.synchronous.dwells import DWELL, read_dwells
     from sim_backend import amb_unbalance
 
     plan: Any = done.recording.plan
@@ -138,8 +138,8 @@ def _balance(done: Simulated) -> Found:
 def _passage(done: Simulated) -> Found:
     """Vectors, orbits and D_max where the speed stands; what is critical at the speeds where the run found it."""
     from procedures.run_up.procedure import evaluated
-    from procedures.unbalance.dwelling import CODES, SETTINGS
-    from procedures.unbalance.steps import AXES, PLANES
+    from procedures.synchronous.dwelling import CODES, SETTINGS
+    from procedures.synchronous.dwells import AXES, PLANES
     from sim_backend import amb_passage, amb_unbalance
 
     plan: Any = done.recording.plan

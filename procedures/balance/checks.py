@@ -34,9 +34,9 @@ from procedures.balance.steps import (
     read_dwell,
     read_runs,
 )
-from procedures.unbalance import bearings, fitting, hum
+from procedures.synchronous import bearings, fitting, hum
+from procedures.synchronous.dwells import AXES, CURRENTS, POSITIONS, RPM, SLOW, TOLD, Dwell
 from procedures.unbalance import checks as unbalance_checks
-from procedures.unbalance.steps import AXES, CURRENTS, POSITIONS, RPM, SLOW, TOLD, Dwell
 
 MOST_RPM = 10000.0  # influence runs
 WORST_CONDITION = 50.0  # of the influence coefficients

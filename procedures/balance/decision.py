@@ -22,9 +22,9 @@ from procedures.balance import estimates
 from procedures.balance.estimates import Balanced
 from procedures.balance.solution import Trials
 from procedures.balance.steps import SIDES, Read, Run, Weight
-from procedures.unbalance import bearings, runout
-from procedures.unbalance.runout import Stand
-from procedures.unbalance.steps import RPM
+from procedures.synchronous import bearings, runout
+from procedures.synchronous.dwells import RPM
+from procedures.synchronous.runout import Stand
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

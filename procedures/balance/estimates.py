@@ -21,9 +21,10 @@ from procedures.balance.solution import Solved, Trials, solved, taken
 from procedures.balance.steps import SIDES, Read, Run, Weight
 from procedures.balance.vector_length import amount
 from procedures.shared.certificates import certified
-from procedures.unbalance import bearings, estimates, runout
-from procedures.unbalance.runout import Stand, Turning
-from procedures.unbalance.steps import AXES
+from procedures.synchronous import bearings, runout
+from procedures.synchronous.dwells import AXES
+from procedures.synchronous.runout import Stand, Turning
+from procedures.unbalance import estimates
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

@@ -14,7 +14,7 @@ from bench.figures import Figure, Series, Sheet, Shown
 from procedures.balance.checks import Evaluated
 from procedures.balance.estimates import Balanced
 from procedures.balance.steps import BASE, SIDES
-from procedures.unbalance.steps import AXES, RPM
+from procedures.synchronous.dwells import AXES, RPM
 
 Complex = npt.NDArray[np.complex128]
 UM = 1e6

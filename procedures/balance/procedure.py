@@ -22,10 +22,10 @@ from procedures.balance import checks, estimates, sequence
 from procedures.balance import figures as drawn
 from procedures.balance.steps import BASE, SIDES
 from procedures.shared import assumptions
-from procedures.unbalance import dwelling
+from procedures.synchronous import dwelling
+from procedures.synchronous.dwelling import Law
+from procedures.synchronous.dwells import RPM
 from procedures.unbalance import procedure as unbalance
-from procedures.unbalance.dwelling import Law
-from procedures.unbalance.steps import RPM
 
 FOUND_COS = Quantity(
     "unbalance_cos",

@@ -15,7 +15,7 @@ from bench.analysis.vectors import estimates
 from bench.uncertainty import Estimate, Influence
 from procedures.balance.solution import Solved, Trials, taken
 from procedures.balance.steps import Read, Run
-from procedures.unbalance.runout import Stand, Turning, found
+from procedures.synchronous.runout import Stand, Turning, found
 
 Complex = npt.NDArray[np.complex128]
 Terms = list[tuple[float, Estimate]]

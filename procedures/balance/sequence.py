@@ -26,9 +26,9 @@ from procedures.balance.steps import (
     Weight,
     read_capture,
 )
-from procedures.unbalance import bearings as unbalance_bearings
-from procedures.unbalance import dwelling
-from procedures.unbalance.steps import CONTACT, DWELL, SLOW
+from procedures.synchronous import bearings as unbalance_bearings
+from procedures.synchronous import dwelling
+from procedures.synchronous.dwells import CONTACT, DWELL, SLOW
 
 if TYPE_CHECKING:
     from procedures.balance.procedure import Plan

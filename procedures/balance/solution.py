@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from procedures.balance.steps import Run, Weight
-from procedures.unbalance import runout
-from procedures.unbalance.runout import Stand, Turning
+from procedures.synchronous import runout
+from procedures.synchronous.runout import Stand, Turning
 
 Complex = npt.NDArray[np.complex128]
 Trial = tuple[complex, Sequence[Turning], Sequence[Turning]]

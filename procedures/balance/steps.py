@@ -16,9 +16,9 @@ from bench.analysis.tachometer import Tachometer, counted, tachometer
 from bench.analysis.vectors import Vectors
 from bench.capture import CaptureData
 from bench.recording import Recording
-from procedures.unbalance.nonsynchronous import folds
-from procedures.unbalance.runout import Turning
-from procedures.unbalance.steps import CURRENTS, POSITIONS, SLOW, Dwell, read_dwells
+from procedures.synchronous.dwells import CURRENTS, POSITIONS, SLOW, Dwell, read_dwells
+from procedures.synchronous.nonsynchronous import folds
+from procedures.synchronous.runout import Turning
 
 Array = npt.NDArray[np.float64]
 MOUNT, UNMOUNT, DECISION, REFUSED, LIGHTER = "mount", "unmount", "decision", "trial-refused", "trial-lighter"

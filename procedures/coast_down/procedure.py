@@ -15,9 +15,9 @@ from procedures.amb_rotor import lift
 from procedures.run_up import procedure as run_up
 from procedures.run_up.procedure import Passing, ended, passed
 from procedures.shared import assumptions
-from procedures.unbalance import dwelling
+from procedures.synchronous import dwelling
+from procedures.synchronous.dwelling import put
 from procedures.unbalance import procedure as unbalance
-from procedures.unbalance.dwelling import put
 
 
 class Plan(Passing):

@@ -8,8 +8,8 @@ import numpy as np
 
 from bench.findings import Finding
 from bench.uncertainty import Estimate, coverage_factor
+from procedures.synchronous.dwells import RPM
 from procedures.unbalance.estimates import Result, Results
-from procedures.unbalance.steps import RPM
 
 Reductions = Sequence[tuple[Result, Estimate]]
 

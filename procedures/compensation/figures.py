@@ -9,8 +9,8 @@ import numpy as np
 from bench.figures import Figure, Series
 from bench.uncertainty import Estimate, coverage_factor
 from procedures.compensation.switching import WITHIN_S, Switched
+from procedures.synchronous.dwells import AXES, RPM
 from procedures.unbalance.estimates import Result
-from procedures.unbalance.steps import AXES, RPM
 
 MOST_POINTS = 4000
 

@@ -25,11 +25,11 @@ from procedures.compensation import checks, switching
 from procedures.compensation import figures as drawn
 from procedures.compensation.switching import SWITCH
 from procedures.shared import assumptions
-from procedures.unbalance import dwelling, hum
+from procedures.synchronous import dwelling, hum
+from procedures.synchronous.dwelling import SETTINGS, Law, Variant
+from procedures.synchronous.dwells import RPM
 from procedures.unbalance import figures as unbalance_figures
 from procedures.unbalance import procedure as unbalance
-from procedures.unbalance.dwelling import SETTINGS, Law, Variant
-from procedures.unbalance.steps import RPM
 
 REDUCTION = Quantity(
     "reduction",

@@ -20,7 +20,7 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from bench.uncertainty.estimate import merged
 from procedures.shared.certificates import certified
-from procedures.unbalance.steps import AXES, POSITIONS
+from procedures.synchronous.dwells import AXES, POSITIONS
 
 Array = npt.NDArray[np.float64]
 SWITCH = "switch"

@@ -17,9 +17,10 @@ from bench.uncertainty import interval
 from procedures.run_up.estimates import DAMPED, Peak, Run, asked_margin
 from procedures.run_up.steps import LEAST_TURNS, MISSED, PASSAGE, Passage
 from procedures.shared import signals
-from procedures.unbalance import checks, fitting, hum
+from procedures.synchronous import fitting, hum
+from procedures.synchronous.dwells import AXES, CONTACT, CURRENT_LIMIT, PLANES, RANGE, RPM, VOLTAGE_LIMIT
+from procedures.unbalance import checks
 from procedures.unbalance.checks import HELD
-from procedures.unbalance.steps import AXES, CONTACT, CURRENT_LIMIT, PLANES, RANGE, RPM, VOLTAGE_LIMIT
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]

@@ -22,11 +22,11 @@ from bench.uncertainty.estimate import merged
 from procedures.run_up import linear_model
 from procedures.run_up.line import DRAWS, Line
 from procedures.run_up.steps import Curve, Passage, curve, near
-from procedures.unbalance import bearings
+from procedures.synchronous import bearings
+from procedures.synchronous.dwells import AXES, Dwell
+from procedures.synchronous.runout import Stand
 from procedures.unbalance import estimates as unbalance_estimates
 from procedures.unbalance.estimates import Result, Results, Runout
-from procedures.unbalance.runout import Stand
-from procedures.unbalance.steps import AXES, Dwell
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

@@ -16,8 +16,8 @@ from bench.rigfile import RigFile
 from bench.uncertainty import interval, stated
 from procedures.run_up.estimates import Run, asked_margin
 from procedures.run_up.steps import Passage
+from procedures.synchronous.dwells import AXES, PLANES, RPM
 from procedures.unbalance import figures
-from procedures.unbalance.steps import AXES, PLANES, RPM
 
 HIGHEST_HZ = 480.0
 HIGHEST_ORDER = 5.0

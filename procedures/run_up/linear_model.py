@@ -24,8 +24,8 @@ import numpy as np
 import numpy.typing as npt
 
 from procedures.run_up.steps import Curve
-from procedures.unbalance.runout import SCALE, Stand, arms, impedance
-from procedures.unbalance.steps import AXES
+from procedures.synchronous.dwells import AXES
+from procedures.synchronous.runout import SCALE, Stand, arms, impedance
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

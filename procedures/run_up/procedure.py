@@ -28,14 +28,14 @@ from procedures.run_up import figures as drawn
 from procedures.run_up.estimates import Run
 from procedures.run_up.steps import MISSED, PASSAGE, read_passage
 from procedures.shared import assumptions
-from procedures.unbalance import bearings as unbalance_bearings
+from procedures.synchronous import bearings as unbalance_bearings
+from procedures.synchronous import dwelling
+from procedures.synchronous.coil_peaks import uncertified
+from procedures.synchronous.dwelling import CODES, Law, put
+from procedures.synchronous.dwells import RECORDED, RPM, SLOW, read_dwell
 from procedures.unbalance import checks as unbalance_checks
-from procedures.unbalance import dwelling
 from procedures.unbalance import procedure as unbalance
-from procedures.unbalance.coil_peaks import uncertified
-from procedures.unbalance.dwelling import CODES, Law, put
 from procedures.unbalance.procedure import CURRENT, D_MAX, MAJOR, READ, SHARE, VOLTAGE
-from procedures.unbalance.steps import RECORDED, RPM, SLOW, read_dwell
 
 COSINE, SINE = unbalance.COSINE, unbalance.SINE
 SPEED = Quantity("critical_speed", "rad/s", "where the amplitude of a probe is greatest, with a factor of 2.5 or more; "

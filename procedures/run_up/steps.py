@@ -18,7 +18,7 @@ from bench.analysis.vectors import parts
 from bench.errors import AnalysisError
 from bench.recording import Recording
 from procedures.shared.signals import clips
-from procedures.unbalance.steps import CURRENTS, POSITIONS, TOLD, Dwell, full_rate
+from procedures.synchronous.dwells import CURRENTS, POSITIONS, TOLD, Dwell, full_rate
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

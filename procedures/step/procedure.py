@@ -27,7 +27,7 @@ from procedures.step import estimates as step_estimates
 from procedures.step import figures as drawn
 from procedures.step.record_length import enough_s, faded_s
 from procedures.step.steps import CHANNELS, STEP, TURNING_RAD_S, cases, read_steps
-from procedures.unbalance.steps import RPM
+from procedures.synchronous.dwells import RPM
 
 OVERSHOOT = Quantity("overshoot", "1", "greatest position beyond the step, as a share of it")
 RISE = Quantity("rise_time", "s", "10 to 90 % of the step")

@@ -23,9 +23,9 @@ from bench.rigfile import RigFile
 from bench.roles import RigState
 from procedures.amb_rotor import lift, wiring
 from procedures.amb_rotor.steps import CHANNELS, GROWN, ORBIT, POSITIONS, START, STARTED, read_orbits
+from procedures.synchronous.dwells import RPM
 from procedures.tracking import checks, estimates
 from procedures.tracking import figures as drawn
-from procedures.unbalance.steps import RPM
 
 Law = Literal["PID", "CCS", "CAC"]
 CODES: dict[Law, float] = {"PID": 0.0, "CCS": 1.0, "CAC": 2.0}

@@ -14,9 +14,7 @@ from bench.analysis.vectors import radius2
 from bench.findings import Effect, Finding
 from bench.recording import Recording
 from procedures.shared import signals
-from procedures.unbalance.estimates import Results
-from procedures.unbalance.fitting import PER_TURN, Settings, too_fast
-from procedures.unbalance.steps import (
+from procedures.synchronous.dwells import (
     AXES,
     CONTACT,
     CURRENT_LIMIT,
@@ -29,6 +27,8 @@ from procedures.unbalance.steps import (
     Array,
     Dwell,
 )
+from procedures.synchronous.fitting import PER_TURN, Settings, too_fast
+from procedures.unbalance.estimates import Results
 
 HELD = 8  # samples in a row at an extreme: a probe that clips
 UNEXPLAINED = 0.1  # share of the forces that two unbalances leave over: a channel is not what its name says

@@ -16,12 +16,12 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate, welch_satterthwaite
 from bench.uncertainty.estimate import merged
 from procedures.shared.certificates import certified
-from procedures.unbalance import coil_peaks, runout
-from procedures.unbalance.bearings import Settings, stated
+from procedures.synchronous import coil_peaks, runout
+from procedures.synchronous.bearings import Settings, stated
+from procedures.synchronous.dwells import AXES, ORDERS, PLANES, SLOW, Dwell
+from procedures.synchronous.nonsynchronous import beside_orders, folds
+from procedures.synchronous.runout import Stand, Turning
 from procedures.unbalance.d_max import farthest
-from procedures.unbalance.nonsynchronous import beside_orders, folds
-from procedures.unbalance.runout import Stand, Turning
-from procedures.unbalance.steps import AXES, ORDERS, PLANES, SLOW, Dwell
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

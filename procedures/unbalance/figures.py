@@ -11,9 +11,9 @@ from bench.analysis.spectra import full
 from bench.figures import Figure, Series, Sheet, Shown
 from bench.rigfile import RigFile
 from bench.uncertainty import coverage_factor, interval
+from procedures.synchronous.dwells import AXES, PLANES, RPM
 from procedures.unbalance.checks import ZONES
 from procedures.unbalance.estimates import Result, Results
-from procedures.unbalance.steps import AXES, PLANES, RPM
 
 Y_DEG = 45.0  # both radial axes stand at 45 degrees to the vertical; where y stands, seen along the shaft
 SHOWN_TURNS = 4

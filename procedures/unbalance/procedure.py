@@ -24,14 +24,15 @@ from bench.rigfile import RigFile
 from bench.roles import RigState
 from procedures.amb_rotor import lift, wiring
 from procedures.shared import assumptions
-from procedures.unbalance import bearings as unbalance_bearings
-from procedures.unbalance import checks, dwelling, estimates, fitting, hum
+from procedures.synchronous import bearings as unbalance_bearings
+from procedures.synchronous import dwelling, fitting, hum
+from procedures.synchronous.bearings import BEARING_MODEL, STATED, adopted_bearings
+from procedures.synchronous.coil_peaks import uncertified
+from procedures.synchronous.dwelling import CODES, POLES, SETTINGS, Law, Variant
+from procedures.synchronous.dwells import RECORDED, RPM, TOLD, read_dwells
+from procedures.unbalance import checks, estimates
 from procedures.unbalance import figures as drawn
-from procedures.unbalance.bearings import BEARING_MODEL, STATED, adopted_bearings
-from procedures.unbalance.coil_peaks import uncertified
-from procedures.unbalance.dwelling import CODES, POLES, SETTINGS, Law, Variant
 from procedures.unbalance.estimates import Results
-from procedures.unbalance.steps import RECORDED, RPM, TOLD, read_dwells
 
 COSINE = Quantity(
     "vector_cos",

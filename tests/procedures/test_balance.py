@@ -20,8 +20,8 @@ from bench.uncertainty import interval
 from procedures.balance import checks, decision, estimates, procedure
 from procedures.balance.procedure import check
 from procedures.balance.steps import BASE, SIDES, Read, Run, Weight
-from procedures.unbalance import runout
-from procedures.unbalance.runout import Stand, Turning
+from procedures.synchronous import runout
+from procedures.synchronous.runout import Stand, Turning
 from reports.figures import draw as draw_figure
 from sim_backend.truth import draw
 

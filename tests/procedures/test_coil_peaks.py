@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bench.uncertainty import coverage_factor
-from procedures.unbalance.coil_peaks import Exceeded, exceeded
+from procedures.synchronous.coil_peaks import Exceeded, exceeded
 
 TURN, PHI = 100, 0.8  # samples; of the noise from one to the next
 

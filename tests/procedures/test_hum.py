@@ -12,8 +12,8 @@ import pytest
 
 from bench.cli.virtual import simulated_run
 from bench.findings import Effect, Finding
-from procedures.unbalance.hum import Heard, heard, leaked
-from procedures.unbalance.steps import SLOW, read_dwell
+from procedures.synchronous.dwells import SLOW, read_dwell
+from procedures.synchronous.hum import Heard, heard, leaked
 
 RPM = math.pi / 30
 DWELLS = {"slow_s": 5.0, "dwell_s": 1.5, "capture_s": 0.2, "settle_s": 1.0, "repeat": False}

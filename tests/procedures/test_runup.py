@@ -30,8 +30,8 @@ from procedures.run_up import checks, estimates, figures
 from procedures.run_up import procedure as run_up
 from procedures.run_up.estimates import Run
 from procedures.run_up.steps import Passage, read_passage
-from procedures.unbalance.dwelling import CODES, SETTINGS
-from procedures.unbalance.steps import RPM
+from procedures.synchronous.dwelling import CODES, SETTINGS
+from procedures.synchronous.dwells import RPM
 from reports.figures import draw as draw_figure
 from sim_backend import amb_unbalance
 from sim_backend.core.amb_params import AmbParams

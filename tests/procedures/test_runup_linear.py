@@ -11,8 +11,8 @@ from bench.rigfile import load_rig
 from procedures.run_up import procedure
 from procedures.run_up.linear_model import bend
 from procedures.run_up.steps import Curve
-from procedures.unbalance.bearings import stated
-from procedures.unbalance.runout import Stand, arms, impedance
+from procedures.synchronous.bearings import stated
+from procedures.synchronous.runout import Stand, arms, impedance
 
 RIG = load_rig("amb5dof")
 GAINS = {name: p.default for name, p in RIG.parameters.items()}

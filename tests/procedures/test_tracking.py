@@ -25,9 +25,9 @@ from bench.uncertainty import Estimate
 from procedures.amb_rotor import geometry as estimator
 from procedures.amb_rotor.geometry import Facts, Wave
 from procedures.amb_rotor.geometry import Path as Orbit
+from procedures.synchronous import bearings
 from procedures.tracking import drift, estimates
 from procedures.tracking.procedure import CODES, MEASURES, OBSERVED, Plan, check, figures, procedure, step_count
-from procedures.unbalance import bearings
 from procedures.unbalance import procedure as unbalance
 from reports.figures import draw as draw_figure
 from sim_backend import amb_track

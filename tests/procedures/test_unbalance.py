@@ -26,15 +26,16 @@ from bench.rigfile import load_rig
 from bench.specs import applied, load_spec
 from bench.uncertainty import Estimate, Influence, interval
 from procedures.compensation import procedure as compensation
-from procedures.unbalance import bearings as unbalance_bearings
-from procedures.unbalance import checks, estimates, runout
+from procedures.synchronous import bearings as unbalance_bearings
+from procedures.synchronous import runout
+from procedures.synchronous.coil_peaks import blocks, uncertified
+from procedures.synchronous.dwelling import CODES, POLES, SETTINGS
+from procedures.synchronous.dwells import AXES, SLOW, read_dwells
+from procedures.unbalance import checks, estimates
 from procedures.unbalance import d_max as unbalance_d_max
 from procedures.unbalance import procedure as unbalance
-from procedures.unbalance.coil_peaks import blocks, uncertified
-from procedures.unbalance.dwelling import CODES, POLES, SETTINGS
 from procedures.unbalance.estimates import Results
 from procedures.unbalance.procedure import check
-from procedures.unbalance.steps import AXES, SLOW, read_dwells
 from reports.figures import draw as draw_figure
 from sim_backend import amb_unbalance
 from sim_backend.core.amb_params import AmbParams

@@ -9,7 +9,7 @@ import numpy as np
 
 from bench.analysis.orders import synchronous
 from bench.analysis.sampling import Sampling
-from procedures.unbalance.steps import DWELL, Array, Dwell
+from procedures.synchronous.dwells import DWELL, Array, Dwell
 
 FITTED = 8  # orders that turn with the shaft
 QUIET = 6.0  # standard deviations of a probe's noise that a peak of it reaches

@@ -15,8 +15,8 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.estimate import merged
 from procedures.shared.certificates import certified
-from procedures.unbalance.runout import arms
-from procedures.unbalance.steps import AXES, COILS
+from procedures.synchronous.dwells import AXES, COILS
+from procedures.synchronous.runout import arms
 
 BEARING_MODEL = "bearing-model"
 

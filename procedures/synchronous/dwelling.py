@@ -8,7 +8,7 @@ from typing import Literal, Protocol
 from bench.recorder import Recorder
 from bench.rig import Rig
 from procedures.amb_rotor import lift
-from procedures.unbalance.steps import DWELL, RECORDED, SLOW
+from procedures.synchronous.dwells import DWELL, RECORDED, SLOW
 
 Law = Literal["PID", "CCS", "CAC"]
 Variant = Literal["off", "corrected", "literal"]

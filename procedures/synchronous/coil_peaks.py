@@ -18,7 +18,7 @@ from bench.findings import Finding
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from procedures.shared.certificates import certified
-from procedures.unbalance.steps import COILS, CURRENTS, PLANES, VOLTAGES, Dwell, Full
+from procedures.synchronous.dwells import COILS, CURRENTS, PLANES, VOLTAGES, Dwell, Full
 
 Array = npt.NDArray[np.float64]
 SHARE = 0.01  # of the time

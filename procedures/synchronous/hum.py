@@ -25,9 +25,9 @@ from bench.uncertainty import Estimate, interval
 from procedures.amb_rotor.steps import PROBE
 from procedures.compensation.switching import TURNS_AT, TURNS_LEFT, WITHIN_S, Switched, rms
 from procedures.run_up.estimates import Peak
+from procedures.synchronous.dwells import AXES, POSITIONS, SLOW, Array, Complex, Dwell
 from procedures.unbalance.checks import its_own
 from procedures.unbalance.estimates import Result
-from procedures.unbalance.steps import AXES, POSITIONS, SLOW, Array, Complex, Dwell
 
 FINER = 8  # points of the spectrum within a line of the slow roll, at least
 CLEAR = 7.0  # standard deviations of a component of the noise: exp(-7^2/2) for each of some thousand points, 1e-7 a run
