@@ -39,6 +39,8 @@ UNITS: dict[str, Unit] = {
     "N m": Unit("N m"), "N m/A": Unit("N m/A"), "N m s/rad": Unit("N m s/rad"), "N s/m": Unit("N s/m"),
 }  # fmt: skip
 
+RPM = 30 / math.pi  # r/min of 1 rad/s
+
 KNOWN = f"a known unit: one of {', '.join(symbol for symbol in UNITS if symbol)}"
 """What is expected where a unit is asked for."""
 

@@ -171,10 +171,10 @@ def _passage(done: Simulated) -> Found:
 def _sensitivity(done: Simulated) -> Found:
     import numpy as np
 
+    from bench.units import RPM
     from procedures.sensitivity.injection import AXES
     from procedures.sensitivity.margins import fall, phase, rise
     from procedures.sensitivity.procedure import CODES
-    from procedures.sensitivity.steps import RPM
     from sim_backend import amb_sensitivity
 
     plan: Any = done.recording.plan

@@ -33,9 +33,11 @@ from procedures.amb_calibration.estimates import less_sure, turning_point, unres
 from procedures.amb_calibration.fit import Fit
 from procedures.amb_calibration.hypotheses import Contradiction
 from procedures.amb_calibration.scatter import OUTPUTS, Scatter, covariance_by_angle, covariance_over_a_turn, scatter
-from procedures.amb_calibration.steps import CHANNELS, COILS, LEVERS, HangingData, read_hangings
+from procedures.amb_calibration.steps import CHANNELS, COILS, HangingData, read_hangings
+from procedures.servomotor.channels import LEVERS
 from procedures.shared import assumptions
 from procedures.shared.certificates import certified
+from procedures.shared.weight import weight
 
 K_I = Quantity("K_i", "N/A", "inboard AMB: dF/di at zero control current, mean over a turn")
 K_O = Quantity("K_o", "N/A", "outboard AMB: dF/di at zero control current, mean over a turn")
@@ -188,9 +190,7 @@ def evaluate(recording: Recording[Plan]) -> Analysis:
     fitted = amb_calibration_fit.fit(data.hangings, values, plan.bias_A, count)
     spread = scatter(fitted, data.hangings, count)
     share = np.array(amb_calibration_fit.hung_shares(values["hook_to_outboard"], values["amb_span"]))
-    hanger = amb_calibration_fit.weight(
-        values["hanger"], values["gravity"], values["air_density"], values["mass_density"]
-    )
+    hanger = weight(values["hanger"], values["gravity"], values["air_density"], values["mass_density"])
     covariance = covariance_by_angle(fitted, spread, -share * float(hanger))
     loads = hypotheses.contradiction(fitted, data.hangings, spread, values, masses_u(recording))
     beyond = hypotheses.scatter_of_set(loads)

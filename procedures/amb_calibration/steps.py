@@ -19,8 +19,6 @@ Array = npt.NDArray[np.float64]
 COILS = tuple(f"i_{axis}{bearing}_{coil}" for axis in "yx" for bearing in "io" for coil in "pn")
 POSITIONS = ("pos_yi", "pos_yo", "pos_xi", "pos_xo")
 CHANNELS = (*COILS, *POSITIONS, "flags")
-LEVERS = tuple(f"com_to_{b}_{what}" for b in ("inboard", "outboard") for what in ("sensor", "amb"))
-"""Of the geometry, what tells the positions in other planes than the sensors'."""
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.errors import AnalysisError
+from bench.rigfile import RigFile
+from procedures.amb_rotor.steps import AXES
 
 Array = npt.NDArray[np.float64]
 SMOOTH_S = 3e-3  # of peaks at rest: the error of a sine of 10 Hz loses a thousandth
@@ -203,3 +205,17 @@ def distances(readings: Array, f: Facts) -> Array:
     """Of the shaft from the rings' centre at the inboard and the outboard sensors, (2, n) m."""
     at = (readings - np.array(f.offsets)[:, None]) / np.array(f.gains)[:, None]
     return np.array([np.hypot(at[YI], at[ZI]), np.hypot(at[YO], at[ZO])])
+
+
+def nominal(rig: RigFile, t_0: float) -> Facts:
+    """The facts as the rig file states them."""
+    sensors, g = [rig.sensors[f"pos_{axis}"] for axis in AXES], rig.geometry
+    gains, offsets = [s.gain.value for s in sensors], [s.offset.value for s in sensors]
+    return Facts(
+        (gains[0], gains[1], gains[2], gains[3]),
+        (offsets[0], offsets[1], offsets[2], offsets[3]),
+        g["com_to_inboard_sensor"].value,
+        g["com_to_outboard_sensor"].value,
+        t_0,
+        g["clearance"].value,
+    )

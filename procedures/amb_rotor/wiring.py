@@ -11,9 +11,8 @@ import numpy as np
 from bench.findings import Effect, Finding
 from bench.recording import Recording
 from procedures.amb_rotor import rings
-from procedures.amb_rotor.geometry import centre
+from procedures.amb_rotor.geometry import centre, nominal
 from procedures.amb_rotor.steps import LIFT, LIFT_LOST, NO_SPEED, POSITIONS, PROBE, RANGE, REST
-from procedures.tracking.estimates import nominal
 
 OWN, OTHER = 0.5, 0.3  # shares of a nudge
 UNEVEN = 0.6  # of the rise

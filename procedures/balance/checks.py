@@ -18,10 +18,11 @@ from bench.recording import Recording
 from bench.requires import Requires
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
+from bench.units import RPM
 from procedures.amb_rotor import wiring
 from procedures.balance import decision, estimates
-from procedures.balance import hum as balance_hum
 from procedures.balance.estimates import Balanced, Forces
+from procedures.balance.hum import of_balance
 from procedures.balance.steps import (
     BASE,
     CAPTURED,
@@ -34,8 +35,9 @@ from procedures.balance.steps import (
     read_dwell,
     read_runs,
 )
-from procedures.synchronous import bearings, fitting, hum
-from procedures.synchronous.dwells import AXES, CURRENTS, POSITIONS, RPM, SLOW, TOLD, Dwell
+from procedures.synchronous import bearings, fitting
+from procedures.synchronous.dwells import AXES, CURRENTS, POSITIONS, SLOW, TOLD, Dwell
+from procedures.synchronous.hum import heard
 from procedures.unbalance import checks as unbalance_checks
 
 MOST_RPM = 10000.0  # influence runs
@@ -141,7 +143,7 @@ def evaluated(recording: Recording[Any]) -> Evaluated:
     found += _of_result(balance, recorded, shown, plan, rig)
     influences = estimates.influences(balance, rig)
     slow = next((d for d in recorded.dwells if d.kind == SLOW), None)
-    found += balance_hum.of_balance(hum.heard(recording, slow), recorded, balance, (BASE, last), influences)
+    found += of_balance(heard(recording, slow), recorded, balance, (BASE, last), influences)
     return Evaluated(tuple(found), balance, recorded, last, influences)
 
 

@@ -18,12 +18,12 @@ from bench.calibration import Calibration
 from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
 from bench.uncertainty import propagate
+from bench.units import RPM
 from procedures.balance import estimates
 from procedures.balance.estimates import Balanced
 from procedures.balance.solution import Trials
 from procedures.balance.steps import SIDES, Read, Run, Weight
 from procedures.synchronous import bearings, runout
-from procedures.synchronous.dwells import RPM
 from procedures.synchronous.runout import Stand
 
 Array = npt.NDArray[np.float64]

@@ -11,10 +11,11 @@ from bench.analysis.balance import G_MM
 from bench.analysis.sampling import lag_deg
 from bench.analysis.vectors import region
 from bench.figures import Figure, Series, Sheet, Shown
+from bench.units import RPM
 from procedures.balance.checks import Evaluated
 from procedures.balance.estimates import Balanced
 from procedures.balance.steps import BASE, SIDES
-from procedures.synchronous.dwells import AXES, RPM
+from procedures.synchronous.dwells import AXES
 
 Complex = npt.NDArray[np.complex128]
 UM = 1e6

@@ -9,10 +9,11 @@ import numpy as np
 
 from bench.findings import Effect, Finding
 from bench.uncertainty import Estimate, interval
+from bench.units import RPM
 from procedures.balance.estimates import Balanced
 from procedures.balance.steps import BASE, SIDES, Recorded
 from procedures.synchronous import hum
-from procedures.synchronous.dwells import AXES, RPM, Complex, Dwell
+from procedures.synchronous.dwells import AXES, Complex, Dwell
 
 TWO_RUNS = math.sqrt(2)  # an influence coefficient is a difference of two, in which the line has any phase
 Influences = Mapping[tuple[str, str], tuple[Estimate, Estimate]]

@@ -17,6 +17,7 @@ from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_metho
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.roles import RigState
+from bench.units import RPM
 from procedures.amb_rotor import lift
 from procedures.balance import checks, estimates, sequence
 from procedures.balance import figures as drawn
@@ -24,7 +25,6 @@ from procedures.balance.steps import BASE, SIDES
 from procedures.shared import assumptions
 from procedures.synchronous import dwelling
 from procedures.synchronous.dwelling import Law
-from procedures.synchronous.dwells import RPM
 from procedures.unbalance import procedure as unbalance
 
 FOUND_COS = Quantity(

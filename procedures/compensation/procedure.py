@@ -20,14 +20,16 @@ from bench.recording import Recording
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
+from bench.units import RPM
 from procedures.amb_rotor import lift
 from procedures.compensation import checks, switching
 from procedures.compensation import figures as drawn
+from procedures.compensation.hum import of_switch
 from procedures.compensation.switching import SWITCH
 from procedures.shared import assumptions
-from procedures.synchronous import dwelling, hum
+from procedures.synchronous import dwelling
 from procedures.synchronous.dwelling import SETTINGS, Law, Variant
-from procedures.synchronous.dwells import RPM
+from procedures.synchronous.hum import heard
 from procedures.unbalance import figures as unbalance_figures
 from procedures.unbalance import procedure as unbalance
 
@@ -124,7 +126,7 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
         yield Finding("no-switch", str(error), "", Effect.ERROR)
         return
     where = f"{recording.plan.switch_rad_s * RPM:.0f} r/min"
-    yield from hum.of_switch(hum.heard(recording, found.results.slow), captured, switched, where)
+    yield from of_switch(heard(recording, found.results.slow), captured, switched, where)
     yield DROP.measured(switched["drop"], where)
     yield RESIDUAL.measured(switched["residual"], where)
 

@@ -7,8 +7,8 @@ from typing import Protocol
 
 from bench.requires import Requires
 from bench.rigfile import RigFile
-from procedures.amb_calibration.steps import LEVERS
 from procedures.force_constant.steps import CHANNELS, COILS, SEGMENTS
+from procedures.servomotor.channels import LEVERS
 
 # What the levels are checked with before anything starts; no result uses these.
 WEIGHT_N, COM_TO_OUTBOARD = 10.2 * 9.81, 0.010  # T Table 6.1

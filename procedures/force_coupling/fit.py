@@ -27,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from procedures.negative_stiffness.fit import radial_currents, sensor_share
+from procedures.servomotor.segments import radial_currents, sensor_share
 from procedures.shared import leastsquares
 from procedures.shared.leastsquares import Fit
 

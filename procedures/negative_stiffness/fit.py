@@ -26,6 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from procedures.servomotor.segments import radial_currents, sensor_share
 from procedures.shared import leastsquares
 from procedures.shared.leastsquares import Fit
 
@@ -82,17 +83,6 @@ class AmbFit:
     y_m: Array
     stiffness: float
     gap_m: float
-
-
-def sensor_share(z: float, p: Mapping[str, float]) -> float:
-    """Share of the outboard sensor in the displacement at plane z, m from the centre of mass (T 6.7)."""
-    return (z + p["l_is"]) / (p["l_is"] + p["l_os"])
-
-
-def radial_currents(segments: Array, p: Mapping[str, float]) -> tuple[Array, Array]:
-    """i_x, i_y (N,) A by T (6.18), freed of the sensors' gains and offsets."""
-    one, two, three, four = ((segments[k] - p[f"offset_m{k + 1}"]) / p[f"gain_m{k + 1}"] for k in range(4))
-    return (four - two) / 2, (one - three) / 2
 
 
 def motor_plane(p: Mapping[str, float]) -> float:

@@ -14,13 +14,17 @@ from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.uncertainty import interval
+from bench.units import RPM
 from procedures.run_up.estimates import DAMPED, Peak, Run, asked_margin
+from procedures.run_up.hum import of_peaks
 from procedures.run_up.steps import LEAST_TURNS, MISSED, PASSAGE, Passage
 from procedures.shared import signals
-from procedures.synchronous import fitting, hum
-from procedures.synchronous.dwells import AXES, CONTACT, CURRENT_LIMIT, PLANES, RANGE, RPM, VOLTAGE_LIMIT
+from procedures.synchronous import fitting
+from procedures.synchronous.dwells import AXES, CONTACT, CURRENT_LIMIT, PLANES, RANGE, VOLTAGE_LIMIT
+from procedures.synchronous.hum import heard
 from procedures.unbalance import checks
 from procedures.unbalance.checks import HELD
+from procedures.unbalance.hum import of_dwells
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -206,9 +210,9 @@ def of_run(run: Run, recording: Recording[Any], plan: Settings) -> Iterator[Find
         return
     yield from checks.sampling([r.dwell for r in run.near.dwells], plan)
     yield from checks.of_results(run.near, plan)
-    sound = hum.heard(recording, run.slow)
-    yield from hum.of_dwells(sound, run.near.dwells)
-    yield from hum.of_peaks(sound, [p for p in run.peaks if p.critical])
+    sound = heard(recording, run.slow)
+    yield from of_dwells(sound, run.near.dwells)
+    yield from of_peaks(sound, [p for p in run.peaks if p.critical])
     yield from _criticals(run, plan)
     yield from _passed(run)
 

@@ -21,6 +21,7 @@ from bench.recording import Recording
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
+from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
 from procedures.amb_rotor.steps import NO_SPEED
 from procedures.run_up import checks, estimates
@@ -32,7 +33,7 @@ from procedures.synchronous import bearings as unbalance_bearings
 from procedures.synchronous import dwelling
 from procedures.synchronous.coil_peaks import uncertified
 from procedures.synchronous.dwelling import CODES, Law, put
-from procedures.synchronous.dwells import RECORDED, RPM, SLOW, read_dwell
+from procedures.synchronous.dwells import RECORDED, SLOW, read_dwell
 from procedures.unbalance import checks as unbalance_checks
 from procedures.unbalance import procedure as unbalance
 from procedures.unbalance.procedure import CURRENT, D_MAX, MAJOR, READ, SHARE, VOLTAGE

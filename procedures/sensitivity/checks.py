@@ -12,6 +12,7 @@ from bench.analysis.responses import guaranteed_margins
 from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.uncertainty import coverage_factor
+from bench.units import RPM
 from procedures.sensitivity.estimates import Peak, Result
 from procedures.sensitivity.steps import (
     AXES,
@@ -19,7 +20,6 @@ from procedures.sensitivity.steps import (
     CURRENT_LIMIT,
     INJECT,
     RANGE,
-    RPM,
     VOLTAGE_LIMIT,
     Taken,
     folds,

@@ -10,8 +10,9 @@ from bench.capture import Layout
 from bench.envelope import Envelope
 from bench.errors import BenchError
 from bench.rigfile import RigFile
+from bench.units import RPM
 from procedures.sensitivity.injection import Comb, refused
-from procedures.sensitivity.steps import REFINED, RPM, channels
+from procedures.sensitivity.steps import REFINED, channels
 
 LEAST_S = 4.0  # of a capture of the second grid: four periods of the finest
 

@@ -25,6 +25,7 @@ from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
+from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
 from procedures.sensitivity import checks, estimates, fitting
 from procedures.sensitivity import figures as drawn
@@ -38,7 +39,6 @@ from procedures.sensitivity.steps import (
     MODE,
     PULSED,
     REFINED,
-    RPM,
     SURVEY,
     TOLD,
     WIRING,

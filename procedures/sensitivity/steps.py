@@ -14,6 +14,7 @@ from bench.analysis.responses import Response, clear_of_orders, lines, response,
 from bench.analysis.tachometer import counted, tachometer
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
+from bench.units import RPM
 from procedures.shared.signals import clips
 
 Array = npt.NDArray[np.float64]
@@ -28,7 +29,6 @@ CURRENTS = tuple(f"i_{a}_{side}" for a in AXES for side in "pn")
 ORDERS = (1.0, 2.0, 3.0, 4.0)
 CLEAR_HZ = 3.0  # to either side of an order of the shaft's speed
 CURRENT_LIMIT, VOLTAGE_LIMIT, CONTACT, RANGE = 1, 2, 4 | 8 | 32, 64  # bits of the telemetry signal `flags`
-RPM = 30 / math.pi
 WHOLE = 1e-6  # of the samples of a period: how far they may be from a whole number
 SHARING = 15  # lines to either side that share a noise
 

@@ -1,8 +1,8 @@
-"""Whether the motor's segments are wired as they should be, from small pushes against the AMBs (`procedures.wiring`)."""
+"""Whether the motor's segments are wired as they should be, from small pushes against the AMBs (`wiring`)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -78,3 +78,14 @@ def _pushes(answers: dict[str, Array]) -> Iterator[Finding]:
                 f"1 A of {name} changes the outboard AMB's control current by {own:+.3f} A only: the motor hardly pushes.",
                 name, Effect.ERROR,
             )  # fmt: skip
+
+
+def sensor_share(z: float, p: Mapping[str, float]) -> float:
+    """Share of the outboard sensor in the displacement at plane z, m from the centre of mass (T 6.7)."""
+    return (z + p["l_is"]) / (p["l_is"] + p["l_os"])
+
+
+def radial_currents(segments: Array, p: Mapping[str, float]) -> tuple[Array, Array]:
+    """i_x, i_y (N,) A by T (6.18), freed of the sensors' gains and offsets."""
+    one, two, three, four = ((segments[k] - p[f"offset_m{k + 1}"]) / p[f"gain_m{k + 1}"] for k in range(4))
+    return (four - two) / 2, (one - three) / 2

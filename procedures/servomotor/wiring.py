@@ -1,7 +1,7 @@
 """Before a loop is closed that a wrong wire would drive into the stops: does the motor turn and push the way it should?
 
 The rotor is levitated by both AMBs and released. Each check moves it a little, records the movement as a step that the
-analysis judges (`direction.of_probe`, `motor_wiring.of_nudges`), and says whether to go on.
+analysis judges (`direction.of_probe`, `segments.of_nudges`), and says whether to go on.
 """
 
 from __future__ import annotations

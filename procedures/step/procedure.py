@@ -21,13 +21,13 @@ from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
+from bench.units import RPM
 from procedures.shared import assumptions
 from procedures.step import checks, planes
 from procedures.step import estimates as step_estimates
 from procedures.step import figures as drawn
 from procedures.step.record_length import enough_s, faded_s
 from procedures.step.steps import CHANNELS, STEP, TURNING_RAD_S, cases, read_steps
-from procedures.synchronous.dwells import RPM
 
 OVERSHOOT = Quantity("overshoot", "1", "greatest position beyond the step, as a share of it")
 RISE = Quantity("rise_time", "s", "10 to 90 % of the step")

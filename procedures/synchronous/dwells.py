@@ -17,6 +17,7 @@ from bench.analysis.tachometer import Tachometer, age, counted, tachometer
 from bench.analysis.vectors import Vectors
 from bench.errors import AnalysisError
 from bench.recording import Captured, Recording, Step
+from bench.units import RPM
 from procedures.shared.signals import clips
 
 Array = npt.NDArray[np.float64]
@@ -31,7 +32,6 @@ TOLD = (*POSITIONS, *CURRENTS, "angle", "speed", "pulses", "flags")
 RECORDED = (*POSITIONS, *CURRENTS, *VOLTAGES, "pulses", "pulse_age")
 CURRENT_LIMIT, VOLTAGE_LIMIT, CONTACT, RANGE = 1, 2, 4 | 8 | 32, 64  # bits of the telemetry signal `flags`
 ORDERS = (1.0, 2.0, 3.0)
-RPM = 30 / math.pi
 
 
 @dataclass(frozen=True)

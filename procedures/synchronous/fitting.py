@@ -9,7 +9,8 @@ from typing import Any, Protocol
 from bench.capture import Layout
 from bench.errors import BenchError
 from bench.rigfile import RigFile
-from procedures.synchronous.dwells import RECORDED, RPM
+from bench.units import RPM
+from procedures.synchronous.dwells import RECORDED
 
 SLOW_MOST = 0.15  # of the lowest speed of the plan, at slow roll, and of the loop's own frequency
 LOOP_RAD_S = 390.0  # sqrt(k1) of T Table 2.4: the rigid modes

@@ -12,22 +12,16 @@ close to be told apart (3000 r/min is order 10 of 300), the shaft that stood bef
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from bench.analysis.tachometer import Tachometer
-from bench.findings import Effect, Finding
 from bench.recording import Recording
-from bench.uncertainty import Estimate, interval
 from procedures.amb_rotor.steps import PROBE
-from procedures.compensation.switching import TURNS_AT, TURNS_LEFT, WITHIN_S, Switched, rms
-from procedures.run_up.estimates import Peak
 from procedures.synchronous.dwells import AXES, POSITIONS, SLOW, Array, Complex, Dwell
-from procedures.unbalance.checks import its_own
-from procedures.unbalance.estimates import Result
 
 FINER = 8  # points of the spectrum within a line of the slow roll, at least
 CLEAR = 7.0  # standard deviations of a component of the noise: exp(-7^2/2) for each of some thousand points, 1e-7 a run
@@ -145,61 +139,6 @@ def leaked(tacho: Tachometer, begin: float, lasts: float, hz: float) -> float:
 def duration(d: Dwell) -> float:
     """Of the whole turns that its vectors are of, s."""
     return 2 * math.pi * d.track.turns / d.speed
-
-
-def of_dwells(found: Heard | None, results: Sequence[Result]) -> Iterator[Finding]:
-    """Dwells whose vectors a line may move by more than their expanded uncertainty."""
-    if found is None:
-        return
-    for r in results:
-        d = r.dwell
-        reach = REACH / duration(d)
-        turns = d.speed / (2 * math.pi)
-        known = [min(interval(r.estimates[name, a]).U for name in ("vector_cos", "vector_sin")) for a in AXES]
-        off = [(x.size * leak(d, x.hz), x) for x in found.lines(turns - reach, turns + reach)]
-        worst = max(off, key=lambda o: o[0] / known[o[1].probe], default=None)
-        if worst is None or worst[0] <= known[worst[1].probe]:
-            continue
-        size, line = worst
-        low, high = (60 * (line.hz + side * reach) for side in (-1, 1))
-        text = (f"{told(line)} Here, at {turns:.2f} Hz, the vector may be off by {size * 1e6:.3f} µm, "
-                f"{size / known[line.probe]:.1f} times its U. Below {low:.0f} and above {high:.0f} r/min it is told "
-                "apart.")  # fmt: skip
-        yield Finding("hum", text, d.where, Effect.INDETERMINATE, its_own(d))
-
-
-def of_peaks(found: Heard | None, peaks: Sequence[Peak]) -> Iterator[Finding]:
-    """Critical speeds in whose peak, down to half power, a line is larger than the amplitude's expanded uncertainty: a passage
-    is too short at any speed to tell it apart."""
-    for p in peaks if found is not None else ():
-        assert found is not None
-        known = interval(p.amplitude).U
-        lines = [x for x in found.lines(p.low / (2 * math.pi), p.high / (2 * math.pi)) if AXES[x.probe] == p.axis]
-        line = max(lines, key=lambda x: x.size, default=None)
-        if line is not None and line.size > known:
-            text = (f"{told(line)} It lies within half power of this critical speed, whose amplitude is known to "
-                    f"{known * 1e6:.3f} µm.")  # fmt: skip
-            yield Finding("hum", text, p.where, Effect.INDETERMINATE, (f"@{p.where}",))
-
-
-def of_switch(found: Heard | None, s: Switched, switched: Mapping[str, Estimate], where: str) -> Iterator[Finding]:
-    """A line that may move the drop or the residual of a switch by more than its expanded uncertainty. Neither is of more than
-    some ten turns, in which much is near the speed."""
-    if found is None:
-        return
-    size = rms(s.between(float(s.t[0]), -s.turn)[0])
-    for name, turns, begin, over in (
-        ("drop", TURNS_AT, WITHIN_S, size),
-        ("residual", TURNS_LEFT, float(s.t[-1]) - (TURNS_LEFT + 1) * s.turn, 1.0),
-    ):
-        lasts, known = turns * s.turn, interval(switched[name]).U
-        lines = found.lines(1 / s.turn - REACH / lasts, 1 / s.turn + REACH / lasts)
-        off = [(x.size * leaked(s.tacho, begin, lasts, x.hz) / over, x) for x in lines]
-        worst = max(off, key=lambda o: o[0], default=None)
-        if worst is not None and worst[0] > known:
-            text = (f"{told(worst[1])} At the switch, at {1 / s.turn:.2f} Hz, the {name} may be off by "
-                    f"{worst[0] / known:.1f} times its U.")  # fmt: skip
-            yield Finding("hum", text, where, Effect.INDETERMINATE, (f"{name}@{where}",))
 
 
 def told(line: Line) -> str:

@@ -37,8 +37,8 @@ import numpy.typing as npt
 from scipy import optimize, special
 
 from bench.errors import AnalysisError
-from procedures.amb_calibration.fit import weight
 from procedures.shared.leastsquares import Fit, linear, nonlinear
+from procedures.shared.weight import weight
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]

@@ -12,7 +12,7 @@ from bench.rigfile import RigFile
 from bench.toleranced import Toleranced
 from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.series import batch_means
-from procedures.amb_rotor.geometry import Facts, Turns, quantities, revolutions, turns
+from procedures.amb_rotor.geometry import Facts, Turns, nominal, quantities, revolutions, turns
 from procedures.amb_rotor.steps import AXES, LOWER, UPPER, Orbit
 from procedures.shared.certificates import certified
 
@@ -30,20 +30,6 @@ class Input:
     name: str
     stated: Toleranced
     moved: Moved
-
-
-def nominal(rig: RigFile, t_0: float) -> Facts:
-    """The facts as the rig file states them."""
-    sensors, g = [rig.sensors[f"pos_{axis}"] for axis in AXES], rig.geometry
-    gains, offsets = [s.gain.value for s in sensors], [s.offset.value for s in sensors]
-    return Facts(
-        (gains[0], gains[1], gains[2], gains[3]),
-        (offsets[0], offsets[1], offsets[2], offsets[3]),
-        g["com_to_inboard_sensor"].value,
-        g["com_to_outboard_sensor"].value,
-        t_0,
-        g["clearance"].value,
-    )
 
 
 def _at(k: int, kind: str) -> Moved:

@@ -21,9 +21,10 @@ from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
+from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
+from procedures.amb_rotor.geometry import nominal
 from procedures.amb_rotor.steps import CHANNELS, GROWN, ORBIT, POSITIONS, START, STARTED, read_orbits
-from procedures.synchronous.dwells import RPM
 from procedures.tracking import checks, estimates
 from procedures.tracking import figures as drawn
 
@@ -202,7 +203,7 @@ def figures(recording: Recording[Plan]) -> Iterable[Figure]:
     if not len(recording.steps(ORBIT)):
         return ()
     orbits = read_orbits(recording)
-    facts = {o.law: estimates.nominal(recording.rig, o.t_0) for o in orbits}
+    facts = {o.law: nominal(recording.rig, o.t_0) for o in orbits}
     return drawn.all_figures(orbits, facts)
 
 

@@ -13,6 +13,7 @@ from bench.analysis.tachometer import against
 from bench.analysis.vectors import radius2
 from bench.findings import Effect, Finding
 from bench.recording import Recording
+from bench.units import RPM
 from procedures.shared import signals
 from procedures.synchronous.dwells import (
     AXES,
@@ -21,7 +22,6 @@ from procedures.synchronous.dwells import (
     DWELL,
     PLANES,
     RANGE,
-    RPM,
     SLOW,
     VOLTAGE_LIMIT,
     Array,

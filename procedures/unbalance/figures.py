@@ -11,7 +11,8 @@ from bench.analysis.spectra import full
 from bench.figures import Figure, Series, Sheet, Shown
 from bench.rigfile import RigFile
 from bench.uncertainty import coverage_factor, interval
-from procedures.synchronous.dwells import AXES, PLANES, RPM
+from bench.units import RPM
+from procedures.synchronous.dwells import AXES, PLANES
 from procedures.unbalance.checks import ZONES
 from procedures.unbalance.estimates import Result, Results
 

@@ -22,17 +22,20 @@ from bench.requires import Requires
 from bench.rig import Rig
 from bench.rigfile import RigFile
 from bench.roles import RigState
+from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
 from procedures.shared import assumptions
 from procedures.synchronous import bearings as unbalance_bearings
-from procedures.synchronous import dwelling, fitting, hum
+from procedures.synchronous import dwelling, fitting
 from procedures.synchronous.bearings import BEARING_MODEL, STATED, adopted_bearings
 from procedures.synchronous.coil_peaks import uncertified
 from procedures.synchronous.dwelling import CODES, POLES, SETTINGS, Law, Variant
-from procedures.synchronous.dwells import RECORDED, RPM, TOLD, read_dwells
+from procedures.synchronous.dwells import RECORDED, TOLD, read_dwells
+from procedures.synchronous.hum import heard
 from procedures.unbalance import checks, estimates
 from procedures.unbalance import figures as drawn
 from procedures.unbalance.estimates import Results
+from procedures.unbalance.hum import of_dwells
 
 COSINE = Quantity(
     "vector_cos",
@@ -166,7 +169,7 @@ def evaluated(recording: Recording[Any]) -> Evaluated:
     model = adopted_bearings(recording)
     results = estimates.results(dwells, recording.rig, plan, model)
     told = (unbalance_bearings.told(model, plan), *uncertified(recording.rig))
-    hums = hum.of_dwells(hum.heard(recording, results.slow), results.dwells)
+    hums = of_dwells(heard(recording, results.slow), results.dwells)
     return Evaluated((*found, *told, *hums, *checks.of_results(results, plan)), results)
 
 

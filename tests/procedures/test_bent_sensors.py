@@ -10,9 +10,10 @@ from scipy import optimize
 from tsbs_statics import Shaft, parameters, sweep_data
 
 from procedures.amb_calibration import fit as amb_calibration_fit
-from procedures.amb_calibration.fit import Hangings, weight
+from procedures.amb_calibration.fit import Hangings
 from procedures.force_coupling import fit as force_coupling_fit
 from procedures.shared import assumptions
+from procedures.shared.weight import weight
 
 BIAS, PAIR = 3.0, (1.0, -1.0)
 CERTIFICATES = {

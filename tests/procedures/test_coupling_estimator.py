@@ -10,7 +10,7 @@ from tsbs_statics import Shaft, parameters, segments, sweep_data
 
 from bench.errors import AnalysisError
 from procedures.force_coupling import fit as force_coupling_fit
-from procedures.negative_stiffness.fit import radial_currents
+from procedures.servomotor.segments import radial_currents
 
 DEGREES = np.arange(-2.5, 3.6, 0.5)
 

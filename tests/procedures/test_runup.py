@@ -25,13 +25,13 @@ from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, correlation, interval, welch_satterthwaite
+from bench.units import RPM
 from procedures.coast_down import procedure as coast_down
 from procedures.run_up import checks, estimates, figures
 from procedures.run_up import procedure as run_up
 from procedures.run_up.estimates import Run
 from procedures.run_up.steps import Passage, read_passage
 from procedures.synchronous.dwelling import CODES, SETTINGS
-from procedures.synchronous.dwells import RPM
 from reports.figures import draw as draw_figure
 from sim_backend import amb_unbalance
 from sim_backend.core.amb_params import AmbParams

@@ -23,11 +23,12 @@ from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate
+from bench.units import RPM
 from procedures.sensitivity import checks, estimates, margins
 from procedures.sensitivity import procedure as sensitivity
 from procedures.sensitivity.injection import Comb, combs
 from procedures.sensitivity.procedure import CODES, Plan, check, procedure
-from procedures.sensitivity.steps import AXES, REFINED, RPM, WIRING, Taken, read_taken
+from procedures.sensitivity.steps import AXES, REFINED, WIRING, Taken, read_taken
 from reports.figures import draw as draw_figure
 from sim_backend import amb_sensitivity
 from sim_backend.truth import draw
