@@ -124,7 +124,7 @@ def of_fit(
     u_mass: Array,
 ) -> Iterator[Finding]:
     """Checks of the fit: loads that contradict each other, single hangings that stand out, hysteresis. `beyond` is what each
-    mass is less sure by than its certificate says (`load_hypotheses.scatter_of_set`)."""
+    mass is less sure by than its certificate says (`hypotheses.scatter_of_set`)."""
     mistaken = hypotheses.mistaken(c, beyond)
     for found in _loads(data, c, p, plan, u_mass):
         text = f"{found.text} No value is stated: {beyond:.1%} of each mass is no scatter of a set."

@@ -14,7 +14,7 @@ BEARINGS = {"i": "inboard", "o": "outboard"}
 
 
 def less_sure(estimate: Estimate, masses: Mapping[str, float], beyond: float) -> Estimate:
-    """With `beyond` (relative) more on each of the `masses` (kg by label), as `load_hypotheses.scatter_of_set` finds it."""
+    """With `beyond` (relative) more on each of the `masses` (kg by label), as `hypotheses.scatter_of_set` finds it."""
     if beyond == 0:
         return estimate
     dof = len(masses) - 2.0

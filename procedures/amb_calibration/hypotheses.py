@@ -77,7 +77,7 @@ class Suspect:
 def contradiction(f: Fit, h: Hangings, s: Scatter, p: Mapping[str, float], u_mass: Array) -> Contradiction:
     """What the means over the loads say of the masses.
 
-    `p` as for `mass_hanging.fit`; `u_mass` (L,) kg, nothing (the hanger) first.
+    `p` as for `fit.fit`; `u_mass` (L,) kg, nothing (the hanger) first.
     """
     newton_per_kg = np.array(fit.hung_shares(p["hook_to_outboard"], p["amb_span"])) * p["gravity"]
     kg = np.array([0.0, *(p[f"mass_{k}"] for k in range(len(u_mass) - 1))])

@@ -12,7 +12,7 @@ from procedures.amb_calibration.fit import Fit, Hangings
 Array = npt.NDArray[np.float64]
 OUTPUTS = ("K_i", "K2_i", "Kw_i", "K_o", "K2_o", "Kw_o")
 CARRIED = ("F0_i", "F0_o")
-"""By angle only: F_0 of each bearing (see `mass_hanging.carried`)."""
+"""By angle only: F_0 of each bearing (see `fit.carried`)."""
 ORDER = (0, 1, 2, 4, 5, 6, 3, 7)  # from K, K2, Kw, F_0 of one bearing and of the other to OUTPUTS and CARRIED
 
 
@@ -74,7 +74,7 @@ def residual_maker(f: Fit, b: int) -> Array:
 def covariance_by_angle(f: Fit, s: Scatter, own_load: Array) -> Array:
     """Type A covariance (A, 8, 8) of the terms at each angle, in the order of OUTPUTS and CARRIED.
 
-    `own_load` (2,) N is the force at own weight in the fit's frame (see `mass_hanging.tangents`). Hangings are
+    `own_load` (2,) N is the force at own weight in the fit's frame (see `fit.tangents`). Hangings are
     independent of each other; the two bearings of one hanging are not (a load that seats badly moves both).
     """
     maps = np.stack([_term_gradients(f.terms[b], own_load[b]) @ f.solvers[b] for b in (0, 1)])  # (2, A, 4, P)

@@ -79,7 +79,7 @@ class Evaluated:
 
 @dataclass(frozen=True)
 class Looked:
-    """A dwell with its balance of forces, as `unbalance_checks` wants it."""
+    """A dwell with its balance of forces, as `unbalance.checks` wants it."""
 
     dwell: Dwell
     misfit: float

@@ -239,7 +239,7 @@ def influences(balance: Balanced, rig: RigFile) -> dict[tuple[str, str], tuple[E
 
 @dataclass(frozen=True)
 class Forces:
-    """Of a dwell, what `unbalance_checks` looks at: share of the forces left over, share of the weight carried (4,)."""
+    """Of a dwell, what `unbalance.checks` looks at: share of the forces left over, share of the weight carried (4,)."""
 
     misfit: float
     carried: Array

@@ -87,7 +87,7 @@ class _Problem:
 def adjust(
     means: Positions, inputs: Mapping[str, Estimate], noise_N: Array, weighed_N: Array, starts: Array
 ) -> Adjusted:
-    """`inputs` as `bearing.statics` wants them, and the gap; `noise_N` (4,) of a position's mean, `weighed_N` (4,) the same
+    """`inputs` as `magnetics.statics` wants them, and the gap; `noise_N` (4,) of a position's mean, `weighed_N` (4,) the same
     with what the model is not trusted with; `starts` (4, 2) terms.
 
     Raises:

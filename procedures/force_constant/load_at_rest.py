@@ -1,6 +1,6 @@
 """What the AMBs carry while the motor gives no force, against what they carried at their calibration at the same angles.
 
-F0 of the calibration has the shaft alone as its zero (`mass_hanging.carried`), so that at rest at the sensors' zero
+F0 of the calibration has the shaft alone as its zero (`amb_calibration.fit.carried`), so that at rest at the sensors' zero
 
     r = F0 + K u + K2 v = 0        at each AMB, at every angle
 
@@ -67,7 +67,7 @@ class Rest:
 
 def compared(r: Ramps, inputs: Mapping[str, Estimate], facts: Mapping[str, Estimate], rig: RigFile, weight: float,
              bias_A: float) -> Rest | None:  # fmt: skip
-    """The comparison for the vertical ramps; None if the calibration handed on no F0. `inputs` of the fit (`force_estimates`),
+    """The comparison for the vertical ramps; None if the calibration handed on no F0. `inputs` of the fit (`estimates`),
     `weight` of the force row in its result."""
     count = len(r.angles)
     names = (*(f"{name}@{k}" for name in AT_REST for k in range(count)), *HANGER)

@@ -2,7 +2,7 @@
 
 Moments about the outboard AMB, with s from AMB to AMB and e from the outboard AMB to the motor: F_y s = e F_i. The outboard
 AMB, whose own stiffness off centre is larger than the motor's, does not enter; the inboard one is held at its zero. Its force
-is the calibration's F = K u + K2 v at each angle (see `mass_hanging`), referred to where the rotor is by K b / gap.
+is the calibration's F = K u + K2 v at each angle (see `amb_calibration.fit`), referred to where the rotor is by K b / gap.
 
 Constants of one angle under one load (the shaft's weight, the magnetic offsets, the load itself) are taken off as means of
 the group. What is left is (5.25b), and three terms that it lacks because it takes the zero of the commutation as exact: a cross
@@ -35,7 +35,7 @@ CROSS = "cross"
 QUADRATURE = ("ripple_y", "ripple_x")
 TERMS = (*FORCE_TERMS, CROSS, *QUADRATURE)
 SCALE = dict.fromkeys(TERMS, 1.0) | {"alpha_4": 1e3, "alpha_5": 1e5, "alpha_8": 1e2, "alpha_9": 1e2}
-Y_ROW = 1  # of `force_map.force_design`
+Y_ROW = 1  # of `fit.force_design`
 EXCITED = 0.02
 MINOR = 0.1  # of a term's standard uncertainty
 

@@ -1,4 +1,4 @@
-"""Which way the encoder counts, from a small movement that a weak gain made (`procedures.rotor.probe`)."""
+"""Which way the encoder counts, from a small movement that a weak gain made (`hold.probe`)."""
 
 from __future__ import annotations
 
