@@ -10,7 +10,8 @@ motor by dF_i, dF_o, dF_m with
     force row   F_m = -(F_i + F_o)        moment row   F_m = F_i s / e
 
 T (6.14a) prints the first with the wrong sign. The AMBs' forces come from their coil currents by each angle's own
-F = F_0 + K u + K2 v (see `amb_calibration.fit`); F_0 is the same in every step of an angle and drops out (`load_at_rest` looks at it).
+F = F_0 + K u + K2 v (see `amb_calibration.fit`); F_0 is the same in every step of an angle and drops out (`load_at_rest`
+looks at it).
 """
 
 from __future__ import annotations
