@@ -17,12 +17,12 @@ from typing import Any, ClassVar, Literal
 from pydantic import ConfigDict
 
 from bench.rigfile import RigFile
+from bench.schema import STRICT
 from bench.toleranced import Toleranced
 from bench.uncertainty import Estimate, Influence
 
 Backend = Literal["sim", "live", "served"]  # served: a live link with a simulated controller behind it
 State = Literal["current", "expired"]
-STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 CLOCKS_DIFFER = timedelta(minutes=1)  # at most: the clock of the run's host, and of the one that uses it
 RIG_TABLES = ("site", "geometry", "masses", "sensors", "machine", "hook")
 """First parts of the identities of influences that stand in the rig file."""

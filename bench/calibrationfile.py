@@ -18,9 +18,9 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from bench.calibration import STRICT, Backend, Calibration, Certificate, Used
+from bench.calibration import Backend, Calibration, Certificate, Used
 from bench.errors import ConfigError, Problem
-from bench.schema import require_schema
+from bench.schema import STRICT, require_schema
 from bench.uncertainty import Distribution, Estimate, Influence
 from bench.wholefile import write_whole
 

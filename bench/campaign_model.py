@@ -19,19 +19,19 @@ from bench.calibration import of_the_rig
 from bench.campaign import Equation
 from bench.records import Measurement, Record
 from bench.rundir import NAME
+from bench.schema import STRICT
 from bench.toleranced import Toleranced
 
 SCHEMA = 1
 SCHEMA_FILE = Path(__file__).with_name("model.schema.json")
 LARGEST = 5  # terms of a budget that the model repeats
-_STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 
 @dataclass(frozen=True)
 class Term:
     """One influence on a constant: its standard uncertainty in the constant's unit, and its share of the variance."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
     name: str
     influence: str
     contribution: float
@@ -42,7 +42,7 @@ class Term:
 class StatedEquation:
     """What a constant means: its equation, and where that is printed."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
     text: str
     source: str
 
@@ -55,7 +55,7 @@ class Constant:
     which it was measured. `terms` are the largest of its budget, `rest` the standard uncertainty of all others together.
     """
 
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
     name: str
     unit: str
     about: str
@@ -81,7 +81,7 @@ class Constant:
 class Given:
     """A number that no step measured: from the rig file (`geometry.amb_gap`) or the campaign file (`mass`), SI."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
     name: str
     unit: str
     value: float
@@ -94,7 +94,7 @@ class Given:
 class Matrix:
     """Correlation coefficients in the order of `names`."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
     names: tuple[str, ...]
     matrix: tuple[tuple[float, ...], ...]
 
@@ -103,7 +103,7 @@ class Matrix:
 class Model:
     """`model.json`."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
     schema: Literal[1]
     name: str
     title: str

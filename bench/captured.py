@@ -10,11 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.errors import AnalysisError
+from bench.source import Source
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from bench.recording import Recording
 
 CAPTURES: Final = "capture/"
 """What the names of their streams begin with."""
@@ -33,7 +32,7 @@ class Captured:
         waited_for: what the trigger was: `kind`, `channel`, `level`.
     """
 
-    recording: Recording[Any]
+    recording: Source
     stream: str
     labels: Mapping[str, Any]
     rate_hz: float
@@ -44,7 +43,7 @@ class Captured:
     waited_for: Mapping[str, Any]
 
     @classmethod
-    def of(cls, recording: Recording[Any], event: Mapping[str, Any]) -> Captured:
+    def of(cls, recording: Source, event: Mapping[str, Any]) -> Captured:
         """What a `capture` event of a recording tells of."""
         names = ("stream", "labels", "rate_hz", "first_tick", "start_ns", "trigger", "samples", "waited_for")
         return cls(recording, **{name: event[name] for name in names})

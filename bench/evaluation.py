@@ -14,13 +14,13 @@ from typing import Any
 from bench.errors import AnalysisError, BenchError, RecordingError, SignalAbort
 from bench.findings import Effect, Finding
 from bench.limits import Limit
+from bench.linkcounts import LinkCounts
 from bench.outcomes import SOUND, Outcome, outcome_of, unjudged
 from bench.procedure import Measured, Procedure
 from bench.recorder import Recorder
 from bench.recording import Recording
 from bench.records import (
     Correlations,
-    LinkCounts,
     Measurement,
     Record,
     RecordingFile,

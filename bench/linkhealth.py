@@ -9,7 +9,7 @@ from bench.clockrate import described
 from bench.findings import Effect, Finding
 from bench.hosttime import Drift
 from bench.link import LinkStats
-from bench.records import LinkCounts
+from bench.linkcounts import LinkCounts
 from bench.stillness import STILL_S
 from bench.telemetry import Counters
 

@@ -16,7 +16,7 @@ from pydantic import ValidationError
 from bench import units
 from bench.errors import ConfigError, Problem
 from bench.inputfile import TomlError, parse_toml
-from bench.procedure import BenchPlan
+from bench.plan import BenchPlan
 from bench.schema import expected_of
 
 P = TypeVar("P", bound=BenchPlan)

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pydantic import BaseModel, ConfigDict
-
 from bench.figures import Shown
 from bench.findings import Finding
+from bench.plan import BenchPlan
+from bench.quantity import Measured, Quantity
 from bench.requires import Requires
 from bench.roles import RigState
 
@@ -23,34 +23,7 @@ if TYPE_CHECKING:
     from bench.uncertainty import Estimate
 
 
-class BenchPlan(BaseModel):
-    """The settings a procedure is done with, SI. Unknown keys and wrong types are refused."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-@dataclass(frozen=True, slots=True)
-class Quantity:
-    """A declared measurand: its name in records and truth, its unit and its definition in one line; `title` is what a report
-    calls it where the name is no word."""
-
-    name: str
-    unit: str
-    about: str
-    title: str = ""
-
-    def measured(self, estimate: Estimate, where: str = "") -> Measured:
-        """This quantity's value in this run."""
-        return Measured(self, estimate, where)
-
-
-@dataclass(frozen=True, slots=True)
-class Measured:
-    """A quantity with its estimate; `where` says at which place of the machine, when that is not the name."""
-
-    quantity: Quantity
-    estimate: Estimate
-    where: str = ""
+__all__ = ["BenchPlan", "Measured", "Procedure", "Quantity", "read_method"]
 
 
 def read_method(file: str) -> str:

@@ -24,7 +24,7 @@ from bench.kept import Kept
 from bench.layout import DecodedBlock
 from bench.mcapchunk import sound
 from bench.mcapfile import McapFile, index
-from bench.procedure import BenchPlan
+from bench.plan import BenchPlan
 from bench.readlimits import MB
 from bench.rigfile import MOST_DBC, MOST_TOML, RigFile
 from bench.samples import StreamLayout

@@ -17,16 +17,16 @@ from bench.calibration import Calibration, Used
 from bench.errors import ConfigError
 from bench.findings import Effect, Finding
 from bench.limits import Limit, Verdict, judge
+from bench.linkcounts import LinkCounts
 from bench.outcomes import Outcome
-from bench.procedure import Measured, Quantity
-from bench.schema import require_schema
+from bench.quantity import Measured, Quantity
+from bench.schema import STRICT, require_schema
 from bench.uncertainty import PROBABILITY, Estimate, Interval, budget, correlation_matrix, interval
 from bench.wholefile import write_whole
 
 SCHEMA = 2
 """2: outcome DONE, findings with `concerns`. Records of schema 1 are read as they stand."""
 SCHEMA_FILE = Path(__file__).with_name("record.schema.json")
-_STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class BudgetEntry:
     """One influence of a measurement; `contribution` in the measurement's unit, `dof` None is infinite. `sensitivity` is the
     derivative at the inputs' values; records of before 2026-11-23 do not say the influence's `standard_uncertainty`."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
     name: str
     influence: str
     contribution: float
@@ -56,7 +56,7 @@ class BudgetEntry:
 class LimitEntry:
     """The acceptance range, in the measurement's unit; None is open."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
     low: float | None
     high: float | None
     unit: str
@@ -70,7 +70,7 @@ class Measurement:
 
     `standard_uncertainty` and `coverage_factor` are None too where the interval alone is stated (see `Interval`)."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
     name: str
     unit: str
     value: float | None
@@ -102,7 +102,7 @@ class Measurement:
 class FindingEntry:
     """A finding, with its effect on the outcome and the quantities that it concerns; empty is all."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
     code: str
     text: str
     where: str
@@ -114,36 +114,16 @@ class FindingEntry:
 class RecordingFile:
     """The recording's file name in the run directory and its digest, None if it was not taken."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
     file: str
     sha256: str | None
-
-
-@dataclass(frozen=True)
-class LinkCounts:
-    """What the controller's link delivered: frames, gaps in the telemetry, everything that a clean link does not do.
-
-    `counts` has it all by name (docs/reference/record.md). `drift_ppm` is host clock against device clock with its
-    expanded uncertainty; `latest_ms` the greatest lateness of a sample, `round_trip_ms` the least time from a
-    request to its answer; None where it was not measured.
-    """
-
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
-    frames: int = 0
-    gaps: int = 0
-    errors: int = 0
-    counts: Mapping[str, int] = dataclasses.field(default_factory=dict)
-    drift_ppm: float | None = None
-    drift_expanded_ppm: float | None = None
-    latest_ms: float | None = None
-    round_trip_ms: float | None = None
 
 
 @dataclass(frozen=True)
 class Correlations:
     """Correlation coefficients of the measured quantities, in the order of `names`."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
     names: tuple[str, ...]
     matrix: tuple[tuple[float, ...], ...]
 
@@ -152,7 +132,7 @@ class Correlations:
 class Record:
     """`record.json`. Times are ISO 8601 UTC; `seed` is None for a real rig; `plan` is in SI."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
     schema: Literal[1, 2]
     run_id: str
     procedure: str

@@ -6,7 +6,12 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from pydantic import ConfigDict
+
 from bench.errors import ConfigError
+
+STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+"""Of what we write ourselves: no unknown key, no number for a text."""
 
 
 def require_schema(text: str, name: str, kind: str, schema: int, oldest: int | None = None) -> None:

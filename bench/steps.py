@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy.typing as npt
 
 from bench.errors import AnalysisError
-
-if TYPE_CHECKING:
-    from bench.recording import Recording
+from bench.source import Source
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
     """A labelled interval."""
 
-    recording: Recording[Any]
+    recording: Source
     kind: str
     labels: Mapping[str, Any]
     start_ns: int

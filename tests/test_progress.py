@@ -8,7 +8,8 @@ import re
 import pytest
 
 from bench.described import described
-from bench.progress import PlainProgress, clock_text, shown_on
+from bench.progress import PlainProgress, shown_on
+from bench.progress_text import clock_text
 
 
 def test_plain_lines_are_few_and_say_step_and_time_left() -> None:

@@ -15,11 +15,11 @@ from bench.cli.run import summary
 from bench.errors import ConfigError
 from bench.findings import Effect, Finding
 from bench.limits import Limit, Verdict
+from bench.linkcounts import LinkCounts
 from bench.outcomes import Outcome, outcome_of, outranking, unjudged
 from bench.procedure import Measured, Quantity
 from bench.records import (
     SCHEMA_FILE,
-    LinkCounts,
     Record,
     RecordingFile,
     correlations_of,

@@ -10,7 +10,8 @@ from bench.cli import reporting
 from bench.cli.compose import Request, prepare
 from bench.cli.summary import summary
 from bench.outcomes import Outcome
-from bench.progress import columns, shown_on
+from bench.progress import shown_on
+from bench.progress_text import columns
 from bench.runner import RunResult
 from bench.supervisor import Supervisor
 

@@ -14,7 +14,7 @@ from bench.cli.compose import load_procedure
 from bench.cli.run import STATUS
 from bench.cli.summary import summary
 from bench.errors import BenchError, ConfigError, RecordingError
-from bench.progress import columns
+from bench.progress_text import columns
 from bench.recording import Recording
 from bench.records import read_record
 from bench.supervisor import Supervisor
