@@ -24,9 +24,9 @@ from bench.findings import Effect, Finding
 from bench.rigfile import load_rig
 from bench.uncertainty import interval
 from bench.units import RPM
+from procedures.amb_rotor.channels import AXES
 from procedures.run_up.procedure import evaluated
 from procedures.synchronous.dwelling import CODES, SETTINGS
-from procedures.synchronous.dwells import AXES
 from sim_backend import amb_passage, amb_unbalance
 from sim_backend.truth import draw
 

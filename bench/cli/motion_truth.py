@@ -76,8 +76,8 @@ def _step(done: Simulated) -> Found:
 
 
 def _tracking(done: Simulated) -> Found:
-    from procedures.amb_rotor.steps import read_orbits
     from procedures.tracking.procedure import CODES
+    from procedures.tracking.steps import read_orbits
     from sim_backend import amb_track
 
     plan: Any = done.recording.plan
@@ -93,7 +93,7 @@ def _tracking(done: Simulated) -> Found:
 
 
 def _vectors(shaft: Iterable[complex], where: str) -> Found:
-    from procedures.synchronous.dwells import AXES
+    from procedures.amb_rotor.channels import AXES
 
     for axis, vector in zip(AXES, shaft, strict=True):
         yield "vector_cos", f"{axis}, {where}", float(vector.real)
@@ -101,7 +101,7 @@ def _vectors(shaft: Iterable[complex], where: str) -> Found:
 
 
 def _distances(d_max: Iterable[float], clearance: float, where: str) -> Found:
-    from procedures.synchronous.dwells import PLANES
+    from procedures.amb_rotor.channels import PLANES
 
     for plane, far in zip(PLANES, d_max, strict=True):
         yield "d_max", f"{plane}, {where}", far
@@ -137,9 +137,9 @@ def _balance(done: Simulated) -> Found:
 
 def _passage(done: Simulated) -> Found:
     """Vectors, orbits and D_max where the speed stands; what is critical at the speeds where the run found it."""
+    from procedures.amb_rotor.channels import AXES, PLANES
     from procedures.run_up.procedure import evaluated
     from procedures.synchronous.dwelling import CODES, SETTINGS
-    from procedures.synchronous.dwells import AXES, PLANES
     from sim_backend import amb_passage, amb_unbalance
 
     plan: Any = done.recording.plan

@@ -11,8 +11,10 @@ from bench.rig import Rig
 from bench.roles import RigState
 from bench.states import transition
 from procedures.amb_rotor import rings
-from procedures.amb_rotor.steps import LIFT, LIFT_LOST, NO_SPEED, POSITIONS, PROBE, REST
+from procedures.amb_rotor.channels import POSITIONS
 
+REST, LIFT, PROBE = "rest", "lift", "probe"
+LIFT_LOST, NO_SPEED = "lift-lost", "no-speed"
 NUDGES = (("ref_y", 10e-6), ("ref_theta", 100e-6))
 STEPS = 2 + 2 * len(NUDGES)  # that `probed` records
 

@@ -11,8 +11,9 @@ import numpy as np
 from bench.findings import Effect, Finding
 from bench.recording import Recording
 from procedures.amb_rotor import rings
+from procedures.amb_rotor.channels import POSITIONS, RANGE
 from procedures.amb_rotor.geometry import centre, nominal
-from procedures.amb_rotor.steps import LIFT, LIFT_LOST, NO_SPEED, POSITIONS, PROBE, RANGE, REST
+from procedures.amb_rotor.lift import LIFT, LIFT_LOST, NO_SPEED, PROBE, REST
 
 OWN, OTHER = 0.5, 0.3  # shares of a nudge
 UNEVEN = 0.6  # of the rise

@@ -20,6 +20,7 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from bench.units import RPM
 from procedures.amb_rotor import wiring
+from procedures.amb_rotor.channels import AXES, CURRENTS, POSITIONS
 from procedures.balance import decision, estimates
 from procedures.balance.estimates import Balanced, Forces
 from procedures.balance.hum import of_balance
@@ -36,7 +37,7 @@ from procedures.balance.steps import (
     read_runs,
 )
 from procedures.synchronous import bearings, fitting
-from procedures.synchronous.dwells import AXES, CURRENTS, POSITIONS, SLOW, TOLD, Dwell
+from procedures.synchronous.dwells import SLOW, TOLD, Dwell
 from procedures.synchronous.hum import heard
 from procedures.unbalance import checks as unbalance_checks
 

@@ -16,13 +16,13 @@ from bench.calibration import Calibration
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate, welch_satterthwaite
 from bench.uncertainty.estimate import merged
+from procedures.amb_rotor.channels import AXES
 from procedures.balance import scatter as balance_scatter
 from procedures.balance.solution import Solved, Trials, solved, taken
 from procedures.balance.steps import SIDES, Read, Run, Weight
 from procedures.balance.vector_length import amount
 from procedures.shared.certificates import certified
 from procedures.synchronous import bearings, runout
-from procedures.synchronous.dwells import AXES
 from procedures.synchronous.runout import Stand, Turning
 from procedures.unbalance import estimates
 

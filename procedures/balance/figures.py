@@ -12,10 +12,10 @@ from bench.analysis.sampling import lag_deg
 from bench.analysis.vectors import region
 from bench.figures import Figure, Series, Sheet, Shown
 from bench.units import RPM
+from procedures.amb_rotor.channels import AXES
 from procedures.balance.checks import Evaluated
 from procedures.balance.estimates import Balanced
 from procedures.balance.steps import BASE, SIDES
-from procedures.synchronous.dwells import AXES
 
 Complex = npt.NDArray[np.complex128]
 UM = 1e6

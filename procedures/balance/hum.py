@@ -10,10 +10,11 @@ import numpy as np
 from bench.findings import Effect, Finding
 from bench.uncertainty import Estimate, interval
 from bench.units import RPM
+from procedures.amb_rotor.channels import AXES
 from procedures.balance.estimates import Balanced
 from procedures.balance.steps import BASE, SIDES, Recorded
 from procedures.synchronous import hum
-from procedures.synchronous.dwells import AXES, Complex, Dwell
+from procedures.synchronous.dwells import Complex, Dwell
 
 TWO_RUNS = math.sqrt(2)  # an influence coefficient is a difference of two, in which the line has any phase
 Influences = Mapping[tuple[str, str], tuple[Estimate, Estimate]]

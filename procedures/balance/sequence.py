@@ -11,6 +11,7 @@ from bench.rig import Rig
 from bench.roles import Plane, RigState
 from bench.states import transition
 from procedures.amb_rotor import lift
+from procedures.amb_rotor.channels import CONTACT
 from procedures.balance import decision, estimates
 from procedures.balance.steps import (
     BASE,
@@ -28,7 +29,7 @@ from procedures.balance.steps import (
 )
 from procedures.synchronous import bearings as unbalance_bearings
 from procedures.synchronous import dwelling
-from procedures.synchronous.dwells import CONTACT, DWELL, SLOW
+from procedures.synchronous.dwells import DWELL, SLOW
 
 if TYPE_CHECKING:
     from procedures.balance.procedure import Plan

@@ -16,7 +16,8 @@ from bench.analysis.tachometer import Tachometer, counted, tachometer
 from bench.analysis.vectors import Vectors
 from bench.capture import CaptureData
 from bench.recording import Recording
-from procedures.synchronous.dwells import CURRENTS, POSITIONS, SLOW, Dwell, read_dwells
+from procedures.amb_rotor.channels import CURRENTS, POSITIONS
+from procedures.synchronous.dwells import SLOW, Dwell, read_dwells
 from procedures.synchronous.nonsynchronous import folds
 from procedures.synchronous.runout import Turning
 

@@ -9,8 +9,8 @@ import numpy as np
 from bench.figures import Figure, Series
 from bench.uncertainty import Estimate, coverage_factor
 from bench.units import RPM
+from procedures.amb_rotor.channels import AXES
 from procedures.compensation.switching import WITHIN_S, Switched
-from procedures.synchronous.dwells import AXES
 from procedures.unbalance.estimates import Result
 
 MOST_POINTS = 4000

@@ -19,8 +19,8 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from bench.uncertainty.estimate import merged
+from procedures.amb_rotor.channels import AXES, POSITIONS
 from procedures.shared.certificates import certified
-from procedures.synchronous.dwells import AXES, POSITIONS
 
 Array = npt.NDArray[np.float64]
 SWITCH = "switch"

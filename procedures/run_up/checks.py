@@ -15,12 +15,12 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.uncertainty import interval
 from bench.units import RPM
+from procedures.amb_rotor.channels import AXES, CONTACT, CURRENT_LIMIT, PLANES, RANGE, VOLTAGE_LIMIT
 from procedures.run_up.estimates import DAMPED, Peak, Run, asked_margin
 from procedures.run_up.hum import of_peaks
 from procedures.run_up.steps import LEAST_TURNS, MISSED, PASSAGE, Passage
 from procedures.shared import signals
 from procedures.synchronous import fitting
-from procedures.synchronous.dwells import AXES, CONTACT, CURRENT_LIMIT, PLANES, RANGE, VOLTAGE_LIMIT
 from procedures.synchronous.hum import heard
 from procedures.unbalance import checks
 from procedures.unbalance.checks import HELD

@@ -19,11 +19,12 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.estimate import merged
+from procedures.amb_rotor.channels import AXES
 from procedures.run_up import linear_model
 from procedures.run_up.line import DRAWS, Line
 from procedures.run_up.steps import Curve, Passage, curve, near
 from procedures.synchronous import bearings
-from procedures.synchronous.dwells import AXES, Dwell
+from procedures.synchronous.dwells import Dwell
 from procedures.synchronous.runout import Stand
 from procedures.unbalance import estimates as unbalance_estimates
 from procedures.unbalance.estimates import Result, Results, Runout

@@ -15,9 +15,9 @@ from bench.figures import Figure, Series, Sheet, Shown
 from bench.rigfile import RigFile
 from bench.uncertainty import interval, stated
 from bench.units import RPM
+from procedures.amb_rotor.channels import AXES, PLANES
 from procedures.run_up.estimates import Run, asked_margin
 from procedures.run_up.steps import Passage
-from procedures.synchronous.dwells import AXES, PLANES
 from procedures.unbalance import figures
 
 HIGHEST_HZ = 480.0

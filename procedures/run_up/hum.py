@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 
 from bench.findings import Effect, Finding
 from bench.uncertainty import interval
+from procedures.amb_rotor.channels import AXES
 from procedures.run_up.estimates import Peak
-from procedures.synchronous.dwells import AXES
 from procedures.synchronous.hum import Heard, told
 
 

@@ -23,8 +23,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from procedures.amb_rotor.channels import AXES
 from procedures.run_up.steps import Curve
-from procedures.synchronous.dwells import AXES
 from procedures.synchronous.runout import SCALE, Stand, arms, impedance
 
 Array = npt.NDArray[np.float64]

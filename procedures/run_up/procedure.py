@@ -23,7 +23,7 @@ from bench.rigfile import RigFile
 from bench.roles import RigState
 from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
-from procedures.amb_rotor.steps import NO_SPEED
+from procedures.amb_rotor.lift import NO_SPEED
 from procedures.run_up import checks, estimates
 from procedures.run_up import figures as drawn
 from procedures.run_up.estimates import Run

@@ -17,8 +17,9 @@ from bench.analysis.tachometer import Tachometer, age, counted, tachometer
 from bench.analysis.vectors import parts
 from bench.errors import AnalysisError
 from bench.recording import Recording
+from procedures.amb_rotor.channels import CURRENTS, POSITIONS
 from procedures.shared.signals import clips
-from procedures.synchronous.dwells import CURRENTS, POSITIONS, TOLD, Dwell, full_rate
+from procedures.synchronous.dwells import TOLD, Dwell, full_rate
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

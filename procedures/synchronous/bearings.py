@@ -14,8 +14,8 @@ from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.estimate import merged
+from procedures.amb_rotor.channels import AXES, COILS
 from procedures.shared.certificates import certified
-from procedures.synchronous.dwells import AXES, COILS
 from procedures.synchronous.runout import arms
 
 BEARING_MODEL = "bearing-model"

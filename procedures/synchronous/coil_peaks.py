@@ -17,8 +17,9 @@ import numpy.typing as npt
 from bench.findings import Finding
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
+from procedures.amb_rotor.channels import COILS, CURRENTS, PLANES, VOLTAGES
 from procedures.shared.certificates import certified
-from procedures.synchronous.dwells import COILS, CURRENTS, PLANES, VOLTAGES, Dwell, Full
+from procedures.synchronous.dwells import Dwell, Full
 
 Array = npt.NDArray[np.float64]
 SHARE = 0.01  # of the time

@@ -18,19 +18,14 @@ from bench.analysis.vectors import Vectors
 from bench.errors import AnalysisError
 from bench.recording import Captured, Recording, Step
 from bench.units import RPM
+from procedures.amb_rotor.channels import CURRENTS, POSITIONS, VOLTAGES
 from procedures.shared.signals import clips
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 DWELL, SLOW, AGAIN = "dwell", "slow-roll", "again"
-AXES = ("yi", "zi", "yo", "zo")
-PLANES = {"inboard": (0, 1), "outboard": (2, 3)}
-POSITIONS = tuple(f"pos_{a}" for a in AXES)
-COILS = tuple(f"{a}_{side}" for a in AXES for side in "pn")
-CURRENTS, VOLTAGES = tuple(f"i_{c}" for c in COILS), tuple(f"u_{c}" for c in COILS)
 TOLD = (*POSITIONS, *CURRENTS, "angle", "speed", "pulses", "flags")
 RECORDED = (*POSITIONS, *CURRENTS, *VOLTAGES, "pulses", "pulse_age")
-CURRENT_LIMIT, VOLTAGE_LIMIT, CONTACT, RANGE = 1, 2, 4 | 8 | 32, 64  # bits of the telemetry signal `flags`
 ORDERS = (1.0, 2.0, 3.0)
 
 

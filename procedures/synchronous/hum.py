@@ -20,8 +20,9 @@ import numpy as np
 
 from bench.analysis.tachometer import Tachometer
 from bench.recording import Recording
-from procedures.amb_rotor.steps import PROBE
-from procedures.synchronous.dwells import AXES, POSITIONS, SLOW, Array, Complex, Dwell
+from procedures.amb_rotor.channels import AXES, POSITIONS
+from procedures.amb_rotor.lift import PROBE
+from procedures.synchronous.dwells import SLOW, Array, Complex, Dwell
 
 FINER = 8  # points of the spectrum within a line of the slow roll, at least
 CLEAR = 7.0  # standard deviations of a component of the noise: exp(-7^2/2) for each of some thousand points, 1e-7 a run

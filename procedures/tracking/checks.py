@@ -11,12 +11,13 @@ import numpy as np
 from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
 from bench.uncertainty import Estimate
+from procedures.amb_rotor.channels import CURRENT_LIMIT, POSITIONS, RANGE, VOLTAGE_LIMIT
 from procedures.amb_rotor.geometry import centre, nominal
-from procedures.amb_rotor.steps import CONTACT, CURRENT_LIMIT, LOWER, POSITIONS, RANGE, UPPER, VOLTAGE_LIMIT, Orbit
 from procedures.shared import signals
 from procedures.shared.sines import known_frequency, unknown_frequency
 from procedures.tracking.drift import Drift, drift
 from procedures.tracking.estimates import TIMING_TICKS
+from procedures.tracking.steps import CONTACT, LOWER, UPPER, Orbit
 
 FATAL = (
     "stuck-channel",

@@ -17,8 +17,9 @@ import numpy.typing as npt
 from scipy.special import stdtrit
 
 from bench.errors import AnalysisError
-from procedures.amb_rotor.geometry import Facts, Path, followed
+from procedures.amb_rotor.geometry import Facts
 from procedures.shared.leastsquares import linear
+from procedures.tracking.ellipse import Path, followed
 
 Array = npt.NDArray[np.float64]
 FALSE_ALARM = 1e-4  # of a sound orbit, two-sided

@@ -12,9 +12,11 @@ from bench.rigfile import RigFile
 from bench.toleranced import Toleranced
 from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.series import batch_means
-from procedures.amb_rotor.geometry import Facts, Turns, nominal, quantities, revolutions, turns
-from procedures.amb_rotor.steps import AXES, LOWER, UPPER, Orbit
+from procedures.amb_rotor.channels import AXES
+from procedures.amb_rotor.geometry import Facts, nominal
 from procedures.shared.certificates import certified
+from procedures.tracking.ellipse import Turns, quantities, revolutions, turns
+from procedures.tracking.steps import LOWER, UPPER, Orbit
 
 TIMING_TICKS = 0.5  # half width: how the reference's zero of phase stands to the answer of the currents
 UNITS = {"error": "m", "amplitude": "1", "phase": "rad", "tilt": "rad", "ring": "m"}

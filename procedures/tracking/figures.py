@@ -7,8 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from bench.figures import Figure, Series
-from procedures.amb_rotor.geometry import Facts, centre, errors, revolutions
-from procedures.amb_rotor.steps import AXES, Orbit
+from procedures.amb_rotor.channels import AXES
+from procedures.amb_rotor.geometry import Facts, centre
+from procedures.tracking.ellipse import errors, revolutions
+from procedures.tracking.steps import Orbit
 
 
 def all_figures(orbits: Sequence[Orbit], facts: Mapping[str, Facts]) -> list[Figure]:

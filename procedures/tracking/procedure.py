@@ -23,10 +23,11 @@ from bench.rigfile import RigFile
 from bench.roles import RigState
 from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
+from procedures.amb_rotor.channels import POSITIONS
 from procedures.amb_rotor.geometry import nominal
-from procedures.amb_rotor.steps import CHANNELS, GROWN, ORBIT, POSITIONS, START, STARTED, read_orbits
 from procedures.tracking import checks, estimates
 from procedures.tracking import figures as drawn
+from procedures.tracking.steps import CHANNELS, GROWN, ORBIT, START, STARTED, read_orbits
 
 Law = Literal["PID", "CCS", "CAC"]
 CODES: dict[Law, float] = {"PID": 0.0, "CCS": 1.0, "CAC": 2.0}

@@ -14,19 +14,9 @@ from bench.analysis.vectors import radius2
 from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.units import RPM
+from procedures.amb_rotor.channels import AXES, CONTACT, CURRENT_LIMIT, PLANES, RANGE, VOLTAGE_LIMIT
 from procedures.shared import signals
-from procedures.synchronous.dwells import (
-    AXES,
-    CONTACT,
-    CURRENT_LIMIT,
-    DWELL,
-    PLANES,
-    RANGE,
-    SLOW,
-    VOLTAGE_LIMIT,
-    Array,
-    Dwell,
-)
+from procedures.synchronous.dwells import DWELL, SLOW, Array, Dwell
 from procedures.synchronous.fitting import PER_TURN, Settings, too_fast
 from procedures.unbalance.estimates import Results
 

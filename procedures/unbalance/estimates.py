@@ -15,10 +15,11 @@ from bench.calibration import Calibration
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate, welch_satterthwaite
 from bench.uncertainty.estimate import merged
+from procedures.amb_rotor.channels import AXES, PLANES
 from procedures.shared.certificates import certified
 from procedures.synchronous import coil_peaks, runout
 from procedures.synchronous.bearings import Settings, stated
-from procedures.synchronous.dwells import AXES, ORDERS, PLANES, SLOW, Dwell
+from procedures.synchronous.dwells import ORDERS, SLOW, Dwell
 from procedures.synchronous.nonsynchronous import beside_orders, folds
 from procedures.synchronous.runout import Stand, Turning
 from procedures.unbalance.d_max import farthest

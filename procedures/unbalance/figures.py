@@ -12,7 +12,7 @@ from bench.figures import Figure, Series, Sheet, Shown
 from bench.rigfile import RigFile
 from bench.uncertainty import coverage_factor, interval
 from bench.units import RPM
-from procedures.synchronous.dwells import AXES, PLANES
+from procedures.amb_rotor.channels import AXES, PLANES
 from procedures.unbalance.checks import ZONES
 from procedures.unbalance.estimates import Result, Results
 

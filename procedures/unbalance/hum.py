@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from bench.findings import Effect, Finding
 from bench.uncertainty import interval
-from procedures.synchronous.dwells import AXES
+from procedures.amb_rotor.channels import AXES
 from procedures.synchronous.hum import REACH, Heard, duration, leak, told
 from procedures.unbalance.checks import its_own
 from procedures.unbalance.estimates import Result

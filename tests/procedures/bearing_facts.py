@@ -7,8 +7,8 @@ import numpy as np
 from bench.calibration import Calibration
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
+from procedures.amb_rotor.channels import AXES
 from procedures.synchronous import runout
-from procedures.synchronous.dwells import AXES
 from sim_backend.core.amb_params import AmbParams
 
 

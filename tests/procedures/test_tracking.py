@@ -22,11 +22,12 @@ from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate
-from procedures.amb_rotor import geometry as estimator
-from procedures.amb_rotor.geometry import Facts, Wave
-from procedures.amb_rotor.geometry import Path as Orbit
+from procedures.amb_rotor.geometry import Facts
 from procedures.synchronous import bearings
 from procedures.tracking import drift, estimates
+from procedures.tracking import ellipse as estimator
+from procedures.tracking.ellipse import Path as Orbit
+from procedures.tracking.ellipse import Wave
 from procedures.tracking.procedure import CODES, MEASURES, OBSERVED, Plan, check, figures, procedure, step_count
 from procedures.unbalance import procedure as unbalance
 from reports.figures import draw as draw_figure

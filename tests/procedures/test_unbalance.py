@@ -25,12 +25,13 @@ from bench.records import measurement
 from bench.rigfile import load_rig
 from bench.specs import applied, load_spec
 from bench.uncertainty import Estimate, Influence, interval
+from procedures.amb_rotor.channels import AXES
 from procedures.compensation import procedure as compensation
 from procedures.synchronous import bearings as unbalance_bearings
 from procedures.synchronous import runout
 from procedures.synchronous.coil_peaks import blocks, uncertified
 from procedures.synchronous.dwelling import CODES, POLES, SETTINGS
-from procedures.synchronous.dwells import AXES, SLOW, read_dwells
+from procedures.synchronous.dwells import SLOW, read_dwells
 from procedures.unbalance import checks, estimates
 from procedures.unbalance import d_max as unbalance_d_max
 from procedures.unbalance import procedure as unbalance

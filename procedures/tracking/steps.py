@@ -11,17 +11,17 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
-from procedures.amb_rotor.geometry import Facts, Path, Wave, distances
+from procedures.amb_rotor.channels import AXES, POSITIONS
+from procedures.amb_rotor.geometry import Facts, distances
 from procedures.amb_rotor.onset import onset
+from procedures.tracking.ellipse import Path, Wave
 
 Array = npt.NDArray[np.float64]
-REST, LIFT, PROBE, START, GROWN, ORBIT = "rest", "lift", "probe", "start", "grown", "orbit"
-STARTED, LIFT_LOST, NO_SPEED = "reference-started", "lift-lost", "no-speed"
-AXES = ("yi", "zi", "yo", "zo")
-POSITIONS = tuple(f"pos_{axis}" for axis in AXES)
+START, GROWN, ORBIT = "start", "grown", "orbit"
+STARTED = "reference-started"
 UPPER, LOWER = (tuple(f"i_{axis}_{side}" for axis in AXES) for side in "pn")
 CHANNELS = (*POSITIONS, *UPPER, *LOWER, "speed", "flags")
-CURRENT_LIMIT, VOLTAGE_LIMIT, CONTACT, RANGE = 1, 2, 12, 64  # bits of the telemetry signal `flags`
+CONTACT = 12  # bits of the telemetry signal `flags`
 
 
 @dataclass(frozen=True)
