@@ -6,7 +6,7 @@ indexes, little endian, without gaps.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
@@ -14,10 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from bench import units
-from bench.binding import Found, multiplexed
 from bench.errors import BenchError
-from bench.messages import MessageMap
 from bench.part import Part
 
 MESSAGES: Final = (
@@ -151,19 +148,3 @@ class Layout:
         rows = np.frombuffer(buffer, self.sample)
         with np.errstate(invalid="ignore"):  # a controller may send any pattern of a NaN; a signalling one is a NaN too
             return {name: rows[name].astype(np.float64) * c.scale for name, c in self.channels.items()}
-
-
-def problems_of(spec: CaptureSpec, messages: MessageMap) -> Iterator[Found]:
-    """Key, found and expected of what is wrong with the table `capture`."""
-    if missing := [name for name in MESSAGES if name not in messages.messages]:
-        yield "capture", f"no message {', '.join(missing)} in the DBC", "the messages of docs/reference/captures.md"
-    yield from multiplexed((("capture", name) for name in MESSAGES), messages)
-    taken: dict[int, str] = {}
-    for name, c in spec.channels.items():
-        key = f"capture.channels.{name}"
-        unit = units.UNITS.get(c.unit)
-        if unit is None or (unit.factor, unit.offset) != (1.0, 0.0):
-            yield f"{key}.unit", repr(c.unit), "an SI unit: `scale` leads there"
-        if c.index in taken:
-            yield f"{key}.index", str(c.index), f"an index of its own ({taken[c.index]})"
-        taken.setdefault(c.index, name)

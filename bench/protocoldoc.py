@@ -18,7 +18,8 @@ from pathlib import Path
 from bench import capture
 from bench.errors import ConfigError
 from bench.messages import Message, MessageMap, Signal
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import RigFile
+from bench.rigload import load_rig
 
 RIG = "rigs/tsbs12.toml"
 CODES = (("state", "CommandReply"), ("fault", "Telemetry"), ("code", "Command"), ("status", "CommandReply"))

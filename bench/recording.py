@@ -26,7 +26,8 @@ from bench.mcapchunk import sound
 from bench.mcapfile import McapFile, index
 from bench.plan import BenchPlan
 from bench.readlimits import MB
-from bench.rigfile import MOST_DBC, MOST_TOML, RigFile
+from bench.rigfile import RigFile
+from bench.rigtext import MOST_DBC, MOST_TOML
 from bench.samples import StreamLayout
 from bench.steps import Step, Steps
 

@@ -6,13 +6,17 @@ import contextlib
 import difflib
 from collections.abc import Iterator
 
-from bench import binding, busload, capture, linkurl, units
+from bench import busload, linkurl, units
 from bench.busload import BusLoad, bus_load
+from bench.check_binding import find, fits, signal_at
+from bench.check_binding import problems_of as problems_of_binding
+from bench.check_capture import problems_of as problems_of_capture
 from bench.errors import ConfigError, Problem
 from bench.messages import MessageMap
-from bench.rigfile import RigFile, RigText, read_rig
+from bench.rigfile import RigFile
 from bench.rigpossible import impossible
 from bench.rigrest import rest_of
+from bench.rigtext import RigText, read_rig
 from bench.units import Unit
 
 GEOMETRY = {
@@ -256,8 +260,8 @@ def _bindings(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
         elif channel.unit in units.UNITS and units.UNITS[dbc_unit].si != units.UNITS[channel.unit].si:
             yield Problem(rig.path, f"channels.{name}.unit", channel.unit, f"the kind of {dbc_unit} ({channel.signal})")
     yield from _signals_of_parameters(rig, messages)
-    captures = capture.problems_of(rig.capture, messages) if rig.capture is not None else ()
-    for key, found, expected in (*binding.problems_of(rig, messages), *captures):
+    captures = problems_of_capture(rig.capture, messages) if rig.capture is not None else ()
+    for key, found, expected in (*problems_of_binding(rig, messages), *captures):
         yield Problem(rig.path, key, found, expected)
 
 
@@ -268,10 +272,10 @@ def _signals_of_parameters(rig: RigFile, messages: MessageMap) -> Iterator[Probl
         if not p.signal:
             continue
         key = f"parameters.{name}.signal"
-        if wrong := binding.find(messages, p.signal):
+        if wrong := find(messages, p.signal):
             yield Problem(rig.path, key, wrong, f"a signal of {rig.link.dbc}")
             continue
-        signal = binding.signal_at(messages, p.signal)
+        signal = signal_at(messages, p.signal)
         assert signal is not None
         if p.signal in taken:
             yield Problem(rig.path, key, p.signal, f"a signal of its own ({taken[p.signal]})")
@@ -281,7 +285,7 @@ def _signals_of_parameters(rig: RigFile, messages: MessageMap) -> Iterator[Probl
             yield Problem(rig.link.dbc, p.signal, f"unit {signal.unit!r}", units.KNOWN)
         elif p.unit in units.UNITS and unit.si != units.UNITS[p.unit].si:
             yield Problem(rig.path, f"parameters.{name}.unit", p.unit, f"the kind of {signal.unit} ({p.signal})")
-        elif not all(binding.fits(signal, (x - unit.offset) / unit.factor) for x in (p.low, p.high, p.default)):
+        elif not all(fits(signal, (x - unit.offset) / unit.factor) for x in (p.low, p.high, p.default)):
             yield Problem(
                 rig.path, f"parameters.{name}", f"{p.low:g} to {p.high:g} {p.unit}", f"a range that {p.signal} can hold"
             )

@@ -6,31 +6,22 @@ The `[simulation]` table is parsed like the rest and read by the simulated backe
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from functools import cached_property, lru_cache
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
-from bench import catalogue, units
+from bench import units
 from bench.binding import Binding
 from bench.capture import CaptureSpec
 from bench.errors import ConfigError, Problem
-from bench.inputfile import TomlError, decoded, parse_toml, read_regular
 from bench.messages import MessageMap, load_messages
 from bench.part import Part
 from bench.registers import Register
+from bench.rigtext import migrated, parse_text
 from bench.schema import expected_of
 from bench.toleranced import UNKNOWN_UNIT, Toleranced, simulated
-
-SCHEMA = 1
-MOST_TOML = 1 << 20
-MOST_DBC = 16_000_000
-"""Bytes of a rig file, and of its DBC wherever it lies."""
-MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
-"""From an older schema to the next one."""
 
 
 class Uut(Part):
@@ -218,37 +209,12 @@ class RigFile(Part):
 @lru_cache(maxsize=8)
 def _parsed(toml_text: str, dbc_text: str, path: str) -> RigFile:
     """A rig file is frozen, and a chain of virtual runs reads the same one a dozen times."""
-    data = migrated(_toml(toml_text, path), path)
+    data = migrated(parse_text(toml_text, path), path)
     try:
         return RigFile.model_validate({**data, "toml_text": toml_text, "dbc_text": dbc_text, "path": path})
     except ValidationError as error:
         problems = tuple(_problem(e, path) for e in error.errors(include_url=False))
         raise ConfigError(f"rig file {path} cannot be used:", problems) from error
-
-
-def _toml(text: str, path: str) -> dict[str, Any]:
-    try:
-        return parse_toml(text)
-    except TomlError as error:
-        raise ConfigError(f"rig file {path}: {error}") from error
-
-
-def migrated(data: dict[str, Any], path: str) -> dict[str, Any]:
-    """The data in today's schema.
-
-    Raises:
-        ConfigError: no schema, a newer one, or one that no migration reaches.
-    """
-    schema = data.get("schema")
-    if not isinstance(schema, int) or schema > SCHEMA:
-        newer = "; it was written for a newer Levbench" if isinstance(schema, int) else ""
-        raise ConfigError(f"rig file {path}: schema: found {schema!r}; expected {SCHEMA}{newer}")
-    while schema < SCHEMA:
-        if schema not in MIGRATIONS:
-            raise ConfigError(f"rig file {path}: schema: found {schema}; no way from there to {SCHEMA}")
-        data = {**MIGRATIONS[schema](data), "schema": schema + 1}
-        schema += 1
-    return data
 
 
 def _problem(error: Any, path: str) -> Problem:
@@ -259,80 +225,3 @@ def _problem(error: Any, path: str) -> Problem:
     if error["type"] != "missing" and isinstance(error.get("input"), dict):
         found = "a table with " + ", ".join(error["input"])
     return Problem(path, key, found, expected_of(error))
-
-
-@dataclass(frozen=True)
-class RigText:
-    """A rig file's two texts and where it lies."""
-
-    path: Path
-    toml: str
-    dbc: str
-
-
-def read_rig(rig: str) -> RigText:
-    """The texts of a rig: a path, else a name in `./rigs`, else in the installed `rigs/`.
-
-    Raises:
-        ConfigError: unknown rig, unreadable file, or a DBC that is not there.
-    """
-    path = catalogue.rig_path(rig)
-    try:
-        text = decoded(read_regular(path, MOST_TOML), "utf-8")
-    except OSError as error:
-        raise ConfigError(f"rig file {path}: cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise ConfigError(f"rig file {path}: byte {error.start} is not UTF-8; expected TOML, which is UTF-8") from error
-    data = _toml(text, str(path))
-    links = _table(data, "links")
-    used = str(_table(_table(data, "devices"), "controller").get("link", ""))
-    mapped = [n for n in (used, *links) if _table(links, n).get("dbc")]  # another's, if the controller's has none
-    if not mapped:
-        raise ConfigError(f'rig file {path}: links: found no dbc; expected [links.NAME] with dbc = "FILE.dbc"')
-    return RigText(path, text, _dbc_text(path, f"links.{mapped[0]}", links[mapped[0]]))
-
-
-def _dbc_text(path: Path, key: str, link: Mapping[str, Any]) -> str:
-    """The DBC of a link; what is wrong with it is told without a word of it: it may be any file."""
-    dbc, encoding = str(link["dbc"]), str(link.get("encoding", "utf-8"))
-    try:
-        return decoded(read_regular(path.parent / dbc, MOST_DBC), encoding)
-    except OSError as error:
-        why = error.strerror or error
-        raise ConfigError(f"rig file {path}: {key}.dbc: cannot read {path.parent / dbc}: {why}") from error
-    except LookupError as error:
-        raise ConfigError(
-            f"rig file {path}: {key}.encoding: found {encoding!r}; expected a known one, such as cp1252"
-        ) from error
-    except ValueError as error:
-        at = f"byte {error.start} of " if isinstance(error, UnicodeDecodeError) else ""
-        raise ConfigError(
-            f"rig file {path}: {key}.encoding: found {encoding!r}, which {at}{dbc} is not; expected that of the file, such as "
-            'encoding = "cp1252"'
-        ) from error
-
-
-def _table(data: Mapping[str, Any], key: str) -> Mapping[str, Any]:
-    found = data.get(key)
-    return found if isinstance(found, dict) else {}
-
-
-def load_rig(rig: str) -> RigFile:
-    """A rig, checked in full (see `bench.rigcheck`).
-
-    Raises:
-        ConfigError: with every problem that was found.
-    """
-    text = read_rig(rig)
-    return _checked(text.toml, text.dbc, str(text.path))
-
-
-@lru_cache(maxsize=8)
-def _checked(toml_text: str, dbc_text: str, path: str) -> RigFile:
-    from bench.rigcheck import problems_of
-
-    loaded = RigFile.parse(toml_text, dbc_text, path)
-    problems = problems_of(loaded)
-    if problems:
-        raise ConfigError(f"rig file {path} cannot be used:", tuple(problems))
-    return loaded

@@ -11,7 +11,8 @@ from pydantic import ValidationError
 
 from bench.errors import Problem
 from bench.inputfile import parse_toml
-from bench.rigfile import RigFile, RigText, migrated
+from bench.rigfile import RigFile
+from bench.rigtext import RigText, migrated
 
 _SURE = {"half_width": 0, "distribution": "rectangular", "source": "stands in"}
 STAND_INS: Mapping[str, Any] = {

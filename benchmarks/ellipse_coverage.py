@@ -25,7 +25,7 @@ from bench.cli.virtual import Simulated, simulated_run
 from bench.findings import Effect, Finding
 from bench.plans import assemble
 from bench.procedure import Measured
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.uncertainty import Estimate, correlation, welch_satterthwaite
 
 RIG = "amb5dof"

@@ -32,7 +32,7 @@ from bench.errors import BenchError
 from bench.findings import Effect, Finding
 from bench.plans import assemble
 from bench.procedure import Measured
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.uncertainty import interval
 
 SURE = 0.95  # of the seeds

@@ -30,7 +30,7 @@ from bench.limits import Verdict
 from bench.outcomes import outcome_of
 from bench.procedure import Measured
 from bench.records import Measurement, measurement, missing
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.specs import applied, load_spec
 from benchmarks.cases import RIGS, TRUTH, Case, cases_of, load, needed
 

@@ -19,7 +19,7 @@ from bench.calibration import Calibration
 from bench.cli.virtual import simulated_run
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.uncertainty import interval, round_to_uncertainty
 from sim_backend.truth import nominal
 

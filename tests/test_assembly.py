@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from bench.assembly import KEPT, Assembler, Joiner, Rows, _Sample
 from bench.codec import encode
 from bench.frames import FrameBatch, empty_batch, frame
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.telemetry import TelemetryDecoder
 
 PLAIN = load_rig(str(Path(__file__).resolve().parent.parent / "examples" / "own-controller" / "plainamb.toml"))

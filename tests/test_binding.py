@@ -10,7 +10,7 @@ import pytest
 from bench import binding
 from bench.errors import ConfigError
 from bench.rigcheck import check_rig
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 
 ROOT = Path(__file__).resolve().parent.parent
 TOML, DBC = ((ROOT / "examples" / "own-controller" / f"plainamb.{x}").read_text() for x in ("toml", "dbc"))

@@ -6,7 +6,7 @@ import pytest
 
 from bench.busload import ON_DEMAND_HZ, bus_load, frame_seconds
 from bench.messages import Message, MessageMap
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 
 
 def message(

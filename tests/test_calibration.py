@@ -28,7 +28,8 @@ from bench.calibrationfile import attached, attachment, from_json, read, to_json
 from bench.calibrationstore import Store, stores_of
 from bench.errors import ConfigError
 from bench.needs import Lookup
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import RigFile
+from bench.rigload import load_rig
 from bench.uncertainty import Estimate, Influence, correlation
 
 GOLDEN = Path(__file__).parent / "calibrations" / "golden.json"

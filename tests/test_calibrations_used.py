@@ -18,7 +18,8 @@ from bench.evaluation import evaluate
 from bench.findings import SIMULATED_CONTROLLER, Finding
 from bench.opened import Job, OpenRig
 from bench.recording import Recording
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import RigFile
+from bench.rigload import load_rig
 from bench.runner import _same_kind
 from bench.uncertainty import Estimate
 

@@ -13,7 +13,7 @@ from bench.cli.campaign_job import _values
 from bench.cli.campaign_steps import planned
 from bench.errors import ConfigError
 from bench.procedure import Measured, Quantity
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.uncertainty import Estimate
 
 TABLES = """

@@ -14,7 +14,8 @@ from bench.capture import Layout
 from bench.codec import Decoder, encode
 from bench.errors import BenchError
 from bench.rigcheck import problems_of
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import RigFile
+from bench.rigload import load_rig
 
 RIG = load_rig("amb5dof")
 assert RIG.capture is not None

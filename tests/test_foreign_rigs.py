@@ -17,7 +17,8 @@ from bench.errors import ConfigError
 from bench.inputfile import DEPTH, TomlError, parse_toml
 from bench.messages import load_messages
 from bench.rigcheck import check_rig
-from bench.rigfile import load_rig, read_rig
+from bench.rigload import load_rig
+from bench.rigtext import read_rig
 from bench.units import KNOWN
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -8,7 +8,7 @@ from bench import capture
 from bench.codec import Decoder, encode
 from bench.frames import frame
 from bench.messages import MessageMap
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 
 TELEMETRY = [
     ("seq", 4660, "34 12"),  # 0x1234, low byte first

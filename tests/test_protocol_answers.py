@@ -14,7 +14,7 @@ import pytest
 from bench.codec import Decoder, encode
 from bench.faults import Fault
 from bench.frames import FD, FrameBatch, empty_batch, frame
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.session import Session
 from drivers import operator_line, slcan_bus
 from drivers.controller import Controller

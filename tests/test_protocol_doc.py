@@ -23,7 +23,7 @@ from bench.codec import Decoder, encode
 from bench.errors import ConfigError
 from bench.frames import FD, empty_batch, frame
 from bench.messages import Message
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.session import Session
 from bench.wire import captureblock, isotp, packet, slcan
 from drivers import controller, dialogue, handshake, slcan_bus, waiting

@@ -17,7 +17,7 @@ from recordings import HEADER, START_NS, STREAM, SetClock, frames_of, gapped, re
 from bench.frames import EXTENDED, FD, SENT, SWITCHED, batch_of, packed
 from bench.recorder import Recorder
 from bench.recording import Recording
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference" / "recording.md"
 FRAME = struct.Struct("<qqIBB64s")

@@ -12,7 +12,8 @@ from bench import rigfile
 from bench.envelope import Envelope
 from bench.errors import ConfigError, InterlockError, Problem
 from bench.rigcheck import check_rig
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import RigFile
+from bench.rigload import load_rig
 from bench.rigpossible import normal_gravity
 from bench.samples import SampleBlock
 

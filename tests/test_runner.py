@@ -31,7 +31,8 @@ from bench.procedure import Procedure
 from bench.progress import PlainProgress
 from bench.recording import Recording
 from bench.records import SCHEMA_FILE, Record
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import RigFile
+from bench.rigload import load_rig
 from bench.runner import RunResult
 from bench.supervisor import Supervisor
 

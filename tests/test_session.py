@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from bench.codec import Decoder, encode
 from bench.frames import frame
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.session import PART_BYTES, PARTS, Session, new_session, who
 
 U32 = st.integers(0, 2**32 - 1)

@@ -11,7 +11,7 @@ from bench.codec import encode
 from bench.envelope import Envelope
 from bench.errors import InterlockError
 from bench.frames import FrameBatch, empty_batch, frame
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.samples import SampleBlock
 from bench.telemetry import TelemetryDecoder
 

@@ -154,7 +154,8 @@ def campaign(
 
     The last line on standard output is the campaign's directory.
     """
-    from bench.cli.campaign import CampaignRequest, campaign_command
+    from bench.cli.campaign import campaign_command
+    from bench.cli.campaign_asked import CampaignRequest
 
     return campaign_command(
         CampaignRequest(

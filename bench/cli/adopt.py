@@ -13,7 +13,7 @@ from bench.calibration import Calibration
 from bench.calibrationstore import Store, named
 from bench.cli.compose import load_procedure
 from bench.outcomes import SOUND
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.uncertainty import interval, stated
 
 

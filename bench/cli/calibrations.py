@@ -15,7 +15,8 @@ from bench.cli.adopt import values
 from bench.cli.compose import load_procedure
 from bench.errors import ConfigError
 from bench.outcomes import SOUND
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import RigFile
+from bench.rigload import load_rig
 
 HEADER = ("machine", "procedure", "bias", "date", "age", "due", "state")
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,50 +11,19 @@ from bench import campaign as campaign_file
 from bench import runlog
 from bench.campaign import Campaign, Virtual
 from bench.campaign_directory import CampaignDirectory, opened
-from bench.cli.campaign_job import Keep, RigTask, StepTask
+from bench.cli.campaign_asked import Asked, CampaignRequest
 from bench.cli.campaign_steps import Planned, planned
+from bench.cli.campaign_tasks import RigTask, StepTask
 from bench.cli.compose import with_links
 from bench.cli.run import STATUS
 from bench.errors import ConfigError
 from bench.limits import Verdict
 from bench.outcomes import Outcome
 from bench.progress import Progress, shown_on
-from bench.rigfile import RigFile, load_rig
+from bench.rigload import load_rig
 
 ABORTED = STATUS[Outcome.ABORTED]
 OF_VERDICT = {Verdict.PASS: 0, Verdict.FAIL: 1, Verdict.INDETERMINATE: 5}
-
-
-@dataclass(frozen=True)
-class CampaignRequest:
-    """A campaign as it was asked for; None leaves what the file says."""
-
-    campaign: str
-    jobs: int | None = None
-    out: Path = Path("runs")
-    rig: str | None = None
-    backend: str | None = None
-    seed: int | None = None
-    count: int | None = None
-    first_seed: int | None = None
-    links: tuple[str, ...] = ()
-    operator: str | None = None
-    report: bool = True
-    keep: Keep | None = None
-    go_on: bool = False
-    new: bool = False
-    short: bool = False
-    scheduler: str = ""
-
-
-@dataclass(frozen=True)
-class Asked:
-    """A campaign that can be run."""
-
-    request: CampaignRequest
-    campaign: Campaign
-    rig: RigFile
-    steps: tuple[Planned, ...]
 
 
 def campaign_command(request: CampaignRequest) -> int:

@@ -22,7 +22,7 @@ from bench.runner import RunResult
 from bench.supervisor import Supervisor
 
 if TYPE_CHECKING:
-    from bench.cli.campaign import Asked
+    from bench.cli.campaign_asked import Asked
 
 
 @dataclass(frozen=True)

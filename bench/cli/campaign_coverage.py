@@ -19,7 +19,7 @@ from bench.cli.campaign_steps import Planned
 from bench.limits import Verdict
 
 if TYPE_CHECKING:
-    from bench.cli.campaign import Asked
+    from bench.cli.campaign_asked import Asked
 
 Entry = Mapping[str, Any]
 Values = list[tuple[int, Mapping[str, Any]]]  # of one quantity: seed, and the value as the journal has it

@@ -15,7 +15,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from bench import __version__, catalogue
-from bench.cli.campaign_job import RigTask, run_rig
+from bench.cli.campaign_job import run_rig
+from bench.cli.campaign_tasks import RigTask
 from bench.errors import ConfigError
 from bench.rigfile import RigFile
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from bench.calibration import Calibration
 from bench.campaign_directory import CampaignDirectory
 from bench.cli.adopt import adopt as adopted_run
-from bench.cli.campaign_job import RigTask, StepTask
+from bench.cli.campaign_tasks import RigTask, StepTask
 from bench.cli.compose import Request
 from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import flown
@@ -19,7 +19,7 @@ from bench.findings import Finding
 from bench.procedure import Measured
 
 if TYPE_CHECKING:
-    from bench.cli.campaign import Asked
+    from bench.cli.campaign_asked import Asked
     from bench.cli.campaign_steps import Planned
 
 

@@ -16,7 +16,8 @@ from typing import Any
 
 from bench import catalogue, signals
 from bench.campaign_directory import CampaignDirectory
-from bench.cli.campaign_job import THREAD_LIMITS, RigTask, run_rig, settle_in
+from bench.cli.campaign_job import THREAD_LIMITS, run_rig, settle_in
+from bench.cli.campaign_tasks import RigTask
 from bench.errors import BenchError
 from bench.progress import Progress
 

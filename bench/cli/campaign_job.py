@@ -16,34 +16,11 @@ import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
+
+from bench.cli.campaign_tasks import RigTask, StepTask
 
 THREAD_LIMITS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-Keep = Literal["all", "missed", "none"]
-
-
-@dataclass(frozen=True)
-class StepTask:
-    """One step: the procedure's name, its whole plan (SI), which quantities are judged, whether it is adopted, and the
-    procedures whose calibrations it needs."""
-
-    procedure: str
-    plan: Mapping[str, Any]
-    judged: tuple[str, ...]
-    adopt: bool
-    needs: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class RigTask:
-    """What every rig of a campaign goes through. `folder` takes recordings while they are needed, and kept ones."""
-
-    rig: str
-    rig_sha256: str
-    steps: tuple[StepTask, ...]
-    truth: Mapping[str, float]
-    keep: Keep
-    folder: str
 
 
 @dataclass
@@ -116,7 +93,7 @@ def run_rig(task: RigTask, seed: int) -> dict[str, Any]:
 
 def _refuse_another_rig(task: RigTask) -> None:
     from bench.errors import ConfigError
-    from bench.rigfile import load_rig
+    from bench.rigload import load_rig
 
     if load_rig(task.rig).digest != task.rig_sha256:
         raise ConfigError(

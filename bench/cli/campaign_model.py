@@ -20,7 +20,7 @@ from bench.toleranced import Toleranced
 from bench.wholefile import write_whole
 
 if TYPE_CHECKING:
-    from bench.cli.campaign import Asked
+    from bench.cli.campaign_asked import Asked
 
 FIGURES = 2  # of each run, its first ones
 

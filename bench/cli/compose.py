@@ -27,7 +27,8 @@ from bench.lock import rig_lock
 from bench.needs import Lookup
 from bench.opened import Connect, Job
 from bench.procedure import BenchPlan, Procedure
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import RigFile
+from bench.rigload import load_rig
 from bench.specs import load_spec, misnamed
 
 

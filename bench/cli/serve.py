@@ -15,7 +15,8 @@ from bench import faults, linkurl, plans
 from bench.cli.compose import with_links
 from bench.clock import WallClock
 from bench.errors import ConfigError
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import RigFile
+from bench.rigload import load_rig
 from bench.signals import delivered_to
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from bench.errors import BenchError, ConfigError
 from bench.plans import assignment, field_of
 from bench.procedure import Procedure
 from bench.records import Measurement
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.runner import RunResult
 
 

@@ -22,7 +22,7 @@ from bench.opened import Job
 from bench.procedure import Measured, Procedure
 from bench.progress import Silent
 from bench.recording import Recording
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.supervisor import Supervisor
 from sim_backend.truth import Truth, draw
 

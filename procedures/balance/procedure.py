@@ -7,13 +7,10 @@ permissible residual unbalance; influence coefficients.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Literal
-
-from pydantic import Field
 
 from bench.figures import Shown
 from bench.findings import Finding
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.roles import RigState
@@ -21,10 +18,10 @@ from bench.units import RPM
 from procedures.amb_rotor import lift
 from procedures.balance import checks, estimates, sequence
 from procedures.balance import figures as drawn
+from procedures.balance.plan import Plan
 from procedures.balance.steps import BASE, SIDES
 from procedures.shared import assumptions
 from procedures.synchronous import dwelling
-from procedures.synchronous.dwelling import Law
 from procedures.unbalance import procedure as unbalance
 
 FOUND_COS = Quantity(
@@ -73,54 +70,6 @@ SINE = Quantity(
     "influence_sin", "m/(kg m)", "as influence_cos: sine component; x = C cos θ + S sin θ", title="influence, sin"
 )
 MEASURES = (FOUND_COS, FOUND_SIN, LEFT_COS, LEFT_SIN, SHARE, PERMITTED, COSINE, SINE)
-
-
-class Plan(BenchPlan):
-    """Settings of a balancing, SI."""
-
-    law: Law = "CCS"
-    speeds_rad_s: tuple[float, ...] = Field((4000 / RPM, 10000 / RPM), min_length=1)  # of every run
-    slow_rad_s: float = Field(300 / RPM, ge=0)  # 0: no slow roll
-    slow_s: float = Field(10.0, ge=1)
-    settle_s: float = Field(1.5, ge=0.2)
-    dwell_s: float = Field(2.0, ge=0.5)
-    capture_s: float = Field(0.4, ge=0.05)
-    repeat: bool = True  # the lowest speed again at the end of each run
-    trial_kg: tuple[float, float] = (1e-4, 1e-4)  # inboard, outboard
-    trial_angle_rad: tuple[float, float] = (0.0, 0.0)  # on the planes' scales
-    leave: bool = False  # trial weights stay on; else each is taken off after its run
-    corrections: int = Field(2, ge=0, le=3)  # at most
-    positions: int = Field(0, ge=0, le=360)  # equally spaced, the first at the scale's zero; 0: any angle
-    grade_m_s: float = Field(2.5e-3, gt=0)  # G2.5
-    service_rad_s: float = Field(15000 / RPM, gt=0)  # the highest, for the permissible residual unbalance
-    max_share: float = Field(0.5, gt=0, le=0.9)  # of the least clearance: where a predicted response may reach
-    refit_u_kg_m: float = Field(0.0, ge=0)  # of the shaft's own unbalance, each time a weight has been fixed
-    bending_hz: float = Field(650.0, ge=0)  # first bending mode of the free shaft; 0: rigid
-    bearings: Literal["adopted", "plan"] = "adopted"  # as in unbalance
-    beta_share: float = Field(0.05, ge=0)
-    offset_u_m: float = Field(10e-6, ge=0)
-    max_lost: float = Field(1e-3, ge=0)
-    max_speed_error: float = Field(0.01, gt=0)
-
-    @property
-    def variants(self) -> tuple[str, ...]:
-        """One setting of the controller."""
-        return (BASE,)
-
-    @property
-    def observed(self) -> bool:
-        """Nothing is compensated."""
-        return False
-
-    @property
-    def orders(self) -> int:
-        """Highest order that the captures must hold."""
-        return 1
-
-    @property
-    def rate_hz(self) -> float:
-        """Of the captures, the controller's own."""
-        return 1e4
 
 
 def settings(plan: Plan) -> dict[str, float]:

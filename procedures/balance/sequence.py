@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from bench.errors import AnalysisError
 from bench.recorder import Recorder
@@ -13,6 +12,7 @@ from bench.states import transition
 from procedures.amb_rotor import lift
 from procedures.amb_rotor.channels import CONTACT
 from procedures.balance import decision, estimates
+from procedures.balance.plan import Plan
 from procedures.balance.steps import (
     BASE,
     CAPTURED,
@@ -30,9 +30,6 @@ from procedures.balance.steps import (
 from procedures.synchronous import bearings as unbalance_bearings
 from procedures.synchronous import dwelling
 from procedures.synchronous.dwells import DWELL, SLOW
-
-if TYPE_CHECKING:
-    from procedures.balance.procedure import Plan
 
 SLOW_HZ = 500.0  # of the slow roll's capture
 

@@ -15,7 +15,7 @@ from bench.adoption import Adoption
 from bench.calibrationfile import digest_of, from_json
 from bench.calibrationstore import Store
 from bench.errors import ConfigError
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from tests.tiny_procedures import procedure
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from bench.capture import Layout
 from bench.codec import Decoder, encode
 from bench.frames import FD, SENT, FrameBatch, frame, payload
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.wire.captureblock import OVERHEAD, ROOM, block_of, piece_of
 from bench.wire.isotp import Reassembler
 from sim_backend.capture_memory import CaptureMemory, Order

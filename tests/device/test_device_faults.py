@@ -9,7 +9,8 @@ from bench import faults
 from bench.codec import Decoder, encode
 from bench.errors import ConfigError, LinkError
 from bench.frames import ERROR, FD, SENT, FrameBatch, empty_batch, frame
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import RigFile
+from bench.rigload import load_rig
 from sim_backend.controller import SimulatedController
 from sim_backend.endpoint import SimulatedRig
 from sim_backend.truth import draw

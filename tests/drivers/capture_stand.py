@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from bench import faults
 from bench.recorder import Recorder, RunHeader
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import RigFile
+from bench.rigload import load_rig
 from bench.session import Session
 from drivers.capture import ControllerCapture
 from drivers.controller import Controller

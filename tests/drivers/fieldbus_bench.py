@@ -9,7 +9,8 @@ from functools import cache
 
 from bench.errors import BenchError
 from bench.registers import RegisterPort, Table, Words
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import RigFile
+from bench.rigload import load_rig
 from bench.session import Session
 from drivers.controller import Controller
 from drivers.fieldbus import Fieldbus, open_devices

@@ -12,7 +12,8 @@ from bench.findings import Finding
 from bench.frames import FrameBatch, payload
 from bench.link import Link, LinkStats
 from bench.opened import WatchedClock
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import RigFile
+from bench.rigload import load_rig
 from bench.session import Session
 from bench.supervisor import Supervisor
 from drivers.controller import Controller

@@ -239,7 +239,7 @@ def test_what_it_says_of_itself(stand: Stand) -> None:
 
 
 def test_a_rig_without_captures_has_no_such_role() -> None:
-    from bench.rigfile import load_rig
+    from bench.rigload import load_rig
     from bench.session import Session as HostSession
     from drivers.controller import Controller
     from sim_backend.endpoint import SimulatedRig

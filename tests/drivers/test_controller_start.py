@@ -9,7 +9,7 @@ from bench.errors import ConfigError, DeviceFault
 from bench.frames import SENT, FrameBatch, frame
 from bench.link import Link, LinkStats
 from bench.opened import WatchedClock
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.session import Session
 from bench.supervisor import Supervisor
 from drivers.controller import Controller

@@ -14,7 +14,8 @@ from bench.codec import Decoder, encode
 from bench.errors import ConfigError, NoReply
 from bench.frames import ERROR, FD, SENT, FrameBatch, empty_batch, frame, payload
 from bench.link import LinkStats
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import RigFile
+from bench.rigload import load_rig
 from bench.session import Session
 from drivers import handshake
 from drivers.dialogue import KEPT, Dialogue, commanded, status_of

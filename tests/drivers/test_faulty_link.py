@@ -11,7 +11,8 @@ from bench import faults
 from bench.codec import Decoder, encode
 from bench.errors import BenchError, ConfigError, DeviceFault, LinkError, NoReply
 from bench.frames import ERROR, FD, SENT, FrameBatch, empty_batch, frame
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import RigFile
+from bench.rigload import load_rig
 from bench.session import Session
 from drivers.controller import Controller
 from drivers.faulty_link import FaultyLink

@@ -14,7 +14,8 @@ from far_end import until
 from bench.clock import WallClock
 from bench.envelope import Envelope
 from bench.errors import LinkError
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import RigFile
+from bench.rigload import load_rig
 from drivers.fieldbus import Fieldbus, open_devices
 from drivers.modbus import open_lines
 from sim_backend.controller import SimulatedController

@@ -14,7 +14,7 @@ import pytest
 from cobs import cobs
 
 from bench.frames import FD, frame, payload
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.wire import packet
 from sim_backend.controller import SimulatedController
 from sim_backend.truth import draw

@@ -14,7 +14,8 @@ from bench.cli.opening import beat_of
 from bench.clock import WallClock
 from bench.errors import BenchError, ConfigError, LinkError
 from bench.opened import WatchedClock
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import RigFile
+from bench.rigload import load_rig
 from bench.session import Session
 from drivers.controller import Controller
 from drivers.live_link import LiveLink

@@ -18,7 +18,8 @@ from bench.cli.opening import LIVE_SLICE_S, beat_of
 from bench.clock import WallClock
 from bench.recorder import Recorder, RunHeader
 from bench.recording import Recording
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import RigFile
+from bench.rigload import load_rig
 from bench.session import new_session
 from drivers.canframes import batch_of, messages_of
 from drivers.controller import Controller

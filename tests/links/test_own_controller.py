@@ -24,7 +24,8 @@ from bench.recorder import Recorder, RunHeader
 from bench.recording import Recording
 from bench.rig import Rig
 from bench.rigcheck import check_rig
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import RigFile
+from bench.rigload import load_rig
 from bench.roles import Load, RigState
 from bench.samples import SampleBlock
 from bench.states import transition

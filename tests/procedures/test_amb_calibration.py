@@ -15,7 +15,7 @@ from bench.limits import Verdict, judge
 from bench.outcomes import Outcome, outcome_of
 from bench.procedure import Measured
 from bench.records import measurement
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import interval
 from procedures.amb_calibration import both_coils

@@ -12,7 +12,7 @@ from bench.calibration import Calibration
 from bench.calibrationfile import from_json, to_json
 from bench.cli.virtual import Simulated
 from bench.procedure import Measured
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.uncertainty import Estimate, correlation
 from procedures.amb_calibration.procedure import evaluate
 from sim_backend.quantities import eccentricity, own_weight

@@ -18,6 +18,7 @@ from bench.figures import Figure
 from bench.findings import Effect
 from bench.uncertainty import interval
 from procedures.balance import checks, decision, estimates, procedure
+from procedures.balance.plan import Plan
 from procedures.balance.procedure import check
 from procedures.balance.steps import BASE, SIDES, Read, Run, Weight
 from procedures.synchronous import runout
@@ -289,7 +290,7 @@ def test_the_trial_weight_that_is_fixed_goes_with_what_the_shaft_does(reads_um: 
     means = np.zeros(12)
     vectors = Vectors(np.full(12, reads_um * 1e-6 + 0j), np.zeros((24, 24)), 10.0)
     present = Run(BASE, (), (Read(400.0, means, vectors),))
-    found, allowed = decision.trial_kg(RIG, procedure.Plan(law="CAC"), present, 0)
+    found, allowed = decision.trial_kg(RIG, Plan(law="CAC"), present, 0)
     assert found == pytest.approx(kg, abs=1e-9)
     assert found <= allowed
 
@@ -322,7 +323,7 @@ def test_a_trial_weight_that_moved_nothing_is_refused(tmp_path: Path) -> None:
 
 def test_plans_that_cannot_work_are_refused() -> None:
     def why(**plan: Any) -> str:
-        return "; ".join(check(RIG, procedure.Plan(**plan)))
+        return "; ".join(check(RIG, Plan(**plan)))
 
     assert why() == ""
     assert "envelope" in why(speeds_rad_s=(1600.0,))
@@ -335,8 +336,8 @@ def test_plans_that_cannot_work_are_refused() -> None:
     assert "allowed are up to 0.5 g" in why(trial_kg=(0.6e-3, 1e-4))
     tight = why(trial_kg=(4e-4, 1e-4), max_share=0.2)
     assert "predicted response" in tight
-    allowed = decision.allowed_kg(RIG, procedure.Plan(max_share=0.2), 0)
+    allowed = decision.allowed_kg(RIG, Plan(max_share=0.2), 0)
     assert f"{allowed * 1e3:.3g} g" in tight
     assert why(trial_kg=(0.99 * allowed, 1e-4), max_share=0.2) == ""
     bare = RIG.model_copy(update={"devices": {k: d for k, d in RIG.devices.items() if k != "drive"}})
-    assert procedure.procedure.problems(bare, procedure.Plan()) == ("devices: found none in the role drive",)
+    assert procedure.procedure.problems(bare, Plan()) == ("devices: found none in the role drive",)

@@ -16,7 +16,7 @@ from bench.errors import DeviceFault
 from bench.findings import Effect, Finding
 from bench.limits import Verdict, judge
 from bench.procedure import Measured
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import Estimate, interval
 from procedures.amb_rotor.magnetics import AXES

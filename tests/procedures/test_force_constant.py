@@ -16,7 +16,7 @@ from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import ConfigError, DeviceFault
 from bench.findings import Effect, Finding
 from bench.limits import Verdict, judge
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import Estimate, interval
 from bench.uncertainty.coverage import ensemble

@@ -15,7 +15,7 @@ from bench.calibration import Calibration
 from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import ConfigError, DeviceFault, InterlockError, RotorNotArrived
 from bench.limits import Verdict, judge
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import interval
 from procedures.force_coupling.estimates import evaluate

@@ -17,7 +17,8 @@ from bench.opened import Job
 from bench.outcomes import Outcome
 from bench.progress import PlainProgress
 from bench.records import FindingEntry
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import RigFile
+from bench.rigload import load_rig
 from bench.runner import RunResult
 from bench.specs import load_spec
 from bench.supervisor import Supervisor

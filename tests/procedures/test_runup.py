@@ -23,7 +23,7 @@ from bench.limits import Verdict
 from bench.outcomes import outranking
 from bench.procedure import Measured
 from bench.recording import Recording
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.uncertainty import Estimate, correlation, interval, welch_satterthwaite
 from bench.units import RPM
 from procedures.coast_down import procedure as coast_down

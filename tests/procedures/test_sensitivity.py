@@ -21,7 +21,7 @@ from bench.errors import InterlockError
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.recording import Recording
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.uncertainty import Estimate
 from bench.units import RPM
 from procedures.sensitivity import checks, estimates, margins

@@ -23,7 +23,7 @@ from bench.outcomes import Outcome, outcome_of
 from bench.procedure import Measured
 from bench.recording import Recording
 from bench.records import measurement
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import Estimate, Influence
 from procedures.slew import fit

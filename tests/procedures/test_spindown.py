@@ -17,7 +17,7 @@ from bench.findings import Effect, Finding
 from bench.limits import Verdict, judge
 from bench.outcomes import Outcome
 from bench.procedure import Measured
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.specs import load_spec
 from bench.uncertainty import Estimate, correlation, interval
 from procedures.spindown.procedure import Plan, check

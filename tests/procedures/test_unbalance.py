@@ -22,7 +22,7 @@ from bench.outcomes import outranking
 from bench.procedure import Measured, Quantity
 from bench.recording import Recording
 from bench.records import measurement
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.specs import applied, load_spec
 from bench.uncertainty import Estimate, Influence, interval
 from procedures.amb_rotor.channels import AXES

@@ -17,7 +17,7 @@ from bench.errors import BenchError, DeviceFault, InterlockError, StateNotReache
 from bench.opened import WatchedClock
 from bench.recorder import Recorder, RunHeader
 from bench.recording import Recording
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.session import Session
 from bench.supervisor import Supervisor
 from drivers.controller import Controller

@@ -11,7 +11,7 @@ from bench.cli.safety import may_touch
 from bench.envelope import Envelope
 from bench.errors import BenchError, InterlockError, OperatorAbort
 from bench.rigcheck import problems_of
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.session import Session
 from drivers.controller import Controller
 from drivers.operator import LineOperator

@@ -9,7 +9,8 @@ import pytest
 from bench.errors import ConfigError
 from bench.frames import empty_batch
 from bench.registers import RegisterRefused
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import RigFile
+from bench.rigload import load_rig
 from bench.telemetry import TelemetryDecoder
 from sim_backend.controller import SimulatedController
 from sim_backend.core import LEVITATE, LIFT, READY, Plant

@@ -6,7 +6,7 @@ import pytest
 
 from bench.envelope import Envelope
 from bench.errors import BenchError, InterlockError, OperatorAbort
-from bench.rigfile import load_rig
+from bench.rigload import load_rig
 from bench.roles import NOTHING, Load
 from drivers.operator import LineOperator
 from drivers.person import ConsoleOperator
