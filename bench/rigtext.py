@@ -1,4 +1,4 @@
-"""TODO"""
+"""The texts of a rig file, before anything in them is understood: where they lie, their size, their schema."""
 
 from __future__ import annotations
 
