@@ -24,7 +24,7 @@ from bench.errors import BenchError, ConfigError
 
 if TYPE_CHECKING:
     from bench.cli.suite import Suite
-    from bench.runner import RunResult
+    from bench.run.runner import RunResult
 
 ROOT = Path(__file__).resolve().parent
 SUITE: pytest.StashKey[Suite] = pytest.StashKey()

@@ -21,7 +21,7 @@ import numpy as np
 from bench.cli.virtual import simulated_run
 from bench.findings import Finding
 from bench.procedure import Measured
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from bench.uncertainty import Estimate
 from sim_backend.core import LEVITATE, LIFT, READY, DriveLaw
 from sim_backend.core.amb import CAC, AmbPlant

@@ -20,13 +20,12 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from bench.busload import net_bytes_per_second
 from bench.cli.opening import beat_of
 from bench.clock import Clock, WallClock
 from bench.link import Link
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
-from bench.session import Session, new_session
+from bench.link.session import Session, new_session
+from bench.rigfile import RigFile, load_rig
+from bench.rigfile.busload import net_bytes_per_second
 from bench.wire import packet
 from drivers.controller import Controller
 from drivers.live_link import LiveLink

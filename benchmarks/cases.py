@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from bench import catalogue
 from bench.procedure import BenchPlan, Procedure
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 
 RPM = math.pi / 30
 RIGS = {

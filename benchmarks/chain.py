@@ -18,7 +18,7 @@ from typing import Any
 from bench.cli.opening import SIMULATED
 from bench.cli.virtual import simulate
 from bench.recording import Recording
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from drivers.controller import Controller
 from sim_backend.core import Plant
 from sim_backend.endpoint import SimulatedRig

@@ -17,9 +17,9 @@ from typing import Any
 import cantools
 import numpy as np
 
-from bench.codec import Decoder
-from bench.frames import FRAME, FrameBatch
-from bench.messages import load_messages
+from bench.link.codec import Decoder
+from bench.link.frames import FRAME, FrameBatch
+from bench.rigfile.messages import load_messages
 
 DBC = Path(__file__).resolve().parent.parent / "rigs" / "tsbs12.dbc"
 FRAMES = 10_000

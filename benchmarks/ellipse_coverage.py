@@ -23,9 +23,9 @@ from bench.analysis.vectors import Vectors, contains
 from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import Simulated, simulated_run
 from bench.findings import Effect, Finding
-from bench.plans import assemble
 from bench.procedure import Measured
-from bench.rigload import load_rig
+from bench.procedure.plans import assemble
+from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, correlation, welch_satterthwaite
 
 RIG = "amb5dof"

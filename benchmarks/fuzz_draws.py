@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from bench.frames import FRAME, FrameBatch
+from bench.link.frames import FRAME, FrameBatch
 from bench.wire.slcan import LENGTHS
 
 Draw = np.random.Generator

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from cobs import cobs
 
-from bench.frames import FD, FrameBatch
+from bench.link.frames import FD, FrameBatch
 from bench.wire import slcanstream
 from bench.wire.packetstream import PacketStream
 from bench.wire.slcan import LENGTHS, LONGEST_LINE

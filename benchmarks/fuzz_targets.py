@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from bench import registers
-from bench.registers import Register, WordOrder
+from bench.rigfile import registers
+from bench.rigfile.registers import Register, WordOrder
 from bench.wire import isotp
 from benchmarks.fuzz_draws import INPUTS, Block, Draw
 from benchmarks.fuzz_streams import serial_block, slcan_block

@@ -32,9 +32,8 @@ from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import BenchError
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
-from bench.toleranced import Toleranced
+from bench.rigfile import RigFile, load_rig
+from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import interval
 from benchmarks.cases import RIGS, load, needed_by
 from reports.unseen import is_reached

@@ -12,8 +12,8 @@ import time
 from pathlib import Path
 
 from bench.cli.opening import SIMULATED
-from bench.recorder import Recorder, RunHeader
-from bench.rigload import load_rig
+from bench.recording.recorder import Recorder, RunHeader
+from bench.rigfile import load_rig
 from drivers.controller import Controller
 from sim_backend.endpoint import SimulatedRig
 from sim_backend.truth import draw

@@ -24,15 +24,15 @@ from pathlib import Path
 from typing import Any
 
 from bench.calibration import Calibration
-from bench.cli.campaign_fleet import pool
+from bench.cli.campaign.fleet import pool
 from bench.cli.compose import load_procedure
 from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import Simulated, flown
 from bench.errors import BenchError
 from bench.findings import Effect, Finding
-from bench.plans import assemble
 from bench.procedure import Measured
-from bench.rigload import load_rig
+from bench.procedure.plans import assemble
+from bench.rigfile import load_rig
 from bench.uncertainty import interval
 
 SURE = 0.95  # of the seeds

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from bench.frames import FRAME, FrameBatch
-from bench.recorder import Recorder, RunHeader
+from bench.link.frames import FRAME, FrameBatch
 from bench.recording import Recording
+from bench.recording.recorder import Recorder, RunHeader
 from bench.samples import ChannelInfo, SampleBlock, StreamLayout
 
 CHANNELS, RATE, SECONDS, SLICE, REPEATS = 30, 1000, 60, 100, 3

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from mcap.writer import Writer
 
-from bench.recorder import Recorder, RunHeader
 from bench.recording import Recording
+from bench.recording.recorder import Recorder, RunHeader
 from bench.samples import ChannelInfo, SampleBlock, StreamLayout
 
 CHANNELS, RATE, SLICE = 52, 35_000, 3500

@@ -26,7 +26,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.frames import FD, frame, payload
+from bench.link.frames import FD, frame, payload
 from bench.rigfile import LinkSpec
 from bench.wire import slcan
 from bench.wire.packetstream import PacketStream, encode

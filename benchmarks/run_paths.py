@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.calibration import Calibration
-from bench.calibrationfile import attached, attachment
+from bench.calibration.file import attached, attachment
 from bench.cli.virtual import Knobs, simulated_run
 from bench.findings import Effect
 from bench.procedure import Measured

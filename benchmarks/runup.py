@@ -20,11 +20,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from bench import runner
 from bench.cli import compose, reporting
 from bench.progress import PlainProgress
 from bench.recording import Recording
-from bench.supervisor import Supervisor
+from bench.run import runner
+from bench.run.supervisor import Supervisor
 
 TARGET_S, RAMP_S = 10.0, 60.0
 PLAN = (f"acceleration_rad_s2={(14000 - 600) / 9.5492966 / RAMP_S:.4f}",)

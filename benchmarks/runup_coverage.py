@@ -21,7 +21,7 @@ from bench.analysis.vectors import contains
 from bench.cli.virtual import simulated_run
 from bench.errors import DeviceFault
 from bench.findings import Effect, Finding
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from bench.uncertainty import interval
 from bench.units import RPM
 from procedures.amb_rotor.channels import AXES

@@ -21,7 +21,7 @@ import numpy as np
 from bench.analysis.responses import Response
 from bench.cli.virtual import simulated_run
 from bench.procedure import Measured
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from bench.uncertainty import coverage_factor, interval
 from procedures.sensitivity import estimates
 from procedures.sensitivity.injection import AXES, Comb, wanted

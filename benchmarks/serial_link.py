@@ -29,10 +29,10 @@ from pathlib import Path
 import numpy as np
 import serial
 
-from bench.codec import Decoder
-from bench.frames import FrameBatch
-from bench.messages import Message, load_messages
+from bench.link.codec import Decoder
+from bench.link.frames import FrameBatch
 from bench.rigfile import LinkSpec
+from bench.rigfile.messages import Message, load_messages
 from bench.wire.packetstream import PacketStream
 from benchmarks.serial_messages import CHANNELS, DBC, Row, frames, packets, plain, plain_packet
 from drivers.wires import open_wire

@@ -9,7 +9,7 @@ import zlib
 import numpy as np
 from cobs import cobs
 
-from bench.frames import FRAME, FrameBatch
+from bench.link.frames import FRAME, FrameBatch
 from bench.wire.packetstream import encode
 
 Row = tuple[int, int, list[float]]

@@ -28,7 +28,7 @@ from typing import Any
 import can
 import numpy as np
 
-from bench.frames import FrameBatch
+from bench.link.frames import FrameBatch
 from drivers.slcan_bus import SlcanBatchBus
 
 RATE = 8000  # frames/s

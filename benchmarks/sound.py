@@ -21,17 +21,17 @@ from pathlib import Path
 from typing import Any
 
 from bench.calibration import Calibration
-from bench.cli.campaign_fleet import pool
+from bench.cli.campaign.fleet import pool
 from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import BenchError, ConfigError
 from bench.findings import Effect, Finding
-from bench.limits import Verdict
-from bench.outcomes import outcome_of
 from bench.procedure import Measured
-from bench.records import Measurement, measurement, missing
-from bench.rigload import load_rig
-from bench.specs import applied, load_spec
+from bench.record.limits import Verdict
+from bench.record.outcomes import outcome_of
+from bench.record.records import Measurement, measurement, missing
+from bench.record.specs import applied, load_spec
+from bench.rigfile import load_rig
 from benchmarks.cases import RIGS, TRUTH, Case, cases_of, load, needed
 
 

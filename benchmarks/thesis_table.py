@@ -14,12 +14,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench import campaign
 from bench.calibration import Calibration
+from bench.campaign import file
 from bench.cli.virtual import simulated_run
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from bench.uncertainty import interval, round_to_uncertainty
 from sim_backend.truth import nominal
 
@@ -55,7 +55,7 @@ def chain() -> Mapping[str, Measured]:
     Raises:
         SystemExit: a step finds something wrong.
     """
-    chosen, _ = campaign.load("tsbs-identification")
+    chosen, _ = file.load("tsbs-identification")
     truth = nominal(load_rig(chosen.rig))
     facts: dict[str, Calibration] = {}
     found: dict[str, Measured] = {}

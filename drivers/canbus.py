@@ -11,11 +11,10 @@ from typing import Any
 
 import can
 
-from bench import linkurl
 from bench.errors import ConfigError, LinkError
-from bench.frames import ERROR, EXTENDED, FrameBatch, empty_batch
 from bench.link import LinkStats
-from bench.rigfile import LinkSpec
+from bench.link.frames import ERROR, EXTENDED, FrameBatch, empty_batch
+from bench.rigfile import LinkSpec, linkurl
 from drivers.canframes import batch_of, messages_of
 from drivers.pace import Pace
 from drivers.slcan_bus import SlcanBatchBus

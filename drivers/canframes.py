@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import can
 import numpy as np
 
-from bench.frames import ERROR, EXTENDED, FD, FRAME, REMOTE, SENT, SWITCHED, FrameBatch, empty_batch
+from bench.link.frames import ERROR, EXTENDED, FD, FRAME, REMOTE, SENT, SWITCHED, FrameBatch, empty_batch
 
 
 def batch_of(messages: Sequence[can.Message], t_ns: int, *, own_time: bool = False) -> FrameBatch:

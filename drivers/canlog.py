@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import can
 
-from bench.frames import FrameBatch
+from bench.link.frames import FrameBatch
 from drivers.canframes import messages_of
 
 SUFFIXES: Final = {"blf": ".blf", "asc": ".asc", "candump": ".log"}

@@ -8,14 +8,14 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from bench.capture import LONGEST_DIVIDER, NOW, CaptureData, CaptureSpec, Layout, Trigger
 from bench.clock import Clock
 from bench.errors import BenchError
-from bench.recorder import Recorder
+from bench.link.session import Session
+from bench.link.telemetry import TelemetryDecoder
+from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
+from bench.rigfile.capture import LONGEST_DIVIDER, NOW, CaptureData, CaptureSpec, Layout, Trigger
 from bench.samples import ChannelInfo, SampleBlock, StreamLayout
-from bench.session import Session
-from bench.telemetry import TelemetryDecoder
 from drivers.capture_upload import Progress, Upload
 from drivers.dialogue import Dialogue, status_of
 

@@ -8,12 +8,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from bench import linkurl
 from bench.clock import Clock
 from bench.errors import BenchError, LinkError
-from bench.frames import ERROR, FrameBatch
 from bench.link import Link
-from bench.rigfile import RigFile
+from bench.link.frames import ERROR, FrameBatch
+from bench.rigfile import RigFile, linkurl
 from bench.wire.captureblock import OVERHEAD, block_of, piece_of
 from bench.wire.isotp import Reassembler
 from drivers.dialogue import Dialogue, status_of

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from bench.errors import DeviceFault, FrozenError, StateContradicts
+from bench.link.stillness import STILL_S
+from bench.link.telemetry import TelemetryDecoder
 from bench.rigfile import RigFile
-from bench.stillness import STILL_S
-from bench.telemetry import TelemetryDecoder
 from drivers import advice
 
 SET_DOWN = ("LAND", "DISABLE", "MAKE_SAFE")

@@ -6,14 +6,14 @@ import math
 from collections.abc import Callable
 
 from bench.clock import Clock, PumpedClock
-from bench.envelope import Envelope
 from bench.errors import BenchError, InterlockError, Refused, StateNotReached
 from bench.link import Link
-from bench.recorder import Recorder
+from bench.link.session import Session
+from bench.link.telemetry import TelemetryDecoder
+from bench.procedure.roles import RigState
+from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.roles import RigState
-from bench.session import Session
-from bench.telemetry import TelemetryDecoder
+from bench.rigfile.envelope import Envelope
 from drivers import advice, handshake, unheard, waiting
 from drivers.capture import ControllerCapture
 from drivers.capture_upload import Upload

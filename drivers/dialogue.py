@@ -7,13 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from bench.codec import Decoder, encode
 from bench.errors import NoReply
-from bench.frames import ERROR, FD, SENT, FrameBatch, frame
 from bench.link import Link
-from bench.messages import Message
-from bench.recorder import Recorder
+from bench.link.codec import Decoder, encode
+from bench.link.frames import ERROR, FD, SENT, FrameBatch, frame
+from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
+from bench.rigfile.messages import Message
 from drivers.waiting import patience_s
 
 REPLIES = ("CommandReply", "ParamReply", "Identity", "Owner", "CaptureStatus")

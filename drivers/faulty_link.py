@@ -9,9 +9,9 @@ import numpy as np
 
 from bench.clock import Clock
 from bench.errors import ConfigError
-from bench.faults import CUTS, DEVICE_ONLY, Fault, FrameFaults, lost
-from bench.frames import ERROR, FrameBatch, empty_batch
 from bench.link import Link, LinkStats
+from bench.link.fault_injection import CUTS, DEVICE_ONLY, Fault, FrameFaults, lost
+from bench.link.frames import ERROR, FrameBatch, empty_batch
 
 
 class FaultyLink:

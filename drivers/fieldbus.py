@@ -19,11 +19,11 @@ from typing import Any, TypeVar
 
 from bench import runlog
 from bench.clock import Clock
-from bench.envelope import Envelope
 from bench.errors import BenchError, DeviceUnreadable, DriveFault, LinkError
-from bench.recorder import Recorder
-from bench.registers import RegisterPort, RegisterRefused
+from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
+from bench.rigfile.envelope import Envelope
+from bench.rigfile.registers import RegisterPort, RegisterRefused
 from bench.samples import StreamLayout
 from drivers import advice
 from drivers.background import Background

@@ -8,8 +8,8 @@ from contextlib import AbstractContextManager, suppress
 from typing import Any, Protocol, TypeVar
 
 from bench import units
-from bench.envelope import Envelope
 from bench.errors import BenchError, ConfigError, DriveFault, InterlockError, Refused, RotorNotArrived, StateNotReached
+from bench.rigfile.envelope import Envelope
 from drivers.registerdevice import RegisterDevice
 
 T = TypeVar("T")

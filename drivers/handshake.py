@@ -6,8 +6,8 @@ from collections.abc import Callable, Collection
 
 from bench.clock import Clock
 from bench.errors import ConfigError
+from bench.link.session import Session
 from bench.rigfile import RigFile
-from bench.session import Session
 from drivers.dialogue import Dialogue
 
 LISTEN_S = 0.15  # for another host, before the first heartbeat

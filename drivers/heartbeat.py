@@ -20,7 +20,7 @@ from typing import Any, Final
 import numpy as np
 
 from bench.errors import ConfigError, LinkError
-from bench.frames import FrameBatch
+from bench.link.frames import FrameBatch
 from drivers import portable
 from drivers.beat import BEATS, FRAMES, GAP, LEASE, RAW, RECORD, REFUSED, WORDS, Beat, Encoder, WriterSpec
 from drivers.heartbeat_thread import HeartbeatThread

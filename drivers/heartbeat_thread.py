@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Final
 
 from bench.errors import LinkError
-from bench.frames import SENT, FrameBatch, frame
+from bench.link.frames import SENT, FrameBatch, frame
 from drivers import portable
 from drivers.beat import Beat, Schedule
 

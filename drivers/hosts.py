@@ -7,11 +7,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from bench.binding import COMMANDS
-from bench.codec import Decoder
 from bench.errors import AnotherHost
-from bench.frames import ERROR, SENT, FrameBatch, payload
+from bench.link.codec import Decoder
+from bench.link.frames import ERROR, SENT, FrameBatch, payload
 from bench.rigfile import RigFile
+from bench.rigfile.binding import COMMANDS
 
 ECHO = 100  # heartbeats of ours that a bus may still bring back
 RATE, WINDOW_NS = 10, 1_000_000_000  # so many of another host within so long are no stray frames

@@ -13,8 +13,8 @@ from typing import Literal
 import numpy as np
 
 from bench.errors import BenchError, ConfigError, LinkError
-from bench.frames import FrameBatch, empty_batch
 from bench.link import LinkStats
+from bench.link.frames import FrameBatch, empty_batch
 from drivers.beat import Beat
 from drivers.heartbeat import HeartbeatProcess
 from drivers.heartbeat_thread import HeartbeatThread

@@ -18,12 +18,11 @@ from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from pymodbus.exceptions import ConnectionException, ModbusException
 from pymodbus.framer import FramerType
 
-from bench import linkurl
 from bench.errors import ConfigError, LinkError
 from bench.link import LinkStats
-from bench.linkurl import LinkUrl
-from bench.registers import RegisterRefused, Table, Words
-from bench.rigfile import LinkSpec, RigFile
+from bench.rigfile import LinkSpec, RigFile, linkurl
+from bench.rigfile.linkurl import LinkUrl
+from bench.rigfile.registers import RegisterRefused, Table, Words
 
 TIMEOUT_S = 0.5  # for an answer, and for a connection; option `timeout_s` of the link
 AGAIN_S = 0.1  # between two attempts to open what was lost

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 from bench.clock import Clock
-from bench.envelope import Envelope
 from bench.errors import OperatorRefused
-from bench.recorder import Recorder
-from bench.roles import Load, Plane, Side
+from bench.procedure.roles import Load, Plane, Side
+from bench.recording.recorder import Recorder
+from bench.rigfile.envelope import Envelope
 
 
 class LineOperator:

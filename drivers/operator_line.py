@@ -6,8 +6,8 @@ import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from bench import linkurl
 from bench.errors import ConfigError, LinkError, OperatorSilent
+from bench.rigfile import linkurl
 
 CONNECT_S, ANSWER_S = 3.0, 10.0
 LONGEST = 4096  # bytes of an answer

@@ -6,11 +6,11 @@ import logging
 from collections.abc import Callable
 
 from bench import units
-from bench.envelope import Envelope
 from bench.errors import BenchError, NoReply, Refused
-from bench.recorder import Recorder
+from bench.link.session import Session
+from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.session import Session
+from bench.rigfile.envelope import Envelope
 from drivers.dialogue import Dialogue, commanded, status_of
 
 logger = logging.getLogger("drivers.orders")

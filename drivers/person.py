@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from bench.clock import Clock
-from bench.envelope import Envelope
 from bench.errors import InterlockError, OperatorAbort
-from bench.recorder import Recorder
-from bench.roles import NOTHING, Load, Plane, Side
+from bench.procedure.roles import NOTHING, Load, Plane, Side
+from bench.recording.recorder import Recorder
+from bench.rigfile.envelope import Envelope
 from drivers.operator import LineOperator
 
 T = TypeVar("T")

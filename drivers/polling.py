@@ -10,7 +10,7 @@ import numpy as np
 from bench import units
 from bench.clock import Clock
 from bench.errors import BenchError
-from bench.registers import Register
+from bench.rigfile.registers import Register
 from bench.samples import ChannelInfo, SampleBlock, StreamLayout
 from drivers.registerdevice import RegisterDevice
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from bench.errors import ConfigError, DeviceUnreadable
-from bench.registers import GAP, Register, RegisterPort, RegisterRefused, Words, grouped, values_of
 from bench.rigfile import Device, RigFile
+from bench.rigfile.registers import GAP, Register, RegisterPort, RegisterRefused, Words, grouped, values_of
 
 NOT_THERE = (1, 2, 3)  # illegal function, data address, data value: devices differ in what they say
 

@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from bench.codec import Decoder
-from bench.frames import ERROR, FrameBatch
+from bench.link.codec import Decoder
+from bench.link.frames import ERROR, FrameBatch
+from bench.link.telemetry import TelemetryDecoder
 from bench.rigfile import RigFile
 from bench.samples import SampleBlock
-from bench.telemetry import TelemetryDecoder
 from drivers.waiting import SILENCE_S
 
 UNSEEN = "UNSEEN"

@@ -21,7 +21,7 @@ import numpy as np
 
 from bench.clock import WallClock
 from bench.errors import BenchError, ConfigError, LinkError
-from bench.frames import EXTENDED, REMOTE, FrameBatch, empty_batch
+from bench.link.frames import EXTENDED, REMOTE, FrameBatch, empty_batch
 from bench.wire import slcan
 from bench.wire.slcanstream import SlcanStream, encode
 from drivers.byteport import BytePort

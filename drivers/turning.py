@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 
 from bench.clock import Clock
 from bench.errors import RotorNotArrived
+from bench.link.telemetry import TelemetryDecoder
 from bench.rigfile import RigFile
-from bench.telemetry import TelemetryDecoder
 from drivers import waiting
 from drivers.arriving import Approach
 from drivers.orders import Orders

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from bench import clockrate
 from bench.errors import ClockWrong, ReadingsStand
-from bench.link import Link
-from bench.linkhealth import CHECK
+from bench.link import Link, clockrate
+from bench.link.health import CHECK
+from bench.link.stillness import STILL_S, StuckChannels
+from bench.link.telemetry import TelemetryDecoder
 from bench.rigfile import RigFile
 from bench.samples import SampleBlock
-from bench.stillness import STILL_S, StuckChannels
-from bench.telemetry import TelemetryDecoder
 from drivers import unheard, waiting
 from drivers.condition import Condition
 from drivers.hosts import HostFrames

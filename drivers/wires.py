@@ -6,12 +6,11 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from bench import linkurl
 from bench.clock import WallClock
 from bench.errors import ConfigError, LinkError
-from bench.frames import FrameBatch
 from bench.link import LinkStats
-from bench.rigfile import LinkSpec
+from bench.link.frames import FrameBatch
+from bench.rigfile import LinkSpec, linkurl
 from bench.wire.packetstream import PacketStream, encode
 from drivers.beat import WriterSpec
 from drivers.byteport import BytePort

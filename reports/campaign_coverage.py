@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench import units
-from bench.campaign_bands import Failure, Quantity, Unable
-from bench.campaign_speed import Speed
+from bench.campaign.bands import Failure, Quantity, Unable
+from bench.campaign.speed import Speed
 from reports import campaign_figures, text
 from reports.campaign_model import _Numbers
 from reports.campaign_symbols import symbol

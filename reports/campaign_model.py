@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from bench.campaign_model import Constant, Given, Matrix, Model
+from bench.campaign.model import Constant, Given, Matrix, Model
 from bench.figures import Figure
 from reports import campaign_figures, figures, text
 from reports.campaign_symbols import place, symbol

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from bench.findings import Effect, Finding
-from bench.limits import Verdict
-from bench.outcomes import outranking
+from bench.record.limits import Verdict
+from bench.record.outcomes import outranking
 from reports.view import FindingRow, ResultRow
 
 Content = Mapping[str, Any]

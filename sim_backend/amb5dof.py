@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.rigfile import RigFile
-from bench.toleranced import Toleranced
+from bench.rigfile.toleranced import Toleranced
 from sim_backend.balancer import Balancer
 from sim_backend.core.amb import AXES, CHANNELS, COILS, TRACE, AmbPlant
 from sim_backend.core.amb_params import AmbParams, runout

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from bench.capture import CaptureSpec, Layout
+from bench.rigfile.capture import CaptureSpec, Layout
 
 Array = npt.NDArray[np.float64]
 

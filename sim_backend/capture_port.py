@@ -7,12 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from bench import linkurl
-from bench.busload import upload_frame_seconds
 from bench.errors import ConfigError
-from bench.frames import FD, FRAME, FrameBatch, empty_batch
-from bench.messages import MessageMap
-from bench.rigfile import RigFile
+from bench.link.frames import FD, FRAME, FrameBatch, empty_batch
+from bench.rigfile import RigFile, linkurl
+from bench.rigfile.busload import upload_frame_seconds
+from bench.rigfile.messages import MessageMap
 from bench.wire.captureblock import block, pieces
 from bench.wire.isotp import Sender, TransferError
 from bench.wire.packet import LIMIT, MESSAGE, PAYLOAD_LIMIT

@@ -7,11 +7,11 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import cast
 
-from bench.codec import Decoder, encode
-from bench.faults import Fault
-from bench.frames import FD, FrameBatch, by_time, frame, joined
-from bench.messages import load_messages
+from bench.link.codec import Decoder, encode
+from bench.link.fault_injection import Fault
+from bench.link.frames import FD, FrameBatch, by_time, frame, joined
 from bench.rigfile import RigFile
+from bench.rigfile.messages import load_messages
 from sim_backend.capture_port import CapturePort
 from sim_backend.core import PERIOD_TICKS, TICK_S, Array
 from sim_backend.device_faults import DeviceFaults

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.errors import ConfigError
-from bench.faults import DEVICE_ONLY, REBOOT_S, Fault
-from bench.frames import FrameBatch, empty_batch
+from bench.link.fault_injection import DEVICE_ONLY, REBOOT_S, Fault
+from bench.link.frames import FrameBatch, empty_batch
 from bench.rigfile import RigFile
 from sim_backend.core import PERIOD_TICKS, TICK_S
 from sim_backend.machine import SimulatedPlant

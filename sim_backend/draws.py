@@ -7,7 +7,7 @@ import math
 
 from scipy import special
 
-from bench.toleranced import Toleranced
+from bench.rigfile.toleranced import Toleranced
 
 
 def uniform(seed: int, name: str) -> float:

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bench.codec import encode
 from bench.errors import LinkError
-from bench.faults import CUTS, Fault, FrameFaults, divided, lost
-from bench.frames import ERROR, FD, SENT, FrameBatch, batch_of, by_time, empty_batch, joined, packed
 from bench.link import LinkStats
-from bench.messages import load_messages
+from bench.link.codec import encode
+from bench.link.fault_injection import CUTS, Fault, FrameFaults, divided, lost
+from bench.link.frames import ERROR, FD, SENT, FrameBatch, batch_of, by_time, empty_batch, joined, packed
 from bench.rigfile import RigFile
+from bench.rigfile.messages import load_messages
 from sim_backend.controller import SimulatedController
 from sim_backend.truth import Truth
 

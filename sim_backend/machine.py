@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from bench.errors import ConfigError
 from bench.rigfile import RigFile
-from bench.toleranced import Toleranced
+from bench.rigfile.toleranced import Toleranced
 from sim_backend import amb5dof, amb_quantities, tsbs
 from sim_backend.core import CHANNELS, DriveLaw
 

@@ -11,10 +11,9 @@ import struct
 from collections.abc import Callable
 from typing import Literal
 
-from bench import linkurl
-from bench.frames import FrameBatch, empty_batch
-from bench.registers import RegisterRefused, Table
-from bench.rigfile import RigFile
+from bench.link.frames import FrameBatch, empty_batch
+from bench.rigfile import RigFile, linkurl
+from bench.rigfile.registers import RegisterRefused, Table
 from sim_backend.registers import RegisterBank, RegisterBankDevice
 from sim_backend.serving import ptys
 from sim_backend.serving.peers import Sent

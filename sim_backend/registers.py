@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 from bench.clock import Clock
 from bench.errors import ConfigError
-from bench.registers import RANGES, Register, RegisterRefused, Table, Words
 from bench.rigfile import Device, RigFile
+from bench.rigfile.registers import RANGES, Register, RegisterRefused, Table, Words
 from sim_backend.core import TICK_S
 from sim_backend.drive import SimulatedDrive
 from sim_backend.machine import SimulatedPlant

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from bench.frames import FD, FRAME, FrameBatch, empty_batch
-from bench.messages import MessageMap
+from bench.link.frames import FD, FRAME, FrameBatch, empty_batch
+from bench.rigfile.messages import MessageMap
 from sim_backend.core import PERIOD_TICKS, TICK_S
 from sim_backend.draws import uniform
 

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.rigfile import RigFile
-from bench.toleranced import Toleranced
+from bench.rigfile.toleranced import Toleranced
 from sim_backend import quantities as of
 from sim_backend.core import CHANNELS, Plant
 from sim_backend.core.params import PlantParams, beta_of

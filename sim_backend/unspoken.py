@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from bench.errors import ConfigError, Problem
-from bench.messages import MessageMap, load_messages
 from bench.rigfile import RigFile
+from bench.rigfile.messages import MessageMap, load_messages
 from sim_backend.machine import Machine
 
 TELEMETRY = "Telemetry"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from bench.requires import Requires
+from bench.procedure.requires import Requires
 from tests import tiny_procedures
 
 

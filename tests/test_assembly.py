@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bench.assembly import KEPT, Assembler, Joiner, Rows, _Sample
-from bench.codec import encode
-from bench.frames import FrameBatch, empty_batch, frame
-from bench.rigload import load_rig
-from bench.telemetry import TelemetryDecoder
+from bench.link.codec import encode
+from bench.link.frames import FrameBatch, empty_batch, frame
+from bench.link.sample_assembler import KEPT, Assembler, Joiner, Rows, _Sample
+from bench.link.telemetry import TelemetryDecoder
+from bench.rigfile import load_rig
 
 PLAIN = load_rig(str(Path(__file__).resolve().parent.parent / "examples" / "own-controller" / "plainamb.toml"))
 MESSAGES = ("AmbSync", "AmbPos", "AmbCurX", "AmbCurY", "AmbRest")

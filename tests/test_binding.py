@@ -7,10 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from bench import binding
 from bench.errors import ConfigError
-from bench.rigcheck import check_rig
-from bench.rigload import load_rig
+from bench.rigfile import binding, load_rig
+from bench.rigfile.check import check_rig
 
 ROOT = Path(__file__).resolve().parent.parent
 TOML, DBC = ((ROOT / "examples" / "own-controller" / f"plainamb.{x}").read_text() for x in ("toml", "dbc"))

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from bench.busload import ON_DEMAND_HZ, bus_load, frame_seconds
-from bench.messages import Message, MessageMap
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
+from bench.rigfile.busload import ON_DEMAND_HZ, bus_load, frame_seconds
+from bench.rigfile.messages import Message, MessageMap
 
 
 def message(

@@ -13,7 +13,6 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from bench.adoption import refuse_other_rig
 from bench.calibration import (
     Calibration,
     Need,
@@ -24,12 +23,12 @@ from bench.calibration import (
     number,
     settings_differ,
 )
-from bench.calibrationfile import attached, attachment, from_json, read, to_json, write
-from bench.calibrationstore import Store, stores_of
+from bench.calibration.file import attached, attachment, from_json, read, to_json, write
+from bench.calibration.lookup import Lookup
+from bench.calibration.store import Store, stores_of
 from bench.errors import ConfigError
-from bench.needs import Lookup
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
+from bench.rigfile import RigFile, load_rig
+from bench.run.adoption import refuse_other_rig
 from bench.uncertainty import Estimate, Influence, correlation
 
 GOLDEN = Path(__file__).parent / "calibrations" / "golden.json"

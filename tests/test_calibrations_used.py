@@ -14,13 +14,12 @@ from bench import catalogue
 from bench.calibration import Calibration, Need
 from bench.cli.virtual import given, simulate, simulated_run
 from bench.errors import ConfigError
-from bench.evaluation import evaluate
 from bench.findings import SIMULATED_CONTROLLER, Finding
-from bench.opened import Job, OpenRig
 from bench.recording import Recording
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
-from bench.runner import _same_kind
+from bench.rigfile import RigFile, load_rig
+from bench.run.evaluation import evaluate
+from bench.run.job import Job, OpenRig
+from bench.run.runner import _same_kind
 from bench.uncertainty import Estimate
 
 CHAIN = (

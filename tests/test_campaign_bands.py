@@ -9,10 +9,10 @@ import pytest
 from scipy.stats import chi2, norm, poisson
 from scipy.stats import t as student
 
-from bench.campaign_bands import LEVEL, Quantity, Sample, Unable, band, coverage, tails
-from bench.campaign_speed import speed
-from bench.cli.campaign_coverage import Result
-from bench.limits import Verdict
+from bench.campaign.bands import LEVEL, Quantity, Sample, Unable, band, coverage, tails
+from bench.campaign.speed import speed
+from bench.cli.campaign.coverage import Result
+from bench.record.limits import Verdict
 from bench.uncertainty import Estimate, Influence, interval
 from bench.uncertainty.tails import tails_of_draws, tails_of_t
 

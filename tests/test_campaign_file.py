@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bench import campaign, catalogue
-from bench.campaign import Campaign
+from bench import catalogue
+from bench.campaign import Campaign, file
 from bench.errors import ConfigError
 
 GOOD = """
@@ -100,21 +100,21 @@ def test_without_a_schema() -> None:
 
 def test_found_by_name_like_rigs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    made, path = campaign.load("tsbs-identification")
+    made, path = file.load("tsbs-identification")
     assert path == catalogue.INSTALLED_CAMPAIGNS / "tsbs-identification.toml"
     assert made.name == "tsbs-identification"
     (tmp_path / "campaigns").mkdir()
     (tmp_path / "campaigns" / "two.toml").write_text(GOOD)
-    assert campaign.load("two")[0].name == "two"
+    assert file.load("two")[0].name == "two"
     assert "two" in {c.name for c in catalogue.campaigns()}
     with pytest.raises(ConfigError, match=r"Did you mean two\?"):
-        campaign.load("too")
+        file.load("too")
 
 
 def test_what_cannot_be_read(tmp_path: Path) -> None:
     (tmp_path / "x.toml").write_bytes(b"\xff\xfe")
     with pytest.raises(ConfigError, match="cannot be read"):
-        campaign.load(str(tmp_path / "x.toml"))
+        file.load(str(tmp_path / "x.toml"))
 
 
 # TOML as text from values: what a person might write by mistake, at every place.

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bench.campaign_directory import newest, opened
-from bench.campaign_journal import Journal
+from bench.campaign.directory import newest, opened
+from bench.campaign.journal import Journal
 from bench.errors import ConfigError
 
 ENTRIES = st.dictionaries(st.text(max_size=3), st.text(max_size=5) | st.integers() | st.none())

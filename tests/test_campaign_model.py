@@ -11,7 +11,7 @@ import pytest
 
 from bench.calibration import adopted
 from bench.campaign import Equation
-from bench.campaign_model import (
+from bench.campaign.model import (
     SCHEMA_FILE,
     Model,
     Source,
@@ -22,7 +22,7 @@ from bench.campaign_model import (
     to_content,
 )
 from bench.procedure import Measured, Quantity
-from bench.records import Record, measurement, unfinished
+from bench.record.records import Record, measurement, unfinished
 from bench.uncertainty import Estimate, Influence, correlation_matrix
 
 D1, D2 = "first-20260101T000000Z-aaaa", "second-20260101T000100Z-bbbb"

@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from bench import campaign, catalogue
-from bench.campaign import Campaign
-from bench.cli.campaign_job import _values
-from bench.cli.campaign_steps import planned
+from bench import catalogue
+from bench.campaign import Campaign, file
+from bench.cli.campaign.job import _values
+from bench.cli.campaign.steps import planned
 from bench.errors import ConfigError
 from bench.procedure import Measured, Quantity
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from bench.uncertainty import Estimate
 
 TABLES = """
@@ -28,7 +28,7 @@ plan = { axes = ["y"], sizes_um = [10, 20], a = { law = 2, "k1" = 2e5 } }
 
 @pytest.mark.parametrize("name", [entry.name for entry in catalogue.campaigns()])
 def test_a_shipped_campaign_fits_its_rig(name: str) -> None:
-    c, path = campaign.load(name)
+    c, path = file.load(name)
     for short in (False, True):
         assert len(planned(c, str(path), load_rig(c.rig), short)) == len(c.step)
 

@@ -10,12 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.capture import Layout
-from bench.codec import Decoder, encode
 from bench.errors import BenchError
-from bench.rigcheck import problems_of
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
+from bench.link.codec import Decoder, encode
+from bench.rigfile import RigFile, load_rig
+from bench.rigfile.capture import Layout
+from bench.rigfile.check import problems_of
 
 RIG = load_rig("amb5dof")
 assert RIG.capture is not None

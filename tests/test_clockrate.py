@@ -9,8 +9,8 @@ import numpy.typing as npt
 import pytest
 from test_hosttime import MS, behind
 
-from bench.clockrate import described
-from bench.hosttime import HostMap
+from bench.link.clockrate import described
+from bench.link.hosttime import HostMap
 
 Floats = npt.NDArray[np.float64]
 EPOCH_NS = 1_800_000_000_000_000_000

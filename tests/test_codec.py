@@ -11,10 +11,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bench.codec import Decoder, encode
 from bench.errors import ConfigError
-from bench.frames import FD, frame
-from bench.messages import Message, load_messages
+from bench.link.codec import Decoder, encode
+from bench.link.frames import FD, frame
+from bench.rigfile.messages import Message, load_messages
 
 LENGTHS = (1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 SCALES = ("1", "2", "0.5", "0.1", "2E-008", "-0.25", "9.587379924285257E-005", "1000", "3.7")

@@ -25,10 +25,10 @@ from typing import Any
 import pytest
 import typer
 
-from bench import plans
 from bench.cli import compose
 from bench.cli.__main__ import app
-from bench.rigload import load_rig
+from bench.procedure import plans
+from bench.rigfile import load_rig
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted(p for p in (ROOT / "docs").rglob("*.md") if "```console" in p.read_text(encoding="utf-8"))

@@ -15,9 +15,9 @@ from test_recorder import messages_of
 
 from bench import rundir
 from bench.errors import BenchError, ConfigError, RecordingError
-from bench.export import export
-from bench.recorder import Recorder
 from bench.recording import Recording
+from bench.recording.recorder import Recorder
+from bench.run.export import export
 
 
 @pytest.fixture

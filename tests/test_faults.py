@@ -9,12 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bench import faults
 from bench.errors import ConfigError
-from bench.faults import DEVICE_ONLY, KINDS, SHARES, TIMES, Fault, FrameFaults
 from bench.findings import Effect
-from bench.frames import ERROR, FRAME, FrameBatch
-from bench.link import LinkStats
+from bench.link import LinkStats, fault_injection
+from bench.link.fault_injection import DEVICE_ONLY, KINDS, SHARES, TIMES, Fault, FrameFaults
+from bench.link.frames import ERROR, FRAME, FrameBatch
 
 MS = 1_000_000
 T0 = 1_000_000_000_000
@@ -37,7 +36,7 @@ def numbers(batch: FrameBatch) -> list[int]:
 
 def through(text: str, batch: FrameBatch, now_ns: int | None = None, seed: int = 1) -> FrameBatch:
     """What is left of a batch, with the fault's times counted from T0."""
-    at_work = FrameFaults([faults.parse(text)], seed, telemetry=[TELEMETRY])
+    at_work = FrameFaults([fault_injection.parse(text)], seed, telemetry=[TELEMETRY])
     at_work.start(T0)
     return at_work.apply(batch, int(batch["t_ns"][-1]) + MS if now_ns is None else now_ns)
 
@@ -55,8 +54,8 @@ def through(text: str, batch: FrameBatch, now_ns: int | None = None, seed: int =
     ],
 )
 def test_a_fault_is_read(text: str, fault: Fault) -> None:
-    assert faults.parse(text) == fault
-    assert faults.parse(str(fault)) == fault
+    assert fault_injection.parse(text) == fault
+    assert fault_injection.parse(str(fault)) == fault
 
 
 @pytest.mark.parametrize(
@@ -81,7 +80,7 @@ def test_a_fault_is_read(text: str, fault: Fault) -> None:
 )
 def test_what_is_no_fault_is_refused_with_what_is_expected(text: str, said: str) -> None:
     with pytest.raises(ConfigError) as refused:
-        faults.parse(text)
+        fault_injection.parse(text)
     assert f"--fault {text}: " in str(refused.value)
     assert said in str(refused.value)
 
@@ -89,28 +88,28 @@ def test_what_is_no_fault_is_refused_with_what_is_expected(text: str, said: str)
 @given(st.text(st.sampled_from("dropstalmuteby-=@+.0123456789e "), max_size=20))
 def test_any_text_is_a_fault_or_refused(text: str) -> None:
     try:
-        fault = faults.parse(text)
+        fault = fault_injection.parse(text)
     except ConfigError:
         return
     assert fault.kind in KINDS
     assert (fault.value > 0) == (fault.kind in (*SHARES, *TIMES))
-    assert faults.parse(str(fault)).kind == fault.kind
+    assert fault_injection.parse(str(fault)).kind == fault.kind
 
 
 def test_faults_are_divided_between_link_and_simulated_controller() -> None:
-    given_ = [faults.parse(t) for t in ("drop=0.1", "mute", "reboot", "stall")]
-    kinds = [[f.kind for f in part] for part in faults.divided(given_, simulated=True)]
+    given_ = [fault_injection.parse(t) for t in ("drop=0.1", "mute", "reboot", "stall")]
+    kinds = [[f.kind for f in part] for part in fault_injection.divided(given_, simulated=True)]
     assert kinds == [["drop", "stall"], ["mute", "reboot"]]
 
 
 def test_a_real_controller_can_be_made_mute_by_its_link_but_not_rebooted() -> None:
-    assert faults.divided([faults.parse("mute")], simulated=False) == ([Fault("mute")], [])
+    assert fault_injection.divided([fault_injection.parse("mute")], simulated=False) == ([Fault("mute")], [])
     with pytest.raises(ConfigError, match="reboot@3: happens inside the controller, which is not simulated"):
-        faults.divided([faults.parse("reboot@3")], simulated=False)
+        fault_injection.divided([fault_injection.parse("reboot@3")], simulated=False)
 
 
 def test_the_record_says_that_the_trouble_was_made() -> None:
-    said = faults.announced([faults.parse("drop=0.01@2"), faults.parse("stall")])
+    said = fault_injection.announced([fault_injection.parse("drop=0.01@2"), fault_injection.parse("stall")])
     assert (said.code, said.effect) == ("faults-injected", Effect.NOTE)
     assert "drop=0.01@2, stall@0" in said.text
 
@@ -169,7 +168,7 @@ def test_a_destroyed_frame_is_an_error_frame_and_nothing_of_it_is_left() -> None
 
 
 def test_delayed_frames_come_later_with_the_time_at_which_they_come() -> None:
-    at_work = FrameFaults([faults.parse("delay=0.05@0.1+0.1")], 1)
+    at_work = FrameFaults([fault_injection.parse("delay=0.05@0.1+0.1")], 1)
     at_work.start(T0)
     first = at_work.apply(frames(200), T0 + 200 * MS)
     assert numbers(first) == list(range(151))  # number 150 was due at 0.2 s
@@ -189,7 +188,7 @@ def test_bursts_come_all_at_once_again_and_again() -> None:
 
 
 def test_a_stall_lets_everything_through_in_the_end() -> None:
-    at_work = FrameFaults([faults.parse("stall@0.1+0.2")], 1)
+    at_work = FrameFaults([fault_injection.parse("stall@0.1+0.2")], 1)
     at_work.start(T0)
     assert numbers(at_work.apply(frames(250), T0 + 250 * MS)) == list(range(100))
     assert at_work.active("stall", T0 + 299 * MS)
@@ -200,7 +199,7 @@ def test_a_stall_lets_everything_through_in_the_end() -> None:
 
 
 def test_a_stall_without_end_keeps_nothing() -> None:
-    at_work = FrameFaults([faults.parse("stall")], 1)
+    at_work = FrameFaults([fault_injection.parse("stall")], 1)
     at_work.start(T0)
     assert len(at_work.apply(frames(1000), T0 + 1000 * MS)) == 0
     assert len(at_work._stages[0].held) == 0
@@ -220,7 +219,7 @@ def test_mute_lets_telemetry_pass_and_no_reply() -> None:
 def test_cutting_into_batches_changes_nothing(sizes: list[int], text: str, seed: int) -> None:
     batch = frames(400)
     end = T0 + 1000 * MS
-    at_work = FrameFaults([faults.parse(text)], seed)
+    at_work = FrameFaults([fault_injection.parse(text)], seed)
     at_work.start(T0)
     bounds = [0, *np.minimum(np.cumsum(sizes, dtype=int), 400).tolist(), 400]
     parts = []
@@ -245,7 +244,7 @@ def test_each_fault_hits_frames_of_its_own() -> None:
 
 
 def test_a_cut_is_told_between_what_came_before_and_after_it() -> None:
-    at_work = FrameFaults([faults.parse("disconnect@0.1+0.05")], 1)
+    at_work = FrameFaults([fault_injection.parse("disconnect@0.1+0.05")], 1)
     at_work.start(T0)
     now = T0 + 300 * MS
     seen = at_work.apply(frames(300), now)
@@ -258,7 +257,7 @@ def test_a_cut_is_told_between_what_came_before_and_after_it() -> None:
 
 
 def test_a_cut_is_told_as_long_as_it_lasts() -> None:
-    at_work = FrameFaults([faults.parse("bus-off@0.1+0.05")], 1)
+    at_work = FrameFaults([fault_injection.parse("bus-off@0.1+0.05")], 1)
     at_work.start(T0)
     told = [at_work.up_to_cut(frames(0), T0 + t * MS, 0.0)[2] is not None for t in (99, 100, 149, 150)]
     assert told == [False, True, True, False]
@@ -268,7 +267,7 @@ def test_a_cut_is_told_as_long_as_it_lasts() -> None:
 
 @pytest.mark.parametrize(("reconnect_s", "told"), [(0.0, True), (0.04, True), (0.05, False), (1.0, False)])
 def test_a_link_that_reconnects_in_time_is_not_told(reconnect_s: float, told: bool) -> None:
-    at_work = FrameFaults([faults.parse("disconnect@0.1+0.05")], 1)
+    at_work = FrameFaults([fault_injection.parse("disconnect@0.1+0.05")], 1)
     at_work.start(T0)
     assert (at_work.up_to_cut(frames(0), T0 + 120 * MS, reconnect_s)[2] is not None) is told
     counted = at_work.counted(LinkStats(reconnects=2, bus_off=1), T0 + 150 * MS)
@@ -279,7 +278,7 @@ PACKETS = b"".join(bytes([n % 255 + 1]) * 9 + b"\x00" for n in range(2000))
 
 
 def test_bytes_of_a_share_of_the_packets_are_flipped() -> None:
-    at_work = FrameFaults([faults.parse("corrupt=0.1@0.1+0.1")], 1, bytewise=True)
+    at_work = FrameFaults([fault_injection.parse("corrupt=0.1@0.1+0.1")], 1, bytewise=True)
     at_work.start(T0)
     assert at_work.corrupt_packets(PACKETS, T0 + 99 * MS) == PACKETS
     assert at_work.corrupt_packets(PACKETS, T0 + 200 * MS) == PACKETS
@@ -292,9 +291,9 @@ def test_bytes_of_a_share_of_the_packets_are_flipped() -> None:
 
 @given(st.binary(max_size=200), st.integers(0, 5))
 def test_any_bytes_keep_their_length(data: bytes, seed: int) -> None:
-    assert len(faults.corrupt_bytes(data, 1.0, np.random.default_rng(seed))) == len(data)
-    assert faults.corrupt_bytes(data, 0.0, np.random.default_rng(seed)) == data
+    assert len(fault_injection.corrupt_bytes(data, 1.0, np.random.default_rng(seed))) == len(data)
+    assert fault_injection.corrupt_bytes(data, 0.0, np.random.default_rng(seed)) == data
 
 
 def test_every_kind_is_one_of_a_group() -> None:
-    assert {*SHARES, *TIMES, "stall", *faults.CUTS, "mute", *DEVICE_ONLY} == set(KINDS)
+    assert {*SHARES, *TIMES, "stall", *fault_injection.CUTS, "mute", *DEVICE_ONLY} == set(KINDS)

@@ -12,13 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from test_rigfile import DBC, TOML, changed, problems, written
 
-from bench.cli.campaign_dask import packed
+from bench.cli.campaign.dask import packed
 from bench.errors import ConfigError
 from bench.inputfile import DEPTH, TomlError, parse_toml
-from bench.messages import load_messages
-from bench.rigcheck import check_rig
-from bench.rigload import load_rig
-from bench.rigtext import read_rig
+from bench.rigfile import load_rig, read_rig
+from bench.rigfile.check import check_rig
+from bench.rigfile.messages import load_messages
 from bench.units import KNOWN
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -14,9 +14,9 @@ from test_records import start
 
 from bench.errors import ConfigError
 from bench.findings import Effect
-from bench.reserve import SIZE, reserved
+from bench.recording.reserve import SIZE, reserved
+from bench.run.runner import RunResult, _written
 from bench.rundir import RunDirectory
-from bench.runner import RunResult, _written
 from bench.wholefile import write_whole
 
 ROOT = Path(__file__).resolve().parent.parent

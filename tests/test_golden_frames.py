@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from bench import capture
-from bench.codec import Decoder, encode
-from bench.frames import frame
-from bench.messages import MessageMap
-from bench.rigload import load_rig
+from bench.link.codec import Decoder, encode
+from bench.link.frames import frame
+from bench.rigfile import capture, load_rig
+from bench.rigfile.messages import MessageMap
 
 TELEMETRY = [
     ("seq", 4660, "34 12"),  # 0x1234, low byte first

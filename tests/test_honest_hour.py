@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from recordings import HEADER, START_NS, SetClock
 
-from bench.frames import FD, FRAME
-from bench.recorder import Recorder
+from bench.link.frames import FD, FRAME
+from bench.recording.recorder import Recorder
 from bench.samples import ChannelInfo, SampleBlock, StreamLayout
 
 HOUR_S = 3600

@@ -20,9 +20,9 @@ from recordings import HEADER, block, record
 from test_recording import content
 
 from bench.errors import ConfigError, RecordingError
-from bench.kept import Kept
-from bench.recorder import RunHeader
 from bench.recording import Recording
+from bench.recording.kept import Kept
+from bench.recording.recorder import RunHeader
 
 READ = """
 import resource, sys
@@ -250,7 +250,7 @@ def test_a_limit_is_raised_by_its_variable(tmp_path: Path, sound: Path, monkeypa
 def test_the_page_states_every_limit() -> None:
     from dataclasses import fields
 
-    from bench.readlimits import ReadLimits, variable
+    from bench.recording.readlimits import ReadLimits, variable
 
     page = (Path(__file__).resolve().parent.parent / "docs" / "reference" / "recording.md").read_text(encoding="utf-8")
     for f in fields(ReadLimits):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bench.hosttime import HostMap
-from bench.linkhealth import BEYOND, DRIFT_PPM
+from bench.link.health import BEYOND, DRIFT_PPM
+from bench.link.hosttime import HostMap
 
 MS = 1_000_000
 

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from bench import index
 from bench.errors import ConfigError
-from bench.outcomes import Outcome
-from bench.records import unfinished, write_record
+from bench.record.outcomes import Outcome
+from bench.record.records import unfinished, write_record
+from bench.run import index
 
 
 def run(root: Path, second: int, outcome: Outcome = Outcome.PASS) -> Path:

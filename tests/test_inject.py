@@ -9,11 +9,12 @@ from typing import Any
 
 import pytest
 
-from bench import catalogue, faults
+from bench import catalogue
 from bench.catalogue import Entry
 from bench.errors import ConfigError
-from bench.outcomes import Outcome
-from bench.runner import RunResult
+from bench.link import fault_injection
+from bench.record.outcomes import Outcome
+from bench.run.runner import RunResult
 
 PAGE = (Path(__file__).parent.parent / "docs" / "how-to" / "inject-faults.md").read_text(encoding="utf-8")
 TINY = Entry("tiny-levitated", "tests.tiny_procedures", "A look at the supply")
@@ -55,4 +56,6 @@ def test_no_fault_is_refused_before_the_start(inject: Inject, tiny: str, tmp_pat
 
 
 def test_the_how_to_names_every_kind() -> None:
-    assert set(re.findall(r"^\| `([a-z-]+)` \|.*\| (?:share.*|s|–) \|$", PAGE, re.MULTILINE)) == set(faults.KINDS)
+    assert set(re.findall(r"^\| `([a-z-]+)` \|.*\| (?:share.*|s|–) \|$", PAGE, re.MULTILINE)) == set(
+        fault_injection.KINDS
+    )

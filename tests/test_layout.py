@@ -11,8 +11,8 @@ from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bench import layout
 from bench.errors import RecordingError
+from bench.recording import layout
 from bench.samples import ChannelInfo, StreamLayout
 
 TWO = StreamLayout("s", 1000, (ChannelInfo("a", "m"), ChannelInfo("code", "1", "u2")))

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from bench.errors import ConfigError
-from bench.limits import Limit, Verdict, judge
+from bench.record.limits import Limit, Verdict, judge
 from bench.uncertainty import Interval
 
 

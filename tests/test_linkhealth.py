@@ -7,10 +7,10 @@ from dataclasses import fields
 import pytest
 
 from bench.findings import Effect
-from bench.hosttime import Drift
 from bench.link import LinkStats
-from bench.linkhealth import BEYOND, Health
-from bench.telemetry import Counters
+from bench.link.health import BEYOND, Health
+from bench.link.hosttime import Drift
+from bench.link.telemetry import Counters
 
 CLEAN = LinkStats(received=100_000, sent=5_000, heartbeats=4_000, longest_heartbeat_gap_ns=21_000_000)
 TROUBLES = [f.name for f in fields(Counters) if f.name != "gaps"]

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench import linkurl
 from bench.errors import ConfigError
+from bench.rigfile import linkurl
 
 
 @pytest.mark.parametrize("scheme", linkurl.EXAMPLES)

@@ -7,9 +7,8 @@ from pathlib import Path
 import pytest
 from pydantic import Field
 
-from bench import plans
 from bench.errors import ConfigError
-from bench.procedure import BenchPlan
+from bench.procedure import BenchPlan, plans
 
 
 class Plan(BenchPlan):

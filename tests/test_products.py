@@ -13,9 +13,9 @@ import pytest
 from pyarrow import parquet
 
 from bench.figures import Figure, Grid, Series
-from bench.limits import Verdict
-from bench.products import products
-from bench.records import Measurement
+from bench.record.limits import Verdict
+from bench.record.records import Measurement
+from bench.run.result_tables import products
 
 PHASE = Figure("phase", "", "", "frequency (Hz)", "phase (deg)",
                (Series("measured", np.array([10.0, 20.0]), np.array([-5.0, -30.0])),))  # fmt: skip

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.codec import Decoder, encode
-from bench.faults import Fault
-from bench.frames import FD, FrameBatch, empty_batch, frame
-from bench.rigload import load_rig
-from bench.session import Session
+from bench.link.codec import Decoder, encode
+from bench.link.fault_injection import Fault
+from bench.link.frames import FD, FrameBatch, empty_batch, frame
+from bench.link.session import Session
+from bench.rigfile import load_rig
 from drivers import operator_line, slcan_bus
 from drivers.controller import Controller
 from sim_backend.controller import SimulatedController

@@ -18,13 +18,12 @@ from cobs import cobs
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench import protocoldoc
-from bench.codec import Decoder, encode
 from bench.errors import ConfigError
-from bench.frames import FD, empty_batch, frame
-from bench.messages import Message
-from bench.rigload import load_rig
-from bench.session import Session
+from bench.link.codec import Decoder, encode
+from bench.link.frames import FD, empty_batch, frame
+from bench.link.session import Session
+from bench.rigfile import load_rig, protocoldoc
+from bench.rigfile.messages import Message
 from bench.wire import captureblock, isotp, packet, slcan
 from drivers import controller, dialogue, handshake, slcan_bus, waiting
 from sim_backend import ownership

@@ -17,7 +17,7 @@ from mcap.stream_reader import StreamReader
 from recordings import HEADER, PERIOD_NS, START_NS, STREAM, SetClock, block, frames_of, gapped, record
 
 from bench.errors import RecordingError
-from bench.recorder import Recorder, RunHeader
+from bench.recording.recorder import Recorder, RunHeader
 
 ROOT = Path(__file__).resolve().parent.parent
 

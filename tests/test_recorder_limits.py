@@ -17,12 +17,12 @@ from mcap.reader import make_reader
 from recordings import HEADER, PERIOD_NS, START_NS, STREAM, SetClock, block, frames_of
 from test_recorder import messages_of
 
-from bench import recorder as recorder_module
 from bench.clock import PumpedClock
 from bench.errors import RecordingError
-from bench.mcapwriter import FLUSH_NS, McapWriter
-from bench.recorder import Recorder
 from bench.recording import Recording
+from bench.recording import recorder as recorder_module
+from bench.recording.mcapwriter import FLUSH_NS, McapWriter
+from bench.recording.recorder import Recorder
 from bench.samples import ChannelInfo, SampleBlock, StreamLayout
 
 ROOT = Path(__file__).resolve().parent.parent

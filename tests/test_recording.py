@@ -13,10 +13,9 @@ import pytest
 from mcap.writer import Writer
 from recordings import HEADER, PERIOD_NS, START_NS, STREAM, block, frames_of, gapped, record
 
-from bench import layout
 from bench.errors import AnalysisError, RecordingError
-from bench.recorder import RunHeader
-from bench.recording import Recording
+from bench.recording import Recording, layout
+from bench.recording.recorder import RunHeader
 
 
 @pytest.fixture(scope="module")

@@ -14,10 +14,10 @@ from mcap.writer import CompressionType, Writer
 from recordings import HEADER, PERIOD_NS, START_NS, STREAM, SetClock, block, frames_of, gapped, record
 
 from bench.errors import AnalysisError, RecordingError
-from bench.mcapfile import KEPT, index
 from bench.procedure import BenchPlan
-from bench.recorder import Recorder, RunHeader
 from bench.recording import Recording
+from bench.recording.mcapfile import KEPT, index
+from bench.recording.recorder import Recorder, RunHeader
 
 
 class Angles(BenchPlan):

@@ -14,10 +14,10 @@ import pytest
 from mcap.reader import make_reader
 from recordings import HEADER, START_NS, STREAM, SetClock, frames_of, gapped, record
 
-from bench.frames import EXTENDED, FD, SENT, SWITCHED, batch_of, packed
-from bench.recorder import Recorder
+from bench.link.frames import EXTENDED, FD, SENT, SWITCHED, batch_of, packed
 from bench.recording import Recording
-from bench.rigload import load_rig
+from bench.recording.recorder import Recorder
+from bench.rigfile import load_rig
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference" / "recording.md"
 FRAME = struct.Struct("<qqIBB64s")

@@ -14,11 +14,11 @@ import pytest
 from bench.cli.run import summary
 from bench.errors import ConfigError
 from bench.findings import Effect, Finding
-from bench.limits import Limit, Verdict
-from bench.linkcounts import LinkCounts
-from bench.outcomes import Outcome, outcome_of, outranking, unjudged
+from bench.link.counts import LinkCounts
 from bench.procedure import Measured, Quantity
-from bench.records import (
+from bench.record.limits import Limit, Verdict
+from bench.record.outcomes import Outcome, outcome_of, outranking, unjudged
+from bench.record.records import (
     SCHEMA_FILE,
     Record,
     RecordingFile,

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from bench.registers import EXCEPTIONS, RANGES, Block, Register, RegisterRefused, grouped, values_of
+from bench.rigfile.registers import EXCEPTIONS, RANGES, Block, Register, RegisterRefused, grouped, values_of
 
 Kind = Literal["u16", "i16", "u32", "i32", "f32"]
 WORD = st.integers(0, 0xFFFF)

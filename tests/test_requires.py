@@ -9,8 +9,7 @@ import pytest
 from bench import catalogue
 from bench.cli.compose import load_procedure
 from bench.procedure import Procedure
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
+from bench.rigfile import RigFile, load_rig
 
 OF = {
     "tsbs12": ("amb-calibration", "force-constant", "negative-stiffness", "force-coupling", "torque-constant", "spindown",

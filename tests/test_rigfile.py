@@ -8,13 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench import rigfile
-from bench.envelope import Envelope
 from bench.errors import ConfigError, InterlockError, Problem
-from bench.rigcheck import check_rig
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
-from bench.rigpossible import normal_gravity
+from bench.rigfile import RigFile, load_rig, model
+from bench.rigfile.check import check_rig
+from bench.rigfile.envelope import Envelope
+from bench.rigfile.possible import normal_gravity
 from bench.samples import SampleBlock
 
 RIGS = Path(__file__).resolve().parent.parent / "rigs"
@@ -314,13 +312,13 @@ def test_an_older_schema_is_migrated_step_by_step(tmp_path: Path, monkeypatch: p
         assert data["schema"] == 2
         return {**data, "title": f"{data['title']}!"}
 
-    monkeypatch.setattr(rigfile, "SCHEMA", 3)
-    monkeypatch.setattr(rigfile, "MIGRATIONS", {1: renamed, 2: rounded})
+    monkeypatch.setattr(model, "SCHEMA", 3)
+    monkeypatch.setattr(model, "MIGRATIONS", {1: renamed, 2: rounded})
     rig = load_rig(written(tmp_path, changed(TOML, ('title = "Toothless', 'heading = "Toothless'))))
     assert rig.schema_ == 3
     assert rig.title.startswith("Toothless self-bearing")
     assert rig.title.endswith("!")
-    monkeypatch.setattr(rigfile, "MIGRATIONS", {1: renamed})
+    monkeypatch.setattr(model, "MIGRATIONS", {1: renamed})
     with pytest.raises(ConfigError, match="found 2; no way from there to 3"):
         load_rig(written(tmp_path))
 

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from bench import catalogue
-from bench.cli.campaign_job import run_rig
-from bench.cli.campaign_tasks import RigTask, StepTask
+from bench.cli.campaign.job import run_rig
+from bench.cli.campaign.tasks import RigTask, StepTask
 from bench.cli.compose import Request
 from bench.cli.run import execute
 from bench.cli.virtual import Knobs, simulated_run
 from bench.errors import InterlockError
 from bench.procedure import Measured
 from bench.recording import Recording
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 
 TINY = (catalogue.Entry("tiny-levitated", "tests.tiny_procedures", "A look at the supply"),)
 PLAN = {"settle_s": 0.3, "average_s": 0.2}

@@ -21,20 +21,19 @@ from mcap.records import Attachment, Chunk, Metadata
 from mcap.stream_reader import StreamReader
 from tiny_procedures import Plan
 
-from bench import reanalysis, runner
 from bench.cli.compose import simulated
 from bench.errors import BenchError
-from bench.limits import Limit, Verdict
-from bench.opened import Job
-from bench.outcomes import Outcome
 from bench.procedure import Procedure
 from bench.progress import PlainProgress
+from bench.record.limits import Limit, Verdict
+from bench.record.outcomes import Outcome
+from bench.record.records import SCHEMA_FILE, Record
 from bench.recording import Recording
-from bench.records import SCHEMA_FILE, Record
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
-from bench.runner import RunResult
-from bench.supervisor import Supervisor
+from bench.rigfile import RigFile, load_rig
+from bench.run import reanalysis, runner
+from bench.run.job import Job
+from bench.run.runner import RunResult
+from bench.run.supervisor import Supervisor
 
 Run = Callable[..., RunResult]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.codec import Decoder, encode
-from bench.frames import frame
-from bench.rigload import load_rig
-from bench.session import PART_BYTES, PARTS, Session, new_session, who
+from bench.link.codec import Decoder, encode
+from bench.link.frames import frame
+from bench.link.session import PART_BYTES, PARTS, Session, new_session, who
+from bench.rigfile import load_rig
 
 U32 = st.integers(0, 2**32 - 1)
 MESSAGES = load_rig("tsbs12").messages

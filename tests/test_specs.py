@@ -15,10 +15,10 @@ from bench import catalogue
 from bench.cli.compose import load_procedure
 from bench.errors import ConfigError
 from bench.findings import Effect
-from bench.limits import Limit
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
-from bench.roles import RigState
-from bench.specs import INSTALLED, applied, in_unit, load_spec, misnamed, parse_spec
+from bench.procedure.roles import RigState
+from bench.record.limits import Limit
+from bench.record.specs import INSTALLED, applied, in_unit, load_spec, misnamed, parse_spec
 
 ENTRY = 'unit = "N/A", source = "house", verified = false'
 

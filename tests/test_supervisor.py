@@ -12,7 +12,7 @@ import pytest
 from bench.clock import PumpedClock
 from bench.errors import LinkError, SignalAbort
 from bench.findings import Effect
-from bench.supervisor import SafeStep, Supervisor
+from bench.run.supervisor import SafeStep, Supervisor
 
 
 class StillClock:

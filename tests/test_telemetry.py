@@ -7,13 +7,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from bench.codec import encode
-from bench.envelope import Envelope
 from bench.errors import InterlockError
-from bench.frames import FrameBatch, empty_batch, frame
-from bench.rigload import load_rig
+from bench.link.codec import encode
+from bench.link.frames import FrameBatch, empty_batch, frame
+from bench.link.telemetry import TelemetryDecoder
+from bench.rigfile import load_rig
+from bench.rigfile.envelope import Envelope
 from bench.samples import SampleBlock
-from bench.telemetry import TelemetryDecoder
 
 RIG = load_rig("tsbs12")
 MESSAGE = RIG.messages["Telemetry"]

@@ -10,8 +10,8 @@ from tiny_procedures import Plan, acquire
 from bench.calibration import Need
 from bench.findings import Finding
 from bench.procedure import Measured, Procedure, Quantity
+from bench.procedure.roles import RigState
 from bench.recording import Recording
-from bench.roles import RigState
 from bench.uncertainty import Estimate, Influence
 
 EXCESS = Quantity("excess", "V", "supply voltage less the calibrated one")

@@ -9,10 +9,10 @@ from typing import Any, Literal
 from bench.errors import OperatorAbort
 from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity
-from bench.recorder import Recorder
+from bench.procedure.rig import Rig
+from bench.procedure.roles import NOTHING, RigState
 from bench.recording import Recording
-from bench.rig import Rig
-from bench.roles import NOTHING, RigState
+from bench.recording.recorder import Recorder
 from bench.uncertainty import Estimate, Influence
 
 SUPPLY = Quantity("supply", "V", "mean supply voltage")

@@ -154,8 +154,8 @@ def campaign(
 
     The last line on standard output is the campaign's directory.
     """
-    from bench.cli.campaign import campaign_command
-    from bench.cli.campaign_asked import CampaignRequest
+    from bench.cli.campaign.asked import CampaignRequest
+    from bench.cli.campaign.command import campaign_command
 
     return campaign_command(
         CampaignRequest(

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 
 from bench import catalogue
 from bench.cli.compose import load_procedure
-from bench.envelope import Envelope
 from bench.errors import ConfigError, Problem
-from bench.plans import assemble
 from bench.procedure import BenchPlan, Procedure
+from bench.procedure.plans import assemble
+from bench.record.specs import load_spec
 from bench.rigfile import RigFile
-from bench.specs import load_spec
+from bench.rigfile.envelope import Envelope
 
 WIDTH = 80
 NAMED = 3  # names of a table, where all procedures are listed

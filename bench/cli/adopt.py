@@ -8,12 +8,12 @@ from datetime import datetime
 from pathlib import Path
 
 from bench import catalogue
-from bench.adoption import Adoption, due, refuse_other_rig
 from bench.calibration import Calibration
-from bench.calibrationstore import Store, named
+from bench.calibration.store import Store, named
 from bench.cli.compose import load_procedure
-from bench.outcomes import SOUND
-from bench.rigload import load_rig
+from bench.record.outcomes import SOUND
+from bench.rigfile import load_rig
+from bench.run.adoption import Adoption, due, refuse_other_rig
 from bench.uncertainty import interval, stated
 
 

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from bench import calibrationfile, catalogue
+from bench import catalogue
 from bench.calibration import Calibration, changed_certificates, number
-from bench.calibrationstore import Store, base_of, machine, stores_of
+from bench.calibration import file as calibration_file
+from bench.calibration.store import Store, base_of, machine, stores_of
 from bench.cli.adopt import values
 from bench.cli.compose import load_procedure
 from bench.errors import ConfigError
-from bench.outcomes import SOUND
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
+from bench.record.outcomes import SOUND
+from bench.rigfile import RigFile, load_rig
 
 HEADER = ("machine", "procedure", "bias", "date", "age", "due", "state")
 
@@ -59,7 +59,7 @@ def rows_of(store: Store, rig: RigFile, now: datetime) -> Iterator[Row]:
     known: list[tuple[tuple[str, bool, float], Row]] = []
     for path in sorted(store.folder.glob("*.json")):
         try:
-            c = calibrationfile.read(path)
+            c = calibration_file.read(path)
         except ConfigError as error:
             cells = (machine(store.seed), path.stem, "", "", "", "", "unreadable")
             known.append(((path.stem, False, 0.0), Row(cells, notes=(str(error),))))
@@ -75,7 +75,7 @@ def row(c: Calibration, store: Store, rig: RigFile, now: datetime, current: bool
     notes = [f"adopted although its outcome was {c.outcome}"] if c.outcome not in SOUND else []
     notes += [f"rests on {u.procedure}, which had expired on {u.due}" for u in c.used if u.state == "expired"]
     if not c.sealed:
-        notes.append(f"carries no digest; its content has {calibrationfile.digest_of(calibrationfile.content(c))}")
+        notes.append(f"carries no digest; its content has {calibration_file.digest_of(calibration_file.content(c))}")
     state = "current"
     if foreign := store.foreign(c):
         state, notes = "other rig", [foreign]

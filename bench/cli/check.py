@@ -11,9 +11,9 @@ from bench import catalogue
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from bench.busload import BusLoad
     from bench.errors import Problem
     from bench.rigfile import RigFile
+    from bench.rigfile.busload import BusLoad
 
 PASS, USAGE = 0, 2
 
@@ -36,7 +36,7 @@ def _table(title: str, rows: list[tuple[str, str]]) -> None:
 
 
 def _load_line(load: BusLoad) -> str:
-    from bench.busload import WARN
+    from bench.rigfile.busload import WARN
 
     largest = max(load.by_message, key=lambda name: load.by_message[name])
     text = f"bus load {load.total:.1%} worst case ({largest} {load.by_message[largest]:.1%})"
@@ -47,7 +47,7 @@ def check_rig_file(rig: str, procedure: str = "") -> int:
     """Every problem of a rig file with file, key, found and expected, on standard error, and which procedures it can run;
     2 if there is a problem, or if it cannot run the one that is asked for."""
     from bench.cli.abilities import Ability, abilities, told, unknown_plans
-    from bench.rigcheck import as_far_as_read, check_rig
+    from bench.rigfile.check import as_far_as_read, check_rig
 
     path = catalogue.rig_path(rig)
     problems, load = check_rig(rig)
@@ -78,8 +78,8 @@ def _of_calibrations(rig: RigFile) -> Iterator[Problem]:
     """The current calibrations beside the rig file that no run would take: not to be read, changed, or of the future."""
     from datetime import UTC, datetime
 
-    from bench.calibrationfile import read
-    from bench.calibrationstore import stores_of
+    from bench.calibration.file import read
+    from bench.calibration.store import stores_of
     from bench.errors import ConfigError, Problem
 
     now = datetime.now(UTC)
@@ -97,7 +97,7 @@ def _of_calibrations(rig: RigFile) -> Iterator[Problem]:
 def _of_spec(rig: str) -> Iterator[Problem]:
     """Limits of no procedure; a spec that cannot be read is told of by the procedures."""
     from bench.errors import ConfigError
-    from bench.specs import misnamed
+    from bench.record.specs import misnamed
 
     with contextlib.suppress(ConfigError):
         yield from misnamed(rig)

@@ -16,20 +16,20 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from bench import catalogue, faults, linkurl, plans
+from bench import catalogue
 from bench.calibration import Need, number
-from bench.calibrationstore import Store
+from bench.calibration.lookup import Lookup
+from bench.calibration.store import Store
 from bench.cli.console import Asking, quietly
 from bench.cli.opening import live, simulated
-from bench.envelope import Envelope
 from bench.errors import ConfigError
+from bench.link import fault_injection
 from bench.lock import rig_lock
-from bench.needs import Lookup
-from bench.opened import Connect, Job
-from bench.procedure import BenchPlan, Procedure
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
-from bench.specs import load_spec, misnamed
+from bench.procedure import BenchPlan, Procedure, plans
+from bench.record.specs import load_spec, misnamed
+from bench.rigfile import RigFile, linkurl, load_rig
+from bench.rigfile.envelope import Envelope
+from bench.run.job import Connect, Job
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ def prepare(request: Request, asking: Asking = quietly) -> tuple[Job, Connect]:
         request.allow_expired,
     )
     used = lookup.found(procedure.name, procedure.needs(plan))
-    injected = [faults.parse(text) for text in request.faults]
+    injected = [fault_injection.parse(text) for text in request.faults]
     if seed is None:
         kind = request.operator or ("console" if sys.stdin.isatty() else "auto")
         job = Job(procedure, rig, plan, limits, "live", None, rig_lock(rig.link.url.partition("?")[0]), used,

@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager, contextmanager
 
 from bench.clock import Clock
 from bench.errors import OperatorAbort
-from bench.supervisor import Supervisor
+from bench.run.supervisor import Supervisor
 
 LOOK_S = 0.05
 CLOSED = "standard input is closed: nobody can answer"

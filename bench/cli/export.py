@@ -10,10 +10,10 @@ from bench import rundir
 from bench.cli.compose import load_procedure
 from bench.cli.reporting import figures
 from bench.errors import BenchError, RecordingError
-from bench.export import Format, Tabular, export, whole_file
-from bench.products import products
+from bench.record.records import read_record
 from bench.recording import Recording
-from bench.records import read_record
+from bench.run.export import Format, Tabular, export, whole_file
+from bench.run.result_tables import products
 
 Log = Literal["blf", "asc", "candump"]
 

@@ -9,24 +9,23 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from bench import faults, linkurl
 from bench.cli import console
 from bench.cli.safety import making_safe, may_touch
 from bench.clock import Clock, WallClock
-from bench.envelope import HELD
 from bench.errors import BenchError, ConfigError
-from bench.faults import Fault
 from bench.findings import SIMULATED_CONTROLLER, Finding
-from bench.link import Link
-from bench.linkhealth import Health
-from bench.opened import Connect, OpenRig, WatchedClock
-from bench.recorder import Recorder
-from bench.registers import RegisterPort
-from bench.rig import Rig
-from bench.rigfile import RigFile
-from bench.roles import Operator
-from bench.session import Session, new_session
-from bench.supervisor import Supervisor
+from bench.link import Link, fault_injection
+from bench.link.fault_injection import Fault
+from bench.link.health import Health
+from bench.link.session import Session, new_session
+from bench.procedure.rig import Rig
+from bench.procedure.roles import Operator
+from bench.recording.recorder import Recorder
+from bench.rigfile import RigFile, linkurl
+from bench.rigfile.envelope import HELD
+from bench.rigfile.registers import RegisterPort
+from bench.run.job import Connect, OpenRig, WatchedClock
+from bench.run.supervisor import Supervisor
 
 if TYPE_CHECKING:
     from drivers.controller import Controller
@@ -114,7 +113,7 @@ def live(
         ConfigError: a link's URL is none, or of a kind that its device cannot have; a fault that only a simulated
             controller can have.
     """
-    faults.divided(injected, simulated=False)
+    fault_injection.divided(injected, simulated=False)
     spec = rig.link
     scheme = linkurl.parse(spec.url).scheme
     if scheme not in linkurl.CONTROLLER_SCHEMES[1:]:
@@ -214,7 +213,7 @@ def beat_of(rig: RigFile, session: Session) -> Any:
     Raises:
         ConfigError: its counter is not a little-endian number of 16 bits at a whole byte.
     """
-    from bench.codec import encode
+    from bench.link.codec import encode
     from drivers.heartbeat import Beat
 
     b = rig.binding
@@ -279,7 +278,7 @@ def _opened(
 
     rig = Rig(controller.rig, controller.clock, controller, controller, operators[0], controller.telemetry.counters,
               health, controller.link.close, bus.drive, bus.supply, bus.thermal, controller.capture)  # fmt: skip
-    found = [faults.announced(injected)] if injected else []
+    found = [fault_injection.announced(injected)] if injected else []
     if controller.cleared:
         found.append(
             Finding("fault-cleared", f"fault {controller.cleared} of an earlier run was cleared", "controller")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from bench.clock import Clock
 from bench.errors import LinkError
-from bench.roles import Drive
+from bench.procedure.roles import Drive
 
 if TYPE_CHECKING:
     from drivers.controller import Controller

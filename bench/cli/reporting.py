@@ -12,8 +12,8 @@ import numpy as np
 
 from bench.figures import Shown
 from bench.procedure import Procedure
+from bench.record.records import Record
 from bench.recording import Recording
-from bench.records import Record
 from bench.rigfile import RigFile
 
 CELSIUS = 273.15

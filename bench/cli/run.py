@@ -5,15 +5,16 @@ from __future__ import annotations
 import sys
 from contextlib import suppress
 
-from bench import runlog, runner
+from bench import runlog
 from bench.cli import reporting
 from bench.cli.compose import Request, prepare
 from bench.cli.summary import summary
-from bench.outcomes import Outcome
 from bench.progress import shown_on
 from bench.progress_text import columns
-from bench.runner import RunResult
-from bench.supervisor import Supervisor
+from bench.record.outcomes import Outcome
+from bench.run import runner
+from bench.run.runner import RunResult
+from bench.run.supervisor import Supervisor
 
 STATUS = {Outcome.PASS: 0, Outcome.DONE: 0, Outcome.FAIL: 1, Outcome.ERROR: 3, Outcome.ABORTED: 4,
           Outcome.INDETERMINATE: 5}  # fmt: skip

@@ -8,16 +8,17 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from bench import index, reanalysis, rundir, runlog
+from bench import rundir, runlog
 from bench.cli import reporting
 from bench.cli.compose import load_procedure
 from bench.cli.run import STATUS
 from bench.cli.summary import summary
 from bench.errors import BenchError, ConfigError, RecordingError
 from bench.progress_text import columns
+from bench.record.records import read_record
 from bench.recording import Recording
-from bench.records import read_record
-from bench.supervisor import Supervisor
+from bench.run import index, reanalysis
+from bench.run.supervisor import Supervisor
 
 logger = logging.getLogger("bench.cli")
 

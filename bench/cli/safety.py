@@ -19,9 +19,9 @@ from bench.cli.patience import Patience
 from bench.cli.witness import RESTING, UNKNOWN, Witness
 from bench.errors import BenchError, InterlockError, LinkError, Refused
 from bench.findings import Finding
-from bench.opened import WatchedClock
-from bench.roles import Drive
-from bench.supervisor import SafeStep
+from bench.procedure.roles import Drive
+from bench.run.job import WatchedClock
+from bench.run.supervisor import SafeStep
 
 if TYPE_CHECKING:
     from drivers.controller import Controller

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bench import faults, linkurl, plans
 from bench.cli.compose import with_links
 from bench.clock import WallClock
 from bench.errors import ConfigError
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
-from bench.signals import delivered_to
+from bench.link import fault_injection
+from bench.os_signals import delivered_to
+from bench.procedure import plans
+from bench.rigfile import RigFile, linkurl, load_rig
 
 if TYPE_CHECKING:
     from sim_backend.machine import SimulatedPlant
@@ -58,7 +58,9 @@ def serve_command(request: ServeRequest) -> int:
 
     rig = with_links(load_rig(request.rig), request.links)
     _check_links(rig, request.links)
-    on_link, in_device = faults.divided([faults.parse(text) for text in request.faults], simulated=True)
+    on_link, in_device = fault_injection.divided(
+        [fault_injection.parse(text) for text in request.faults], simulated=True
+    )
     truth = draw(rig, request.seed, _overrides(request.truth))
     controller = SimulatedController(rig, truth, in_device)
     wire = WireFaults(on_link, request.seed, [rig.messages[name].identifier for name in rig.binding.telemetry])
@@ -82,7 +84,7 @@ def serve_command(request: ServeRequest) -> int:
         sys.stdout.write("".join(f"{line}\n" for line in [*lines, "ready"]))
         sys.stdout.flush()
         if request.faults:
-            _say(faults.announced([*on_link, *in_device]).text)
+            _say(fault_injection.announced([*on_link, *in_device]).text)
         server.run(lambda: bool(stopped))
         _say(f"{stopped[0]}: stopped, controller {controller.state}; {server.statistics()}")
     return 0

@@ -12,16 +12,16 @@ from pathlib import Path
 
 from bench import catalogue
 from bench.calibration import Need, number, settings_differ
-from bench.calibrationstore import Store, machine
+from bench.calibration.store import Store, machine
 from bench.cli.adopt import adopt
 from bench.cli.compose import Request, load_procedure, planned
 from bench.cli.run import execute
 from bench.errors import BenchError, ConfigError
-from bench.plans import assignment, field_of
 from bench.procedure import Procedure
-from bench.records import Measurement
-from bench.rigload import load_rig
-from bench.runner import RunResult
+from bench.procedure.plans import assignment, field_of
+from bench.record.records import Measurement
+from bench.rigfile import load_rig
+from bench.run.runner import RunResult
 
 
 class NotCalibrated(BenchError):

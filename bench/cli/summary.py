@@ -9,10 +9,10 @@ from pathlib import Path
 
 from bench import units
 from bench.findings import Effect
-from bench.limits import Verdict
-from bench.outcomes import Outcome, outranking
-from bench.records import FindingEntry, LimitEntry, Measurement, Record
-from bench.specs import NOT_APPLIED
+from bench.record.limits import Verdict
+from bench.record.outcomes import Outcome, outranking
+from bench.record.records import FindingEntry, LimitEntry, Measurement, Record
+from bench.record.specs import NOT_APPLIED
 from bench.uncertainty import stated
 
 SHOWN = 12  # results, unless all are asked for

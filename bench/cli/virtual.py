@@ -10,20 +10,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bench.acquisition import Acquired, acquired
-from bench.adoption import calibration_of
 from bench.calibration import Calibration, Need, facts_of, settings_differ
 from bench.cli import opening
 from bench.cli.compose import load_procedure
 from bench.errors import ConfigError
-from bench.evaluation import yielded
 from bench.findings import Finding
-from bench.opened import Job
 from bench.procedure import Measured, Procedure
 from bench.progress import Silent
 from bench.recording import Recording
-from bench.rigload import load_rig
-from bench.supervisor import Supervisor
+from bench.rigfile import load_rig
+from bench.run.adoption import calibration_of
+from bench.run.evaluation import yielded
+from bench.run.job import Job
+from bench.run.machine_phase import Acquired, acquired
+from bench.run.supervisor import Supervisor
 from sim_backend.truth import Truth, draw
 
 

@@ -11,7 +11,7 @@ from itertools import chain
 
 import numpy as np
 
-from bench.frames import ERROR, FD, FRAME, FrameBatch, empty_batch
+from bench.link.frames import ERROR, FD, FRAME, FrameBatch, empty_batch
 from bench.wire import packet
 from bench.wire.packet import Malformed, WrongCrc
 

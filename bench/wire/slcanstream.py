@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from bench.frames import ERROR, FD, FRAME, REMOTE, SWITCHED, FrameBatch, empty_batch
+from bench.link.frames import ERROR, FD, FRAME, REMOTE, SWITCHED, FrameBatch, empty_batch
 from bench.wire.slcan import BEL, CR, EXTENDED, FRAME_LETTERS, LENGTHS, LONGEST_LINE, LOSSES, WRAP_MS, head, parse
 
 REPLIES: Final = 256

@@ -18,12 +18,12 @@ from pydantic import Field
 from bench.figures import Figure
 from bench.findings import Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
-from bench.recorder import Recorder
+from bench.procedure.requires import Requires
+from bench.procedure.rig import Rig
+from bench.procedure.roles import NOTHING, Load, RigState
 from bench.recording import Recording
-from bench.requires import Requires
-from bench.rig import Rig
+from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.roles import NOTHING, Load, RigState
 from bench.uncertainty import Estimate, propagate
 from procedures.amb_calibration import both_coils, checks, hypotheses
 from procedures.amb_calibration import by_angle as amb_calibration_by_angle

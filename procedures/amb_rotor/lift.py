@@ -6,10 +6,10 @@ What is recorded here is judged by `procedures.amb_rotor.wiring.before_orbits`.
 from __future__ import annotations
 
 from bench.errors import DeviceFault, NotReached
-from bench.recorder import Recorder
-from bench.rig import Rig
-from bench.roles import RigState
-from bench.states import transition
+from bench.procedure.rig import Rig
+from bench.procedure.roles import RigState
+from bench.procedure.states import transition
+from bench.recording.recorder import Recorder
 from procedures.amb_rotor import rings
 from procedures.amb_rotor.channels import POSITIONS
 

@@ -14,8 +14,8 @@ import numpy as np
 from bench.analysis.balance import G_MM, bound
 from bench.calibration import Calibration
 from bench.findings import Effect, Finding
+from bench.procedure.requires import Requires
 from bench.recording import Recording
-from bench.requires import Requires
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from bench.units import RPM

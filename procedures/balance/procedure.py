@@ -11,9 +11,9 @@ from collections.abc import Iterable, Iterator
 from bench.figures import Shown
 from bench.findings import Finding
 from bench.procedure import Measured, Procedure, Quantity, read_method
+from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.rigfile import RigFile
-from bench.roles import RigState
 from bench.units import RPM
 from procedures.amb_rotor import lift
 from procedures.balance import checks, estimates, sequence

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from bench.errors import AnalysisError
-from bench.recorder import Recorder
-from bench.rig import Rig
-from bench.roles import Plane, RigState
-from bench.states import transition
+from bench.procedure.rig import Rig
+from bench.procedure.roles import Plane, RigState
+from bench.procedure.states import transition
+from bench.recording.recorder import Recorder
 from procedures.amb_rotor import lift
 from procedures.amb_rotor.channels import CONTACT
 from procedures.balance import decision, estimates

@@ -14,8 +14,8 @@ from bench.analysis.orders import Track, synchronous
 from bench.analysis.sampling import Sampling
 from bench.analysis.tachometer import Tachometer, counted, tachometer
 from bench.analysis.vectors import Vectors
-from bench.capture import CaptureData
 from bench.recording import Recording
+from bench.rigfile.capture import CaptureData
 from procedures.amb_rotor.channels import CURRENTS, POSITIONS
 from procedures.synchronous.dwells import SLOW, Dwell, read_dwells
 from procedures.synchronous.nonsynchronous import folds

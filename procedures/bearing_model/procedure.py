@@ -17,13 +17,13 @@ from bench.errors import DeviceFault, OperatorAbort
 from bench.figures import Figure
 from bench.findings import Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
-from bench.recorder import Recorder
+from bench.procedure.requires import Requires
+from bench.procedure.rig import Rig
+from bench.procedure.roles import RigState
+from bench.procedure.states import transition
 from bench.recording import Recording
-from bench.requires import Requires
-from bench.rig import Rig
+from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.roles import RigState
-from bench.states import transition
 from procedures.amb_rotor import rings
 from procedures.amb_rotor.magnetics import AXES
 from procedures.amb_rotor.places import CURRENTS, HOLD, LIFT, LIFT_LOST, POSITIONS, REST, TILT, Held, read_steps

@@ -8,9 +8,9 @@ from __future__ import annotations
 from pydantic import Field
 
 from bench.procedure import Procedure, read_method
-from bench.recorder import Recorder
-from bench.rig import Rig
-from bench.roles import RigState
+from bench.procedure.rig import Rig
+from bench.procedure.roles import RigState
+from bench.recording.recorder import Recorder
 from procedures.amb_rotor import lift
 from procedures.run_up import procedure as run_up
 from procedures.run_up.procedure import Passing, ended, passed

@@ -15,11 +15,11 @@ from bench.errors import AnalysisError
 from bench.figures import Shown
 from bench.findings import Effect, Finding
 from bench.procedure import Measured, Procedure, Quantity, read_method
-from bench.recorder import Recorder
+from bench.procedure.rig import Rig
+from bench.procedure.roles import RigState
 from bench.recording import Recording
-from bench.rig import Rig
+from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.roles import RigState
 from bench.units import RPM
 from procedures.amb_rotor import lift
 from procedures.compensation import checks, switching

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Protocol
 
-from bench.requires import Requires
+from bench.procedure.requires import Requires
 from bench.rigfile import RigFile
 from procedures.force_constant.steps import CHANNELS, COILS, SEGMENTS
 from procedures.servomotor.channels import LEVERS

@@ -21,11 +21,11 @@ from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
-from bench.recorder import Recorder
+from bench.procedure.rig import Rig
+from bench.procedure.roles import RigState
 from bench.recording import Recording
-from bench.rig import Rig
+from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.roles import RigState
 from bench.uncertainty import Estimate
 from procedures.force_constant import checks, estimates, fit, load_at_rest
 from procedures.force_constant import figures as drawn

@@ -20,12 +20,12 @@ from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
-from bench.recorder import Recorder
+from bench.procedure.requires import Requires
+from bench.procedure.rig import Rig
+from bench.procedure.roles import NOTHING, Load, RigState
 from bench.recording import Recording
-from bench.requires import Requires
-from bench.rig import Rig
+from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.roles import NOTHING, Load, RigState
 from procedures.force_map import estimates, steps
 from procedures.force_map import figures as force_map_figures
 from procedures.force_map.estimates import CROSS, Result

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from bench.findings import Effect, Finding
-from bench.toleranced import Toleranced
+from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import Estimate, coverage_factor, welch_satterthwaite
 from procedures.negative_stiffness.fit import AmbFit, MotorFit
 from procedures.servomotor import checks

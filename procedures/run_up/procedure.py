@@ -11,16 +11,16 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from bench.capture import at_speed
 from bench.errors import AnalysisError, BenchError
 from bench.figures import Shown
 from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
-from bench.recorder import Recorder
+from bench.procedure.rig import Rig
+from bench.procedure.roles import RigState
 from bench.recording import Recording
-from bench.rig import Rig
+from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.roles import RigState
+from bench.rigfile.capture import at_speed
 from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
 from procedures.amb_rotor.lift import NO_SPEED

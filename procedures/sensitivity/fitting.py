@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any, Protocol
 
-from bench.capture import Layout
-from bench.envelope import Envelope
 from bench.errors import BenchError
 from bench.rigfile import RigFile
+from bench.rigfile.capture import Layout
+from bench.rigfile.envelope import Envelope
 from bench.units import RPM
 from procedures.sensitivity.injection import Comb, refused
 from procedures.sensitivity.steps import REFINED, channels

@@ -8,9 +8,9 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from fractions import Fraction
 
-from bench.envelope import Envelope
 from bench.errors import BenchError
-from bench.rig import Rig
+from bench.procedure.rig import Rig
+from bench.rigfile.envelope import Envelope
 
 AXES = ("yi", "zi", "yo", "zo", "x")  # by their number in `inject_axis`
 PARAMETERS = ("inject_axis", "inject_amplitude", "inject_hz", "inject_lines", "inject_step")

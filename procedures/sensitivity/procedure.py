@@ -14,17 +14,17 @@ import numpy as np
 from pydantic import Field
 
 from bench.analysis.responses import Response, image_distance
-from bench.capture import Layout
 from bench.errors import AnalysisError
 from bench.figures import Figure
 from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
-from bench.recorder import Recorder
+from bench.procedure.requires import Requires
+from bench.procedure.rig import Rig
+from bench.procedure.roles import RigState
 from bench.recording import Recording
-from bench.requires import Requires
-from bench.rig import Rig
+from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.roles import RigState
+from bench.rigfile.capture import Layout
 from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
 from procedures.sensitivity import checks, estimates, fitting

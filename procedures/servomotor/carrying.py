@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from bench.errors import RotorNotArrived
-from bench.rig import Rig
+from bench.procedure.rig import Rig
 from bench.rigfile import RigFile
 from procedures.servomotor import hold
 

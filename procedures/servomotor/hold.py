@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 
-from bench.recorder import Recorder
-from bench.rig import Rig
+from bench.procedure.rig import Rig
+from bench.recording.recorder import Recorder
 
 GAINS = ("kp_theta", "kd_theta", "ki_theta")
 PARAMETERS = (*GAINS, "angle_ref")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bench.toleranced import Toleranced
+from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import Estimate, Influence
 
 WORDS = {"com": "centre of mass", "amb": "AMB"}

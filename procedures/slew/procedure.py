@@ -16,12 +16,12 @@ from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
-from bench.recorder import Recorder
+from bench.procedure.requires import Requires
+from bench.procedure.rig import Rig
+from bench.procedure.roles import RigState
 from bench.recording import Recording
-from bench.requires import Requires
-from bench.rig import Rig
+from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.roles import RigState
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.direction import of_probe
 from procedures.shared import assumptions

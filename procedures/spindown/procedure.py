@@ -16,13 +16,13 @@ from pydantic import Field
 from bench.figures import Figure
 from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
-from bench.recorder import Recorder
+from bench.procedure.requires import Requires
+from bench.procedure.rig import Rig
+from bench.procedure.roles import RigState
+from bench.procedure.states import transition
 from bench.recording import Recording
-from bench.requires import Requires
-from bench.rig import Rig
+from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.roles import RigState
-from bench.states import transition
 from bench.uncertainty import Estimate
 from procedures.servomotor import hold
 from procedures.shared import assumptions

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from bench.errors import NotReached
-from bench.rig import Rig
+from bench.procedure.rig import Rig
 from procedures.servomotor import hold
 
 PATIENCE_S = 2.0  # at its limit without a gain of speed: a drive trips after some seconds

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Literal, Protocol
 
-from bench.recorder import Recorder
-from bench.rig import Rig
+from bench.procedure.rig import Rig
+from bench.recording.recorder import Recorder
 from procedures.amb_rotor import lift
 from procedures.synchronous.dwells import DWELL, RECORDED, SLOW
 

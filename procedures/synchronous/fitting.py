@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable
 from typing import Any, Protocol
 
-from bench.capture import Layout
 from bench.errors import BenchError
 from bench.rigfile import RigFile
+from bench.rigfile.capture import Layout
 from bench.units import RPM
 from procedures.synchronous.dwells import RECORDED
 

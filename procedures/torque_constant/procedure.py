@@ -17,12 +17,12 @@ from bench.errors import RotorNotArrived
 from bench.figures import Figure
 from bench.findings import Effect, Finding
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
-from bench.recorder import Recorder
+from bench.procedure.requires import Requires
+from bench.procedure.rig import Rig
+from bench.procedure.roles import NOTHING, Load, RigState
 from bench.recording import Recording
-from bench.requires import Requires
-from bench.rig import Rig
+from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.roles import NOTHING, Load, RigState
 from bench.uncertainty import Estimate, Influence, propagate
 from procedures.servomotor import hold
 from procedures.servomotor.direction import SEGMENTS, of_probe

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.rigfile import RigFile
-from bench.toleranced import Toleranced
+from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.series import batch_means
 from procedures.amb_rotor.channels import AXES

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from bench.frames import FD, FrameBatch, frame
+from bench.link.frames import FD, FrameBatch, frame
 from bench.wire import slcan
 from sim_backend.serving.peers import Sent, joined
 

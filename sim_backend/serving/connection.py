@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from bench.frames import FrameBatch, empty_batch
+from bench.link.frames import FrameBatch, empty_batch
 from sim_backend.serving.peers import Peer, Sent
 
 READ_BYTES = 16_384  # at most so much of one client in a slice: a flood must not hold up the bench time

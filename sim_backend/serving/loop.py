@@ -9,9 +9,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from bench.clock import Clock
-from bench.frames import FrameBatch
-from bench.messages import load_messages
+from bench.link.frames import FrameBatch
 from bench.rigfile import RigFile
+from bench.rigfile.messages import load_messages
 from sim_backend.controller import SimulatedController
 from sim_backend.serving.connection import Connection
 from sim_backend.serving.pacing import TICK_NS, Pacer

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from bench.frames import ERROR, FrameBatch, empty_batch
+from bench.link.frames import ERROR, FrameBatch, empty_batch
 from bench.wire import packetstream, slcanstream
 
 LONGEST_REQUEST = 4096

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-from bench.faults import Fault, FrameFaults
-from bench.frames import FrameBatch, empty_batch
+from bench.link.fault_injection import Fault, FrameFaults
+from bench.link.frames import FrameBatch, empty_batch
 from sim_backend.serving.peers import joined
 
 

@@ -11,7 +11,7 @@ import pytest
 from in_process import Bench, bench_in_process
 
 from bench import catalogue
-from bench.calibrationfile import digest_of
+from bench.calibration.file import digest_of
 
 CHAIN = (
     catalogue.Entry("tiny-levitated", "tests.tiny_procedures", "A look at the supply"),

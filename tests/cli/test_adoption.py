@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 from chained import FILE, RIG, Bench, adopted, chained, edit, opened, run
 
-from bench.adoption import Adoption
-from bench.calibrationfile import digest_of, from_json
-from bench.calibrationstore import Store
+from bench.calibration.file import digest_of, from_json
+from bench.calibration.store import Store
 from bench.errors import ConfigError
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
+from bench.run.adoption import Adoption
 from tests.tiny_procedures import procedure
 
 ROOT = Path(__file__).resolve().parents[2]

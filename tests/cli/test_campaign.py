@@ -15,11 +15,11 @@ from campaign_catalogue import SMALL
 from in_process import Bench, bench_in_process
 
 from bench import catalogue
-from bench.campaign_model import SCHEMA_FILE, json_schema
-from bench.cli.campaign_job import run_rig
-from bench.cli.campaign_tasks import RigTask
+from bench.campaign.model import SCHEMA_FILE, json_schema
+from bench.cli.campaign.job import run_rig
+from bench.cli.campaign.tasks import RigTask
 from bench.errors import ConfigError
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 
 ROOT = Path(__file__).resolve().parents[2]
 HEAD = 'schema = 1\nname = "small"\nrig = "tsbs12"\n'

@@ -9,7 +9,7 @@ import pytest
 
 from bench.cli.__main__ import main
 from bench.errors import ConfigError
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from sim_backend.truth import draw
 
 RIGS = Path(__file__).resolve().parents[2] / "rigs"

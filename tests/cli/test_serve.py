@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from bench.cli.__main__ import main
-from bench.frames import empty_batch, payload
+from bench.link.frames import empty_batch, payload
 from bench.wire import packet, slcan
 from bench.wire.packetstream import PacketStream
 from bench.wire.slcanstream import SlcanStream

@@ -16,11 +16,11 @@ from suite_catalogue import SMALL
 from bench import catalogue
 from bench.cli.suite import by_procedure, properties
 from bench.errors import ConfigError
-from bench.limits import Limit
-from bench.outcomes import Outcome
 from bench.procedure import Quantity
-from bench.records import measurement, unfinished
-from bench.runner import RunResult
+from bench.record.limits import Limit
+from bench.record.outcomes import Outcome
+from bench.record.records import measurement, unfinished
+from bench.run.runner import RunResult
 from bench.uncertainty import Estimate, Influence
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from bench.cli.summary import summary
 from bench.findings import Effect
-from bench.limits import Verdict
-from bench.outcomes import Outcome
 from bench.procedure import Quantity
-from bench.records import FindingEntry, LimitEntry, Measurement, Record, missing, unfinished
+from bench.record.limits import Verdict
+from bench.record.outcomes import Outcome
+from bench.record.records import FindingEntry, LimitEntry, Measurement, Record, missing, unfinished
 
 LIMIT = LimitEntry(None, 30e-6, "m", "test", True)
 

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bench.capture import Layout
-from bench.codec import Decoder, encode
-from bench.frames import FD, SENT, FrameBatch, frame, payload
-from bench.rigload import load_rig
+from bench.link.codec import Decoder, encode
+from bench.link.frames import FD, SENT, FrameBatch, frame, payload
+from bench.rigfile import load_rig
+from bench.rigfile.capture import Layout
 from bench.wire.captureblock import OVERHEAD, ROOM, block_of, piece_of
 from bench.wire.isotp import Reassembler
 from sim_backend.capture_memory import CaptureMemory, Order

@@ -7,11 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bench.codec import Decoder, encode
-from bench.frames import FD, SENT, FrameBatch, empty_batch, frame
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
-from bench.session import Session
+from bench.link.codec import Decoder, encode
+from bench.link.frames import FD, SENT, FrameBatch, empty_batch, frame
+from bench.link.session import Session
+from bench.rigfile import RigFile, load_rig
 from sim_backend.controller import SimulatedController
 from sim_backend.truth import draw
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bench import faults
-from bench.codec import Decoder, encode
 from bench.errors import ConfigError, LinkError
-from bench.frames import ERROR, FD, SENT, FrameBatch, empty_batch, frame
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
+from bench.link import fault_injection
+from bench.link.codec import Decoder, encode
+from bench.link.frames import ERROR, FD, SENT, FrameBatch, empty_batch, frame
+from bench.rigfile import RigFile, load_rig
 from sim_backend.controller import SimulatedController
 from sim_backend.endpoint import SimulatedRig
 from sim_backend.truth import draw
@@ -27,7 +26,7 @@ class Host:
     """The other end of the wire, beating every 20 ms; the first beat is the origin of the faults' times."""
 
     def __init__(self, *texts: str) -> None:
-        self.device = SimulatedController(RIG, draw(RIG, 5), [faults.parse(text) for text in texts])
+        self.device = SimulatedController(RIG, draw(RIG, 5), [fault_injection.parse(text) for text in texts])
         self.now, self.count = T0, 0
 
     def run(self, seconds: float, *sent: FrameBatch, slice_ticks: int = SLICE) -> FrameBatch:
@@ -154,7 +153,7 @@ class Line:
     def __init__(self, *texts: str, reconnect_s: float = 0.0) -> None:
         link = RIG.link.model_copy(update={"reconnect_s": reconnect_s})
         rig = RIG.model_copy(update={"links": {**RIG.links, RIG.devices["controller"].link: link}})
-        self.rig = SimulatedRig(rig, draw(RIG, 5), SESSION, [faults.parse(text) for text in texts])
+        self.rig = SimulatedRig(rig, draw(RIG, 5), SESSION, [fault_injection.parse(text) for text in texts])
         self.start = self.rig.now_ns()
 
     def run(self, seconds: float) -> FrameBatch:

@@ -20,7 +20,7 @@ from hypothesis.stateful import (
 )
 from test_controller import COMMANDS, Host
 
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from sim_backend.core import LAND, LEVITATE, LIFT
 from sim_backend.drive import SimulatedDrive
 from sim_backend.setdown import TOO_FAST

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.session import Session
+from bench.link.session import Session
 from sim_backend.core import TICK_S
 from sim_backend.ownership import NAME_PARTS, TAKEOVER_S, Ownership
 

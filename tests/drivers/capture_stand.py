@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from bench import faults
-from bench.recorder import Recorder, RunHeader
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
-from bench.session import Session
+from bench.link import fault_injection
+from bench.link.session import Session
+from bench.recording.recorder import Recorder, RunHeader
+from bench.rigfile import RigFile, load_rig
 from drivers.capture import ControllerCapture
 from drivers.controller import Controller
 from sim_backend.endpoint import SimulatedRig
@@ -33,7 +32,7 @@ class Stand:
         self, kind: str = "can", injected: Sequence[str] = (), reconnect_s: float = 0.0, seed: int = 3
     ) -> None:
         rig = rig_on(kind, reconnect_s)
-        found = [faults.parse(text) for text in injected]
+        found = [fault_injection.parse(text) for text in injected]
         self.machine = SimulatedRig(rig, draw(rig, seed), 1, found, substeps=1)
         self.controller = Controller(rig, self.machine.link, self.machine, Session(1, 1_767_225_600, "test"))
         self.controller.connect()

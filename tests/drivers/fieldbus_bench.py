@@ -8,10 +8,9 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from bench.errors import BenchError
-from bench.registers import RegisterPort, Table, Words
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
-from bench.session import Session
+from bench.link.session import Session
+from bench.rigfile import RigFile, load_rig
+from bench.rigfile.registers import RegisterPort, Table, Words
 from drivers.controller import Controller
 from drivers.fieldbus import Fieldbus, open_devices
 from sim_backend.endpoint import SimulatedRig

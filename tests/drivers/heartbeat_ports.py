@@ -15,7 +15,7 @@ from contextlib import contextmanager, suppress
 
 import numpy as np
 
-from bench.frames import FD, FrameBatch, empty_batch, frame
+from bench.link.frames import FD, FrameBatch, empty_batch, frame
 from bench.wire import slcan
 from drivers.heartbeat import Beat, HeartbeatProcess, WriterSpec
 

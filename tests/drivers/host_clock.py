@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from sim_backend.endpoint import SimulatedRig
 from sim_backend.truth import draw
 

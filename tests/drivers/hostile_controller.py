@@ -7,15 +7,14 @@ from collections.abc import Callable
 import numpy as np
 
 from bench.cli.safety import making_safe
-from bench.codec import Decoder, encode
 from bench.findings import Finding
-from bench.frames import FrameBatch, payload
 from bench.link import Link, LinkStats
-from bench.opened import WatchedClock
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
-from bench.session import Session
-from bench.supervisor import Supervisor
+from bench.link.codec import Decoder, encode
+from bench.link.frames import FrameBatch, payload
+from bench.link.session import Session
+from bench.rigfile import RigFile, load_rig
+from bench.run.job import WatchedClock
+from bench.run.supervisor import Supervisor
 from drivers.controller import Controller
 from sim_backend.endpoint import SimulatedRig
 from sim_backend.truth import draw

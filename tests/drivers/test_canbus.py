@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bench.errors import ConfigError, LinkError
-from bench.frames import ERROR, EXTENDED, FD, FRAME, FrameBatch, empty_batch, frame, payload
+from bench.link.frames import ERROR, EXTENDED, FD, FRAME, FrameBatch, empty_batch, frame, payload
 from bench.rigfile import LinkSpec
 from bench.wire.slcan import LENGTHS
 from drivers.canbus import CanBus, open_bus

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from bench.cli.export import export_command
 from bench.clock import WallClock
 from bench.errors import RecordingError
-from bench.frames import ERROR, EXTENDED, FD, SENT, SWITCHED, FrameBatch, batch_of, packed
-from bench.recorder import Recorder, RunHeader
+from bench.link.frames import ERROR, EXTENDED, FD, SENT, SWITCHED, FrameBatch, batch_of, packed
 from bench.recording import Recording
+from bench.recording.recorder import Recorder, RunHeader
 from bench.wire.slcan import LENGTHS
 from drivers.canlog import SUFFIXES, write_log
 

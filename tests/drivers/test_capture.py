@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from capture_stand import POSITIONS, RIG, Stand
 
-from bench import capture
-from bench.capture import CaptureData
 from bench.errors import AnalysisError, BenchError, NoReply
-from bench.export import export
-from bench.frames import FrameBatch
+from bench.link.frames import FrameBatch
 from bench.recording import Recording
+from bench.rigfile import capture
+from bench.rigfile.capture import CaptureData
+from bench.run.export import export
 
 CHANNELS = ("pos_yi", "i_yi_p", "u_yi_p", "speed", "pulses", "pulse_age")
 LEVEL = 8e-6
@@ -239,8 +239,8 @@ def test_what_it_says_of_itself(stand: Stand) -> None:
 
 
 def test_a_rig_without_captures_has_no_such_role() -> None:
-    from bench.rigload import load_rig
-    from bench.session import Session as HostSession
+    from bench.link.session import Session as HostSession
+    from bench.rigfile import load_rig
     from drivers.controller import Controller
     from sim_backend.endpoint import SimulatedRig
     from sim_backend.truth import draw

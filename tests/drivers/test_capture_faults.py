@@ -10,7 +10,7 @@ import pytest
 from capture_stand import Stand
 
 from bench.errors import BenchError, DeviceFault, LinkError
-from bench.frames import FrameBatch
+from bench.link.frames import FrameBatch
 
 BLOCKS, PIECES = 0x200, 0x201
 KINDS = pytest.mark.parametrize("kind", ["can", "serial"])

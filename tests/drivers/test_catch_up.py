@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 from host_clock import RIG, HostClock
 
-from bench.acquisition import WatchedSteps
 from bench.errors import LinkError
-from bench.frames import FrameBatch
+from bench.link.frames import FrameBatch
+from bench.link.session import Session
 from bench.progress import Silent
-from bench.recorder import Recorder, RunHeader
 from bench.recording import Recording
-from bench.session import Session
+from bench.recording.recorder import Recorder, RunHeader
+from bench.run.machine_phase import WatchedSteps
 from drivers.controller import Controller
 
 

@@ -6,8 +6,8 @@ import pytest
 from host_clock import RIG, HostClock
 
 from bench.errors import ClockWrong
-from bench.frames import FrameBatch
-from bench.session import Session
+from bench.link.frames import FrameBatch
+from bench.link.session import Session
 from drivers.controller import Controller
 
 

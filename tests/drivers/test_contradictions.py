@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 from hostile_controller import TSBS, Bench, Telemetry, unchanged
 
-from bench.acquisition import cause_of
 from bench.cli import opening
 from bench.errors import (
     BenchError,
@@ -22,8 +21,9 @@ from bench.errors import (
     SpeedContradicts,
     StateContradicts,
 )
-from bench.frames import FrameBatch
-from bench.recorder import Recorder, RunHeader
+from bench.link.frames import FrameBatch
+from bench.recording.recorder import Recorder, RunHeader
+from bench.run.machine_phase import cause_of
 from sim_backend.core import DriveLaw
 
 CODES = {name: float(code) for code, name in TSBS.choices("state").items()}

@@ -6,12 +6,12 @@ import pytest
 
 from bench.cli import safety
 from bench.errors import ConfigError, DeviceFault
-from bench.frames import SENT, FrameBatch, frame
 from bench.link import Link, LinkStats
-from bench.opened import WatchedClock
-from bench.rigload import load_rig
-from bench.session import Session
-from bench.supervisor import Supervisor
+from bench.link.frames import SENT, FrameBatch, frame
+from bench.link.session import Session
+from bench.rigfile import load_rig
+from bench.run.job import WatchedClock
+from bench.run.supervisor import Supervisor
 from drivers.controller import Controller
 from sim_backend.endpoint import SimulatedRig
 from sim_backend.truth import draw

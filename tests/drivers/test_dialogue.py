@@ -10,13 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bench.codec import Decoder, encode
 from bench.errors import ConfigError, NoReply
-from bench.frames import ERROR, FD, SENT, FrameBatch, empty_batch, frame, payload
 from bench.link import LinkStats
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
-from bench.session import Session
+from bench.link.codec import Decoder, encode
+from bench.link.frames import ERROR, FD, SENT, FrameBatch, empty_batch, frame, payload
+from bench.link.session import Session
+from bench.rigfile import RigFile, load_rig
 from drivers import handshake
 from drivers.dialogue import KEPT, Dialogue, commanded, status_of
 

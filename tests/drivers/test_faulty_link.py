@@ -7,13 +7,12 @@ from contextlib import nullcontext
 import numpy as np
 import pytest
 
-from bench import faults
-from bench.codec import Decoder, encode
 from bench.errors import BenchError, ConfigError, DeviceFault, LinkError, NoReply
-from bench.frames import ERROR, FD, SENT, FrameBatch, empty_batch, frame
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
-from bench.session import Session
+from bench.link import fault_injection
+from bench.link.codec import Decoder, encode
+from bench.link.frames import ERROR, FD, SENT, FrameBatch, empty_batch, frame
+from bench.link.session import Session
+from bench.rigfile import RigFile, load_rig
 from drivers.controller import Controller
 from drivers.faulty_link import FaultyLink
 from sim_backend.endpoint import SimulatedRig
@@ -31,7 +30,7 @@ class Bench:
     def __init__(self, *texts: str, reconnect_s: float = 0.0) -> None:
         self.rig = SimulatedRig(RIG, draw(RIG, 5), SESSION.number)
         self.link = FaultyLink(
-            self.rig.link, [faults.parse(text) for text in texts], 1, self.rig, telemetry=[TELEMETRY],
+            self.rig.link, [fault_injection.parse(text) for text in texts], 1, self.rig, telemetry=[TELEMETRY],
             hush=self.rig.link.close, reconnect_s=reconnect_s,
         )  # fmt: skip
 

@@ -13,9 +13,9 @@ import pytest
 from fieldbus_bench import Bench, go, opened, rig
 
 from bench.errors import BenchError, DeviceFault, DeviceUnreadable, InterlockError, LinkError, RotorNotArrived
-from bench.recorder import Recorder, RunHeader
 from bench.recording import Recording
-from bench.registers import RegisterRefused
+from bench.recording.recorder import Recorder, RunHeader
+from bench.rigfile.registers import RegisterRefused
 from drivers.fieldbus import Fieldbus
 from drivers.polling import Reading
 from sim_backend.drive import SimulatedDrive

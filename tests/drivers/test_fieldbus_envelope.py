@@ -7,9 +7,9 @@ from collections.abc import Callable
 import pytest
 from fieldbus_bench import Bench, changed, go, opened
 
-from bench.envelope import HELD
 from bench.errors import InterlockError
-from bench.registers import Table, Words
+from bench.rigfile.envelope import HELD
+from bench.rigfile.registers import Table, Words
 
 Change = Callable[[Table, int, Words], Words]
 

@@ -12,10 +12,9 @@ import pytest
 from far_end import until
 
 from bench.clock import WallClock
-from bench.envelope import Envelope
 from bench.errors import LinkError
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
+from bench.rigfile import RigFile, load_rig
+from bench.rigfile.envelope import Envelope
 from drivers.fieldbus import Fieldbus, open_devices
 from drivers.modbus import open_lines
 from sim_backend.controller import SimulatedController

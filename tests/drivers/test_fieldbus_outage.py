@@ -9,10 +9,10 @@ from fieldbus_bench import opened, rig
 from bench.cli.safety import making_safe
 from bench.cli.witness import RESTING
 from bench.clock import WallClock
-from bench.envelope import Envelope
 from bench.errors import LinkError
-from bench.opened import WatchedClock
-from bench.registers import RegisterPort, Table, Words
+from bench.rigfile.envelope import Envelope
+from bench.rigfile.registers import RegisterPort, Table, Words
+from bench.run.job import WatchedClock
 from drivers.fieldbus import LEASE_S, open_devices
 
 COAST = (0, (0,))

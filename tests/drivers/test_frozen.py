@@ -9,7 +9,7 @@ import pytest
 from hostile_controller import AMB, TSBS, Bench, Telemetry, unchanged
 
 from bench.errors import AnotherHost, DeviceFault, FrozenError
-from bench.frames import ERROR, FrameBatch, frame
+from bench.link.frames import ERROR, FrameBatch, frame
 from bench.rigfile import RigFile
 from drivers.hosts import ECHO, RATE, HostFrames
 

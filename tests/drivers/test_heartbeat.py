@@ -28,7 +28,7 @@ from heartbeat_ports import (
 )  # fmt: skip
 
 from bench.errors import ConfigError, LinkError
-from bench.frames import FD, empty_batch, frame, payload
+from bench.link.frames import FD, empty_batch, frame, payload
 from bench.wire import packet
 from drivers import heartbeat
 from drivers.heartbeat import Beat, HeartbeatProcess, WriterSpec

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bench.errors import LinkError
-from bench.frames import FD, SENT, FrameBatch, frame
+from bench.link.frames import FD, SENT, FrameBatch, frame
 from drivers.heartbeat import Beat, HeartbeatThread
 
 BEAT = Beat(0x010, bytes(8), counter_at=4, fd=True, period_s=0.005, lease_s=1.0)

@@ -15,8 +15,8 @@ import pytest
 from far_end import Adapter, FarEnd, descriptors, far_end, until
 
 from bench.errors import ConfigError, LinkError
-from bench.frames import FD, FrameBatch, empty_batch, frame
 from bench.link import LinkStats
+from bench.link.frames import FD, FrameBatch, empty_batch, frame
 from bench.rigfile import LinkSpec
 from drivers.beat import Beat, WriterSpec
 from drivers.heartbeat import HeartbeatProcess

@@ -10,7 +10,7 @@ import pytest
 from hostile_controller import AMB, TSBS, Bench, Telemetry, unchanged
 
 from bench.cli.safety import END_S
-from bench.frames import FrameBatch
+from bench.link.frames import FrameBatch
 from sim_backend.core import DriveLaw
 
 FAST = {"speed": 1000.0}

@@ -14,8 +14,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bench.errors import ConfigError, LinkError
-from bench.registers import RegisterRefused
 from bench.rigfile import LinkSpec
+from bench.rigfile.registers import RegisterRefused
 from drivers.modbus import ModbusLine, ModbusPort
 from sim_backend.modbus_server import crc16
 

@@ -12,7 +12,7 @@ import pytest
 from far_end import Adapter, FarEnd, descriptors, far_end, until
 
 from bench.errors import LinkError
-from bench.frames import ERROR, EXTENDED, FD, SWITCHED, FrameBatch, empty_batch, frame, payload
+from bench.link.frames import ERROR, EXTENDED, FD, SWITCHED, FrameBatch, empty_batch, frame, payload
 from drivers import slcan_bus
 from drivers.slcan_bus import SlcanBatchBus
 

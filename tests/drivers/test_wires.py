@@ -11,7 +11,7 @@ from cobs import cobs
 from far_end import Adapter, FarEnd, far_end, until
 
 from bench.errors import ConfigError, LinkError
-from bench.frames import ERROR, EXTENDED, FD, FrameBatch, empty_batch, frame, payload
+from bench.link.frames import ERROR, EXTENDED, FD, FrameBatch, empty_batch, frame, payload
 from bench.rigfile import LinkSpec
 from drivers.wires import CanWire, PacketWire, Wire, open_wire
 

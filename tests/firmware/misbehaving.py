@@ -18,7 +18,7 @@ from pathlib import Path
 
 from fieldbus_server import FieldbusServer
 
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 
 ROOT = Path(__file__).resolve().parents[2]
 K_I, K_O = 73.2, 74.4  # N/A, what the limits of specs/tsbs12.toml expect

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 from cobs import cobs
 
-from bench.frames import FD, frame, payload
-from bench.rigload import load_rig
+from bench.link.frames import FD, frame, payload
+from bench.rigfile import load_rig
 from bench.wire import packet
 from sim_backend.controller import SimulatedController
 from sim_backend.truth import draw

@@ -13,10 +13,9 @@ import pytest
 from bench.cli.opening import beat_of
 from bench.clock import WallClock
 from bench.errors import BenchError, ConfigError, LinkError
-from bench.opened import WatchedClock
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
-from bench.session import Session
+from bench.link.session import Session
+from bench.rigfile import RigFile, load_rig
+from bench.run.job import WatchedClock
 from drivers.controller import Controller
 from drivers.live_link import LiveLink
 from drivers.wires import open_wire

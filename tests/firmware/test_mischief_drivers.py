@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from bench.acquisition import cause_of
 from bench.cli.opening import beat_of
 from bench.clock import WallClock
 from bench.errors import BenchError
-from bench.opened import WatchedClock
-from bench.rigload import load_rig
-from bench.session import Session
+from bench.link.session import Session
+from bench.rigfile import load_rig
+from bench.run.job import WatchedClock
+from bench.run.machine_phase import cause_of
 from drivers.controller import Controller
 from drivers.live_link import LiveLink
 from drivers.wires import open_wire

@@ -12,8 +12,8 @@ from types import TracebackType
 
 import numpy as np
 
-from bench.codec import Decoder
-from bench.messages import load_messages
+from bench.link.codec import Decoder
+from bench.rigfile.messages import load_messages
 from bench.wire.slcanstream import SlcanStream
 
 RIGS = Path(__file__).resolve().parents[2] / "rigs"

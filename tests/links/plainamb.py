@@ -10,8 +10,8 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from bench.frames import FD, FRAME, SENT, FrameBatch, empty_batch, frame, payload
 from bench.link import Link, LinkStats
+from bench.link.frames import FD, FRAME, SENT, FrameBatch, empty_batch, frame, payload
 
 TELEMETRY, HEARTBEAT, COMMAND, PARAM_SET, CLAIM = 0x100, 0x010, 0x011, 0x012, 0x014
 COMMAND_REPLY, PARAM_REPLY = 0x021, 0x022

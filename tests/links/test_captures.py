@@ -16,11 +16,10 @@ import pytest
 
 from bench.cli.opening import LIVE_SLICE_S, beat_of
 from bench.clock import WallClock
-from bench.recorder import Recorder, RunHeader
+from bench.link.session import new_session
 from bench.recording import Recording
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
-from bench.session import new_session
+from bench.recording.recorder import Recorder, RunHeader
+from bench.rigfile import RigFile, load_rig
 from drivers.canframes import batch_of, messages_of
 from drivers.controller import Controller
 from drivers.live_link import LiveLink

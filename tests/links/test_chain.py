@@ -18,7 +18,8 @@ from typing import Any
 import processes
 import pytest
 
-from bench import campaign, catalogue
+from bench import catalogue
+from bench.campaign import file
 
 SEED = "3"
 NAME = "tsbs-identification"
@@ -31,7 +32,7 @@ Records = Mapping[str, dict[str, Any]]
 
 def short(folder: Path, steps: int) -> Path:
     """The first steps of the shipped campaign with the short plans of virtual rigs, as a file."""
-    text = campaign.load(NAME)[1].read_text(encoding="utf-8").partition("[equations]")[0]
+    text = file.load(NAME)[1].read_text(encoding="utf-8").partition("[equations]")[0]
     head, *tables = text.split("[[step]]")
     lines = [line for line in "[[step]]".join([head, *tables[:steps]]).splitlines() if not line.startswith("plan =")]
     path = folder / "short.toml"
@@ -65,7 +66,7 @@ def in_one_process(tmp_path_factory: pytest.TempPathFactory) -> Records:
 
 
 def test_the_chain_has_what_identifies_the_machine() -> None:
-    steps = [step.procedure for step in campaign.load(NAME)[0].step]
+    steps = [step.procedure for step in file.load(NAME)[0].step]
     assert steps == [
         "amb-calibration",
         "force-constant",

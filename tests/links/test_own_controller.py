@@ -15,21 +15,20 @@ import pytest
 
 from bench.cli.opening import SIMULATED, beat_of
 from bench.errors import BenchError, ConfigError, DeviceFault, InterlockError
-from bench.faults import FrameFaults, parse
 from bench.findings import Finding
-from bench.frames import FrameBatch
-from bench.linkhealth import Health
+from bench.link.fault_injection import FrameFaults, parse
+from bench.link.frames import FrameBatch
+from bench.link.health import Health
+from bench.link.telemetry import TelemetryDecoder
 from bench.procedure import Measured
-from bench.recorder import Recorder, RunHeader
+from bench.procedure.rig import Rig
+from bench.procedure.roles import Load, RigState
+from bench.procedure.states import transition
 from bench.recording import Recording
-from bench.rig import Rig
-from bench.rigcheck import check_rig
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
-from bench.roles import Load, RigState
+from bench.recording.recorder import Recorder, RunHeader
+from bench.rigfile import RigFile, load_rig
+from bench.rigfile.check import check_rig
 from bench.samples import SampleBlock
-from bench.states import transition
-from bench.telemetry import TelemetryDecoder
 from drivers.controller import Controller
 from drivers.operator import LineOperator
 from procedures.amb_calibration.procedure import Plan, analyse, procedure, settings

@@ -16,7 +16,7 @@ from bench.cli.virtual import simulated_run
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.recording import Recording
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from bench.uncertainty import Estimate
 from procedures.balance import checks
 from procedures.balance.checks import Evaluated

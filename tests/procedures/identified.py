@@ -10,7 +10,7 @@ from bench.calibration import Calibration
 from bench.cli.virtual import Simulated, simulated_run
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
-from bench.rig import Rig
+from bench.procedure.rig import Rig
 from bench.uncertainty import Estimate
 
 SEED = 2026

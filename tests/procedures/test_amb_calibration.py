@@ -11,12 +11,12 @@ from identified import calibrated, serious
 from bench.cli.virtual import simulate, simulated_run
 from bench.errors import DeviceFault, InterlockError
 from bench.findings import Effect, Finding
-from bench.limits import Verdict, judge
-from bench.outcomes import Outcome, outcome_of
 from bench.procedure import Measured
-from bench.records import measurement
-from bench.rigload import load_rig
-from bench.specs import load_spec
+from bench.record.limits import Verdict, judge
+from bench.record.outcomes import Outcome, outcome_of
+from bench.record.records import measurement
+from bench.record.specs import load_spec
+from bench.rigfile import load_rig
 from bench.uncertainty import interval
 from procedures.amb_calibration import both_coils
 from procedures.amb_calibration.procedure import Plan, check, procedure

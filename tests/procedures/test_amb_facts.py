@@ -9,10 +9,10 @@ import pytest
 from identified import CALIBRATE, SEED, calibrated
 
 from bench.calibration import Calibration
-from bench.calibrationfile import from_json, to_json
+from bench.calibration.file import from_json, to_json
 from bench.cli.virtual import Simulated
 from bench.procedure import Measured
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, correlation
 from procedures.amb_calibration.procedure import evaluate
 from sim_backend.quantities import eccentricity, own_weight

@@ -17,7 +17,7 @@ from bench.errors import Aborted, AnalysisError
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.recording import Recording
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from bench.uncertainty import Estimate
 from procedures.angle_step import response
 from procedures.angle_step.procedure import MEASURES, Plan, check, figures, planned, procedure, step_count

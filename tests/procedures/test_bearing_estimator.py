@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, Influence
 from procedures.amb_rotor import magnetics
 from procedures.amb_rotor.magnetics import AXES, COILS, Positions

@@ -14,10 +14,10 @@ from reanalysed import reanalysed
 from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import DeviceFault
 from bench.findings import Effect, Finding
-from bench.limits import Verdict, judge
 from bench.procedure import Measured
-from bench.rigload import load_rig
-from bench.specs import load_spec
+from bench.record.limits import Verdict, judge
+from bench.record.specs import load_spec
+from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, interval
 from procedures.amb_rotor.magnetics import AXES
 from procedures.amb_rotor.places import Held

@@ -15,9 +15,9 @@ from bench.calibration import Calibration
 from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import ConfigError, DeviceFault
 from bench.findings import Effect, Finding
-from bench.limits import Verdict, judge
-from bench.rigload import load_rig
-from bench.specs import load_spec
+from bench.record.limits import Verdict, judge
+from bench.record.specs import load_spec
+from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, interval
 from bench.uncertainty.coverage import ensemble
 from procedures.force_constant import checks

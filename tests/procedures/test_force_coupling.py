@@ -14,9 +14,9 @@ from reanalysed import reanalysed
 from bench.calibration import Calibration
 from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import ConfigError, DeviceFault, InterlockError, RotorNotArrived
-from bench.limits import Verdict, judge
-from bench.rigload import load_rig
-from bench.specs import load_spec
+from bench.record.limits import Verdict, judge
+from bench.record.specs import load_spec
+from bench.rigfile import load_rig
 from bench.uncertainty import interval
 from procedures.force_coupling.estimates import evaluate
 from procedures.force_coupling.fit import TERMS

@@ -15,7 +15,7 @@ from bench.calibration import Calibration
 from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import ConfigError
 from bench.findings import Effect, Finding
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from procedures.force_map.procedure import MEASURES, Plan, check, figures, loaded_points, points, procedure, step_count
 from reports.figures import draw as draw_figure
 from sim_backend.truth import draw

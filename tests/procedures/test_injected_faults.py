@@ -9,19 +9,19 @@ from pathlib import Path
 
 import pytest
 
-from bench import faults, runner
 from bench.cli.compose import load_procedure
 from bench.cli.opening import simulated
-from bench.faults import Fault
-from bench.opened import Job
-from bench.outcomes import Outcome
+from bench.link import fault_injection
+from bench.link.fault_injection import Fault
 from bench.progress import PlainProgress
-from bench.records import FindingEntry
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
-from bench.runner import RunResult
-from bench.specs import load_spec
-from bench.supervisor import Supervisor
+from bench.record.outcomes import Outcome
+from bench.record.records import FindingEntry
+from bench.record.specs import load_spec
+from bench.rigfile import RigFile, load_rig
+from bench.run import runner
+from bench.run.job import Job
+from bench.run.runner import RunResult
+from bench.run.supervisor import Supervisor
 from sim_backend import endpoint
 from sim_backend.truth import Truth
 
@@ -93,7 +93,7 @@ def rig() -> RigFile:
 
 
 def parsed(case: Case) -> tuple[Fault, ...]:
-    return tuple(faults.parse(text) for text in case.faults.split())
+    return tuple(fault_injection.parse(text) for text in case.faults.split())
 
 
 def run(rig: RigFile, case: Case, out: Path, monkeypatch: pytest.MonkeyPatch) -> RunResult:
@@ -133,4 +133,4 @@ def test_a_fault_is_named_and_the_rotor_comes_to_rest(
 
 
 def test_every_kind_has_its_case() -> None:
-    assert {fault.kind for case in CASES for fault in parsed(case)} == set(faults.KINDS)
+    assert {fault.kind for case in CASES for fault in parsed(case)} == set(fault_injection.KINDS)

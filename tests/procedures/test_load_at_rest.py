@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bench.findings import Effect
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, Influence
 from procedures.force_constant import estimates, fit, load_at_rest
 from procedures.force_constant.checks import load_moved

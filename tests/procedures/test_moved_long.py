@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from benchmarks.moved import identity, moved, numbers
 
 SEED = 5

@@ -19,11 +19,11 @@ from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import DeviceFault
 from bench.figures import Figure, Sheet
 from bench.findings import Effect, Finding
-from bench.limits import Verdict
-from bench.outcomes import outranking
 from bench.procedure import Measured
+from bench.record.limits import Verdict
+from bench.record.outcomes import outranking
 from bench.recording import Recording
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, correlation, interval, welch_satterthwaite
 from bench.units import RPM
 from procedures.coast_down import procedure as coast_down

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from procedures.run_up import procedure
 from procedures.run_up.linear_model import bend
 from procedures.run_up.steps import Curve

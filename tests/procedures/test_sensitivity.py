@@ -16,12 +16,12 @@ from scipy.optimize import brentq
 from bench.analysis import peaks
 from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import simulated_run
-from bench.envelope import Envelope
 from bench.errors import InterlockError
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.recording import Recording
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
+from bench.rigfile.envelope import Envelope
 from bench.uncertainty import Estimate
 from bench.units import RPM
 from procedures.sensitivity import checks, estimates, margins

@@ -18,13 +18,13 @@ from bench.calibration import Calibration
 from bench.cli.virtual import simulate, simulated_run
 from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
-from bench.limits import Verdict
-from bench.outcomes import Outcome, outcome_of
 from bench.procedure import Measured
+from bench.record.limits import Verdict
+from bench.record.outcomes import Outcome, outcome_of
+from bench.record.records import measurement
+from bench.record.specs import load_spec
 from bench.recording import Recording
-from bench.records import measurement
-from bench.rigload import load_rig
-from bench.specs import load_spec
+from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, Influence
 from procedures.slew import fit
 from procedures.slew.fit import Gains, Swing

@@ -14,11 +14,11 @@ from bench.cli.run import execute
 from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
-from bench.limits import Verdict, judge
-from bench.outcomes import Outcome
 from bench.procedure import Measured
-from bench.rigload import load_rig
-from bench.specs import load_spec
+from bench.record.limits import Verdict, judge
+from bench.record.outcomes import Outcome
+from bench.record.specs import load_spec
+from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, correlation, interval
 from procedures.spindown.procedure import Plan, check
 from sim_backend.truth import draw

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bench.findings import Effect
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from procedures.spindown import checks, estimates, fit
 from procedures.spindown.procedure import Plan
 from procedures.spindown.steps import ANGLE_LAGS, COILS, SPEED_LAGS, RunDown

@@ -18,7 +18,7 @@ from bench.errors import AnalysisError, BenchError
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.recording import Recording
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, interval
 from bench.uncertainty.coverage import ensemble
 from procedures.amb_rotor.onset import onset

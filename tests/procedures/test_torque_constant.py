@@ -9,10 +9,10 @@ import pytest
 
 from bench.cli.virtual import Simulated, simulated_run
 from bench.findings import Effect, Finding
-from bench.limits import Verdict, judge
 from bench.procedure import Measured
-from bench.rigload import load_rig
-from bench.specs import load_spec
+from bench.record.limits import Verdict, judge
+from bench.record.specs import load_spec
+from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, interval
 from procedures.torque_constant.procedure import Plan, check, procedure
 

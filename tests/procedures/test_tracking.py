@@ -20,7 +20,7 @@ from bench.errors import AnalysisError, BenchError
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.recording import Recording
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from bench.uncertainty import Estimate
 from procedures.amb_rotor.geometry import Facts
 from procedures.synchronous import bearings

@@ -17,13 +17,13 @@ from bench.cli.virtual import given, simulated_run
 from bench.errors import BenchError
 from bench.figures import Figure
 from bench.findings import Effect, Finding
-from bench.limits import Limit
-from bench.outcomes import outranking
 from bench.procedure import Measured, Quantity
+from bench.record.limits import Limit
+from bench.record.outcomes import outranking
+from bench.record.records import measurement
+from bench.record.specs import applied, load_spec
 from bench.recording import Recording
-from bench.records import measurement
-from bench.rigload import load_rig
-from bench.specs import applied, load_spec
+from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, Influence, interval
 from procedures.amb_rotor.channels import AXES
 from procedures.compensation import procedure as compensation

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.campaign_bands import Failure, Quantity, Sample, Unable, coverage, tails
-from bench.campaign_model import Constant, Given, Matrix, Model, StatedEquation, Term
-from bench.campaign_speed import Speed
+from bench.campaign.bands import Failure, Quantity, Sample, Unable, coverage, tails
+from bench.campaign.model import Constant, Given, Matrix, Model, StatedEquation, Term
+from bench.campaign.speed import Speed
 from bench.errors import BenchError
 from reports import campaign, campaign_coverage, campaign_model
 from reports.campaign_coverage import CoverageContent

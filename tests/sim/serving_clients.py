@@ -10,10 +10,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from bench.faults import parse
-from bench.frames import FrameBatch, empty_batch, payload
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
+from bench.link.fault_injection import parse
+from bench.link.frames import FrameBatch, empty_batch, payload
+from bench.rigfile import RigFile, load_rig
 from bench.wire import packet, slcan
 from bench.wire.packetstream import PacketStream
 from bench.wire.slcanstream import SlcanStream

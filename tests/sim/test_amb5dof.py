@@ -9,9 +9,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bench.rigcheck import check_rig
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
+from bench.rigfile import RigFile, load_rig
+from bench.rigfile.check import check_rig
 from sim_backend import amb5dof, amb_linear
 from sim_backend.core import LEVITATE, LIFT, READY
 from sim_backend.core.amb import CHANNELS, AmbPlant

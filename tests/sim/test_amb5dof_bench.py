@@ -11,15 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench import capture
 from bench.cli.safety import making_safe
 from bench.errors import BenchError, DeviceFault, InterlockError, StateNotReached
-from bench.opened import WatchedClock
-from bench.recorder import Recorder, RunHeader
+from bench.link.session import Session
 from bench.recording import Recording
-from bench.rigload import load_rig
-from bench.session import Session
-from bench.supervisor import Supervisor
+from bench.recording.recorder import Recorder, RunHeader
+from bench.rigfile import capture, load_rig
+from bench.run.job import WatchedClock
+from bench.run.supervisor import Supervisor
 from drivers.controller import Controller
 from drivers.fieldbus import Fieldbus, open_devices
 from sim_backend.endpoint import SimulatedRig

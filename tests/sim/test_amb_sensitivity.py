@@ -8,7 +8,7 @@ import control
 import numpy as np
 import pytest
 
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from sim_backend import amb_sensitivity
 from sim_backend.amb_linear import notch
 from sim_backend.amb_step import floating

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from sim_backend import amb_step
 from sim_backend.core import TICK_S
 from sim_backend.core.amb import CAC, CCS, AmbPlant

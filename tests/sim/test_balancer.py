@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from bench.cli.safety import may_touch
-from bench.envelope import Envelope
 from bench.errors import BenchError, InterlockError, OperatorAbort
-from bench.rigcheck import problems_of
-from bench.rigload import load_rig
-from bench.session import Session
+from bench.link.session import Session
+from bench.rigfile import load_rig
+from bench.rigfile.check import problems_of
+from bench.rigfile.envelope import Envelope
 from drivers.controller import Controller
 from drivers.operator import LineOperator
 from drivers.person import ConsoleOperator

@@ -7,11 +7,10 @@ from functools import cache
 import pytest
 
 from bench.errors import ConfigError
-from bench.frames import empty_batch
-from bench.registers import RegisterRefused
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
-from bench.telemetry import TelemetryDecoder
+from bench.link.frames import empty_batch
+from bench.link.telemetry import TelemetryDecoder
+from bench.rigfile import RigFile, load_rig
+from bench.rigfile.registers import RegisterRefused
 from sim_backend.controller import SimulatedController
 from sim_backend.core import LEVITATE, LIFT, READY, Plant
 from sim_backend.registers import Followed, RegisterBank

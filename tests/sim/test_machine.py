@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bench.errors import ConfigError
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
+from bench.rigfile import RigFile, load_rig
 from sim_backend.machine import MACHINES, machine_of
 from sim_backend.truth import draw
 

@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymodbus.framer import FramerRTU
 
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
+from bench.rigfile import RigFile, load_rig
 from sim_backend.core import Plant
 from sim_backend.modbus_server import LONGEST_RTU, SILENCE_NS, RtuPeer, TcpPeer, crc16
 from sim_backend.registers import RegisterBank

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 from sim_plants import centred, levitated, quiet
 
-from bench.rigload import load_rig
+from bench.rigfile import load_rig
 from sim_backend import core
 from sim_backend.core import CHANNELS, LAND, LEVITATE, Plant
 from sim_backend.core.params import ControlParams, PlantParams

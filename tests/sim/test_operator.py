@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from bench.envelope import Envelope
 from bench.errors import BenchError, InterlockError, OperatorAbort
-from bench.rigload import load_rig
-from bench.roles import NOTHING, Load
+from bench.procedure.roles import NOTHING, Load
+from bench.rigfile import load_rig
+from bench.rigfile.envelope import Envelope
 from drivers.operator import LineOperator
 from drivers.person import ConsoleOperator
 from sim_backend.endpoint import SimulatedRig

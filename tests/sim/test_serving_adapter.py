@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from serving_clients import MS, SECOND, SET_UP, T0, adapter
 
-from bench.frames import ERROR, FD, empty_batch, frame, payload
+from bench.link.frames import ERROR, FD, empty_batch, frame, payload
 from bench.wire import packet, slcan
 from sim_backend.serving import connection as connections
 from sim_backend.serving.adapter import SlcanAdapter

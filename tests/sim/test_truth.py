@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from bench.errors import ConfigError
-from bench.rigfile import RigFile
-from bench.rigload import load_rig
+from bench.rigfile import RigFile, load_rig
 from sim_backend.core import derivative
 from sim_backend.core.params import PlantParams
 from sim_backend.truth import draw, nominal

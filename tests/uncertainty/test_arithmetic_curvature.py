@@ -8,9 +8,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from bench.limits import Limit, Verdict
 from bench.procedure import Quantity
-from bench.records import measurement
+from bench.record.limits import Limit, Verdict
+from bench.record.records import measurement
 from bench.uncertainty import Estimate, Influence, interval, propagate
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bench.procedure import Measured, Quantity
-from bench.records import measurement
+from bench.record.records import measurement
 from bench.uncertainty import Distribution, Estimate, Influence, budget, interval, propagate
 from bench.uncertainty.estimate import Array
 

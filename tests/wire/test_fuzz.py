@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bench.registers import Register
+from bench.rigfile.registers import Register
 from bench.wire import isotp, packet, slcan, slcanstream
 from benchmarks.fuzz import fuzz
 from benchmarks.fuzz_targets import TARGETS

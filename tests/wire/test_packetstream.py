@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from test_packet import HEARTBEAT, HEARTBEAT_PACKET, crc16, crc32
 
-from bench.frames import ERROR, EXTENDED, FD, FRAME, FrameBatch, frame, payload
+from bench.link.frames import ERROR, EXTENDED, FD, FRAME, FrameBatch, frame, payload
 from bench.wire import packet
 from bench.wire.packetstream import PacketStream, encode
 

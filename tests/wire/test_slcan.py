@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bench.errors import ConfigError
-from bench.frames import EXTENDED as FRAMES_EXTENDED
+from bench.link.frames import EXTENDED as FRAMES_EXTENDED
 from bench.wire.slcan import EXTENDED, LENGTHS, Parsed, line, parse, setup
 
 HEARTBEAT = bytes.fromhex("78563412 0100 0000")

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from bench.frames import ERROR, EXTENDED, FD, FRAME, REMOTE, SWITCHED, FrameBatch, frame, payload
+from bench.link.frames import ERROR, EXTENDED, FD, FRAME, REMOTE, SWITCHED, FrameBatch, frame, payload
 from bench.wire.slcan import BUS_ERROR, LENGTHS
 from bench.wire.slcanstream import REPLIES, SlcanStream, encode
 

@@ -1,0 +1,136 @@
+"""Roles: what a device can do for a procedure. Drivers implement them; procedures ask the rig for them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Literal, Protocol
+
+from bench.rigfile.capture import NOW, CaptureData, Trigger
+
+
+class RigState(StrEnum):
+    """Where the rig stands. Transitions between them live in `bench.states` and nowhere else."""
+
+    OFF = "OFF"
+    READY = "READY"
+    LEVITATED = "LEVITATED"
+    SPINNING = "SPINNING"
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """What hangs on the hook besides the hanger, or on the lever: a label of the rig file's `masses` table, or nothing."""
+
+    label: str  # "" is nothing
+
+
+NOTHING = Load("")
+Side = Literal["left", "right"]
+"""An end of the lever, seen from its outboard end: a weight on the left turns the shaft forward."""
+Plane = Literal["inboard", "outboard"]
+"""A balancing plane."""
+
+
+class Levitation(Protocol):
+    """The device that holds the rotor. Every call returns when the controller reports the state, or raises."""
+
+    @property
+    def state(self) -> RigState: ...
+    def enable(self) -> None: ...  # OFF -> READY
+    def levitate(self) -> None: ...  # READY -> LEVITATED
+    def land(self) -> None: ...  # LEVITATED -> READY
+    def disable(self) -> None: ...  # READY -> OFF
+    def set(self, parameter: str, value: float) -> None: ...  # SI; passes the envelope; read back
+    def get(self, parameter: str) -> float: ...  # SI
+    def reading(
+        self, channel: str
+    ) -> float: ...  # newest sample, SI: for deciding whether to go on, never for a result
+
+
+class Rotation(Protocol):
+    """The device that turns the rotor."""
+
+    @property
+    def speed_rad_s(self) -> float: ...
+    def point(self, angle_rad: float) -> None: ...  # returns when the rotor stands at that angle
+    def spin(self, rad_s: float) -> None: ...  # returns when the rotor turns at that speed
+    def stop(self) -> None: ...  # returns when the rotor is below the landing speed
+
+
+class Operator(Protocol):
+    """A person, or what stands in for one."""
+
+    def hang(self, load: Load) -> Load: ...  # the hanger stays on; returns when done, with what hangs
+    def lever(
+        self, side: Side, load: Load
+    ) -> Load: ...  # on an end of the level lever, the other end empty; what hangs
+    def mount(self, part: str) -> None: ...  # "ring" on the shaft; "" takes it off
+    def attach(
+        self, plane: Plane, mass_kg: float, angle_rad: float
+    ) -> tuple[float, float]: ...  # a weight beside what is there; kg and rad of what was fixed; angle
+    # on the plane's scale, counted from y towards z while its zero faces y; the shaft must be landed
+    def detach(self, plane: Plane) -> None: ...  # every weight of that plane; the shaft must be landed
+    def ask(self, question: str) -> bool: ...  # yes or no
+
+
+class Drive(Protocol):
+    """An external drive that turns the shaft. Every call returns when the drive reports what was asked, or raises."""
+
+    @property
+    def speed_rad_s(self) -> float: ...  # as the drive measures it
+    @property
+    def fault(self) -> str: ...  # its name, "" without one
+    @property
+    def running(self) -> bool: ...  # it gives torque
+    def confirm_off(self) -> bool: ...  # a reading made now says: no torque; raises nothing
+    def let_go(self) -> None: ...  # sends coast, waits for nothing and raises nothing
+    def set_speed(self, rad_s: float) -> None: ...  # passes the envelope; takes effect while it runs
+    def set_acceleration(self, rad_s2: float) -> None: ...  # towards a speed; 0: as fast as it does by itself
+    def run(self) -> None: ...  # it gives torque; the speed follows
+    def reach(self, rad_s: float, patience_s: float = 25.0) -> None: ...
+    # set_speed, run, at its own acceleration; returns at that speed, gives up where it comes no nearer for so long
+    def coast(self) -> None: ...  # no torque
+    def brake(self) -> None: ...  # begins to brake; returns when it was told
+    def stop(self) -> None: ...  # brakes; returns at standstill
+
+
+class Capture(Protocol):
+    """What records inside the controller, at its full rate, and uploads. One capture at a time."""
+
+    @property
+    def channels(self) -> tuple[str, ...]: ...  # what it can record
+    @property
+    def memory_bytes(self) -> int: ...
+    @property
+    def rate_hz(self) -> float: ...  # the highest
+    def arm(
+        self, channels: Sequence[str], *, seconds: float, before_s: float = 0.0, rate_hz: float | None = None,
+        trigger: Trigger = NOW,
+    ) -> None: ...  # `seconds` in all, `before_s` of them before the trigger; refuses more than memory_bytes  # fmt: skip
+    def wait(self, timeout_s: float) -> None: ...  # returns when it is recorded
+    def upload(
+        self, progress: Callable[[int, int], None] | None = None, **labels: str | float
+    ) -> CaptureData: ...  # into the recording, as stream capture/1, capture/2 ...; progress: bytes so far, and in all
+    def cancel(self) -> None: ...  # gives up what is armed or recorded
+
+
+class Supply(Protocol):
+    """The power supply of the amplifiers."""
+
+    @property
+    def voltage_V(self) -> float: ...
+    @property
+    def current_A(self) -> float: ...
+    @property
+    def on(self) -> bool: ...
+
+
+class Thermal(Protocol):
+    """What measures temperatures."""
+
+    @property
+    def temperatures_K(self) -> Mapping[str, float]: ...  # of the windings, by name
+    @property
+    def ambient_K(self) -> float: ...

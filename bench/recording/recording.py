@@ -1,0 +1,365 @@
+"""A recording read back: the only thing that `analyse` and reports get to see.
+
+Steps are read through the chunk index, block by block, so an hour-long file takes little memory.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Generic, TypeVar, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.calibration import Calibration
+from bench.calibration.file import attached
+from bench.errors import AnalysisError, ConfigError, RecordingError
+from bench.link.frames import FrameBatch, frames_of
+from bench.plan import BenchPlan
+from bench.recording import layout, stored
+from bench.recording.captured import CAPTURES, Captured
+from bench.recording.kept import Kept
+from bench.recording.layout import DecodedBlock
+from bench.recording.mcapchunk import sound
+from bench.recording.mcapfile import McapFile, index
+from bench.recording.readlimits import MB
+from bench.recording.steps import Step, Steps
+from bench.rigfile import MOST_DBC, MOST_TOML, RigFile
+from bench.samples import StreamLayout
+
+__all__ = ["Captured", "Recording", "Step", "Steps"]
+P = TypeVar("P", bound=BenchPlan)
+Q = TypeVar("Q", bound=BenchPlan)
+R = TypeVar("R")
+J = TypeVar("J", dict[str, Any], list[Any])
+KEPT = 160  # decoded blocks: views of the messages, which the file keeps as long
+KEPT_BYTES = 64 << 20
+MOST_JSON = 8 << 20  # bytes of an attachment that is no DBC
+BLOCK_NS = 2_000_000_000  # no block is longer: how far back a block that reaches into an interval can begin
+
+
+class Recording(Generic[P]):
+    """One recording, closed. Open with `Recording.open`."""
+
+    def __init__(self, file: McapFile, plan: type[P] | None) -> None:
+        self._file, self._plan_class = file, plan
+        self._kept: Kept[tuple[bytes, DecodedBlock]] = Kept(KEPT, KEPT_BYTES)
+        self._made: dict[Callable[[Any], Any], Any] = {}
+        self.version = int(file.metadata["layout"]["version"])
+        self.path = file.path
+        self.integrity: Mapping[str, Any] | None = _integrity(file)
+        self.truncated = file.truncated or self.integrity is None
+
+    @classmethod
+    def open(cls, path: Path, plan: type[P] | None = None) -> Recording[P]:
+        """Open and check a recording.
+
+        Raises:
+            RecordingError: not a recording of ours, of a newer layout, or damaged. A file that was only cut off opens
+            with `truncated` set.
+        """
+        file = index(path)
+        version = file.metadata.get("layout", {}).get("version", "")
+        if file.profile != "levbench" or not (version.isascii() and version.isdigit() and len(version) < 10):
+            raise RecordingError(
+                f"{path} is MCAP but no Levbench recording (profile {file.profile[:40]!r}, layout {version[:40]!r})"
+            )
+        if int(version) > layout.VERSION:
+            raise RecordingError(
+                f"{path}: layout version: found {version}; expected at most {layout.VERSION}. It was recorded with a "
+                "newer Levbench: use that one, or `bench export` there"
+            )
+        return cls(file, plan)
+
+    @cached_property
+    def rig(self) -> RigFile:
+        """The rig file as it was when the run was made.
+
+        Raises:
+            RecordingError: it cannot be used.
+        """
+        try:
+            return RigFile.parse(
+                self.attachment("rig.toml"), self.attachment("rig.dbc"), "rig.toml (from the recording)"
+            )
+        except ConfigError as error:
+            raise RecordingError(f"recording {self.path}: {error}") from error
+
+    @cached_property
+    def plan(self) -> P:
+        """The plan the run was made with."""
+        if self._plan_class is None:
+            raise AnalysisError("the recording was opened without a plan type")
+        return self.plan_as(self._plan_class)
+
+    def plan_as(self, kind: type[Q]) -> Q:
+        """The plan as a type of one's choice.
+
+        Raises:
+            RecordingError: the stored plan is not of that type.
+        """
+        try:
+            return kind.model_validate_json(self.attachment("plan.json"))
+        except ValueError as error:
+            raise RecordingError(f"{self.path}: its plan is no {kind.__name__}: {error}") from error
+
+    @property
+    def plan_dict(self) -> dict[str, Any]:
+        return self._json("plan.json", dict)
+
+    @property
+    def spec(self) -> dict[str, Any]:
+        """The acceptance limits that the run was made with, by quantity."""
+        return self._json("spec.json", dict)
+
+    @cached_property
+    def calibrations(self) -> tuple[Calibration, ...]:
+        """The calibrations that the run used, whole, as they were then.
+
+        Raises:
+            RecordingError: they cannot be understood.
+        """
+        try:
+            return attached(self.attachment("calibrations.json"), f"recording {self.path}")
+        except ConfigError as error:
+            raise RecordingError(str(error)) from error
+
+    def calibration(self, procedure: str) -> Calibration:
+        """The calibration by a procedure that the run used.
+
+        Raises:
+            AnalysisError: it used none; the procedure that runs must name it in its `needs`.
+        """
+        for found in self.calibrations:
+            if found.procedure == procedure:
+                return found
+        used = ", ".join(c.procedure for c in self.calibrations) or "none"
+        raise AnalysisError(f"{self.path.name}: found calibrations by {used}; expected one by {procedure}")
+
+    def _json(self, name: str, kind: type[J]) -> J:
+        found = stored.parsed(self.attachment(name), f"recording {self.path}: attachment {name!r}")
+        if not isinstance(found, kind):
+            raise RecordingError(
+                f"recording {self.path}: attachment {name!r}: found a {type(found).__name__}; expected a {kind.__name__}"
+            )
+        return found
+
+    @property
+    def versions(self) -> dict[str, str]:
+        return self._file.metadata.get("versions", {})
+
+    @property
+    def wall(self) -> dict[str, str]:
+        """What came from the wall clock: dates, host, durations."""
+        return self._file.metadata.get("wall", {})
+
+    @property
+    def run(self) -> dict[str, str]:
+        """Procedure, backend and seed as strings."""
+        return self._file.metadata.get("run", {})
+
+    @property
+    def verdict_required(self) -> bool:
+        """Whether the run was to give a verdict: one without is an error."""
+        return self.run.get("verdict") == "required"
+
+    @property
+    def procedure(self) -> str:
+        return self.run.get("procedure", "")
+
+    @property
+    def seed(self) -> int | None:
+        text = self.run.get("seed", "")
+        try:
+            return int(text) if text else None
+        except ValueError as error:
+            raise RecordingError(f"recording {self.path}: seed: found {text[:40]!r}; expected an integer") from error
+
+    def attachment(self, name: str) -> str:
+        """An attached text.
+
+        Raises:
+            RecordingError: the recording has none of that name, or a larger one than any of ours.
+        """
+        try:
+            data = self._file.attachments[name]
+            if len(data) > (MOST_DBC if name == "rig.dbc" else MOST_TOML if name == "rig.toml" else MOST_JSON):
+                raise RecordingError(
+                    f"recording {self.path}: attachment {name!r} has {len(data)} bytes; expected fewer"
+                )
+            return data.decode("utf-8")
+        except (KeyError, UnicodeDecodeError) as error:
+            raise RecordingError(f"recording {self.path}: attachment {name!r} is missing or not text") from error
+
+    def digest(self) -> str:
+        """SHA-256 of the file."""
+        with self.path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+
+    @cached_property
+    def _layouts(self) -> dict[str, StreamLayout]:
+        out = {}
+        for topic, metadata in self._file.topics.values():
+            if topic.endswith("/block") and "layout" in metadata:
+                name = topic.removeprefix("/").removesuffix("/block")
+                out[name] = stored.stream_of(name, metadata["layout"], f"recording {self.path}: topic {topic[:80]}")
+        return out
+
+    @property
+    def streams(self) -> dict[str, StreamLayout]:
+        """The streams that were recorded all the time, by name."""
+        return {name: s for name, s in self._layouts.items() if not name.startswith(CAPTURES)}
+
+    @property
+    def capture_streams(self) -> dict[str, StreamLayout]:
+        """The streams of captures, by name."""
+        return {name: s for name, s in self._layouts.items() if name.startswith(CAPTURES)}
+
+    def captures(self, **labels: Any) -> tuple[Captured, ...]:
+        """The captures that were uploaded with these labels, in order; all of them by default."""
+        found = (Captured.of(self, event) for event in self.events("capture") if event["stream"] in self._layouts)
+        return tuple(c for c in found if labels.items() <= c.labels.items())
+
+    @cached_property
+    def start_ns(self) -> int:
+        """Time of the first sample of the telemetry; what `t_s` counts from.
+
+        Raises:
+            AnalysisError: there is none.
+        """
+        for block in self.blocks("telemetry"):
+            return int(block.t_ns[0])
+        raise AnalysisError(f"{self.path.name} holds no telemetry")
+
+    def blocks(self, stream: str, start_ns: int = 0, end_ns: int = 1 << 63) -> Iterator[DecodedBlock]:
+        """Decoded blocks that may hold samples of an interval, in order."""
+        for t_ns, data in self._file.messages(layout.block_topic(stream), max(0, start_ns - BLOCK_NS), end_ns):
+            block = self._decoded(stream, t_ns, data)
+            if block.count and block.t_ns[-1] >= start_ns:
+                yield block
+
+    def _decoded(self, stream: str, t_ns: int, data: bytes) -> DecodedBlock:
+        """A block; the last few are kept, for steps are read one after the other and each more than once."""
+        key = (stream, t_ns, id(data))
+        kept = self._kept.get(key)
+        if kept is None or kept[0] is not data:
+            try:
+                kept = (data, DecodedBlock(self._layouts[stream], data))
+            except RecordingError as error:
+                raise RecordingError(f"recording {self.path}: {error}") from error
+            self._kept.put(key, kept, 2 * len(data))
+        return kept[1]
+
+    def read(self, channels: tuple[str, ...], start_ns: int, end_ns: int) -> dict[str, npt.NDArray[Any]]:
+        """Samples with start <= t < end: float64 by channel, `t_ns`, and `index` (counts lost samples too).
+
+        Raises:
+            AnalysisError: a channel was not recorded, or the channels are of different streams.
+            RecordingError: more numbers than the limits allow.
+        """
+        stream = self._stream_of(channels)
+        count = 0
+        parts: dict[str, list[npt.NDArray[Any]]] = {name: [] for name in (*channels, "t_ns", "index")}
+        for block in self.blocks(stream, start_ns, end_ns):
+            a, b = np.searchsorted(block.t_ns, [start_ns, end_ns])
+            count += int(b - a) * len(parts)
+            self.limit_samples(count)
+            parts["t_ns"].append(block.t_ns[a:b])
+            parts["index"].append(np.arange(block.first + a, block.first + b))
+            for name in channels:
+                parts[name].append(block.columns[name][a:b].astype(np.float64))
+        empty = {"t_ns": np.zeros(0, np.int64), "index": np.zeros(0, np.int64)}
+        names = tuple(parts)  # each part goes when its whole is there
+        return {n: np.concatenate(x) if (x := parts.pop(n)) else empty.get(n, np.zeros(0)) for n in names}
+
+    def limit_samples(self, count: int) -> None:
+        """See that no more numbers are read at once than the limits allow.
+
+        Raises:
+            RecordingError: `count` is too many.
+        """
+        self._file.limits.check("samples", count, f"recording {self.path}", "numbers to read at once")
+
+    def channel(self, name: str, start_ns: int = 0, end_ns: int = 1 << 62) -> dict[str, npt.NDArray[Any]]:
+        """One channel with start <= t < end, float64, with `t_ns` and `index`; the whole recording by default."""
+        return self.read((name,), start_ns, end_ns)
+
+    def lost(self, stream: str, start_ns: int, end_ns: int) -> int:
+        """How many samples with start <= t < end are missing: those that blocks count as lost before them, and those
+        after the last block, where a recording was cut off."""
+        period, missing, last = self._layouts[stream].period_ns, 0, None
+        for block in self.blocks(stream, start_ns):
+            first, last = int(block.t_ns[0]), int(block.t_ns[-1])
+            # The k-th lost sample before a block was due at first - k periods.
+            missing += max(0, min(block.lost, (first - start_ns) // period) - max(0, (first - end_ns) // period))
+            if first >= end_ns:
+                break
+        if last is None:
+            return round((end_ns - start_ns) / period)
+        return missing + max(0, (end_ns - 1 - last) // period)
+
+    def _stream_of(self, channels: tuple[str, ...]) -> str:
+        for name, stream in self.streams.items():
+            known = {c.name for c in stream.channels}
+            if known.issuperset(channels):
+                return name
+        raise AnalysisError(f"channels {', '.join(channels)}: not all recorded in one stream of {self.path.name}")
+
+    @cached_property
+    def _events(self) -> list[dict[str, Any]]:
+        out, size, where = [], 0, f"recording {self.path}"
+        for _, data in self._file.messages(layout.EVENTS):
+            size += len(data)
+            self._file.limits.check("event_mb", size / MB, where, "MB of events")
+            out.append(stored.event_of(data, f"{where}: an event"))
+            self._file.limits.check("events", len(out), where, "events")
+        return out
+
+    def events(self, kind: str | None = None) -> list[dict[str, Any]]:
+        """Events in order: `kind`, `t_ns` and their data."""
+        return [e for e in self._events if kind is None or e["kind"] == kind]
+
+    def steps(self, kind: str) -> Steps:
+        """The completed steps of a kind, in time order."""
+        return Steps(tuple(s for s in self.all_steps() if s.kind == kind))
+
+    def all_steps(self) -> Steps:
+        """The completed steps of every kind, in time order."""
+        ends = {e["step"]: e["t_ns"] for e in self.events("step-end")}
+        told: dict[int, dict[str, Any]] = {}
+        for e in self.events("step-corrected"):
+            told.setdefault(e["step"], {}).update(e["labels"])
+        return Steps(tuple(
+            Step(self, e["name"], {**e["labels"], **told.get(e["step"], {})}, e["t_ns"], ends[e["step"]])
+            for e in self.events("step-begin") if e["step"] in ends
+        ))  # fmt: skip
+
+    def once(self, work: Callable[[Recording[P]], R]) -> R:
+        """What `work` makes of this recording, made the first time it is asked for: results and figures share an evaluation."""
+        if work not in self._made:
+            self._made[work] = work(self)
+        return cast(R, self._made[work])
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """The links whose frames were recorded."""
+        raw = layout.raw_topic("")
+        return tuple(sorted({t.removeprefix(raw) for t, _ in self._file.topics.values() if t.startswith(raw)}))
+
+    def frames(self, link: str) -> Iterator[FrameBatch]:
+        """Raw frames, batch by batch as they were recorded."""
+        with sound(self.path):
+            for _, data in self._file.messages(layout.raw_topic(link)):
+                _, records = layout.decode_frames(data)
+                yield frames_of(records, self.version)
+
+    def close(self) -> None:
+        """Nothing stays open between reads; here for symmetry with the recorder."""
+
+
+def _integrity(file: McapFile) -> dict[str, Any] | None:
+    found = file.metadata.get("integrity")
+    return None if found is None else stored.integrity_of(found, f"recording {file.path}: its integrity record")

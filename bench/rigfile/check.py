@@ -1,0 +1,292 @@
+"""What the types of a rig file cannot say: units that fit, geometry that exists, bindings that lead somewhere."""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+from collections.abc import Iterator
+
+from bench import units
+from bench.errors import ConfigError, Problem
+from bench.rigfile import busload, linkurl
+from bench.rigfile.busload import BusLoad, bus_load
+from bench.rigfile.check_binding import find, fits, signal_at
+from bench.rigfile.check_binding import problems_of as problems_of_binding
+from bench.rigfile.check_capture import problems_of as problems_of_capture
+from bench.rigfile.messages import MessageMap
+from bench.rigfile.model import RigFile
+from bench.rigfile.possible import impossible
+from bench.rigfile.rest import rest_of
+from bench.rigfile.text import RigText, read_rig
+from bench.units import Unit
+
+GEOMETRY = {
+    "amb_span": "AMB plane to AMB plane",
+    "com_to_outboard_amb": "centre of mass to outboard AMB",
+    "com_to_inboard_amb": "centre of mass to inboard AMB",
+    "com_to_outboard_sensor": "centre of mass to outboard sensors",
+    "com_to_inboard_sensor": "centre of mass to inboard sensors",
+    "amb_gap": "air gap of the radial AMBs",
+    "clearance": "clearance of the touchdown bearings",
+}
+HOOK_GEOMETRY = {"hook_to_outboard": "hook plane to outboard AMB plane"}
+MOTOR_GEOMETRY = {"com_to_motor": "centre of mass to motor", "motor_stiffness": "negative stiffness of the motor"}
+"""Of a rig on which masses hang, and of one whose controller turns the rotor."""
+SOME_GEOMETRY = {
+    "motor_to_outboard_amb": "motor plane to outboard AMB plane",
+    "lever_left": "shaft axis to the left end of the lever",
+    "lever_right": "shaft axis to the right end of the lever",
+    "axial_gap": "air gap of the axial AMB",
+    "com_to_inboard_balance": "centre of mass to the inboard balancing plane",
+    "com_to_outboard_balance": "centre of mass to the outboard balancing plane",
+    "balance_radius": "shaft axis to where weights are fixed in the balancing planes",
+    "com_to_coupling": "centre of mass to the coupling of an external motor",
+    "coupling_stiffness": "radial stiffness of that coupling",
+}
+"""Lengths that a rig may have; the procedures that need one say so."""
+MACHINE = {"pole_pairs": "1", "polar_inertia": "kg m^2", "ring_inertia": "kg m^2", "amb_asymmetry": "1",
+           "radial_axes": "rad", "runout": "m", "coupling_offset": "m", "mass": "kg", "transverse_inertia": "kg m^2",
+           "weight_mass": "kg", "weight_angle": "rad", "drive_drag": "N m"}  # fmt: skip
+
+
+def check_rig(rig: str) -> tuple[tuple[Problem, ...], BusLoad | None]:
+    """Every problem of a rig file at once, and the bus load when the DBC can be read.
+
+    Raises:
+        ConfigError: there is no such rig, or its files cannot be read at all.
+    """
+    text = read_rig(rig)
+    try:
+        loaded = RigFile.parse(text.toml, text.dbc, str(text.path))
+    except ConfigError as error:
+        if not error.problems:
+            return (Problem(str(text.path), "(file)", str(error), "a rig file"),), None
+        return error.problems + tuple(_behind(text, error.problems)), None
+    load = None
+    with contextlib.suppress(ConfigError, KeyError):
+        load = bus_load(loaded.messages, loaded.link.bitrate, loaded.link.data_bitrate) if loaded.link.bitrate else None
+    return tuple(problems_of(loaded)), load
+
+
+def _behind(text: RigText, problems: tuple[Problem, ...]) -> Iterator[Problem]:
+    """What else is wrong with a file that breaks the types: the entries at fault are left out and the rest checked."""
+    if (rest := rest_of(text, problems)) is None:
+        return
+    told = {p.key for p in problems}
+    entries = {".".join(key.split(".")[:2]) for key in told}
+    for p in problems_of(rest):
+        first, *_ = p.key.split(".")
+        judged_by_another = first == "site" and any(key.startswith("site.") for key in told)  # gravity by the latitude
+        if p.key not in told and ".".join(p.key.split(".")[:2]) not in entries and not judged_by_another:
+            yield p
+
+
+def as_far_as_read(rig: str) -> RigFile | None:
+    """A rig file, whatever is wrong with it: entries at fault are left out; None where nothing of it can be told.
+
+    Raises:
+        ConfigError: there is no such rig, or its files cannot be read at all.
+    """
+    text = read_rig(rig)
+    try:
+        return RigFile.parse(text.toml, text.dbc, str(text.path))
+    except ConfigError as error:
+        return rest_of(text, error.problems) if error.problems else None
+
+
+def problems_of(rig: RigFile) -> list[Problem]:
+    """What is wrong with a parsed rig file."""
+    found = [
+        *_devices(rig),
+        *_links(rig),
+        *_units(rig),
+        *_geometry(rig),
+        *_masses(rig),
+        *_envelope(rig),
+        *_parameters(rig),
+        *impossible(rig),
+    ]
+    if not any(p.key.startswith("devices") for p in found):
+        try:
+            messages = rig.messages
+        except ConfigError as error:
+            why = str(error).removeprefix(f"{rig.link.dbc}: not a usable DBC: ")
+            return [*found, Problem(rig.link.dbc, "(file)", why, "a usable DBC")]
+        found += [*_bindings(rig, messages), *busload.problems_of(rig, messages)]
+    return found
+
+
+def _devices(rig: RigFile) -> Iterator[Problem]:
+    if "controller" not in rig.devices:
+        yield Problem(rig.path, "devices", ", ".join(rig.devices) or "nothing", "[devices.controller]")
+    for name, device in rig.devices.items():
+        if device.link not in rig.links:
+            yield Problem(
+                rig.path, f"devices.{name}.link", device.link, f"one of {', '.join(rig.links) or '(no links)'}"
+            )
+    controller = rig.devices.get("controller")
+    if controller is not None and controller.link in rig.links and not rig.links[controller.link].dbc:
+        yield Problem(rig.path, f"devices.controller.link: links.{controller.link}.dbc", "nothing", 'dbc = "FILE.dbc"')
+
+
+def _schemes(rig: RigFile, device: str) -> tuple[str, ...]:
+    """URL schemes that a device can be on: the controller, the operator's line; the others' are Modbus."""
+    if device == "controller":
+        return linkurl.CONTROLLER_SCHEMES
+    return ("line",) if "operator" in rig.devices[device].roles else linkurl.MODBUS_SCHEMES
+
+
+def _links(rig: RigFile) -> Iterator[Problem]:
+    """URLs that can be taken apart, of a kind that their devices can have, with the bit rates that they need."""
+    for name, link in rig.links.items():
+        key = f"links.{name}"
+        try:
+            url = linkurl.parse(link.url)
+            if url.scheme in linkurl.TCP_SCHEMES:
+                _ = url.address
+        except ConfigError as error:
+            yield Problem(rig.path, f"{key}.url", repr(link.url), str(error))
+            continue
+        for device in (n for n, d in rig.devices.items() if d.link == name):
+            fit = _schemes(rig, device)
+            if url.scheme not in fit:
+                such = ", ".join(linkurl.EXAMPLES[x] for x in fit)
+                yield Problem(rig.path, f"{key}.url", link.url, f"a URL for the {device}, such as {such}")
+        stated = link.bitrate is not None or "bitrate" in {**url.query, **link.options}
+        if url.scheme in ("slcan", "can") and not stated:
+            yield Problem(rig.path, f"{key}.bitrate", "nothing", "the bit rate of the CAN bus, bit/s")
+
+
+def _units(rig: RigFile) -> Iterator[Problem]:
+    named = {f"channels.{n}.unit": c.unit for n, c in rig.channels.items()}
+    named |= {f"parameters.{n}.unit": p.unit for n, p in rig.parameters.items()}
+    for key, symbol in named.items():
+        if key.startswith("parameters.") and symbol in units.UNITS and not _is_si(units.UNITS[symbol]):
+            yield Problem(
+                rig.path, key, symbol, f"{units.UNITS[symbol].si}: default and range are in SI; the DBC may differ"
+            )
+        if symbol not in units.UNITS:
+            close = difflib.get_close_matches(symbol, units.UNITS, 1)
+            yield Problem(rig.path, key, repr(symbol), units.KNOWN + (f". Did you mean {close[0]!r}?" if close else ""))
+    kinds = {f"geometry.{n}": (g, "N/m" if n.endswith("_stiffness") else "m") for n, g in rig.geometry.items()}
+    kinds |= {f"masses.{n}": (m, "kg") for n, m in rig.masses.items()}
+    kinds |= {f"machine.{n}": (m, MACHINE[n]) for n, m in rig.machine.items() if n in MACHINE}
+    kinds |= {"hanger": (rig.hanger, "kg"), "mass_density": (rig.mass_density, "kg/m^3"),
+              "site.gravity": (rig.site.gravity, "m/s^2"), "site.air_density": (rig.site.air_density, "kg/m^3")}  # fmt: skip
+    for key, (toleranced, si) in kinds.items():
+        if toleranced.unit != si:
+            yield Problem(rig.path, f"{key}.unit", toleranced.unit, f"a unit of the kind of {si}")
+
+
+def _is_si(unit: Unit) -> bool:
+    return (unit.factor, unit.offset) == (1.0, 0.0)
+
+
+def _geometry(rig: RigFile) -> Iterator[Problem]:
+    g, needed = rig.geometry, dict(GEOMETRY)
+    needed |= HOOK_GEOMETRY if rig.masses else {}
+    needed |= MOTOR_GEOMETRY if any("rotation" in d.roles for d in rig.devices.values()) else {}
+    for key in sorted(needed.keys() - g.keys()):
+        yield Problem(rig.path, f"geometry.{key}", "nothing", f"{needed[key]}, with its certificate")
+    for key in sorted(rig.machine.keys() - MACHINE.keys()):
+        yield Problem(rig.path, f"machine.{key}", "a number nobody asks for", f"one of {', '.join(MACHINE)}")
+    known = GEOMETRY | HOOK_GEOMETRY | MOTOR_GEOMETRY | SOME_GEOMETRY
+    for key in sorted(g.keys() - known.keys()):
+        close = difflib.get_close_matches(key, known, 1)
+        yield Problem(rig.path, f"geometry.{key}", "a length nobody asks for",
+                      f"did you mean {close[0]}?" if close else "no such key")  # fmt: skip
+    for key, length in g.items():
+        if length.value <= 0:
+            yield Problem(rig.path, f"geometry.{key}.value", f"{length.value:g} {length.unit}", "a positive number")
+    if {"com_to_inboard_amb", "com_to_outboard_amb", "amb_span"} <= g.keys():
+        span = g["com_to_inboard_amb"].value + g["com_to_outboard_amb"].value
+        if abs(span - g["amb_span"].value) > 1e-3:
+            yield Problem(rig.path, "geometry.amb_span.value", f"{g['amb_span'].value:g} m",
+                          f"within 1 mm of com_to_inboard_amb + com_to_outboard_amb = {span:g} m")  # fmt: skip
+    if {"clearance", "amb_gap"} <= g.keys() and g["clearance"].value >= g["amb_gap"].value:
+        yield Problem(rig.path, "geometry.clearance.value", f"{g['clearance'].value:g} m",
+                      f"less than amb_gap = {g['amb_gap'].value:g} m, or the journal strikes the AMB first")  # fmt: skip
+
+
+def _masses(rig: RigFile) -> Iterator[Problem]:
+    if not rig.masses:
+        return
+    for name, mass in {**rig.masses, "hanger": rig.hanger}.items():
+        key = name if name == "hanger" else f"masses.{name}"
+        if mass.value <= 0:
+            yield Problem(rig.path, f"{key}.value", f"{mass.value:g} kg", "a positive mass")
+        elif mass.value > rig.envelope.max_hung_kg:
+            yield Problem(rig.path, f"{key}.value", f"{mass.value:g} kg",
+                          f"at most envelope.max_hung_kg = {rig.envelope.max_hung_kg:g} kg")  # fmt: skip
+
+
+def _envelope(rig: RigFile) -> Iterator[Problem]:
+    """Channels that a rig file puts under protection by name exist; the ones it does not name are protected if they do."""
+    if "positions" in rig.envelope.model_fields_set:
+        for name in rig.envelope.positions:
+            if name not in rig.channels:
+                yield Problem(rig.path, "envelope.positions", name, "a channel of this rig")
+    low, high = rig.envelope.min_supply_V or 0.0, rig.envelope.max_supply_V
+    if high is not None and high <= low:
+        yield Problem(rig.path, "envelope.max_supply_V", f"{high:g}", f"more than min_supply_V = {low:g}")
+
+
+def _parameters(rig: RigFile) -> Iterator[Problem]:
+    taken: dict[int, str] = {}
+    for name, p in rig.parameters.items():
+        if p.low > p.high:
+            yield Problem(rig.path, f"parameters.{name}", f"low {p.low:g} above high {p.high:g}", "low <= high")
+        elif not p.low <= p.default <= p.high:
+            yield Problem(rig.path, f"parameters.{name}.default", f"{p.default:g} {p.unit}", f"{p.low:g} to {p.high:g}")
+        if (p.index is None) == (not p.signal):
+            yield Problem(rig.path, f"parameters.{name}", "both or neither", "either index or signal")
+        elif p.index is not None and p.index in taken:
+            yield Problem(rig.path, f"parameters.{name}.index", str(p.index), f"an index of its own ({taken[p.index]})")
+        if p.index is not None:
+            taken.setdefault(p.index, name)
+
+
+def _bindings(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
+    for name, channel in rig.channels.items():
+        message, _, signal = channel.signal.partition(".")
+        known = {s.name: s for s in messages.messages[message].signals} if message in messages.messages else {}
+        if signal not in known:
+            close = difflib.get_close_matches(signal, known, 1)
+            yield Problem(rig.path, f"channels.{name}.signal", channel.signal,
+                          f"a signal of {rig.link.dbc}" + (f", such as {message}.{close[0]}" if close else ""))  # fmt: skip
+            continue
+        dbc_unit = known[signal].unit
+        if dbc_unit not in units.UNITS:
+            yield Problem(rig.link.dbc, channel.signal, f"unit {dbc_unit!r}", units.KNOWN)
+        elif channel.unit in units.UNITS and units.UNITS[dbc_unit].si != units.UNITS[channel.unit].si:
+            yield Problem(rig.path, f"channels.{name}.unit", channel.unit, f"the kind of {dbc_unit} ({channel.signal})")
+    yield from _signals_of_parameters(rig, messages)
+    captures = problems_of_capture(rig.capture, messages) if rig.capture is not None else ()
+    for key, found, expected in (*problems_of_binding(rig, messages), *captures):
+        yield Problem(rig.path, key, found, expected)
+
+
+def _signals_of_parameters(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
+    """Parameters that are signals of the host's messages: they exist, in a unit of the kind, and can hold the range."""
+    taken: dict[str, str] = {}
+    for name, p in rig.parameters.items():
+        if not p.signal:
+            continue
+        key = f"parameters.{name}.signal"
+        if wrong := find(messages, p.signal):
+            yield Problem(rig.path, key, wrong, f"a signal of {rig.link.dbc}")
+            continue
+        signal = signal_at(messages, p.signal)
+        assert signal is not None
+        if p.signal in taken:
+            yield Problem(rig.path, key, p.signal, f"a signal of its own ({taken[p.signal]})")
+        taken.setdefault(p.signal, name)
+        unit = units.UNITS.get(signal.unit)
+        if unit is None:
+            yield Problem(rig.link.dbc, p.signal, f"unit {signal.unit!r}", units.KNOWN)
+        elif p.unit in units.UNITS and unit.si != units.UNITS[p.unit].si:
+            yield Problem(rig.path, f"parameters.{name}.unit", p.unit, f"the kind of {signal.unit} ({p.signal})")
+        elif not all(fits(signal, (x - unit.offset) / unit.factor) for x in (p.low, p.high, p.default)):
+            yield Problem(
+                rig.path, f"parameters.{name}", f"{p.low:g} to {p.high:g} {p.unit}", f"a range that {p.signal} can hold"
+            )

@@ -1,0 +1,199 @@
+"""From a closed recording to what a record says: measurements with verdicts, correlations and findings.
+
+The runner and `bench analyse` both come here, and neither hands over anything but the file.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from itertools import chain
+from typing import Any
+
+from bench.errors import AnalysisError, BenchError, RecordingError, SignalAbort
+from bench.findings import Effect, Finding
+from bench.link.counts import LinkCounts
+from bench.procedure import Measured, Procedure
+from bench.record.limits import Limit
+from bench.record.outcomes import SOUND, Outcome, outcome_of, unjudged
+from bench.record.records import (
+    Correlations,
+    Measurement,
+    Record,
+    RecordingFile,
+    correlations_of,
+    findings_of,
+    measurement,
+    missing,
+)
+from bench.record.specs import applied, in_unit
+from bench.recording import Recording
+from bench.recording.recorder import Recorder
+from bench.run.step_gaps import incomplete_steps, missing_steps
+
+logger = logging.getLogger("bench.evaluation")
+RUN_END = "run-end"
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How the machine's part of a run ended: what stopped it early, if anything, and what was noticed on the way."""
+
+    stopped: Outcome | None = None
+    findings: tuple[Finding, ...] = ()
+    link: LinkCounts = field(default_factory=LinkCounts)
+
+    def write(self, recorder: Recorder) -> None:
+        """Into the recording, so that a later analysis knows it too."""
+        recorder.event(
+            RUN_END,
+            stopped=None if self.stopped is None else self.stopped.value,
+            findings=[asdict(f) for f in self.findings],
+            link=asdict(self.link),
+        )
+
+    @classmethod
+    def read(cls, recording: Recording[Any]) -> Ending:
+        """From a recording; one that was cut off says so.
+
+        Raises:
+            RecordingError: the entry is there and cannot be understood.
+        """
+        events = recording.events(RUN_END)
+        if recording.truncated or not events:
+            text = "the recording was cut off: its process was killed or lost power; what was written before is whole"
+            return cls(Outcome.ERROR, (Finding("recording-truncated", text, recording.path.name, Effect.ERROR),))
+        try:
+            e = events[-1]
+            found = tuple(Finding(f["code"], f["text"], f["where"], Effect(f["effect"]), tuple(f.get("concerns", ())))
+                          for f in e["findings"])  # fmt: skip
+            return cls(Outcome(e["stopped"]) if e["stopped"] else None, found, LinkCounts(**e["link"]))
+        except (KeyError, TypeError, ValueError) as error:
+            raise RecordingError(f"{recording.path}: its event {RUN_END} cannot be read: {error!r}") from error
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What a record takes from a recording."""
+
+    measurements: tuple[Measurement, ...]
+    correlations: Correlations
+    findings: tuple[Finding, ...]
+
+    def finish(self, record: Record, ending: Ending, ended: str, recording: RecordingFile | None) -> Record:
+        """An unfinished record with its end; the outcome follows from what it holds."""
+        known = {
+            (f.code, f.where) for f in ending.findings
+        }  # a channel that stood is seen while it does, and in its steps
+        findings = (*ending.findings, *(f for f in self.findings if (f.code, f.where) not in known))
+        return replace(
+            record, ended=ended, recording=recording, link=ending.link, findings=findings_of(findings),
+            measurements=self.measurements, correlations=self.correlations,
+            outcome=outcome_of(self.measurements, findings, ending.stopped),
+        )  # fmt: skip
+
+
+def evaluate(
+    procedure: Procedure, recording: Recording[Any], limits: Mapping[str, Limit], *, stopped: bool
+) -> Evaluation:
+    """Run `analyse` on the file and judge what it yields; what was declared and not yielded is missing.
+
+    A run that was stopped early is not analysed: its recording is kept, its quantities are missing. An analysis that
+    fails is a finding, not an exception. A limit that does not hold for the plan judges nothing, and a note says so.
+    A run that was to give a verdict (`bench run --require-verdict`, `--spec`) and gave none is an error.
+
+    Raises:
+        SignalAbort: the user stops it.
+    """
+    if stopped:
+        return Evaluation(_in_order(procedure, {}, limits), Correlations((), ()), ())
+    stated, (limits, notes) = limits, applied(limits, recording.plan)
+    limits, mistaken = in_unit(limits, procedure.measures)
+    measured: dict[tuple[str, str], Measured] = {}
+    findings = [*notes, *mistaken]
+    entries: dict[tuple[str, str], Measurement] = {}
+    correlations = Correlations((), ())
+    try:
+        for item in yielded(procedure, recording):
+            if isinstance(item, Finding):
+                findings.append(item)
+            else:
+                _accept(procedure, item, measured)
+        for key, item in measured.items():
+            entries[key] = measurement(item, limits.get(item.quantity.name), recording.seed)
+        correlations = correlations_of(list(measured.values()))
+    except SignalAbort:
+        raise
+    except Exception as error:
+        findings.append(_failed(error))
+        entries, correlations = {}, Correlations((), ())
+    measurements = _in_order(procedure, entries, limits)
+    if recording.verdict_required and (nothing := unjudged(measurements, len(stated))) is not None:
+        findings.append(nothing)
+    return Evaluation(measurements, correlations, tuple(findings))
+
+
+def yielded(procedure: Procedure, recording: Recording[Any]) -> Iterator[Measured | Finding]:
+    """What a closed recording says: of the calibrations that the run used, of steps that lack samples, what `analyse` yields,
+    and of steps that are missing."""
+    explained = False
+    for item in chain(_calibrations(recording), incomplete_steps(recording), procedure.analyse(recording)):
+        explained = explained or (isinstance(item, Finding) and item.effect is not Effect.NOTE)
+        yield item
+    if not explained:  # else a procedure that ended early has said why
+        yield from missing_steps(procedure, recording)
+
+
+def _calibrations(recording: Recording[Any]) -> Iterator[Finding]:
+    """Calibrations that the run used though they were overdue (only --allow-expired lets it), that rest on such, that carry
+    no digest, or that were adopted although their run did not pass."""
+    for c in recording.calibrations:
+        name = f"the calibration {c.procedure} of {c.date[:10]}"
+        if c.expired:
+            yield Finding("calibration-expired", f"{name} was used though it had expired on {c.due}", c.run_id)
+        for used in c.used:
+            if used.state == "expired":
+                text = f"{name} rests on {used.procedure} of {used.date[:10]}, which had expired on {used.due}"
+                yield Finding("calibration-expired", text, c.run_id)
+            here = {other.procedure: other.run_id for other in recording.calibrations}
+            if here.get(used.procedure, used.run_id) != used.run_id:
+                text = f"{name} rests on {used.run_id}; this run uses {here[used.procedure]} beside it"
+                yield Finding("calibrations-of-two-runs", text, c.run_id)
+        if not c.sealed:
+            text = f"{name} carries no digest: whether its file is as it was written cannot be told"
+            yield Finding("calibration-without-digest", text, c.run_id)
+        if c.outcome not in SOUND:
+            yield Finding(
+                "calibration-not-passed", f"{name} was adopted although its outcome was {c.outcome}", c.run_id
+            )
+
+
+def _accept(procedure: Procedure, item: Measured, measured: dict[tuple[str, str], Measured]) -> None:
+    key = (item.quantity.name, item.where)
+    if item.quantity not in procedure.measures:
+        raise AnalysisError(f"{procedure.name} yields {item.quantity.name}, which it does not declare")
+    if key in measured:
+        raise AnalysisError(f"{procedure.name} yields {item.quantity.name} {item.where} twice")
+    measured[key] = item
+
+
+def _in_order(
+    procedure: Procedure, entries: Mapping[tuple[str, str], Measurement], limits: Mapping[str, Limit]
+) -> tuple[Measurement, ...]:
+    """As declared, with a missing entry where nothing was yielded that a sound machine has, or that a limit asks for."""
+    out: list[Measurement] = []
+    for quantity in procedure.measures:
+        found = [m for (name, _), m in entries.items() if name == quantity.name]
+        limit = limits.get(quantity.name)
+        if found or quantity not in procedure.optional or limit is not None:
+            out += found or [missing(quantity, limit)]
+    return tuple(out)
+
+
+def _failed(error: Exception) -> Finding:
+    if isinstance(error, BenchError):
+        logger.warning("the analysis failed: %s", error)
+        return Finding("analysis-failed", str(error), "analyse", Effect.ERROR)
+    logger.error("the analysis failed: %s: %s", type(error).__name__, error, exc_info=error)
+    return Finding("analysis-failed", f"{type(error).__name__}: {error}; see the log", "analyse", Effect.ERROR)

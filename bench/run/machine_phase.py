@@ -1,0 +1,205 @@
+"""The machine's part of a run: bring the rig to its state, acquire, and make safe, always."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, cast
+
+from bench import runlog
+from bench.described import described
+from bench.errors import (
+    Aborted,
+    AnotherHost,
+    BenchError,
+    BytesUnreadable,
+    ClockWrong,
+    DeviceFault,
+    DeviceUnreadable,
+    DriveFault,
+    FrozenError,
+    InterlockError,
+    LinkError,
+    NoReply,
+    OperatorAbort,
+    OperatorRefused,
+    OperatorSilent,
+    ReadingsStand,
+    RecordingError,
+    Refused,
+    RotorNotArrived,
+    SignalAbort,
+    SpeedContradicts,
+    StateContradicts,
+    StateNotReached,
+)
+from bench.findings import Effect, Finding
+from bench.procedure.roles import RigState
+from bench.procedure.states import transition
+from bench.progress import Progress
+from bench.record.outcomes import Outcome
+from bench.recording.recorder import Recorder
+from bench.rigfile.registers import RegisterRefused
+from bench.run import provenance
+from bench.run.evaluation import Ending
+from bench.run.job import Job, OpenRig
+from bench.run.supervisor import SafeStep, Supervisor
+
+logger = logging.getLogger("bench.runner")
+CODES: tuple[tuple[type[BaseException], str], ...] = (
+    (SignalAbort, "signal"), (OperatorAbort, "operator-stop"), (DriveFault, "drive-fault"),
+    (DeviceFault, "controller-fault"), (AnotherHost, "another-host"), (InterlockError, "interlock"),
+    (RegisterRefused, "device-refused"), (DeviceUnreadable, "device-unreadable"), (NoReply, "no-reply"),
+    (BytesUnreadable, "bytes-unreadable"), (OperatorSilent, "operator-silent"), (FrozenError, "telemetry-frozen"),
+    (ClockWrong, "clock-drift"),
+    (ReadingsStand, "stuck-channel"), (StateContradicts, "state-contradicts"), (SpeedContradicts, "speed-and-angle-disagree"),
+    (LinkError, "link-lost"), (StateNotReached, "state-not-reached"), (RotorNotArrived, "rotor-not-arrived"),
+    (OperatorRefused, "operator-refused"), (Refused, "controller-refused"), (RecordingError, "recording-failed"),
+    (BenchError, "run-failed"),
+)  # fmt: skip
+"""The finding of an error that ends a run: the first kind that it is."""
+
+
+@dataclass(frozen=True)
+class Acquired:
+    """The machine's part of a run: how and when it ended, the truth if the rig is simulated, what raised where it was
+    stopped early, and whether the rig had come into the procedure's state."""
+
+    ending: Ending
+    ended: str
+    truth: Mapping[str, Any] | None
+    cause: BaseException | None
+    brought_up: bool
+
+
+def acquired(
+    job: Job, path: Path, live: OpenRig, supervisor: Supervisor, progress: Progress, *, plain: bool = False,
+    wall: Callable[[], Mapping[str, str]] = dict,
+) -> Acquired:  # fmt: skip
+    """Open the recording at `path`, move, make safe, close it. Raises nothing: what went wrong is in the ending.
+
+    Args:
+        plain: record without a thread and without the 100 Hz view (`bench.recorder.Recorder`).
+        wall: what the recording says of the wall clock, asked at its end.
+    """
+    ending: Ending | None = None
+    cause: BaseException | None = None
+    said, up = wall(), False
+    try:
+        recorder = Recorder(
+            path, clock=live.rig.clock, streams=live.streams, header=provenance.header(job),
+            live=job.backend == "live", plain=plain,
+        )  # fmt: skip
+        with recorder:
+            live.attach(recorder)
+            cause, findings, up = _moved(job, live, recorder, supervisor, progress)
+            ending = _ending(cause, findings, live, recorder)
+            said = wall()
+            recorder.wall |= said
+            with suppress(RecordingError):  # closing raises the same failure again
+                ending.write(recorder)
+    except Exception as error:
+        cause = cause or error
+        stopped, finding = cause_of(error)
+        before = ending or Ending()
+        known = finding.code in [f.code for f in before.findings]  # a failed recorder raises again when it is closed
+        findings = before.findings if known else (*before.findings, finding)
+        ending = replace(before, stopped=before.stopped or stopped, findings=findings)
+    assert ending is not None
+    return Acquired(ending, said.get("ended", ""), live.truth, cause, up)
+
+
+def _moved(
+    job: Job, live: OpenRig, recorder: Recorder, supervisor: Supervisor, progress: Progress
+) -> tuple[BaseException | None, tuple[Finding, ...], bool]:
+    """Bring the rig to the procedure's state, acquire, make safe; what ended it early, what make-safe could not do, and
+    whether the rig had come into its state."""
+    cause: BaseException | None = None
+    up = False
+    rig, procedure = live.rig, job.procedure
+    with runlog.warnings_to(lambda room, text: recorder.event("log", room=room, text=text)):
+        try:
+            with supervisor.moving():
+                progress.stage(f"bring the rig to {procedure.state}")
+                transition(rig, RigState.READY)
+                for name, value in procedure.settings(job.plan).items():
+                    rig.levitation.set(name, value)
+                transition(rig, procedure.state)
+                up = True
+                progress.stage("acquire")
+                progress.total(procedure.step_count(job.plan))
+                procedure.acquire(rig, job.plan, cast(Recorder, WatchedSteps(recorder, progress, live.catch_up)))
+        except BaseException as error:
+            # Whatever it is, also SystemExit: the machine is made safe first.
+            cause = error
+        finally:
+            with supervisor.finishing(), suppress(Exception):
+                _told(cause, progress)
+            live.unguard()
+            findings = supervisor.make_safe([_recording_or_not(s, live) for s in live.safe_steps], rig.clock.now_ns)
+            known = None if cause is None else cause_of(cause)[1].code
+            findings += tuple(f for f in live.aftermath() if f.code != known)
+    return cause, findings, up
+
+
+def _told(cause: BaseException | None, progress: Progress) -> None:
+    if cause is not None:
+        logger.warning("stopped: %s", str(cause) or type(cause).__name__)
+    progress.total(0)
+    progress.stage("make safe")
+
+
+def _recording_or_not(step: SafeStep, live: OpenRig) -> SafeStep:
+    """A recorder that fails (a full disk) must not keep the machine from being made safe."""
+
+    def action() -> None:
+        try:
+            step.action()
+        except RecordingError as error:
+            live.attach(None)
+            logger.error("recording stopped: %s", error)
+            step.action()
+
+    return SafeStep(step.name, action, step.timeout_s)
+
+
+class WatchedSteps:
+    """The recorder as `acquire` sees it, with each step told to the progress display, and over only when telemetry has
+    reached its end: what `acquire` commands next does not act within it."""
+
+    def __init__(self, recorder: Recorder, progress: Progress, catch_up: Callable[[], None]) -> None:
+        self._recorder, self._progress, self._catch_up = recorder, progress, catch_up
+
+    @contextmanager
+    def step(self, kind: str, **labels: Any) -> Iterator[None]:
+        self._progress.step(f"{kind} {described(labels)}".rstrip())
+        with self._recorder.step(kind, **labels):
+            yield
+        self._catch_up()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._recorder, name)
+
+
+def _ending(cause: BaseException | None, findings: tuple[Finding, ...], live: OpenRig, recorder: Recorder) -> Ending:
+    health = live.rig.health()
+    link = health.counts(sum(recorder.integrity.frames.values()))
+    findings, told = (*live.findings, *findings), tuple(health.findings())
+    if cause is None:
+        return Ending(None, (*findings, *told), link)
+    stopped, finding = cause_of(cause)
+    return Ending(stopped, (finding, *findings, *(f for f in told if f.code != finding.code)), link)
+
+
+def cause_of(error: BaseException) -> tuple[Outcome, Finding]:
+    """Outcome and finding of what ended a run early; an error nobody raised on purpose leaves its traceback in the log."""
+    code = next((code for kind, code in CODES if isinstance(error, kind)), "exception")
+    text = str(error)
+    if code == "exception":
+        text = f"{type(error).__name__}: {error}"
+        logger.error("unexpected %s (traceback in run.log)", text, exc_info=error)
+    stopped = Outcome.ABORTED if isinstance(error, Aborted | KeyboardInterrupt) else Outcome.ERROR
+    return stopped, Finding(code, text, "acquire", Effect.ERROR)
