@@ -114,7 +114,7 @@ def inject(tmp_path: Path) -> Callable[..., RunResult]:
     """Runs a procedure on the simulated rig while faults happen: `inject("stall@12", procedure="amb-calibration")`.
 
     Further keywords are those of `bench.cli.compose.Request`: `rig`, `seed`, `plan`, `truth`, `backend`, `links`. The run
-    directory lies in `tmp_path`; what comes back is a `bench.runner.RunResult`.
+    directory lies in `tmp_path`; what comes back is a `bench.run.runner.RunResult`.
     """
     from bench.cli.compose import Request
     from bench.cli.run import execute

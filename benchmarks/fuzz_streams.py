@@ -10,11 +10,11 @@ from typing import Final
 import numpy as np
 from cobs import cobs
 
+from bench.link import slcanstream
 from bench.link.frames import FD, FrameBatch
-from bench.wire import slcanstream
-from bench.wire.packetstream import PacketStream
+from bench.link.packetstream import PacketStream
+from bench.link.slcanstream import SlcanStream
 from bench.wire.slcan import LENGTHS, LONGEST_LINE
-from bench.wire.slcanstream import SlcanStream
 from benchmarks.fuzz_draws import INPUTS, LENGTH_CHOICES, T_NS, Block, Draw, batch_of, mutated, noise, pieces
 
 # SLCAN ------------------------------------------------------------------------------------------------------------

@@ -27,9 +27,9 @@ from pathlib import Path
 import numpy as np
 
 from bench.link.frames import FD, frame, payload
+from bench.link.packetstream import PacketStream, encode
 from bench.rigfile import LinkSpec
 from bench.wire import slcan
-from bench.wire.packetstream import PacketStream, encode
 from drivers.beat import Beat
 from drivers.live_link import LiveLink
 from drivers.wires import open_wire

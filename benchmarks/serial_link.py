@@ -31,9 +31,9 @@ import serial
 
 from bench.link.codec import Decoder
 from bench.link.frames import FrameBatch
+from bench.link.packetstream import PacketStream
 from bench.rigfile import LinkSpec
 from bench.rigfile.messages import Message, load_messages
-from bench.wire.packetstream import PacketStream
 from benchmarks.serial_messages import CHANNELS, DBC, Row, frames, packets, plain, plain_packet
 from drivers.wires import open_wire
 

@@ -10,7 +10,7 @@ import numpy as np
 from cobs import cobs
 
 from bench.link.frames import FRAME, FrameBatch
-from bench.wire.packetstream import encode
+from bench.link.packetstream import encode
 
 Row = tuple[int, int, list[float]]
 """Sequence number, tick, values."""

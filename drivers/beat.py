@@ -17,7 +17,7 @@ from bench.errors import ConfigError
 from bench.wire import packet, slcan
 
 FD: Final = 2
-"""Flag of a frame: CAN FD. The same as in bench.frames, which would bring numpy along."""
+"""Flag of a frame: CAN FD. The same as in bench.link.frames, which would bring numpy along."""
 RAW: Final = 0x80
 """Flag of what is no frame: `data` is whole lines, written as they are."""
 RECORD: Final = struct.Struct("<IBB64s")

@@ -25,7 +25,7 @@ _log = logging.getLogger("drivers")
 
 
 class ControllerCapture:
-    """The role `bench.roles.Capture` of a controller whose rig file has a table `capture`.
+    """The role `bench.procedure.roles.Capture` of a controller whose rig file has a table `capture`.
 
     `clock` is the controller's, `wait` lets it run until something is true, `telemetry` knows when its ticks are.
     """

@@ -207,7 +207,7 @@ class Controller:
 
     @property
     def mode(self) -> str:
-        """What the controller's state amounts to: one of bench.binding.MODES, or UNKNOWN for a state without a name:
+        """What the controller's state amounts to: one of bench.rigfile.binding.MODES, or UNKNOWN for a state without a name:
         nobody knows what the machine does in it."""
         return self.watch.condition.mode
 

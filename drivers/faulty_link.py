@@ -23,7 +23,7 @@ class FaultyLink:
 
     Args:
         link: the sound link.
-        faults: none of `bench.faults.DEVICE_ONLY`.
+        faults: none of `bench.link.fault_injection.DEVICE_ONLY`.
         seed: of which frames are hit.
         clock: the link's own time; frames carry it.
         telemetry: identifiers that `mute` lets pass.

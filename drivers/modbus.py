@@ -143,7 +143,7 @@ def open_lines(rig: RigFile) -> Iterator[Mapping[str, ModbusLine]]:
 
 @dataclass(frozen=True)
 class ModbusPort:
-    """A `bench.registers.RegisterPort` over a line."""
+    """A `bench.rigfile.registers.RegisterPort` over a line."""
 
     line: ModbusLine
     unit: int

@@ -12,7 +12,7 @@ Latest = Callable[[str], Mapping[str, float]]
 
 
 class FieldSupply:
-    """A `bench.roles.Supply` from the last poll. Registers: voltage, current, state."""
+    """A `bench.procedure.roles.Supply` from the last poll. Registers: voltage, current, state."""
 
     def __init__(self, device: RegisterDevice, latest: Latest) -> None:
         """Raises ConfigError: the rig file does not state the registers."""
@@ -33,7 +33,7 @@ class FieldSupply:
 
 
 class FieldThermal:
-    """A `bench.roles.Thermal` from the last poll. Registers: ambient; every other temperature is a winding's."""
+    """A `bench.procedure.roles.Thermal` from the last poll. Registers: ambient; every other temperature is a winding's."""
 
     def __init__(self, device: RegisterDevice, latest: Latest) -> None:
         """Raises ConfigError: the rig file does not state the registers."""

@@ -22,8 +22,8 @@ import numpy as np
 from bench.clock import WallClock
 from bench.errors import BenchError, ConfigError, LinkError
 from bench.link.frames import EXTENDED, REMOTE, FrameBatch, empty_batch
+from bench.link.slcanstream import SlcanStream, encode
 from bench.wire import slcan
-from bench.wire.slcanstream import SlcanStream, encode
 from drivers.byteport import BytePort
 from drivers.canframes import messages_of
 

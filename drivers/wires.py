@@ -10,8 +10,8 @@ from bench.clock import WallClock
 from bench.errors import ConfigError, LinkError
 from bench.link import LinkStats
 from bench.link.frames import FrameBatch
+from bench.link.packetstream import PacketStream, encode
 from bench.rigfile import LinkSpec, linkurl
-from bench.wire.packetstream import PacketStream, encode
 from drivers.beat import WriterSpec
 from drivers.byteport import BytePort
 from drivers.canbus import CanBus, open_bus

@@ -32,7 +32,7 @@ class SimulatedController:
     Args:
         rig: its message map and parameters.
         truth: which machine it has.
-        faults: that happen inside it (`bench.faults`): reboot, stuck-heartbeat, mute.
+        faults: that happen inside it (`bench.link.fault_injection`): reboot, stuck-heartbeat, mute.
         substeps: integration steps of the plant in a tick.
 
     Raises:

@@ -29,7 +29,7 @@ class SimulatedRig:
         rig: the rig file.
         truth: which machine it is.
         session: of its heartbeat.
-        faults: of its controller and of its link (`bench.faults`); the truth's seed says which frames they hit.
+        faults: of its controller and of its link (`bench.link.fault_injection`); the truth's seed says which frames they hit.
         substeps: integration steps of the plant in a tick.
     """
 

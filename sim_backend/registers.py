@@ -111,7 +111,7 @@ class RegisterBankDevice:
 
 @dataclass(frozen=True)
 class BankPort:
-    """A `bench.registers.RegisterPort` in this process."""
+    """A `bench.rigfile.registers.RegisterPort` in this process."""
 
     device: RegisterBankDevice
 

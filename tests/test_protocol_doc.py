@@ -85,7 +85,7 @@ def worked(name: str, block: str) -> tuple[bytes, dict[str, float], str]:
 
 def test_generated_sections_are_up_to_date() -> None:
     assert protocoldoc.replaced(TEXT, protocoldoc.sections(RIG)) == TEXT, (
-        "run: python -m bench.protocoldoc --into docs/reference/protocol.md"
+        "run: python -m bench.rigfile.protocoldoc --into docs/reference/protocol.md"
     )
 
 
@@ -119,7 +119,7 @@ def test_a_page_of_one_rig_has_its_telemetry_and_its_parameters(tmp_path: Path) 
 def test_the_page_of_captures_is_up_to_date_and_its_bytes_are_right() -> None:
     page, rig = PAGE.with_name("captures.md").read_text(encoding="utf-8"), load_rig("amb5dof")
     assert protocoldoc.replaced(page, protocoldoc.capture_sections(rig)) == page, (
-        "run: python -m bench.protocoldoc amb5dof --captures --into docs/reference/captures.md"
+        "run: python -m bench.rigfile.protocoldoc amb5dof --captures --into docs/reference/captures.md"
     )
     shown = re.findall(r"^(?:[0-9A-F]{2} )+[0-9A-F]{2}$", page, re.MULTILINE)
     arm = {"session": 7, "token": 1, "trigger": 3, "channels0": 15, "divider": 1, "length": 10000, "before": 1000}
@@ -133,7 +133,7 @@ def test_the_page_of_captures_is_up_to_date_and_its_bytes_are_right() -> None:
 def test_the_page_of_the_amb_stand_is_up_to_date() -> None:
     page = PAGE.with_name("amb5dof.md").read_text(encoding="utf-8")
     assert protocoldoc.replaced(page, protocoldoc.own_sections(load_rig("amb5dof"))) == page, (
-        "run: python -m bench.protocoldoc amb5dof --own --into docs/reference/amb5dof.md"
+        "run: python -m bench.rigfile.protocoldoc amb5dof --own --into docs/reference/amb5dof.md"
     )
 
 

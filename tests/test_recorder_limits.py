@@ -65,7 +65,7 @@ KILLED = """
 import sys
 sys.path[:0] = [{root!r}, {tests!r}]
 from pathlib import Path
-from bench.recorder import Recorder
+from bench.recording.recorder import Recorder
 from recordings import HEADER, PERIOD_NS, STREAM, SetClock, block, frames_of
 clock = SetClock()
 recorder = Recorder(Path({path!r}), clock=clock, streams=[STREAM], header=HEADER)

@@ -1,7 +1,7 @@
 """The campaign file: procedures and their plans in order, on one rig or on many virtual ones. TOML, strict.
 
 A file is checked in full before anything starts: every problem of it is in one error. Plans are checked later, where
-the procedures are known (`bench.cli.campaign_steps`).
+the procedures are known (`bench.cli.campaign.steps`).
 """
 
 from __future__ import annotations

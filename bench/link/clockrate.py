@@ -16,7 +16,7 @@ SLICE_NS = 500_000_000
 # So near the line the least of a slice is, to be read by it and to end a run by it; a computer that is too slow keeps to none.
 TIGHT_NS, CERTAIN_NS = 5e6, 3e6
 LOOSE = 0.001  # and by this share of what the clock is off in all: crystals warm up
-GROSS = 0.005  # less is for bench.hosttime, by windows of a second
+GROSS = 0.005  # less is for bench.link.hosttime, by windows of a second
 CERTAIN = 0.01  # a clock that is further off ends a run
 FEWEST_SLOW, FEWEST_FAST = 10, 20  # slices for that; a backlog from before the first sample may look fast for a while
 MOST = 300  # points of a line

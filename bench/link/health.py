@@ -14,7 +14,7 @@ from bench.link.stillness import STILL_S
 from bench.link.telemetry import Counters
 
 LATE_S = 0.04  # telemetry that comes later than this is worth a word
-DRIFT_PPM, WRONG_PPM = 200.0, 1000.0  # bench.hosttime follows no more; no crystal is as wrong as that
+DRIFT_PPM, WRONG_PPM = 200.0, 1000.0  # bench.link.hosttime follows no more; no crystal is as wrong as that
 BEYOND = 5  # windows of a second in a row
 UNKNOWN_S, GAINED_S = 6.0, 0.02  # a rate is known by then; no drift gains that much in five seconds
 CHECK = (

@@ -18,7 +18,7 @@ WINDOW_NS = 1_000_000_000
 MAX_DRIFT = 200e-6  # two crystals differ by less; what goes faster is latency
 JITTER_NS = 2_000_000
 FEWEST, MOST = 8, 600  # windows for a slope
-FASTEST = 0.01  # no clock that is read for its drift by windows gains more; bench.clockrate sees those that do
+FASTEST = 0.01  # no clock that is read for its drift by windows gains more; bench.link.clockrate sees those that do
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,7 @@ class HostMap:
     def drift(self) -> Drift | None:
         """Slope of the windows' minima (Theil and Sen: no latency of a few windows moves it) but of those that a later,
         much earlier one proves late; None with too few windows, or where nothing varies (simulation). A clock that is off
-        by half a per cent or more is read from the line of `bench.clockrate`."""
+        by half a per cent or more is read from the line of `bench.link.clockrate`."""
         line = self.rate.line()
         if line is not None and abs(line.slope) - line.expanded > GROSS:
             return Drift(line.slope * 1e6, line.expanded * 1e6, line.points)

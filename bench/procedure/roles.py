@@ -11,7 +11,7 @@ from bench.rigfile.capture import NOW, CaptureData, Trigger
 
 
 class RigState(StrEnum):
-    """Where the rig stands. Transitions between them live in `bench.states` and nowhere else."""
+    """Where the rig stands. Transitions between them live in `bench.procedure.states` and nowhere else."""
 
     OFF = "OFF"
     READY = "READY"

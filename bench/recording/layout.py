@@ -81,7 +81,7 @@ def _kind(name: str) -> int:
 
 
 def raw_schema() -> bytes:
-    """`Frames`: host time and the packed frame records (see bench.frames.FRAME)."""
+    """`Frames`: host time and the packed frame records (see bench.link.frames.FRAME)."""
     return _file("Frames", [("host_time_ns", 1, _kind("TYPE_FIXED64"), False), ("count", 2, _kind("TYPE_FIXED32"), False),
                             ("frames", 3, _kind("TYPE_BYTES"), False)])  # fmt: skip
 

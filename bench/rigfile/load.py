@@ -11,7 +11,7 @@ from bench.rigfile.text import read_rig
 
 
 def load_rig(rig: str) -> RigFile:
-    """A rig, checked in full (see `bench.rigcheck`).
+    """A rig, checked in full (see `bench.rigfile.check`).
 
     Raises:
         ConfigError: with every problem that was found.

@@ -38,7 +38,7 @@ class Site(Part):
 
 
 class LinkSpec(Part):
-    """A link by its URL (see `bench.linkurl`); `dbc` where messages travel, bit rates where it is a CAN bus."""
+    """A link by its URL (see `bench.rigfile.linkurl`); `dbc` where messages travel, bit rates where it is a CAN bus."""
 
     url: str
     bitrate: float | None = Field(None, gt=0)

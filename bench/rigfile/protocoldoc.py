@@ -1,6 +1,6 @@
 """The generated part of docs/reference/protocol.md: message tables, codes and parameters, from a rig file and its DBC.
 
-`python -m bench.protocoldoc [RIG]` prints it, each section between its markers; with `--into PAGE` it replaces the
+`python -m bench.rigfile.protocoldoc [RIG]` prints it, each section between its markers; with `--into PAGE` it replaces the
 sections of a page instead. `--own` are the sections of a page of one rig: its telemetry and its parameters; `--captures`
 those of the page of captures.
 """
@@ -63,7 +63,7 @@ def capture_sections(rig: RigFile) -> dict[str, str]:
 
 def marked(name: str, text: str) -> str:
     """A section between its markers."""
-    return f"<!-- generated: {name} (python -m bench.protocoldoc) -->\n\n{text}\n\n<!-- end of {name} -->"
+    return f"<!-- generated: {name} (python -m bench.rigfile.protocoldoc) -->\n\n{text}\n\n<!-- end of {name} -->"
 
 
 def replaced(page: str, generated: Mapping[str, str]) -> str:
@@ -155,7 +155,7 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the sections, or put them into a page. Returns the exit status: 0, or 2 for a rig or page that will not do."""
-    parser = argparse.ArgumentParser(prog="python -m bench.protocoldoc", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m bench.rigfile.protocoldoc", description=__doc__)
     parser.add_argument("rig", nargs="?", default=RIG, help="rig file (default: %(default)s)")
     parser.add_argument("--into", type=Path, metavar="PAGE", help="replace the generated sections of a page")
     parser.add_argument("--own", action="store_true", help="telemetry and parameters alone")

@@ -32,7 +32,7 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.run.step_gaps import incomplete_steps, missing_steps
 
-logger = logging.getLogger("bench.evaluation")
+logger = logging.getLogger("bench.run.evaluation")
 RUN_END = "run-end"
 
 

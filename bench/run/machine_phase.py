@@ -48,7 +48,7 @@ from bench.run.evaluation import Ending
 from bench.run.job import Job, OpenRig
 from bench.run.supervisor import SafeStep, Supervisor
 
-logger = logging.getLogger("bench.runner")
+logger = logging.getLogger("bench.run.runner")
 CODES: tuple[tuple[type[BaseException], str], ...] = (
     (SignalAbort, "signal"), (OperatorAbort, "operator-stop"), (DriveFault, "drive-fault"),
     (DeviceFault, "controller-fault"), (AnotherHost, "another-host"), (InterlockError, "interlock"),
@@ -82,7 +82,7 @@ def acquired(
     """Open the recording at `path`, move, make safe, close it. Raises nothing: what went wrong is in the ending.
 
     Args:
-        plain: record without a thread and without the 100 Hz view (`bench.recorder.Recorder`).
+        plain: record without a thread and without the 100 Hz view (`bench.recording.recorder.Recorder`).
         wall: what the recording says of the wall clock, asked at its end.
     """
     ending: Ending | None = None

@@ -33,7 +33,7 @@ from bench.run.machine_phase import Acquired, acquired, cause_of
 from bench.run.supervisor import Supervisor
 from bench.rundir import RunDirectory
 
-logger = logging.getLogger("bench.runner")
+logger = logging.getLogger("bench.run.runner")
 Report = Callable[[Path, Record, Procedure, Recording[Any] | None], None]
 
 

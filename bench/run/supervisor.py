@@ -22,7 +22,7 @@ from bench import os_signals
 from bench.errors import LinkError, SignalAbort
 from bench.findings import Effect, Finding
 
-logger = logging.getLogger("bench.supervisor")
+logger = logging.getLogger("bench.run.supervisor")
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ from bench.errors import ConfigError
 CR: Final = b"\r"
 BEL: Final = b"\a"
 EXTENDED: Final = 1 << 31
-"""Bit of the identifier: 29 bits. The same as in bench.frames, which would bring numpy into the heartbeat process."""
+"""Bit of the identifier: 29 bits. The same as in bench.link.frames, which would bring numpy into the heartbeat process."""
 LENGTHS: Final = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 """Payload bytes for each DLC of a CAN FD frame; the first nine are those of a classic frame."""
 LONGEST_LINE: Final = 1 + 8 + 1 + 2 * 64 + 4

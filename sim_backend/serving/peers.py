@@ -8,8 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
+from bench.link import packetstream, slcanstream
 from bench.link.frames import ERROR, FrameBatch, empty_batch
-from bench.wire import packetstream, slcanstream
 
 LONGEST_REQUEST = 4096
 

@@ -13,7 +13,7 @@ class WireFaults:
     """The faults of the CAN bus and of the serial port alike; `corrupt` destroys frames there and flips bits here.
 
     Args:
-        faults: of the link (see `bench.faults.divided`); times count from the first frame that a host sends.
+        faults: of the link (see `bench.link.fault_injection.divided`); times count from the first frame that a host sends.
         seed: of which frames are hit.
         telemetry: identifiers of telemetry.
     """

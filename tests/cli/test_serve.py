@@ -19,9 +19,9 @@ import pytest
 
 from bench.cli.__main__ import main
 from bench.link.frames import empty_batch, payload
+from bench.link.packetstream import PacketStream
+from bench.link.slcanstream import SlcanStream
 from bench.wire import packet, slcan
-from bench.wire.packetstream import PacketStream
-from bench.wire.slcanstream import SlcanStream
 from sim_backend.serving import ptys
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -163,12 +163,12 @@ def test_a_signal_during_it_is_answered_and_changes_no_step(
         return still(batch)
 
     heard = Heard()
-    logging.getLogger("bench.supervisor").addHandler(heard)
+    logging.getLogger("bench.run.supervisor").addHandler(heard)
     try:
         with bench.supervisor.watching():
             found, took_s = bench.made_safe(interrupted)
     finally:
-        logging.getLogger("bench.supervisor").removeHandler(heard)
+        logging.getLogger("bench.run.supervisor").removeHandler(heard)
     assert len(answered) == 2
     assert max(answered) <= 0.2
     assert set(bench.said) == {"MAKE_SAFE"}  # and its repeats: no reply comes

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from bench.errors import BytesUnreadable, LinkError
 from bench.link import LinkStats
-from bench.wire.slcanstream import SlcanStream
+from bench.link.slcanstream import SlcanStream
 from drivers import unheard
 from drivers.unheard import Heard
 

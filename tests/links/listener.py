@@ -13,8 +13,8 @@ from types import TracebackType
 import numpy as np
 
 from bench.link.codec import Decoder
+from bench.link.slcanstream import SlcanStream
 from bench.rigfile.messages import load_messages
-from bench.wire.slcanstream import SlcanStream
 
 RIGS = Path(__file__).resolve().parents[2] / "rigs"
 

@@ -12,10 +12,10 @@ import numpy as np
 
 from bench.link.fault_injection import parse
 from bench.link.frames import FrameBatch, empty_batch, payload
+from bench.link.packetstream import PacketStream
+from bench.link.slcanstream import SlcanStream
 from bench.rigfile import RigFile, load_rig
 from bench.wire import packet, slcan
-from bench.wire.packetstream import PacketStream
-from bench.wire.slcanstream import SlcanStream
 from sim_backend.controller import SimulatedController
 from sim_backend.serving.adapter import SlcanAdapter
 from sim_backend.serving.loop import Server

@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from serving_clients import MS, PATIENCE_S, SECOND, T0, Bus, address_of
 
+from bench.link.packetstream import PacketStream
 from bench.wire import slcan
-from bench.wire.packetstream import PacketStream
 from sim_backend.serving import connection as connections
 from sim_backend.serving import loop
 from sim_backend.serving.pacing import DEBT_NS, TICK_NS, Pacer

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from bench.link import slcanstream
 from bench.rigfile.registers import Register
-from bench.wire import isotp, packet, slcan, slcanstream
+from bench.wire import isotp, packet, slcan
 from benchmarks.fuzz import fuzz
 from benchmarks.fuzz_targets import TARGETS
 

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from test_packet import HEARTBEAT, HEARTBEAT_PACKET, crc16, crc32
 
 from bench.link.frames import ERROR, EXTENDED, FD, FRAME, FrameBatch, frame, payload
+from bench.link.packetstream import PacketStream, encode
 from bench.wire import packet
-from bench.wire.packetstream import PacketStream, encode
 
 Messages = list[tuple[int, bytes]]
 messages = st.tuples(st.integers(0, 0x7FF), st.binary(max_size=64))

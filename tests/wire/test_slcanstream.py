@@ -10,8 +10,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bench.link.frames import ERROR, EXTENDED, FD, FRAME, REMOTE, SWITCHED, FrameBatch, frame, payload
+from bench.link.slcanstream import REPLIES, SlcanStream, encode
 from bench.wire.slcan import BUS_ERROR, LENGTHS
-from bench.wire.slcanstream import REPLIES, SlcanStream, encode
 
 T = 1_767_225_600 * 10**9
 FRAMES = st.builds(
