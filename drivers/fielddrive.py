@@ -36,7 +36,7 @@ class Surroundings(Protocol):
 
 
 class FieldDrive:
-    """A `bench.procedure.roles.Drive`. Registers: target_speed, actual_speed, fault; running and acceleration where the drive has
+    """A `roles.Drive`. Registers: target_speed, actual_speed, fault; running and acceleration where the drive has
     them. Commands: run, coast, stop; reset where it has one. `may_run` raises when the shaft must not be driven now."""
 
     def __init__(self, bus: Surroundings, device: RegisterDevice, envelope: Envelope) -> None:

@@ -29,7 +29,7 @@ from sim_backend.truth import Truth, draw
 
 @dataclass(frozen=True)
 class Knobs:
-    """What costs time in a run, as `bench run` has it: see `bench.cli.opening.of_truth` and `bench.recording.recorder.Recorder`."""
+    """What costs time in a run, as `bench run` has it: see `opening.of_truth` and `recorder.Recorder`."""
 
     substeps: int = opening.SUBSTEPS
     slice_s: float = opening.SLICE_S
