@@ -12,8 +12,8 @@ import math
 import time
 
 from sim_backend.core import LEVITATE, LIFT, READY, TICK_S, DriveLaw
-from sim_backend.core.amb import AmbPlant
-from sim_backend.core.amb_params import AmbControl, AmbParams
+from sim_backend.machines.amb5dof.params import AmbControl, AmbParams
+from sim_backend.machines.amb5dof.plant import AmbPlant
 
 BENCH_S = 60
 SPEED = 10000 * math.pi / 30

@@ -24,8 +24,8 @@ from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate
 from sim_backend.core import LEVITATE, LIFT, READY, DriveLaw
-from sim_backend.core.amb import CAC, AmbPlant
-from sim_backend.core.amb_params import AmbControl, unbalance
+from sim_backend.machines.amb5dof.params import AmbControl, unbalance
+from sim_backend.machines.amb5dof.plant import CAC, AmbPlant
 from sim_backend.truth import draw, nominal
 
 SEED = 1  # of the noise

@@ -20,8 +20,8 @@ from bench.cli.virtual import simulate
 from bench.recording import Recording
 from bench.rigfile import load_rig
 from drivers.controller import Controller
-from sim_backend.core import Plant
 from sim_backend.endpoint import SimulatedRig
+from sim_backend.machines.tsbs.plant import Plant
 from sim_backend.truth import draw
 
 CHAIN: tuple[tuple[str, Mapping[str, Any]], ...] = (("amb-calibration", {"settle_s": 0.5, "average_s": 0.3}),)

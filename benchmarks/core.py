@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import time
 
-from sim_backend.core import LEVITATE, LIFT, READY, TICK_S, Plant
+from sim_backend.core import LEVITATE, LIFT, READY, TICK_S
+from sim_backend.machines.tsbs.plant import Plant
 
 BENCH_S = 60
 CASES = {"standing": {}, "at 40 rad/s": {"speed_ref": 40.0}, "motor carrying": {"motor_share": 1.0}}

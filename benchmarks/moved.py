@@ -37,7 +37,7 @@ from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import interval
 from benchmarks.cases import RIGS, load, needed_by
 from reports.unseen import is_reached
-from sim_backend.machine import machine_of
+from sim_backend.machines.table import machine_of
 
 HALF_WIDTHS = 3.0
 MATTERS = 2.0  # U of the run with nothing moved

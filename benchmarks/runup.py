@@ -74,7 +74,7 @@ class Parts:
 def whole_run(out: Path, parts: Parts) -> Path:
     """Run, analyse and report; the run's folder."""
     from reports import figures as drawing
-    from sim_backend.core.amb import AmbPlant
+    from sim_backend.machines.amb5dof.plant import AmbPlant
 
     AmbPlant.run = parts.timed("simulation", AmbPlant.run)  # type: ignore[method-assign]
     drawing.draw = parts.timed("drawing", drawing.draw)

@@ -27,7 +27,7 @@ from bench.units import RPM
 from procedures.amb_rotor.channels import AXES
 from procedures.run_up.procedure import evaluated
 from procedures.synchronous.dwelling import CODES, SETTINGS
-from sim_backend import amb_passage, amb_unbalance
+from sim_backend.machines.amb5dof import truth_passage, truth_unbalance
 from sim_backend.truth import draw
 
 RIG = "amb5dof"
@@ -58,7 +58,7 @@ def one(name: str, seed: int, plan: dict[str, Any], folder: Path, hits: Hits) ->
     made, plant = done.recording.plan, draw(rig, seed).plant
     defaults = {n: p.default for n, p in rig.parameters.items()}
     settings = {**defaults, **SETTINGS["off"], **made.parameters, "law": CODES[made.law]}
-    true = amb_unbalance.response(plant, settings, np.array([r.dwell.speed for r in run.near.dwells]))
+    true = truth_unbalance.response(plant, settings, np.array([r.dwell.speed for r in run.near.dwells]))
     for r, shaft in zip(run.near.dwells, true, strict=True):
         for k, axis in enumerate(AXES):
             hits["ellipse"].append(
@@ -74,7 +74,7 @@ def _peaks(run: Any, plant: Any, settings: dict[str, float], hits: Hits) -> None
     """The greatest amplitudes of each probe."""
     low = min(p.low if math.isfinite(p.low) else p.speed.value for p in run.peaks)
     high = max(p.high if math.isfinite(p.high) else p.speed.value for p in run.peaks)
-    held = amb_passage.curves(plant, settings, 0.85 * low, 1.1 * high)
+    held = truth_passage.curves(plant, settings, 0.85 * low, 1.1 * high)
     for p in run.peaks:
         speed, amplitude, factor = held.critical(AXES.index(p.axis), p.speed.value)
         if not abs(speed / p.speed.value - 1) < 0.1:

@@ -27,10 +27,10 @@ from procedures.sensitivity import estimates
 from procedures.sensitivity.injection import AXES, Comb, wanted
 from procedures.sensitivity.procedure import CODES, MARGIN_S, RPM, Plan, refinements, surveys
 from procedures.sensitivity.steps import REFINED, WIRING, Grid, Taken, channels, sensitivity
-from sim_backend import amb_sensitivity
-from sim_backend.amb_step import floating
-from sim_backend.core.amb import TRACE, AmbPlant
-from sim_backend.core.amb_params import AmbParams
+from sim_backend.machines.amb5dof import truth_sensitivity
+from sim_backend.machines.amb5dof.params import AmbParams
+from sim_backend.machines.amb5dof.plant import TRACE, AmbPlant
+from sim_backend.machines.amb5dof.truth_step import floating
 from sim_backend.truth import draw
 
 RIG = "amb5dof"
@@ -90,7 +90,7 @@ def one(seed: int, plan: dict[str, Any], folder: Path | None) -> Iterator[tuple[
     rig, made = load_rig(RIG), Plan(**plan)
     plant, speed = draw(rig, seed).plant, made.speeds_rad_s[0]
     settings = {**{n: p.default for n, p in rig.parameters.items()}, "law": CODES[made.law]}
-    loop = None if speed else amb_sensitivity.loop(plant, settings)
+    loop = None if speed else truth_sensitivity.loop(plant, settings)
     known: dict[str, tuple[float, float]] = {}
     for name, quantity, value, half, u in (
         light(plant, settings, made, seed) if folder is None else whole(seed, plan, folder)
@@ -100,7 +100,7 @@ def one(seed: int, plan: dict[str, Any], folder: Path | None) -> Iterator[tuple[
             known[name] = (
                 loop.peak(axis, made.low_hz, made.high_hz)
                 if loop is not None
-                else amb_sensitivity.quiet_peak(plant, settings, axis, speed)
+                else truth_sensitivity.quiet_peak(plant, settings, axis, speed)
             )
         true = known[name][quantity == "s_max_hz"]
         yield quantity, (value - true, half, u, true)

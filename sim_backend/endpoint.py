@@ -13,8 +13,8 @@ from bench.link.fault_injection import CUTS, Fault, FrameFaults, divided, lost
 from bench.link.frames import ERROR, FD, SENT, FrameBatch, batch_of, by_time, empty_batch, joined, packed
 from bench.rigfile import RigFile
 from bench.rigfile.messages import load_messages
-from sim_backend.controller import SimulatedController
-from sim_backend.truth import Truth
+from sim_backend.controller.controller import SimulatedController
+from sim_backend.machine import Truth
 
 EPOCH_NS = 1_767_225_600 * 10**9  # 2026-01-01T00:00:00Z
 TICK_NS = 100_000

@@ -1,22 +1,17 @@
-"""The machines that can be simulated: what the device's interface needs of each. The rig file chooses one."""
+"""What a machine is that can be simulated, and the truth of one rig of it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from bench.errors import ConfigError
 from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
-from sim_backend import amb5dof, amb_quantities, tsbs
-from sim_backend.core import CHANNELS, DriveLaw
-
-if TYPE_CHECKING:
-    from sim_backend.truth import Truth
+from sim_backend.core import DriveLaw
 
 Array = npt.NDArray[np.float64]
 Numbers = Mapping[str, float]
@@ -105,32 +100,49 @@ class Machine:
     traced: Callable[[Numbers], tuple[str, ...]] = lambda _: ()
 
 
-TSBS = Machine(
-    name="tsbs", stated=tsbs.stated, defects=tsbs.DEFECTS, params=tsbs.params, quantities=tsbs.quantities,
-    targets={"K_i": "slope_i", "K_o": "slope_o"}, make=tsbs.make, radial=slice(0, 4),
-    integral_gains=frozenset(("ki_i", "ki_o", "ki_z", "ki_m")), turns=True,
-    channels=CHANNELS, places=tsbs.places, spoil=tsbs.spoil,
-    supply_V=148.0, windings={"temp_i": 0.0, "temp_o": 2.0, "temp_m": -3.0}, copper_W=tsbs.copper_W,
-    operator=tsbs.operator,
-)  # fmt: skip
-AMB5DOF = Machine(
-    name="amb5dof", stated=amb5dof.stated, defects=amb5dof.DEFECTS, params=amb5dof.params,
-    quantities=amb_quantities.quantities, targets={}, make=amb5dof.make, radial=slice(0, 4),
-    integral_gains=frozenset(("ki", "k0")), turns=False,
-    channels=amb5dof.NEEDED, places=amb5dof.places, spoil=amb5dof.spoil, supply_V=48.0,
-    windings={"temp_i": 0.0, "temp_o": 2.0, "temp_x": -3.0}, copper_W=amb5dof.copper_W, operator=amb5dof.operator,
-    traced=amb5dof.traced,
-)  # fmt: skip
-MACHINES = {machine.name: machine for machine in (TSBS, AMB5DOF)}
+@dataclass(frozen=True)
+class Truth:
+    """Every drawn value by name, planted defects, and what follows from them."""
+
+    seed: int
+    values: Mapping[str, float]
+    defects: Mapping[str, float]
+    plant: Any  # parameters of the machine's plant
+    quantities: Mapping[str, float]
+    machine: Machine
+
+    @property
+    def supply_V(self) -> float:
+        """Of the amplifiers: the machine's, or what the rig file or an override says."""
+        return self.values.get("supply_V", self.machine.supply_V)
+
+    def load(self, label: str) -> tuple[float, float]:
+        """Hung mass in kg and its weight in air in N for a load's label; the hanger is on, and "" is nothing else.
+
+        Raises:
+            KeyError: the rig has no such mass.
+        """
+        kg = 0.0
+        if label:
+            kg = self.values[f"masses.{label}"] * (1 + self.defects.get(f"mass_error_{label}", 0.0))
+        if label or not self.defects["hanger_off_at_zero"]:
+            kg += self.values["hanger"]
+        return kg, _weight(kg, self.values)
+
+    def on_lever(self, side: str, label: str) -> tuple[float, float, float]:
+        """Mass in kg on the lever, its weight in air in N, and its arm in m, positive on the left.
+
+        Raises:
+            KeyError: the rig has no such mass, or no lever.
+        """
+        arm = self.values[f"geometry.lever_{side}"] * {"left": 1, "right": -1}[side]
+        if not label:
+            return 0.0, 0.0, arm
+        kg = self.values[f"masses.{label}"] * (1 + self.defects.get(f"mass_error_{label}", 0.0))
+        return kg, _weight(kg, self.values), arm
 
 
-def machine_of(rig: RigFile) -> Machine:
-    """The machine that `machine` in a rig file's simulation table names; a TSBS where it names none.
-
-    Raises:
-        ConfigError: there is no such machine.
-    """
-    name = rig.simulation.get("machine", TSBS.name)
-    if name not in MACHINES:
-        raise ConfigError(f"rig {rig.name}: simulation.machine: found {name!r}; expected one of {', '.join(MACHINES)}")
-    return MACHINES[name]
+def _weight(kg: float, v: Mapping[str, float]) -> float:
+    density = v["mass_density"]
+    true = kg * (1 - 1.2 / 8000) / (1 - 1.2 / density)  # `kg` is a conventional mass, OIML D 28
+    return true * v["site.gravity"] * (1 - v["site.air_density"] / density)

@@ -7,62 +7,13 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
 
 from bench.errors import ConfigError
 from bench.rigfile import RigFile
 from sim_backend.draws import draw_one
-from sim_backend.machine import Machine, machine_of
+from sim_backend.machine import Truth
+from sim_backend.machines.table import machine_of
 from sim_backend.unspoken import unspoken
-
-
-@dataclass(frozen=True)
-class Truth:
-    """Every drawn value by name, planted defects, and what follows from them."""
-
-    seed: int
-    values: Mapping[str, float]
-    defects: Mapping[str, float]
-    plant: Any  # parameters of the machine's plant
-    quantities: Mapping[str, float]
-    machine: Machine
-
-    @property
-    def supply_V(self) -> float:
-        """Of the amplifiers: the machine's, or what the rig file or an override says."""
-        return self.values.get("supply_V", self.machine.supply_V)
-
-    def load(self, label: str) -> tuple[float, float]:
-        """Hung mass in kg and its weight in air in N for a load's label; the hanger is on, and "" is nothing else.
-
-        Raises:
-            KeyError: the rig has no such mass.
-        """
-        kg = 0.0
-        if label:
-            kg = self.values[f"masses.{label}"] * (1 + self.defects.get(f"mass_error_{label}", 0.0))
-        if label or not self.defects["hanger_off_at_zero"]:
-            kg += self.values["hanger"]
-        return kg, _weight(kg, self.values)
-
-    def on_lever(self, side: str, label: str) -> tuple[float, float, float]:
-        """Mass in kg on the lever, its weight in air in N, and its arm in m, positive on the left.
-
-        Raises:
-            KeyError: the rig has no such mass, or no lever.
-        """
-        arm = self.values[f"geometry.lever_{side}"] * {"left": 1, "right": -1}[side]
-        if not label:
-            return 0.0, 0.0, arm
-        kg = self.values[f"masses.{label}"] * (1 + self.defects.get(f"mass_error_{label}", 0.0))
-        return kg, _weight(kg, self.values), arm
-
-
-def _weight(kg: float, v: Mapping[str, float]) -> float:
-    density = v["mass_density"]
-    true = kg * (1 - 1.2 / 8000) / (1 - 1.2 / density)  # `kg` is a conventional mass, OIML D 28
-    return true * v["site.gravity"] * (1 - v["site.air_density"] / density)
 
 
 def draw(

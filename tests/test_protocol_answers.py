@@ -18,7 +18,7 @@ from bench.link.session import Session
 from bench.rigfile import load_rig
 from drivers import operator_line, slcan_bus
 from drivers.controller import Controller
-from sim_backend.controller import SimulatedController
+from sim_backend.controller.controller import SimulatedController
 from sim_backend.endpoint import SimulatedRig
 from sim_backend.truth import draw
 

@@ -26,8 +26,8 @@ from bench.rigfile import load_rig, protocoldoc
 from bench.rigfile.messages import Message
 from bench.wire import captureblock, isotp, packet, slcan
 from drivers import controller, dialogue, handshake, slcan_bus, waiting
-from sim_backend import ownership
-from sim_backend.controller import MAP_VERSION, SimulatedController
+from sim_backend.controller import ownership
+from sim_backend.controller.controller import MAP_VERSION, SimulatedController
 from sim_backend.truth import draw
 
 PAGE = Path(__file__).parent.parent / "docs" / "reference" / "protocol.md"

@@ -109,7 +109,7 @@ def _of_simulation(rig: RigFile) -> Iterator[Problem]:
 
     if not rig.simulation:
         return
-    from sim_backend.machine import machine_of
+    from sim_backend.machines.table import machine_of
     from sim_backend.unspoken import unspoken
 
     try:

@@ -44,7 +44,7 @@ def _settings(done: Simulated, *more: Mapping[str, float]) -> dict[str, float]:
 def _step(done: Simulated) -> Found:
     from procedures.step.procedure import chosen, model, recorded_s, waited_s
     from procedures.step.steps import AT_REST_S, Case
-    from sim_backend import amb_step
+    from sim_backend.machines.amb5dof import truth_step
 
     plan: Any = done.recording.plan
     other_band = {r.where for r in done.results if isinstance(r, Finding) and r.code == "band-widened"}
@@ -53,7 +53,7 @@ def _step(done: Simulated) -> Found:
         for speed in plan.speeds_rad_s:
             window = 2 * math.pi / speed if speed else AT_REST_S
             for axis in plan.axes:
-                small, shown = amb_step.truth(
+                small, shown = truth_step.truth(
                     done.drawn.plant,
                     settings,
                     axis,
@@ -78,13 +78,13 @@ def _step(done: Simulated) -> Found:
 def _tracking(done: Simulated) -> Found:
     from procedures.tracking.procedure import CODES
     from procedures.tracking.steps import read_orbits
-    from sim_backend import amb_track
+    from sim_backend.machines.amb5dof import truth_track
 
     plan: Any = done.recording.plan
     for orbit in read_orbits(done.recording):
         if orbit.law in plan.laws:
             settings = _settings(done, {"law": CODES[orbit.law]})  # type: ignore[index]
-            true = amb_track.truth(
+            true = truth_track.truth(
                 done.drawn.plant, settings, hz=plan.hz, y=plan.y_m, z=plan.z_m, ratio=plan.ratio, speed=plan.speed_rad_s,
                 settle_s=plan.settle_s,
             )  # fmt: skip
@@ -111,7 +111,7 @@ def _distances(d_max: Iterable[float], clearance: float, where: str) -> Found:
 def _unbalance(done: Simulated) -> Found:
     from procedures.synchronous.dwelling import CODES, POLES, SETTINGS
     from procedures.synchronous.dwells import DWELL, read_dwells
-    from sim_backend import amb_unbalance
+    from sim_backend.machines.amb5dof import truth_unbalance
 
     plan: Any = done.recording.plan
     law = {**(POLES if plan.observed else {}), "law": CODES[plan.law]}
@@ -119,16 +119,16 @@ def _unbalance(done: Simulated) -> Found:
         if dwell.kind != DWELL or dwell.again:
             continue
         settings = _settings(done, law, SETTINGS[dwell.variant])  # type: ignore[index]
-        true = amb_unbalance.motion(done.drawn.plant, settings, dwell.speed)
+        true = truth_unbalance.motion(done.drawn.plant, settings, dwell.speed)
         yield from _vectors(true.shaft, dwell.where)
         yield from _distances(true.d_max, done.drawn.plant.clearance, dwell.where)
 
 
 def _balance(done: Simulated) -> Found:
     from procedures.balance.steps import SIDES
-    from sim_backend import amb_balance
+    from sim_backend.machines.amb5dof import truth_balance
 
-    own = amb_balance.left(done.recording.rig, done.drawn, done.recording.events("operator"))
+    own = truth_balance.left(done.recording.rig, done.drawn, done.recording.events("operator"))
     for name, values in (("unbalance", own[0]), ("residual", own[-1])):
         for side, value in zip(SIDES, values, strict=True):
             yield f"{name}_cos", side, float(value.real)
@@ -140,7 +140,7 @@ def _passage(done: Simulated) -> Found:
     from procedures.amb_rotor.channels import AXES, PLANES
     from procedures.run_up.procedure import evaluated
     from procedures.synchronous.dwelling import CODES, SETTINGS
-    from sim_backend import amb_passage, amb_unbalance
+    from sim_backend.machines.amb5dof import truth_passage, truth_unbalance
 
     plan: Any = done.recording.plan
     run = done.recording.once(evaluated)[1]
@@ -149,7 +149,7 @@ def _passage(done: Simulated) -> Found:
     plant = done.drawn.plant
     settings = _settings(done, SETTINGS["off"], plan.parameters, {"law": CODES[plan.law]})
     for result in run.near.dwells:
-        true, where = amb_unbalance.motion(plant, settings, result.dwell.speed), result.dwell.where
+        true, where = truth_unbalance.motion(plant, settings, result.dwell.speed), result.dwell.where
         yield from _vectors(true.shaft, where)
         yield from _distances(true.d_max, plant.clearance, where)
         for plane, (y, z) in PLANES.items():
@@ -159,7 +159,7 @@ def _passage(done: Simulated) -> Found:
     if not peaks:
         return
     ends = [x for p in run.peaks for x in (p.low, p.speed.value, p.high) if math.isfinite(x)]
-    held = amb_passage.curves(plant, settings, 0.85 * min(ends), 1.1 * max(ends))
+    held = truth_passage.curves(plant, settings, 0.85 * min(ends), 1.1 * max(ends))
     for p in peaks:
         speed, amplitude, factor = held.critical(AXES.index(p.axis), p.speed.value)
         yield "critical_speed", p.where, speed
@@ -175,18 +175,18 @@ def _sensitivity(done: Simulated) -> Found:
     from procedures.sensitivity.injection import AXES
     from procedures.sensitivity.margins import fall, phase, rise
     from procedures.sensitivity.procedure import CODES
-    from sim_backend import amb_sensitivity
+    from sim_backend.machines.amb5dof import truth_sensitivity
 
     plan: Any = done.recording.plan
     plant, settings = done.drawn.plant, _settings(done, {"law": CODES[plan.law]})
     for speed in plan.speeds_rad_s:
-        loop = None if speed else amb_sensitivity.loop(plant, settings)
+        loop = None if speed else truth_sensitivity.loop(plant, settings)
         for axis in plan.axes:
             k, where = AXES.index(axis), f"{axis}, {f'{speed * RPM:.0f} r/min' if speed else 'at rest'}"
             if loop is not None:
                 value, hz = loop.peak(k, plan.low_hz, plan.high_hz)
             else:
-                value, hz = amb_sensitivity.quiet_peak(plant, settings, k, speed)
+                value, hz = truth_sensitivity.quiet_peak(plant, settings, k, speed)
             yield "s_max", where, value
             yield "s_max_hz", where, hz
             if loop is not None:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from drivers.live_link import LiveLink
     from drivers.modbus import ModbusLine
     from drivers.operator import LineOperator
-    from sim_backend.truth import Truth
+    from sim_backend.machine import Truth
 
 logger = logging.getLogger("bench.opening")
 LIVE_SLICE_S = 0.02
@@ -82,7 +82,7 @@ def of_truth(
         from drivers.controller import Controller
         from drivers.fieldbus import open_devices
         from drivers.operator import LineOperator
-        from sim_backend.registers import Followed, RegisterBank
+        from sim_backend.devices.registers import Followed, RegisterBank
 
         machine = SimulatedRig(rig, truth, SIMULATED.number, injected, substeps)
         bank = RegisterBank(rig, truth, machine.device.plant)

@@ -20,11 +20,10 @@ from bench.procedure import plans
 from bench.rigfile import RigFile, linkurl, load_rig
 
 if TYPE_CHECKING:
-    from sim_backend.machine import SimulatedPlant
+    from sim_backend.machine import SimulatedPlant, Truth
     from sim_backend.serving.ports import Port
     from sim_backend.serving.service import Service
     from sim_backend.serving.wirefaults import WireFaults
-    from sim_backend.truth import Truth
 
 LOOPBACK = "127.0.0.1"
 SOCKET = "socket://"
@@ -49,9 +48,9 @@ def serve_command(request: ServeRequest) -> int:
     Raises:
         ConfigError: usage, rig file, an address that cannot be listened on, an unwritable truth file.
     """
-    from sim_backend.controller import SimulatedController
-    from sim_backend.modbus_server import open_fieldbus
-    from sim_backend.registers import RegisterBank
+    from sim_backend.controller.controller import SimulatedController
+    from sim_backend.devices.modbus_server import open_fieldbus
+    from sim_backend.devices.registers import RegisterBank
     from sim_backend.serving.loop import Server
     from sim_backend.serving.wirefaults import WireFaults
     from sim_backend.truth import draw

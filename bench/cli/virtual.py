@@ -24,7 +24,8 @@ from bench.run.evaluation import yielded
 from bench.run.job import Job
 from bench.run.machine_phase import Acquired, acquired
 from bench.run.supervisor import Supervisor
-from sim_backend.truth import Truth, draw
+from sim_backend.machine import Truth
+from sim_backend.truth import draw
 
 
 @dataclass(frozen=True)

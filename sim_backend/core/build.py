@@ -1,4 +1,5 @@
-"""Builds the C core: a plain shared library beside its sources, named by the digest of what it is made from."""
+"""Builds the C core: a plain shared library of what is in this folder and in those of the machines, named by the digest of
+what it is made from."""
 
 from __future__ import annotations
 
@@ -13,6 +14,7 @@ from pathlib import Path
 from bench.errors import ConfigError
 
 HERE = Path(__file__).resolve().parent
+MACHINES = HERE.with_name("machines")
 FLAGS = (
     "-std=c11",
     "-O3",
@@ -38,14 +40,18 @@ def library() -> Path:
     Raises:
         ConfigError: there is no C compiler, or it fails; its output is in the message.
     """
-    sources = sorted(HERE.glob("*.c"))
+    sources, headers = _files("*.c"), _files("*.h")
     flags = (*FLAGS, *AVX2) if _has_avx2() else FLAGS
-    parts = [path.read_bytes() for path in (*sources, *sorted(HERE.glob("*.h")))]
+    parts = [path.read_bytes() for path in (*sources, *headers)]
     digest = hashlib.sha256(b"\0".join([*parts, " ".join(flags).encode()])).hexdigest()[:16]
     target = HERE / f"{'core_avx2' if AVX2[0] in flags else 'core'}-{digest}.so"
     if not target.exists():
         _compile(sources, target, flags)
     return target
+
+
+def _files(pattern: str) -> list[Path]:
+    return [*sorted(HERE.glob(pattern)), *sorted(MACHINES.glob(f"*/{pattern}"))]
 
 
 def _has_avx2() -> bool:
@@ -62,7 +68,7 @@ def _compile(sources: list[Path], target: Path, flags: Sequence[str]) -> None:
         raise ConfigError("no C compiler found (looked for cc, gcc, clang); install one, or name it in CC")
     with tempfile.TemporaryDirectory(dir=HERE) as folder:
         made = Path(folder) / "core.so"
-        command = [compiler, *flags, "-o", str(made), *map(str, sources), "-lm"]
+        command = [compiler, *flags, "-I", str(HERE), "-o", str(made), *map(str, sources), "-lm"]
         try:
             done = subprocess.run(command, capture_output=True, text=True, check=False)
         except OSError as error:

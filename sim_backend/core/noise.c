@@ -2,7 +2,7 @@
  * Hash: the finaliser of SplitMix64 on key + n * odd constant. Normals: ziggurat with 128 layers (Marsaglia and Tsang;
  * constants R and V of Doornik 2005). */
 #include <math.h>
-#include "tsbs.h"
+#include "core.h"
 
 #define LAYERS 128
 static const double R = 3.442619855899, V = 9.91256303526217e-3;
@@ -28,17 +28,17 @@ static uint64_t mix(uint64_t z) {
     return z ^ (z >> 31);
 }
 
-void tsbs_noise_seed(tsbs_noise *n, uint64_t seed, uint64_t stream) {
+void core_noise_seed(core_noise *n, uint64_t seed, uint64_t stream) {
     if (!ready) tables();
     n->key = mix(mix(seed + 0x9E3779B97F4A7C15u) ^ mix(stream * 0xD1B54A32D192ED03u + 1));
     n->counter = 0;
 }
 
-static uint64_t draw(tsbs_noise *n) { return mix(n->key + ++n->counter * 0x9E3779B97F4A7C15u); }
-static double uniform(tsbs_noise *n) { return ((double)(draw(n) >> 11) + 0.5) * 0x1p-53; }
+static uint64_t draw(core_noise *n) { return mix(n->key + ++n->counter * 0x9E3779B97F4A7C15u); }
+static double uniform(core_noise *n) { return ((double)(draw(n) >> 11) + 0.5) * 0x1p-53; }
 
 /* the whole method, from a first draw on */
-static double slow(tsbs_noise *n, uint64_t bits) {
+static double slow(core_noise *n, uint64_t bits) {
     for (;; bits = draw(n)) {
         int i = bits & (LAYERS - 1);
         double u = 2 * (((double)(bits >> 11) + 0.5) * 0x1p-53) - 1;
@@ -58,21 +58,21 @@ static double slow(tsbs_noise *n, uint64_t bits) {
 }
 
 /* 98 of 100 draws fall inside their layer */
-static inline double one(tsbs_noise *n) {
+static inline double one(core_noise *n) {
     uint64_t bits = draw(n);
     int i = bits & (LAYERS - 1);
     double u = 2 * (((double)(int64_t)(bits >> 11) + 0.5) * 0x1p-53) - 1;
     return fabs(u) < ratio[i] ? u * edge[i] : slow(n, bits);
 }
 
-double tsbs_normal(tsbs_noise *n) { return one(n); }
+double core_normal(core_noise *n) { return one(n); }
 
-void tsbs_draws(tsbs_noise *n, double *out, int count) {
+void core_draws(core_noise *n, double *out, int count) {
     for (int k = 0; k < count; k++) out[k] = one(n);
 }
 
-void tsbs_normals(uint64_t seed, uint64_t stream, double *out, int64_t count) {
-    tsbs_noise n;
-    tsbs_noise_seed(&n, seed, stream);
-    for (int64_t k = 0; k < count; k++) out[k] = tsbs_normal(&n);
+void core_normals(uint64_t seed, uint64_t stream, double *out, int64_t count) {
+    core_noise n;
+    core_noise_seed(&n, seed, stream);
+    for (int64_t k = 0; k < count; k++) out[k] = core_normal(&n);
 }

@@ -12,7 +12,7 @@ from bench.clock import Clock
 from bench.link.frames import FrameBatch
 from bench.rigfile import RigFile
 from bench.rigfile.messages import load_messages
-from sim_backend.controller import SimulatedController
+from sim_backend.controller.controller import SimulatedController
 from sim_backend.serving.connection import Connection
 from sim_backend.serving.pacing import TICK_NS, Pacer
 from sim_backend.serving.peers import Sent, joined

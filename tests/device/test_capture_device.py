@@ -16,8 +16,8 @@ from bench.rigfile import load_rig
 from bench.rigfile.capture import Layout
 from bench.wire.captureblock import OVERHEAD, ROOM, block_of, piece_of
 from bench.wire.isotp import Reassembler
-from sim_backend.capture_memory import CaptureMemory, Order
-from sim_backend.controller import SimulatedController
+from sim_backend.controller.capture_memory import CaptureMemory, Order
+from sim_backend.controller.controller import SimulatedController
 from sim_backend.truth import draw
 
 RIG = load_rig("amb5dof")

@@ -11,7 +11,7 @@ from bench.link.codec import Decoder, encode
 from bench.link.frames import FD, SENT, FrameBatch, empty_batch, frame
 from bench.link.session import Session
 from bench.rigfile import RigFile, load_rig
-from sim_backend.controller import SimulatedController
+from sim_backend.controller.controller import SimulatedController
 from sim_backend.truth import draw
 
 RIG: RigFile = load_rig("tsbs12")

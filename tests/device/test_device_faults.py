@@ -10,7 +10,7 @@ from bench.link import fault_injection
 from bench.link.codec import Decoder, encode
 from bench.link.frames import ERROR, FD, SENT, FrameBatch, empty_batch, frame
 from bench.rigfile import RigFile, load_rig
-from sim_backend.controller import SimulatedController
+from sim_backend.controller.controller import SimulatedController
 from sim_backend.endpoint import SimulatedRig
 from sim_backend.truth import draw
 

@@ -21,9 +21,9 @@ from hypothesis.stateful import (
 from test_controller import COMMANDS, Host
 
 from bench.rigfile import load_rig
+from sim_backend.controller.setdown import TOO_FAST
 from sim_backend.core import LAND, LEVITATE, LIFT
-from sim_backend.drive import SimulatedDrive
-from sim_backend.setdown import TOO_FAST
+from sim_backend.devices.drive import SimulatedDrive
 
 RIGS = {name: load_rig(name) for name in ("tsbs12", "amb5dof")}
 FLOATING = (LIFT, LEVITATE)

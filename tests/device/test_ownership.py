@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bench.link.session import Session
+from sim_backend.controller.ownership import NAME_PARTS, TAKEOVER_S, Ownership
 from sim_backend.core import TICK_S
-from sim_backend.ownership import NAME_PARTS, TAKEOVER_S, Ownership
 
 SECOND = round(1 / TICK_S)
 ANN, BOB = Session(0x101, 100, "ann"), Session(0x202, 200, "bob")

@@ -13,8 +13,8 @@ from bench.rigfile import RigFile, load_rig
 from bench.rigfile.registers import RegisterPort, Table, Words
 from drivers.controller import Controller
 from drivers.fieldbus import Fieldbus, open_devices
+from sim_backend.devices.registers import Followed, RegisterBank
 from sim_backend.endpoint import SimulatedRig
-from sim_backend.registers import Followed, RegisterBank
 from sim_backend.truth import draw
 
 

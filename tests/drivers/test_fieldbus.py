@@ -18,7 +18,7 @@ from bench.recording.recorder import Recorder, RunHeader
 from bench.rigfile.registers import RegisterRefused
 from drivers.fieldbus import Fieldbus
 from drivers.polling import Reading
-from sim_backend.drive import SimulatedDrive
+from sim_backend.devices.drive import SimulatedDrive
 
 
 def test_the_shaft_reaches_its_speed_coasts_and_stops() -> None:

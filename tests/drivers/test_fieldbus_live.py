@@ -17,10 +17,10 @@ from bench.rigfile import RigFile, load_rig
 from bench.rigfile.envelope import Envelope
 from drivers.fieldbus import Fieldbus, open_devices
 from drivers.modbus import open_lines
-from sim_backend.controller import SimulatedController
+from sim_backend.controller.controller import SimulatedController
 from sim_backend.core import LEVITATE, LIFT, READY
-from sim_backend.modbus_server import open_fieldbus
-from sim_backend.registers import RegisterBank
+from sim_backend.devices.modbus_server import open_fieldbus
+from sim_backend.devices.registers import RegisterBank
 from sim_backend.serving.loop import Server
 from sim_backend.serving.ports import Port
 from sim_backend.truth import draw

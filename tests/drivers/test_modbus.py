@@ -17,7 +17,7 @@ from bench.errors import ConfigError, LinkError
 from bench.rigfile import LinkSpec
 from bench.rigfile.registers import RegisterRefused
 from drivers.modbus import ModbusLine, ModbusPort
-from sim_backend.modbus_server import crc16
+from sim_backend.devices.modbus_server import crc16
 
 READ = bytes.fromhex("04 00 64 00 02")  # input registers 100 and 101
 Answer = Callable[[bytes], bytes]

@@ -16,7 +16,7 @@ from cobs import cobs
 from bench.link.frames import FD, frame, payload
 from bench.rigfile import load_rig
 from bench.wire import packet
-from sim_backend.controller import SimulatedController
+from sim_backend.controller.controller import SimulatedController
 from sim_backend.truth import draw
 
 DEADLINE_S = 20.0

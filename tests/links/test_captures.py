@@ -24,7 +24,7 @@ from drivers.canframes import batch_of, messages_of
 from drivers.controller import Controller
 from drivers.live_link import LiveLink
 from drivers.wires import open_wire
-from sim_backend.controller import SimulatedController
+from sim_backend.controller.controller import SimulatedController
 from sim_backend.truth import draw
 
 RIG = load_rig("amb5dof")

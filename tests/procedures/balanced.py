@@ -21,7 +21,7 @@ from bench.uncertainty import Estimate
 from procedures.balance import checks
 from procedures.balance.checks import Evaluated
 from procedures.balance.steps import Run
-from sim_backend import amb_balance
+from sim_backend.machines.amb5dof import truth_balance
 from sim_backend.truth import draw
 
 RPM = math.pi / 30
@@ -59,7 +59,7 @@ def done(
     measured = {(m.quantity.name, m.where): m.estimate for m in run.results if isinstance(m, Measured)}
     findings = [f for f in run.results if isinstance(f, Finding)]
     file = load_rig(rig)
-    true = amb_balance.left(file, draw(file, seed, truth), run.recording.events("operator"))
+    true = truth_balance.left(file, draw(file, seed, truth), run.recording.events("operator"))
     return Balancing(measured, findings, run.recording, checks.evaluated(run.recording), true, truth_of_motion(run))
 
 

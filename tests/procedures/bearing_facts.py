@@ -9,7 +9,7 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from procedures.amb_rotor.channels import AXES
 from procedures.synchronous import runout
-from sim_backend.core.amb_params import AmbParams
+from sim_backend.machines.amb5dof.params import AmbParams
 
 
 def bearings(rig: RigFile, plant: AmbParams) -> Calibration:

@@ -15,7 +15,7 @@ from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, correlation
 from procedures.amb_calibration.procedure import evaluate
-from sim_backend.quantities import eccentricity, own_weight
+from sim_backend.machines.tsbs.quantities import eccentricity, own_weight
 from sim_backend.truth import draw
 
 BIAS_A, ANGLES = 3.0, CALIBRATE["angles"]

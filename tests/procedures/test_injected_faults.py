@@ -23,7 +23,7 @@ from bench.run.job import Job
 from bench.run.runner import RunResult
 from bench.run.supervisor import Supervisor
 from sim_backend import endpoint
-from sim_backend.truth import Truth
+from sim_backend.machine import Truth
 
 PLAN = {"settle_s": 0.2, "average_s": 0.1, "max_position_m": 5e-6, "max_drift_A": 0.1}  # sound, and quick
 LIFTED, WATCHDOG_S, BEAT_S, LANDING_S = ("LIFTING", "LEVITATED", "SPINNING"), 0.08, 0.02, 1.0

@@ -33,8 +33,8 @@ from procedures.run_up.estimates import Run
 from procedures.run_up.steps import Passage, read_passage
 from procedures.synchronous.dwelling import CODES, SETTINGS
 from reports.figures import draw as draw_figure
-from sim_backend import amb_unbalance
-from sim_backend.core.amb_params import AmbParams
+from sim_backend.machines.amb5dof import truth_unbalance
+from sim_backend.machines.amb5dof.params import AmbParams
 from sim_backend.truth import draw
 
 pytestmark = pytest.mark.xdist_group("runup")  # one worker makes the sound run once
@@ -73,7 +73,7 @@ def settled(plant: AmbParams, run: Run, law: str, **parameters: float) -> np.nda
     assert run.near is not None
     defaults = {n: p.default for n, p in load_rig("amb5dof").parameters.items()}
     settings = {**defaults, **SETTINGS["off"], **parameters, "law": CODES[law]}  # type: ignore[index]
-    return amb_unbalance.response(plant, settings, np.array([r.dwell.speed for r in run.near.dwells]))
+    return truth_unbalance.response(plant, settings, np.array([r.dwell.speed for r in run.near.dwells]))
 
 
 @pytest.fixture(scope="module")
@@ -236,7 +236,7 @@ def test_up_and_down_agree_on_criticals_and_with_the_truth(tmp_path: Path) -> No
     settings = {**defaults, **SETTINGS["off"], **parameters, "law": CODES["PID"]}
     plant = draw(rig, SEED, truth).plant
     little = {name: tuple(0.02 * x for x in getattr(plant, name)) for name in ("unbalance", "runout")}
-    true = amb_unbalance.response(dataclasses.replace(plant, **little), settings, speeds)  # small orbits
+    true = truth_unbalance.response(dataclasses.replace(plant, **little), settings, speeds)  # small orbits
     both = sorted(set(ways[0]) & set(ways[1]))
     assert len(both) >= 2
     for axis in both:

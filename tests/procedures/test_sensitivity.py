@@ -30,7 +30,7 @@ from procedures.sensitivity.injection import Comb, combs
 from procedures.sensitivity.procedure import CODES, Plan, check, procedure
 from procedures.sensitivity.steps import AXES, REFINED, WIRING, Taken, read_taken
 from reports.figures import draw as draw_figure
-from sim_backend import amb_sensitivity
+from sim_backend.machines.amb5dof import truth_sensitivity
 from sim_backend.truth import draw
 
 pytestmark = pytest.mark.xdist_group("sensitivity")
@@ -88,7 +88,7 @@ def test_s_max_is_that_of_the_linearised_loop(sound: Run) -> None:
 
 
 def test_margins_are_those_of_the_linearised_loop(sound: Run, settings: Mapping[str, float]) -> None:
-    loop = amb_sensitivity.loop(draw(load_rig("amb5dof"), SEED).plant, settings)
+    loop = truth_sensitivity.loop(draw(load_rig("amb5dof"), SEED).plant, settings)
     open_loop = 1 / loop.sensitivity(np.geomspace(2.0, 500.0, 4000))[:, 1] - 1
     for name, value in (
         ("phase_margin", margins.phase(open_loop)),

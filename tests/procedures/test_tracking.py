@@ -31,7 +31,7 @@ from procedures.tracking.ellipse import Wave
 from procedures.tracking.procedure import CODES, MEASURES, OBSERVED, Plan, check, figures, procedure, step_count
 from procedures.unbalance import procedure as unbalance
 from reports.figures import draw as draw_figure
-from sim_backend import amb_track
+from sim_backend.machines.amb5dof import truth_track
 from sim_backend.truth import draw
 
 RIGS = Path(__file__).parents[2] / "rigs"
@@ -54,7 +54,7 @@ def agree(
     """Every quantity but the distance to the rings is that of the same machine without noise, within 3.5 u."""
     rig = load_rig("amb5dof")
     settings = {name: p.default for name, p in rig.parameters.items()} | more | {"law": CODES[law]}
-    for name, value in amb_track.truth(draw(rig, seed).plant, settings, settle_s=1.5, **orbit).items():
+    for name, value in truth_track.truth(draw(rig, seed).plant, settings, settle_s=1.5, **orbit).items():
         e = measured[name, law]
         assert e.value == pytest.approx(value, abs=3.5 * e.u), (name, law)
 

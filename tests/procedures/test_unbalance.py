@@ -38,8 +38,8 @@ from procedures.unbalance import procedure as unbalance
 from procedures.unbalance.estimates import Results
 from procedures.unbalance.procedure import check
 from reports.figures import draw as draw_figure
-from sim_backend import amb_unbalance
-from sim_backend.core.amb_params import AmbParams
+from sim_backend.machines.amb5dof import truth_unbalance
+from sim_backend.machines.amb5dof.params import AmbParams
 from sim_backend.truth import draw
 
 pytestmark = pytest.mark.xdist_group("unbalance")  # one worker makes the sound run once
@@ -100,7 +100,7 @@ def test_vectors_are_what_the_shaft_really_does(compared: Run) -> None:
         if r.dwell.variant == "literal":
             continue  # its limit cycle is not the other plant's
         settings = {**defaults, **POLES, **SETTINGS[r.dwell.variant], "law": CODES["CCS"]}  # type: ignore[index]
-        true = amb_unbalance.motion(compared.plant, settings, r.dwell.speed)
+        true = truth_unbalance.motion(compared.plant, settings, r.dwell.speed)
         for k, axis in enumerate(AXES):
             for name, value in (("vector_cos", true.shaft[k].real), ("vector_sin", -true.shaft[k].imag)):
                 e = r.estimates[name, axis]
@@ -151,7 +151,7 @@ def test_voltages_without_certificates_are_told() -> None:
 
 def test_the_slow_roll_reading_is_not_the_runout(compared: Run) -> None:
     """The loop moves the shaft against it: the reading alone is off by more than the whole runout; the forces put it right."""
-    true, found = amb_unbalance.first(compared.plant), compared.results.runouts[1.0]
+    true, found = truth_unbalance.first(compared.plant), compared.results.runouts[1.0]
     assert np.abs(found.reading - true).max() > 1.2 * np.abs(true).max()
     assert np.abs(found.values - true).max() < 0.1 * np.abs(true).max()
     for k in range(4):
@@ -178,7 +178,7 @@ def test_a5_switched_on(compared: Run) -> None:
 def test_compensation_lets_the_shaft_follow_the_runout(compared: Run) -> None:
     """The probes read next to nothing, and the shaft still moves by the runout: what the reduction does not say."""
     on = next(r for r in compared.results.of("corrected") if r.dwell.wanted > 1000)
-    true = amb_unbalance.first(compared.plant)
+    true = truth_unbalance.first(compared.plant)
     assert np.abs(on.vectors.values + true).max() < 0.3e-6
     assert np.abs(on.dwell.readings().values).max() < 0.3e-6
 
@@ -437,7 +437,7 @@ def test_adopted_bearings_take_the_plan_s_place(compared: Run) -> None:
     rig, model = compared.recording.rig, bearings(compared.recording.rig, compared.plant)
     dwells = read_dwells(compared.recording)
     found = estimates.results(dwells, rig, compared.recording.plan, model).runouts[1.0]
-    before, true = compared.results.runouts[1.0], amb_unbalance.first(compared.plant)
+    before, true = compared.results.runouts[1.0], truth_unbalance.first(compared.plant)
     for k, part in enumerate(found.parts):
         value = true[k // 2].imag if k % 2 else true[k // 2].real
         ids = {i.id for i in part.sensitivities}

@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 from amb_plants import AmbPlant
 
-from sim_backend.amb_reference import amb_force
-from sim_backend.amb_reference_law import Model
-from sim_backend.core.amb_params import AmbControl
+from sim_backend.machines.amb5dof.params import AmbControl
+from sim_backend.machines.amb5dof.reference import amb_force
+from sim_backend.machines.amb5dof.reference_law import Model
 
 Complex = npt.NDArray[np.complex128]
 T = 1e-4

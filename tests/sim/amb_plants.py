@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_backend.core import LEVITATE, LIFT, READY, DriveLaw
-from sim_backend.core.amb import CHANNELS, AmbPlant
-from sim_backend.core.amb_params import AmbControl, AmbParams, unbalance
+from sim_backend.machines.amb5dof.params import AmbControl, AmbParams, unbalance
+from sim_backend.machines.amb5dof.plant import CHANNELS, AmbPlant
 
 Array = npt.NDArray[np.float64]
 RPM = math.pi / 30

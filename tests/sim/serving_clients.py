@@ -16,7 +16,7 @@ from bench.link.packetstream import PacketStream
 from bench.link.slcanstream import SlcanStream
 from bench.rigfile import RigFile, load_rig
 from bench.wire import packet, slcan
-from sim_backend.controller import SimulatedController
+from sim_backend.controller.controller import SimulatedController
 from sim_backend.serving.adapter import SlcanAdapter
 from sim_backend.serving.loop import Server
 from sim_backend.serving.peers import PacketPeer

@@ -5,8 +5,9 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from sim_backend.core import LEVITATE, LIFT, READY, Plant
-from sim_backend.core.params import ControlParams, PlantParams
+from sim_backend.core import LEVITATE, LIFT, READY
+from sim_backend.machines.tsbs.params import ControlParams, PlantParams
+from sim_backend.machines.tsbs.plant import Plant
 
 NONE4, NONE8 = (0.0,) * 4, (0.0,) * 8
 

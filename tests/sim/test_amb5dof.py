@@ -11,12 +11,13 @@ import pytest
 
 from bench.rigfile import RigFile, load_rig
 from bench.rigfile.check import check_rig
-from sim_backend import amb5dof, amb_linear
 from sim_backend.core import LEVITATE, LIFT, READY
-from sim_backend.core.amb import CHANNELS, AmbPlant
-from sim_backend.core.amb_params import AmbControl, AmbParams
-from sim_backend.machine import machine_of
-from sim_backend.truth import Truth, draw, nominal
+from sim_backend.machine import Truth
+from sim_backend.machines.amb5dof import linear, machine
+from sim_backend.machines.amb5dof.params import AmbControl, AmbParams
+from sim_backend.machines.amb5dof.plant import CHANNELS, AmbPlant
+from sim_backend.machines.table import machine_of
+from sim_backend.truth import draw, nominal
 
 OWN = {"watchdog_s", "landing_speed"}  # of the interface, not of the laws
 OF_THE_RIG = {"notch1_hz", "notch1_q", "notch2_hz", "notch2_q", "lift_time_s"}  # other than the core's defaults
@@ -58,12 +59,12 @@ def test_the_nominal_machine_is_that_of_the_thesis() -> None:
 def test_every_number_of_the_rig_file_is_drawn_once_for_each_axis_and_has_an_effect() -> None:
     truth, again, other = draw(rig(), 3), draw(rig(), 3), draw(rig(), 4)
     assert truth.plant == again.plant
-    free = {name for name, t in amb5dof.stated(rig()).items() if t.standard_uncertainty > 0}
+    free = {name for name, t in machine.stated(rig()).items() if t.standard_uncertainty > 0}
     assert {name for name in free if truth.values[name] == other.values[name]} == set()
-    assert len({truth.values[f"beta_{axis}"] for axis in amb5dof.RADIAL}) == 4
-    assert not set(amb5dof.SHARED) - set(rig().simulation)
+    assert len({truth.values[f"beta_{axis}"] for axis in machine.RADIAL}) == 4
+    assert not set(machine.SHARED) - set(rig().simulation)
     for name in free - NOT_OF_THE_PLANT:
-        changed = amb5dof.params({**truth.values, name: truth.values[name] + 1e-6}, truth.defects)
+        changed = machine.params({**truth.values, name: truth.values[name] + 1e-6}, truth.defects)
         assert changed != truth.plant, name
 
 
@@ -86,7 +87,7 @@ def test_parameters_of_the_rig_file_are_those_of_the_laws() -> None:
         assert stated[name] == pytest.approx(laws[name], rel=1e-5), name
 
 
-@pytest.mark.parametrize("law", amb_linear.LAWS)
+@pytest.mark.parametrize("law", linear.LAWS)
 def test_the_linearised_loop_is_the_core_near_the_centre(law: str) -> None:
     """Two shafts, one 0.1 um and 1 urad aside: what lies between them over 40 ms, against powers of the matrix."""
     quiet = {"position_noise": 0.0, "current_noise": 0.0, "position_lsb": 0.0, "current_lsb": 0.0, "mode_on": (0.0, 0.0),
@@ -95,7 +96,7 @@ def test_the_linearised_loop_is_the_core_near_the_centre(law: str) -> None:
     settings = {name: q.default for name, q in rig().parameters.items()}
     paths = []
     for aside in (np.zeros(2), np.array([1e-7, 1e-6])):
-        plant = AmbPlant(p, 1, control=AmbControl(law=amb_linear.LAWS.index(law)))
+        plant = AmbPlant(p, 1, control=AmbControl(law=linear.LAWS.index(law)))
         for name in OF_THE_RIG:
             plant.set(name, settings[name])
         for mode, ticks in ((READY, 100), (LIFT, 12000), (LEVITATE, 30000)):
@@ -109,7 +110,7 @@ def test_the_linearised_loop_is_the_core_near_the_centre(law: str) -> None:
             plant.run(1)
             path.append(plant.state()["s"][[1, 4]])
         paths.append(np.array(path))
-    a, x = amb_linear.matrix(p, settings, law), np.zeros(amb_linear.SIZE)
+    a, x = linear.matrix(p, settings, law), np.zeros(linear.SIZE)
     x[0:2] = 1e-7, 1e-6
     expected = []
     for _ in range(400):
@@ -122,12 +123,12 @@ def test_the_linearised_loop_is_the_core_near_the_centre(law: str) -> None:
 def test_damping_is_that_of_the_eigenvalues() -> None:
     """Without filters and lags the flatness laws place k1 and k2 (T 2.16): 61.6 Hz, and damping k2 / (2 sqrt k1)."""
     q = thesis().quantities
-    assert [q[f"frequency_{law}"] for law in amb_linear.LAWS] == pytest.approx([70, 67, 66], abs=2)
+    assert [q[f"frequency_{law}"] for law in linear.LAWS] == pytest.approx([70, 67, 66], abs=2)
     fast = dataclasses.replace(thesis().plant, amplifier_rate=1e5)
     settings = {name: p.default for name, p in rig().parameters.items()}
     settings |= {"notch1_hz": 0.0, "notch2_hz": 0.0, "derivative_hz": 1e5, "k0": 0.0}
     for law, k2 in (("ccs", 300), ("cac", 250)):
-        hz, damping = amb_linear.slowest(fast, settings, law)
+        hz, damping = linear.slowest(fast, settings, law)
         assert hz == pytest.approx(math.sqrt(1.5e5) / (2 * math.pi), rel=0.05)
         assert damping == pytest.approx(k2 / (2 * math.sqrt(1.5e5)), abs=0.06)  # two ticks of delay are left
 
@@ -135,7 +136,7 @@ def test_damping_is_that_of_the_eigenvalues() -> None:
 def test_telemetry_wraps_and_leaves_room_for_the_watchdogs_bit() -> None:
     at = {"angle": 0, "pulses": 1, "flags": 2}
     values = np.array([[2 * math.pi * 7 + 0.5, 65537.0, 63.0], [-4.0, 3.0, 16.0]])
-    amb5dof.spoil(values, at, thesis().defects)
+    machine.spoil(values, at, thesis().defects)
     assert values[:, 0] == pytest.approx([0.5, 2 * math.pi - 4.0])
     assert values[:, 1].tolist() == [1, 3]
     assert values[:, 2].tolist() == [0b1101111, 0b100000]
@@ -144,11 +145,11 @@ def test_telemetry_wraps_and_leaves_room_for_the_watchdogs_bit() -> None:
 def test_places_follow_the_signals_and_planted_signs() -> None:
     signals = [s.name for s in rig().messages["Telemetry"].signals[2:]]
     at = {name: k for k, name in enumerate(signals)}
-    told, goes = amb5dof.places(thesis().defects, at)
+    told, goes = machine.places(thesis().defects, at)
     assert [CHANNELS[k] for k in told] == [signals[k] for k in goes]
     assert set(signals) - {CHANNELS[k] for k in told} == {
         *("supply", "temp_i", "temp_o", "temp_x", "state", "fault", "host_age")
     }
-    _, wrong = amb5dof.places({**thesis().defects, "current_sign_o": -1.0}, at)
+    _, wrong = machine.places({**thesis().defects, "current_sign_o": -1.0}, at)
     exchanged = {signals[a] for a, b in zip(goes, wrong, strict=True) if a != b}
     assert exchanged == {"i_yo_p", "i_yo_n", "i_zo_p", "i_zo_n"}

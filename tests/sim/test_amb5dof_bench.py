@@ -21,8 +21,8 @@ from bench.run.job import WatchedClock
 from bench.run.supervisor import Supervisor
 from drivers.controller import Controller
 from drivers.fieldbus import Fieldbus, open_devices
+from sim_backend.devices.registers import Followed, RegisterBank
 from sim_backend.endpoint import SimulatedRig
-from sim_backend.registers import Followed, RegisterBank
 from sim_backend.truth import draw
 
 RIG = load_rig("amb5dof")

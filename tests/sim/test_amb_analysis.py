@@ -12,8 +12,8 @@ from bench.analysis.responses import clear_of_orders, lines, response, without_o
 from bench.analysis.sampling import Sampling
 from bench.analysis.tachometer import age, counted, tachometer
 from bench.analysis.vectors import contains
-from sim_backend.core.amb import TRACE
-from sim_backend.core.amb_params import AmbControl
+from sim_backend.machines.amb5dof.params import AmbControl
+from sim_backend.machines.amb5dof.plant import TRACE
 
 SETTLED = {"ki": 1e5, "k0": 1e7}
 SPEED = 6000 * RPM

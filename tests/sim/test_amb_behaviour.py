@@ -13,7 +13,7 @@ from amb_plants import COLUMN, DRIVE, RPM, Array, levitated, spun, synchronous
 from scipy.optimize import least_squares
 
 from sim_backend.core import LAND, OFF
-from sim_backend.core.amb import TRACE, AmbPlant
+from sim_backend.machines.amb5dof.plant import TRACE, AmbPlant
 
 CONTACT = 4 | 8
 OBSERVED = {"observer": 1.0, "integral": 0.0, "k1": 2e5, "k2_ccs": 400.0, "k2_cac": 400.0}

@@ -9,12 +9,12 @@ import pytest
 from amb_plants import RPM, levitated, quiet
 from scipy.integrate import solve_ivp
 
-from sim_backend import amb_reference_law
-from sim_backend.amb_reference import amb_force
-from sim_backend.amb_reference_loop import Law, simulate
-from sim_backend.amb_reference_observer import place, poles, transition
-from sim_backend.core.amb import cac, ccs, follow, observer_gains
-from sim_backend.core.amb_params import AmbControl, AmbParams
+from sim_backend.machines.amb5dof import reference_law
+from sim_backend.machines.amb5dof.params import AmbControl, AmbParams
+from sim_backend.machines.amb5dof.plant import cac, ccs, follow, observer_gains
+from sim_backend.machines.amb5dof.reference import amb_force
+from sim_backend.machines.amb5dof.reference_loop import Law, simulate
+from sim_backend.machines.amb5dof.reference_observer import place, poles, transition
 
 BETA, GAP, BIAS, ETA = 6.95e-7, 5.25e-4, 1.0, 0.1
 
@@ -25,7 +25,7 @@ def test_constant_current_sum_gives_the_force(xi: float) -> None:
     for force in np.linspace(0.99 * low, 0.99 * high, 9):
         di = ccs(force, BETA, GAP, xi, BIAS)
         assert amb_force(BETA, GAP, xi, BIAS + di, BIAS - di) == pytest.approx(force, rel=1e-11, abs=1e-11)
-        assert di == pytest.approx(amb_reference_law.ccs(force, BETA, GAP, xi, BIAS), abs=1e-9)
+        assert di == pytest.approx(reference_law.ccs(force, BETA, GAP, xi, BIAS), abs=1e-9)
     assert (ccs(2 * low, BETA, GAP, xi, BIAS), ccs(2 * high, BETA, GAP, xi, BIAS)) == (-BIAS, BIAS)
 
 
@@ -52,7 +52,7 @@ def test_almost_complementary_currents_give_the_force(force: float) -> None:
     for xi in (-1e-4, 0.0, 1.15e-4):
         pair = cac(force, BETA, GAP, xi, ETA)
         assert amb_force(BETA, GAP, xi, *pair) == pytest.approx(force, rel=1e-12, abs=1e-12)
-        assert pair == pytest.approx(amb_reference_law.cac(force, BETA, GAP, xi, ETA), abs=1e-7)
+        assert pair == pytest.approx(reference_law.cac(force, BETA, GAP, xi, ETA), abs=1e-7)
         if abs(force) > ETA:
             assert min(pair) == 0
 

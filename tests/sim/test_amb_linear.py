@@ -7,8 +7,8 @@ import pytest
 from amb_linear import Linear
 from amb_plants import RPM, levitated, spun, synchronous
 
-from sim_backend.core.amb import TRACE
-from sim_backend.core.amb_params import AmbControl
+from sim_backend.machines.amb5dof.params import AmbControl
+from sim_backend.machines.amb5dof.plant import TRACE
 
 QUIET = {"position_noise": 0.0, "current_noise": 0.0, "position_lsb": 0.0, "current_lsb": 0.0}
 SETTLED = {"ki": 1e5, "k0": 1e7}

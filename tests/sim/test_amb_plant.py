@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from amb_plants import COLUMN, RPM, Array, levitated, quiet, spun, synchronous
 
-from sim_backend.amb_reference import amb_force
 from sim_backend.core import TRIPS, DriveLaw
-from sim_backend.core.amb import CHANNELS, TRACE, AmbPlant, derivative
-from sim_backend.core.amb_params import AmbParams, unbalance
+from sim_backend.machines.amb5dof.params import AmbParams, unbalance
+from sim_backend.machines.amb5dof.plant import CHANNELS, TRACE, AmbPlant, derivative
+from sim_backend.machines.amb5dof.reference import amb_force
 
 NONE = np.zeros(10)
 

@@ -10,11 +10,11 @@ import numpy.typing as npt
 import pytest
 from amb_plants import RPM, quiet
 
-from sim_backend import amb_reference
-from sim_backend.amb_reference_loop import Advance, Trace, dop853, runge_kutta, simulate
 from sim_backend.core import LEVITATE, LIFT, OFF, DriveLaw
-from sim_backend.core.amb import AmbPlant, derivative
-from sim_backend.core.amb_params import AmbControl, AmbParams, runout
+from sim_backend.machines.amb5dof import reference
+from sim_backend.machines.amb5dof.params import AmbControl, AmbParams, runout
+from sim_backend.machines.amb5dof.plant import AmbPlant, derivative
+from sim_backend.machines.amb5dof.reference_loop import Advance, Trace, dop853, runge_kutta, simulate
 
 Array = npt.NDArray[np.float64]
 TICKS = 500
@@ -86,7 +86,7 @@ def test_right_hand_side_equals_the_core(spread: float, modes: tuple[float, floa
         s = scale * rng.normal(size=20) * np.where(np.arange(20) < 5, spread, 1)
         coil, torque = rng.uniform(0, 3, 10), rng.uniform(-0.01, 0.01)
         np.testing.assert_allclose(
-            derivative(p, s, coil, torque), amb_reference.derivative(p, s, coil, torque), rtol=1e-12, atol=1e-11
+            derivative(p, s, coil, torque), reference.derivative(p, s, coil, torque), rtol=1e-12, atol=1e-11
         )
         touched += any(np.hypot(s[1] + z * s[4], s[2] - z * s[3]) > p.clearance for z in (-p.l_is, p.l_os))
     assert touched > 80 if spread > 1 else touched < 30

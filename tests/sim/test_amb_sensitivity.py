@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from bench.rigfile import load_rig
-from sim_backend import amb_sensitivity
-from sim_backend.amb_linear import notch
-from sim_backend.amb_step import floating
-from sim_backend.core.amb import TRACE
-from sim_backend.core.amb_params import AmbParams
+from sim_backend.machines.amb5dof import truth_sensitivity
+from sim_backend.machines.amb5dof.linear import notch
+from sim_backend.machines.amb5dof.params import AmbParams
+from sim_backend.machines.amb5dof.plant import TRACE
+from sim_backend.machines.amb5dof.truth_step import floating
 from sim_backend.truth import draw
 
 RIG = load_rig("amb5dof")
@@ -27,7 +27,7 @@ PLANT: AmbParams = draw(RIG, 2).plant
 def test_the_core_is_the_closed_form(law: float, axis: int, substeps: int, speed: float) -> None:
     """Small lines into the quiet machine with bending modes, 20 Hz to 2 kHz, at rest and at 14 000 r/min. What is left goes
     with the amplitude: what the bearings' curvature makes of a hundred lines."""
-    settings, p = {**SETTINGS, "law": law}, amb_sensitivity.even(PLANT) if speed else PLANT
+    settings, p = {**SETTINGS, "law": law}, truth_sensitivity.even(PLANT) if speed else PLANT
     plant = floating(p, settings, speed, substeps=substeps, settle_s=20.0)
     lines = {
         "inject_axis": axis,
@@ -41,7 +41,7 @@ def test_the_core_is_the_closed_form(law: float, axis: int, substeps: int, speed
     plant.run(30000)
     trace = plant.run(5000, 1)[1][:, [TRACE.index("inject"), TRACE.index("after")]]
     bins = np.fft.rfft(trace, axis=0)[10 : 10 * 100 + 1 : 10]
-    expected = amb_sensitivity.loop(PLANT, settings, speed, substeps).sensitivity(20.0 * np.arange(1, 101))[:, axis]
+    expected = truth_sensitivity.loop(PLANT, settings, speed, substeps).sensitivity(20.0 * np.arange(1, 101))[:, axis]
     away = np.abs(bins[:, 1] / bins[:, 0] - expected)
     assert (away / np.maximum(np.abs(expected), 1.0)).max() < 2e-4
     assert np.median(away) < 2e-6
@@ -49,7 +49,7 @@ def test_the_core_is_the_closed_form(law: float, axis: int, substeps: int, speed
 
 def test_python_control_finds_the_same() -> None:
     """The PID's loop of all five axes put together, closed and evaluated by another program; its margins of one axis."""
-    loop, s, dt, size = amb_sensitivity.loop(PLANT, SETTINGS), SETTINGS, 1e-4, 28
+    loop, s, dt, size = truth_sensitivity.loop(PLANT, SETTINGS), SETTINGS, 1e-4, 28
     delayed = np.block([[loop.a, loop.b], [np.zeros((5, size)), np.zeros((5, 5))]])
     enters = np.vstack([np.zeros((size, 5)), np.eye(5)])
     plant = control.ss(delayed, enters, np.hstack([loop.c, np.zeros((5, 5))]), np.zeros((5, 5)), dt)
@@ -73,9 +73,9 @@ def test_python_control_finds_the_same() -> None:
 def test_the_peak_of_the_turning_machine_is_the_closed_form_without_an_orbit(law: float) -> None:
     """Lines into the core at 6000 r/min. With the orbit of the drawn unbalance the peak is off by tenths of a percent."""
     settings, speed = {**SETTINGS, "law": law}, 6000 * math.pi / 30
-    value, hz = amb_sensitivity.quiet_peak(amb_sensitivity.even(PLANT), settings, 0, speed)
-    expected, at = amb_sensitivity.loop(PLANT, settings, speed).peak(0, 2.0, 2000.0)
+    value, hz = truth_sensitivity.quiet_peak(truth_sensitivity.even(PLANT), settings, 0, speed)
+    expected, at = truth_sensitivity.loop(PLANT, settings, speed).peak(0, 2.0, 2000.0)
     assert value == pytest.approx(expected, rel=3e-4)
     assert hz == pytest.approx(at, abs=0.3)
-    turning = amb_sensitivity.quiet_peak(PLANT, settings, 0, speed)[0]
+    turning = truth_sensitivity.quiet_peak(PLANT, settings, 0, speed)[0]
     assert 5e-4 < abs(turning / expected - 1) < 1e-2

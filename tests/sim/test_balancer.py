@@ -16,8 +16,8 @@ from bench.rigfile.envelope import Envelope
 from drivers.controller import Controller
 from drivers.operator import LineOperator
 from drivers.person import ConsoleOperator
-from sim_backend.core.amb import AmbPlant
 from sim_backend.endpoint import SimulatedRig
+from sim_backend.machines.amb5dof.plant import AmbPlant
 from sim_backend.truth import draw
 
 RIG = load_rig("amb5dof")

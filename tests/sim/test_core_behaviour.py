@@ -9,8 +9,9 @@ import pytest
 from sim_plants import centred, levitated, quiet
 
 from sim_backend import core
-from sim_backend.core import CHANNELS, LAND, LEVITATE, LIFT, OFF, READY, Plant
-from sim_backend.core.params import ControlParams, PlantParams
+from sim_backend.core import LAND, LEVITATE, LIFT, OFF, READY
+from sim_backend.machines.tsbs.params import ControlParams, PlantParams
+from sim_backend.machines.tsbs.plant import CHANNELS, Plant
 
 COLUMN = {name: k for k, name in enumerate(CHANNELS)}
 SATURATED, CONTACT = 1, 4 + 8

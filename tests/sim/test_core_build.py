@@ -10,7 +10,7 @@ import pytest
 import sim_backend.core as core
 from bench.errors import ConfigError
 from sim_backend.core import build
-from sim_backend.core.params import ControlParams, PlantParams
+from sim_backend.machines.tsbs.params import ControlParams, PlantParams
 
 
 @pytest.fixture

@@ -9,8 +9,8 @@ import numpy.typing as npt
 import pytest
 from sim_plants import floating
 
-from sim_backend.core import derivative
-from sim_backend.core.params import PlantParams
+from sim_backend.machines.tsbs.params import PlantParams
+from sim_backend.machines.tsbs.plant import derivative
 
 Array = npt.NDArray[np.float64]
 X, Y, Z, PHI, PSI, THETA = range(6, 12)

@@ -10,8 +10,8 @@ import pytest
 from scipy import integrate
 from sim_plants import floating
 
-from sim_backend.core import derivative
-from sim_backend.core.params import PlantParams
+from sim_backend.machines.tsbs.params import PlantParams
+from sim_backend.machines.tsbs.plant import derivative
 
 X, Y, THETA = 6, 7, 11
 M, P = 8, 16

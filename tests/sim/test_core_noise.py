@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from sim_backend.core import normals
+from sim_backend.machines.tsbs.plant import normals
 
 MASK = 2**64 - 1
 GOLDEN = 0x9E3779B97F4A7C15

@@ -7,8 +7,8 @@ import numpy.typing as npt
 import pytest
 from sim_plants import centred, floating, levitated
 
-from sim_backend.core import Plant, derivative
-from sim_backend.core.params import PlantParams
+from sim_backend.machines.tsbs.params import PlantParams
+from sim_backend.machines.tsbs.plant import Plant, derivative
 
 Array = npt.NDArray[np.float64]
 BIAS = 3.0

@@ -10,8 +10,9 @@ import numpy.typing as npt
 import pytest
 from sim_plants import floating, levitated, quiet
 
-from sim_backend.core import LEVITATE, DriveLaw, Plant, derivative
-from sim_backend.core.params import ControlParams, PlantParams
+from sim_backend.core import LEVITATE, DriveLaw
+from sim_backend.machines.tsbs.params import ControlParams, PlantParams
+from sim_backend.machines.tsbs.plant import Plant, derivative
 
 Array = npt.NDArray[np.float64]
 X, Y, PHI, THETA = 6, 7, 9, 11

@@ -11,9 +11,10 @@ from bench.link.frames import empty_batch
 from bench.link.telemetry import TelemetryDecoder
 from bench.rigfile import RigFile, load_rig
 from bench.rigfile.registers import RegisterRefused
-from sim_backend.controller import SimulatedController
-from sim_backend.core import LEVITATE, LIFT, READY, Plant
-from sim_backend.registers import Followed, RegisterBank
+from sim_backend.controller.controller import SimulatedController
+from sim_backend.core import LEVITATE, LIFT, READY
+from sim_backend.devices.registers import Followed, RegisterBank
+from sim_backend.machines.tsbs.plant import Plant
 from sim_backend.truth import draw
 
 COAST, RUN, STOP, RESET = 0, 1, 2, 4

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from sim_plants import floating, levitated, quiet
 
-from sim_backend.core import LEVITATE, DriveLaw, Plant
-from sim_backend.core.params import ControlParams
-from sim_backend.reference_loop import Driving, simulate
+from sim_backend.core import LEVITATE, DriveLaw
+from sim_backend.machines.tsbs.params import ControlParams
+from sim_backend.machines.tsbs.plant import Plant
+from sim_backend.machines.tsbs.reference_loop import Driving, simulate
 
 LAW = DriveLaw(gain=20.0, limit=8.0, ramp=20.0)
 IDLE = ControlParams(torque_on=0.0)

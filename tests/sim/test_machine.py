@@ -6,7 +6,7 @@ import pytest
 
 from bench.errors import ConfigError
 from bench.rigfile import RigFile, load_rig
-from sim_backend.machine import MACHINES, machine_of
+from sim_backend.machines.table import MACHINES, machine_of
 from sim_backend.truth import draw
 
 TSBS12: RigFile = load_rig("tsbs12")

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from pymodbus.framer import FramerRTU
 
 from bench.rigfile import RigFile, load_rig
-from sim_backend.core import Plant
-from sim_backend.modbus_server import LONGEST_RTU, SILENCE_NS, RtuPeer, TcpPeer, crc16
-from sim_backend.registers import RegisterBank
+from sim_backend.devices.modbus_server import LONGEST_RTU, SILENCE_NS, RtuPeer, TcpPeer, crc16
+from sim_backend.devices.registers import RegisterBank
+from sim_backend.machines.tsbs.plant import Plant
 from sim_backend.truth import draw
 
 SPLITS = st.lists(st.integers(1, 12), max_size=20)

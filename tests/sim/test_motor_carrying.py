@@ -12,8 +12,9 @@ from sim_plants import centred, levitated, quiet
 
 from bench.rigfile import load_rig
 from sim_backend import core
-from sim_backend.core import CHANNELS, LAND, LEVITATE, Plant
-from sim_backend.core.params import ControlParams, PlantParams
+from sim_backend.core import LAND, LEVITATE
+from sim_backend.machines.tsbs.params import ControlParams, PlantParams
+from sim_backend.machines.tsbs.plant import CHANNELS, Plant
 from sim_backend.truth import draw
 
 Array = npt.NDArray[np.float64]

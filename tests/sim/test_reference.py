@@ -10,10 +10,20 @@ import numpy.typing as npt
 import pytest
 from sim_plants import quiet
 
-from sim_backend import reference
-from sim_backend.core import LEVITATE, DriveLaw, Plant, derivative
-from sim_backend.core.params import ControlParams, PlantParams
-from sim_backend.reference_loop import Driving, Hanging, Interval, Levering, Trace, dop853, runge_kutta, simulate
+from sim_backend.core import LEVITATE, DriveLaw
+from sim_backend.machines.tsbs import reference
+from sim_backend.machines.tsbs.params import ControlParams, PlantParams
+from sim_backend.machines.tsbs.plant import Plant, derivative
+from sim_backend.machines.tsbs.reference_loop import (
+    Driving,
+    Hanging,
+    Interval,
+    Levering,
+    Trace,
+    dop853,
+    runge_kutta,
+    simulate,
+)
 
 Array = npt.NDArray[np.float64]
 TICKS = 600

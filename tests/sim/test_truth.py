@@ -10,10 +10,10 @@ import pytest
 
 from bench.errors import ConfigError
 from bench.rigfile import RigFile, load_rig
-from sim_backend.core import derivative
-from sim_backend.core.params import PlantParams
+from sim_backend.machines.tsbs.machine import DEFECTS
+from sim_backend.machines.tsbs.params import PlantParams
+from sim_backend.machines.tsbs.plant import derivative
 from sim_backend.truth import draw, nominal
-from sim_backend.tsbs import DEFECTS
 
 X, Y, THETA = 6, 7, 11
 

@@ -1,0 +1,199 @@
+"""The simulated controller's states: what a command does in each, and what it does by itself (docs/reference/protocol.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from sim_backend import core
+from sim_backend.controller import setdown
+from sim_backend.controller.ownership import Ownership
+from sim_backend.core import PERIOD_TICKS, TICK_S
+from sim_backend.machine import Machine, SimulatedPlant
+
+SETTLED_M, SETTLED_S = 20e-6, 0.05
+LIFT_TIMEOUT_S = 5.0
+RESTING = ("OFF", "READY")
+AT_REST = (*RESTING, "FAULT")
+WITHOUT_CURRENT = ("OFF", "FAULT")
+MOVING = ("LIFTING", "LANDING", "COASTING")
+HELD = ("LEVITATED", "SPINNING")
+TURNING = (*HELD, "COASTING")
+
+
+class States:
+    """State and fault of a controller that has just been switched on. Its plant goes on as it is, without currents.
+
+    Args:
+        plant: what it holds and turns.
+        machine: which kind it is.
+        parameters: values in force, by name.
+        owner: whose silence it watches.
+        fault_after_s: a planted fault of a sensor, 0 for none.
+    """
+
+    def __init__(
+        self,
+        plant: SimulatedPlant,
+        machine: Machine,
+        parameters: Mapping[str, float],
+        owner: Ownership,
+        fault_after_s: float = 0.0,
+    ) -> None:
+        self._plant, self._machine, self._own, self._owner = plant, machine, parameters, owner
+        self._planted_s = fault_after_s
+        self.state, self.fault = "OFF", "NONE"
+        self._since, self._steady = plant.tick, 0
+        self._leaving = False  # MAKE_SAFE: OFF when the rotor has landed
+        self._free = plant.tick  # from here on nothing drives a shaft that is to be landed
+        plant.mode = core.OFF
+        plant.clear_trips()
+        self._brake()
+
+    @property
+    def watching(self) -> bool:
+        """Whether a host that falls silent would be noticed."""
+        return self._owner.armed and self.state not in WITHOUT_CURRENT
+
+    def progress(self, rows: core.Array) -> None:
+        """What it does by itself at the present, after `rows` of the plant: trips, watchdog, ends of movements."""
+        plant, tick = self._plant, self._plant.tick
+        planted = self._planted_s and tick * TICK_S > self._planted_s
+        if plant.trips or (self.fault == "NONE" and (planted or (self.state in HELD and setdown.pulses_lost(plant)))):
+            self.fail(next((name for bit, name in core.TRIPS.items() if plant.trips & bit), "SENSOR"))
+        elif self.watching and (tick - self._owner.heartbeat) * TICK_S > self._own["watchdog_s"]:
+            self._lose_host()
+        if self.state == "LIFTING" and len(rows):
+            self._lifting(rows)
+        elif self.state == "LANDING":
+            self._landing()
+        elif self.state == "COASTING":
+            self._coasting()
+        elif self.state in HELD:
+            turning = abs(plant.speed) > self._own["landing_speed"]
+            self.state = "SPINNING" if turning else "LEVITATED"
+
+    def _lifting(self, rows: core.Array) -> None:
+        plant = self._plant
+        still = bool((np.abs(rows[:, self._machine.radial]) < SETTLED_M).all()) and plant.moved
+        self._steady = self._steady + len(rows) if still else 0
+        if self._steady * PERIOD_TICKS * TICK_S >= SETTLED_S:
+            plant.mode = core.LEVITATE
+            self._enter("LEVITATED")
+        elif (plant.tick - self._since) * TICK_S > LIFT_TIMEOUT_S + self._own["lift_time_s"]:
+            self.fail("LIFT_TIMEOUT")
+
+    def _landing(self) -> None:
+        plant = self._plant
+        if setdown.too_fast(plant, self._own["landing_speed"]):
+            plant.mode = core.LIFT
+            self._enter("COASTING")
+        elif plant.moved:
+            if self.fault != "NONE":
+                self._switch_off("FAULT")
+            elif self._leaving:
+                self._switch_off("OFF")
+            else:
+                plant.mode = core.READY
+                self._enter("READY")
+
+    def _coasting(self) -> None:
+        plant = self._plant
+        if plant.mode == core.LIFT and plant.moved:  # a landing was broken off
+            plant.mode = core.LEVITATE
+        if setdown.slow(plant, self._own["landing_speed"], self._free):
+            self._land()
+
+    def fail(self, fault: str) -> None:
+        """Latch a fault, and set the rotor down as its kind asks for."""
+        first = self.fault == "NONE"
+        self.fault = fault if first else self.fault
+        self._plant.clear_trips()
+        if fault in ("OVERCURRENT", "OVERSPEED", "SENSOR") and self.state in TURNING:
+            if first or self.state != "COASTING":  # a trip that comes again and again does not put the landing off
+                self._safe()
+        else:
+            self._switch_off("FAULT")
+
+    def _lose_host(self) -> None:
+        self.fault = "HEARTBEAT_LOST" if self.fault == "NONE" else self.fault
+        self._owner.armed = False
+        self._safe()
+
+    def _safe(self) -> None:
+        """Coast while turning fast, then land; amplifiers off where the rotor rests already. Nobody says that the drive on
+        the shaft is off."""
+        if self.state in TURNING:
+            self._let_down(setdown.DRIVE_GIVES_UP_S)
+        elif self.state == "LIFTING":
+            self._land()
+        elif self.state in RESTING:
+            self._switch_off("OFF" if self.fault == "NONE" else "FAULT")
+
+    def _let_down(self, driven_s: float) -> None:
+        """Land as soon as the shaft is slow; a drive may turn it for `driven_s` more."""
+        self._torque(0.0)
+        self._brake()
+        self._free = self._plant.tick + round(driven_s / TICK_S)
+        if setdown.slow(self._plant, self._own["landing_speed"], self._free):
+            self._land()
+        else:
+            self._enter("COASTING")
+
+    def _brake(self) -> None:
+        """Aim at standstill, where the controller has a motor."""
+        if self._machine.turns:
+            self._plant.set("speed_ref", 0.0)
+
+    def _torque(self, on: float) -> None:
+        if self._machine.turns:
+            self._plant.set("torque_on", on)
+
+    def _switch_off(self, state: str) -> None:
+        self._plant.mode = core.OFF
+        self._owner.armed = False
+        self._enter(state)
+
+    def _land(self) -> None:
+        self._plant.mode = core.LAND
+        self._enter("LANDING")
+
+    def _enter(self, state: str) -> None:
+        self.state, self._since, self._steady = state, self._plant.tick, 0
+
+    def obey(self, name: str) -> bool:
+        """Carry out a command, or refuse it in this state."""
+        state, plant = self.state, self._plant
+        if name == "IDENTIFY":
+            return True
+        if name == "MAKE_SAFE":
+            self._leaving = True
+            self._safe()
+            return True
+        if name == "RELEASE" and state in WITHOUT_CURRENT:
+            self._owner.release()
+        elif name == "CLEAR_FAULT" and state == "FAULT":
+            self.fault = "NONE"
+            plant.clear_trips()
+            self._enter("OFF")
+        elif name == "ENABLE" and state == "OFF":
+            self._leaving = False
+            self._owner.arm(plant.tick)
+            plant.mode = core.READY
+            self._enter("READY")
+        elif name == "DISABLE" and state in RESTING:
+            self._switch_off("OFF")
+        elif name == "LEVITATE" and state == "READY":
+            self._torque(1.0)
+            plant.mode = core.LIFT
+            self._enter("LIFTING")
+        elif name == "LAND" and state == "LEVITATED" and abs(plant.speed) <= self._own["landing_speed"]:
+            self._let_down(0.0)  # who asks for it has switched the drive off
+        elif name == "SPIN" and state in HELD and self._machine.turns:
+            plant.set("speed_ref", self._own["speed_ref"])
+        elif name == "STOP" and state in HELD:
+            self._brake()
+        else:
+            return False
+        return True

@@ -1,0 +1,229 @@
+/* The sampled loop: sense, law, one-sample delay, amplifiers (exact) and mechanics (RK4), telemetry means, trips. */
+#include <math.h>
+#include <string.h>
+#include "tsbs.h"
+
+static double least(double a, double b) { return a < b ? a : b; }
+static double most(double a, double b) { return a > b ? a : b; }
+
+/* Nearest multiple of lsb: at this size a double holds no fractions, so adding it rounds. Without a branch, for the sign
+ * of what is nothing but noise cannot be predicted. */
+#define WHOLE 6755399441055744.0
+static double quantise(double x, double lsb, double per_lsb) {
+    return lsb > 0 ? lsb * (x * per_lsb + WHOLE - WHOLE) : x;
+}
+
+static double plane(const double *s, double z, int axis) { return axis ? s[1] - z * s[3] : s[0] + z * s[4]; }
+
+void tsbs_sense(const tsbs_params *p, tsbs_derived *d, tsbs_state *st, tsbs_reading *r, double *coil, double *segment) {
+    const double *s = st->s;
+    double raw[5], tc[4], ts[4];
+    tsbs_at(d, s[5], tc, ts);
+    for (int b = 0; b < 2; b++) {
+        double qy, qx = tsbs_harmonics(d->target_c + 4 * b, d->target_s + 4 * b, tc, ts, &qy);
+        int swap = p->exchange_axes[b] != 0;
+        raw[2 * b + swap] = plane(s, p->z_sensor[b], 0) + qx;
+        raw[2 * b + !swap] = plane(s, p->z_sensor[b], 1) + qy;
+    }
+    raw[4] = s[2];
+    double normal[19];
+    if (p->position_noise > 0) core_draws(&st->noise, normal, 5);
+    else memset(normal, 0, 5 * sizeof *normal);
+    if (p->current_noise > 0) core_draws(&st->noise, normal + 5, 14);
+    else memset(normal + 5, 0, 14 * sizeof *normal);
+    for (int k = 0; k < 5; k++) {
+        double noise = p->position_noise * normal[k];
+        double y = p->position_sign[k] * (p->position_gain[k] * raw[k] + p->position_offset[k]) + noise;
+        r->position[k] = p->stuck[k] != 0 ? p->stuck_value : quantise(y, p->position_lsb, d->per_position_lsb);
+    }
+    double now = st->tick * TICK;
+    for (int k = 0; k < 10; k++) {
+        double noise = p->current_noise * normal[5 + k];
+        double i = p->current_gain[k] * st->coil[k] + p->current_offset[k] + p->current_drift[k] * now + noise;
+        coil[k] = quantise(i, p->current_lsb, d->per_current_lsb);
+    }
+    double scale = 1 + p->segment_scale_drift * now; /* of what the four sensors share */
+    for (int k = 0; k < 4; k++) {
+        double noise = p->current_noise * normal[15 + k];
+        double i = scale * p->segment_sense[k] * st->segment[k] + p->segment_offset[k] + p->segment_drift[k] * now + noise;
+        segment[k] = quantise(i, p->current_lsb, d->per_current_lsb);
+    }
+    double angle = p->encoder_sign * (s[5] + p->encoder_offset);
+    r->angle = p->encoder_counts > 0 ? floor(angle * p->encoder_counts / 6.283185307179586 + 0.5) *
+                                           6.283185307179586 / p->encoder_counts
+                                     : angle;
+}
+
+static void amplifiers(const tsbs_params *p, const tsbs_derived *d, tsbs_state *st, double *coil, double *segment) {
+    double now = st->tick * TICK;
+    int enabled = st->law.mode != OFF;
+    for (int k = 0; k < 10; k++) /* a current that has died away is none: denormal numbers are slow */
+        if (st->coil[k] < 1e-30) st->coil[k] = 0;
+    for (int k = 0; k < 4; k++)
+        if (fabs(st->segment[k]) < 1e-30) st->segment[k] = 0;
+    for (int k = 0; k < 10; k++) { /* the inner loop closes on its own sensor */
+        double ref = enabled ? least(most(st->applied.coil[k], 0), p->coil_limit[k]) : 0;
+        coil[k] = enabled ? most((ref - p->current_offset[k] - p->current_drift[k] * now) * d->per_gain[k], 0) : 0;
+    }
+    double per_scale = 1 / (1 + p->segment_scale_drift * now);
+    for (int k = 0; k < 4; k++) {
+        double ref = least(most(st->applied.segment[k], -p->segment_limit), p->segment_limit);
+        segment[k] = enabled ? (ref - p->segment_offset[k] - p->segment_drift[k] * now) * d->per_sense[k] * per_scale : 0;
+    }
+}
+
+static void approach(const double *from, const double *to, int n, double keep, double *out) {
+    for (int k = 0; k < n; k++) out[k] = to[k] + (from[k] - to[k]) * keep;
+}
+
+static void step(const tsbs_params *p, const tsbs_derived *d, tsbs_state *st, const double *coil_to, const double *segment_to, double h) {
+    double c1[10], c2[10], g0[3], g1[3], g2[3], to[3], k1[14], k2[14], k3[14], k4[14], at[14];
+    double w0 = st->weight, w1 = w0, w2 = w0;
+    if (st->weight_rate > 0) {
+        double left = st->weight_to - w0, step = st->weight_rate * h;
+        w2 = w0 + (left > step ? step : left < -step ? -step : left);
+        w1 = (w0 + w2) / 2;
+    }
+    double half = d->coil_keep, seg = d->segment_keep;
+    approach(st->coil, coil_to, 10, half, c1);
+    approach(c1, coil_to, 10, half, c2);
+    tsbs_mix(p, st->segment, g0); /* one rate for all segments: what acts of them goes by it too */
+    tsbs_mix(p, segment_to, to);
+    approach(g0, to, 3, seg, g1);
+    approach(g1, to, 3, seg, g2);
+    double *s = st->s, m = st->hung_mass;
+    tsbs_rates(p, d, s, st->coil, g0, st->play, m, w0, k1);
+    for (int k = 0; k < 14; k++) at[k] = s[k] + h / 2 * k1[k];
+    tsbs_rates(p, d, at, c1, g1, st->play, m, w1, k2);
+    for (int k = 0; k < 14; k++) at[k] = s[k] + h / 2 * k2[k];
+    tsbs_rates(p, d, at, c1, g1, st->play, m, w1, k3);
+    for (int k = 0; k < 14; k++) at[k] = s[k] + h * k3[k];
+    tsbs_rates(p, d, at, c2, g2, st->play, m, w2, k4);
+    for (int k = 0; k < 14; k++) s[k] += h / 6 * (k1[k] + 2 * k2[k] + 2 * k3[k] + k4[k]);
+    memcpy(st->coil, c2, sizeof c2);
+    approach(st->segment, segment_to, 4, seg * seg, st->segment);
+    st->weight = w2;
+}
+
+/* play operator on the control current, once per tick: what is left of it lags in the force by at most `hysteresis` */
+static void hysteresis(const tsbs_params *p, tsbs_state *st) {
+    for (int a = 0; a < 4; a++) {
+        double control = (st->coil[2 * a] - st->coil[2 * a + 1]) / 2, *follow = st->follow + a;
+        *follow = least(most(*follow, control - p->hysteresis), control + p->hysteresis);
+        st->play[a] = control - *follow;
+    }
+}
+
+/* the external drive's speed goes to its target; it is held over the tick */
+static void drive(tsbs_state *st, tsbs_derived *d) {
+    double left = st->drive_target - st->drive_speed, step = st->drive_ramp * TICK;
+    st->drive_speed += least(most(left, -step), step);
+    d->drive_gain = st->drive_gain;
+    d->drive_limit = st->drive_limit;
+    d->drive_speed = st->drive_speed;
+}
+
+static double near_to(double x, double goal, double step) { return x + least(most(goal - x, -step), step); }
+
+/* what holds over the tick: the lever's weight is handed over gradually, and it may slip */
+static void hold(const tsbs_params *p, tsbs_state *st, tsbs_derived *d) {
+    st->lever_weight = near_to(st->lever_weight, st->lever_weight_to, st->lever_weight_rate * TICK);
+    st->lever_moment = near_to(st->lever_moment, st->lever_moment_to, st->lever_moment_rate * TICK);
+    if (p->lever_slip != 0) st->slip += p->lever_slip * st->lever_moment * cos(st->s[5] + st->slip) * TICK;
+    double lever[4] = {st->lever_weight, st->lever_moment, st->slip, st->lever_inertia + st->ring_inertia};
+    tsbs_hold(p, st->coil, lever, d);
+    d->near = 0; /* a free rotor gains less than 0.1 m/s in a tick */
+    for (int b = 0; b < 2; b++) {
+        double z = p->z_sensor[b], x = plane(st->s, z, 0) - p->ring_x[b], y = plane(st->s, z, 1) - p->ring_y[b];
+        double vx = st->s[6] + z * st->s[10], vy = st->s[7] - z * st->s[9];
+        double inside = p->clearance - 2e-5;
+        if (x * x + y * y > inside * inside || vx * vx + vy * vy > 0.01) d->near = 1;
+    }
+}
+
+static void watch(const tsbs_params *p, tsbs_state *st, const double *coil, double speed) {
+    int trips = 0, lost = 0;
+    for (int b = 0; b < 2; b++) {
+        double x = plane(st->s, p->z_sensor[b], 0) - p->ring_x[b], y = plane(st->s, p->z_sensor[b], 1) - p->ring_y[b];
+        double square = x * x + y * y;
+        if (square > p->clearance * p->clearance) st->flags |= b ? CONTACT_O : CONTACT_I;
+        lost |= square > p->lost_radius * p->lost_radius;
+    }
+    /* a rotor that bounces between the rings is lost too: a tick outside counts two, a tick inside takes one back */
+    st->lost_ticks = st->law.mode != LEVITATE ? 0 : lost ? st->lost_ticks + 2 : st->lost_ticks > 0 ? st->lost_ticks - 1 : 0;
+    if (st->lost_ticks * TICK > 2 * p->lost_time) trips |= TRIP_LOST;
+    for (int k = 0; k < 10; k++) {
+        if (fabs(coil[k]) > p->trip_current) trips |= TRIP_CURRENT;
+        if (st->applied.coil[k] >= p->coil_limit[k]) st->flags |= SATURATED;
+    }
+    for (int k = 0; k < 4; k++)
+        if (fabs(st->applied.segment[k]) > p->segment_limit) st->flags |= SEGMENT_SATURATED;
+    if (fabs(speed) > p->trip_speed) trips |= TRIP_SPEED;
+    if (trips && !st->trips) {
+        st->trip_tick = st->tick;
+        if (trips & TRIP_LOST) st->law.mode = OFF; /* the rings hold it now; current would only fight them */
+    }
+    st->trips |= trips;
+}
+
+void tsbs_start(const tsbs_params *p, const tsbs_control *c, tsbs_state *st, uint64_t seed) {
+    int substeps = st->substeps;
+    memset(st, 0, sizeof *st);
+    (void)c;
+    st->substeps = substeps > 0 ? substeps : 2;
+    core_noise_seed(&st->noise, seed, 0);
+    double zi = p->z_sensor[0], zo = p->z_sensor[1], yi = p->ring_y[0] - p->clearance, yo = p->ring_y[1] - p->clearance;
+    st->s[3] = (yi - yo) / (zo - zi); /* T (6.7): at rest on both rings */
+    st->s[1] = yi + zi * st->s[3];
+    st->s[0] = (p->ring_x[0] * zo - p->ring_x[1] * zi) / (zo - zi);
+    st->s[4] = (p->ring_x[1] - p->ring_x[0]) / (zo - zi);
+    st->angle_before = st->s[5];
+}
+
+/* Runs `ticks` control ticks, or fewer when a trip occurs (then to the end of the telemetry period). Each completed
+ * period appends COLUMNS numbers to `rows`: means of 5 positions, angle (last), speed, 10 coils, 4 segments, flags.
+ * Returns the number of ticks run. */
+int64_t tsbs_run(const tsbs_params *p, const tsbs_control *c, tsbs_state *st, int64_t ticks, double *rows,
+                 int64_t row_limit) {
+    int64_t done = 0, filled = 0;
+    int before = st->trips;
+    tsbs_derived d;
+    tsbs_derive(p, TICK / st->substeps, &d);
+    tsbs_gains g;
+    tsbs_settle(c, &g);
+    double gamma = NAN;
+    while (done < ticks && (filled < row_limit || st->in_period)) {
+        tsbs_reading r;
+        double coil[10], segment[4], coil_to[10], segment_to[4];
+        tsbs_sense(p, &d, st, &r, coil, segment);
+        st->applied = st->next; /* one sample of delay */
+        /* commutation goes by the encoder: one that counts backwards puts the currents at minus the rotor's angle */
+        double at = p->encoder_sign < 0 ? st->applied.gamma - 2 * st->s[5] : st->applied.gamma;
+        if (at != gamma) tsbs_commutate(p, gamma = at, &d);
+        tsbs_act(c, &g, &st->law, &r, &st->next);
+        st->speed = d.speed_keep * st->speed + (1 - d.speed_keep) * (r.angle - st->angle_before) / TICK;
+        st->angle_before = r.angle;
+        watch(p, st, coil, st->speed);
+        for (int k = 0; k < 5; k++) st->sums[k] += r.position[k];
+        st->sums[5] = r.angle;
+        st->sums[6] += st->speed;
+        for (int k = 0; k < 10; k++) st->sums[7 + k] += coil[k];
+        for (int k = 0; k < 4; k++) st->sums[17 + k] += segment[k];
+        amplifiers(p, &d, st, coil_to, segment_to);
+        hysteresis(p, st);
+        drive(st, &d);
+        hold(p, st, &d);
+        for (int k = 0; k < st->substeps; k++) step(p, &d, st, coil_to, segment_to, TICK / st->substeps);
+        st->tick++;
+        done++;
+        if (++st->in_period == PERIOD) {
+            double *row = rows + COLUMNS * filled++;
+            for (int k = 0; k < 21; k++) row[k] = k == 5 ? st->sums[5] : st->sums[k] / PERIOD;
+            row[21] = st->flags;
+            memset(st->sums, 0, sizeof st->sums);
+            st->flags = st->in_period = 0;
+            if (st->trips & ~before) break;
+        }
+    }
+    return done;
+}
