@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import ctypes
 import dataclasses
 from pathlib import Path
 
 import pytest
 
-import sim_backend.core as core
 from bench.errors import ConfigError
 from sim_backend.core import build
+from sim_backend.machines.tsbs import plant
 from sim_backend.machines.tsbs.params import ControlParams, PlantParams
 
 
@@ -19,6 +20,7 @@ def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "tsbs.h").write_text("int one(void);\n")
     (tmp_path / "tsbs.c").write_text('#include "tsbs.h"\nint one(void) { return 1; }\n')
     monkeypatch.setattr(build, "HERE", tmp_path)
+    monkeypatch.setattr(build, "MACHINES", tmp_path / "machines")
     return tmp_path
 
 
@@ -33,6 +35,16 @@ def test_built_once_and_again_when_a_header_changes(sources: Path) -> None:
     second = build.library()
     assert second != first
     assert not first.exists()
+
+
+def test_a_machine_s_folder_belongs_to_it(sources: Path) -> None:
+    without = build.library()
+    folder = sources / "machines" / "pendulum"
+    folder.mkdir(parents=True)
+    (folder / "law.c").write_text('#include "tsbs.h"\nint two(void) { return 2 * one(); }\n')
+    with_it = build.library()
+    assert with_it != without
+    assert ctypes.CDLL(str(with_it)).two() == 2
 
 
 def test_no_compiler(sources: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -51,7 +63,7 @@ def test_compiler_output_is_in_the_error(sources: Path) -> None:
 
 @pytest.mark.parametrize(("kind", "struct"), [(PlantParams, "tsbs_params"), (ControlParams, "tsbs_control")])
 def test_every_field_of_the_header_has_a_default(kind: type, struct: str) -> None:
-    declared = {name: field.type for name, field in core._ffi.typeof(struct).fields}
+    declared = {name: field.type for name, field in plant._ffi.typeof(struct).fields}
     defaults = kind()
     assert set(declared) == {f.name for f in dataclasses.fields(kind)}
     for name, ctype in declared.items():
