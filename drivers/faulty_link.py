@@ -10,7 +10,8 @@ import numpy as np
 from bench.clock import Clock
 from bench.errors import ConfigError
 from bench.link import Link, LinkStats
-from bench.link.fault_injection import CUTS, DEVICE_ONLY, Fault, FrameFaults, lost
+from bench.link.fault_injection import CUTS, DEVICE_ONLY, Fault
+from bench.link.frame_faults import FrameFaults, lost
 from bench.link.frames import ERROR, FrameBatch, empty_batch
 
 

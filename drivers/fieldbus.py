@@ -14,7 +14,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from bench import runlog
@@ -281,37 +281,3 @@ class Fieldbus:
                 raise kind(f"device {name} on link {device.spec.link}: no reading for {silent:.1f} s{why}")
         if self.drive is not None and self.drive.fault:
             raise DriveFault(f"the drive reports {self.drive.fault}; look at it before the next run")
-
-
-@contextmanager
-def open_devices(
-    rig: RigFile, port_of: Callable[[str], RegisterPort], clock: Clock, envelope: Envelope, *, threaded: bool = False,
-    clear_fault: bool = False,
-) -> Iterator[Fieldbus]:  # fmt: skip
-    """The rig's register devices, probed and polled for the block; nothing where it has none. However the block ends, a
-    drive is told to coast.
-
-    Raises:
-        ConfigError: a map that cannot be, or a register that a device does not have.
-        LinkError: a device does not answer.
-        DriveFault: the drive has a fault that stays.
-    """
-    bus = Fieldbus(rig, port_of, clock, envelope, threaded=threaded)
-    try:
-        bus.connect(
-            clear_fault
-        )  # where that fails nothing may be written to a device that is not the one of the rig file
-    except BaseException:
-        bus.close()
-        raise
-    try:
-        yield bus
-    finally:
-        try:
-            if bus.drive is not None:  # before the end of polling is awaited: that may take a lost line's whole time
-                with suppress(BenchError, TimeoutError):
-                    coasting = bus.send(bus.devices[bus.drive.name].command, "coast")
-                    if coasting is not None:
-                        coasting.result(END_S)
-        finally:
-            bus.close()

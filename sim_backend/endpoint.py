@@ -9,7 +9,8 @@ import numpy as np
 from bench.errors import LinkError
 from bench.link import LinkStats
 from bench.link.codec import encode
-from bench.link.fault_injection import CUTS, Fault, FrameFaults, divided, lost
+from bench.link.fault_injection import CUTS, Fault, divided
+from bench.link.frame_faults import FrameFaults, lost
 from bench.link.frames import ERROR, FD, SENT, FrameBatch, batch_of, by_time, empty_batch, joined, packed
 from bench.rigfile import RigFile
 from bench.rigfile.messages import load_messages

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from bench.errors import ConfigError
 from bench.findings import Effect
 from bench.link import LinkStats, fault_injection
-from bench.link.fault_injection import DEVICE_ONLY, KINDS, SHARES, TIMES, Fault, FrameFaults
+from bench.link.fault_injection import DEVICE_ONLY, KINDS, SHARES, TIMES, Fault
+from bench.link.frame_faults import FrameFaults, corrupt_bytes
 from bench.link.frames import ERROR, FRAME, FrameBatch
 
 MS = 1_000_000
@@ -291,8 +292,8 @@ def test_bytes_of_a_share_of_the_packets_are_flipped() -> None:
 
 @given(st.binary(max_size=200), st.integers(0, 5))
 def test_any_bytes_keep_their_length(data: bytes, seed: int) -> None:
-    assert len(fault_injection.corrupt_bytes(data, 1.0, np.random.default_rng(seed))) == len(data)
-    assert fault_injection.corrupt_bytes(data, 0.0, np.random.default_rng(seed)) == data
+    assert len(corrupt_bytes(data, 1.0, np.random.default_rng(seed))) == len(data)
+    assert corrupt_bytes(data, 0.0, np.random.default_rng(seed)) == data
 
 
 def test_every_kind_is_one_of_a_group() -> None:

@@ -11,8 +11,6 @@ import numpy as np
 
 from bench.analysis.orbits import Ellipse
 from bench.analysis.ordermap import OrderMap
-from bench.analysis.peaks import Peak
-from bench.analysis.responses import Response
 from bench.analysis.sampling import Array, Complex
 from bench.analysis.spectra import FullSpectrum, Waterfall
 from bench.figures import Figure, Grid, Series
@@ -21,7 +19,7 @@ UM, RPM = 1e6, 30 / math.pi
 HIGH = 0.16  # of the axis: the tallest line of a waterfall
 SMALL = 0.4  # of the clearance: the reach of an orbit that is shown closer too
 GAP_DEG = 22.0  # of a turn left blank before the mark: the motion runs from the blank into the dot
-_TURN = np.linspace(0, 2 * math.pi, 181)
+TURN = np.linspace(0, 2 * math.pi, 181)
 
 
 @dataclass(frozen=True)
@@ -52,7 +50,7 @@ def orbits(key: str, title: str, shown: Sequence[Orbit], clearance: float, x_pro
     what, closer = "", _closer(shown, clearance, x_probe_deg)
     if closer is not None:
         what = " Beside it the same, closer."
-    series = [Series("clearance", UM * clearance * np.cos(_TURN), UM * clearance * np.sin(_TURN), "guide")]
+    series = [Series("clearance", UM * clearance * np.cos(TURN), UM * clearance * np.sin(TURN), "guide")]
     for o in shown:
         if o.x is not None and o.y is not None:
             series.append(_turned(o.label, o.x, o.y, x_probe_deg, "faint"))
@@ -260,51 +258,4 @@ def full_spectrum(key: str, title: str, found: FullSpectrum, speed: float, highe
         f"amplitude (µm {found.scaling})",
         (Series("orbit", hz, size),),
         notes=tuple(peaks),
-    )
-
-
-def sensitivity(
-    key: str, title: str, curves: Sequence[tuple[str, Response]], zones: Sequence[float], peak: Peak | None = None
-) -> Figure:
-    """abs(S) of each axis over the zones that end at `zones` (A/B, B/C, C/D), with the interval of the greatest."""
-    edges = [0.0, *zones, math.inf]
-    bands = tuple((f"zone {name}", low, high) for name, low, high in zip("ABCD", edges[:-1], edges[1:], strict=True))
-    series = [Series(label, r.hz, np.abs(r.values)) for label, r in curves]
-    notes: tuple[tuple[str, float, float], ...] = ()
-    if peak is not None:
-        half = np.array([max(peak.high - peak.value, peak.value - peak.low)])
-        series.append(Series("maximum, 95 %", np.array([peak.at]), np.array([peak.value]), "points", half))
-        notes = ((f"{peak.value:.2f} at {peak.at:.0f} Hz", peak.at, peak.value),)
-    return Figure(
-        key,
-        title,
-        "Sensitivity |S| with all other loops closed; zones after ISO 14839-3. The synchronous lines are left out.",
-        "frequency (Hz)",
-        "|S|",
-        tuple(series),
-        bands=bands,
-        notes=notes,
-        log_x=True,
-    )
-
-
-def nyquist(key: str, title: str, curves: Sequence[tuple[str, Response]], peak: float, view: float = 3.0) -> Figure:
-    """Open loops about the point -1, with the circle of radius 1/`peak` that they must stay out of."""
-    series = [
-        Series(f"|S| = {peak:g}", -1 + np.cos(_TURN) / peak, np.sin(_TURN) / peak, "guide"),
-        Series("unit circle", np.cos(_TURN), np.sin(_TURN), "guide"),
-    ]
-    for label, r in curves:
-        near = np.abs(r.values + 1) < view
-        series.append(Series(label, np.where(near, r.values.real, np.nan), np.where(near, r.values.imag, np.nan)))
-    series.append(Series("−1", np.array([-1.0]), np.array([0.0]), "mark"))
-    return Figure(
-        key,
-        title,
-        "Open loop L = 1/S − 1. Its distance from −1 is 1/|S|; in the dashed circle about −1 the sensitivity is greater than "
-        "stated.",
-        "real part",
-        "imaginary part",
-        tuple(series),
-        "plane",
     )

@@ -80,7 +80,7 @@ def of_truth(
     @contextmanager
     def connect(supervisor: Supervisor) -> Iterator[OpenRig]:
         from drivers.controller import Controller
-        from drivers.fieldbus import open_devices
+        from drivers.open_devices import open_devices
         from drivers.operator import LineOperator
         from sim_backend.devices.registers import Followed, RegisterBank
 
@@ -123,8 +123,8 @@ def live(
     @contextmanager
     def connect(supervisor: Supervisor) -> Iterator[OpenRig]:
         from drivers.controller import Controller
-        from drivers.fieldbus import open_devices
         from drivers.modbus import open_lines
+        from drivers.open_devices import open_devices
 
         session = new_session()
         with ExitStack() as stack:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from bench.analysis import pictures
+from bench.analysis import loop_pictures
 from bench.analysis.peaks import Peak
 from bench.analysis.responses import Response, loop
 from bench.figures import Figure, Series
@@ -26,7 +26,7 @@ def all_figures(results: Sequence[Result]) -> Iterator[Figure]:
             key = f"{speed * 30 / np.pi:.0f}"
             yield _zones(some, key, named(speed))
             yield _bode(some, key, named(speed))
-            yield pictures.nyquist(
+            yield loop_pictures.nyquist(
                 f"nyquist-{key}", f"Open loop, {named(speed)}", [(r.axis, loop(_survey(r))) for r in some], ZONES[0]
             )
             yield _coherence(some, key, named(speed))
@@ -39,7 +39,7 @@ def _zones(some: Sequence[Result], key: str, name: str) -> Figure:
         e, t = top.estimates["s_max"], top.peaks[0].top
         i = interval(e)
         peak = Peak(e.value, i.low, i.high, e.u, t.at, t.u_at, e.value + t.bias, t.bias)
-    return pictures.sensitivity(
+    return loop_pictures.sensitivity(
         f"sensitivity-{key}", f"Sensitivity, {name}", [(r.axis, r.curve) for r in some], ZONES, peak
     )
 

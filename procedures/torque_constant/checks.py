@@ -15,7 +15,7 @@ import numpy.typing as npt
 from bench.findings import Effect, Finding
 from bench.recording import Recording
 from procedures.servomotor.direction import SEGMENTS
-from procedures.torque_constant import drifts, fit
+from procedures.torque_constant import drifts, hypotheses
 from procedures.torque_constant.drifts import SIGNIFICANT
 from procedures.torque_constant.fit import Balance, Detent
 from procedures.torque_constant.steps import TorqueData
@@ -177,7 +177,7 @@ def _slip(data: TorqueData, b: Balance) -> Iterator[Finding]:
     """A slipping lever's torque falls by half the square of an angle that grows with torque and time: so the current falls
     within each step, the more the heavier the load, and comes back when the load is hung again."""
     s = data.steps
-    carried = fit.loaded(b)
+    carried = hypotheses.loaded(b)
     heavy = np.abs(b.torque) / np.abs(b.torque).max()
     on = s.side != 0
     rate = data.drift[on] * 2 / data.length[on] * np.sign(carried[on])  # A/s, negative where the load gets lighter
@@ -208,7 +208,7 @@ def _detent(b: Balance, held: Detent) -> Iterator[Finding]:
 
 
 def _arms(data: TorqueData, b: Balance, arm_u: float) -> Iterator[Finding]:
-    found = fit.ratio_of_sides(b, data.steps)
+    found = hypotheses.ratio_of_sides(b, data.steps)
     if abs(found.value) > SIGNIFICANT * math.hypot(found.u, arm_u):
         yield Finding(
             "arms-disagree",
@@ -219,7 +219,7 @@ def _arms(data: TorqueData, b: Balance, arm_u: float) -> Iterator[Finding]:
 
 
 def _loads(data: TorqueData, b: Balance, p: Mapping[str, float], mass_u: Sequence[float]) -> Iterator[Finding]:
-    found = [fit.of_load(b, data.steps, k) for k in range(len(data.masses))]
+    found = [hypotheses.of_load(b, data.steps, k) for k in range(len(data.masses))]
     t = [abs(e.value) / math.hypot(e.u, u) if math.isfinite(e.u) else 0.0 for e, u in zip(found, mass_u, strict=True)]
     worst = max(t)
     if worst < SIGNIFICANT:
@@ -234,7 +234,7 @@ def _loads(data: TorqueData, b: Balance, p: Mapping[str, float], mass_u: Sequenc
 
 
 def _cosine(data: TorqueData, b: Balance) -> Iterator[Finding]:
-    chance, largest = fit.shape_over_gamma(b, data.steps)
+    chance, largest = hypotheses.shape_over_gamma(b, data.steps)
     if chance < 1e-6 and largest > 5e-3:
         yield Finding(
             "not-a-cosine",

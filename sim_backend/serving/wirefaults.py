@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-from bench.link.fault_injection import Fault, FrameFaults
+from bench.link.fault_injection import Fault
+from bench.link.frame_faults import FrameFaults
 from bench.link.frames import FrameBatch, empty_batch
 from sim_backend.serving.peers import joined
 

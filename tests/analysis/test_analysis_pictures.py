@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from turning import FULL, Shaft
 
-from bench.analysis import pictures
+from bench.analysis import loop_pictures, pictures
 from bench.analysis.orbits import ellipse
 from bench.analysis.ordermap import order_map
 from bench.analysis.peaks import Peak
@@ -44,8 +44,10 @@ def made() -> dict[str, Figure]:
         pictures.waterfall("waterfall", "t", waterfall(t, x, tacho, FULL, segment=1024, count=12), 300.0),
         pictures.order_map("map", "t", order_map(t, x, tacho, FULL, turns=8)),
         pictures.full_spectrum("full", "t", full(x, np.zeros_like(x), 5000.0), 500.0, 300.0),
-        pictures.sensitivity("sensitivity", "t", [("y", s)], (3, 4, 5), Peak(2.5, 2.4, 2.6, 0.05, 60, 1, 2.6, 0.1)),
-        pictures.nyquist("nyquist", "t", [("y", loop(s))], 3.0),
+        loop_pictures.sensitivity(
+            "sensitivity", "t", [("y", s)], (3, 4, 5), Peak(2.5, 2.4, 2.6, 0.05, 60, 1, 2.6, 0.1)
+        ),
+        loop_pictures.nyquist("nyquist", "t", [("y", loop(s))], 3.0),
     )
     return {f.key: f for f in figures}
 

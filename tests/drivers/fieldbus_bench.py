@@ -12,7 +12,8 @@ from bench.link.session import Session
 from bench.rigfile import RigFile, load_rig
 from bench.rigfile.registers import RegisterPort, Table, Words
 from drivers.controller import Controller
-from drivers.fieldbus import Fieldbus, open_devices
+from drivers.fieldbus import Fieldbus
+from drivers.open_devices import open_devices
 from sim_backend.devices.registers import Followed, RegisterBank
 from sim_backend.endpoint import SimulatedRig
 from sim_backend.truth import draw

@@ -15,8 +15,9 @@ from bench.clock import WallClock
 from bench.errors import LinkError
 from bench.rigfile import RigFile, load_rig
 from bench.rigfile.envelope import Envelope
-from drivers.fieldbus import Fieldbus, open_devices
+from drivers.fieldbus import Fieldbus
 from drivers.modbus import open_lines
+from drivers.open_devices import open_devices
 from sim_backend.controller.controller import SimulatedController
 from sim_backend.core import LEVITATE, LIFT, READY
 from sim_backend.devices.modbus_server import open_fieldbus

@@ -13,7 +13,8 @@ from bench.errors import LinkError
 from bench.rigfile.envelope import Envelope
 from bench.rigfile.registers import RegisterPort, Table, Words
 from bench.run.job import WatchedClock
-from drivers.fieldbus import LEASE_S, open_devices
+from drivers.fieldbus import LEASE_S
+from drivers.open_devices import open_devices
 
 COAST = (0, (0,))
 

@@ -7,7 +7,7 @@ from fieldbus_bench import Bench, changed, opened, rig
 
 from bench.errors import ConfigError, DeviceFault
 from bench.rigfile import RigFile
-from drivers.fieldbus import open_devices
+from drivers.open_devices import open_devices
 
 
 def test_a_fault_of_an_earlier_run_is_cleared_and_told() -> None:

@@ -16,7 +16,8 @@ import pytest
 from bench.cli.opening import SIMULATED, beat_of
 from bench.errors import BenchError, ConfigError, DeviceFault, InterlockError
 from bench.findings import Finding
-from bench.link.fault_injection import FrameFaults, parse
+from bench.link.fault_injection import parse
+from bench.link.frame_faults import FrameFaults
 from bench.link.frames import FrameBatch
 from bench.link.health import Health
 from bench.link.telemetry import TelemetryDecoder

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.errors import AnalysisError
-from procedures.torque_constant import fit
+from procedures.torque_constant import fit, hypotheses
 from procedures.torque_constant.fit import NO_DETENT, Steps, balance, detent
 from procedures.torque_constant.procedure import Plan, visits
 
@@ -190,13 +190,13 @@ def test_detent_is_found_and_taken_off() -> None:
 
 def test_each_extra_term_finds_its_own() -> None:
     s = made(2.87, 0.0, noise=5e-4)
-    assert abs(fit.ratio_of_sides(balance(s, P, 3, 8.0), s).t) < 4
+    assert abs(hypotheses.ratio_of_sides(balance(s, P, 3, 8.0), s).t) < 4
     longer = balance(s, {**P, "lever_left": 0.232}, 3, 8.0)
-    assert fit.ratio_of_sides(longer, s).value == pytest.approx(-0.0087, abs=1e-3)
+    assert hypotheses.ratio_of_sides(longer, s).value == pytest.approx(-0.0087, abs=1e-3)
     heavier = balance(s, {**P, "mass_1": 0.98}, 3, 8.0)
-    assert fit.of_load(heavier, s, 1).value == pytest.approx(0.02, abs=2e-3)
-    assert fit.shape_over_gamma(balance(s, P, 3, 8.0), s)[0] > 1e-4
-    assert fit.shape_over_gamma(balance(s, P, 3, 6.0), s)[0] < 1e-6
+    assert hypotheses.of_load(heavier, s, 1).value == pytest.approx(0.02, abs=2e-3)
+    assert hypotheses.shape_over_gamma(balance(s, P, 3, 8.0), s)[0] > 1e-4
+    assert hypotheses.shape_over_gamma(balance(s, P, 3, 6.0), s)[0] < 1e-6
 
 
 def test_arms_and_masses_within_their_certificates_are_no_departure_from_the_cosine() -> None:
@@ -206,7 +206,7 @@ def test_arms_and_masses_within_their_certificates_are_no_departure_from_the_cos
     for seed in range(200):
         s = made(2.87, 0.008, noise=5e-5, seed=seed, ripple=0.005)
         found = balance(s, {**P, "lever_left": 0.23005, "mass_1": 1.0001}, 3, 8.0)
-        chance, largest = fit.shape_over_gamma(found, s)
+        chance, largest = hypotheses.shape_over_gamma(found, s)
         chances.append(chance)
         assert largest < 1e-3
     assert sum(c < 0.01 for c in chances) <= 8
@@ -219,7 +219,7 @@ def test_a_torque_that_is_no_cosine_over_gamma_is_seen(depth: float) -> None:
     s = made(2.87, 0.003, noise=5e-5)
     turn = 8 * (s.gamma - 0.003)
     bent = replace(s, segments=s.segments * (1 + depth * np.cos(3 * turn) * (s.side != 0))[:, None])
-    chance, largest = fit.shape_over_gamma(balance(bent, P, 3, 8.0), bent)
+    chance, largest = hypotheses.shape_over_gamma(balance(bent, P, 3, 8.0), bent)
     assert chance < 1e-6
     assert largest == pytest.approx(abs(depth), rel=0.6)
 
@@ -229,7 +229,7 @@ def test_three_phase_angles_leave_no_shape_to_look_for() -> None:
     s = made(2.87, 0.003, noise=5e-5)
     three = np.isin(s.gamma, np.unique(s.gamma)[1:4])
     part = Steps(*(getattr(s, n)[three] for n in ("segments", "angle", "gamma", "time", "side", "load", "spread")))
-    assert fit.shape_over_gamma(balance(part, P, 3, 8.0), part) == (1.0, 0.0)
+    assert hypotheses.shape_over_gamma(balance(part, P, 3, 8.0), part) == (1.0, 0.0)
 
 
 def test_a_run_that_was_stopped_early_is_told() -> None:

@@ -20,7 +20,8 @@ from bench.rigfile import capture, load_rig
 from bench.run.job import WatchedClock
 from bench.run.supervisor import Supervisor
 from drivers.controller import Controller
-from drivers.fieldbus import Fieldbus, open_devices
+from drivers.fieldbus import Fieldbus
+from drivers.open_devices import open_devices
 from sim_backend.devices.registers import Followed, RegisterBank
 from sim_backend.endpoint import SimulatedRig
 from sim_backend.truth import draw
