@@ -12,7 +12,8 @@ from typing import Annotated
 
 import typer
 
-from bench.cli.options import Backend, Calibrations, Keep, OperatorKind, Out, RunArgument, Table, Verbose
+from bench.cli import stored
+from bench.cli.options import Backend, Calibrations, Keep, OperatorKind, Out, Verbose
 from bench.cli.status import run_app
 
 app = typer.Typer(
@@ -179,73 +180,8 @@ def campaign(
     )
 
 
-@app.command()
-def adopt(
-    run: RunArgument,
-    rig: Annotated[str, typer.Option("--rig", metavar="RIG", help="Default: the rig file the run was made with.")] = "",
-    calibrations: Calibrations = None,
-    anyway: Annotated[
-        bool, typer.Option("--anyway", help="Also a run that is neither PASS nor DONE; the file says so.")
-    ] = False,
-) -> int:
-    """Make a run's results the rig's current calibration.
-
-    The last line on standard output is its file.
-    """
-    from bench.cli.adopt import adopt_command
-
-    return adopt_command(run, rig, calibrations, anyway)
-
-
-@app.command("calibrations")
-def calibrations_(
-    rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig file, or its name in rigs/.")],
-    calibrations: Calibrations = None,
-) -> int:
-    """List a rig's calibrations with their age and state."""
-    from bench.cli.calibrations import calibrations_command
-
-    return calibrations_command(rig, calibrations)
-
-
-@app.command()
-def analyse(run: RunArgument, verbose: Verbose = False) -> int:
-    """Analyse a stored run again, from its recording alone.
-
-    Writes RUN/analyses/<UTC>/record.json; the original stays as it is.
-    """
-    from bench.cli.runs import analyse_command
-
-    return analyse_command(run, verbose)
-
-
-@app.command()
-def report(run: RunArgument) -> int:
-    """Build the report of a stored run again."""
-    from bench.cli.runs import report_command
-
-    return report_command(run)
-
-
-@app.command()
-def runs(out: Out = Path("runs")) -> int:
-    """List the runs with their outcomes."""
-    from bench.cli.runs import runs_command
-
-    return runs_command(out)
-
-
-@app.command()
-def export(
-    run: RunArgument, to: Annotated[Table, typer.Option("--to", help="File format of the tables.")] = Table.PARQUET
-) -> int:
-    """Write the channels, results and figures of a run as tables.
-
-    One file per stream and per figure, in RUN/export.
-    """
-    from bench.cli.export import export_command
-
-    return export_command(run, to.value)
+for of_stored_runs in (stored.adopt, stored.calibrations, stored.analyse, stored.report, stored.runs, stored.export):
+    app.command()(of_stored_runs)
 
 
 @app.command()
