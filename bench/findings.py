@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -30,3 +31,29 @@ class Finding:
     where: str = ""
     effect: Effect = Effect.NOTE
     concerns: tuple[str, ...] = ()
+
+
+class Ended(Exception):
+    """An evaluation ends here: what would come next rests on data that a finding says are wrong."""
+
+
+class Findings:
+    """The findings of an evaluation, in the order in which they are told."""
+
+    def __init__(self) -> None:
+        self.told: list[Finding] = []
+
+    def add(self, found: Iterable[Finding]) -> None:
+        """Tell them; the evaluation goes on."""
+        self.told += found
+
+    def gate(self, found: Iterable[Finding]) -> None:
+        """Tell them; the evaluation ends here if one of them is an error.
+
+        Raises:
+            Ended: one is.
+        """
+        found = list(found)
+        self.told += found
+        if any(f.effect is Effect.ERROR for f in found):
+            raise Ended

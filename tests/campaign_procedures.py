@@ -25,5 +25,5 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
 
 procedure: Any = dataclasses.replace(
     tiny_procedures.levitated, name="tiny-needing", title="Needs a look at the supply", measures=(DOUBLE,),
-    analyse=analyse, needs=lambda plan: (Need("tiny-levitated", {"bias_A": plan.bias_A}),),
+    measured=analyse, needs=lambda plan: (Need("tiny-levitated", {"bias_A": plan.bias_A}),),
 )  # fmt: skip

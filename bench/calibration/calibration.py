@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, date, datetime, timedelta
 from typing import Any, ClassVar, Literal
@@ -203,16 +203,3 @@ def settings_differ(found: Mapping[str, float], needed: Mapping[str, float]) -> 
 def number(value: float) -> str:
     """A setting as it is typed: a whole number without a point."""
     return str(int(value)) if float(value).is_integer() and abs(value) < 1e15 else repr(float(value))
-
-
-def facts_of(procedure: Any, recording: Any, results: Iterable[Any] | None = None) -> Mapping[str, Estimate]:
-    """What a run of a procedure states as facts: its `facts`, or what `analyse` yields, by quantity (`name@where`).
-
-    `results` are what `analyse` yielded, where that is known already.
-    """
-    facts: Callable[[Any], Mapping[str, Estimate]] | None = procedure.facts
-    if facts is not None:
-        return facts(recording)
-    found = procedure.analyse(recording) if results is None else results
-    measured = [m for m in found if hasattr(m, "estimate")]
-    return {m.quantity.name + (f"@{m.where}" if m.where else ""): m.estimate for m in measured}

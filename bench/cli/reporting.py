@@ -44,7 +44,7 @@ def build(directory: Path, record: Record, procedure: Procedure, recording: Reco
 def figures(record: Record, procedure: Procedure, recording: Recording[Any] | None) -> Iterable[Shown]:
     """What the procedure draws of a run; nothing of one that measured nothing."""
     measured = any(m.value is not None for m in record.measurements)
-    return procedure.figures(recording) if recording is not None and measured else ()
+    return procedure.drawn(recording) if recording is not None and measured else ()
 
 
 def conditions(recording: Recording[Any]) -> dict[str, str]:

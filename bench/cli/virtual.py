@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bench.calibration import Calibration, Need, facts_of, settings_differ
+from bench.calibration import Calibration, Need, settings_differ
 from bench.cli import opening
 from bench.cli.compose import load_procedure
 from bench.errors import ConfigError
@@ -59,7 +59,7 @@ class Simulated:
     def calibration(self) -> Calibration:
         """What `bench adopt` would make of this run; its run id and its date follow from the seed, so that a chain of
         such runs gives the same numbers each time. The file's digest is left out."""
-        facts = facts_of(self.procedure, self.recording, self.results)
+        facts = self.procedure.stated(self.recording)
         run_id = f"{self.procedure.name}-sim-{self.seed}"
         return calibration_of(self.procedure, self.recording, facts, run_id=run_id)
 

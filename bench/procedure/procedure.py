@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bench.figures import Shown
-from bench.findings import Finding
+from bench.findings import Ended, Finding, Findings
 from bench.plan import BenchPlan
 from bench.procedure.requires import Requires
 from bench.procedure.roles import RigState
@@ -31,7 +31,11 @@ def read_method(file: str) -> str:
     return Path(file).with_name("method.md").read_text("utf-8")
 
 
-def _no_figures(_: Recording[Any]) -> Iterable[Shown]:
+def _as_recorded(recording: Recording[Any], _: Findings) -> Recording[Any]:
+    return recording
+
+
+def _no_figures(_: Any) -> Iterable[Shown]:
     return ()
 
 
@@ -57,19 +61,30 @@ def _numbers_of(plan: BenchPlan) -> Mapping[str, float]:
 
 
 @dataclass(frozen=True)
+class Evaluated:
+    """What a procedure made of a recording: findings, its result, and whether it `ended` before there was one."""
+
+    findings: tuple[Finding, ...]
+    result: Any
+    ended: bool
+
+
+@dataclass(frozen=True)
 class Procedure:
-    """A procedure. `acquire` moves the machine, `analyse` is pure and sees only the closed file.
+    """A procedure. `acquire` moves the machine, `evaluate` is pure and sees only the closed file.
 
     `requires` is what a rig must have, whatever the plan. `check` looks at a plan against a rig that has it, before anything
     starts, and names what cannot work. `settings` are the
     controller parameters (SI) that the runner writes in READY, before it levitates. `step_count` is how many steps
     `acquire` will record, for the progress display; 0 is unknown. `fewest_steps` is how many a run that goes to its end has
     at least, where these are fewer.
-    `analyse` yields what it measured and what it found, in the order of the report. `figures` come in the order in which a
-    specialist looks at them: the first two stand on page 1, and so do its tables.
+    `evaluate` makes of a recording what all that follows needs, once, and tells its findings as it goes; it ends where one
+    that is told at a gate is an error, and then nothing is measured nor drawn. Without it the recording itself is what
+    follows needs. `measured` yields the quantities of it in the order of the report. `figures` come in the order in which
+    a specialist looks at them: the first two stand on page 1, and so do its tables.
 
     `needs` are the calibrations that a run with that plan uses; it reads them with `Recording.calibration`. `facts` is
-    what `bench adopt` keeps of a run: values by name, None for what `analyse` yields. `holds_for` are the settings that these
+    what `bench adopt` keeps of a run: values by name, None for what `measured` yields. `holds_for` are the settings that these
     facts hold for, by default the plan's numbers; a setting that a need names must be equal in it.
 
     `reached` are patterns of influences' identities ("!" takes away again): a check of the procedure sees an error of such a
@@ -83,15 +98,16 @@ class Procedure:
     state: RigState
     plan: type[BenchPlan]
     acquire: Callable[[Rig, Any, Recorder], None]
-    analyse: Callable[[Recording[Any]], Iterator[Measured | Finding]]
-    figures: Callable[[Recording[Any]], Iterable[Shown]] = field(default=_no_figures)
+    measured: Callable[[Any], Iterator[Measured | Finding]]
+    evaluate: Callable[[Recording[Any], Findings], Any] = field(default=_as_recorded)
+    figures: Callable[[Any], Iterable[Shown]] = field(default=_no_figures)
     requires: Requires = field(default=Requires())
     check: Callable[[RigFile, Any], Iterable[str]] = field(default=_no_problems)
     settings: Callable[[Any], Mapping[str, float]] = field(default=_no_settings)
     step_count: Callable[[Any], int] = field(default=_unknown_count)
     fewest_steps: Callable[[Any], int] | None = None
     needs: Callable[[Any], tuple[Need, ...]] = field(default=_no_needs)
-    facts: Callable[[Recording[Any]], Mapping[str, Estimate]] | None = None
+    facts: Callable[[Any], Mapping[str, Estimate]] | None = None
     holds_for: Callable[[Any], Mapping[str, float]] = field(default=_numbers_of)
     optional: tuple[
         Quantity, ...
@@ -103,3 +119,42 @@ class Procedure:
     def problems(self, rig: RigFile, plan: Any) -> tuple[str, ...]:
         """What cannot work, found before anything starts: what the rig lacks, else what the plan asks too much of it."""
         return self.requires.lacking(rig) or tuple(self.check(rig, plan))
+
+    def evaluated(self, recording: Recording[Any]) -> Evaluated:
+        """What `evaluate` makes of a recording and what it finds in it, made the first time it is asked for."""
+        return recording.once(self._evaluated)
+
+    def _evaluated(self, recording: Recording[Any]) -> Evaluated:
+        findings, result, ended = Findings(), None, False
+        try:
+            result = self.evaluate(recording, findings)
+        except Ended:
+            ended = True
+        return Evaluated(tuple(findings.told), result, ended)
+
+    def analyse(self, recording: Recording[Any]) -> Iterator[Measured | Finding]:
+        """What a closed recording says: findings first, then what was measured."""
+        found = self.evaluated(recording)
+        yield from found.findings
+        if not found.ended:
+            yield from self.measured(found.result)
+
+    def drawn(self, recording: Recording[Any]) -> Iterable[Shown]:
+        """The figures of a recording; none where its evaluation ended early."""
+        found = self.evaluated(recording)
+        return () if found.ended else self.figures(found.result)
+
+    def stated(self, recording: Recording[Any]) -> Mapping[str, Estimate]:
+        """What a recording states as facts: `facts`, or what was measured, by quantity (`name@where`); nothing where its
+        evaluation ended early."""
+        found = self.evaluated(recording)
+        if found.ended:
+            return {}
+        if self.facts is not None:
+            return self.facts(found.result)
+        return named(m for m in self.measured(found.result) if isinstance(m, Measured))
+
+
+def named(measured: Iterable[Measured]) -> Mapping[str, Estimate]:
+    """Estimates by quantity, and by `name@where` where there are several places."""
+    return {m.quantity.name + (f"@{m.where}" if m.where else ""): m.estimate for m in measured}

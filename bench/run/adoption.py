@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from bench import __version__, rundir
-from bench.calibration import Backend, Calibration, adopted, certificates_of, changed_certificates, facts_of
+from bench.calibration import Backend, Calibration, adopted, certificates_of, changed_certificates
 from bench.calibration.store import Store
 from bench.errors import ConfigError
 from bench.findings import SIMULATED_CONTROLLER
@@ -113,7 +113,7 @@ class Adoption:
             raise ConfigError(f"{where}: the run was stopped before its end; expected a completed one")
         served = any(f.code == SIMULATED_CONTROLLER for f in again.findings)
         made = calibration_of(
-            procedure, recording, facts_of(procedure, recording), run_id=again.run_id,
+            procedure, recording, procedure.stated(recording), run_id=again.run_id,
             began=datetime.fromisoformat(again.started), outcome=outcome.value, sha256=self.digest, served=served,
         )  # fmt: skip
         refuse_the_future(where, made, now or datetime.now(UTC))

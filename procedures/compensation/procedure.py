@@ -164,7 +164,7 @@ procedure = Procedure(
     state=RigState.READY,
     plan=Plan,
     acquire=acquire,
-    analyse=analyse,
+    measured=analyse,
     figures=figures,
     requires=replace(unbalance.REQUIRES, parameters=(*unbalance.REQUIRES.parameters, *SETTINGS["corrected"])),
     check=check,

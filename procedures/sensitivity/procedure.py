@@ -250,7 +250,7 @@ procedure = Procedure(
     state=RigState.READY,
     plan=Plan,
     acquire=acquire,
-    analyse=analyse,
+    measured=analyse,
     figures=figures,
     requires=Requires(channels=TOLD, parameters=(*PARAMETERS, "law"), capture=(*LOOP, *PULSED, *CURRENTS)),
     check=check,

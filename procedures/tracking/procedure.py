@@ -215,7 +215,7 @@ procedure = Procedure(
     state=RigState.READY,
     plan=Plan,
     acquire=acquire,
-    analyse=analyse,
+    measured=analyse,
     figures=figures,
     requires=Requires(channels=CHANNELS, sensors=POSITIONS, parameters=PARAMETERS, geometry=LENGTHS),
     check=check,

@@ -100,7 +100,7 @@ def _figures(directory: CampaignDirectory, d: Done) -> tuple[Figure, ...]:
         return ()
     try:
         recording: Recording[Any] = Recording.open(run.recording, d.step.procedure.plan)
-        shown = (s for s in d.step.procedure.figures(recording) if isinstance(s, Figure))
+        shown = (s for s in d.step.procedure.drawn(recording) if isinstance(s, Figure))
         return tuple(islice(shown, FIGURES))
     except BenchError:
         return ()
