@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any, NoReturn
 
 SIMULATED_CONTROLLER = "simulated-controller"  # a live run whose controller says that it is a simulated one
 
@@ -34,7 +35,12 @@ class Finding:
 
 
 class Ended(Exception):
-    """An evaluation ends here: what would come next rests on data that a finding says are wrong."""
+    """An evaluation ends here: what would come next rests on data that a finding says are wrong. `so_far` is what there is to
+    be drawn of it, if anything."""
+
+    def __init__(self, so_far: Any = None) -> None:
+        super().__init__()
+        self.so_far = so_far
 
 
 class Findings:
@@ -47,13 +53,28 @@ class Findings:
         """Tell them; the evaluation goes on."""
         self.told += found
 
-    def gate(self, found: Iterable[Finding]) -> None:
-        """Tell them; the evaluation ends here if one of them is an error.
+    def gate(self, found: Iterable[Finding], codes: Collection[str] | None = None, so_far: Any = None) -> None:
+        """Tell them; the evaluation ends here if one of them is an error, or with `codes` only if one has such a code. What
+        there is `so_far` is drawn then.
 
         Raises:
             Ended: one is.
         """
         found = list(found)
         self.told += found
-        if any(f.effect is Effect.ERROR for f in found):
-            raise Ended
+        if any(f.effect is Effect.ERROR if codes is None else f.code in codes for f in found):
+            raise Ended(so_far)
+
+    @property
+    def wrong(self) -> bool:
+        """Whether one of them is an error."""
+        return any(f.effect is Effect.ERROR for f in self.told)
+
+    def end(self, finding: Finding) -> NoReturn:
+        """Tell why there is no result, and end the evaluation.
+
+        Raises:
+            Ended: always.
+        """
+        self.told.append(finding)
+        raise Ended

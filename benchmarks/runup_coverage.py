@@ -25,7 +25,6 @@ from bench.rigfile import load_rig
 from bench.uncertainty import interval
 from bench.units import RPM
 from procedures.amb_rotor.channels import AXES
-from procedures.run_up.procedure import evaluated
 from procedures.synchronous.dwelling import CODES, SETTINGS
 from sim_backend.machines.amb5dof import truth_passage, truth_unbalance
 from sim_backend.truth import draw
@@ -52,7 +51,7 @@ def one(name: str, seed: int, plan: dict[str, Any], folder: Path, hits: Hits) ->
     if serious:
         print(f"seed {seed}: {', '.join(serious)}")
         return
-    run = evaluated(done.recording)[1]
+    run = done.procedure.evaluated(done.recording).result
     if run is None or run.near is None:
         return
     made, plant = done.recording.plan, draw(rig, seed).plant

@@ -138,12 +138,11 @@ def _balance(done: Simulated) -> Found:
 def _passage(done: Simulated) -> Found:
     """Vectors, orbits and D_max where the speed stands; what is critical at the speeds where the run found it."""
     from procedures.amb_rotor.channels import AXES, PLANES
-    from procedures.run_up.procedure import evaluated
     from procedures.synchronous.dwelling import CODES, SETTINGS
     from sim_backend.machines.amb5dof import truth_passage, truth_unbalance
 
     plan: Any = done.recording.plan
-    run = done.recording.once(evaluated)[1]
+    run = done.procedure.evaluated(done.recording).result
     if run is None or run.near is None:
         return
     plant = done.drawn.plant

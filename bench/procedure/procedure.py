@@ -35,7 +35,7 @@ def _as_recorded(recording: Recording[Any], _: Findings) -> Recording[Any]:
     return recording
 
 
-def _no_figures(_: Any) -> Iterable[Shown]:
+def _no_figures(_: Any, _recording: Recording[Any]) -> Iterable[Shown]:
     return ()
 
 
@@ -62,7 +62,7 @@ def _numbers_of(plan: BenchPlan) -> Mapping[str, float]:
 
 @dataclass(frozen=True)
 class Evaluated:
-    """What a procedure made of a recording: findings, its result, and whether it `ended` before there was one."""
+    """What a procedure made of a recording: findings, its result, and whether it `ended` before that was whole."""
 
     findings: tuple[Finding, ...]
     result: Any
@@ -100,7 +100,7 @@ class Procedure:
     acquire: Callable[[Rig, Any, Recorder], None]
     measured: Callable[[Any], Iterator[Measured | Finding]]
     evaluate: Callable[[Recording[Any], Findings], Any] = field(default=_as_recorded)
-    figures: Callable[[Any], Iterable[Shown]] = field(default=_no_figures)
+    figures: Callable[[Any, Recording[Any]], Iterable[Shown]] = field(default=_no_figures)
     requires: Requires = field(default=Requires())
     check: Callable[[RigFile, Any], Iterable[str]] = field(default=_no_problems)
     settings: Callable[[Any], Mapping[str, float]] = field(default=_no_settings)
@@ -128,8 +128,8 @@ class Procedure:
         findings, result, ended = Findings(), None, False
         try:
             result = self.evaluate(recording, findings)
-        except Ended:
-            ended = True
+        except Ended as end:
+            result, ended = end.so_far, True
         return Evaluated(tuple(findings.told), result, ended)
 
     def analyse(self, recording: Recording[Any]) -> Iterator[Measured | Finding]:
@@ -140,9 +140,9 @@ class Procedure:
             yield from self.measured(found.result)
 
     def drawn(self, recording: Recording[Any]) -> Iterable[Shown]:
-        """The figures of a recording; none where its evaluation ended early."""
+        """The figures of a recording; none where its evaluation ended early and left nothing to draw."""
         found = self.evaluated(recording)
-        return () if found.ended else self.figures(found.result)
+        return () if found.ended and found.result is None else self.figures(found.result, recording)
 
     def stated(self, recording: Recording[Any]) -> Mapping[str, Estimate]:
         """What a recording states as facts: `facts`, or what was measured, by quantity (`name@where`); nothing where its

@@ -10,13 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from pydantic import Field
 
 from bench.figures import Figure
-from bench.findings import Finding
+from bench.findings import Ended, Findings
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
@@ -127,29 +126,26 @@ class Analysis:
     estimates: dict[str, Estimate]
 
 
-def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
-    """Findings first (they decide what the numbers are worth), then the six quantities."""
-    if first := list(checks.of_first(recording)):
-        yield from first
-        return
-    data = hangings(recording)
-    findings = list(checks.of_signals(data, recording.plan))
-    yield from findings
-    if any(f.code in checks.FATAL for f in findings):
-        return
-    result = evaluate(recording)
-    values = {name: e.value for name, e in result.inputs.items()}
-    findings = list(
-        checks.of_fit(data, result.fit, result.scatter, result.loads, result.beyond, values, recording.plan,
-                           masses_u(recording))
-    )  # fmt: skip
-    yield from findings
-    if any(f.code in checks.FATAL for f in findings) or hypotheses.mistaken(result.loads, result.beyond):
-        return
-    estimates = _scattered(result)
-    if tied := list(both_coils.of_fit(estimates, data.hangings, recording.plan.bias_A)):
-        yield from tied
-        return
+def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
+    """Fit, scatter and estimates with their influences."""
+    findings.gate(checks.of_first(recording))
+    plan = recording.plan
+    data = read_hangings(recording, plan.masses)
+    findings.gate(checks.of_signals(data, plan), checks.FATAL)
+    a = _fitted(recording, data)
+    values = {name: e.value for name, e in a.inputs.items()}
+    findings.gate(
+        checks.of_fit(data, a.fit, a.scatter, a.loads, a.beyond, values, plan, masses_u(recording)), checks.FATAL
+    )
+    if hypotheses.mistaken(a.loads, a.beyond):
+        raise Ended
+    findings.gate(both_coils.of_fit(_scattered(a), data.hangings, plan.bias_A))
+    return a
+
+
+def measured(a: Analysis) -> Iterator[Measured]:
+    """The six quantities."""
+    estimates = _scattered(a)
     for quantity in MEASURES:
         yield quantity.measured(estimates[quantity.name])
 
@@ -160,23 +156,13 @@ def _scattered(a: Analysis) -> dict[str, Estimate]:
     return {q.name: a.estimates[q.name] + terms[q.name] for q in MEASURES}
 
 
-def facts(recording: Recording[Plan]) -> dict[str, Estimate]:
+def facts(a: Analysis) -> dict[str, Estimate]:
     """The six quantities, and K, K2 and F0 of each bearing at each angle, all with one scatter for each angle: what a later
     procedure takes at one angle and what it takes over a turn then stay correlated as they are."""
-    result = evaluate(recording)
-    return amb_calibration_by_angle.with_scatter(result.estimates, result.spread, result.scatter.dof)
+    return amb_calibration_by_angle.with_scatter(a.estimates, a.spread, a.scatter.dof)
 
 
-@lru_cache(maxsize=1)
-def hangings(recording: Recording[Plan]) -> HangingData:
-    """What was recorded, step by step. Kept, like what is made of it."""
-    return read_hangings(recording, recording.plan.masses)
-
-
-@lru_cache(maxsize=1)
-def evaluate(recording: Recording[Plan]) -> Analysis:
-    """Fit, scatter and estimates with their influences. Kept, because measurements, facts and figures all need it."""
-    data = hangings(recording)
+def _fitted(recording: Recording[Plan], data: HangingData) -> Analysis:
     plan = recording.plan
     inputs = fit_inputs(recording.rig, plan)
     count = len(plan.masses)
@@ -251,16 +237,10 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         yield f"masses: found {kg} kg; expected different masses in ascending order"
 
 
-def figures(recording: Recording[Plan]) -> Iterable[Figure]:
-    """Fit, residuals, one step over time, and both polar plots; empty when the data carry no fit."""
-    if any(checks.of_first(recording)):
-        return ()
-    data = hangings(recording)
-    if any(f.code in checks.FATAL for f in checks.of_signals(data, recording.plan)):
-        return ()
-    result = evaluate(recording)
-    values = {name: e.value for name, e in result.inputs.items()}
-    return drawn.all_figures(recording, data, result.fit, values)
+def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
+    """Fit, residuals, one step over time, and both polar plots."""
+    values = {name: e.value for name, e in a.inputs.items()}
+    return drawn.all_figures(recording, a.data, a.fit, values)
 
 
 procedure = Procedure(
@@ -270,7 +250,8 @@ procedure = Procedure(
     state=RigState.LEVITATED,
     plan=Plan,
     acquire=acquire,
-    measured=analyse,
+    evaluate=evaluate,
+    measured=measured,
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),

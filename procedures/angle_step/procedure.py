@@ -8,13 +8,14 @@ T (6.19) with (6.24): force first, and torque with what it leaves.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 from pydantic import Field
 
 from bench.figures import Figure
-from bench.findings import Finding
+from bench.findings import Findings
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
@@ -24,8 +25,9 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.angle_step import checks, estimates, response
 from procedures.angle_step import figures as drawn
+from procedures.angle_step.estimates import Result
 from procedures.angle_step.response import Loop
-from procedures.angle_step.steps import CHANNELS, POSITIONS, STEP, Case, cases, read_moves
+from procedures.angle_step.steps import CHANNELS, POSITIONS, STEP, Case, Done, cases, read_moves
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.direction import of_probe
 from procedures.shared import assumptions
@@ -113,22 +115,29 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     write("angle_slew", rig.file.parameters["angle_slew"].default)
 
 
-def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
-    """Findings first, then the quantities of each case."""
-    wrong = [*of_probe(recording), *segments.of_nudges(recording)]
-    yield from wrong
-    if wrong:
-        return
-    plan = recording.plan
+@dataclass(frozen=True)
+class Results:
+    """What was recorded, move by move, and what each case makes of it."""
+
+    moves: Sequence[Done]
+    by_case: Mapping[Case, Result]
+
+
+def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
+    """The response of each case."""
+    findings.gate([*of_probe(recording), *segments.of_nudges(recording)])
+    plan, rig = recording.plan, recording.rig
     moves = read_moves(recording)
-    signals = list(checks.of_signals(moves, plan))
-    yield from signals
-    if any(f.code in checks.FATAL for f in signals):
-        return
-    results = estimates.by_case(moves, recording.rig, plan.band, 2 * math.pi / plan.encoder_counts)
-    yield from checks.of_responses(results, plan, {c: _loop(recording.rig, plan, c) for c in results})
-    yield from checks.compared(results)
-    for case, result in results.items():
+    findings.gate(checks.of_signals(moves, plan), checks.FATAL)
+    by_case = estimates.by_case(moves, rig, plan.band, 2 * math.pi / plan.encoder_counts)
+    findings.add(checks.of_responses(by_case, plan, {c: _loop(rig, plan, c) for c in by_case}))
+    findings.add(checks.compared(by_case))
+    return Results(moves, by_case)
+
+
+def measured(results: Results) -> Iterator[Measured]:
+    """The quantities of each case."""
+    for case, result in results.by_case.items():
         for quantity in (q for q in MEASURES if q.name in result.estimates):
             yield quantity.measured(result.estimates[quantity.name], case.where)
 
@@ -160,14 +169,9 @@ def _too_fast(rig: RigFile, plan: Plan) -> Iterator[str]:
                f"allows {rig.envelope.max_speed_rad_s:g} rad/s, of which {carrying.MARGIN:.0%} is planned with")  # fmt: skip
 
 
-def figures(recording: Recording[Plan]) -> Iterable[Figure]:
-    """Orbits, angle and segment currents of the largest step, and peaks over the cases; empty without moves."""
-    if not len(recording.steps(STEP)):
-        return ()
-    moves = read_moves(recording)
-    plan = recording.plan
-    results = estimates.by_case(moves, recording.rig, plan.band, 2 * math.pi / plan.encoder_counts)
-    return drawn.all_figures(moves, results, recording.rig)
+def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
+    """Orbits, angle and segment currents of the largest step, and peaks over the cases."""
+    return drawn.all_figures(results.moves, results.by_case, recording.rig)
 
 
 procedure = Procedure(
@@ -177,7 +181,8 @@ procedure = Procedure(
     state=RigState.LEVITATED,
     plan=Plan,
     acquire=acquire,
-    measured=analyse,
+    evaluate=evaluate,
+    measured=measured,
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
-from functools import lru_cache
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Protocol
 
@@ -17,13 +16,10 @@ from bench.findings import Effect, Finding
 from bench.procedure.requires import Requires
 from bench.recording import Recording
 from bench.rigfile import RigFile
-from bench.uncertainty import Estimate
 from bench.units import RPM
-from procedures.amb_rotor import wiring
 from procedures.amb_rotor.channels import AXES, CURRENTS, POSITIONS
 from procedures.balance import decision, estimates
 from procedures.balance.estimates import Balanced, Forces
-from procedures.balance.hum import of_balance
 from procedures.balance.steps import (
     BASE,
     CAPTURED,
@@ -34,11 +30,9 @@ from procedures.balance.steps import (
     Recorded,
     Run,
     read_dwell,
-    read_runs,
 )
 from procedures.synchronous import bearings, fitting
 from procedures.synchronous.dwells import SLOW, TOLD, Dwell
-from procedures.synchronous.hum import heard
 from procedures.unbalance import checks as unbalance_checks
 
 MOST_RPM = 10000.0  # influence runs
@@ -65,17 +59,6 @@ class Settings(decision.Settings, fitting.Settings, Protocol):
     def repeat(self) -> bool: ...
     @property
     def trial_angle_rad(self) -> tuple[float, float]: ...
-
-
-@dataclass(frozen=True)
-class Evaluated:
-    """Findings; where there is a result: `balance`, the runs by name, the `last` run, influences by probe and plane."""
-
-    findings: tuple[Finding, ...]
-    balance: Balanced | None = None
-    recorded: Recorded | None = None
-    last: str = BASE
-    influences: Mapping[tuple[str, str], tuple[Estimate, Estimate]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -119,36 +102,7 @@ def of_plan(rig: RigFile, plan: Settings) -> Iterable[str]:
                    f"and by the predicted response, which may reach {plan.max_share:.0%} of the least clearance")  # fmt: skip
 
 
-@lru_cache(maxsize=1)
-def evaluated(recording: Recording[Any]) -> Evaluated:
-    """What a recording says. The last one is kept: analysis and figures ask for the same."""
-    found = [*wiring.before_orbits(recording), *unbalance_checks.before(recording), *_refusals(recording)]
-    if any(f.code in ("no-dwells", "probe-polarity", "lift-lost", "stuck-channel") for f in found):
-        return Evaluated(tuple(found))
-    plan, rig = recording.plan, recording.rig
-    recorded = read_runs(recording, plan.speeds_rad_s)
-    found += unbalance_checks.of_signals(recorded.dwells, plan, doubts=lambda _: ())  # every run is in all results
-    model = bearings.adopted_bearings(recording)
-    found += of_runs(recorded, rig, plan, model)
-    trials = decision.trials_of(recorded.runs, rig, plan.leave)
-    if trials is None and not any(f.effect is Effect.ERROR for f in found):
-        text = "the runs with trial weights were not completed: no influence coefficients."
-        found.append(Finding("no-trials", text, "", Effect.ERROR))
-    if trials is None or any(f.effect is Effect.ERROR for f in found):
-        return Evaluated((*found, *sheet(recorded, "still-mounted", rig, plan)))
-    checks = [r for r in recorded.runs if r.name.startswith("check")]
-    shown = [trials.base, *([trials.having[1]] if plan.leave else []), *checks]
-    balance = estimates.balanced(recorded.slow, shown, trials, rig, plan, model)
-    last = shown[-1].name
-    found.append(bearings.told(model, plan))
-    found += _of_result(balance, recorded, shown, plan, rig)
-    influences = estimates.influences(balance, rig)
-    slow = next((d for d in recorded.dwells if d.kind == SLOW), None)
-    found += of_balance(heard(recording, slow), recorded, balance, (BASE, last), influences)
-    return Evaluated(tuple(found), balance, recorded, last, influences)
-
-
-def _refusals(recording: Recording[Any]) -> Iterator[Finding]:
+def refusals(recording: Recording[Any]) -> Iterator[Finding]:
     for e in recording.events(LIGHTER):
         text = (f"{e['allowed_kg'] * 1e3:.3g} g was fixed in place of {e['kg'] * 1e3:g} g: beside what the shaft does already, "
                 "more would leave the plan's share of the clearance.")  # fmt: skip
@@ -207,7 +161,7 @@ def _speeds(recorded: Recorded) -> Iterator[Finding]:
             yield Finding("speeds-differ", text, "", Effect.INDETERMINATE)
 
 
-def _of_result(
+def of_result(
     balance: Balanced, recorded: Recorded, shown: list[Run], plan: Settings, rig: RigFile
 ) -> Iterator[Finding]:
     """Was it reached, did the corrections act as predicted, and the sheet."""

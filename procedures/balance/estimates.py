@@ -18,8 +18,9 @@ from bench.uncertainty import Estimate, Influence, propagate, welch_satterthwait
 from bench.uncertainty.estimate import merged
 from procedures.amb_rotor.channels import AXES
 from procedures.balance import scatter as balance_scatter
+from procedures.balance.plan import Plan
 from procedures.balance.solution import Solved, Trials, solved, taken
-from procedures.balance.steps import SIDES, Read, Run, Weight
+from procedures.balance.steps import SIDES, Read, Recorded, Run, Weight
 from procedures.balance.vector_length import amount
 from procedures.shared.certificates import certified
 from procedures.synchronous import bearings, runout
@@ -60,6 +61,17 @@ class Balanced:
     parts: Mapping[str, tuple[Estimate, ...]]
     permissible: tuple[Estimate, Estimate]
     radius: float
+
+
+@dataclass(frozen=True)
+class Result:
+    """A balancing: the settings, the solution, the runs as recorded, the `last` run's name, influences by probe and plane."""
+
+    plan: Plan
+    balance: Balanced
+    recorded: Recorded
+    last: str
+    influences: Mapping[tuple[str, str], tuple[Estimate, Estimate]]
 
 
 def fixed(weights: Sequence[Weight], radius: float) -> Complex:

@@ -13,8 +13,7 @@ from bench.analysis.vectors import region
 from bench.figures import Figure, Series, Sheet, Shown
 from bench.units import RPM
 from procedures.amb_rotor.channels import AXES
-from procedures.balance.checks import Evaluated
-from procedures.balance.estimates import Balanced
+from procedures.balance.estimates import Balanced, Result
 from procedures.balance.steps import BASE, SIDES
 
 Complex = npt.NDArray[np.complex128]
@@ -23,11 +22,9 @@ FIRST = {"inboard": 0, "outboard": 2}  # probe y of each plane
 TURN = np.linspace(0, 2 * np.pi, 181)
 
 
-def all_figures(found: Evaluated) -> Iterator[Shown]:
+def all_figures(found: Result) -> Iterator[Shown]:
     """In the order of the report."""
     balance = found.balance
-    if balance is None or found.recorded is None:
-        return
     yield _weights(found, balance)
     yield _before_and_after(found, balance)
     for p, side in enumerate(SIDES):
@@ -38,9 +35,8 @@ def all_figures(found: Evaluated) -> Iterator[Shown]:
         yield _vectors(found, balance, side, probe)
 
 
-def _weights(found: Evaluated, balance: Balanced) -> Sheet:
+def _weights(found: Result, balance: Balanced) -> Sheet:
     """What was fixed, in order."""
-    assert found.recorded is not None
     on = {w.number for w in found.recorded.on}
     rows = tuple(
         (purpose, SIDES[w.plane], f"{1e3 * w.kg:.3f}", f"{np.degrees(w.angle) % 360:.1f}",
@@ -52,7 +48,7 @@ def _weights(found: Evaluated, balance: Balanced) -> Sheet:
                  "towards z, in the direction of rotation.", head, rows, (2, 3, 4))  # fmt: skip
 
 
-def _before_and_after(found: Evaluated, balance: Balanced) -> Sheet:
+def _before_and_after(found: Result, balance: Balanced) -> Sheet:
     """Unbalance as found and as left, against the permissible one."""
     rows = []
     for p, side in enumerate(SIDES):
@@ -64,9 +60,8 @@ def _before_and_after(found: Evaluated, balance: Balanced) -> Sheet:
                  (1, 2, 3, 4))  # fmt: skip
 
 
-def _vectors(found: Evaluated, balance: Balanced, side: str, probe: int) -> Figure:
+def _vectors(found: Result, balance: Balanced, side: str, probe: int) -> Figure:
     """A probe's vectors at the highest speed, one arrow a run, and the reading that would be left of runout alone."""
-    assert found.recorded is not None
     runs = found.recorded.runs
     speed = runs[0].fastest.speed * RPM
     tips = [(r.name, complex(r.fastest.vectors.values[probe])) for r in runs]
@@ -107,9 +102,8 @@ def _residual(balance: Balanced, last: str, p: int, side: str) -> Figure:
     )  # fmt: skip
 
 
-def _sheet(found: Evaluated, balance: Balanced, p: int, side: str) -> Figure:
+def _sheet(found: Result, balance: Balanced, p: int, side: str) -> Figure:
     """Unbalance as found and the weights that were fixed, as vectors on the scale."""
-    assert found.recorded is not None
     points = [("unbalance as found", complex(balance.unbalance[BASE].values[p]))]
     points += [(purpose, w.unbalance(balance.radius)) for w, purpose in found.recorded.fixed if w.plane == p]
     points = [(name, z / G_MM) for name, z in points]

@@ -9,19 +9,24 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from bench.figures import Shown
-from bench.findings import Finding
+from bench.findings import Effect, Ended, Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.units import RPM
-from procedures.amb_rotor import lift
-from procedures.balance import checks, estimates, sequence
+from procedures.amb_rotor import lift, wiring
+from procedures.balance import checks, decision, estimates, sequence
 from procedures.balance import figures as drawn
+from procedures.balance.estimates import Result
+from procedures.balance.hum import of_balance
 from procedures.balance.plan import Plan
-from procedures.balance.steps import BASE, SIDES
+from procedures.balance.steps import BASE, SIDES, read_runs
 from procedures.shared import assumptions
-from procedures.synchronous import dwelling
+from procedures.synchronous import bearings, dwelling
+from procedures.synchronous.dwells import SLOW
+from procedures.synchronous.hum import heard
+from procedures.unbalance import checks as unbalance_checks
 from procedures.unbalance import procedure as unbalance
 
 FOUND_COS = Quantity(
@@ -90,23 +95,46 @@ def fewest_steps(plan: Plan) -> int:
     return lift.STEPS + (plan.slow_rad_s > 0) + len(plan.speeds_rad_s)
 
 
-def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
-    """Findings first, then the quantities."""
-    found = recording.once(checks.evaluated)
-    yield from found.findings
-    result = found.balance
-    if result is None:
-        return
-    last = found.last
+def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
+    """Unbalance as found and as left, and the influence coefficients at the highest speed."""
+    findings.gate([*wiring.before_orbits(recording), *unbalance_checks.before(recording), *checks.refusals(recording)],
+                  ("no-dwells", "probe-polarity", "lift-lost", "stuck-channel"))  # fmt: skip
+    plan, rig = recording.plan, recording.rig
+    recorded = read_runs(recording, plan.speeds_rad_s)
+    # every run is in all results
+    findings.add(unbalance_checks.of_signals(recorded.dwells, plan, doubts=lambda _: ()))
+    model = bearings.adopted_bearings(recording)
+    findings.add(checks.of_runs(recorded, rig, plan, model))
+    trials = decision.trials_of(recorded.runs, rig, plan.leave)
+    if trials is None and not findings.wrong:
+        text = "the runs with trial weights were not completed: no influence coefficients."
+        findings.add([Finding("no-trials", text, "", Effect.ERROR)])
+    if trials is None or findings.wrong:
+        findings.add(checks.sheet(recorded, "still-mounted", rig, plan))
+        raise Ended
+    verified = [r for r in recorded.runs if r.name.startswith("check")]
+    shown = [trials.base, *([trials.having[1]] if plan.leave else []), *verified]
+    balance = estimates.balanced(recorded.slow, shown, trials, rig, plan, model)
+    result = Result(plan, balance, recorded, shown[-1].name, estimates.influences(balance, rig))
+    findings.add([bearings.told(model, plan)])
+    findings.add(checks.of_result(balance, recorded, shown, plan, rig))
+    slow = next((d for d in recorded.dwells if d.kind == SLOW), None)
+    findings.add(of_balance(heard(recording, slow), recorded, balance, (BASE, result.last), result.influences))
+    return result
+
+
+def measured(result: Result) -> Iterator[Measured]:
+    """By plane the unbalance as found and as left; the influence coefficients by probe and plane."""
+    balance, last = result.balance, result.last
     for p, side in enumerate(SIDES):
         for quantity, k in ((FOUND_COS, 2 * p), (FOUND_SIN, 2 * p + 1)):
-            yield quantity.measured(result.parts[BASE][k], side)
-        yield PERMITTED.measured(result.permissible[p], side)
+            yield quantity.measured(balance.parts[BASE][k], side)
+        yield PERMITTED.measured(balance.permissible[p], side)
         for quantity, k in ((LEFT_COS, 2 * p), (LEFT_SIN, 2 * p + 1)):
-            yield quantity.measured(result.parts[last][k], side)
-        yield SHARE.measured(estimates.share(result, last, p), side)
-    for (axis, side), (cosine, sine) in found.influences.items():
-        where = f"{axis}, weight {side}, {max(recording.plan.speeds_rad_s) * RPM:.0f} r/min"
+            yield quantity.measured(balance.parts[last][k], side)
+        yield SHARE.measured(estimates.share(balance, last, p), side)
+    for (axis, side), (cosine, sine) in result.influences.items():
+        where = f"{axis}, weight {side}, {max(result.plan.speeds_rad_s) * RPM:.0f} r/min"
         yield COSINE.measured(cosine, where)
         yield SINE.measured(sine, where)
 
@@ -116,10 +144,10 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     yield from checks.of_plan(rig, plan)
 
 
-def figures(recording: Recording[Plan]) -> Iterable[Shown]:
-    """Polar plots of the vectors, influence coefficients, residual against U_per; empty where nothing was evaluated."""
-    found = recording.once(checks.evaluated)
-    return () if found.balance is None else drawn.all_figures(found)
+def figures(result: Result, recording: Recording[Plan]) -> Iterable[Shown]:
+    """Polar plots of the vectors, influence coefficients, residual against U_per."""
+    del recording
+    return drawn.all_figures(result)
 
 
 procedure = Procedure(
@@ -129,7 +157,8 @@ procedure = Procedure(
     state=RigState.READY,
     plan=Plan,
     acquire=sequence.acquire,
-    measured=analyse,
+    evaluate=evaluate,
+    measured=measured,
     figures=figures,
     requires=checks.REQUIRES,
     check=check,

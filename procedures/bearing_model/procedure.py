@@ -15,7 +15,7 @@ from pydantic import Field
 
 from bench.errors import DeviceFault, OperatorAbort
 from bench.figures import Figure
-from bench.findings import Finding
+from bench.findings import Finding, Findings
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
@@ -27,10 +27,10 @@ from bench.rigfile import RigFile
 from procedures.amb_rotor import rings
 from procedures.amb_rotor.magnetics import AXES
 from procedures.amb_rotor.places import CURRENTS, HOLD, LIFT, LIFT_LOST, POSITIONS, REST, TILT, Held, read_steps
-from procedures.bearing_model import checks, wiring
+from procedures.bearing_model import checks, estimates, wiring
 from procedures.bearing_model import figures as drawn
 from procedures.bearing_model.comparison import BEARINGS, COMPARED
-from procedures.bearing_model.estimates import evaluate
+from procedures.bearing_model.estimates import Analysis
 from procedures.shared import assumptions
 
 BETA = {a: Quantity(f"beta_{a}", "N m^2/A^2", f"force constant of axis {a}, at the same gap for all") for a in AXES}
@@ -175,18 +175,18 @@ def read(recording: Recording[Plan]) -> tuple[Held, Held]:
     )
 
 
-def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
-    """Findings first (they decide what the numbers are worth), then each axis."""
-    if early := rings.before(recording):
-        yield from early
-        return
+def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
+    """The adjustment of all positions, and both models compared."""
+    findings.gate(rings.before(recording))
     held, tilted = read(recording)
-    found = list(_of_data(recording, held, tilted))
-    yield from found
-    if any(f.code in checks.FATAL for f in found):
-        return
-    a = evaluate(recording, held)
-    yield from checks.of_results(a, recording.plan)
+    findings.gate(_of_data(recording, held, tilted), checks.FATAL)
+    a = estimates.evaluate(recording, held)
+    findings.add(checks.of_results(a, recording.plan))
+    return a
+
+
+def measured(a: Analysis) -> Iterator[Measured]:
+    """Each axis, then the comparison of each AMB."""
     for axis in AXES:
         yield BETA[axis].measured(a.estimates[f"beta_{axis}"])
         yield OFFSET[axis].measured(a.estimates[f"offset_{axis}"])
@@ -231,14 +231,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
             )
 
 
-def figures(recording: Recording[Plan]) -> Iterable[Figure]:
-    """Positions, currents, forces by both models and residuals; empty when the data carry no fit."""
-    if rings.before(recording):
-        return ()
-    held, tilted = read(recording)
-    if any(f.code in checks.FATAL for f in _of_data(recording, held, tilted)):
-        return ()
-    return drawn.all_figures(evaluate(recording, held), recording.rig)
+def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
+    """Positions, currents, forces by both models and residuals."""
+    return drawn.all_figures(a, recording.rig)
 
 
 procedure = Procedure(
@@ -248,7 +243,8 @@ procedure = Procedure(
     state=RigState.READY,
     plan=Plan,
     acquire=acquire,
-    measured=analyse,
+    evaluate=evaluate,
+    measured=measured,
     figures=figures,
     requires=Requires(
         channels=(*POSITIONS, *CURRENTS, "flags"),

@@ -6,32 +6,34 @@ the switch; what is left of mean and amplitude in steady state.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
 from pydantic import Field
 
 from bench.errors import AnalysisError
 from bench.figures import Shown
-from bench.findings import Effect, Finding
+from bench.findings import Effect, Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
+from bench.uncertainty import Estimate
 from bench.units import RPM
 from procedures.amb_rotor import lift
 from procedures.compensation import checks, switching
 from procedures.compensation import figures as drawn
 from procedures.compensation.hum import of_switch
-from procedures.compensation.switching import SWITCH
+from procedures.compensation.switching import SWITCH, Switched
 from procedures.shared import assumptions
 from procedures.synchronous import dwelling
 from procedures.synchronous.dwelling import SETTINGS, Law, Variant
 from procedures.synchronous.hum import heard
 from procedures.unbalance import figures as unbalance_figures
 from procedures.unbalance import procedure as unbalance
+from procedures.unbalance.estimates import Results
 
 REDUCTION = Quantity(
     "reduction",
@@ -107,28 +109,46 @@ def _switched(rig: Rig, plan: Plan, record: Recorder) -> bool:
     return True
 
 
-def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
-    """Findings first, then the quantities of each dwell, reductions, and the switch."""
-    found = recording.once(unbalance.evaluated)
-    yield from found.findings
-    if found.results is None:
-        return
-    reductions = checks.reductions(found.results)
-    yield from checks.told(found.results, reductions, recording.plan.judged_to_rad_s)
-    yield from unbalance.measured(found.results)
-    for result, estimate in reductions:
-        if result.dwell.variant == "corrected" and result.dwell.speed <= recording.plan.judged_to_rad_s:
-            yield REDUCTION.measured(estimate, f"{result.dwell.wanted * RPM:.0f} r/min")
+@dataclass(frozen=True)
+class Compared:
+    """The dwells, by how much each compensation reduces what the probes read, and the switch with its drop and residual."""
+
+    plan: Plan
+    results: Results
+    reductions: checks.Reductions
+    captured: Switched | None = None
+    switched: Mapping[str, Estimate] = field(default_factory=dict)
+
+
+def evaluate(recording: Recording[Plan], findings: Findings) -> Compared:
+    """The dwells as in `unbalance`, the reductions, and the switch where it was captured."""
+    results = unbalance.evaluate(recording, findings)
+    reductions = checks.reductions(results)
+    findings.add(checks.told(results, reductions, recording.plan.judged_to_rad_s))
     try:
         captured = switching.read_switch(recording)
         switched = switching.of_switch(captured, recording.rig)
     except AnalysisError as error:
-        yield Finding("no-switch", str(error), "", Effect.ERROR)
-        return
-    where = f"{recording.plan.switch_rad_s * RPM:.0f} r/min"
-    yield from of_switch(heard(recording, found.results.slow), captured, switched, where)
-    yield DROP.measured(switched["drop"], where)
-    yield RESIDUAL.measured(switched["residual"], where)
+        findings.add([Finding("no-switch", str(error), "", Effect.ERROR)])
+        return Compared(recording.plan, results, reductions)
+    findings.add(of_switch(heard(recording, results.slow), captured, switched, _switched_at(recording.plan)))
+    return Compared(recording.plan, results, reductions, captured, switched)
+
+
+def measured(found: Compared) -> Iterator[Measured]:
+    """The quantities of each dwell, reductions, and the switch."""
+    plan = found.plan
+    yield from unbalance.measured(found.results)
+    for result, estimate in found.reductions:
+        if result.dwell.variant == "corrected" and result.dwell.speed <= plan.judged_to_rad_s:
+            yield REDUCTION.measured(estimate, f"{result.dwell.wanted * RPM:.0f} r/min")
+    if found.switched:
+        yield DROP.measured(found.switched["drop"], _switched_at(plan))
+        yield RESIDUAL.measured(found.switched["residual"], _switched_at(plan))
+
+
+def _switched_at(plan: Plan) -> str:
+    return f"{plan.switch_rad_s * RPM:.0f} r/min"
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
@@ -146,15 +166,12 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         yield f"after_s: found {plan.after_s:g} s; expected {switching.TURNS_LEFT + 3} turns beyond {switching.WITHIN_S} s"
 
 
-def figures(recording: Recording[Plan]) -> Iterable[Shown]:
+def figures(found: Compared, recording: Recording[Plan]) -> Iterable[Shown]:
     """Those of `unbalance`, the reduction over the speed, and the switch."""
-    results = recording.once(unbalance.evaluated).results
-    if results is None:
-        return
-    yield from drawn.reductions(checks.reductions(results))
-    if recording.captures(switch=1):
-        yield from drawn.switched(switching.read_switch(recording))
-    yield from unbalance_figures.all_figures(results, recording.rig)
+    yield from drawn.reductions(found.reductions)
+    if found.captured is not None:
+        yield from drawn.switched(found.captured)
+    yield from unbalance_figures.all_figures(found.results, recording.rig)
 
 
 procedure = Procedure(
@@ -164,7 +181,8 @@ procedure = Procedure(
     state=RigState.READY,
     plan=Plan,
     acquire=acquire,
-    measured=analyse,
+    evaluate=evaluate,
+    measured=measured,
     figures=figures,
     requires=replace(unbalance.REQUIRES, parameters=(*unbalance.REQUIRES.parameters, *SETTINGS["corrected"])),
     check=check,

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +18,7 @@ from pydantic import Field
 
 from bench.calibration import Need
 from bench.figures import Figure
-from bench.findings import Effect, Finding
+from bench.findings import Effect, Finding, Findings
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
@@ -135,16 +134,11 @@ class Analysis:
     alone: AxisResult
 
 
-@lru_cache(maxsize=1)
-def ramps_of(recording: Recording[Plan]) -> RampData:
-    """The steps. Kept, because findings and fits both need them."""
-    return read_ramps(recording)
-
-
-@lru_cache(maxsize=1)
-def evaluate(recording: Recording[Plan]) -> Analysis:
-    """Both axes with their influences. Kept, because measurements, facts and figures all need it."""
-    plan, rig, data = recording.plan, recording.rig, ramps_of(recording)
+def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
+    """Both axes with their influences."""
+    plan, rig, data = recording.plan, recording.rig, read_ramps(recording)
+    signals = list(checks.of_signals(data, plan))
+    findings.gate(signals, checks.FATAL)
     facts = recording.calibration(CALIBRATION).values
     count = len(data.vertical.angles)
     shared = estimates.fact_inputs(facts, count)
@@ -153,21 +147,15 @@ def evaluate(recording: Recording[Plan]) -> Analysis:
     y = estimates.axis_result(data.vertical, y_inputs, plan.bias_A)
     x = estimates.axis_result(data.horizontal, x_inputs, plan.bias_A)
     unshared = {**y_inputs, **estimates.taken_alone(facts, count)}
-    return Analysis(data, y_inputs, y, x, estimates.axis_result(data.vertical, unshared, plan.bias_A))
+    a = Analysis(data, y_inputs, y, x, estimates.axis_result(data.vertical, unshared, plan.bias_A))
+    if not any(f.code == "unsettled" for f in signals):  # or the fit would be blamed for what moves
+        findings.add(contradictions(recording, a))
+    findings.add([*_ripple(rig, plan), *_notes(rig, a)])
+    return a
 
 
-def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
-    """Findings first (they decide what the numbers are worth), then both constants."""
-    data = ramps_of(recording)
-    found = list(checks.of_signals(data, recording.plan))
-    yield from found
-    if any(f.code in checks.FATAL for f in found):
-        return
-    a = evaluate(recording)
-    if not any(f.code == "unsettled" for f in found):  # or the fit would be blamed for what moves
-        yield from contradictions(recording, a)
-    yield from _ripple(recording.rig, recording.plan)
-    yield from _notes(recording.rig, a)
+def measured(a: Analysis) -> Iterator[Measured]:
+    """Both constants."""
     yield ALPHA_D.measured(a.y.mean)
     yield ALPHA_DX.measured(a.x.mean)
 
@@ -235,20 +223,16 @@ def _notes(rig: RigFile, a: Analysis) -> Iterator[Finding]:
     )
 
 
-def facts(recording: Recording[Plan]) -> dict[str, Estimate]:
+def facts(a: Analysis) -> dict[str, Estimate]:
     """What later procedures use: both constants, the vertical one at each angle, and at home (0) the force across."""
-    a = evaluate(recording)
     found = {"alpha_d": a.y.mean, "alpha_dx": a.x.mean, "alpha_cross@0": a.y.cross}
     found |= {f"alpha_d@{k}": e for k, e in enumerate(a.y.angles)}
     return {name: replace(e, unit=ALPHA_D.unit) for name, e in found.items()}
 
 
-def figures(recording: Recording[Plan]) -> Iterable[Figure]:
-    """Forces, residuals, constants over the angle, and the budgets; empty when the data carry no fit."""
-    data = ramps_of(recording)
-    if any(f.code in checks.FATAL for f in checks.of_signals(data, recording.plan)):
-        return ()
-    a = evaluate(recording)
+def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
+    """Forces, residuals, constants over the angle, and the budgets."""
+    del recording
     return drawn.all_figures(a.data, a.y, a.x, a.alone)
 
 
@@ -259,7 +243,8 @@ procedure = Procedure(
     state=RigState.LEVITATED,
     plan=Plan,
     acquire=acquire,
-    measured=analyse,
+    evaluate=evaluate,
+    measured=measured,
     figures=figures,
     requires=REQUIRES,
     check=check,

@@ -28,6 +28,7 @@ class Analysis:
     same from step to step. `turn`: by how much the force turns for the gamma that was told. `moved` rad: gamma_0 less what
     the force constant's calibration found of it, where it did."""
 
+    data: StepMeans
     fit: CouplingFit
     estimates: dict[str, Estimate]
     printed: float
@@ -61,7 +62,7 @@ def evaluate(recording: Recording[Any], data: StepMeans, count_rad: float) -> An
     left = Influence(id="scatter/turn", name="scatter of the steps", u=fit.turn[1], unit="1", kind="A",
                      distribution="normal", dof=float(fit.fit.dof - 1), source="residuals of the fit")  # fmt: skip
     turn = by_sensors + Estimate.of(0.0, left)
-    return Analysis(fit, estimates, ratios[0], ratios[1], turn, _moved(recording, fit, estimates))
+    return Analysis(data, fit, estimates, ratios[0], ratios[1], turn, _moved(recording, fit, estimates))
 
 
 def _moved(recording: Recording[Any], fit: CouplingFit, estimates: dict[str, Estimate]) -> Estimate | None:

@@ -16,7 +16,7 @@ from pydantic import Field
 
 from bench.calibration import Need
 from bench.figures import Figure
-from bench.findings import Finding
+from bench.findings import Finding, Findings
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
@@ -25,8 +25,9 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.force_coupling import checks as force_coupling_checks
+from procedures.force_coupling import estimates
 from procedures.force_coupling import figures as drawn
-from procedures.force_coupling.estimates import evaluate
+from procedures.force_coupling.estimates import Analysis
 from procedures.servomotor import carrying, checks
 from procedures.servomotor.steps import CHANNELS, POSITIONS, SEGMENTS, StepMeans, read_steps
 from procedures.shared import assumptions
@@ -90,16 +91,18 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     carrying.give_back(rig, plan.settle_s)
 
 
-def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
-    """Findings first (they decide what the numbers are worth), then the three quantities."""
+def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
+    """The currents over the phase angle with their fit."""
     data = read(recording)
-    findings = list(_of_signals(data, recording.plan))
-    yield from findings
-    if any(f.code in FATAL for f in findings):
-        return
-    a = evaluate(recording, data, recording.plan.count_rad)
-    yield from force_coupling_checks.of_fit(data, a.fit, recording.plan)
-    yield from force_coupling_checks.of_results(a, recording.rig.machine["pole_pairs"].value)
+    findings.gate(_of_signals(data, recording.plan), FATAL)
+    a = estimates.evaluate(recording, data, recording.plan.count_rad)
+    findings.add(force_coupling_checks.of_fit(data, a.fit, recording.plan))
+    findings.add(force_coupling_checks.of_results(a, recording.rig.machine["pole_pairs"].value))
+    return a
+
+
+def measured(a: Analysis) -> Iterator[Measured]:
+    """The three quantities."""
     for quantity in MEASURES:
         yield quantity.measured(a.estimates[quantity.name])
 
@@ -149,14 +152,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         yield f"gamma_rad: the motor would need {current:.1f} A; expected at most {allowed:.1f} A"
 
 
-def figures(recording: Recording[Plan]) -> Iterable[Figure]:
-    """Currents over gamma with the model, and residuals; empty when the data carry no fit."""
-    data = read(recording)
-    if any(f.code in FATAL for f in _of_signals(data, recording.plan)):
-        return ()
-    return drawn.all_figures(
-        data, evaluate(recording, data, recording.plan.count_rad), recording.rig.machine["pole_pairs"].value
-    )
+def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
+    """Currents over gamma with the model, and residuals."""
+    return drawn.all_figures(a.data, a, recording.rig.machine["pole_pairs"].value)
 
 
 procedure = Procedure(
@@ -166,7 +164,8 @@ procedure = Procedure(
     state=RigState.LEVITATED,
     plan=Plan,
     acquire=acquire,
-    measured=analyse,
+    evaluate=evaluate,
+    measured=measured,
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -18,7 +17,7 @@ from pydantic import Field
 
 from bench.calibration import Need
 from bench.figures import Figure
-from bench.findings import Effect, Finding
+from bench.findings import Effect, Finding, Findings
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
@@ -135,36 +134,22 @@ def _visit(rig: Rig, plan: Plan, record: Recorder, visited: list[Point], turn: i
             rig.clock.sleep(plan.average_s)
 
 
-@lru_cache(maxsize=1)
-def measured(recording: Recording[Plan]) -> MapData:
-    """What was recorded, point by point. Kept, like what is made of it."""
-    return read_points(recording)
-
-
-@lru_cache(maxsize=1)
-def evaluate(recording: Recording[Plan]) -> tuple[MapData, Result]:
-    """Points and terms. Kept, because measurements and figures both need them."""
-    plan, rig, data = recording.plan, recording.rig, measured(recording)
-    facts = recording.calibration(CALIBRATION).values
-    inputs = estimates.inputs_of(rig, facts, plan.angles)
+def evaluate(recording: Recording[Plan], findings: Findings) -> tuple[MapData, Result]:
+    """Points and terms."""
+    findings.gate([*of_probe(recording), *segments.of_nudges(recording)])
+    plan, rig, data = recording.plan, recording.rig, read_points(recording)
+    findings.gate(steps.of_signals(data, plan), ("stuck-channel",))
+    inputs = estimates.inputs_of(rig, recording.calibration(CALIBRATION).values, plan.angles)
     poles = 2 * round(rig.machine["pole_pairs"].value)
-    return data, estimates.evaluate(data, inputs, plan.bias_A, plan.angles, poles)
+    result = estimates.evaluate(data, inputs, plan.bias_A, plan.angles, poles)
+    findings.add(steps.drifts(data, result.force, result.points.i_theta))
+    findings.add([*_contradictions(result, plan), *_notes(result)])
+    return data, result
 
 
-def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
-    """Findings first, then every constant that the points can tell."""
-    wrong = [*of_probe(recording), *segments.of_nudges(recording)]
-    yield from wrong
-    if wrong:
-        return
-    signals = list(steps.of_signals(measured(recording), recording.plan))
-    yield from signals
-    if any(f.code == "stuck-channel" for f in signals):
-        return
-    data, result = evaluate(recording)
-    yield from steps.drifts(data, result.force, result.points.i_theta)
-    yield from _contradictions(result, recording.plan)
-    yield from _notes(result)
+def measured(found: tuple[MapData, Result]) -> Iterator[Measured]:
+    """Every constant that the points can tell."""
+    _, result = found
     for quantity in MEASURES:
         if quantity.name in result.estimates:
             yield quantity.measured(result.estimates[quantity.name])
@@ -222,11 +207,10 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         yield f"offset_m: the motor would be {reach * 1e6:.0f} um off centre; the envelope allows less"
 
 
-def figures(recording: Recording[Plan]) -> Iterable[Figure]:
-    """The greatest terms, residuals and selection; empty without points."""
-    if not len(recording.steps(STEP)):
-        return ()
-    return force_map_figures.rig_figures(*evaluate(recording))
+def figures(found: tuple[MapData, Result], recording: Recording[Plan]) -> Iterable[Figure]:
+    """The greatest terms, residuals and selection."""
+    del recording
+    return force_map_figures.rig_figures(*found)
 
 
 procedure = Procedure(
@@ -236,7 +220,8 @@ procedure = Procedure(
     state=RigState.LEVITATED,
     plan=Plan,
     acquire=acquire,
-    measured=analyse,
+    evaluate=evaluate,
+    measured=measured,
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),

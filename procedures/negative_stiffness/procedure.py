@@ -15,7 +15,7 @@ from pydantic import Field
 
 from bench.calibration import Need
 from bench.figures import Figure
-from bench.findings import Finding
+from bench.findings import Finding, Findings
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
@@ -25,8 +25,9 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.negative_stiffness import checks as negative_stiffness_checks
+from procedures.negative_stiffness import estimates
 from procedures.negative_stiffness import figures as drawn
-from procedures.negative_stiffness.estimates import COILS, evaluate
+from procedures.negative_stiffness.estimates import COILS, Analysis
 from procedures.servomotor import carrying, checks
 from procedures.servomotor.steps import CHANNELS, POSITIONS, SEGMENTS, StepMeans, read_steps
 
@@ -128,16 +129,18 @@ def _tilt(rig: RigFile) -> float:
     return outboard - (1 - outboard) * inboard / (1 - inboard)
 
 
-def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
-    """Findings first (they decide what the numbers are worth), then both values."""
+def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
+    """The stiffness both ways, by the motor's current and by the AMB's."""
     motor, ambs = read(recording)
-    findings = list(_of_signals(recording, motor, ambs))
-    yield from findings
-    if any(f.code in checks.FATAL for f in findings):
-        return
-    a = evaluate(recording, motor, ambs)
-    yield from negative_stiffness_checks.of_fits(a.motor, a.ambs, a.by_motor, a.by_ambs, recording.plan)
-    yield from negative_stiffness_checks.of_results(a.estimates, recording.rig.geometry["amb_gap"])
+    findings.gate(_of_signals(recording, motor, ambs), checks.FATAL)
+    a = estimates.evaluate(recording, motor, ambs)
+    findings.add(negative_stiffness_checks.of_fits(a.motor, a.ambs, a.by_motor, a.by_ambs, recording.plan))
+    findings.add(negative_stiffness_checks.of_results(a.estimates, recording.rig.geometry["amb_gap"]))
+    return a
+
+
+def measured(a: Analysis) -> Iterator[Measured]:
+    """Both values."""
     yield ALPHA_X.measured(a.estimates["motor"])
     yield ALPHA_X_AMB.measured(a.estimates["ambs"])
 
@@ -215,12 +218,9 @@ def _ranges(rig: RigFile, plan: Plan, furthest: float) -> Iterator[str]:
         )
 
 
-def figures(recording: Recording[Plan]) -> Iterable[Figure]:
-    """Force over displacement with residuals, and the AMB's lines at both biases; empty when the data carry no fit."""
-    motor, ambs = read(recording)
-    if any(f.code in checks.FATAL for f in _of_signals(recording, motor, ambs)):
-        return ()
-    return drawn.all_figures(evaluate(recording, motor, ambs), recording.plan)
+def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
+    """Force over displacement with residuals, and the AMB's lines at both biases."""
+    return drawn.all_figures(a, recording.plan)
 
 
 procedure = Procedure(
@@ -230,7 +230,8 @@ procedure = Procedure(
     state=RigState.LEVITATED,
     plan=Plan,
     acquire=acquire,
-    measured=analyse,
+    evaluate=evaluate,
+    measured=measured,
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),

@@ -13,7 +13,7 @@ from pydantic import Field
 
 from bench.errors import AnalysisError, BenchError
 from bench.figures import Shown
-from bench.findings import Effect, Finding
+from bench.findings import Effect, Finding, Findings
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
@@ -29,8 +29,7 @@ from procedures.run_up import figures as drawn
 from procedures.run_up.estimates import Run
 from procedures.run_up.steps import MISSED, PASSAGE, read_passage
 from procedures.shared import assumptions
-from procedures.synchronous import bearings as unbalance_bearings
-from procedures.synchronous import dwelling
+from procedures.synchronous import bearings, dwelling
 from procedures.synchronous.coil_peaks import uncertified
 from procedures.synchronous.dwelling import CODES, Law, put
 from procedures.synchronous.dwells import RECORDED, SLOW, read_dwell
@@ -202,38 +201,26 @@ def _fetch(rig: Rig, plan: Passing, record: Recorder, speed: float) -> None:
         rig.capture.cancel()
 
 
-def analyse(recording: Recording[Any]) -> Iterator[Measured | Finding]:
-    """Findings first, then the quantities."""
-    findings, run = recording.once(evaluated)
-    yield from findings
-    if run is not None:
-        yield from measured(run)
-
-
-def evaluated(recording: Recording[Any]) -> tuple[tuple[Finding, ...], Run | None]:
-    """Findings, and the estimates where there are any."""
-    found = [*wiring.before_orbits(recording), *checks.before(recording)]
-    if any(f.effect is Effect.ERROR for f in found):
-        return tuple(found), None
+def evaluate(recording: Recording[Any], findings: Findings) -> Run:
+    """The passage's curves with their criticals, and the vectors at the captures' speeds."""
+    findings.gate([*wiring.before_orbits(recording), *checks.before(recording)])
     plan = recording.plan
     slow = next((read_dwell(recording, s) for s in recording.steps(SLOW)), None)
-    found += unbalance_checks.of_signals([slow], plan) if slow else unbalance_checks.slow_roll([], plan)
-    if any(f.effect is Effect.ERROR for f in found):  # what a steady speed shows, a changing one may hide
-        return tuple(found), None
+    # what a steady speed shows, a changing one may hide
+    findings.gate(unbalance_checks.of_signals([slow], plan) if slow else unbalance_checks.slow_roll([], plan))
     try:
         passage = read_passage(recording)
     except AnalysisError as error:
-        return (*found, Finding("no-passage", str(error), "", Effect.ERROR)), None
-    found += checks.of_passage(passage, recording, plan)
-    if any(f.effect is Effect.ERROR for f in found):
-        return tuple(found), None
-    model = unbalance_bearings.adopted_bearings(recording)
+        findings.end(Finding("no-passage", str(error), "", Effect.ERROR))
+    findings.gate(checks.of_passage(passage, recording, plan))
+    model = bearings.adopted_bearings(recording)
     try:
         run = estimates.run(passage, slow, recording, plan, model)
     except AnalysisError as error:  # a drive that was faster than it was told: too few turns for a curve
-        return (*found, Finding("no-passage", str(error), passage.name, Effect.ERROR)), None
-    told = (unbalance_bearings.told(model, plan), *uncertified(recording.rig))
-    return (*found, *told, *checks.of_run(run, recording, plan)), run
+        findings.end(Finding("no-passage", str(error), passage.name, Effect.ERROR))
+    findings.add((bearings.told(model, plan), *uncertified(recording.rig)))
+    findings.add(checks.of_run(run, recording, plan))
+    return run
 
 
 def measured(run: Run) -> Iterator[Measured]:
@@ -256,10 +243,9 @@ def check(rig: RigFile, plan: Passing) -> Iterable[str]:
     yield from lacking or checks.of_plan(rig, plan)
 
 
-def figures(recording: Recording[Any]) -> Iterable[Shown]:
-    """Bode pairs, polar plots, waterfall, order map, coil use, orbits; empty where nothing was evaluated."""
-    run = recording.once(evaluated)[1]
-    return () if run is None else drawn.all_figures(run, recording.rig, recording.plan.running_rad_s)
+def figures(run: Run, recording: Recording[Any]) -> Iterable[Shown]:
+    """Bode pairs, polar plots, waterfall, order map, coil use, orbits."""
+    return drawn.all_figures(run, recording.rig, recording.plan.running_rad_s)
 
 
 procedure = Procedure(
@@ -269,7 +255,8 @@ procedure = Procedure(
     state=RigState.READY,
     plan=Plan,
     acquire=acquire,
-    measured=analyse,
+    evaluate=evaluate,
+    measured=measured,
     figures=figures,
     requires=unbalance.REQUIRES,
     check=check,

@@ -6,8 +6,7 @@ Measurands, by axis and speed: greatest |S| with its frequency, phase margin, an
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -16,7 +15,7 @@ from pydantic import Field
 from bench.analysis.responses import Response, image_distance
 from bench.errors import AnalysisError
 from bench.figures import Figure
-from bench.findings import Effect, Finding
+from bench.findings import Findings
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
@@ -42,7 +41,6 @@ from procedures.sensitivity.steps import (
     SURVEY,
     TOLD,
     WIRING,
-    Taken,
     channels,
     folds,
     grid_of,
@@ -198,35 +196,20 @@ def _taken(
         return None  # which the analysis tells
 
 
-@dataclass(frozen=True)
-class Evaluated:
-    """Findings, what was taken, and the results where there are any."""
-
-    findings: tuple[Finding, ...]
-    taken: tuple[Taken, ...]
-    results: tuple[Result, ...]
-
-
-def evaluated(recording: Recording[Any]) -> Evaluated:
-    """What a recording of injections says."""
-    found = [*wiring.before_orbits(recording), *checks.before(recording)]
-    if any(f.effect is Effect.ERROR for f in found):
-        return Evaluated(tuple(found), (), ())
+def evaluate(recording: Recording[Any], findings: Findings) -> list[Result]:
+    """S, its peak and the margins, of each axis and speed."""
+    findings.gate([*wiring.before_orbits(recording), *checks.before(recording)])
     plan, taken = recording.plan, read_taken(recording)
-    found += checks.of_signals(taken, plan)
-    if any(f.effect is Effect.ERROR for f in found):
-        return Evaluated(tuple(found), tuple(taken), ())
+    findings.gate(checks.of_signals(taken, plan))
     results = estimates.results(taken)
-    found += checks.of_results(results, plan)
-    return Evaluated(tuple(found), tuple(taken), tuple(results))
+    findings.add(checks.of_results(results, plan))
+    return results
 
 
-def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
-    """Findings first, then the quantities of each axis and speed."""
-    done = recording.once(evaluated)
-    yield from done.findings
+def measured(results: Sequence[Result]) -> Iterator[Measured]:
+    """The quantities of each axis and speed."""
     known = {q.name: q for q in MEASURES}
-    for result in done.results:
+    for result in results:
         for name, estimate in result.estimates.items():
             yield known[name].measured(estimate, result.where)
 
@@ -238,9 +221,10 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     )
 
 
-def figures(recording: Recording[Plan]) -> Iterable[Figure]:
-    """|S| over its zones, Bode pair of S, Nyquist plot and coherence, by speed; empty where nothing was evaluated."""
-    return drawn.all_figures(recording.once(evaluated).results)
+def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[Figure]:
+    """|S| over its zones, Bode pair of S, Nyquist plot and coherence, by speed."""
+    del recording
+    return drawn.all_figures(results)
 
 
 procedure = Procedure(
@@ -250,7 +234,8 @@ procedure = Procedure(
     state=RigState.READY,
     plan=Plan,
     acquire=acquire,
-    measured=analyse,
+    evaluate=evaluate,
+    measured=measured,
     figures=figures,
     requires=Requires(channels=TOLD, parameters=(*PARAMETERS, "law"), capture=(*LOOP, *PULSED, *CURRENTS)),
     check=check,

@@ -14,7 +14,7 @@ from pydantic import Field
 
 from bench.calibration import Need
 from bench.figures import Figure
-from bench.findings import Finding
+from bench.findings import Findings
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
@@ -25,9 +25,9 @@ from bench.rigfile import RigFile
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.direction import of_probe
 from procedures.shared import assumptions
-from procedures.slew import estimates as slew_estimates
+from procedures.slew import estimates, fit, steps
 from procedures.slew import figures as drawn
-from procedures.slew import fit, steps
+from procedures.slew.estimates import Result
 from procedures.slew.fit import Gains
 from procedures.slew.steps import CHANNELS, STARTED, STEP, read_swings
 
@@ -110,21 +110,20 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         carrying.give_back(rig, 0.2)
 
 
-def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
-    """Findings first, then the quantities of each frequency, then those of the slowest."""
-    wrong = [*of_probe(recording), *segments.of_nudges(recording)]
-    yield from wrong
-    if wrong:
-        return
-    signals = list(steps.of_signals(recording, recording.plan))
-    yield from signals
-    if any(f.code == "stuck-channel" for f in signals):
-        return
-    result = slew_estimates.evaluate(recording, read_swings(recording), gains(recording.plan))
-    yield from slew_estimates.findings(result, recording.plan)
-    for hz, estimates in result.tracking.items():
+def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
+    """The swings by frequency, and what the slowest says of the torque."""
+    findings.gate([*of_probe(recording), *segments.of_nudges(recording)])
+    findings.gate(steps.of_signals(recording, recording.plan), ("stuck-channel",))
+    result = estimates.evaluate(recording, read_swings(recording), gains(recording.plan))
+    findings.add(estimates.findings(result, recording.plan))
+    return result
+
+
+def measured(result: Result) -> Iterator[Measured]:
+    """The quantities of each frequency, then those of the slowest."""
+    for hz, found in result.tracking.items():
         for quantity in (RMS, PEAK, RATIO, LAG):
-            yield quantity.measured(estimates[quantity.name], f"{hz:g} Hz")
+            yield quantity.measured(found[quantity.name], f"{hz:g} Hz")
     yield DETENT.measured(result.detent)
     yield FRICTION.measured(result.friction)
 
@@ -153,11 +152,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
                f"{most:g} A is planned with")  # fmt: skip
 
 
-def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+def figures(result: Result, recording: Recording[Plan]) -> Iterable[Figure]:
     """Angle and error over time and over angle, growth with frequency, torque current over angle, its orders."""
-    if not len(recording.steps(STEP)):
-        return ()
-    result = slew_estimates.evaluate(recording, read_swings(recording), gains(recording.plan))
     return drawn.all_figures(result, recording.plan.detent_order)
 
 
@@ -168,7 +164,8 @@ procedure = Procedure(
     state=RigState.LEVITATED,
     plan=Plan,
     acquire=acquire,
-    measured=analyse,
+    evaluate=evaluate,
+    measured=measured,
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),

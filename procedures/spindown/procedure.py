@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Literal
 
 from pydantic import Field
 
 from bench.figures import Figure
-from bench.findings import Effect, Finding
+from bench.findings import Finding, Findings
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
@@ -26,8 +25,7 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from procedures.servomotor import hold
 from procedures.shared import assumptions
-from procedures.spindown import checks
-from procedures.spindown import estimates as spindown_estimates
+from procedures.spindown import checks, estimates
 from procedures.spindown import figures as drawn
 from procedures.spindown.estimates import Drag
 from procedures.spindown.running_up import let_go, run_up
@@ -157,50 +155,40 @@ class Analysis:
     runs: list[RunDown]
     angle: Drag
     speed: Drag
+    inertia: Estimate
 
 
-@lru_cache(maxsize=1)
-def evaluate(recording: Recording[Plan]) -> Analysis:
-    """Read the run-downs and evaluate them by the angle and by the speed. Kept, because measurements, facts and figures
-    all need it."""
-    plan, runs = recording.plan, read_run_downs(recording)
-    by = {
-        m: spindown_estimates.evaluate(runs, recording.rig, m, plan.bias_A, plan.bias_high_A)
-        for m in spindown_estimates.METHODS
-    }
-    return Analysis(runs, by["angle"], by["speed"])
-
-
-def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
-    """Findings first; then B and T_c by the speed, and all quantities by the angle, which are the results."""
-    early = list(checks.before_fits(recording))
-    yield from early
-    if any(f.effect is Effect.ERROR for f in early):
-        return
-    plan, a = recording.plan, evaluate(recording)
-    yield from checks.of_runs(a.runs, plan)
-    yield from checks.of_result(a.runs, a.angle, a.speed, plan)
-    yield from checks.of_drive(recording, a.angle)
-    yield from checks.of_inertia(recording.rig, a.angle)
-    estimates = {**a.angle.estimates, "J_z": _inertia(a.angle, recording.rig)}
+def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
+    """The run-downs, evaluated by the angle and by the speed."""
+    findings.gate(checks.before_fits(recording))
+    plan, rig, runs = recording.plan, recording.rig, read_run_downs(recording)
+    angle, speed = (estimates.evaluate(runs, rig, m, plan.bias_A, plan.bias_high_A) for m in ("angle", "speed"))
+    findings.add(checks.of_runs(runs, plan))
+    findings.add(checks.of_result(runs, angle, speed, plan))
+    findings.add([*checks.of_drive(recording, angle), *checks.of_inertia(rig, angle)])
     if not plan.added_inertia:
         text = "J_z is the rig file's value, not measured here; B and T_c carry its tolerance. The ring measures it"
-        yield Finding("inertia-as-stated", text, "J_z")
-    yield drawn.stopping(a.runs, a.angle, plan.speed_rad_s)
+        findings.add([Finding("inertia-as-stated", text, "J_z")])
+    findings.add([drawn.stopping(runs, angle, plan.speed_rad_s)])
+    return Analysis(runs, angle, speed, _inertia(angle, rig))
+
+
+def measured(a: Analysis) -> Iterator[Measured]:
+    """B and T_c by the speed, and all quantities by the angle, which are the results."""
     for quantity in (B, T_C):
         yield quantity.measured(a.speed.estimates[quantity.name], "by the speed channel")
+    estimates = facts(a)
     for quantity in MEASURES:
         yield quantity.measured(estimates[quantity.name])
 
 
 def _inertia(result: Drag, rig: RigFile) -> Estimate:
-    return result.estimates.get("J_z") or spindown_estimates.stated_inertia(rig)
+    return result.estimates.get("J_z") or estimates.stated_inertia(rig)
 
 
-def facts(recording: Recording[Plan]) -> dict[str, Estimate]:
+def facts(a: Analysis) -> dict[str, Estimate]:
     """What a calibration of this rig holds: the results by the angle."""
-    a = evaluate(recording)
-    return {**a.angle.estimates, "J_z": _inertia(a.angle, recording.rig)}
+    return {**a.angle.estimates, "J_z": a.inertia}
 
 
 def holds_for(plan: Plan) -> dict[str, float]:
@@ -226,11 +214,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         yield "run_up: found drive; the rig file has no device in that role"
 
 
-def figures(recording: Recording[Plan]) -> Iterable[Figure]:
-    """Speed over time with fit and residuals, deceleration and loss power over speed; empty when there is no fit."""
-    if any(f.effect is Effect.ERROR for f in checks.before_fits(recording)):
-        return ()
-    a = evaluate(recording)
+def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
+    """Speed over time with fit and residuals, deceleration and loss power over speed."""
     return drawn.all_figures(a.runs, a.angle, recording.plan.speed_rad_s)
 
 
@@ -241,7 +226,8 @@ procedure = Procedure(
     state=RigState.LEVITATED,
     plan=Plan,
     acquire=acquire,
-    measured=analyse,
+    evaluate=evaluate,
+    measured=measured,
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),

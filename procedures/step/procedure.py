@@ -6,14 +6,15 @@ setting, speed and axis: damping ratio and natural frequency, and how far size a
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Literal
 
 from pydantic import Field
 
 from bench.errors import NotReached
 from bench.figures import Figure
-from bench.findings import Effect, Finding
+from bench.findings import Findings
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
@@ -21,13 +22,14 @@ from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
+from bench.uncertainty import Estimate
 from bench.units import RPM
 from procedures.shared import assumptions
-from procedures.step import checks, planes
-from procedures.step import estimates as step_estimates
+from procedures.step import checks, estimates, planes
 from procedures.step import figures as drawn
+from procedures.step.estimates import Result
 from procedures.step.record_length import enough_s, faded_s
-from procedures.step.steps import CHANNELS, STEP, TURNING_RAD_S, cases, read_steps
+from procedures.step.steps import CHANNELS, STEP, TURNING_RAD_S, Case, Done, cases, read_steps
 
 OVERSHOOT = Quantity("overshoot", "1", "greatest position beyond the step, as a share of it")
 RISE = Quantity("rise_time", "s", "10 to 90 % of the step")
@@ -178,29 +180,42 @@ def _put(rig: Rig, plan: Plan, setting: Mapping[str, float], used: dict[str, flo
     rig.clock.sleep(plan.settle_s)
 
 
-def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
-    """Findings first, then the quantities of each case, then those over sizes and directions."""
-    early = list(checks.before(recording))
-    early += () if early else planes.exchanged(recording)
-    yield from early
-    if any(f.effect is Effect.ERROR for f in early):
-        return
+@dataclass(frozen=True)
+class Results:
+    """What was recorded, step by step; the result of each case, and the estimates over sizes and directions by place."""
+
+    steps: Sequence[Done]
+    by_case: Mapping[Case, Result] = field(default_factory=dict)
+    by_group: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)
+
+
+def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
+    """The response of each case, and what the cases of an axis have in common."""
+    before = list(checks.before(recording))
+    findings.gate([*before, *(() if before else planes.exchanged(recording))])
     plan, steps = recording.plan, read_steps(recording)
-    signals = list(checks.of_steps(steps, plan))
-    yield from signals
-    if any(f.code in checks.FATAL for f in signals):
-        return
-    results = step_estimates.by_case(steps, recording.rig, plan.band)
-    groups = step_estimates.by_group(steps, results)
-    yield from checks.of_results(results, groups, plan)
-    yield from checks.compared(results, plan.names)
+    findings.gate(checks.of_steps(steps, plan), checks.FATAL, Results(steps))
+    by_case = estimates.by_case(steps, recording.rig, plan.band)
+    by_group = estimates.by_group(steps, by_case)
+    findings.add(checks.of_results(by_case, by_group, plan))
+    findings.add(checks.compared(by_case, plan.names))
+    return Results(steps, by_case, by_group)
+
+
+def measured(results: Results) -> Iterator[Measured]:
+    """The quantities of each case, then those over sizes and directions."""
     known = {q.name: q for q in MEASURES}
-    for case, result in results.items():
+    for case, result in results.by_case.items():
         for name, estimate in result.estimates.items():
             yield known[name].measured(estimate, case.where)
-    for where, estimates in groups.items():
-        for name, estimate in estimates.items():
+    for where, found in results.by_group.items():
+        for name, estimate in found.items():
             yield known[name].measured(estimate, where)
+
+
+def model_names(plan: Plan) -> list[str]:
+    """Parameters that `model_error` changes."""
+    return [m.format(a) for m in MODEL for a in RADIAL] if plan.model_error else []
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
@@ -228,19 +243,11 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         yield "speeds_rad_s: the rig file has no device in the role drive, so that nothing turns the shaft"
 
 
-def model_names(plan: Plan) -> list[str]:
-    """Parameters that `model_error` changes."""
-    return [m.format(a) for m in MODEL for a in RADIAL] if plan.model_error else []
-
-
-def figures(recording: Recording[Plan]) -> Iterable[Figure]:
-    """Responses with band and model, control currents, overshoot over the size; empty without steps."""
-    if any(f.effect is Effect.ERROR for f in checks.before(recording)) or not len(recording.steps(STEP)):
-        return ()
-    steps = read_steps(recording)
-    if any(f.code in checks.FATAL for f in checks.of_steps(steps, recording.plan)):
-        return drawn.raw_figures(steps)
-    return drawn.all_figures(steps, step_estimates.by_case(steps, recording.rig, recording.plan.band))
+def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
+    """Responses with band and model, control currents, overshoot over the size; the steps as they came where the evaluation
+    ended with them."""
+    del recording
+    return drawn.all_figures(results.steps, results.by_case) if results.by_case else drawn.raw_figures(results.steps)
 
 
 procedure = Procedure(
@@ -251,7 +258,8 @@ procedure = Procedure(
     state=RigState.LEVITATED,
     plan=Plan,
     acquire=acquire,
-    measured=analyse,
+    evaluate=evaluate,
+    measured=measured,
     figures=figures,
     requires=Requires(
         channels=CHANNELS,

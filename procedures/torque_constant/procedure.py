@@ -15,7 +15,7 @@ from pydantic import Field
 
 from bench.errors import RotorNotArrived
 from bench.figures import Figure
-from bench.findings import Effect, Finding
+from bench.findings import Findings
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
@@ -164,26 +164,26 @@ class Analysis:
     estimates: dict[str, Estimate]
 
 
-def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
-    """Findings first (they decide what the numbers are worth), then both quantities."""
-    early = [*of_probe(recording), *checks.of_events(recording)]
-    yield from early
-    if early:
-        return
-    data = read_torques(recording, recording.plan.masses, recording.plan.count_rad)
-    wrong = list(checks.of_signals(data, recording.plan))
-    yield from wrong
-    if any(f.effect is Effect.ERROR for f in wrong):
-        return
-    a = evaluate(recording, data)
+def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
+    """The balance of torques, with its fit and estimates."""
+    findings.gate([*of_probe(recording), *checks.of_events(recording)])
+    plan = recording.plan
+    data = read_torques(recording, plan.masses, plan.count_rad)
+    findings.gate(checks.of_signals(data, plan))
+    a = _fitted(recording, data)
     values = {name: e.value for name, e in a.inputs.items()}
-    mass_u = masses_u(recording.rig, recording.plan.masses)
-    yield from checks.of_fit(data, a.balance, a.detent, values, mass_u, arms_u(recording.rig), recording.plan)
+    mass_u = masses_u(recording.rig, plan.masses)
+    findings.add(checks.of_fit(data, a.balance, a.detent, values, mass_u, arms_u(recording.rig), plan))
+    return a
+
+
+def measured(a: Analysis) -> Iterator[Measured]:
+    """Both quantities."""
     for quantity in MEASURES:
         yield quantity.measured(a.estimates[quantity.name])
 
 
-def evaluate(recording: Recording[Plan], data: TorqueData) -> Analysis:
+def _fitted(recording: Recording[Plan], data: TorqueData) -> Analysis:
     """Fit and estimates with their influences."""
     plan, rig = recording.plan, recording.rig
     inputs, pairs, count = fit_inputs(rig, plan.masses), rig.machine["pole_pairs"].value, len(plan.masses)
@@ -227,15 +227,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
                "expected 60 deg or less, where the motor still has half of its torque")  # fmt: skip
 
 
-def figures(recording: Recording[Plan]) -> Iterable[Figure]:
-    """Torque over current per side, the constant over gamma with residuals, detent, one step; empty without a fit."""
-    if [*of_probe(recording), *checks.of_events(recording)]:
-        return ()
-    data = read_torques(recording, recording.plan.masses, recording.plan.count_rad)
-    if any(f.effect is Effect.ERROR for f in checks.of_signals(data, recording.plan)):
-        return ()
-    a = evaluate(recording, data)
-    return drawn.all_figures(recording, data, a.balance, a.detent, recording.rig.machine["pole_pairs"].value)
+def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
+    """Torque over current per side, the constant over gamma with residuals, detent, one step."""
+    return drawn.all_figures(recording, a.data, a.balance, a.detent, recording.rig.machine["pole_pairs"].value)
 
 
 procedure = Procedure(
@@ -245,7 +239,8 @@ procedure = Procedure(
     state=RigState.LEVITATED,
     plan=Plan,
     acquire=acquire,
-    measured=analyse,
+    evaluate=evaluate,
+    measured=measured,
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),

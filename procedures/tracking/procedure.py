@@ -7,13 +7,14 @@ frequency, the tilts psi and theta, what is left to the touchdown rings, and wha
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 from pydantic import Field
 
 from bench.figures import Figure
-from bench.findings import Effect, Finding
+from bench.findings import Findings
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
@@ -21,13 +22,14 @@ from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
+from bench.uncertainty import Estimate
 from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
 from procedures.amb_rotor.channels import POSITIONS
 from procedures.amb_rotor.geometry import nominal
 from procedures.tracking import checks, estimates
 from procedures.tracking import figures as drawn
-from procedures.tracking.steps import CHANNELS, GROWN, ORBIT, START, STARTED, read_orbits
+from procedures.tracking.steps import CHANNELS, GROWN, ORBIT, START, STARTED, Orbit, read_orbits
 
 Law = Literal["PID", "CCS", "CAC"]
 CODES: dict[Law, float] = {"PID": 0.0, "CCS": 1.0, "CAC": 2.0}
@@ -155,23 +157,31 @@ def _size(rig: Rig, plan: Plan, share: float) -> None:
     rig.clock.sleep(GROW_S)
 
 
-def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
-    """Findings first, then the quantities of each law that is judged; the others are in a note."""
-    early = list(wiring.before_orbits(recording))
-    yield from early
-    if any(f.effect is Effect.ERROR for f in early):
-        return
-    orbits = read_orbits(recording)
-    wrong = list(checks.of_signals(orbits, recording.plan))
-    yield from wrong
-    if any(f.code in checks.FATAL for f in wrong):
-        return
-    results = estimates.by_law(orbits, recording.rig, recording.plan.runout_m)
-    yield from checks.of_results(orbits, results, recording.plan)
-    for orbit in orbits:
-        if orbit.law in recording.plan.laws:
+@dataclass(frozen=True)
+class Results:
+    """The settings, the orbits, and the estimates of each law."""
+
+    plan: Plan
+    orbits: Sequence[Orbit]
+    by_law: Mapping[str, Mapping[str, Estimate]]
+
+
+def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
+    """Errors, tilts and distances of each law's orbit."""
+    findings.gate(wiring.before_orbits(recording))
+    plan, orbits = recording.plan, read_orbits(recording)
+    findings.gate(checks.of_signals(orbits, plan), checks.FATAL)
+    by_law = estimates.by_law(orbits, recording.rig, plan.runout_m)
+    findings.add(checks.of_results(orbits, by_law, plan))
+    return Results(plan, orbits, by_law)
+
+
+def measured(results: Results) -> Iterator[Measured]:
+    """The quantities of each law that is judged; the others are in a note."""
+    for orbit in results.orbits:
+        if orbit.law in results.plan.laws:
             for quantity in MEASURES:
-                yield quantity.measured(results[orbit.law][quantity.name], orbit.where)
+                yield quantity.measured(results.by_law[orbit.law][quantity.name], orbit.where)
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
@@ -199,13 +209,10 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         )
 
 
-def figures(recording: Recording[Plan]) -> Iterable[Figure]:
+def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """Orbits with the ring, errors over time and over the reference's revolution, tilts, coil currents."""
-    if not len(recording.steps(ORBIT)):
-        return ()
-    orbits = read_orbits(recording)
-    facts = {o.law: nominal(recording.rig, o.t_0) for o in orbits}
-    return drawn.all_figures(orbits, facts)
+    facts = {o.law: nominal(recording.rig, o.t_0) for o in results.orbits}
+    return drawn.all_figures(results.orbits, facts)
 
 
 procedure = Procedure(
@@ -215,7 +222,8 @@ procedure = Procedure(
     state=RigState.READY,
     plan=Plan,
     acquire=acquire,
-    measured=analyse,
+    evaluate=evaluate,
+    measured=measured,
     figures=figures,
     requires=Requires(channels=CHANNELS, sensors=POSITIONS, parameters=PARAMETERS, geometry=LENGTHS),
     check=check,

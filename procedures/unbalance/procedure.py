@@ -7,14 +7,13 @@ D_max and its share of the clearance (ISO 14839-2), currents and voltages of the
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
 from pydantic import Field
 
 from bench.calibration import Need
 from bench.figures import Shown
-from bench.findings import Effect, Finding
+from bench.findings import Findings
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
@@ -25,8 +24,7 @@ from bench.rigfile import RigFile
 from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
 from procedures.shared import assumptions
-from procedures.synchronous import bearings as unbalance_bearings
-from procedures.synchronous import dwelling, fitting
+from procedures.synchronous import bearings, dwelling, fitting
 from procedures.synchronous.bearings import BEARING_MODEL, STATED, adopted_bearings
 from procedures.synchronous.coil_peaks import uncertified
 from procedures.synchronous.dwelling import CODES, POLES, SETTINGS, Law, Variant
@@ -141,36 +139,17 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     dwelling.finished(rig)
 
 
-def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
-    """Findings first, then the quantities of each dwell."""
-    found = recording.once(evaluated)
-    yield from found.findings
-    if found.results is not None:
-        yield from measured(found.results)
-
-
-@dataclass(frozen=True)
-class Evaluated:
-    """Findings, and the dwells' results where there are any."""
-
-    findings: tuple[Finding, ...]
-    results: Results | None
-
-
-def evaluated(recording: Recording[Any]) -> Evaluated:
-    """What a recording of dwells says."""
-    found = [*wiring.before_orbits(recording), *checks.before(recording)]
-    if any(f.effect is Effect.ERROR for f in found):
-        return Evaluated(tuple(found), None)
+def evaluate(recording: Recording[Any], findings: Findings) -> Results:
+    """Vectors, orbits, D_max and what the coils need, of each dwell."""
+    findings.gate([*wiring.before_orbits(recording), *checks.before(recording)])
     dwells, plan = read_dwells(recording), recording.plan
-    found += checks.of_signals(dwells, plan, runout=LESS_RUNOUT)
-    if any(f.effect is Effect.ERROR for f in found):
-        return Evaluated(tuple(found), None)
+    findings.gate(checks.of_signals(dwells, plan, runout=LESS_RUNOUT))
     model = adopted_bearings(recording)
     results = estimates.results(dwells, recording.rig, plan, model)
-    told = (unbalance_bearings.told(model, plan), *uncertified(recording.rig))
-    hums = of_dwells(heard(recording, results.slow), results.dwells)
-    return Evaluated((*found, *told, *hums, *checks.of_results(results, plan)), results)
+    findings.add((bearings.told(model, plan), *uncertified(recording.rig)))
+    findings.add(of_dwells(heard(recording, results.slow), results.dwells))
+    findings.add(checks.of_results(results, plan))
+    return results
 
 
 def measured(results: Results) -> Iterator[Measured]:
@@ -198,10 +177,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     yield from fitting.of_plan(rig, plan)
 
 
-def figures(recording: Recording[Plan]) -> Iterable[Shown]:
-    """Orbits of both planes, Bode pair, polar plot, full spectra, what the coils need; empty where nothing was evaluated."""
-    results = recording.once(evaluated).results
-    return () if results is None else drawn.all_figures(results, recording.rig)
+def figures(results: Results, recording: Recording[Plan]) -> Iterable[Shown]:
+    """Orbits of both planes, Bode pair, polar plot, full spectra, what the coils need."""
+    return drawn.all_figures(results, recording.rig)
 
 
 procedure = Procedure(
@@ -211,7 +189,8 @@ procedure = Procedure(
     state=RigState.READY,
     plan=Plan,
     acquire=acquire,
-    measured=analyse,
+    evaluate=evaluate,
+    measured=measured,
     figures=figures,
     requires=REQUIRES,
     check=check,

@@ -18,8 +18,7 @@ from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate
-from procedures.balance import checks
-from procedures.balance.checks import Evaluated
+from procedures.balance.estimates import Result
 from procedures.balance.steps import Run
 from sim_backend.machines.amb5dof import truth_balance
 from sim_backend.truth import draw
@@ -37,7 +36,7 @@ class Balancing:
     measured: dict[tuple[str, str], Estimate]
     findings: list[Finding]
     recording: Recording[Any]
-    found: Evaluated
+    found: Result
     true: list[np.ndarray]
     truth: Mapping[str, float]
 
@@ -60,7 +59,9 @@ def done(
     findings = [f for f in run.results if isinstance(f, Finding)]
     file = load_rig(rig)
     true = truth_balance.left(file, draw(file, seed, truth), run.recording.events("operator"))
-    return Balancing(measured, findings, run.recording, checks.evaluated(run.recording), true, truth_of_motion(run))
+    return Balancing(
+        measured, findings, run.recording, run.procedure.evaluated(run.recording).result, true, truth_of_motion(run)
+    )
 
 
 def runs_of(b: Balancing) -> dict[str, Run]:

@@ -166,7 +166,7 @@ def test_the_first_hanging_tells_exchanged_wires(tmp_path: Path) -> None:
     assert not run.recording.all_steps()
     hung = [e for e in run.recording.events("operator") if e.get("load")]
     assert len(hung) <= 1
-    assert not list(run.procedure.figures(run.recording))
+    assert not list(run.procedure.drawn(run.recording))
 
 
 def test_a_bearing_that_carries_the_rotor_by_one_coil_is_named_before_anything_is_recorded(tmp_path: Path) -> None:
@@ -176,7 +176,7 @@ def test_a_bearing_that_carries_the_rotor_by_one_coil_is_named_before_anything_i
     assert (found.code, found.where, found.effect) == ("one-sided", "outboard", Effect.ERROR)
     assert "2.2 A or more" in found.text
     assert not run.recording.all_steps()
-    assert not list(run.procedure.figures(run.recording))
+    assert not list(run.procedure.drawn(run.recording))
 
 
 def test_what_the_loads_leave_one_number_is_not_reported_as_two(

@@ -20,7 +20,7 @@ from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate
 from procedures.angle_step import response
-from procedures.angle_step.procedure import MEASURES, Plan, check, figures, planned, procedure, step_count
+from procedures.angle_step.procedure import MEASURES, Plan, check, planned, procedure, step_count
 from procedures.angle_step.response import Loop, Move
 from reports.figures import draw as draw_figure
 from sim_backend.truth import draw
@@ -48,7 +48,7 @@ def test_at_12_degrees_priority_leaves_less_than_a_third_of_the_excursion(tmp_pa
         assert abs(measured["final_error", case].value) < 3e-3
         assert measured["peak_motor", case].value > measured["peak_outboard", case].value  # further out from the pivot
     recording = Recording.open(tmp_path / "recording.mcap", Plan)
-    drawn = list(figures(recording))
+    drawn = list(procedure.drawn(recording))
     assert [f.key for f in drawn] == ["orbit", "angle-2", "angle-12", "radius", "segments-static", "segments-priority",
                                       "excess-size"]  # fmt: skip
     for figure in drawn:
@@ -72,7 +72,7 @@ def test_at_2_degrees_it_depends_on_the_filter_of_the_derivative(tmp_path: Path)
     slow, fast = ([measured["excess", f"{a}, 2°, {f} Hz"].value for a in ("static", "priority")] for f in (20, 200))
     assert slow[0] == pytest.approx(slow[1], abs=0.3e-6)
     assert fast[1] < fast[0] / 3
-    keys = [f.key for f in figures(Recording.open(tmp_path / "recording.mcap", Plan))]
+    keys = [f.key for f in procedure.drawn(Recording.open(tmp_path / "recording.mcap", Plan))]
     assert "excess-filter" in keys
 
 

@@ -23,7 +23,7 @@ from procedures.amb_rotor.magnetics import AXES
 from procedures.amb_rotor.places import Held
 from procedures.bearing_model import adjustment, checks, wiring
 from procedures.bearing_model.estimates import evaluate
-from procedures.bearing_model.procedure import MEASURES, Plan, check, figures, grid, procedure, read, step_count
+from procedures.bearing_model.procedure import MEASURES, Plan, check, grid, procedure, read, step_count
 from reports.figures import draw as draw_figure
 from reports.unseen import is_reached
 from sim_backend.truth import nominal
@@ -236,7 +236,7 @@ def test_what_cannot_work_is_told_before_anything_starts(plan: dict[str, float],
 
 
 def test_figures_show_the_data(sound: Simulated) -> None:
-    drawn = {f.key: f for f in figures(sound.recording)}
+    drawn = {f.key: f for f in procedure.drawn(sound.recording)}
     assert set(drawn) == {"positions", "currents", "residuals-linear", "residuals-nonlinear", "forces", "adjustments"}
     worst = {
         k: max(float(np.abs(s.y).max()) for s in drawn[k].series) for k in ("residuals-linear", "residuals-nonlinear")

@@ -22,7 +22,7 @@ from bench.uncertainty import Estimate, interval
 from bench.uncertainty.coverage import ensemble
 from procedures.force_constant import checks
 from procedures.force_constant.fitting import check, predicted_controls
-from procedures.force_constant.procedure import Plan, evaluate, facts, figures, procedure
+from procedures.force_constant.procedure import Plan, procedure
 from procedures.force_constant.steps import read_ramps
 
 NAME, CALIBRATION = "force-constant", "amb-calibration"
@@ -74,7 +74,7 @@ def test_scatter_that_was_pooled_over_the_angles_is_counted_once(sound: Simulate
 def test_what_the_calibration_shares_is_in_the_report(sound: Simulated) -> None:
     """Without the sensors of this run alone the AMBs give alpha_d to a few hundredths of a per cent; taken alone the
     calibration would leave 0.3 % and more."""
-    a = evaluate(sound.recording)
+    a = procedure.evaluated(sound.recording).result
     by_ambs = [v for k, v in a.y.mean.contributions.items() if not k.startswith("sensors/i_m")]
     assert sum(v**2 for v in by_ambs) ** 0.5 < 6e-4 * a.y.mean.value
     assert a.alone.mean.u > 2 * a.y.mean.u
@@ -203,13 +203,13 @@ def test_a_calibration_at_other_settings_is_refused(
 
 
 def test_figures_show_both_rows_and_what_sharing_does(sound: Simulated) -> None:
-    made = {f.key: f for f in figures(sound.recording)}
+    made = {f.key: f for f in procedure.drawn(sound.recording)}
     assert list(made) == ["force-y", "residuals-y", "angle-y", "sharing", "force-x", "angle-x"]
     shared, alone = made["sharing"].series
     assert shared.u is not None
     assert alone.u is not None
     assert alone.u[2] > 2 * shared.u[2]
-    assert figures(sound.recording)
+    assert procedure.drawn(sound.recording)
 
 
 @pytest.mark.parametrize(

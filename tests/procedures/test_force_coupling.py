@@ -20,7 +20,7 @@ from bench.rigfile import load_rig
 from bench.uncertainty import interval
 from procedures.force_coupling.estimates import evaluate
 from procedures.force_coupling.fit import TERMS
-from procedures.force_coupling.procedure import Plan, check, figures, read
+from procedures.force_coupling.procedure import Plan, check, procedure, read
 from procedures.servomotor import carrying
 
 NAME = "force-coupling"
@@ -184,7 +184,7 @@ def test_what_cannot_work_is_told_before_anything_starts(gammas: tuple[float, ..
 
 
 def test_figures_show_the_currents_and_what_the_model_leaves(sound: Simulated) -> None:
-    drawn = {f.key: f for f in figures(sound.recording)}
+    drawn = {f.key: f for f in procedure.drawn(sound.recording)}
     assert set(drawn) == {"currents", "turn", "residuals", "residuals-as-printed"}
     left = np.concatenate([s.y for s in drawn["residuals"].series])
     printed = np.concatenate([s.y for s in drawn["residuals-as-printed"].series])

@@ -16,7 +16,7 @@ from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import ConfigError
 from bench.findings import Effect, Finding
 from bench.rigfile import load_rig
-from procedures.force_map.procedure import MEASURES, Plan, check, figures, loaded_points, points, procedure, step_count
+from procedures.force_map.procedure import MEASURES, Plan, check, loaded_points, points, procedure, step_count
 from reports.figures import draw as draw_figure
 from sim_backend.truth import draw
 
@@ -82,7 +82,7 @@ def test_the_term_that_nothing_excites_is_named(sound: Simulated) -> None:
 
 
 def test_figures_and_steps(sound: Simulated) -> None:
-    drawn = list(figures(sound.recording))
+    drawn = list(procedure.drawn(sound.recording))
     assert [f.key for f in drawn] == ["force-current", "force-displacement", "residuals", "selection"]
     for figure in drawn:
         draw_figure(figure)

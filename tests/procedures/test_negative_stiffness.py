@@ -20,7 +20,7 @@ from bench.rigfile import load_rig
 from bench.uncertainty import interval
 from procedures.negative_stiffness import procedure as negative_stiffness
 from procedures.negative_stiffness.estimates import evaluate
-from procedures.negative_stiffness.procedure import Plan, check, figures, procedure, read
+from procedures.negative_stiffness.procedure import Plan, check, procedure, read
 from procedures.servomotor import carrying
 
 NAME = "negative-stiffness"
@@ -184,7 +184,7 @@ def test_what_the_rig_file_lacks_is_told(kind: str) -> None:
 
 
 def test_figures_show_the_data_with_the_fit(sound: Simulated) -> None:
-    drawn = {f.key: f for f in figures(sound.recording)}
+    drawn = {f.key: f for f in procedure.drawn(sound.recording)}
     assert set(drawn) == {"current", "current-residuals", "two-biases", "two-biases-residuals"}
     assert np.ptp(drawn["current"].series[0].y) > 1.0  # amperes
     slopes = [float(np.polyfit(s.x, s.y, 1)[0]) for s in drawn["two-biases"].series]

@@ -63,7 +63,7 @@ def codes(run: Simulated, *, serious: bool = True) -> set[str]:
 
 
 def evaluated(run: Simulated) -> Run:
-    found = run_up.evaluated(run.recording)[1]
+    found = run.procedure.evaluated(run.recording).result
     assert found is not None
     return found
 
@@ -301,7 +301,7 @@ def test_a_planted_defect_is_named_and_never_passes(
     found = [f for f in run.results if isinstance(f, Finding) and f.code == code]
     assert found, codes(run, serious=False)
     assert found[0].effect is effect
-    list(run_up.figures(run.recording))  # what can be drawn is drawn
+    list(run.procedure.drawn(run.recording))  # what can be drawn is drawn
 
 
 def test_exchanged_current_sensors_are_told_where_the_offset_carries_the_weight(tmp_path: Path) -> None:

@@ -25,7 +25,6 @@ from bench.rigfile.envelope import Envelope
 from bench.uncertainty import Estimate
 from bench.units import RPM
 from procedures.sensitivity import checks, estimates, margins
-from procedures.sensitivity import procedure as sensitivity
 from procedures.sensitivity.injection import Comb, combs
 from procedures.sensitivity.procedure import CODES, Plan, check, procedure
 from procedures.sensitivity.steps import AXES, REFINED, WIRING, Taken, read_taken
@@ -108,7 +107,7 @@ def test_the_refined_grid_is_fine_and_the_orders_are_left_out(sound: Run) -> Non
 
 
 def test_figures(sound: Run) -> None:
-    drawn = list(sensitivity.figures(sound.recording))
+    drawn = list(sensitivity.procedure.drawn(sound.recording))
     assert {f.key for f in drawn} == {
         f"{k}-{rpm}" for k in ("sensitivity", "bode", "nyquist", "coherence") for rpm in (0, 6000)
     }
@@ -247,7 +246,7 @@ def test_a_planted_defect_is_named_and_never_passes(
     found = [f for f in run.results if isinstance(f, Finding) and f.code == code]
     assert found, [f.code for f in run.results if isinstance(f, Finding)]
     assert found[0].effect is effect
-    list(sensitivity.figures(run.recording))  # what can be drawn is drawn
+    list(sensitivity.procedure.drawn(run.recording))  # what can be drawn is drawn
 
 
 @pytest.mark.long

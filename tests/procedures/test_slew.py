@@ -28,7 +28,7 @@ from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, Influence
 from procedures.slew import fit
 from procedures.slew.fit import Gains, Swing
-from procedures.slew.procedure import MEASURES, Plan, check, figures, needs, procedure, step_count
+from procedures.slew.procedure import MEASURES, Plan, check, needs, procedure, step_count
 from reports.figures import draw as draw_figure
 from sim_backend.truth import draw
 
@@ -70,7 +70,7 @@ def test_the_detent_and_the_closed_loop_are_recovered(tmp_path: Path, seed: int)
 def test_figures_and_steps(tmp_path: Path) -> None:
     slewed(tmp_path, motor_carries=True)
     recording = Recording.open(tmp_path / "recording.mcap", Plan)
-    drawn = list(figures(recording))
+    drawn = list(procedure.drawn(recording))
     assert [f.key for f in drawn] == ["following", "error-time", "error-angle", "growth", "torque-angle", "orders"]
     for figure in drawn:
         draw_figure(figure)

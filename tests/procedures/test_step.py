@@ -24,7 +24,7 @@ from bench.uncertainty.coverage import ensemble
 from procedures.amb_rotor.onset import onset
 from procedures.step import checks, estimates, oscillation, planes, response, settling
 from procedures.step import steps as step_steps
-from procedures.step.procedure import MEASURES, Plan, check, figures, recorded_s, step_count, waited_s
+from procedures.step.procedure import MEASURES, Plan, check, procedure, recorded_s, step_count, waited_s
 from reports.figures import draw as draw_figure
 
 SHORT = {"axes": ("y",), "sizes_m": (10e-6, 20e-6), "record_s": 0.4, "settle_s": 3.0}
@@ -114,7 +114,7 @@ def test_a7_the_estimate_settles_and_integral_action_does_not(tmp_path: Path) ->
     assert abs(a.value - b.value) < 0.3e-3
     recording = Recording.open(tmp_path / "recording.mcap", Plan)
     assert len(recording.all_steps()) == step_count(recording.plan)
-    drawn = list(figures(recording))
+    drawn = list(procedure.drawn(recording))
     assert [f.key for f in drawn] == ["swing-z-10000", "settling-z-10000", "control-z-10000", "sizes-z-10000"]
     for figure in drawn:
         draw_figure(figure)
@@ -155,7 +155,7 @@ def test_a_planted_defect_is_named_and_never_passes(
     found = [f for f in findings if f.code == code]
     assert found, [f.code for f in findings]
     assert found[0].effect is not Effect.NOTE
-    assert list(figures(Recording.open(tmp_path / "recording.mcap", Plan)))
+    assert list(procedure.drawn(Recording.open(tmp_path / "recording.mcap", Plan)))
 
 
 def test_a_finding_about_one_axis_leaves_the_other_alone(tmp_path: Path) -> None:

@@ -28,7 +28,7 @@ from procedures.tracking import drift, estimates
 from procedures.tracking import ellipse as estimator
 from procedures.tracking.ellipse import Path as Orbit
 from procedures.tracking.ellipse import Wave
-from procedures.tracking.procedure import CODES, MEASURES, OBSERVED, Plan, check, figures, procedure, step_count
+from procedures.tracking.procedure import CODES, MEASURES, OBSERVED, Plan, check, procedure, step_count
 from procedures.unbalance import procedure as unbalance
 from reports.figures import draw as draw_figure
 from sim_backend.machines.amb5dof import truth_track
@@ -88,7 +88,7 @@ def test_a4_flatness_follows_and_the_pid_touches(tmp_path: Path) -> None:
     assert findings[0].where.startswith("PID")
     recording = Recording.open(tmp_path / "recording.mcap", Plan)
     assert len(recording.all_steps()) == step_count(recording.plan)
-    drawn = list(figures(recording))
+    drawn = list(procedure.drawn(recording))
     assert [f.key for f in drawn][:5] == ["orbit", "ring-inboard", "ring-outboard", "error-y", "error-z"]
     for figure in drawn:
         draw_figure(figure)

@@ -184,7 +184,7 @@ def test_compensation_lets_the_shaft_follow_the_runout(compared: Run) -> None:
 
 
 def test_figures(compared: Run) -> None:
-    drawn = list(compensation.figures(compared.recording))
+    drawn = list(compensation.procedure.drawn(compared.recording))
     keys = [f.key for f in drawn]
     assert len(set(keys)) == len(keys)
     assert {"reduction", "switch-amplitude", "switch-readings", "bode-inboard", "polar-outboard", "orbit-inboard-off-10000",
@@ -235,7 +235,7 @@ def test_a_planted_defect_is_named_and_never_passes(
     found = [f for f in run.results if isinstance(f, Finding) and f.code == code]
     assert found, [f.code for f in run.results if isinstance(f, Finding)]
     assert found[0].effect is effect
-    list(unbalance.figures(run.recording))  # what can be drawn is drawn
+    list(unbalance.procedure.drawn(run.recording))  # what can be drawn is drawn
 
 
 def test_a_clipping_probe_shows_in_the_capture_where_the_controller_does_not_tell(
