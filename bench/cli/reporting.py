@@ -15,6 +15,7 @@ from bench.procedure import Procedure
 from bench.record.records import Record
 from bench.recording import Recording
 from bench.rigfile import RigFile
+from bench.run.evaluation import ANALYSIS_FAILED, Ending
 
 CELSIUS = 273.15
 
@@ -42,9 +43,10 @@ def build(directory: Path, record: Record, procedure: Procedure, recording: Reco
 
 
 def figures(record: Record, procedure: Procedure, recording: Recording[Any] | None) -> Iterable[Shown]:
-    """What the procedure draws of a run; nothing of one that measured nothing."""
-    measured = any(m.value is not None for m in record.measurements)
-    return procedure.drawn(recording) if recording is not None and measured else ()
+    """What the procedure draws of a run that was analysed; nothing of one that was stopped, or whose analysis failed."""
+    if recording is None or Ending.read(recording).stopped is not None:
+        return ()
+    return () if any(f.code == ANALYSIS_FAILED for f in record.findings) else procedure.drawn(recording)
 
 
 def conditions(recording: Recording[Any]) -> dict[str, str]:

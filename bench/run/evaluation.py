@@ -33,6 +33,7 @@ from bench.recording.recorder import Recorder
 from bench.run.step_gaps import incomplete_steps, missing_steps
 
 logger = logging.getLogger("bench.run.evaluation")
+ANALYSIS_FAILED = "analysis-failed"
 RUN_END = "run-end"
 
 
@@ -194,6 +195,6 @@ def _in_order(
 def _failed(error: Exception) -> Finding:
     if isinstance(error, BenchError):
         logger.warning("the analysis failed: %s", error)
-        return Finding("analysis-failed", str(error), "analyse", Effect.ERROR)
+        return Finding(ANALYSIS_FAILED, str(error), "analyse", Effect.ERROR)
     logger.error("the analysis failed: %s: %s", type(error).__name__, error, exc_info=error)
-    return Finding("analysis-failed", f"{type(error).__name__}: {error}; see the log", "analyse", Effect.ERROR)
+    return Finding(ANALYSIS_FAILED, f"{type(error).__name__}: {error}; see the log", "analyse", Effect.ERROR)

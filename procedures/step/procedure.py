@@ -192,8 +192,10 @@ class Results:
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """The response of each case, and what the cases of an axis have in common."""
     before = list(checks.before(recording))
-    findings.gate([*before, *(() if before else planes.exchanged(recording))])
+    findings.gate(before)
+    exchanged = [] if before else list(planes.exchanged(recording))
     plan, steps = recording.plan, read_steps(recording)
+    findings.gate(exchanged, so_far=Results(steps))
     findings.gate(checks.of_steps(steps, plan), checks.FATAL, Results(steps))
     by_case = estimates.by_case(steps, recording.rig, plan.band)
     by_group = estimates.by_group(steps, by_case)

@@ -83,7 +83,7 @@ def test_the_forces_tell_what_each_trial_weight_did(sound: Balancing) -> None:
 
 
 def test_figures(sound: Balancing) -> None:
-    drawn = list(procedure.drawn(sound.recording))
+    drawn = list(procedure.procedure.drawn(sound.recording))
     assert [f.key for f in drawn] == ["weights", "before-after", "residual-inboard", "residual-outboard", "sheet-inboard",
                                       "sheet-outboard", "vectors-inboard", "vectors-outboard"]  # fmt: skip
     for figure in drawn:

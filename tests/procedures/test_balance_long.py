@@ -61,7 +61,7 @@ def second_was_needed_and_right(run: Balancing, leave: bool = False) -> None:
     assert len(sheet) == len(mounts) - (0 if leave else 2)
     assert {"correction 1", "correction 2"} <= {f.text.partition(":")[0] for f in sheet}
     assert len(run.recording.all_steps()) <= procedure.step_count(run.recording.plan)
-    assert len(list(procedure.drawn(run.recording))) == 8
+    assert len(list(procedure.procedure.drawn(run.recording))) == 8
 
 
 @pytest.mark.parametrize("plan", [FINE, {**FINE, "leave": True, "law": "PID"}], ids=["taken-off", "left-on"])
@@ -126,4 +126,4 @@ def test_a_planted_defect_is_named_and_never_passes(
     found = [f for f in run.findings if f.code == code]
     assert found, [f.code for f in run.findings]
     assert found[0].effect is effect
-    list(procedure.drawn(run.recording))  # what can be drawn is drawn
+    list(procedure.procedure.drawn(run.recording))  # what can be drawn is drawn

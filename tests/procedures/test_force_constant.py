@@ -86,7 +86,7 @@ def test_what_the_calibration_shares_is_in_the_report(sound: Simulated) -> None:
 def test_the_ripple_is_seen_over_the_angle(tmp_path: Path, calibration: Calibration) -> None:
     """alpha_d at home is alpha_d less the ripple; the mean over nine angles holds neither."""
     run = measure(tmp_path, calibration, {"alpha_2": 0.28, "alpha_3": 0.0})
-    known = facts(run.recording)
+    known = procedure.stated(run.recording)
     home, mean = known["alpha_d@0"], known["alpha_d"]
     assert set(known) == {"alpha_d", "alpha_dx", "alpha_cross@0", *(f"alpha_d@{k}" for k in range(9))}
     assert mean.value - home.value == pytest.approx(0.28, abs=0.02)

@@ -13,6 +13,7 @@ from bench.uncertainty import Estimate, interval
 from procedures.amb_calibration import fit, hypotheses, procedure
 from procedures.amb_calibration.hypotheses import Contradiction
 from procedures.amb_calibration.scatter import scatter
+from procedures.amb_calibration.steps import read_hangings
 
 SHORT = {"settle_s": 0.3, "average_s": 0.2}
 SEEDS = (0, 2)
@@ -30,7 +31,7 @@ def stated(run: Simulated, label: str, error: float) -> tuple[dict[str, Estimate
     masses = dict(recording.rig.masses)
     masses[label] = masses[label].model_copy(update={"value": masses[label].value * (1 + error)})
     recording.rig = recording.rig.model_copy(update={"masses": masses})
-    results = list(procedure.analyse(recording))
+    results = list(procedure.procedure.analyse(recording))
     found = {m.quantity.name: m.estimate for m in results if isinstance(m, Measured)}
     return found, [f for f in results if isinstance(f, Finding)]
 
@@ -83,7 +84,7 @@ def test_the_interval_of_a_suspect_holds_the_mass(sound: list[Simulated]) -> Non
     held = 0
     for run in sound:
         recording: Recording[procedure.Plan] = Recording.open(run.recording.path, procedure.Plan)
-        data = procedure.hangings(recording)
+        data = read_hangings(recording, recording.plan.masses)
         true = {k: e.value for k, e in procedure.fit_inputs(recording.rig, recording.plan).items()}
         u = procedure.masses_u(recording)
         for k in range(4):

@@ -107,7 +107,7 @@ def test_the_refined_grid_is_fine_and_the_orders_are_left_out(sound: Run) -> Non
 
 
 def test_figures(sound: Run) -> None:
-    drawn = list(sensitivity.procedure.drawn(sound.recording))
+    drawn = list(procedure.drawn(sound.recording))
     assert {f.key for f in drawn} == {
         f"{k}-{rpm}" for k in ("sensitivity", "bode", "nyquist", "coherence") for rpm in (0, 6000)
     }
@@ -246,7 +246,7 @@ def test_a_planted_defect_is_named_and_never_passes(
     found = [f for f in run.results if isinstance(f, Finding) and f.code == code]
     assert found, [f.code for f in run.results if isinstance(f, Finding)]
     assert found[0].effect is effect
-    list(sensitivity.procedure.drawn(run.recording))  # what can be drawn is drawn
+    list(procedure.drawn(run.recording))  # what can be drawn is drawn
 
 
 @pytest.mark.long
