@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bench.errors import ConfigError, InterlockError, Problem
-from bench.rigfile import RigFile, load_rig, model
+from bench.rigfile import RigFile, load_rig, text
 from bench.rigfile.check import check_rig
 from bench.rigfile.envelope import Envelope
 from bench.rigfile.possible import normal_gravity
@@ -312,13 +312,13 @@ def test_an_older_schema_is_migrated_step_by_step(tmp_path: Path, monkeypatch: p
         assert data["schema"] == 2
         return {**data, "title": f"{data['title']}!"}
 
-    monkeypatch.setattr(model, "SCHEMA", 3)
-    monkeypatch.setattr(model, "MIGRATIONS", {1: renamed, 2: rounded})
+    monkeypatch.setattr(text, "SCHEMA", 3)
+    monkeypatch.setattr(text, "MIGRATIONS", {1: renamed, 2: rounded})
     rig = load_rig(written(tmp_path, changed(TOML, ('title = "Toothless', 'heading = "Toothless'))))
     assert rig.schema_ == 3
     assert rig.title.startswith("Toothless self-bearing")
     assert rig.title.endswith("!")
-    monkeypatch.setattr(model, "MIGRATIONS", {1: renamed})
+    monkeypatch.setattr(text, "MIGRATIONS", {1: renamed})
     with pytest.raises(ConfigError, match="found 2; no way from there to 3"):
         load_rig(written(tmp_path))
 

@@ -22,7 +22,7 @@ from bench.record.speccheck import wrong_limits
 SCHEMA = 1
 NOT_APPLIED = "limit-not-applied"  # a note: the limit was stated for other settings
 LIMIT_UNIT = "limit-unit"
-INSTALLED = Path(__file__).resolve().parent.parent / "specs"
+INSTALLED = Path(__file__).resolve().parents[2] / "specs"
 
 
 _STRICT = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)

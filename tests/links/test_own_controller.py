@@ -32,7 +32,7 @@ from bench.rigfile.check import check_rig
 from bench.samples import SampleBlock
 from drivers.controller import Controller
 from drivers.operator import LineOperator
-from procedures.amb_calibration.procedure import Plan, analyse, procedure, settings
+from procedures.amb_calibration.procedure import Plan, procedure, settings
 from sim_backend.endpoint import SimulatedRig
 from sim_backend.truth import draw
 
@@ -147,7 +147,7 @@ def test_the_calibration_is_the_same_through_both_maps(tmp_path: Path) -> None:
 
 
 def _results(recording: Recording[Plan]) -> tuple[dict[str, tuple[float, float]], list[str]]:
-    found = list(analyse(recording))
+    found = list(procedure.analyse(recording))
     values = {m.quantity.name: (m.estimate.value, m.estimate.u) for m in found if isinstance(m, Measured)}
     return values, [f.code for f in found if isinstance(f, Finding)]
 

@@ -105,7 +105,7 @@ class Exchanged(Law):
 def test_the_printed_wiring_of_the_pid_loses_the_shaft(monkeypatch: pytest.MonkeyPatch) -> None:
     start = [0.0, 1e-6, -1e-6, *(0.0,) * 17]
     held = simulate(quiet(), AmbControl(law=0), start, 300).s
-    monkeypatch.setattr("sim_backend.amb_reference_loop.Law", Exchanged)
+    monkeypatch.setattr("sim_backend.machines.amb5dof.reference_loop.Law", Exchanged)
     lost = simulate(quiet(), AmbControl(law=0), start, 300).s
     assert np.hypot(*held[150:, 1:3].T).max() < 3e-5
     assert np.hypot(*lost[150:, 1:3].T).min() > 9e-5

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from sim_plants import centred, levitated, quiet
 
-from sim_backend import core
 from sim_backend.core import LAND, LEVITATE, LIFT, OFF, READY
+from sim_backend.machines.tsbs import plant as tsbs_core
 from sim_backend.machines.tsbs.params import ControlParams, PlantParams
 from sim_backend.machines.tsbs.plant import CHANNELS, Plant
 
@@ -221,13 +221,13 @@ def test_unknown_parameter_is_refused() -> None:
 
 def test_integrator_waits_at_the_limit_and_leaves_it_at_once() -> None:
     """The law alone: an error that pushes further into the current limit is not integrated, one that leads out is."""
-    control, state = core._ffi.new("tsbs_control *"), core._ffi.new("tsbs_law_state *")
-    reading, out = core._ffi.new("tsbs_reading *"), core._ffi.new("tsbs_reference *")
-    core._fill(control, vars(ControlParams(kd_i=0.0)))
+    control, state = tsbs_core._ffi.new("tsbs_control *"), tsbs_core._ffi.new("tsbs_law_state *")
+    reading, out = tsbs_core._ffi.new("tsbs_reading *"), tsbs_core._ffi.new("tsbs_reference *")
+    tsbs_core.fill(control, vars(ControlParams(kd_i=0.0)))
     state.mode = LEVITATE
     for y, change in ((-1e-3, 0.0), (1e-5, -1e-5 * control.ki_i * 1e-4)):
         before = state.integral[0] = 20.0
         reading.position = [y, 0.0, y, 0.0, 0.0]
-        core._lib.tsbs_law(control, state, reading, out)
+        tsbs_core._lib.tsbs_law(control, state, reading, out)
         assert out.coil[0] == control.current_limit
         assert state.integral[0] - before == pytest.approx(change, abs=1e-12)

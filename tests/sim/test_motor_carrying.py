@@ -11,8 +11,8 @@ import pytest
 from sim_plants import centred, levitated, quiet
 
 from bench.rigfile import load_rig
-from sim_backend import core
 from sim_backend.core import LAND, LEVITATE
+from sim_backend.machines.tsbs import plant as tsbs_core
 from sim_backend.machines.tsbs.params import ControlParams, PlantParams
 from sim_backend.machines.tsbs.plant import CHANNELS, Plant
 from sim_backend.truth import draw
@@ -137,11 +137,11 @@ def test_segment_amplifier_closes_on_its_own_sensor() -> None:
 def allocated(ix: float, iy: float, turn: float, **settings: float) -> Array:
     """Segment references (4,) in A of the law for open-loop i_x, i_y and a torque current of kp_theta * 1 rad."""
     gains = {"kp_theta": turn, "kd_theta": 0.0, "ki_theta": 1e-9, "angle_slew": 1e5, "angle_ref": 1.0}
-    control, state = core._ffi.new("tsbs_control *"), core._ffi.new("tsbs_law_state *")
-    reading, out = core._ffi.new("tsbs_reading *"), core._ffi.new("tsbs_reference *")
-    core._fill(control, vars(ControlParams(i_x=ix, i_y=iy, i_ramp=1e9, **gains, **settings)))
+    control, state = tsbs_core._ffi.new("tsbs_control *"), tsbs_core._ffi.new("tsbs_law_state *")
+    reading, out = tsbs_core._ffi.new("tsbs_reading *"), tsbs_core._ffi.new("tsbs_reference *")
+    tsbs_core.fill(control, vars(ControlParams(i_x=ix, i_y=iy, i_ramp=1e9, **gains, **settings)))
     state.mode = LEVITATE
-    core._lib.tsbs_law(control, state, reading, out)
+    tsbs_core._lib.tsbs_law(control, state, reading, out)
     return np.array(list(out.segment))
 
 
