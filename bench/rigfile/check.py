@@ -20,15 +20,15 @@ from bench.rigfile.rest import rest_of
 from bench.rigfile.text import RigText, read_rig
 from bench.units import Unit
 
-GEOMETRY = {
+GEOMETRY = {"amb_gap": "air gap of the radial AMBs", "clearance": "clearance of the touchdown bearings"}
+SHAFT_GEOMETRY = {
     "amb_span": "AMB plane to AMB plane",
     "com_to_outboard_amb": "centre of mass to outboard AMB",
     "com_to_inboard_amb": "centre of mass to inboard AMB",
     "com_to_outboard_sensor": "centre of mass to outboard sensors",
     "com_to_inboard_sensor": "centre of mass to inboard sensors",
-    "amb_gap": "air gap of the radial AMBs",
-    "clearance": "clearance of the touchdown bearings",
 }
+"""Of a shaft in two radial AMBs: a rig that states one of them states them all."""
 HOOK_GEOMETRY = {"hook_to_outboard": "hook plane to outboard AMB plane"}
 MOTOR_GEOMETRY = {"com_to_motor": "centre of mass to motor", "motor_stiffness": "negative stiffness of the motor"}
 """Of a rig on which masses hang, and of one whose controller turns the rotor."""
@@ -184,13 +184,14 @@ def _is_si(unit: Unit) -> bool:
 
 def _geometry(rig: RigFile) -> Iterator[Problem]:
     g, needed = rig.geometry, dict(GEOMETRY)
+    needed |= SHAFT_GEOMETRY if SHAFT_GEOMETRY.keys() & g.keys() else {}
     needed |= HOOK_GEOMETRY if rig.masses else {}
     needed |= MOTOR_GEOMETRY if any("rotation" in d.roles for d in rig.devices.values()) else {}
     for key in sorted(needed.keys() - g.keys()):
         yield Problem(rig.path, f"geometry.{key}", "nothing", f"{needed[key]}, with its certificate")
     for key in sorted(rig.machine.keys() - MACHINE.keys()):
         yield Problem(rig.path, f"machine.{key}", "a number nobody asks for", f"one of {', '.join(MACHINE)}")
-    known = GEOMETRY | HOOK_GEOMETRY | MOTOR_GEOMETRY | SOME_GEOMETRY
+    known = GEOMETRY | SHAFT_GEOMETRY | HOOK_GEOMETRY | MOTOR_GEOMETRY | SOME_GEOMETRY
     for key in sorted(g.keys() - known.keys()):
         close = difflib.get_close_matches(key, known, 1)
         yield Problem(rig.path, f"geometry.{key}", "a length nobody asks for",

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 AMBIENT_K, RISE_K, WARM_S = 295.0, 12.0, 600.0
 WATCHDOG_ARMED = 16
-PAYLOAD = np.dtype([("sequence", "<u2"), ("tick", "<u4"), ("words", "<u2", (29,))])
 
 
 class Span(NamedTuple):
@@ -33,7 +32,7 @@ class Span(NamedTuple):
 
 
 class TelemetryEncoder:
-    """Makes one 64-byte message per row: sequence, tick, then 29 sixteen-bit numbers (see the DBC)."""
+    """Makes one message per row: sequence, tick, then sixteen-bit numbers, as many as the DBC has (29 in 64 bytes)."""
 
     def __init__(self, messages: MessageMap, truth: Truth, first_tick: int = 0) -> None:
         """`first_tick`: what ran before it was sent too, to nobody."""
@@ -44,6 +43,8 @@ class TelemetryEncoder:
         }
         signals = self._message.signals[2:]
         self._names = [s.name for s in signals]
+        self._payload = np.dtype({"names": ["sequence", "tick", "words"], "formats": ["<u2", "<u4", ("<u2", (len(signals),))],
+                                  "offsets": [0, 2, 6], "itemsize": 64})  # fmt: skip
         self._place = {name: k for k, name in enumerate(self._names)}
         self._moves = _moves(*truth.machine.places(truth.defects, self._place))
         self._scale = np.array([s.scale for s in signals])
@@ -66,9 +67,9 @@ class TelemetryEncoder:
         np.minimum(np.maximum(raw, self._low, out=raw), self._high, out=raw)
         batch = np.zeros(n, FRAME)
         batch["t_ns"] = clock[0] + (ticks - clock[1]) * 100_000
-        batch["id"], batch["flags"], batch["length"] = self._message.identifier, FD, 64
+        batch["id"], batch["flags"], batch["length"] = self._message.identifier, FD, self._message.length
         start, self._sequence = self._sequence, self._sequence + n
-        payloads = batch["data"].view(PAYLOAD)[:, 0]
+        payloads = batch["data"].view(self._payload)[:, 0]
         payloads["sequence"] = np.arange(start, start + n) & 0xFFFF
         payloads["tick"] = ticks & 0xFFFFFFFF
         payloads["words"] = raw.astype(np.int64)  # two's complement where negative
