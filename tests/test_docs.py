@@ -31,11 +31,20 @@ from bench.procedure import plans
 from bench.rigfile import load_rig
 
 ROOT = Path(__file__).parent.parent
-PAGES = sorted(p for p in (ROOT / "docs").rglob("*.md") if "```console" in p.read_text(encoding="utf-8"))
+TREE = ("add-a-procedure", "add-a-machine")
+"""Guides that add to the tree itself, in the order in which they are executed, in one scratch copy of it."""
+PAGES = sorted(
+    p for p in (ROOT / "docs").rglob("*.md") if "```console" in p.read_text(encoding="utf-8") and p.stem not in TREE
+)
 REFUSED = re.compile(r"\|\| (true|test \$\? -eq 2)")
 RIGS = [path.stem for path in (ROOT / "rigs").glob("*.toml")]
 CHAIN = re.compile(r'RUN=\$\(bench run [^\\]*\| tail -1\)|bench adopt "\$RUN" [^\\]*')
 """A command on one line that leaves nothing but files and the variable RUN."""
+BLOCK = re.compile(r"^```(\w+)(?: (\S+))?\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+END_OF_FILE = "END_OF_FILE"
+COPIED = ("bench", "drivers", "procedures", "reports", "sim_backend", "rigs", "specs", "campaigns", "examples",
+          "pyproject.toml", ".importlinter")  # fmt: skip
+"""What a clone has that these guides use."""
 
 
 LONG = (
@@ -76,13 +85,13 @@ def bench_commands(page: Path) -> list[tuple[list[str], bool]]:
     return found
 
 
-def shell(lines: list[str], folder: Path) -> str:
-    """Execute them as one script; standard output."""
+def shell(lines: list[str], folder: Path, **variables: str) -> str:
+    """Execute them as one script, with more variables in its environment; standard output."""
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     script = "\n".join(["set -euo pipefail", *lines])
-    done = subprocess.run(["bash", "-c", script], cwd=folder, env={**os.environ, "PATH": path}, capture_output=True,
-                          text=True, check=False)  # fmt: skip
-    assert done.returncode == 0, done.stderr[-2000:]
+    done = subprocess.run(["bash", "-c", script], cwd=folder, env={**os.environ, "PATH": path, **variables},
+                          capture_output=True, text=True, check=False)  # fmt: skip
+    assert done.returncode == 0, (done.stdout + done.stderr)[-2000:]
     return done.stdout
 
 
@@ -127,6 +136,29 @@ def test_commands_work(page: Path, tmp_path: Path, chains: Chains) -> None:
         shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
         lines = [f"RUN={shlex.quote(run)}", *lines]
     shell(lines, tmp_path)
+
+
+def tree_lines(page: Path) -> list[str]:
+    """Its console blocks as they are; a block of another kind that names a file is written to it."""
+    lines: list[str] = []
+    for kind, name, text in BLOCK.findall(page.read_text(encoding="utf-8")):
+        if kind == "console":
+            lines += text.splitlines()
+        elif name:
+            assert END_OF_FILE not in text
+            lines += [f"mkdir -p {shlex.quote(str(Path(name).parent))}", f"cat > {shlex.quote(name)} <<'{END_OF_FILE}'"]
+            lines += [*text.splitlines(), END_OF_FILE]
+    return lines
+
+
+@pytest.mark.timeout(300)
+def test_guides_that_add_to_the_tree_work(tmp_path: Path) -> None:
+    """One after the other, each going on from what the one before has left, with the scratch copy in front of the clone."""
+    for part in COPIED:
+        copy = shutil.copytree if (ROOT / part).is_dir() else shutil.copy2
+        copy(ROOT / part, tmp_path / part)
+    for name in TREE:
+        shell(tree_lines(ROOT / f"docs/how-to/{name}.md"), tmp_path, PYTHONPATH=str(tmp_path))
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
