@@ -102,6 +102,19 @@ def test_a_rig_on_which_nothing_hangs_needs_neither_hook_nor_hanger(tmp_path: Pa
         written(tmp_path, changed(bare, ("com_to_motor = { value = 122,", "axial_gap = { value = 0.7,")))
     )[0]
     assert [p.key for p in found] == ["geometry.com_to_motor"]
+    lengths = (
+        "amb_span",
+        "com_to_outboard_amb",
+        "com_to_inboard_amb",
+        "com_to_outboard_sensor",
+        "com_to_inboard_sensor",
+    )
+    table = motorless.split("[geometry]")[1].split("[machine]")[0]
+    kept = [line for line in table.splitlines() if not line.startswith(lengths)]
+    assert check_rig(written(tmp_path, motorless.replace(table, "\n".join([*kept, ""]))))[0] == ()
+    one = [line for line in table.splitlines() if not line.startswith(lengths[1:])]
+    found = check_rig(written(tmp_path, motorless.replace(table, "\n".join([*one, ""]))))[0]
+    assert {p.key for p in found} == {f"geometry.{name}" for name in lengths[1:]}
 
 
 def test_protected_positions_are_those_that_the_rig_file_names(tmp_path: Path) -> None:
