@@ -193,6 +193,15 @@ def test_the_workflow_for_ci_is_understood() -> None:
     assert "18 tests collected" in done.stdout
 
 
+def test_modules_that_pages_name_exist() -> None:
+    """Not those of decisions, which are not rewritten, nor what the guides of TREE add."""
+    pages = [*ROOT.glob("*.md"), *(p for p in (ROOT / "docs").rglob("*.md") if p.parent.name != "decisions")]
+    rooms = "bench|drivers|procedures|reports|sim_backend|tests|benchmarks|examples"
+    for page in (p for p in pages if p.stem not in (*TREE, "CHANGELOG")):
+        for name in re.findall(rf"`((?:{rooms})/[\w./-]+\.py)`", page.read_text(encoding="utf-8")):
+            assert (ROOT / name).exists(), f"{page.name}: {name}"
+
+
 def test_links_lead_somewhere() -> None:
     for page in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]:
         for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text(encoding="utf-8")):

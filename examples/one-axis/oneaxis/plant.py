@@ -30,8 +30,9 @@ class Plant(CorePlant):
     def __init__(self, params: PlantParams, seed: int = 0, *, substeps: int = 2) -> None:
         self._p: Any = _ffi.new("oneaxis_params *")
         self._c: Any = _ffi.new("oneaxis_control *")
-        self._s: Any = _ffi.new("oneaxis_state *")
-        self._s.substeps = substeps
+        state: Any = _ffi.new("oneaxis_state *")
+        state.substeps = substeps
+        self._s: Any = state
         fill(self._p, vars(params))
         fill(self._c, vars(ControlParams()))
         _lib.oneaxis_start(self._p, self._s, seed & (2**64 - 1))
