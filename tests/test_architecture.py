@@ -21,7 +21,6 @@ from bench.cli.run import execute
 from bench.link.frames import SENT
 from bench.procedure import Measured
 from bench.recording import Recording
-from procedures.amb_calibration.procedure import Analysis, Plan
 from procedures.shared.step_table import reduced
 from reports import resultrows
 
@@ -84,7 +83,7 @@ class Walked:
     """A finished run: its record and its recording."""
 
     record: dict[str, Any]
-    recording: Recording[Plan]
+    recording: Recording[Any]
 
     @property
     def entry(self) -> dict[str, Any]:
@@ -93,10 +92,9 @@ class Walked:
         return dict(entry)
 
     @property
-    def result(self) -> Analysis:
-        found = load_procedure("amb-calibration").evaluated(self.recording)
-        assert isinstance(found.result, Analysis)
-        return found.result
+    def result(self) -> Any:
+        """What the procedure makes of the recording."""
+        return load_procedure("amb-calibration").evaluated(self.recording).result
 
 
 @pytest.fixture(scope="module")
@@ -105,7 +103,7 @@ def walked(tmp_path_factory: pytest.TempPathFactory) -> Walked:
     plan = ("settle_s=0.3", "average_s=0.2")
     done = execute(Request("amb-calibration", "tsbs12", seed=1, plan=plan, out=out, report=False))
     record = json.loads((done.directory / "record.json").read_text(encoding="utf-8"))
-    return Walked(record, Recording.open(done.directory / "recording.mcap", Plan))
+    return Walked(record, Recording.open(done.directory / "recording.mcap", load_procedure("amb-calibration").plan))
 
 
 def test_the_cell_is_the_records_value_rounded(walked: Walked) -> None:
@@ -126,13 +124,12 @@ def test_the_records_value_is_what_the_recording_is_evaluated_to(walked: Walked)
 
 
 def test_the_fit_is_made_of_means_of_steps(walked: Walked) -> None:
-    data = walked.result.data
+    inboard_upper = walked.result.data.hangings.currents[0, 0]
     for turn, (_, steps) in enumerate(walked.recording.steps("hang").by("angle_rad")):
         for point, step in enumerate(steps):
             samples = step.read(CHANNEL, "flags")
             mean = reduced(samples, (CHANNEL, "flags"), step.labels)["mean"][CHANNEL]
-            assert mean == pytest.approx(data.mean[CHANNEL][turn, point], rel=1e-14)
-            assert data.hangings.currents[0, 0, turn, point] == data.mean[CHANNEL][turn, point]
+            assert mean == pytest.approx(inboard_upper[turn, point], rel=1e-14)
 
 
 def test_a_step_is_cut_out_of_decoded_blocks(walked: Walked) -> None:
