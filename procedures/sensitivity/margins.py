@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -43,17 +44,21 @@ def margins(surveys: Sequence[Taken], where: str) -> dict[str, Estimate]:
     seen = smooth.everywhere(z), smooth.everywhere(base), smooth.everywhere(base + drawn)
     found = {
         "phase_margin": ("rad", _told(seen, lambda s: phase(1 / s - 1))),
-        "gain_reduction": ("1", _told((z, base, base + drawn), lambda s: fall(between(hz, 1 / s - 1)))),
-        "gain_increase": ("1", _raised(hz, z, power, drawn, smooth)),
+        # about the curve as it is seen: the local models follow it less well where it ends
+        "gain_reduction": ("1", _told((z, z, z + drawn), lambda s: fall(between(hz, 1 / s - 1)))),
+        "gain_increase": ("1", _least(hz, z, base, power, drawn, smooth)),
     }
-    dof = max(float(min(t.dof for t in surveys)), 1.0)
+    dof = {name: max(float(min(t.dof for t in surveys)), 1.0) for name in found}
+    dof["gain_reduction"] = max(float(min(t.dof_at_ends for t in surveys)), 1.0)
     out = {}
     for name, (unit, of) in found.items():
         if of is not None:
             identity = f"scatter/{where}/{name}"
             out[name] = Estimate.of(
-                of[0], Influence(identity, "scatter over the periods", of[1], unit, "A", "normal", dof)
+                of[0], Influence(identity, "scatter over the periods", of[1], unit, "A", "normal", dof[name])
             )
+    if "gain_increase" in out:  # that of L is what scatters alike to both sides
+        out["gain_increase"] = replace(1 / out["gain_increase"], unit="1")
     return out
 
 
@@ -128,8 +133,11 @@ def between(hz: Array, loop: Complex) -> Complex:
     return np.concatenate([*out, loop[len(out) :]])
 
 
-def _raised(hz: Array, z: Complex, power: Array, drawn: Complex, smooth: peaks.Smoother) -> tuple[float, float] | None:
-    """How far the gain may rise, and its u, by a polynomial about where a first look sees the crossing."""
+def _least(
+    hz: Array, z: Complex, base: Complex, power: Array, drawn: Complex, smooth: peaks.Smoother
+) -> tuple[float, float] | None:
+    """|L| where it crosses the negative real axis below 1, and its u, by a polynomial about where a first look sees that;
+    `base` is S as its local models have it at the lines."""
     loop = 1 / smooth.everywhere(z) - 1
     at = _crossings(loop.imag, loop + 0j).real, _crossings(loop.imag, smooth.x.astype(np.complex128)).real
     can = (at[0] < -FAINT) & (at[0] > -1)
@@ -141,13 +149,14 @@ def _raised(hz: Array, z: Complex, power: Array, drawn: Complex, smooth: peaks.S
         x, many = np.log(hz[near] / middle), int(near.sum())
         if many < 3 * (DEGREE + 1):
             return None
-        terms, weight = np.vander(x, DEGREE + 1), np.abs(z[near]) ** 2 / np.sqrt(power[near])  # d(1/S) = dS/S²
+        # d(1/S) = dS/S²; by the smooth S: noise that makes a line larger would weigh it more, and pull all to one side
+        terms, weight = np.vander(x, DEGREE + 1), np.abs(base[near]) ** 2 / np.sqrt(power[near])
         inverse = np.linalg.pinv(terms * weight[:, None]) * weight
         fitted = inverse @ (1 / z[near] - 1)
         off = float((np.abs((1 / z[near] - 1 - terms @ fitted) * weight) ** 2).sum()) / (many - DEGREE - 1)
         if off < 1 + MISFIT / math.sqrt(many - DEGREE - 1):
             fine = np.vander(np.linspace(x[0], x[-1], 20 * many), DEGREE + 1)
             noisy = 1 / (1 / (1 + terms @ fitted) + drawn[:, near]) - 1
-            found = rise(fine @ fitted)
-            return _freed(found, found, np.array([rise(fine @ (inverse @ each)) for each in noisy]))
+            found = 1 / rise(fine @ fitted)
+            return _freed(found, found, 1 / np.array([rise(fine @ (inverse @ each)) for each in noisy]))
     return None

@@ -30,7 +30,7 @@ ORDERS = (1.0, 2.0, 3.0, 4.0)
 CLEAR_HZ = 3.0  # to either side of an order of the shaft's speed
 CURRENT_LIMIT, VOLTAGE_LIMIT, CONTACT, RANGE = 1, 2, 4 | 8 | 32, 64  # bits of the telemetry signal `flags`
 WHOLE = 1e-6  # of the samples of a period: how far they may be from a whole number
-SHARING = 15  # lines to either side that share a noise
+SHARING, FEW = 15, 4  # lines to either side that share a noise; at the ends of a grid
 
 
 @dataclass(frozen=True)
@@ -87,12 +87,19 @@ class Taken:
         """Degrees of freedom of `noise`: those of the periods, over the lines that share it; two for each complex value."""
         return 2 * self.response.dof * min(self.response.hz.size, 2 * SHARING + 1)
 
+    @property
+    def dof_at_ends(self) -> float:
+        """The same where the grid begins and where it ends."""
+        return 2 * self.response.dof * min(self.response.hz.size, FEW + 1)
+
 
 def shared_noise(r: Response) -> Array:
-    """Mean square (m,) of the noise in a response, its share of abs squared averaged over neighbouring lines."""
+    """Mean square (m,) of the noise in a response, its share of abs squared averaged over neighbouring lines: as many to
+    either side, since the share grows with the frequency, but a few at the ends."""
     size = np.maximum(np.abs(r.values) ** 2, 1e-12)
     share = np.trace(r.covariance, axis1=1, axis2=2) / size
-    near = [share[max(0, k - SHARING) : k + SHARING + 1].mean() for k in range(share.size)]
+    reach = [min(max(k, FEW), max(share.size - 1 - k, FEW), SHARING) for k in range(share.size)]
+    near = [share[max(0, k - n) : k + n + 1].mean() for k, n in enumerate(reach)]
     return np.asarray(np.array(near) * size)
 
 

@@ -271,21 +271,22 @@ def test_how_far_a_gain_may_fall_between_the_lowest_lines(crossing: float) -> No
 
 def test_how_far_a_gain_may_rise_is_not_where_noise_crosses_the_axis() -> None:
     """A first-order loop with delay, K e^(-s D)/(1 + s T), has |L| where its angle is -180° by bisection. Each of 40 draws of
-    lines with 3.5 % of noise gives a value; none is further off than its u says."""
+    lines with 7 % of noise gives a value; none is further off than its u says, and together they lie about it: lines that
+    are weighed by |S| as read, and not by the smooth one, pull |L| up."""
     gain, constant, delay = 1.19, 1 / (2 * math.pi * 25), 1 / 600
     w = brentq(lambda w: w * delay + math.atan(w * constant) - math.pi, 1.0, 1e4)
     true = math.hypot(1, w * constant) / gain
     hz = np.concatenate([np.arange(2, 256, 4.0), np.arange(264, 2000, 16.0)])
     s = 2j * math.pi * hz
     exact = 1 / (1 + gain * np.exp(-s * delay) / (1 + s * constant))
-    power, off = 0.035**2 * np.abs(exact) ** 2, []
+    power, off = 0.07**2 * np.abs(exact) ** 2, []
     covariance = power[:, None, None] / 2 * np.eye(2)
     for seed in range(40):
         z = exact + peaks.noise(covariance, seed + 1, 1)[0]
         drawn, smooth = peaks.noise(covariance, 0, margins.DRAWS), peaks.smoother(hz, z, covariance)
-        found = margins._raised(hz, z, power, drawn, smooth)
+        found = margins._least(hz, z, smooth.at_lines(z), power, drawn, smooth)
         assert found is not None
-        off.append((found[0] - true) / found[1])
+        off.append((found[0] - 1 / true) / found[1])
     assert np.abs(off).max() < 4.0
     assert np.std(off) == pytest.approx(1.0, abs=0.3)
-    assert abs(np.mean(off)) < 0.5
+    assert abs(np.mean(off)) < 0.3
