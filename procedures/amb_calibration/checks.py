@@ -20,7 +20,9 @@ from procedures.amb_calibration import both_coils, hypotheses
 from procedures.amb_calibration.fit import Fit
 from procedures.amb_calibration.hypotheses import CHANCE, Contradiction, Suspect
 from procedures.amb_calibration.scatter import Scatter
-from procedures.amb_calibration.steps import COILS, POSITIONS, HangingData
+from procedures.amb_calibration.steps import AXES, VERTICAL, HangingData
+from procedures.servomotor.checks import limits
+from procedures.servomotor.conventions import Servomotor
 from procedures.shared import signals
 
 Array = npt.NDArray[np.float64]
@@ -28,7 +30,6 @@ Array = npt.NDArray[np.float64]
 FATAL = ("stuck-channel", "no-response", "axes-exchanged", "bearings-exchanged", "wrong-sign", "masses-exchanged")
 """Findings after which a fit means nothing and is not attempted."""
 NAMES = ("inboard", "outboard")
-AXES = ("yi", "yo", "xi", "xo")
 WIRED_WRONG = "wired-wrong"  # event: changes of the control currents under the first mass, A
 MOST_WRONG = 0.03  # relative: a set of masses that is off by more would be seen by eye
 
@@ -46,14 +47,15 @@ class Tolerances(Protocol):
     def bias_A(self) -> float: ...
 
 
-def of_signals(data: HangingData, plan: Tolerances) -> Iterator[Finding]:
+def of_signals(data: HangingData, machine: Servomotor, plan: Tolerances) -> Iterator[Finding]:
     """Checks that need no fit: losses, stuck channels, saturation, contact, settling, wiring."""
     where = partial(_worst, data)
     yield from signals.losses(data.lost, data.expected, plan.max_lost, where)
-    yield from signals.stuck(data.spread, (*COILS, *POSITIONS))
-    yield from signals.flagged(data.flags, where)
-    yield from signals.settled(data.mean, data.drift, ("yi", "yo"), plan.max_position_m, plan.max_drift_A, where)
-    yield from _wiring(data)
+    yield from signals.stuck(data.spread, (*machine.coils_of(*AXES), *machine.positions_of(*AXES)))
+    yield from signals.flagged(data.flags, limits(machine), where)
+    vertical = {machine.positions[axis]: machine.coils[axis] for axis in VERTICAL}
+    yield from signals.settled(data.mean, data.drift, vertical, plan.max_position_m, plan.max_drift_A, where)
+    yield from _wiring(data, machine)
 
 
 def _worst(data: HangingData, values: Array) -> str:
@@ -61,7 +63,7 @@ def _worst(data: HangingData, values: Array) -> str:
     return data.where(int(turn), int(point))
 
 
-def _wiring(data: HangingData) -> Iterator[Finding]:
+def _wiring(data: HangingData, machine: Servomotor) -> Iterator[Finding]:
     """Signs and axes, from how the control currents answer the load: the outboard AMB pulls more (positive), the
     inboard one less (negative), the horizontal axes hardly at all (the axes stand within a few mrad of the plumb).
     `acquire` asks the same after the first hanging."""
@@ -69,7 +71,7 @@ def _wiring(data: HangingData) -> Iterator[Finding]:
     heavy, light = load == load.max(), load < 0
 
     def answer(axis: str) -> float:
-        control = (data.mean[f"i_{axis}_p"] - data.mean[f"i_{axis}_n"]) / 2
+        control = machine.control(axis, data.mean.__getitem__)
         return float(control[heavy].mean() - control[light].mean())
 
     yield from wiring(*(answer(axis) for axis in AXES))

@@ -12,6 +12,7 @@ from bench.figures import Figure, Series
 from bench.recording import Recording
 from procedures.amb_calibration.fit import Fit
 from procedures.amb_calibration.steps import HangingData
+from procedures.servomotor.conventions import conventions
 
 Array = npt.NDArray[np.float64]
 NAMES = ("inboard", "outboard")
@@ -53,12 +54,14 @@ def _residuals(data: HangingData, f: Fit) -> Iterator[Figure]:
 def _one_step(recording: Recording[Any]) -> Iterator[Figure]:
     heaviest = recording.plan.masses[-1]
     step = next(s for s in recording.steps("hang") if s.labels["load"] == heaviest)
-    data = step.read("pos_yi", "pos_yo", "i_yo_p", "i_yo_n")
+    machine = conventions(recording.rig)
+    inboard, outboard = machine.positions_of("yi", "yo")
+    data = step.read(inboard, outboard, *machine.coils["yo"])
     t = (data["t_ns"] - data["t_ns"][0]).astype(np.float64) * 1e-9
     yield Figure("step-position", f"Position during one step ({heaviest})",
                  "Vertical position at both sensor planes while the heaviest mass hangs.", "time (s)", "position (µm)",
-                 (Series("inboard", t, 1e6 * data["pos_yi"]), Series("outboard", t, 1e6 * data["pos_yo"])))  # fmt: skip
-    control = (data["i_yo_p"] - data["i_yo_n"]) / 2
+                 (Series("inboard", t, 1e6 * data[inboard]), Series("outboard", t, 1e6 * data[outboard])))  # fmt: skip
+    control = machine.control("yo", data.__getitem__)
     yield Figure("step-current", f"Outboard control current during one step ({heaviest})",
                  "Control current of the outboard AMB in the same step; its mean enters the fit.", "time (s)",
                  "control current (A)", (Series("outboard", t, control),),

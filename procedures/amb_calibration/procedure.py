@@ -32,8 +32,8 @@ from procedures.amb_calibration.estimates import less_sure, turning_point, unres
 from procedures.amb_calibration.fit import Fit
 from procedures.amb_calibration.hypotheses import Contradiction
 from procedures.amb_calibration.scatter import OUTPUTS, Scatter, covariance_by_angle, covariance_over_a_turn, scatter
-from procedures.amb_calibration.steps import CHANNELS, COILS, HangingData, read_hangings
-from procedures.servomotor.channels import LEVERS
+from procedures.amb_calibration.steps import AXES, VERTICAL, HangingData, channels, read_hangings
+from procedures.servomotor.conventions import SERVOMOTOR, Servomotor, conventions
 from procedures.shared import assumptions
 from procedures.shared.certificates import certified
 from procedures.shared.weight import weight
@@ -82,10 +82,11 @@ def step_count(plan: Plan) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Hang every mass up and down at each angle; the hanger stays on throughout."""
-    before = _controls(rig)
+    machine = conventions(rig.file)
+    before = _controls(rig, machine)
     rig.operator.hang(Load(plan.masses[-1]))  # exercise: the first zero is then reached by unloading, like the others
     rig.clock.sleep(plan.settle_s)
-    changes = {axis: after - before[axis] for axis, after in _controls(rig).items()}
+    changes = {axis: after - before[axis] for axis, after in _controls(rig, machine).items()}
     rig.operator.hang(NOTHING)
     if max(map(abs, changes.values())) > CLEAR_A and any(checks.wiring(**changes)):
         record.event(checks.WIRED_WRONG, changes=changes)  # an hour of hangings would say no more
@@ -96,17 +97,16 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         for k, (load, branch) in enumerate(sequence(plan)):
             hanging = rig.operator.hang(load)
             rig.clock.sleep(plan.settle_s)
-            if turn == k == 0 and (needed := both_coils.at_no_load(rig.levitation.reading, plan.bias_A)):
+            if turn == k == 0 and (needed := both_coils.at_no_load(machine, rig.levitation.reading, plan.bias_A)):
                 record.event(both_coils.ONE_SIDED, needed=needed)
                 return
             with record.step("hang", angle_rad=angle, load=hanging.label, branch=branch):
                 rig.clock.sleep(plan.average_s)
 
 
-def _controls(rig: Rig) -> dict[str, float]:
+def _controls(rig: Rig, machine: Servomotor) -> dict[str, float]:
     """The control currents by axis as they are now, A."""
-    at = rig.levitation.reading
-    return {axis: (at(f"i_{axis}_p") - at(f"i_{axis}_n")) / 2 for axis in checks.AXES}
+    return {axis: machine.control(axis, rig.levitation.reading) for axis in AXES}
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     findings.gate(checks.of_first(recording))
     plan = recording.plan
     data = read_hangings(recording, plan.masses)
-    findings.gate(checks.of_signals(data, plan), checks.FATAL)
+    findings.gate(checks.of_signals(data, conventions(recording.rig), plan), checks.FATAL)
     a = _fitted(recording, data)
     values = {name: e.value for name, e in a.inputs.items()}
     findings.gate(
@@ -208,9 +208,9 @@ def fit_inputs(rig: RigFile, plan: Plan) -> dict[str, Estimate]:
     }
     for k, label in enumerate(plan.masses):
         inputs[f"mass_{k}"] = certified(f"masses/{label}", rig.masses[label], f"mass {label}")
+    machine = conventions(rig)
     for bearing in "io":
-        for coil in "pn":
-            channel = f"i_y{bearing}_{coil}"
+        for coil, channel in zip("pn", machine.coils[f"y{bearing}"], strict=True):
             sensor = rig.sensors[channel]
             inputs[f"gain_{bearing}{coil}"] = certified(f"sensors/{channel}/gain", sensor.gain, f"gain of {channel}")
             inputs[f"offset_{bearing}{coil}"] = certified(
@@ -255,10 +255,10 @@ procedure = Procedure(
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),
-        channels=CHANNELS,
-        sensors=tuple(c for c in COILS if c.startswith("i_y")),
+        channels=channels(SERVOMOTOR),
+        sensors=SERVOMOTOR.coils_of(*VERTICAL),
         parameters=("bias_i", "bias_o", "angle_ref"),
-        geometry=("hook_to_outboard", "amb_span", "amb_gap", "com_to_motor", "motor_stiffness", *LEVERS),
+        geometry=("hook_to_outboard", "amb_span", "amb_gap", "com_to_motor", "motor_stiffness", *SERVOMOTOR.levers),
         masses=True,
     ),
     check=check,

@@ -12,13 +12,17 @@ from bench.errors import AnalysisError
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from procedures.amb_calibration.fit import Hangings
+from procedures.servomotor.conventions import Servomotor, conventions, displacement
 from procedures.shared.step_table import reduced
 
 Array = npt.NDArray[np.float64]
+AXES = ("yi", "yo", "xi", "xo")
+VERTICAL = ("yi", "yo")
 
-COILS = tuple(f"i_{axis}{bearing}_{coil}" for axis in "yx" for bearing in "io" for coil in "pn")
-POSITIONS = ("pos_yi", "pos_yo", "pos_xi", "pos_xo")
-CHANNELS = (*COILS, *POSITIONS, "flags")
+
+def channels(machine: Servomotor) -> tuple[str, ...]:
+    """What is recorded while masses hang."""
+    return (*machine.coils_of(*AXES), *machine.positions_of(*AXES), "flags")
 
 
 @dataclass(frozen=True)
@@ -56,12 +60,14 @@ def read_hangings(recording: Recording[Any], masses: tuple[str, ...]) -> Hanging
             f"hangings per angle: found {sorted(counts) or 'none'}; expected the same number at each angle "
             "(was the run stopped early?)"
         )
-    read = [[reduced(step.read(*CHANNELS), CHANNELS, step.labels) for step in steps] for _, steps in groups]
+    machine = conventions(recording.rig)
+    names = channels(machine)
+    read = [[reduced(step.read(*names), names, step.labels) for step in steps] for _, steps in groups]
 
     def stack(key: str, channel: str) -> Array:
         return np.array([[one[key][channel] for one in row] for row in read])
 
-    mean = {c: stack("mean", c) for c in CHANNELS}
+    mean = {c: stack("mean", c) for c in names}
     steps = [s for _, s in groups]
     labels = {"": -1} | {label: k for k, label in enumerate(masses)}
     hung = [[str(s.labels["load"]) for s in row] for row in steps]
@@ -71,16 +77,16 @@ def read_hangings(recording: Recording[Any], masses: tuple[str, ...]) -> Hanging
         )
     load = np.array([[labels[label] for label in row] for row in hung])
     branch = np.array([[float(s.labels["branch"]) for s in row] for row in steps])
-    currents = np.stack([np.stack([mean[f"i_y{b}_{c}"] for c in "pn"]) for b in "io"])
-    inboard, outboard, motor = _plane_positions(recording.rig, mean["pos_yi"], mean["pos_yo"])
+    currents = np.stack([np.stack([mean[c] for c in machine.coils[axis]]) for axis in VERTICAL])
+    inboard, outboard, motor = _plane_positions(recording.rig, *(mean[c] for c in machine.positions_of(*VERTICAL)))
     hangings = Hangings(
         currents, np.stack([inboard, outboard]), motor, load, branch, np.array([angle for angle, _ in groups])
     )
     return HangingData(
         hangings,
         mean,
-        {c: stack("drift", c) for c in CHANNELS},
-        {c: stack("spread", c) for c in CHANNELS},
+        {c: stack("drift", c) for c in names},
+        {c: stack("spread", c) for c in names},
         np.array([[float(s.lost()) for s in row] for row in steps]),
         np.array([[float(s.expected()) for s in row] for row in steps]),
         np.array([[one["flags"] for one in row] for row in read]),
@@ -90,11 +96,7 @@ def read_hangings(recording: Recording[Any], masses: tuple[str, ...]) -> Hanging
 
 def _plane_positions(rig: RigFile, y_inboard: Array, y_outboard: Array) -> tuple[Array, Array, Array]:
     """Displacement at the inboard AMB, the outboard AMB and the motor from both sensor planes (T 6.7)."""
-    g = rig.geometry
-    l_is, l_os = g["com_to_inboard_sensor"].value, g["com_to_outboard_sensor"].value
-
-    def at(zeta: float) -> Array:
-        share = (zeta + l_is) / (l_is + l_os)
-        return y_inboard * (1 - share) + y_outboard * share
-
-    return at(-g["com_to_inboard_amb"].value), at(g["com_to_outboard_amb"].value), at(g["com_to_motor"].value)
+    machine = conventions(rig)
+    inboard, outboard, motor = (rig.geometry[name].value for name in (*machine.ambs, "com_to_motor"))
+    at = [displacement(y_inboard, y_outboard, machine.sensor_share(z, rig)) for z in (-inboard, outboard, motor)]
+    return at[0], at[1], at[2]

@@ -12,7 +12,8 @@ from bench.findings import Effect, Finding
 from bench.uncertainty import coverage_factor
 from procedures.angle_step.estimates import Result
 from procedures.angle_step.response import Loop, kick_A
-from procedures.angle_step.steps import CONTACT, SATURATED, SATURATED_AMB, Case, Done
+from procedures.angle_step.steps import Case, Done
+from procedures.servomotor.conventions import Servomotor
 
 FATAL = ("stuck-channel",)
 SMALL = 0.9  # of the segments' limit: a step whose demand stays below it should not meet it
@@ -29,7 +30,7 @@ class Tolerances(Protocol):
     def max_lost(self) -> float: ...
 
 
-def of_signals(moves: Sequence[Done], plan: Tolerances) -> Iterator[Finding]:
+def of_signals(moves: Sequence[Done], machine: Servomotor, plan: Tolerances) -> Iterator[Finding]:
     """Lost samples, stuck channels, contact, amplifiers at their limits while nothing moves."""
     shares = [d.lost / max(d.expected, 1) for d in moves]
     worst = int(np.argmax(shares))
@@ -45,10 +46,10 @@ def of_signals(moves: Sequence[Done], plan: Tolerances) -> Iterator[Finding]:
             "stuck-channel", f"{channel} does not move at all; a live sensor has noise.", channel, Effect.ERROR
         )
     for bits, of, code, text in (
-        (CONTACT, "flags", "contact", "the rotor touched a touchdown bearing"),
-        (SATURATED_AMB, "flags", "saturated", "an AMB amplifier was at its limit"),
-        (SATURATED, "rest_flags", "saturated-at-rest", "a segment of the motor was at its limit before the step: it carries "
-         "more than it should"),
+        (machine.contact, "flags", "contact", "the rotor touched a touchdown bearing"),
+        (machine.amb_limit, "flags", "saturated", "an AMB amplifier was at its limit"),
+        (machine.segment_limit, "rest_flags", "saturated-at-rest",
+         "a segment of the motor was at its limit before the step: it carries more than it should"),
     ):  # fmt: skip
         hit = [d for d in moves if getattr(d, of) & bits]
         if hit:

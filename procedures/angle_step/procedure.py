@@ -27,8 +27,9 @@ from procedures.angle_step import checks, estimates, response
 from procedures.angle_step import figures as drawn
 from procedures.angle_step.estimates import Result
 from procedures.angle_step.response import Loop
-from procedures.angle_step.steps import CHANNELS, POSITIONS, STEP, Case, Done, cases, read_moves
+from procedures.angle_step.steps import STEP, Case, Done, cases, channels, positions, read_moves
 from procedures.servomotor import carrying, hold, segments, wiring
+from procedures.servomotor.conventions import SERVOMOTOR, conventions
 from procedures.servomotor.direction import of_probe
 from procedures.shared import assumptions
 
@@ -128,7 +129,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     findings.gate([*of_probe(recording), *segments.of_nudges(recording)])
     plan, rig = recording.plan, recording.rig
     moves = read_moves(recording)
-    findings.gate(checks.of_signals(moves, plan), checks.FATAL)
+    findings.gate(checks.of_signals(moves, conventions(rig), plan), checks.FATAL)
     by_case = estimates.by_case(moves, rig, plan.band, 2 * math.pi / plan.encoder_counts)
     findings.add(checks.of_responses(by_case, plan, {c: _loop(rig, plan, c) for c in by_case}))
     findings.add(checks.compared(by_case))
@@ -186,8 +187,8 @@ procedure = Procedure(
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),
-        channels=(*CHANNELS, *wiring.CHANNELS),
-        sensors=POSITIONS,
+        channels=(*channels(SERVOMOTOR), *wiring.channels(SERVOMOTOR)),
+        sensors=positions(SERVOMOTOR),
         parameters=(*hold.PARAMETERS, *wiring.PARAMETERS, *NEEDED),
         machine=("polar_inertia",),
     ),

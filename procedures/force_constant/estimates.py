@@ -13,6 +13,7 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate
 from procedures.force_constant import fit as force_constant_fit
 from procedures.force_constant.fit import CROSS, DIRECT, FORCE, MOMENT, Constants, Fit, Ramps
+from procedures.servomotor.conventions import conventions
 from procedures.shared.certificates import certified
 
 Array = npt.NDArray[np.float64]
@@ -74,9 +75,9 @@ def rig_inputs(rig: RigFile, axis: str) -> dict[str, Estimate]:
             "geometry/motor_stiffness", g["motor_stiffness"], "motor stiffness (residual pos.)"
         ),
     }
-    channels = {f"{axis}{b}{c}": f"i_{axis}{b}_{c}" for b in "io" for c in "pn"} | {
-        f"m{k}": f"i_m{k}" for k in range(1, 5)
-    }
+    machine = conventions(rig)
+    channels = {f"{axis}{b}{c}": coil for b in "io" for c, coil in zip("pn", machine.coils[f"{axis}{b}"], strict=True)}
+    channels |= {f"m{k}": segment for k, segment in enumerate(machine.segments, 1)}
     for short, channel in channels.items():
         sensor = rig.sensors[channel]
         out[f"gain_{short}"] = certified(f"sensors/{channel}/gain", sensor.gain, f"gain of {channel}")

@@ -7,8 +7,8 @@ from typing import Protocol
 
 from bench.procedure.requires import Requires
 from bench.rigfile import RigFile
-from procedures.force_constant.steps import CHANNELS, COILS, SEGMENTS
-from procedures.servomotor.channels import LEVERS
+from procedures.force_constant.steps import AXES, channels
+from procedures.servomotor.conventions import SERVOMOTOR
 
 # What the levels are checked with before anything starts; no result uses these.
 WEIGHT_N, COM_TO_OUTBOARD = 10.2 * 9.81, 0.010  # T Table 6.1
@@ -29,10 +29,10 @@ class Levels(Protocol):
 
 REQUIRES = Requires(
     roles=("levitation", "rotation"),
-    channels=CHANNELS,
-    sensors=(*COILS, *SEGMENTS),
+    channels=channels(SERVOMOTOR),
+    sensors=(*SERVOMOTOR.coils_of(*AXES), *SERVOMOTOR.segments),
     parameters=("bias_i", "bias_o", "i_ramp", "i_x", "i_y"),
-    geometry=("amb_span", "motor_to_outboard_amb", "amb_gap", "motor_stiffness", *LEVERS),
+    geometry=("amb_span", "motor_to_outboard_amb", "amb_gap", "motor_stiffness", *SERVOMOTOR.levers),
     machine=("amb_asymmetry", "pole_pairs"),
 )
 

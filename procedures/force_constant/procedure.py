@@ -32,6 +32,7 @@ from procedures.force_constant.estimates import AxisResult
 from procedures.force_constant.fit import TIME
 from procedures.force_constant.fitting import REQUIRES, check
 from procedures.force_constant.steps import STEP, RampData, read_ramps
+from procedures.servomotor.conventions import conventions
 from procedures.shared import assumptions
 
 Array = npt.NDArray[np.float64]
@@ -137,7 +138,7 @@ class Analysis:
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """Both axes with their influences."""
     plan, rig, data = recording.plan, recording.rig, read_ramps(recording)
-    signals = list(checks.of_signals(data, plan))
+    signals = list(checks.of_signals(data, conventions(rig), plan))
     findings.gate(signals, checks.FATAL)
     facts = recording.calibration(CALIBRATION).values
     count = len(data.vertical.angles)

@@ -12,15 +12,18 @@ from bench.errors import AnalysisError
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from procedures.force_constant.fit import Ramps
+from procedures.servomotor.conventions import Servomotor, conventions, displacement
 from procedures.shared.step_table import reduced
 
 Array = npt.NDArray[np.float64]
 
 STEP = "level"
-COILS = tuple(f"i_{axis}{bearing}_{coil}" for axis in "yx" for bearing in "io" for coil in "pn")
-SEGMENTS = ("i_m1", "i_m2", "i_m3", "i_m4")
-POSITIONS = ("pos_yi", "pos_yo", "pos_xi", "pos_xo")
-CHANNELS = (*COILS, *SEGMENTS, *POSITIONS, "flags")
+AXES = ("yi", "yo", "xi", "xo")
+
+
+def channels(machine: Servomotor) -> tuple[str, ...]:
+    """What is recorded at a level."""
+    return (*machine.coils_of(*AXES), *machine.segments, *machine.positions_of(*AXES), "flags")
 
 
 @dataclass(frozen=True)
@@ -61,13 +64,15 @@ def read_ramps(recording: Recording[Any]) -> RampData:
             "(was the run stopped early?)"
         )
     steps = [row for _, row in groups]
-    read = [[reduced(step.read(*CHANNELS), CHANNELS, step.labels) for step in row] for row in steps]
+    machine = conventions(recording.rig)
+    names = channels(machine)
+    read = [[reduced(step.read(*names), names, step.labels) for step in row] for row in steps]
 
     def label(name: str) -> Array:
         return np.array([[float(s.labels[name]) for s in row] for row in steps])
 
     mean, drift, spread = (
-        {c: np.array([[one[kind][c] for one in row] for row in read]) for c in CHANNELS}
+        {c: np.array([[one[kind][c] for one in row] for row in read]) for c in names}
         for kind in ("mean", "drift", "spread")
     )
     begun = np.array([[(s.start_ns - steps[0][0].start_ns) * 1e-9 for s in row] for row in steps])
@@ -79,9 +84,9 @@ def read_ramps(recording: Recording[Any]) -> RampData:
         branch = label(f"branch_{axis}")
         return Ramps(
             axis,
-            np.stack([np.stack([mean[f"i_{axis}{b}_{c}"] for c in "pn"]) for b in "io"]),
-            np.stack([mean[c] for c in SEGMENTS]),
-            *planes(recording.rig, mean[f"pos_{axis}i"], mean[f"pos_{axis}o"]),
+            np.stack([np.stack([mean[c] for c in machine.coils[f"{axis}{b}"]]) for b in "io"]),
+            np.stack([mean[c] for c in machine.segments]),
+            *planes(recording.rig, *(mean[c] for c in machine.positions_of(f"{axis}i", f"{axis}o"))),
             branch,
             np.isin(level, (level.min(), level.max())).astype(np.float64),
             time,
@@ -99,12 +104,7 @@ def read_ramps(recording: Recording[Any]) -> RampData:
 
 def planes(rig: RigFile, inboard: Array, outboard: Array) -> tuple[Array, Array]:
     """Displacement at the AMB planes (2, A, P) and at the motor (A, P) from both sensor planes (T 6.7)."""
-    g = rig.geometry
-    l_is, l_os = g["com_to_inboard_sensor"].value, g["com_to_outboard_sensor"].value
-    l_oa = g["com_to_outboard_amb"].value
-
-    def at(zeta: float) -> Array:
-        share = (zeta + l_is) / (l_is + l_os)
-        return inboard * (1 - share) + outboard * share
-
-    return np.stack([at(-g["com_to_inboard_amb"].value), at(l_oa)]), at(l_oa + g["motor_to_outboard_amb"].value)
+    machine = conventions(rig)
+    l_ia, l_oa, on = (rig.geometry[name].value for name in (*machine.ambs, "motor_to_outboard_amb"))
+    at = [displacement(inboard, outboard, machine.sensor_share(z, rig)) for z in (-l_ia, l_oa, l_oa + on)]
+    return np.stack(at[:2]), at[2]

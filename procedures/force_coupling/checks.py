@@ -11,6 +11,7 @@ from bench.findings import Effect, Finding
 from procedures.force_coupling.estimates import Analysis
 from procedures.force_coupling.fit import TERMS, CouplingFit
 from procedures.servomotor import checks
+from procedures.servomotor.conventions import Servomotor
 from procedures.servomotor.steps import StepMeans
 
 ZERO_RAD = math.radians(2.0)  # four times what a commutation set with care is off
@@ -29,7 +30,7 @@ def of_fit(data: StepMeans, f: CouplingFit, plan: checks.Tolerances) -> Iterator
     yield from checks.misfit(data, residuals, span, "currents over gamma", plan)
 
 
-def of_results(a: Analysis, pole_pairs: float) -> Iterator[Finding]:
+def of_results(a: Analysis, machine: Servomotor, pole_pairs: float) -> Iterator[Finding]:
     """Signs, a zero far off, unequal windings; and T's own way beside ours."""
     ratio, zero, winding = a.fit.term("r"), a.fit.term("gamma_0"), a.fit.term("a")
     yield from _commutation(a)
@@ -55,7 +56,7 @@ def of_results(a: Analysis, pole_pairs: float) -> Iterator[Finding]:
             "windings-differ",
             f"the x winding gives {winding:.3f} of the y winding's force (within {WINDING:.0%} is expected): a segment "
             "gives no current or counts it wrongly, or segments are exchanged.",
-            "i_m2, i_m4",
+            f"{machine.segments[1]}, {machine.segments[3]}",
             Effect.ERROR,
         )
     direct, coupled = (

@@ -14,7 +14,8 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from procedures.force_coupling import fit as force_coupling_fit
 from procedures.force_coupling.fit import CouplingFit, Sweep
-from procedures.servomotor.steps import SEGMENTS, StepMeans
+from procedures.servomotor.conventions import conventions
+from procedures.servomotor.steps import StepMeans
 from procedures.shared.certificates import certified
 from procedures.shared.gradients import by_inputs, linearised
 from procedures.shared.type_a import scatter
@@ -40,7 +41,9 @@ class Analysis:
 def evaluate(recording: Recording[Any], data: StepMeans, count_rad: float) -> Analysis:
     """Fit, and the three estimates by name (with `winding`, the x winding's constant over the y winding's)."""
     inputs = fit_inputs(recording)
-    sweep = Sweep(data.stack(SEGMENTS), data.stack(("pos_yi", "pos_yo")), data.stack(("pos_xi", "pos_xo")),
+    machine = conventions(recording.rig)
+    y, x = (data.stack(machine.positions_of(f"{axis}i", f"{axis}o")) for axis in "yx")
+    sweep = Sweep(data.stack(machine.segments), y, x,
                   data.labels["gamma_rad"], rotor_angle(data.mean["angle"], count_rad), data.time_s)  # fmt: skip
 
     def model(p: dict[str, float]) -> dict[str, float]:
@@ -132,8 +135,7 @@ def fit_inputs(recording: Recording[Any]) -> dict[str, Estimate]:
 def segment_sensors(rig: RigFile) -> dict[str, Estimate]:
     """Gains and offsets of the segments' current sensors."""
     out = {}
-    for k in range(1, 5):
-        channel = f"i_m{k}"
+    for k, channel in enumerate(conventions(rig).segments, 1):
         sensor = rig.sensors[channel]
         out[f"gain_m{k}"] = certified(f"sensors/{channel}/gain", sensor.gain, f"gain of {channel}")
         out[f"offset_m{k}"] = certified(f"sensors/{channel}/offset", sensor.offset, f"offset of {channel}")

@@ -29,7 +29,8 @@ from procedures.force_coupling import estimates
 from procedures.force_coupling import figures as drawn
 from procedures.force_coupling.estimates import Analysis
 from procedures.servomotor import carrying, checks
-from procedures.servomotor.steps import CHANNELS, POSITIONS, SEGMENTS, StepMeans, read_steps
+from procedures.servomotor.conventions import SERVOMOTOR, Servomotor, conventions, radial_currents
+from procedures.servomotor.steps import POSITIONS, StepMeans, channels, read_steps
 from procedures.shared import assumptions
 
 RATIO = Quantity(
@@ -94,10 +95,12 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """The currents over the phase angle with their fit."""
     data = read(recording)
-    findings.gate(_of_signals(data, recording.plan), FATAL)
+    findings.gate(_of_signals(data, conventions(recording.rig), recording.plan), FATAL)
     a = estimates.evaluate(recording, data, recording.plan.count_rad)
     findings.add(force_coupling_checks.of_fit(data, a.fit, recording.plan))
-    findings.add(force_coupling_checks.of_results(a, recording.rig.machine["pole_pairs"].value))
+    findings.add(
+        force_coupling_checks.of_results(a, conventions(recording.rig), recording.rig.machine["pole_pairs"].value)
+    )
     return a
 
 
@@ -116,13 +119,13 @@ def read(recording: Recording[Plan]) -> StepMeans:
     return read_steps(recording, "phase", ("gamma_rad", "branch"), name)
 
 
-def _of_signals(data: StepMeans, plan: Plan) -> Iterator[Finding]:
-    yield from checks.of_signals(data, (*SEGMENTS, *POSITIONS), plan)
-    yield from checks.segments(data)
+def _of_signals(data: StepMeans, machine: Servomotor, plan: Plan) -> Iterator[Finding]:
+    positions = machine.positions_of(*POSITIONS)
+    yield from checks.of_signals(data, machine, (*machine.segments, *positions), plan)
+    yield from checks.segments(data, machine)
     yield from checks.at_edge(data, plan.count_rad)
-    d = data.drift
-    currents = {"i_y": (d["i_m1"] - d["i_m3"]) / 2, "i_x": (d["i_m4"] - d["i_m2"]) / 2}
-    yield from checks.settled(data, {c: data.mean[c] for c in POSITIONS}, currents, plan)
+    i_x, i_y = radial_currents(*(data.drift[c] for c in machine.segments))
+    yield from checks.settled(data, {c: data.mean[c] for c in positions}, {"i_y": i_y, "i_x": i_x}, plan)
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
@@ -169,8 +172,8 @@ procedure = Procedure(
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),
-        channels=CHANNELS,
-        sensors=(*SEGMENTS, *POSITIONS),
+        channels=channels(SERVOMOTOR),
+        sensors=(*SERVOMOTOR.segments, *SERVOMOTOR.positions_of(*POSITIONS)),
         parameters=(*carrying.PARAMETERS, "gamma", "segment_max"),
         geometry=GEOMETRY,
         machine=("pole_pairs",),

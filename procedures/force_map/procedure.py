@@ -29,10 +29,10 @@ from procedures.force_map import estimates, steps
 from procedures.force_map import figures as force_map_figures
 from procedures.force_map.estimates import CROSS, Result
 from procedures.force_map.fit import ABOUT, UNITS
-from procedures.force_map.steps import CHANNELS, COILS, POSITIONS, STEP, MapData, read_points
+from procedures.force_map.steps import STEP, MapData, channels, positions, read_points
 from procedures.servomotor import carrying, hold, segments, wiring
+from procedures.servomotor.conventions import SERVOMOTOR, conventions
 from procedures.servomotor.direction import of_probe
-from procedures.servomotor.segments import SEGMENTS
 from procedures.shared import assumptions
 
 CALIBRATION = "amb-calibration"
@@ -138,10 +138,11 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> tuple[MapData, R
     """Points and terms."""
     findings.gate([*of_probe(recording), *segments.of_nudges(recording)])
     plan, rig, data = recording.plan, recording.rig, read_points(recording)
-    findings.gate(steps.of_signals(data, plan), ("stuck-channel",))
+    machine = conventions(rig)
+    findings.gate(steps.of_signals(data, machine, plan), ("stuck-channel",))
     inputs = estimates.inputs_of(rig, recording.calibration(CALIBRATION).values, plan.angles)
     poles = 2 * round(rig.machine["pole_pairs"].value)
-    result = estimates.evaluate(data, inputs, plan.bias_A, plan.angles, poles)
+    result = estimates.evaluate(data, machine, inputs, plan.bias_A, plan.angles, poles)
     findings.add(steps.drifts(data, result.force, result.points.i_theta))
     findings.add([*_contradictions(result, plan), *_notes(result)])
     return data, result
@@ -225,8 +226,8 @@ procedure = Procedure(
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),
-        channels=(*CHANNELS, *wiring.CHANNELS),
-        sensors=(*COILS, *SEGMENTS, *POSITIONS),
+        channels=(*channels(SERVOMOTOR), *wiring.channels(SERVOMOTOR)),
+        sensors=(*SERVOMOTOR.coils["yi"], *SERVOMOTOR.segments, *positions(SERVOMOTOR)),
         parameters=(*hold.PARAMETERS, *wiring.PARAMETERS, *NEEDED),
         geometry=GEOMETRY,
         machine=("pole_pairs",),

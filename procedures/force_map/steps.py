@@ -13,21 +13,25 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
 from bench.recording import Recording
-from procedures.servomotor.segments import SEGMENTS
+from procedures.servomotor.conventions import Servomotor, conventions
 
 Array = npt.NDArray[np.float64]
 STEP = "point"
-COILS = ("i_yi_p", "i_yi_n")
-POSITIONS = ("pos_xi", "pos_yi", "pos_xo", "pos_yo")
-CHANNELS = (*COILS, *POSITIONS, *SEGMENTS, "flags")
-LIMITS = ((1, "saturated", "an AMB amplifier was at its limit"), (2, "saturated", "a segment of the motor was at its limit"),
-          (12, "contact", "the rotor touched a touchdown bearing"))  # fmt: skip
-"""Bits of the telemetry signal `flags`."""
 WANDER_N = (
     0.05  # of the motor's force between two points of an angle at which nothing is set; constants then move by half a U
 )
 SLIP = 0.1  # of the torque current of a load; friction makes 2 %
 SIGNIFICANT = 6.0  # standard uncertainties
+
+
+def positions(machine: Servomotor) -> tuple[str, ...]:
+    """Where the shaft is, inboard first."""
+    return machine.positions_of("xi", "yi", "xo", "yo")
+
+
+def channels(machine: Servomotor) -> tuple[str, ...]:
+    """What is recorded at a point."""
+    return (*machine.coils["yi"], *positions(machine), *machine.segments, "flags")
 
 
 class Tolerances(Protocol):
@@ -69,9 +73,11 @@ def read_points(recording: Recording[Any]) -> MapData:
         raise AnalysisError("found no points; expected those of the plan (was the run stopped early?)")
     names: list[tuple[int, str]] = []
     rows, flags, drift, group = [], [], [], []
-    still = dict.fromkeys(CHANNELS[:-1], 0)
+    machine = conventions(recording.rig)
+    channels_read = channels(machine)
+    still = dict.fromkeys(channels_read[:-1], 0)
     for step in steps:
-        data = step.read(*CHANNELS)
+        data = step.read(*channels_read)
         half = len(data["flags"]) // 2
         if half == 0:
             raise AnalysisError(f"point {dict(step.labels)}: found no samples")
@@ -79,8 +85,8 @@ def read_points(recording: Recording[Any]) -> MapData:
         if key not in names:
             names.append(key)
         group.append(names.index(key))
-        rows.append([float(data[c].mean()) for c in CHANNELS[:-1]])
-        control = (data["i_yi_p"] - data["i_yi_n"]) / 2
+        rows.append([float(data[c].mean()) for c in still])
+        control = machine.control("yi", data.__getitem__)
         drift.append(float(control[half:].mean() - control[:half].mean()))
         flags.append(int(np.bitwise_or.reduce(data["flags"].astype(np.int64))))
         for channel in still:
@@ -90,7 +96,7 @@ def read_points(recording: Recording[Any]) -> MapData:
         np.array([int(s.labels["turn"]) for s in steps]),
         np.array(group),
         tuple(load for _, load in names),
-        {c: table[:, k] for k, c in enumerate(CHANNELS[:-1])},
+        {c: table[:, k] for k, c in enumerate(still)},
         np.array(drift),
         np.array([s.lost() / max(s.expected(), 1) for s in steps]),
         np.array(flags),
@@ -98,7 +104,7 @@ def read_points(recording: Recording[Any]) -> MapData:
     )
 
 
-def of_signals(data: MapData, plan: Tolerances) -> Iterator[Finding]:
+def of_signals(data: MapData, machine: Servomotor, plan: Tolerances) -> Iterator[Finding]:
     """Lost samples, stuck channels, limits, contact, points that had not settled."""
     if data.lost.max() > plan.max_lost:
         yield Finding("missing-samples", f"{data.lost.max():.2%} of the samples of a point are missing ({plan.max_lost:.2%} is "
@@ -107,7 +113,11 @@ def of_signals(data: MapData, plan: Tolerances) -> Iterator[Finding]:
         if count:
             text = f"{channel} does not move at all in {count} of {len(data)} points; a live sensor has noise."
             yield Finding("stuck-channel", text, channel, Effect.ERROR)
-    for bits, code, text in LIMITS:
+    for bits, code, text in (
+        (machine.amb_limit, "saturated", "an AMB amplifier was at its limit"),
+        (machine.segment_limit, "saturated", "a segment of the motor was at its limit"),
+        (machine.contact, "contact", "the rotor touched a touchdown bearing"),
+    ):
         if hit := int(((data.flags & bits) != 0).sum()):
             yield Finding(code, f"{text} in {hit} of {len(data)} points", "", Effect.INDETERMINATE)
     worst = float(np.abs(data.drift).max())

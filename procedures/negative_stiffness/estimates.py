@@ -12,12 +12,11 @@ from bench.recording import Recording
 from bench.uncertainty import Estimate, Influence
 from procedures.negative_stiffness import fit
 from procedures.negative_stiffness.fit import AmbFit, ByAmbs, ByMotor, MotorFit
-from procedures.servomotor.steps import SEGMENTS, StepMeans
+from procedures.servomotor.conventions import Servomotor, conventions
+from procedures.servomotor.steps import StepMeans
 from procedures.shared.certificates import certified
 from procedures.shared.gradients import by_inputs
 from procedures.shared.type_a import scatter
-
-COILS = ("i_yo_p", "i_yo_n")
 
 
 class Biases(Protocol):
@@ -43,7 +42,7 @@ class Analysis:
 def evaluate(recording: Recording[Any], motor: StepMeans, ambs: StepMeans) -> Analysis:
     """Both fits with their influences; `estimates` motor, ambs, gap and difference."""
     inputs = fit_inputs(recording)
-    one, two = measured(recording.plan, motor, ambs)
+    one, two = measured(conventions(recording.rig), recording.plan, motor, ambs)
 
     def model(p: dict[str, float]) -> dict[str, float]:
         fitted = fit.by_ambs(two, p)
@@ -64,14 +63,14 @@ def evaluate(recording: Recording[Any], motor: StepMeans, ambs: StepMeans) -> An
     return Analysis(motor, ambs, by_motor, by_ambs, estimates)
 
 
-def measured(plan: Biases, motor: StepMeans, ambs: StepMeans) -> tuple[ByMotor, ByAmbs]:
+def measured(machine: Servomotor, plan: Biases, motor: StepMeans, ambs: StepMeans) -> tuple[ByMotor, ByAmbs]:
     """What the estimators get."""
-    y = ("pos_yi", "pos_yo")
+    y, x = machine.positions_of("yi", "yo"), machine.positions_of("xi", "xo")
     which = (ambs.labels["bias_A"] != plan.bias_A).astype(np.int64)
     biases, branch = (plan.bias_A, plan.bias_high_A), ambs.labels["branch"]
     return (
-        ByMotor(motor.stack(SEGMENTS), motor.stack(y), motor.stack(("pos_xi", "pos_xo")), motor.time_s),
-        ByAmbs(ambs.stack(COILS), ambs.stack(y), which, branch, ambs.time_s, biases),
+        ByMotor(motor.stack(machine.segments), motor.stack(y), motor.stack(x), motor.time_s),
+        ByAmbs(ambs.stack(machine.coils["yo"]), ambs.stack(y), which, branch, ambs.time_s, biases),
     )
 
 
@@ -102,10 +101,11 @@ def fit_inputs(recording: Recording[Any]) -> dict[str, Estimate]:
                       ("motor_to_outboard", "motor_to_outboard_amb"), ("amb_span", "amb_span")):  # fmt: skip
         inputs[key] = certified(f"geometry/{name}", g[name])
     inputs["amb_gap"] = Estimate.exact(g["amb_gap"].value)  # where the iteration starts, and nothing else
-    for axis in ("yi", "yo", "xi", "xo"):
-        channel = f"pos_{axis}"
+    machine = conventions(rig)
+    for axis, channel in machine.positions.items():
         inputs[f"gain_{axis}"] = certified(f"sensors/{channel}/gain", rig.sensors[channel].gain, f"gain of {channel}")
-    sensors = {f"m{k}": f"i_m{k}" for k in range(1, 5)} | {"op": "i_yo_p", "on": "i_yo_n"}
+    sensors = {f"m{k}": segment for k, segment in enumerate(machine.segments, 1)}
+    sensors |= dict(zip(("op", "on"), machine.coils["yo"], strict=True))
     for key, channel in sensors.items():
         sensor = rig.sensors[channel]
         inputs[f"gain_{key}"] = certified(f"sensors/{channel}/gain", sensor.gain, f"gain of {channel}")

@@ -9,6 +9,7 @@ import numpy as np
 
 from bench.figures import Figure, Series
 from procedures.negative_stiffness.fit import AmbFit, MotorFit
+from procedures.servomotor.conventions import Servomotor
 from procedures.servomotor.steps import StepMeans
 
 
@@ -34,13 +35,13 @@ class Biases(Protocol):
     def bias_high_A(self) -> float: ...
 
 
-def all_figures(a: Analysed, plan: Biases) -> list[Figure]:
+def all_figures(a: Analysed, machine: Servomotor, plan: Biases) -> list[Figure]:
     """In the order of the report."""
-    return [*_motor(a), *_ambs(a, plan)]
+    return [*_motor(a, machine), *_ambs(a, plan)]
 
 
-def _motor(a: Analysed) -> Iterator[Figure]:
-    y, up = 1e6 * a.motor.mean["pos_yo"], a.motor.labels["branch"] > 0
+def _motor(a: Analysed, machine: Servomotor) -> Iterator[Figure]:
+    y, up = 1e6 * a.motor.mean[machine.positions["yo"]], a.motor.labels["branch"] > 0
     i, n = a.by_motor.i_y, len(a.motor)
     slope, intercept = np.polyfit(y, i, 1)
     ends = np.array([y.min(), y.max()])

@@ -11,6 +11,8 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 from pydantic import Field
 
 from bench.calibration import Need
@@ -27,10 +29,12 @@ from bench.rigfile import RigFile
 from procedures.negative_stiffness import checks as negative_stiffness_checks
 from procedures.negative_stiffness import estimates
 from procedures.negative_stiffness import figures as drawn
-from procedures.negative_stiffness.estimates import COILS, Analysis
+from procedures.negative_stiffness.estimates import Analysis
 from procedures.servomotor import carrying, checks
-from procedures.servomotor.steps import CHANNELS, POSITIONS, SEGMENTS, StepMeans, read_steps
+from procedures.servomotor.conventions import SERVOMOTOR, conventions, radial_currents
+from procedures.servomotor.steps import POSITIONS, StepMeans, channels, read_steps
 
+Array = npt.NDArray[np.float64]
 ALPHA_X = Quantity(
     "alpha_x_prime", "N/m", "negative stiffness at the outboard sensor, from the motor's own current", title="α′_x"
 )
@@ -81,7 +85,7 @@ def step_count(plan: Plan) -> int:
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Displace the outboard end: by the motor, then by the AMBs at both biases. The bias is written at rest."""
     carrying.home(rig)
-    inboard = _share(rig.file, -rig.file.geometry["com_to_inboard_amb"].value)
+    inboard = _amb_shares(rig.file)[0]
     carrying.carry(rig, plan.settle_s)
     carrying.to_edge(rig, 1, plan.count_rad)
     # The inboard AMB's plane goes with the displacement as far as keeps the inboard sensor at zero.
@@ -114,18 +118,17 @@ def _walk(rig: Rig, plan: Plan, record: Recorder, kind: str, references: Mapping
     go(0.0)
 
 
-def _share(rig: RigFile, z: float) -> float:
-    """Share of the outboard sensor in the displacement at plane z, as the controller has it (T 6.7)."""
-    near, far = rig.geometry["com_to_inboard_sensor"].value, rig.geometry["com_to_outboard_sensor"].value
-    return (z + near) / (near + far)
+def _amb_shares(rig: RigFile) -> tuple[float, float]:
+    """Share of the outboard sensor in the displacement at the inboard and at the outboard AMB, as the controller has it."""
+    machine = conventions(rig)
+    inboard, outboard = (rig.geometry[name].value for name in machine.ambs)
+    return machine.sensor_share(-inboard, rig), machine.sensor_share(outboard, rig)
 
 
 def _tilt(rig: RigFile) -> float:
     """Displacement of the outboard AMB's plane over that of the outboard sensor's while the inboard AMB's plane stays; the
     inboard sensor, beyond it, goes the other way."""
-    inboard, outboard = (
-        _share(rig, rig.geometry[k].value * s) for k, s in (("com_to_inboard_amb", -1), ("com_to_outboard_amb", 1))
-    )
+    inboard, outboard = _amb_shares(rig)
     return outboard - (1 - outboard) * inboard / (1 - inboard)
 
 
@@ -157,19 +160,22 @@ def read(recording: Recording[Plan]) -> tuple[StepMeans, StepMeans]:
 
 def _of_signals(recording: Recording[Plan], motor: StepMeans, ambs: StepMeans) -> Iterator[Finding]:
     plan = recording.plan
-    inboard = _share(recording.rig, -recording.rig.geometry["com_to_inboard_amb"].value)
-    ways = ((motor, (*SEGMENTS, *POSITIONS), 0.0), (ambs, (*COILS, *POSITIONS), -inboard / (1 - inboard)))
-    yield from checks.segments(motor)
+    machine, inboard = conventions(recording.rig), _amb_shares(recording.rig)[0]
+    positions = machine.positions_of(*POSITIONS)
+    i_x, i_y = radial_currents(*(motor.drift[c] for c in machine.segments))
+    i_yo = machine.control("yo", ambs.drift.__getitem__)
+    ways = (
+        (motor, machine.segments, 0.0, {"i_y": i_y, "i_x": i_x}),
+        (ambs, machine.coils["yo"], -inboard / (1 - inboard), {"i_yo": i_yo}),
+    )
+    yield from checks.segments(motor, machine)
     yield from checks.at_edge(motor, plan.count_rad)
-    for data, channels, follow in ways:
-        yield from checks.of_signals(data, channels, plan)
-        mean, d, level = data.mean, data.drift, data.labels["level_m"]
-        offsets = {"pos_yo": mean["pos_yo"] - level, "pos_yi": mean["pos_yi"] - follow * level,
-                   "pos_xi": mean["pos_xi"], "pos_xo": mean["pos_xo"]}  # fmt: skip
-        currents = {"i_y": (d["i_m1"] - d["i_m3"]) / 2, "i_x": (d["i_m4"] - d["i_m2"]) / 2}
-        if data is ambs:
-            currents = {"i_yo": (d["i_yo_p"] - d["i_yo_n"]) / 2}
-        yield from checks.settled(data, offsets, currents, plan)
+    for data, currents, follow, drifts in ways:
+        yield from checks.of_signals(data, machine, (*currents, *positions), plan)
+        level = data.labels["level_m"]
+        references: dict[str, Array | float] = {"yo": level, "yi": follow * level, "xi": 0.0, "xo": 0.0}
+        offsets = {c: data.mean[c] - references[a] for a in references for c in machine.positions_of(a)}
+        yield from checks.settled(data, offsets, drifts, plan)
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
@@ -196,7 +202,7 @@ def _ranges(rig: RigFile, plan: Plan, furthest: float) -> Iterator[str]:
         if plan.bias_high_A > rig.parameters[name].high:
             yield f"bias_high_A: found {plan.bias_high_A:g} A; {name} goes to {rig.parameters[name].high:g} A"
     g = rig.geometry
-    share = _share(rig, g["com_to_motor"].value)
+    share = conventions(rig).sensor_share(g["com_to_motor"].value, rig)
     pull = g["motor_stiffness"].value * share * furthest
     current, most = (
         (carrying.gravity_share_N(rig) + pull) / carrying.ALPHA_D,
@@ -220,7 +226,7 @@ def _ranges(rig: RigFile, plan: Plan, furthest: float) -> Iterator[str]:
 
 def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
     """Force over displacement with residuals, and the AMB's lines at both biases."""
-    return drawn.all_figures(a, recording.plan)
+    return drawn.all_figures(a, conventions(recording.rig), recording.plan)
 
 
 procedure = Procedure(
@@ -235,8 +241,8 @@ procedure = Procedure(
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),
-        channels=CHANNELS,
-        sensors=(*SEGMENTS, *COILS, *POSITIONS),
+        channels=channels(SERVOMOTOR),
+        sensors=(*SERVOMOTOR.segments, *SERVOMOTOR.coils["yo"], *SERVOMOTOR.positions_of(*POSITIONS)),
         parameters=(*carrying.PARAMETERS, "ref_yo", "bias_i", "bias_o", "segment_max"),
         geometry=GEOMETRY,
         machine=("pole_pairs",),

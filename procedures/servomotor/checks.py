@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.findings import Effect, Finding
+from procedures.servomotor.conventions import Servomotor
 from procedures.servomotor.steps import StepMeans
 from procedures.shared import signals
 
@@ -37,18 +38,33 @@ class Tolerances(Protocol):
     def max_lost(self) -> float: ...
 
 
-def of_signals(data: StepMeans, channels: Sequence[str], plan: Tolerances) -> Iterator[Finding]:
+def of_signals(
+    data: StepMeans, machine: Servomotor, channels: Sequence[str], plan: Tolerances
+) -> Iterator[Finding]:  # fmt: skip
     """Lost samples, stuck channels, saturation and contact."""
     yield from signals.losses(data.lost, data.expected, plan.max_lost, data.where)
     yield from signals.stuck(data.spread, channels)
-    yield from signals.flagged(data.flags, data.where)
+    yield from signals.flagged(data.flags, limits(machine), data.where)
 
 
-def segments(data: StepMeans) -> Iterator[Finding]:
+def limits(machine: Servomotor) -> tuple[signals.Meaning, ...]:
+    """Flags that stand for a limit that was reached, with what they are called."""
+    return (
+        (machine.amb_limit, "saturated", "an AMB amplifier was at its limit"),
+        (machine.segment_limit, "saturated", "a motor segment was at its limit"),
+        (machine.contact_inboard, "contact", "the rotor touched the inboard touchdown bearing"),
+        (machine.contact_outboard, "contact", "the rotor touched the outboard touchdown bearing"),
+    )
+
+
+def segments(data: StepMeans, machine: Servomotor) -> Iterator[Finding]:
     """Signs of the segments' currents while the motor carries: opposite ones carry opposite currents (T 6.9; at rest there is
     hardly a torque current), and segment 1 a positive one, because it lifts."""
-    one, two, three, four = (float(data.mean[f"i_m{k}"].mean()) for k in range(1, 5))
-    for a, b, name_a, name_b, lifts in ((one, three, "i_m1", "i_m3", True), (four, two, "i_m4", "i_m2", False)):
+    names = machine.segments
+    one, two, three, four = (float(data.mean[c].mean()) for c in names)
+    for a, b, name_a, name_b, lifts in (
+        (one, three, names[0], names[2], True), (four, two, names[3], names[1], False)
+    ):  # fmt: skip
         if abs(a + b) / 2 > UNBALANCED_A:
             suspect = f"{name_a} or {name_b}" if not lifts else name_a if a < 0 else name_b
             yield Finding(
@@ -61,9 +77,9 @@ def segments(data: StepMeans) -> Iterator[Finding]:
     if one < 0 < three:
         yield Finding(
             "segment-sign",
-            f"i_m1 reads {one:+.2f} A and i_m3 {three:+.2f} A: the motor pushes down while it lifts. Both sensors have the "
-            "wrong sign, or the segments are exchanged.",
-            "i_m1, i_m3",
+            f"{names[0]} reads {one:+.2f} A and {names[2]} {three:+.2f} A: the motor pushes down while it lifts. Both sensors "
+            "have the wrong sign, or the segments are exchanged.",
+            f"{names[0]}, {names[2]}",
             Effect.ERROR,
         )
 

@@ -11,14 +11,17 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
+from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.shared.step_table import reduced
 
 Array = npt.NDArray[np.float64]
+POSITIONS = ("yi", "yo", "xi", "xo")
+"""Axes in the order in which they are read."""
 
-SEGMENTS = ("i_m1", "i_m2", "i_m3", "i_m4")
-COILS = ("i_yi_p", "i_yi_n", "i_yo_p", "i_yo_n")
-POSITIONS = ("pos_yi", "pos_yo", "pos_xi", "pos_xo")
-CHANNELS = (*SEGMENTS, *COILS, *POSITIONS, "angle", "flags")
+
+def channels(machine: Servomotor) -> tuple[str, ...]:
+    """What is recorded of a displaced shaft."""
+    return (*machine.segments, *machine.coils_of("yi", "yo"), *machine.positions_of(*POSITIONS), "angle", "flags")
 
 
 @dataclass(frozen=True)
@@ -70,12 +73,13 @@ def read_steps(
     steps = list(recording.steps(kind))
     if not steps:
         raise AnalysisError(f"steps of kind {kind!r}: found none; expected the run's (was it stopped early?)")
-    read = [_reduce(step) for step in steps]
+    names = channels(conventions(recording.rig))
+    read = [_reduce(step, names) for step in steps]
     middle = np.array([(s.start_ns + s.end_ns) / 2 for s in steps])
     return StepMeans(
-        {c: np.array([r["mean"][c] for r in read]) for c in CHANNELS},
-        {c: np.array([r["drift"][c] for r in read]) for c in CHANNELS},
-        {c: np.array([r["spread"][c] for r in read]) for c in CHANNELS},
+        {c: np.array([r["mean"][c] for r in read]) for c in names},
+        {c: np.array([r["drift"][c] for r in read]) for c in names},
+        {c: np.array([r["spread"][c] for r in read]) for c in names},
         (middle - middle[0]) * 1e-9,
         {key: np.array([float(s.labels[key]) for s in steps]) for key in labels},
         np.array([float(s.lost()) for s in steps]),
@@ -85,7 +89,7 @@ def read_steps(
     )
 
 
-def _reduce(step: Step) -> dict[str, Any]:
-    data = step.read(*CHANNELS)
+def _reduce(step: Step, names: tuple[str, ...]) -> dict[str, Any]:
+    data = step.read(*names)
     data["angle"] = (data["angle"] + np.pi) % (2 * np.pi) - np.pi  # home is angle 0: no mean across the turn's end
-    return reduced(data, CHANNELS, step.labels)
+    return reduced(data, names, step.labels)

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.uncertainty import Estimate, Influence
-from procedures.servomotor.segments import SEGMENTS
+from procedures.servomotor.conventions import conventions
 from procedures.shared.certificates import certified
 from procedures.slew.fit import Gains, Passes, Swing, Tracking, answered, passes, starts, tracking
 
@@ -121,7 +121,7 @@ def _torque_constant(recording: Recording[Any]) -> Estimate:
 def _segment_gain(recording: Recording[Any]) -> Estimate:
     """One, with what the gains of the segments' current sensors do to the torque current."""
     out = Estimate.exact(1.0)
-    for channel in (c for c in SEGMENTS if c in recording.rig.sensors):
+    for channel in (c for c in conventions(recording.rig).segments if c in recording.rig.sensors):
         gain = certified(f"sensors/{channel}/gain", recording.rig.sensors[channel].gain, f"gain of {channel}")
         out = out - (gain - gain.value) * 0.25
     return out

@@ -23,13 +23,14 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.servomotor import carrying, hold, segments, wiring
+from procedures.servomotor.conventions import SERVOMOTOR
 from procedures.servomotor.direction import of_probe
 from procedures.shared import assumptions
 from procedures.slew import estimates, fit, steps
 from procedures.slew import figures as drawn
 from procedures.slew.estimates import Result
 from procedures.slew.fit import Gains
-from procedures.slew.steps import CHANNELS, STARTED, STEP, read_swings
+from procedures.slew.steps import STARTED, STEP, channels, read_swings
 
 RMS = Quantity("error_rms", "rad", "root mean square of the tracking error, free of the encoder's counts")
 PEAK = Quantity("error_peak", "rad", "greatest tracking error")
@@ -169,7 +170,7 @@ procedure = Procedure(
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),
-        channels=(*CHANNELS, *wiring.CHANNELS),
+        channels=(*channels(SERVOMOTOR), *wiring.channels(SERVOMOTOR)),
         parameters=(*hold.PARAMETERS, *wiring.PARAMETERS, *NEEDED, "segment_max"),
         machine=("polar_inertia",),
     ),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any, Protocol
 
 import numpy as np
@@ -10,12 +10,15 @@ import numpy as np
 from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
 from bench.recording import Recording, Step
-from procedures.servomotor.segments import SEGMENTS
+from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.slew.fit import Swing
 
 STEP, STARTED = "swing", "sine-started"
-CHANNELS = ("angle", *SEGMENTS, "flags")
-SATURATED, CONTACT = 3, 12  # bits of the telemetry signal `flags`
+
+
+def channels(machine: Servomotor) -> tuple[str, ...]:
+    """What is recorded of a swing."""
+    return ("angle", *machine.segments, "flags")
 
 
 class Tolerances(Protocol):
@@ -38,7 +41,8 @@ def read_swings(recording: Recording[Any]) -> list[Swing]:
 
 
 def _read(recording: Recording[Any], step: Step) -> Swing:
-    data = step.read(*CHANNELS)
+    machine = conventions(recording.rig)
+    data = step.read(*channels(machine))
     inside = [e for e in recording.events() if step.start_ns <= e["t_ns"] < step.end_ns]
     written = [
         e["t_ns"] for e in inside if e["kind"] == "parameter" and e["name"] == "sine_amplitude" and e["value"] > 0
@@ -58,7 +62,7 @@ def _read(recording: Recording[Any], step: Step) -> Swing:
         float(step.labels["amplitude_rad"]),
         (data["t_ns"] - origin).astype(np.float64) * 1e-9,
         angle - 2 * np.pi * np.round(angle[0] / (2 * np.pi)),
-        np.mean([data[c] for c in SEGMENTS], axis=0),
+        np.mean([data[c] for c in machine.segments], axis=0),
         seconds(written[0]),
         seconds(answered[0]),
         int(step.labels["periods"]),
@@ -69,8 +73,9 @@ def _read(recording: Recording[Any], step: Step) -> Swing:
 
 def of_signals(recording: Recording[Any], plan: Tolerances) -> Iterator[Finding]:
     """Lost samples, channels that stand still, amplifiers at their limits, contact."""
-    steps: Sequence[Step] = list(recording.steps(STEP))
-    for step in steps:
+    machine = conventions(recording.rig)
+    names = channels(machine)
+    for step in recording.steps(STEP):
         where = f"{float(step.labels['hz']):g} Hz"
         share = step.lost() / max(step.expected(), 1)
         if share > plan.max_lost:
@@ -80,11 +85,11 @@ def of_signals(recording: Recording[Any], plan: Tolerances) -> Iterator[Finding]
                 "cable, gateway.",
                 where, Effect.INDETERMINATE,
             )  # fmt: skip
-        data = step.read(*CHANNELS)
+        data = step.read(*names)
         flags = int(np.bitwise_or.reduce(data["flags"].astype(np.int64))) if len(data["flags"]) else 0
-        for channel in (c for c in CHANNELS[:-1] if np.ptp(data[c]) == 0):
+        for channel in (c for c in names[:-1] if np.ptp(data[c]) == 0):
             yield Finding("stuck-channel", f"{channel} does not move at all during a swing.", channel, Effect.ERROR)
-        for bits, code, text in ((SATURATED, "saturated", "an amplifier was at its limit"),
-                                 (CONTACT, "contact", "the rotor touched a touchdown bearing")):  # fmt: skip
+        for bits, code, text in ((machine.amb_limit | machine.segment_limit, "saturated", "an amplifier was at its limit"),
+                                 (machine.contact, "contact", "the rotor touched a touchdown bearing")):  # fmt: skip
             if flags & bits:
                 yield Finding(code, f"{text} during a swing", where, Effect.INDETERMINATE)

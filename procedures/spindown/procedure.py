@@ -24,12 +24,13 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from procedures.servomotor import hold
+from procedures.servomotor.conventions import SERVOMOTOR, conventions
 from procedures.shared import assumptions
 from procedures.spindown import checks, estimates
 from procedures.spindown import figures as drawn
 from procedures.spindown.estimates import Drag
 from procedures.spindown.running_up import let_go, run_up
-from procedures.spindown.steps import CHANNELS, COILS, RunDown, read_run_downs
+from procedures.spindown.steps import RunDown, channels, coils, read_run_downs
 
 B = Quantity("B", "N m s/rad", "viscous drag at the bias of the plan, mean over both directions")
 B_HIGH = Quantity("B_high", "N m s/rad", "viscous drag at the higher bias, mean over both directions")
@@ -163,7 +164,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     findings.gate(checks.before_fits(recording))
     plan, rig, runs = recording.plan, recording.rig, read_run_downs(recording)
     angle, speed = (estimates.evaluate(runs, rig, m, plan.bias_A, plan.bias_high_A) for m in ("angle", "speed"))
-    findings.add(checks.of_runs(runs, plan))
+    findings.add(checks.of_runs(runs, conventions(rig), plan))
     findings.add(checks.of_result(runs, angle, speed, plan))
     findings.add([*checks.of_drive(recording, angle), *checks.of_inertia(rig, angle)])
     if not plan.added_inertia:
@@ -231,8 +232,8 @@ procedure = Procedure(
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),
-        channels=CHANNELS,
-        sensors=COILS,
+        channels=channels(SERVOMOTOR),
+        sensors=coils(SERVOMOTOR),
         parameters=(*hold.PARAMETERS, "bias_i", "bias_o", "speed_ref"),
     ),
     check=check,

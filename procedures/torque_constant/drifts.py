@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.findings import Effect, Finding
-from procedures.servomotor.direction import SEGMENTS
+from procedures.servomotor.conventions import Servomotor
 from procedures.shared.leastsquares import linear
 from procedures.torque_constant.fit import Balance
 from procedures.torque_constant.steps import TorqueData
@@ -40,7 +40,7 @@ def scale(b: Balance, plan: Tolerances) -> Iterator[Finding]:
     )  # fmt: skip
 
 
-def baseline(data: TorqueData, b: Balance, plan: Tolerances) -> Iterator[Finding]:
+def baseline(data: TorqueData, machine: Servomotor, b: Balance, plan: Tolerances) -> Iterator[Finding]:
     """Drift of the current without load. The amplifier closes on its own sensor, so that a drifting sensor moves the true
     current of its segment, all references follow to hold the angle, and the outboard AMB answers the pull to the side.
 
@@ -52,7 +52,8 @@ def baseline(data: TorqueData, b: Balance, plan: Tolerances) -> Iterator[Finding
     slope = float(fit.terms[0])
     if abs(slope) <= max(plan.max_baseline_drift_A_s, SIGNIFICANT * float(fit.u[0])):
         return
-    channel = _drifting(data, zero, t, 4 * slope, pairs)
+    segment = _drifting(data, zero, t, 4 * slope, pairs)
+    channel = "" if segment is None else machine.segments[segment]
     yield Finding(
         "current-drift",
         f"the torque current without load drifts by {slope * 1e3:+.3f} mA/s over the run "
@@ -62,8 +63,8 @@ def baseline(data: TorqueData, b: Balance, plan: Tolerances) -> Iterator[Finding
     )  # fmt: skip
 
 
-def _drifting(data: TorqueData, zero: npt.NDArray[np.bool_], t: Array, drift: float, pairs: float) -> str:
-    """The segment whose drift explains the pull to the side: one whose sensor drifts by d lowers its true current by d, which
+def _drifting(data: TorqueData, zero: npt.NDArray[np.bool_], t: Array, drift: float, pairs: float) -> int | None:
+    """Which segment's drift explains the pull to the side: one whose sensor drifts by d lowers its true current by d, which
     is a drift of i_x or i_y by d/2; the phase angle turns the pull by M gamma, as nearly as both force constants are alike."""
     turn = pairs * data.steps.gamma[zero]
     c, q = np.cos(turn), np.sin(turn)
@@ -78,4 +79,4 @@ def _drifting(data: TorqueData, zero: npt.NDArray[np.bool_], t: Array, drift: fl
     expected = np.array([[0.0, -drift / 2], [drift / 2, 0.0], [0.0, drift / 2], [-drift / 2, 0.0]])
     apart = np.linalg.norm(expected - found, axis=1)
     best = int(np.argmin(apart))
-    return SEGMENTS[best] if apart[best] < 0.3 * abs(drift) else ""
+    return best if apart[best] < 0.3 * abs(drift) else None

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from bench.figures import Figure, Series
 from bench.recording import Recording
-from procedures.servomotor.direction import SEGMENTS
+from procedures.servomotor.conventions import conventions
 from procedures.torque_constant.fit import Balance, Detent, Steps
 from procedures.torque_constant.steps import TorqueData
 
@@ -99,9 +99,10 @@ def _one_step(recording: Recording[Any]) -> Figure:
     """The end of a step close by: over its whole second, which is what is averaged, the swing would be a solid block."""
     heaviest = recording.plan.masses[-1]
     step = next(s for s in recording.steps("lever") if s.labels["load"] == heaviest)
-    data = recording.read(SEGMENTS, step.end_ns - round(1e9 * SHOWN_S), step.end_ns)
+    segments = conventions(recording.rig).segments
+    data = recording.read(segments, step.end_ns - round(1e9 * SHOWN_S), step.end_ns)
     t = (data["t_ns"] - step.end_ns).astype(np.float64) * 1e-6
-    current = np.mean([data[c] for c in SEGMENTS], axis=0)
+    current = np.mean([data[c] for c in segments], axis=0)
     return Figure("step-current", f"Torque current at the end of a step ({heaviest})", "Between two counts of the "
                   "encoder the rotor is not held: it swings, and the current with it. What counts is the current's mean over "
                   "the step.", "time to the end of the step (ms)", "torque current (A)",

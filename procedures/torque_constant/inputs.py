@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
-from procedures.servomotor.direction import SEGMENTS
+from procedures.servomotor.conventions import conventions
 from procedures.shared.certificates import certified
 
 SIDES = ("left", "right")
@@ -25,7 +25,7 @@ def fit_inputs(rig: RigFile, masses: Sequence[str]) -> dict[str, Estimate]:
         inputs[name] = certified(f"geometry/{name}", rig.geometry[name], f"arm of the lever, {side}")
     for k, label in enumerate(masses):
         inputs[f"mass_{k}"] = certified(f"masses/{label}", rig.masses[label], f"mass {label}")
-    for k, channel in enumerate(SEGMENTS, 1):
+    for k, channel in enumerate(conventions(rig).segments, 1):
         inputs[f"gain_{k}"] = certified(f"sensors/{channel}/gain", rig.sensors[channel].gain, f"gain of {channel}")
     return inputs
 

@@ -25,13 +25,14 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate
 from procedures.servomotor import hold
-from procedures.servomotor.direction import SEGMENTS, of_probe
+from procedures.servomotor.conventions import SERVOMOTOR, conventions
+from procedures.servomotor.direction import of_probe
 from procedures.shared import assumptions
 from procedures.torque_constant import checks, fit
 from procedures.torque_constant import figures as drawn
 from procedures.torque_constant.fit import NO_DETENT, Balance, Detent
 from procedures.torque_constant.inputs import SIDES, arms_u, fit_inputs, masses_u
-from procedures.torque_constant.steps import CHANNELS, TorqueData, read_torques
+from procedures.torque_constant.steps import TorqueData, channels, read_torques
 
 ALPHA_TAU = Quantity("alpha_tau", "N m/A", "torque per mean true segment current at the home angle, peak over gamma")
 GAMMA_0T = Quantity("gamma_0t", "rad", "phase angle at which the torque per current is largest")
@@ -167,13 +168,13 @@ class Analysis:
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """The balance of torques, with its fit and estimates."""
     findings.gate([*of_probe(recording), *checks.of_events(recording)])
-    plan = recording.plan
+    plan, machine = recording.plan, conventions(recording.rig)
     data = read_torques(recording, plan.masses, plan.count_rad)
-    findings.gate(checks.of_signals(data, plan))
+    findings.gate(checks.of_signals(data, machine, plan))
     a = _fitted(recording, data)
     values = {name: e.value for name, e in a.inputs.items()}
     mass_u = masses_u(recording.rig, plan.masses)
-    findings.add(checks.of_fit(data, a.balance, a.detent, values, mass_u, arms_u(recording.rig), plan))
+    findings.add(checks.of_fit(data, machine, a.balance, a.detent, values, mass_u, arms_u(recording.rig), plan))
     return a
 
 
@@ -244,8 +245,8 @@ procedure = Procedure(
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),
-        channels=CHANNELS,
-        sensors=SEGMENTS,
+        channels=channels(SERVOMOTOR),
+        sensors=SERVOMOTOR.segments,
         parameters=(*hold.PARAMETERS, "gamma", "i_x", "i_y", "i_ramp", "bias_i", "bias_o"),
         geometry=tuple(f"lever_{s}" for s in SIDES),
         machine=("pole_pairs",),

@@ -11,12 +11,15 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
-from procedures.servomotor.direction import SEGMENTS
+from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.torque_constant.fit import Steps, resting
 
 Array = npt.NDArray[np.float64]
-COILS = ("i_xo_p", "i_xo_n", "i_yo_p", "i_yo_n")
-CHANNELS = ("angle", *SEGMENTS, *COILS, "flags")
+
+
+def channels(machine: Servomotor) -> tuple[str, ...]:
+    """What is recorded while loads hang on the lever."""
+    return ("angle", *machine.segments, *machine.coils_of("xo", "yo"), "flags")
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,10 @@ class TorqueData:
         what = f"{self.masses[s.load[k]]} on the {'left' if s.side[k] > 0 else 'right'}" if s.side[k] else "no load"
         return f"gamma {np.degrees(s.gamma[k]):+.2f} deg, {what}"
 
+    def worst(self, values: Array) -> str:
+        """The name of the step with the greatest of `values` (n,)."""
+        return self.where(int(np.argmax(values)))
+
 
 def read_torques(recording: Recording[Any], masses: tuple[str, ...], count: float) -> TorqueData:
     """Read all steps.
@@ -58,7 +65,8 @@ def read_torques(recording: Recording[Any], masses: tuple[str, ...], count: floa
     found = list(recording.steps("lever"))
     if not found:
         raise AnalysisError("found no loads on the lever (was the run stopped early?)")
-    read = [_reduce(step) for step in found]
+    machine = conventions(recording.rig)
+    read = [_reduce(step, machine) for step in found]
     index = {"": -1} | {label: k for k, label in enumerate(masses)}
     if strange := sorted({str(s.labels["load"]) for s in found} - set(index)):
         raise AnalysisError(
@@ -73,7 +81,7 @@ def read_torques(recording: Recording[Any], masses: tuple[str, ...], count: floa
         np.array([sides[str(s.labels["side"])] for s in found]), np.array([index[str(s.labels["load"])] for s in found]),
         np.array([r["jumps"] for r in read]),
     )  # fmt: skip
-    turned = [_reduce(step) for step in recording.steps("detent")]
+    turned = [_reduce(step, machine) for step in recording.steps("detent")]
     return TorqueData(
         steps, masses, np.array([r["drift"] for r in read]),
         np.array([(s.end_ns - s.start_ns) * 1e-9 for s in found]),
@@ -81,28 +89,28 @@ def read_torques(recording: Recording[Any], masses: tuple[str, ...], count: floa
         np.array([float(s.lost()) for s in found]), np.array([float(s.expected()) for s in found]),
         np.array([r["flags"] for r in read]), np.array([r["spread"] for r in read]),
         np.array([r["angle"] for r in turned]), np.array([r["segments"].mean() for r in turned]),
-        _wiring(recording),
+        _wiring(recording, machine),
     )  # fmt: skip
 
 
-def _reduce(step: Step) -> Mapping[str, Any]:
-    data = step.read(*CHANNELS)
+def _reduce(step: Step, machine: Servomotor) -> Mapping[str, Any]:
+    data = step.read(*channels(machine))
     n = len(data["angle"])
     if n < 20:
         raise AnalysisError(f"step {dict(step.labels)}: found {n} samples; expected 20 or more")
-    segments = np.array([data[c] for c in SEGMENTS])
+    segments = np.array([data[c] for c in machine.segments])
     current = segments.mean(axis=0)
     return {
         "segments": segments.mean(axis=1), "spread": segments.std(axis=1), "angle": float(np.unwrap(data["angle"]).mean()),
         "jumps": float(current.std()), "drift": float(current[n // 2 :].mean() - current[: n // 2].mean()),
-        "x": float((data["i_xo_p"] - data["i_xo_n"]).mean() / 2), "y": float((data["i_yo_p"] - data["i_yo_n"]).mean() / 2),
+        "x": float(machine.control("xo", data.__getitem__).mean()), "y": float(machine.control("yo", data.__getitem__).mean()),
         "flags": int(np.bitwise_or.reduce(data["flags"].astype(np.int64))),
     }  # fmt: skip
 
 
-def _wiring(recording: Recording[Any]) -> Array:
+def _wiring(recording: Recording[Any], machine: Servomotor) -> Array:
     """Slopes of the outboard AMB's control currents over i_x and i_y, from the steps at plus and minus."""
-    found = [(float(s.labels["i_x"]), float(s.labels["i_y"]), _reduce(s)) for s in recording.steps("wiring")]
+    found = [(float(s.labels["i_x"]), float(s.labels["i_y"]), _reduce(s, machine)) for s in recording.steps("wiring")]
     if not found:
         return np.zeros((2, 2))
     asked = np.array([[1.0, x, y] for x, y, _ in found])

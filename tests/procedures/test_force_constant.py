@@ -24,6 +24,7 @@ from procedures.force_constant import checks
 from procedures.force_constant.fitting import check, predicted_controls
 from procedures.force_constant.procedure import Plan, procedure
 from procedures.force_constant.steps import read_ramps
+from procedures.servomotor.conventions import SERVOMOTOR
 
 NAME, CALIBRATION = "force-constant", "amb-calibration"
 SHORT = {"settle_s": 0.15}
@@ -151,7 +152,7 @@ def test_a_coil_that_cannot_reach_its_current_does_not_pass(
     data = read_ramps(sound.recording)
     for bit, named in ((1, "AMB"), (2, "motor"), (8, "outboard touchdown")):
         flagged = replace(data, flags=np.where(data.level_y == -2, bit, 0))
-        found = list(checks.of_signals(flagged, Plan()))
+        found = list(checks.of_signals(flagged, SERVOMOTOR, Plan()))
         assert [(f.code, f.effect) for f in found] == [("contact" if bit == 8 else "saturated", Effect.INDETERMINATE)]
         assert named in found[0].text
         assert "i_y -2 A" in found[0].where
