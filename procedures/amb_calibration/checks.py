@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -21,7 +20,7 @@ from procedures.amb_calibration.fit import Fit
 from procedures.amb_calibration.hypotheses import CHANCE, Contradiction, Suspect
 from procedures.amb_calibration.scatter import Scatter
 from procedures.amb_calibration.steps import AXES, VERTICAL, HangingData
-from procedures.servomotor.checks import limits
+from procedures.servomotor import checks as servomotor_checks
 from procedures.servomotor.conventions import Servomotor
 from procedures.shared import signals
 
@@ -49,18 +48,11 @@ class Tolerances(Protocol):
 
 def of_signals(data: HangingData, machine: Servomotor, plan: Tolerances) -> Iterator[Finding]:
     """Checks that need no fit: losses, stuck channels, saturation, contact, settling, wiring."""
-    where = partial(_worst, data)
-    yield from signals.losses(data.lost, data.expected, plan.max_lost, where)
-    yield from signals.stuck(data.spread, (*machine.coils_of(*AXES), *machine.positions_of(*AXES)))
-    yield from signals.flagged(data.flags, limits(machine), where)
+    table = data.table
+    yield from servomotor_checks.of_signals(table, machine, tuple(table.mean), plan.max_lost)
     vertical = {machine.positions[axis]: machine.coils[axis] for axis in VERTICAL}
-    yield from signals.settled(data.mean, data.drift, vertical, plan.max_position_m, plan.max_drift_A, where)
+    yield from signals.settled(table.mean, table.drift, vertical, plan.max_position_m, plan.max_drift_A, table.where)
     yield from _wiring(data, machine)
-
-
-def _worst(data: HangingData, values: Array) -> str:
-    turn, point = np.unravel_index(int(np.argmax(values)), values.shape)
-    return data.where(int(turn), int(point))
 
 
 def _wiring(data: HangingData, machine: Servomotor) -> Iterator[Finding]:
@@ -71,7 +63,7 @@ def _wiring(data: HangingData, machine: Servomotor) -> Iterator[Finding]:
     heavy, light = load == load.max(), load < 0
 
     def answer(axis: str) -> float:
-        control = machine.control(axis, data.mean.__getitem__)
+        control = machine.control(axis, data.table.mean.__getitem__)
         return float(control[heavy].mean() - control[light].mean())
 
     yield from wiring(*(answer(axis) for axis in AXES))
@@ -212,6 +204,6 @@ def _outliers(data: HangingData, f: Fit, s: Scatter) -> Iterator[Finding]:
                 "outlier",
                 f"one hanging is {e.max():.3f} N off the fit of the {NAMES[b]} AMB ({limit:.3f} N allowed); was the "
                 "right mass hung, and was the hanger on?",
-                _worst(data, e),
+                data.table.where(e),
                 Effect.INDETERMINATE,
             )

@@ -1,19 +1,20 @@
-"""From the recorded steps of a mass-hanging calibration to arrays: step means, drifts, losses and flags."""
+"""From the recorded steps of a mass-hanging calibration to arrays: the hangings, and a table of their steps."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from bench.errors import AnalysisError
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from procedures.amb_calibration.fit import Hangings
 from procedures.servomotor.conventions import Servomotor, conventions, displacement
-from procedures.shared.step_table import reduced
+from procedures.servomotor.loads import load_index
+from procedures.shared.step_table import StepTable, by_angle, tabulate
 
 Array = npt.NDArray[np.float64]
 AXES = ("yi", "yo", "xi", "xo")
@@ -21,77 +22,43 @@ VERTICAL = ("yi", "yo")
 
 
 def channels(machine: Servomotor) -> tuple[str, ...]:
-    """What is recorded while masses hang."""
-    return (*machine.coils_of(*AXES), *machine.positions_of(*AXES), "flags")
+    """What is recorded while masses hang, besides the flags."""
+    return (*machine.coils_of(*AXES), *machine.positions_of(*AXES))
 
 
 @dataclass(frozen=True)
 class HangingData:
-    """`hangings` for the fit, and per channel and step (A, P): `mean`, `drift` (second half less first half of the
-    step), `spread` (standard deviation of the samples); `lost` and `expected` samples; `flags` ORed over the step."""
+    """`hangings` for the fit, and the `table` (A, P) of their steps."""
 
     hangings: Hangings
-    mean: dict[str, Array]
-    drift: dict[str, Array]
-    spread: dict[str, Array]
-    lost: Array
-    expected: Array
-    flags: npt.NDArray[np.int64]
+    table: StepTable
     masses: tuple[str, ...]
-
-    def where(self, turn: int, point: int) -> str:
-        """How a step is named to the reader."""
-        load = self.hangings.load[turn, point]
-        label = self.masses[load] if load >= 0 else "no load"
-        way = "loading" if self.hangings.branch[turn, point] > 0 else "unloading"
-        return f"{np.degrees(self.hangings.angles[turn]):.0f}°, {label}, {way}"
 
 
 def read_hangings(recording: Recording[Any], masses: tuple[str, ...]) -> HangingData:
     """Read every "hang" step, in the order of its angle and time.
 
     Raises:
-        AnalysisError: there are no steps, or an angle lacks some.
+        AnalysisError: there are no steps, an angle lacks some, or what hung is none of the `masses`.
     """
-    groups = [(float(angle), list(steps)) for angle, steps in recording.steps("hang").by("angle_rad")]
-    counts = {len(steps) for _, steps in groups}
-    if len(counts) != 1:
-        raise AnalysisError(
-            f"hangings per angle: found {sorted(counts) or 'none'}; expected the same number at each angle "
-            "(was the run stopped early?)"
-        )
     machine = conventions(recording.rig)
-    names = channels(machine)
-    read = [[reduced(step.read(*names), names, step.labels) for step in steps] for _, steps in groups]
-
-    def stack(key: str, channel: str) -> Array:
-        return np.array([[one[key][channel] for one in row] for row in read])
-
-    mean = {c: stack("mean", c) for c in names}
-    steps = [s for _, s in groups]
-    labels = {"": -1} | {label: k for k, label in enumerate(masses)}
-    hung = [[str(s.labels["load"]) for s in row] for row in steps]
-    if strange := sorted({label for row in hung for label in row} - set(labels)):
-        raise AnalysisError(
-            f"masses: found {', '.join(strange)} on the hanger; expected those of the plan, {', '.join(masses)}"
-        )
-    load = np.array([[labels[label] for label in row] for row in hung])
-    branch = np.array([[float(s.labels["branch"]) for s in row] for row in steps])
-    currents = np.stack([np.stack([mean[c] for c in machine.coils[axis]]) for axis in VERTICAL])
-    inboard, outboard, motor = _plane_positions(recording.rig, *(mean[c] for c in machine.positions_of(*VERTICAL)))
+    steps, shape = by_angle(recording.steps("hang"), "hangings")
+    table = tabulate(steps, channels(machine), _name, shape=shape)
+    inboard, outboard, motor = _plane_positions(recording.rig, *table.stack(machine.positions_of(*VERTICAL)))
     hangings = Hangings(
-        currents, np.stack([inboard, outboard]), motor, load, branch, np.array([angle for angle, _ in groups])
+        np.stack([table.stack(machine.coils[axis]) for axis in VERTICAL]),
+        np.stack([inboard, outboard]),
+        motor,
+        load_index(table.labels["load"], masses, "hanger"),
+        table.labels["branch"],
+        table.labels["angle_rad"][:, 0].copy(),
     )
-    return HangingData(
-        hangings,
-        mean,
-        {c: stack("drift", c) for c in names},
-        {c: stack("spread", c) for c in names},
-        np.array([[float(s.lost()) for s in row] for row in steps]),
-        np.array([[float(s.expected()) for s in row] for row in steps]),
-        np.array([[one["flags"] for one in row] for row in read]),
-        masses,
-    )
+    return HangingData(hangings, table, masses)
+
+
+def _name(labels: Mapping[str, Any]) -> str:
+    way = "loading" if labels["branch"] > 0 else "unloading"
+    return f"{np.degrees(labels['angle_rad']):.0f}°, {labels['load'] or 'no load'}, {way}"
 
 
 def _plane_positions(rig: RigFile, y_inboard: Array, y_outboard: Array) -> tuple[Array, Array, Array]:

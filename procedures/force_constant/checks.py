@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -20,9 +19,10 @@ from procedures.force_constant import load_at_rest
 from procedures.force_constant.fit import CROSS, DIRECT, FORCE, PAIRS
 from procedures.force_constant.load_at_rest import Cause, Rest
 from procedures.force_constant.steps import AXES, RampData
-from procedures.servomotor.checks import limits
+from procedures.servomotor import checks as servomotor_checks
 from procedures.servomotor.conventions import Servomotor
 from procedures.shared import signals
+from procedures.shared.step_table import StepTable
 
 Array = npt.NDArray[np.float64]
 
@@ -49,25 +49,19 @@ class Tolerances(Protocol):
 
 def of_signals(data: RampData, machine: Servomotor, plan: Tolerances) -> Iterator[Finding]:
     """Checks that need no fit: losses, stuck channels, saturation, contact, settling, segments that do as commanded."""
-    where = partial(_worst, data)
-    yield from signals.losses(data.lost, data.expected, plan.max_lost, where)
-    yield from signals.stuck(data.spread, [c for c in data.spread if c != "flags"])
-    yield from signals.flagged(data.flags, limits(machine), where)
+    table = data.table
+    yield from servomotor_checks.of_signals(table, machine, tuple(table.mean), plan.max_lost)
     axes = {machine.positions[axis]: machine.coils[axis] for axis in AXES}
-    yield from signals.settled(data.mean, data.drift, axes, plan.max_position_m, plan.max_drift_A, where)
-    yield from _segments(data, machine)
+    yield from signals.settled(table.mean, table.drift, axes, plan.max_position_m, plan.max_drift_A, table.where)
+    yield from _segments(table, machine)
 
 
-def _worst(data: RampData, values: Array) -> str:
-    turn, point = np.unravel_index(int(np.argmax(values)), values.shape)
-    return data.where(int(turn), int(point))
-
-
-def _segments(data: RampData, machine: Servomotor) -> Iterator[Finding]:
+def _segments(table: StepTable, machine: Servomotor) -> Iterator[Finding]:
     """Each segment's current follows its command (T 6.9), and no level asks the angle control for torque."""
-    design = np.stack([np.ones_like(data.level_y), data.level_y, data.level_x], axis=-1).reshape(-1, 3)
+    level_y, level_x = table.labels["i_y_A"], table.labels["i_x_A"]
+    design = np.stack([np.ones_like(level_y), level_y, level_x], axis=-1).reshape(-1, 3)
     solver = np.linalg.pinv(design)[1:]
-    answer = np.array([solver @ data.mean[c].reshape(-1) for c in machine.segments])  # (4, 2): per i_y, per i_x
+    answer = np.array([solver @ table.mean[c].reshape(-1) for c in machine.segments])  # (4, 2): per i_y, per i_x
     expected = np.array([[1.0, 0.0], [0.0, -1.0], [-1.0, 0.0], [0.0, 1.0]])
     reversed_ = (answer * expected).sum(axis=1) < -0.5
     if reversed_.sum() == 1:

@@ -29,7 +29,7 @@ class Levels(Protocol):
 
 REQUIRES = Requires(
     roles=("levitation", "rotation"),
-    channels=channels(SERVOMOTOR),
+    channels=(*channels(SERVOMOTOR), "flags"),
     sensors=(*SERVOMOTOR.coils_of(*AXES), *SERVOMOTOR.segments),
     parameters=("bias_i", "bias_o", "i_ramp", "i_x", "i_y"),
     geometry=("amb_span", "motor_to_outboard_amb", "amb_gap", "motor_stiffness", *SERVOMOTOR.levers),

@@ -1,19 +1,19 @@
-"""From the recorded steps of a force-constant run to arrays: step means, drifts, losses and flags."""
+"""From the recorded steps of a force-constant run to arrays: the ramps of both axes, and a table of their steps."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from bench.errors import AnalysisError
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from procedures.force_constant.fit import Ramps
 from procedures.servomotor.conventions import Servomotor, conventions, displacement
-from procedures.shared.step_table import reduced
+from procedures.shared.step_table import StepTable, by_angle, tabulate
 
 Array = npt.NDArray[np.float64]
 
@@ -22,32 +22,19 @@ AXES = ("yi", "yo", "xi", "xo")
 
 
 def channels(machine: Servomotor) -> tuple[str, ...]:
-    """What is recorded at a level."""
-    return (*machine.coils_of(*AXES), *machine.segments, *machine.positions_of(*AXES), "flags")
+    """What is recorded at a level, besides the flags."""
+    return (*machine.coils_of(*AXES), *machine.segments, *machine.positions_of(*AXES))
 
 
 @dataclass(frozen=True)
 class RampData:
-    """`vertical` and `horizontal` for the fits, and per step (A, P): `level_x`, `level_y` A as commanded; by channel
-    `mean`, `drift` (second half less first half of the step) and `spread` (standard deviation of the samples);
-    `lost` and `expected` samples; `flags` ORed over the step. `duration_s` from the first step's start to the last's end."""
+    """`vertical` and `horizontal` for the fits, and the `table` (A, P) of the steps, whose labels `i_y_A`, `i_x_A` are what was
+    commanded. `duration_s` from the first step's start to the last's end."""
 
     vertical: Ramps
     horizontal: Ramps
-    level_x: Array
-    level_y: Array
-    mean: dict[str, Array]
-    drift: dict[str, Array]
-    spread: dict[str, Array]
-    lost: Array
-    expected: Array
-    flags: npt.NDArray[np.int64]
+    table: StepTable
     duration_s: float
-
-    def where(self, turn: int, point: int) -> str:
-        """How a step is named to the reader."""
-        angle = np.degrees(self.vertical.angles[turn])
-        return f"{angle:.0f}°, i_y {self.level_y[turn, point]:+g} A, i_x {self.level_x[turn, point]:+g} A"
 
 
 def read_ramps(recording: Recording[Any]) -> RampData:
@@ -56,50 +43,30 @@ def read_ramps(recording: Recording[Any]) -> RampData:
     Raises:
         AnalysisError: there are no steps, or an angle lacks some.
     """
-    groups = [(float(angle), list(steps)) for angle, steps in recording.steps(STEP).by("angle_rad")]
-    counts = {len(steps) for _, steps in groups}
-    if len(counts) != 1:
-        raise AnalysisError(
-            f"steps per angle: found {sorted(counts) or 'none'}; expected the same number at each angle "
-            "(was the run stopped early?)"
-        )
-    steps = [row for _, row in groups]
-    machine = conventions(recording.rig)
-    names = channels(machine)
-    read = [[reduced(step.read(*names), names, step.labels) for step in row] for row in steps]
+    steps, shape = by_angle(recording.steps(STEP), "steps")
+    table = tabulate(steps, channels(conventions(recording.rig)), _name, shape=shape)
+    duration_s = (steps[-1].end_ns - steps[0].start_ns) * 1e-9
+    return RampData(_ramps(table, recording.rig, "y"), _ramps(table, recording.rig, "x"), table, duration_s)
 
-    def label(name: str) -> Array:
-        return np.array([[float(s.labels[name]) for s in row] for row in steps])
 
-    mean, drift, spread = (
-        {c: np.array([[one[kind][c] for one in row] for row in read]) for c in names}
-        for kind in ("mean", "drift", "spread")
+def _name(labels: Mapping[str, Any]) -> str:
+    return f"{np.degrees(labels['angle_rad']):.0f}°, i_y {labels['i_y_A']:+g} A, i_x {labels['i_x_A']:+g} A"
+
+
+def _ramps(table: StepTable, rig: RigFile, axis: str) -> Ramps:
+    machine, level = conventions(rig), table.labels[f"i_{axis}_A"]
+    bearings = (f"{axis}i", f"{axis}o")
+    begun = (table.start_ns - table.start_ns[0, 0]) * 1e-9
+    return Ramps(
+        axis,
+        np.stack([table.stack(machine.coils[b]) for b in bearings]),
+        table.stack(machine.segments),
+        *planes(rig, *table.stack(machine.positions_of(*bearings))),
+        table.labels[f"branch_{axis}"],
+        np.isin(level, (level.min(), level.max())).astype(np.float64),
+        begun - begun.mean(axis=1, keepdims=True),
+        table.labels["angle_rad"][:, 0].copy(),
     )
-    begun = np.array([[(s.start_ns - steps[0][0].start_ns) * 1e-9 for s in row] for row in steps])
-    time = begun - begun.mean(axis=1, keepdims=True)
-    angles = np.array([angle for angle, _ in groups])
-
-    def ramps(axis: str) -> Ramps:
-        level = label(f"i_{axis}_A")
-        branch = label(f"branch_{axis}")
-        return Ramps(
-            axis,
-            np.stack([np.stack([mean[c] for c in machine.coils[f"{axis}{b}"]]) for b in "io"]),
-            np.stack([mean[c] for c in machine.segments]),
-            *planes(recording.rig, *(mean[c] for c in machine.positions_of(f"{axis}i", f"{axis}o"))),
-            branch,
-            np.isin(level, (level.min(), level.max())).astype(np.float64),
-            time,
-            angles,
-        )
-
-    return RampData(
-        ramps("y"), ramps("x"), label("i_x_A"), label("i_y_A"), mean, drift, spread,
-        np.array([[float(s.lost()) for s in row] for row in steps]),
-        np.array([[float(s.expected()) for s in row] for row in steps]),
-        np.array([[one["flags"] for one in row] for row in read]),
-        (steps[-1][-1].end_ns - steps[0][0].start_ns) * 1e-9,
-    )  # fmt: skip
 
 
 def planes(rig: RigFile, inboard: Array, outboard: Array) -> tuple[Array, Array]:

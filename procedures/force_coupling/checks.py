@@ -12,14 +12,14 @@ from procedures.force_coupling.estimates import Analysis
 from procedures.force_coupling.fit import TERMS, CouplingFit
 from procedures.servomotor import checks
 from procedures.servomotor.conventions import Servomotor
-from procedures.servomotor.steps import StepMeans
+from procedures.shared.step_table import StepTable
 
 ZERO_RAD = math.radians(2.0)  # four times what a commutation set with care is off
 SURE = 5  # standard uncertainties
 WINDING = 0.1  # segments differ by 1 %
 
 
-def of_fit(data: StepMeans, f: CouplingFit, plan: checks.Tolerances) -> Iterator[Finding]:
+def of_fit(data: StepTable, f: CouplingFit, plan: checks.Tolerances) -> Iterator[Finding]:
     """Drift over the sequence and steps off the model."""
     n, terms, u = len(data), f.fit.terms, f.fit.u
     yield from checks.creeping(

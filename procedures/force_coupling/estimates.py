@@ -15,9 +15,9 @@ from bench.uncertainty import Estimate, Influence
 from procedures.force_coupling import fit as force_coupling_fit
 from procedures.force_coupling.fit import CouplingFit, Sweep
 from procedures.servomotor.conventions import conventions
-from procedures.servomotor.steps import StepMeans
 from procedures.shared.certificates import certified
 from procedures.shared.gradients import by_inputs, linearised
+from procedures.shared.step_table import StepTable
 from procedures.shared.type_a import scatter
 
 Array = npt.NDArray[np.float64]
@@ -29,7 +29,7 @@ class Analysis:
     same from step to step. `turn`: by how much the force turns for the gamma that was told. `moved` rad: gamma_0 less what
     the force constant's calibration found of it, where it did."""
 
-    data: StepMeans
+    data: StepTable
     fit: CouplingFit
     estimates: dict[str, Estimate]
     printed: float
@@ -38,7 +38,7 @@ class Analysis:
     moved: Estimate | None
 
 
-def evaluate(recording: Recording[Any], data: StepMeans, count_rad: float) -> Analysis:
+def evaluate(recording: Recording[Any], data: StepTable, count_rad: float) -> Analysis:
     """Fit, and the three estimates by name (with `winding`, the x winding's constant over the y winding's)."""
     inputs = fit_inputs(recording)
     machine = conventions(recording.rig)

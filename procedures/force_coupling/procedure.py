@@ -8,7 +8,7 @@ stepped; gravity keeps a current of several amperes in it, and how that current 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -30,8 +30,9 @@ from procedures.force_coupling import figures as drawn
 from procedures.force_coupling.estimates import Analysis
 from procedures.servomotor import carrying, checks
 from procedures.servomotor.conventions import SERVOMOTOR, Servomotor, conventions, radial_currents
-from procedures.servomotor.steps import POSITIONS, StepMeans, channels, read_steps
+from procedures.servomotor.steps import POSITIONS, channels, read_steps
 from procedures.shared import assumptions
+from procedures.shared.step_table import StepTable
 
 RATIO = Quantity(
     "alpha_ratio", "1", "alpha_d/alpha_c, direct over coupled force constant at the home angle", title="α_d/α_c"
@@ -110,18 +111,18 @@ def measured(a: Analysis) -> Iterator[Measured]:
         yield quantity.measured(a.estimates[quantity.name])
 
 
-def read(recording: Recording[Plan]) -> StepMeans:
+def read(recording: Recording[Plan]) -> StepTable:
     """The steps, in time order."""
 
-    def name(labels: dict[str, Any]) -> str:
+    def name(labels: Mapping[str, Any]) -> str:
         return f"gamma {math.degrees(labels['gamma_rad']):+.2f}°"
 
-    return read_steps(recording, "phase", ("gamma_rad", "branch"), name)
+    return read_steps(recording, "phase", name)
 
 
-def _of_signals(data: StepMeans, machine: Servomotor, plan: Plan) -> Iterator[Finding]:
+def _of_signals(data: StepTable, machine: Servomotor, plan: Plan) -> Iterator[Finding]:
     positions = machine.positions_of(*POSITIONS)
-    yield from checks.of_signals(data, machine, (*machine.segments, *positions), plan)
+    yield from checks.of_signals(data, machine, (*machine.segments, *positions), plan.max_lost)
     yield from checks.segments(data, machine)
     yield from checks.at_edge(data, plan.count_rad)
     i_x, i_y = radial_currents(*(data.drift[c] for c in machine.segments))
@@ -172,7 +173,7 @@ procedure = Procedure(
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),
-        channels=channels(SERVOMOTOR),
+        channels=(*channels(SERVOMOTOR), "flags"),
         sensors=(*SERVOMOTOR.segments, *SERVOMOTOR.positions_of(*POSITIONS)),
         parameters=(*carrying.PARAMETERS, "gamma", "segment_max"),
         geometry=GEOMETRY,

@@ -12,7 +12,7 @@ from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import Estimate, coverage_factor, welch_satterthwaite
 from procedures.negative_stiffness.fit import AmbFit, MotorFit
 from procedures.servomotor import checks
-from procedures.servomotor.steps import StepMeans
+from procedures.shared.step_table import StepTable
 
 ONE_IN_A_THOUSAND = 1.7  # times the 95 % expanded uncertainty
 AMB_N_PER_A = 74.4  # T (6.12); turns a force into a current for a judgement
@@ -29,7 +29,7 @@ class Tolerances(checks.Tolerances, Protocol):
 
 
 def of_fits(
-    motor: StepMeans, ambs: StepMeans, by_motor: MotorFit, by_ambs: AmbFit, plan: Tolerances
+    motor: StepTable, ambs: StepTable, by_motor: MotorFit, by_ambs: AmbFit, plan: Tolerances
 ) -> Iterator[Finding]:
     """Drift, misfit, and an axis that answers the other's displacement."""
     n = len(motor)

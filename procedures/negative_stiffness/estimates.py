@@ -13,9 +13,9 @@ from bench.uncertainty import Estimate, Influence
 from procedures.negative_stiffness import fit
 from procedures.negative_stiffness.fit import AmbFit, ByAmbs, ByMotor, MotorFit
 from procedures.servomotor.conventions import Servomotor, conventions
-from procedures.servomotor.steps import StepMeans
 from procedures.shared.certificates import certified
 from procedures.shared.gradients import by_inputs
+from procedures.shared.step_table import StepTable
 from procedures.shared.type_a import scatter
 
 
@@ -32,14 +32,14 @@ class Biases(Protocol):
 class Analysis:
     """Everything the measurements, findings and figures are made of."""
 
-    motor: StepMeans
-    ambs: StepMeans
+    motor: StepTable
+    ambs: StepTable
     by_motor: MotorFit
     by_ambs: AmbFit
     estimates: dict[str, Estimate]
 
 
-def evaluate(recording: Recording[Any], motor: StepMeans, ambs: StepMeans) -> Analysis:
+def evaluate(recording: Recording[Any], motor: StepTable, ambs: StepTable) -> Analysis:
     """Both fits with their influences; `estimates` motor, ambs, gap and difference."""
     inputs = fit_inputs(recording)
     one, two = measured(conventions(recording.rig), recording.plan, motor, ambs)
@@ -63,7 +63,7 @@ def evaluate(recording: Recording[Any], motor: StepMeans, ambs: StepMeans) -> An
     return Analysis(motor, ambs, by_motor, by_ambs, estimates)
 
 
-def measured(machine: Servomotor, plan: Biases, motor: StepMeans, ambs: StepMeans) -> tuple[ByMotor, ByAmbs]:
+def measured(machine: Servomotor, plan: Biases, motor: StepTable, ambs: StepTable) -> tuple[ByMotor, ByAmbs]:
     """What the estimators get."""
     y, x = machine.positions_of("yi", "yo"), machine.positions_of("xi", "xo")
     which = (ambs.labels["bias_A"] != plan.bias_A).astype(np.int64)

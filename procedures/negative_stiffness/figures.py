@@ -10,16 +10,16 @@ import numpy as np
 from bench.figures import Figure, Series
 from procedures.negative_stiffness.fit import AmbFit, MotorFit
 from procedures.servomotor.conventions import Servomotor
-from procedures.servomotor.steps import StepMeans
+from procedures.shared.step_table import StepTable
 
 
 class Analysed(Protocol):
     """The part of an analysis that is drawn."""
 
     @property
-    def motor(self) -> StepMeans: ...
+    def motor(self) -> StepTable: ...
     @property
-    def ambs(self) -> StepMeans: ...
+    def ambs(self) -> StepTable: ...
     @property
     def by_motor(self) -> MotorFit: ...
     @property

@@ -32,7 +32,8 @@ from procedures.negative_stiffness import figures as drawn
 from procedures.negative_stiffness.estimates import Analysis
 from procedures.servomotor import carrying, checks
 from procedures.servomotor.conventions import SERVOMOTOR, conventions, radial_currents
-from procedures.servomotor.steps import POSITIONS, StepMeans, channels, read_steps
+from procedures.servomotor.steps import POSITIONS, channels, read_steps
+from procedures.shared.step_table import StepTable
 
 Array = npt.NDArray[np.float64]
 ALPHA_X = Quantity(
@@ -148,17 +149,16 @@ def measured(a: Analysis) -> Iterator[Measured]:
     yield ALPHA_X_AMB.measured(a.estimates["ambs"])
 
 
-def read(recording: Recording[Plan]) -> tuple[StepMeans, StepMeans]:
+def read(recording: Recording[Plan]) -> tuple[StepTable, StepTable]:
     """The steps of both ways."""
 
     def name(way: str) -> Any:
         return lambda x: f"{way}, {x['level_m'] * 1e6:+.0f} µm at {x['bias_A']:g} A"
 
-    labels = ("level_m", "branch", "bias_A")
-    return read_steps(recording, "motor", labels, name("motor")), read_steps(recording, "ambs", labels, name("AMBs"))
+    return read_steps(recording, "motor", name("motor")), read_steps(recording, "ambs", name("AMBs"))
 
 
-def _of_signals(recording: Recording[Plan], motor: StepMeans, ambs: StepMeans) -> Iterator[Finding]:
+def _of_signals(recording: Recording[Plan], motor: StepTable, ambs: StepTable) -> Iterator[Finding]:
     plan = recording.plan
     machine, inboard = conventions(recording.rig), _amb_shares(recording.rig)[0]
     positions = machine.positions_of(*POSITIONS)
@@ -171,7 +171,7 @@ def _of_signals(recording: Recording[Plan], motor: StepMeans, ambs: StepMeans) -
     yield from checks.segments(motor, machine)
     yield from checks.at_edge(motor, plan.count_rad)
     for data, currents, follow, drifts in ways:
-        yield from checks.of_signals(data, machine, (*currents, *positions), plan)
+        yield from checks.of_signals(data, machine, (*currents, *positions), plan.max_lost)
         level = data.labels["level_m"]
         references: dict[str, Array | float] = {"yo": level, "yi": follow * level, "xi": 0.0, "xo": 0.0}
         offsets = {c: data.mean[c] - references[a] for a in references for c in machine.positions_of(a)}
@@ -241,7 +241,7 @@ procedure = Procedure(
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),
-        channels=channels(SERVOMOTOR),
+        channels=(*channels(SERVOMOTOR), "flags"),
         sensors=(*SERVOMOTOR.segments, *SERVOMOTOR.coils["yo"], *SERVOMOTOR.positions_of(*POSITIONS)),
         parameters=(*carrying.PARAMETERS, "ref_yo", "bias_i", "bias_o", "segment_max"),
         geometry=GEOMETRY,

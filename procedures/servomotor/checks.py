@@ -13,8 +13,8 @@ import numpy.typing as npt
 
 from bench.findings import Effect, Finding
 from procedures.servomotor.conventions import Servomotor
-from procedures.servomotor.steps import StepMeans
 from procedures.shared import signals
+from procedures.shared.step_table import StepTable
 
 Array = npt.NDArray[np.float64]
 
@@ -39,10 +39,10 @@ class Tolerances(Protocol):
 
 
 def of_signals(
-    data: StepMeans, machine: Servomotor, channels: Sequence[str], plan: Tolerances
+    data: StepTable, machine: Servomotor, channels: Sequence[str], max_lost: float
 ) -> Iterator[Finding]:  # fmt: skip
     """Lost samples, stuck channels, saturation and contact."""
-    yield from signals.losses(data.lost, data.expected, plan.max_lost, data.where)
+    yield from signals.losses(data.lost, data.expected, max_lost, data.where)
     yield from signals.stuck(data.spread, channels)
     yield from signals.flagged(data.flags, limits(machine), data.where)
 
@@ -57,7 +57,7 @@ def limits(machine: Servomotor) -> tuple[signals.Meaning, ...]:
     )
 
 
-def segments(data: StepMeans, machine: Servomotor) -> Iterator[Finding]:
+def segments(data: StepTable, machine: Servomotor) -> Iterator[Finding]:
     """Signs of the segments' currents while the motor carries: opposite ones carry opposite currents (T 6.9; at rest there is
     hardly a torque current), and segment 1 a positive one, because it lifts."""
     names = machine.segments
@@ -84,7 +84,7 @@ def segments(data: StepMeans, machine: Servomotor) -> Iterator[Finding]:
         )
 
 
-def at_edge(data: StepMeans, count_rad: float) -> Iterator[Finding]:
+def at_edge(data: StepTable, count_rad: float) -> Iterator[Finding]:
     """The rotor at the edges it was sent to: its encoder reads now one count and now the other.
 
     A reading that is 0 or one count c, the latter with probability p, has the mean p c and the variance p (1 - p) c^2: from
@@ -105,7 +105,7 @@ def at_edge(data: StepMeans, count_rad: float) -> Iterator[Finding]:
 
 
 def settled(
-    data: StepMeans, offsets: Mapping[str, Array], drifts: Mapping[str, Array], plan: Tolerances
+    data: StepTable, offsets: Mapping[str, Array], drifts: Mapping[str, Array], plan: Tolerances
 ) -> Iterator[Finding]:
     """Settled means where the reference is and standing still. `offsets` (N,) m are mean positions less their
     references, `drifts` (N,) A the drift of each control current within the step, by name.
@@ -150,7 +150,7 @@ def creeping(drift_A: Mapping[str, float], u_A: Mapping[str, float], plan: Toler
             )
 
 
-def misfit(data: StepMeans, residuals: Array, span: float, what: str, plan: Tolerances) -> Iterator[Finding]:
+def misfit(data: StepTable, residuals: Array, span: float, what: str, plan: Tolerances) -> Iterator[Finding]:
     """Residuals (N,) beyond `max_misfit` of the range `span`, both in one unit: the model does not describe the machine."""
     worst = np.abs(residuals)
     if worst.max() > plan.max_misfit * span:

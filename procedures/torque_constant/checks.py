@@ -45,8 +45,9 @@ def of_events(recording: Recording[Any]) -> Iterator[Finding]:
 
 def of_signals(data: TorqueData, machine: Servomotor, plan: Tolerances) -> Iterator[Finding]:
     """Checks that need no fit."""
-    yield from signals.losses(data.lost, data.expected, plan.max_lost, data.worst)
-    yield from signals.flagged(data.flags, _limits(machine), data.worst)
+    table = data.table
+    yield from signals.losses(table.lost, table.expected, plan.max_lost, table.where)
+    yield from signals.flagged(table.flags, _limits(machine), table.where)
     yield from _segments(data, machine)
     yield from _wiring(data.wiring)
     yield from _settled(data, plan)
@@ -62,8 +63,8 @@ def _limits(machine: Servomotor) -> tuple[signals.Meaning, ...]:
 
 def _segments(data: TorqueData, machine: Servomotor) -> Iterator[Finding]:
     """At home without i_x and i_y all four segments carry the torque current."""
-    for k, channel in enumerate(machine.segments):
-        if (data.spread[:, k] == 0).any():
+    for channel in machine.segments:
+        if (data.table.spread[channel] == 0).any():
             yield Finding("stuck-channel", f"{channel} does not move at all in some step; a live sensor has noise.", channel,
                           Effect.ERROR)  # fmt: skip
     s = data.steps
@@ -121,20 +122,20 @@ def _misfit(seen: Array, expected: Array) -> float:
 
 
 def _settled(data: TorqueData, plan: Tolerances) -> Iterator[Finding]:
-    angle, drift = np.abs(data.steps.angle), np.abs(data.drift)
+    angle, drift = np.abs(data.steps.angle), np.abs(data.table.drift["torque"])
     if angle.max() > plan.max_angle_rad:
         yield Finding(
             "not-held",
             f"the rotor stands {angle.max() * 1e3:.1f} mrad off home in the worst step ({plan.max_angle_rad * 1e3:.1f} mrad "
             f"allowed, {int((angle > plan.max_angle_rad).sum())} of {angle.size} steps): a load or a detent that the motor "
-            "does not hold, or too short a time to settle.", data.worst(angle), Effect.INDETERMINATE,
+            "does not hold, or too short a time to settle.", data.table.where(angle), Effect.INDETERMINATE,
         )  # fmt: skip
     if drift.max() > plan.max_drift_A:
         yield Finding(
             "unsettled",
             f"the torque current drifts by {drift.max() * 1e3:.0f} mA within a step ({plan.max_drift_A * 1e3:.0f} mA allowed, "
             f"{int((drift > plan.max_drift_A).sum())} of {drift.size} steps). Settle longer, or look at the integrator.",
-            data.worst(drift), Effect.INDETERMINATE,
+            data.table.where(drift), Effect.INDETERMINATE,
         )  # fmt: skip
 
 
@@ -167,7 +168,10 @@ def _slip(data: TorqueData, b: Balance) -> Iterator[Finding]:
     carried = hypotheses.loaded(b)
     heavy = np.abs(b.torque) / np.abs(b.torque).max()
     on = s.side != 0
-    rate = data.drift[on] * 2 / data.length[on] * np.sign(carried[on])  # A/s, negative where the load gets lighter
+    length_s = (data.table.end_ns - data.table.start_ns) * 1e-9
+    rate = (
+        data.table.drift["torque"][on] * 2 / length_s[on] * np.sign(carried[on])
+    )  # A/s, negative where the load gets lighter
     shape = np.abs(carried[on]) * heavy[on] ** 2
     value = float(rate @ shape) / float(shape @ shape)  # relative, 1/s, of the heaviest load
     u = float(np.std(rate - value * shape)) / math.sqrt(float(shape @ shape))

@@ -74,7 +74,7 @@ def _drifting(data: TorqueData, zero: npt.NDArray[np.bool_], t: Array, drift: fl
         rows.append(np.column_stack([pull * t[:, None], pull]))
     nothing, one = np.zeros_like(t), np.ones_like(t)
     design = np.vstack([np.column_stack([rows[0], one, nothing]), np.column_stack([rows[1], nothing, one])])
-    seen = np.concatenate([data.side_x[zero], data.side_y[zero]])
+    seen = np.concatenate([data.table.mean[f"side_{axis}"][zero] for axis in "xy"])
     found = np.linalg.lstsq(design, seen, rcond=None)[0][:2]  # A/s of i_x, i_y
     expected = np.array([[0.0, -drift / 2], [drift / 2, 0.0], [0.0, drift / 2], [-drift / 2, 0.0]])
     apart = np.linalg.norm(expected - found, axis=1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,8 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from procedures.servomotor.conventions import Servomotor, conventions
+from procedures.servomotor.loads import load_index
+from procedures.shared.step_table import Samples, StepTable, tabulate
 from procedures.torque_constant.fit import Steps, resting
 
 Array = npt.NDArray[np.float64]
@@ -24,8 +26,8 @@ def channels(machine: Servomotor) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class TorqueData:
-    """`steps` for the fit; per step (n,): `drift` of the torque current (second half less first) A, `length` s, control
-    current of the outboard AMB `side_x`, `side_y` A, `lost`, `expected`, `flags`, `spread` (n, 4) of the segments' samples A.
+    """`steps` for the fit, and the `table` (n,) of these steps, with the torque current as "torque" and the outboard AMB's
+    control currents as "side_x", "side_y", A.
 
     `detent_angle`, `detent_current` (m,): rad and A without load over a period of the detent.
     `wiring` (2, 2): control current x, y of the outboard AMB in A per A of i_x, i_y.
@@ -33,27 +35,10 @@ class TorqueData:
 
     steps: Steps
     masses: tuple[str, ...]
-    drift: Array
-    length: Array
-    side_x: Array
-    side_y: Array
-    lost: Array
-    expected: Array
-    flags: npt.NDArray[np.int64]
-    spread: Array
+    table: StepTable
     detent_angle: Array
     detent_current: Array
     wiring: Array
-
-    def where(self, k: int) -> str:
-        """How a step is named to the reader."""
-        s = self.steps
-        what = f"{self.masses[s.load[k]]} on the {'left' if s.side[k] > 0 else 'right'}" if s.side[k] else "no load"
-        return f"gamma {np.degrees(s.gamma[k]):+.2f} deg, {what}"
-
-    def worst(self, values: Array) -> str:
-        """The name of the step with the greatest of `values` (n,)."""
-        return self.where(int(np.argmax(values)))
 
 
 def read_torques(recording: Recording[Any], masses: tuple[str, ...], count: float) -> TorqueData:
@@ -66,54 +51,55 @@ def read_torques(recording: Recording[Any], masses: tuple[str, ...], count: floa
     if not found:
         raise AnalysisError("found no loads on the lever (was the run stopped early?)")
     machine = conventions(recording.rig)
-    read = [_reduce(step, machine) for step in found]
-    index = {"": -1} | {label: k for k, label in enumerate(masses)}
-    if strange := sorted({str(s.labels["load"]) for s in found} - set(index)):
-        raise AnalysisError(
-            f"masses: found {', '.join(strange)} on the lever; expected those of the plan, {', '.join(masses)}"
-        )
+    table = _table(found, machine)
+    load = load_index(table.labels["load"], masses, "lever")
     sides = {"left": 1, "right": -1, "": 0}
-    start = found[0].start_ns
     steps = Steps(
-        np.array([r["segments"] for r in read]), resting(np.array([r["angle"] for r in read]), count),
-        np.array([float(s.labels["gamma_rad"]) for s in found]),
-        np.array([(s.start_ns + s.end_ns) / 2 - start for s in found]) * 1e-9,
-        np.array([sides[str(s.labels["side"])] for s in found]), np.array([index[str(s.labels["load"])] for s in found]),
-        np.array([r["jumps"] for r in read]),
-    )  # fmt: skip
-    turned = [_reduce(step, machine) for step in recording.steps("detent")]
+        np.ascontiguousarray(table.stack(machine.segments).T),
+        resting(table.mean["angle"], count),
+        table.labels["gamma_rad"],
+        ((table.start_ns + table.end_ns) / 2 - table.start_ns[0]) * 1e-9,
+        np.array([sides[side] for side in table.labels["side"]]),
+        load,
+        table.spread["torque"],
+    )
+    detent = _table(list(recording.steps("detent")), machine)
     return TorqueData(
-        steps, masses, np.array([r["drift"] for r in read]),
-        np.array([(s.end_ns - s.start_ns) * 1e-9 for s in found]),
-        np.array([r["x"] for r in read]), np.array([r["y"] for r in read]),
-        np.array([float(s.lost()) for s in found]), np.array([float(s.expected()) for s in found]),
-        np.array([r["flags"] for r in read]), np.array([r["spread"] for r in read]),
-        np.array([r["angle"] for r in turned]), np.array([r["segments"].mean() for r in turned]),
-        _wiring(recording, machine),
+        steps, masses, table, detent.mean["angle"], detent.stack(machine.segments).mean(axis=0),
+        _wiring(_table(list(recording.steps("wiring")), machine)),
     )  # fmt: skip
 
 
-def _reduce(step: Step, machine: Servomotor) -> Mapping[str, Any]:
-    data = step.read(*channels(machine))
-    n = len(data["angle"])
-    if n < 20:
-        raise AnalysisError(f"step {dict(step.labels)}: found {n} samples; expected 20 or more")
-    segments = np.array([data[c] for c in machine.segments])
-    current = segments.mean(axis=0)
-    return {
-        "segments": segments.mean(axis=1), "spread": segments.std(axis=1), "angle": float(np.unwrap(data["angle"]).mean()),
-        "jumps": float(current.std()), "drift": float(current[n // 2 :].mean() - current[: n // 2].mean()),
-        "x": float(machine.control("xo", data.__getitem__).mean()), "y": float(machine.control("yo", data.__getitem__).mean()),
-        "flags": int(np.bitwise_or.reduce(data["flags"].astype(np.int64))),
-    }  # fmt: skip
+def _table(steps: list[Step], machine: Servomotor) -> StepTable:
+    return tabulate(steps, (*machine.segments, "angle", "torque", "side_x", "side_y"), _name, read=_reading(machine))
 
 
-def _wiring(recording: Recording[Any], machine: Servomotor) -> Array:
+def _name(labels: Mapping[str, Any]) -> str:
+    if "gamma_rad" not in labels:
+        return "no load"
+    what = f"{labels['load'] or 'nothing'} on the {labels['side']}" if labels["side"] else "no load"
+    return f"gamma {np.degrees(labels['gamma_rad']):+.2f} deg, {what}"
+
+
+def _reading(machine: Servomotor) -> Callable[[Step], Samples]:
+    def read(step: Step) -> Samples:
+        data = step.read(*channels(machine))
+        n = len(data["angle"])
+        if n < 20:
+            raise AnalysisError(f"step {dict(step.labels)}: found {n} samples; expected 20 or more")
+        data["angle"] = np.unwrap(data["angle"])
+        data["torque"] = np.array([data[c] for c in machine.segments]).mean(axis=0)
+        data |= {f"side_{axis}": machine.control(f"{axis}o", data.__getitem__) for axis in "xy"}
+        return data
+
+    return read
+
+
+def _wiring(table: StepTable) -> Array:
     """Slopes of the outboard AMB's control currents over i_x and i_y, from the steps at plus and minus."""
-    found = [(float(s.labels["i_x"]), float(s.labels["i_y"]), _reduce(s, machine)) for s in recording.steps("wiring")]
-    if not found:
+    if not len(table):
         return np.zeros((2, 2))
-    asked = np.array([[1.0, x, y] for x, y, _ in found])
-    answers = np.array([[r["x"], r["y"]] for _, _, r in found])
+    asked = np.stack([np.ones(len(table)), table.labels["i_x"], table.labels["i_y"]], axis=-1)
+    answers = np.stack([table.mean["side_x"], table.mean["side_y"]], axis=-1)
     slopes: Array = np.linalg.lstsq(asked, answers, rcond=None)[0][1:].T
     return slopes
