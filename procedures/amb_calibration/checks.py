@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,7 @@ from bench.uncertainty.coverage import coverage_factor
 from procedures.amb_calibration import both_coils, hypotheses
 from procedures.amb_calibration.fit import Fit
 from procedures.amb_calibration.hypotheses import CHANCE, Contradiction, Suspect
+from procedures.amb_calibration.plan import Plan
 from procedures.amb_calibration.scatter import Scatter
 from procedures.amb_calibration.steps import AXES, VERTICAL, HangingData
 from procedures.servomotor import checks as servomotor_checks
@@ -33,20 +34,7 @@ WIRED_WRONG = "wired-wrong"  # event: changes of the control currents under the 
 MOST_WRONG = 0.03  # relative: a set of masses that is off by more would be seen by eye
 
 
-class Tolerances(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def max_position_m(self) -> float: ...
-    @property
-    def max_drift_A(self) -> float: ...
-    @property
-    def max_lost(self) -> float: ...
-    @property
-    def bias_A(self) -> float: ...
-
-
-def of_signals(data: HangingData, machine: Servomotor, plan: Tolerances) -> Iterator[Finding]:
+def of_signals(data: HangingData, machine: Servomotor, plan: Plan) -> Iterator[Finding]:
     """Checks that need no fit: losses, stuck channels, saturation, contact, settling, wiring."""
     table = data.table
     yield from servomotor_checks.of_signals(table, machine, tuple(table.mean), plan.max_lost)
@@ -114,7 +102,7 @@ def of_fit(
     c: Contradiction,
     beyond: float,
     p: Mapping[str, float],
-    plan: Tolerances,
+    plan: Plan,
     u_mass: Array,
 ) -> Iterator[Finding]:
     """Checks of the fit: loads that contradict each other, single hangings that stand out, hysteresis. `beyond` is what each
@@ -143,7 +131,7 @@ def of_fit(
 
 
 def _loads(
-    data: HangingData, c: Contradiction, p: Mapping[str, float], plan: Tolerances, u_mass: Array
+    data: HangingData, c: Contradiction, p: Mapping[str, float], plan: Plan, u_mass: Array
 ) -> Iterator[Finding]:  # fmt: skip
     if c.probability > CHANCE:
         return

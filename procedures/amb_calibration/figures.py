@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +10,7 @@ import numpy.typing as npt
 from bench.figures import Figure, Series
 from bench.recording import Recording
 from procedures.amb_calibration.fit import Fit
+from procedures.amb_calibration.plan import Plan
 from procedures.amb_calibration.steps import HangingData
 from procedures.servomotor.conventions import conventions
 
@@ -18,7 +18,7 @@ Array = npt.NDArray[np.float64]
 NAMES = ("inboard", "outboard")
 
 
-def all_figures(recording: Recording[Any], data: HangingData, f: Fit, p: Mapping[str, float]) -> list[Figure]:
+def all_figures(recording: Recording[Plan], data: HangingData, f: Fit, p: Mapping[str, float]) -> list[Figure]:
     """In the order of the report."""
     return [*_fits(data, f), *_residuals(data, f), *_one_step(recording), _slopes(data, f), _zero_load(data, f)]
 
@@ -51,7 +51,7 @@ def _residuals(data: HangingData, f: Fit) -> Iterator[Figure]:
                      lines=(("zero", 0.0),))  # fmt: skip
 
 
-def _one_step(recording: Recording[Any]) -> Iterator[Figure]:
+def _one_step(recording: Recording[Plan]) -> Iterator[Figure]:
     heaviest = recording.plan.masses[-1]
     step = next(s for s in recording.steps("hang") if s.labels["load"] == heaviest)
     machine = conventions(recording.rig)

@@ -12,11 +12,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import Field
 
 from bench.figures import Figure
 from bench.findings import Ended, Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import NOTHING, Load, RigState
@@ -31,6 +30,7 @@ from procedures.amb_calibration import fit as amb_calibration_fit
 from procedures.amb_calibration.estimates import less_sure, turning_point, unresolved_angles
 from procedures.amb_calibration.fit import Fit
 from procedures.amb_calibration.hypotheses import Contradiction
+from procedures.amb_calibration.plan import Plan
 from procedures.amb_calibration.scatter import OUTPUTS, Scatter, covariance_by_angle, covariance_over_a_turn, scatter
 from procedures.amb_calibration.steps import AXES, VERTICAL, HangingData, channels, read_hangings
 from procedures.servomotor.conventions import SERVOMOTOR, Servomotor, conventions
@@ -46,19 +46,6 @@ KW_I = Quantity("Kw_i", "N/A", "inboard AMB: dF/di at the current that carries t
 KW_O = Quantity("Kw_o", "N/A", "outboard AMB: dF/di at the current that carries the rotor's own weight")
 MEASURES = (K_I, K_O, K2_I, K2_O, KW_I, KW_O)
 CLEAR_A = 0.1  # a change of a control current that is no noise
-
-
-class Plan(BenchPlan):
-    """Settings of the calibration, SI."""
-
-    masses: tuple[str, ...] = Field(("M1", "M2", "M3", "M4"), min_length=4)  # labels of the rig's masses, ascending
-    angles: int = Field(8, ge=8)  # equally spaced over a turn
-    bias_A: float = Field(3.0, gt=0)
-    settle_s: float = Field(2.0, gt=0)
-    average_s: float = Field(1.0, ge=0.1)
-    max_position_m: float = Field(5e-8, gt=0)  # settled: |mean position| and its drift within a step
-    max_drift_A: float = Field(2e-3, gt=0)  # settled: drift of a control current within a step
-    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 
 
 def settings(plan: Plan) -> dict[str, float]:
@@ -130,7 +117,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """Fit, scatter and estimates with their influences."""
     findings.gate(checks.of_first(recording))
     plan = recording.plan
-    data = read_hangings(recording, plan.masses)
+    data = read_hangings(recording)
     findings.gate(checks.of_signals(data, conventions(recording.rig), plan), checks.FATAL)
     a = _fitted(recording, data)
     values = {name: e.value for name, e in a.inputs.items()}

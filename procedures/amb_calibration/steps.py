@@ -12,6 +12,7 @@ import numpy.typing as npt
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from procedures.amb_calibration.fit import Hangings
+from procedures.amb_calibration.plan import Plan
 from procedures.servomotor.conventions import Servomotor, conventions, displacement
 from procedures.servomotor.loads import load_index
 from procedures.shared.step_table import StepTable, by_angle, tabulate
@@ -35,13 +36,13 @@ class HangingData:
     masses: tuple[str, ...]
 
 
-def read_hangings(recording: Recording[Any], masses: tuple[str, ...]) -> HangingData:
+def read_hangings(recording: Recording[Plan]) -> HangingData:
     """Read every "hang" step, in the order of its angle and time.
 
     Raises:
-        AnalysisError: there are no steps, an angle lacks some, or what hung is none of the `masses`.
+        AnalysisError: there are no steps, an angle lacks some, or what hung is no mass of the plan.
     """
-    machine = conventions(recording.rig)
+    machine, masses = conventions(recording.rig), recording.plan.masses
     steps, shape = by_angle(recording.steps("hang"), "hangings")
     table = tabulate(steps, channels(machine), _name, shape=shape)
     inboard, outboard, motor = _plane_positions(recording.rig, *table.stack(machine.positions_of(*VERTICAL)))

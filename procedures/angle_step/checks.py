@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Protocol
 
 import numpy as np
 
 from bench.findings import Effect, Finding
 from bench.uncertainty import coverage_factor
 from procedures.angle_step.estimates import Result
+from procedures.angle_step.plan import Plan
 from procedures.angle_step.response import Loop, kick_A
 from procedures.angle_step.steps import Case, Done
 from procedures.servomotor.conventions import Servomotor
@@ -21,16 +21,7 @@ CARRIES_A = 4.0  # i_y that the shaft's weight takes at T Table 6.2's force cons
 UNEXPECTED = 2e-3  # s, of saturation; single samples may come from a noisy encoder
 
 
-class Tolerances(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def max_hold_A(self) -> float: ...
-    @property
-    def max_lost(self) -> float: ...
-
-
-def of_signals(moves: Sequence[Done], machine: Servomotor, plan: Tolerances) -> Iterator[Finding]:
+def of_signals(moves: Sequence[Done], machine: Servomotor, plan: Plan) -> Iterator[Finding]:
     """Lost samples, stuck channels, contact, amplifiers at their limits while nothing moves."""
     shares = [d.lost / max(d.expected, 1) for d in moves]
     worst = int(np.argmax(shares))
@@ -58,7 +49,7 @@ def of_signals(moves: Sequence[Done], machine: Servomotor, plan: Tolerances) -> 
             yield Finding(code, said, hit[0].case.where, Effect.INDETERMINATE, places)
 
 
-def of_responses(results: Mapping[Case, Result], plan: Tolerances, loops: Mapping[Case, Loop]) -> Iterator[Finding]:
+def of_responses(results: Mapping[Case, Result], plan: Plan, loops: Mapping[Case, Loop]) -> Iterator[Finding]:
     """Steps that do not settle, torque at rest, saturation that the step does not explain."""
     for case, result in results.items():
         if not all(math.isfinite(r.settling) for r in result.responses):
@@ -77,7 +68,7 @@ def of_responses(results: Mapping[Case, Result], plan: Tolerances, loops: Mappin
             )  # fmt: skip
 
 
-def _holding(results: Mapping[Case, Result], plan: Tolerances) -> Iterator[Finding]:
+def _holding(results: Mapping[Case, Result], plan: Plan) -> Iterator[Finding]:
     """Torque current while the rotor stands: a levitated rotor needs none but against drag."""
     held = [
         (abs(current), current, case)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +17,7 @@ from bench.uncertainty import Estimate
 from procedures.force_constant import load_at_rest
 from procedures.force_constant.fit import CROSS, DIRECT, FORCE, PAIRS
 from procedures.force_constant.load_at_rest import Cause, Rest
+from procedures.force_constant.plan import Plan
 from procedures.force_constant.steps import AXES, RampData
 from procedures.servomotor import checks as servomotor_checks
 from procedures.servomotor.conventions import Servomotor
@@ -34,20 +34,7 @@ EXCHANGED = 0.3  # cross over direct force: 8 % by half a degree of encoder zero
 CHANCE = 1e-6  # false alarm rate of the tests of the fit
 
 
-class Tolerances(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def max_position_m(self) -> float: ...
-    @property
-    def max_drift_A(self) -> float: ...
-    @property
-    def max_lost(self) -> float: ...
-    @property
-    def max_wander_N(self) -> float: ...
-
-
-def of_signals(data: RampData, machine: Servomotor, plan: Tolerances) -> Iterator[Finding]:
+def of_signals(data: RampData, machine: Servomotor, plan: Plan) -> Iterator[Finding]:
     """Checks that need no fit: losses, stuck channels, saturation, contact, settling, segments that do as commanded."""
     table = data.table
     yield from servomotor_checks.of_signals(table, machine, tuple(table.mean), plan.max_lost)
@@ -199,7 +186,7 @@ def _cause(c: Cause) -> str:
     return f"a gain of {which} changed by {c.amounts[0]:+.2%}, or its offset (alpha_d {off})"
 
 
-def wander(axis: str, drift: Array, u: Array, data: RampData, plan: Tolerances) -> Iterator[Finding]:
+def wander(axis: str, drift: Array, u: Array, data: RampData, plan: Plan) -> Iterator[Finding]:
     """Drift of the motor's force by both rows, (2,) N/s with u, over the run: five u and the plan's limit."""
     total = drift * data.duration_s
     significant = (np.abs(total) > plan.max_wander_N) & (np.abs(drift) > 5 * u)

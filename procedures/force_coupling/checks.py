@@ -10,6 +10,7 @@ import numpy as np
 from bench.findings import Effect, Finding
 from procedures.force_coupling.estimates import Analysis
 from procedures.force_coupling.fit import TERMS, CouplingFit
+from procedures.force_coupling.plan import Plan
 from procedures.servomotor import checks
 from procedures.servomotor.conventions import Servomotor
 from procedures.shared.step_table import StepTable
@@ -19,15 +20,15 @@ SURE = 5  # standard uncertainties
 WINDING = 0.1  # segments differ by 1 %
 
 
-def of_fit(data: StepTable, f: CouplingFit, plan: checks.Tolerances) -> Iterator[Finding]:
+def of_fit(data: StepTable, f: CouplingFit, plan: Plan) -> Iterator[Finding]:
     """Drift over the sequence and steps off the model."""
     n, terms, u = len(data), f.fit.terms, f.fit.u
     yield from checks.creeping(
-        {"i_x": float(terms[7]), "i_y": float(terms[8])}, {"i_x": float(u[7]), "i_y": float(u[8])}, plan
+        {"i_x": float(terms[7]), "i_y": float(terms[8])}, {"i_x": float(u[7]), "i_y": float(u[8])}, plan.max_creep_A
     )
     residuals = np.hypot(f.fit.residuals[:n], f.fit.residuals[n:])
     span = float(np.hypot(np.ptp(f.i_x), np.ptp(f.i_y)))
-    yield from checks.misfit(data, residuals, span, "currents over gamma", plan)
+    yield from checks.misfit(data, residuals, span, "currents over gamma", plan.max_misfit)
 
 
 def of_results(a: Analysis, machine: Servomotor, pole_pairs: float) -> Iterator[Finding]:

@@ -12,12 +12,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Finding, Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
@@ -28,6 +27,7 @@ from procedures.force_coupling import checks as force_coupling_checks
 from procedures.force_coupling import estimates
 from procedures.force_coupling import figures as drawn
 from procedures.force_coupling.estimates import Analysis
+from procedures.force_coupling.plan import Plan
 from procedures.servomotor import carrying, checks
 from procedures.servomotor.conventions import SERVOMOTOR, Servomotor, conventions, radial_currents
 from procedures.servomotor.steps import POSITIONS, channels, read_steps
@@ -46,20 +46,6 @@ ALPHA_RATIO = 0.85  # T 6.6.3; for predictions before a run, and for nothing tha
 STEADY_RAD = (
     0.7  # electrical: beyond it the motor's force is turned so far from the controller's that levitation is lost
 )
-
-
-class Plan(BenchPlan):
-    """Settings, SI."""
-
-    gamma_rad: tuple[float, ...] = Field(tuple(round(math.radians(d / 2), 9) for d in range(-5, 8)), min_length=5)
-    count_rad: float = Field(2 * math.pi / 4096, gt=0)  # one count of the rotor's encoder
-    settle_s: float = Field(2.0, gt=0)
-    average_s: float = Field(1.0, ge=0.1)
-    max_position_m: float = Field(5e-8, gt=0)  # settled: |mean position|; its drift may be twice that
-    max_drift_A: float = Field(5e-3, gt=0)  # settled: drift of a current within a step
-    max_creep_A: float = Field(2e-3, gt=0)  # drift of i_x, i_y over the sequence
-    max_misfit: float = Field(5e-3, gt=0)  # residual over range
-    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 
 
 def needs(_: Plan) -> tuple[Need, ...]:
@@ -126,7 +112,9 @@ def _of_signals(data: StepTable, machine: Servomotor, plan: Plan) -> Iterator[Fi
     yield from checks.segments(data, machine)
     yield from checks.at_edge(data, plan.count_rad)
     i_x, i_y = radial_currents(*(data.drift[c] for c in machine.segments))
-    yield from checks.settled(data, {c: data.mean[c] for c in positions}, {"i_y": i_y, "i_x": i_x}, plan)
+    yield from checks.settled(
+        data, {c: data.mean[c] for c in positions}, {"i_y": i_y, "i_x": i_x}, plan.max_position_m, plan.max_drift_A
+    )
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:

@@ -13,12 +13,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from pydantic import Field
 
 from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Effect, Finding, Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import NOTHING, Load, RigState
@@ -29,6 +28,7 @@ from procedures.force_map import estimates, steps
 from procedures.force_map import figures as force_map_figures
 from procedures.force_map.estimates import CROSS, Result
 from procedures.force_map.fit import ABOUT, UNITS
+from procedures.force_map.plan import Plan
 from procedures.force_map.steps import STEP, MapData, channels, positions, read_points
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import SERVOMOTOR, conventions
@@ -46,24 +46,6 @@ GEOMETRY = ("amb_span", "motor_to_outboard_amb", "amb_gap", "lever_left", "lever
 K_N_A, STIFFNESS_N_M = 74.4, 242.6e3  # T (6.12) and Table 6.2; for predictions before a run
 LEAST_TORQUE_A = 0.2
 EXCHANGED = 0.3  # cross over direct force; half a degree of encoder zero makes 8 %
-
-
-class Plan(BenchPlan):
-    """Settings of the map, SI."""
-
-    current_A: float = Field(2.0, gt=0)  # of i_x and i_y, each way
-    loaded_current_A: float = Field(1.5, gt=0)  # while the lever is loaded
-    offset_m: float = Field(40e-6, gt=0, le=80e-6)  # of the outboard AMB's reference, each way
-    loaded_offset_m: float = Field(30e-6, gt=0, le=80e-6)
-    mass: str = "M3"  # on the lever
-    angles: int = Field(9, ge=3)  # equally spaced over a turn; those of the calibration
-    bias_A: float = Field(3.0, gt=0)  # that of the calibration
-    ramp_A_s: float = Field(2.0, gt=0)
-    settle_s: float = Field(1.0, gt=0)
-    average_s: float = Field(0.5, ge=0.1)
-    max_drift_A: float = Field(5e-3, gt=0)  # of the inboard control current within a point
-    max_residual_N: float = Field(0.5, gt=0)  # of the fit, root mean square
-    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,7 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
 from bench.recording import Recording, Step
+from procedures.force_map.plan import Plan
 from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.shared.step_table import Samples, StepTable, tabulate
 
@@ -33,15 +34,6 @@ def positions(machine: Servomotor) -> tuple[str, ...]:
 def channels(machine: Servomotor) -> tuple[str, ...]:
     """What is recorded at a point, besides the flags."""
     return (*machine.coils["yi"], *positions(machine), *machine.segments)
-
-
-class Tolerances(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def max_drift_A(self) -> float: ...
-    @property
-    def max_lost(self) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -87,7 +79,7 @@ def read_points(recording: Recording[Any]) -> MapData:
     )
 
 
-def of_signals(data: MapData, machine: Servomotor, plan: Tolerances) -> Iterator[Finding]:
+def of_signals(data: MapData, machine: Servomotor, plan: Plan) -> Iterator[Finding]:
     """Lost samples, stuck channels, limits, contact, points that had not settled."""
     table = data.table
     lost = float((table.lost / np.maximum(table.expected, 1)).max())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Protocol
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from bench.findings import Effect, Finding
 from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import Estimate, coverage_factor, welch_satterthwaite
 from procedures.negative_stiffness.fit import AmbFit, MotorFit
+from procedures.negative_stiffness.plan import Plan
 from procedures.servomotor import checks
 from procedures.shared.step_table import StepTable
 
@@ -19,33 +19,22 @@ AMB_N_PER_A = 74.4  # T (6.12); turns a force into a current for a judgement
 COUPLED = 0.25  # cross force over direct force: an encoder zero 0.5 deg off makes 0.08
 
 
-class Tolerances(checks.Tolerances, Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def bias_A(self) -> float: ...
-    @property
-    def bias_high_A(self) -> float: ...
-
-
-def of_fits(
-    motor: StepTable, ambs: StepTable, by_motor: MotorFit, by_ambs: AmbFit, plan: Tolerances
-) -> Iterator[Finding]:
+def of_fits(motor: StepTable, ambs: StepTable, by_motor: MotorFit, by_ambs: AmbFit, plan: Plan) -> Iterator[Finding]:
     """Drift, misfit, and an axis that answers the other's displacement."""
     n = len(motor)
     alpha_d = float(by_motor.force[0]) / float(by_motor.i_y[0])
     terms, u = by_motor.fit.terms, by_motor.fit.u
     drift = {"i_y": float(terms[2]) / alpha_d, "i_x": float(terms[5]) / alpha_d}
-    yield from checks.creeping(drift, {"i_y": float(u[2]) / alpha_d, "i_x": float(u[5]) / alpha_d}, plan)
+    yield from checks.creeping(drift, {"i_y": float(u[2]) / alpha_d, "i_x": float(u[5]) / alpha_d}, plan.max_creep_A)
     residuals = np.hypot(by_motor.fit.residuals[:n], by_motor.fit.residuals[n:])
-    yield from checks.misfit(motor, residuals, float(np.ptp(by_motor.force)), "force of the motor", plan)
+    yield from checks.misfit(motor, residuals, float(np.ptp(by_motor.force)), "force of the motor", plan.max_misfit)
     total = float(np.ptp(by_ambs.force))
-    yield from checks.misfit(ambs, by_ambs.fit.residuals, total, "force of the outboard AMB", plan)
+    yield from checks.misfit(ambs, by_ambs.fit.residuals, total, "force of the outboard AMB", plan.max_misfit)
     for k, bias in enumerate((plan.bias_A, plan.bias_high_A)):
         newton_per_A = AMB_N_PER_A * bias / plan.bias_A
         _, branch, creep = (float(x) / newton_per_A for x in by_ambs.fit.terms[2 + 3 * k : 5 + 3 * k])
         u_A = float(by_ambs.fit.u[4 + 3 * k]) / newton_per_A
-        yield from checks.creeping({f"i_yo at {bias:g} A": creep}, {f"i_yo at {bias:g} A": u_A}, plan)
+        yield from checks.creeping({f"i_yo at {bias:g} A": creep}, {f"i_yo at {bias:g} A": u_A}, plan.max_creep_A)
         if abs(branch) > plan.max_creep_A:
             yield Finding(
                 "hysteresis",

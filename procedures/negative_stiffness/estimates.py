@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
 
 import numpy as np
 
@@ -12,20 +11,12 @@ from bench.recording import Recording
 from bench.uncertainty import Estimate, Influence
 from procedures.negative_stiffness import fit
 from procedures.negative_stiffness.fit import AmbFit, ByAmbs, ByMotor, MotorFit
+from procedures.negative_stiffness.plan import Plan
 from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.shared.certificates import certified
 from procedures.shared.gradients import by_inputs
 from procedures.shared.step_table import StepTable
 from procedures.shared.type_a import scatter
-
-
-class Biases(Protocol):
-    """The part of a plan that tells the two series of the AMBs apart."""
-
-    @property
-    def bias_A(self) -> float: ...
-    @property
-    def bias_high_A(self) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -39,7 +30,7 @@ class Analysis:
     estimates: dict[str, Estimate]
 
 
-def evaluate(recording: Recording[Any], motor: StepTable, ambs: StepTable) -> Analysis:
+def evaluate(recording: Recording[Plan], motor: StepTable, ambs: StepTable) -> Analysis:
     """Both fits with their influences; `estimates` motor, ambs, gap and difference."""
     inputs = fit_inputs(recording)
     one, two = measured(conventions(recording.rig), recording.plan, motor, ambs)
@@ -63,7 +54,7 @@ def evaluate(recording: Recording[Any], motor: StepTable, ambs: StepTable) -> An
     return Analysis(motor, ambs, by_motor, by_ambs, estimates)
 
 
-def measured(machine: Servomotor, plan: Biases, motor: StepTable, ambs: StepTable) -> tuple[ByMotor, ByAmbs]:
+def measured(machine: Servomotor, plan: Plan, motor: StepTable, ambs: StepTable) -> tuple[ByMotor, ByAmbs]:
     """What the estimators get."""
     y, x = machine.positions_of("yi", "yo"), machine.positions_of("xi", "xo")
     which = (ambs.labels["bias_A"] != plan.bias_A).astype(np.int64)
@@ -86,7 +77,7 @@ def _turning_point(name: str, shift: float) -> Estimate:
     return Estimate.of(0.0, influence) if shift else Estimate.exact(0.0)
 
 
-def fit_inputs(recording: Recording[Any]) -> dict[str, Estimate]:
+def fit_inputs(recording: Recording[Plan]) -> dict[str, Estimate]:
     """What the fits need besides the steps: calibrations, and certificates of the rig file as influences by identity."""
     rig, g = recording.rig, recording.rig.geometry
     amb, motor = recording.calibration("amb-calibration"), recording.calibration("force-constant")

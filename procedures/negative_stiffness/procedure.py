@@ -7,18 +7,16 @@ way: the AMBs hold, the motor has no current, and the AMB's own stiffness is tol
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import Field
 
 from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Finding, Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
@@ -30,6 +28,7 @@ from procedures.negative_stiffness import checks as negative_stiffness_checks
 from procedures.negative_stiffness import estimates
 from procedures.negative_stiffness import figures as drawn
 from procedures.negative_stiffness.estimates import Analysis
+from procedures.negative_stiffness.plan import Plan
 from procedures.servomotor import carrying, checks
 from procedures.servomotor.conventions import SERVOMOTOR, conventions, radial_currents
 from procedures.servomotor.steps import POSITIONS, channels, read_steps
@@ -50,22 +49,6 @@ MARGIN = carrying.MARGIN
 AMB_N_PER_A = 74.4  # T (6.12), K_o; for predictions before a run, and for nothing that is measured
 GEOMETRY = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_inboard_amb", "com_to_outboard_amb", "com_to_motor",
             "motor_to_outboard_amb", "amb_span", "amb_gap", "motor_stiffness")  # fmt: skip
-
-
-class Plan(BenchPlan):
-    """Settings, SI. Levels are displacements of the outboard sensor's plane, the same in both ways."""
-
-    levels_m: tuple[float, ...] = Field(tuple(round(x * 1e-5, 9) for x in range(-4, 5)), min_length=5)
-    bias_A: float = Field(3.0, gt=0)  # that of the AMBs' calibration
-    bias_high_A: float = Field(4.0, gt=0)
-    count_rad: float = Field(2 * math.pi / 4096, gt=0)  # one count of the rotor's encoder
-    settle_s: float = Field(2.0, gt=0)
-    average_s: float = Field(1.0, ge=0.1)
-    max_position_m: float = Field(5e-8, gt=0)  # settled: |mean position - reference|; its drift may be twice that
-    max_drift_A: float = Field(5e-3, gt=0)  # settled: drift of a current within a step
-    max_creep_A: float = Field(2e-3, gt=0)  # drift of i_x, i_y over the sequence
-    max_misfit: float = Field(5e-3, gt=0)  # residual over range
-    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 
 
 def settings(plan: Plan) -> dict[str, float]:
@@ -175,7 +158,7 @@ def _of_signals(recording: Recording[Plan], motor: StepTable, ambs: StepTable) -
         level = data.labels["level_m"]
         references: dict[str, Array | float] = {"yo": level, "yi": follow * level, "xi": 0.0, "xo": 0.0}
         offsets = {c: data.mean[c] - references[a] for a in references for c in machine.positions_of(a)}
-        yield from checks.settled(data, offsets, drifts, plan)
+        yield from checks.settled(data, offsets, drifts, plan.max_position_m, plan.max_drift_A)
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:

@@ -6,7 +6,6 @@ Thresholds are chosen so that a sound rig trips one in fewer than one run in a t
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -21,21 +20,6 @@ Array = npt.NDArray[np.float64]
 FATAL = ("stuck-channel", "segment-sign")
 """Findings after which a fit means nothing and is not attempted."""
 UNBALANCED_A = 0.5  # half the sum of opposite segments is the torque current: at rest within 0.1 A
-
-
-class Tolerances(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def max_position_m(self) -> float: ...
-    @property
-    def max_drift_A(self) -> float: ...
-    @property
-    def max_creep_A(self) -> float: ...
-    @property
-    def max_misfit(self) -> float: ...
-    @property
-    def max_lost(self) -> float: ...
 
 
 def of_signals(
@@ -105,7 +89,11 @@ def at_edge(data: StepTable, count_rad: float) -> Iterator[Finding]:
 
 
 def settled(
-    data: StepTable, offsets: Mapping[str, Array], drifts: Mapping[str, Array], plan: Tolerances
+    data: StepTable,
+    offsets: Mapping[str, Array],
+    drifts: Mapping[str, Array],
+    max_position_m: float,
+    max_drift_A: float,
 ) -> Iterator[Finding]:
     """Settled means where the reference is and standing still. `offsets` (N,) m are mean positions less their
     references, `drifts` (N,) A the drift of each control current within the step, by name.
@@ -115,9 +103,9 @@ def settled(
     """
     moving = {c: np.abs(data.drift[c]) for c in offsets}
     for values, limit, what, unit, scale in (
-        (offsets, plan.max_position_m, "mean position off its reference", "µm", 1e6),
-        (moving, 2 * plan.max_position_m, "drift of the position", "µm", 1e6),
-        (drifts, plan.max_drift_A, "drift of the current", "mA", 1e3),
+        (offsets, max_position_m, "mean position off its reference", "µm", 1e6),
+        (moving, 2 * max_position_m, "drift of the position", "µm", 1e6),
+        (drifts, max_drift_A, "drift of the current", "mA", 1e3),
     ):
         name = max(values, key=lambda c, v=values: float(np.abs(v[c]).max()))
         worst = np.abs(values[name])
@@ -131,7 +119,7 @@ def settled(
             )
 
 
-def creeping(drift_A: Mapping[str, float], u_A: Mapping[str, float], plan: Tolerances) -> Iterator[Finding]:
+def creeping(drift_A: Mapping[str, float], u_A: Mapping[str, float], max_creep_A: float) -> Iterator[Finding]:
     """Currents that change over the sequence at equal positions: more than `max_creep_A` and five standard uncertainties.
 
     `drift_A` is what a current, i_x, i_y or that of an AMB, changes by from the first step to the last. The amplifiers
@@ -139,24 +127,24 @@ def creeping(drift_A: Mapping[str, float], u_A: Mapping[str, float], plan: Toler
     """
     pairs = {"i_x": "segments 2 and 4", "i_y": "segments 1 and 3"}
     for name, change in drift_A.items():
-        if abs(change) > max(plan.max_creep_A, 5 * u_A[name]):
+        if abs(change) > max(max_creep_A, 5 * u_A[name]):
             yield Finding(
                 "drifting-sensor",
                 f"{name} changes by {change * 1e3:+.2f} mA over the sequence with the shaft where it was "
-                f"({plan.max_creep_A * 1e3:.2f} mA allowed): a current sensor of {pairs.get(name, 'that AMB')} drifts, or the "
+                f"({max_creep_A * 1e3:.2f} mA allowed): a current sensor of {pairs.get(name, 'that AMB')} drifts, or the "
                 "load does. The sequence is mirrored, so that a steady drift does not reach the result; an unsteady one does.",
                 name,
                 Effect.INDETERMINATE,
             )
 
 
-def misfit(data: StepTable, residuals: Array, span: float, what: str, plan: Tolerances) -> Iterator[Finding]:
+def misfit(data: StepTable, residuals: Array, span: float, what: str, max_misfit: float) -> Iterator[Finding]:
     """Residuals (N,) beyond `max_misfit` of the range `span`, both in one unit: the model does not describe the machine."""
     worst = np.abs(residuals)
-    if worst.max() > plan.max_misfit * span:
+    if worst.max() > max_misfit * span:
         yield Finding(
             "misfit",
-            f"{what}: one step is {worst.max() / span:.2%} of the range off the model ({plan.max_misfit:.2%} allowed). "
+            f"{what}: one step is {worst.max() / span:.2%} of the range off the model ({max_misfit:.2%} allowed). "
             "A reading that is not proportional, a step that was disturbed, or a machine that the model does not describe.",
             data.where(worst),
             Effect.INDETERMINATE,

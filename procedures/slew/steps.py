@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Protocol
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from bench.findings import Effect, Finding
 from bench.recording import Recording, Step
 from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.slew.fit import Swing
+from procedures.slew.plan import Plan
 
 STEP, STARTED = "swing", "sine-started"
 
@@ -21,14 +21,7 @@ def channels(machine: Servomotor) -> tuple[str, ...]:
     return ("angle", *machine.segments, "flags")
 
 
-class Tolerances(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def max_lost(self) -> float: ...
-
-
-def read_swings(recording: Recording[Any]) -> list[Swing]:
+def read_swings(recording: Recording[Plan]) -> list[Swing]:
     """Every swing, in time order.
 
     Raises:
@@ -40,7 +33,7 @@ def read_swings(recording: Recording[Any]) -> list[Swing]:
     return [_read(recording, step) for step in steps]
 
 
-def _read(recording: Recording[Any], step: Step) -> Swing:
+def _read(recording: Recording[Plan], step: Step) -> Swing:
     machine = conventions(recording.rig)
     data = step.read(*channels(machine))
     inside = [e for e in recording.events() if step.start_ns <= e["t_ns"] < step.end_ns]
@@ -71,17 +64,17 @@ def _read(recording: Recording[Any], step: Step) -> Swing:
     )
 
 
-def of_signals(recording: Recording[Any], plan: Tolerances) -> Iterator[Finding]:
+def of_signals(recording: Recording[Plan]) -> Iterator[Finding]:
     """Lost samples, channels that stand still, amplifiers at their limits, contact."""
-    machine = conventions(recording.rig)
+    machine, max_lost = conventions(recording.rig), recording.plan.max_lost
     names = channels(machine)
     for step in recording.steps(STEP):
         where = f"{float(step.labels['hz']):g} Hz"
         share = step.lost() / max(step.expected(), 1)
-        if share > plan.max_lost:
+        if share > max_lost:
             yield Finding(
                 "missing-samples",
-                f"{share:.2%} of the samples of a swing are missing ({plan.max_lost:.2%} is allowed). Look at the link: load, "
+                f"{share:.2%} of the samples of a swing are missing ({max_lost:.2%} is allowed). Look at the link: load, "
                 "cable, gateway.",
                 where, Effect.INDETERMINATE,
             )  # fmt: skip

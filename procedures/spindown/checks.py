@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,7 @@ from procedures.servomotor.conventions import Servomotor
 from procedures.servomotor.direction import of_probe
 from procedures.shared.leastsquares import linear
 from procedures.spindown.estimates import Drag, drive_drag, stated_inertia
+from procedures.spindown.plan import Plan
 from procedures.spindown.steps import RunDown
 
 Array = npt.NDArray[np.float64]
@@ -32,23 +33,6 @@ COUNT_N_m = 0.01  # of the drive's torque
 SURE = 3.0  # standard uncertainties beyond what is stated
 LOWERED = "lowered"  # event: the drive did not bring the shaft to the speed asked for
 TICK_S = 0.45e-3  # the speed is a mean over a sample, the angle its last value
-
-
-class Plan(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def speed_rad_s(self) -> float: ...
-    @property
-    def bias_A(self) -> float: ...
-    @property
-    def bias_high_A(self) -> float: ...
-    @property
-    def max_lost(self) -> float: ...
-    @property
-    def max_coulomb_N_m(self) -> float: ...
-    @property
-    def speed_filter_hz(self) -> float: ...
 
 
 def before_fits(recording: Recording[Any]) -> Iterator[Finding]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +13,7 @@ from bench.recording import Recording, Step
 from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.spindown import fit
 from procedures.spindown.fit import Coast
+from procedures.spindown.plan import Plan
 
 Array = npt.NDArray[np.float64]
 ANGLE_LAGS = 60  # samples of 1 ms over which its residuals repeat themselves
@@ -60,7 +60,7 @@ class RunDown:
         return f"{self.bias_A:g} A, {way}, run {self.repeat + 1}{', with the ring' if self.ring else ''}"
 
 
-def read_run_downs(recording: Recording[Any]) -> list[RunDown]:
+def read_run_downs(recording: Recording[Plan]) -> list[RunDown]:
     """Every "coast" step, fitted between the filter's transient and the end speed.
 
     Raises:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,21 +19,11 @@ from procedures.shared import signals
 from procedures.torque_constant import drifts, hypotheses
 from procedures.torque_constant.drifts import SIGNIFICANT
 from procedures.torque_constant.fit import Balance, Detent
+from procedures.torque_constant.plan import Plan
 from procedures.torque_constant.steps import TorqueData
 
 Array = npt.NDArray[np.float64]
 SLIP_RATE = 4e-3  # 1/s, relative, of the heaviest load's torque
-
-
-class Tolerances(drifts.Tolerances, Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def max_angle_rad(self) -> float: ...
-    @property
-    def max_drift_A(self) -> float: ...
-    @property
-    def max_lost(self) -> float: ...
 
 
 def of_events(recording: Recording[Any]) -> Iterator[Finding]:
@@ -43,7 +33,7 @@ def of_events(recording: Recording[Any]) -> Iterator[Finding]:
                       f"{event['angle']:.3f} rad", Effect.ERROR)  # fmt: skip
 
 
-def of_signals(data: TorqueData, machine: Servomotor, plan: Tolerances) -> Iterator[Finding]:
+def of_signals(data: TorqueData, machine: Servomotor, plan: Plan) -> Iterator[Finding]:
     """Checks that need no fit."""
     table = data.table
     yield from signals.losses(table.lost, table.expected, plan.max_lost, table.where)
@@ -121,7 +111,7 @@ def _misfit(seen: Array, expected: Array) -> float:
     return float(np.linalg.norm(seen - scale * expected) / np.linalg.norm(seen))
 
 
-def _settled(data: TorqueData, plan: Tolerances) -> Iterator[Finding]:
+def _settled(data: TorqueData, plan: Plan) -> Iterator[Finding]:
     angle, drift = np.abs(data.steps.angle), np.abs(data.table.drift["torque"])
     if angle.max() > plan.max_angle_rad:
         yield Finding(
@@ -147,7 +137,7 @@ def of_fit(
     p: Mapping[str, float],
     mass_u: Sequence[float],
     arm_u: float,
-    plan: Tolerances,
+    plan: Plan,
 ) -> Iterator[Finding]:
     """Checks of the fit: slip, drifts, detent, arms, masses, the cosine."""
     slips = list(_slip(data, b))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -12,22 +11,14 @@ from bench.findings import Effect, Finding
 from procedures.servomotor.conventions import Servomotor
 from procedures.shared.leastsquares import linear
 from procedures.torque_constant.fit import Balance
+from procedures.torque_constant.plan import Plan
 from procedures.torque_constant.steps import TorqueData
 
 Array = npt.NDArray[np.float64]
 SIGNIFICANT = 6.0  # standard deviations, of Student's t with some twenty degrees of freedom
 
 
-class Tolerances(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def max_baseline_drift_A_s(self) -> float: ...
-    @property
-    def max_scale_drift(self) -> float: ...
-
-
-def scale(b: Balance, plan: Tolerances) -> Iterator[Finding]:
+def scale(b: Balance, plan: Plan) -> Iterator[Finding]:
     """Drift of the torque per current. The fit takes off what is even in time; what is not grows with it."""
     found = b.drift
     if abs(found.value) <= max(plan.max_scale_drift, SIGNIFICANT * found.u):
@@ -40,7 +31,7 @@ def scale(b: Balance, plan: Tolerances) -> Iterator[Finding]:
     )  # fmt: skip
 
 
-def baseline(data: TorqueData, machine: Servomotor, b: Balance, plan: Tolerances) -> Iterator[Finding]:
+def baseline(data: TorqueData, machine: Servomotor, b: Balance, plan: Plan) -> Iterator[Finding]:
     """Drift of the current without load. The amplifier closes on its own sensor, so that a drifting sensor moves the true
     current of its segment, all references follow to hold the angle, and the outboard AMB answers the pull to the side.
 

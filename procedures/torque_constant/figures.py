@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +12,7 @@ from bench.figures import Figure, Series
 from bench.recording import Recording
 from procedures.servomotor.conventions import conventions
 from procedures.torque_constant.fit import Balance, Detent, Steps
+from procedures.torque_constant.plan import Plan
 from procedures.torque_constant.steps import TorqueData
 
 Array = npt.NDArray[np.float64]
@@ -20,7 +20,7 @@ SIDES = ((1, "left"), (-1, "right"))
 SHOWN_S = 0.06
 
 
-def all_figures(recording: Recording[Any], data: TorqueData, b: Balance, held: Detent, pairs: float) -> list[Figure]:
+def all_figures(recording: Recording[Plan], data: TorqueData, b: Balance, held: Detent, pairs: float) -> list[Figure]:
     """In the order of the report."""
     return [_torque(data, b, pairs), *_over_gamma(data, b, pairs), _residuals(data, b), _detent(data, b, held),
             _one_step(recording)]  # fmt: skip
@@ -95,7 +95,7 @@ def _detent(data: TorqueData, b: Balance, held: Detent) -> Figure:
                    Series("fit", np.degrees(grid), 1e3 * b.alpha * curve)))  # fmt: skip
 
 
-def _one_step(recording: Recording[Any]) -> Figure:
+def _one_step(recording: Recording[Plan]) -> Figure:
     """The end of a step close by: over its whole second, which is what is averaged, the swing would be a solid block."""
     heaviest = recording.plan.masses[-1]
     step = next(s for s in recording.steps("lever") if s.labels["load"] == heaviest)

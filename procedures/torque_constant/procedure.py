@@ -11,12 +11,11 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import Field
 
 from bench.errors import RotorNotArrived
 from bench.figures import Figure
 from bench.findings import Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import NOTHING, Load, RigState
@@ -32,31 +31,12 @@ from procedures.torque_constant import checks, fit
 from procedures.torque_constant import figures as drawn
 from procedures.torque_constant.fit import NO_DETENT, Balance, Detent
 from procedures.torque_constant.inputs import SIDES, arms_u, fit_inputs, masses_u
+from procedures.torque_constant.plan import Plan
 from procedures.torque_constant.steps import TorqueData, channels, read_torques
 
 ALPHA_TAU = Quantity("alpha_tau", "N m/A", "torque per mean true segment current at the home angle, peak over gamma")
 GAMMA_0T = Quantity("gamma_0t", "rad", "phase angle at which the torque per current is largest")
 MEASURES = (ALPHA_TAU, GAMMA_0T)
-
-
-class Plan(BenchPlan):
-    """Settings of the calibration, SI."""
-
-    masses: tuple[str, ...] = Field(("M1", "M2", "M3"), min_length=2)  # labels of the rig's masses, ascending
-    gamma_max_rad: float = Field(0.0873, gt=0.01)  # phase angles from minus to plus this
-    gammas: int = Field(5, ge=5)  # equally spaced
-    bias_A: float = Field(3.0, gt=0)
-    settle_s: float = Field(2.0, gt=0)
-    average_s: float = Field(1.0, ge=0.1)
-    ki_theta: float = Field(300.0, gt=0)  # A/(rad s) of the angle's integrator while loads hang
-    detent_angles: int = Field(4, ge=4)  # over one period of the detent, without load
-    wiring_A: float = Field(1.5, gt=0)  # of i_x and i_y, to see which segment is which
-    max_angle_rad: float = Field(1e-2, gt=0)  # held: mean angle off home (beyond 2 A the integrator ends, kp holds)
-    max_drift_A: float = Field(0.03, gt=0)  # settled: drift of the torque current within a step
-    max_baseline_drift_A_s: float = Field(5e-5, gt=0)  # of the current without load, over the run
-    max_scale_drift: float = Field(7e-4, gt=0)  # relative, of the torque per current, from the first load to the last
-    count_rad: float = Field(2 * math.pi / 4096, gt=0)  # of the rotor's encoder
-    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 
 
 def settings(plan: Plan) -> dict[str, float]:
@@ -169,7 +149,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """The balance of torques, with its fit and estimates."""
     findings.gate([*of_probe(recording), *checks.of_events(recording)])
     plan, machine = recording.plan, conventions(recording.rig)
-    data = read_torques(recording, plan.masses, plan.count_rad)
+    data = read_torques(recording)
     findings.gate(checks.of_signals(data, machine, plan))
     a = _fitted(recording, data)
     values = {name: e.value for name, e in a.inputs.items()}

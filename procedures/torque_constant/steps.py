@@ -15,6 +15,7 @@ from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.servomotor.loads import load_index
 from procedures.shared.step_table import Samples, StepTable, tabulate
 from procedures.torque_constant.fit import Steps, resting
+from procedures.torque_constant.plan import Plan
 
 Array = npt.NDArray[np.float64]
 
@@ -41,22 +42,22 @@ class TorqueData:
     wiring: Array
 
 
-def read_torques(recording: Recording[Any], masses: tuple[str, ...], count: float) -> TorqueData:
+def read_torques(recording: Recording[Plan]) -> TorqueData:
     """Read all steps.
 
     Raises:
-        AnalysisError: there are none, or too few samples in one.
+        AnalysisError: there are none, too few samples in one, or what hung is no mass of the plan.
     """
     found = list(recording.steps("lever"))
     if not found:
         raise AnalysisError("found no loads on the lever (was the run stopped early?)")
-    machine = conventions(recording.rig)
+    machine, masses = conventions(recording.rig), recording.plan.masses
     table = _table(found, machine)
     load = load_index(table.labels["load"], masses, "lever")
     sides = {"left": 1, "right": -1, "": 0}
     steps = Steps(
         np.ascontiguousarray(table.stack(machine.segments).T),
-        resting(table.mean["angle"], count),
+        resting(table.mean["angle"], recording.plan.count_rad),
         table.labels["gamma_rad"],
         ((table.start_ns + table.end_ns) / 2 - table.start_ns[0]) * 1e-9,
         np.array([sides[side] for side in table.labels["side"]]),

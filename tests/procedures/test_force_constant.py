@@ -22,7 +22,8 @@ from bench.uncertainty import Estimate, interval
 from bench.uncertainty.coverage import ensemble
 from procedures.force_constant import checks
 from procedures.force_constant.fitting import check, predicted_controls
-from procedures.force_constant.procedure import Plan, procedure
+from procedures.force_constant.plan import Plan
+from procedures.force_constant.procedure import procedure
 from procedures.force_constant.steps import read_ramps
 from procedures.servomotor.conventions import SERVOMOTOR
 

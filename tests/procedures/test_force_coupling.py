@@ -20,7 +20,8 @@ from bench.rigfile import load_rig
 from bench.uncertainty import interval
 from procedures.force_coupling.estimates import evaluate
 from procedures.force_coupling.fit import TERMS
-from procedures.force_coupling.procedure import Plan, check, procedure, read
+from procedures.force_coupling.plan import Plan
+from procedures.force_coupling.procedure import check, procedure, read
 from procedures.servomotor import carrying
 
 NAME = "force-coupling"

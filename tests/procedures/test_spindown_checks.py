@@ -11,7 +11,7 @@ from bench.findings import Effect
 from bench.rigfile import load_rig
 from procedures.servomotor.conventions import SERVOMOTOR
 from procedures.spindown import checks, estimates, fit
-from procedures.spindown.procedure import Plan
+from procedures.spindown.plan import Plan
 from procedures.spindown.steps import ANGLE_LAGS, SPEED_LAGS, RunDown, coils
 
 J, COUNT = 0.033, 2 * np.pi / 4096
