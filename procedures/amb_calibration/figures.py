@@ -11,7 +11,7 @@ from bench.figures import Figure, Series
 from bench.recording import Recording
 from procedures.amb_calibration.fit import Fit
 from procedures.amb_calibration.plan import Plan
-from procedures.amb_calibration.steps import HangingData
+from procedures.amb_calibration.steps import Hang, HangingData
 from procedures.servomotor.conventions import conventions
 
 Array = npt.NDArray[np.float64]
@@ -53,7 +53,7 @@ def _residuals(data: HangingData, f: Fit) -> Iterator[Figure]:
 
 def _one_step(recording: Recording[Plan]) -> Iterator[Figure]:
     heaviest = recording.plan.masses[-1]
-    step = next(s for s in recording.steps("hang") if s.labels["load"] == heaviest)
+    step = next(s for s in recording.steps(Hang.kind) if s.labels["load"] == heaviest)
     machine = conventions(recording.rig)
     inboard, outboard = machine.positions_of("yi", "yo")
     data = step.read(inboard, outboard, *machine.coils["yo"])

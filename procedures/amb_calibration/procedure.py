@@ -32,10 +32,11 @@ from procedures.amb_calibration.fit import Fit
 from procedures.amb_calibration.hypotheses import Contradiction
 from procedures.amb_calibration.plan import Plan
 from procedures.amb_calibration.scatter import OUTPUTS, Scatter, covariance_by_angle, covariance_over_a_turn, scatter
-from procedures.amb_calibration.steps import AXES, VERTICAL, HangingData, channels, read_hangings
+from procedures.amb_calibration.steps import AXES, VERTICAL, Hang, HangingData, channels, read_hangings
 from procedures.servomotor.conventions import SERVOMOTOR, Servomotor, conventions
 from procedures.shared import assumptions
 from procedures.shared.certificates import certified
+from procedures.shared.step_table import record_step
 from procedures.shared.weight import weight
 
 K_I = Quantity("K_i", "N/A", "inboard AMB: dF/di at zero control current, mean over a turn")
@@ -87,7 +88,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
             if turn == k == 0 and (needed := both_coils.at_no_load(machine, rig.levitation.reading, plan.bias_A)):
                 record.event(both_coils.ONE_SIDED, needed=needed)
                 return
-            with record.step("hang", angle_rad=angle, load=hanging.label, branch=branch):
+            with record_step(record, Hang(angle, hanging.label, branch)):
                 rig.clock.sleep(plan.average_s)
 
 

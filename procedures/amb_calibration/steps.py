@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +14,7 @@ from procedures.amb_calibration.fit import Hangings
 from procedures.amb_calibration.plan import Plan
 from procedures.servomotor.conventions import Servomotor, conventions, displacement
 from procedures.servomotor.loads import load_index
-from procedures.shared.step_table import StepTable, by_angle, tabulate
+from procedures.shared.step_table import Labels, StepTable, by_angle, tabulate
 
 Array = npt.NDArray[np.float64]
 AXES = ("yi", "yo", "xi", "xo")
@@ -28,11 +27,25 @@ def channels(machine: Servomotor) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
+class Hang(Labels):
+    """What hangs ("" for nothing but the hanger), reached by loading (+1) or unloading (-1)."""
+
+    kind: ClassVar[str] = "hang"
+    angle_rad: float
+    load: str
+    branch: int
+
+    def __str__(self) -> str:
+        way = "loading" if self.branch > 0 else "unloading"
+        return f"{np.degrees(self.angle_rad):.0f}°, {self.load or 'no load'}, {way}"
+
+
+@dataclass(frozen=True)
 class HangingData:
     """`hangings` for the fit, and the `table` (A, P) of their steps."""
 
     hangings: Hangings
-    table: StepTable
+    table: StepTable[Hang]
     masses: tuple[str, ...]
 
 
@@ -43,23 +56,18 @@ def read_hangings(recording: Recording[Plan]) -> HangingData:
         AnalysisError: there are no steps, an angle lacks some, or what hung is no mass of the plan.
     """
     machine, masses = conventions(recording.rig), recording.plan.masses
-    steps, shape = by_angle(recording.steps("hang"), "hangings")
-    table = tabulate(steps, channels(machine), _name, shape=shape)
+    steps, shape = by_angle(recording.steps(Hang.kind), "hangings")
+    table = tabulate(steps, Hang, channels(machine), shape=shape)
     inboard, outboard, motor = _plane_positions(recording.rig, *table.stack(machine.positions_of(*VERTICAL)))
     hangings = Hangings(
         np.stack([table.stack(machine.coils[axis]) for axis in VERTICAL]),
         np.stack([inboard, outboard]),
         motor,
-        load_index(table.labels["load"], masses, "hanger"),
-        table.labels["branch"],
-        table.labels["angle_rad"][:, 0].copy(),
+        load_index([hang.load for hang in table.labels], masses, "hanger").reshape(shape),
+        table.each(lambda hang: hang.branch),
+        table.each(lambda hang: hang.angle_rad)[:, 0].copy(),
     )
     return HangingData(hangings, table, masses)
-
-
-def _name(labels: Mapping[str, Any]) -> str:
-    way = "loading" if labels["branch"] > 0 else "unloading"
-    return f"{np.degrees(labels['angle_rad']):.0f}°, {labels['load'] or 'no load'}, {way}"
 
 
 def _plane_positions(rig: RigFile, y_inboard: Array, y_outboard: Array) -> tuple[Array, Array, Array]:

@@ -18,7 +18,7 @@ from procedures.force_constant import load_at_rest
 from procedures.force_constant.fit import CROSS, DIRECT, FORCE, PAIRS
 from procedures.force_constant.load_at_rest import Cause, Rest
 from procedures.force_constant.plan import Plan
-from procedures.force_constant.steps import AXES, RampData
+from procedures.force_constant.steps import AXES, AtLevel, RampData
 from procedures.servomotor import checks as servomotor_checks
 from procedures.servomotor.conventions import Servomotor
 from procedures.shared import signals
@@ -43,9 +43,9 @@ def of_signals(data: RampData, machine: Servomotor, plan: Plan) -> Iterator[Find
     yield from _segments(table, machine)
 
 
-def _segments(table: StepTable, machine: Servomotor) -> Iterator[Finding]:
+def _segments(table: StepTable[AtLevel], machine: Servomotor) -> Iterator[Finding]:
     """Each segment's current follows its command (T 6.9), and no level asks the angle control for torque."""
-    level_y, level_x = table.labels["i_y_A"], table.labels["i_x_A"]
+    level_y, level_x = table.each(lambda at: at.i_y_A), table.each(lambda at: at.i_x_A)
     design = np.stack([np.ones_like(level_y), level_y, level_x], axis=-1).reshape(-1, 3)
     solver = np.linalg.pinv(design)[1:]
     answer = np.array([solver @ table.mean[c].reshape(-1) for c in machine.segments])  # (4, 2): per i_y, per i_x

@@ -31,9 +31,10 @@ from procedures.force_constant.estimates import AxisResult
 from procedures.force_constant.fit import TIME
 from procedures.force_constant.fitting import REQUIRES, check
 from procedures.force_constant.plan import Plan
-from procedures.force_constant.steps import STEP, RampData, read_ramps
+from procedures.force_constant.steps import AtLevel, RampData, read_ramps
 from procedures.servomotor.conventions import conventions
 from procedures.shared import assumptions
+from procedures.shared.step_table import record_step
 
 Array = npt.NDArray[np.float64]
 
@@ -102,8 +103,8 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         for level in sequence(plan):
             ramp(i_y=level.i_y, i_x=level.i_x)
             rig.clock.sleep(plan.settle_s)
-            with record.step(STEP, angle_rad=angle, i_y_A=level.i_y, i_x_A=level.i_x,
-                             branch_y=level.branch_y, branch_x=level.branch_x):  # fmt: skip
+            labels = AtLevel(angle, level.i_y, level.i_x, level.branch_y, level.branch_x)
+            with record_step(record, labels):
                 rig.clock.sleep(plan.average_s)
         ramp(i_y=0.0, i_x=0.0)
 

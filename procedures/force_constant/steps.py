@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -13,11 +12,10 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from procedures.force_constant.fit import Ramps
 from procedures.servomotor.conventions import Servomotor, conventions, displacement
-from procedures.shared.step_table import StepTable, by_angle, tabulate
+from procedures.shared.step_table import Labels, StepTable, by_angle, tabulate
 
 Array = npt.NDArray[np.float64]
 
-STEP = "level"
 AXES = ("yi", "yo", "xi", "xo")
 
 
@@ -27,13 +25,28 @@ def channels(machine: Servomotor) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
+class AtLevel(Labels):
+    """Both currents as commanded, and whether each was reached by raising it (+1) or lowering it (-1)."""
+
+    kind: ClassVar[str] = "level"
+    angle_rad: float
+    i_y_A: float
+    i_x_A: float
+    branch_y: int
+    branch_x: int
+
+    def __str__(self) -> str:
+        return f"{np.degrees(self.angle_rad):.0f}°, i_y {self.i_y_A:+g} A, i_x {self.i_x_A:+g} A"
+
+
+@dataclass(frozen=True)
 class RampData:
-    """`vertical` and `horizontal` for the fits, and the `table` (A, P) of the steps, whose labels `i_y_A`, `i_x_A` are what was
-    commanded. `duration_s` from the first step's start to the last's end."""
+    """`vertical` and `horizontal` for the fits, and the `table` (A, P) of the steps. `duration_s` from the first step's start to the
+    last's end."""
 
     vertical: Ramps
     horizontal: Ramps
-    table: StepTable
+    table: StepTable[AtLevel]
     duration_s: float
 
 
@@ -43,18 +56,16 @@ def read_ramps(recording: Recording[Any]) -> RampData:
     Raises:
         AnalysisError: there are no steps, or an angle lacks some.
     """
-    steps, shape = by_angle(recording.steps(STEP), "steps")
-    table = tabulate(steps, channels(conventions(recording.rig)), _name, shape=shape)
+    steps, shape = by_angle(recording.steps(AtLevel.kind), "steps")
+    table = tabulate(steps, AtLevel, channels(conventions(recording.rig)), shape=shape)
     duration_s = (steps[-1].end_ns - steps[0].start_ns) * 1e-9
-    return RampData(_ramps(table, recording.rig, "y"), _ramps(table, recording.rig, "x"), table, duration_s)
+    y = _ramps(table, recording.rig, "y", table.each(lambda at: at.i_y_A), table.each(lambda at: at.branch_y))
+    x = _ramps(table, recording.rig, "x", table.each(lambda at: at.i_x_A), table.each(lambda at: at.branch_x))
+    return RampData(y, x, table, duration_s)
 
 
-def _name(labels: Mapping[str, Any]) -> str:
-    return f"{np.degrees(labels['angle_rad']):.0f}°, i_y {labels['i_y_A']:+g} A, i_x {labels['i_x_A']:+g} A"
-
-
-def _ramps(table: StepTable, rig: RigFile, axis: str) -> Ramps:
-    machine, level = conventions(rig), table.labels[f"i_{axis}_A"]
+def _ramps(table: StepTable[AtLevel], rig: RigFile, axis: str, level: Array, branch: Array) -> Ramps:
+    machine = conventions(rig)
     bearings = (f"{axis}i", f"{axis}o")
     begun = (table.start_ns - table.start_ns[0, 0]) * 1e-9
     return Ramps(
@@ -62,10 +73,10 @@ def _ramps(table: StepTable, rig: RigFile, axis: str) -> Ramps:
         np.stack([table.stack(machine.coils[b]) for b in bearings]),
         table.stack(machine.segments),
         *planes(rig, *table.stack(machine.positions_of(*bearings))),
-        table.labels[f"branch_{axis}"],
+        branch,
         np.isin(level, (level.min(), level.max())).astype(np.float64),
         begun - begun.mean(axis=1, keepdims=True),
-        table.labels["angle_rad"][:, 0].copy(),
+        table.each(lambda at: at.angle_rad)[:, 0].copy(),
     )
 
 

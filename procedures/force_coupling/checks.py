@@ -11,6 +11,7 @@ from bench.findings import Effect, Finding
 from procedures.force_coupling.estimates import Analysis
 from procedures.force_coupling.fit import TERMS, CouplingFit
 from procedures.force_coupling.plan import Plan
+from procedures.force_coupling.steps import Phase
 from procedures.servomotor import checks
 from procedures.servomotor.conventions import Servomotor
 from procedures.shared.step_table import StepTable
@@ -20,7 +21,7 @@ SURE = 5  # standard uncertainties
 WINDING = 0.1  # segments differ by 1 %
 
 
-def of_fit(data: StepTable, f: CouplingFit, plan: Plan) -> Iterator[Finding]:
+def of_fit(data: StepTable[Phase], f: CouplingFit, plan: Plan) -> Iterator[Finding]:
     """Drift over the sequence and steps off the model."""
     n, terms, u = len(data), f.fit.terms, f.fit.u
     yield from checks.creeping(

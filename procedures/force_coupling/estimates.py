@@ -14,6 +14,7 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from procedures.force_coupling import fit as force_coupling_fit
 from procedures.force_coupling.fit import CouplingFit, Sweep
+from procedures.force_coupling.steps import Phase
 from procedures.servomotor.conventions import conventions
 from procedures.shared.certificates import certified
 from procedures.shared.gradients import by_inputs, linearised
@@ -29,7 +30,7 @@ class Analysis:
     same from step to step. `turn`: by how much the force turns for the gamma that was told. `moved` rad: gamma_0 less what
     the force constant's calibration found of it, where it did."""
 
-    data: StepTable
+    data: StepTable[Phase]
     fit: CouplingFit
     estimates: dict[str, Estimate]
     printed: float
@@ -38,13 +39,13 @@ class Analysis:
     moved: Estimate | None
 
 
-def evaluate(recording: Recording[Any], data: StepTable, count_rad: float) -> Analysis:
+def evaluate(recording: Recording[Any], data: StepTable[Phase], count_rad: float) -> Analysis:
     """Fit, and the three estimates by name (with `winding`, the x winding's constant over the y winding's)."""
     inputs = fit_inputs(recording)
     machine = conventions(recording.rig)
     y, x = (data.stack(machine.positions_of(f"{axis}i", f"{axis}o")) for axis in "yx")
     sweep = Sweep(data.stack(machine.segments), y, x,
-                  data.labels["gamma_rad"], rotor_angle(data.mean["angle"], count_rad), data.time_s)  # fmt: skip
+                  data.each(lambda step: step.gamma_rad), rotor_angle(data.mean["angle"], count_rad), data.time_s)  # fmt: skip
 
     def model(p: dict[str, float]) -> dict[str, float]:
         return outputs(force_coupling_fit.fit_sweep(sweep, p), p)

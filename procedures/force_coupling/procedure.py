@@ -8,8 +8,7 @@ stepped; gravity keeps a current of several amperes in it, and how that current 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -28,11 +27,12 @@ from procedures.force_coupling import estimates
 from procedures.force_coupling import figures as drawn
 from procedures.force_coupling.estimates import Analysis
 from procedures.force_coupling.plan import Plan
+from procedures.force_coupling.steps import Phase
 from procedures.servomotor import carrying, checks
 from procedures.servomotor.conventions import SERVOMOTOR, Servomotor, conventions, radial_currents
 from procedures.servomotor.steps import POSITIONS, channels, read_steps
 from procedures.shared import assumptions
-from procedures.shared.step_table import StepTable
+from procedures.shared.step_table import StepTable, record_step
 
 RATIO = Quantity(
     "alpha_ratio", "1", "alpha_d/alpha_c, direct over coupled force constant at the home angle", title="α_d/α_c"
@@ -70,7 +70,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         for gamma in gammas:
             rig.levitation.set("gamma", gamma)
             rig.clock.sleep(plan.settle_s)
-            with record.step("phase", gamma_rad=gamma, branch=branch):
+            with record_step(record, Phase(gamma, branch)):
                 rig.clock.sleep(plan.average_s)
     carrying.leave_edge(rig)
     for gamma in (*reversed(carrying.approach(plan.gamma_rad)), 0.0):
@@ -97,16 +97,12 @@ def measured(a: Analysis) -> Iterator[Measured]:
         yield quantity.measured(a.estimates[quantity.name])
 
 
-def read(recording: Recording[Plan]) -> StepTable:
+def read(recording: Recording[Plan]) -> StepTable[Phase]:
     """The steps, in time order."""
-
-    def name(labels: Mapping[str, Any]) -> str:
-        return f"gamma {math.degrees(labels['gamma_rad']):+.2f}°"
-
-    return read_steps(recording, "phase", name)
+    return read_steps(recording, Phase)
 
 
-def _of_signals(data: StepTable, machine: Servomotor, plan: Plan) -> Iterator[Finding]:
+def _of_signals(data: StepTable[Phase], machine: Servomotor, plan: Plan) -> Iterator[Finding]:
     positions = machine.positions_of(*POSITIONS)
     yield from checks.of_signals(data, machine, (*machine.segments, *positions), plan.max_lost)
     yield from checks.segments(data, machine)

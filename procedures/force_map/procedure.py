@@ -29,11 +29,12 @@ from procedures.force_map import figures as force_map_figures
 from procedures.force_map.estimates import CROSS, Result
 from procedures.force_map.fit import ABOUT, UNITS
 from procedures.force_map.plan import Plan
-from procedures.force_map.steps import STEP, MapData, channels, positions, read_points
+from procedures.force_map.steps import AtPoint, MapData, channels, positions, read_points
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import SERVOMOTOR, conventions
 from procedures.servomotor.direction import of_probe
 from procedures.shared import assumptions
+from procedures.shared.step_table import record_step
 
 CALIBRATION = "amb-calibration"
 SHOWN = ("alpha_1", "alpha_2", "alpha_3", "alpha_4", "alpha_5", "alpha_6", "alpha_8", "alpha_9")
@@ -111,8 +112,8 @@ def _visit(rig: Rig, plan: Plan, record: Recorder, visited: list[Point], turn: i
             rig.levitation.set(name, value)
         rig.clock.sleep(max(abs(point.i_y - now.i_y), abs(point.i_x - now.i_x)) / plan.ramp_A_s + plan.settle_s)
         now = point
-        labels = {"i_y_A": point.i_y, "i_x_A": point.i_x, "y_m": point.y, "x_m": point.x}
-        with record.step(STEP, turn=turn, side=side, load=load.label, **labels):
+        labels = AtPoint(turn, side, load.label, point.i_y, point.i_x, point.y, point.x)
+        with record_step(record, labels):
             rig.clock.sleep(plan.average_s)
 
 

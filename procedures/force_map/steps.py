@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -15,10 +15,9 @@ from bench.findings import Effect, Finding
 from bench.recording import Recording, Step
 from procedures.force_map.plan import Plan
 from procedures.servomotor.conventions import Servomotor, conventions
-from procedures.shared.step_table import Samples, StepTable, tabulate
+from procedures.shared.step_table import Labels, Samples, StepTable, tabulate
 
 Array = npt.NDArray[np.float64]
-STEP = "point"
 WANDER_N = (
     0.05  # of the motor's force between two points of an angle at which nothing is set; constants then move by half a U
 )
@@ -37,11 +36,25 @@ def channels(machine: Servomotor) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
+class AtPoint(Labels):
+    """The angle by its index, the load on the lever, and what is set: currents, references of the outboard AMB."""
+
+    kind: ClassVar[str] = "point"
+    turn: int
+    side: str
+    load: str
+    i_y_A: float
+    i_x_A: float
+    y_m: float
+    x_m: float
+
+
+@dataclass(frozen=True)
 class MapData:
     """The `table` (n,) of the points, with the inboard AMB's control current as "control", A. By point: index of the
     calibration's `angle`; `group`, equal where angle and load are, with the `loads` by group."""
 
-    table: StepTable
+    table: StepTable[AtPoint]
     angle: npt.NDArray[np.int64]
     group: npt.NDArray[np.int64]
     loads: tuple[str, ...]
@@ -56,7 +69,7 @@ def read_points(recording: Recording[Any]) -> MapData:
     Raises:
         AnalysisError: there are none, or one holds no samples.
     """
-    steps = list(recording.steps(STEP))
+    steps = list(recording.steps(AtPoint.kind))
     if not steps:
         raise AnalysisError("found no points; expected those of the plan (was the run stopped early?)")
     machine = conventions(recording.rig)
@@ -68,8 +81,8 @@ def read_points(recording: Recording[Any]) -> MapData:
             raise AnalysisError(f"point {dict(step.labels)}: found no samples")
         return data | {"control": machine.control("yi", data.__getitem__)}
 
-    table = tabulate(steps, (*read, "control"), lambda _: "", read=samples)
-    keys = [(int(s.labels["turn"]), f"{s.labels['side']} {s.labels['load']}".strip()) for s in steps]
+    table = tabulate(steps, AtPoint, (*read, "control"), read=samples)
+    keys = [(point.turn, f"{point.side} {point.load}".strip()) for point in table.labels]
     groups = list(dict.fromkeys(keys))
     return MapData(
         table,

@@ -12,14 +12,16 @@ from bench.uncertainty import Estimate, coverage_factor, welch_satterthwaite
 from procedures.negative_stiffness.fit import AmbFit, MotorFit
 from procedures.negative_stiffness.plan import Plan
 from procedures.servomotor import checks
-from procedures.shared.step_table import StepTable
+from procedures.shared.step_table import Labels, StepTable
 
 ONE_IN_A_THOUSAND = 1.7  # times the 95 % expanded uncertainty
 AMB_N_PER_A = 74.4  # T (6.12); turns a force into a current for a judgement
 COUPLED = 0.25  # cross force over direct force: an encoder zero 0.5 deg off makes 0.08
 
 
-def of_fits(motor: StepTable, ambs: StepTable, by_motor: MotorFit, by_ambs: AmbFit, plan: Plan) -> Iterator[Finding]:
+def of_fits(
+    motor: StepTable[Labels], ambs: StepTable[Labels], by_motor: MotorFit, by_ambs: AmbFit, plan: Plan
+) -> Iterator[Finding]:
     """Drift, misfit, and an axis that answers the other's displacement."""
     n = len(motor)
     alpha_d = float(by_motor.force[0]) / float(by_motor.i_y[0])

@@ -12,6 +12,7 @@ from bench.uncertainty import Estimate, Influence
 from procedures.negative_stiffness import fit
 from procedures.negative_stiffness.fit import AmbFit, ByAmbs, ByMotor, MotorFit
 from procedures.negative_stiffness.plan import Plan
+from procedures.negative_stiffness.steps import Displaced
 from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.shared.certificates import certified
 from procedures.shared.gradients import by_inputs
@@ -23,14 +24,14 @@ from procedures.shared.type_a import scatter
 class Analysis:
     """Everything the measurements, findings and figures are made of."""
 
-    motor: StepTable
-    ambs: StepTable
+    motor: StepTable[Displaced]
+    ambs: StepTable[Displaced]
     by_motor: MotorFit
     by_ambs: AmbFit
     estimates: dict[str, Estimate]
 
 
-def evaluate(recording: Recording[Plan], motor: StepTable, ambs: StepTable) -> Analysis:
+def evaluate(recording: Recording[Plan], motor: StepTable[Displaced], ambs: StepTable[Displaced]) -> Analysis:
     """Both fits with their influences; `estimates` motor, ambs, gap and difference."""
     inputs = fit_inputs(recording)
     one, two = measured(conventions(recording.rig), recording.plan, motor, ambs)
@@ -54,11 +55,13 @@ def evaluate(recording: Recording[Plan], motor: StepTable, ambs: StepTable) -> A
     return Analysis(motor, ambs, by_motor, by_ambs, estimates)
 
 
-def measured(machine: Servomotor, plan: Plan, motor: StepTable, ambs: StepTable) -> tuple[ByMotor, ByAmbs]:
+def measured(
+    machine: Servomotor, plan: Plan, motor: StepTable[Displaced], ambs: StepTable[Displaced]
+) -> tuple[ByMotor, ByAmbs]:
     """What the estimators get."""
     y, x = machine.positions_of("yi", "yo"), machine.positions_of("xi", "xo")
-    which = (ambs.labels["bias_A"] != plan.bias_A).astype(np.int64)
-    biases, branch = (plan.bias_A, plan.bias_high_A), ambs.labels["branch"]
+    which = (ambs.each(lambda step: step.bias_A) != plan.bias_A).astype(np.int64)
+    biases, branch = (plan.bias_A, plan.bias_high_A), ambs.each(lambda step: step.branch)
     return (
         ByMotor(motor.stack(machine.segments), motor.stack(y), motor.stack(x), motor.time_s),
         ByAmbs(ambs.stack(machine.coils["yo"]), ambs.stack(y), which, branch, ambs.time_s, biases),

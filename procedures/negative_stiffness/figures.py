@@ -18,7 +18,7 @@ def all_figures(a: Analysis, machine: Servomotor, plan: Plan) -> list[Figure]:
 
 
 def _motor(a: Analysis, machine: Servomotor) -> Iterator[Figure]:
-    y, up = 1e6 * a.motor.mean[machine.positions["yo"]], a.motor.labels["branch"] > 0
+    y, up = 1e6 * a.motor.mean[machine.positions["yo"]], a.motor.each(lambda step: step.branch) > 0
     i, n = a.by_motor.i_y, len(a.motor)
     slope, intercept = np.polyfit(y, i, 1)
     ends = np.array([y.min(), y.max()])
@@ -42,7 +42,7 @@ def _ambs(a: Analysis, plan: Plan) -> Iterator[Figure]:
     y = 1e6 * f.y_o
     series, left = [], []
     for bias in (plan.bias_A, plan.bias_high_A):
-        use = a.ambs.labels["bias_A"] == bias
+        use = a.ambs.each(lambda step: step.bias_A) == bias
         order = np.argsort(y[use], kind="stable")
         zero = float(np.interp(0.0, y[use][order], f.force[use][order]))
         for force, what in ((f.force[use] - zero, "current alone"), (f.total[use] - zero, "in all")):

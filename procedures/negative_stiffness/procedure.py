@@ -8,7 +8,6 @@ way: the AMBs hold, the motor has no current, and the AMB's own stiffness is tol
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -29,10 +28,11 @@ from procedures.negative_stiffness import estimates
 from procedures.negative_stiffness import figures as drawn
 from procedures.negative_stiffness.estimates import Analysis
 from procedures.negative_stiffness.plan import Plan
+from procedures.negative_stiffness.steps import ByAmbs, ByMotor, Displaced
 from procedures.servomotor import carrying, checks
 from procedures.servomotor.conventions import SERVOMOTOR, conventions, radial_currents
 from procedures.servomotor.steps import POSITIONS, channels, read_steps
-from procedures.shared.step_table import StepTable
+from procedures.shared.step_table import StepTable, record_step
 
 Array = npt.NDArray[np.float64]
 ALPHA_X = Quantity(
@@ -73,7 +73,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     carrying.carry(rig, plan.settle_s)
     carrying.to_edge(rig, 1, plan.count_rad)
     # The inboard AMB's plane goes with the displacement as far as keeps the inboard sensor at zero.
-    _walk(rig, plan, record, "motor", {"ref_ym": 1.0, "ref_yi": inboard}, plan.bias_A)
+    _walk(rig, plan, record, ByMotor, {"ref_ym": 1.0, "ref_yi": inboard}, plan.bias_A)
     carrying.leave_edge(rig)
     carrying.give_back(rig, plan.settle_s)
     for bias in (plan.bias_A, plan.bias_high_A):
@@ -84,10 +84,12 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
             transition(rig, RigState.LEVITATED)
             carrying.home(rig)
             rig.clock.sleep(plan.settle_s)
-        _walk(rig, plan, record, "ambs", {"ref_yo": _tilt(rig.file)}, bias)
+        _walk(rig, plan, record, ByAmbs, {"ref_yo": _tilt(rig.file)}, bias)
 
 
-def _walk(rig: Rig, plan: Plan, record: Recorder, kind: str, references: Mapping[str, float], bias: float) -> None:
+def _walk(
+    rig: Rig, plan: Plan, record: Recorder, kind: type[Displaced], references: Mapping[str, float], bias: float
+) -> None:
     def go(level: float) -> None:
         for name, factor in references.items():
             rig.levitation.set(name, factor * level)
@@ -97,7 +99,7 @@ def _walk(rig: Rig, plan: Plan, record: Recorder, kind: str, references: Mapping
         go(level)
     for level, branch in carrying.mirrored(plan.levels_m):
         go(level)
-        with record.step(kind, level_m=level, branch=branch, bias_A=bias):
+        with record_step(record, kind(level, branch, bias)):
             rig.clock.sleep(plan.average_s)
     go(0.0)
 
@@ -132,16 +134,12 @@ def measured(a: Analysis) -> Iterator[Measured]:
     yield ALPHA_X_AMB.measured(a.estimates["ambs"])
 
 
-def read(recording: Recording[Plan]) -> tuple[StepTable, StepTable]:
+def read(recording: Recording[Plan]) -> tuple[StepTable[ByMotor], StepTable[ByAmbs]]:
     """The steps of both ways."""
-
-    def name(way: str) -> Any:
-        return lambda x: f"{way}, {x['level_m'] * 1e6:+.0f} µm at {x['bias_A']:g} A"
-
-    return read_steps(recording, "motor", name("motor")), read_steps(recording, "ambs", name("AMBs"))
+    return read_steps(recording, ByMotor), read_steps(recording, ByAmbs)
 
 
-def _of_signals(recording: Recording[Plan], motor: StepTable, ambs: StepTable) -> Iterator[Finding]:
+def _of_signals(recording: Recording[Plan], motor: StepTable[ByMotor], ambs: StepTable[ByAmbs]) -> Iterator[Finding]:
     plan = recording.plan
     machine, inboard = conventions(recording.rig), _amb_shares(recording.rig)[0]
     positions = machine.positions_of(*POSITIONS)
@@ -155,7 +153,7 @@ def _of_signals(recording: Recording[Plan], motor: StepTable, ambs: StepTable) -
     yield from checks.at_edge(motor, plan.count_rad)
     for data, currents, follow, drifts in ways:
         yield from checks.of_signals(data, machine, (*currents, *positions), plan.max_lost)
-        level = data.labels["level_m"]
+        level = data.each(lambda step: step.level_m)
         references: dict[str, Array | float] = {"yo": level, "yi": follow * level, "xi": 0.0, "xo": 0.0}
         offsets = {c: data.mean[c] - references[a] for a in references for c in machine.positions_of(a)}
         yield from checks.settled(data, offsets, drifts, plan.max_position_m, plan.max_drift_A)

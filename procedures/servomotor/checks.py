@@ -13,7 +13,7 @@ import numpy.typing as npt
 from bench.findings import Effect, Finding
 from procedures.servomotor.conventions import Servomotor
 from procedures.shared import signals
-from procedures.shared.step_table import StepTable
+from procedures.shared.step_table import Labels, StepTable
 
 Array = npt.NDArray[np.float64]
 
@@ -23,7 +23,7 @@ UNBALANCED_A = 0.5  # half the sum of opposite segments is the torque current: a
 
 
 def of_signals(
-    data: StepTable, machine: Servomotor, channels: Sequence[str], max_lost: float
+    data: StepTable[Labels], machine: Servomotor, channels: Sequence[str], max_lost: float
 ) -> Iterator[Finding]:  # fmt: skip
     """Lost samples, stuck channels, saturation and contact."""
     yield from signals.losses(data.lost, data.expected, max_lost, data.where)
@@ -41,7 +41,7 @@ def limits(machine: Servomotor) -> tuple[signals.Meaning, ...]:
     )
 
 
-def segments(data: StepTable, machine: Servomotor) -> Iterator[Finding]:
+def segments(data: StepTable[Labels], machine: Servomotor) -> Iterator[Finding]:
     """Signs of the segments' currents while the motor carries: opposite ones carry opposite currents (T 6.9; at rest there is
     hardly a torque current), and segment 1 a positive one, because it lifts."""
     names = machine.segments
@@ -68,7 +68,7 @@ def segments(data: StepTable, machine: Servomotor) -> Iterator[Finding]:
         )
 
 
-def at_edge(data: StepTable, count_rad: float) -> Iterator[Finding]:
+def at_edge(data: StepTable[Labels], count_rad: float) -> Iterator[Finding]:
     """The rotor at the edges it was sent to: its encoder reads now one count and now the other.
 
     A reading that is 0 or one count c, the latter with probability p, has the mean p c and the variance p (1 - p) c^2: from
@@ -89,7 +89,7 @@ def at_edge(data: StepTable, count_rad: float) -> Iterator[Finding]:
 
 
 def settled(
-    data: StepTable,
+    data: StepTable[Labels],
     offsets: Mapping[str, Array],
     drifts: Mapping[str, Array],
     max_position_m: float,
@@ -138,7 +138,7 @@ def creeping(drift_A: Mapping[str, float], u_A: Mapping[str, float], max_creep_A
             )
 
 
-def misfit(data: StepTable, residuals: Array, span: float, what: str, max_misfit: float) -> Iterator[Finding]:
+def misfit(data: StepTable[Labels], residuals: Array, span: float, what: str, max_misfit: float) -> Iterator[Finding]:
     """Residuals (N,) beyond `max_misfit` of the range `span`, both in one unit: the model does not describe the machine."""
     worst = np.abs(residuals)
     if worst.max() > max_misfit * span:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from procedures.servomotor.conventions import Servomotor, conventions
-from procedures.shared.step_table import Samples, StepTable, tabulate
+from procedures.shared.step_table import Read, Samples, StepTable, tabulate
 
 POSITIONS = ("yi", "yo", "xi", "xo")
 """Axes in the order in which they are read."""
@@ -21,15 +20,15 @@ def channels(machine: Servomotor) -> tuple[str, ...]:
     return (*machine.segments, *machine.coils_of("yi", "yo"), *machine.positions_of(*POSITIONS), "angle")
 
 
-def read_steps(recording: Recording[Any], kind: str, name: Callable[[Mapping[str, Any]], str]) -> StepTable:
-    """Every step of `kind` in time order; `name` makes the reader's name from a step's labels.
+def read_steps(recording: Recording[Any], kind: type[Read]) -> StepTable[Read]:
+    """Every step of `kind` in time order.
 
     Raises:
         AnalysisError: there are no steps, or one of them holds no samples.
     """
-    steps = list(recording.steps(kind))
+    steps = list(recording.steps(kind.kind))
     if not steps:
-        raise AnalysisError(f"steps of kind {kind!r}: found none; expected the run's (was it stopped early?)")
+        raise AnalysisError(f"steps of kind {kind.kind!r}: found none; expected the run's (was it stopped early?)")
     read = channels(conventions(recording.rig))
 
     def samples(step: Step) -> Samples:
@@ -37,4 +36,4 @@ def read_steps(recording: Recording[Any], kind: str, name: Callable[[Mapping[str
         data["angle"] = (data["angle"] + np.pi) % (2 * np.pi) - np.pi  # home is angle 0: no mean across the turn's end
         return data
 
-    return tabulate(steps, read, name, read=samples)
+    return tabulate(steps, kind, read, read=samples)

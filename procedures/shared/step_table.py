@@ -1,15 +1,20 @@
-"""Recorded steps as arrays: what each says of its channels, how it is labelled, and what was lost of it."""
+"""Recorded steps as arrays: what each says of its channels, how it is labelled, and what was lost of it.
+
+A kind of step is a class with its labels as fields: `record_step` writes them, `tabulate` reads them back.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from contextlib import AbstractContextManager
+from dataclasses import asdict, dataclass, fields
+from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.errors import AnalysisError
+from bench.recording.recorder import Recorder
 from bench.recording.steps import Step, Steps
 
 Array = npt.NDArray[np.float64]
@@ -17,25 +22,40 @@ Samples = Mapping[str, npt.NDArray[Any]]
 
 
 @dataclass(frozen=True)
-class StepTable:
+class Labels:
+    """Labels of a kind of step; `str` of them is what the reader of a finding calls the step."""
+
+    kind: ClassVar[str]
+
+
+Kind = TypeVar("Kind", bound=Labels, covariant=True)
+Read = TypeVar("Read", bound=Labels)
+
+
+def record_step(record: Recorder, labels: Labels) -> AbstractContextManager[None]:
+    """A step with these labels."""
+    return record.step(labels.kind, **asdict(labels))
+
+
+@dataclass(frozen=True)
+class StepTable(Generic[Kind]):
     """One entry per step: (N,) in time order, or (A, P) by angle and time. By channel `mean`, `drift` (second half less first
-    half of the step), `spread` (standard deviation of the samples) and `ptp` (greatest less least); by label `labels`, numbers
-    as floats; `start_ns`, `end_ns`; `lost` and `expected` samples; `flags` ORed over the step. `names` for the reader, (N,)."""
+    half of the step), `spread` (standard deviation of the samples) and `ptp` (greatest less least); `start_ns`, `end_ns`;
+    `lost` and `expected` samples; `flags` ORed over the step. `labels` are those of the N steps."""
 
     mean: dict[str, Array]
     drift: dict[str, Array]
     spread: dict[str, Array]
     ptp: dict[str, Array]
-    labels: dict[str, npt.NDArray[Any]]
+    labels: tuple[Kind, ...]
     start_ns: npt.NDArray[np.int64]
     end_ns: npt.NDArray[np.int64]
     lost: Array
     expected: Array
     flags: npt.NDArray[np.int64]
-    names: tuple[str, ...]
 
     def __len__(self) -> int:
-        return len(self.names)
+        return len(self.labels)
 
     @property
     def time_s(self) -> Array:
@@ -46,7 +66,11 @@ class StepTable:
 
     def where(self, values: Array) -> str:
         """The name of the step with the greatest of `values`."""
-        return self.names[int(np.argmax(values))]
+        return str(self.labels[int(np.argmax(values))])
+
+    def each(self, label: Callable[[Kind], float]) -> Array:
+        """A label of every step."""
+        return np.array([float(label(one)) for one in self.labels]).reshape(self.flags.shape)
 
     def stack(self, channels: Sequence[str]) -> Array:
         """Means (C, N) or (C, A, P) of several channels."""
@@ -55,14 +79,14 @@ class StepTable:
 
 def tabulate(
     steps: Sequence[Step],
+    kind: type[Read],
     channels: Sequence[str],
-    name: Callable[[Mapping[str, Any]], str],
     *,
     shape: tuple[int, ...] = (-1,),
     read: Callable[[Step], Samples] | None = None,
-) -> StepTable:
-    """The steps, which are of one kind, with `channels` reduced; `name` makes the reader's name from a step's labels.
-    `read` gives the samples where they are not just those of the channels: one array (n,) for each, and `flags`.
+) -> StepTable[Read]:
+    """The steps, which are of this kind, with `channels` reduced. `read` gives the samples where they are not just those of the
+    channels: one array (n,) for each, and `flags`.
 
     Raises:
         AnalysisError: a step holds fewer than two samples.
@@ -78,10 +102,10 @@ def tabulate(
 
     return StepTable(
         by_channel("mean"), by_channel("drift"), by_channel("spread"), by_channel("ptp"),
-        {key: array([_number(s.labels[key]) for s in steps]) for key in (steps[0].labels if steps else ())},
+        tuple(kind(**{field.name: s.labels[field.name] for field in fields(kind)}) for s in steps),
         array([s.start_ns for s in steps]), array([s.end_ns for s in steps]),
         array([float(s.lost()) for s in steps]), array([float(s.expected()) for s in steps]),
-        array([row["flags"] for row in rows]), tuple(name(s.labels) for s in steps),
+        array([row["flags"] for row in rows]),
     )  # fmt: skip
 
 
@@ -120,7 +144,3 @@ def reduced(data: Samples, channels: Sequence[str], labels: Mapping[str, Any]) -
     out: dict[str, Any] = {kind: dict(zip(channels, values, strict=True)) for kind, values in found}
     out["flags"] = int(np.bitwise_or.reduce(data["flags"].astype(np.int64)))
     return out
-
-
-def _number(label: Any) -> Any:
-    return label if isinstance(label, str) else float(label)

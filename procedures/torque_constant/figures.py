@@ -13,7 +13,7 @@ from bench.recording import Recording
 from procedures.servomotor.conventions import conventions
 from procedures.torque_constant.fit import Balance, Detent, Steps
 from procedures.torque_constant.plan import Plan
-from procedures.torque_constant.steps import TorqueData
+from procedures.torque_constant.steps import OnLever, TorqueData
 
 Array = npt.NDArray[np.float64]
 SIDES = ((1, "left"), (-1, "right"))
@@ -98,7 +98,7 @@ def _detent(data: TorqueData, b: Balance, held: Detent) -> Figure:
 def _one_step(recording: Recording[Plan]) -> Figure:
     """The end of a step close by: over its whole second, which is what is averaged, the swing would be a solid block."""
     heaviest = recording.plan.masses[-1]
-    step = next(s for s in recording.steps("lever") if s.labels["load"] == heaviest)
+    step = next(s for s in recording.steps(OnLever.kind) if s.labels["load"] == heaviest)
     segments = conventions(recording.rig).segments
     data = recording.read(segments, step.end_ns - round(1e9 * SHOWN_S), step.end_ns)
     t = (data["t_ns"] - step.end_ns).astype(np.float64) * 1e-6

@@ -27,12 +27,13 @@ from procedures.servomotor import hold
 from procedures.servomotor.conventions import SERVOMOTOR, conventions
 from procedures.servomotor.direction import of_probe
 from procedures.shared import assumptions
+from procedures.shared.step_table import record_step
 from procedures.torque_constant import checks, fit
 from procedures.torque_constant import figures as drawn
 from procedures.torque_constant.fit import NO_DETENT, Balance, Detent
 from procedures.torque_constant.inputs import SIDES, arms_u, fit_inputs, masses_u
 from procedures.torque_constant.plan import Plan
-from procedures.torque_constant.steps import TorqueData, channels, read_torques
+from procedures.torque_constant.steps import OnLever, OverDetent, Sideways, TorqueData, channels, read_torques
 
 ALPHA_TAU = Quantity("alpha_tau", "N m/A", "torque per mean true segment current at the home angle, peak over gamma")
 GAMMA_0T = Quantity("gamma_0t", "rad", "phase angle at which the torque per current is largest")
@@ -81,7 +82,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         if not _at_home(rig, record, angle):
             return
         rig.clock.sleep(plan.settle_s)
-        with record.step("detent", angle_rad=angle):
+        with record_step(record, OverDetent(angle)):
             rig.clock.sleep(plan.average_s)
     if not _at_home(rig, record, 0.0):
         return
@@ -110,7 +111,7 @@ def _wiring(rig: Rig, plan: Plan, record: Recorder) -> None:
         for value in (plan.wiring_A, -plan.wiring_A):
             rig.levitation.set(name, value)
             rig.clock.sleep(2 * plan.wiring_A / ramp + min(plan.settle_s, 0.5))
-            with record.step("wiring", **{name: value, other: 0.0}):
+            with record.step(Sideways.kind, **{name: value, other: 0.0}):
                 rig.clock.sleep(0.2)
         rig.levitation.set(name, 0.0)
     rig.clock.sleep(plan.wiring_A / ramp + min(plan.settle_s, 0.5))
@@ -125,7 +126,7 @@ def _loads(rig: Rig, plan: Plan, record: Recorder, gamma: float) -> None:
             load = rig.operator.lever("left" if side == "left" else "right", load)
         hanging = side
         rig.clock.sleep(plan.settle_s)
-        with record.step("lever", gamma_rad=gamma, side=side, load=load.label):
+        with record_step(record, OnLever(gamma, side, load.label)):
             rig.clock.sleep(plan.average_s)
 
 

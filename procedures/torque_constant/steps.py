@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +12,7 @@ from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.servomotor.loads import load_index
-from procedures.shared.step_table import Samples, StepTable, tabulate
+from procedures.shared.step_table import Labels, Read, Samples, StepTable, tabulate
 from procedures.torque_constant.fit import Steps, resting
 from procedures.torque_constant.plan import Plan
 
@@ -23,6 +22,37 @@ Array = npt.NDArray[np.float64]
 def channels(machine: Servomotor) -> tuple[str, ...]:
     """What is recorded while loads hang on the lever."""
     return ("angle", *machine.segments, *machine.coils_of("xo", "yo"), "flags")
+
+
+@dataclass(frozen=True)
+class OnLever(Labels):
+    """Which load hangs on which side; both "" without one."""
+
+    kind: ClassVar[str] = "lever"
+    gamma_rad: float
+    side: str
+    load: str
+
+    def __str__(self) -> str:
+        what = f"{self.load or 'nothing'} on the {self.side}" if self.side else "no load"
+        return f"gamma {np.degrees(self.gamma_rad):+.2f} deg, {what}"
+
+
+@dataclass(frozen=True)
+class OverDetent(Labels):
+    """Where the rotor is held without load."""
+
+    kind: ClassVar[str] = "detent"
+    angle_rad: float
+
+
+@dataclass(frozen=True)
+class Sideways(Labels):
+    """Currents that push the rotor aside, A."""
+
+    kind: ClassVar[str] = "wiring"
+    i_x: float
+    i_y: float
 
 
 @dataclass(frozen=True)
@@ -36,7 +66,7 @@ class TorqueData:
 
     steps: Steps
     masses: tuple[str, ...]
-    table: StepTable
+    table: StepTable[OnLever]
     detent_angle: Array
     detent_current: Array
     wiring: Array
@@ -48,42 +78,31 @@ def read_torques(recording: Recording[Plan]) -> TorqueData:
     Raises:
         AnalysisError: there are none, too few samples in one, or what hung is no mass of the plan.
     """
-    found = list(recording.steps("lever"))
-    if not found:
+    masses, table = recording.plan.masses, _table(recording, OnLever)
+    if not len(table):
         raise AnalysisError("found no loads on the lever (was the run stopped early?)")
-    machine, masses = conventions(recording.rig), recording.plan.masses
-    table = _table(found, machine)
-    load = load_index(table.labels["load"], masses, "lever")
+    segments = conventions(recording.rig).segments
     sides = {"left": 1, "right": -1, "": 0}
     steps = Steps(
-        np.ascontiguousarray(table.stack(machine.segments).T),
+        np.ascontiguousarray(table.stack(segments).T),
         resting(table.mean["angle"], recording.plan.count_rad),
-        table.labels["gamma_rad"],
+        table.each(lambda step: step.gamma_rad),
         ((table.start_ns + table.end_ns) / 2 - table.start_ns[0]) * 1e-9,
-        np.array([sides[side] for side in table.labels["side"]]),
-        load,
+        np.array([sides[step.side] for step in table.labels]),
+        load_index([step.load for step in table.labels], masses, "lever"),
         table.spread["torque"],
     )
-    detent = _table(list(recording.steps("detent")), machine)
+    detent = _table(recording, OverDetent)
     return TorqueData(
-        steps, masses, table, detent.mean["angle"], detent.stack(machine.segments).mean(axis=0),
-        _wiring(_table(list(recording.steps("wiring")), machine)),
+        steps, masses, table, detent.mean["angle"], detent.stack(segments).mean(axis=0),
+        _wiring(_table(recording, Sideways)),
     )  # fmt: skip
 
 
-def _table(steps: list[Step], machine: Servomotor) -> StepTable:
-    return tabulate(steps, (*machine.segments, "angle", "torque", "side_x", "side_y"), _name, read=_reading(machine))
+def _table(recording: Recording[Plan], kind: type[Read]) -> StepTable[Read]:
+    machine = conventions(recording.rig)
 
-
-def _name(labels: Mapping[str, Any]) -> str:
-    if "gamma_rad" not in labels:
-        return "no load"
-    what = f"{labels['load'] or 'nothing'} on the {labels['side']}" if labels["side"] else "no load"
-    return f"gamma {np.degrees(labels['gamma_rad']):+.2f} deg, {what}"
-
-
-def _reading(machine: Servomotor) -> Callable[[Step], Samples]:
-    def read(step: Step) -> Samples:
+    def samples(step: Step) -> Samples:
         data = step.read(*channels(machine))
         n = len(data["angle"])
         if n < 20:
@@ -93,14 +112,15 @@ def _reading(machine: Servomotor) -> Callable[[Step], Samples]:
         data |= {f"side_{axis}": machine.control(f"{axis}o", data.__getitem__) for axis in "xy"}
         return data
 
-    return read
+    reduced = (*machine.segments, "angle", "torque", "side_x", "side_y")
+    return tabulate(list(recording.steps(kind.kind)), kind, reduced, read=samples)
 
 
-def _wiring(table: StepTable) -> Array:
+def _wiring(table: StepTable[Sideways]) -> Array:
     """Slopes of the outboard AMB's control currents over i_x and i_y, from the steps at plus and minus."""
     if not len(table):
         return np.zeros((2, 2))
-    asked = np.stack([np.ones(len(table)), table.labels["i_x"], table.labels["i_y"]], axis=-1)
+    asked = np.array([[1.0, step.i_x, step.i_y] for step in table.labels])
     answers = np.stack([table.mean["side_x"], table.mean["side_y"]], axis=-1)
     slopes: Array = np.linalg.lstsq(asked, answers, rcond=None)[0][1:].T
     return slopes

@@ -152,7 +152,9 @@ def test_a_coil_that_cannot_reach_its_current_does_not_pass(
         measure(tmp_path, calibration, {"coil_limit_yo_p": 8.0})
     data = read_ramps(sound.recording)
     for bit, named in ((1, "AMB"), (2, "motor"), (8, "outboard touchdown")):
-        flagged = replace(data, table=replace(data.table, flags=np.where(data.table.labels["i_y_A"] == -2, bit, 0)))
+        flagged = replace(
+            data, table=replace(data.table, flags=np.where(data.table.each(lambda at: at.i_y_A) == -2, bit, 0))
+        )
         found = list(checks.of_signals(flagged, SERVOMOTOR, Plan()))
         assert [(f.code, f.effect) for f in found] == [("contact" if bit == 8 else "saturated", Effect.INDETERMINATE)]
         assert named in found[0].text

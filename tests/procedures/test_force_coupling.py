@@ -95,7 +95,7 @@ def test_where_the_rotor_was_before_does_not_matter(
     monkeypatch.setattr(carrying, "home", lambda rig: swung(rig, swing))
     run = measure(tmp_path, known)
     data = read(run.recording)
-    readings = data.labels["branch"] * data.mean["angle"] / Plan().count_rad
+    readings = data.each(lambda step: step.branch) * data.mean["angle"] / Plan().count_rad
     assert np.all((readings > 0.05) & (readings < 0.95)), readings
     assert serious(run) == []
 
