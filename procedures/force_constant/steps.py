@@ -41,8 +41,8 @@ class AtLevel(Labels):
 
 @dataclass(frozen=True)
 class RampData:
-    """`vertical` and `horizontal` for the fits, and the `table` (A, P) of the steps. `duration_s` from the first step's start to the
-    last's end."""
+    """`vertical` and `horizontal` for the fits, and the `table` (A, P) of the steps. `duration_s` from the first step's start
+    to the last's end."""
 
     vertical: Ramps
     horizontal: Ramps

@@ -7,11 +7,12 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from bench.findings import Effect, Finding
-from bench.rigfile.toleranced import Toleranced
+from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, coverage_factor, welch_satterthwaite
 from procedures.negative_stiffness.fit import AmbFit, MotorFit
 from procedures.negative_stiffness.plan import Plan
 from procedures.servomotor import checks
+from procedures.servomotor.conventions import conventions
 from procedures.shared.step_table import Labels, StepTable
 
 ONE_IN_A_THOUSAND = 1.7  # times the 95 % expanded uncertainty
@@ -55,7 +56,7 @@ def of_fits(
         )
 
 
-def of_results(estimates: Mapping[str, Estimate], gap: Toleranced) -> Iterator[Finding]:
+def of_results(estimates: Mapping[str, Estimate], rig: RigFile) -> Iterator[Finding]:
     """Signs, the AMB's gap against its drawing, and the two values against each other."""
     for name, way in (("motor", "motor's current"), ("ambs", "AMBs' currents")):
         if estimates[name].value <= 0:
@@ -66,7 +67,7 @@ def of_results(estimates: Mapping[str, Estimate], gap: Toleranced) -> Iterator[F
                 way,
                 Effect.ERROR,
             )
-    yield from _gap(estimates["gap"], gap)
+    yield from _gap(estimates["gap"], rig)
     yield from _disagreement(estimates)
 
 
@@ -75,16 +76,17 @@ def _expanded(e: Estimate) -> float:
     return coverage_factor(welch_satterthwaite(e)) * e.u
 
 
-def _gap(found: Estimate, drawing: Toleranced) -> Iterator[Finding]:
+def _gap(found: Estimate, rig: RigFile) -> Iterator[Finding]:
+    drawing, sensor = rig.geometry["amb_gap"], conventions(rig).positions["yo"]
     off = found.value - drawing.value
     allowed = (drawing.half_width or 3.3 * drawing.standard_uncertainty) + ONE_IN_A_THOUSAND * _expanded(found)
     if abs(off) > allowed:
         yield Finding(
             "gap-inconsistent",
             f"the outboard AMB behaves as if its gap were {found.value * 1e3:.3f} mm; the drawing has "
-            f"{drawing.value * 1e3:.3f} mm ± {allowed * 1e3:.3f} mm with this run's uncertainty. Most likely pos_yo "
+            f"{drawing.value * 1e3:.3f} mm ± {allowed * 1e3:.3f} mm with this run's uncertainty. Most likely {sensor} "
             f"reads {found.value / drawing.value - 1:+.0%} off: then alpha_x' is wrong by as much, in both ways.",
-            "pos_yo",
+            sensor,
             Effect.INDETERMINATE,
         )
 

@@ -124,7 +124,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     findings.gate(_of_signals(recording, motor, ambs), checks.FATAL)
     a = estimates.evaluate(recording, motor, ambs)
     findings.add(negative_stiffness_checks.of_fits(a.motor, a.ambs, a.by_motor, a.by_ambs, recording.plan))
-    findings.add(negative_stiffness_checks.of_results(a.estimates, recording.rig.geometry["amb_gap"]))
+    findings.add(negative_stiffness_checks.of_results(a.estimates, recording.rig))
     return a
 
 

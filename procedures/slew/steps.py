@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -10,15 +12,26 @@ from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
 from bench.recording import Recording, Step
 from procedures.servomotor.conventions import Servomotor, conventions
+from procedures.shared.step_table import Labels, read_labels
 from procedures.slew.fit import Swing
 from procedures.slew.plan import Plan
 
-STEP, STARTED = "swing", "sine-started"
+STARTED = "sine-started"
 
 
 def channels(machine: Servomotor) -> tuple[str, ...]:
     """What is recorded of a swing."""
     return ("angle", *machine.segments, "flags")
+
+
+@dataclass(frozen=True)
+class Swung(Labels):
+    """So many periods of a sine of the reference."""
+
+    kind: ClassVar[str] = "swing"
+    hz: float
+    amplitude_rad: float
+    periods: int
 
 
 def read_swings(recording: Recording[Plan]) -> list[Swing]:
@@ -27,7 +40,7 @@ def read_swings(recording: Recording[Plan]) -> list[Swing]:
     Raises:
         AnalysisError: there are none, or one has no start.
     """
-    steps = list(recording.steps(STEP))
+    steps = list(recording.steps(Swung.kind))
     if not steps:
         raise AnalysisError("found no swings; expected those of the plan (was the run stopped early?)")
     return [_read(recording, step) for step in steps]
@@ -35,7 +48,7 @@ def read_swings(recording: Recording[Plan]) -> list[Swing]:
 
 def _read(recording: Recording[Plan], step: Step) -> Swing:
     machine = conventions(recording.rig)
-    data = step.read(*channels(machine))
+    data, labels = step.read(*channels(machine)), read_labels(step, Swung)
     inside = [e for e in recording.events() if step.start_ns <= e["t_ns"] < step.end_ns]
     written = [
         e["t_ns"] for e in inside if e["kind"] == "parameter" and e["name"] == "sine_amplitude" and e["value"] > 0
@@ -51,14 +64,14 @@ def _read(recording: Recording[Plan], step: Step) -> Swing:
     moved = [e for e in inside if e["kind"] == "parameter" and e["name"] == "angle_ref"]
     angle = np.unwrap(data["angle"])
     return Swing(
-        float(step.labels["hz"]),
-        float(step.labels["amplitude_rad"]),
+        labels.hz,
+        labels.amplitude_rad,
         (data["t_ns"] - origin).astype(np.float64) * 1e-9,
         angle - 2 * np.pi * np.round(angle[0] / (2 * np.pi)),
         np.mean([data[c] for c in machine.segments], axis=0),
         seconds(written[0]),
         seconds(answered[0]),
-        int(step.labels["periods"]),
+        labels.periods,
         np.array([seconds(e["t_ns"]) for e in moved]),
         np.array([float(e["value"]) for e in moved]),
     )
@@ -68,8 +81,8 @@ def of_signals(recording: Recording[Plan]) -> Iterator[Finding]:
     """Lost samples, channels that stand still, amplifiers at their limits, contact."""
     machine, max_lost = conventions(recording.rig), recording.plan.max_lost
     names = channels(machine)
-    for step in recording.steps(STEP):
-        where = f"{float(step.labels['hz']):g} Hz"
+    for step in recording.steps(Swung.kind):
+        where = f"{read_labels(step, Swung).hz:g} Hz"
         share = step.lost() / max(step.expected(), 1)
         if share > max_lost:
             yield Finding(
