@@ -34,8 +34,9 @@ from procedures.amb_calibration.plan import Plan
 from procedures.amb_calibration.scatter import OUTPUTS, Scatter, covariance_by_angle, covariance_over_a_turn, scatter
 from procedures.amb_calibration.steps import AXES, VERTICAL, Hang, HangingData, channels, read_hangings
 from procedures.servomotor.conventions import SERVOMOTOR, Servomotor, conventions
+from procedures.servomotor.loads import certified_masses, certified_weighing, check_masses
 from procedures.shared import assumptions
-from procedures.shared.certificates import certified
+from procedures.shared.certificates import certified, certified_sensors
 from procedures.shared.step_table import record_step
 from procedures.shared.weight import weight
 
@@ -181,10 +182,7 @@ def _fitted(recording: Recording[Plan], data: HangingData) -> Analysis:
 def fit_inputs(rig: RigFile, plan: Plan) -> dict[str, Estimate]:
     """What the fit needs besides the recording: certificates of the rig file, each as an influence by identity."""
     g = rig.geometry
-    inputs = {
-        "gravity": certified("site/gravity", rig.site.gravity, "local gravity"),
-        "air_density": certified("site/air_density", rig.site.air_density, "air density (buoyancy)"),
-        "mass_density": certified("masses/density", rig.mass_density, "density of the masses (buoyancy)"),
+    inputs = certified_weighing(rig) | {
         "hook_to_outboard": certified("geometry/hook_to_outboard", g["hook_to_outboard"], "span hook to outboard AMB"),
         "amb_span": certified("geometry/amb_span", g["amb_span"], "span AMB to AMB"),
         "motor_to_outboard": Estimate.exact(g["com_to_motor"].value - g["com_to_outboard_amb"].value),
@@ -194,17 +192,7 @@ def fit_inputs(rig: RigFile, plan: Plan) -> dict[str, Estimate]:
         ),
         "hanger": certified("masses/hanger", rig.hanger, "hanger"),
     }
-    for k, label in enumerate(plan.masses):
-        inputs[f"mass_{k}"] = certified(f"masses/{label}", rig.masses[label], f"mass {label}")
-    machine = conventions(rig)
-    for bearing in "io":
-        for coil, channel in zip("pn", machine.coils[f"y{bearing}"], strict=True):
-            sensor = rig.sensors[channel]
-            inputs[f"gain_{bearing}{coil}"] = certified(f"sensors/{channel}/gain", sensor.gain, f"gain of {channel}")
-            inputs[f"offset_{bearing}{coil}"] = certified(
-                f"sensors/{channel}/offset", sensor.offset, f"offset of {channel}"
-            )
-    return inputs
+    return inputs | certified_masses(rig, plan.masses) | certified_sensors(rig, conventions(rig).coils_along("y"))
 
 
 def masses_u(recording: Recording[Plan]) -> np.ndarray:
@@ -216,13 +204,7 @@ def masses_u(recording: Recording[Plan]) -> np.ndarray:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    unknown = [m for m in plan.masses if m not in rig.masses]
-    if unknown:
-        yield f"masses: found {', '.join(unknown)}; the rig file certifies {', '.join(rig.masses)}"
-        return
-    kg = [rig.masses[m].value for m in plan.masses]
-    if kg != sorted(kg) or len(set(kg)) != len(kg):
-        yield f"masses: found {kg} kg; expected different masses in ascending order"
+    return check_masses(rig, plan.masses)
 
 
 def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:

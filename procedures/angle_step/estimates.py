@@ -14,7 +14,7 @@ from procedures.angle_step import steps
 from procedures.angle_step.response import Response, response
 from procedures.angle_step.steps import Case, Done
 from procedures.servomotor.conventions import conventions
-from procedures.shared.certificates import certified
+from procedures.shared.certificates import certified_gain
 
 
 @dataclass(frozen=True)
@@ -35,10 +35,7 @@ def by_case(moves: list[Done], rig: RigFile, band: float, count_rad: float) -> d
     """
     machine = conventions(rig)
     share = machine.sensor_share(rig.geometry["com_to_motor"].value, rig)
-    gains = {
-        axis: certified(f"sensors/{c}/gain", rig.sensors[c].gain, f"gain of {c}")
-        for axis, c in machine.positions.items()
-    }
+    gains = {axis: certified_gain(rig, channel) for axis, channel in machine.positions.items()}
     period = _period(moves)
     out = {}
     for case, done in steps.by_case(moves).items():

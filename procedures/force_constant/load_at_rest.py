@@ -159,10 +159,9 @@ def _sensors(r: Ramps, p: Values, rig: RigFile, weight: float, bias_A: float, re
     """Every coil's sensor, and all of them, whose change alone leaves neither AMB another load."""
     c = fit.vertical(p, len(r.angles))
     before, alpha = loads(r, p, bias_A), _constant(r, p, c, weight, bias_A)
-    by_axis = conventions(rig).coils
-    coils = {coil: f"{b}{c}" for b in "io" for c, coil in zip("pn", by_axis[f"y{b}"], strict=True)}
+    coils = conventions(rig).coils_along("y")
     out = []
-    for name, changed in [*((coil, (short,)) for coil, short in coils.items()), (ALL, tuple(coils.values()))]:
+    for name, changed in [*((coil, (place,)) for place, coil in coils.items()), (ALL, tuple(coils))]:
         other = {**p, **{f"gain_y{x}": p[f"gain_y{x}"] * (1 + STEP) for x in changed}}
         slope = (loads(r, other, bias_A) - before) / STEP
         scaled, seen = slope / rest.u, rest.moved / rest.u

@@ -61,6 +61,11 @@ def of_results(a: Analysis, machine: Servomotor, pole_pairs: float) -> Iterator[
             f"{machine.segments[1]}, {machine.segments[3]}",
             Effect.ERROR,
         )
+    yield from _notes(a, pole_pairs)
+
+
+def _notes(a: Analysis, pole_pairs: float) -> Iterator[Finding]:
+    ratio, zero, winding = a.fit.term("r"), a.fit.term("gamma_0"), a.fit.term("a")
     direct, coupled = (
         f"{a.fit.term(name):+.2%} ± {2 * float(a.fit.fit.u[TERMS.index(name)]):.2%}" for name in ("rho_2", "rho_3")
     )

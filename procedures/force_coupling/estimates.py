@@ -10,13 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.recording import Recording
-from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from procedures.force_coupling import fit as force_coupling_fit
 from procedures.force_coupling.fit import CouplingFit, Sweep
 from procedures.force_coupling.steps import Phase
 from procedures.servomotor.conventions import conventions
-from procedures.shared.certificates import certified
+from procedures.shared.certificates import certified_sensors
 from procedures.shared.gradients import by_inputs, linearised
 from procedures.shared.step_table import StepTable
 from procedures.shared.type_a import scatter
@@ -130,14 +129,4 @@ def fit_inputs(recording: Recording[Any]) -> dict[str, Estimate]:
         # Refers currents to the sensors' zero, a matter of nanometres: its tolerance does not show.
         "per_metre": Estimate.exact(g["motor_stiffness"].value / alpha_d.value),
     }
-    return inputs | segment_sensors(rig)
-
-
-def segment_sensors(rig: RigFile) -> dict[str, Estimate]:
-    """Gains and offsets of the segments' current sensors."""
-    out = {}
-    for k, channel in enumerate(conventions(rig).segments, 1):
-        sensor = rig.sensors[channel]
-        out[f"gain_m{k}"] = certified(f"sensors/{channel}/gain", sensor.gain, f"gain of {channel}")
-        out[f"offset_m{k}"] = certified(f"sensors/{channel}/offset", sensor.offset, f"offset of {channel}")
-    return out
+    return inputs | certified_sensors(rig, {f"m{k}": c for k, c in enumerate(conventions(rig).segments, 1)})

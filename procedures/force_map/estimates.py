@@ -28,7 +28,7 @@ from procedures.force_map.steps import MapData, positions
 from procedures.servomotor.conventions import Servomotor, conventions, displacement, radial_currents, sensor_share
 from procedures.shared import gradients as shared_gradients
 from procedures.shared import leastsquares, type_a
-from procedures.shared.certificates import certified
+from procedures.shared.certificates import certified, certified_gain, certified_sensors
 
 Array = npt.NDArray[np.float64]
 CROSS = "cross"
@@ -63,18 +63,13 @@ def inputs_of(rig: RigFile, facts: Mapping[str, Estimate], angles: int) -> dict[
                 "com_to_outboard_amb"):  # fmt: skip
         out[key] = certified(f"geometry/{key}", g[key])
     machine = conventions(rig)
-    for channel in (*machine.coils["yi"], *machine.segments):
-        sensor = rig.sensors[channel]
-        out[f"gain/{channel}"] = certified(f"sensors/{channel}/gain", sensor.gain, f"gain of {channel}")
-        out[f"offset/{channel}"] = certified(f"sensors/{channel}/offset", sensor.offset, f"offset of {channel}")
-    for channel in positions(machine):
-        out[f"gain/{channel}"] = certified(f"sensors/{channel}/gain", rig.sensors[channel].gain, f"gain of {channel}")
-    return out
+    out |= certified_sensors(rig, {channel: channel for channel in (*machine.coils["yi"], *machine.segments)})
+    return out | {f"gain_{channel}": certified_gain(rig, channel) for channel in positions(machine)}
 
 
 def points_of(data: MapData, machine: Servomotor, p: Mapping[str, float], angles: int) -> Points:
     """Currents and displacements of the motor, freed of the sensors' gains and the segments' offsets."""
-    i1, i2, i3, i4 = ((data.table.mean[c] - p[f"offset/{c}"]) / p[f"gain/{c}"] for c in machine.segments)
+    i1, i2, i3, i4 = ((data.table.mean[c] - p[f"offset_{c}"]) / p[f"gain_{c}"] for c in machine.segments)
     z = p["com_to_outboard_amb"] + p["motor_to_outboard_amb"]
     x, y = (_at(data, machine, p, axis, z) for axis in "xy")
     return Points(*radial_currents(i1, i2, i3, i4), (i1 + i2 + i3 + i4) / 4, x, y, 2 * np.pi * data.angle / angles)
@@ -82,14 +77,14 @@ def points_of(data: MapData, machine: Servomotor, p: Mapping[str, float], angles
 
 def _at(data: MapData, machine: Servomotor, p: Mapping[str, float], axis: str, z: float) -> Array:
     """Displacement at plane z, m from the centre of mass, outboard positive."""
-    inboard, outboard = (data.table.mean[c] / p[f"gain/{c}"] for c in machine.positions_of(f"{axis}i", f"{axis}o"))
+    inboard, outboard = (data.table.mean[c] / p[f"gain_{c}"] for c in machine.positions_of(f"{axis}i", f"{axis}o"))
     l_is, l_os = (p[name] for name in machine.sensors)
     return displacement(inboard, outboard, sensor_share(z, l_is, l_os))
 
 
 def motor_force(data: MapData, machine: Servomotor, p: Mapping[str, float], bias_A: float) -> Array:
     """Vertical force of the motor on the shaft, (n,) N, but for a constant at each angle and load."""
-    ip, i_n = ((data.table.mean[c] - p[f"offset/{c}"]) / p[f"gain/{c}"] for c in machine.coils["yi"])
+    ip, i_n = ((data.table.mean[c] - p[f"offset_{c}"]) / p[f"gain_{c}"] for c in machine.coils["yi"])
     count = 1 + int(data.angle.max())
     k, k2 = (np.array([p[f"{name}@{n}"] for n in range(count)])[data.angle] for name in ("K_i", "K2_i"))
     u, v = (ip**2 - i_n**2) / (4 * bias_A), (ip**2 + i_n**2) / 2 - bias_A**2

@@ -14,7 +14,7 @@ from procedures.negative_stiffness.fit import AmbFit, ByAmbs, ByMotor, MotorFit
 from procedures.negative_stiffness.plan import Plan
 from procedures.negative_stiffness.steps import Displaced
 from procedures.servomotor.conventions import Servomotor, conventions
-from procedures.shared.certificates import certified
+from procedures.shared.certificates import certified, certified_gain, certified_sensors
 from procedures.shared.gradients import by_inputs
 from procedures.shared.step_table import StepTable
 from procedures.shared.type_a import scatter
@@ -97,11 +97,7 @@ def fit_inputs(recording: Recording[Plan]) -> dict[str, Estimate]:
     inputs["amb_gap"] = Estimate.exact(g["amb_gap"].value)  # where the iteration starts, and nothing else
     machine = conventions(rig)
     for axis, channel in machine.positions.items():
-        inputs[f"gain_{axis}"] = certified(f"sensors/{channel}/gain", rig.sensors[channel].gain, f"gain of {channel}")
+        inputs[f"gain_{axis}"] = certified_gain(rig, channel)
     sensors = {f"m{k}": segment for k, segment in enumerate(machine.segments, 1)}
     sensors |= dict(zip(("op", "on"), machine.coils["yo"], strict=True))
-    for key, channel in sensors.items():
-        sensor = rig.sensors[channel]
-        inputs[f"gain_{key}"] = certified(f"sensors/{channel}/gain", sensor.gain, f"gain of {channel}")
-        inputs[f"offset_{key}"] = certified(f"sensors/{channel}/offset", sensor.offset, f"offset of {channel}")
-    return inputs
+    return inputs | certified_sensors(rig, sensors)

@@ -64,6 +64,10 @@ class Servomotor:
         """Coil currents of some axes, in that order."""
         return tuple(coil for axis in axes for coil in self.coils[axis])
 
+    def coils_along(self, direction: str) -> dict[str, str]:
+        """Coils of both AMBs along "x" or "y", by bearing and the end they pull to: "ip", "in", "op", "on"."""
+        return {f"{b}{end}": coil for b in "io" for end, coil in zip("pn", self.coils[f"{direction}{b}"], strict=True)}
+
     def control(self, axis: str, at: Callable[[str], Value]) -> Value:
         """Control current of an axis in A, half the difference of its coils' currents, which `at` gives by name."""
         positive, negative = self.coils[axis]

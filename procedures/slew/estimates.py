@@ -13,7 +13,7 @@ from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.uncertainty import Estimate, Influence
 from procedures.servomotor.conventions import conventions
-from procedures.shared.certificates import certified
+from procedures.shared.certificates import certified_gain
 from procedures.slew.fit import Gains, Passes, Swing, Tracking, answered, passes, starts, tracking
 from procedures.slew.plan import Plan
 
@@ -105,7 +105,7 @@ def _segment_gain(recording: Recording[Plan]) -> Estimate:
     """One, with what the gains of the segments' current sensors do to the torque current."""
     out = Estimate.exact(1.0)
     for channel in (c for c in conventions(recording.rig).segments if c in recording.rig.sensors):
-        gain = certified(f"sensors/{channel}/gain", recording.rig.sensors[channel].gain, f"gain of {channel}")
+        gain = certified_gain(recording.rig, channel)
         out = out - (gain - gain.value) * 0.25
     return out
 

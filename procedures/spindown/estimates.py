@@ -21,7 +21,7 @@ from bench.errors import AnalysisError
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate
 from procedures.servomotor.conventions import conventions
-from procedures.shared.certificates import certified
+from procedures.shared.certificates import certified, certified_sensors
 from procedures.spindown.fit import Coast, inertia_from_ring
 from procedures.spindown.steps import RunDown, coils
 
@@ -149,10 +149,7 @@ def _inputs(rig: RigFile, ring: bool) -> dict[str, Estimate]:
         out["ring"] = certified("machine/ring_inertia", rig.machine["ring_inertia"], "inertia of the ring")
     else:
         out["inertia"] = stated_inertia(rig)
-    for c in coils(conventions(rig)):
-        out[f"gain_{c}"] = certified(f"sensors/{c}/gain", rig.sensors[c].gain, f"gain of {c}")
-        out[f"offset_{c}"] = certified(f"sensors/{c}/offset", rig.sensors[c].offset, f"offset of {c}")
-    return out
+    return out | certified_sensors(rig, {c: c for c in coils(conventions(rig))})
 
 
 def _type_a(group: str, method: str, r: Rates) -> dict[str, Estimate]:

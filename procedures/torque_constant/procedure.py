@@ -26,6 +26,7 @@ from bench.uncertainty import Estimate, Influence, propagate
 from procedures.servomotor import hold
 from procedures.servomotor.conventions import SERVOMOTOR, conventions
 from procedures.servomotor.direction import of_probe
+from procedures.servomotor.loads import check_masses
 from procedures.shared import assumptions
 from procedures.shared.step_table import record_step
 from procedures.torque_constant import checks, fit
@@ -196,13 +197,9 @@ def _fitted(recording: Recording[Plan], data: TorqueData) -> Analysis:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    unknown = [m for m in plan.masses if m not in rig.masses]
-    if unknown:
-        yield f"masses: found {', '.join(unknown)}; the rig file certifies {', '.join(rig.masses)}"
+    yield from check_masses(rig, plan.masses)
+    if not rig.masses.keys() >= set(plan.masses):
         return
-    kg = [rig.masses[m].value for m in plan.masses]
-    if kg != sorted(kg) or len(set(kg)) != len(kg):
-        yield f"masses: found {kg} kg; expected different masses in ascending order"
     turn = plan.gamma_max_rad * rig.machine["pole_pairs"].value
     if turn > math.pi / 3:
         yield (f"gamma_max_rad: found {plan.gamma_max_rad:g} rad, {math.degrees(turn):.0f} deg of the electrical turn; "
