@@ -25,12 +25,11 @@ from procedures.angle_step import figures as drawn
 from procedures.angle_step.estimates import Result
 from procedures.angle_step.plan import Plan
 from procedures.angle_step.response import Loop
-from procedures.angle_step.steps import Case, Done, Moved, cases, channels, positions, read_moves
+from procedures.angle_step.steps import STEP, Case, Done, cases, channels, positions, read_moves
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import SERVOMOTOR, conventions
 from procedures.servomotor.direction import of_probe
 from procedures.shared import assumptions
-from procedures.shared.step_table import record_step
 
 RISE = Quantity("rise_time", "s", "10 to 90 % of the step of the angle")
 OVERSHOOT = Quantity("overshoot", "1", "greatest angle beyond the step, as a share of it")
@@ -86,7 +85,8 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         for repeat in range(2 * plan.repeats):
             step = case.size if repeat % 2 == 0 else -case.size
             target = case.size if repeat % 2 == 0 else 0.0
-            with record_step(record, Moved(case.allocation, case.size, case.filter_hz, step, target, repeat)):
+            with record.step(STEP, allocation=case.allocation, size_rad=case.size, filter_hz=case.filter_hz, step_rad=step,
+                             target_rad=target, repeat=repeat):  # fmt: skip
                 rig.clock.sleep(plan.standstill_s)
                 write("angle_ref", target)
                 rig.clock.sleep(plan.record_s)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,9 +13,9 @@ from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from procedures.angle_step.response import Move
 from procedures.servomotor.conventions import Servomotor, conventions, displacement
-from procedures.shared.step_table import Labels, read_labels
 
 Array = npt.NDArray[np.float64]
+STEP = "move"
 ANSWER_A = 0.2  # of torque current: well above its noise, a twentieth of the smallest sensible step's
 
 
@@ -44,19 +44,6 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Moved(Labels):
-    """A move of a case (`allocation`, `size_rad`, `filter_hz`) by `step_rad` to `target_rad`."""
-
-    kind: ClassVar[str] = "move"
-    allocation: str
-    size_rad: float
-    filter_hz: float
-    step_rad: float
-    target_rad: float
-    repeat: int
-
-
-@dataclass(frozen=True)
 class Done:
     """One recorded move: its case, the move, its flags ORed, the channels that stood still, and lost samples."""
 
@@ -77,7 +64,7 @@ def read_moves(recording: Recording[Any]) -> list[Done]:
     """
     machine, rig = conventions(recording.rig), recording.rig
     share = machine.sensor_share(rig.geometry["com_to_motor"].value, rig)
-    out = [_read(recording, step, machine, share) for step in recording.steps(Moved.kind)]
+    out = [_read(recording, step, machine, share) for step in recording.steps(STEP)]
     if not out:
         raise AnalysisError("found no moves; expected those of the plan (was the run stopped early?)")
     return out
@@ -101,8 +88,8 @@ def _read(recording: Recording[Any], step: Step, machine: Servomotor, share: flo
     if rest.sum() < 20 or (~rest).sum() < 100:
         raise AnalysisError(f"move {dict(step.labels)}: found {int(rest.sum())} samples before it and "
                             f"{int((~rest).sum())} after; expected at least 20 and 100")  # fmt: skip
-    labels = read_labels(step, Moved)
-    case = Case(labels.allocation, labels.size_rad, labels.filter_hz)
+    labels = step.labels
+    case = Case(str(labels["allocation"]), float(labels["size_rad"]), float(labels["filter_hz"]))
     flags = data["flags"].astype(np.int64)
     return Done(
         case,
@@ -116,10 +103,10 @@ def _read(recording: Recording[Any], step: Step, machine: Servomotor, share: flo
 
 
 def _move(
-    data: Mapping[str, npt.NDArray[Any]], rest: npt.NDArray[np.bool_], labels: Moved, machine: Servomotor,
+    data: Mapping[str, npt.NDArray[Any]], rest: npt.NDArray[np.bool_], labels: Mapping[str, Any], machine: Servomotor,
     share: float,
 ) -> Move:  # fmt: skip
-    step = labels.step_rad
+    step = float(labels["step_rad"])
     segments = np.array([data[c] for c in machine.segments])
     torque = segments.mean(axis=0)
     standing = float(torque[rest].mean())
@@ -128,7 +115,7 @@ def _move(
         raise AnalysisError(f"a step of {np.degrees(step):.2f} deg: the torque current never answers")
     first = max(int(answers[0]) - 1, int(np.flatnonzero(~rest)[0]))
     after = slice(first, None)
-    angle = np.unwrap(data["angle"]) - (labels.target_rad - step)
+    angle = np.unwrap(data["angle"]) - (float(labels["target_rad"]) - step)
     angle -= 2 * np.pi * np.round(angle[rest].mean() / (2 * np.pi))
     inboard, outboard = (np.array([data[c] for c in machine.positions_of(f"x{b}", f"y{b}")]) for b in "io")
     motor = displacement(inboard, outboard, share)

@@ -28,7 +28,7 @@ from procedures.negative_stiffness import estimates
 from procedures.negative_stiffness import figures as drawn
 from procedures.negative_stiffness.estimates import Analysis
 from procedures.negative_stiffness.plan import Plan
-from procedures.negative_stiffness.steps import ByAmbs, ByMotor, Displaced
+from procedures.negative_stiffness.steps import Displaced, HeldByAmbs, HeldByMotor
 from procedures.servomotor import carrying, checks
 from procedures.servomotor.conventions import SERVOMOTOR, conventions, radial_currents
 from procedures.servomotor.steps import POSITIONS, channels, read_steps
@@ -73,7 +73,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     carrying.carry(rig, plan.settle_s)
     carrying.to_edge(rig, 1, plan.count_rad)
     # The inboard AMB's plane goes with the displacement as far as keeps the inboard sensor at zero.
-    _walk(rig, plan, record, ByMotor, {"ref_ym": 1.0, "ref_yi": inboard}, plan.bias_A)
+    _walk(rig, plan, record, HeldByMotor, {"ref_ym": 1.0, "ref_yi": inboard}, plan.bias_A)
     carrying.leave_edge(rig)
     carrying.give_back(rig, plan.settle_s)
     for bias in (plan.bias_A, plan.bias_high_A):
@@ -84,7 +84,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
             transition(rig, RigState.LEVITATED)
             carrying.home(rig)
             rig.clock.sleep(plan.settle_s)
-        _walk(rig, plan, record, ByAmbs, {"ref_yo": _tilt(rig.file)}, bias)
+        _walk(rig, plan, record, HeldByAmbs, {"ref_yo": _tilt(rig.file)}, bias)
 
 
 def _walk(
@@ -134,12 +134,14 @@ def measured(a: Analysis) -> Iterator[Measured]:
     yield ALPHA_X_AMB.measured(a.estimates["ambs"])
 
 
-def read(recording: Recording[Plan]) -> tuple[StepTable[ByMotor], StepTable[ByAmbs]]:
+def read(recording: Recording[Plan]) -> tuple[StepTable[HeldByMotor], StepTable[HeldByAmbs]]:
     """The steps of both ways."""
-    return read_steps(recording, ByMotor), read_steps(recording, ByAmbs)
+    return read_steps(recording, HeldByMotor), read_steps(recording, HeldByAmbs)
 
 
-def _of_signals(recording: Recording[Plan], motor: StepTable[ByMotor], ambs: StepTable[ByAmbs]) -> Iterator[Finding]:
+def _of_signals(
+    recording: Recording[Plan], motor: StepTable[HeldByMotor], ambs: StepTable[HeldByAmbs]
+) -> Iterator[Finding]:
     plan = recording.plan
     machine, inboard = conventions(recording.rig), _amb_shares(recording.rig)[0]
     positions = machine.positions_of(*POSITIONS)

@@ -22,7 +22,7 @@ class Displaced(Labels):
 
 
 @dataclass(frozen=True)
-class ByMotor(Displaced):
+class HeldByMotor(Displaced):
     """The motor holds the outboard end."""
 
     kind: ClassVar[str] = "motor"
@@ -30,7 +30,7 @@ class ByMotor(Displaced):
 
 
 @dataclass(frozen=True)
-class ByAmbs(Displaced):
+class HeldByAmbs(Displaced):
     """The AMBs hold it."""
 
     kind: ClassVar[str] = "ambs"

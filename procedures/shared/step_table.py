@@ -1,6 +1,6 @@
 """Recorded steps as arrays: what each says of its channels, how it is labelled, and what was lost of it.
 
-A kind of step is a class with its labels as fields: `record_step` writes them, `read_labels` and `tabulate` read them.
+A kind of step is a class with its labels as fields: `record_step` writes them, `tabulate` reads them back.
 """
 
 from __future__ import annotations
@@ -35,11 +35,6 @@ Read = TypeVar("Read", bound=Labels)
 def record_step(record: Recorder, labels: Labels) -> AbstractContextManager[None]:
     """A step with these labels."""
     return record.step(labels.kind, **asdict(labels))
-
-
-def read_labels(step: Step, kind: type[Read]) -> Read:
-    """The labels of a step of that kind."""
-    return kind(**{field.name: step.labels[field.name] for field in fields(kind)})
 
 
 @dataclass(frozen=True)
@@ -107,7 +102,7 @@ def tabulate(
 
     return StepTable(
         by_channel("mean"), by_channel("drift"), by_channel("spread"), by_channel("ptp"),
-        tuple(read_labels(s, kind) for s in steps),
+        tuple(kind(**{field.name: s.labels[field.name] for field in fields(kind)}) for s in steps),
         array([s.start_ns for s in steps]), array([s.end_ns for s in steps]),
         array([float(s.lost()) for s in steps]), array([float(s.expected()) for s in steps]),
         array([row["flags"] for row in rows]),

@@ -23,13 +23,12 @@ from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import SERVOMOTOR
 from procedures.servomotor.direction import of_probe
 from procedures.shared import assumptions
-from procedures.shared.step_table import record_step
 from procedures.slew import estimates, fit, steps
 from procedures.slew import figures as drawn
 from procedures.slew.estimates import Result
 from procedures.slew.fit import Gains
 from procedures.slew.plan import Plan
-from procedures.slew.steps import STARTED, Swung, channels, read_swings
+from procedures.slew.steps import STARTED, STEP, channels, read_swings
 
 RMS = Quantity("error_rms", "rad", "root mean square of the tracking error, free of the encoder's counts")
 PEAK = Quantity("error_peak", "rad", "greatest tracking error")
@@ -73,7 +72,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     for hz in sorted(plan.frequencies_hz):
         rig.clock.sleep(plan.settle_s)
         write("sine_hz", hz)
-        with record_step(record, Swung(hz, plan.amplitude_rad, plan.periods)):
+        with record.step(STEP, hz=hz, amplitude_rad=plan.amplitude_rad, periods=plan.periods):
             rig.clock.sleep(0.2)
             write("sine_amplitude", plan.amplitude_rad)
             record.event(STARTED, hz=hz)  # after the answer: with the write itself it brackets the start

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -12,26 +10,15 @@ from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
 from bench.recording import Recording, Step
 from procedures.servomotor.conventions import Servomotor, conventions
-from procedures.shared.step_table import Labels, read_labels
 from procedures.slew.fit import Swing
 from procedures.slew.plan import Plan
 
-STARTED = "sine-started"
+STEP, STARTED = "swing", "sine-started"
 
 
 def channels(machine: Servomotor) -> tuple[str, ...]:
     """What is recorded of a swing."""
     return ("angle", *machine.segments, "flags")
-
-
-@dataclass(frozen=True)
-class Swung(Labels):
-    """So many periods of a sine of the reference."""
-
-    kind: ClassVar[str] = "swing"
-    hz: float
-    amplitude_rad: float
-    periods: int
 
 
 def read_swings(recording: Recording[Plan]) -> list[Swing]:
@@ -40,7 +27,7 @@ def read_swings(recording: Recording[Plan]) -> list[Swing]:
     Raises:
         AnalysisError: there are none, or one has no start.
     """
-    steps = list(recording.steps(Swung.kind))
+    steps = list(recording.steps(STEP))
     if not steps:
         raise AnalysisError("found no swings; expected those of the plan (was the run stopped early?)")
     return [_read(recording, step) for step in steps]
@@ -48,7 +35,7 @@ def read_swings(recording: Recording[Plan]) -> list[Swing]:
 
 def _read(recording: Recording[Plan], step: Step) -> Swing:
     machine = conventions(recording.rig)
-    data, labels = step.read(*channels(machine)), read_labels(step, Swung)
+    data = step.read(*channels(machine))
     inside = [e for e in recording.events() if step.start_ns <= e["t_ns"] < step.end_ns]
     written = [
         e["t_ns"] for e in inside if e["kind"] == "parameter" and e["name"] == "sine_amplitude" and e["value"] > 0
@@ -64,14 +51,14 @@ def _read(recording: Recording[Plan], step: Step) -> Swing:
     moved = [e for e in inside if e["kind"] == "parameter" and e["name"] == "angle_ref"]
     angle = np.unwrap(data["angle"])
     return Swing(
-        labels.hz,
-        labels.amplitude_rad,
+        float(step.labels["hz"]),
+        float(step.labels["amplitude_rad"]),
         (data["t_ns"] - origin).astype(np.float64) * 1e-9,
         angle - 2 * np.pi * np.round(angle[0] / (2 * np.pi)),
         np.mean([data[c] for c in machine.segments], axis=0),
         seconds(written[0]),
         seconds(answered[0]),
-        labels.periods,
+        int(step.labels["periods"]),
         np.array([seconds(e["t_ns"]) for e in moved]),
         np.array([float(e["value"]) for e in moved]),
     )
@@ -81,8 +68,8 @@ def of_signals(recording: Recording[Plan]) -> Iterator[Finding]:
     """Lost samples, channels that stand still, amplifiers at their limits, contact."""
     machine, max_lost = conventions(recording.rig), recording.plan.max_lost
     names = channels(machine)
-    for step in recording.steps(Swung.kind):
-        where = f"{read_labels(step, Swung).hz:g} Hz"
+    for step in recording.steps(STEP):
+        where = f"{float(step.labels['hz']):g} Hz"
         share = step.lost() / max(step.expected(), 1)
         if share > max_lost:
             yield Finding(

@@ -15,7 +15,7 @@ from bench.errors import AnalysisError
 from bench.recording.recorder import Recorder
 from bench.recording.steps import Step, Steps
 from procedures.servomotor.loads import load_index
-from procedures.shared.step_table import Labels, StepTable, by_angle, read_labels, record_step, tabulate
+from procedures.shared.step_table import Labels, StepTable, by_angle, record_step, tabulate
 
 MS = 1_000_000
 
@@ -78,7 +78,7 @@ def test_labels_are_read_back_as_written() -> None:
     (step,) = recorded(Level(0.5, "M1"))
     assert (step.kind, dict(step.labels)) == ("level", {"angle_rad": 0.5, "load": "M1"})
     assert list(step.labels) == ["angle_rad", "load"]
-    assert read_labels(step, Level) == Level(0.5, "M1")
+    assert tabulate([step], Level, ("a",)).labels == (Level(0.5, "M1"),)
 
 
 def test_a_table_has_the_shape_of_angles_and_steps() -> None:
