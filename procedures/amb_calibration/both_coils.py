@@ -17,6 +17,7 @@ from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.uncertainty import Estimate, correlation
 from procedures.amb_calibration.fit import Hangings
+from procedures.servomotor.conventions import Servomotor
 
 # finding, and event: no-load current of the lower coils A, and by bearing the bias that would do
 ONE_SIDED = "one-sided"
@@ -26,11 +27,11 @@ TIED = 0.99  # correlation of two numbers that the data do not separate
 NAMES = {"i": "inboard", "o": "outboard"}
 
 
-def at_no_load(reading: Callable[[str], float], bias_A: float) -> dict[str, float]:
+def at_no_load(machine: Servomotor, reading: Callable[[str], float], bias_A: float) -> dict[str, float]:
     """Bearings of which one vertical coil carries next to nothing as it is now, each with the bias that it needs, A."""
     out = {}
     for b in NAMES:
-        strong, weak = sorted((reading(f"i_y{b}_p"), reading(f"i_y{b}_n")), reverse=True)
+        strong, weak = sorted((reading(coil) for coil in machine.coils[f"y{b}"]), reverse=True)
         if weak < LEAST * bias_A:
             out[b] = enough(strong, weak)
     return out

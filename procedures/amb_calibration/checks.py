@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,8 +18,11 @@ from bench.uncertainty.coverage import coverage_factor
 from procedures.amb_calibration import both_coils, hypotheses
 from procedures.amb_calibration.fit import Fit
 from procedures.amb_calibration.hypotheses import CHANCE, Contradiction, Suspect
+from procedures.amb_calibration.plan import Plan
 from procedures.amb_calibration.scatter import Scatter
-from procedures.amb_calibration.steps import COILS, POSITIONS, HangingData
+from procedures.amb_calibration.steps import AXES, VERTICAL, HangingData
+from procedures.servomotor import checks as servomotor_checks
+from procedures.servomotor.conventions import Servomotor
 from procedures.shared import signals
 
 Array = npt.NDArray[np.float64]
@@ -28,40 +30,20 @@ Array = npt.NDArray[np.float64]
 FATAL = ("stuck-channel", "no-response", "axes-exchanged", "bearings-exchanged", "wrong-sign", "masses-exchanged")
 """Findings after which a fit means nothing and is not attempted."""
 NAMES = ("inboard", "outboard")
-AXES = ("yi", "yo", "xi", "xo")
 WIRED_WRONG = "wired-wrong"  # event: changes of the control currents under the first mass, A
 MOST_WRONG = 0.03  # relative: a set of masses that is off by more would be seen by eye
 
 
-class Tolerances(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def max_position_m(self) -> float: ...
-    @property
-    def max_drift_A(self) -> float: ...
-    @property
-    def max_lost(self) -> float: ...
-    @property
-    def bias_A(self) -> float: ...
-
-
-def of_signals(data: HangingData, plan: Tolerances) -> Iterator[Finding]:
+def of_signals(data: HangingData, machine: Servomotor, plan: Plan) -> Iterator[Finding]:
     """Checks that need no fit: losses, stuck channels, saturation, contact, settling, wiring."""
-    where = partial(_worst, data)
-    yield from signals.losses(data.lost, data.expected, plan.max_lost, where)
-    yield from signals.stuck(data.spread, (*COILS, *POSITIONS))
-    yield from signals.flagged(data.flags, where)
-    yield from signals.settled(data.mean, data.drift, ("yi", "yo"), plan.max_position_m, plan.max_drift_A, where)
-    yield from _wiring(data)
+    table = data.table
+    yield from servomotor_checks.of_signals(table, machine, tuple(table.mean), plan.max_lost)
+    vertical = {machine.positions[axis]: machine.coils[axis] for axis in VERTICAL}
+    yield from signals.settled(table.mean, table.drift, vertical, plan.max_position_m, plan.max_drift_A, table.where)
+    yield from _wiring(data, machine)
 
 
-def _worst(data: HangingData, values: Array) -> str:
-    turn, point = np.unravel_index(int(np.argmax(values)), values.shape)
-    return data.where(int(turn), int(point))
-
-
-def _wiring(data: HangingData) -> Iterator[Finding]:
+def _wiring(data: HangingData, machine: Servomotor) -> Iterator[Finding]:
     """Signs and axes, from how the control currents answer the load: the outboard AMB pulls more (positive), the
     inboard one less (negative), the horizontal axes hardly at all (the axes stand within a few mrad of the plumb).
     `acquire` asks the same after the first hanging."""
@@ -69,7 +51,7 @@ def _wiring(data: HangingData) -> Iterator[Finding]:
     heavy, light = load == load.max(), load < 0
 
     def answer(axis: str) -> float:
-        control = (data.mean[f"i_{axis}_p"] - data.mean[f"i_{axis}_n"]) / 2
+        control = machine.control(axis, data.table.mean.__getitem__)
         return float(control[heavy].mean() - control[light].mean())
 
     yield from wiring(*(answer(axis) for axis in AXES))
@@ -120,7 +102,7 @@ def of_fit(
     c: Contradiction,
     beyond: float,
     p: Mapping[str, float],
-    plan: Tolerances,
+    plan: Plan,
     u_mass: Array,
 ) -> Iterator[Finding]:
     """Checks of the fit: loads that contradict each other, single hangings that stand out, hysteresis. `beyond` is what each
@@ -149,7 +131,7 @@ def of_fit(
 
 
 def _loads(
-    data: HangingData, c: Contradiction, p: Mapping[str, float], plan: Tolerances, u_mass: Array
+    data: HangingData, c: Contradiction, p: Mapping[str, float], plan: Plan, u_mass: Array
 ) -> Iterator[Finding]:  # fmt: skip
     if c.probability > CHANCE:
         return
@@ -210,6 +192,6 @@ def _outliers(data: HangingData, f: Fit, s: Scatter) -> Iterator[Finding]:
                 "outlier",
                 f"one hanging is {e.max():.3f} N off the fit of the {NAMES[b]} AMB ({limit:.3f} N allowed); was the "
                 "right mass hung, and was the hanger on?",
-                _worst(data, e),
+                data.table.where(e),
                 Effect.INDETERMINATE,
             )

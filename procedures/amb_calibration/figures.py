@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,13 +10,15 @@ import numpy.typing as npt
 from bench.figures import Figure, Series
 from bench.recording import Recording
 from procedures.amb_calibration.fit import Fit
-from procedures.amb_calibration.steps import HangingData
+from procedures.amb_calibration.plan import Plan
+from procedures.amb_calibration.steps import Hang, HangingData
+from procedures.servomotor.conventions import conventions
 
 Array = npt.NDArray[np.float64]
 NAMES = ("inboard", "outboard")
 
 
-def all_figures(recording: Recording[Any], data: HangingData, f: Fit, p: Mapping[str, float]) -> list[Figure]:
+def all_figures(recording: Recording[Plan], data: HangingData, f: Fit, p: Mapping[str, float]) -> list[Figure]:
     """In the order of the report."""
     return [*_fits(data, f), *_residuals(data, f), *_one_step(recording), _slopes(data, f), _zero_load(data, f)]
 
@@ -50,15 +51,17 @@ def _residuals(data: HangingData, f: Fit) -> Iterator[Figure]:
                      lines=(("zero", 0.0),))  # fmt: skip
 
 
-def _one_step(recording: Recording[Any]) -> Iterator[Figure]:
+def _one_step(recording: Recording[Plan]) -> Iterator[Figure]:
     heaviest = recording.plan.masses[-1]
-    step = next(s for s in recording.steps("hang") if s.labels["load"] == heaviest)
-    data = step.read("pos_yi", "pos_yo", "i_yo_p", "i_yo_n")
+    step = next(s for s in recording.steps(Hang.kind) if s.labels["load"] == heaviest)
+    machine = conventions(recording.rig)
+    inboard, outboard = machine.positions_of("yi", "yo")
+    data = step.read(inboard, outboard, *machine.coils["yo"])
     t = (data["t_ns"] - data["t_ns"][0]).astype(np.float64) * 1e-9
     yield Figure("step-position", f"Position during one step ({heaviest})",
                  "Vertical position at both sensor planes while the heaviest mass hangs.", "time (s)", "position (µm)",
-                 (Series("inboard", t, 1e6 * data["pos_yi"]), Series("outboard", t, 1e6 * data["pos_yo"])))  # fmt: skip
-    control = (data["i_yo_p"] - data["i_yo_n"]) / 2
+                 (Series("inboard", t, 1e6 * data[inboard]), Series("outboard", t, 1e6 * data[outboard])))  # fmt: skip
+    control = machine.control("yo", data.__getitem__)
     yield Figure("step-current", f"Outboard control current during one step ({heaviest})",
                  "Control current of the outboard AMB in the same step; its mean enters the fit.", "time (s)",
                  "control current (A)", (Series("outboard", t, control),),

@@ -12,11 +12,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import Field
 
 from bench.figures import Figure
 from bench.findings import Ended, Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import NOTHING, Load, RigState
@@ -31,11 +30,14 @@ from procedures.amb_calibration import fit as amb_calibration_fit
 from procedures.amb_calibration.estimates import less_sure, turning_point, unresolved_angles
 from procedures.amb_calibration.fit import Fit
 from procedures.amb_calibration.hypotheses import Contradiction
+from procedures.amb_calibration.plan import Plan
 from procedures.amb_calibration.scatter import OUTPUTS, Scatter, covariance_by_angle, covariance_over_a_turn, scatter
-from procedures.amb_calibration.steps import CHANNELS, COILS, HangingData, read_hangings
-from procedures.servomotor.channels import LEVERS
+from procedures.amb_calibration.steps import AXES, VERTICAL, Hang, HangingData, channels, read_hangings
+from procedures.servomotor.conventions import SERVOMOTOR, Servomotor, conventions
+from procedures.servomotor.loads import certified_masses, certified_weighing, check_masses
 from procedures.shared import assumptions
-from procedures.shared.certificates import certified
+from procedures.shared.certificates import certified, certified_sensors
+from procedures.shared.step_table import record_step
 from procedures.shared.weight import weight
 
 K_I = Quantity("K_i", "N/A", "inboard AMB: dF/di at zero control current, mean over a turn")
@@ -46,19 +48,6 @@ KW_I = Quantity("Kw_i", "N/A", "inboard AMB: dF/di at the current that carries t
 KW_O = Quantity("Kw_o", "N/A", "outboard AMB: dF/di at the current that carries the rotor's own weight")
 MEASURES = (K_I, K_O, K2_I, K2_O, KW_I, KW_O)
 CLEAR_A = 0.1  # a change of a control current that is no noise
-
-
-class Plan(BenchPlan):
-    """Settings of the calibration, SI."""
-
-    masses: tuple[str, ...] = Field(("M1", "M2", "M3", "M4"), min_length=4)  # labels of the rig's masses, ascending
-    angles: int = Field(8, ge=8)  # equally spaced over a turn
-    bias_A: float = Field(3.0, gt=0)
-    settle_s: float = Field(2.0, gt=0)
-    average_s: float = Field(1.0, ge=0.1)
-    max_position_m: float = Field(5e-8, gt=0)  # settled: |mean position| and its drift within a step
-    max_drift_A: float = Field(2e-3, gt=0)  # settled: drift of a control current within a step
-    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 
 
 def settings(plan: Plan) -> dict[str, float]:
@@ -82,10 +71,11 @@ def step_count(plan: Plan) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Hang every mass up and down at each angle; the hanger stays on throughout."""
-    before = _controls(rig)
+    machine = conventions(rig.file)
+    before = _controls(rig, machine)
     rig.operator.hang(Load(plan.masses[-1]))  # exercise: the first zero is then reached by unloading, like the others
     rig.clock.sleep(plan.settle_s)
-    changes = {axis: after - before[axis] for axis, after in _controls(rig).items()}
+    changes = {axis: after - before[axis] for axis, after in _controls(rig, machine).items()}
     rig.operator.hang(NOTHING)
     if max(map(abs, changes.values())) > CLEAR_A and any(checks.wiring(**changes)):
         record.event(checks.WIRED_WRONG, changes=changes)  # an hour of hangings would say no more
@@ -96,17 +86,16 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         for k, (load, branch) in enumerate(sequence(plan)):
             hanging = rig.operator.hang(load)
             rig.clock.sleep(plan.settle_s)
-            if turn == k == 0 and (needed := both_coils.at_no_load(rig.levitation.reading, plan.bias_A)):
+            if turn == k == 0 and (needed := both_coils.at_no_load(machine, rig.levitation.reading, plan.bias_A)):
                 record.event(both_coils.ONE_SIDED, needed=needed)
                 return
-            with record.step("hang", angle_rad=angle, load=hanging.label, branch=branch):
+            with record_step(record, Hang(angle, hanging.label, branch)):
                 rig.clock.sleep(plan.average_s)
 
 
-def _controls(rig: Rig) -> dict[str, float]:
+def _controls(rig: Rig, machine: Servomotor) -> dict[str, float]:
     """The control currents by axis as they are now, A."""
-    at = rig.levitation.reading
-    return {axis: (at(f"i_{axis}_p") - at(f"i_{axis}_n")) / 2 for axis in checks.AXES}
+    return {axis: machine.control(axis, rig.levitation.reading) for axis in AXES}
 
 
 @dataclass(frozen=True)
@@ -130,8 +119,8 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """Fit, scatter and estimates with their influences."""
     findings.gate(checks.of_first(recording))
     plan = recording.plan
-    data = read_hangings(recording, plan.masses)
-    findings.gate(checks.of_signals(data, plan), checks.FATAL)
+    data = read_hangings(recording)
+    findings.gate(checks.of_signals(data, conventions(recording.rig), plan), checks.FATAL)
     a = _fitted(recording, data)
     values = {name: e.value for name, e in a.inputs.items()}
     findings.gate(
@@ -193,10 +182,7 @@ def _fitted(recording: Recording[Plan], data: HangingData) -> Analysis:
 def fit_inputs(rig: RigFile, plan: Plan) -> dict[str, Estimate]:
     """What the fit needs besides the recording: certificates of the rig file, each as an influence by identity."""
     g = rig.geometry
-    inputs = {
-        "gravity": certified("site/gravity", rig.site.gravity, "local gravity"),
-        "air_density": certified("site/air_density", rig.site.air_density, "air density (buoyancy)"),
-        "mass_density": certified("masses/density", rig.mass_density, "density of the masses (buoyancy)"),
+    inputs = certified_weighing(rig) | {
         "hook_to_outboard": certified("geometry/hook_to_outboard", g["hook_to_outboard"], "span hook to outboard AMB"),
         "amb_span": certified("geometry/amb_span", g["amb_span"], "span AMB to AMB"),
         "motor_to_outboard": Estimate.exact(g["com_to_motor"].value - g["com_to_outboard_amb"].value),
@@ -206,17 +192,7 @@ def fit_inputs(rig: RigFile, plan: Plan) -> dict[str, Estimate]:
         ),
         "hanger": certified("masses/hanger", rig.hanger, "hanger"),
     }
-    for k, label in enumerate(plan.masses):
-        inputs[f"mass_{k}"] = certified(f"masses/{label}", rig.masses[label], f"mass {label}")
-    for bearing in "io":
-        for coil in "pn":
-            channel = f"i_y{bearing}_{coil}"
-            sensor = rig.sensors[channel]
-            inputs[f"gain_{bearing}{coil}"] = certified(f"sensors/{channel}/gain", sensor.gain, f"gain of {channel}")
-            inputs[f"offset_{bearing}{coil}"] = certified(
-                f"sensors/{channel}/offset", sensor.offset, f"offset of {channel}"
-            )
-    return inputs
+    return inputs | certified_masses(rig, plan.masses) | certified_sensors(rig, conventions(rig).coils_along("y"))
 
 
 def masses_u(recording: Recording[Plan]) -> np.ndarray:
@@ -228,13 +204,7 @@ def masses_u(recording: Recording[Plan]) -> np.ndarray:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    unknown = [m for m in plan.masses if m not in rig.masses]
-    if unknown:
-        yield f"masses: found {', '.join(unknown)}; the rig file certifies {', '.join(rig.masses)}"
-        return
-    kg = [rig.masses[m].value for m in plan.masses]
-    if kg != sorted(kg) or len(set(kg)) != len(kg):
-        yield f"masses: found {kg} kg; expected different masses in ascending order"
+    return check_masses(rig, plan.masses)
 
 
 def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
@@ -255,10 +225,10 @@ procedure = Procedure(
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),
-        channels=CHANNELS,
-        sensors=tuple(c for c in COILS if c.startswith("i_y")),
+        channels=(*channels(SERVOMOTOR), "flags"),
+        sensors=SERVOMOTOR.coils_of(*VERTICAL),
         parameters=("bias_i", "bias_o", "angle_ref"),
-        geometry=("hook_to_outboard", "amb_span", "amb_gap", "com_to_motor", "motor_stiffness", *LEVERS),
+        geometry=("hook_to_outboard", "amb_span", "amb_gap", "com_to_motor", "motor_stiffness", *SERVOMOTOR.levers),
         masses=True,
     ),
     check=check,

@@ -1,100 +1,78 @@
-"""From the recorded steps of a mass-hanging calibration to arrays: step means, drifts, losses and flags."""
+"""From the recorded steps of a mass-hanging calibration to arrays: the hangings, and a table of their steps."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from bench.errors import AnalysisError
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from procedures.amb_calibration.fit import Hangings
-from procedures.shared.step_table import reduced
+from procedures.amb_calibration.plan import Plan
+from procedures.servomotor.conventions import Servomotor, conventions, displacement
+from procedures.servomotor.loads import load_index
+from procedures.shared.step_table import Labels, StepTable, by_angle, tabulate
 
 Array = npt.NDArray[np.float64]
+AXES = ("yi", "yo", "xi", "xo")
+VERTICAL = ("yi", "yo")
 
-COILS = tuple(f"i_{axis}{bearing}_{coil}" for axis in "yx" for bearing in "io" for coil in "pn")
-POSITIONS = ("pos_yi", "pos_yo", "pos_xi", "pos_xo")
-CHANNELS = (*COILS, *POSITIONS, "flags")
+
+def channels(machine: Servomotor) -> tuple[str, ...]:
+    """What is recorded while masses hang, besides the flags."""
+    return (*machine.coils_of(*AXES), *machine.positions_of(*AXES))
+
+
+@dataclass(frozen=True)
+class Hang(Labels):
+    """What hangs ("" for nothing but the hanger), reached by loading (+1) or unloading (-1)."""
+
+    kind: ClassVar[str] = "hang"
+    angle_rad: float
+    load: str
+    branch: int
+
+    def __str__(self) -> str:
+        way = "loading" if self.branch > 0 else "unloading"
+        return f"{np.degrees(self.angle_rad):.0f}°, {self.load or 'no load'}, {way}"
 
 
 @dataclass(frozen=True)
 class HangingData:
-    """`hangings` for the fit, and per channel and step (A, P): `mean`, `drift` (second half less first half of the
-    step), `spread` (standard deviation of the samples); `lost` and `expected` samples; `flags` ORed over the step."""
+    """`hangings` for the fit, and the `table` (A, P) of their steps."""
 
     hangings: Hangings
-    mean: dict[str, Array]
-    drift: dict[str, Array]
-    spread: dict[str, Array]
-    lost: Array
-    expected: Array
-    flags: npt.NDArray[np.int64]
+    table: StepTable[Hang]
     masses: tuple[str, ...]
 
-    def where(self, turn: int, point: int) -> str:
-        """How a step is named to the reader."""
-        load = self.hangings.load[turn, point]
-        label = self.masses[load] if load >= 0 else "no load"
-        way = "loading" if self.hangings.branch[turn, point] > 0 else "unloading"
-        return f"{np.degrees(self.hangings.angles[turn]):.0f}°, {label}, {way}"
 
-
-def read_hangings(recording: Recording[Any], masses: tuple[str, ...]) -> HangingData:
+def read_hangings(recording: Recording[Plan]) -> HangingData:
     """Read every "hang" step, in the order of its angle and time.
 
     Raises:
-        AnalysisError: there are no steps, or an angle lacks some.
+        AnalysisError: there are no steps, an angle lacks some, or what hung is no mass of the plan.
     """
-    groups = [(float(angle), list(steps)) for angle, steps in recording.steps("hang").by("angle_rad")]
-    counts = {len(steps) for _, steps in groups}
-    if len(counts) != 1:
-        raise AnalysisError(
-            f"hangings per angle: found {sorted(counts) or 'none'}; expected the same number at each angle "
-            "(was the run stopped early?)"
-        )
-    read = [[reduced(step.read(*CHANNELS), CHANNELS, step.labels) for step in steps] for _, steps in groups]
-
-    def stack(key: str, channel: str) -> Array:
-        return np.array([[one[key][channel] for one in row] for row in read])
-
-    mean = {c: stack("mean", c) for c in CHANNELS}
-    steps = [s for _, s in groups]
-    labels = {"": -1} | {label: k for k, label in enumerate(masses)}
-    hung = [[str(s.labels["load"]) for s in row] for row in steps]
-    if strange := sorted({label for row in hung for label in row} - set(labels)):
-        raise AnalysisError(
-            f"masses: found {', '.join(strange)} on the hanger; expected those of the plan, {', '.join(masses)}"
-        )
-    load = np.array([[labels[label] for label in row] for row in hung])
-    branch = np.array([[float(s.labels["branch"]) for s in row] for row in steps])
-    currents = np.stack([np.stack([mean[f"i_y{b}_{c}"] for c in "pn"]) for b in "io"])
-    inboard, outboard, motor = _plane_positions(recording.rig, mean["pos_yi"], mean["pos_yo"])
+    machine, masses = conventions(recording.rig), recording.plan.masses
+    steps, shape = by_angle(recording.steps(Hang.kind), "hangings")
+    table = tabulate(steps, Hang, channels(machine), shape=shape)
+    inboard, outboard, motor = _plane_positions(recording.rig, *table.stack(machine.positions_of(*VERTICAL)))
     hangings = Hangings(
-        currents, np.stack([inboard, outboard]), motor, load, branch, np.array([angle for angle, _ in groups])
+        np.stack([table.stack(machine.coils[axis]) for axis in VERTICAL]),
+        np.stack([inboard, outboard]),
+        motor,
+        load_index([hang.load for hang in table.labels], masses, "hanger").reshape(shape),
+        table.each(lambda hang: hang.branch),
+        table.each(lambda hang: hang.angle_rad)[:, 0].copy(),
     )
-    return HangingData(
-        hangings,
-        mean,
-        {c: stack("drift", c) for c in CHANNELS},
-        {c: stack("spread", c) for c in CHANNELS},
-        np.array([[float(s.lost()) for s in row] for row in steps]),
-        np.array([[float(s.expected()) for s in row] for row in steps]),
-        np.array([[one["flags"] for one in row] for row in read]),
-        masses,
-    )
+    return HangingData(hangings, table, masses)
 
 
 def _plane_positions(rig: RigFile, y_inboard: Array, y_outboard: Array) -> tuple[Array, Array, Array]:
     """Displacement at the inboard AMB, the outboard AMB and the motor from both sensor planes (T 6.7)."""
-    g = rig.geometry
-    l_is, l_os = g["com_to_inboard_sensor"].value, g["com_to_outboard_sensor"].value
-
-    def at(zeta: float) -> Array:
-        share = (zeta + l_is) / (l_is + l_os)
-        return y_inboard * (1 - share) + y_outboard * share
-
-    return at(-g["com_to_inboard_amb"].value), at(g["com_to_outboard_amb"].value), at(g["com_to_motor"].value)
+    machine = conventions(rig)
+    inboard, outboard, motor = (rig.geometry[name].value for name in (*machine.ambs, "com_to_motor"))
+    at = [displacement(y_inboard, y_outboard, machine.sensor_share(z, rig)) for z in (-inboard, outboard, motor)]
+    return at[0], at[1], at[2]

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Protocol
 
 import numpy as np
 
 from bench.findings import Effect, Finding
 from bench.uncertainty import coverage_factor
 from procedures.angle_step.estimates import Result
+from procedures.angle_step.plan import Plan
 from procedures.angle_step.response import Loop, kick_A
-from procedures.angle_step.steps import CONTACT, SATURATED, SATURATED_AMB, Case, Done
+from procedures.angle_step.steps import Case, Done
+from procedures.servomotor.conventions import Servomotor
 
 FATAL = ("stuck-channel",)
 SMALL = 0.9  # of the segments' limit: a step whose demand stays below it should not meet it
@@ -20,16 +21,7 @@ CARRIES_A = 4.0  # i_y that the shaft's weight takes at T Table 6.2's force cons
 UNEXPECTED = 2e-3  # s, of saturation; single samples may come from a noisy encoder
 
 
-class Tolerances(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def max_hold_A(self) -> float: ...
-    @property
-    def max_lost(self) -> float: ...
-
-
-def of_signals(moves: Sequence[Done], plan: Tolerances) -> Iterator[Finding]:
+def of_signals(moves: Sequence[Done], machine: Servomotor, plan: Plan) -> Iterator[Finding]:
     """Lost samples, stuck channels, contact, amplifiers at their limits while nothing moves."""
     shares = [d.lost / max(d.expected, 1) for d in moves]
     worst = int(np.argmax(shares))
@@ -45,10 +37,10 @@ def of_signals(moves: Sequence[Done], plan: Tolerances) -> Iterator[Finding]:
             "stuck-channel", f"{channel} does not move at all; a live sensor has noise.", channel, Effect.ERROR
         )
     for bits, of, code, text in (
-        (CONTACT, "flags", "contact", "the rotor touched a touchdown bearing"),
-        (SATURATED_AMB, "flags", "saturated", "an AMB amplifier was at its limit"),
-        (SATURATED, "rest_flags", "saturated-at-rest", "a segment of the motor was at its limit before the step: it carries "
-         "more than it should"),
+        (machine.contact, "flags", "contact", "the rotor touched a touchdown bearing"),
+        (machine.amb_limit, "flags", "saturated", "an AMB amplifier was at its limit"),
+        (machine.segment_limit, "rest_flags", "saturated-at-rest",
+         "a segment of the motor was at its limit before the step: it carries more than it should"),
     ):  # fmt: skip
         hit = [d for d in moves if getattr(d, of) & bits]
         if hit:
@@ -57,7 +49,7 @@ def of_signals(moves: Sequence[Done], plan: Tolerances) -> Iterator[Finding]:
             yield Finding(code, said, hit[0].case.where, Effect.INDETERMINATE, places)
 
 
-def of_responses(results: Mapping[Case, Result], plan: Tolerances, loops: Mapping[Case, Loop]) -> Iterator[Finding]:
+def of_responses(results: Mapping[Case, Result], plan: Plan, loops: Mapping[Case, Loop]) -> Iterator[Finding]:
     """Steps that do not settle, torque at rest, saturation that the step does not explain."""
     for case, result in results.items():
         if not all(math.isfinite(r.settling) for r in result.responses):
@@ -76,7 +68,7 @@ def of_responses(results: Mapping[Case, Result], plan: Tolerances, loops: Mappin
             )  # fmt: skip
 
 
-def _holding(results: Mapping[Case, Result], plan: Tolerances) -> Iterator[Finding]:
+def _holding(results: Mapping[Case, Result], plan: Plan) -> Iterator[Finding]:
     """Torque current while the rotor stands: a levitated rotor needs none but against drag."""
     held = [
         (abs(current), current, case)

@@ -13,7 +13,8 @@ from bench.uncertainty import Estimate, Influence
 from procedures.angle_step import steps
 from procedures.angle_step.response import Response, response
 from procedures.angle_step.steps import Case, Done
-from procedures.shared.certificates import certified
+from procedures.servomotor.conventions import conventions
+from procedures.shared.certificates import certified_gain
 
 
 @dataclass(frozen=True)
@@ -32,8 +33,9 @@ def by_case(moves: list[Done], rig: RigFile, band: float, count_rad: float) -> d
     Raises:
         AnalysisError: a move does not reach its step.
     """
-    share = steps.motor_share(rig)
-    gains = {c: certified(f"sensors/{c}/gain", rig.sensors[c].gain, f"gain of {c}") for c in steps.POSITIONS}
+    machine = conventions(rig)
+    share = machine.sensor_share(rig.geometry["com_to_motor"].value, rig)
+    gains = {axis: certified_gain(rig, channel) for axis, channel in machine.positions.items()}
     period = _period(moves)
     out = {}
     for case, done in steps.by_case(moves).items():
@@ -106,6 +108,6 @@ def _gained(
     for sensor, part in share.items():
         axis = 0 if sensor[0] == "x" else 1
         weight = float(np.mean([peak(x) * towards(x)[axis] ** 2 for x in r]))
-        gain = gains[f"pos_{sensor}"]
+        gain = gains[sensor]
         out = out + (gain - gain.value) * (-weight * part / gain.value)
     return Estimate(out.value, "m", out.sensitivities)

@@ -10,13 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
-
-from pydantic import Field
 
 from bench.figures import Figure
 from bench.findings import Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
@@ -26,9 +23,11 @@ from bench.rigfile import RigFile
 from procedures.angle_step import checks, estimates, response
 from procedures.angle_step import figures as drawn
 from procedures.angle_step.estimates import Result
+from procedures.angle_step.plan import Plan
 from procedures.angle_step.response import Loop
-from procedures.angle_step.steps import CHANNELS, POSITIONS, STEP, Case, Done, cases, read_moves
+from procedures.angle_step.steps import STEP, Case, Done, cases, channels, positions, read_moves
 from procedures.servomotor import carrying, hold, segments, wiring
+from procedures.servomotor.conventions import SERVOMOTOR, conventions
 from procedures.servomotor.direction import of_probe
 from procedures.shared import assumptions
 
@@ -52,27 +51,7 @@ NEEDED = (
     "angle_slew",
     "i_ramp",
 )
-Allocation = Literal["static", "priority"]
 CODES = {"static": 0.0, "priority": 1.0}
-
-
-class Plan(BenchPlan):
-    """Settings of the angle step, SI."""
-
-    steps_rad: tuple[float, ...] = Field((math.radians(2), math.radians(12)), min_length=1)
-    allocations: tuple[Allocation, ...] = Field(("static", "priority"), min_length=1)
-    filters_hz: tuple[float, ...] = Field((200.0,), min_length=1)  # of the angle's derivative
-    repeats: int = Field(3, ge=2)  # each way
-    kp_theta: float = Field(50.0, gt=0)  # A/rad
-    kd_theta: float = Field(0.5, gt=0)  # A s/rad, on the error
-    ki_theta: float = Field(50.0, ge=0)  # A/(rad s)
-    settle_s: float = Field(2.0, gt=0)  # after the motor has taken the shaft
-    standstill_s: float = Field(0.5, ge=0.1)  # before each step
-    record_s: float = Field(1.5, ge=0.6)  # after it
-    band: float = Field(0.02, gt=0)  # of settling, as a share of the step; at least two encoder counts
-    encoder_counts: int = Field(4096, gt=0)  # per turn
-    max_hold_A: float = Field(0.06, gt=0)  # torque current at rest: drag of a levitated rotor needs half of it
-    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 
 
 def settings(_: Plan) -> dict[str, float]:
@@ -128,7 +107,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     findings.gate([*of_probe(recording), *segments.of_nudges(recording)])
     plan, rig = recording.plan, recording.rig
     moves = read_moves(recording)
-    findings.gate(checks.of_signals(moves, plan), checks.FATAL)
+    findings.gate(checks.of_signals(moves, conventions(rig), plan), checks.FATAL)
     by_case = estimates.by_case(moves, rig, plan.band, 2 * math.pi / plan.encoder_counts)
     findings.add(checks.of_responses(by_case, plan, {c: _loop(rig, plan, c) for c in by_case}))
     findings.add(checks.compared(by_case))
@@ -186,8 +165,8 @@ procedure = Procedure(
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),
-        channels=(*CHANNELS, *wiring.CHANNELS),
-        sensors=POSITIONS,
+        channels=(*channels(SERVOMOTOR), *wiring.channels(SERVOMOTOR)),
+        sensors=positions(SERVOMOTOR),
         parameters=(*hold.PARAMETERS, *wiring.PARAMETERS, *NEEDED),
         machine=("polar_inertia",),
     ),

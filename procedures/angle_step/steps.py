@@ -11,16 +11,22 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
-from bench.rigfile import RigFile
 from procedures.angle_step.response import Move
-from procedures.servomotor.segments import SEGMENTS
+from procedures.servomotor.conventions import Servomotor, conventions, displacement
 
 Array = npt.NDArray[np.float64]
 STEP = "move"
-POSITIONS = ("pos_xi", "pos_yi", "pos_xo", "pos_yo")
-CHANNELS = ("angle", *POSITIONS, *SEGMENTS, "flags")
-SATURATED_AMB, SATURATED, CONTACT = 1, 2, 12  # bits of the telemetry signal `flags`
 ANSWER_A = 0.2  # of torque current: well above its noise, a twentieth of the smallest sensible step's
+
+
+def positions(machine: Servomotor) -> tuple[str, ...]:
+    """Where the shaft is, inboard first."""
+    return machine.positions_of("xi", "yi", "xo", "yo")
+
+
+def channels(machine: Servomotor) -> tuple[str, ...]:
+    """What is recorded of a step."""
+    return ("angle", *positions(machine), *machine.segments, "flags")
 
 
 @dataclass(frozen=True)
@@ -50,20 +56,15 @@ class Done:
     expected: int
 
 
-def motor_share(rig: RigFile) -> float:
-    """Share of the outboard reading in the motor plane's position; the inboard one's is the rest (T 6.7)."""
-    g = rig.geometry
-    l_is, l_os = g["com_to_inboard_sensor"].value, g["com_to_outboard_sensor"].value
-    return (g["com_to_motor"].value + l_is) / (l_is + l_os)
-
-
 def read_moves(recording: Recording[Any]) -> list[Done]:
     """Every move, in time order.
 
     Raises:
         AnalysisError: there are none, or one does not show its step.
     """
-    out = [_read(recording, step) for step in recording.steps(STEP)]
+    machine, rig = conventions(recording.rig), recording.rig
+    share = machine.sensor_share(rig.geometry["com_to_motor"].value, rig)
+    out = [_read(recording, step, machine, share) for step in recording.steps(STEP)]
     if not out:
         raise AnalysisError("found no moves; expected those of the plan (was the run stopped early?)")
     return out
@@ -77,8 +78,8 @@ def by_case(moves: list[Done]) -> Mapping[Case, list[Done]]:
     return out
 
 
-def _read(recording: Recording[Any], step: Step) -> Done:
-    data = step.read(*CHANNELS)
+def _read(recording: Recording[Any], step: Step, machine: Servomotor, share: float) -> Done:
+    data = step.read(*channels(machine))
     written = [e["t_ns"] for e in recording.events("parameter")
                if e["name"] == "angle_ref" and step.start_ns <= e["t_ns"] < step.end_ns]  # fmt: skip
     if not written:
@@ -92,20 +93,21 @@ def _read(recording: Recording[Any], step: Step) -> Done:
     flags = data["flags"].astype(np.int64)
     return Done(
         case,
-        _move(data, rest, labels, motor_share(recording.rig)),
+        _move(data, rest, labels, machine, share),
         int(np.bitwise_or.reduce(flags[~rest])),
         int(np.bitwise_or.reduce(flags[rest])),
-        tuple(c for c in (*POSITIONS, *SEGMENTS) if np.ptp(data[c]) == 0),
+        tuple(c for c in (*positions(machine), *machine.segments) if np.ptp(data[c]) == 0),
         step.lost(),
         step.expected(),
     )
 
 
 def _move(
-    data: Mapping[str, npt.NDArray[Any]], rest: npt.NDArray[np.bool_], labels: Mapping[str, Any], share: float
-) -> Move:
+    data: Mapping[str, npt.NDArray[Any]], rest: npt.NDArray[np.bool_], labels: Mapping[str, Any], machine: Servomotor,
+    share: float,
+) -> Move:  # fmt: skip
     step = float(labels["step_rad"])
-    segments = np.array([data[c] for c in SEGMENTS])
+    segments = np.array([data[c] for c in machine.segments])
     torque = segments.mean(axis=0)
     standing = float(torque[rest].mean())
     answers = np.flatnonzero(~rest & (np.abs(torque - standing) > ANSWER_A))
@@ -115,8 +117,8 @@ def _move(
     after = slice(first, None)
     angle = np.unwrap(data["angle"]) - (float(labels["target_rad"]) - step)
     angle -= 2 * np.pi * np.round(angle[rest].mean() / (2 * np.pi))
-    inboard, outboard = (np.array([data[f"pos_x{b}"], data[f"pos_y{b}"]]) for b in "io")
-    motor = inboard * (1 - share) + outboard * share
+    inboard, outboard = (np.array([data[c] for c in machine.positions_of(f"x{b}", f"y{b}")]) for b in "io")
+    motor = displacement(inboard, outboard, share)
     return Move(
         step=step,
         t=(data["t_ns"][after] - data["t_ns"][first]).astype(np.float64) * 1e-9,
@@ -124,7 +126,7 @@ def _move(
         orbit=outboard[:, after],
         motor=motor[:, after],
         segments=segments[:, after],
-        saturated=(data["flags"][after].astype(np.int64) & SATURATED) != 0,
+        saturated=(data["flags"][after].astype(np.int64) & machine.segment_limit) != 0,
         rest_orbit=outboard[:, rest],
         rest_motor=motor[:, rest],
         rest_segments=segments[:, rest],

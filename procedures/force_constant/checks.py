@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from functools import partial
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -17,62 +15,46 @@ from scipy import special
 from bench.findings import Effect, Finding
 from bench.uncertainty import Estimate
 from procedures.force_constant import load_at_rest
-from procedures.force_constant.fit import CROSS, DIRECT, FORCE, SEGMENTS
+from procedures.force_constant.fit import CROSS, DIRECT, FORCE, PAIRS
 from procedures.force_constant.load_at_rest import Cause, Rest
-from procedures.force_constant.steps import COILS, POSITIONS, RampData
-from procedures.force_constant.steps import SEGMENTS as SEGMENT_CHANNELS
+from procedures.force_constant.plan import Plan
+from procedures.force_constant.steps import AXES, AtLevel, RampData
+from procedures.servomotor import checks as servomotor_checks
+from procedures.servomotor.conventions import Servomotor
 from procedures.shared import signals
+from procedures.shared.step_table import StepTable
 
 Array = npt.NDArray[np.float64]
 
 ALONG = {"y": ("alpha_d",), "x": ("alpha_dx",)}  # what is measured along an axis
 FATAL = ("stuck-channel", "segment-sign", "segment-current")
 """Findings after which a fit means nothing and is not attempted."""
-AXES = ("yi", "yo", "xi", "xo")
 FOLLOWS = 0.05  # A per A, share of a level that a segment's current may be off: sensors and amplifiers are within 0.5 %
 EXCHANGED = 0.3  # cross over direct force: 8 % by half a degree of encoder zero, a few per cent by ripple
 CHANCE = 1e-6  # false alarm rate of the tests of the fit
 
 
-class Tolerances(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def max_position_m(self) -> float: ...
-    @property
-    def max_drift_A(self) -> float: ...
-    @property
-    def max_lost(self) -> float: ...
-    @property
-    def max_wander_N(self) -> float: ...
-
-
-def of_signals(data: RampData, plan: Tolerances) -> Iterator[Finding]:
+def of_signals(data: RampData, machine: Servomotor, plan: Plan) -> Iterator[Finding]:
     """Checks that need no fit: losses, stuck channels, saturation, contact, settling, segments that do as commanded."""
-    where = partial(_worst, data)
-    yield from signals.losses(data.lost, data.expected, plan.max_lost, where)
-    yield from signals.stuck(data.spread, (*COILS, *SEGMENT_CHANNELS, *POSITIONS))
-    yield from signals.flagged(data.flags, where)
-    yield from signals.settled(data.mean, data.drift, AXES, plan.max_position_m, plan.max_drift_A, where)
-    yield from _segments(data)
+    table = data.table
+    yield from servomotor_checks.of_signals(table, machine, tuple(table.mean), plan.max_lost)
+    axes = {machine.positions[axis]: machine.coils[axis] for axis in AXES}
+    yield from signals.settled(table.mean, table.drift, axes, plan.max_position_m, plan.max_drift_A, table.where)
+    yield from _segments(table, machine)
 
 
-def _worst(data: RampData, values: Array) -> str:
-    turn, point = np.unravel_index(int(np.argmax(values)), values.shape)
-    return data.where(int(turn), int(point))
-
-
-def _segments(data: RampData) -> Iterator[Finding]:
+def _segments(table: StepTable[AtLevel], machine: Servomotor) -> Iterator[Finding]:
     """Each segment's current follows its command (T 6.9), and no level asks the angle control for torque."""
-    design = np.stack([np.ones_like(data.level_y), data.level_y, data.level_x], axis=-1).reshape(-1, 3)
+    level_y, level_x = table.each(lambda at: at.i_y_A), table.each(lambda at: at.i_x_A)
+    design = np.stack([np.ones_like(level_y), level_y, level_x], axis=-1).reshape(-1, 3)
     solver = np.linalg.pinv(design)[1:]
-    answer = np.array([solver @ data.mean[c].reshape(-1) for c in SEGMENT_CHANNELS])  # (4, 2): per i_y, per i_x
+    answer = np.array([solver @ table.mean[c].reshape(-1) for c in machine.segments])  # (4, 2): per i_y, per i_x
     expected = np.array([[1.0, 0.0], [0.0, -1.0], [-1.0, 0.0], [0.0, 1.0]])
     reversed_ = (answer * expected).sum(axis=1) < -0.5
     if reversed_.sum() == 1:
         k = int(np.argmax(reversed_))
         text = f"the current of segment {k + 1} reads with the opposite sign: check the sign of its sensor."
-        yield Finding("segment-sign", text, f"i_m{k + 1}", Effect.ERROR)
+        yield Finding("segment-sign", text, machine.segments[k], Effect.ERROR)
         return
     torque = answer.mean(axis=0)
     for axis, name in ((0, "i_y"), (1, "i_x")):
@@ -83,7 +65,7 @@ def _segments(data: RampData) -> Iterator[Finding]:
                 f"holding the angle takes {torque[axis]:+.2f} A in every segment per A of {name}, where a pure force takes "
                 f"none: a segment pushes the wrong way. Segment {suspect} carries {answer[suspect - 1, axis]:+.2f} A per A "
                 "by its own sensor; check the sign of its sensor and its wires.",
-                f"i_m{suspect}",
+                machine.segments[suspect - 1],
                 Effect.ERROR,
             )
             return
@@ -94,7 +76,7 @@ def _segments(data: RampData) -> Iterator[Finding]:
             "segment-current",
             f"segment {k + 1} reads {answer[k, 0]:+.2f} A per A of i_y and {answer[k, 1]:+.2f} A per A of i_x; by (6.9) it "
             f"should be {expected[k, 0]:+.0f} and {expected[k, 1]:+.0f}. Check its sensor and its amplifier.",
-            f"i_m{k + 1}",
+            machine.segments[k],
             Effect.ERROR,
         )
 
@@ -106,7 +88,7 @@ def exchanged(axis: str, terms: Array) -> Iterator[Finding]:
     (i_y + i_x)/2, with 1 and 3 it sees -i_y.
     """
     direct, cross = (float(terms[FORCE, :, k].mean()) for k in (DIRECT, CROSS))
-    own = SEGMENTS[axis][0]
+    own = PAIRS[axis][0]
     if abs(cross) > EXCHANGED * abs(direct):
         pairs = "1 and 2, or 3 and 4" if direct * cross < 0 else "1 and 4, or 2 and 3"
         text = (f"along {axis} the other axis' current gives {cross / direct:+.0%} of the force that i_{axis} gives: "
@@ -204,14 +186,14 @@ def _cause(c: Cause) -> str:
     return f"a gain of {which} changed by {c.amounts[0]:+.2%}, or its offset (alpha_d {off})"
 
 
-def wander(axis: str, drift: Array, u: Array, data: RampData, plan: Tolerances) -> Iterator[Finding]:
+def wander(axis: str, drift: Array, u: Array, data: RampData, plan: Plan) -> Iterator[Finding]:
     """Drift of the motor's force by both rows, (2,) N/s with u, over the run: five u and the plan's limit."""
     total = drift * data.duration_s
     significant = (np.abs(total) > plan.max_wander_N) & (np.abs(drift) > 5 * u)
     if not significant.any():
         return
     both = bool(abs(drift[0] - drift[1]) < 5 * math.hypot(*u) + 0.1 * np.abs(drift).max())
-    pair = SEGMENTS[axis][0]
+    pair = PAIRS[axis][0]
     bearing = "outboard" if abs(drift[1]) < 0.2 * abs(drift[0]) else "inboard"
     what = (f"both rows agree, so the motor's force itself drifts: the current sensor of segment {pair[0]} or {pair[1]}"
             if both else f"the rows do not agree, so it is a coil sensor of the {bearing} AMB, axis {axis}")  # fmt: skip

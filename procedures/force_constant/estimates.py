@@ -13,7 +13,8 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate
 from procedures.force_constant import fit as force_constant_fit
 from procedures.force_constant.fit import CROSS, DIRECT, FORCE, MOMENT, Constants, Fit, Ramps
-from procedures.shared.certificates import certified
+from procedures.servomotor.conventions import conventions
+from procedures.shared.certificates import certified, certified_sensors
 
 Array = npt.NDArray[np.float64]
 Facts = Mapping[str, Estimate]
@@ -74,13 +75,10 @@ def rig_inputs(rig: RigFile, axis: str) -> dict[str, Estimate]:
             "geometry/motor_stiffness", g["motor_stiffness"], "motor stiffness (residual pos.)"
         ),
     }
-    channels = {f"{axis}{b}{c}": f"i_{axis}{b}_{c}" for b in "io" for c in "pn"} | {
-        f"m{k}": f"i_m{k}" for k in range(1, 5)
-    }
-    for short, channel in channels.items():
-        sensor = rig.sensors[channel]
-        out[f"gain_{short}"] = certified(f"sensors/{channel}/gain", sensor.gain, f"gain of {channel}")
-        out[f"offset_{short}"] = certified(f"sensors/{channel}/offset", sensor.offset, f"offset of {channel}")
+    machine = conventions(rig)
+    channels = {f"{axis}{place}": coil for place, coil in machine.coils_along(axis).items()}
+    channels |= {f"m{k}": segment for k, segment in enumerate(machine.segments, 1)}
+    out |= certified_sensors(rig, channels)
     if axis == "x":
         for b, name in (("i", "inboard"), ("o", "outboard")):
             stated = rig.machine["amb_asymmetry"]

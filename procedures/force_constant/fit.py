@@ -29,7 +29,7 @@ Sensors = tuple[float, ...]
 TERMS = 5  # constant, direct, cross, branch, time
 DIRECT, CROSS, BRANCH, TIME, BEND = 1, 2, 3, 4, slice(5, 7)
 FORCE, MOMENT = 0, 1
-SEGMENTS = {"y": ((1, 3), (4, 2)), "x": ((4, 2), (1, 3))}
+PAIRS = {"y": ((1, 3), (4, 2)), "x": ((4, 2), (1, 3))}
 """By axis: the two segments whose half difference is the axis' own current, and those of the other axis (T 6.9)."""
 
 
@@ -147,7 +147,7 @@ def _coil_terms(r: Ramps, sensors: Sensors, bias_A: float) -> tuple[Array, Array
 def _motor_currents(r: Ramps, sensors: Sensors) -> tuple[Array, Array]:
     """The axis' own current and the other axis' current (A, P), freed of the segment sensors' offsets and gains."""
     i = {k: (r.segments[k - 1] - sensors[k - 1]) / sensors[k + 3] for k in (1, 2, 3, 4)}
-    own, other = SEGMENTS[r.axis]
+    own, other = PAIRS[r.axis]
     return (i[own[0]] - i[own[1]]) / 2, (i[other[0]] - i[other[1]]) / 2
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Protocol
 
 from bench.procedure.requires import Requires
 from bench.rigfile import RigFile
-from procedures.force_constant.steps import CHANNELS, COILS, SEGMENTS
-from procedures.servomotor.channels import LEVERS
+from procedures.force_constant.plan import Plan
+from procedures.force_constant.steps import AXES, channels
+from procedures.servomotor.conventions import SERVOMOTOR
 
 # What the levels are checked with before anything starts; no result uses these.
 WEIGHT_N, COM_TO_OUTBOARD = 10.2 * 9.81, 0.010  # T Table 6.1
@@ -16,35 +16,24 @@ SLOPE_N_A, SLOPE_BIAS_A, ALPHA_N_A = 74.4, 3.0, 12.1  # T (6.12), Table 6.2
 ROOM = 0.95  # share of the bias that a control current may take: a coil cannot pull with less than no current
 
 
-class Levels(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def levels_A(self) -> tuple[float, ...]: ...
-    @property
-    def bias_A(self) -> float: ...
-    @property
-    def ramp_A_s(self) -> float: ...
-
-
 REQUIRES = Requires(
     roles=("levitation", "rotation"),
-    channels=CHANNELS,
-    sensors=(*COILS, *SEGMENTS),
+    channels=(*channels(SERVOMOTOR), "flags"),
+    sensors=(*SERVOMOTOR.coils_of(*AXES), *SERVOMOTOR.segments),
     parameters=("bias_i", "bias_o", "i_ramp", "i_x", "i_y"),
-    geometry=("amb_span", "motor_to_outboard_amb", "amb_gap", "motor_stiffness", *LEVERS),
+    geometry=("amb_span", "motor_to_outboard_amb", "amb_gap", "motor_stiffness", *SERVOMOTOR.levers),
     machine=("amb_asymmetry", "pole_pairs"),
 )
 
 
-def check(rig: RigFile, plan: Levels) -> Iterable[str]:
+def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
     yield from _levels(plan)
     yield from _ranges(rig, plan)
     yield from _control_currents(rig, plan)
 
 
-def _levels(plan: Levels) -> Iterator[str]:
+def _levels(plan: Plan) -> Iterator[str]:
     levels = plan.levels_A
     if len(levels) < 5:
         yield f"levels_A: found {len(levels)} levels; expected at least five, or curvature cannot be told from scatter"
@@ -54,7 +43,7 @@ def _levels(plan: Levels) -> Iterator[str]:
         yield f"levels_A: found {min(levels):g} to {max(levels):g} A; expected levels of both signs"
 
 
-def _ranges(rig: RigFile, plan: Levels) -> Iterator[str]:
+def _ranges(rig: RigFile, plan: Plan) -> Iterator[str]:
     wanted = [("i_ramp", plan.ramp_A_s, "ramp_A_s")]
     wanted += [(name, x, "levels_A") for name in ("i_y", "i_x") for x in (min(plan.levels_A), max(plan.levels_A))]
     for name, value, key in wanted:
@@ -66,7 +55,7 @@ def _ranges(rig: RigFile, plan: Levels) -> Iterator[str]:
             )
 
 
-def predicted_controls(rig: RigFile, plan: Levels) -> dict[str, float]:
+def predicted_controls(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Greatest control current in A that each AMB is expected to need, by nominal constants and the rotor's weight."""
     span, reach = rig.geometry["amb_span"].value, rig.geometry["motor_to_outboard_amb"].value
     slope = SLOPE_N_A * plan.bias_A / SLOPE_BIAS_A
@@ -75,7 +64,7 @@ def predicted_controls(rig: RigFile, plan: Levels) -> dict[str, float]:
     return {b: max(abs(own[b] + share[b] * ALPHA_N_A * level) for level in plan.levels_A) / slope for b in own}
 
 
-def _control_currents(rig: RigFile, plan: Levels) -> Iterator[str]:
+def _control_currents(rig: RigFile, plan: Plan) -> Iterator[str]:
     limit = min(ROOM * plan.bias_A, rig.envelope.max_current_A - plan.bias_A)
     for bearing, control in predicted_controls(rig, plan).items():
         if control > limit:

@@ -30,6 +30,7 @@ from bench.uncertainty import Estimate, propagate
 from procedures.force_constant import estimates, fit
 from procedures.force_constant.fit import DIRECT, Constants, Ramps
 from procedures.force_constant.steps import planes
+from procedures.servomotor.conventions import conventions
 
 Array = npt.NDArray[np.float64]
 Values = Mapping[str, float]
@@ -88,7 +89,7 @@ def compared(r: Ramps, inputs: Mapping[str, Estimate], facts: Mapping[str, Estim
         rest = hung
     if not rest.beyond.any():
         return rest
-    causes = _sensors(r, values, weight, bias_A, rest) or (_zeros(r, values, rig, weight, bias_A, rest),)
+    causes = _sensors(r, values, rig, weight, bias_A, rest) or (_zeros(r, values, rig, weight, bias_A, rest),)
     return replace(rest, causes=causes)
 
 
@@ -129,7 +130,7 @@ def loads(r: Ramps, p: Values, bias_A: float, off: Array | None = None, *, turni
 
 def _design(r: Ramps, turning: float = 1.0) -> Array:
     """(A, P, 5), by the motor's currents as its sensors read them: so that their zero is the calibration's."""
-    own, other = fit.SEGMENTS[r.axis]
+    own, other = fit.PAIRS[r.axis]
     i = {k: r.segments[k - 1] for k in (1, 2, 3, 4)}
     branch = r.branch * np.where(r.turning > 0, turning, 1.0)
     currents = ((i[own[0]] - i[own[1]]) / 2, (i[other[0]] - i[other[1]]) / 2)
@@ -154,21 +155,20 @@ def _constant(r: Ramps, p: Values, c: Constants, weight: float, bias_A: float) -
     return float(terms @ [weight, 1 - weight])
 
 
-def _sensors(r: Ramps, p: Values, weight: float, bias_A: float, rest: Rest) -> tuple[Cause, ...]:
+def _sensors(r: Ramps, p: Values, rig: RigFile, weight: float, bias_A: float, rest: Rest) -> tuple[Cause, ...]:
     """Every coil's sensor, and all of them, whose change alone leaves neither AMB another load."""
     c = fit.vertical(p, len(r.angles))
     before, alpha = loads(r, p, bias_A), _constant(r, p, c, weight, bias_A)
-    coils = [f"{b}{coil}" for b in "io" for coil in "pn"]
+    coils = conventions(rig).coils_along("y")
     out = []
-    for name, changed in [*((f"i_y{x}", (x,)) for x in coils), (ALL, tuple(coils))]:
+    for name, changed in [*((coil, (place,)) for place, coil in coils.items()), (ALL, tuple(coils))]:
         other = {**p, **{f"gain_y{x}": p[f"gain_y{x}"] * (1 + STEP) for x in changed}}
         slope = (loads(r, other, bias_A) - before) / STEP
         scaled, seen = slope / rest.u, rest.moved / rest.u
         amount = -float(scaled @ seen) / float(scaled @ scaled)
         if np.abs(seen + amount * scaled).max() < FIVE:
             shift = -amount * (_constant(r, other, c, weight, bias_A) - alpha) / STEP
-            named = name if name == ALL else f"{name[:-1]}_{name[-1]}"
-            out.append(Cause((named,), (amount,), shift))
+            out.append(Cause((name,), (amount,), shift))
     return tuple(out)
 
 
@@ -184,4 +184,4 @@ def _zeros(r: Ramps, p: Values, rig: RigFile, weight: float, bias_A: float, rest
         at = displaced(c, off[:2], p["amb_gap"], bias_A)
         effects.append((_constant(r, p, at, weight, bias_A) - alpha) / STEP_M)
     amounts = -np.linalg.solve(np.array(slopes).T, rest.moved)
-    return Cause(("pos_yi", "pos_yo"), tuple(map(float, amounts)), -float(amounts @ effects))
+    return Cause(conventions(rig).positions_of("yi", "yo"), tuple(map(float, amounts)), -float(amounts @ effects))

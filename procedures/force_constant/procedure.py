@@ -14,12 +14,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import Field
 
 from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Effect, Finding, Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
@@ -31,8 +30,11 @@ from procedures.force_constant import figures as drawn
 from procedures.force_constant.estimates import AxisResult
 from procedures.force_constant.fit import TIME
 from procedures.force_constant.fitting import REQUIRES, check
-from procedures.force_constant.steps import STEP, RampData, read_ramps
+from procedures.force_constant.plan import Plan
+from procedures.force_constant.steps import AtLevel, RampData, read_ramps
+from procedures.servomotor.conventions import conventions
 from procedures.shared import assumptions
+from procedures.shared.step_table import record_step
 
 Array = npt.NDArray[np.float64]
 
@@ -40,21 +42,6 @@ CALIBRATION = "amb-calibration"
 ALPHA_D = Quantity("alpha_d", "N/A", "motor: dF_y/di_y at gamma = 0, mean over a turn")
 ALPHA_DX = Quantity("alpha_dx", "N/A", "motor: dF_x/di_x at gamma = 0, mean over a turn, with K_x = K_y of the AMBs")
 MEASURES = (ALPHA_D, ALPHA_DX)
-
-
-class Plan(BenchPlan):
-    """Settings of the measurement, SI."""
-
-    levels_A: tuple[float, ...] = (-3.0, -1.5, 0.0, 1.5, 3.0)  # of i_y and i_x, ascending, of both signs
-    angles: int = Field(9, ge=3)  # equally spaced over a turn; those of the calibration
-    bias_A: float = Field(3.0, gt=0)  # that of the calibration
-    ramp_A_s: float = Field(2.0, gt=0)
-    settle_s: float = Field(2.0, gt=0)  # after each ramp
-    average_s: float = Field(1.0, ge=0.1)
-    max_position_m: float = Field(5e-8, gt=0)  # settled: |mean position| and its drift within a step
-    max_drift_A: float = Field(5e-3, gt=0)  # settled: drift of a control current within a step
-    max_wander_N: float = Field(0.3, gt=0)  # drift of the force at constant current over the whole run
-    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 
 
 def settings(plan: Plan) -> dict[str, float]:
@@ -116,8 +103,8 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         for level in sequence(plan):
             ramp(i_y=level.i_y, i_x=level.i_x)
             rig.clock.sleep(plan.settle_s)
-            with record.step(STEP, angle_rad=angle, i_y_A=level.i_y, i_x_A=level.i_x,
-                             branch_y=level.branch_y, branch_x=level.branch_x):  # fmt: skip
+            labels = AtLevel(angle, level.i_y, level.i_x, level.branch_y, level.branch_x)
+            with record_step(record, labels):
                 rig.clock.sleep(plan.average_s)
         ramp(i_y=0.0, i_x=0.0)
 
@@ -137,7 +124,7 @@ class Analysis:
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """Both axes with their influences."""
     plan, rig, data = recording.plan, recording.rig, read_ramps(recording)
-    signals = list(checks.of_signals(data, plan))
+    signals = list(checks.of_signals(data, conventions(rig), plan))
     findings.gate(signals, checks.FATAL)
     facts = recording.calibration(CALIBRATION).values
     count = len(data.vertical.angles)

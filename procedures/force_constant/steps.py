@@ -1,50 +1,53 @@
-"""From the recorded steps of a force-constant run to arrays: step means, drifts, losses and flags."""
+"""From the recorded steps of a force-constant run to arrays: the ramps of both axes, and a table of their steps."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from bench.errors import AnalysisError
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from procedures.force_constant.fit import Ramps
-from procedures.shared.step_table import reduced
+from procedures.servomotor.conventions import Servomotor, conventions, displacement
+from procedures.shared.step_table import Labels, StepTable, by_angle, tabulate
 
 Array = npt.NDArray[np.float64]
 
-STEP = "level"
-COILS = tuple(f"i_{axis}{bearing}_{coil}" for axis in "yx" for bearing in "io" for coil in "pn")
-SEGMENTS = ("i_m1", "i_m2", "i_m3", "i_m4")
-POSITIONS = ("pos_yi", "pos_yo", "pos_xi", "pos_xo")
-CHANNELS = (*COILS, *SEGMENTS, *POSITIONS, "flags")
+AXES = ("yi", "yo", "xi", "xo")
+
+
+def channels(machine: Servomotor) -> tuple[str, ...]:
+    """What is recorded at a level, besides the flags."""
+    return (*machine.coils_of(*AXES), *machine.segments, *machine.positions_of(*AXES))
+
+
+@dataclass(frozen=True)
+class AtLevel(Labels):
+    """Both currents as commanded, and whether each was reached by raising it (+1) or lowering it (-1)."""
+
+    kind: ClassVar[str] = "level"
+    angle_rad: float
+    i_y_A: float
+    i_x_A: float
+    branch_y: int
+    branch_x: int
+
+    def __str__(self) -> str:
+        return f"{np.degrees(self.angle_rad):.0f}°, i_y {self.i_y_A:+g} A, i_x {self.i_x_A:+g} A"
 
 
 @dataclass(frozen=True)
 class RampData:
-    """`vertical` and `horizontal` for the fits, and per step (A, P): `level_x`, `level_y` A as commanded; by channel
-    `mean`, `drift` (second half less first half of the step) and `spread` (standard deviation of the samples);
-    `lost` and `expected` samples; `flags` ORed over the step. `duration_s` from the first step's start to the last's end."""
+    """`vertical` and `horizontal` for the fits, and the `table` (A, P) of the steps. `duration_s` from the first step's start
+    to the last's end."""
 
     vertical: Ramps
     horizontal: Ramps
-    level_x: Array
-    level_y: Array
-    mean: dict[str, Array]
-    drift: dict[str, Array]
-    spread: dict[str, Array]
-    lost: Array
-    expected: Array
-    flags: npt.NDArray[np.int64]
+    table: StepTable[AtLevel]
     duration_s: float
-
-    def where(self, turn: int, point: int) -> str:
-        """How a step is named to the reader."""
-        angle = np.degrees(self.vertical.angles[turn])
-        return f"{angle:.0f}°, i_y {self.level_y[turn, point]:+g} A, i_x {self.level_x[turn, point]:+g} A"
 
 
 def read_ramps(recording: Recording[Any]) -> RampData:
@@ -53,58 +56,33 @@ def read_ramps(recording: Recording[Any]) -> RampData:
     Raises:
         AnalysisError: there are no steps, or an angle lacks some.
     """
-    groups = [(float(angle), list(steps)) for angle, steps in recording.steps(STEP).by("angle_rad")]
-    counts = {len(steps) for _, steps in groups}
-    if len(counts) != 1:
-        raise AnalysisError(
-            f"steps per angle: found {sorted(counts) or 'none'}; expected the same number at each angle "
-            "(was the run stopped early?)"
-        )
-    steps = [row for _, row in groups]
-    read = [[reduced(step.read(*CHANNELS), CHANNELS, step.labels) for step in row] for row in steps]
+    steps, shape = by_angle(recording.steps(AtLevel.kind), "steps")
+    table = tabulate(steps, AtLevel, channels(conventions(recording.rig)), shape=shape)
+    duration_s = (steps[-1].end_ns - steps[0].start_ns) * 1e-9
+    y = _ramps(table, recording.rig, "y", table.each(lambda at: at.i_y_A), table.each(lambda at: at.branch_y))
+    x = _ramps(table, recording.rig, "x", table.each(lambda at: at.i_x_A), table.each(lambda at: at.branch_x))
+    return RampData(y, x, table, duration_s)
 
-    def label(name: str) -> Array:
-        return np.array([[float(s.labels[name]) for s in row] for row in steps])
 
-    mean, drift, spread = (
-        {c: np.array([[one[kind][c] for one in row] for row in read]) for c in CHANNELS}
-        for kind in ("mean", "drift", "spread")
+def _ramps(table: StepTable[AtLevel], rig: RigFile, axis: str, level: Array, branch: Array) -> Ramps:
+    machine = conventions(rig)
+    bearings = (f"{axis}i", f"{axis}o")
+    begun = (table.start_ns - table.start_ns[0, 0]) * 1e-9
+    return Ramps(
+        axis,
+        np.stack([table.stack(machine.coils[b]) for b in bearings]),
+        table.stack(machine.segments),
+        *planes(rig, *table.stack(machine.positions_of(*bearings))),
+        branch,
+        np.isin(level, (level.min(), level.max())).astype(np.float64),
+        begun - begun.mean(axis=1, keepdims=True),
+        table.each(lambda at: at.angle_rad)[:, 0].copy(),
     )
-    begun = np.array([[(s.start_ns - steps[0][0].start_ns) * 1e-9 for s in row] for row in steps])
-    time = begun - begun.mean(axis=1, keepdims=True)
-    angles = np.array([angle for angle, _ in groups])
-
-    def ramps(axis: str) -> Ramps:
-        level = label(f"i_{axis}_A")
-        branch = label(f"branch_{axis}")
-        return Ramps(
-            axis,
-            np.stack([np.stack([mean[f"i_{axis}{b}_{c}"] for c in "pn"]) for b in "io"]),
-            np.stack([mean[c] for c in SEGMENTS]),
-            *planes(recording.rig, mean[f"pos_{axis}i"], mean[f"pos_{axis}o"]),
-            branch,
-            np.isin(level, (level.min(), level.max())).astype(np.float64),
-            time,
-            angles,
-        )
-
-    return RampData(
-        ramps("y"), ramps("x"), label("i_x_A"), label("i_y_A"), mean, drift, spread,
-        np.array([[float(s.lost()) for s in row] for row in steps]),
-        np.array([[float(s.expected()) for s in row] for row in steps]),
-        np.array([[one["flags"] for one in row] for row in read]),
-        (steps[-1][-1].end_ns - steps[0][0].start_ns) * 1e-9,
-    )  # fmt: skip
 
 
 def planes(rig: RigFile, inboard: Array, outboard: Array) -> tuple[Array, Array]:
     """Displacement at the AMB planes (2, A, P) and at the motor (A, P) from both sensor planes (T 6.7)."""
-    g = rig.geometry
-    l_is, l_os = g["com_to_inboard_sensor"].value, g["com_to_outboard_sensor"].value
-    l_oa = g["com_to_outboard_amb"].value
-
-    def at(zeta: float) -> Array:
-        share = (zeta + l_is) / (l_is + l_os)
-        return inboard * (1 - share) + outboard * share
-
-    return np.stack([at(-g["com_to_inboard_amb"].value), at(l_oa)]), at(l_oa + g["motor_to_outboard_amb"].value)
+    machine = conventions(rig)
+    l_ia, l_oa, on = (rig.geometry[name].value for name in (*machine.ambs, "motor_to_outboard_amb"))
+    at = [displacement(inboard, outboard, machine.sensor_share(z, rig)) for z in (-l_ia, l_oa, l_oa + on)]
+    return np.stack(at[:2]), at[2]

@@ -10,26 +10,29 @@ import numpy as np
 from bench.findings import Effect, Finding
 from procedures.force_coupling.estimates import Analysis
 from procedures.force_coupling.fit import TERMS, CouplingFit
+from procedures.force_coupling.plan import Plan
+from procedures.force_coupling.steps import Phase
 from procedures.servomotor import checks
-from procedures.servomotor.steps import StepMeans
+from procedures.servomotor.conventions import Servomotor
+from procedures.shared.step_table import StepTable
 
 ZERO_RAD = math.radians(2.0)  # four times what a commutation set with care is off
 SURE = 5  # standard uncertainties
 WINDING = 0.1  # segments differ by 1 %
 
 
-def of_fit(data: StepMeans, f: CouplingFit, plan: checks.Tolerances) -> Iterator[Finding]:
+def of_fit(data: StepTable[Phase], f: CouplingFit, plan: Plan) -> Iterator[Finding]:
     """Drift over the sequence and steps off the model."""
     n, terms, u = len(data), f.fit.terms, f.fit.u
     yield from checks.creeping(
-        {"i_x": float(terms[7]), "i_y": float(terms[8])}, {"i_x": float(u[7]), "i_y": float(u[8])}, plan
+        {"i_x": float(terms[7]), "i_y": float(terms[8])}, {"i_x": float(u[7]), "i_y": float(u[8])}, plan.max_creep_A
     )
     residuals = np.hypot(f.fit.residuals[:n], f.fit.residuals[n:])
     span = float(np.hypot(np.ptp(f.i_x), np.ptp(f.i_y)))
-    yield from checks.misfit(data, residuals, span, "currents over gamma", plan)
+    yield from checks.misfit(data, residuals, span, "currents over gamma", plan.max_misfit)
 
 
-def of_results(a: Analysis, pole_pairs: float) -> Iterator[Finding]:
+def of_results(a: Analysis, machine: Servomotor, pole_pairs: float) -> Iterator[Finding]:
     """Signs, a zero far off, unequal windings; and T's own way beside ours."""
     ratio, zero, winding = a.fit.term("r"), a.fit.term("gamma_0"), a.fit.term("a")
     yield from _commutation(a)
@@ -55,9 +58,14 @@ def of_results(a: Analysis, pole_pairs: float) -> Iterator[Finding]:
             "windings-differ",
             f"the x winding gives {winding:.3f} of the y winding's force (within {WINDING:.0%} is expected): a segment "
             "gives no current or counts it wrongly, or segments are exchanged.",
-            "i_m2, i_m4",
+            f"{machine.segments[1]}, {machine.segments[3]}",
             Effect.ERROR,
         )
+    yield from _notes(a, pole_pairs)
+
+
+def _notes(a: Analysis, pole_pairs: float) -> Iterator[Finding]:
+    ratio, zero, winding = a.fit.term("r"), a.fit.term("gamma_0"), a.fit.term("a")
     direct, coupled = (
         f"{a.fit.term(name):+.2%} ± {2 * float(a.fit.fit.u[TERMS.index(name)]):.2%}" for name in ("rho_2", "rho_3")
     )

@@ -10,13 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.recording import Recording
-from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from procedures.force_coupling import fit as force_coupling_fit
 from procedures.force_coupling.fit import CouplingFit, Sweep
-from procedures.servomotor.steps import SEGMENTS, StepMeans
-from procedures.shared.certificates import certified
+from procedures.force_coupling.steps import Phase
+from procedures.servomotor.conventions import conventions
+from procedures.shared.certificates import certified_sensors
 from procedures.shared.gradients import by_inputs, linearised
+from procedures.shared.step_table import StepTable
 from procedures.shared.type_a import scatter
 
 Array = npt.NDArray[np.float64]
@@ -28,7 +29,7 @@ class Analysis:
     same from step to step. `turn`: by how much the force turns for the gamma that was told. `moved` rad: gamma_0 less what
     the force constant's calibration found of it, where it did."""
 
-    data: StepMeans
+    data: StepTable[Phase]
     fit: CouplingFit
     estimates: dict[str, Estimate]
     printed: float
@@ -37,11 +38,13 @@ class Analysis:
     moved: Estimate | None
 
 
-def evaluate(recording: Recording[Any], data: StepMeans, count_rad: float) -> Analysis:
+def evaluate(recording: Recording[Any], data: StepTable[Phase], count_rad: float) -> Analysis:
     """Fit, and the three estimates by name (with `winding`, the x winding's constant over the y winding's)."""
     inputs = fit_inputs(recording)
-    sweep = Sweep(data.stack(SEGMENTS), data.stack(("pos_yi", "pos_yo")), data.stack(("pos_xi", "pos_xo")),
-                  data.labels["gamma_rad"], rotor_angle(data.mean["angle"], count_rad), data.time_s)  # fmt: skip
+    machine = conventions(recording.rig)
+    y, x = (data.stack(machine.positions_of(f"{axis}i", f"{axis}o")) for axis in "yx")
+    sweep = Sweep(data.stack(machine.segments), y, x,
+                  data.each(lambda step: step.gamma_rad), rotor_angle(data.mean["angle"], count_rad), data.time_s)  # fmt: skip
 
     def model(p: dict[str, float]) -> dict[str, float]:
         return outputs(force_coupling_fit.fit_sweep(sweep, p), p)
@@ -126,15 +129,4 @@ def fit_inputs(recording: Recording[Any]) -> dict[str, Estimate]:
         # Refers currents to the sensors' zero, a matter of nanometres: its tolerance does not show.
         "per_metre": Estimate.exact(g["motor_stiffness"].value / alpha_d.value),
     }
-    return inputs | segment_sensors(rig)
-
-
-def segment_sensors(rig: RigFile) -> dict[str, Estimate]:
-    """Gains and offsets of the segments' current sensors."""
-    out = {}
-    for k in range(1, 5):
-        channel = f"i_m{k}"
-        sensor = rig.sensors[channel]
-        out[f"gain_m{k}"] = certified(f"sensors/{channel}/gain", sensor.gain, f"gain of {channel}")
-        out[f"offset_m{k}"] = certified(f"sensors/{channel}/offset", sensor.offset, f"offset of {channel}")
-    return out
+    return inputs | certified_sensors(rig, {f"m{k}": c for k, c in enumerate(conventions(rig).segments, 1)})

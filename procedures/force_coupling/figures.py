@@ -8,14 +8,15 @@ import numpy.typing as npt
 from bench.figures import Figure, Series
 from procedures.force_coupling.estimates import Analysis
 from procedures.force_coupling.fit import currents
-from procedures.servomotor.steps import StepMeans
+from procedures.force_coupling.steps import Phase
+from procedures.shared.step_table import StepTable
 
 Array = npt.NDArray[np.float64]
 
 
-def all_figures(data: StepMeans, a: Analysis, pole_pairs: float) -> list[Figure]:
+def all_figures(data: StepTable[Phase], a: Analysis, pole_pairs: float) -> list[Figure]:
     """In the order of the report."""
-    gamma, up = data.labels["gamma_rad"], data.labels["branch"] > 0
+    gamma, up = data.each(lambda step: step.gamma_rad), data.each(lambda step: step.branch) > 0
     degrees = np.degrees(gamma)
     grid = np.linspace(gamma.min(), gamma.max(), 121)
     x, y = currents(grid, a.fit.fit.terms, pole_pairs)

@@ -27,7 +27,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from procedures.servomotor.segments import radial_currents, sensor_share
+from procedures.servomotor.conventions import displacement, sensor_share
+from procedures.servomotor.segments import radial_currents
 from procedures.shared import leastsquares
 from procedures.shared.leastsquares import Fit
 
@@ -96,8 +97,8 @@ def fit_sweep(s: Sweep, p: Mapping[str, float]) -> CouplingFit:
         AnalysisError: the data do not determine the terms: gamma or the rotor stayed where they were.
     """
     i_x, i_y = radial_currents(s.segments, p)
-    share = sensor_share(p["z_m"], p)
-    pull = p["per_metre"] * np.array([v[0] * (1 - share) + v[1] * share for v in (s.x, s.y)])
+    share = sensor_share(p["z_m"], p["l_is"], p["l_os"])
+    pull = p["per_metre"] * np.array([displacement(v[0], v[1], share) for v in (s.x, s.y)])
     t = s.time_s / max(float(np.ptp(s.time_s)), 1e-9) - 0.5
     none = np.zeros_like(t)
     drift = np.column_stack([np.concatenate([t, none]), np.concatenate([none, t])])

@@ -9,15 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Finding, Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
@@ -28,9 +26,13 @@ from procedures.force_coupling import checks as force_coupling_checks
 from procedures.force_coupling import estimates
 from procedures.force_coupling import figures as drawn
 from procedures.force_coupling.estimates import Analysis
+from procedures.force_coupling.plan import Plan
+from procedures.force_coupling.steps import Phase
 from procedures.servomotor import carrying, checks
-from procedures.servomotor.steps import CHANNELS, POSITIONS, SEGMENTS, StepMeans, read_steps
+from procedures.servomotor.conventions import SERVOMOTOR, Servomotor, conventions, radial_currents
+from procedures.servomotor.steps import POSITIONS, channels, read_steps
 from procedures.shared import assumptions
+from procedures.shared.step_table import StepTable, record_step
 
 RATIO = Quantity(
     "alpha_ratio", "1", "alpha_d/alpha_c, direct over coupled force constant at the home angle", title="α_d/α_c"
@@ -44,20 +46,6 @@ ALPHA_RATIO = 0.85  # T 6.6.3; for predictions before a run, and for nothing tha
 STEADY_RAD = (
     0.7  # electrical: beyond it the motor's force is turned so far from the controller's that levitation is lost
 )
-
-
-class Plan(BenchPlan):
-    """Settings, SI."""
-
-    gamma_rad: tuple[float, ...] = Field(tuple(round(math.radians(d / 2), 9) for d in range(-5, 8)), min_length=5)
-    count_rad: float = Field(2 * math.pi / 4096, gt=0)  # one count of the rotor's encoder
-    settle_s: float = Field(2.0, gt=0)
-    average_s: float = Field(1.0, ge=0.1)
-    max_position_m: float = Field(5e-8, gt=0)  # settled: |mean position|; its drift may be twice that
-    max_drift_A: float = Field(5e-3, gt=0)  # settled: drift of a current within a step
-    max_creep_A: float = Field(2e-3, gt=0)  # drift of i_x, i_y over the sequence
-    max_misfit: float = Field(5e-3, gt=0)  # residual over range
-    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 
 
 def needs(_: Plan) -> tuple[Need, ...]:
@@ -82,7 +70,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         for gamma in gammas:
             rig.levitation.set("gamma", gamma)
             rig.clock.sleep(plan.settle_s)
-            with record.step("phase", gamma_rad=gamma, branch=branch):
+            with record_step(record, Phase(gamma, branch)):
                 rig.clock.sleep(plan.average_s)
     carrying.leave_edge(rig)
     for gamma in (*reversed(carrying.approach(plan.gamma_rad)), 0.0):
@@ -94,10 +82,12 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """The currents over the phase angle with their fit."""
     data = read(recording)
-    findings.gate(_of_signals(data, recording.plan), FATAL)
+    findings.gate(_of_signals(data, conventions(recording.rig), recording.plan), FATAL)
     a = estimates.evaluate(recording, data, recording.plan.count_rad)
     findings.add(force_coupling_checks.of_fit(data, a.fit, recording.plan))
-    findings.add(force_coupling_checks.of_results(a, recording.rig.machine["pole_pairs"].value))
+    findings.add(
+        force_coupling_checks.of_results(a, conventions(recording.rig), recording.rig.machine["pole_pairs"].value)
+    )
     return a
 
 
@@ -107,22 +97,20 @@ def measured(a: Analysis) -> Iterator[Measured]:
         yield quantity.measured(a.estimates[quantity.name])
 
 
-def read(recording: Recording[Plan]) -> StepMeans:
+def read(recording: Recording[Plan]) -> StepTable[Phase]:
     """The steps, in time order."""
-
-    def name(labels: dict[str, Any]) -> str:
-        return f"gamma {math.degrees(labels['gamma_rad']):+.2f}°"
-
-    return read_steps(recording, "phase", ("gamma_rad", "branch"), name)
+    return read_steps(recording, Phase)
 
 
-def _of_signals(data: StepMeans, plan: Plan) -> Iterator[Finding]:
-    yield from checks.of_signals(data, (*SEGMENTS, *POSITIONS), plan)
-    yield from checks.segments(data)
+def _of_signals(data: StepTable[Phase], machine: Servomotor, plan: Plan) -> Iterator[Finding]:
+    positions = machine.positions_of(*POSITIONS)
+    yield from checks.of_signals(data, machine, (*machine.segments, *positions), plan.max_lost)
+    yield from checks.segments(data, machine)
     yield from checks.at_edge(data, plan.count_rad)
-    d = data.drift
-    currents = {"i_y": (d["i_m1"] - d["i_m3"]) / 2, "i_x": (d["i_m4"] - d["i_m2"]) / 2}
-    yield from checks.settled(data, {c: data.mean[c] for c in POSITIONS}, currents, plan)
+    i_x, i_y = radial_currents(*(data.drift[c] for c in machine.segments))
+    yield from checks.settled(
+        data, {c: data.mean[c] for c in positions}, {"i_y": i_y, "i_x": i_x}, plan.max_position_m, plan.max_drift_A
+    )
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
@@ -169,8 +157,8 @@ procedure = Procedure(
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),
-        channels=CHANNELS,
-        sensors=(*SEGMENTS, *POSITIONS),
+        channels=(*channels(SERVOMOTOR), "flags"),
+        sensors=(*SERVOMOTOR.segments, *SERVOMOTOR.positions_of(*POSITIONS)),
         parameters=(*carrying.PARAMETERS, "gamma", "segment_max"),
         geometry=GEOMETRY,
         machine=("pole_pairs",),

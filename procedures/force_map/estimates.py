@@ -24,11 +24,11 @@ from procedures.force_map import fit as force_map_fit
 from procedures.force_map import selection as force_map_selection
 from procedures.force_map.fit import FORCE_TERMS, Identifiability, Points
 from procedures.force_map.selection import Selection
-from procedures.force_map.steps import COILS, POSITIONS, MapData
-from procedures.servomotor.segments import SEGMENTS
+from procedures.force_map.steps import MapData, positions
+from procedures.servomotor.conventions import Servomotor, conventions, displacement, radial_currents, sensor_share
 from procedures.shared import gradients as shared_gradients
 from procedures.shared import leastsquares, type_a
-from procedures.shared.certificates import certified
+from procedures.shared.certificates import certified, certified_gain, certified_sensors
 
 Array = npt.NDArray[np.float64]
 CROSS = "cross"
@@ -62,41 +62,33 @@ def inputs_of(rig: RigFile, facts: Mapping[str, Estimate], angles: int) -> dict[
     for key in ("amb_span", "motor_to_outboard_amb", "amb_gap", "com_to_inboard_sensor", "com_to_outboard_sensor",
                 "com_to_outboard_amb"):  # fmt: skip
         out[key] = certified(f"geometry/{key}", g[key])
-    for channel in (*COILS, *SEGMENTS):
-        sensor = rig.sensors[channel]
-        out[f"gain/{channel}"] = certified(f"sensors/{channel}/gain", sensor.gain, f"gain of {channel}")
-        out[f"offset/{channel}"] = certified(f"sensors/{channel}/offset", sensor.offset, f"offset of {channel}")
-    for channel in POSITIONS:
-        out[f"gain/{channel}"] = certified(f"sensors/{channel}/gain", rig.sensors[channel].gain, f"gain of {channel}")
-    return out
+    machine = conventions(rig)
+    out |= certified_sensors(rig, {channel: channel for channel in (*machine.coils["yi"], *machine.segments)})
+    return out | {f"gain_{channel}": certified_gain(rig, channel) for channel in positions(machine)}
 
 
-def points_of(data: MapData, p: Mapping[str, float], angles: int) -> Points:
+def points_of(data: MapData, machine: Servomotor, p: Mapping[str, float], angles: int) -> Points:
     """Currents and displacements of the motor, freed of the sensors' gains and the segments' offsets."""
-    i1, i2, i3, i4 = ((data.mean[c] - p[f"offset/{c}"]) / p[f"gain/{c}"] for c in SEGMENTS)
-    share = _share(p, p["com_to_outboard_amb"] + p["motor_to_outboard_amb"])
-    x, y = (_at(data, p, axis, share) for axis in "xy")
-    return Points((i4 - i2) / 2, (i1 - i3) / 2, (i1 + i2 + i3 + i4) / 4, x, y, 2 * np.pi * data.angle / angles)
+    i1, i2, i3, i4 = ((data.table.mean[c] - p[f"offset_{c}"]) / p[f"gain_{c}"] for c in machine.segments)
+    z = p["com_to_outboard_amb"] + p["motor_to_outboard_amb"]
+    x, y = (_at(data, machine, p, axis, z) for axis in "xy")
+    return Points(*radial_currents(i1, i2, i3, i4), (i1 + i2 + i3 + i4) / 4, x, y, 2 * np.pi * data.angle / angles)
 
 
-def _share(p: Mapping[str, float], z: float) -> float:
-    """Share of the outboard sensors' reading in the position at z from the centre of mass, outboard positive (T 6.7)."""
-    l_is = p["com_to_inboard_sensor"]
-    return (z + l_is) / (l_is + p["com_to_outboard_sensor"])
+def _at(data: MapData, machine: Servomotor, p: Mapping[str, float], axis: str, z: float) -> Array:
+    """Displacement at plane z, m from the centre of mass, outboard positive."""
+    inboard, outboard = (data.table.mean[c] / p[f"gain_{c}"] for c in machine.positions_of(f"{axis}i", f"{axis}o"))
+    l_is, l_os = (p[name] for name in machine.sensors)
+    return displacement(inboard, outboard, sensor_share(z, l_is, l_os))
 
 
-def _at(data: MapData, p: Mapping[str, float], axis: str, share: float) -> Array:
-    inboard, outboard = (data.mean[f"pos_{axis}{b}"] / p[f"gain/pos_{axis}{b}"] for b in "io")
-    return inboard * (1 - share) + outboard * share
-
-
-def motor_force(data: MapData, p: Mapping[str, float], bias_A: float) -> Array:
+def motor_force(data: MapData, machine: Servomotor, p: Mapping[str, float], bias_A: float) -> Array:
     """Vertical force of the motor on the shaft, (n,) N, but for a constant at each angle and load."""
-    ip, i_n = ((data.mean[c] - p[f"offset/{c}"]) / p[f"gain/{c}"] for c in COILS)
+    ip, i_n = ((data.table.mean[c] - p[f"offset_{c}"]) / p[f"gain_{c}"] for c in machine.coils["yi"])
     count = 1 + int(data.angle.max())
     k, k2 = (np.array([p[f"{name}@{n}"] for n in range(count)])[data.angle] for name in ("K_i", "K2_i"))
     u, v = (ip**2 - i_n**2) / (4 * bias_A), (ip**2 + i_n**2) / 2 - bias_A**2
-    position = _at(data, p, "y", _share(p, p["com_to_outboard_amb"] - p["amb_span"]))
+    position = _at(data, machine, p, "y", p["com_to_outboard_amb"] - p["amb_span"])
     inboard = k * u + k2 * v + k * bias_A / p["amb_gap"] * position
     force: Array = inboard * p["amb_span"] / p["motor_to_outboard_amb"]
     return force
@@ -119,22 +111,24 @@ def design_of(points: Points, poles: int, group: npt.NDArray[np.int64]) -> Array
     return _centred(columns * np.array([SCALE[name] for name in TERMS]), group)
 
 
-def evaluate(data: MapData, inputs: Mapping[str, Estimate], bias_A: float, angles: int, poles: int) -> Result:
+def evaluate(
+    data: MapData, machine: Servomotor, inputs: Mapping[str, Estimate], bias_A: float, angles: int, poles: int
+) -> Result:
     """Terms that can be told, with their influences and the scatter of the fit.
 
     Raises:
         AnalysisError: the points leave no degree of freedom, or tell no term.
     """
     values = {name: e.value for name, e in inputs.items()}
-    points = points_of(data, values, angles)
+    points = points_of(data, machine, values, angles)
     whole = design_of(points, poles, data.group)
     told = force_map_fit.identifiability(_excited(whole, points)[:, None, :], TERMS)
     terms = tuple(n for n in TERMS if n not in told.unidentifiable)
     columns = [TERMS.index(n) for n in terms]
 
     def fitted(p: Mapping[str, float]) -> leastsquares.Fit:
-        design = design_of(points_of(data, p, angles), poles, data.group)[:, columns]
-        return leastsquares.linear(design, _centred(motor_force(data, p, bias_A), data.group))
+        design = design_of(points_of(data, machine, p, angles), poles, data.group)[:, columns]
+        return leastsquares.linear(design, _centred(motor_force(data, machine, p, bias_A), data.group))
 
     def model(p: dict[str, float]) -> dict[str, float]:
         return {n: float(x) * SCALE[n] for n, x in zip(terms, fitted(p).terms, strict=True)}
@@ -148,7 +142,7 @@ def evaluate(data: MapData, inputs: Mapping[str, Estimate], bias_A: float, angle
     gradients = {n: np.eye(len(terms))[k] * SCALE[n] for k, n in enumerate(terms)}
     spread = type_a.scatter(fit, gradients, "map", "scatter of the points")
     sums = {n: _straight(estimates[n], estimates[n] + spread[n]) for n in terms}
-    force = _centred(motor_force(data, values, bias_A), data.group)
+    force = _centred(motor_force(data, machine, values, bias_A), data.group)
     selection = force_map_selection.select(whole[:, None, columns], force[:, None], None, terms)
     return Result(terms, told, sums, force, fit.residuals, selection, points)
 

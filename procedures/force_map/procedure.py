@@ -13,12 +13,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from pydantic import Field
 
 from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Effect, Finding, Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import NOTHING, Load, RigState
@@ -29,11 +28,13 @@ from procedures.force_map import estimates, steps
 from procedures.force_map import figures as force_map_figures
 from procedures.force_map.estimates import CROSS, Result
 from procedures.force_map.fit import ABOUT, UNITS
-from procedures.force_map.steps import CHANNELS, COILS, POSITIONS, STEP, MapData, read_points
+from procedures.force_map.plan import Plan
+from procedures.force_map.steps import AtPoint, MapData, channels, positions, read_points
 from procedures.servomotor import carrying, hold, segments, wiring
+from procedures.servomotor.conventions import SERVOMOTOR, conventions
 from procedures.servomotor.direction import of_probe
-from procedures.servomotor.segments import SEGMENTS
 from procedures.shared import assumptions
+from procedures.shared.step_table import record_step
 
 CALIBRATION = "amb-calibration"
 SHOWN = ("alpha_1", "alpha_2", "alpha_3", "alpha_4", "alpha_5", "alpha_6", "alpha_8", "alpha_9")
@@ -46,24 +47,6 @@ GEOMETRY = ("amb_span", "motor_to_outboard_amb", "amb_gap", "lever_left", "lever
 K_N_A, STIFFNESS_N_M = 74.4, 242.6e3  # T (6.12) and Table 6.2; for predictions before a run
 LEAST_TORQUE_A = 0.2
 EXCHANGED = 0.3  # cross over direct force; half a degree of encoder zero makes 8 %
-
-
-class Plan(BenchPlan):
-    """Settings of the map, SI."""
-
-    current_A: float = Field(2.0, gt=0)  # of i_x and i_y, each way
-    loaded_current_A: float = Field(1.5, gt=0)  # while the lever is loaded
-    offset_m: float = Field(40e-6, gt=0, le=80e-6)  # of the outboard AMB's reference, each way
-    loaded_offset_m: float = Field(30e-6, gt=0, le=80e-6)
-    mass: str = "M3"  # on the lever
-    angles: int = Field(9, ge=3)  # equally spaced over a turn; those of the calibration
-    bias_A: float = Field(3.0, gt=0)  # that of the calibration
-    ramp_A_s: float = Field(2.0, gt=0)
-    settle_s: float = Field(1.0, gt=0)
-    average_s: float = Field(0.5, ge=0.1)
-    max_drift_A: float = Field(5e-3, gt=0)  # of the inboard control current within a point
-    max_residual_N: float = Field(0.5, gt=0)  # of the fit, root mean square
-    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 
 
 @dataclass(frozen=True)
@@ -129,8 +112,8 @@ def _visit(rig: Rig, plan: Plan, record: Recorder, visited: list[Point], turn: i
             rig.levitation.set(name, value)
         rig.clock.sleep(max(abs(point.i_y - now.i_y), abs(point.i_x - now.i_x)) / plan.ramp_A_s + plan.settle_s)
         now = point
-        labels = {"i_y_A": point.i_y, "i_x_A": point.i_x, "y_m": point.y, "x_m": point.x}
-        with record.step(STEP, turn=turn, side=side, load=load.label, **labels):
+        labels = AtPoint(turn, side, load.label, point.i_y, point.i_x, point.y, point.x)
+        with record_step(record, labels):
             rig.clock.sleep(plan.average_s)
 
 
@@ -138,10 +121,11 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> tuple[MapData, R
     """Points and terms."""
     findings.gate([*of_probe(recording), *segments.of_nudges(recording)])
     plan, rig, data = recording.plan, recording.rig, read_points(recording)
-    findings.gate(steps.of_signals(data, plan), ("stuck-channel",))
+    machine = conventions(rig)
+    findings.gate(steps.of_signals(data, machine, plan), ("stuck-channel",))
     inputs = estimates.inputs_of(rig, recording.calibration(CALIBRATION).values, plan.angles)
     poles = 2 * round(rig.machine["pole_pairs"].value)
-    result = estimates.evaluate(data, inputs, plan.bias_A, plan.angles, poles)
+    result = estimates.evaluate(data, machine, inputs, plan.bias_A, plan.angles, poles)
     findings.add(steps.drifts(data, result.force, result.points.i_theta))
     findings.add([*_contradictions(result, plan), *_notes(result)])
     return data, result
@@ -225,8 +209,8 @@ procedure = Procedure(
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),
-        channels=(*CHANNELS, *wiring.CHANNELS),
-        sensors=(*COILS, *SEGMENTS, *POSITIONS),
+        channels=(*channels(SERVOMOTOR), "flags", *wiring.channels(SERVOMOTOR)),
+        sensors=(*SERVOMOTOR.coils["yi"], *SERVOMOTOR.segments, *positions(SERVOMOTOR)),
         parameters=(*hold.PARAMETERS, *wiring.PARAMETERS, *NEEDED),
         geometry=GEOMETRY,
         machine=("pole_pairs",),

@@ -5,24 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
-from bench.recording import Recording
-from procedures.servomotor.segments import SEGMENTS
+from bench.recording import Recording, Step
+from procedures.force_map.plan import Plan
+from procedures.servomotor.conventions import Servomotor, conventions
+from procedures.shared.step_table import Labels, Samples, StepTable, tabulate
 
 Array = npt.NDArray[np.float64]
-STEP = "point"
-COILS = ("i_yi_p", "i_yi_n")
-POSITIONS = ("pos_xi", "pos_yi", "pos_xo", "pos_yo")
-CHANNELS = (*COILS, *POSITIONS, *SEGMENTS, "flags")
-LIMITS = ((1, "saturated", "an AMB amplifier was at its limit"), (2, "saturated", "a segment of the motor was at its limit"),
-          (12, "contact", "the rotor touched a touchdown bearing"))  # fmt: skip
-"""Bits of the telemetry signal `flags`."""
 WANDER_N = (
     0.05  # of the motor's force between two points of an angle at which nothing is set; constants then move by half a U
 )
@@ -30,29 +25,39 @@ SLIP = 0.1  # of the torque current of a load; friction makes 2 %
 SIGNIFICANT = 6.0  # standard uncertainties
 
 
-class Tolerances(Protocol):
-    """The part of a plan that these checks need."""
+def positions(machine: Servomotor) -> tuple[str, ...]:
+    """Where the shaft is, inboard first."""
+    return machine.positions_of("xi", "yi", "xo", "yo")
 
-    @property
-    def max_drift_A(self) -> float: ...
-    @property
-    def max_lost(self) -> float: ...
+
+def channels(machine: Servomotor) -> tuple[str, ...]:
+    """What is recorded at a point, besides the flags."""
+    return (*machine.coils["yi"], *positions(machine), *machine.segments)
+
+
+@dataclass(frozen=True)
+class AtPoint(Labels):
+    """The angle by its index, the load on the lever, and what is set: currents, references of the outboard AMB."""
+
+    kind: ClassVar[str] = "point"
+    turn: int
+    side: str
+    load: str
+    i_y_A: float
+    i_x_A: float
+    y_m: float
+    x_m: float
 
 
 @dataclass(frozen=True)
 class MapData:
-    """Points (n,): index of the calibration's `angle`; `group`, equal where angle and load are; `mean` by channel; and
-    per point the drift of the inboard control current in A, the share of lost samples, flags ORed; `still`: in how many points
-    a channel did not move."""
+    """The `table` (n,) of the points, with the inboard AMB's control current as "control", A. By point: index of the
+    calibration's `angle`; `group`, equal where angle and load are, with the `loads` by group."""
 
+    table: StepTable[AtPoint]
     angle: npt.NDArray[np.int64]
     group: npt.NDArray[np.int64]
     loads: tuple[str, ...]
-    mean: dict[str, Array]
-    drift: Array
-    lost: Array
-    flags: npt.NDArray[np.int64]
-    still: dict[str, int]
 
     def __len__(self) -> int:
         return len(self.angle)
@@ -64,53 +69,48 @@ def read_points(recording: Recording[Any]) -> MapData:
     Raises:
         AnalysisError: there are none, or one holds no samples.
     """
-    steps = list(recording.steps(STEP))
+    steps = list(recording.steps(AtPoint.kind))
     if not steps:
         raise AnalysisError("found no points; expected those of the plan (was the run stopped early?)")
-    names: list[tuple[int, str]] = []
-    rows, flags, drift, group = [], [], [], []
-    still = dict.fromkeys(CHANNELS[:-1], 0)
-    for step in steps:
-        data = step.read(*CHANNELS)
-        half = len(data["flags"]) // 2
-        if half == 0:
+    machine = conventions(recording.rig)
+    read = channels(machine)
+
+    def samples(step: Step) -> Samples:
+        data = step.read(*read, "flags")
+        if len(data["flags"]) < 2:
             raise AnalysisError(f"point {dict(step.labels)}: found no samples")
-        key = (int(step.labels["turn"]), f"{step.labels['side']} {step.labels['load']}".strip())
-        if key not in names:
-            names.append(key)
-        group.append(names.index(key))
-        rows.append([float(data[c].mean()) for c in CHANNELS[:-1]])
-        control = (data["i_yi_p"] - data["i_yi_n"]) / 2
-        drift.append(float(control[half:].mean() - control[:half].mean()))
-        flags.append(int(np.bitwise_or.reduce(data["flags"].astype(np.int64))))
-        for channel in still:
-            still[channel] += int(np.ptp(data[channel]) == 0)
-    table = np.array(rows)
+        return data | {"control": machine.control("yi", data.__getitem__)}
+
+    table = tabulate(steps, AtPoint, (*read, "control"), read=samples)
+    keys = [(point.turn, f"{point.side} {point.load}".strip()) for point in table.labels]
+    groups = list(dict.fromkeys(keys))
     return MapData(
-        np.array([int(s.labels["turn"]) for s in steps]),
-        np.array(group),
-        tuple(load for _, load in names),
-        {c: table[:, k] for k, c in enumerate(CHANNELS[:-1])},
-        np.array(drift),
-        np.array([s.lost() / max(s.expected(), 1) for s in steps]),
-        np.array(flags),
-        still,
+        table,
+        np.array([turn for turn, _ in keys]),
+        np.array([groups.index(key) for key in keys]),
+        tuple(load for _, load in groups),
     )
 
 
-def of_signals(data: MapData, plan: Tolerances) -> Iterator[Finding]:
+def of_signals(data: MapData, machine: Servomotor, plan: Plan) -> Iterator[Finding]:
     """Lost samples, stuck channels, limits, contact, points that had not settled."""
-    if data.lost.max() > plan.max_lost:
-        yield Finding("missing-samples", f"{data.lost.max():.2%} of the samples of a point are missing ({plan.max_lost:.2%} is "
+    table = data.table
+    lost = float((table.lost / np.maximum(table.expected, 1)).max())
+    if lost > plan.max_lost:
+        yield Finding("missing-samples", f"{lost:.2%} of the samples of a point are missing ({plan.max_lost:.2%} is "
                       "allowed). Look at the link: load, cable, gateway.", "", Effect.INDETERMINATE)  # fmt: skip
-    for channel, count in data.still.items():
-        if count:
+    for channel in channels(machine):
+        if count := int((table.ptp[channel] == 0).sum()):
             text = f"{channel} does not move at all in {count} of {len(data)} points; a live sensor has noise."
             yield Finding("stuck-channel", text, channel, Effect.ERROR)
-    for bits, code, text in LIMITS:
-        if hit := int(((data.flags & bits) != 0).sum()):
+    for bits, code, text in (
+        (machine.amb_limit, "saturated", "an AMB amplifier was at its limit"),
+        (machine.segment_limit, "saturated", "a segment of the motor was at its limit"),
+        (machine.contact, "contact", "the rotor touched a touchdown bearing"),
+    ):
+        if hit := int(((table.flags & bits) != 0).sum()):
             yield Finding(code, f"{text} in {hit} of {len(data)} points", "", Effect.INDETERMINATE)
-    worst = float(np.abs(data.drift).max())
+    worst = float(np.abs(table.drift["control"]).max())
     if worst > plan.max_drift_A:
         yield Finding("unsettled", f"the inboard control current drifts by {worst * 1e3:.1f} mA within a point "
                       f"({plan.max_drift_A * 1e3:g} mA allowed): settle longer.", "", Effect.INDETERMINATE)  # fmt: skip

@@ -3,49 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Protocol
 
 import numpy as np
 
 from bench.findings import Effect, Finding
-from bench.rigfile.toleranced import Toleranced
+from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, coverage_factor, welch_satterthwaite
 from procedures.negative_stiffness.fit import AmbFit, MotorFit
+from procedures.negative_stiffness.plan import Plan
 from procedures.servomotor import checks
-from procedures.servomotor.steps import StepMeans
+from procedures.servomotor.conventions import conventions
+from procedures.shared.step_table import Labels, StepTable
 
 ONE_IN_A_THOUSAND = 1.7  # times the 95 % expanded uncertainty
 AMB_N_PER_A = 74.4  # T (6.12); turns a force into a current for a judgement
 COUPLED = 0.25  # cross force over direct force: an encoder zero 0.5 deg off makes 0.08
 
 
-class Tolerances(checks.Tolerances, Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def bias_A(self) -> float: ...
-    @property
-    def bias_high_A(self) -> float: ...
-
-
 def of_fits(
-    motor: StepMeans, ambs: StepMeans, by_motor: MotorFit, by_ambs: AmbFit, plan: Tolerances
+    motor: StepTable[Labels], ambs: StepTable[Labels], by_motor: MotorFit, by_ambs: AmbFit, plan: Plan
 ) -> Iterator[Finding]:
     """Drift, misfit, and an axis that answers the other's displacement."""
     n = len(motor)
     alpha_d = float(by_motor.force[0]) / float(by_motor.i_y[0])
     terms, u = by_motor.fit.terms, by_motor.fit.u
     drift = {"i_y": float(terms[2]) / alpha_d, "i_x": float(terms[5]) / alpha_d}
-    yield from checks.creeping(drift, {"i_y": float(u[2]) / alpha_d, "i_x": float(u[5]) / alpha_d}, plan)
+    yield from checks.creeping(drift, {"i_y": float(u[2]) / alpha_d, "i_x": float(u[5]) / alpha_d}, plan.max_creep_A)
     residuals = np.hypot(by_motor.fit.residuals[:n], by_motor.fit.residuals[n:])
-    yield from checks.misfit(motor, residuals, float(np.ptp(by_motor.force)), "force of the motor", plan)
+    yield from checks.misfit(motor, residuals, float(np.ptp(by_motor.force)), "force of the motor", plan.max_misfit)
     total = float(np.ptp(by_ambs.force))
-    yield from checks.misfit(ambs, by_ambs.fit.residuals, total, "force of the outboard AMB", plan)
+    yield from checks.misfit(ambs, by_ambs.fit.residuals, total, "force of the outboard AMB", plan.max_misfit)
     for k, bias in enumerate((plan.bias_A, plan.bias_high_A)):
         newton_per_A = AMB_N_PER_A * bias / plan.bias_A
         _, branch, creep = (float(x) / newton_per_A for x in by_ambs.fit.terms[2 + 3 * k : 5 + 3 * k])
         u_A = float(by_ambs.fit.u[4 + 3 * k]) / newton_per_A
-        yield from checks.creeping({f"i_yo at {bias:g} A": creep}, {f"i_yo at {bias:g} A": u_A}, plan)
+        yield from checks.creeping({f"i_yo at {bias:g} A": creep}, {f"i_yo at {bias:g} A": u_A}, plan.max_creep_A)
         if abs(branch) > plan.max_creep_A:
             yield Finding(
                 "hysteresis",
@@ -64,7 +56,7 @@ def of_fits(
         )
 
 
-def of_results(estimates: Mapping[str, Estimate], gap: Toleranced) -> Iterator[Finding]:
+def of_results(estimates: Mapping[str, Estimate], rig: RigFile) -> Iterator[Finding]:
     """Signs, the AMB's gap against its drawing, and the two values against each other."""
     for name, way in (("motor", "motor's current"), ("ambs", "AMBs' currents")):
         if estimates[name].value <= 0:
@@ -75,7 +67,7 @@ def of_results(estimates: Mapping[str, Estimate], gap: Toleranced) -> Iterator[F
                 way,
                 Effect.ERROR,
             )
-    yield from _gap(estimates["gap"], gap)
+    yield from _gap(estimates["gap"], rig)
     yield from _disagreement(estimates)
 
 
@@ -84,16 +76,17 @@ def _expanded(e: Estimate) -> float:
     return coverage_factor(welch_satterthwaite(e)) * e.u
 
 
-def _gap(found: Estimate, drawing: Toleranced) -> Iterator[Finding]:
+def _gap(found: Estimate, rig: RigFile) -> Iterator[Finding]:
+    drawing, sensor = rig.geometry["amb_gap"], conventions(rig).positions["yo"]
     off = found.value - drawing.value
     allowed = (drawing.half_width or 3.3 * drawing.standard_uncertainty) + ONE_IN_A_THOUSAND * _expanded(found)
     if abs(off) > allowed:
         yield Finding(
             "gap-inconsistent",
             f"the outboard AMB behaves as if its gap were {found.value * 1e3:.3f} mm; the drawing has "
-            f"{drawing.value * 1e3:.3f} mm ± {allowed * 1e3:.3f} mm with this run's uncertainty. Most likely pos_yo "
+            f"{drawing.value * 1e3:.3f} mm ± {allowed * 1e3:.3f} mm with this run's uncertainty. Most likely {sensor} "
             f"reads {found.value / drawing.value - 1:+.0%} off: then alpha_x' is wrong by as much, in both ways.",
-            "pos_yo",
+            sensor,
             Effect.INDETERMINATE,
         )
 

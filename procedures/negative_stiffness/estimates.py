@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
 
 import numpy as np
 
@@ -12,38 +11,30 @@ from bench.recording import Recording
 from bench.uncertainty import Estimate, Influence
 from procedures.negative_stiffness import fit
 from procedures.negative_stiffness.fit import AmbFit, ByAmbs, ByMotor, MotorFit
-from procedures.servomotor.steps import SEGMENTS, StepMeans
-from procedures.shared.certificates import certified
+from procedures.negative_stiffness.plan import Plan
+from procedures.negative_stiffness.steps import Displaced
+from procedures.servomotor.conventions import Servomotor, conventions
+from procedures.shared.certificates import certified, certified_gain, certified_sensors
 from procedures.shared.gradients import by_inputs
+from procedures.shared.step_table import StepTable
 from procedures.shared.type_a import scatter
-
-COILS = ("i_yo_p", "i_yo_n")
-
-
-class Biases(Protocol):
-    """The part of a plan that tells the two series of the AMBs apart."""
-
-    @property
-    def bias_A(self) -> float: ...
-    @property
-    def bias_high_A(self) -> float: ...
 
 
 @dataclass(frozen=True)
 class Analysis:
     """Everything the measurements, findings and figures are made of."""
 
-    motor: StepMeans
-    ambs: StepMeans
+    motor: StepTable[Displaced]
+    ambs: StepTable[Displaced]
     by_motor: MotorFit
     by_ambs: AmbFit
     estimates: dict[str, Estimate]
 
 
-def evaluate(recording: Recording[Any], motor: StepMeans, ambs: StepMeans) -> Analysis:
+def evaluate(recording: Recording[Plan], motor: StepTable[Displaced], ambs: StepTable[Displaced]) -> Analysis:
     """Both fits with their influences; `estimates` motor, ambs, gap and difference."""
     inputs = fit_inputs(recording)
-    one, two = measured(recording.plan, motor, ambs)
+    one, two = measured(conventions(recording.rig), recording.plan, motor, ambs)
 
     def model(p: dict[str, float]) -> dict[str, float]:
         fitted = fit.by_ambs(two, p)
@@ -64,14 +55,16 @@ def evaluate(recording: Recording[Any], motor: StepMeans, ambs: StepMeans) -> An
     return Analysis(motor, ambs, by_motor, by_ambs, estimates)
 
 
-def measured(plan: Biases, motor: StepMeans, ambs: StepMeans) -> tuple[ByMotor, ByAmbs]:
+def measured(
+    machine: Servomotor, plan: Plan, motor: StepTable[Displaced], ambs: StepTable[Displaced]
+) -> tuple[ByMotor, ByAmbs]:
     """What the estimators get."""
-    y = ("pos_yi", "pos_yo")
-    which = (ambs.labels["bias_A"] != plan.bias_A).astype(np.int64)
-    biases, branch = (plan.bias_A, plan.bias_high_A), ambs.labels["branch"]
+    y, x = machine.positions_of("yi", "yo"), machine.positions_of("xi", "xo")
+    which = (ambs.each(lambda step: step.bias_A) != plan.bias_A).astype(np.int64)
+    biases, branch = (plan.bias_A, plan.bias_high_A), ambs.each(lambda step: step.branch)
     return (
-        ByMotor(motor.stack(SEGMENTS), motor.stack(y), motor.stack(("pos_xi", "pos_xo")), motor.time_s),
-        ByAmbs(ambs.stack(COILS), ambs.stack(y), which, branch, ambs.time_s, biases),
+        ByMotor(motor.stack(machine.segments), motor.stack(y), motor.stack(x), motor.time_s),
+        ByAmbs(ambs.stack(machine.coils["yo"]), ambs.stack(y), which, branch, ambs.time_s, biases),
     )
 
 
@@ -87,7 +80,7 @@ def _turning_point(name: str, shift: float) -> Estimate:
     return Estimate.of(0.0, influence) if shift else Estimate.exact(0.0)
 
 
-def fit_inputs(recording: Recording[Any]) -> dict[str, Estimate]:
+def fit_inputs(recording: Recording[Plan]) -> dict[str, Estimate]:
     """What the fits need besides the steps: calibrations, and certificates of the rig file as influences by identity."""
     rig, g = recording.rig, recording.rig.geometry
     amb, motor = recording.calibration("amb-calibration"), recording.calibration("force-constant")
@@ -102,12 +95,9 @@ def fit_inputs(recording: Recording[Any]) -> dict[str, Estimate]:
                       ("motor_to_outboard", "motor_to_outboard_amb"), ("amb_span", "amb_span")):  # fmt: skip
         inputs[key] = certified(f"geometry/{name}", g[name])
     inputs["amb_gap"] = Estimate.exact(g["amb_gap"].value)  # where the iteration starts, and nothing else
-    for axis in ("yi", "yo", "xi", "xo"):
-        channel = f"pos_{axis}"
-        inputs[f"gain_{axis}"] = certified(f"sensors/{channel}/gain", rig.sensors[channel].gain, f"gain of {channel}")
-    sensors = {f"m{k}": f"i_m{k}" for k in range(1, 5)} | {"op": "i_yo_p", "on": "i_yo_n"}
-    for key, channel in sensors.items():
-        sensor = rig.sensors[channel]
-        inputs[f"gain_{key}"] = certified(f"sensors/{channel}/gain", sensor.gain, f"gain of {channel}")
-        inputs[f"offset_{key}"] = certified(f"sensors/{channel}/offset", sensor.offset, f"offset of {channel}")
-    return inputs
+    machine = conventions(rig)
+    for axis, channel in machine.positions.items():
+        inputs[f"gain_{axis}"] = certified_gain(rig, channel)
+    sensors = {f"m{k}": segment for k, segment in enumerate(machine.segments, 1)}
+    sensors |= dict(zip(("op", "on"), machine.coils["yo"], strict=True))
+    return inputs | certified_sensors(rig, sensors)

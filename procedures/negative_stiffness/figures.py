@@ -3,44 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Protocol
 
 import numpy as np
 
 from bench.figures import Figure, Series
-from procedures.negative_stiffness.fit import AmbFit, MotorFit
-from procedures.servomotor.steps import StepMeans
+from procedures.negative_stiffness.estimates import Analysis
+from procedures.negative_stiffness.plan import Plan
+from procedures.servomotor.conventions import Servomotor
 
 
-class Analysed(Protocol):
-    """The part of an analysis that is drawn."""
-
-    @property
-    def motor(self) -> StepMeans: ...
-    @property
-    def ambs(self) -> StepMeans: ...
-    @property
-    def by_motor(self) -> MotorFit: ...
-    @property
-    def by_ambs(self) -> AmbFit: ...
-
-
-class Biases(Protocol):
-    """The part of a plan that is named in a figure."""
-
-    @property
-    def bias_A(self) -> float: ...
-    @property
-    def bias_high_A(self) -> float: ...
-
-
-def all_figures(a: Analysed, plan: Biases) -> list[Figure]:
+def all_figures(a: Analysis, machine: Servomotor, plan: Plan) -> list[Figure]:
     """In the order of the report."""
-    return [*_motor(a), *_ambs(a, plan)]
+    return [*_motor(a, machine), *_ambs(a, plan)]
 
 
-def _motor(a: Analysed) -> Iterator[Figure]:
-    y, up = 1e6 * a.motor.mean["pos_yo"], a.motor.labels["branch"] > 0
+def _motor(a: Analysis, machine: Servomotor) -> Iterator[Figure]:
+    y, up = 1e6 * a.motor.mean[machine.positions["yo"]], a.motor.each(lambda step: step.branch) > 0
     i, n = a.by_motor.i_y, len(a.motor)
     slope, intercept = np.polyfit(y, i, 1)
     ends = np.array([y.min(), y.max()])
@@ -59,12 +37,12 @@ def _motor(a: Analysed) -> Iterator[Figure]:
                  lines=(("zero", 0.0),))  # fmt: skip
 
 
-def _ambs(a: Analysed, plan: Biases) -> Iterator[Figure]:
+def _ambs(a: Analysis, plan: Plan) -> Iterator[Figure]:
     f = a.by_ambs
     y = 1e6 * f.y_o
     series, left = [], []
     for bias in (plan.bias_A, plan.bias_high_A):
-        use = a.ambs.labels["bias_A"] == bias
+        use = a.ambs.each(lambda step: step.bias_A) == bias
         order = np.argsort(y[use], kind="stable")
         zero = float(np.interp(0.0, y[use][order], f.force[use][order]))
         for force, what in ((f.force[use] - zero, "current alone"), (f.total[use] - zero, "in all")):

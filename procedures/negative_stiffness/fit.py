@@ -26,7 +26,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from procedures.servomotor.segments import radial_currents, sensor_share
+from procedures.servomotor.conventions import displacement, sensor_share
+from procedures.servomotor.segments import radial_currents
 from procedures.shared import leastsquares
 from procedures.shared.leastsquares import Fit
 
@@ -91,8 +92,7 @@ def motor_plane(p: Mapping[str, float]) -> float:
 
 
 def _at(z: float, inboard: Array, outboard: Array, p: Mapping[str, float]) -> Array:
-    share = sensor_share(z, p)
-    return inboard * (1 - share) + outboard * share
+    return displacement(inboard, outboard, sensor_share(z, p["l_is"], p["l_os"]))
 
 
 def by_motor(d: ByMotor, p: Mapping[str, float]) -> MotorFit:
@@ -112,7 +112,7 @@ def by_motor(d: ByMotor, p: Mapping[str, float]) -> MotorFit:
     design = np.concatenate([np.stack(vertical, axis=1), np.stack(horizontal, axis=1)])
     force = p["alpha_d"] * i_y
     fit = leastsquares.linear(design, np.concatenate([force, p["alpha_d"] * p["chi"] * i_x]))
-    share = sensor_share(zm, p)
+    share = sensor_share(zm, p["l_is"], p["l_os"])
     return MotorFit(fit, i_y, force, y_m, float(fit.terms[0]) * share)
 
 
@@ -154,7 +154,7 @@ def by_ambs(d: ByAmbs, p: Mapping[str, float]) -> AmbFit:
     # At the gap of the drawing everything else is linear: a start from which the iteration needs a few steps.
     around = leastsquares.linear(rest, -force(1 / p["amb_gap"])).terms
     fit = leastsquares.nonlinear(model, np.zeros_like(ip), np.insert(around, 1, 1 / p["amb_gap"]), jacobian=jacobian)
-    share = sensor_share(motor_plane(p), p)
+    share = sensor_share(motor_plane(p), p["l_is"], p["l_os"])
     return AmbFit(fit, pull - push, force(fit.terms[1]), y_o, y_m, float(fit.terms[0]) * share, 1 / float(fit.terms[1]))
 
 
@@ -175,7 +175,7 @@ def at_one_bias(d: ByAmbs, p: Mapping[str, float]) -> float:
     current = (d.coils[0, use] - d.coils[1, use]) / 2
     lever = (p["amb_span"] + p["motor_to_outboard"]) / p["amb_span"]
     slope = float(np.polyfit(y_m, p["K_o"] * current, 1)[0])
-    return -slope / lever * sensor_share(motor_plane(p), p)
+    return -slope / lever * sensor_share(motor_plane(p), p["l_is"], p["l_os"])
 
 
 def scaled(fit: Fit) -> float:

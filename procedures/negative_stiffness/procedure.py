@@ -7,16 +7,15 @@ way: the AMBs hold, the motor has no current, and the AMB's own stiffness is tol
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
 
-from pydantic import Field
+import numpy as np
+import numpy.typing as npt
 
 from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Finding, Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
@@ -27,10 +26,15 @@ from bench.rigfile import RigFile
 from procedures.negative_stiffness import checks as negative_stiffness_checks
 from procedures.negative_stiffness import estimates
 from procedures.negative_stiffness import figures as drawn
-from procedures.negative_stiffness.estimates import COILS, Analysis
+from procedures.negative_stiffness.estimates import Analysis
+from procedures.negative_stiffness.plan import Plan
+from procedures.negative_stiffness.steps import Displaced, HeldByAmbs, HeldByMotor
 from procedures.servomotor import carrying, checks
-from procedures.servomotor.steps import CHANNELS, POSITIONS, SEGMENTS, StepMeans, read_steps
+from procedures.servomotor.conventions import SERVOMOTOR, conventions, radial_currents
+from procedures.servomotor.steps import POSITIONS, channels, read_steps
+from procedures.shared.step_table import StepTable, record_step
 
+Array = npt.NDArray[np.float64]
 ALPHA_X = Quantity(
     "alpha_x_prime", "N/m", "negative stiffness at the outboard sensor, from the motor's own current", title="α′_x"
 )
@@ -45,22 +49,6 @@ MARGIN = carrying.MARGIN
 AMB_N_PER_A = 74.4  # T (6.12), K_o; for predictions before a run, and for nothing that is measured
 GEOMETRY = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_inboard_amb", "com_to_outboard_amb", "com_to_motor",
             "motor_to_outboard_amb", "amb_span", "amb_gap", "motor_stiffness")  # fmt: skip
-
-
-class Plan(BenchPlan):
-    """Settings, SI. Levels are displacements of the outboard sensor's plane, the same in both ways."""
-
-    levels_m: tuple[float, ...] = Field(tuple(round(x * 1e-5, 9) for x in range(-4, 5)), min_length=5)
-    bias_A: float = Field(3.0, gt=0)  # that of the AMBs' calibration
-    bias_high_A: float = Field(4.0, gt=0)
-    count_rad: float = Field(2 * math.pi / 4096, gt=0)  # one count of the rotor's encoder
-    settle_s: float = Field(2.0, gt=0)
-    average_s: float = Field(1.0, ge=0.1)
-    max_position_m: float = Field(5e-8, gt=0)  # settled: |mean position - reference|; its drift may be twice that
-    max_drift_A: float = Field(5e-3, gt=0)  # settled: drift of a current within a step
-    max_creep_A: float = Field(2e-3, gt=0)  # drift of i_x, i_y over the sequence
-    max_misfit: float = Field(5e-3, gt=0)  # residual over range
-    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 
 
 def settings(plan: Plan) -> dict[str, float]:
@@ -81,11 +69,11 @@ def step_count(plan: Plan) -> int:
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Displace the outboard end: by the motor, then by the AMBs at both biases. The bias is written at rest."""
     carrying.home(rig)
-    inboard = _share(rig.file, -rig.file.geometry["com_to_inboard_amb"].value)
+    inboard = _amb_shares(rig.file)[0]
     carrying.carry(rig, plan.settle_s)
     carrying.to_edge(rig, 1, plan.count_rad)
     # The inboard AMB's plane goes with the displacement as far as keeps the inboard sensor at zero.
-    _walk(rig, plan, record, "motor", {"ref_ym": 1.0, "ref_yi": inboard}, plan.bias_A)
+    _walk(rig, plan, record, HeldByMotor, {"ref_ym": 1.0, "ref_yi": inboard}, plan.bias_A)
     carrying.leave_edge(rig)
     carrying.give_back(rig, plan.settle_s)
     for bias in (plan.bias_A, plan.bias_high_A):
@@ -96,10 +84,12 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
             transition(rig, RigState.LEVITATED)
             carrying.home(rig)
             rig.clock.sleep(plan.settle_s)
-        _walk(rig, plan, record, "ambs", {"ref_yo": _tilt(rig.file)}, bias)
+        _walk(rig, plan, record, HeldByAmbs, {"ref_yo": _tilt(rig.file)}, bias)
 
 
-def _walk(rig: Rig, plan: Plan, record: Recorder, kind: str, references: Mapping[str, float], bias: float) -> None:
+def _walk(
+    rig: Rig, plan: Plan, record: Recorder, kind: type[Displaced], references: Mapping[str, float], bias: float
+) -> None:
     def go(level: float) -> None:
         for name, factor in references.items():
             rig.levitation.set(name, factor * level)
@@ -109,23 +99,22 @@ def _walk(rig: Rig, plan: Plan, record: Recorder, kind: str, references: Mapping
         go(level)
     for level, branch in carrying.mirrored(plan.levels_m):
         go(level)
-        with record.step(kind, level_m=level, branch=branch, bias_A=bias):
+        with record_step(record, kind(level, branch, bias)):
             rig.clock.sleep(plan.average_s)
     go(0.0)
 
 
-def _share(rig: RigFile, z: float) -> float:
-    """Share of the outboard sensor in the displacement at plane z, as the controller has it (T 6.7)."""
-    near, far = rig.geometry["com_to_inboard_sensor"].value, rig.geometry["com_to_outboard_sensor"].value
-    return (z + near) / (near + far)
+def _amb_shares(rig: RigFile) -> tuple[float, float]:
+    """Share of the outboard sensor in the displacement at the inboard and at the outboard AMB, as the controller has it."""
+    machine = conventions(rig)
+    inboard, outboard = (rig.geometry[name].value for name in machine.ambs)
+    return machine.sensor_share(-inboard, rig), machine.sensor_share(outboard, rig)
 
 
 def _tilt(rig: RigFile) -> float:
     """Displacement of the outboard AMB's plane over that of the outboard sensor's while the inboard AMB's plane stays; the
     inboard sensor, beyond it, goes the other way."""
-    inboard, outboard = (
-        _share(rig, rig.geometry[k].value * s) for k, s in (("com_to_inboard_amb", -1), ("com_to_outboard_amb", 1))
-    )
+    inboard, outboard = _amb_shares(rig)
     return outboard - (1 - outboard) * inboard / (1 - inboard)
 
 
@@ -135,7 +124,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     findings.gate(_of_signals(recording, motor, ambs), checks.FATAL)
     a = estimates.evaluate(recording, motor, ambs)
     findings.add(negative_stiffness_checks.of_fits(a.motor, a.ambs, a.by_motor, a.by_ambs, recording.plan))
-    findings.add(negative_stiffness_checks.of_results(a.estimates, recording.rig.geometry["amb_gap"]))
+    findings.add(negative_stiffness_checks.of_results(a.estimates, recording.rig))
     return a
 
 
@@ -145,31 +134,31 @@ def measured(a: Analysis) -> Iterator[Measured]:
     yield ALPHA_X_AMB.measured(a.estimates["ambs"])
 
 
-def read(recording: Recording[Plan]) -> tuple[StepMeans, StepMeans]:
+def read(recording: Recording[Plan]) -> tuple[StepTable[HeldByMotor], StepTable[HeldByAmbs]]:
     """The steps of both ways."""
-
-    def name(way: str) -> Any:
-        return lambda x: f"{way}, {x['level_m'] * 1e6:+.0f} µm at {x['bias_A']:g} A"
-
-    labels = ("level_m", "branch", "bias_A")
-    return read_steps(recording, "motor", labels, name("motor")), read_steps(recording, "ambs", labels, name("AMBs"))
+    return read_steps(recording, HeldByMotor), read_steps(recording, HeldByAmbs)
 
 
-def _of_signals(recording: Recording[Plan], motor: StepMeans, ambs: StepMeans) -> Iterator[Finding]:
+def _of_signals(
+    recording: Recording[Plan], motor: StepTable[HeldByMotor], ambs: StepTable[HeldByAmbs]
+) -> Iterator[Finding]:
     plan = recording.plan
-    inboard = _share(recording.rig, -recording.rig.geometry["com_to_inboard_amb"].value)
-    ways = ((motor, (*SEGMENTS, *POSITIONS), 0.0), (ambs, (*COILS, *POSITIONS), -inboard / (1 - inboard)))
-    yield from checks.segments(motor)
+    machine, inboard = conventions(recording.rig), _amb_shares(recording.rig)[0]
+    positions = machine.positions_of(*POSITIONS)
+    i_x, i_y = radial_currents(*(motor.drift[c] for c in machine.segments))
+    i_yo = machine.control("yo", ambs.drift.__getitem__)
+    ways = (
+        (motor, machine.segments, 0.0, {"i_y": i_y, "i_x": i_x}),
+        (ambs, machine.coils["yo"], -inboard / (1 - inboard), {"i_yo": i_yo}),
+    )
+    yield from checks.segments(motor, machine)
     yield from checks.at_edge(motor, plan.count_rad)
-    for data, channels, follow in ways:
-        yield from checks.of_signals(data, channels, plan)
-        mean, d, level = data.mean, data.drift, data.labels["level_m"]
-        offsets = {"pos_yo": mean["pos_yo"] - level, "pos_yi": mean["pos_yi"] - follow * level,
-                   "pos_xi": mean["pos_xi"], "pos_xo": mean["pos_xo"]}  # fmt: skip
-        currents = {"i_y": (d["i_m1"] - d["i_m3"]) / 2, "i_x": (d["i_m4"] - d["i_m2"]) / 2}
-        if data is ambs:
-            currents = {"i_yo": (d["i_yo_p"] - d["i_yo_n"]) / 2}
-        yield from checks.settled(data, offsets, currents, plan)
+    for data, currents, follow, drifts in ways:
+        yield from checks.of_signals(data, machine, (*currents, *positions), plan.max_lost)
+        level = data.each(lambda step: step.level_m)
+        references: dict[str, Array | float] = {"yo": level, "yi": follow * level, "xi": 0.0, "xo": 0.0}
+        offsets = {c: data.mean[c] - references[a] for a in references for c in machine.positions_of(a)}
+        yield from checks.settled(data, offsets, drifts, plan.max_position_m, plan.max_drift_A)
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
@@ -196,7 +185,7 @@ def _ranges(rig: RigFile, plan: Plan, furthest: float) -> Iterator[str]:
         if plan.bias_high_A > rig.parameters[name].high:
             yield f"bias_high_A: found {plan.bias_high_A:g} A; {name} goes to {rig.parameters[name].high:g} A"
     g = rig.geometry
-    share = _share(rig, g["com_to_motor"].value)
+    share = conventions(rig).sensor_share(g["com_to_motor"].value, rig)
     pull = g["motor_stiffness"].value * share * furthest
     current, most = (
         (carrying.gravity_share_N(rig) + pull) / carrying.ALPHA_D,
@@ -220,7 +209,7 @@ def _ranges(rig: RigFile, plan: Plan, furthest: float) -> Iterator[str]:
 
 def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
     """Force over displacement with residuals, and the AMB's lines at both biases."""
-    return drawn.all_figures(a, recording.plan)
+    return drawn.all_figures(a, conventions(recording.rig), recording.plan)
 
 
 procedure = Procedure(
@@ -235,8 +224,8 @@ procedure = Procedure(
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),
-        channels=CHANNELS,
-        sensors=(*SEGMENTS, *COILS, *POSITIONS),
+        channels=(*channels(SERVOMOTOR), "flags"),
+        sensors=(*SERVOMOTOR.segments, *SERVOMOTOR.coils["yo"], *SERVOMOTOR.positions_of(*POSITIONS)),
         parameters=(*carrying.PARAMETERS, "ref_yo", "bias_i", "bias_o", "segment_max"),
         geometry=GEOMETRY,
         machine=("pole_pairs",),

@@ -6,14 +6,14 @@ Thresholds are chosen so that a sound rig trips one in fewer than one run in a t
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.findings import Effect, Finding
-from procedures.servomotor.steps import StepMeans
+from procedures.servomotor.conventions import Servomotor
 from procedures.shared import signals
+from procedures.shared.step_table import Labels, StepTable
 
 Array = npt.NDArray[np.float64]
 
@@ -22,33 +22,33 @@ FATAL = ("stuck-channel", "segment-sign")
 UNBALANCED_A = 0.5  # half the sum of opposite segments is the torque current: at rest within 0.1 A
 
 
-class Tolerances(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def max_position_m(self) -> float: ...
-    @property
-    def max_drift_A(self) -> float: ...
-    @property
-    def max_creep_A(self) -> float: ...
-    @property
-    def max_misfit(self) -> float: ...
-    @property
-    def max_lost(self) -> float: ...
-
-
-def of_signals(data: StepMeans, channels: Sequence[str], plan: Tolerances) -> Iterator[Finding]:
+def of_signals(
+    data: StepTable[Labels], machine: Servomotor, channels: Sequence[str], max_lost: float
+) -> Iterator[Finding]:  # fmt: skip
     """Lost samples, stuck channels, saturation and contact."""
-    yield from signals.losses(data.lost, data.expected, plan.max_lost, data.where)
+    yield from signals.losses(data.lost, data.expected, max_lost, data.where)
     yield from signals.stuck(data.spread, channels)
-    yield from signals.flagged(data.flags, data.where)
+    yield from signals.flagged(data.flags, limits(machine), data.where)
 
 
-def segments(data: StepMeans) -> Iterator[Finding]:
+def limits(machine: Servomotor) -> tuple[signals.Meaning, ...]:
+    """Flags that stand for a limit that was reached, with what they are called."""
+    return (
+        (machine.amb_limit, "saturated", "an AMB amplifier was at its limit"),
+        (machine.segment_limit, "saturated", "a motor segment was at its limit"),
+        (machine.contact_inboard, "contact", "the rotor touched the inboard touchdown bearing"),
+        (machine.contact_outboard, "contact", "the rotor touched the outboard touchdown bearing"),
+    )
+
+
+def segments(data: StepTable[Labels], machine: Servomotor) -> Iterator[Finding]:
     """Signs of the segments' currents while the motor carries: opposite ones carry opposite currents (T 6.9; at rest there is
     hardly a torque current), and segment 1 a positive one, because it lifts."""
-    one, two, three, four = (float(data.mean[f"i_m{k}"].mean()) for k in range(1, 5))
-    for a, b, name_a, name_b, lifts in ((one, three, "i_m1", "i_m3", True), (four, two, "i_m4", "i_m2", False)):
+    names = machine.segments
+    one, two, three, four = (float(data.mean[c].mean()) for c in names)
+    for a, b, name_a, name_b, lifts in (
+        (one, three, names[0], names[2], True), (four, two, names[3], names[1], False)
+    ):  # fmt: skip
         if abs(a + b) / 2 > UNBALANCED_A:
             suspect = f"{name_a} or {name_b}" if not lifts else name_a if a < 0 else name_b
             yield Finding(
@@ -61,14 +61,14 @@ def segments(data: StepMeans) -> Iterator[Finding]:
     if one < 0 < three:
         yield Finding(
             "segment-sign",
-            f"i_m1 reads {one:+.2f} A and i_m3 {three:+.2f} A: the motor pushes down while it lifts. Both sensors have the "
-            "wrong sign, or the segments are exchanged.",
-            "i_m1, i_m3",
+            f"{names[0]} reads {one:+.2f} A and {names[2]} {three:+.2f} A: the motor pushes down while it lifts. Both sensors "
+            "have the wrong sign, or the segments are exchanged.",
+            f"{names[0]}, {names[2]}",
             Effect.ERROR,
         )
 
 
-def at_edge(data: StepMeans, count_rad: float) -> Iterator[Finding]:
+def at_edge(data: StepTable[Labels], count_rad: float) -> Iterator[Finding]:
     """The rotor at the edges it was sent to: its encoder reads now one count and now the other.
 
     A reading that is 0 or one count c, the latter with probability p, has the mean p c and the variance p (1 - p) c^2: from
@@ -89,7 +89,11 @@ def at_edge(data: StepMeans, count_rad: float) -> Iterator[Finding]:
 
 
 def settled(
-    data: StepMeans, offsets: Mapping[str, Array], drifts: Mapping[str, Array], plan: Tolerances
+    data: StepTable[Labels],
+    offsets: Mapping[str, Array],
+    drifts: Mapping[str, Array],
+    max_position_m: float,
+    max_drift_A: float,
 ) -> Iterator[Finding]:
     """Settled means where the reference is and standing still. `offsets` (N,) m are mean positions less their
     references, `drifts` (N,) A the drift of each control current within the step, by name.
@@ -99,9 +103,9 @@ def settled(
     """
     moving = {c: np.abs(data.drift[c]) for c in offsets}
     for values, limit, what, unit, scale in (
-        (offsets, plan.max_position_m, "mean position off its reference", "µm", 1e6),
-        (moving, 2 * plan.max_position_m, "drift of the position", "µm", 1e6),
-        (drifts, plan.max_drift_A, "drift of the current", "mA", 1e3),
+        (offsets, max_position_m, "mean position off its reference", "µm", 1e6),
+        (moving, 2 * max_position_m, "drift of the position", "µm", 1e6),
+        (drifts, max_drift_A, "drift of the current", "mA", 1e3),
     ):
         name = max(values, key=lambda c, v=values: float(np.abs(v[c]).max()))
         worst = np.abs(values[name])
@@ -115,7 +119,7 @@ def settled(
             )
 
 
-def creeping(drift_A: Mapping[str, float], u_A: Mapping[str, float], plan: Tolerances) -> Iterator[Finding]:
+def creeping(drift_A: Mapping[str, float], u_A: Mapping[str, float], max_creep_A: float) -> Iterator[Finding]:
     """Currents that change over the sequence at equal positions: more than `max_creep_A` and five standard uncertainties.
 
     `drift_A` is what a current, i_x, i_y or that of an AMB, changes by from the first step to the last. The amplifiers
@@ -123,24 +127,24 @@ def creeping(drift_A: Mapping[str, float], u_A: Mapping[str, float], plan: Toler
     """
     pairs = {"i_x": "segments 2 and 4", "i_y": "segments 1 and 3"}
     for name, change in drift_A.items():
-        if abs(change) > max(plan.max_creep_A, 5 * u_A[name]):
+        if abs(change) > max(max_creep_A, 5 * u_A[name]):
             yield Finding(
                 "drifting-sensor",
                 f"{name} changes by {change * 1e3:+.2f} mA over the sequence with the shaft where it was "
-                f"({plan.max_creep_A * 1e3:.2f} mA allowed): a current sensor of {pairs.get(name, 'that AMB')} drifts, or the "
+                f"({max_creep_A * 1e3:.2f} mA allowed): a current sensor of {pairs.get(name, 'that AMB')} drifts, or the "
                 "load does. The sequence is mirrored, so that a steady drift does not reach the result; an unsteady one does.",
                 name,
                 Effect.INDETERMINATE,
             )
 
 
-def misfit(data: StepMeans, residuals: Array, span: float, what: str, plan: Tolerances) -> Iterator[Finding]:
+def misfit(data: StepTable[Labels], residuals: Array, span: float, what: str, max_misfit: float) -> Iterator[Finding]:
     """Residuals (N,) beyond `max_misfit` of the range `span`, both in one unit: the model does not describe the machine."""
     worst = np.abs(residuals)
-    if worst.max() > plan.max_misfit * span:
+    if worst.max() > max_misfit * span:
         yield Finding(
             "misfit",
-            f"{what}: one step is {worst.max() / span:.2%} of the range off the model ({plan.max_misfit:.2%} allowed). "
+            f"{what}: one step is {worst.max() / span:.2%} of the range off the model ({max_misfit:.2%} allowed). "
             "A reading that is not proportional, a step that was disturbed, or a machine that the model does not describe.",
             data.where(worst),
             Effect.INDETERMINATE,

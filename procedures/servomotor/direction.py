@@ -10,8 +10,8 @@ import numpy as np
 
 from bench.findings import Effect, Finding
 from bench.recording import Recording, Step
+from procedures.servomotor.conventions import Servomotor, conventions
 
-SEGMENTS = ("i_m1", "i_m2", "i_m3", "i_m4")
 MOVED_RAD = 0.03
 
 
@@ -31,7 +31,8 @@ def of_probe(recording: Recording[Any]) -> Iterator[Finding]:
     The first movement decides: a loop on a backward encoder runs to where the motor's torque changes its sign, and what it
     does from there tells nothing.
     """
-    found = [m for step in recording.steps("probe") if (m := _movement(step)) is not None]
+    machine = conventions(recording.rig)
+    found = [m for step in recording.steps("probe") if (m := _movement(step, machine)) is not None]
     if not found:
         return
     moved = next((m for m in found if m.turned >= MOVED_RAD), None)
@@ -52,11 +53,11 @@ def of_probe(recording: Recording[Any]) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def _movement(step: Step) -> Movement | None:
-    data = step.read("angle", *SEGMENTS)
+def _movement(step: Step, machine: Servomotor) -> Movement | None:
+    data = step.read("angle", *machine.segments)
     angle = np.unwrap(data["angle"])
     if len(angle) < 20:
         return None
-    current = np.mean([data[c] for c in SEGMENTS], axis=0)
+    current = np.mean([data[c] for c in machine.segments], axis=0)
     work = float(((current[1:] + current[:-1]) / 2 * np.diff(angle)).sum())
     return Movement(float(np.ptp(angle)), float(np.abs(current).max()), work)

@@ -10,10 +10,10 @@ import numpy.typing as npt
 
 from bench.findings import Effect, Finding
 from bench.recording import Recording
+from procedures.servomotor.conventions import Servomotor, conventions
+from procedures.servomotor.conventions import radial_currents as of_segments
 
 Array = npt.NDArray[np.float64]
-SEGMENTS = ("i_m1", "i_m2", "i_m3", "i_m4")
-OUTBOARD = ("i_xo_p", "i_xo_n", "i_yo_p", "i_yo_n")
 FATAL = ("segments-exchanged", "segment-sign", "no-push")
 """Findings after which nothing else is measured."""
 EXPECTED = {"i_y": np.array([1.0, 0.0, -1.0, 0.0]), "i_x": np.array([0.0, -1.0, 0.0, 1.0])}  # (6.9), per A
@@ -23,21 +23,22 @@ LEAST, CROSS = 0.05, 0.3  # A of the outboard AMB per A; cross over own: half a 
 
 def of_nudges(recording: Recording[Any]) -> Iterator[Finding]:
     """Segment by segment by their own sensors, then by the force that the outboard AMB feels."""
-    means = {}
+    machine, means = conventions(recording.rig), {}
+    channels = (*machine.segments, *machine.coils_of("xo", "yo"))
     for step in recording.steps("nudge"):
-        data = step.read(*SEGMENTS, *OUTBOARD)
+        data = step.read(*channels)
         i_x, i_y = float(step.labels["i_x_A"]), float(step.labels["i_y_A"])
-        means[(bool(i_x), bool(i_y))] = (max(i_x, i_y), np.array([data[c].mean() for c in (*SEGMENTS, *OUTBOARD)]))
+        means[(bool(i_x), bool(i_y))] = (max(i_x, i_y), np.array([data[c].mean() for c in channels]))
     if len(means) < 3:
         return
     rest = means[(False, False)][1]
     answers = {name: (means[key][1] - rest) / means[key][0]
                for name, key in (("i_y", (False, True)), ("i_x", (True, False)))}  # fmt: skip
-    found = list(_segments(answers))
+    found = list(_segments(answers, machine))
     yield from found or _pushes(answers)
 
 
-def _segments(answers: dict[str, Array]) -> Iterator[Finding]:
+def _segments(answers: dict[str, Array], machine: Servomotor) -> Iterator[Finding]:
     for name, answer in answers.items():
         error = answer[:4] - EXPECTED[name]
         if np.abs(error).max() <= OFF:
@@ -48,7 +49,7 @@ def _segments(answers: dict[str, Array]) -> Iterator[Finding]:
             f"with 1 A of {name}, segment {k + 1} reads {answer[k]:+.2f} A where (6.9) gives {EXPECTED[name][k]:+.0f} A: its "
             "current sensor is connected the wrong way round or to another segment, or a force of this axis gives torque "
             "that the angle's control works against.",
-            SEGMENTS[k], Effect.ERROR,
+            machine.segments[k], Effect.ERROR,
         )  # fmt: skip
         return
 
@@ -80,12 +81,6 @@ def _pushes(answers: dict[str, Array]) -> Iterator[Finding]:
             )  # fmt: skip
 
 
-def sensor_share(z: float, p: Mapping[str, float]) -> float:
-    """Share of the outboard sensor in the displacement at plane z, m from the centre of mass (T 6.7)."""
-    return (z + p["l_is"]) / (p["l_is"] + p["l_os"])
-
-
 def radial_currents(segments: Array, p: Mapping[str, float]) -> tuple[Array, Array]:
     """i_x, i_y (N,) A by T (6.18), freed of the sensors' gains and offsets."""
-    one, two, three, four = ((segments[k] - p[f"offset_m{k + 1}"]) / p[f"gain_m{k + 1}"] for k in range(4))
-    return (four - two) / 2, (one - three) / 2
+    return of_segments(*((segments[k] - p[f"offset_m{k + 1}"]) / p[f"gain_m{k + 1}"] for k in range(4)))

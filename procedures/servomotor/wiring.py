@@ -11,9 +11,9 @@ import math
 from bench.procedure.rig import Rig
 from bench.recording.recorder import Recorder
 from procedures.servomotor import hold
+from procedures.servomotor.conventions import Servomotor, conventions
 
 PARAMETERS = ("i_x", "i_y")
-CHANNELS = ("angle", "i_xo_p", "i_xo_n", "i_yo_p", "i_yo_n")
 NUDGE_A, NUDGE_S = 1.0, 0.3
 TURN_RAD, TURN_S = 0.2, 0.12  # a third of a swing at that gain: it is still on its way
 LEAST_RAD, LEAST_A = (
@@ -21,6 +21,11 @@ LEAST_RAD, LEAST_A = (
     0.05,
 )  # what the analysis calls turned; a sixth of what a sound motor does to the outboard AMB
 STEPS = 4  # that `sound` records
+
+
+def channels(machine: Servomotor) -> tuple[str, ...]:
+    """What the checks read."""
+    return ("angle", *machine.coils_of("xo", "yo"))
 
 
 def sound(rig: Rig, record: Recorder) -> bool:
@@ -64,8 +69,8 @@ def _nudged(rig: Rig, record: Recorder, i_x: float, i_y: float) -> tuple[float, 
     rig.clock.sleep(_ramp_s(rig) + NUDGE_S)
     with record.step("nudge", i_x_A=i_x, i_y_A=i_y):
         rig.clock.sleep(NUDGE_S)
-    at = rig.levitation.reading
-    return (at("i_xo_p") - at("i_xo_n")) / 2, (at("i_yo_p") - at("i_yo_n")) / 2
+    machine, at = conventions(rig.file), rig.levitation.reading
+    return machine.control("xo", at), machine.control("yo", at)
 
 
 def _ramp_s(rig: Rig) -> float:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import Estimate, Influence
 
@@ -26,3 +29,19 @@ def certified(identity: str, t: Toleranced, name: str = "") -> Estimate:
         source=t.source,
     )
     return Estimate.of(t.value, influence)
+
+
+def certified_gain(rig: RigFile, channel: str) -> Estimate:
+    """Gain of a channel's sensor."""
+    return certified(f"sensors/{channel}/gain", rig.sensors[channel].gain, f"gain of {channel}")
+
+
+def certified_sensors(rig: RigFile, channels: Mapping[str, str]) -> dict[str, Estimate]:
+    """`gain_<key>` and `offset_<key>` of each of the channels' sensors, by key."""
+    out = {}
+    for key, channel in channels.items():
+        out[f"gain_{key}"] = certified_gain(rig, channel)
+        out[f"offset_{key}"] = certified(
+            f"sensors/{channel}/offset", rig.sensors[channel].offset, f"offset of {channel}"
+        )
+    return out

@@ -14,15 +14,9 @@ from bench.findings import Effect, Finding
 
 Array = npt.NDArray[np.float64]
 Where = Callable[[Array], str]
+Meaning = tuple[int, str, str]
+"""Bits of a flag, the code of the finding and what it says."""
 SAME_M = 1.5e-8  # apart, and positions are still the same: one and a half of their digits on the bus
-
-FLAGS = (
-    (1, "saturated", "an AMB amplifier was at its limit"),
-    (2, "saturated", "a motor segment was at its limit"),
-    (4, "contact", "the rotor touched the inboard touchdown bearing"),
-    (8, "contact", "the rotor touched the outboard touchdown bearing"),
-)
-"""Bits of the telemetry signal `flags` on the TSBS rig."""
 
 
 def losses(lost: Array, expected: Array, allowed: float, where: Where) -> Iterator[Finding]:
@@ -51,28 +45,28 @@ def stuck(spread: Mapping[str, Array], channels: Sequence[str]) -> Iterator[Find
             )
 
 
-def flagged(flags: npt.NDArray[np.int64], where: Where) -> Iterator[Finding]:
+def flagged(flags: npt.NDArray[np.int64], meanings: Iterable[Meaning], where: Where) -> Iterator[Finding]:
     """Saturation and contact, as the controller reported them."""
-    for bit, code, text in FLAGS:
-        hit = (flags & bit) != 0
+    for bits, code, text in meanings:
+        hit = (flags & bits) != 0
         if hit.any():
             yield Finding(code, f"{text} in {int(hit.sum())} of {hit.size} steps", where(hit.astype(float)),
                           Effect.INDETERMINATE)  # fmt: skip
 
 
 def settled(
-    mean: Mapping[str, Array], drift: Mapping[str, Array], axes: Sequence[str],
+    mean: Mapping[str, Array], drift: Mapping[str, Array], axes: Mapping[str, tuple[str, str]],
     max_position_m: float, max_drift_A: float, where: Where,
 ) -> Iterator[Finding]:  # fmt: skip
-    """Settled means at the sensors' zero and standing still, on position and on control current, on each of `axes`
-    (such as "yi").
+    """Settled means at the sensors' zero and standing still, on position and on control current. `axes`: by the position's
+    channel those of both coils.
 
     The drift allowed in position is twice the mean allowed, because the noise of a difference of half means is twice
     that of the mean.
     """
-    position = np.max([np.abs(mean[f"pos_{a}"]) for a in axes], axis=0)
-    moving = np.max([np.abs(drift[f"pos_{a}"]) for a in axes], axis=0)
-    current = np.max([np.abs(drift[f"i_{a}_p"] - drift[f"i_{a}_n"]) / 2 for a in axes], axis=0)
+    position = np.max([np.abs(mean[c]) for c in axes], axis=0)
+    moving = np.max([np.abs(drift[c]) for c in axes], axis=0)
+    current = np.max([np.abs(drift[p] - drift[n]) / 2 for p, n in axes.values()], axis=0)
     for values, limit, what, unit, scale in (
         (position, max_position_m, "mean position", "µm", 1e6),
         (moving, 2 * max_position_m, "drift of the position", "µm", 1e6),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -13,9 +12,10 @@ import numpy.typing as npt
 from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.uncertainty import Estimate, Influence
-from procedures.servomotor.segments import SEGMENTS
-from procedures.shared.certificates import certified
+from procedures.servomotor.conventions import conventions
+from procedures.shared.certificates import certified_gain
 from procedures.slew.fit import Gains, Passes, Swing, Tracking, answered, passes, starts, tracking
+from procedures.slew.plan import Plan
 
 Array = npt.NDArray[np.float64]
 DESIGN_NM_A, DESIGN_SHARE = 2.87, 0.1  # T Table 6.2, and how far a machine may be from it
@@ -23,23 +23,6 @@ RIPPLE_NM_A = 0.02  # T Table 5.3, beta_4: ripple of the torque constant that on
 SURE = 5  # standard uncertainties
 FOLLOWING = ("error_rms", "error_peak", "amplitude_ratio", "lag")  # what a detent or a friction gets into
 COUNTED = 0.1  # share of the counts' variance that the assumption of evenly spread counts may be wrong by
-
-
-class Plan(Protocol):
-    """The part of a plan that this needs."""
-
-    @property
-    def encoder_counts(self) -> int: ...
-    @property
-    def detent_order(self) -> int: ...
-    @property
-    def torque_constant(self) -> str: ...
-    @property
-    def kp_theta(self) -> float: ...
-    @property
-    def max_detent_N_m(self) -> float: ...
-    @property
-    def max_friction_N_m(self) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -55,13 +38,13 @@ class Result:
     torque: float
 
 
-def evaluate(recording: Recording[Any], swings: Sequence[Swing], gains: Gains) -> Result:
+def evaluate(recording: Recording[Plan], swings: Sequence[Swing], gains: Gains) -> Result:
     """Every estimate.
 
     Raises:
         AnalysisError: a record is too short, or the slowest swing does not cover a period of the detent.
     """
-    plan: Plan = recording.plan
+    plan = recording.plan
     count = 2 * math.pi / plan.encoder_counts
     begun, half = starts(swings, gains)
     started = tuple(zip(swings, begun, strict=True))
@@ -109,7 +92,7 @@ def _rectangular(identity: str, name: str, half: float, unit: str, source: str =
     return Estimate.of(0.0, influence)
 
 
-def _torque_constant(recording: Recording[Any]) -> Estimate:
+def _torque_constant(recording: Recording[Plan]) -> Estimate:
     """N m/A, from the calibration or the design value."""
     if recording.plan.torque_constant == "calibration":
         ripple = _rectangular("torque/ripple", "ripple of the torque constant", RIPPLE_NM_A, "N m/A", "T Table 5.3")
@@ -118,11 +101,11 @@ def _torque_constant(recording: Recording[Any]) -> Estimate:
                                       "T Table 6.2, within a tenth (house choice)")  # fmt: skip
 
 
-def _segment_gain(recording: Recording[Any]) -> Estimate:
+def _segment_gain(recording: Recording[Plan]) -> Estimate:
     """One, with what the gains of the segments' current sensors do to the torque current."""
     out = Estimate.exact(1.0)
-    for channel in (c for c in SEGMENTS if c in recording.rig.sensors):
-        gain = certified(f"sensors/{channel}/gain", recording.rig.sensors[channel].gain, f"gain of {channel}")
+    for channel in (c for c in conventions(recording.rig).segments if c in recording.rig.sensors):
+        gain = certified_gain(recording.rig, channel)
         out = out - (gain - gain.value) * 0.25
     return out
 

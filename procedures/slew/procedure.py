@@ -8,14 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import Literal
-
-from pydantic import Field
 
 from bench.calibration import Need
 from bench.figures import Figure
 from bench.findings import Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
@@ -23,13 +20,15 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.servomotor import carrying, hold, segments, wiring
+from procedures.servomotor.conventions import SERVOMOTOR
 from procedures.servomotor.direction import of_probe
 from procedures.shared import assumptions
 from procedures.slew import estimates, fit, steps
 from procedures.slew import figures as drawn
 from procedures.slew.estimates import Result
 from procedures.slew.fit import Gains
-from procedures.slew.steps import CHANNELS, STARTED, STEP, read_swings
+from procedures.slew.plan import Plan
+from procedures.slew.steps import STARTED, STEP, channels, read_swings
 
 RMS = Quantity("error_rms", "rad", "root mean square of the tracking error, free of the encoder's counts")
 PEAK = Quantity("error_peak", "rad", "greatest tracking error")
@@ -41,26 +40,6 @@ MEASURES = (RMS, PEAK, RATIO, LAG, DETENT, FRICTION)
 NEEDED = ("sine_amplitude", "sine_hz", "angle_hz", "derivative_on_error", "i_ramp", "motor_share", "allocation")
 FADE = 20
 DESIGN_NM_A = 2.87  # T Table 6.2; with a tenth of it either way where no calibration is used
-
-
-class Plan(BenchPlan):
-    """Settings of the slewing test, SI."""
-
-    frequencies_hz: tuple[float, ...] = Field((0.1, 0.2, 0.5, 1.0, 2.0), min_length=1)
-    amplitude_rad: float = Field(0.4, gt=0, le=0.5)
-    periods: int = Field(6, ge=3)  # at each frequency, after a first one that settles
-    kp_theta: float = Field(50.0, gt=0)  # A/rad
-    kd_theta: float = Field(0.5, gt=0)  # A s/rad, on the error
-    ki_theta: float = Field(50.0, ge=0)  # A/(rad s)
-    angle_hz: float = Field(60.0, gt=0)  # filter of the derivative
-    motor_carries: bool = False  # the shaft too, in place of the outboard AMB
-    torque_constant: Literal["design", "calibration"] = "design"  # calibration: of `torque-constant`
-    detent_order: int = Field(16, gt=0)  # per turn
-    settle_s: float = Field(1.0, gt=0)  # before each swing
-    encoder_counts: int = Field(4096, gt=0)  # per turn
-    max_detent_N_m: float = Field(0.05, gt=0)  # beyond, it is named
-    max_friction_N_m: float = Field(0.2, gt=0)  # a levitated rotor has no more
-    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 
 
 def settings(_: Plan) -> dict[str, float]:
@@ -113,7 +92,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """The swings by frequency, and what the slowest says of the torque."""
     findings.gate([*of_probe(recording), *segments.of_nudges(recording)])
-    findings.gate(steps.of_signals(recording, recording.plan), ("stuck-channel",))
+    findings.gate(steps.of_signals(recording), ("stuck-channel",))
     result = estimates.evaluate(recording, read_swings(recording), gains(recording.plan))
     findings.add(estimates.findings(result, recording.plan))
     return result
@@ -169,7 +148,7 @@ procedure = Procedure(
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),
-        channels=(*CHANNELS, *wiring.CHANNELS),
+        channels=(*channels(SERVOMOTOR), *wiring.channels(SERVOMOTOR)),
         parameters=(*hold.PARAMETERS, *wiring.PARAMETERS, *NEEDED, "segment_max"),
         machine=("polar_inertia",),
     ),

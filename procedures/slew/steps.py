@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import Any, Protocol
+from collections.abc import Iterator
 
 import numpy as np
 
 from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
 from bench.recording import Recording, Step
-from procedures.servomotor.segments import SEGMENTS
+from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.slew.fit import Swing
+from procedures.slew.plan import Plan
 
 STEP, STARTED = "swing", "sine-started"
-CHANNELS = ("angle", *SEGMENTS, "flags")
-SATURATED, CONTACT = 3, 12  # bits of the telemetry signal `flags`
 
 
-class Tolerances(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def max_lost(self) -> float: ...
+def channels(machine: Servomotor) -> tuple[str, ...]:
+    """What is recorded of a swing."""
+    return ("angle", *machine.segments, "flags")
 
 
-def read_swings(recording: Recording[Any]) -> list[Swing]:
+def read_swings(recording: Recording[Plan]) -> list[Swing]:
     """Every swing, in time order.
 
     Raises:
@@ -37,8 +33,9 @@ def read_swings(recording: Recording[Any]) -> list[Swing]:
     return [_read(recording, step) for step in steps]
 
 
-def _read(recording: Recording[Any], step: Step) -> Swing:
-    data = step.read(*CHANNELS)
+def _read(recording: Recording[Plan], step: Step) -> Swing:
+    machine = conventions(recording.rig)
+    data = step.read(*channels(machine))
     inside = [e for e in recording.events() if step.start_ns <= e["t_ns"] < step.end_ns]
     written = [
         e["t_ns"] for e in inside if e["kind"] == "parameter" and e["name"] == "sine_amplitude" and e["value"] > 0
@@ -58,7 +55,7 @@ def _read(recording: Recording[Any], step: Step) -> Swing:
         float(step.labels["amplitude_rad"]),
         (data["t_ns"] - origin).astype(np.float64) * 1e-9,
         angle - 2 * np.pi * np.round(angle[0] / (2 * np.pi)),
-        np.mean([data[c] for c in SEGMENTS], axis=0),
+        np.mean([data[c] for c in machine.segments], axis=0),
         seconds(written[0]),
         seconds(answered[0]),
         int(step.labels["periods"]),
@@ -67,24 +64,25 @@ def _read(recording: Recording[Any], step: Step) -> Swing:
     )
 
 
-def of_signals(recording: Recording[Any], plan: Tolerances) -> Iterator[Finding]:
+def of_signals(recording: Recording[Plan]) -> Iterator[Finding]:
     """Lost samples, channels that stand still, amplifiers at their limits, contact."""
-    steps: Sequence[Step] = list(recording.steps(STEP))
-    for step in steps:
+    machine, max_lost = conventions(recording.rig), recording.plan.max_lost
+    names = channels(machine)
+    for step in recording.steps(STEP):
         where = f"{float(step.labels['hz']):g} Hz"
         share = step.lost() / max(step.expected(), 1)
-        if share > plan.max_lost:
+        if share > max_lost:
             yield Finding(
                 "missing-samples",
-                f"{share:.2%} of the samples of a swing are missing ({plan.max_lost:.2%} is allowed). Look at the link: load, "
+                f"{share:.2%} of the samples of a swing are missing ({max_lost:.2%} is allowed). Look at the link: load, "
                 "cable, gateway.",
                 where, Effect.INDETERMINATE,
             )  # fmt: skip
-        data = step.read(*CHANNELS)
+        data = step.read(*names)
         flags = int(np.bitwise_or.reduce(data["flags"].astype(np.int64))) if len(data["flags"]) else 0
-        for channel in (c for c in CHANNELS[:-1] if np.ptp(data[c]) == 0):
+        for channel in (c for c in names[:-1] if np.ptp(data[c]) == 0):
             yield Finding("stuck-channel", f"{channel} does not move at all during a swing.", channel, Effect.ERROR)
-        for bits, code, text in ((SATURATED, "saturated", "an amplifier was at its limit"),
-                                 (CONTACT, "contact", "the rotor touched a touchdown bearing")):  # fmt: skip
+        for bits, code, text in ((machine.amb_limit | machine.segment_limit, "saturated", "an amplifier was at its limit"),
+                                 (machine.contact, "contact", "the rotor touched a touchdown bearing")):  # fmt: skip
             if flags & bits:
                 yield Finding(code, f"{text} during a swing", where, Effect.INDETERMINATE)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,13 +17,14 @@ from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
-from procedures.servomotor.direction import SEGMENTS, of_probe
+from procedures.servomotor.conventions import Servomotor
+from procedures.servomotor.direction import of_probe
 from procedures.shared.leastsquares import linear
 from procedures.spindown.estimates import Drag, drive_drag, stated_inertia
+from procedures.spindown.plan import Plan
 from procedures.spindown.steps import RunDown
 
 Array = npt.NDArray[np.float64]
-SATURATED, CONTACT = 1, 12  # bits of the telemetry signal `flags`
 RELEASED_A = 0.02  # the certificates allow 4 mA of offset each, noise averages out
 SAME_SPEED = 5e-3
 LARGEST_OFFSET_N_m = 0.02  # 4 mA of every segment's sensor are a little over 11 mN m
@@ -32,23 +33,6 @@ COUNT_N_m = 0.01  # of the drive's torque
 SURE = 3.0  # standard uncertainties beyond what is stated
 LOWERED = "lowered"  # event: the drive did not bring the shaft to the speed asked for
 TICK_S = 0.45e-3  # the speed is a mean over a sample, the angle its last value
-
-
-class Plan(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def speed_rad_s(self) -> float: ...
-    @property
-    def bias_A(self) -> float: ...
-    @property
-    def bias_high_A(self) -> float: ...
-    @property
-    def max_lost(self) -> float: ...
-    @property
-    def max_coulomb_N_m(self) -> float: ...
-    @property
-    def speed_filter_hz(self) -> float: ...
 
 
 def before_fits(recording: Recording[Any]) -> Iterator[Finding]:
@@ -80,7 +64,7 @@ def before_fits(recording: Recording[Any]) -> Iterator[Finding]:
             )  # fmt: skip
 
 
-def of_runs(runs: Sequence[RunDown], plan: Plan) -> Iterator[Finding]:
+def of_runs(runs: Sequence[RunDown], machine: Servomotor, plan: Plan) -> Iterator[Finding]:
     """Checks of each run-down: losses, contact, currents that should not be there, speed against angle."""
     lost = [r.lost / max(r.expected, 1) for r in runs]
     if max(lost) > plan.max_lost:
@@ -89,15 +73,15 @@ def of_runs(runs: Sequence[RunDown], plan: Plan) -> Iterator[Finding]:
             "load, cable, gateway."
         )
         yield Finding("missing-samples", text, runs[int(np.argmax(lost))].where, Effect.INDETERMINATE)
-    for bit, code, text in ((SATURATED, "saturated", "an AMB amplifier was at its limit"),
-                            (CONTACT, "contact", "the rotor touched a touchdown bearing")):  # fmt: skip
+    for bit, code, text in ((machine.amb_limit, "saturated", "an AMB amplifier was at its limit"),
+                            (machine.contact, "contact", "the rotor touched a touchdown bearing")):  # fmt: skip
         hit = [r for r in runs if r.flags & bit]
         if hit:
             yield Finding(code, f"{text} in {len(hit)} of {len(runs)} run-downs", hit[0].where, Effect.INDETERMINATE)
     torque = [abs(r.segments).max() for r in runs]
     if max(torque) > RELEASED_A:
         worst = runs[int(np.argmax(torque))]
-        channel = SEGMENTS[int(np.argmax(abs(worst.segments)))]
+        channel = machine.segments[int(np.argmax(abs(worst.segments)))]
         yield Finding("not-released", f"{channel} carries {max(torque):.3f} A while the rotor should coast "
                       f"({RELEASED_A} A allowed): the motor is not released.", worst.where, Effect.INDETERMINATE)  # fmt: skip
     yield from _same_level(runs, plan)

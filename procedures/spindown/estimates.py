@@ -20,9 +20,10 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate
-from procedures.shared.certificates import certified
+from procedures.servomotor.conventions import conventions
+from procedures.shared.certificates import certified, certified_sensors
 from procedures.spindown.fit import Coast, inertia_from_ring
-from procedures.spindown.steps import COILS, RunDown
+from procedures.spindown.steps import RunDown, coils
 
 Array = npt.NDArray[np.float64]
 METHODS: Mapping[str, Callable[[RunDown], Coast]] = {"angle": lambda r: r.of_angle, "speed": lambda r: r.of_speed}
@@ -106,7 +107,8 @@ def evaluate(runs: Sequence[RunDown], rig: RigFile, method: str, bias_A: float, 
     for name, r in found.items():
         inputs |= _type_a(name, method, r)
     currents = {
-        name: {c: float(np.mean([r.coils[c] for r in members])) for c in COILS} for name, members in groups.items()
+        name: {c: float(np.mean([r.coils[c] for r in members])) for c in members[0].coils}
+        for name, members in groups.items()
     }
 
     def model(p: dict[str, float]) -> dict[str, float]:
@@ -147,10 +149,7 @@ def _inputs(rig: RigFile, ring: bool) -> dict[str, Estimate]:
         out["ring"] = certified("machine/ring_inertia", rig.machine["ring_inertia"], "inertia of the ring")
     else:
         out["inertia"] = stated_inertia(rig)
-    for c in COILS:
-        out[f"gain_{c}"] = certified(f"sensors/{c}/gain", rig.sensors[c].gain, f"gain of {c}")
-        out[f"offset_{c}"] = certified(f"sensors/{c}/offset", rig.sensors[c].offset, f"offset of {c}")
-    return out
+    return out | certified_sensors(rig, {c: c for c in coils(conventions(rig))})
 
 
 def _type_a(group: str, method: str, r: Rates) -> dict[str, Estimate]:

@@ -8,13 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Literal
-
-from pydantic import Field
 
 from bench.figures import Figure
 from bench.findings import Finding, Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
@@ -24,12 +21,14 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from procedures.servomotor import hold
+from procedures.servomotor.conventions import SERVOMOTOR, conventions
 from procedures.shared import assumptions
 from procedures.spindown import checks, estimates
 from procedures.spindown import figures as drawn
 from procedures.spindown.estimates import Drag
+from procedures.spindown.plan import Plan
 from procedures.spindown.running_up import let_go, run_up
-from procedures.spindown.steps import CHANNELS, COILS, RunDown, read_run_downs
+from procedures.spindown.steps import RunDown, channels, coils, read_run_downs
 
 B = Quantity("B", "N m s/rad", "viscous drag at the bias of the plan, mean over both directions")
 B_HIGH = Quantity("B_high", "N m s/rad", "viscous drag at the higher bias, mean over both directions")
@@ -38,24 +37,6 @@ J_Z = Quantity("J_z", "kg m^2", "polar inertia: by the ring where one was mounte
 MEASURES = (B, B_HIGH, T_C, J_Z)
 RAMP_S = 0.25  # what is left of the run-up's ramp when the speed is nearly there
 SLOW = (0.1, 0.15, 0.2, 0.25, 0.3)  # shares of the speed that the drive also holds: they tell its constant torque
-
-
-class Plan(BenchPlan):
-    """Settings of the spindown, SI."""
-
-    speed_rad_s: float = Field(60.0, gt=5)  # where a run-down starts
-    end_speed_rad_s: float = Field(3.0, gt=0.5)  # and where its fit ends
-    repeats: int = Field(3, ge=2)  # each way, at each bias
-    bias_A: float = Field(3.0, gt=0)
-    bias_high_A: float = Field(4.0, gt=0)
-    added_inertia: bool = False  # mount the ring and take the inertia from it
-    run_up: Literal["auto", "drive", "motor"] = "auto"  # auto: the drive if the rig has one
-    steady_s: float = Field(0.5, ge=0.1)  # at speed before it is let go
-    start_delay_s: float = Field(0.1, ge=0)  # for the transient of the speed's filter
-    coast_s: float = Field(15.0, gt=0)  # at most
-    speed_filter_hz: float = Field(20.0, gt=0)  # of the controller's speed channel
-    max_coulomb_N_m: float = Field(0.12, gt=0)  # a levitated rotor has no more
-    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 
 
 def settings(plan: Plan) -> dict[str, float]:
@@ -163,7 +144,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     findings.gate(checks.before_fits(recording))
     plan, rig, runs = recording.plan, recording.rig, read_run_downs(recording)
     angle, speed = (estimates.evaluate(runs, rig, m, plan.bias_A, plan.bias_high_A) for m in ("angle", "speed"))
-    findings.add(checks.of_runs(runs, plan))
+    findings.add(checks.of_runs(runs, conventions(rig), plan))
     findings.add(checks.of_result(runs, angle, speed, plan))
     findings.add([*checks.of_drive(recording, angle), *checks.of_inertia(rig, angle)])
     if not plan.added_inertia:
@@ -231,8 +212,8 @@ procedure = Procedure(
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),
-        channels=CHANNELS,
-        sensors=COILS,
+        channels=channels(SERVOMOTOR),
+        sensors=coils(SERVOMOTOR),
         parameters=(*hold.PARAMETERS, "bias_i", "bias_o", "speed_ref"),
     ),
     check=check,

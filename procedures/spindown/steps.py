@@ -4,25 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
-from procedures.servomotor.direction import SEGMENTS
+from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.spindown import fit
 from procedures.spindown.fit import Coast
+from procedures.spindown.plan import Plan
 
 Array = npt.NDArray[np.float64]
-COILS = tuple(f"i_{axis}{bearing}_{coil}" for axis in "xy" for bearing in "io" for coil in "pn")
-CHANNELS = ("angle", "speed", "flags", *SEGMENTS, *COILS)
 ANGLE_LAGS = 60  # samples of 1 ms over which its residuals repeat themselves
 SPEED_LAGS = 200
 """The speed is the angle differentiated: its noise takes back what it adds, and only far beyond the 8 ms of its filter
 does the sum over the lags come near what is left."""
 SMALLEST_SAMPLES = 400
+
+
+def coils(machine: Servomotor) -> tuple[str, ...]:
+    """The radial AMBs' currents."""
+    return machine.coils_of("xi", "xo", "yi", "yo")
+
+
+def channels(machine: Servomotor) -> tuple[str, ...]:
+    """What is recorded of a coast."""
+    return ("angle", "speed", "flags", *machine.segments, *coils(machine))
 
 
 @dataclass(frozen=True)
@@ -52,24 +60,23 @@ class RunDown:
         return f"{self.bias_A:g} A, {way}, run {self.repeat + 1}{', with the ring' if self.ring else ''}"
 
 
-def read_run_downs(recording: Recording[Any]) -> list[RunDown]:
+def read_run_downs(recording: Recording[Plan]) -> list[RunDown]:
     """Every "coast" step, fitted between the filter's transient and the end speed.
 
     Raises:
         AnalysisError: there are none, or one is too short to be fitted.
     """
-    out = [
-        _read(step, recording.plan.start_delay_s, recording.plan.end_speed_rad_s) for step in recording.steps("coast")
-    ]
+    plan, machine = recording.plan, conventions(recording.rig)
+    out = [_read(step, machine, plan.start_delay_s, plan.end_speed_rad_s) for step in recording.steps("coast")]
     if not out:
         raise AnalysisError("found no run-down (was the run stopped early?)")
     return out
 
 
-def _read(step: Step, delay_s: float, end: float) -> RunDown:
+def _read(step: Step, machine: Servomotor, delay_s: float, end: float) -> RunDown:
     labels = step.labels
     direction = int(labels["direction"])
-    data = step.read(*CHANNELS)
+    data = step.read(*channels(machine))
     name = f"{labels['bias_A']:g} A, {'forward' if direction > 0 else 'backward'}, run {int(labels['repeat']) + 1}"
     t = (data["t_ns"] - data["t_ns"][0]).astype(np.float64) * 1e-9 if len(data["t_ns"]) else np.zeros(0)
     speed, angle = direction * data["speed"], direction * np.unwrap(data["angle"])
@@ -81,8 +88,8 @@ def _read(step: Step, delay_s: float, end: float) -> RunDown:
         bias_A=float(labels["bias_A"]), direction=direction, repeat=int(labels["repeat"]), ring=bool(labels["ring"]),
         t=t, speed=speed, angle=angle - angle[0],
         of_speed=fit.of_speed(t, speed, SPEED_LAGS), of_angle=fit.of_angle(t, angle - angle[0], ANGLE_LAGS),
-        coils={c: float(data[c][used].mean()) for c in COILS},
-        segments=np.array([float(data[c][used].mean()) for c in SEGMENTS]),
+        coils={c: float(data[c][used].mean()) for c in coils(machine)},
+        segments=np.array([float(data[c][used].mean()) for c in machine.segments]),
         lost=step.lost(), expected=step.expected(), flags=int(np.bitwise_or.reduce(data["flags"].astype(np.int64))),
     )  # fmt: skip
 

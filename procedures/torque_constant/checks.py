@@ -7,33 +7,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.findings import Effect, Finding
 from bench.recording import Recording
-from procedures.servomotor.direction import SEGMENTS
+from procedures.servomotor.conventions import Servomotor, radial_currents
+from procedures.shared import signals
 from procedures.torque_constant import drifts, hypotheses
 from procedures.torque_constant.drifts import SIGNIFICANT
 from procedures.torque_constant.fit import Balance, Detent
+from procedures.torque_constant.plan import Plan
 from procedures.torque_constant.steps import TorqueData
 
 Array = npt.NDArray[np.float64]
-SATURATED, SEGMENT_SATURATED, CONTACT = 1, 2, 12  # bits of the telemetry signal `flags`
 SLIP_RATE = 4e-3  # 1/s, relative, of the heaviest load's torque
-
-
-class Tolerances(drifts.Tolerances, Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def max_angle_rad(self) -> float: ...
-    @property
-    def max_drift_A(self) -> float: ...
-    @property
-    def max_lost(self) -> float: ...
 
 
 def of_events(recording: Recording[Any]) -> Iterator[Finding]:
@@ -43,48 +33,35 @@ def of_events(recording: Recording[Any]) -> Iterator[Finding]:
                       f"{event['angle']:.3f} rad", Effect.ERROR)  # fmt: skip
 
 
-def of_signals(data: TorqueData, plan: Tolerances) -> Iterator[Finding]:
+def of_signals(data: TorqueData, machine: Servomotor, plan: Plan) -> Iterator[Finding]:
     """Checks that need no fit."""
-    yield from _lost(data, plan)
-    yield from _flags(data)
-    yield from _segments(data)
+    table = data.table
+    yield from signals.losses(table.lost, table.expected, plan.max_lost, table.where)
+    yield from signals.flagged(table.flags, _limits(machine), table.where)
+    yield from _segments(data, machine)
     yield from _wiring(data.wiring)
     yield from _settled(data, plan)
 
 
-def _lost(data: TorqueData, plan: Tolerances) -> Iterator[Finding]:
-    share = data.lost / np.maximum(data.expected, 1)
-    if share.max() > plan.max_lost:
-        text = (
-            f"{data.lost.sum() / data.expected.sum():.2%} of the samples inside steps are missing ({share.max():.2%} in the "
-            f"worst step; {plan.max_lost:.2%} is allowed). Look at the link: load, cable, gateway."
-        )
-        yield Finding("missing-samples", text, data.where(int(share.argmax())), Effect.INDETERMINATE)
+def _limits(machine: Servomotor) -> tuple[signals.Meaning, ...]:
+    return (
+        (machine.amb_limit, "saturated", "an AMB amplifier was at its limit"),
+        (machine.segment_limit, "saturated", "a segment's amplifier was at its limit"),
+        (machine.contact, "contact", "the rotor touched a touchdown bearing"),
+    )
 
 
-def _flags(data: TorqueData) -> Iterator[Finding]:
-    for bit, code, text in (
-        (SATURATED, "saturated", "an AMB amplifier was at its limit"),
-        (SEGMENT_SATURATED, "saturated", "a segment's amplifier was at its limit"),
-        (CONTACT, "contact", "the rotor touched a touchdown bearing"),
-    ):
-        hit = (data.flags & bit) != 0
-        if hit.any():
-            where = data.where(int(np.argmax(hit)))
-            yield Finding(code, f"{text} in {int(hit.sum())} of {hit.size} steps", where, Effect.INDETERMINATE)
-
-
-def _segments(data: TorqueData) -> Iterator[Finding]:
+def _segments(data: TorqueData, machine: Servomotor) -> Iterator[Finding]:
     """At home without i_x and i_y all four segments carry the torque current."""
-    for k, channel in enumerate(SEGMENTS):
-        if (data.spread[:, k] == 0).any():
+    for channel in machine.segments:
+        if (data.table.spread[channel] == 0).any():
             yield Finding("stuck-channel", f"{channel} does not move at all in some step; a live sensor has noise.", channel,
                           Effect.ERROR)  # fmt: skip
     s = data.steps
     drive = np.median(s.segments, axis=1)
     drive = drive - drive.mean()
     share = drive @ s.segments / float(drive @ drive)
-    for k, channel in enumerate(SEGMENTS):
+    for k, channel in enumerate(machine.segments):
         if share[k] < -0.5:
             yield Finding("segment-sign", f"{channel} reads the torque current with the wrong sign ({share[k]:+.2f} times the "
                           "others). Exchange its sensor's wires.", channel, Effect.ERROR)  # fmt: skip
@@ -124,7 +101,7 @@ def _answer(exchanged: tuple[int, ...]) -> Array:
         if exchanged:
             a, b = exchanged
             e[[a, b]] = e[[b, a]]
-        out[:, column] = (e[3] - e[1]) / 2, (e[0] - e[2]) / 2
+        out[:, column] = radial_currents(*e)
     return out
 
 
@@ -134,37 +111,38 @@ def _misfit(seen: Array, expected: Array) -> float:
     return float(np.linalg.norm(seen - scale * expected) / np.linalg.norm(seen))
 
 
-def _settled(data: TorqueData, plan: Tolerances) -> Iterator[Finding]:
-    angle, drift = np.abs(data.steps.angle), np.abs(data.drift)
+def _settled(data: TorqueData, plan: Plan) -> Iterator[Finding]:
+    angle, drift = np.abs(data.steps.angle), np.abs(data.table.drift["torque"])
     if angle.max() > plan.max_angle_rad:
         yield Finding(
             "not-held",
             f"the rotor stands {angle.max() * 1e3:.1f} mrad off home in the worst step ({plan.max_angle_rad * 1e3:.1f} mrad "
             f"allowed, {int((angle > plan.max_angle_rad).sum())} of {angle.size} steps): a load or a detent that the motor "
-            "does not hold, or too short a time to settle.", data.where(int(angle.argmax())), Effect.INDETERMINATE,
+            "does not hold, or too short a time to settle.", data.table.where(angle), Effect.INDETERMINATE,
         )  # fmt: skip
     if drift.max() > plan.max_drift_A:
         yield Finding(
             "unsettled",
             f"the torque current drifts by {drift.max() * 1e3:.0f} mA within a step ({plan.max_drift_A * 1e3:.0f} mA allowed, "
             f"{int((drift > plan.max_drift_A).sum())} of {drift.size} steps). Settle longer, or look at the integrator.",
-            data.where(int(drift.argmax())), Effect.INDETERMINATE,
+            data.table.where(drift), Effect.INDETERMINATE,
         )  # fmt: skip
 
 
 def of_fit(
     data: TorqueData,
+    machine: Servomotor,
     b: Balance,
     held: Detent,
     p: Mapping[str, float],
     mass_u: Sequence[float],
     arm_u: float,
-    plan: Tolerances,
+    plan: Plan,
 ) -> Iterator[Finding]:
     """Checks of the fit: slip, drifts, detent, arms, masses, the cosine."""
     slips = list(_slip(data, b))
     yield from slips
-    yield from drifts.baseline(data, b, plan)
+    yield from drifts.baseline(data, machine, b, plan)
     yield from drifts.scale(b, plan)
     yield from _detent(b, held)
     yield from _arms(data, b, arm_u)
@@ -180,7 +158,10 @@ def _slip(data: TorqueData, b: Balance) -> Iterator[Finding]:
     carried = hypotheses.loaded(b)
     heavy = np.abs(b.torque) / np.abs(b.torque).max()
     on = s.side != 0
-    rate = data.drift[on] * 2 / data.length[on] * np.sign(carried[on])  # A/s, negative where the load gets lighter
+    length_s = (data.table.end_ns - data.table.start_ns) * 1e-9
+    rate = (
+        data.table.drift["torque"][on] * 2 / length_s[on] * np.sign(carried[on])
+    )  # A/s, negative where the load gets lighter
     shape = np.abs(carried[on]) * heavy[on] ** 2
     value = float(rate @ shape) / float(shape @ shape)  # relative, 1/s, of the heaviest load
     u = float(np.std(rate - value * shape)) / math.sqrt(float(shape @ shape))

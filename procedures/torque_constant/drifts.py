@@ -3,31 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.findings import Effect, Finding
-from procedures.servomotor.direction import SEGMENTS
+from procedures.servomotor.conventions import Servomotor
 from procedures.shared.leastsquares import linear
 from procedures.torque_constant.fit import Balance
+from procedures.torque_constant.plan import Plan
 from procedures.torque_constant.steps import TorqueData
 
 Array = npt.NDArray[np.float64]
 SIGNIFICANT = 6.0  # standard deviations, of Student's t with some twenty degrees of freedom
 
 
-class Tolerances(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def max_baseline_drift_A_s(self) -> float: ...
-    @property
-    def max_scale_drift(self) -> float: ...
-
-
-def scale(b: Balance, plan: Tolerances) -> Iterator[Finding]:
+def scale(b: Balance, plan: Plan) -> Iterator[Finding]:
     """Drift of the torque per current. The fit takes off what is even in time; what is not grows with it."""
     found = b.drift
     if abs(found.value) <= max(plan.max_scale_drift, SIGNIFICANT * found.u):
@@ -40,7 +31,7 @@ def scale(b: Balance, plan: Tolerances) -> Iterator[Finding]:
     )  # fmt: skip
 
 
-def baseline(data: TorqueData, b: Balance, plan: Tolerances) -> Iterator[Finding]:
+def baseline(data: TorqueData, machine: Servomotor, b: Balance, plan: Plan) -> Iterator[Finding]:
     """Drift of the current without load. The amplifier closes on its own sensor, so that a drifting sensor moves the true
     current of its segment, all references follow to hold the angle, and the outboard AMB answers the pull to the side.
 
@@ -52,7 +43,8 @@ def baseline(data: TorqueData, b: Balance, plan: Tolerances) -> Iterator[Finding
     slope = float(fit.terms[0])
     if abs(slope) <= max(plan.max_baseline_drift_A_s, SIGNIFICANT * float(fit.u[0])):
         return
-    channel = _drifting(data, zero, t, 4 * slope, pairs)
+    segment = _drifting(data, zero, t, 4 * slope, pairs)
+    channel = "" if segment is None else machine.segments[segment]
     yield Finding(
         "current-drift",
         f"the torque current without load drifts by {slope * 1e3:+.3f} mA/s over the run "
@@ -62,8 +54,8 @@ def baseline(data: TorqueData, b: Balance, plan: Tolerances) -> Iterator[Finding
     )  # fmt: skip
 
 
-def _drifting(data: TorqueData, zero: npt.NDArray[np.bool_], t: Array, drift: float, pairs: float) -> str:
-    """The segment whose drift explains the pull to the side: one whose sensor drifts by d lowers its true current by d, which
+def _drifting(data: TorqueData, zero: npt.NDArray[np.bool_], t: Array, drift: float, pairs: float) -> int | None:
+    """Which segment's drift explains the pull to the side: one whose sensor drifts by d lowers its true current by d, which
     is a drift of i_x or i_y by d/2; the phase angle turns the pull by M gamma, as nearly as both force constants are alike."""
     turn = pairs * data.steps.gamma[zero]
     c, q = np.cos(turn), np.sin(turn)
@@ -73,9 +65,9 @@ def _drifting(data: TorqueData, zero: npt.NDArray[np.bool_], t: Array, drift: fl
         rows.append(np.column_stack([pull * t[:, None], pull]))
     nothing, one = np.zeros_like(t), np.ones_like(t)
     design = np.vstack([np.column_stack([rows[0], one, nothing]), np.column_stack([rows[1], nothing, one])])
-    seen = np.concatenate([data.side_x[zero], data.side_y[zero]])
+    seen = np.concatenate([data.table.mean[f"side_{axis}"][zero] for axis in "xy"])
     found = np.linalg.lstsq(design, seen, rcond=None)[0][:2]  # A/s of i_x, i_y
     expected = np.array([[0.0, -drift / 2], [drift / 2, 0.0], [0.0, drift / 2], [-drift / 2, 0.0]])
     apart = np.linalg.norm(expected - found, axis=1)
     best = int(np.argmin(apart))
-    return SEGMENTS[best] if apart[best] < 0.3 * abs(drift) else ""
+    return best if apart[best] < 0.3 * abs(drift) else None

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.figures import Figure, Series
 from bench.recording import Recording
-from procedures.servomotor.direction import SEGMENTS
+from procedures.servomotor.conventions import conventions
 from procedures.torque_constant.fit import Balance, Detent, Steps
-from procedures.torque_constant.steps import TorqueData
+from procedures.torque_constant.plan import Plan
+from procedures.torque_constant.steps import OnLever, TorqueData
 
 Array = npt.NDArray[np.float64]
 SIDES = ((1, "left"), (-1, "right"))
 SHOWN_S = 0.06
 
 
-def all_figures(recording: Recording[Any], data: TorqueData, b: Balance, held: Detent, pairs: float) -> list[Figure]:
+def all_figures(recording: Recording[Plan], data: TorqueData, b: Balance, held: Detent, pairs: float) -> list[Figure]:
     """In the order of the report."""
     return [_torque(data, b, pairs), *_over_gamma(data, b, pairs), _residuals(data, b), _detent(data, b, held),
             _one_step(recording)]  # fmt: skip
@@ -95,13 +95,14 @@ def _detent(data: TorqueData, b: Balance, held: Detent) -> Figure:
                    Series("fit", np.degrees(grid), 1e3 * b.alpha * curve)))  # fmt: skip
 
 
-def _one_step(recording: Recording[Any]) -> Figure:
+def _one_step(recording: Recording[Plan]) -> Figure:
     """The end of a step close by: over its whole second, which is what is averaged, the swing would be a solid block."""
     heaviest = recording.plan.masses[-1]
-    step = next(s for s in recording.steps("lever") if s.labels["load"] == heaviest)
-    data = recording.read(SEGMENTS, step.end_ns - round(1e9 * SHOWN_S), step.end_ns)
+    step = next(s for s in recording.steps(OnLever.kind) if s.labels["load"] == heaviest)
+    segments = conventions(recording.rig).segments
+    data = recording.read(segments, step.end_ns - round(1e9 * SHOWN_S), step.end_ns)
     t = (data["t_ns"] - step.end_ns).astype(np.float64) * 1e-6
-    current = np.mean([data[c] for c in SEGMENTS], axis=0)
+    current = np.mean([data[c] for c in segments], axis=0)
     return Figure("step-current", f"Torque current at the end of a step ({heaviest})", "Between two counts of the "
                   "encoder the rotor is not held: it swings, and the current with it. What counts is the current's mean over "
                   "the step.", "time to the end of the step (ms)", "torque current (A)",

@@ -7,27 +7,21 @@ from collections.abc import Sequence
 
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
-from procedures.servomotor.direction import SEGMENTS
-from procedures.shared.certificates import certified
+from procedures.servomotor.conventions import conventions
+from procedures.servomotor.loads import certified_masses, certified_weighing
+from procedures.shared.certificates import certified, certified_gain
 
 SIDES = ("left", "right")
 
 
 def fit_inputs(rig: RigFile, masses: Sequence[str]) -> dict[str, Estimate]:
     """What the fit needs besides the recording: certificates of the rig file, each as an influence by identity."""
-    inputs = {
-        "gravity": certified("site/gravity", rig.site.gravity, "local gravity"),
-        "air_density": certified("site/air_density", rig.site.air_density, "air density (buoyancy)"),
-        "mass_density": certified("masses/density", rig.mass_density, "density of the masses (buoyancy)"),
-    }
+    inputs = certified_weighing(rig)
     for side in SIDES:
         name = f"lever_{side}"
         inputs[name] = certified(f"geometry/{name}", rig.geometry[name], f"arm of the lever, {side}")
-    for k, label in enumerate(masses):
-        inputs[f"mass_{k}"] = certified(f"masses/{label}", rig.masses[label], f"mass {label}")
-    for k, channel in enumerate(SEGMENTS, 1):
-        inputs[f"gain_{k}"] = certified(f"sensors/{channel}/gain", rig.sensors[channel].gain, f"gain of {channel}")
-    return inputs
+    gains = {f"gain_{k}": certified_gain(rig, segment) for k, segment in enumerate(conventions(rig).segments, 1)}
+    return inputs | certified_masses(rig, masses) | gains
 
 
 def masses_u(rig: RigFile, masses: Sequence[str]) -> list[float]:

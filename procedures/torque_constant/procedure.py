@@ -11,12 +11,11 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import Field
 
 from bench.errors import RotorNotArrived
 from bench.figures import Figure
 from bench.findings import Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import NOTHING, Load, RigState
@@ -25,37 +24,21 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate
 from procedures.servomotor import hold
-from procedures.servomotor.direction import SEGMENTS, of_probe
+from procedures.servomotor.conventions import SERVOMOTOR, conventions
+from procedures.servomotor.direction import of_probe
+from procedures.servomotor.loads import check_masses
 from procedures.shared import assumptions
+from procedures.shared.step_table import record_step
 from procedures.torque_constant import checks, fit
 from procedures.torque_constant import figures as drawn
 from procedures.torque_constant.fit import NO_DETENT, Balance, Detent
 from procedures.torque_constant.inputs import SIDES, arms_u, fit_inputs, masses_u
-from procedures.torque_constant.steps import CHANNELS, TorqueData, read_torques
+from procedures.torque_constant.plan import Plan
+from procedures.torque_constant.steps import OnLever, OverDetent, Sideways, TorqueData, channels, read_torques
 
 ALPHA_TAU = Quantity("alpha_tau", "N m/A", "torque per mean true segment current at the home angle, peak over gamma")
 GAMMA_0T = Quantity("gamma_0t", "rad", "phase angle at which the torque per current is largest")
 MEASURES = (ALPHA_TAU, GAMMA_0T)
-
-
-class Plan(BenchPlan):
-    """Settings of the calibration, SI."""
-
-    masses: tuple[str, ...] = Field(("M1", "M2", "M3"), min_length=2)  # labels of the rig's masses, ascending
-    gamma_max_rad: float = Field(0.0873, gt=0.01)  # phase angles from minus to plus this
-    gammas: int = Field(5, ge=5)  # equally spaced
-    bias_A: float = Field(3.0, gt=0)
-    settle_s: float = Field(2.0, gt=0)
-    average_s: float = Field(1.0, ge=0.1)
-    ki_theta: float = Field(300.0, gt=0)  # A/(rad s) of the angle's integrator while loads hang
-    detent_angles: int = Field(4, ge=4)  # over one period of the detent, without load
-    wiring_A: float = Field(1.5, gt=0)  # of i_x and i_y, to see which segment is which
-    max_angle_rad: float = Field(1e-2, gt=0)  # held: mean angle off home (beyond 2 A the integrator ends, kp holds)
-    max_drift_A: float = Field(0.03, gt=0)  # settled: drift of the torque current within a step
-    max_baseline_drift_A_s: float = Field(5e-5, gt=0)  # of the current without load, over the run
-    max_scale_drift: float = Field(7e-4, gt=0)  # relative, of the torque per current, from the first load to the last
-    count_rad: float = Field(2 * math.pi / 4096, gt=0)  # of the rotor's encoder
-    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 
 
 def settings(plan: Plan) -> dict[str, float]:
@@ -100,7 +83,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         if not _at_home(rig, record, angle):
             return
         rig.clock.sleep(plan.settle_s)
-        with record.step("detent", angle_rad=angle):
+        with record_step(record, OverDetent(angle)):
             rig.clock.sleep(plan.average_s)
     if not _at_home(rig, record, 0.0):
         return
@@ -129,7 +112,7 @@ def _wiring(rig: Rig, plan: Plan, record: Recorder) -> None:
         for value in (plan.wiring_A, -plan.wiring_A):
             rig.levitation.set(name, value)
             rig.clock.sleep(2 * plan.wiring_A / ramp + min(plan.settle_s, 0.5))
-            with record.step("wiring", **{name: value, other: 0.0}):
+            with record.step(Sideways.kind, **{name: value, other: 0.0}):
                 rig.clock.sleep(0.2)
         rig.levitation.set(name, 0.0)
     rig.clock.sleep(plan.wiring_A / ramp + min(plan.settle_s, 0.5))
@@ -144,7 +127,7 @@ def _loads(rig: Rig, plan: Plan, record: Recorder, gamma: float) -> None:
             load = rig.operator.lever("left" if side == "left" else "right", load)
         hanging = side
         rig.clock.sleep(plan.settle_s)
-        with record.step("lever", gamma_rad=gamma, side=side, load=load.label):
+        with record_step(record, OnLever(gamma, side, load.label)):
             rig.clock.sleep(plan.average_s)
 
 
@@ -167,13 +150,13 @@ class Analysis:
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """The balance of torques, with its fit and estimates."""
     findings.gate([*of_probe(recording), *checks.of_events(recording)])
-    plan = recording.plan
-    data = read_torques(recording, plan.masses, plan.count_rad)
-    findings.gate(checks.of_signals(data, plan))
+    plan, machine = recording.plan, conventions(recording.rig)
+    data = read_torques(recording)
+    findings.gate(checks.of_signals(data, machine, plan))
     a = _fitted(recording, data)
     values = {name: e.value for name, e in a.inputs.items()}
     mass_u = masses_u(recording.rig, plan.masses)
-    findings.add(checks.of_fit(data, a.balance, a.detent, values, mass_u, arms_u(recording.rig), plan))
+    findings.add(checks.of_fit(data, machine, a.balance, a.detent, values, mass_u, arms_u(recording.rig), plan))
     return a
 
 
@@ -214,13 +197,9 @@ def _fitted(recording: Recording[Plan], data: TorqueData) -> Analysis:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    unknown = [m for m in plan.masses if m not in rig.masses]
-    if unknown:
-        yield f"masses: found {', '.join(unknown)}; the rig file certifies {', '.join(rig.masses)}"
+    yield from check_masses(rig, plan.masses)
+    if not rig.masses.keys() >= set(plan.masses):
         return
-    kg = [rig.masses[m].value for m in plan.masses]
-    if kg != sorted(kg) or len(set(kg)) != len(kg):
-        yield f"masses: found {kg} kg; expected different masses in ascending order"
     turn = plan.gamma_max_rad * rig.machine["pole_pairs"].value
     if turn > math.pi / 3:
         yield (f"gamma_max_rad: found {plan.gamma_max_rad:g} rad, {math.degrees(turn):.0f} deg of the electrical turn; "
@@ -244,8 +223,8 @@ procedure = Procedure(
     figures=figures,
     requires=Requires(
         roles=("levitation", "rotation"),
-        channels=CHANNELS,
-        sensors=SEGMENTS,
+        channels=channels(SERVOMOTOR),
+        sensors=SERVOMOTOR.segments,
         parameters=(*hold.PARAMETERS, "gamma", "i_x", "i_y", "i_ramp", "bias_i", "bias_o"),
         geometry=tuple(f"lever_{s}" for s in SIDES),
         machine=("pole_pairs",),

@@ -2,27 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
-from procedures.servomotor.direction import SEGMENTS
+from procedures.servomotor.conventions import Servomotor, conventions
+from procedures.servomotor.loads import load_index
+from procedures.shared.step_table import Labels, Read, Samples, StepTable, tabulate
 from procedures.torque_constant.fit import Steps, resting
+from procedures.torque_constant.plan import Plan
 
 Array = npt.NDArray[np.float64]
-COILS = ("i_xo_p", "i_xo_n", "i_yo_p", "i_yo_n")
-CHANNELS = ("angle", *SEGMENTS, *COILS, "flags")
+
+
+def channels(machine: Servomotor) -> tuple[str, ...]:
+    """What is recorded while loads hang on the lever."""
+    return ("angle", *machine.segments, *machine.coils_of("xo", "yo"), "flags")
+
+
+@dataclass(frozen=True)
+class OnLever(Labels):
+    """Which load hangs on which side; both "" without one."""
+
+    kind: ClassVar[str] = "lever"
+    gamma_rad: float
+    side: str
+    load: str
+
+    def __str__(self) -> str:
+        what = f"{self.load or 'nothing'} on the {self.side}" if self.side else "no load"
+        return f"gamma {np.degrees(self.gamma_rad):+.2f} deg, {what}"
+
+
+@dataclass(frozen=True)
+class OverDetent(Labels):
+    """Where the rotor is held without load."""
+
+    kind: ClassVar[str] = "detent"
+    angle_rad: float
+
+
+@dataclass(frozen=True)
+class Sideways(Labels):
+    """Currents that push the rotor aside, A."""
+
+    kind: ClassVar[str] = "wiring"
+    i_x: float
+    i_y: float
 
 
 @dataclass(frozen=True)
 class TorqueData:
-    """`steps` for the fit; per step (n,): `drift` of the torque current (second half less first) A, `length` s, control
-    current of the outboard AMB `side_x`, `side_y` A, `lost`, `expected`, `flags`, `spread` (n, 4) of the segments' samples A.
+    """`steps` for the fit, and the `table` (n,) of these steps, with the torque current as "torque" and the outboard AMB's
+    control currents as "side_x", "side_y", A.
 
     `detent_angle`, `detent_current` (m,): rad and A without load over a period of the detent.
     `wiring` (2, 2): control current x, y of the outboard AMB in A per A of i_x, i_y.
@@ -30,82 +66,61 @@ class TorqueData:
 
     steps: Steps
     masses: tuple[str, ...]
-    drift: Array
-    length: Array
-    side_x: Array
-    side_y: Array
-    lost: Array
-    expected: Array
-    flags: npt.NDArray[np.int64]
-    spread: Array
+    table: StepTable[OnLever]
     detent_angle: Array
     detent_current: Array
     wiring: Array
 
-    def where(self, k: int) -> str:
-        """How a step is named to the reader."""
-        s = self.steps
-        what = f"{self.masses[s.load[k]]} on the {'left' if s.side[k] > 0 else 'right'}" if s.side[k] else "no load"
-        return f"gamma {np.degrees(s.gamma[k]):+.2f} deg, {what}"
 
-
-def read_torques(recording: Recording[Any], masses: tuple[str, ...], count: float) -> TorqueData:
+def read_torques(recording: Recording[Plan]) -> TorqueData:
     """Read all steps.
 
     Raises:
-        AnalysisError: there are none, or too few samples in one.
+        AnalysisError: there are none, too few samples in one, or what hung is no mass of the plan.
     """
-    found = list(recording.steps("lever"))
-    if not found:
+    masses, table = recording.plan.masses, _table(recording, OnLever)
+    if not len(table):
         raise AnalysisError("found no loads on the lever (was the run stopped early?)")
-    read = [_reduce(step) for step in found]
-    index = {"": -1} | {label: k for k, label in enumerate(masses)}
-    if strange := sorted({str(s.labels["load"]) for s in found} - set(index)):
-        raise AnalysisError(
-            f"masses: found {', '.join(strange)} on the lever; expected those of the plan, {', '.join(masses)}"
-        )
+    segments = conventions(recording.rig).segments
     sides = {"left": 1, "right": -1, "": 0}
-    start = found[0].start_ns
     steps = Steps(
-        np.array([r["segments"] for r in read]), resting(np.array([r["angle"] for r in read]), count),
-        np.array([float(s.labels["gamma_rad"]) for s in found]),
-        np.array([(s.start_ns + s.end_ns) / 2 - start for s in found]) * 1e-9,
-        np.array([sides[str(s.labels["side"])] for s in found]), np.array([index[str(s.labels["load"])] for s in found]),
-        np.array([r["jumps"] for r in read]),
-    )  # fmt: skip
-    turned = [_reduce(step) for step in recording.steps("detent")]
+        np.ascontiguousarray(table.stack(segments).T),
+        resting(table.mean["angle"], recording.plan.count_rad),
+        table.each(lambda step: step.gamma_rad),
+        ((table.start_ns + table.end_ns) / 2 - table.start_ns[0]) * 1e-9,
+        np.array([sides[step.side] for step in table.labels]),
+        load_index([step.load for step in table.labels], masses, "lever"),
+        table.spread["torque"],
+    )
+    detent = _table(recording, OverDetent)
     return TorqueData(
-        steps, masses, np.array([r["drift"] for r in read]),
-        np.array([(s.end_ns - s.start_ns) * 1e-9 for s in found]),
-        np.array([r["x"] for r in read]), np.array([r["y"] for r in read]),
-        np.array([float(s.lost()) for s in found]), np.array([float(s.expected()) for s in found]),
-        np.array([r["flags"] for r in read]), np.array([r["spread"] for r in read]),
-        np.array([r["angle"] for r in turned]), np.array([r["segments"].mean() for r in turned]),
-        _wiring(recording),
+        steps, masses, table, detent.mean["angle"], detent.stack(segments).mean(axis=0),
+        _wiring(_table(recording, Sideways)),
     )  # fmt: skip
 
 
-def _reduce(step: Step) -> Mapping[str, Any]:
-    data = step.read(*CHANNELS)
-    n = len(data["angle"])
-    if n < 20:
-        raise AnalysisError(f"step {dict(step.labels)}: found {n} samples; expected 20 or more")
-    segments = np.array([data[c] for c in SEGMENTS])
-    current = segments.mean(axis=0)
-    return {
-        "segments": segments.mean(axis=1), "spread": segments.std(axis=1), "angle": float(np.unwrap(data["angle"]).mean()),
-        "jumps": float(current.std()), "drift": float(current[n // 2 :].mean() - current[: n // 2].mean()),
-        "x": float((data["i_xo_p"] - data["i_xo_n"]).mean() / 2), "y": float((data["i_yo_p"] - data["i_yo_n"]).mean() / 2),
-        "flags": int(np.bitwise_or.reduce(data["flags"].astype(np.int64))),
-    }  # fmt: skip
+def _table(recording: Recording[Plan], kind: type[Read]) -> StepTable[Read]:
+    machine = conventions(recording.rig)
+
+    def samples(step: Step) -> Samples:
+        data = step.read(*channels(machine))
+        n = len(data["angle"])
+        if n < 20:
+            raise AnalysisError(f"step {dict(step.labels)}: found {n} samples; expected 20 or more")
+        data["angle"] = np.unwrap(data["angle"])
+        data["torque"] = np.array([data[c] for c in machine.segments]).mean(axis=0)
+        data |= {f"side_{axis}": machine.control(f"{axis}o", data.__getitem__) for axis in "xy"}
+        return data
+
+    reduced = (*machine.segments, "angle", "torque", "side_x", "side_y")
+    return tabulate(list(recording.steps(kind.kind)), kind, reduced, read=samples)
 
 
-def _wiring(recording: Recording[Any]) -> Array:
+def _wiring(table: StepTable[Sideways]) -> Array:
     """Slopes of the outboard AMB's control currents over i_x and i_y, from the steps at plus and minus."""
-    found = [(float(s.labels["i_x"]), float(s.labels["i_y"]), _reduce(s)) for s in recording.steps("wiring")]
-    if not found:
+    if not len(table):
         return np.zeros((2, 2))
-    asked = np.array([[1.0, x, y] for x, y, _ in found])
-    answers = np.array([[r["x"], r["y"]] for _, _, r in found])
+    asked = np.array([[1.0, step.i_x, step.i_y] for step in table.labels])
+    answers = np.stack([table.mean["side_x"], table.mean["side_y"]], axis=-1)
     slopes: Array = np.linalg.lstsq(asked, answers, rcond=None)[0][1:].T
     return slopes

@@ -32,7 +32,8 @@ from bench.rigfile.check import check_rig
 from bench.samples import SampleBlock
 from drivers.controller import Controller
 from drivers.operator import LineOperator
-from procedures.amb_calibration.procedure import Plan, procedure, settings
+from procedures.amb_calibration.plan import Plan
+from procedures.amb_calibration.procedure import procedure, settings
 from sim_backend.endpoint import SimulatedRig
 from sim_backend.truth import draw
 

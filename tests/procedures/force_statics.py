@@ -11,7 +11,8 @@ import numpy.typing as npt
 from scipy import optimize
 
 from procedures.force_constant.fit import Ramps
-from procedures.force_constant.procedure import Plan, sequence
+from procedures.force_constant.plan import Plan
+from procedures.force_constant.procedure import sequence
 
 Array = npt.NDArray[np.float64]
 BIAS, WEIGHT, L_OA, SPAN, REACH, GAP = 3.0, 10.2 * 9.81, 0.010, 0.125, 0.112, 5e-4

@@ -19,7 +19,8 @@ from bench.record.specs import load_spec
 from bench.rigfile import load_rig
 from bench.uncertainty import interval
 from procedures.amb_calibration import both_coils
-from procedures.amb_calibration.procedure import Plan, check, procedure
+from procedures.amb_calibration.plan import Plan
+from procedures.amb_calibration.procedure import check, procedure
 from sim_backend.truth import draw
 
 SHORT = {"settle_s": 0.3, "average_s": 0.2}

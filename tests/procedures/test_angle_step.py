@@ -20,7 +20,8 @@ from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate
 from procedures.angle_step import response
-from procedures.angle_step.procedure import MEASURES, Plan, check, planned, procedure, step_count
+from procedures.angle_step.plan import Plan
+from procedures.angle_step.procedure import MEASURES, check, planned, procedure, step_count
 from procedures.angle_step.response import Loop, Move
 from reports.figures import draw as draw_figure
 from sim_backend.truth import draw

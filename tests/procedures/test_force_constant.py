@@ -22,8 +22,10 @@ from bench.uncertainty import Estimate, interval
 from bench.uncertainty.coverage import ensemble
 from procedures.force_constant import checks
 from procedures.force_constant.fitting import check, predicted_controls
-from procedures.force_constant.procedure import Plan, procedure
+from procedures.force_constant.plan import Plan
+from procedures.force_constant.procedure import procedure
 from procedures.force_constant.steps import read_ramps
+from procedures.servomotor.conventions import SERVOMOTOR
 
 NAME, CALIBRATION = "force-constant", "amb-calibration"
 SHORT = {"settle_s": 0.15}
@@ -150,8 +152,10 @@ def test_a_coil_that_cannot_reach_its_current_does_not_pass(
         measure(tmp_path, calibration, {"coil_limit_yo_p": 8.0})
     data = read_ramps(sound.recording)
     for bit, named in ((1, "AMB"), (2, "motor"), (8, "outboard touchdown")):
-        flagged = replace(data, flags=np.where(data.level_y == -2, bit, 0))
-        found = list(checks.of_signals(flagged, Plan()))
+        flagged = replace(
+            data, table=replace(data.table, flags=np.where(data.table.each(lambda at: at.i_y_A) == -2, bit, 0))
+        )
+        found = list(checks.of_signals(flagged, SERVOMOTOR, Plan()))
         assert [(f.code, f.effect) for f in found] == [("contact" if bit == 8 else "saturated", Effect.INDETERMINATE)]
         assert named in found[0].text
         assert "i_y -2 A" in found[0].where

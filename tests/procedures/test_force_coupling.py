@@ -20,7 +20,8 @@ from bench.rigfile import load_rig
 from bench.uncertainty import interval
 from procedures.force_coupling.estimates import evaluate
 from procedures.force_coupling.fit import TERMS
-from procedures.force_coupling.procedure import Plan, check, procedure, read
+from procedures.force_coupling.plan import Plan
+from procedures.force_coupling.procedure import check, procedure, read
 from procedures.servomotor import carrying
 
 NAME = "force-coupling"
@@ -94,7 +95,7 @@ def test_where_the_rotor_was_before_does_not_matter(
     monkeypatch.setattr(carrying, "home", lambda rig: swung(rig, swing))
     run = measure(tmp_path, known)
     data = read(run.recording)
-    readings = data.labels["branch"] * data.mean["angle"] / Plan().count_rad
+    readings = data.each(lambda step: step.branch) * data.mean["angle"] / Plan().count_rad
     assert np.all((readings > 0.05) & (readings < 0.95)), readings
     assert serious(run) == []
 

@@ -11,7 +11,8 @@ from bench.uncertainty import Estimate, Influence
 from procedures.force_constant import estimates as force_constant_estimates
 from procedures.force_constant import fit
 from procedures.force_constant.fit import BRANCH, CROSS, DIRECT, FORCE, MOMENT, TIME
-from procedures.force_constant.procedure import Plan, sequence
+from procedures.force_constant.plan import Plan
+from procedures.force_constant.procedure import sequence
 from tests.procedures.force_statics import BIAS, REACH, SPAN, Machine, changed, facts, parameters, ramps
 
 

@@ -16,7 +16,8 @@ from bench.cli.virtual import Simulated, simulated_run
 from bench.errors import ConfigError
 from bench.findings import Effect, Finding
 from bench.rigfile import load_rig
-from procedures.force_map.procedure import MEASURES, Plan, check, loaded_points, points, procedure, step_count
+from procedures.force_map.plan import Plan
+from procedures.force_map.procedure import MEASURES, check, loaded_points, points, procedure, step_count
 from reports.figures import draw as draw_figure
 from sim_backend.truth import draw
 

@@ -84,7 +84,7 @@ def test_the_interval_of_a_suspect_holds_the_mass(sound: list[Simulated]) -> Non
     held = 0
     for run in sound:
         recording: Recording[procedure.Plan] = Recording.open(run.recording.path, procedure.Plan)
-        data = read_hangings(recording, recording.plan.masses)
+        data = read_hangings(recording)
         true = {k: e.value for k, e in procedure.fit_inputs(recording.rig, recording.plan).items()}
         u = procedure.masses_u(recording)
         for k in range(4):

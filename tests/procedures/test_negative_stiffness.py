@@ -20,7 +20,8 @@ from bench.rigfile import load_rig
 from bench.uncertainty import interval
 from procedures.negative_stiffness import procedure as negative_stiffness
 from procedures.negative_stiffness.estimates import evaluate
-from procedures.negative_stiffness.procedure import Plan, check, procedure, read
+from procedures.negative_stiffness.plan import Plan
+from procedures.negative_stiffness.procedure import check, procedure, read
 from procedures.servomotor import carrying
 
 NAME = "negative-stiffness"

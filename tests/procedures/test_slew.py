@@ -28,7 +28,8 @@ from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, Influence
 from procedures.slew import fit
 from procedures.slew.fit import Gains, Swing
-from procedures.slew.procedure import MEASURES, Plan, check, needs, procedure, step_count
+from procedures.slew.plan import Plan
+from procedures.slew.procedure import MEASURES, check, needs, procedure, step_count
 from reports.figures import draw as draw_figure
 from sim_backend.truth import draw
 

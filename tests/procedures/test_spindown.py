@@ -20,7 +20,8 @@ from bench.record.outcomes import Outcome
 from bench.record.specs import load_spec
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, correlation, interval
-from procedures.spindown.procedure import Plan, check
+from procedures.spindown.plan import Plan
+from procedures.spindown.procedure import check
 from sim_backend.truth import draw
 
 RIGS = Path(__file__).parents[2] / "rigs"

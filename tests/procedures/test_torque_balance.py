@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from bench.errors import AnalysisError
 from procedures.torque_constant import fit, hypotheses
 from procedures.torque_constant.fit import NO_DETENT, Steps, balance, detent
-from procedures.torque_constant.procedure import Plan, visits
+from procedures.torque_constant.plan import Plan
+from procedures.torque_constant.procedure import visits
 
 Array = npt.NDArray[np.float64]
 KG = np.array([0.5, 1.0, 2.0, 0.0])

@@ -14,7 +14,8 @@ from bench.record.limits import Verdict, judge
 from bench.record.specs import load_spec
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, interval
-from procedures.torque_constant.procedure import Plan, check, procedure
+from procedures.torque_constant.plan import Plan
+from procedures.torque_constant.procedure import check, procedure
 
 QUICK = {"masses": ["M2", "M3"], "settle_s": 0.7, "average_s": 0.3}
 THREE = {**QUICK, "masses": ["M1", "M2", "M3"]}

@@ -1,0 +1,115 @@
+"""What the servomotor's controller calls its signals, what the bits of its flags mean, and where the shaft's planes lie.
+
+Whatever looks at a recording or drives a rig gets them from `conventions(rig)` and names no signal by itself; only what a
+procedure declares before there is a rig (`requires`) names those of SERVOMOTOR.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import IntFlag
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.rigfile import RigFile
+
+Array = npt.NDArray[np.float64]
+Value = TypeVar("Value", float, Array)
+
+
+class Flag(IntFlag):
+    """Bits of the telemetry signal `flags`."""
+
+    AMB_LIMIT = 1
+    SEGMENT_LIMIT = 2
+    CONTACT_INBOARD = 4
+    CONTACT_OUTBOARD = 8
+    WATCHDOG_ARMED = 16
+
+
+@dataclass(frozen=True)
+class Servomotor:
+    """Signals by axis: "x" or "y" with the bearing, inboard "i" or outboard "o". `coils` has of each axis the one that pulls
+    towards the positive end first. `segments` in the order of T (6.9). `sensors` and `ambs` are the inboard and the outboard
+    lever from the centre of mass, by their names in the rig file's geometry. Then the flags by what they mean."""
+
+    positions: Mapping[str, str]
+    coils: Mapping[str, tuple[str, str]]
+    segments: tuple[str, str, str, str]
+    sensors: tuple[str, str]
+    ambs: tuple[str, str]
+    amb_limit: int
+    segment_limit: int
+    contact_inboard: int
+    contact_outboard: int
+
+    @property
+    def contact(self) -> int:
+        """Contact at either end."""
+        return self.contact_inboard | self.contact_outboard
+
+    @property
+    def levers(self) -> tuple[str, ...]:
+        """Names of all levers, inboard ones first."""
+        return tuple(name for pair in zip(self.sensors, self.ambs, strict=True) for name in pair)
+
+    def positions_of(self, *axes: str) -> tuple[str, ...]:
+        """Position signals of some axes, in that order."""
+        return tuple(self.positions[axis] for axis in axes)
+
+    def coils_of(self, *axes: str) -> tuple[str, ...]:
+        """Coil currents of some axes, in that order."""
+        return tuple(coil for axis in axes for coil in self.coils[axis])
+
+    def coils_along(self, direction: str) -> dict[str, str]:
+        """Coils of both AMBs along "x" or "y", by bearing and the end they pull to: "ip", "in", "op", "on"."""
+        return {f"{b}{end}": coil for b in "io" for end, coil in zip("pn", self.coils[f"{direction}{b}"], strict=True)}
+
+    def control(self, axis: str, at: Callable[[str], Value]) -> Value:
+        """Control current of an axis in A, half the difference of its coils' currents, which `at` gives by name."""
+        positive, negative = self.coils[axis]
+        return (at(positive) - at(negative)) / 2
+
+    def sensor_share(self, z: float, rig: RigFile) -> float:
+        """`sensor_share` by the nominal lengths of the rig file."""
+        l_is, l_os = (rig.geometry[name].value for name in self.sensors)
+        return sensor_share(z, l_is, l_os)
+
+
+_AXES = ("yi", "yo", "xi", "xo")
+SERVOMOTOR = Servomotor(
+    positions={axis: f"pos_{axis}" for axis in _AXES},
+    coils={axis: (f"i_{axis}_p", f"i_{axis}_n") for axis in _AXES},
+    segments=("i_m1", "i_m2", "i_m3", "i_m4"),
+    sensors=("com_to_inboard_sensor", "com_to_outboard_sensor"),
+    ambs=("com_to_inboard_amb", "com_to_outboard_amb"),
+    amb_limit=Flag.AMB_LIMIT,
+    segment_limit=Flag.SEGMENT_LIMIT,
+    contact_inboard=Flag.CONTACT_INBOARD,
+    contact_outboard=Flag.CONTACT_OUTBOARD,
+)
+
+
+def conventions(rig: RigFile) -> Servomotor:
+    """Those of a rig."""
+    del rig  # there is one such machine so far
+    return SERVOMOTOR
+
+
+def sensor_share(z: float, l_is: float, l_os: float) -> float:
+    """Share of the outboard sensor in the displacement at plane z, m from the centre of mass, outboard positive; the inboard
+    one's is the rest (T 6.7). `l_is`, `l_os`: their distances from it, m."""
+    return (z + l_is) / (l_is + l_os)
+
+
+def displacement(inboard: Array, outboard: Array, share: float) -> Array:
+    """Displacement in m of the plane that has that `share`, from both sensors' readings."""
+    return inboard * (1 - share) + outboard * share
+
+
+def radial_currents(one: Array, two: Array, three: Array, four: Array) -> tuple[Array, Array]:
+    """i_x, i_y in A by the currents of the four segments (T 6.18)."""
+    return (four - two) / 2, (one - three) / 2
