@@ -17,22 +17,22 @@ from bench.procedure.requires import Requires
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.units import RPM
-from procedures.amb_rotor.channels import AXES, CURRENTS, POSITIONS
+from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.balance import decision, estimates
 from procedures.balance.estimates import Balanced, Forces
 from procedures.balance.steps import (
     BASE,
-    CAPTURED,
     DECISION,
     LIGHTER,
     REFUSED,
     SIDES,
     Recorded,
     Run,
+    captured_channels,
     read_dwell,
 )
-from procedures.synchronous import bearings, fitting
-from procedures.synchronous.dwells import SLOW, TOLD, Dwell
+from procedures.synchronous import fitting
+from procedures.synchronous.dwells import SLOW, Dwell, telemetry_channels
 from procedures.unbalance import checks as unbalance_checks
 
 MOST_RPM = 10000.0  # influence runs
@@ -72,13 +72,14 @@ class Looked:
 
 REQUIRES = Requires(
     roles=("levitation", "drive"),
-    channels=TOLD,
-    sensors=(*POSITIONS, *CURRENTS),
-    parameters=("law", "ref_y", "ref_theta", "bias", "kp", "kd", "k1", "k2_ccs", "k2_cac", *bearings.STATED),
+    channels=telemetry_channels(AMB_ROTOR),
+    sensors=(*AMB_ROTOR.positions, *AMB_ROTOR.currents),
+    parameters=(AMB_ROTOR.law, AMB_ROTOR.set_points["y"], AMB_ROTOR.set_points["theta"], "bias", "kp", "kd", *AMB_ROTOR.poles,
+                *AMB_ROTOR.model_parameters),
     geometry=NEEDED,
     machine=("mass", "transverse_inertia", "polar_inertia", "radial_axes", "runout", "weight_mass", "weight_angle"),
-    capture=CAPTURED,
-)
+    capture=captured_channels(AMB_ROTOR),
+)  # fmt: skip
 
 
 def of_plan(rig: RigFile, plan: Settings) -> Iterable[str]:
@@ -188,7 +189,7 @@ def of_result(
     for p, side in enumerate(SIDES):
         some = ", ".join(
             f"{axis} {abs(a):.3f} µm ∠{-math.degrees(np.angle(a)) % 360:.0f}°"
-            for axis, a in zip(AXES, balance.solved.influence[-1, :, p], strict=True)
+            for axis, a in zip(recorded.machine.axes, balance.solved.influence[-1, :, p], strict=True)
         )
         text = (f"1 g mm at the scale's zero of the {side} plane, {max(plan.speeds_rad_s) * RPM:.0f} r/min (0-pk, phase "
                 f"lag): {some}; condition of all {balance.solved.condition:.1f}.")  # fmt: skip

@@ -16,7 +16,7 @@ from bench.calibration import Calibration
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate, welch_satterthwaite
 from bench.uncertainty.estimate import merged
-from procedures.amb_rotor.channels import AXES
+from procedures.amb_rotor.conventions import conventions
 from procedures.balance import scatter as balance_scatter
 from procedures.balance.plan import Plan
 from procedures.balance.solution import Solved, Trials, solved, taken
@@ -224,18 +224,17 @@ def share(balance: Balanced, name: str, plane: int) -> Estimate:
 def influences(balance: Balanced, rig: RigFile) -> dict[tuple[str, str], tuple[Estimate, Estimate]]:
     """Influence coefficients at the highest speed by probe and plane, cosine and sine, m/(kg m): scatter of both runs, the
     trial weight, and the probe's gain."""
-    out = {}
+    out, machine = {}, conventions(rig)
     radius = certified("geometry/balance_radius", rig.geometry["balance_radius"], "radius of the weights")
     known = _weights(balance.trials, rig)
     for p, side in enumerate(SIDES):
         before, having = balance.trials.before[p], balance.trials.having[p]
         scatter = [balance_scatter.of_read(f"{r.name}/{len(r.reads) - 1}", r.fastest, 4) for r in (before, having)]
-        for k, axis in enumerate(AXES):
-            parts = [scatter[n][2 * k + j] for n in (0, 1) for j in (0, 1)]
+        for k, axis in enumerate(machine.axes):
+            parts, name = [scatter[n][2 * k + j] for n in (0, 1) for j in (0, 1)], machine.position(axis)
             inputs = {"a": parts[0], "b": parts[1], "c": parts[2], "d": parts[3], "kg": known[f"kg_{p}"],
                       "angle": known[f"angle_{p}"], "radius": radius,
-                      "gain": certified(f"sensors/pos_{axis}/gain", rig.sensors[f"pos_{axis}"].gain,
-                                        f"gain of pos_{axis}")}  # fmt: skip
+                      "gain": certified(f"sensors/{name}/gain", rig.sensors[name].gain, f"gain of {name}")}  # fmt: skip
 
             def model(v: dict[str, float]) -> dict[str, float]:
                 u = v["kg"] * v["radius"] * v["gain"] * np.exp(1j * v["angle"])

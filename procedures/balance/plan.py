@@ -8,8 +8,8 @@ from pydantic import Field
 
 from bench.procedure import BenchPlan
 from bench.units import RPM
+from procedures.amb_rotor.conventions import Law
 from procedures.balance.steps import BASE
-from procedures.synchronous.dwelling import Law
 
 
 class Plan(BenchPlan):

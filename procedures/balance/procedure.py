@@ -16,6 +16,7 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
+from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.balance import checks, decision, estimates, sequence
 from procedures.balance import figures as drawn
 from procedures.balance.estimates import Result
@@ -23,7 +24,7 @@ from procedures.balance.hum import of_balance
 from procedures.balance.plan import Plan
 from procedures.balance.steps import BASE, SIDES, read_runs
 from procedures.shared import assumptions
-from procedures.synchronous import bearings, dwelling
+from procedures.synchronous import bearings
 from procedures.synchronous.dwells import SLOW
 from procedures.synchronous.hum import heard
 from procedures.unbalance import checks as unbalance_checks
@@ -80,7 +81,7 @@ MEASURES = (FOUND_COS, FOUND_SIN, LEFT_COS, LEFT_SIN, SHARE, PERMITTED, COSINE, 
 def settings(plan: Plan) -> dict[str, float]:
     """Lifted by the PID, nothing compensated."""
     del plan
-    return {"law": dwelling.CODES["PID"], "observer": 0.0, "compensate": 0.0}
+    return AMB_ROTOR.lifting
 
 
 def step_count(plan: Plan) -> int:

@@ -10,12 +10,11 @@ from bench.procedure.roles import Plane, RigState
 from bench.procedure.states import transition
 from bench.recording.recorder import Recorder
 from procedures.amb_rotor import lift
-from procedures.amb_rotor.channels import CONTACT
+from procedures.amb_rotor.conventions import conventions
 from procedures.balance import decision, estimates
 from procedures.balance.plan import Plan
 from procedures.balance.steps import (
     BASE,
-    CAPTURED,
     DECISION,
     LIGHTER,
     MOUNT,
@@ -25,6 +24,7 @@ from procedures.balance.steps import (
     Read,
     Run,
     Weight,
+    captured_channels,
     read_capture,
 )
 from procedures.synchronous import bearings as unbalance_bearings
@@ -53,7 +53,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     work = Work(rig, plan, record)
     if not lift.probed(rig, record):
         return
-    dwelling.put(rig, {"law": dwelling.CODES[plan.law], **dwelling.SETTINGS["off"]})
+    dwelling.select(rig, plan.law)
     if not _rolled(work) or not _run(work, BASE):
         return
     for p, side in enumerate(SIDES):
@@ -89,7 +89,7 @@ def _run(work: Work, name: str) -> bool:
     rig, plan = work.rig, work.plan
     if rig.levitation.state is RigState.READY:  # the base run goes on from the slow roll
         transition(rig, RigState.LEVITATED)
-    dwelling.put(rig, {"law": dwelling.CODES[plan.law], **dwelling.SETTINGS["off"]})
+    dwelling.select(rig, plan.law)
     reads: list[Read] = []
     speeds = sorted(plan.speeds_rad_s)
     for speed in (*speeds, *(speeds[:1] if plan.repeat else ())):
@@ -113,19 +113,19 @@ def _dwell(
     again: bool = False,
 ) -> Read | None:  # fmt: skip
     """A recorded dwell and what its capture says, None where that cannot be told."""
-    rig, number = work.rig, -1 if again else work.dwells
+    rig, number, machine = work.rig, -1 if again else work.dwells, conventions(work.rig.file)
     assert rig.capture is not None  # `check` refuses a rig without one
     driven = rig.drive.speed_rad_s if rig.drive is not None else 0.0
     labels = {"speed_rad_s": speed, "variant": name, "driven_rad_s": driven, "number": number, "again": again}
     with work.record.step(kind, **labels):
-        rig.capture.arm(CAPTURED, seconds=capture_s, rate_hz=rate_hz)
+        rig.capture.arm(captured_channels(machine), seconds=capture_s, rate_hz=rate_hz)
         rig.capture.wait(capture_s + 5.0)
         rig.clock.sleep(max(seconds - capture_s, dwelling.MARGIN_S))
     work.dwells += 1
-    touched = int(rig.levitation.reading("flags")) & CONTACT
+    touched = int(rig.levitation.reading("flags")) & machine.contact
     data = rig.capture.upload(run=name, speed_rad_s=speed)
     try:
-        return None if touched else read_capture(data, kind == SLOW)
+        return None if touched else read_capture(data, machine, kind == SLOW)
     except AnalysisError:
         return None  # of the pulses; the analysis says what is wrong with them
 

@@ -9,7 +9,6 @@ import numpy as np
 from bench.figures import Figure, Series
 from bench.uncertainty import Estimate, coverage_factor
 from bench.units import RPM
-from procedures.amb_rotor.channels import AXES
 from procedures.compensation.switching import WITHIN_S, Switched
 from procedures.unbalance.estimates import Result
 
@@ -41,7 +40,7 @@ def switched(s: Switched) -> Iterator[Figure]:
                   Series(f"{WITHIN_S * 1e3:.0f} ms", np.full(2, 1e3 * WITHIN_S), np.array([0.0, 1e6 * size.max()]), "guide")),
                  lines=(("20 %", 0.2e6 * float(size[t < -3 * s.turn].mean())),))  # fmt: skip
     part = slice(None, None, max(1, -(-len(s.t) // MOST_POINTS)))
-    places = zip(AXES, s.positions, strict=True)
+    places = zip(s.axes, s.positions, strict=True)
     series = tuple(Series(a, 1e3 * s.t[part], 1e6 * x[part] - 40 * k) for k, (a, x) in enumerate(places))
     yield Figure("switch-readings", f"Switched on at {rpm}: the readings", "As read, noise and runout included; "
                  "each one below the one before, 40 µm apart.", "time (ms)", "reading (µm)",

@@ -23,13 +23,13 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from bench.units import RPM
 from procedures.amb_rotor import lift
+from procedures.amb_rotor.conventions import AMB_ROTOR, Law, Variant, conventions
 from procedures.compensation import checks, switching
 from procedures.compensation import figures as drawn
 from procedures.compensation.hum import of_switch
 from procedures.compensation.switching import SWITCH, Switched
 from procedures.shared import assumptions
 from procedures.synchronous import dwelling
-from procedures.synchronous.dwelling import SETTINGS, Law, Variant
 from procedures.synchronous.hum import heard
 from procedures.unbalance import figures as unbalance_figures
 from procedures.unbalance import procedure as unbalance
@@ -49,7 +49,6 @@ RESIDUAL = Quantity(
     title="reading after the switch",
 )
 MEASURES = (*unbalance.MEASURES, REDUCTION, DROP, RESIDUAL)
-WAITING = {"observer": 1.0, "compensate": 0.0, "integral": 0.0}  # the estimates run and do nothing
 AFTER_ARM_S = 0.05
 SAME = 1e-6  # of a speed
 
@@ -95,15 +94,17 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 
 def _switched(rig: Rig, plan: Plan, record: Recorder) -> bool:
     """Switch the compensation on while the controller records."""
-    dwelling.put(rig, dwelling.SETTINGS["off"])
+    machine = conventions(rig.file)
+    dwelling.put(rig, machine.variants["off"])
     if rig.capture is None or not lift.turned(rig, record, plan.switch_rad_s, plan.settle_s):
         return False
-    dwelling.put(rig, WAITING)
+    compensating = machine.variants["corrected"]
+    dwelling.put(rig, {**compensating, machine.compensate: 0.0})  # the estimates run and do nothing
     rig.clock.sleep(plan.settle_s)
     with record.step(SWITCH, speed_rad_s=plan.switch_rad_s):
-        rig.capture.arm(switching.RECORDED, seconds=plan.before_s + AFTER_ARM_S + plan.after_s)
+        rig.capture.arm(switching.captured_channels(machine), seconds=plan.before_s + AFTER_ARM_S + plan.after_s)
         rig.clock.sleep(plan.before_s)
-        rig.levitation.set("compensate", dwelling.SETTINGS["corrected"]["compensate"])
+        rig.levitation.set(machine.compensate, compensating[machine.compensate])
         rig.capture.wait(plan.after_s + 5.0)
     rig.capture.upload(switch=1)
     return True
@@ -184,7 +185,7 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=replace(unbalance.REQUIRES, parameters=(*unbalance.REQUIRES.parameters, *SETTINGS["corrected"])),
+    requires=replace(unbalance.REQUIRES, parameters=(*unbalance.REQUIRES.parameters, *AMB_ROTOR.variants["corrected"])),
     check=check,
     settings=settings,
     step_count=step_count,

@@ -15,7 +15,6 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.uncertainty import interval
 from bench.units import RPM
-from procedures.amb_rotor.channels import AXES, CONTACT, CURRENT_LIMIT, PLANES, RANGE, VOLTAGE_LIMIT
 from procedures.run_up.estimates import DAMPED, Peak, Run, asked_margin
 from procedures.run_up.hum import of_peaks
 from procedures.run_up.steps import LEAST_TURNS, MISSED, PASSAGE, Passage
@@ -38,7 +37,6 @@ FEWEST_TURNS = (WINDOW + 1) * LEAST_TURNS  # the local models of the curve take 
 UPLOAD_S = 1.2
 LARGE = 0.5  # of the clearance
 BY_THE_RING = 0.95  # of the clearance: probes, whose zeros are known to 5 µm, tell no more whether the shaft touches
-INBOARD, OUTBOARD, AXIAL = 4, 8, 32
 BESIDE = 0.05  # of a speed: what happens there may be in its turns
 OF_CRITICALS = ("critical_speed", "amplification_factor", "critical_amplitude", "separation")
 
@@ -159,8 +157,9 @@ def _doubted(p: Passage, samples: Mask, plan: Settings) -> tuple[str, ...]:
 
 
 def _limits(p: Passage, plan: Settings) -> Iterator[Finding]:
+    m = p.machine
     beyond, touched, current, voltage = (
-        (p.flags & bits) != 0 for bits in (RANGE, CONTACT, CURRENT_LIMIT, VOLTAGE_LIMIT)
+        (p.flags & bits) != 0 for bits in (m.sensor_range, m.contact, m.current_limit, m.voltage_limit)
     )
     if p.clips >= HELD or beyond.any():
         text = (
@@ -168,8 +167,8 @@ def _limits(p: Passage, plan: Settings) -> Iterator[Finding]:
         )
         yield Finding("sensor-clipped", text, p.name, Effect.ERROR)
     if touched.any():
-        rings = [name for bit, name in ((INBOARD, "the inboard ring"), (OUTBOARD, "the outboard ring"),
-                                        (AXIAL, "the axial stop")) if (p.flags & bit).any()]  # fmt: skip
+        rings = [f"the {place} {'stop' if place == 'axial' else 'ring'}"
+                 for place, bit in m.contacts.items() if (p.flags & bit).any()]  # fmt: skip
         text = f"the shaft touched {' and '.join(rings)}{_when(p, touched)}: this is not its response to unbalance."
         yield Finding("contact", text, p.name, Effect.INDETERMINATE, _doubted(p, touched, plan))
     if current.any():
@@ -183,9 +182,9 @@ def _limits(p: Passage, plan: Settings) -> Iterator[Finding]:
 def _silent(p: Passage, rig: RigFile, plan: Settings) -> Iterator[Finding]:
     """A controller may not tell of contact; the probes show where the shaft went."""
     clear = rig.geometry["clearance"].value
-    far = np.max([np.hypot(p.data[y], p.data[z]) for y, z in PLANES.values()], axis=0)
+    far = np.max([np.hypot(p.data[y], p.data[z]) for y, z in p.machine.planes.values()], axis=0)
     near = far > BY_THE_RING * clear
-    if near.any() and not (p.flags & CONTACT).any():
+    if near.any() and not (p.flags & p.machine.contact).any():
         text = (
             f"the probes show the shaft up to {far.max() * 1e6:.0f} µm off their zero{_when(p, near)}, with rings at "
             f"{clear * 1e6:.0f} µm: it may have touched, though the controller tells of no contact. Balance first."
@@ -268,7 +267,9 @@ def _passed(run: Run) -> Iterator[Finding]:
     c, up = run.curve, run.passage.direction == "up"
     rate, ends = np.abs(c.acceleration) * RPM, c.speed[[0, -1] if up else [-1, 0]] * RPM
     most = [(np.abs(run.shaft[k]).max() * 1e6, c.speed[int(np.argmax(np.abs(run.shaft[k])))] * RPM) for k in range(4)]
-    greatest = ", ".join(f"{a} {size:.1f} µm at {at:.0f}" for a, (size, at) in zip(AXES, most, strict=True))
+    greatest = ", ".join(
+        f"{a} {size:.1f} µm at {at:.0f}" for a, (size, at) in zip(run.passage.machine.axes, most, strict=True)
+    )
     text = (f"from {ends[0]:.0f} to {ends[1]:.0f} r/min at {rate.min():.0f} to {rate.max():.0f} r/min per second, "
             f"{c.speed.size} blocks of {np.median(c.width) * RPM:.0f} r/min; "
             f"greatest amplitudes of the shaft {greatest} r/min.")  # fmt: skip

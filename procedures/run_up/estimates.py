@@ -19,7 +19,6 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.estimate import merged
-from procedures.amb_rotor.channels import AXES
 from procedures.run_up import linear_model
 from procedures.run_up.line import DRAWS, Line
 from procedures.run_up.steps import Curve, Passage, curve, near
@@ -124,8 +123,8 @@ def run(
     inputs = bearings.stated(rig, plan, model)
     large = _large(found, inputs, results.runouts, plan.law, gains(rig, plan))
     shaft, peaks = [], []
-    for k in range(4):
-        line = Line(found, k, inputs[f"gain_{k}"].value, results.runouts[1.0])
+    for k, axis in enumerate(passage.machine.axes):
+        line = Line(found, k, axis, inputs[f"gain_{k}"].value, results.runouts[1.0])
         series = line.series()
         shaft.append(series[-1])
         peaks += _peaks(line, series, {name: bent[k] for name, bent in large.items()}, inputs, plan.running_rad_s)
@@ -155,7 +154,7 @@ def _peaks(
     """Of small orbits, with the influences of the scatter, of the runout, of the probe's gain, of what the bearings' bend rests
     on, and of what is left of the lag and of that bend: no more than what the last term of the one and the second harmonics in
     the other change. The amplitude is that of the orbit as it was."""
-    axis, gain, out = AXES[line.k], inputs[f"gain_{line.k}"], []
+    axis, gain, out = line.axis, inputs[f"gain_{line.k}"], []
     raw, once, best = (z - large[""] for z in series)
     runout = [
         (p, p.u * (1j if j else 1.0)) for j, p in enumerate(line.runout.parts[2 * line.k : 2 * line.k + 2]) if p.u
@@ -242,7 +241,7 @@ def _at(speed: Array, values: Complex, where: float) -> complex:
 def _with(r: Result, left: Complex) -> Result:
     """With what is left of the lag in the budget of the vectors and half axes."""
     out: dict[tuple[str, str], Estimate] = dict(r.estimates)
-    for k, axis in enumerate(AXES):
+    for k, axis in enumerate(r.dwell.machine.axes):
         half = abs(left[k]) / math.sqrt(3)
         rest = Influence(f"lag/{r.dwell.where}/{axis}", LAG, half, "m", "B", "rectangular")
         for name in ("vector_cos", "vector_sin"):

@@ -23,6 +23,7 @@ from bench.rigfile import RigFile
 from bench.rigfile.capture import at_speed
 from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
+from procedures.amb_rotor.conventions import AMB_ROTOR, Law, conventions
 from procedures.amb_rotor.lift import NO_SPEED
 from procedures.run_up import checks, estimates
 from procedures.run_up import figures as drawn
@@ -31,8 +32,8 @@ from procedures.run_up.steps import MISSED, PASSAGE, read_passage
 from procedures.shared import assumptions
 from procedures.synchronous import bearings, dwelling
 from procedures.synchronous.coil_peaks import uncertified
-from procedures.synchronous.dwelling import CODES, Law, put
-from procedures.synchronous.dwells import RECORDED, SLOW, read_dwell
+from procedures.synchronous.dwelling import put
+from procedures.synchronous.dwells import SLOW, captured_channels, read_dwell
 from procedures.unbalance import checks as unbalance_checks
 from procedures.unbalance import procedure as unbalance
 from procedures.unbalance.procedure import CURRENT, D_MAX, MAJOR, READ, SHARE, VOLTAGE
@@ -109,7 +110,7 @@ class Plan(Passing):
 def settings(plan: Passing) -> dict[str, float]:
     """Lifted by the PID, which needs no model."""
     del plan
-    return {"law": CODES["PID"], "observer": 0.0, "compensate": 0.0}
+    return AMB_ROTOR.lifting
 
 
 def step_count(plan: Passing) -> int:
@@ -182,8 +183,9 @@ def passed(rig: Rig, plan: Passing, record: Recorder, direction: str, goal: floa
 
 def _arm(rig: Rig, plan: Passing, speed: float) -> None:
     if rig.capture is not None:
+        names = captured_channels(conventions(rig.file))
         rig.capture.arm(
-            RECORDED, seconds=plan.capture_s, before_s=plan.capture_s / 2, rate_hz=plan.rate_hz, trigger=at_speed(speed)
+            names, seconds=plan.capture_s, before_s=plan.capture_s / 2, rate_hz=plan.rate_hz, trigger=at_speed(speed)
         )
 
 

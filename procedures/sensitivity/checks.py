@@ -15,12 +15,7 @@ from bench.uncertainty import coverage_factor
 from bench.units import RPM
 from procedures.sensitivity.estimates import Peak, Result
 from procedures.sensitivity.steps import (
-    AXES,
-    CONTACT,
-    CURRENT_LIMIT,
     INJECT,
-    RANGE,
-    VOLTAGE_LIMIT,
     Taken,
     folds,
     grid_of,
@@ -95,17 +90,18 @@ def of_signals(taken: Sequence[Taken], plan: Settings) -> Iterator[Finding]:
 
 
 def _limits(t: Taken) -> Iterator[Finding]:
-    if t.flags & RANGE or t.clips >= HELD:
+    if t.flags & t.machine.sensor_range or t.clips >= HELD:
         yield Finding(
             "sensor-clipped",
             "a position sensor stood at the end of its range: the loop was cut.",
             t.where,
             Effect.ERROR,
         )
+    m = t.machine
     for bits, code, text in (
-        (CONTACT, "contact", "the shaft touched a ring or the axial stop: this is not the levitated loop."),
-        (CURRENT_LIMIT, "current-saturated", "a coil current was at its limit: the loop was not linear. Inject less."),
-        (VOLTAGE_LIMIT, "voltage-saturated", "an amplifier's voltage was at its limit: this is not S of small motions."),
+        (m.contact, "contact", "the shaft touched a ring or the axial stop: this is not the levitated loop."),
+        (m.current_limit, "current-saturated", "a coil current was at its limit: the loop was not linear. Inject less."),
+        (m.voltage_limit, "voltage-saturated", "an amplifier's voltage was at its limit: this is not S of small motions."),
     ):  # fmt: skip
         if t.flags & bits:
             yield Finding(code, text, t.where, Effect.INDETERMINATE, (f"@{t.where}",))
@@ -135,7 +131,8 @@ def _followed(t: Taken) -> Iterator[Finding]:
     """The coils of the axis that was asked for must follow the reference with the injection, and with its sign."""
     if t.follows is None:
         return
-    own = t.follows[AXES.index(t.axis)]
+    axes = t.machine.all_axes
+    own = t.follows[axes.index(t.axis)]
     if FOLLOWS[0] < own.real < FOLLOWS[1] and abs(own) < FOLLOWS[1]:
         return
     k = int(np.abs(t.follows).argmax())
@@ -146,8 +143,8 @@ def _followed(t: Taken) -> Iterator[Finding]:
         yield Finding("coils-exchanged", text, t.where, Effect.ERROR)
         return
     text = f"the coils of {t.axis} do not follow the reference with the injection ({abs(own):.2f} of it)"
-    if k != AXES.index(t.axis) and FOLLOWS[0] < abs(t.follows[k]) < FOLLOWS[1]:
-        text += f"; those of {AXES[k]} do: it went into that axis, or the channels are exchanged."
+    if k != axes.index(t.axis) and FOLLOWS[0] < abs(t.follows[k]) < FOLLOWS[1]:
+        text += f"; those of {axes[k]} do: it went into that axis, or the channels are exchanged."
     yield Finding("wrong-axis", f"{text.rstrip('.')}.", t.where, Effect.ERROR)
 
 

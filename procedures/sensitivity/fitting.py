@@ -11,8 +11,9 @@ from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
 from bench.rigfile.envelope import Envelope
 from bench.units import RPM
+from procedures.amb_rotor.conventions import conventions
 from procedures.sensitivity.injection import Comb, refused
-from procedures.sensitivity.steps import REFINED, channels
+from procedures.sensitivity.steps import REFINED, captured_channels
 
 LEAST_S = 4.0  # of a capture of the second grid: four periods of the finest
 
@@ -69,7 +70,8 @@ def _memory(rig: RigFile, plan: Settings, combs: Sequence[tuple[str, Comb]]) -> 
     extra = 0.1 + 4 * math.pi / slowest if slowest else 0.0
     for kind, seconds in [*((k, plan.periods * c.period_s) for k, c in combs), (REFINED, LEAST_S)]:
         try:
-            size = Layout.of(rig.capture, channels(kind, speed)).sample.itemsize * (seconds + extra) * plan.rate_hz
+            names = captured_channels(conventions(rig), kind, speed)
+            size = Layout.of(rig.capture, names).sample.itemsize * (seconds + extra) * plan.rate_hz
         except BenchError as error:
             yield str(error)
             return

@@ -11,8 +11,8 @@ from fractions import Fraction
 from bench.errors import BenchError
 from bench.procedure.rig import Rig
 from bench.rigfile.envelope import Envelope
+from procedures.amb_rotor.conventions import conventions
 
-AXES = ("yi", "zi", "yo", "zo", "x")  # by their number in `inject_axis`
 PARAMETERS = ("inject_axis", "inject_amplitude", "inject_hz", "inject_lines", "inject_step")
 MOST_LINES = 128
 CREST = 1.1  # greatest of Schroeder's phases over sqrt(2 lines) amplitudes: 1.08 at three lines, less elsewhere
@@ -82,7 +82,7 @@ def injected(rig: Rig, axis: str, comb: Comb, settle_s: float) -> Iterator[None]
     for name, value in wanted(comb).items():
         write(name, value)
     try:
-        write("inject_axis", float(AXES.index(axis)))
+        write("inject_axis", float(conventions(rig.file).all_axes.index(axis)))
         rig.clock.sleep(settle_s)
         yield
     except BaseException:

@@ -26,12 +26,12 @@ from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
 from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
+from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
 from procedures.sensitivity import checks, estimates, fitting
 from procedures.sensitivity import figures as drawn
 from procedures.sensitivity.estimates import Candidate, Result
 from procedures.sensitivity.injection import PARAMETERS, Comb, combs, injected
 from procedures.sensitivity.steps import (
-    CURRENTS,
     HALF,
     INJECT,
     LOOP,
@@ -39,19 +39,18 @@ from procedures.sensitivity.steps import (
     PULSED,
     REFINED,
     SURVEY,
-    TOLD,
     WIRING,
-    channels,
+    captured_channels,
     folds,
     grid_of,
     read_taken,
     sensitivity,
+    telemetry_channels,
 )
 from procedures.shared import assumptions
 
 Law = Literal["PID", "CCS"]
 Axis = Literal["yi", "zi", "yo", "zo", "x"]
-CODES: dict[Law, float] = {"PID": 0.0, "CCS": 1.0}
 S_MAX = Quantity("s_max", "1", "greatest |V1/E| of an axis, all other loops closed (ISO 14839-3)", title="S_max")
 AT = Quantity("s_max_hz", "Hz", "frequency of the greatest |V1/E|", title="frequency of S_max")
 PHASE = Quantity("phase_margin", "rad", "least angle of the open loop L = 1/S - 1 from -1 where |L| = 1, either way")
@@ -60,7 +59,6 @@ RISE = Quantity("gain_increase", "1", "factor to which the loop's gain may rise 
 MEASURES = (S_MAX, AT, PHASE, FALL, RISE)
 MARGIN_S = 0.1  # of a capture, for the first and last pulse
 FOLLOWED_HZ, FOLLOWED = 8.0, 12  # lines at its odd multiples: below 200 Hz coils follow their references
-STANDS_S = 1.0  # the controller knows half a second after the last pulse that the shaft stands
 
 
 class Plan(BenchPlan):
@@ -120,13 +118,13 @@ def refinements(plan: Plan, about: Candidate, speed: float) -> list[tuple[str, f
 def size(rig: RigFile, kind: str, speed: float) -> int:
     """Bytes of a sample of what is captured."""
     assert rig.capture is not None
-    return Layout.of(rig.capture, channels(kind, speed)).sample.itemsize
+    return Layout.of(rig.capture, captured_channels(conventions(rig), kind, speed)).sample.itemsize
 
 
 def settings(plan: Plan) -> dict[str, float]:
     """Lifted by the PID, which needs no model; nothing compensated, nothing injected."""
     del plan
-    return {"law": CODES["PID"], "observer": 0.0, "compensate": 0.0, "inject_axis": -1.0}
+    return {**AMB_ROTOR.lifting, "inject_axis": -1.0}
 
 
 def step_count(plan: Plan) -> int:
@@ -138,7 +136,8 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Lift the shaft, nudge it, and at each speed inject into each axis: the survey, then finer where it peaks."""
     if not lift.probed(rig, record):
         return
-    rig.levitation.set("law", CODES[plan.law])
+    machine = conventions(rig.file)
+    rig.levitation.set(machine.law, machine.laws[plan.law])
     rig.clock.sleep(plan.settle_s)
     number = 0
     for speed in sorted(plan.speeds_rad_s):
@@ -149,8 +148,8 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     if rig.drive is not None and max(plan.speeds_rad_s) > 0:
         rig.drive.stop()
         rig.drive.coast()
-        rig.clock.sleep(STANDS_S)
-    rig.levitation.set("law", CODES["PID"])
+        rig.clock.sleep(machine.stands_s)
+    rig.levitation.set(machine.law, machine.laws["PID"])
 
 
 def _axis(rig: Rig, plan: Plan, record: Recorder, speed: float, axis: str, number: int) -> int:
@@ -184,7 +183,8 @@ def _taken(
     seconds += pulses
     with injected(rig, axis, comb, plan.survey_start_s if kind == SURVEY else plan.start_s):
         with record.step(INJECT, **labels):
-            rig.capture.arm(channels(kind, speed), seconds=seconds, rate_hz=plan.rate_hz)
+            names = captured_channels(conventions(rig.file), kind, speed)
+            rig.capture.arm(names, seconds=seconds, rate_hz=plan.rate_hz)
             rig.capture.wait(seconds + 5.0)
     data, grid = rig.capture.upload(None, **labels), grid_of(labels)
     if folds(grid, data.rate_hz):
@@ -237,7 +237,11 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=Requires(channels=TOLD, parameters=(*PARAMETERS, "law"), capture=(*LOOP, *PULSED, *CURRENTS)),
+    requires=Requires(
+        channels=telemetry_channels(AMB_ROTOR),
+        parameters=(*PARAMETERS, AMB_ROTOR.law),
+        capture=(*LOOP, *PULSED, *AMB_ROTOR.all_currents),
+    ),
     check=check,
     settings=settings,
     step_count=step_count,

@@ -15,20 +15,17 @@ from bench.analysis.tachometer import counted, tachometer
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.units import RPM
+from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.shared.signals import clips
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 INJECT, NOT_REACHED = "inject", "not-reached"
 WIRING, SURVEY, MODE, REFINED, HALF = "wiring", "survey", "mode", "refined", "half"
-AXES = ("yi", "zi", "yo", "zo", "x")
-TOLD = (*(f"pos_{a}" for a in AXES), "flags", "speed")
 LOOP = ("inject", "before", "after")
 PULSED = ("pulses", "pulse_age")
-CURRENTS = tuple(f"i_{a}_{side}" for a in AXES for side in "pn")
 ORDERS = (1.0, 2.0, 3.0, 4.0)
 CLEAR_HZ = 3.0  # to either side of an order of the shaft's speed
-CURRENT_LIMIT, VOLTAGE_LIMIT, CONTACT, RANGE = 1, 2, 4 | 8 | 32, 64  # bits of the telemetry signal `flags`
 WHOLE = 1e-6  # of the samples of a period: how far they may be from a whole number
 SHARING = 15  # lines to either side that share a noise
 
@@ -71,6 +68,7 @@ class Taken:
     clips: int
     lost: int
     expected: int
+    machine: AmbRotor
 
     @property
     def where(self) -> str:
@@ -101,9 +99,14 @@ def named(speed: float) -> str:
     return f"{speed * RPM:.0f} r/min" if speed else "at rest"
 
 
-def channels(kind: str, speed: float) -> tuple[str, ...]:
+def telemetry_channels(machine: AmbRotor) -> tuple[str, ...]:
+    """What is read of the telemetry."""
+    return (*machine.all_positions, "flags", "speed")
+
+
+def captured_channels(machine: AmbRotor, kind: str, speed: float) -> tuple[str, ...]:
     """What is captured: first of all also the coil currents, which tell where the injection goes."""
-    return (*LOOP, *(CURRENTS if kind == WIRING else ()), *(PULSED if speed else ()))
+    return (*LOOP, *(machine.all_currents if kind == WIRING else ()), *(PULSED if speed else ()))
 
 
 def folds(grid: Grid, rate: float) -> bool:
@@ -159,7 +162,8 @@ def grid_of(labels: Mapping[str, Any]) -> Grid:
 
 
 def _read(recording: Recording[Any], step: Step) -> Taken:
-    labels, told = step.labels, step.read(*TOLD)
+    machine = conventions(recording.rig)
+    labels, data = step.labels, step.read(*telemetry_channels(machine))
     captured = recording.captures(number=labels["number"])
     if not captured:
         raise AnalysisError(f"injection {dict(labels)}: found no capture")
@@ -167,21 +171,21 @@ def _read(recording: Recording[Any], step: Step) -> Taken:
     columns = captured[0].arrays(*captured[0].channels)
     found, injected, excluded = sensitivity(columns, columns["t_s"], rate, grid)
     clipped = float(np.abs(columns["after"] - columns["before"] - columns["inject"]).max())
-    follows = _follows(columns, rate, grid) if kind == WIRING else None
+    follows = _follows(columns, machine, rate, grid) if kind == WIRING else None
     turning = turned(columns, columns["t_s"])[1] if "pulses" in columns else 0.0
-    flags = int(np.bitwise_or.reduce(told["flags"].astype(np.int64)))
+    flags = int(np.bitwise_or.reduce(data["flags"].astype(np.int64)))
     return Taken(
         str(labels["axis"]), float(labels["speed_rad_s"]), turning, kind, float(labels["about_hz"]), grid, found, excluded,
         injected, float(np.abs(columns["inject"]).max()), clipped, follows, rate, flags,
-        clips([told[f"pos_{a}"] for a in AXES]), step.lost(), step.expected(),
+        clips([data[name] for name in machine.all_positions]), step.lost(), step.expected(), machine,
     )  # fmt: skip
 
 
-def _follows(columns: Mapping[str, Array], rate: float, grid: Grid) -> Complex | None:
+def _follows(columns: Mapping[str, Array], machine: AmbRotor, rate: float, grid: Grid) -> Complex | None:
     """Differential current of each axis per `after`, by the whole of the lines: (5,)."""
-    if any(c not in columns for c in CURRENTS):
+    if any(c not in columns for c in machine.all_currents):
         return None
-    pairs = np.array([(columns[f"i_{a}_p"] - columns[f"i_{a}_n"]) / 2 for a in AXES])
+    pairs = np.array([(columns[p] - columns[n]) / 2 for p, n in map(machine.pair, machine.all_axes)])
     data = np.concatenate([columns["after"][None], pairs])
     spectra = lines(data - data.mean(axis=1, keepdims=True), rate, round(grid.period * rate), grid.hz).values.mean(
         axis=0

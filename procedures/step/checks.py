@@ -13,7 +13,7 @@ from bench.recording import Recording
 from bench.uncertainty import Estimate, interval
 from procedures.shared import signals
 from procedures.step.estimates import Result
-from procedures.step.steps import CLIPPED, COIL_LIMIT, CONTACT, STEP, VOLTAGE_LIMIT, Case, Done
+from procedures.step.steps import STEP, Case, Done
 
 FATAL = (
     "current-sign",
@@ -70,13 +70,15 @@ def _signals(steps: Sequence[Done], plan: Tolerances) -> Iterator[Finding]:
     for channel in sorted({c for d in steps for c in d.stuck}):
         text = f"{channel} does not move at all; a live sensor has noise."
         yield Finding("stuck-channel", text, channel, Effect.ERROR)
+    m = steps[0].machine
     for bits, code, effect, text in (
-        (CLIPPED, "sensor-clipped", Effect.ERROR,
+        (m.sensor_range, "sensor-clipped", Effect.ERROR,
          "a position sensor read beyond its range: what it shows of the swing is cut off"),
-        (CONTACT, "contact", Effect.INDETERMINATE,
+        (m.contact, "contact", Effect.INDETERMINATE,
          "the shaft touched a ring or the axial stop: the response is not that of the loop"),
-        (COIL_LIMIT, "current-saturated", Effect.INDETERMINATE, "a coil current was at its limit: the response is not linear"),
-        (VOLTAGE_LIMIT, "voltage-saturated", Effect.INDETERMINATE,
+        (m.current_limit, "current-saturated", Effect.INDETERMINATE,
+         "a coil current was at its limit: the response is not linear"),
+        (m.voltage_limit, "voltage-saturated", Effect.INDETERMINATE,
          "an amplifier's voltage was at its limit: the currents slewed, "
          "and the response is not linear; steps are too large, the supply too low or the coils' inductance too high"),
     ):  # fmt: skip

@@ -24,12 +24,13 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from bench.units import RPM
+from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
 from procedures.shared import assumptions
 from procedures.step import checks, estimates, planes
 from procedures.step import figures as drawn
 from procedures.step.estimates import Result
 from procedures.step.record_length import enough_s, faded_s
-from procedures.step.steps import CHANNELS, STEP, TURNING_RAD_S, Case, Done, cases, read_steps
+from procedures.step.steps import STEP, TURNING_RAD_S, Case, Done, cases, channels, read_steps
 
 OVERSHOOT = Quantity("overshoot", "1", "greatest position beyond the step, as a share of it")
 RISE = Quantity("rise_time", "s", "10 to 90 % of the step")
@@ -51,9 +52,6 @@ WAY = Quantity(
 )
 MEASURES = (OVERSHOOT, RISE, SETTLING, ERROR, BANDWIDTH, DAMPING, FREQUENCY, SIZE, WAY)
 Axis = Literal["y", "z", "x"]
-MODEL = ("model_beta_{}", "model_offset_{}")
-RADIAL = ("yi", "zi", "yo", "zo")
-PULSES_S = 1.0  # until the speed by the pulses, and with it the controller's state, says that the shaft stands
 SETTLED_S = 0.5  # after the last ramp of a speed
 MARGIN = 0.8  # of the clearance that a step with its overshoot may use
 
@@ -65,7 +63,7 @@ class Plan(BenchPlan):
     sizes_m: tuple[float, ...] = Field((10e-6, 20e-6), min_length=2)  # one alone says nothing of linearity
     speeds_rad_s: tuple[float, ...] = Field((0.0,), min_length=1)
     repeats: int = Field(2, ge=2)  # of: up, back, down, back
-    a: dict[str, float] = Field(default_factory=lambda: {"law": 1.0})  # parameters of the controller
+    a: dict[str, float] = Field(default_factory=lambda: AMB_ROTOR.select("CCS"))  # parameters of the controller
     b: dict[str, float] = Field(default_factory=dict)  # the other setting; empty: nothing is compared
     names: tuple[str, str] = ("A", "B")
     warm: dict[str, float] = Field(default_factory=dict)  # on top of either setting until it is warm
@@ -89,20 +87,19 @@ def chosen(plan: Plan) -> dict[str, dict[str, float]]:
 
 def model(rig: RigFile, plan: Plan) -> dict[str, float]:
     """The controller's idea of the bearings, wrong by what the plan says; what the rig file says where that is nothing."""
-    names = [m.format(a) for m in MODEL for a in RADIAL]
-    return {n: rig.parameters[n].default * (1 + plan.model_error) for n in names} if plan.model_error else {}
+    return {n: rig.parameters[n].default * (1 + plan.model_error) for n in model_names(rig, plan)}
 
 
 def recorded_s(rig: RigFile, plan: Plan) -> float:
     """How long each step is recorded, s: what the plan says, or as long as the slowest of its laws takes."""
     if plan.record_s is not None:
         return plan.record_s
-    return enough_s([{**_usual(rig), **s} for s in chosen(plan).values()], plan.axes, plan.band)
+    return enough_s(conventions(rig), [{**_usual(rig), **s} for s in chosen(plan).values()], plan.axes, plan.band)
 
 
 def waited_s(rig: RigFile, plan: Plan, setting: str, axis: str) -> float:
     """Before the rest of each step, s, until what the one before it leaves is nothing."""
-    needed = faded_s({**_usual(rig), **chosen(plan)[setting]}, axis, plan.band)
+    needed = faded_s(conventions(rig), {**_usual(rig), **chosen(plan)[setting]}, axis, plan.band)
     return max(needed - recorded_s(rig, plan) - plan.rest_s, 0.0)
 
 
@@ -117,7 +114,7 @@ def step_count(plan: Plan) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Up, back, down and back for every case; the shaft stands and the controller has its own settings again in the end."""
-    write, settings = rig.levitation.set, chosen(plan)
+    write, settings, machine = rig.levitation.set, chosen(plan), conventions(rig.file)
     used: dict[str, float] = {}
     record_s = recorded_s(rig.file, plan)
     for name, value in model(rig.file, plan).items():
@@ -144,13 +141,13 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
                     repeat=repeat,
                 ):
                     rig.clock.sleep(plan.rest_s)
-                    write(f"ref_{axis}", end)
+                    write(machine.set_points[axis], end)
                     rig.clock.sleep(record_s)
     if rig.drive is not None and max(plan.speeds_rad_s) > 0:
         rig.drive.stop()
         rig.drive.coast()
-        rig.clock.sleep(PULSES_S)
-    for name in ("slew", *sorted({*used} - {"law"}), *model(rig.file, plan)):
+        rig.clock.sleep(machine.stands_s)
+    for name in ("slew", *sorted({*used} - {machine.law}), *model(rig.file, plan)):
         write(name, rig.file.parameters[name].default)
 
 
@@ -215,14 +212,15 @@ def measured(results: Results) -> Iterator[Measured]:
             yield known[name].measured(estimate, where)
 
 
-def model_names(plan: Plan) -> list[str]:
+def model_names(rig: RigFile, plan: Plan) -> tuple[str, ...]:
     """Parameters that `model_error` changes."""
-    return [m.format(a) for m in MODEL for a in RADIAL] if plan.model_error else []
+    return conventions(rig).model_parameters if plan.model_error else ()
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    needed = ["slew", *(f"ref_{a}" for a in plan.axes), *model_names(plan), *plan.a, *plan.b, *plan.warm]
+    points = conventions(rig).set_points
+    needed = ["slew", *(points[a] for a in plan.axes), *model_names(rig, plan), *plan.a, *plan.b, *plan.warm]
     for name in dict.fromkeys(needed):
         if name not in rig.parameters:
             yield f"parameters: found no {name}; needed are the set points, slew and those of the plan's settings"
@@ -264,8 +262,8 @@ procedure = Procedure(
     measured=measured,
     figures=figures,
     requires=Requires(
-        channels=CHANNELS,
-        sensors=tuple(n for n in CHANNELS if n.startswith(("pos_", "i_"))),
+        channels=channels(AMB_ROTOR),
+        sensors=(*AMB_ROTOR.all_positions, *AMB_ROTOR.all_currents),
         parameters=("slew", "model_rate", "model_l_is", "model_l_os"),
         geometry=("clearance",),
     ),

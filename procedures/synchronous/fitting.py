@@ -10,7 +10,8 @@ from bench.errors import BenchError
 from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
 from bench.units import RPM
-from procedures.synchronous.dwells import RECORDED
+from procedures.amb_rotor.conventions import conventions
+from procedures.synchronous.dwells import captured_channels
 
 SLOW_MOST = 0.15  # of the lowest speed of the plan, at slow roll, and of the loop's own frequency
 LOOP_RAD_S = 390.0  # sqrt(k1) of T Table 2.4: the rigid modes
@@ -68,7 +69,9 @@ def of_plan(rig: RigFile, plan: Settings) -> Iterable[str]:
         yield "capture: the controller has none; orbits and D_max are read at its full rate"
         return
     try:
-        size = Layout.of(rig.capture, RECORDED).sample.itemsize * plan.capture_s * plan.rate_hz
+        size = (
+            Layout.of(rig.capture, captured_channels(conventions(rig))).sample.itemsize * plan.capture_s * plan.rate_hz
+        )
     except BenchError as error:
         yield str(error)
         return

@@ -11,13 +11,12 @@ import numpy as np
 from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
 from bench.uncertainty import Estimate
-from procedures.amb_rotor.channels import CURRENT_LIMIT, POSITIONS, RANGE, VOLTAGE_LIMIT
 from procedures.amb_rotor.geometry import centre, nominal
 from procedures.shared import signals
 from procedures.shared.sines import known_frequency, unknown_frequency
 from procedures.tracking.drift import Drift, drift
 from procedures.tracking.estimates import TIMING_TICKS
-from procedures.tracking.steps import CONTACT, LOWER, UPPER, Orbit
+from procedures.tracking.steps import CONTACT, Orbit, upper_and_lower
 
 FATAL = (
     "stuck-channel",
@@ -52,10 +51,11 @@ def of_signals(orbits: Sequence[Orbit], plan: Settings) -> Iterator[Finding]:
     lost, expected = np.array([(o.step.lost(), o.step.expected()) for o in orbits], dtype=float).T
     yield from signals.losses(lost, expected, plan.max_lost, lambda share: orbits[int(np.argmax(share))].where)
     for o in orbits:
+        upper, lower = upper_and_lower(o.machine)
         rows = (
-            *zip(POSITIONS, o.path.readings, strict=True),
-            *zip(UPPER, o.upper, strict=True),
-            *zip(LOWER, o.lower, strict=True),
+            *zip(o.machine.positions, o.path.readings, strict=True),
+            *zip(upper, o.upper, strict=True),
+            *zip(lower, o.lower, strict=True),
         )
         for name, values in rows:
             if np.ptp(values) == 0:
@@ -77,7 +77,7 @@ def of_signals(orbits: Sequence[Orbit], plan: Settings) -> Iterator[Finding]:
 def _clipping(o: Orbit) -> Iterator[Finding]:
     """A live sensor has noise also where it is greatest; one that clips repeats its limit."""
     found = False
-    for name, x in zip(POSITIONS, o.path.readings, strict=True):
+    for name, x in zip(o.machine.positions, o.path.readings, strict=True):
         for limit in (x.max(), x.min()):
             if signals.longest_at(x, limit) >= HELD:
                 found = True
@@ -87,7 +87,7 @@ def _clipping(o: Orbit) -> Iterator[Finding]:
                     name,
                     Effect.ERROR,
                 )
-    if not found and (o.flags & RANGE).any():
+    if not found and (o.flags & o.machine.sensor_range).any():
         yield Finding(
             "sensor-range", "the controller reports a position sensor beyond its range.", o.where, Effect.ERROR
         )
@@ -151,7 +151,8 @@ def of_results(
     for o in orbits:
         judged = o.law in plan.laws
         yield from _of_contact(o, results[o.law]["ring_distance"], Effect.INDETERMINATE if judged else Effect.NOTE)
-        for bit, text in ((CURRENT_LIMIT, "a coil's current"), (VOLTAGE_LIMIT, "a coil's voltage")):
+        current, voltage = o.machine.current_limit, o.machine.voltage_limit
+        for bit, text in ((current, "a coil's current"), (voltage, "a coil's voltage")):
             share = float((o.flags & bit != 0).mean())
             if share > 0:
                 bad = judged and share > PARTS
@@ -178,7 +179,7 @@ def of_results(
 def _of_contact(o: Orbit, left: Estimate, effect: Effect) -> Iterator[Finding]:
     told = float((o.flags & CONTACT != 0).mean())
     if told > 0:
-        sides = " and ".join(s for bit, s in ((4, "inboard"), (8, "outboard")) if (o.flags & bit).any())
+        sides = " and ".join(s for s, bit in o.machine.contacts.items() if s != "axial" and (o.flags & bit).any())
         yield Finding(
             "contact",
             f"the rotor touches the {sides} ring in {told:.1%} of the samples; by its positions "

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 from pydantic import Field
 
@@ -25,14 +24,12 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
-from procedures.amb_rotor.channels import POSITIONS
+from procedures.amb_rotor.conventions import AMB_ROTOR, Law, conventions
 from procedures.amb_rotor.geometry import nominal
 from procedures.tracking import checks, estimates
 from procedures.tracking import figures as drawn
-from procedures.tracking.steps import CHANNELS, GROWN, ORBIT, START, STARTED, Orbit, read_orbits
+from procedures.tracking.steps import GROWN, ORBIT, START, STARTED, Orbit, channels, read_orbits
 
-Law = Literal["PID", "CCS", "CAC"]
-CODES: dict[Law, float] = {"PID": 0.0, "CCS": 1.0, "CAC": 2.0}
 PEAK_Y = Quantity(
     "error_peak_y", "m", "greatest error of the centre of mass in the mean revolution of the reference, y"
 )
@@ -50,14 +47,13 @@ DISTANCE = Quantity("ring_distance", "m", "least distance that is left to a touc
 LOW = Quantity("lower_current", "A", "mean current of the lower coil that carries most")
 HIGH = Quantity("upper_current", "A", "mean current of the upper coil that carries most")
 MEASURES = (PEAK_Y, PEAK_Z, PLANE, RMS_Y, RMS_Z, RATIO_Y, RATIO_Z, LAG_Y, LAG_Z, PSI, THETA, DISTANCE, LOW, HIGH)
-OBSERVED = {"observer": 1.0, "compensate": 3.0, "integral": 0.0, "k1": 2e5, "k2_ccs": 400.0, "k2_cac": 400.0}
+OBSERVED = {**AMB_ROTOR.variants["corrected"], **AMB_ROTOR.poles}
 REFERENCE = ("ellipse_on", "ellipse_y", "ellipse_z", "ellipse_hz", "ellipse_phase", "ellipse_ramp_s", "ellipse_ratio")
-PARAMETERS = ("law", "ref_y", "ref_theta", "model_rate", *REFERENCE)
+PARAMETERS = (AMB_ROTOR.law, AMB_ROTOR.set_points["y"], AMB_ROTOR.set_points["theta"], "model_rate", *REFERENCE)
 LENGTHS = ("com_to_inboard_sensor", "com_to_outboard_sensor", "clearance")
 UM = 1e6
 MARK_M = 15e-6  # of the jump that the reference starts with
 GROW, GROW_S = 25, 0.02
-STANDS_S = 1.0  # the controller knows half a second after the last pulse that the shaft stands
 NEAR = 0.95  # of the ring's clearance: no reference may go further
 
 
@@ -91,7 +87,7 @@ class Plan(BenchPlan):
 
 def settings(plan: Plan) -> dict[str, float]:
     """Lifted by the PID, which needs no model; with the poles of T 3.5 where disturbances are compensated."""
-    return {"law": CODES["PID"], "ellipse_on": 0.0, **(OBSERVED if plan.observed else {})}
+    return {**AMB_ROTOR.select("PID"), "ellipse_on": 0.0, **(OBSERVED if plan.observed else {})}
 
 
 def step_count(plan: Plan) -> int:
@@ -106,13 +102,16 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     _started(rig, plan, record)
     if plan.speed_rad_s and not lift.turned(rig, record, plan.speed_rad_s, plan.settle_s):
         return
+    machine = conventions(rig.file)
     for law in plan.order:
+        rig.levitation.set(machine.law, machine.laws[law])
+        rig.clock.sleep(plan.settle_s)
         _orbit(rig, plan, record, law)
     rig.levitation.set("ellipse_on", 0.0)
     if plan.speed_rad_s and rig.drive is not None:
         rig.drive.stop()
-    rig.levitation.set("law", CODES["PID"])
-    rig.clock.sleep(STANDS_S)
+    rig.levitation.set(machine.law, machine.laws["PID"])
+    rig.clock.sleep(machine.stands_s)
 
 
 def _started(rig: Rig, plan: Plan, record: Recorder) -> None:
@@ -138,8 +137,6 @@ def _started(rig: Rig, plan: Plan, record: Recorder) -> None:
 
 def _orbit(rig: Rig, plan: Plan, record: Recorder, law: Law) -> None:
     """The reference grows, settles, and shrinks to its mark again."""
-    rig.levitation.set("law", CODES[law])
-    rig.clock.sleep(plan.settle_s)
     for part in range(1, GROW + 1):
         _size(rig, plan, part / GROW)
     with record.step(GROWN, law=law):  # the longer, the better it tells the reference's frequency
@@ -225,7 +222,9 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=Requires(channels=CHANNELS, sensors=POSITIONS, parameters=PARAMETERS, geometry=LENGTHS),
+    requires=Requires(
+        channels=channels(AMB_ROTOR), sensors=AMB_ROTOR.positions, parameters=PARAMETERS, geometry=LENGTHS
+    ),
     check=check,
     settings=settings,
     step_count=step_count,

@@ -14,7 +14,6 @@ from bench.analysis.vectors import radius2
 from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.units import RPM
-from procedures.amb_rotor.channels import AXES, CONTACT, CURRENT_LIMIT, PLANES, RANGE, VOLTAGE_LIMIT
 from procedures.shared import signals
 from procedures.synchronous.dwells import DWELL, SLOW, Array, Dwell
 from procedures.synchronous.fitting import PER_TURN, Settings, too_fast
@@ -82,14 +81,18 @@ def _pulses(d: Dwell) -> Iterator[Finding]:
 
 
 def _limits(d: Dwell, doubts: Doubts) -> Iterator[Finding]:
-    if d.flags & RANGE or d.clips >= HELD:
+    if d.flags & d.machine.sensor_range or d.clips >= HELD:
         text = "a position sensor stood at the end of its range: what it shows of the orbit is cut off."
         yield Finding("sensor-clipped", text, d.where, Effect.ERROR)
     for bits, code, text in (
-        (CONTACT, "contact", "the shaft touched a ring or the axial stop: this is not its response to unbalance."),
-        (CURRENT_LIMIT, "current-saturated", "a coil current was at its limit: the response is not linear."),
         (
-            VOLTAGE_LIMIT,
+            d.machine.contact,
+            "contact",
+            "the shaft touched a ring or the axial stop: this is not its response to unbalance.",
+        ),
+        (d.machine.current_limit, "current-saturated", "a coil current was at its limit: the response is not linear."),
+        (
+            d.machine.voltage_limit,
             "voltage-saturated",
             "an amplifier's voltage was at its limit: the currents slewed (T Fig. 2.9).",
         ),
@@ -162,7 +165,8 @@ def weight(dwells: Sequence[Balanced]) -> Iterator[Finding]:
         off = np.abs(r.carried - 1)
         k = int(np.argmax(off))
         if off[k] > CARRIED:
-            text = (f"by their currents the coils of {AXES[k]} carry {r.carried[k]:.2f} of their share of the weight: "
+            axis = r.dwell.machine.axes[k]
+            text = (f"by their currents the coils of {axis} carry {r.carried[k]:.2f} of their share of the weight: "
                     "suspect the coils of an axis exchanged, a current sensor, or a wrong model of the bearing.")  # fmt: skip
             yield Finding("weight-not-carried", text, r.dwell.where, Effect.ERROR)
             return
@@ -173,7 +177,7 @@ def _beside(results: Results) -> Iterator[Finding]:
     clearance = results.clearance.value
     for r in results.dwells:
         if r.beside.max() > BESIDE * clearance:
-            plane, far = list(PLANES)[int(r.beside.argmax())], float(r.beside.max())
+            plane, far = list(r.dwell.machine.planes)[int(r.beside.argmax())], float(r.beside.max())
             text = (f"{plane} the shaft moves by up to {far * 1e6:.1f} µm that does not turn with it ({far / clearance:.0%} of "
                     f"the clearance; {BESIDE:.0%} is allowed): D_max holds what that may add to the orbit. Suspect a loop near "
                     "its limit of stability, a rub, or a shaker: see the spectrum.")  # fmt: skip
@@ -188,9 +192,9 @@ def _folded(results: Results) -> Iterator[Finding]:
         known = np.sqrt(np.maximum(whole - off**2 / 2, 1e-24))  # without it
         k = int(np.argmax(off / known))
         if off[k] > 2 * known[k]:
-            period = r.dwell.sampling.ticks * r.dwell.sampling.tick
+            period, axis = r.dwell.sampling.ticks * r.dwell.sampling.tick, r.dwell.machine.axes[k]
             text = (f"at {r.dwell.speed * RPM:.0f} r/min the telemetry, a sample every {period * 1e3:g} ms, shows order {n} as "
-                    f"order 1: the vector of {AXES[k]} may be off by {off[k] * 1e6:.2f} µm, which its interval holds. "
+                    f"order 1: the vector of {axis} may be off by {off[k] * 1e6:.2f} µm, which its interval holds. "
                     "Dwell at a speed that is a percent away.")  # fmt: skip
             yield Finding("aliasing", text, r.dwell.where, Effect.INDETERMINATE, its_own(r.dwell))
 
@@ -238,7 +242,7 @@ def _regions(results: Results) -> Iterator[Finding]:
     for variant in results.variants:
         some = []
         for r in results.of(variant):
-            for k, axis in enumerate(AXES):
+            for k, axis in enumerate(r.dwell.machine.axes):
                 one = r.vectors.one(k)
                 sizes = np.sqrt(radius2(one.dof) * np.linalg.eigvalsh(one.covariance))
                 some.append((float(sizes[1]), float(sizes[0]), f"{axis}, {r.dwell.where}"))

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 
 from bench.findings import Effect, Finding
 from bench.uncertainty import interval
-from procedures.amb_rotor.channels import AXES
 from procedures.synchronous.hum import REACH, Heard, duration, leak, told
 from procedures.unbalance.checks import its_own
 from procedures.unbalance.estimates import Result
@@ -21,7 +20,7 @@ def of_dwells(found: Heard | None, results: Sequence[Result]) -> Iterator[Findin
         d = r.dwell
         reach = REACH / duration(d)
         turns = d.speed / (2 * math.pi)
-        known = [min(interval(r.estimates[name, a]).U for name in ("vector_cos", "vector_sin")) for a in AXES]
+        known = [min(interval(r.estimates[name, a]).U for name in ("vector_cos", "vector_sin")) for a in d.machine.axes]
         off = [(x.size * leak(d, x.hz), x) for x in found.lines(turns - reach, turns + reach)]
         worst = max(off, key=lambda o: o[0] / known[o[1].probe], default=None)
         if worst is None or worst[0] <= known[worst[1].probe]:

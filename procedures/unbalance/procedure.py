@@ -23,12 +23,12 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
+from procedures.amb_rotor.conventions import AMB_ROTOR, Law, Variant
 from procedures.shared import assumptions
 from procedures.synchronous import bearings, dwelling, fitting
-from procedures.synchronous.bearings import BEARING_MODEL, STATED, adopted_bearings
+from procedures.synchronous.bearings import BEARING_MODEL, adopted_bearings
 from procedures.synchronous.coil_peaks import uncertified
-from procedures.synchronous.dwelling import CODES, POLES, SETTINGS, Law, Variant
-from procedures.synchronous.dwells import RECORDED, TOLD, read_dwells
+from procedures.synchronous.dwells import captured_channels, read_dwells, telemetry_channels
 from procedures.synchronous.hum import heard
 from procedures.unbalance import checks, estimates
 from procedures.unbalance import figures as drawn
@@ -65,7 +65,7 @@ CURRENT = Quantity("current_peak", "A", "coil current of a plane that is exceede
 VOLTAGE = Quantity("voltage_peak", "V", "coil voltage of a plane that is exceeded for 1 % of the time, either way")
 MEASURES = (COSINE, SINE, MAJOR, D_MAX, SHARE, READ, CURRENT, VOLTAGE)
 LESS_RUNOUT = tuple(q.name for q in (COSINE, SINE, MAJOR, D_MAX, SHARE))
-PARAMETERS = ("law", "ref_y", "ref_theta")
+PARAMETERS = (AMB_ROTOR.law, AMB_ROTOR.set_points["y"], AMB_ROTOR.set_points["theta"])
 LENGTHS = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_inboard_amb", "com_to_outboard_amb", "com_to_coupling",
            "com_to_inboard_balance", "com_to_outboard_balance", "coupling_stiffness", "amb_gap", "clearance")  # fmt: skip
 
@@ -117,7 +117,7 @@ class Resting(Protocol):
 
 def settings(plan: Plan) -> dict[str, float]:
     """Lifted by the PID, which needs no model."""
-    return {"law": CODES["PID"], "observer": 0.0, "compensate": 0.0, **(POLES if plan.observed else {})}
+    return {**AMB_ROTOR.lifting, **(AMB_ROTOR.poles if plan.observed else {})}
 
 
 def needs(plan: Resting) -> tuple[Need, ...]:
@@ -163,12 +163,12 @@ def measured(results: Results) -> Iterator[Measured]:
 
 REQUIRES = Requires(
     roles=("levitation", "drive"),
-    channels=TOLD,
-    sensors=tuple(n for n in TOLD if n.startswith(("pos_", "i_"))),
-    parameters=(*PARAMETERS, *SETTINGS["off"], *POLES, *STATED),
+    channels=telemetry_channels(AMB_ROTOR),
+    sensors=(*AMB_ROTOR.positions, *AMB_ROTOR.currents),
+    parameters=(*PARAMETERS, *AMB_ROTOR.variants["off"], *AMB_ROTOR.poles, *AMB_ROTOR.model_parameters),
     geometry=LENGTHS,
     machine=("mass", "transverse_inertia", "polar_inertia", "radial_axes", "runout"),
-    capture=RECORDED,
+    capture=captured_channels(AMB_ROTOR),
 )
 
 

@@ -12,6 +12,7 @@ import pytest
 
 from bench.cli.virtual import simulated_run
 from bench.findings import Effect, Finding
+from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.synchronous.dwells import SLOW, read_dwell
 from procedures.synchronous.hum import Heard, heard, leaked
 
@@ -114,9 +115,11 @@ def test_of_a_line_within_the_width_of_an_order_counts_what_the_standing_shaft_s
     values[1, np.argmin(np.abs(hz - 50.0))] = 1e-7
     for there, size in ((0.0, None), (2e-8, 2e-8), (6e-8, 1e-7)):
         still = tuple((t + k, there * np.sin(100 * math.pi * (t + k)) + noise[k]) for k in range(4))
-        lines = [x.size for x in Heard(hz, values, 0.1, 5.0, 0.0, still).lines(49.0, 51.0)]
+        lines = [x.size for x in Heard(hz, values, 0.1, 5.0, 0.0, still, AMB_ROTOR.axes).lines(49.0, 51.0)]
         assert lines == ([] if size is None else [pytest.approx(size, rel=0.1)])
-        assert len(list(Heard(hz, values, 0.1, 4.9, 0.0, still).lines(49.0, 51.0))) == 1  # order 10 lies at 49 Hz
+        assert (
+            len(list(Heard(hz, values, 0.1, 4.9, 0.0, still, AMB_ROTOR.axes).lines(49.0, 51.0))) == 1
+        )  # order 10 lies at 49 Hz
 
 
 class Steady:

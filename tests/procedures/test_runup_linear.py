@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bench.rigfile import load_rig
+from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.run_up import procedure
 from procedures.run_up.linear_model import bend
 from procedures.run_up.steps import Curve
@@ -32,7 +33,16 @@ def passing(shaft: np.ndarray, currents: np.ndarray, means: float = 1.0) -> Curv
     still = np.concatenate([np.zeros(4), np.full(8, means)])[None]
     one = np.array([W])
     return Curve(
-        one, one, one, values, np.zeros((12, 1, 2, 2)), still, np.zeros((1, 2)), np.full((12, 1), np.nan + 0j), one
+        one,
+        one,
+        one,
+        values,
+        np.zeros((12, 1, 2, 2)),
+        still,
+        np.zeros((1, 2)),
+        np.full((12, 1), np.nan + 0j),
+        one,
+        AMB_ROTOR,
     )
 
 

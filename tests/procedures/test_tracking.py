@@ -22,13 +22,14 @@ from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate
+from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.amb_rotor.geometry import Facts
 from procedures.synchronous import bearings
 from procedures.tracking import drift, estimates
 from procedures.tracking import ellipse as estimator
 from procedures.tracking.ellipse import Path as Orbit
 from procedures.tracking.ellipse import Wave
-from procedures.tracking.procedure import CODES, MEASURES, OBSERVED, Plan, check, procedure, step_count
+from procedures.tracking.procedure import MEASURES, OBSERVED, Plan, check, procedure, step_count
 from procedures.unbalance import procedure as unbalance
 from reports.figures import draw as draw_figure
 from sim_backend.machines.amb5dof import truth_track
@@ -53,7 +54,7 @@ def agree(
 ) -> None:
     """Every quantity but the distance to the rings is that of the same machine without noise, within 3.5 u."""
     rig = load_rig("amb5dof")
-    settings = {name: p.default for name, p in rig.parameters.items()} | more | {"law": CODES[law]}
+    settings = {name: p.default for name, p in rig.parameters.items()} | more | AMB_ROTOR.select(law)
     for name, value in truth_track.truth(draw(rig, seed).plant, settings, settle_s=1.5, **orbit).items():
         e = measured[name, law]
         assert e.value == pytest.approx(value, abs=3.5 * e.u), (name, law)

@@ -25,12 +25,11 @@ from bench.record.specs import applied, load_spec
 from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, Influence, interval
-from procedures.amb_rotor.channels import AXES
+from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.compensation import procedure as compensation
 from procedures.synchronous import bearings as unbalance_bearings
 from procedures.synchronous import runout
 from procedures.synchronous.coil_peaks import blocks, uncertified
-from procedures.synchronous.dwelling import CODES, POLES, SETTINGS
 from procedures.synchronous.dwells import SLOW, read_dwells
 from procedures.unbalance import checks, estimates
 from procedures.unbalance import d_max as unbalance_d_max
@@ -99,9 +98,9 @@ def test_vectors_are_what_the_shaft_really_does(compared: Run) -> None:
     for r in compared.results.dwells:
         if r.dwell.variant == "literal":
             continue  # its limit cycle is not the other plant's
-        settings = {**defaults, **POLES, **SETTINGS[r.dwell.variant], "law": CODES["CCS"]}  # type: ignore[index]
+        settings = {**defaults, **AMB_ROTOR.poles, **AMB_ROTOR.variants[r.dwell.variant], **AMB_ROTOR.select("CCS")}  # type: ignore[index]
         true = truth_unbalance.motion(compared.plant, settings, r.dwell.speed)
-        for k, axis in enumerate(AXES):
+        for k, axis in enumerate(AMB_ROTOR.axes):
             for name, value in (("vector_cos", true.shaft[k].real), ("vector_sin", -true.shaft[k].imag)):
                 e = r.estimates[name, axis]
                 away.append((e.value - value) / e.u)
@@ -307,7 +306,7 @@ def test_an_order_that_the_telemetry_takes_for_order_1_is_named(tmp_path: Path, 
 def test_motion_that_does_not_turn_with_the_shaft_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """D_max is of what turns with the shaft: at 47 Hz beside it the shaft went to 45 µm, and D_max said 16 in zone A."""
     shaken = {"inject_amplitude": 0.1, "inject_hz": 47.0, "inject_lines": 1.0, "inject_axis": 0.0}
-    monkeypatch.setitem(SETTINGS, "off", SETTINGS["off"] | shaken)
+    monkeypatch.setitem(AMB_ROTOR.variants, "off", {**AMB_ROTOR.variants["off"], **shaken})
     run = simulated_run("unbalance", "amb5dof", SEED, ONE, tmp_path / "recording.mcap", {})
     found = [f for f in run.results if isinstance(f, Finding) and f.code == "not-synchronous"]
     assert found[0].effect is Effect.INDETERMINATE
