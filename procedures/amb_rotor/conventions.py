@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntFlag
+from functools import reduce
+from operator import or_
 from typing import Literal
 
 from bench.rigfile import RigFile
@@ -34,7 +36,7 @@ class AmbRotor:
     """The names of one machine.
 
     `axes` are the four radial ones, in the order of every array of four, `axial` is the fifth. `planes` has by name where their
-    y and z stand among the axes. `contacts` has by place the flag of a touch there.
+    y and z stand among the axes; `rings` has by plane the flag of a touch there, `axial_stop` is that of the axial one.
 
     Of the controller: `law` is the parameter that chooses among `laws`, by name the value it takes; `set_points` are the
     parameters by coordinate; `variants` the parameters that set how disturbances are compensated, with the estimator's `poles`;
@@ -44,7 +46,8 @@ class AmbRotor:
     axes: tuple[str, str, str, str]
     axial: str
     planes: Mapping[str, tuple[int, int]]
-    contacts: Mapping[str, Flag]
+    rings: Mapping[str, Flag]
+    axial_stop: Flag
     current_limit: Flag
     voltage_limit: Flag
     sensor_range: Flag
@@ -61,10 +64,7 @@ class AmbRotor:
     @property
     def contact(self) -> Flag:
         """A touch anywhere."""
-        whole = Flag(0)
-        for one in self.contacts.values():
-            whole |= one
-        return whole
+        return reduce(or_, self.rings.values(), self.axial_stop)
 
     @property
     def all_axes(self) -> tuple[str, ...]:
@@ -140,7 +140,8 @@ AMB_ROTOR = AmbRotor(
     axes=("yi", "zi", "yo", "zo"),
     axial="x",
     planes={"inboard": (0, 1), "outboard": (2, 3)},
-    contacts={"inboard": Flag.CONTACT_INBOARD, "outboard": Flag.CONTACT_OUTBOARD, "axial": Flag.CONTACT_AXIAL},
+    rings={"inboard": Flag.CONTACT_INBOARD, "outboard": Flag.CONTACT_OUTBOARD},
+    axial_stop=Flag.CONTACT_AXIAL,
     current_limit=Flag.CURRENT_LIMIT,
     voltage_limit=Flag.VOLTAGE_LIMIT,
     sensor_range=Flag.SENSOR_RANGE,

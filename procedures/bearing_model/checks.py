@@ -68,8 +68,9 @@ def _meanings(m: AmbRotor) -> Iterator[tuple[int, str, str]]:
     """Flags that speak against a position: bits, the finding's code, its words."""
     yield m.current_limit, "saturated", "a coil was at its current limit"
     yield m.voltage_limit, "saturated", "a coil was at its voltage limit"
-    for place, bit in m.contacts.items():
-        yield bit, "contact", f"the shaft touched the {place} {'stop' if place == 'axial' else 'touchdown ring'}"
+    for plane, bit in m.rings.items():
+        yield bit, "contact", f"the shaft touched the {plane} touchdown ring"
+    yield m.axial_stop, "contact", "the shaft touched the axial stop"
     yield m.sensor_range, "clipped", "a position sensor was beyond its range"
 
 

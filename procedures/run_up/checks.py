@@ -167,9 +167,9 @@ def _limits(p: Passage, plan: Settings) -> Iterator[Finding]:
         )
         yield Finding("sensor-clipped", text, p.name, Effect.ERROR)
     if touched.any():
-        rings = [f"the {place} {'stop' if place == 'axial' else 'ring'}"
-                 for place, bit in m.contacts.items() if (p.flags & bit).any()]  # fmt: skip
-        text = f"the shaft touched {' and '.join(rings)}{_when(p, touched)}: this is not its response to unbalance."
+        places = {**{f"the {plane} ring": bit for plane, bit in m.rings.items()}, "the axial stop": m.axial_stop}
+        hit = [place for place, bit in places.items() if (p.flags & bit).any()]
+        text = f"the shaft touched {' and '.join(hit)}{_when(p, touched)}: this is not its response to unbalance."
         yield Finding("contact", text, p.name, Effect.INDETERMINATE, _doubted(p, touched, plan))
     if current.any():
         text = f"a coil current was at its limit{_when(p, current)}: the response is not linear."

@@ -179,7 +179,7 @@ def of_results(
 def _of_contact(o: Orbit, left: Estimate, effect: Effect) -> Iterator[Finding]:
     told = float((o.flags & CONTACT != 0).mean())
     if told > 0:
-        sides = " and ".join(s for s, bit in o.machine.contacts.items() if s != "axial" and (o.flags & bit).any())
+        sides = " and ".join(s for s, bit in o.machine.rings.items() if (o.flags & bit).any())
         yield Finding(
             "contact",
             f"the rotor touches the {sides} ring in {told:.1%} of the samples; by its positions "
