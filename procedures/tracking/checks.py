@@ -16,7 +16,7 @@ from procedures.shared import signals
 from procedures.shared.sines import known_frequency, unknown_frequency
 from procedures.tracking.drift import Drift, drift
 from procedures.tracking.estimates import TIMING_TICKS
-from procedures.tracking.steps import CONTACT, Orbit, upper_and_lower
+from procedures.tracking.steps import Orbit, upper_and_lower
 
 FATAL = (
     "stuck-channel",
@@ -128,7 +128,7 @@ def _of_reference(o: Orbit, judged: bool) -> Iterator[Finding]:
             o.where,
             Effect.ERROR,
         )
-    elif judged and not (o.flags & CONTACT).any():
+    elif judged and not (o.flags & o.machine.contact).any():
         yield from _of_drift(o, drift(o.whole, facts))
 
 
@@ -177,18 +177,17 @@ def of_results(
 
 
 def _of_contact(o: Orbit, left: Estimate, effect: Effect) -> Iterator[Finding]:
-    told = float((o.flags & CONTACT != 0).mean())
+    told = float((o.flags & o.machine.contact != 0).mean())
     if told > 0:
-        sides = " and ".join(s for s, bit in o.machine.rings.items() if (o.flags & bit).any())
-        yield Finding(
-            "contact",
-            f"the rotor touches the {sides} ring in {told:.1%} of the samples; by its positions "
-            f"{left.value * 1e6:.1f} ± {2 * left.u * 1e6:.1f} µm are left to it.",
-            o.where,
-            effect,
-            (f"@{o.where}",),
-        )
-        if left.value > 3 * left.u:
+        sides = [plane for plane, bit in o.machine.rings.items() if (o.flags & bit).any()]
+        places = [f"the {' and '.join(sides)} ring"] if sides else []
+        places += ["the axial stop"] if (o.flags & o.machine.axial_stop).any() else []
+        text = f"the rotor touches {' and '.join(places)} in {told:.1%} of the samples"
+        if sides:
+            room = f"{left.value * 1e6:.1f} ± {2 * left.u * 1e6:.1f} µm"
+            text += f"; by its positions {room} are left to {'the ring' if len(places) > 1 else 'it'}"
+        yield Finding("contact", f"{text}.", o.where, effect, (f"@{o.where}",))
+        if sides and left.value > 3 * left.u:  # of the axial stop the positions say nothing
             yield Finding(
                 "contact-not-seen",
                 "the controller reports contact, the positions show none: look at the "
@@ -216,5 +215,5 @@ def _said(o: Orbit, r: Mapping[str, Estimate]) -> str:
         f"{o.law}: peaks {y.value * 1e6:.1f} ± {2 * y.u * 1e6:.1f} µm in y, {z.value * 1e6:.1f} ± "
         f"{2 * z.u * 1e6:.1f} µm in z, "
         f"tilts {psi.value * 1e6:.0f} and {theta.value * 1e6:.0f} µrad, lower coils up to {low.value:.2f} A, "
-        f"contact in {float((o.flags & CONTACT != 0).mean()):.0%} of the samples"
+        f"contact in {float((o.flags & o.machine.contact != 0).mean()):.0%} of the samples"
     )

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
-from procedures.amb_rotor.conventions import AmbRotor, Flag, conventions
+from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.amb_rotor.geometry import Facts, distances
 from procedures.amb_rotor.onset import onset
 from procedures.tracking.ellipse import Path, Wave
@@ -20,7 +20,6 @@ from procedures.tracking.ellipse import Path, Wave
 Array = npt.NDArray[np.float64]
 START, GROWN, ORBIT = "start", "grown", "orbit"
 STARTED = "reference-started"
-CONTACT = Flag.CONTACT_INBOARD | Flag.CONTACT_OUTBOARD
 
 
 @dataclass(frozen=True)
