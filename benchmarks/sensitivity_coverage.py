@@ -23,10 +23,12 @@ from bench.cli.virtual import simulated_run
 from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.uncertainty import coverage_factor, interval
+from bench.units import RPM
 from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.sensitivity import estimates
 from procedures.sensitivity.injection import Comb, wanted
-from procedures.sensitivity.procedure import MARGIN_S, RPM, Plan, refinements, surveys
+from procedures.sensitivity.plan import Plan
+from procedures.sensitivity.procedure import MARGIN_S, refinements, surveys
 from procedures.sensitivity.steps import REFINED, WIRING, Grid, Taken, captured_channels, sensitivity
 from sim_backend.machines.amb5dof import truth_sensitivity
 from sim_backend.machines.amb5dof.params import AmbParams

@@ -6,12 +6,11 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from bench.analysis.balance import G_MM, bound
-from bench.calibration import Calibration
 from bench.findings import Effect, Finding
 from bench.procedure.requires import Requires
 from bench.recording import Recording
@@ -20,6 +19,7 @@ from bench.units import RPM
 from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.balance import decision, estimates
 from procedures.balance.estimates import Balanced, Forces
+from procedures.balance.plan import Plan
 from procedures.balance.steps import (
     BASE,
     DECISION,
@@ -32,10 +32,12 @@ from procedures.balance.steps import (
     read_dwell,
 )
 from procedures.synchronous import fitting
+from procedures.synchronous.bearings import Known
 from procedures.synchronous.dwells import SLOW, Dwell, telemetry_channels
 from procedures.unbalance import checks as unbalance_checks
 
 MOST_RPM = 10000.0  # influence runs
+RATE_HZ = 1e4  # of the captures, the controller's own; order 1 alone is read
 WORST_CONDITION = 50.0  # of the influence coefficients
 SPEEDS_APART = 2e-3
 SAME_PLACE_RAD = math.radians(0.1)
@@ -46,19 +48,6 @@ NEEDED = (
     *(f"com_to_{b}_{what}" for b in ("inboard", "outboard") for what in ("balance", "sensor", "amb")),
     *("com_to_coupling", "balance_radius", "clearance", "coupling_stiffness", "amb_gap"),
 )
-
-
-class Settings(decision.Settings, fitting.Settings, Protocol):
-    """The plan."""
-
-    @property
-    def leave(self) -> bool: ...
-    @property
-    def corrections(self) -> int: ...
-    @property
-    def repeat(self) -> bool: ...
-    @property
-    def trial_angle_rad(self) -> tuple[float, float]: ...
 
 
 @dataclass(frozen=True)
@@ -82,9 +71,11 @@ REQUIRES = Requires(
 )  # fmt: skip
 
 
-def of_plan(rig: RigFile, plan: Settings) -> Iterable[str]:
+def of_plan(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work, before anything starts."""
-    yield from fitting.of_plan(rig, plan)
+    yield from fitting.of_speeds(rig, plan.speeds_rad_s)
+    yield from fitting.of_slow_roll(plan.slow_rad_s, plan.slow_s, plan.speeds_rad_s)
+    yield from fitting.of_captures(rig, plan.capture_s, RATE_HZ, 1, plan.speeds_rad_s)
     if max(plan.speeds_rad_s) * RPM > MOST_RPM + 1:
         top = max(plan.speeds_rad_s) * RPM
         yield f"speeds_rad_s: found {top:.0f} r/min; influence runs are made at {MOST_RPM:.0f} r/min or below"
@@ -122,7 +113,7 @@ def refusals(recording: Recording[Any]) -> Iterator[Finding]:
             yield Finding("correction-refused", text, str(e["run"]), Effect.ERROR)
 
 
-def of_runs(recorded: Recorded, rig: RigFile, plan: Settings, model: Calibration | None = None) -> Iterator[Finding]:
+def of_runs(recorded: Recorded, rig: RigFile, plan: Plan, known: Known) -> Iterator[Finding]:
     """Loose parts, forces, trial weights."""
     for run in recorded.runs:
         yield from decision.slipped(run)
@@ -130,11 +121,11 @@ def of_runs(recorded: Recorded, rig: RigFile, plan: Settings, model: Calibration
     if base is None:
         return
     yield from _speeds(recorded)
-    off = decision.slow_runout(recorded.slow, base, rig, plan, model)
+    off = decision.slow_runout(recorded.slow, base, rig, known)
     looked = []
     for d in recorded.dwells:
         if d.kind != SLOW:
-            f: Forces = estimates.forces(read_dwell(d), off, rig, plan, model)
+            f: Forces = estimates.forces(read_dwell(d), off, rig, known)
             looked.append(Looked(d, f.misfit, f.carried))
     yield from unbalance_checks.channels(looked)
     yield from unbalance_checks.weight(looked)
@@ -145,7 +136,7 @@ def of_runs(recorded: Recorded, rig: RigFile, plan: Settings, model: Calibration
         having = named.get(f"trial {side}")
         if having is None or not having.weights:
             return
-        shown.append(decision.shown(before, having, having.weights[-1], rig, plan, model))
+        shown.append(decision.shown(before, having, having.weights[-1], rig, known))
         yield from decision.of_trial(shown[-1])
         before = having if plan.leave else base
     yield from decision.of_trials(shown[0], shown[1])
@@ -162,9 +153,7 @@ def _speeds(recorded: Recorded) -> Iterator[Finding]:
             yield Finding("speeds-differ", text, "", Effect.INDETERMINATE)
 
 
-def of_result(
-    balance: Balanced, recorded: Recorded, shown: list[Run], plan: Settings, rig: RigFile
-) -> Iterator[Finding]:
+def of_result(balance: Balanced, recorded: Recorded, shown: list[Run], plan: Plan, rig: RigFile) -> Iterator[Finding]:
     """Was it reached, did the corrections act as predicted, and the sheet."""
     if balance.solved.condition > WORST_CONDITION:
         text = (f"the condition of the influence coefficients is {balance.solved.condition:.0f}: the probes do not tell the "
@@ -231,7 +220,7 @@ def _between(balance: Balanced, before: Run, after: Run, rig: RigFile) -> np.nda
     return np.asarray(np.sqrt(own + (apart**2).sum(axis=1)))
 
 
-def sheet(recorded: Recorded, code: str, rig: RigFile, plan: Settings) -> Iterator[Finding]:
+def sheet(recorded: Recorded, code: str, rig: RigFile, plan: Plan) -> Iterator[Finding]:
     """The weights that stay on the shaft, for the operator."""
     kept, radius = {w.number for w in recorded.on}, rig.geometry["balance_radius"].value
     for w, purpose in recorded.fixed:

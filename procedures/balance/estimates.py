@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.analysis.balance import allocated, permissible
 from bench.analysis.vectors import Vectors
-from bench.calibration import Calibration
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate, welch_satterthwaite
 from bench.uncertainty.estimate import merged
@@ -24,6 +22,7 @@ from procedures.balance.steps import SIDES, Read, Recorded, Run, Weight
 from procedures.balance.vector_length import amount
 from procedures.shared.certificates import certified
 from procedures.synchronous import bearings, runout
+from procedures.synchronous.bearings import Known
 from procedures.synchronous.runout import Stand, Turning
 from procedures.unbalance import estimates
 
@@ -31,23 +30,6 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 BENDING = 0.1  # of (omega/omega_1)^2: docs/reference/balance.md, Uncertainty, as the next
 NONLINEAR = 3.0  # of (X/gap)^2
-
-
-class Settings(Protocol):
-    """The part of a plan that the estimates need."""
-
-    @property
-    def beta_share(self) -> float: ...
-    @property
-    def offset_u_m(self) -> float: ...
-    @property
-    def bending_hz(self) -> float: ...
-    @property
-    def refit_u_kg_m(self) -> float: ...
-    @property
-    def grade_m_s(self) -> float: ...
-    @property
-    def service_rad_s(self) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -83,15 +65,15 @@ def fixed(weights: Sequence[Weight], radius: float) -> Complex:
 
 
 def balanced(
-    slow: Read | None, runs: Sequence[Run], trials: Trials, rig: RigFile, plan: Settings, model: Calibration | None = None
+    slow: Read | None, runs: Sequence[Run], trials: Trials, rig: RigFile, plan: Plan, known: Known
 ) -> Balanced:  # fmt: skip
-    """Unbalance of every run in `runs`, with influences shared by their identity; `model` is the bearings' adopted calibration.
+    """Unbalance of every run in `runs`, with influences shared by their identity; `known` is what is known of the bearings.
 
     Certificates and the bearings' model go through the whole model, scatter through its linear part.
     """
     radius = rig.geometry["balance_radius"].value
-    known = {
-        **bearings.stated(rig, plan, model),
+    inputs = {
+        **bearings.stated(rig, known),
         **_weights(trials, rig),
         **_bending(),
         **_nonlinear(trials, rig),
@@ -122,8 +104,8 @@ def balanced(
             out |= {f"{run.name}/{k}": float(x) for k, x in enumerate(u.view(np.float64))}
         return out
 
-    out = propagate(parted, known)
-    stand, nominal = solve({name: e.value for name, e in known.items()})
+    out = propagate(parted, inputs)
+    stand, nominal = solve({name: e.value for name, e in inputs.items()})
     parts = {}
     for run in runs:
         scatter = balance_scatter.of_run(stand, nominal, slow, run, trials, plan.refit_u_kg_m)
@@ -201,7 +183,7 @@ def _vectors(parts: Sequence[Estimate]) -> Vectors:
     return Vectors(values, estimates.covariance(parts), min(welch_satterthwaite(e) for e in parts))
 
 
-def permitted(rig: RigFile, plan: Settings) -> tuple[Estimate, Estimate]:
+def permitted(rig: RigFile, plan: Plan) -> tuple[Estimate, Estimate]:
     """U_per of each plane (ISO 21940-11), kg m, uncertain by the rotor's mass and the planes' places."""
     inputs = {"mass": certified("machine/mass", rig.machine["mass"]),
               "left": certified("geometry/com_to_inboard_balance", rig.geometry["com_to_inboard_balance"]),
@@ -256,8 +238,8 @@ class Forces:
     carried: Array
 
 
-def forces(read: Read, off: Complex, rig: RigFile, plan: Settings, model: Calibration | None = None) -> Forces:
-    """The balance of forces of one dwell, with a runout (4,) m; `model` is the bearings' adopted calibration."""
-    s = Stand.of({name: e.value for name, e in bearings.stated(rig, plan, model).items()})
+def forces(read: Read, off: Complex, rig: RigFile, known: Known) -> Forces:
+    """The balance of forces of one dwell, with a runout (4,) m and what is known of the bearings."""
+    s = Stand.of({name: e.value for name, e in bearings.stated(rig, known).items()})
     _, misfit = runout.unbalances(s, read.turning, off)
     return Forces(misfit, runout.carried(s, read.means) / estimates.shares(rig, s))

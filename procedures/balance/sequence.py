@@ -27,11 +27,11 @@ from procedures.balance.steps import (
     captured_channels,
     read_capture,
 )
-from procedures.synchronous import bearings as unbalance_bearings
-from procedures.synchronous import dwelling
+from procedures.synchronous import bearings, dwelling
 from procedures.synchronous.dwells import DWELL, SLOW
 
 SLOW_HZ = 500.0  # of the slow roll's capture
+MARGIN_S = 0.1  # of a dwell beside its capture
 
 
 @dataclass
@@ -46,6 +46,11 @@ class Work:
     slow: Read | None = None
     fixed: int = 0
     dwells: int = 0
+
+    @property
+    def known(self) -> bearings.Known:
+        """What is known of the bearings."""
+        return bearings.known(self.record.calibrations, self.plan.beta_share, self.plan.offset_u_m)
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
@@ -120,7 +125,7 @@ def _dwell(
     with work.record.step(kind, **labels):
         rig.capture.arm(captured_channels(machine), seconds=capture_s, rate_hz=rate_hz)
         rig.capture.wait(capture_s + 5.0)
-        rig.clock.sleep(max(seconds - capture_s, dwelling.MARGIN_S))
+        rig.clock.sleep(max(seconds - capture_s, MARGIN_S))
     work.dwells += 1
     touched = int(rig.levitation.reading("flags")) & machine.contact
     data = rig.capture.upload(run=name, speed_rad_s=speed)
@@ -154,8 +159,7 @@ def _acted(work: Work, plane: int) -> bool:
     """Whether the trial weight of the last run did what it should."""
     base, last = work.runs[0], work.runs[-1]
     before = work.runs[-2] if work.plan.leave else base
-    bearings = unbalance_bearings.adopted_bearings(work.record)
-    shown = decision.shown(before, last, last.weights[-1], work.rig.file, work.plan, bearings)
+    shown = decision.shown(before, last, last.weights[-1], work.rig.file, work.known)
     return not list(decision.of_trial(shown))
 
 
@@ -164,14 +168,13 @@ def _correct(work: Work) -> None:
     rig, plan = work.rig.file, work.plan
     trials = decision.trials_of(work.runs, rig, plan.leave)
     assert trials is not None
-    bearings = unbalance_bearings.adopted_bearings(work.record)
     by_plane = zip(trials.before, trials.having, trials.weights, strict=True)
-    inboard, outboard = (decision.shown(*of, rig, plan, bearings) for of in by_plane)
+    inboard, outboard = (decision.shown(*of, rig, work.known) for of in by_plane)
     if list(decision.of_trials(inboard, outboard)):
         return
     present = work.runs[-1] if plan.leave else trials.base
     for n in range(plan.corrections):
-        found = estimates.balanced(work.slow, [present], trials, rig, plan, bearings)
+        found = estimates.balanced(work.slow, [present], trials, rig, plan, work.known)
         needed = decision.correction(found, present.name, rig, plan)
         work.record.event(DECISION, run=present.name, reached=needed.reached, too_heavy_kg=needed.too_heavy)
         if needed.reached or needed.too_heavy or not needed.weights:  # what is missing is not a matter of weights

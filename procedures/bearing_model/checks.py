@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Protocol
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from procedures.amb_rotor.conventions import AmbRotor
 from procedures.amb_rotor.places import Held
 from procedures.bearing_model.comparison import BEARINGS
 from procedures.bearing_model.estimates import Analysis
+from procedures.bearing_model.plan import Plan
 from procedures.shared import signals
 
 FATAL = (
@@ -33,24 +33,7 @@ CONTRADICTED = 4.0  # times its u may an adjustment be: one rig in some hundred 
 ALIKE = 0.9  # of the greatest: inputs that act alike are suspected together
 
 
-class Tolerances(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def average_s(self) -> float: ...
-    @property
-    def max_speed_m_s(self) -> float: ...
-    @property
-    def max_misfit(self) -> float: ...
-    @property
-    def min_ratio(self) -> float: ...
-    @property
-    def max_lost(self) -> float: ...
-    @property
-    def coupled(self) -> bool: ...
-
-
-def of_signals(held: Held, tilted: Held, plan: Tolerances) -> Iterator[Finding]:
+def of_signals(held: Held, tilted: Held, plan: Plan) -> Iterator[Finding]:
     """Lost samples, stuck channels, flags, and a shaft that moves within a step."""
     yield from signals.losses(held.lost, held.expected, plan.max_lost, held.where)
     yield from signals.stuck(held.spread, (*held.machine.positions, *held.machine.currents))
@@ -84,7 +67,7 @@ def _flags(held: Held, tilted: Held) -> Iterator[Finding]:
                 yield Finding(code, said, data.where(hit.astype(float)), effect)
 
 
-def of_results(a: Analysis, plan: Tolerances) -> Iterator[Finding]:
+def of_results(a: Analysis, plan: Plan) -> Iterator[Finding]:
     """The gap that the data ask for, the offset's sign, and the comparison with the linear model."""
     yield from _adjustments(a, plan)
     for axis in a.held.machine.axes:
@@ -133,7 +116,7 @@ def expanded(e: Estimate) -> float:
     return coverage_factor(welch_satterthwaite(e)) * e.u
 
 
-def _adjustments(a: Analysis, plan: Tolerances) -> Iterator[Finding]:
+def _adjustments(a: Analysis, plan: Plan) -> Iterator[Finding]:
     """Do the positions fit the certificates, and what is left then?"""
     pulls = a.adjusted.pulls
     worst = max(abs(v) for v in pulls.values())

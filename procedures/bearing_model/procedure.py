@@ -11,12 +11,10 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator
 
-from pydantic import Field
-
 from bench.errors import DeviceFault, OperatorAbort
 from bench.figures import Figure
 from bench.findings import Finding, Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
@@ -31,6 +29,7 @@ from procedures.bearing_model import checks, estimates, wiring
 from procedures.bearing_model import figures as drawn
 from procedures.bearing_model.comparison import BEARINGS, COMPARED
 from procedures.bearing_model.estimates import Analysis
+from procedures.bearing_model.plan import Plan
 from procedures.shared import assumptions
 
 AXES = AMB_ROTOR.axes
@@ -65,25 +64,6 @@ REACHED = ("sensors/*", "!sensors/pos_*/offset", "!sensors/i_?o_p/gain", "geomet
 """Certificates that the adjustment contradicts before an error of theirs moves a result by 2 U: where what one carries of a
 result's standard uncertainty is less than what the positions say of it, both as shares (docs/reference/bearing-model.md)."""
 ASKED = "Is the motor's coupling taken off the shaft, so that nothing but the AMBs holds it?"
-
-
-class Plan(BenchPlan):
-    """Settings, SI. Positions are a grid of the centre of mass in y and z, within a circle."""
-
-    spacing_m: float = Field(20e-6, gt=0)
-    radius_m: float = Field(82e-6, gt=0)
-    tilt_rad: float = Field(3e-4, gt=0)  # of the check of the wiring
-    biases_A: tuple[float, ...] = Field(
-        (1.15, 0.8), min_length=1
-    )  # of each pass; T Table 2.2 is compared with the first
-    coupled: bool = True  # False: the operator has taken the coupling off
-    settle_s: float = Field(0.6, gt=0)
-    average_s: float = Field(0.5, ge=0.1)
-    batches: int = Field(5, ge=2)  # parts of a step; longer than the loop's swings
-    max_speed_m_s: float = Field(5e-6, gt=0)  # a shaft that moves faster is not at rest
-    max_misfit: float = Field(0.005, gt=0)  # a position's residual over the mean load of its axis
-    min_ratio: float = Field(20.0, gt=1)  # of the residual sums, over samples and over batch means
-    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
 
 
 def settings(plan: Plan) -> dict[str, float]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -17,18 +16,12 @@ from procedures.amb_rotor.conventions import AmbRotor
 from procedures.amb_rotor.magnetics import Positions, Statics
 from procedures.amb_rotor.places import Held
 from procedures.bearing_model.estimates import fit_inputs
+from procedures.bearing_model.plan import Plan
 
 Array = npt.NDArray[np.float64]
 FOLLOWS = 0.6  # a reading may answer a set point by this much less or more (the integrators are slow)
 SUSPECT = 0.05  # of the load: certificates within their tolerances leave a third of it before they are adjusted
 BETTER = 4.0  # times smaller must a sum of squares be with other wiring, to suspect the wiring
-
-
-class Tolerances(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def coupled(self) -> bool: ...
 
 
 def expected(rig: RigFile) -> Array:
@@ -150,7 +143,7 @@ def _judged(s: Statics, k: int, gap: float, coils_of: int, coils: int) -> Judged
     return Judged(fit.chi2, beta, offset, beta > 0 and inside, fit.residuals)
 
 
-def of_models(held: Held, tilted: Held, rig: RigFile, plan: Tolerances) -> Iterator[Finding]:
+def of_models(held: Held, tilted: Held, rig: RigFile, plan: Plan) -> Iterator[Finding]:
     """Does the model describe each axis as it is wired, and would another wiring do so better? At the drawing's gap.
 
     The tilts count: without them both planes of an axis move alike, and their coils could be exchanged unseen."""

@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
-from pydantic import Field
-
 from bench.errors import AnalysisError
 from bench.figures import Shown
 from bench.findings import Effect, Finding, Findings
@@ -23,16 +21,18 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from bench.units import RPM
 from procedures.amb_rotor import lift
-from procedures.amb_rotor.conventions import AMB_ROTOR, Law, Variant, conventions
+from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
 from procedures.compensation import checks, switching
 from procedures.compensation import figures as drawn
 from procedures.compensation.hum import of_switch
+from procedures.compensation.plan import Plan
 from procedures.compensation.switching import SWITCH, Switched
 from procedures.shared import assumptions
-from procedures.synchronous import dwelling
+from procedures.synchronous import bearings, dwelling
 from procedures.synchronous.hum import heard
 from procedures.unbalance import figures as unbalance_figures
 from procedures.unbalance import procedure as unbalance
+from procedures.unbalance import sequence
 from procedures.unbalance.estimates import Results
 
 REDUCTION = Quantity(
@@ -50,27 +50,6 @@ RESIDUAL = Quantity(
 )
 MEASURES = (*unbalance.MEASURES, REDUCTION, DROP, RESIDUAL)
 AFTER_ARM_S = 0.05
-SAME = 1e-6  # of a speed
-
-
-class Plan(unbalance.Plan):
-    """Settings, SI; those of `unbalance` and some more."""
-
-    law: Law = "CCS"
-    variants: tuple[Variant, ...] = Field(("off", "corrected"), min_length=2)
-    literal_rad_s: tuple[float, ...] = (
-        2000 / RPM,
-        10000 / RPM,
-    )  # of these, where there is a dwell, the observer as printed too
-    judged_to_rad_s: float = Field(10001 / RPM, gt=0)  # the range of T 3.5; above it the reduction is told, not judged
-    switch_rad_s: float = Field(10000 / RPM, gt=0)
-    before_s: float = Field(0.2, ge=0.05)
-    after_s: float = Field(0.8, ge=0.2)
-
-    def at(self, speed: float) -> tuple[Variant, ...]:
-        """With the literal observer where the plan says so."""
-        tried = any(abs(speed / s - 1) < SAME for s in self.literal_rad_s)
-        return (*self.variants, "literal") if tried else self.variants
 
 
 def settings(plan: Plan) -> dict[str, float]:
@@ -85,10 +64,10 @@ def step_count(plan: Plan) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Slow roll, dwells with each setting, the switch, the lowest speed again."""
-    if not dwelling.rolled(rig, plan, record):
+    if not sequence.begun(rig, plan, record):
         return
-    if dwelling.dwelt(rig, plan, record) and _switched(rig, plan, record):
-        dwelling.repeated(rig, plan, record)
+    if sequence.dwelt(rig, plan, record) and _switched(rig, plan, record):
+        sequence.repeated(rig, plan, record)
     dwelling.finished(rig)
 
 
@@ -189,7 +168,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
-    needs=unbalance.needs,
+    needs=lambda plan: bearings.needs(plan.bearings),
     assumes=assumptions.UNBALANCE,
     method=f"{unbalance.procedure.method}\n{read_method(__file__)}",
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,13 +14,13 @@ from bench.analysis import transient
 from bench.analysis.criticals import Critical, criticals, moved
 from bench.analysis.peaks import Smoother
 from bench.analysis.vectors import complexes, estimates, parts
-from bench.calibration import Calibration
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.estimate import merged
 from procedures.run_up import linear_model
 from procedures.run_up.line import DRAWS, Line
+from procedures.run_up.plan import Passing
 from procedures.run_up.steps import Curve, Passage, curve, near
 from procedures.synchronous import bearings
 from procedures.synchronous.dwells import Dwell
@@ -39,25 +39,6 @@ HARMONICS = "harmonics"
 BENDING = (*(f"{name}_{k}" for name in ("beta", "offset", "zero", "gain") for k in range(4)), "gap", "mass", "inertia",
            "l_ia", "l_oa", "l_is", "l_os")  # fmt: skip
 """What the bend of the forces rests on; what else there is of it changes it by less than a twentieth."""
-
-
-class Settings(Protocol):
-    """The part of a plan that the estimates need."""
-
-    @property
-    def law(self) -> str: ...
-    @property
-    def parameters(self) -> Mapping[str, float]: ...
-    @property
-    def speeds_rad_s(self) -> tuple[float, ...]: ...
-    @property
-    def running_rad_s(self) -> float: ...
-    @property
-    def blocks(self) -> int: ...
-    @property
-    def beta_share(self) -> float: ...
-    @property
-    def offset_u_m(self) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -102,10 +83,8 @@ class Run:
     clearance: float = field(default=math.nan)
 
 
-def run(
-    passage: Passage, slow: Dwell | None, recording: Recording[Any], plan: Settings, model: Calibration | None = None
-) -> Run:
-    """All estimates of a passage; `model` is the bearings' adopted calibration."""
+def run(passage: Passage, slow: Dwell | None, recording: Recording[Any], plan: Passing, known: bearings.Known) -> Run:
+    """All estimates of a passage, with what is known of the bearings."""
     rig = recording.rig
     found = curve(passage, plan.blocks)
     passed = [n for s in sorted(plan.speeds_rad_s) if (n := near(passage, recording, s, plan.law)) is not None]
@@ -118,9 +97,9 @@ def run(
         still, rest = _still(found, models, dwell, width)
         dwells.append(still)
         left.append(rest)
-    results = unbalance_estimates.results([*([] if slow is None else [slow]), *dwells], rig, plan, model)
+    results = unbalance_estimates.results([*([] if slow is None else [slow]), *dwells], rig, known)
     results = replace(results, dwells=tuple(_with(r, rest) for r, rest in zip(results.dwells, left, strict=True)))
-    inputs = bearings.stated(rig, plan, model)
+    inputs = bearings.stated(rig, known)
     large = _large(found, inputs, results.runouts, plan.law, gains(rig, plan))
     shaft, peaks = [], []
     for k, axis in enumerate(passage.machine.axes):
@@ -131,7 +110,7 @@ def run(
     return Run(passage, found, np.array(shaft), tuple(peaks), results, slow, clearance)
 
 
-def gains(rig: RigFile, plan: Settings) -> dict[str, float]:
+def gains(rig: RigFile, plan: Passing) -> dict[str, float]:
     """The controller's parameters while the speeds are passed, SI, by name."""
     return {name: p.default for name, p in rig.parameters.items()} | dict(plan.parameters)
 

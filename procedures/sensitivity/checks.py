@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from bench.recording import Recording
 from bench.uncertainty import coverage_factor
 from bench.units import RPM
 from procedures.sensitivity.estimates import Peak, Result
+from procedures.sensitivity.plan import Plan
 from procedures.sensitivity.steps import (
     INJECT,
     Taken,
@@ -35,21 +36,6 @@ SAME = 1e-5  # A: what single precision makes of after - before - inject
 FOLLOWS = (0.4, 1.6)  # shares of `after` that the injected axis' coils may follow below 200 Hz, lag and delay included
 UNEXPLAINED = 1e-3  # probability below which no model explains the lines about a peak
 SURE = 4.0  # standard deviations of a line above the refined maximum
-
-
-class Settings(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def amplitude_A(self) -> float: ...
-    @property
-    def max_lost(self) -> float: ...
-    @property
-    def max_speed_error(self) -> float: ...
-    @property
-    def max_change(self) -> float: ...
-    @property
-    def min_coherence(self) -> float: ...
 
 
 def before(recording: Recording[Any]) -> Iterator[Finding]:
@@ -77,7 +63,7 @@ def before(recording: Recording[Any]) -> Iterator[Finding]:
             return
 
 
-def of_signals(taken: Sequence[Taken], plan: Settings) -> Iterator[Finding]:
+def of_signals(taken: Sequence[Taken], plan: Plan) -> Iterator[Finding]:
     """Lost samples, probes, contact, limits, the injection itself and where it went."""
     lost, expected = np.array([(t.lost, t.expected) for t in taken], dtype=float).T
     yield from signals.losses(lost, expected, plan.max_lost, lambda share: taken[int(np.argmax(share))].where)
@@ -148,7 +134,7 @@ def _followed(t: Taken) -> Iterator[Finding]:
     yield Finding("wrong-axis", f"{text.rstrip('.')}.", t.where, Effect.ERROR)
 
 
-def _turning(t: Taken, plan: Settings) -> Iterator[Finding]:
+def _turning(t: Taken, plan: Plan) -> Iterator[Finding]:
     off = abs(t.turning / t.speed - 1) if t.speed else 0.0
     if off > plan.max_speed_error:
         yield Finding(
@@ -160,7 +146,7 @@ def _turning(t: Taken, plan: Settings) -> Iterator[Finding]:
         )
 
 
-def of_results(results: Sequence[Result], plan: Settings) -> Iterator[Finding]:
+def of_results(results: Sequence[Result], plan: Plan) -> Iterator[Finding]:
     """Is the greatest value where the grid is fine, explained, coherent and independent of the amplitude? Then notes."""
     for r in results:
         if not r.peaks:
@@ -192,7 +178,7 @@ def _covered(r: Result) -> Iterator[Finding]:
         yield Finding("peak-not-refined", text, r.where, Effect.INDETERMINATE, (f"@{r.where}",))
 
 
-def _of_peak(p: Peak, plan: Settings) -> Iterator[Finding]:
+def _of_peak(p: Peak, plan: Plan) -> Iterator[Finding]:
     where, half = p.taken.where, p.top.width / 2
     if p.taken.grid.step > half:
         text = (f"lines stand {p.taken.grid.step:g} Hz apart at {p.top.at:.4g} Hz; half of the half-power width there is "
@@ -212,7 +198,7 @@ def _of_peak(p: Peak, plan: Settings) -> Iterator[Finding]:
         yield Finding("not-linear", text, where, Effect.INDETERMINATE, (f"@{where}",))
 
 
-def _notes(results: Sequence[Result], plan: Settings) -> Iterator[Finding]:
+def _notes(results: Sequence[Result], plan: Plan) -> Iterator[Finding]:
     for r in results:
         if not r.peaks or "s_max" not in r.estimates:
             continue

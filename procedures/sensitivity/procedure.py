@@ -7,16 +7,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from bench.analysis.responses import Response, image_distance
 from bench.errors import AnalysisError
 from bench.figures import Figure
 from bench.findings import Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
@@ -24,13 +23,13 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
-from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
 from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
 from procedures.sensitivity import checks, estimates, fitting
 from procedures.sensitivity import figures as drawn
 from procedures.sensitivity.estimates import Candidate, Result
 from procedures.sensitivity.injection import PARAMETERS, Comb, combs, injected
+from procedures.sensitivity.plan import Plan
 from procedures.sensitivity.steps import (
     HALF,
     INJECT,
@@ -49,8 +48,6 @@ from procedures.sensitivity.steps import (
 )
 from procedures.shared import assumptions
 
-Law = Literal["PID", "CCS"]
-Axis = Literal["yi", "zi", "yo", "zo", "x"]
 S_MAX = Quantity("s_max", "1", "greatest |V1/E| of an axis, all other loops closed (ISO 14839-3)", title="S_max")
 AT = Quantity("s_max_hz", "Hz", "frequency of the greatest |V1/E|", title="frequency of S_max")
 PHASE = Quantity("phase_margin", "rad", "least angle of the open loop L = 1/S - 1 from -1 where |L| = 1, either way")
@@ -59,32 +56,6 @@ RISE = Quantity("gain_increase", "1", "factor to which the loop's gain may rise 
 MEASURES = (S_MAX, AT, PHASE, FALL, RISE)
 MARGIN_S = 0.1  # of a capture, for the first and last pulse
 FOLLOWED_HZ, FOLLOWED = 8.0, 12  # lines at its odd multiples: below 200 Hz coils follow their references
-
-
-class Plan(BenchPlan):
-    """Settings of the injections, SI."""
-
-    law: Law = "PID"
-    axes: tuple[Axis, ...] = Field(("yi", "zi", "yo", "zo", "x"), min_length=1)
-    speeds_rad_s: tuple[float, ...] = Field((0.0, 10000 / RPM), min_length=1)
-    amplitude_A: float = Field(4e-3, gt=0)  # of each line, 0-pk
-    low_hz: float = Field(2.0, gt=0)
-    middle_hz: float = Field(256.0, gt=0)  # up to here the odd multiples of low_hz; above it every high_step_hz
-    high_step_hz: float = Field(16.0, gt=0)
-    high_hz: float = Field(2000.0, gt=0)
-    modes_hz: tuple[float, ...] = (650.0, 1240.0)  # bending modes, about which a finer grid is laid
-    mode_within_hz: float = Field(26.0, gt=0)  # to either side
-    mode_damping: float = Field(2e-3, gt=0)  # least that is expected of them
-    periods: int = Field(4, ge=3)  # of the survey
-    refined_periods: int = Field(8, ge=4)
-    settle_s: float = Field(8.0, ge=0.5)  # under the law, before anything is injected
-    start_s: float = Field(0.5, ge=0.1)  # of each injection
-    survey_start_s: float = Field(1.5, ge=0.1)  # of the survey: a slow integrator answers its lowest lines
-    rate_hz: float = Field(10000.0, gt=0)  # of the captures
-    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
-    max_speed_error: float = Field(0.01, gt=0)  # share of the speed
-    max_change: float = Field(0.05, gt=0)  # of S_max, at half the amplitude: linear enough
-    min_coherence: float = Field(0.9, gt=0, lt=1)  # at the lines about the peak
 
 
 def surveys(plan: Plan, speed: float) -> list[tuple[str, float, Comb]]:

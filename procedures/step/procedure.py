@@ -8,14 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
-
-from pydantic import Field
 
 from bench.errors import NotReached
 from bench.figures import Figure
 from bench.findings import Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
@@ -29,6 +26,7 @@ from procedures.shared import assumptions
 from procedures.step import checks, estimates, planes
 from procedures.step import figures as drawn
 from procedures.step.estimates import Result
+from procedures.step.plan import Plan
 from procedures.step.record_length import enough_s, faded_s
 from procedures.step.steps import STEP, TURNING_RAD_S, Case, Done, cases, channels, read_steps
 
@@ -51,32 +49,8 @@ WAY = Quantity(
     "way_effect", "1", "overshoot upwards less that downwards, at the largest step", title="effect of the direction"
 )
 MEASURES = (OVERSHOOT, RISE, SETTLING, ERROR, BANDWIDTH, DAMPING, FREQUENCY, SIZE, WAY)
-Axis = Literal["y", "z", "x"]
 SETTLED_S = 0.5  # after the last ramp of a speed
 MARGIN = 0.8  # of the clearance that a step with its overshoot may use
-
-
-class Plan(BenchPlan):
-    """Settings of the steps, SI."""
-
-    axes: tuple[Axis, ...] = Field(("y", "z"), min_length=1)
-    sizes_m: tuple[float, ...] = Field((10e-6, 20e-6), min_length=2)  # one alone says nothing of linearity
-    speeds_rad_s: tuple[float, ...] = Field((0.0,), min_length=1)
-    repeats: int = Field(2, ge=2)  # of: up, back, down, back
-    a: dict[str, float] = Field(default_factory=lambda: AMB_ROTOR.select("CCS"))  # parameters of the controller
-    b: dict[str, float] = Field(default_factory=dict)  # the other setting; empty: nothing is compared
-    names: tuple[str, str] = ("A", "B")
-    warm: dict[str, float] = Field(default_factory=dict)  # on top of either setting until it is warm
-    warm_s: float = Field(4.0, ge=0)
-    settle_s: float = Field(5.0, ge=0.1)  # with the setting itself
-    model_error: float = Field(
-        0.0, gt=-0.5, lt=1.0
-    )  # share by which the controller's betas and offsets are made too large
-    rest_s: float = Field(0.3, ge=0.1)  # before each step
-    record_s: float | None = Field(None, ge=0.2)  # after it; by default until the law's integrator has arrived
-    band: float = Field(0.02, gt=0)  # of settling, as a share of the step
-    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
-    max_speed_error: float = Field(0.02, gt=0)  # share of the speed
 
 
 def chosen(plan: Plan) -> dict[str, dict[str, float]]:

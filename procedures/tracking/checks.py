@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Protocol
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from procedures.shared import signals
 from procedures.shared.sines import known_frequency, unknown_frequency
 from procedures.tracking.drift import Drift, drift
 from procedures.tracking.estimates import TIMING_TICKS
+from procedures.tracking.plan import Plan
 from procedures.tracking.steps import Orbit, upper_and_lower
 
 FATAL = (
@@ -33,20 +33,7 @@ STEADY = 0.01  # of the speed
 PARTS = 0.02  # share of samples at a limit that a smooth reference does not explain
 
 
-class Settings(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def laws(self) -> tuple[Any, ...]: ...
-    @property
-    def speed_rad_s(self) -> float: ...
-    @property
-    def max_lower_A(self) -> float: ...
-    @property
-    def max_lost(self) -> float: ...
-
-
-def of_signals(orbits: Sequence[Orbit], plan: Settings) -> Iterator[Finding]:
+def of_signals(orbits: Sequence[Orbit], plan: Plan) -> Iterator[Finding]:
     """Lost samples, channels that stand still or clip, a reference that is not what was planned."""
     lost, expected = np.array([(o.step.lost(), o.step.expected()) for o in orbits], dtype=float).T
     yield from signals.losses(lost, expected, plan.max_lost, lambda share: orbits[int(np.argmax(share))].where)
@@ -144,9 +131,7 @@ def _of_drift(o: Orbit, found: Drift | None) -> Iterator[Finding]:
     yield Finding("reference-frequency", text, o.where, Effect.ERROR)
 
 
-def of_results(
-    orbits: Sequence[Orbit], results: Mapping[str, Mapping[str, Estimate]], plan: Settings
-) -> Iterator[Finding]:
+def of_results(orbits: Sequence[Orbit], results: Mapping[str, Mapping[str, Estimate]], plan: Plan) -> Iterator[Finding]:
     """Contact, saturation, coils that should be off, and the laws side by side."""
     for o in orbits:
         judged = o.law in plan.laws

@@ -16,7 +16,7 @@ from bench.recording import Recording
 from bench.units import RPM
 from procedures.shared import signals
 from procedures.synchronous.dwells import DWELL, SLOW, Array, Dwell
-from procedures.synchronous.fitting import PER_TURN, Settings, too_fast
+from procedures.synchronous.fitting import PER_TURN, too_fast
 from procedures.unbalance.estimates import Results
 
 HELD = 8  # samples in a row at an extreme: a probe that clips
@@ -48,13 +48,13 @@ def its_own(d: Dwell) -> tuple[str, ...]:
 
 
 def of_signals(
-    dwells: Sequence[Dwell], plan: Settings, doubts: Doubts = its_own, runout: tuple[str, ...] = ()
+    dwells: Sequence[Dwell], max_lost: float, max_speed_error: float, doubts: Doubts = its_own
 ) -> Iterator[Finding]:
-    """Lost samples, pulses, probes that clip or stand still, contact, limits, sampling, speed. `doubts` are the quantities
-    that a dwell's data are in, `runout` those that the slow roll is in; none is all of them."""
+    """Lost samples (a share of them is allowed), pulses, probes that clip or stand still, contact, limits, speed (a share of
+    which it may be off). `doubts` are the quantities that a dwell's data are in; none is all of them."""
     lost, expected = np.array([(d.lost, d.expected) for d in dwells], dtype=float).T
-    for f in signals.losses(lost, expected, plan.max_lost, lambda share: dwells[int(np.argmax(share))].where):
-        hit = [doubts(d) for d in dwells if d.lost > plan.max_lost * max(d.expected, 1)]
+    for f in signals.losses(lost, expected, max_lost, lambda share: dwells[int(np.argmax(share))].where):
+        hit = [doubts(d) for d in dwells if d.lost > max_lost * max(d.expected, 1)]
         yield replace(f, concerns=tuple(q for some in hit for q in some) if all(hit) else ())
     for d in dwells:
         for name in d.stuck:
@@ -62,11 +62,9 @@ def of_signals(
         yield from _pulses(d)
         yield from _limits(d, doubts)
         off = abs(d.speed / d.wanted - 1)
-        if off > plan.max_speed_error:
+        if off > max_speed_error:
             text = f"the pulses say {d.speed * RPM:.0f} r/min, {off:.1%} off."
             yield Finding("speed-off", text, d.where, Effect.INDETERMINATE, doubts(d))
-    yield from sampling(dwells, plan)
-    yield from slow_roll(dwells, plan, runout)
 
 
 def _pulses(d: Dwell) -> Iterator[Finding]:
@@ -101,31 +99,32 @@ def _limits(d: Dwell, doubts: Doubts) -> Iterator[Finding]:
             yield Finding(code, text, d.where, Effect.INDETERMINATE, doubts(d))
 
 
-def sampling(dwells: Sequence[Dwell], plan: Settings) -> Iterator[Finding]:
-    """The capture must be fast enough for the orders asked."""
+def sampling(dwells: Sequence[Dwell], orders: int) -> Iterator[Finding]:
+    """The capture must be fast enough for the highest of the orders asked."""
     for d in dwells:
         if d.full is None:
             continue
-        need = PER_TURN * plan.orders * d.speed / (2 * math.pi)
+        need = PER_TURN * orders * d.speed / (2 * math.pi)
         if d.full.rate < need:
-            text = (f"captured at {d.full.rate:g} Hz; order {plan.orders} needs {need:.0f} Hz: what is above half of the rate "
+            text = (f"captured at {d.full.rate:g} Hz; order {orders} needs {need:.0f} Hz: what is above half of the rate "
                     "appears at other frequencies, and D_max misses peaks.")  # fmt: skip
             yield Finding("aliasing", text, d.where, Effect.ERROR)
 
 
-def slow_roll(dwells: Sequence[Dwell], plan: Settings, runout: tuple[str, ...] = ()) -> Iterator[Finding]:
-    """Is there a slow roll, and was it slow? `runout` are the quantities that it is in."""
+def slow_roll(dwells: Sequence[Dwell], speeds: Sequence[float], runout: tuple[str, ...] = ()) -> Iterator[Finding]:
+    """Is there a slow roll, and was it slow beside the speeds in rad/s? `runout` are the quantities that it is in; none is
+    all of them."""
     slow = [d for d in dwells if d.kind == SLOW]
     if not slow:
         text = "no slow roll: what the probes read of the journals' runout is in every vector, as if it were unbalance."
         yield Finding("no-slow-roll", text, "", Effect.INDETERMINATE, runout)
-    elif slow[0].speed > 1.02 * too_fast(plan):
-        text = (f"the slow roll was made at {slow[0].speed * RPM:.0f} r/min; above {too_fast(plan) * RPM:.0f} r/min unbalance "
-                "and the loop's own response are in it.")  # fmt: skip
+    elif slow[0].speed > 1.02 * too_fast(speeds):
+        text = (f"the slow roll was made at {slow[0].speed * RPM:.0f} r/min; above {too_fast(speeds) * RPM:.0f} r/min "
+                "unbalance and the loop's own response are in it.")  # fmt: skip
         yield Finding("slow-roll-too-fast", text, slow[0].where, Effect.INDETERMINATE, runout)
 
 
-def of_results(results: Results, plan: Settings) -> Iterator[Finding]:
+def of_results(results: Results) -> Iterator[Finding]:
     """Do forces and motion agree? Is a repeat the same? Then zones and the runout, as notes."""
     yield from channels(results.dwells)
     yield from weight(results.dwells)
@@ -133,9 +132,8 @@ def of_results(results: Results, plan: Settings) -> Iterator[Finding]:
     yield from _folded(results)
     yield from _repeats(results)
     yield from _told(results)
-    if plan.variants:
-        yield from _regions(results)
-        yield from _zones(results)
+    yield from _regions(results)
+    yield from _zones(results)
 
 
 class Balanced(Protocol):

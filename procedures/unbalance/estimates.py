@@ -11,14 +11,13 @@ import numpy.typing as npt
 
 from bench.analysis.orbits import Ellipse, ellipse
 from bench.analysis.vectors import Vectors, estimates
-from bench.calibration import Calibration
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate, welch_satterthwaite
 from bench.uncertainty.estimate import merged
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.shared.certificates import certified
 from procedures.synchronous import coil_peaks, runout
-from procedures.synchronous.bearings import Settings, stated
+from procedures.synchronous.bearings import Known, stated
 from procedures.synchronous.dwells import ORDERS, SLOW, Dwell
 from procedures.synchronous.nonsynchronous import beside_orders, folds
 from procedures.synchronous.runout import Stand, Turning
@@ -85,12 +84,12 @@ class Results:
         return self.dwells[0].dwell.machine
 
 
-def results(dwells: Sequence[Dwell], rig: RigFile, plan: Settings, model: Calibration | None = None) -> Results:
-    """Estimates of every dwell; `model` is the bearings' adopted calibration."""
+def results(dwells: Sequence[Dwell], rig: RigFile, known: Known) -> Results:
+    """Estimates of every dwell, with what is known of the bearings."""
     slow = next((d for d in dwells if d.kind == SLOW), None)
     turning = [d for d in dwells if d.kind != SLOW]
     fast = max((d for d in turning if d.variant == turning[0].variant), key=lambda d: d.speed)
-    inputs = stated(rig, plan, model)
+    inputs = stated(rig, known)
     nominal = Stand.of({name: e.value for name, e in inputs.items()})
     runouts = _runouts(inputs, rig, slow, fast)
     clearance = certified("geometry/clearance", rig.geometry["clearance"], "least clearance")

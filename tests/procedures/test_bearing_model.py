@@ -23,7 +23,8 @@ from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.amb_rotor.places import Held
 from procedures.bearing_model import adjustment, checks, wiring
 from procedures.bearing_model.estimates import evaluate
-from procedures.bearing_model.procedure import MEASURES, Plan, check, grid, procedure, read, step_count
+from procedures.bearing_model.plan import Plan
+from procedures.bearing_model.procedure import MEASURES, check, grid, procedure, read, step_count
 from reports.figures import draw as draw_figure
 from reports.unseen import is_reached
 from sim_backend.truth import nominal

@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from bearing_facts import known
 
 from bench.rigfile import load_rig
 from procedures.amb_rotor.conventions import AMB_ROTOR
@@ -23,7 +24,7 @@ W = 450.0
 
 def stand(**changed: object) -> Stand:
     """The nominal one, with magnetic fields that stand about the rings' centre."""
-    s = Stand.of({name: e.value for name, e in stated(RIG, procedure.Plan()).items()})
+    s = Stand.of({name: e.value for name, e in stated(RIG, known(procedure.Plan())).items()})
     return dataclasses.replace(s, offset=np.zeros(4), **changed)  # type: ignore[arg-type]
 
 

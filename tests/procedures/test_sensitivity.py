@@ -27,7 +27,8 @@ from bench.units import RPM
 from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.sensitivity import checks, estimates, margins
 from procedures.sensitivity.injection import Comb, combs
-from procedures.sensitivity.procedure import Plan, check, procedure
+from procedures.sensitivity.plan import Plan
+from procedures.sensitivity.procedure import check, procedure
 from procedures.sensitivity.steps import REFINED, WIRING, Taken, read_taken
 from reports.figures import draw as draw_figure
 from sim_backend.machines.amb5dof import truth_sensitivity

@@ -24,7 +24,8 @@ from bench.uncertainty.coverage import ensemble
 from procedures.amb_rotor.onset import onset
 from procedures.step import checks, estimates, oscillation, planes, response, settling
 from procedures.step import steps as step_steps
-from procedures.step.procedure import MEASURES, Plan, check, procedure, recorded_s, step_count, waited_s
+from procedures.step.plan import Plan
+from procedures.step.procedure import MEASURES, check, procedure, recorded_s, step_count, waited_s
 from reports.figures import draw as draw_figure
 
 SHORT = {"axes": ("y",), "sizes_m": (10e-6, 20e-6), "record_s": 0.4, "settle_s": 3.0}

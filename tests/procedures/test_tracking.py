@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bearing_facts import known
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
@@ -29,7 +30,8 @@ from procedures.tracking import checks, drift, estimates
 from procedures.tracking import ellipse as estimator
 from procedures.tracking.ellipse import Path as Orbit
 from procedures.tracking.ellipse import Wave
-from procedures.tracking.procedure import MEASURES, OBSERVED, Plan, check, procedure, step_count
+from procedures.tracking.plan import Plan
+from procedures.tracking.procedure import MEASURES, OBSERVED, check, procedure, step_count
 from procedures.tracking.steps import read_orbits
 from procedures.unbalance import procedure as unbalance
 from reports.figures import draw as draw_figure
@@ -272,6 +274,6 @@ def test_a_certificate_has_one_name_in_all_procedures() -> None:
     """Else results that share a probe would count as independent."""
     rig = load_rig("amb5dof")
     here = {i.id for i in estimates.inputs(rig, 1e-4, 0.0)} - {"timing/start", "geometry/clearance"}
-    there = {i.id for e in bearings.stated(rig, unbalance.Plan()).values() for i in e.sensitivities}
+    there = {i.id for e in bearings.stated(rig, known(unbalance.Plan())).values() for i in e.sensitivities}
     assert here
     assert here <= there

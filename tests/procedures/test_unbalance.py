@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bearing_facts import bearings
+from bearing_facts import bearings, known
 
 from bench.analysis.vectors import radius2
 from bench.cli.virtual import given, simulated_run
@@ -66,7 +66,7 @@ def done(folder: Path, procedure: str, plan: Mapping[str, Any], truth: Mapping[s
     measured = {(m.quantity.name, m.where): m.estimate for m in run.results if isinstance(m, Measured)}
     findings = [f for f in run.results if isinstance(f, Finding)]
     plan_ = run.recording.plan
-    results = estimates.results(read_dwells(run.recording), run.recording.rig, plan_)
+    results = estimates.results(read_dwells(run.recording), run.recording.rig, known(plan_))
     return Run(measured, findings, run.recording, results, draw(load_rig("amb5dof"), SEED, truth).plant)
 
 
@@ -267,7 +267,7 @@ def test_a_finding_of_one_speed_leaves_the_others_alone(tmp_path: Path) -> None:
 
 def test_without_a_slow_roll_readings_and_currents_stand(compared: Run) -> None:
     slow = [d for d in read_dwells(compared.recording) if d.kind != SLOW]
-    found = list(checks.slow_roll(slow, compared.recording.plan, unbalance.LESS_RUNOUT))
+    found = list(checks.slow_roll(slow, compared.recording.plan.speeds_rad_s, unbalance.LESS_RUNOUT))
     assert [f.code for f in found] == ["no-slow-roll"]
     assert set(found[0].concerns) == {"vector_cos", "vector_sin", "major_half_axis", "d_max", "d_max_share"}
 
@@ -435,7 +435,7 @@ def test_adopted_bearings_take_the_plan_s_place(compared: Run) -> None:
     """The runout is known better, by the calibration's influences and not by the plan's; the probes' zeros drop out of it."""
     rig, model = compared.recording.rig, bearings(compared.recording.rig, compared.plant)
     dwells = read_dwells(compared.recording)
-    found = estimates.results(dwells, rig, compared.recording.plan, model).runouts[1.0]
+    found = estimates.results(dwells, rig, known(compared.recording.plan, model)).runouts[1.0]
     before, true = compared.results.runouts[1.0], truth_unbalance.first(compared.plant)
     for k, part in enumerate(found.parts):
         value = true[k // 2].imag if k % 2 else true[k // 2].real
@@ -448,13 +448,13 @@ def test_adopted_bearings_take_the_plan_s_place(compared: Run) -> None:
     assert max(p.u for p in found.parts) < 0.8 * max(p.u for p in before.parts)
     (said,) = [f.text for f in compared.findings if f.code == "bearings"]
     assert "no calibration bearing-model was used" in said
-    assert "bearing-model-1, 2026-02-03" in unbalance_bearings.told(model, compared.recording.plan).text
+    assert "bearing-model-1, 2026-02-03" in unbalance_bearings.told(known(compared.recording.plan, model)).text
 
 
 def test_bearings_are_used_where_there_are_some_and_not_missed_where_there_are_none() -> None:
     rig = load_rig("amb5dof")
-    (need,) = unbalance.needs(unbalance.Plan())
-    assert unbalance.needs(unbalance.Plan(bearings="plan")) == ()
+    (need,) = unbalance.procedure.needs(unbalance.Plan())
+    assert unbalance.procedure.needs(unbalance.Plan(bearings="plan")) == ()
     assert compensation.procedure.needs(compensation.Plan()) == (need,)
     model = bearings(rig, draw(rig, SEED).plant)
     assert given([need], {}) == []
