@@ -150,8 +150,8 @@ def test_refitting_and_speeds_that_differ(sound: Balancing) -> None:
     fast = dataclasses.replace(runs["check 1"], reads=tuple(
         dataclasses.replace(r, speed=1.003 * r.speed) for r in runs["check 1"].reads))  # fmt: skip
     changed = dataclasses.replace(found, runs=(*found.runs[:-1], fast))
-    assert {f.code for f in checks.of_runs(changed, rig, plan)} == {"speeds-differ"}
-    assert not list(checks.of_runs(found, rig, plan))
+    assert {f.code for f in checks.of_runs(changed, rig, plan, known(plan))} == {"speeds-differ"}
+    assert not list(checks.of_runs(found, rig, plan, known(plan)))
 
 
 def test_corrections_at_positions_and_those_too_heavy(sound: Balancing) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,10 +25,10 @@ from bench.record.specs import applied, load_spec
 from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, Influence, interval
-from procedures.amb_rotor.conventions import AMB_ROTOR
+from procedures.amb_rotor.conventions import AMB_ROTOR, Flag
 from procedures.compensation import procedure as compensation
 from procedures.synchronous import bearings as unbalance_bearings
-from procedures.synchronous import runout
+from procedures.synchronous import dwells, runout
 from procedures.synchronous.coil_peaks import blocks, uncertified
 from procedures.synchronous.dwells import SLOW, read_dwells
 from procedures.unbalance import checks, estimates
@@ -241,7 +241,8 @@ def test_a_clipping_probe_shows_in_the_capture_where_the_controller_does_not_tel
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """At 4000 r/min a turn is 15 samples of the telemetry: none of them stays at the limit for eight."""
-    monkeypatch.setattr(checks, "RANGE", 0)
+    silent = replace(AMB_ROTOR, sensor_range=Flag(0))
+    monkeypatch.setattr(dwells, "conventions", lambda _: silent)
     truth = {"position_range": 78e-6, "unbalance_i": 1.05e-5, "unbalance_o": 1.05e-5}
     plan = {**ONE, "speeds_rad_s": (4000 * RPM,)}
     run = simulated_run("unbalance", "amb5dof", SEED, plan, tmp_path / "recording.mcap", truth)
