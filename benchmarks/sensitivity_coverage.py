@@ -26,7 +26,7 @@ from bench.uncertainty import coverage_factor, interval
 from bench.units import RPM
 from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.sensitivity import estimates
-from procedures.sensitivity.injection import Comb, wanted
+from procedures.sensitivity.injection import Comb, parameters_of
 from procedures.sensitivity.plan import Plan
 from procedures.sensitivity.procedure import MARGIN_S, refinements, surveys
 from procedures.sensitivity.steps import REFINED, WIRING, Grid, Taken, captured_channels, sensitivity
@@ -63,7 +63,7 @@ def light(p: AmbParams, settings: Mapping[str, float], plan: Plan, seed: int) ->
 
 def _taken(plant: AmbPlant, plan: Plan, axis: str, kind: str, about: float, comb: Comb) -> Taken:
     speed = plan.speeds_rad_s[0]
-    for name, value in {**wanted(comb), "inject_axis": float(AMB_ROTOR.all_axes.index(axis))}.items():
+    for name, value in {**parameters_of(comb), "inject_axis": float(AMB_ROTOR.all_axes.index(axis))}.items():
         plant.set(name, value)
     plant.run(round(plan.start_s * 1e4))
     pulses = MARGIN_S + 4 * math.pi / speed if speed else 0.0

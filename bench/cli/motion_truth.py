@@ -42,13 +42,13 @@ def _settings(done: Simulated, *more: Mapping[str, float]) -> dict[str, float]:
 
 
 def _step(done: Simulated) -> Found:
-    from procedures.step.procedure import chosen, model, recorded_s, waited_s
+    from procedures.step.procedure import list_settings, model, recorded_s, waited_s
     from procedures.step.steps import AT_REST_S, Case
     from sim_backend.machines.amb5dof import truth_step
 
     plan: Any = done.recording.plan
     other_band = {r.where for r in done.results if isinstance(r, Finding) and r.code == "band-widened"}
-    for setting, changed in chosen(plan).items():
+    for setting, changed in list_settings(plan).items():
         settings = _settings(done, model(done.recording.rig, plan), changed)
         for speed in plan.speeds_rad_s:
             window = 2 * math.pi / speed if speed else AT_REST_S

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -18,7 +17,7 @@ from bench.rigfile import RigFile
 from bench.units import RPM
 from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.balance import decision, estimates
-from procedures.balance.estimates import Balanced, Forces
+from procedures.balance.estimates import Balanced
 from procedures.balance.plan import Plan
 from procedures.balance.steps import (
     BASE,
@@ -29,11 +28,10 @@ from procedures.balance.steps import (
     Recorded,
     Run,
     captured_channels,
-    read_dwell,
 )
 from procedures.synchronous import fitting
 from procedures.synchronous.bearings import Known
-from procedures.synchronous.dwells import SLOW, Dwell, telemetry_channels
+from procedures.synchronous.dwells import SLOW, telemetry_channels
 from procedures.unbalance import checks as unbalance_checks
 
 MOST_RPM = 10000.0  # influence runs
@@ -48,15 +46,6 @@ NEEDED = (
     *(f"com_to_{b}_{what}" for b in ("inboard", "outboard") for what in ("balance", "sensor", "amb")),
     *("com_to_coupling", "balance_radius", "clearance", "coupling_stiffness", "amb_gap"),
 )
-
-
-@dataclass(frozen=True)
-class Looked:
-    """A dwell with its balance of forces, as `unbalance.checks` wants it."""
-
-    dwell: Dwell
-    misfit: float
-    carried: np.ndarray
 
 
 REQUIRES = Requires(
@@ -116,17 +105,13 @@ def refusals(recording: Recording[Any]) -> Iterator[Finding]:
 def of_runs(recorded: Recorded, rig: RigFile, plan: Plan, known: Known) -> Iterator[Finding]:
     """Loose parts, forces, trial weights."""
     for run in recorded.runs:
-        yield from decision.slipped(run)
+        yield from decision.find_slips(run)
     base = next((r for r in recorded.runs if r.name == BASE), None)
     if base is None:
         return
     yield from _speeds(recorded)
     off = decision.slow_runout(recorded.slow, base, rig, known)
-    looked = []
-    for d in recorded.dwells:
-        if d.kind != SLOW:
-            f: Forces = estimates.forces(read_dwell(d), off, rig, known)
-            looked.append(Looked(d, f.misfit, f.carried))
+    looked = [estimates.balance_forces(d, off, rig, known) for d in recorded.dwells if d.kind != SLOW]
     yield from unbalance_checks.channels(looked)
     yield from unbalance_checks.weight(looked)
     shown: list[decision.Shown] = []
@@ -136,7 +121,7 @@ def of_runs(recorded: Recorded, rig: RigFile, plan: Plan, known: Known) -> Itera
         having = named.get(f"trial {side}")
         if having is None or not having.weights:
             return
-        shown.append(decision.shown(before, having, having.weights[-1], rig, known))
+        shown.append(decision.observe(before, having, having.weights[-1], rig, known))
         yield from decision.of_trial(shown[-1])
         before = having if plan.leave else base
     yield from decision.of_trials(shown[0], shown[1])
@@ -188,7 +173,7 @@ def of_result(balance: Balanced, recorded: Recorded, shown: list[Run], plan: Pla
 
 def predicted(balance: Balanced, before: Run, after: Run, rig: RigFile) -> Iterator[Finding]:
     """What was measured against what was expected of the weights that were fixed in between."""
-    added = estimates.fixed(after.weights, balance.radius) - estimates.fixed(before.weights, balance.radius)
+    added = estimates.sum_weights(after.weights, balance.radius) - estimates.sum_weights(before.weights, balance.radius)
     expected = balance.unbalance[before.name].values + added
     found = balance.unbalance[after.name]
     off = found.values - expected

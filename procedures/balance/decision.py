@@ -41,7 +41,7 @@ def gain(rig: RigFile, plan: Plan, plane: int) -> float:
     """Greatest response of a probe to an unbalance in a plane on the way to the highest speed, m/(kg m): a rigid shaft in the
     loop that the controller's gains are meant to make, s^2 + k2 s + k1 in each degree of freedom."""
     known = bearings.Known(None, plan.beta_share, plan.offset_u_m)
-    stand = Stand.of({n: e.value for n, e in bearings.stated(rig, known).items()})
+    stand = Stand.of({n: e.value for n, e in bearings.collect_inputs(rig, known).items()})
     p = {n: q.default for n, q in rig.parameters.items()}
     if plan.law == "PID":
         means = np.concatenate([np.zeros(4), np.full(8, p["bias"])])
@@ -79,8 +79,8 @@ def slow_runout(slow: Read | None, base: Run, rig: RigFile, known: Known) -> Com
     """Runout (4,) m by the slow roll and the forces, with what is known of the bearings; none without a slow roll."""
     if slow is None:
         return np.zeros(4, complex)
-    stand = Stand.of({n: e.value for n, e in bearings.stated(rig, known).items()})
-    return runout.found(stand, {1.0: slow.turning}, base.fastest.turning).runout[1.0]
+    stand = Stand.of({n: e.value for n, e in bearings.collect_inputs(rig, known).items()})
+    return runout.find_runout(stand, {1.0: slow.turning}, base.fastest.turning).runout[1.0]
 
 
 @dataclass(frozen=True)
@@ -93,11 +93,11 @@ class Shown:
     turn_u: Callable[[int], float]
 
 
-def shown(before: Run, having: Run, weight: Weight, rig: RigFile, known: Known) -> Shown:
+def observe(before: Run, having: Run, weight: Weight, rig: RigFile, known: Known) -> Shown:
     """What the forces say of a weight, with what is known of the bearings; runout cancels."""
     u = weight.unbalance(rig.geometry["balance_radius"].value)
     pairs = list(zip(before.reads, having.reads, strict=True))
-    inputs = bearings.stated(rig, known)
+    inputs = bearings.collect_inputs(rig, known)
 
     def added(s: Stand, k: int) -> Complex:
         none = np.zeros(4, complex)
@@ -156,7 +156,7 @@ def of_trials(inboard: Shown, outboard: Shown) -> Iterator[Finding]:
         yield Finding("weight-angle", text, "trials", Effect.ERROR)
 
 
-def slipped(run: Run) -> Iterator[Finding]:
+def find_slips(run: Run) -> Iterator[Finding]:
     """The slowest speed again at the end of a run: what turned with the shaft must be the same."""
     if run.again is None:
         return
@@ -184,7 +184,7 @@ class Correction:
     too_heavy: float = 0.0
 
 
-def reached(balance: Balanced, name: str) -> tuple[bool, bool]:
+def is_reached(balance: Balanced, name: str) -> tuple[bool, bool]:
     """Of each plane, whether the farthest point of the 95 % region of a run's unbalance lies within U_per."""
     found = balance.unbalance[name]
     inside = [bound(found.one(p)) <= balance.permissible[p].value for p in (0, 1)]
@@ -193,7 +193,7 @@ def reached(balance: Balanced, name: str) -> tuple[bool, bool]:
 
 def correction(balance: Balanced, name: str, rig: RigFile, plan: Plan) -> Correction:
     """What takes the unbalance of a run away, at the plan's positions where it has some."""
-    if all(reached(balance, name)):
+    if all(is_reached(balance, name)):
         return Correction((), reached=True)
     wanted: list[tuple[int, float, float]] = []
     for p, u in enumerate(balance.unbalance[name].values):

@@ -35,7 +35,7 @@ def of_balance(
         ]
         ratio, what, line = max(off, key=lambda o: o[0], default=(0.0, "", None))
         if line is not None and ratio > 1:
-            text = (f"{hum.told(line)} Here, at {turns:.2f} Hz, {what} may be off by {ratio:.1f} times its U. Below "
+            text = (f"{hum.describe(line)} Here, at {turns:.2f} Hz, {what} may be off by {ratio:.1f} times its U. Below "
                     f"{60 * (line.hz - reach):.0f} and above {60 * (line.hz + reach):.0f} r/min it is told apart.")  # fmt: skip
             yield Finding("hum", text, _name(d), Effect.INDETERMINATE)
 

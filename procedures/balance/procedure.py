@@ -26,7 +26,7 @@ from procedures.balance.steps import BASE, SIDES, read_runs
 from procedures.shared import assumptions
 from procedures.synchronous import bearings
 from procedures.synchronous.dwells import SLOW
-from procedures.synchronous.hum import heard
+from procedures.synchronous.hum import listen
 from procedures.unbalance import checks as unbalance_checks
 
 FOUND_COS = Quantity(
@@ -104,7 +104,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     # every run is in all results
     findings.add(unbalance_checks.of_signals(recorded.dwells, plan.max_lost, plan.max_speed_error, doubts=lambda _: ()))
     findings.add(unbalance_checks.slow_roll(recorded.dwells, plan.speeds_rad_s))
-    known = bearings.known(recording.calibrations, plan.beta_share, plan.offset_u_m)
+    known = bearings.Known.of(recording.calibrations, plan.beta_share, plan.offset_u_m)
     findings.add(checks.of_runs(recorded, rig, plan, known))
     trials = decision.trials_of(recorded.runs, rig, plan.leave)
     if trials is None and not findings.wrong:
@@ -115,12 +115,12 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
         raise Ended
     verified = [r for r in recorded.runs if r.name.startswith("check")]
     shown = [trials.base, *([trials.having[1]] if plan.leave else []), *verified]
-    balance = estimates.balanced(recorded.slow, shown, trials, rig, plan, known)
+    balance = estimates.solve_runs(recorded.slow, shown, trials, rig, plan, known)
     result = Result(plan, balance, recorded, shown[-1].name, estimates.influences(balance, rig))
-    findings.add([bearings.told(known)])
+    findings.add([bearings.describe(known)])
     findings.add(checks.of_result(balance, recorded, shown, plan, rig))
     slow = next((d for d in recorded.dwells if d.kind == SLOW), None)
-    findings.add(of_balance(heard(recording, slow), recorded, balance, (BASE, result.last), result.influences))
+    findings.add(of_balance(listen(recording, slow), recorded, balance, (BASE, result.last), result.influences))
     return result
 
 

@@ -50,16 +50,16 @@ class Work:
     @property
     def known(self) -> bearings.Known:
         """What is known of the bearings."""
-        return bearings.known(self.record.calibrations, self.plan.beta_share, self.plan.offset_u_m)
+        return bearings.Known.of(self.record.calibrations, self.plan.beta_share, self.plan.offset_u_m)
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Look, lift and nudge; slow roll and base run; a run with a trial weight in each plane; corrections, each verified."""
     work = Work(rig, plan, record)
-    if not lift.probed(rig, record):
+    if not lift.lift_and_nudge(rig, record):
         return
     dwelling.select(rig, plan.law)
-    if not _rolled(work) or not _run(work, BASE):
+    if not _roll(work) or not _run(work, BASE):
         return
     for p, side in enumerate(SIDES):
         kg, allowed = decision.trial_kg(rig.file, plan, work.runs[-1 if plan.leave else 0], p)
@@ -68,24 +68,24 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         if not kg:
             return
         _mount(work, p, kg, plan.trial_angle_rad[p], "trial")
-        if not _run(work, f"trial {side}") or not _acted(work, p):
+        if not _run(work, f"trial {side}") or not _has_acted(work, p):
             return
         if not plan.leave:
             _unmount(work, p)
     _correct(work)
 
 
-def _rolled(work: Work) -> bool:
+def _roll(work: Work) -> bool:
     """The slow roll, where the plan has one."""
     rig, plan = work.rig, work.plan
     if not plan.slow_rad_s:
         return True
-    if not lift.turned(rig, work.record, plan.slow_rad_s, plan.settle_s):
-        dwelling.finished(rig)
+    if not lift.bring_to_speed(rig, work.record, plan.slow_rad_s, plan.settle_s):
+        dwelling.stop(rig)
         return False
     work.slow = _dwell(work, SLOW, BASE, plan.slow_rad_s, plan.slow_s, plan.slow_s, SLOW_HZ)
     if work.slow is None:
-        dwelling.finished(rig)
+        dwelling.stop(rig)
     return work.slow is not None
 
 
@@ -98,19 +98,19 @@ def _run(work: Work, name: str) -> bool:
     reads: list[Read] = []
     speeds = sorted(plan.speeds_rad_s)
     for speed in (*speeds, *(speeds[:1] if plan.repeat else ())):
-        if not lift.turned(rig, work.record, speed, plan.settle_s):
+        if not lift.bring_to_speed(rig, work.record, speed, plan.settle_s):
             break
         read = _dwell(work, DWELL, name, speed, plan.dwell_s, plan.capture_s, None, again=len(reads) == len(speeds))
         if read is None or not read.sound or abs(read.speed / speed - 1) > plan.max_speed_error:
             break  # the analysis says why
         reads.append(read)
-    dwelling.finished(rig)
+    dwelling.stop(rig)
     transition(rig, RigState.READY)
     if len(reads) < len(speeds) + plan.repeat:
         return False
     run = Run(name, tuple(work.mounted), tuple(reads[: len(speeds)]), reads[-1] if plan.repeat else None)
     work.runs.append(run)
-    return not list(decision.slipped(run))
+    return not list(decision.find_slips(run))
 
 
 def _dwell(
@@ -155,11 +155,11 @@ def _unmount(work: Work, plane: int) -> None:
     work.mounted = [w for w in work.mounted if w.plane != plane]
 
 
-def _acted(work: Work, plane: int) -> bool:
+def _has_acted(work: Work, plane: int) -> bool:
     """Whether the trial weight of the last run did what it should."""
     base, last = work.runs[0], work.runs[-1]
     before = work.runs[-2] if work.plan.leave else base
-    shown = decision.shown(before, last, last.weights[-1], work.rig.file, work.known)
+    shown = decision.observe(before, last, last.weights[-1], work.rig.file, work.known)
     return not list(decision.of_trial(shown))
 
 
@@ -169,12 +169,12 @@ def _correct(work: Work) -> None:
     trials = decision.trials_of(work.runs, rig, plan.leave)
     assert trials is not None
     by_plane = zip(trials.before, trials.having, trials.weights, strict=True)
-    inboard, outboard = (decision.shown(*of, rig, work.known) for of in by_plane)
+    inboard, outboard = (decision.observe(*of, rig, work.known) for of in by_plane)
     if list(decision.of_trials(inboard, outboard)):
         return
     present = work.runs[-1] if plan.leave else trials.base
     for n in range(plan.corrections):
-        found = estimates.balanced(work.slow, [present], trials, rig, plan, work.known)
+        found = estimates.solve_runs(work.slow, [present], trials, rig, plan, work.known)
         needed = decision.correction(found, present.name, rig, plan)
         work.record.event(DECISION, run=present.name, reached=needed.reached, too_heavy_kg=needed.too_heavy)
         if needed.reached or needed.too_heavy or not needed.weights:  # what is missing is not a matter of weights

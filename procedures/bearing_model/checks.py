@@ -92,10 +92,10 @@ def of_results(a: Analysis, plan: Plan) -> Iterator[Finding]:
                 f"{q}_{name}" for q in ("beta", "offset") for name in axes
             )  # the ratio itself is what it is
             yield Finding("linear-suffices", text, where, Effect.INDETERMINATE, doubted)
-    yield _compared(a)
+    yield _compare(a)
 
 
-def _compared(a: Analysis) -> Finding:
+def _compare(a: Analysis) -> Finding:
     """The linear model's two numbers beside the bearing's slopes, and the noise under both residual sums."""
     said = []
     for axis, f in a.fits.items():

@@ -101,13 +101,13 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         rig.clock.sleep(REST_S)
     machine = conventions(rig.file)
     readings = {name: rig.levitation.reading(name) for name in machine.positions}
-    if any(rings.of_readings(readings, rig.file)) or not _lifted(rig, record):
+    if any(rings.of_readings(readings, rig.file)) or not _lift(rig, record):
         return
     rig.clock.sleep(3 * plan.settle_s)
-    _tilted(rig, plan, record)
+    _tilt(rig, plan, record)
     ref_y, ref_z = machine.set_points["y"], machine.set_points["z"]
     for k, bias in enumerate(plan.biases_A):
-        _biased(rig, plan, bias)
+        _set_bias(rig, plan, bias)
         for y, z in grid(plan) if k % 2 == 0 else reversed(grid(plan)):
             rig.levitation.set(ref_y, y)
             rig.levitation.set(ref_z, z)
@@ -119,7 +119,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     rig.clock.sleep(plan.settle_s)
 
 
-def _lifted(rig: Rig, record: Recorder) -> bool:
+def _lift(rig: Rig, record: Recorder) -> bool:
     with record.step(LIFT):
         try:
             transition(rig, RigState.LEVITATED)
@@ -129,7 +129,7 @@ def _lifted(rig: Rig, record: Recorder) -> bool:
     return True
 
 
-def _biased(rig: Rig, plan: Plan, bias: float) -> None:
+def _set_bias(rig: Rig, plan: Plan, bias: float) -> None:
     """In small steps: each one is a push, until the integrators have taken it up."""
     before = rig.levitation.get("bias")
     count = math.ceil(abs(bias - before) / BIAS_STEP_A - 1e-3)
@@ -139,7 +139,7 @@ def _biased(rig: Rig, plan: Plan, bias: float) -> None:
     rig.clock.sleep(plan.settle_s if count else 0.0)
 
 
-def _tilted(rig: Rig, plan: Plan, record: Recorder) -> None:
+def _tilt(rig: Rig, plan: Plan, record: Recorder) -> None:
     write, points = rig.levitation.set, conventions(rig.file).set_points
     for psi, theta in tilts(plan):
         write(points["psi"], psi)

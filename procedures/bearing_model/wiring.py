@@ -24,13 +24,13 @@ SUSPECT = 0.05  # of the load: certificates within their tolerances leave a thir
 BETTER = 4.0  # times smaller must a sum of squares be with other wiring, to suspect the wiring
 
 
-def expected(rig: RigFile) -> Array:
+def model_answers(rig: RigFile) -> Array:
     """What a reading of each axis (rows) does per set point y, z (m) and psi, theta (rad): T (2.17)."""
     l_is, l_os = (rig.geometry[f"com_to_{b}_sensor"].value for b in ("inboard", "outboard"))
     return np.array([[1, 0, 0, -l_is], [0, 1, l_is, 0], [1, 0, 0, l_os], [0, 1, -l_os, 0]])
 
 
-def followed(held: Held, tilted: Held) -> Array:
+def fit_answers(held: Held, tilted: Held) -> Array:
     """The same as found: each reading's answer to the four set points, by least squares."""
     n, m = len(held), len(tilted)
     design = np.zeros((n + m, 5))
@@ -44,7 +44,7 @@ def followed(held: Held, tilted: Held) -> Array:
 
 def of_wiring(held: Held, tilted: Held, rig: RigFile) -> Iterator[Finding]:
     """Each reading follows its own set points: not another axis', not the other plane's, not backwards."""
-    want, have = expected(rig), followed(held, tilted)
+    want, have = model_answers(rig), fit_answers(held, tilted)
     scale = np.array([1, 1, *[0.5 * np.abs(want[:, 2:]).max()] * 2])
 
     def off(row: Array, model: Array) -> float:
@@ -130,7 +130,7 @@ class Judged:
         return float(np.abs(self.residuals).max())
 
 
-def _judged(s: Statics, k: int, gap: float, coils_of: int, coils: int) -> Judged:
+def _judge(s: Statics, k: int, gap: float, coils_of: int, coils: int) -> Judged:
     """Axis k with the coils of axis `coils_of`, p and n exchanged where `coils` is below zero."""
     j = coils_of
     p, n = (s.p[j], s.n[j]) if coils > 0 else (s.n[j], s.p[j])
@@ -154,19 +154,19 @@ def of_models(held: Held, tilted: Held, rig: RigFile, plan: Plan) -> Iterator[Fi
     by_gravity = {g: magnetics.statics(means, values | {"gravity": g * values["gravity"]}) for g in (1, -1)}
     for k in range(len(held.machine.axes)):
         load = float(np.abs(by_gravity[1].force[k]).mean())
-        found = _judged(by_gravity[1], k, values["gap"], k, 1)
+        found = _judge(by_gravity[1], k, values["gap"], k, 1)
         if not found.sane or found.worst > SUSPECT * load:
-            yield from _explained(held.machine, k, found, by_gravity, values["gap"], load)
+            yield from _explain(held.machine, k, found, by_gravity, values["gap"], load)
 
 
-def _explained(
+def _explain(
     machine: AmbRotor, k: int, found: Judged, by_gravity: dict[int, Statics], gap: float, load: float
 ) -> Iterator[Finding]:
     """What is wrong with axis k, which fits as `found`: another wiring, or no magnet at all; else the adjustment shows it."""
     axis = machine.axes[k]
     least, best = found.chi2 / BETTER if found.sane else float("inf"), None
     for w in wirings(machine, k):
-        other = _judged(by_gravity[w.gravity], k, gap, w.coils_of, w.coils)
+        other = _judge(by_gravity[w.gravity], k, gap, w.coils_of, w.coils)
         if other.sane and other.worst <= 2 * SUSPECT * load and other.chi2 < least:
             least, best = other.chi2, w
     if best:

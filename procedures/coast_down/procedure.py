@@ -19,11 +19,11 @@ from procedures.unbalance import procedure as unbalance
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Look at the shaft on its rings, lift it, nudge it, roll it slowly, run it up, and let it slow down."""
-    if not run_up.begun(rig, plan, record):
+    if not run_up.begin(rig, plan, record):
         return
-    if lift.turned(rig, record, plan.top_rad_s, plan.settle_s):
-        run_up.passed(rig, plan, record, "down", plan.bottom_rad_s)
-    run_up.ended(rig, plan)
+    if lift.bring_to_speed(rig, record, plan.top_rad_s, plan.settle_s):
+        run_up.pass_speeds(rig, plan, record, "down", plan.bottom_rad_s)
+    run_up.end(rig, plan)
 
 
 procedure = Procedure(

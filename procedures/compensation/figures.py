@@ -15,7 +15,7 @@ from procedures.unbalance.estimates import Result
 MOST_POINTS = 4000
 
 
-def reductions(found: Sequence[tuple[Result, Estimate]]) -> Iterator[Figure]:
+def draw_reductions(found: Sequence[tuple[Result, Estimate]]) -> Iterator[Figure]:
     """Reduction of what the probes read over the speed, by setting."""
     series = []
     for variant in dict.fromkeys(r.dwell.variant for r, _ in found):
@@ -29,7 +29,7 @@ def reductions(found: Sequence[tuple[Result, Estimate]]) -> Iterator[Figure]:
                  lines=(("90 %", 90.0),))  # fmt: skip
 
 
-def switched(s: Switched) -> Iterator[Figure]:
+def draw_switch(s: Switched) -> Iterator[Figure]:
     """The amplitude over time, and the four readings."""
     t, size = s.course()
     rpm = f"{s.speed * RPM:.0f} r/min"

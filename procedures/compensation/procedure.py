@@ -29,7 +29,7 @@ from procedures.compensation.plan import Plan
 from procedures.compensation.switching import SWITCH, Switched
 from procedures.shared import assumptions
 from procedures.synchronous import bearings, dwelling
-from procedures.synchronous.hum import heard
+from procedures.synchronous.hum import listen
 from procedures.unbalance import figures as unbalance_figures
 from procedures.unbalance import procedure as unbalance
 from procedures.unbalance import sequence
@@ -64,18 +64,18 @@ def step_count(plan: Plan) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Slow roll, dwells with each setting, the switch, the lowest speed again."""
-    if not sequence.begun(rig, plan, record):
+    if not sequence.begin(rig, plan, record):
         return
-    if sequence.dwelt(rig, plan, record) and _switched(rig, plan, record):
-        sequence.repeated(rig, plan, record)
-    dwelling.finished(rig)
+    if sequence.dwell(rig, plan, record) and _switch(rig, plan, record):
+        sequence.repeat_lowest(rig, plan, record)
+    dwelling.stop(rig)
 
 
-def _switched(rig: Rig, plan: Plan, record: Recorder) -> bool:
+def _switch(rig: Rig, plan: Plan, record: Recorder) -> bool:
     """Switch the compensation on while the controller records."""
     machine = conventions(rig.file)
     dwelling.put(rig, machine.variants["off"])
-    if rig.capture is None or not lift.turned(rig, record, plan.switch_rad_s, plan.settle_s):
+    if rig.capture is None or not lift.bring_to_speed(rig, record, plan.switch_rad_s, plan.settle_s):
         return False
     compensating = machine.variants["corrected"]
     dwelling.put(rig, {**compensating, machine.compensate: 0.0})  # the estimates run and do nothing
@@ -104,14 +104,14 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Compared:
     """The dwells as in `unbalance`, the reductions, and the switch where it was captured."""
     results = unbalance.evaluate(recording, findings)
     reductions = checks.reductions(results)
-    findings.add(checks.told(results, reductions, recording.plan.judged_to_rad_s))
+    findings.add(checks.describe(results, reductions, recording.plan.judged_to_rad_s))
     try:
         captured = switching.read_switch(recording)
         switched = switching.of_switch(captured, recording.rig)
     except AnalysisError as error:
         findings.add([Finding("no-switch", str(error), "", Effect.ERROR)])
         return Compared(recording.plan, results, reductions)
-    findings.add(of_switch(heard(recording, results.slow), captured, switched, _switched_at(recording.plan)))
+    findings.add(of_switch(listen(recording, results.slow), captured, switched, _switched_at(recording.plan)))
     return Compared(recording.plan, results, reductions, captured, switched)
 
 
@@ -148,9 +148,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(found: Compared, recording: Recording[Plan]) -> Iterable[Shown]:
     """Those of `unbalance`, the reduction over the speed, and the switch."""
-    yield from drawn.reductions(found.reductions)
+    yield from drawn.draw_reductions(found.reductions)
     if found.captured is not None:
-        yield from drawn.switched(found.captured)
+        yield from drawn.draw_switch(found.captured)
     yield from unbalance_figures.all_figures(found.results, recording.rig)
 
 

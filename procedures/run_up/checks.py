@@ -21,7 +21,7 @@ from procedures.run_up.plan import Passing
 from procedures.run_up.steps import LEAST_TURNS, MISSED, PASSAGE, Passage
 from procedures.shared import signals
 from procedures.synchronous import fitting
-from procedures.synchronous.hum import heard
+from procedures.synchronous.hum import listen
 from procedures.unbalance import checks
 from procedures.unbalance.checks import HELD
 from procedures.unbalance.hum import of_dwells
@@ -197,7 +197,7 @@ def of_run(run: Run, recording: Recording[Any], plan: Passing) -> Iterator[Findi
         return
     yield from checks.sampling([r.dwell for r in run.near.dwells], plan.orders)
     yield from checks.of_results(run.near)
-    sound = heard(recording, run.slow)
+    sound = listen(recording, run.slow)
     yield from of_dwells(sound, run.near.dwells)
     yield from of_peaks(sound, [p for p in run.peaks if p.critical])
     yield from _criticals(run, plan)

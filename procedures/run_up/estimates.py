@@ -99,7 +99,7 @@ def run(passage: Passage, slow: Dwell | None, recording: Recording[Any], plan: P
         left.append(rest)
     results = unbalance_estimates.results([*([] if slow is None else [slow]), *dwells], rig, known)
     results = replace(results, dwells=tuple(_with(r, rest) for r, rest in zip(results.dwells, left, strict=True)))
-    inputs = bearings.stated(rig, known)
+    inputs = bearings.collect_inputs(rig, known)
     large = _large(found, inputs, results.runouts, plan.law, gains(rig, plan))
     shaft, peaks = [], []
     for k, axis in enumerate(passage.machine.axes):

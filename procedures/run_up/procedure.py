@@ -30,7 +30,7 @@ from procedures.run_up.plan import Passing, Plan
 from procedures.run_up.steps import MISSED, PASSAGE, read_passage
 from procedures.shared import assumptions
 from procedures.synchronous import bearings, dwelling
-from procedures.synchronous.coil_peaks import uncertified
+from procedures.synchronous.coil_peaks import find_uncertified
 from procedures.synchronous.dwelling import put
 from procedures.synchronous.dwells import SLOW, captured_channels, read_dwell
 from procedures.unbalance import checks as unbalance_checks
@@ -68,22 +68,22 @@ def step_count(plan: Passing) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Look at the shaft on its rings, lift it, nudge it, roll it slowly, run it up, and stop it."""
-    if not begun(rig, plan, record):
+    if not begin(rig, plan, record):
         return
-    if lift.turned(rig, record, plan.bottom_rad_s, plan.settle_s):
-        passed(rig, plan, record, "up", plan.top_rad_s)
-    ended(rig, plan)
+    if lift.bring_to_speed(rig, record, plan.bottom_rad_s, plan.settle_s):
+        pass_speeds(rig, plan, record, "up", plan.top_rad_s)
+    end(rig, plan)
 
 
-def begun(rig: Rig, plan: Passing, record: Recorder) -> bool:
-    """Lifted, nudged, rolled slowly, the controller set as planned; False where the run ends here."""
-    if not dwelling.rolled(rig, record, plan.law, plan.slow_rad_s, plan.slow_s, plan.settle_s):
+def begin(rig: Rig, plan: Passing, record: Recorder) -> bool:
+    """Lift, nudge and slow roll, then set the controller as planned; False where the run ends here."""
+    if not dwelling.roll_slowly(rig, record, plan.law, plan.slow_rad_s, plan.slow_s, plan.settle_s):
         return False
     put(rig, plan.parameters)
     return True
 
 
-def ended(rig: Rig, plan: Passing) -> None:
+def end(rig: Rig, plan: Passing) -> None:
     """Stop the shaft, and give the controller its own settings again."""
     if rig.drive is not None:
         rig.drive.stop()
@@ -91,10 +91,10 @@ def ended(rig: Rig, plan: Passing) -> None:
         if plan.rate_rad_s2:
             rig.drive.set_acceleration(0.0)
     put(rig, {name: rig.file.parameters[name].default for name in plan.parameters})
-    dwelling.finished(rig)
+    dwelling.stop(rig)
 
 
-def passed(rig: Rig, plan: Passing, record: Recorder, direction: str, goal: float) -> None:
+def pass_speeds(rig: Rig, plan: Passing, record: Recorder, direction: str, goal: float) -> None:
     """Through all speeds to `goal` in rad/s, with captures on the way; the drive coasts where the plan gives no rate."""
     drive, rate = rig.drive, plan.rate_rad_s2
     assert drive is not None
@@ -172,12 +172,12 @@ def evaluate(recording: Recording[Any], findings: Findings) -> Run:
     except AnalysisError as error:
         findings.end(Finding("no-passage", str(error), "", Effect.ERROR))
     findings.gate(checks.of_passage(passage, recording, plan))
-    known = bearings.known(recording.calibrations, plan.beta_share, plan.offset_u_m)
+    known = bearings.Known.of(recording.calibrations, plan.beta_share, plan.offset_u_m)
     try:
         run = estimates.run(passage, slow, recording, plan, known)
     except AnalysisError as error:  # a drive that was faster than it was told: too few turns for a curve
         findings.end(Finding("no-passage", str(error), passage.name, Effect.ERROR))
-    findings.add((bearings.told(known), *uncertified(recording.rig)))
+    findings.add((bearings.describe(known), *find_uncertified(recording.rig)))
     findings.add(checks.of_run(run, recording, plan))
     return run
 

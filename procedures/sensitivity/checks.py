@@ -20,7 +20,7 @@ from procedures.sensitivity.steps import (
     Taken,
     folds,
     grid_of,
-    named,
+    name_speed,
 )
 from procedures.shared import signals
 
@@ -45,7 +45,7 @@ def before(recording: Recording[Any]) -> Iterator[Finding]:
         yield Finding("no-injection", "no injection was recorded", "", Effect.ERROR)
     for step in steps:
         captured = recording.captures(number=step.labels["number"])
-        where = f"{step.labels['axis']}, {named(float(step.labels['speed_rad_s']))}"
+        where = f"{step.labels['axis']}, {name_speed(float(step.labels['speed_rad_s']))}"
         if not captured:
             yield Finding("no-capture", "an injection was not captured.", where, Effect.ERROR)
             return

@@ -11,7 +11,7 @@ from bench.rigfile.capture import Layout
 from bench.rigfile.envelope import Envelope
 from bench.units import RPM
 from procedures.amb_rotor.conventions import conventions
-from procedures.sensitivity.injection import Comb, refused
+from procedures.sensitivity.injection import Comb, find_refusal
 from procedures.sensitivity.plan import Plan
 from procedures.sensitivity.steps import REFINED, captured_channels
 
@@ -30,7 +30,7 @@ def of_plan(rig: RigFile, plan: Plan, combs: Sequence[tuple[str, Comb]]) -> Iter
 def _injection(rig: RigFile, plan: Plan, combs: Sequence[tuple[str, Comb]]) -> Iterator[str]:
     refined = Comb(plan.low_hz, plan.low_hz, 128, plan.amplitude_A)  # at most, in the second pass
     greatest = max([*(c for _, c in combs), refined], key=lambda c: c.peak)
-    if why := refused(Envelope(rig), greatest):
+    if why := find_refusal(Envelope(rig), greatest):
         yield f"amplitude_A: found {plan.amplitude_A:g} A for each line; expected less: {why}"
     for key, value in (("low_hz", plan.low_hz), ("high_step_hz", plan.high_step_hz)):
         if math.log2(value) % 1:

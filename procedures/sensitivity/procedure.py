@@ -28,7 +28,7 @@ from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
 from procedures.sensitivity import checks, estimates, fitting
 from procedures.sensitivity import figures as drawn
 from procedures.sensitivity.estimates import Candidate, Result
-from procedures.sensitivity.injection import PARAMETERS, Comb, combs, injected
+from procedures.sensitivity.injection import PARAMETERS, Comb, combs, inject
 from procedures.sensitivity.plan import Plan
 from procedures.sensitivity.steps import (
     HALF,
@@ -105,14 +105,14 @@ def step_count(plan: Plan) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Lift the shaft, nudge it, and at each speed inject into each axis: the survey, then finer where it peaks."""
-    if not lift.probed(rig, record):
+    if not lift.lift_and_nudge(rig, record):
         return
     machine = conventions(rig.file)
     rig.levitation.set(machine.law, machine.laws[plan.law])
     rig.clock.sleep(plan.settle_s)
     number = 0
     for speed in sorted(plan.speeds_rad_s):
-        if speed and not lift.turned(rig, record, speed, plan.settle_s):
+        if speed and not lift.bring_to_speed(rig, record, speed, plan.settle_s):
             break
         for axis in plan.axes:
             number = _axis(rig, plan, record, speed, axis, number)
@@ -127,17 +127,17 @@ def _axis(rig: Rig, plan: Plan, record: Recorder, speed: float, axis: str, numbe
     """Both passes of an axis; the number of the next capture."""
     seen: list[Response] = []
     for kind, about, comb in surveys(plan, speed):
-        found = _taken(rig, plan, record, speed, axis, kind, about, comb, number)
+        found = _take(rig, plan, record, speed, axis, kind, about, comb, number)
         seen += [found] if found is not None and kind != WIRING else []
         number += 1
     for candidate in estimates.candidates(seen):
         for kind, about, comb in refinements(plan, candidate, speed):
-            _taken(rig, plan, record, speed, axis, kind, about, comb, number)
+            _take(rig, plan, record, speed, axis, kind, about, comb, number)
             number += 1
     return number
 
 
-def _taken(
+def _take(
     rig: Rig, plan: Plan, record: Recorder, speed: float, axis: str, kind: str, about: float, comb: Comb, number: int
 ) -> Response | None:
     """Inject, capture, upload; what S seems to be, for deciding how to go on; None where that cannot be told."""
@@ -152,7 +152,7 @@ def _taken(
         most = rig.capture.memory_bytes / size(rig.file, kind, speed) / plan.rate_hz - pulses
         seconds = comb.period_s * min(plan.refined_periods, math.floor(most / comb.period_s))
     seconds += pulses
-    with injected(rig, axis, comb, plan.survey_start_s if kind == SURVEY else plan.start_s):
+    with inject(rig, axis, comb, plan.survey_start_s if kind == SURVEY else plan.start_s):
         with record.step(INJECT, **labels):
             names = captured_channels(conventions(rig.file), kind, speed)
             rig.capture.arm(names, seconds=seconds, rate_hz=plan.rate_hz)

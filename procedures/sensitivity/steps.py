@@ -73,7 +73,7 @@ class Taken:
     @property
     def where(self) -> str:
         """How it is named to the reader."""
-        return f"{self.axis}, {named(self.speed)}"
+        return f"{self.axis}, {name_speed(self.speed)}"
 
     @property
     def noise(self) -> Array:
@@ -94,7 +94,7 @@ def shared_noise(r: Response) -> Array:
     return np.asarray(np.array(near) * size)
 
 
-def named(speed: float) -> str:
+def name_speed(speed: float) -> str:
     """A speed, for the reader."""
     return f"{speed * RPM:.0f} r/min" if speed else "at rest"
 
@@ -124,7 +124,7 @@ def sensitivity(columns: Mapping[str, Array], t: Array, rate: float, grid: Grid)
     data = np.array([columns["inject"], columns["after"]])
     hz, near = grid.hz, grid.hz[:0]
     if "pulses" in columns:
-        angle, speed, inside = turned(columns, t)
+        angle, speed, inside = track_angle(columns, t)
         data = np.concatenate([data[:1, inside], without_orders(data[1:, inside], angle[inside], ORDERS)])
         free = clear_of_orders(hz, speed, CLEAR_HZ, ORDERS)
         hz, near = hz[free], hz[~free]
@@ -132,7 +132,7 @@ def sensitivity(columns: Mapping[str, Array], t: Array, rate: float, grid: Grid)
     return response(found, 1, 0), np.abs(found.values[:, 0]).mean(axis=0), near
 
 
-def turned(columns: Mapping[str, Array], t: Array) -> tuple[Array, float, npt.NDArray[np.bool_]]:
+def track_angle(columns: Mapping[str, Array], t: Array) -> tuple[Array, float, npt.NDArray[np.bool_]]:
     """Angle (n,) rad by the pulses, mean speed rad/s, and where the angle is known, (n,)."""
     tacho = tachometer(*counted(t, columns["pulses"], columns["pulse_age"]))
     angle = tacho.angle(t)
@@ -172,7 +172,7 @@ def _read(recording: Recording[Any], step: Step) -> Taken:
     found, injected, excluded = sensitivity(columns, columns["t_s"], rate, grid)
     clipped = float(np.abs(columns["after"] - columns["before"] - columns["inject"]).max())
     follows = _follows(columns, machine, rate, grid) if kind == WIRING else None
-    turning = turned(columns, columns["t_s"])[1] if "pulses" in columns else 0.0
+    turning = track_angle(columns, columns["t_s"])[1] if "pulses" in columns else 0.0
     flags = int(np.bitwise_or.reduce(data["flags"].astype(np.int64)))
     return Taken(
         str(labels["axis"]), float(labels["speed_rad_s"]), turning, kind, float(labels["about_hz"]), grid, found, excluded,

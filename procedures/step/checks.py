@@ -195,7 +195,7 @@ def _longer(result: Result) -> str:
             f"record_s of {math.ceil(2 * enough) / 2:g} s shows it settle")  # fmt: skip
 
 
-def compared(results: Mapping[Case, Result], names: tuple[str, str]) -> Iterator[Finding]:
+def compare(results: Mapping[Case, Result], names: tuple[str, str]) -> Iterator[Finding]:
     """One setting against the other, at the largest step upwards of each axis and speed."""
     for case, first in results.items():
         other = results.get(Case(names[1], case.speed, case.axis, case.size, case.way))

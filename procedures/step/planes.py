@@ -29,14 +29,14 @@ BACK = 3  # samples of a reading that a current can answer
 FEWEST = 50  # samples of a step's rest
 
 
-def exchanged(recording: Recording[Any]) -> Iterator[Finding]:
+def find_exchanged(recording: Recording[Any]) -> Iterator[Finding]:
     """A finding for each axis whose readings of the two planes answer for each other's bearings."""
     for axis in dict.fromkeys(str(s.labels["axis"]) for s in recording.steps(STEP)):
         steps = [s for s in recording.steps(STEP) if s.labels["axis"] == axis]
         alike: dict[tuple[str, float], list[Step]] = {}
         for step in steps if axis != "x" else ():
             alike.setdefault((str(step.labels["setting"]), float(step.labels["speed_rad_s"])), []).append(step)
-        if any(crossed([rested(step, axis) for step in of]) for of in alike.values()):
+        if any(is_crossed([read_rest(step, axis) for step in of]) for of in alike.values()):
             text = (
                 f"while the shaft rests, the {axis} currents of each bearing answer the readings of the other plane: "
                 f"readings or currents of {axis} are exchanged between the planes."
@@ -44,7 +44,7 @@ def exchanged(recording: Recording[Any]) -> Iterator[Finding]:
             yield Finding("planes-exchanged", text, axis, Effect.ERROR)
 
 
-def rested(step: Step, axis: str) -> Array:
+def read_rest(step: Step, axis: str) -> Array:
     """Before a step, without what turns with the shaft: readings (m) and control currents (A) of both planes, (4, n)."""
     machine = conventions(step.recording.rig)
     along = machine.along(axis)
@@ -61,7 +61,7 @@ def rested(step: Step, axis: str) -> Array:
     return np.asarray(x - (design @ np.linalg.lstsq(design, x.T, rcond=None)[0]).T)
 
 
-def crossed(steps: Sequence[Array]) -> bool:
+def is_crossed(steps: Sequence[Array]) -> bool:
     """Of steps at rest (4, n): whether the currents answer the other plane, and do so beyond chance."""
     used = [x for x in steps if x.shape[1] >= FEWEST]
     if len(used) < 3:

@@ -53,7 +53,7 @@ SETTLED_S = 0.5  # after the last ramp of a speed
 MARGIN = 0.8  # of the clearance that a step with its overshoot may use
 
 
-def chosen(plan: Plan) -> dict[str, dict[str, float]]:
+def list_settings(plan: Plan) -> dict[str, dict[str, float]]:
     """The settings by name."""
     first = {plan.names[0]: plan.a}
     return first | {plan.names[1]: plan.b} if plan.b else first
@@ -68,12 +68,14 @@ def recorded_s(rig: RigFile, plan: Plan) -> float:
     """How long each step is recorded, s: what the plan says, or as long as the slowest of its laws takes."""
     if plan.record_s is not None:
         return plan.record_s
-    return enough_s(conventions(rig), [{**_usual(rig), **s} for s in chosen(plan).values()], plan.axes, plan.band)
+    return enough_s(
+        conventions(rig), [{**_usual(rig), **s} for s in list_settings(plan).values()], plan.axes, plan.band
+    )
 
 
 def waited_s(rig: RigFile, plan: Plan, setting: str, axis: str) -> float:
     """Before the rest of each step, s, until what the one before it leaves is nothing."""
-    needed = faded_s(conventions(rig), {**_usual(rig), **chosen(plan)[setting]}, axis, plan.band)
+    needed = faded_s(conventions(rig), {**_usual(rig), **list_settings(plan)[setting]}, axis, plan.band)
     return max(needed - recorded_s(rig, plan) - plan.rest_s, 0.0)
 
 
@@ -83,12 +85,12 @@ def _usual(rig: RigFile) -> dict[str, float]:
 
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records, for the progress display."""
-    return 4 * plan.repeats * len(list(cases(tuple(chosen(plan)), plan.speeds_rad_s, plan.axes, plan.sizes_m)))
+    return 4 * plan.repeats * len(list(cases(tuple(list_settings(plan)), plan.speeds_rad_s, plan.axes, plan.sizes_m)))
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Up, back, down and back for every case; the shaft stands and the controller has its own settings again in the end."""
-    write, settings, machine = rig.levitation.set, chosen(plan), conventions(rig.file)
+    write, settings, machine = rig.levitation.set, list_settings(plan), conventions(rig.file)
     used: dict[str, float] = {}
     record_s = recorded_s(rig.file, plan)
     for name, value in model(rig.file, plan).items():
@@ -164,14 +166,14 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """The response of each case, and what the cases of an axis have in common."""
     before = list(checks.before(recording))
     findings.gate(before)
-    exchanged = [] if before else list(planes.exchanged(recording))
+    exchanged = [] if before else list(planes.find_exchanged(recording))
     plan, steps = recording.plan, read_steps(recording)
     findings.gate(exchanged, so_far=Results(steps))
     findings.gate(checks.of_steps(steps, plan), checks.FATAL, Results(steps))
     by_case = estimates.by_case(steps, recording.rig, plan.band)
     by_group = estimates.by_group(steps, by_case)
     findings.add(checks.of_results(by_case, by_group, plan))
-    findings.add(checks.compared(by_case, plan.names))
+    findings.add(checks.compare(by_case, plan.names))
     return Results(steps, by_case, by_group)
 
 

@@ -30,10 +30,10 @@ class Known:
     beta_share: float
     offset_u_m: float
 
-
-def known(calibrations: Iterable[Calibration], beta_share: float, offset_u_m: float) -> Known:
-    """By the calibrations that a run uses, and the plan's numbers where none of them is of the bearings."""
-    return Known(next((c for c in calibrations if c.procedure == BEARING_MODEL), None), beta_share, offset_u_m)
+    @classmethod
+    def of(cls, calibrations: Iterable[Calibration], beta_share: float, offset_u_m: float) -> Known:
+        """By the calibrations that a run uses, and the plan's numbers where none of them is of the bearings."""
+        return cls(next((c for c in calibrations if c.procedure == BEARING_MODEL), None), beta_share, offset_u_m)
 
 
 def needs(bearings: str) -> tuple[Need, ...]:
@@ -41,7 +41,7 @@ def needs(bearings: str) -> tuple[Need, ...]:
     return (Need(BEARING_MODEL, optional=True),) if bearings == "adopted" else ()
 
 
-def told(known: Known) -> Finding:
+def describe(known: Known) -> Finding:
     """A note on what the forces rest on."""
     if (model := known.calibration) is not None:
         text = f"betas and magnetic offsets are those of {model.run_id}, {model.date[:10]}, with its influences"
@@ -51,7 +51,7 @@ def told(known: Known) -> Finding:
     return Finding("bearings", text, "", Effect.NOTE)
 
 
-def stated(rig: RigFile, known: Known) -> dict[str, Estimate]:
+def collect_inputs(rig: RigFile, known: Known) -> dict[str, Estimate]:
     """What the rig file says of the stand (`runout.Stand`), with what is known of its bearings."""
     g = rig.geometry
     out = _probes_and_coils(rig)

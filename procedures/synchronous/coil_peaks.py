@@ -38,7 +38,7 @@ class Exceeded:
     sign: float
 
 
-def exceeded(x: Array, edges: npt.NDArray[np.intp]) -> Exceeded:
+def find_exceeded(x: Array, edges: npt.NDArray[np.intp]) -> Exceeded:
     """Of readings (n,), in blocks of whole turns between the indices `edges` (b + 1,), b at least 2."""
     inside = x[edges[0] : edges[-1]]
     size = np.abs(inside)
@@ -67,7 +67,7 @@ def peaks(d: Dwell, inputs: Mapping[str, Estimate], plane: str, rig: RigFile) ->
     of = range(first, first + 4)
 
     def greatest(readings: Array) -> tuple[int, Exceeded]:
-        found = {k: exceeded(readings[k], edges) for k in of}
+        found = {k: find_exceeded(readings[k], edges) for k in of}
         k = max(of, key=lambda k: found[k].value)
         return k, found[k]
 
@@ -87,7 +87,7 @@ def peaks(d: Dwell, inputs: Mapping[str, Estimate], plane: str, rig: RigFile) ->
     return {("current_peak", plane): replace(current, unit="A"), ("voltage_peak", plane): replace(voltage, unit="V")}
 
 
-def uncertified(rig: RigFile) -> Iterator[Finding]:
+def find_uncertified(rig: RigFile) -> Iterator[Finding]:
     """Whether the voltages are no more than what the amplifiers say."""
     missing = [name for name in conventions(rig).voltages if name not in rig.sensors]
     if missing:

@@ -11,14 +11,15 @@ from procedures.amb_rotor.conventions import Law, Variant, conventions
 from procedures.synchronous.dwells import SLOW
 
 
-def rolled(rig: Rig, record: Recorder, law: Law, rad_s: float, seconds: float, settle_s: float) -> bool:
-    """Lifted, nudged, under a law, and for some time rolled slowly at a speed that is not 0; False where the run ends here."""
-    if not lift.probed(rig, record):
+def roll_slowly(rig: Rig, record: Recorder, law: Law, rad_s: float, seconds: float, settle_s: float) -> bool:
+    """Lift and nudge the shaft, put it under a law, and roll it slowly for some time where the speed is not 0; False where the
+    run ends here."""
+    if not lift.lift_and_nudge(rig, record):
         return False
     select(rig, law)
     if rad_s:
-        if not lift.turned(rig, record, rad_s, settle_s):
-            finished(rig)
+        if not lift.bring_to_speed(rig, record, rad_s, settle_s):
+            stop(rig)
             return False
         with record.step(SLOW, **step_labels(rig, rad_s, "off")):
             rig.clock.sleep(seconds)
@@ -31,8 +32,8 @@ def step_labels(rig: Rig, speed: float, variant: Variant, number: int = 0) -> di
     return {"speed_rad_s": speed, "variant": variant, "driven_rad_s": driven, "number": number, "again": number < 0}
 
 
-def finished(rig: Rig) -> None:
-    """Nothing compensated, the drive stopped, the shaft standing under the PID."""
+def stop(rig: Rig) -> None:
+    """Compensate nothing, stop the drive, and leave the shaft standing under the PID."""
     machine = conventions(rig.file)
     put(rig, machine.variants["off"])
     if rig.drive is not None:

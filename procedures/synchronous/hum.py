@@ -101,7 +101,7 @@ class Heard:
         return float(np.hypot(*np.linalg.lstsq(np.concatenate(waves), np.concatenate(read), rcond=None)[0]))
 
 
-def heard(recording: Recording[Any], slow: Dwell | None) -> Heard | None:
+def listen(recording: Recording[Any], slow: Dwell | None) -> Heard | None:
     """What the slow roll of a recording and the shaft before it let hear; None without a slow roll."""
     if slow is None:
         return None
@@ -129,10 +129,10 @@ def heard(recording: Recording[Any], slow: Dwell | None) -> Heard | None:
 def leak(d: Dwell, hz: float) -> float:
     """The share of a line's amplitude that is in a dwell's vectors of order 1."""
     lasts = duration(d)
-    return leaked(d.tacho, float(d.track.t[0]) - lasts / 2, lasts, hz)
+    return leak_over(d.tacho, float(d.track.t[0]) - lasts / 2, lasts, hz)
 
 
-def leaked(tacho: Tachometer, begin: float, lasts: float, hz: float) -> float:
+def leak_over(tacho: Tachometer, begin: float, lasts: float, hz: float) -> float:
     """The mean of exp(j (2 pi f t - theta)) over the turns from `begin` on: 1 where a line cannot be told from the speed. The
     speed of a passage goes on meanwhile: then it is less."""
     t = begin + lasts * (np.arange(4096) + 0.5) / 4096
@@ -145,7 +145,7 @@ def duration(d: Dwell) -> float:
     return 2 * math.pi * d.track.turns / d.speed
 
 
-def told(line: Line) -> str:
+def describe(line: Line) -> str:
     """What was heard, for the reader."""
     return (f"at slow roll {line.axis} reads a line of {line.size * 1e6:.3f} µm at {line.hz:.2f} Hz, over "
             f"{line.noise * 1e6:.3f} µm of noise, that does not turn with the shaft: suspect mains hum in probes or "

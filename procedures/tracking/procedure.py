@@ -68,10 +68,10 @@ def step_count(plan: Plan) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Look at the rotor on its rings, lift it, nudge it, spin it up, and let it follow the reference with each law."""
-    if not lift.probed(rig, record):
+    if not lift.lift_and_nudge(rig, record):
         return
-    _started(rig, plan, record)
-    if plan.speed_rad_s and not lift.turned(rig, record, plan.speed_rad_s, plan.settle_s):
+    _start(rig, plan, record)
+    if plan.speed_rad_s and not lift.bring_to_speed(rig, record, plan.speed_rad_s, plan.settle_s):
         return
     machine = conventions(rig.file)
     for law in plan.order:
@@ -85,7 +85,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     rig.clock.sleep(machine.stands_s)
 
 
-def _started(rig: Rig, plan: Plan, record: Recorder) -> None:
+def _start(rig: Rig, plan: Plan, record: Recorder) -> None:
     """The reference starts at rest with a small jump of z, whose time the currents tell. From here on it never stops: its phase
     is known for every law, at any speed."""
     write = rig.levitation.set

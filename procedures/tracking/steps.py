@@ -65,7 +65,7 @@ def channels(machine: AmbRotor) -> tuple[str, ...]:
     return (*machine.positions, *upper, *lower, "speed", "flags")
 
 
-def sampled(rig: RigFile, hz: float, y: float, z: float, period_ns: int, ratio: int = 1) -> Wave:
+def sample_reference(rig: RigFile, hz: float, y: float, z: float, period_ns: int, ratio: int = 1) -> Wave:
     """The reference, as this rig's telemetry samples it."""
     tick = rig.devices["controller"].tick_s
     return Wave(hz, y, z, tick, round(period_ns * 1e-9 / tick), ratio)
@@ -88,7 +88,7 @@ def read_orbits(recording: Recording[Any]) -> list[Orbit]:
 
 def _wave(recording: Recording[Any], step: Step) -> Wave:
     labels, period_ns = step.labels, recording.streams["telemetry"].period_ns
-    return sampled(recording.rig, float(labels["hz"]), float(labels["y_m"]), float(labels["z_m"]), period_ns,
+    return sample_reference(recording.rig, float(labels["hz"]), float(labels["y_m"]), float(labels["z_m"]), period_ns,
                    int(labels["ratio"]))  # fmt: skip
 
 
@@ -121,13 +121,13 @@ def _read(recording: Recording[Any], step: Step, grown: Step | None, origin: int
         np.array([data[c] for c in machine.positions]),
         2 * np.pi / float(np.median(speed)) if turning else 0.0,
     )
-    whole = path if grown is None else _joined(grown, path, machine.positions, origin)
+    whole = path if grown is None else _join(grown, path, machine.positions, origin)
     upper, lower = (np.array([data[c] for c in names]) for names in upper_and_lower(machine))
     flags = data["flags"].astype(np.int64)
     return Orbit(str(labels["law"]), path, whole, upper, lower, flags, speed, t_0, clear, step, machine)
 
 
-def _joined(grown: Step, path: Path, names: Sequence[str], origin: int) -> Path:
+def _join(grown: Step, path: Path, names: Sequence[str], origin: int) -> Path:
     """A path with what was recorded before it."""
     data = grown.read(*names)
     t = np.concatenate([(data["t_ns"] - origin) * 1e-9, path.t])

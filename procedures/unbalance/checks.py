@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +15,9 @@ from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.units import RPM
 from procedures.shared import signals
-from procedures.synchronous.dwells import DWELL, SLOW, Array, Dwell
+from procedures.synchronous.dwells import DWELL, SLOW, Dwell
 from procedures.synchronous.fitting import PER_TURN, too_fast
-from procedures.unbalance.estimates import Results
+from procedures.unbalance.estimates import ForceBalance, Results
 
 HELD = 8  # samples in a row at an extreme: a probe that clips
 UNEXPLAINED = 0.1  # share of the forces that two unbalances leave over: a channel is not what its name says
@@ -126,8 +126,9 @@ def slow_roll(dwells: Sequence[Dwell], speeds: Sequence[float], runout: tuple[st
 
 def of_results(results: Results) -> Iterator[Finding]:
     """Do forces and motion agree? Is a repeat the same? Then zones and the runout, as notes."""
-    yield from channels(results.dwells)
-    yield from weight(results.dwells)
+    forces = [ForceBalance(r.dwell, r.misfit, r.carried) for r in results.dwells]
+    yield from channels(forces)
+    yield from weight(forces)
     yield from _beside(results)
     yield from _folded(results)
     yield from _repeats(results)
@@ -136,18 +137,7 @@ def of_results(results: Results) -> Iterator[Finding]:
     yield from _zones(results)
 
 
-class Balanced(Protocol):
-    """A dwell with the share of the forces left over, and what each axis carries of its share of the weight (4,)."""
-
-    @property
-    def dwell(self) -> Dwell: ...
-    @property
-    def misfit(self) -> float: ...
-    @property
-    def carried(self) -> Array: ...
-
-
-def channels(dwells: Sequence[Balanced]) -> Iterator[Finding]:
+def channels(dwells: Sequence[ForceBalance]) -> Iterator[Finding]:
     """Two unbalances must explain motion less control forces of all four axes: they do not where channels are exchanged."""
     worst = max(dwells, key=lambda r: r.misfit)
     if worst.misfit > UNEXPLAINED:
@@ -157,7 +147,7 @@ def channels(dwells: Sequence[Balanced]) -> Iterator[Finding]:
         yield Finding("forces-disagree", text, worst.dwell.where, Effect.ERROR)
 
 
-def weight(dwells: Sequence[Balanced]) -> Iterator[Finding]:
+def weight(dwells: Sequence[ForceBalance]) -> Iterator[Finding]:
     """The mean coil forces must carry the weight; they do not where the two coils of an axis are exchanged."""
     for r in dwells:
         off = np.abs(r.carried - 1)

@@ -17,7 +17,7 @@ from bench.uncertainty.estimate import merged
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.shared.certificates import certified
 from procedures.synchronous import coil_peaks, runout
-from procedures.synchronous.bearings import Known, stated
+from procedures.synchronous.bearings import Known, collect_inputs
 from procedures.synchronous.dwells import ORDERS, SLOW, Dwell
 from procedures.synchronous.nonsynchronous import beside_orders, folds
 from procedures.synchronous.runout import Stand, Turning
@@ -38,6 +38,16 @@ class Runout:
     shaft: Complex
     reading: Complex
     known: bool
+
+
+@dataclass(frozen=True)
+class ForceBalance:
+    """Of a `dwell`: `misfit`, the share of the forces that two unbalances do not explain; `carried` (4,), of what each axis
+    should carry of the weight."""
+
+    dwell: Dwell
+    misfit: float
+    carried: Array
 
 
 @dataclass(frozen=True)
@@ -89,7 +99,7 @@ def results(dwells: Sequence[Dwell], rig: RigFile, known: Known) -> Results:
     slow = next((d for d in dwells if d.kind == SLOW), None)
     turning = [d for d in dwells if d.kind != SLOW]
     fast = max((d for d in turning if d.variant == turning[0].variant), key=lambda d: d.speed)
-    inputs = stated(rig, known)
+    inputs = collect_inputs(rig, known)
     nominal = Stand.of({name: e.value for name, e in inputs.items()})
     runouts = _runouts(inputs, rig, slow, fast)
     clearance = certified("geometry/clearance", rig.geometry["clearance"], "least clearance")
@@ -119,16 +129,18 @@ def _runouts(inputs: Mapping[str, Estimate], rig: RigFile, slow: Dwell | None, f
 
     values = {name: e.value for name, e in {**inputs, **scatter}.items()}
     others = {n: Turning(fast.speed, fast.means, fast.both(n).values) for n in orders if n in fast.track.orders}
-    more = runout.mixed(Stand.of(values), at(values), others)  # so small that what is not known of it does not count
+    more = runout.mixed_forces(
+        Stand.of(values), at(values), others
+    )  # so small that what is not known of it does not count
 
     names = _parts(conventions(rig))
 
     def model(v: dict[str, float]) -> dict[str, float]:
-        made = runout.found(Stand.of(v), at(v), high, more)
+        made = runout.find_runout(Stand.of(v), at(v), high, more)
         return {f"{n:g}{p}": x for n in orders for p, x in zip(names, made.runout[n].view(float), strict=True)}
 
     out = propagate(model, {**inputs, **scatter})
-    made = runout.found(Stand.of(values), at(values), high, more)
+    made = runout.find_runout(Stand.of(values), at(values), high, more)
 
     def of(n: float) -> Runout:
         parts = tuple(Estimate(out[f"{n:g}{p}"].value, "m", out[f"{n:g}{p}"].sensitivities) for p in names)
@@ -180,7 +192,7 @@ def _result(
         out["d_max_share", plane] = _unit(far / clearance, "1")
         out |= coil_peaks.peaks(d, inputs, plane, rig)
     out["reading", ""] = _reading(d, inputs)
-    weight = runout.carried(nominal, d.means) / shares(rig, nominal)
+    weight = runout.mean_forces(nominal, d.means) / shares(rig, nominal)
     return Result(d, vectors, orbits, centres, misfit, weight, u, beside, folded, out)
 
 

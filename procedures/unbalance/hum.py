@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from bench.findings import Effect, Finding
 from bench.uncertainty import interval
-from procedures.synchronous.hum import REACH, Heard, duration, leak, told
+from procedures.synchronous.hum import REACH, Heard, describe, duration, leak
 from procedures.unbalance.checks import its_own
 from procedures.unbalance.estimates import Result
 
@@ -27,7 +27,7 @@ def of_dwells(found: Heard | None, results: Sequence[Result]) -> Iterator[Findin
             continue
         size, line = worst
         low, high = (60 * (line.hz + side * reach) for side in (-1, 1))
-        text = (f"{told(line)} Here, at {turns:.2f} Hz, the vector may be off by {size * 1e6:.3f} µm, "
+        text = (f"{describe(line)} Here, at {turns:.2f} Hz, the vector may be off by {size * 1e6:.3f} µm, "
                 f"{size / known[line.probe]:.1f} times its U. Below {low:.0f} and above {high:.0f} r/min it is told "
                 "apart.")  # fmt: skip
         yield Finding("hum", text, d.where, Effect.INDETERMINATE, its_own(d))

@@ -22,9 +22,9 @@ from procedures.amb_rotor import lift, wiring
 from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.shared import assumptions
 from procedures.synchronous import bearings, dwelling, fitting
-from procedures.synchronous.coil_peaks import uncertified
+from procedures.synchronous.coil_peaks import find_uncertified
 from procedures.synchronous.dwells import captured_channels, read_dwells, telemetry_channels
-from procedures.synchronous.hum import heard
+from procedures.synchronous.hum import listen
 from procedures.unbalance import checks, estimates, sequence
 from procedures.unbalance import figures as drawn
 from procedures.unbalance.estimates import Results
@@ -78,11 +78,11 @@ def step_count(plan: Plan) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Look at the shaft on its rings, lift it, nudge it, roll it slowly, and let it dwell at each speed with each setting."""
-    if not sequence.begun(rig, plan, record):
+    if not sequence.begin(rig, plan, record):
         return
-    if sequence.dwelt(rig, plan, record):
-        sequence.repeated(rig, plan, record)
-    dwelling.finished(rig)
+    if sequence.dwell(rig, plan, record):
+        sequence.repeat_lowest(rig, plan, record)
+    dwelling.stop(rig)
 
 
 def evaluate(recording: Recording[Any], findings: Findings) -> Results:
@@ -91,10 +91,10 @@ def evaluate(recording: Recording[Any], findings: Findings) -> Results:
     dwells, plan = read_dwells(recording), recording.plan
     findings.gate([*checks.of_signals(dwells, plan.max_lost, plan.max_speed_error), *checks.sampling(dwells, plan.orders),
                    *checks.slow_roll(dwells, plan.speeds_rad_s, LESS_RUNOUT)])  # fmt: skip
-    known = bearings.known(recording.calibrations, plan.beta_share, plan.offset_u_m)
+    known = bearings.Known.of(recording.calibrations, plan.beta_share, plan.offset_u_m)
     results = estimates.results(dwells, recording.rig, known)
-    findings.add((bearings.told(known), *uncertified(recording.rig)))
-    findings.add(of_dwells(heard(recording, results.slow), results.dwells))
+    findings.add((bearings.describe(known), *find_uncertified(recording.rig)))
+    findings.add(of_dwells(listen(recording, results.slow), results.dwells))
     findings.add(checks.of_results(results))
     return results
 

@@ -6,24 +6,24 @@ from bench.procedure.rig import Rig
 from bench.recording.recorder import Recorder
 from procedures.amb_rotor import lift
 from procedures.amb_rotor.conventions import Variant, conventions
-from procedures.synchronous.dwelling import put, rolled, step_labels
+from procedures.synchronous.dwelling import put, roll_slowly, step_labels
 from procedures.synchronous.dwells import DWELL, captured_channels
 from procedures.unbalance.plan import Plan
 
 MARGIN_S = 0.1  # of a dwell beside its capture
 
 
-def begun(rig: Rig, plan: Plan, record: Recorder) -> bool:
-    """Lifted, nudged and rolled slowly; False where the run ends here."""
-    return rolled(rig, record, plan.law, plan.slow_rad_s, plan.slow_s, plan.settle_s)
+def begin(rig: Rig, plan: Plan, record: Recorder) -> bool:
+    """Lift, nudge and slow roll; False where the run ends here."""
+    return roll_slowly(rig, record, plan.law, plan.slow_rad_s, plan.slow_s, plan.settle_s)
 
 
-def dwelt(rig: Rig, plan: Plan, record: Recorder) -> bool:
+def dwell(rig: Rig, plan: Plan, record: Recorder) -> bool:
     """All dwells, the slowest first; False if a speed is not reached."""
     machine, number = conventions(rig.file), 0
     for speed in sorted(plan.speeds_rad_s):
         put(rig, machine.variants[plan.variants[0]])
-        if not lift.turned(rig, record, speed, plan.settle_s):
+        if not lift.bring_to_speed(rig, record, speed, plan.settle_s):
             return False
         for variant in plan.at(speed):
             put(rig, machine.variants[variant])
@@ -33,11 +33,11 @@ def dwelt(rig: Rig, plan: Plan, record: Recorder) -> bool:
     return True
 
 
-def repeated(rig: Rig, plan: Plan, record: Recorder) -> None:
+def repeat_lowest(rig: Rig, plan: Plan, record: Recorder) -> None:
     """The lowest speed once more, with the first setting."""
     speed = min(plan.speeds_rad_s)
     machine = conventions(rig.file)
-    if plan.repeat and lift.turned(rig, record, speed, plan.settle_s):
+    if plan.repeat and lift.bring_to_speed(rig, record, speed, plan.settle_s):
         put(rig, machine.variants[plan.variants[0]])
         rig.clock.sleep(plan.settle_s)
         _dwell(rig, plan, record, speed, plan.variants[0], -1)

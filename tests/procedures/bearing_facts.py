@@ -10,7 +10,6 @@ from bench.calibration import Calibration
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from procedures.amb_rotor.conventions import AMB_ROTOR
-from procedures.synchronous import bearings as synchronous_bearings
 from procedures.synchronous import runout
 from procedures.synchronous.bearings import Known
 from sim_backend.machines.amb5dof.params import AmbParams
@@ -18,7 +17,7 @@ from sim_backend.machines.amb5dof.params import AmbParams
 
 def known(plan: Any, *calibrations: Calibration) -> Known:
     """What a run with that plan and these calibrations knows of the bearings."""
-    return synchronous_bearings.known(calibrations, plan.beta_share, plan.offset_u_m)
+    return Known.of(calibrations, plan.beta_share, plan.offset_u_m)
 
 
 def bearings(rig: RigFile, plant: AmbParams) -> Calibration:

@@ -13,7 +13,7 @@ from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.run_up import procedure
 from procedures.run_up.linear_model import bend
 from procedures.run_up.steps import Curve
-from procedures.synchronous.bearings import stated
+from procedures.synchronous.bearings import collect_inputs
 from procedures.synchronous.runout import Stand, arms, impedance
 
 RIG = load_rig("amb5dof")
@@ -24,7 +24,7 @@ W = 450.0
 
 def stand(**changed: object) -> Stand:
     """The nominal one, with magnetic fields that stand about the rings' centre."""
-    s = Stand.of({name: e.value for name, e in stated(RIG, known(procedure.Plan())).items()})
+    s = Stand.of({name: e.value for name, e in collect_inputs(RIG, known(procedure.Plan())).items()})
     return dataclasses.replace(s, offset=np.zeros(4), **changed)  # type: ignore[arg-type]
 
 

@@ -257,10 +257,10 @@ def test_planes_that_answer_alike_are_called_exchanged_by_chance_only() -> None:
         x = rng.normal(size=(8, 2, 60))
         return [np.concatenate([a, own * a + other * a[::-1] + rng.normal(size=(2, 60))]) for a in x]
 
-    assert not any(planes.crossed(steps(1.0, 1.0)) for _ in range(300))
-    assert not planes.crossed(steps(1.0, 0.2))
-    assert planes.crossed(steps(0.2, 1.0))
-    assert not planes.crossed([x[:, :20] for x in steps(0.2, 1.0)])
+    assert not any(planes.is_crossed(steps(1.0, 1.0)) for _ in range(300))
+    assert not planes.is_crossed(steps(1.0, 0.2))
+    assert planes.is_crossed(steps(0.2, 1.0))
+    assert not planes.is_crossed([x[:, :20] for x in steps(0.2, 1.0)])
 
 
 def second_order(w: float, z: float, shift: float, seconds: float = 0.4) -> tuple[np.ndarray, np.ndarray]:

@@ -274,6 +274,6 @@ def test_a_certificate_has_one_name_in_all_procedures() -> None:
     """Else results that share a probe would count as independent."""
     rig = load_rig("amb5dof")
     here = {i.id for i in estimates.inputs(rig, 1e-4, 0.0)} - {"timing/start", "geometry/clearance"}
-    there = {i.id for e in bearings.stated(rig, known(unbalance.Plan())).values() for i in e.sensitivities}
+    there = {i.id for e in bearings.collect_inputs(rig, known(unbalance.Plan())).values() for i in e.sensitivities}
     assert here
     assert here <= there

@@ -27,9 +27,9 @@ from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, Influence, interval
 from procedures.amb_rotor.conventions import AMB_ROTOR, Flag
 from procedures.compensation import procedure as compensation
-from procedures.synchronous import bearings as unbalance_bearings
 from procedures.synchronous import dwells, runout
-from procedures.synchronous.coil_peaks import blocks, uncertified
+from procedures.synchronous.bearings import describe
+from procedures.synchronous.coil_peaks import blocks, find_uncertified
 from procedures.synchronous.dwells import SLOW, read_dwells
 from procedures.unbalance import checks, estimates
 from procedures.unbalance import d_max as unbalance_d_max
@@ -140,9 +140,9 @@ def test_peaks_of_the_coils_are_known_by_more_than_their_resolution(compared: Ru
 
 def test_voltages_without_certificates_are_told() -> None:
     rig = load_rig("amb5dof")
-    assert list(uncertified(rig)) == []
+    assert list(find_uncertified(rig)) == []
     bare = rig.model_copy(update={"sensors": {n: s for n, s in rig.sensors.items() if n != "u_zo_n"}})
-    (found,) = uncertified(bare)
+    (found,) = find_uncertified(bare)
     assert (found.code, found.effect) == ("voltage-not-certified", Effect.NOTE)
     assert "u_zo_n" in found.text
     assert draw(bare, SEED).plant.voltage_gain[7] == 1.0
@@ -368,9 +368,9 @@ def test_runout_by_forces_is_exact_on_its_own_model() -> None:
         i = np.array([0.01, 0.02j, -0.01, 0.005 + 0.001j])
         vectors = np.concatenate([np.zeros(4), np.stack([i, -i], axis=1).ravel()])
         turning = runout.Turning(speed, means, vectors)
-        at = runout.moved(stand, turning, 1.0, u) + true
+        at = runout.shaft_motion(stand, turning, 1.0, u) + true
         made.append(runout.Turning(speed, means, np.concatenate([at, vectors[4:]])))
-    found = runout.found(stand, {1.0: made[0]}, made[1])
+    found = runout.find_runout(stand, {1.0: made[0]}, made[1])
     assert np.abs(found.runout[1.0] - true).max() < 1e-11
     assert np.abs(found.shaft[1.0] - made[0].vectors[:4] + true).max() < 1e-11
     assert np.abs(found.unbalance - u).max() < 1e-10
@@ -389,7 +389,7 @@ def test_orders_mix_in_forces_that_are_not_linear() -> None:
     means, first, second = np.zeros(12), np.zeros(12, complex), np.zeros(12, complex)
     means[4], first[4], second[4] = 1.5, 0.05, 0.02j
     slow = {1.0: runout.Turning(31.4, means, first), 2.0: runout.Turning(31.4, means, second)}
-    found = runout.bent(stand, slow, {n: np.zeros(4, complex) for n in slow})
+    found = runout.forces_beyond_slopes(stand, slow, {n: np.zeros(4, complex) for n in slow})
     scale = 6.95e-7 / 5.25e-4**2
     assert found[1.0][0] == pytest.approx(scale * 0.05 * 0.02j)
     assert found[2.0][0] == pytest.approx(scale * 0.05**2 / 2)
@@ -449,7 +449,7 @@ def test_adopted_bearings_take_the_plan_s_place(compared: Run) -> None:
     assert max(p.u for p in found.parts) < 0.8 * max(p.u for p in before.parts)
     (said,) = [f.text for f in compared.findings if f.code == "bearings"]
     assert "no calibration bearing-model was used" in said
-    assert "bearing-model-1, 2026-02-03" in unbalance_bearings.told(known(compared.recording.plan, model)).text
+    assert "bearing-model-1, 2026-02-03" in describe(known(compared.recording.plan, model)).text
 
 
 def test_bearings_are_used_where_there_are_some_and_not_missed_where_there_are_none() -> None:
