@@ -24,8 +24,7 @@ from bench.findings import Effect, Finding
 from bench.rigfile import load_rig
 from bench.uncertainty import interval
 from bench.units import RPM
-from procedures.amb_rotor.channels import AXES
-from procedures.synchronous.dwelling import CODES, SETTINGS
+from procedures.amb_rotor.conventions import AMB_ROTOR
 from sim_backend.machines.amb5dof import truth_passage, truth_unbalance
 from sim_backend.truth import draw
 
@@ -56,10 +55,10 @@ def one(name: str, seed: int, plan: dict[str, Any], folder: Path, hits: Hits) ->
         return
     made, plant = done.recording.plan, draw(rig, seed).plant
     defaults = {n: p.default for n, p in rig.parameters.items()}
-    settings = {**defaults, **SETTINGS["off"], **made.parameters, "law": CODES[made.law]}
+    settings = {**defaults, **AMB_ROTOR.variants["off"], **made.parameters, **AMB_ROTOR.select(made.law)}
     true = truth_unbalance.response(plant, settings, np.array([r.dwell.speed for r in run.near.dwells]))
     for r, shaft in zip(run.near.dwells, true, strict=True):
-        for k, axis in enumerate(AXES):
+        for k, axis in enumerate(AMB_ROTOR.axes):
             hits["ellipse"].append(
                 (contains(r.vectors.one(k), complex(shaft[k])), 1e6 * abs(r.vectors.values[k] - shaft[k]), math.nan)
             )
@@ -75,7 +74,7 @@ def _peaks(run: Any, plant: Any, settings: dict[str, float], hits: Hits) -> None
     high = max(p.high if math.isfinite(p.high) else p.speed.value for p in run.peaks)
     held = truth_passage.curves(plant, settings, 0.85 * low, 1.1 * high)
     for p in run.peaks:
-        speed, amplitude, factor = held.critical(AXES.index(p.axis), p.speed.value)
+        speed, amplitude, factor = held.critical(AMB_ROTOR.axes.index(p.axis), p.speed.value)
         if not abs(speed / p.speed.value - 1) < 0.1:
             hits["unmatched"].append((False, 0.0, math.nan))
             continue

@@ -23,10 +23,13 @@ from bench.cli.virtual import simulated_run
 from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.uncertainty import coverage_factor, interval
+from bench.units import RPM
+from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.sensitivity import estimates
-from procedures.sensitivity.injection import AXES, Comb, wanted
-from procedures.sensitivity.procedure import CODES, MARGIN_S, RPM, Plan, refinements, surveys
-from procedures.sensitivity.steps import REFINED, WIRING, Grid, Taken, channels, sensitivity
+from procedures.sensitivity.injection import Comb, parameters_of
+from procedures.sensitivity.plan import Plan
+from procedures.sensitivity.procedure import MARGIN_S, refinements, surveys
+from procedures.sensitivity.steps import REFINED, WIRING, Grid, Taken, captured_channels, sensitivity
 from sim_backend.machines.amb5dof import truth_sensitivity
 from sim_backend.machines.amb5dof.params import AmbParams
 from sim_backend.machines.amb5dof.plant import TRACE, AmbPlant
@@ -60,19 +63,20 @@ def light(p: AmbParams, settings: Mapping[str, float], plan: Plan, seed: int) ->
 
 def _taken(plant: AmbPlant, plan: Plan, axis: str, kind: str, about: float, comb: Comb) -> Taken:
     speed = plan.speeds_rad_s[0]
-    for name, value in {**wanted(comb), "inject_axis": float(AXES.index(axis))}.items():
+    for name, value in {**parameters_of(comb), "inject_axis": float(AMB_ROTOR.all_axes.index(axis))}.items():
         plant.set(name, value)
     plant.run(round(plan.start_s * 1e4))
     pulses = MARGIN_S + 4 * math.pi / speed if speed else 0.0
     periods = plan.refined_periods if kind == REFINED else plan.periods
     start, trace = plant.tick, plant.run(round((comb.period_s * periods + pulses) * 1e4), 1)[1]
     plant.set("inject_axis", -1.0)
-    names = channels(REFINED, speed)
+    names = captured_channels(AMB_ROTOR, REFINED, speed)
     columns = {n: trace[:, TRACE.index(n)] for n in names}
     grid = Grid(np.array(comb.hz), comb.period_s, comb.amplitude)
     response: Response
     response, injected, excluded = sensitivity(columns, (start + np.arange(len(trace))) * 1e-4, 1e4, grid)
-    return Taken(axis, speed, 0.0, kind, about, grid, response, excluded, injected, 0.0, 0.0, None, 1e4, 0, 0, 0, 1)
+    return Taken(axis, speed, 0.0, kind, about, grid, response, excluded, injected, 0.0, 0.0, None, 1e4, 0, 0, 0, 1,
+                 AMB_ROTOR)  # fmt: skip
 
 
 def whole(seed: int, plan: dict[str, Any], folder: Path) -> Found:
@@ -89,13 +93,13 @@ def one(seed: int, plan: dict[str, Any], folder: Path | None) -> Iterator[tuple[
     """A rig's axes."""
     rig, made = load_rig(RIG), Plan(**plan)
     plant, speed = draw(rig, seed).plant, made.speeds_rad_s[0]
-    settings = {**{n: p.default for n, p in rig.parameters.items()}, "law": CODES[made.law]}
+    settings = {**{n: p.default for n, p in rig.parameters.items()}, **AMB_ROTOR.select(made.law)}
     loop = None if speed else truth_sensitivity.loop(plant, settings)
     known: dict[str, tuple[float, float]] = {}
     for name, quantity, value, half, u in (
         light(plant, settings, made, seed) if folder is None else whole(seed, plan, folder)
     ):
-        axis = AXES.index(name)
+        axis = AMB_ROTOR.all_axes.index(name)
         if name not in known:
             known[name] = (
                 loop.peak(axis, made.low_hz, made.high_hz)
@@ -111,7 +115,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--first", type=int, default=3000)
     parser.add_argument("--count", type=int, default=100)
-    parser.add_argument("--law", default="PID", choices=list(CODES))
+    parser.add_argument("--law", default="PID", choices=["PID", "CCS"])
     parser.add_argument("--axes", default="yi,zo")
     parser.add_argument("--rpm", type=float, default=0.0)
     parser.add_argument("--whole", action="store_true")

@@ -42,13 +42,13 @@ def _settings(done: Simulated, *more: Mapping[str, float]) -> dict[str, float]:
 
 
 def _step(done: Simulated) -> Found:
-    from procedures.step.procedure import chosen, model, recorded_s, waited_s
+    from procedures.step.procedure import list_settings, model, recorded_s, waited_s
     from procedures.step.steps import AT_REST_S, Case
     from sim_backend.machines.amb5dof import truth_step
 
     plan: Any = done.recording.plan
     other_band = {r.where for r in done.results if isinstance(r, Finding) and r.code == "band-widened"}
-    for setting, changed in chosen(plan).items():
+    for setting, changed in list_settings(plan).items():
         settings = _settings(done, model(done.recording.rig, plan), changed)
         for speed in plan.speeds_rad_s:
             window = 2 * math.pi / speed if speed else AT_REST_S
@@ -76,14 +76,13 @@ def _step(done: Simulated) -> Found:
 
 
 def _tracking(done: Simulated) -> Found:
-    from procedures.tracking.procedure import CODES
     from procedures.tracking.steps import read_orbits
     from sim_backend.machines.amb5dof import truth_track
 
     plan: Any = done.recording.plan
     for orbit in read_orbits(done.recording):
         if orbit.law in plan.laws:
-            settings = _settings(done, {"law": CODES[orbit.law]})  # type: ignore[index]
+            settings = _settings(done, orbit.machine.select(orbit.law))  # type: ignore[arg-type]
             true = truth_track.truth(
                 done.drawn.plant, settings, hz=plan.hz, y=plan.y_m, z=plan.z_m, ratio=plan.ratio, speed=plan.speed_rad_s,
                 settle_s=plan.settle_s,
@@ -92,36 +91,32 @@ def _tracking(done: Simulated) -> Found:
                 yield name, orbit.where, value
 
 
-def _vectors(shaft: Iterable[complex], where: str) -> Found:
-    from procedures.amb_rotor.channels import AXES
-
-    for axis, vector in zip(AXES, shaft, strict=True):
+def _vectors(axes: Iterable[str], shaft: Iterable[complex], where: str) -> Found:
+    for axis, vector in zip(axes, shaft, strict=True):
         yield "vector_cos", f"{axis}, {where}", float(vector.real)
         yield "vector_sin", f"{axis}, {where}", float(-vector.imag)
 
 
-def _distances(d_max: Iterable[float], clearance: float, where: str) -> Found:
-    from procedures.amb_rotor.channels import PLANES
-
-    for plane, far in zip(PLANES, d_max, strict=True):
+def _distances(planes: Iterable[str], d_max: Iterable[float], clearance: float, where: str) -> Found:
+    for plane, far in zip(planes, d_max, strict=True):
         yield "d_max", f"{plane}, {where}", far
         yield "d_max_share", f"{plane}, {where}", far / clearance
 
 
 def _unbalance(done: Simulated) -> Found:
-    from procedures.synchronous.dwelling import CODES, POLES, SETTINGS
     from procedures.synchronous.dwells import DWELL, read_dwells
     from sim_backend.machines.amb5dof import truth_unbalance
 
     plan: Any = done.recording.plan
-    law = {**(POLES if plan.observed else {}), "law": CODES[plan.law]}
     for dwell in read_dwells(done.recording):
         if dwell.kind != DWELL or dwell.again:
             continue
-        settings = _settings(done, law, SETTINGS[dwell.variant])  # type: ignore[index]
+        machine = dwell.machine
+        law = {**(machine.poles if plan.observed else {}), **machine.select(plan.law)}
+        settings = _settings(done, law, machine.variants[dwell.variant])  # type: ignore[index]
         true = truth_unbalance.motion(done.drawn.plant, settings, dwell.speed)
-        yield from _vectors(true.shaft, dwell.where)
-        yield from _distances(true.d_max, done.drawn.plant.clearance, dwell.where)
+        yield from _vectors(machine.axes, true.shaft, dwell.where)
+        yield from _distances(machine.planes, true.d_max, done.drawn.plant.clearance, dwell.where)
 
 
 def _balance(done: Simulated) -> Found:
@@ -137,21 +132,20 @@ def _balance(done: Simulated) -> Found:
 
 def _passage(done: Simulated) -> Found:
     """Vectors, orbits and D_max where the speed stands; what is critical at the speeds where the run found it."""
-    from procedures.amb_rotor.channels import AXES, PLANES
-    from procedures.synchronous.dwelling import CODES, SETTINGS
+    from procedures.amb_rotor.conventions import conventions
     from sim_backend.machines.amb5dof import truth_passage, truth_unbalance
 
     plan: Any = done.recording.plan
     run = done.procedure.evaluated(done.recording).result
     if run is None or run.near is None:
         return
-    plant = done.drawn.plant
-    settings = _settings(done, SETTINGS["off"], plan.parameters, {"law": CODES[plan.law]})
+    plant, machine = done.drawn.plant, conventions(done.recording.rig)
+    settings = _settings(done, machine.variants["off"], plan.parameters, machine.select(plan.law))
     for result in run.near.dwells:
         true, where = truth_unbalance.motion(plant, settings, result.dwell.speed), result.dwell.where
-        yield from _vectors(true.shaft, where)
-        yield from _distances(true.d_max, plant.clearance, where)
-        for plane, (y, z) in PLANES.items():
+        yield from _vectors(machine.axes, true.shaft, where)
+        yield from _distances(machine.planes, true.d_max, plant.clearance, where)
+        for plane, (y, z) in machine.planes.items():
             a, b = true.shaft[y], true.shaft[z]
             yield "major_half_axis", f"{plane}, {where}", float(abs(a + 1j * b) + abs(a - 1j * b)) / 2
     peaks = [p for p in run.peaks if p.critical]
@@ -160,7 +154,7 @@ def _passage(done: Simulated) -> Found:
     ends = [x for p in run.peaks for x in (p.low, p.speed.value, p.high) if math.isfinite(x)]
     held = truth_passage.curves(plant, settings, 0.85 * min(ends), 1.1 * max(ends))
     for p in peaks:
-        speed, amplitude, factor = held.critical(AXES.index(p.axis), p.speed.value)
+        speed, amplitude, factor = held.critical(machine.axes.index(p.axis), p.speed.value)
         yield "critical_speed", p.where, speed
         yield "critical_amplitude", p.where, amplitude
         yield "amplification_factor", p.where, factor
@@ -171,17 +165,17 @@ def _sensitivity(done: Simulated) -> Found:
     import numpy as np
 
     from bench.units import RPM
-    from procedures.sensitivity.injection import AXES
+    from procedures.amb_rotor.conventions import conventions
     from procedures.sensitivity.margins import fall, phase, rise
-    from procedures.sensitivity.procedure import CODES
     from sim_backend.machines.amb5dof import truth_sensitivity
 
     plan: Any = done.recording.plan
-    plant, settings = done.drawn.plant, _settings(done, {"law": CODES[plan.law]})
+    machine = conventions(done.recording.rig)
+    plant, settings = done.drawn.plant, _settings(done, machine.select(plan.law))
     for speed in plan.speeds_rad_s:
         loop = None if speed else truth_sensitivity.loop(plant, settings)
         for axis in plan.axes:
-            k, where = AXES.index(axis), f"{axis}, {f'{speed * RPM:.0f} r/min' if speed else 'at rest'}"
+            k, where = machine.all_axes.index(axis), f"{axis}, {f'{speed * RPM:.0f} r/min' if speed else 'at rest'}"
             if loop is not None:
                 value, hz = loop.peak(k, plan.low_hz, plan.high_hz)
             else:

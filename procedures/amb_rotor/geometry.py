@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.rigfile import RigFile
-from procedures.amb_rotor.channels import AXES
+from procedures.amb_rotor.conventions import conventions
 
 Array = npt.NDArray[np.float64]
 YI, ZI, YO, ZO = range(4)
@@ -42,7 +42,7 @@ def distances(readings: Array, f: Facts) -> Array:
 
 def nominal(rig: RigFile, t_0: float) -> Facts:
     """The facts as the rig file states them."""
-    sensors, g = [rig.sensors[f"pos_{axis}"] for axis in AXES], rig.geometry
+    sensors, g = [rig.sensors[name] for name in conventions(rig).positions], rig.geometry
     gains, offsets = [s.gain.value for s in sensors], [s.offset.value for s in sensors]
     return Facts(
         (gains[0], gains[1], gains[2], gains[3]),

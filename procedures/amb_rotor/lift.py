@@ -11,27 +11,28 @@ from bench.procedure.roles import RigState
 from bench.procedure.states import transition
 from bench.recording.recorder import Recorder
 from procedures.amb_rotor import rings
-from procedures.amb_rotor.channels import POSITIONS
+from procedures.amb_rotor.conventions import AmbRotor, conventions
 
 REST, LIFT, PROBE = "rest", "lift", "probe"
 LIFT_LOST, NO_SPEED = "lift-lost", "no-speed"
-NUDGES = (("ref_y", 10e-6), ("ref_theta", 100e-6))
-STEPS = 2 + 2 * len(NUDGES)  # that `probed` records
+NUDGES = (("y", 10e-6), ("theta", 100e-6))  # of the set points, m and rad
+STEPS = 2 + 2 * len(NUDGES)  # that `lift_and_nudge` records
 
 
-def probed(rig: Rig, record: Recorder) -> bool:
+def lift_and_nudge(rig: Rig, record: Recorder) -> bool:
     """Lift the shaft from its rings and nudge it; False where it must not or cannot be lifted, which the analysis tells."""
+    machine = conventions(rig.file)
     with record.step(REST):
         rig.clock.sleep(0.3)
-    if any(rings.of_readings({name: rig.levitation.reading(name) for name in POSITIONS}, rig.file)):
+    if any(rings.of_readings({name: rig.levitation.reading(name) for name in machine.positions}, rig.file)):
         return False  # it lies below, on its rings: a probe that says otherwise may close a loop the wrong way round
-    if not _lifted(rig, record):
+    if not _lift(rig, record):
         return False
-    _nudged(rig, record)
+    _nudge(rig, machine, record)
     return True
 
 
-def turned(rig: Rig, record: Recorder, rad_s: float, settle_s: float) -> bool:
+def bring_to_speed(rig: Rig, record: Recorder, rad_s: float, settle_s: float) -> bool:
     """Bring the shaft to a speed; False where it does not get there, which the analysis tells."""
     try:
         if rig.drive is None:
@@ -44,7 +45,7 @@ def turned(rig: Rig, record: Recorder, rad_s: float, settle_s: float) -> bool:
     return True
 
 
-def _lifted(rig: Rig, record: Recorder) -> bool:
+def _lift(rig: Rig, record: Recorder) -> bool:
     with record.step(LIFT):
         try:
             transition(rig, RigState.LEVITATED)
@@ -55,8 +56,9 @@ def _lifted(rig: Rig, record: Recorder) -> bool:
     return True
 
 
-def _nudged(rig: Rig, record: Recorder) -> None:
-    for name, aside in NUDGES:
+def _nudge(rig: Rig, machine: AmbRotor, record: Recorder) -> None:
+    for coordinate, aside in NUDGES:
+        name = machine.set_points[coordinate]
         for value in (0.0, aside):
             rig.levitation.set(name, value)
             rig.clock.sleep(0.5)

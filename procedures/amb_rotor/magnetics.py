@@ -22,23 +22,23 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from procedures.amb_rotor.conventions import AMB_ROTOR, AmbRotor
 from procedures.shared import leastsquares
 from procedures.shared.leastsquares import Fit
 
 Array = npt.NDArray[np.float64]
 Numbers = Mapping[str, float]
-AXES = ("yi", "zi", "yo", "zo")
-COILS = tuple(f"{a}_{c}" for a in AXES for c in "pn")
 
 
 @dataclass(frozen=True)
 class Positions:
-    """Means (4, N) as the sensors read them, of axes yi zi yo zo: `read` m, `p` and `n` A (coils pulling to the positive and
-    the negative side)."""
+    """Means (4, N) as the sensors read them, of the machine's radial axes: `read` m, `p` and `n` A (coils pulling to the
+    positive and the negative side)."""
 
     read: Array
     p: Array
     n: Array
+    machine: AmbRotor = AMB_ROTOR
 
 
 @dataclass(frozen=True)
@@ -78,10 +78,10 @@ def statics(d: Positions, p: Numbers) -> Statics:
     relaxed_z (m, where the coupling does not pull, off the rings' centre); per axis gain_*, zero_* (reading where the shaft
     is in the rings' centre), runout_*; per coil gain_*, offset_* of its current sensor.
     """
-    l_is, l_os, l_oa = p["l_is"], p["l_os"], p["l_oa"]
+    l_is, l_os, l_oa, axes = p["l_is"], p["l_os"], p["l_oa"], d.machine.axes
     l_ia, span = p["amb_span"] - l_oa, l_is + l_os
-    off = np.array([d.read[k] / p[f"gain_{a}"] - p[f"runout_{a}"] for k, a in enumerate(AXES)])
-    zero = np.array([[p[f"zero_{a}"] / p[f"gain_{a}"]] for a in AXES])
+    off = np.array([d.read[k] / p[f"gain_{a}"] - p[f"runout_{a}"] for k, a in enumerate(axes)])
+    zero = np.array([[p[f"zero_{a}"] / p[f"gain_{a}"]] for a in axes])
 
     def at(station: float, x: Array) -> Array:
         share = (station + l_is) / span
@@ -93,7 +93,7 @@ def statics(d: Positions, p: Numbers) -> Statics:
     weight = p["mass"] * p["gravity"] * np.array([[math.cos(p["axes"])], [math.sin(p["axes"])]])
     force = np.concatenate([weight * l_oa + pull * (l_oa + p["l_c"]), weight * l_ia + pull * (l_ia - p["l_c"])])
     pos, neg = (
-        np.array([(c[k] - p[f"offset_{a}_{s}"]) / p[f"gain_{a}_{s}"] for k, a in enumerate(AXES)])
+        np.array([(c[k] - p[f"offset_{a}_{s}"]) / p[f"gain_{a}_{s}"] for k, a in enumerate(axes)])
         for s, c in (("p", d.p), ("n", d.n))
     )
     return Statics(r, pos, neg, force / p["amb_span"])
@@ -145,7 +145,7 @@ def fits(d: Positions, p: Numbers) -> dict[str, AxisFit]:
     """Both models of every axis by itself, with the numbers as they are given, of positions at one bias."""
     s = statics(d, p)
     out = {}
-    for k, a in enumerate(AXES):
+    for k, a in enumerate(d.machine.axes):
         of = (s.r[k], s.p[k], s.n[k], s.force[k])
         fit = nonlinear(*of, p["gap"])
         out[a] = AxisFit(fit.terms, -fit.residuals, linear(*of))

@@ -10,19 +10,17 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
-from procedures.amb_rotor.magnetics import AXES, COILS, Positions
+from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.amb_rotor.magnetics import Positions
 from procedures.shared.step_table import reduced
 
 Array = npt.NDArray[np.float64]
 REST, LIFT, LIFT_LOST, TILT, HOLD = "rest", "lift", "lift-lost", "tilt", "hold"
-POSITIONS = tuple(f"pos_{a}" for a in AXES)
-CURRENTS = tuple(f"i_{c}" for c in COILS)
-CHANNELS = (*POSITIONS, *CURRENTS, "flags")
 
 
 @dataclass(frozen=True)
 class Held:
-    """Steps in time order, N of them, by channel.
+    """Steps in time order, N of them, by channel of the `machine`.
 
     `mean`, `drift`, `spread` (N,); `batches` (N, B), means of B parts of a step; `every` (S,), all samples, step by step,
     of which `of_step` (S,) says the step; `labels` (N,); `lost` and `expected` samples; `flags` ORed; `names` for the
@@ -40,6 +38,7 @@ class Held:
     expected: Array
     flags: npt.NDArray[np.int64]
     names: tuple[str, ...]
+    machine: AmbRotor
 
     def __len__(self) -> int:
         return len(self.names)
@@ -64,6 +63,7 @@ class Held:
             self.expected[which],
             self.flags[which],
             tuple(name for name, use in zip(self.names, which, strict=True) if use),
+            self.machine,
         )
 
     def where(self, values: Array) -> str:
@@ -72,20 +72,26 @@ class Held:
 
     def means(self) -> Positions:
         """One column a step."""
-        return _positions(self.mean)
+        return self._positions(self.mean)
 
     def parts(self) -> Positions:
         """One column a batch, step by step (N B)."""
-        return _positions({k: v.ravel() for k, v in self.batches.items()})
+        return self._positions({k: v.ravel() for k, v in self.batches.items()})
 
     def samples(self) -> Positions:
         """One column a sample, step by step (S)."""
-        return _positions(self.every)
+        return self._positions(self.every)
+
+    def _positions(self, of: dict[str, Array]) -> Positions:
+        p, n = (
+            np.array([of[c] for c in names]) for names in zip(*map(self.machine.pair, self.machine.axes), strict=True)
+        )
+        return Positions(np.array([of[c] for c in self.machine.positions]), p, n, self.machine)
 
 
-def _positions(of: dict[str, Array]) -> Positions:
-    p, n = (np.array([of[f"i_{a}_{s}"] for a in AXES]) for s in "pn")
-    return Positions(np.array([of[c] for c in POSITIONS]), p, n)
+def channels(machine: AmbRotor) -> tuple[str, ...]:
+    """What is read of a step."""
+    return (*machine.positions, *machine.currents, "flags")
 
 
 def read_steps(recording: Recording[Any], kind: str, labels: tuple[str, ...], batches: int) -> Held:
@@ -97,22 +103,25 @@ def read_steps(recording: Recording[Any], kind: str, labels: tuple[str, ...], ba
     steps = list(recording.steps(kind))
     if not steps:
         raise AnalysisError(f"steps of kind {kind!r}: found none; expected the run's (was it stopped early?)")
-    read = [_read(step, batches) for step in steps]
+    machine = conventions(recording.rig)
+    names = channels(machine)
+    read = [_read(step, names, batches) for step in steps]
     mean, drift, spread, parts = (
-        {c: np.array([r[key][c] for r in read]) for c in CHANNELS} for key in ("mean", "drift", "spread", "batches")
+        {c: np.array([r[key][c] for r in read]) for c in names} for key in ("mean", "drift", "spread", "batches")
     )
     return Held(
         mean,
         drift,
         spread,
         parts,
-        {c: np.concatenate([r["every"][c] for r in read]) for c in (*POSITIONS, *CURRENTS)},
+        {c: np.concatenate([r["every"][c] for r in read]) for c in names if c != "flags"},
         np.repeat(np.arange(len(read)), [r["samples"] for r in read]),
         {key: np.array([float(s.labels[key]) for s in steps]) for key in labels},
         np.array([float(s.lost()) for s in steps]),
         np.array([float(s.expected()) for s in steps]),
         np.array([r["flags"] for r in read]),
         tuple(_name(kind, dict(s.labels)) for s in steps),
+        machine,
     )
 
 
@@ -122,13 +131,13 @@ def _name(kind: str, labels: dict[str, Any]) -> str:
     return f"y {labels['y_m'] * 1e6:+.0f}, z {labels['z_m'] * 1e6:+.0f} µm at {labels['bias_A']:g} A"
 
 
-def _read(step: Step, batches: int) -> dict[str, Any]:
-    data = step.read(*CHANNELS)
+def _read(step: Step, names: tuple[str, ...], batches: int) -> dict[str, Any]:
+    data = step.read(*names)
     count = len(data["flags"])
     if count < 2 * batches:
         raise AnalysisError(f"step {dict(step.labels)}: found {count} samples; expected {2 * batches} or more")
-    out = reduced(data, CHANNELS, step.labels)
-    out["batches"] = {c: np.array([part.mean() for part in np.array_split(data[c], batches)]) for c in CHANNELS}
-    out["every"] = {c: data[c] for c in (*POSITIONS, *CURRENTS)}
+    out = reduced(data, names, step.labels)
+    out["batches"] = {c: np.array([part.mean() for part in np.array_split(data[c], batches)]) for c in names}
+    out["every"] = {c: data[c] for c in names if c != "flags"}
     out["samples"] = count
     return out

@@ -19,8 +19,8 @@ from bench.findings import Effect, Finding
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
 from procedures.amb_rotor import magnetics
-from procedures.amb_rotor.magnetics import AXES
-from procedures.amb_rotor.places import CURRENTS, LIFT, LIFT_LOST, POSITIONS, REST
+from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.places import LIFT, LIFT_LOST, REST
 
 Array = npt.NDArray[np.float64]
 BETA, OFFSET = 6.95e-7, 1.15e-4  # T Table 2.2: good enough to say which way a coil presses
@@ -35,7 +35,7 @@ ALIKE_N = 0.5  # that two exchanges may differ by, both being named
 def room(rig: RigFile) -> float:
     """How far from the sensors' zero the rings stand at least, m: clearance, the sensors' zeros and their runout taken off."""
     clear = rig.geometry["clearance"]
-    offsets = [rig.sensors[name].offset for name in POSITIONS]
+    offsets = [rig.sensors[name].offset for name in conventions(rig).positions]
     zero = max(t.half_width or 3 * t.standard_uncertainty for t in offsets)
     ring = clear.value - (clear.half_width or 3 * clear.standard_uncertainty)
     return ring - math.sqrt(2) * zero - 2 * rig.machine["runout"].standard_uncertainty
@@ -44,15 +44,16 @@ def room(rig: RigFile) -> float:
 def farthest(rig: RigFile) -> float:
     """How far from the sensors' zero a shaft on its rings lies at most, m: as `room`, the other way, and the sensors' gain."""
     clear = rig.geometry["clearance"]
-    gains = [rig.sensors[name].gain for name in POSITIONS]
+    gains = [rig.sensors[name].gain for name in conventions(rig).positions]
     gain = max(t.half_width or 3 * t.standard_uncertainty for t in gains)
     return (2 + gain) * clear.value - room(rig)
 
 
 def of_readings(readings: Mapping[str, float], rig: RigFile) -> Iterator[Finding]:
     """Readings (m) of a shaft that lies on its rings: what forbids to lift it."""
+    machine = conventions(rig)
     for axis in "yz":
-        above = [name for name in POSITIONS if name[4] == axis and readings[name] > 0]
+        above = [name for name in map(machine.position, machine.along(axis)) if readings[name] > 0]
         said = " and ".join(f"{name} reads {readings[name] * 1e6:+.0f} µm" for name in above)
         if len(above) == 1:
             text = f"{said} while the shaft lies on its rings, below the middle: the probe's polarity is wrong."
@@ -69,10 +70,11 @@ def of_readings(readings: Mapping[str, float], rig: RigFile) -> Iterator[Finding
 def of_rings(readings: Mapping[str, float], rig: RigFile) -> Iterator[Finding]:
     """Readings (m) of a shaft that lies on its rings, below the middle: is it where they and the sensors' zeros can have it?
     Nothing where the rig states none of them."""
-    if "clearance" not in rig.geometry or "runout" not in rig.machine or not set(POSITIONS) <= set(rig.sensors):
+    machine = conventions(rig)
+    if "clearance" not in rig.geometry or "runout" not in rig.machine or not set(machine.positions) <= set(rig.sensors):
         return
-    for b, where in (("i", "inboard"), ("o", "outboard")):
-        y, z = readings[f"pos_y{b}"], readings[f"pos_z{b}"]
+    for where, pair in machine.planes.items():
+        y, z = (readings[machine.positions[k]] for k in pair)
         far = math.hypot(y, z)
         if max(y, z) > 0 or room(rig) <= far <= farthest(rig):
             continue
@@ -91,7 +93,7 @@ def before(recording: Recording[Any]) -> list[Finding]:
     rig = recording.rig
     found: list[Finding] = []
     for step in recording.steps(REST):
-        found += of_readings({name: step.mean(name) for name in POSITIONS}, rig)
+        found += of_readings({name: step.mean(name) for name in conventions(rig).positions}, rig)
     for event, step in zip(recording.events(LIFT_LOST), recording.steps(LIFT), strict=False):
         found.append(_of_lift(step, str(event["fault"]), rig))
     return found
@@ -99,13 +101,15 @@ def before(recording: Recording[Any]) -> list[Finding]:
 
 def _of_lift(step: Step, fault: str, rig: RigFile) -> Finding:
     """Which exchange of readings explains where the shaft lies at the end of a lift that failed."""
-    data = step.read(*POSITIONS, *CURRENTS)
-    tries = np.all([data[f"i_{a}_p"] + data[f"i_{a}_n"] > CARRIES_A for a in AXES], axis=0)
+    machine = conventions(rig)
+    data = step.read(*machine.positions, *machine.currents)
+    pairs = [machine.pair(axis) for axis in machine.axes]
+    tries = np.all([data[p] + data[n] > CARRIES_A for p, n in pairs], axis=0)
     last = np.flatnonzero(tries)[-round(PRESSED_S / recording_period(step)) :]
     text = f"the shaft was lost in the lift ({fault})"
     if len(last):
-        read = np.array([data[name][last].mean() for name in POSITIONS])
-        p, n = (np.array([data[f"i_{a}_{side}"][last].mean() for a in AXES]) for side in "pn")
+        read = np.array([data[name][last].mean() for name in machine.positions])
+        p, n = (np.array([data[name][last].mean() for name in names]) for names in zip(*pairs, strict=True))
         left = {names: unexplained(read[list(order)], p, n, rig) for names, order in exchanges().items()}
         by_kind = {kind: min(left[e] for e in left if kind_of(e) == kind) for kind in ("planes", "axes", "")}
         what, least = min(by_kind.items(), key=lambda kv: kv[1])
@@ -132,7 +136,7 @@ def recording_period(step: Step) -> float:
 
 
 def exchanges() -> dict[str, tuple[int, ...]]:
-    """By name ("" for none), which reading each axis of AXES takes."""
+    """By name ("" for none), which reading each radial axis takes."""
     yi, zi, yo, zo = range(4)
     pairs = {"": (), "yi-yo": ((yi, yo),), "zi-zo": ((zi, zo),), "yi-yo+zi-zo": ((yi, yo), (zi, zo)), "yi-zi": ((yi, zi),),
              "yo-zo": ((yo, zo),), "yi-zi+yo-zo": ((yi, zi), (yo, zo))}  # fmt: skip

@@ -4,38 +4,38 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from bench.analysis.balance import G_MM, bound
-from bench.calibration import Calibration
 from bench.findings import Effect, Finding
 from bench.procedure.requires import Requires
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.units import RPM
-from procedures.amb_rotor.channels import AXES, CURRENTS, POSITIONS
+from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.balance import decision, estimates
-from procedures.balance.estimates import Balanced, Forces
+from procedures.balance.estimates import Balanced
+from procedures.balance.plan import Plan
 from procedures.balance.steps import (
     BASE,
-    CAPTURED,
     DECISION,
     LIGHTER,
     REFUSED,
     SIDES,
     Recorded,
     Run,
-    read_dwell,
+    captured_channels,
 )
-from procedures.synchronous import bearings, fitting
-from procedures.synchronous.dwells import SLOW, TOLD, Dwell
+from procedures.synchronous import fitting
+from procedures.synchronous.bearings import Known
+from procedures.synchronous.dwells import SLOW, telemetry_channels
 from procedures.unbalance import checks as unbalance_checks
 
 MOST_RPM = 10000.0  # influence runs
+RATE_HZ = 1e4  # of the captures, the controller's own; order 1 alone is read
 WORST_CONDITION = 50.0  # of the influence coefficients
 SPEEDS_APART = 2e-3
 SAME_PLACE_RAD = math.radians(0.1)
@@ -48,42 +48,23 @@ NEEDED = (
 )
 
 
-class Settings(decision.Settings, fitting.Settings, Protocol):
-    """The plan."""
-
-    @property
-    def leave(self) -> bool: ...
-    @property
-    def corrections(self) -> int: ...
-    @property
-    def repeat(self) -> bool: ...
-    @property
-    def trial_angle_rad(self) -> tuple[float, float]: ...
-
-
-@dataclass(frozen=True)
-class Looked:
-    """A dwell with its balance of forces, as `unbalance.checks` wants it."""
-
-    dwell: Dwell
-    misfit: float
-    carried: np.ndarray
-
-
 REQUIRES = Requires(
     roles=("levitation", "drive"),
-    channels=TOLD,
-    sensors=(*POSITIONS, *CURRENTS),
-    parameters=("law", "ref_y", "ref_theta", "bias", "kp", "kd", "k1", "k2_ccs", "k2_cac", *bearings.STATED),
+    channels=telemetry_channels(AMB_ROTOR),
+    sensors=(*AMB_ROTOR.positions, *AMB_ROTOR.currents),
+    parameters=(AMB_ROTOR.law, AMB_ROTOR.set_points["y"], AMB_ROTOR.set_points["theta"], "bias", "kp", "kd", *AMB_ROTOR.poles,
+                *AMB_ROTOR.model_parameters),
     geometry=NEEDED,
     machine=("mass", "transverse_inertia", "polar_inertia", "radial_axes", "runout", "weight_mass", "weight_angle"),
-    capture=CAPTURED,
-)
+    capture=captured_channels(AMB_ROTOR),
+)  # fmt: skip
 
 
-def of_plan(rig: RigFile, plan: Settings) -> Iterable[str]:
+def of_plan(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work, before anything starts."""
-    yield from fitting.of_plan(rig, plan)
+    yield from fitting.of_speeds(rig, plan.speeds_rad_s)
+    yield from fitting.of_slow_roll(plan.slow_rad_s, plan.slow_s, plan.speeds_rad_s)
+    yield from fitting.of_captures(rig, plan.capture_s, RATE_HZ, 1, plan.speeds_rad_s)
     if max(plan.speeds_rad_s) * RPM > MOST_RPM + 1:
         top = max(plan.speeds_rad_s) * RPM
         yield f"speeds_rad_s: found {top:.0f} r/min; influence runs are made at {MOST_RPM:.0f} r/min or below"
@@ -121,20 +102,16 @@ def refusals(recording: Recording[Any]) -> Iterator[Finding]:
             yield Finding("correction-refused", text, str(e["run"]), Effect.ERROR)
 
 
-def of_runs(recorded: Recorded, rig: RigFile, plan: Settings, model: Calibration | None = None) -> Iterator[Finding]:
+def of_runs(recorded: Recorded, rig: RigFile, plan: Plan, known: Known) -> Iterator[Finding]:
     """Loose parts, forces, trial weights."""
     for run in recorded.runs:
-        yield from decision.slipped(run)
+        yield from decision.find_slips(run)
     base = next((r for r in recorded.runs if r.name == BASE), None)
     if base is None:
         return
     yield from _speeds(recorded)
-    off = decision.slow_runout(recorded.slow, base, rig, plan, model)
-    looked = []
-    for d in recorded.dwells:
-        if d.kind != SLOW:
-            f: Forces = estimates.forces(read_dwell(d), off, rig, plan, model)
-            looked.append(Looked(d, f.misfit, f.carried))
+    off = decision.slow_runout(recorded.slow, base, rig, known)
+    looked = [estimates.balance_forces(d, off, rig, known) for d in recorded.dwells if d.kind != SLOW]
     yield from unbalance_checks.channels(looked)
     yield from unbalance_checks.weight(looked)
     shown: list[decision.Shown] = []
@@ -144,7 +121,7 @@ def of_runs(recorded: Recorded, rig: RigFile, plan: Settings, model: Calibration
         having = named.get(f"trial {side}")
         if having is None or not having.weights:
             return
-        shown.append(decision.shown(before, having, having.weights[-1], rig, plan, model))
+        shown.append(decision.observe(before, having, having.weights[-1], rig, known))
         yield from decision.of_trial(shown[-1])
         before = having if plan.leave else base
     yield from decision.of_trials(shown[0], shown[1])
@@ -161,9 +138,7 @@ def _speeds(recorded: Recorded) -> Iterator[Finding]:
             yield Finding("speeds-differ", text, "", Effect.INDETERMINATE)
 
 
-def of_result(
-    balance: Balanced, recorded: Recorded, shown: list[Run], plan: Settings, rig: RigFile
-) -> Iterator[Finding]:
+def of_result(balance: Balanced, recorded: Recorded, shown: list[Run], plan: Plan, rig: RigFile) -> Iterator[Finding]:
     """Was it reached, did the corrections act as predicted, and the sheet."""
     if balance.solved.condition > WORST_CONDITION:
         text = (f"the condition of the influence coefficients is {balance.solved.condition:.0f}: the probes do not tell the "
@@ -188,7 +163,7 @@ def of_result(
     for p, side in enumerate(SIDES):
         some = ", ".join(
             f"{axis} {abs(a):.3f} µm ∠{-math.degrees(np.angle(a)) % 360:.0f}°"
-            for axis, a in zip(AXES, balance.solved.influence[-1, :, p], strict=True)
+            for axis, a in zip(recorded.machine.axes, balance.solved.influence[-1, :, p], strict=True)
         )
         text = (f"1 g mm at the scale's zero of the {side} plane, {max(plan.speeds_rad_s) * RPM:.0f} r/min (0-pk, phase "
                 f"lag): {some}; condition of all {balance.solved.condition:.1f}.")  # fmt: skip
@@ -198,7 +173,7 @@ def of_result(
 
 def predicted(balance: Balanced, before: Run, after: Run, rig: RigFile) -> Iterator[Finding]:
     """What was measured against what was expected of the weights that were fixed in between."""
-    added = estimates.fixed(after.weights, balance.radius) - estimates.fixed(before.weights, balance.radius)
+    added = estimates.sum_weights(after.weights, balance.radius) - estimates.sum_weights(before.weights, balance.radius)
     expected = balance.unbalance[before.name].values + added
     found = balance.unbalance[after.name]
     off = found.values - expected
@@ -230,7 +205,7 @@ def _between(balance: Balanced, before: Run, after: Run, rig: RigFile) -> np.nda
     return np.asarray(np.sqrt(own + (apart**2).sum(axis=1)))
 
 
-def sheet(recorded: Recorded, code: str, rig: RigFile, plan: Settings) -> Iterator[Finding]:
+def sheet(recorded: Recorded, code: str, rig: RigFile, plan: Plan) -> Iterator[Finding]:
     """The weights that stay on the shaft, for the operator."""
     kept, radius = {w.number for w in recorded.on}, rig.geometry["balance_radius"].value
     for w, purpose in recorded.fixed:

@@ -8,22 +8,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.analysis.balance import bound, split
-from bench.calibration import Calibration
 from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
 from bench.uncertainty import propagate
 from bench.units import RPM
-from procedures.balance import estimates
 from procedures.balance.estimates import Balanced
+from procedures.balance.plan import Plan
 from procedures.balance.solution import Trials
 from procedures.balance.steps import SIDES, Read, Run, Weight
 from procedures.synchronous import bearings, runout
+from procedures.synchronous.bearings import Known
 from procedures.synchronous.runout import Stand
 
 Array = npt.NDArray[np.float64]
@@ -38,25 +37,11 @@ MILLIGRAM = 1e-6  # kg
 LIGHTEST_KG = 1e-6  # what a laboratory balance still tells from nothing
 
 
-class Settings(estimates.Settings, Protocol):
-    """The part of a plan that decides."""
-
-    @property
-    def law(self) -> str: ...
-    @property
-    def speeds_rad_s(self) -> tuple[float, ...]: ...
-    @property
-    def max_share(self) -> float: ...
-    @property
-    def positions(self) -> int: ...
-    @property
-    def trial_kg(self) -> tuple[float, float]: ...
-
-
-def gain(rig: RigFile, plan: Settings, plane: int) -> float:
+def gain(rig: RigFile, plan: Plan, plane: int) -> float:
     """Greatest response of a probe to an unbalance in a plane on the way to the highest speed, m/(kg m): a rigid shaft in the
     loop that the controller's gains are meant to make, s^2 + k2 s + k1 in each degree of freedom."""
-    stand = Stand.of({n: e.value for n, e in bearings.stated(rig, plan).items()})
+    known = bearings.Known(None, plan.beta_share, plan.offset_u_m)
+    stand = Stand.of({n: e.value for n, e in bearings.collect_inputs(rig, known).items()})
     p = {n: q.default for n, q in rig.parameters.items()}
     if plan.law == "PID":
         means = np.concatenate([np.zeros(4), np.full(8, p["bias"])])
@@ -71,7 +56,7 @@ def gain(rig: RigFile, plan: Settings, plane: int) -> float:
     return most * max(abs(1 / stand.mass + arm * at / stand.inertia) for at in (-stand.l_is, stand.l_os))
 
 
-def allowed_kg(rig: RigFile, plan: Settings, plane: int, before: float = 0.0) -> float:
+def allowed_kg(rig: RigFile, plan: Plan, plane: int, before: float = 0.0) -> float:
     """The greatest trial weight whose predicted response, beside `before` m that is there, stays within the plan's share of
     the least clearance and the envelope."""
     c, radius = rig.geometry["clearance"], rig.geometry["balance_radius"].value
@@ -79,7 +64,7 @@ def allowed_kg(rig: RigFile, plan: Settings, plane: int, before: float = 0.0) ->
     return float(min(max(room, 0.0) / gain(rig, plan, plane) / radius, rig.envelope.max_trial_weight_kg))
 
 
-def trial_kg(rig: RigFile, plan: Settings, present: Run, plane: int) -> tuple[float, float]:
+def trial_kg(rig: RigFile, plan: Plan, present: Run, plane: int) -> tuple[float, float]:
     """The trial weight to fix beside what a run with the weights that are on the shaft now showed, kg, and the heaviest that is
     allowed: the planned one, else the allowed one in whole milligrams; 0 where that is too light to tell anything by."""
     before = max(r.farthest for r in (*present.reads, *([present.again] if present.again else [])))
@@ -90,14 +75,12 @@ def trial_kg(rig: RigFile, plan: Settings, present: Run, plane: int) -> tuple[fl
     return (lighter if lighter >= LIGHTER * planned else 0.0), allowed
 
 
-def slow_runout(
-    slow: Read | None, base: Run, rig: RigFile, plan: Settings, model: Calibration | None = None
-) -> Complex:  # fmt: skip
-    """Runout (4,) m by the slow roll and the forces; none without one. `model` is the bearings' adopted calibration."""
+def slow_runout(slow: Read | None, base: Run, rig: RigFile, known: Known) -> Complex:
+    """Runout (4,) m by the slow roll and the forces, with what is known of the bearings; none without a slow roll."""
     if slow is None:
         return np.zeros(4, complex)
-    stand = Stand.of({n: e.value for n, e in bearings.stated(rig, plan, model).items()})
-    return runout.found(stand, {1.0: slow.turning}, base.fastest.turning).runout[1.0]
+    stand = Stand.of({n: e.value for n, e in bearings.collect_inputs(rig, known).items()})
+    return runout.find_runout(stand, {1.0: slow.turning}, base.fastest.turning).runout[1.0]
 
 
 @dataclass(frozen=True)
@@ -110,13 +93,11 @@ class Shown:
     turn_u: Callable[[int], float]
 
 
-def shown(
-    before: Run, having: Run, weight: Weight, rig: RigFile, plan: Settings, model: Calibration | None = None
-) -> Shown:  # fmt: skip
-    """What the forces say of a weight; runout cancels. `model` is the bearings' adopted calibration."""
+def observe(before: Run, having: Run, weight: Weight, rig: RigFile, known: Known) -> Shown:
+    """What the forces say of a weight, with what is known of the bearings; runout cancels."""
     u = weight.unbalance(rig.geometry["balance_radius"].value)
     pairs = list(zip(before.reads, having.reads, strict=True))
-    inputs = bearings.stated(rig, plan, model)
+    inputs = bearings.collect_inputs(rig, known)
 
     def added(s: Stand, k: int) -> Complex:
         none = np.zeros(4, complex)
@@ -175,7 +156,7 @@ def of_trials(inboard: Shown, outboard: Shown) -> Iterator[Finding]:
         yield Finding("weight-angle", text, "trials", Effect.ERROR)
 
 
-def slipped(run: Run) -> Iterator[Finding]:
+def find_slips(run: Run) -> Iterator[Finding]:
     """The slowest speed again at the end of a run: what turned with the shaft must be the same."""
     if run.again is None:
         return
@@ -203,16 +184,16 @@ class Correction:
     too_heavy: float = 0.0
 
 
-def reached(balance: Balanced, name: str) -> tuple[bool, bool]:
+def is_reached(balance: Balanced, name: str) -> tuple[bool, bool]:
     """Of each plane, whether the farthest point of the 95 % region of a run's unbalance lies within U_per."""
     found = balance.unbalance[name]
     inside = [bound(found.one(p)) <= balance.permissible[p].value for p in (0, 1)]
     return inside[0], inside[1]
 
 
-def correction(balance: Balanced, name: str, rig: RigFile, plan: Settings) -> Correction:
+def correction(balance: Balanced, name: str, rig: RigFile, plan: Plan) -> Correction:
     """What takes the unbalance of a run away, at the plan's positions where it has some."""
-    if all(reached(balance, name)):
+    if all(is_reached(balance, name)):
         return Correction((), reached=True)
     wanted: list[tuple[int, float, float]] = []
     for p, u in enumerate(balance.unbalance[name].values):

@@ -5,49 +5,33 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.analysis.balance import allocated, permissible
 from bench.analysis.vectors import Vectors
-from bench.calibration import Calibration
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate, welch_satterthwaite
 from bench.uncertainty.estimate import merged
-from procedures.amb_rotor.channels import AXES
+from procedures.amb_rotor.conventions import conventions
 from procedures.balance import scatter as balance_scatter
 from procedures.balance.plan import Plan
-from procedures.balance.solution import Solved, Trials, solved, taken
-from procedures.balance.steps import SIDES, Read, Recorded, Run, Weight
+from procedures.balance.solution import Solved, Trials, runout_as_unbalance, solve
+from procedures.balance.steps import SIDES, Read, Recorded, Run, Weight, read_dwell
 from procedures.balance.vector_length import amount
 from procedures.shared.certificates import certified
 from procedures.synchronous import bearings, runout
+from procedures.synchronous.bearings import Known
+from procedures.synchronous.dwells import Dwell
 from procedures.synchronous.runout import Stand, Turning
 from procedures.unbalance import estimates
+from procedures.unbalance.estimates import ForceBalance
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 BENDING = 0.1  # of (omega/omega_1)^2: docs/reference/balance.md, Uncertainty, as the next
 NONLINEAR = 3.0  # of (X/gap)^2
-
-
-class Settings(Protocol):
-    """The part of a plan that the estimates need."""
-
-    @property
-    def beta_share(self) -> float: ...
-    @property
-    def offset_u_m(self) -> float: ...
-    @property
-    def bending_hz(self) -> float: ...
-    @property
-    def refit_u_kg_m(self) -> float: ...
-    @property
-    def grade_m_s(self) -> float: ...
-    @property
-    def service_rad_s(self) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -74,7 +58,7 @@ class Result:
     influences: Mapping[tuple[str, str], tuple[Estimate, Estimate]]
 
 
-def fixed(weights: Sequence[Weight], radius: float) -> Complex:
+def sum_weights(weights: Sequence[Weight], radius: float) -> Complex:
     """Sum of weights by plane, (2,) kg m."""
     out = np.zeros(2, complex)
     for w in weights:
@@ -82,16 +66,16 @@ def fixed(weights: Sequence[Weight], radius: float) -> Complex:
     return out
 
 
-def balanced(
-    slow: Read | None, runs: Sequence[Run], trials: Trials, rig: RigFile, plan: Settings, model: Calibration | None = None
+def solve_runs(
+    slow: Read | None, runs: Sequence[Run], trials: Trials, rig: RigFile, plan: Plan, known: Known
 ) -> Balanced:  # fmt: skip
-    """Unbalance of every run in `runs`, with influences shared by their identity; `model` is the bearings' adopted calibration.
+    """Unbalance of every run in `runs`, with influences shared by their identity; `known` is what is known of the bearings.
 
     Certificates and the bearings' model go through the whole model, scatter through its linear part.
     """
     radius = rig.geometry["balance_radius"].value
-    known = {
-        **bearings.stated(rig, plan, model),
+    inputs = {
+        **bearings.collect_inputs(rig, known),
         **_weights(trials, rig),
         **_bending(),
         **_nonlinear(trials, rig),
@@ -101,19 +85,19 @@ def balanced(
     speeds = np.array([r.speed for r in trials.base.reads])
     near = (speeds / (2 * math.pi * plan.bending_hz)) ** 2 if plan.bending_hz else 0 * speeds
 
-    def solve(v: Mapping[str, float]) -> tuple[Stand, Solved]:
+    def solve_for(v: Mapping[str, float]) -> tuple[Stand, Solved]:
         s = Stand.of(v)
         some = [(complex(v[f"kg_{p}"] * v["radius"] * np.exp(1j * v[f"angle_{p}"])), _turnings(trials.before[p]),
                  _turnings(trials.having[p])) for p in (0, 1)]  # fmt: skip
-        found = solved(s, None if slow is None else slow.turning, some, _turnings(trials.base))
+        found = solve(s, None if slow is None else slow.turning, some, _turnings(trials.base))
         if slow is None:
-            lost = taken(s, _turnings(trials.base), _unknown(v), found.mark)
+            lost = runout_as_unbalance(s, _turnings(trials.base), _unknown(v), found.mark)
             found = replace(found, taken=found.taken + lost)
         bent = np.array([[v[f"bending_{j}{k}"] for k in (0, 1)] for j in (0, 1)])
         return s, replace(found, taken=found.taken + near[:, None] * (found.taken @ bent.T))
 
     def parted(v: dict[str, float]) -> dict[str, float]:
-        s, found = solve(v)
+        s, found = solve_for(v)
         out: dict[str, float] = {}
         for run in runs:
             u = found.unbalance(_readings(run) / s.gain)
@@ -122,8 +106,8 @@ def balanced(
             out |= {f"{run.name}/{k}": float(x) for k, x in enumerate(u.view(np.float64))}
         return out
 
-    out = propagate(parted, known)
-    stand, nominal = solve({name: e.value for name, e in known.items()})
+    out = propagate(parted, inputs)
+    stand, nominal = solve_for({name: e.value for name, e in inputs.items()})
     parts = {}
     for run in runs:
         scatter = balance_scatter.of_run(stand, nominal, slow, run, trials, plan.refit_u_kg_m)
@@ -132,7 +116,12 @@ def balanced(
             for e, more in zip((out[f"{run.name}/{k}"] for k in range(4)), scatter, strict=True)
         )
     return Balanced(
-        trials, nominal, {name: _vectors(p) for name, p in parts.items()}, parts, permitted(rig, plan), radius
+        trials,
+        nominal,
+        {name: _vectors(p) for name, p in parts.items()},
+        parts,
+        permissible_of_planes(rig, plan),
+        radius,
     )
 
 
@@ -201,7 +190,7 @@ def _vectors(parts: Sequence[Estimate]) -> Vectors:
     return Vectors(values, estimates.covariance(parts), min(welch_satterthwaite(e) for e in parts))
 
 
-def permitted(rig: RigFile, plan: Settings) -> tuple[Estimate, Estimate]:
+def permissible_of_planes(rig: RigFile, plan: Plan) -> tuple[Estimate, Estimate]:
     """U_per of each plane (ISO 21940-11), kg m, uncertain by the rotor's mass and the planes' places."""
     inputs = {"mass": certified("machine/mass", rig.machine["mass"]),
               "left": certified("geometry/com_to_inboard_balance", rig.geometry["com_to_inboard_balance"]),
@@ -224,18 +213,17 @@ def share(balance: Balanced, name: str, plane: int) -> Estimate:
 def influences(balance: Balanced, rig: RigFile) -> dict[tuple[str, str], tuple[Estimate, Estimate]]:
     """Influence coefficients at the highest speed by probe and plane, cosine and sine, m/(kg m): scatter of both runs, the
     trial weight, and the probe's gain."""
-    out = {}
+    out, machine = {}, conventions(rig)
     radius = certified("geometry/balance_radius", rig.geometry["balance_radius"], "radius of the weights")
     known = _weights(balance.trials, rig)
     for p, side in enumerate(SIDES):
         before, having = balance.trials.before[p], balance.trials.having[p]
         scatter = [balance_scatter.of_read(f"{r.name}/{len(r.reads) - 1}", r.fastest, 4) for r in (before, having)]
-        for k, axis in enumerate(AXES):
-            parts = [scatter[n][2 * k + j] for n in (0, 1) for j in (0, 1)]
+        for k, axis in enumerate(machine.axes):
+            parts, name = [scatter[n][2 * k + j] for n in (0, 1) for j in (0, 1)], machine.position(axis)
             inputs = {"a": parts[0], "b": parts[1], "c": parts[2], "d": parts[3], "kg": known[f"kg_{p}"],
                       "angle": known[f"angle_{p}"], "radius": radius,
-                      "gain": certified(f"sensors/pos_{axis}/gain", rig.sensors[f"pos_{axis}"].gain,
-                                        f"gain of pos_{axis}")}  # fmt: skip
+                      "gain": certified(f"sensors/{name}/gain", rig.sensors[name].gain, f"gain of {name}")}  # fmt: skip
 
             def model(v: dict[str, float]) -> dict[str, float]:
                 u = v["kg"] * v["radius"] * v["gain"] * np.exp(1j * v["angle"])
@@ -249,16 +237,8 @@ def influences(balance: Balanced, rig: RigFile) -> dict[tuple[str, str], tuple[E
     return out  # type: ignore[return-value]
 
 
-@dataclass(frozen=True)
-class Forces:
-    """Of a dwell, what `unbalance.checks` looks at: share of the forces left over, share of the weight carried (4,)."""
-
-    misfit: float
-    carried: Array
-
-
-def forces(read: Read, off: Complex, rig: RigFile, plan: Settings, model: Calibration | None = None) -> Forces:
-    """The balance of forces of one dwell, with a runout (4,) m; `model` is the bearings' adopted calibration."""
-    s = Stand.of({name: e.value for name, e in bearings.stated(rig, plan, model).items()})
+def balance_forces(d: Dwell, off: Complex, rig: RigFile, known: Known) -> ForceBalance:
+    """The balance of forces of one dwell, with a runout (4,) m and what is known of the bearings."""
+    read, s = read_dwell(d), Stand.of({name: e.value for name, e in bearings.collect_inputs(rig, known).items()})
     _, misfit = runout.unbalances(s, read.turning, off)
-    return Forces(misfit, runout.carried(s, read.means) / estimates.shares(rig, s))
+    return ForceBalance(d, misfit, runout.mean_forces(s, read.means) / estimates.shares(rig, s))

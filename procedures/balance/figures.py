@@ -12,13 +12,11 @@ from bench.analysis.sampling import lag_deg
 from bench.analysis.vectors import region
 from bench.figures import Figure, Series, Sheet, Shown
 from bench.units import RPM
-from procedures.amb_rotor.channels import AXES
 from procedures.balance.estimates import Balanced, Result
 from procedures.balance.steps import BASE, SIDES
 
 Complex = npt.NDArray[np.complex128]
 UM = 1e6
-FIRST = {"inboard": 0, "outboard": 2}  # probe y of each plane
 TURN = np.linspace(0, 2 * np.pi, 181)
 
 
@@ -31,7 +29,7 @@ def all_figures(found: Result) -> Iterator[Shown]:
         yield _residual(balance, found.last, p, side)
     for p, side in enumerate(SIDES):
         yield _sheet(found, balance, p, side)
-    for side, probe in FIRST.items():
+    for side, (probe, _) in found.recorded.machine.planes.items():
         yield _vectors(found, balance, side, probe)
 
 
@@ -63,7 +61,7 @@ def _before_and_after(found: Result, balance: Balanced) -> Sheet:
 def _vectors(found: Result, balance: Balanced, side: str, probe: int) -> Figure:
     """A probe's vectors at the highest speed, one arrow a run, and the reading that would be left of runout alone."""
     runs = found.recorded.runs
-    speed = runs[0].fastest.speed * RPM
+    speed, axes = runs[0].fastest.speed * RPM, found.recorded.machine.axes
     tips = [(r.name, complex(r.fastest.vectors.values[probe])) for r in runs]
     alone = complex(balance.solved.influence[-1, probe] @ balance.solved.taken[-1])
     tips.append(("no unbalance, runout alone", alone))
@@ -73,10 +71,10 @@ def _vectors(found: Result, balance: Balanced, side: str, probe: int) -> Figure:
         for name, z in tips
     ]  # fmt: skip
     return Figure(
-        f"vectors-{side}", f"Vectors of order 1 at probe {AXES[probe]}, {speed:.0f} r/min, by run",
+        f"vectors-{side}", f"Vectors of order 1 at probe {axes[probe]}, {speed:.0f} r/min, by run",
         f"As read, zero to peak, runout included; the angle is the phase lag from the once-per-turn mark, against "
         f"the rotation. "
-        f"A balanced shaft would read what the runout alone leaves. Probe {AXES[probe + 1]} shows the same a quarter turn "
+        f"A balanced shaft would read what the runout alone leaves. Probe {axes[probe + 1]} shows the same a quarter turn "
         "later.",
         "phase lag", "µm 0-pk", tuple(series), "vectors",
     )  # fmt: skip

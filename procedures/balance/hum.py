@@ -10,7 +10,6 @@ import numpy as np
 from bench.findings import Effect, Finding
 from bench.uncertainty import Estimate, interval
 from bench.units import RPM
-from procedures.amb_rotor.channels import AXES
 from procedures.balance.estimates import Balanced
 from procedures.balance.steps import BASE, SIDES, Recorded
 from procedures.synchronous import hum
@@ -31,10 +30,12 @@ def of_balance(
     for s, d in enumerate(dwells):
         turns, reach = d.speed / (2 * math.pi), hum.REACH / hum.duration(d)
         lines = list(found.lines(turns - reach, turns + reach))
-        off = [(*_worst(found.at(x.hz) * hum.leak(d, x.hz), s, balance, shown, influences), x) for x in lines]
+        off = [
+            (*_worst(found.at(x.hz) * hum.leak(d, x.hz), s, balance, shown, influences, found.axes), x) for x in lines
+        ]
         ratio, what, line = max(off, key=lambda o: o[0], default=(0.0, "", None))
         if line is not None and ratio > 1:
-            text = (f"{hum.told(line)} Here, at {turns:.2f} Hz, {what} may be off by {ratio:.1f} times its U. Below "
+            text = (f"{hum.describe(line)} Here, at {turns:.2f} Hz, {what} may be off by {ratio:.1f} times its U. Below "
                     f"{60 * (line.hz - reach):.0f} and above {60 * (line.hz + reach):.0f} r/min it is told apart.")  # fmt: skip
             yield Finding("hum", text, _name(d), Effect.INDETERMINATE)
 
@@ -43,7 +44,9 @@ def _name(d: Dwell) -> str:
     return f"{d.wanted * RPM:.0f} r/min"
 
 
-def _worst(h: Complex, s: int, balance: Balanced, shown: Sequence[str], influences: Influences) -> tuple[float, str]:
+def _worst(
+    h: Complex, s: int, balance: Balanced, shown: Sequence[str], influences: Influences, axes: Sequence[str]
+) -> tuple[float, str]:
     """What a line `h` (4,) m at the s-th speed moves most, over its U, and its name. It moves the readings that an unbalance
     follows from, and the influence coefficients by which it does."""
     all_ = balance.solved.influence
@@ -58,7 +61,7 @@ def _worst(h: Complex, s: int, balance: Balanced, shown: Sequence[str], influenc
             known = min(interval(e).U for e in balance.parts[run][2 * p : 2 * p + 2])
             out.append((float(moved[p]) * math.hypot(1, share) / known, f"the unbalance {side}, {run},"))
     for p, side in enumerate(SIDES if s == len(all_) - 1 else ()):  # stated at the highest speed alone
-        for k, axis in enumerate(AXES):
+        for k, axis in enumerate(axes):
             known = min(interval(e).U for e in influences[axis, side])
             out.append((TWO_RUNS * abs(h[k]) / weights[p] / known, f"the influence of a weight {side} on {axis}"))
     return max(out)

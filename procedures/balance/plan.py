@@ -1,4 +1,4 @@
-"""Settings of a balancing, and what a recording of it is made of."""
+"""Settings of a balancing."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from pydantic import Field
 
 from bench.procedure import BenchPlan
 from bench.units import RPM
-from procedures.balance.steps import BASE
-from procedures.synchronous.dwelling import Law
+from procedures.amb_rotor.conventions import Law
 
 
 class Plan(BenchPlan):
@@ -38,23 +37,3 @@ class Plan(BenchPlan):
     offset_u_m: float = Field(10e-6, ge=0)
     max_lost: float = Field(1e-3, ge=0)
     max_speed_error: float = Field(0.01, gt=0)
-
-    @property
-    def variants(self) -> tuple[str, ...]:
-        """One setting of the controller."""
-        return (BASE,)
-
-    @property
-    def observed(self) -> bool:
-        """Nothing is compensated."""
-        return False
-
-    @property
-    def orders(self) -> int:
-        """Highest order that the captures must hold."""
-        return 1
-
-    @property
-    def rate_hz(self) -> float:
-        """Of the captures, the controller's own."""
-        return 1e4

@@ -16,6 +16,7 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
+from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.balance import checks, decision, estimates, sequence
 from procedures.balance import figures as drawn
 from procedures.balance.estimates import Result
@@ -23,11 +24,10 @@ from procedures.balance.hum import of_balance
 from procedures.balance.plan import Plan
 from procedures.balance.steps import BASE, SIDES, read_runs
 from procedures.shared import assumptions
-from procedures.synchronous import bearings, dwelling
+from procedures.synchronous import bearings
 from procedures.synchronous.dwells import SLOW
-from procedures.synchronous.hum import heard
+from procedures.synchronous.hum import listen
 from procedures.unbalance import checks as unbalance_checks
-from procedures.unbalance import procedure as unbalance
 
 FOUND_COS = Quantity(
     "unbalance_cos",
@@ -80,7 +80,7 @@ MEASURES = (FOUND_COS, FOUND_SIN, LEFT_COS, LEFT_SIN, SHARE, PERMITTED, COSINE, 
 def settings(plan: Plan) -> dict[str, float]:
     """Lifted by the PID, nothing compensated."""
     del plan
-    return {"law": dwelling.CODES["PID"], "observer": 0.0, "compensate": 0.0}
+    return AMB_ROTOR.lifting
 
 
 def step_count(plan: Plan) -> int:
@@ -102,9 +102,10 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     plan, rig = recording.plan, recording.rig
     recorded = read_runs(recording, plan.speeds_rad_s)
     # every run is in all results
-    findings.add(unbalance_checks.of_signals(recorded.dwells, plan, doubts=lambda _: ()))
-    model = bearings.adopted_bearings(recording)
-    findings.add(checks.of_runs(recorded, rig, plan, model))
+    findings.add(unbalance_checks.of_signals(recorded.dwells, plan.max_lost, plan.max_speed_error, doubts=lambda _: ()))
+    findings.add(unbalance_checks.slow_roll(recorded.dwells, plan.speeds_rad_s))
+    known = bearings.Known.of(recording.calibrations, plan.beta_share, plan.offset_u_m)
+    findings.add(checks.of_runs(recorded, rig, plan, known))
     trials = decision.trials_of(recorded.runs, rig, plan.leave)
     if trials is None and not findings.wrong:
         text = "the runs with trial weights were not completed: no influence coefficients."
@@ -114,12 +115,12 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
         raise Ended
     verified = [r for r in recorded.runs if r.name.startswith("check")]
     shown = [trials.base, *([trials.having[1]] if plan.leave else []), *verified]
-    balance = estimates.balanced(recorded.slow, shown, trials, rig, plan, model)
+    balance = estimates.solve_runs(recorded.slow, shown, trials, rig, plan, known)
     result = Result(plan, balance, recorded, shown[-1].name, estimates.influences(balance, rig))
-    findings.add([bearings.told(model, plan)])
+    findings.add([bearings.describe(known)])
     findings.add(checks.of_result(balance, recorded, shown, plan, rig))
     slow = next((d for d in recorded.dwells if d.kind == SLOW), None)
-    findings.add(of_balance(heard(recording, slow), recorded, balance, (BASE, result.last), result.influences))
+    findings.add(of_balance(listen(recording, slow), recorded, balance, (BASE, result.last), result.influences))
     return result
 
 
@@ -165,7 +166,7 @@ procedure = Procedure(
     settings=settings,
     step_count=step_count,
     fewest_steps=fewest_steps,
-    needs=unbalance.needs,
+    needs=lambda plan: bearings.needs(plan.bearings),
     assumes=assumptions.BALANCE,
     method=read_method(__file__),
 )

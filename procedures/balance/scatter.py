@@ -13,9 +13,9 @@ import numpy.typing as npt
 
 from bench.analysis.vectors import estimates
 from bench.uncertainty import Estimate, Influence
-from procedures.balance.solution import Solved, Trials, taken
+from procedures.balance.solution import Solved, Trials, runout_as_unbalance
 from procedures.balance.steps import Read, Run
-from procedures.synchronous.runout import Stand, Turning, found
+from procedures.synchronous.runout import Stand, Turning, find_runout
 
 Complex = npt.NDArray[np.complex128]
 Terms = list[tuple[float, Estimate]]
@@ -101,8 +101,11 @@ def _slow(s: Stand, solution: Solved, slow: Read, trials: Trials) -> Complex:
     base = [r.turning for r in trials.base.reads]
 
     def at(vectors: Complex) -> Complex:
-        return taken(
-            s, base, found(s, {1.0: Turning(slow.speed, slow.means, vectors)}, base[-1]).runout[1.0], solution.mark
+        return runout_as_unbalance(
+            s,
+            base,
+            find_runout(s, {1.0: Turning(slow.speed, slow.means, vectors)}, base[-1]).runout[1.0],
+            solution.mark,
         )
 
     start, size = at(slow.vectors.values), 1e-6

@@ -10,12 +10,11 @@ from bench.procedure.roles import Plane, RigState
 from bench.procedure.states import transition
 from bench.recording.recorder import Recorder
 from procedures.amb_rotor import lift
-from procedures.amb_rotor.channels import CONTACT
+from procedures.amb_rotor.conventions import conventions
 from procedures.balance import decision, estimates
 from procedures.balance.plan import Plan
 from procedures.balance.steps import (
     BASE,
-    CAPTURED,
     DECISION,
     LIGHTER,
     MOUNT,
@@ -25,13 +24,14 @@ from procedures.balance.steps import (
     Read,
     Run,
     Weight,
+    captured_channels,
     read_capture,
 )
-from procedures.synchronous import bearings as unbalance_bearings
-from procedures.synchronous import dwelling
+from procedures.synchronous import bearings, dwelling
 from procedures.synchronous.dwells import DWELL, SLOW
 
 SLOW_HZ = 500.0  # of the slow roll's capture
+MARGIN_S = 0.1  # of a dwell beside its capture
 
 
 @dataclass
@@ -47,14 +47,19 @@ class Work:
     fixed: int = 0
     dwells: int = 0
 
+    @property
+    def known(self) -> bearings.Known:
+        """What is known of the bearings."""
+        return bearings.Known.of(self.record.calibrations, self.plan.beta_share, self.plan.offset_u_m)
+
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Look, lift and nudge; slow roll and base run; a run with a trial weight in each plane; corrections, each verified."""
     work = Work(rig, plan, record)
-    if not lift.probed(rig, record):
+    if not lift.lift_and_nudge(rig, record):
         return
-    dwelling.put(rig, {"law": dwelling.CODES[plan.law], **dwelling.SETTINGS["off"]})
-    if not _rolled(work) or not _run(work, BASE):
+    dwelling.select(rig, plan.law)
+    if not _roll(work) or not _run(work, BASE):
         return
     for p, side in enumerate(SIDES):
         kg, allowed = decision.trial_kg(rig.file, plan, work.runs[-1 if plan.leave else 0], p)
@@ -63,24 +68,24 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         if not kg:
             return
         _mount(work, p, kg, plan.trial_angle_rad[p], "trial")
-        if not _run(work, f"trial {side}") or not _acted(work, p):
+        if not _run(work, f"trial {side}") or not _has_acted(work, p):
             return
         if not plan.leave:
             _unmount(work, p)
     _correct(work)
 
 
-def _rolled(work: Work) -> bool:
+def _roll(work: Work) -> bool:
     """The slow roll, where the plan has one."""
     rig, plan = work.rig, work.plan
     if not plan.slow_rad_s:
         return True
-    if not lift.turned(rig, work.record, plan.slow_rad_s, plan.settle_s):
-        dwelling.finished(rig)
+    if not lift.bring_to_speed(rig, work.record, plan.slow_rad_s, plan.settle_s):
+        dwelling.stop(rig)
         return False
     work.slow = _dwell(work, SLOW, BASE, plan.slow_rad_s, plan.slow_s, plan.slow_s, SLOW_HZ)
     if work.slow is None:
-        dwelling.finished(rig)
+        dwelling.stop(rig)
     return work.slow is not None
 
 
@@ -89,23 +94,23 @@ def _run(work: Work, name: str) -> bool:
     rig, plan = work.rig, work.plan
     if rig.levitation.state is RigState.READY:  # the base run goes on from the slow roll
         transition(rig, RigState.LEVITATED)
-    dwelling.put(rig, {"law": dwelling.CODES[plan.law], **dwelling.SETTINGS["off"]})
+    dwelling.select(rig, plan.law)
     reads: list[Read] = []
     speeds = sorted(plan.speeds_rad_s)
     for speed in (*speeds, *(speeds[:1] if plan.repeat else ())):
-        if not lift.turned(rig, work.record, speed, plan.settle_s):
+        if not lift.bring_to_speed(rig, work.record, speed, plan.settle_s):
             break
         read = _dwell(work, DWELL, name, speed, plan.dwell_s, plan.capture_s, None, again=len(reads) == len(speeds))
         if read is None or not read.sound or abs(read.speed / speed - 1) > plan.max_speed_error:
             break  # the analysis says why
         reads.append(read)
-    dwelling.finished(rig)
+    dwelling.stop(rig)
     transition(rig, RigState.READY)
     if len(reads) < len(speeds) + plan.repeat:
         return False
     run = Run(name, tuple(work.mounted), tuple(reads[: len(speeds)]), reads[-1] if plan.repeat else None)
     work.runs.append(run)
-    return not list(decision.slipped(run))
+    return not list(decision.find_slips(run))
 
 
 def _dwell(
@@ -113,19 +118,19 @@ def _dwell(
     again: bool = False,
 ) -> Read | None:  # fmt: skip
     """A recorded dwell and what its capture says, None where that cannot be told."""
-    rig, number = work.rig, -1 if again else work.dwells
+    rig, number, machine = work.rig, -1 if again else work.dwells, conventions(work.rig.file)
     assert rig.capture is not None  # `check` refuses a rig without one
     driven = rig.drive.speed_rad_s if rig.drive is not None else 0.0
     labels = {"speed_rad_s": speed, "variant": name, "driven_rad_s": driven, "number": number, "again": again}
     with work.record.step(kind, **labels):
-        rig.capture.arm(CAPTURED, seconds=capture_s, rate_hz=rate_hz)
+        rig.capture.arm(captured_channels(machine), seconds=capture_s, rate_hz=rate_hz)
         rig.capture.wait(capture_s + 5.0)
-        rig.clock.sleep(max(seconds - capture_s, dwelling.MARGIN_S))
+        rig.clock.sleep(max(seconds - capture_s, MARGIN_S))
     work.dwells += 1
-    touched = int(rig.levitation.reading("flags")) & CONTACT
+    touched = int(rig.levitation.reading("flags")) & machine.contact
     data = rig.capture.upload(run=name, speed_rad_s=speed)
     try:
-        return None if touched else read_capture(data, kind == SLOW)
+        return None if touched else read_capture(data, machine, kind == SLOW)
     except AnalysisError:
         return None  # of the pulses; the analysis says what is wrong with them
 
@@ -150,12 +155,11 @@ def _unmount(work: Work, plane: int) -> None:
     work.mounted = [w for w in work.mounted if w.plane != plane]
 
 
-def _acted(work: Work, plane: int) -> bool:
+def _has_acted(work: Work, plane: int) -> bool:
     """Whether the trial weight of the last run did what it should."""
     base, last = work.runs[0], work.runs[-1]
     before = work.runs[-2] if work.plan.leave else base
-    bearings = unbalance_bearings.adopted_bearings(work.record)
-    shown = decision.shown(before, last, last.weights[-1], work.rig.file, work.plan, bearings)
+    shown = decision.observe(before, last, last.weights[-1], work.rig.file, work.known)
     return not list(decision.of_trial(shown))
 
 
@@ -164,14 +168,13 @@ def _correct(work: Work) -> None:
     rig, plan = work.rig.file, work.plan
     trials = decision.trials_of(work.runs, rig, plan.leave)
     assert trials is not None
-    bearings = unbalance_bearings.adopted_bearings(work.record)
     by_plane = zip(trials.before, trials.having, trials.weights, strict=True)
-    inboard, outboard = (decision.shown(*of, rig, plan, bearings) for of in by_plane)
+    inboard, outboard = (decision.observe(*of, rig, work.known) for of in by_plane)
     if list(decision.of_trials(inboard, outboard)):
         return
     present = work.runs[-1] if plan.leave else trials.base
     for n in range(plan.corrections):
-        found = estimates.balanced(work.slow, [present], trials, rig, plan, bearings)
+        found = estimates.solve_runs(work.slow, [present], trials, rig, plan, work.known)
         needed = decision.correction(found, present.name, rig, plan)
         work.record.event(DECISION, run=present.name, reached=needed.reached, too_heavy_kg=needed.too_heavy)
         if needed.reached or needed.too_heavy or not needed.weights:  # what is missing is not a matter of weights

@@ -58,11 +58,11 @@ class Solved:
         return np.asarray(np.linalg.lstsq(a, clean.reshape(-1), rcond=None)[0])
 
 
-def solved(s: Stand, slow: Turning | None, trials: Sequence[Trial], base: Sequence[Turning]) -> Solved:
+def solve(s: Stand, slow: Turning | None, trials: Sequence[Trial], base: Sequence[Turning]) -> Solved:
     """Influence coefficients and what they need, of one set of numbers. `trials` by plane: weight kg m on the scale, readings
     by speed before it was fixed and with it. The
     mark's angle is that of the highest speed, where masses rule and not the bearings."""
-    found = np.zeros(4, complex) if slow is None else runout.found(s, {1.0: slow}, base[-1]).runout[1.0]
+    found = np.zeros(4, complex) if slow is None else runout.find_runout(s, {1.0: slow}, base[-1]).runout[1.0]
     count = len(base)
     influence, moved = np.zeros((count, 4, 2), complex), np.zeros((2, 2), complex)
     for p, (u, before, having) in enumerate(trials):
@@ -72,10 +72,10 @@ def solved(s: Stand, slow: Turning | None, trials: Sequence[Trial], base: Sequen
                 none = np.zeros(4, complex)
                 moved[p] = (runout.unbalances(s, b, none)[0] - runout.unbalances(s, a, none)[0]) / u
     mark = float(np.angle(moved[0, 0] + moved[1, 1]))
-    return Solved(influence, moved * np.exp(-1j * mark), mark, found, taken(s, base, found, mark))
+    return Solved(influence, moved * np.exp(-1j * mark), mark, found, runout_as_unbalance(s, base, found, mark))
 
 
-def taken(s: Stand, base: Sequence[Turning], off: Complex, mark: float) -> Complex:
+def runout_as_unbalance(s: Stand, base: Sequence[Turning], off: Complex, mark: float) -> Complex:
     """The unbalance by speed (s, 2) kg m on the scale that a runout `off` (4,) m is taken for."""
     back = np.exp(-1j * mark)
     out: Complex = np.array([runout.as_unbalance(s, t.means, off, t.speed) * back for t in base])

@@ -16,7 +16,7 @@ from bench.analysis.tachometer import Tachometer, counted, tachometer
 from bench.analysis.vectors import Vectors
 from bench.recording import Recording
 from bench.rigfile.capture import CaptureData
-from procedures.amb_rotor.channels import CURRENTS, POSITIONS
+from procedures.amb_rotor.conventions import AmbRotor
 from procedures.synchronous.dwells import SLOW, Dwell, read_dwells
 from procedures.synchronous.nonsynchronous import folds
 from procedures.synchronous.runout import Turning
@@ -25,7 +25,6 @@ Array = npt.NDArray[np.float64]
 MOUNT, UNMOUNT, DECISION, REFUSED, LIGHTER = "mount", "unmount", "decision", "trial-refused", "trial-lighter"
 BASE = "base"
 SIDES = ("inboard", "outboard")
-CAPTURED = (*POSITIONS, *CURRENTS, "pulses", "pulse_age")
 
 
 @dataclass(frozen=True)
@@ -81,7 +80,12 @@ class Run:
         return self.reads[-1]
 
 
-def read_capture(data: CaptureData, slow: bool = False) -> Read:
+def captured_channels(machine: AmbRotor) -> tuple[str, ...]:
+    """What is captured in a dwell of a balancing: no voltages."""
+    return (*machine.positions, *machine.currents, "pulses", "pulse_age")
+
+
+def read_capture(data: CaptureData, machine: AmbRotor, slow: bool = False) -> Read:
     """Vectors of a capture that was just uploaded. At slow roll the higher orders are the runout's: they are left out.
 
     Raises:
@@ -90,7 +94,8 @@ def read_capture(data: CaptureData, slow: bool = False) -> Read:
     c: Mapping[str, Array] = data.columns
     t = np.arange(len(c["pulses"])) / data.rate_hz
     tacho: Tachometer = tachometer(*counted(t, c["pulses"], c["pulse_age"]))
-    track = synchronous(t, np.array([c[n] for n in (*POSITIONS, *CURRENTS)]), tacho, Sampling(1 / data.rate_hz))
+    wide = np.array([c[n] for n in (*machine.positions, *machine.currents)])
+    track = synchronous(t, wide, tacho, Sampling(1 / data.rate_hz))
     return Read(float(track.speed[0]), np.asarray(track.means[0]), track.vectors(0, range(12)), tacho.sound,
                 higher={} if slow else _higher(track))  # fmt: skip
 
@@ -115,6 +120,11 @@ class Recorded:
     runs: tuple[Run, ...]
     fixed: tuple[tuple[Weight, str], ...]
     on: tuple[Weight, ...]
+
+    @property
+    def machine(self) -> AmbRotor:
+        """Whose dwells they are."""
+        return self.dwells[0].machine
 
     def of(self, name: str) -> list[Dwell]:
         """Dwells of a run."""

@@ -25,7 +25,7 @@ from scipy import linalg
 from bench.errors import AnalysisError
 from bench.uncertainty import Estimate
 from procedures.amb_rotor import magnetics
-from procedures.amb_rotor.magnetics import AXES, Positions
+from procedures.amb_rotor.magnetics import Positions
 from procedures.shared.leastsquares import Fit
 from procedures.shared.type_a import scatter
 
@@ -138,13 +138,13 @@ def _inverse(design: Array) -> Array:
 
 
 def _adjusted(problem: _Problem, inputs: Mapping[str, Estimate], x: Array, weighed: Array, noise: Array) -> Adjusted:
-    count, size = problem.means.read.shape[1], len(x)
+    count, size, axes = problem.means.read.shape[1], len(x), problem.means.machine.axes
     slopes, left = problem.slopes(x), problem.left(x).reshape(4, count)
     weighted = slopes * np.repeat(1 / weighed, count)[:, None]
     inverse = _inverse(np.vstack([weighted, np.eye(size)[8:]]))
     units = np.concatenate([np.tile([BETA_UNIT, OFFSET_UNIT], 4), problem.u])
     values = problem.inputs(x[8:])
-    rows = {f"{what}_{a}": 2 * k + j for k, a in enumerate(AXES) for j, what in enumerate(("beta", "offset"))}
+    rows = {f"{what}_{a}": 2 * k + j for k, a in enumerate(axes) for j, what in enumerate(("beta", "offset"))}
     rows["gap"] = 8 + problem.names.index("gap")
     estimates = {}
     for name, row in rows.items():
@@ -154,7 +154,7 @@ def _adjusted(problem: _Problem, inputs: Mapping[str, Estimate], x: Array, weigh
     terms = (x[:8] * units[:8]).reshape(4, 2)
     random = weighted * np.repeat(noise / weighed, count)[:, None]
     by_noise = inverse @ (random.T @ random) @ inverse * np.outer(units, units)
-    for k, a in enumerate(AXES):
+    for k, a in enumerate(axes):
         of = slice(2 * k, 2 * k + 2)
         rows_of_k = slopes[k * count : (k + 1) * count, of] / units[of]
         fit = Fit(terms[k], by_noise[of, of], -left[k], float(left[k] @ left[k]), count - 2, rows_of_k)

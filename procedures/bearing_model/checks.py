@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Protocol
 
 import numpy as np
 
 from bench.findings import Effect, Finding
 from bench.uncertainty import Estimate, Influence, coverage_factor, welch_satterthwaite
 from procedures.amb_rotor import magnetics
-from procedures.amb_rotor.magnetics import AXES
-from procedures.amb_rotor.places import CURRENTS, POSITIONS, Held
+from procedures.amb_rotor.conventions import AmbRotor
+from procedures.amb_rotor.places import Held
 from procedures.bearing_model.comparison import BEARINGS
 from procedures.bearing_model.estimates import Analysis
+from procedures.bearing_model.plan import Plan
 from procedures.shared import signals
 
 FATAL = (
@@ -29,41 +29,16 @@ FATAL = (
     "model-fails",
 )
 """Findings after which the numbers mean nothing: none is given."""
-FLAGS = (
-    (1, "saturated", "a coil was at its current limit"),
-    (2, "saturated", "a coil was at its voltage limit"),
-    (4, "contact", "the shaft touched the inboard touchdown ring"),
-    (8, "contact", "the shaft touched the outboard touchdown ring"),
-    (32, "contact", "the shaft touched the axial stop"),
-    (64, "clipped", "a position sensor was beyond its range"),
-)  # bits of the telemetry signal `flags`
 CONTRADICTED = 4.0  # times its u may an adjustment be: one rig in some hundred by chance, of about fifty inputs
 ALIKE = 0.9  # of the greatest: inputs that act alike are suspected together
 
 
-class Tolerances(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def average_s(self) -> float: ...
-    @property
-    def max_speed_m_s(self) -> float: ...
-    @property
-    def max_misfit(self) -> float: ...
-    @property
-    def min_ratio(self) -> float: ...
-    @property
-    def max_lost(self) -> float: ...
-    @property
-    def coupled(self) -> bool: ...
-
-
-def of_signals(held: Held, tilted: Held, plan: Tolerances) -> Iterator[Finding]:
+def of_signals(held: Held, tilted: Held, plan: Plan) -> Iterator[Finding]:
     """Lost samples, stuck channels, flags, and a shaft that moves within a step."""
     yield from signals.losses(held.lost, held.expected, plan.max_lost, held.where)
-    yield from signals.stuck(held.spread, (*POSITIONS, *CURRENTS))
+    yield from signals.stuck(held.spread, (*held.machine.positions, *held.machine.currents))
     yield from _flags(held, tilted)
-    speed = np.abs([held.drift[c] for c in POSITIONS]).max(axis=0) / (plan.average_s / 2)
+    speed = np.abs([held.drift[c] for c in held.machine.positions]).max(axis=0) / (plan.average_s / 2)
     if speed.max() > plan.max_speed_m_s:
         text = (
             f"the shaft moves at up to {speed.max() * 1e6:.2g} µm/s within a step, {plan.max_speed_m_s * 1e6:.2g} µm/s "
@@ -72,8 +47,18 @@ def of_signals(held: Held, tilted: Held, plan: Tolerances) -> Iterator[Finding]:
         yield Finding("unsettled", text, held.where(speed), Effect.INDETERMINATE)
 
 
+def _meanings(m: AmbRotor) -> Iterator[tuple[int, str, str]]:
+    """Flags that speak against a position: bits, the finding's code, its words."""
+    yield m.current_limit, "saturated", "a coil was at its current limit"
+    yield m.voltage_limit, "saturated", "a coil was at its voltage limit"
+    for plane, bit in m.rings.items():
+        yield bit, "contact", f"the shaft touched the {plane} touchdown ring"
+    yield m.axial_stop, "contact", "the shaft touched the axial stop"
+    yield m.sensor_range, "clipped", "a position sensor was beyond its range"
+
+
 def _flags(held: Held, tilted: Held) -> Iterator[Finding]:
-    for bit, code, text in FLAGS:
+    for bit, code, text in _meanings(held.machine):
         effect = Effect.ERROR if code in FATAL else Effect.INDETERMINATE
         for data in (held, tilted):
             hit = (data.flags & bit) != 0
@@ -82,10 +67,10 @@ def _flags(held: Held, tilted: Held) -> Iterator[Finding]:
                 yield Finding(code, said, data.where(hit.astype(float)), effect)
 
 
-def of_results(a: Analysis, plan: Tolerances) -> Iterator[Finding]:
+def of_results(a: Analysis, plan: Plan) -> Iterator[Finding]:
     """The gap that the data ask for, the offset's sign, and the comparison with the linear model."""
     yield from _adjustments(a, plan)
-    for axis in AXES:
+    for axis in a.held.machine.axes:
         offset = a.estimates[f"offset_{axis}"]
         if offset.value + expanded(offset) < 0:
             text = (
@@ -102,13 +87,15 @@ def of_results(a: Analysis, plan: Tolerances) -> Iterator[Finding]:
                 f"{plan.min_ratio:g} is expected: the offset does not show at this bias, or the nonlinear model fits no "
                 "better."
             )
-            axes = [a for a in AXES if a.endswith(end)]
-            doubted = tuple(f"{q}_{a}" for q in ("beta", "offset") for a in axes)  # the ratio itself is what it is
+            axes = [name for name in a.held.machine.axes if name.endswith(end)]
+            doubted = tuple(
+                f"{q}_{name}" for q in ("beta", "offset") for name in axes
+            )  # the ratio itself is what it is
             yield Finding("linear-suffices", text, where, Effect.INDETERMINATE, doubted)
-    yield _compared(a)
+    yield _compare(a)
 
 
-def _compared(a: Analysis) -> Finding:
+def _compare(a: Analysis) -> Finding:
     """The linear model's two numbers beside the bearing's slopes, and the noise under both residual sums."""
     said = []
     for axis, f in a.fits.items():
@@ -129,7 +116,7 @@ def expanded(e: Estimate) -> float:
     return coverage_factor(welch_satterthwaite(e)) * e.u
 
 
-def _adjustments(a: Analysis, plan: Tolerances) -> Iterator[Finding]:
+def _adjustments(a: Analysis, plan: Plan) -> Iterator[Finding]:
     """Do the positions fit the certificates, and what is left then?"""
     pulls = a.adjusted.pulls
     worst = max(abs(v) for v in pulls.values())
@@ -139,7 +126,7 @@ def _adjustments(a: Analysis, plan: Tolerances) -> Iterator[Finding]:
         spring = "" if plan.coupled else " The plan says that the coupling is off: is it?"
         text = f"the positions contradict a certificate by {worst:.1f} standard deviations. Suspect: {listed}.{spring}"
         yield Finding("certificate-contradicted", text, _influence(a, suspects[0]).id, Effect.INDETERMINATE)
-    for k, axis in enumerate(AXES):
+    for k, axis in enumerate(a.held.machine.axes):
         load, left = float(np.abs(a.statics.force[k]).mean()), np.abs(a.adjusted.residuals[k])
         if left.max() > plan.max_misfit * load:
             text = (

@@ -13,7 +13,8 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from procedures.amb_rotor import magnetics
-from procedures.amb_rotor.magnetics import AXES, COILS, AxisFit, Statics
+from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.magnetics import AxisFit, Statics
 from procedures.amb_rotor.places import Held
 from procedures.bearing_model import comparison
 from procedures.bearing_model.adjustment import Adjusted, adjust
@@ -62,7 +63,7 @@ def evaluate(recording: Recording[Any], held: Held) -> Analysis:
     compared = magnetics.statics(chosen.means(), found.values)
     estimates = dict(found.estimates)
     fits, noise = {}, {}
-    for k, a in enumerate(AXES):
+    for k, a in enumerate(held.machine.axes):
         linear = magnetics.linear(compared.r[k], compared.p[k], compared.n[k], compared.force[k])
         fits[a] = AxisFit(found.terms[k], found.residuals[k], linear)
         slopes = {f"k_linear_{a}": [1, 0], f"stiffness_linear_{a}": [0, 1]}
@@ -95,7 +96,7 @@ def _start(held: Held, values: dict[str, float]) -> tuple[Array, Array, Array]:
 
 def fit_inputs(rig: RigFile, coupled: bool) -> dict[str, Estimate]:
     """What the fits need besides the positions: certificates of the rig file as influences by identity."""
-    g, m = rig.geometry, rig.machine
+    g, m, machine = rig.geometry, rig.machine, conventions(rig)
     inputs = {"mass": certified("machine/mass", m["mass"], "mass of the shaft"),
               "axes": certified("machine/radial_axes", m["radial_axes"], "angle of the axes to the vertical"),
               "gravity": certified("site/gravity", rig.site.gravity, "gravity")}  # fmt: skip
@@ -105,14 +106,14 @@ def fit_inputs(rig: RigFile, coupled: bool) -> dict[str, Estimate]:
     for d in "yz":
         name = f"machine/coupling_offset/{d}"
         inputs[f"relaxed_{d}"] = certified(name, m["coupling_offset"], f"where the coupling is relaxed, {d}")
-    for a in AXES:
+    for a in machine.axes:
         sensor, name = rig.sensors[f"pos_{a}"], f"sensors/pos_{a}"
         inputs[f"gain_{a}"] = certified(f"{name}/gain", sensor.gain, f"gain of pos_{a}")
         inputs[f"zero_{a}"] = certified(f"{name}/offset", sensor.offset, f"zero of pos_{a}")
         inputs[f"runout_{a}"] = certified(
             f"machine/runout/{a}", m["runout"], f"runout of pos_{a} where the shaft rests"
         )
-    for c in COILS:
+    for c in machine.coils:
         sensor, name = rig.sensors[f"i_{c}"], f"sensors/i_{c}"
         inputs[f"gain_{c}"] = certified(f"{name}/gain", sensor.gain, f"gain of i_{c}")
         inputs[f"offset_{c}"] = certified(f"{name}/offset", sensor.offset, f"offset of i_{c}")

@@ -9,7 +9,6 @@ import numpy as np
 from bench.figures import Figure, Series
 from bench.rigfile import RigFile
 from procedures.amb_rotor import magnetics
-from procedures.amb_rotor.magnetics import AXES
 from procedures.bearing_model.estimates import Analysis
 
 DISPLACEMENT = "displacement at the AMB (µm)"
@@ -23,7 +22,7 @@ def all_figures(a: Analysis, rig: RigFile) -> list[Figure]:
 def _places(a: Analysis, rig: RigFile) -> Figure:
     turn = np.linspace(0, 2 * np.pi, 181)
     radius = 1e6 * rig.geometry["clearance"].value
-    yi, zi, yo, zo = (1e6 * a.held.mean[f"pos_{axis}"] for axis in AXES)
+    yi, zi, yo, zo = (1e6 * a.held.mean[name] for name in a.held.machine.positions)
     series = (
         Series("touchdown ring", radius * np.cos(turn), radius * np.sin(turn), "guide"),
         Series("inboard", yi, zi, "points"),
@@ -35,7 +34,7 @@ def _places(a: Analysis, rig: RigFile) -> Figure:
 
 def _currents(a: Analysis) -> Figure:
     control = (a.statics.p - a.statics.n) / 2
-    series = (Series(axis, 1e6 * a.statics.r[k], control[k], "points") for k, axis in enumerate(AXES))
+    series = (Series(axis, 1e6 * a.statics.r[k], control[k], "points") for k, axis in enumerate(a.held.machine.axes))
     caption = (
         "Half the difference of both coils' currents that carries the shaft, over the displacement at the AMB. "
         "It falls towards the upper coils, which pull by themselves; there is one row of points for each bias."
@@ -54,15 +53,18 @@ def _residuals(a: Analysis) -> Iterator[Figure]:
         ("residuals-linear", f"linear model without intercept (T 2.9) at {a.bias_A:g} A", a.compared, of_linear),
         ("residuals-nonlinear", "nonlinear model (T 2.8)", a.statics, of_nonlinear),
     ):
-        series = tuple(Series(axis, 1e6 * at.r[k], 1e3 * residuals[axis], "points") for k, axis in enumerate(AXES))
+        series = tuple(
+            Series(axis, 1e6 * at.r[k], 1e3 * residuals[axis], "points") for k, axis in enumerate(a.held.machine.axes)
+        )
         title = f"Residuals of the {name}"
         yield Figure(key, title, caption, DISPLACEMENT, "residual (mN)", series, lines=(("zero", 0.0),))
 
 
 def _forces(a: Analysis) -> Figure:
     """Force of the magnets at equal currents over position: the fit's, and the linear model's line."""
-    axis, bias = "yi", a.bias_A
-    k, f = AXES.index(axis), a.fits[axis]
+    k, bias = 0, a.bias_A
+    axis = a.held.machine.axes[k]
+    f = a.fits[axis]
     r = np.linspace(float(a.compared.r[k].min()), float(a.compared.r[k].max()), 60)
     both = np.full_like(r, bias)
     pull = magnetics.magnet(f.beta, f.offset, a.adjusted.values["gap"], r, both, both)

@@ -11,12 +11,10 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator
 
-from pydantic import Field
-
 from bench.errors import DeviceFault, OperatorAbort
 from bench.figures import Figure
 from bench.findings import Finding, Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
@@ -25,14 +23,16 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.amb_rotor import rings
-from procedures.amb_rotor.magnetics import AXES
-from procedures.amb_rotor.places import CURRENTS, HOLD, LIFT, LIFT_LOST, POSITIONS, REST, TILT, Held, read_steps
+from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
+from procedures.amb_rotor.places import HOLD, LIFT, LIFT_LOST, REST, TILT, Held, channels, read_steps
 from procedures.bearing_model import checks, estimates, wiring
 from procedures.bearing_model import figures as drawn
 from procedures.bearing_model.comparison import BEARINGS, COMPARED
 from procedures.bearing_model.estimates import Analysis
+from procedures.bearing_model.plan import Plan
 from procedures.shared import assumptions
 
+AXES = AMB_ROTOR.axes
 BETA = {a: Quantity(f"beta_{a}", "N m^2/A^2", f"force constant of axis {a}, at the same gap for all") for a in AXES}
 OFFSET = {
     a: Quantity(f"offset_{a}", "m", f"axis {a}: from the magnetic centre to where the sensors read zero") for a in AXES
@@ -51,11 +51,11 @@ OF_LINEAR = {
     ),
 }
 MEASURES = (*BETA.values(), *OFFSET.values(), *OF_LINEAR.values())
-CCS = 1.0
 REST_S = 0.3
 BIAS_STEP_A = 0.1
 MARGIN = 5e-6  # of the radius: noise, and what the controller swings on the way
-PARAMETERS = ("law", "bias", "integral", "ref_y", "ref_z", "ref_psi", "ref_theta", "slew", "current_limit")
+POINTS = tuple(AMB_ROTOR.set_points[name] for name in ("y", "z", "psi", "theta"))
+PARAMETERS = (AMB_ROTOR.law, "bias", AMB_ROTOR.integral, *POINTS, "slew", "current_limit")
 GEOMETRY = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_outboard_amb", "amb_span", "amb_gap", "clearance",
             "com_to_coupling", "coupling_stiffness")  # fmt: skip
 MACHINE = ("mass", "radial_axes", "runout", "coupling_offset")
@@ -66,28 +66,9 @@ result's standard uncertainty is less than what the positions say of it, both as
 ASKED = "Is the motor's coupling taken off the shaft, so that nothing but the AMBs holds it?"
 
 
-class Plan(BenchPlan):
-    """Settings, SI. Positions are a grid of the centre of mass in y and z, within a circle."""
-
-    spacing_m: float = Field(20e-6, gt=0)
-    radius_m: float = Field(82e-6, gt=0)
-    tilt_rad: float = Field(3e-4, gt=0)  # of the check of the wiring
-    biases_A: tuple[float, ...] = Field(
-        (1.15, 0.8), min_length=1
-    )  # of each pass; T Table 2.2 is compared with the first
-    coupled: bool = True  # False: the operator has taken the coupling off
-    settle_s: float = Field(0.6, gt=0)
-    average_s: float = Field(0.5, ge=0.1)
-    batches: int = Field(5, ge=2)  # parts of a step; longer than the loop's swings
-    max_speed_m_s: float = Field(5e-6, gt=0)  # a shaft that moves faster is not at rest
-    max_misfit: float = Field(0.005, gt=0)  # a position's residual over the mean load of its axis
-    min_ratio: float = Field(20.0, gt=1)  # of the residual sums, over samples and over batch means
-    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
-
-
 def settings(plan: Plan) -> dict[str, float]:
     """Controller parameters that the runner writes before levitation: flatness with constant current sum."""
-    return {"law": CCS, "bias": plan.biases_A[0], "integral": 1.0}
+    return {**AMB_ROTOR.select("CCS"), "bias": plan.biases_A[0], AMB_ROTOR.integral: 1.0}
 
 
 def grid(plan: Plan) -> list[tuple[float, float]]:
@@ -118,25 +99,27 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         raise OperatorAbort("the coupling is on the shaft; expected it off, or a plan with coupled = true")
     with record.step(REST):
         rig.clock.sleep(REST_S)
-    readings = {name: rig.levitation.reading(name) for name in POSITIONS}
-    if any(rings.of_readings(readings, rig.file)) or not _lifted(rig, record):
+    machine = conventions(rig.file)
+    readings = {name: rig.levitation.reading(name) for name in machine.positions}
+    if any(rings.of_readings(readings, rig.file)) or not _lift(rig, record):
         return
     rig.clock.sleep(3 * plan.settle_s)
-    _tilted(rig, plan, record)
+    _tilt(rig, plan, record)
+    ref_y, ref_z = machine.set_points["y"], machine.set_points["z"]
     for k, bias in enumerate(plan.biases_A):
-        _biased(rig, plan, bias)
+        _set_bias(rig, plan, bias)
         for y, z in grid(plan) if k % 2 == 0 else reversed(grid(plan)):
-            rig.levitation.set("ref_y", y)
-            rig.levitation.set("ref_z", z)
+            rig.levitation.set(ref_y, y)
+            rig.levitation.set(ref_z, z)
             rig.clock.sleep(plan.settle_s)
             with record.step(HOLD, y_m=y, z_m=z, bias_A=bias):
                 rig.clock.sleep(plan.average_s)
-    rig.levitation.set("ref_y", 0.0)
-    rig.levitation.set("ref_z", 0.0)
+    rig.levitation.set(ref_y, 0.0)
+    rig.levitation.set(ref_z, 0.0)
     rig.clock.sleep(plan.settle_s)
 
 
-def _lifted(rig: Rig, record: Recorder) -> bool:
+def _lift(rig: Rig, record: Recorder) -> bool:
     with record.step(LIFT):
         try:
             transition(rig, RigState.LEVITATED)
@@ -146,7 +129,7 @@ def _lifted(rig: Rig, record: Recorder) -> bool:
     return True
 
 
-def _biased(rig: Rig, plan: Plan, bias: float) -> None:
+def _set_bias(rig: Rig, plan: Plan, bias: float) -> None:
     """In small steps: each one is a push, until the integrators have taken it up."""
     before = rig.levitation.get("bias")
     count = math.ceil(abs(bias - before) / BIAS_STEP_A - 1e-3)
@@ -156,15 +139,15 @@ def _biased(rig: Rig, plan: Plan, bias: float) -> None:
     rig.clock.sleep(plan.settle_s if count else 0.0)
 
 
-def _tilted(rig: Rig, plan: Plan, record: Recorder) -> None:
-    write = rig.levitation.set
+def _tilt(rig: Rig, plan: Plan, record: Recorder) -> None:
+    write, points = rig.levitation.set, conventions(rig.file).set_points
     for psi, theta in tilts(plan):
-        write("ref_psi", psi)
-        write("ref_theta", theta)
+        write(points["psi"], psi)
+        write(points["theta"], theta)
         rig.clock.sleep(plan.settle_s)
         with record.step(TILT, psi_rad=psi, theta_rad=theta):
             rig.clock.sleep(plan.average_s)
-    write("ref_theta", 0.0)
+    write(points["theta"], 0.0)
 
 
 def read(recording: Recording[Plan]) -> tuple[Held, Held]:
@@ -187,7 +170,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
 
 def measured(a: Analysis) -> Iterator[Measured]:
     """Each axis, then the comparison of each AMB."""
-    for axis in AXES:
+    for axis in a.held.machine.axes:
         yield BETA[axis].measured(a.estimates[f"beta_{axis}"])
         yield OFFSET[axis].measured(a.estimates[f"offset_{axis}"])
     for where in BEARINGS.values():
@@ -215,11 +198,12 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
             f"radius_m: found {plan.radius_m * 1e6:.1f} µm; the ring, the sensors' zeros and their runout leave "
             f"{room * 1e6:.1f} µm"
         )
-    for name in ("ref_y", "ref_z"):
+    points = conventions(rig).set_points
+    for name in (points["y"], points["z"]):
         if plan.radius_m > rig.parameters[name].high:
             yield f"radius_m: found {plan.radius_m * 1e6:.1f} µm; {name} goes to {rig.parameters[name].high * 1e6:.0f} µm"
     arm = max(g[k].value for k in ("com_to_inboard_sensor", "com_to_outboard_sensor"))
-    if plan.tilt_rad > rig.parameters["ref_psi"].high or plan.tilt_rad * arm > room:
+    if plan.tilt_rad > rig.parameters[points["psi"]].high or plan.tilt_rad * arm > room:
         yield f"tilt_rad: found {plan.tilt_rad * 1e6:.0f} µrad; reference and ring allow less"
     allowed = rig.parameters["bias"]
     low, high = allowed.low, min(allowed.high, rig.parameters["current_limit"].default / 2)
@@ -247,8 +231,8 @@ procedure = Procedure(
     measured=measured,
     figures=figures,
     requires=Requires(
-        channels=(*POSITIONS, *CURRENTS, "flags"),
-        sensors=(*POSITIONS, *CURRENTS),
+        channels=channels(AMB_ROTOR),
+        sensors=(*AMB_ROTOR.positions, *AMB_ROTOR.currents),
         parameters=PARAMETERS,
         geometry=GEOMETRY,
         machine=MACHINE,

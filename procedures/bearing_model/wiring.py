@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -13,9 +12,11 @@ from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
 from procedures.amb_rotor import magnetics
-from procedures.amb_rotor.magnetics import AXES, Positions, Statics
-from procedures.amb_rotor.places import POSITIONS, Held
+from procedures.amb_rotor.conventions import AmbRotor
+from procedures.amb_rotor.magnetics import Positions, Statics
+from procedures.amb_rotor.places import Held
 from procedures.bearing_model.estimates import fit_inputs
+from procedures.bearing_model.plan import Plan
 
 Array = npt.NDArray[np.float64]
 FOLLOWS = 0.6  # a reading may answer a set point by this much less or more (the integrators are slow)
@@ -23,63 +24,57 @@ SUSPECT = 0.05  # of the load: certificates within their tolerances leave a thir
 BETTER = 4.0  # times smaller must a sum of squares be with other wiring, to suspect the wiring
 
 
-class Tolerances(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def coupled(self) -> bool: ...
-
-
-def expected(rig: RigFile) -> Array:
+def model_answers(rig: RigFile) -> Array:
     """What a reading of each axis (rows) does per set point y, z (m) and psi, theta (rad): T (2.17)."""
     l_is, l_os = (rig.geometry[f"com_to_{b}_sensor"].value for b in ("inboard", "outboard"))
     return np.array([[1, 0, 0, -l_is], [0, 1, l_is, 0], [1, 0, 0, l_os], [0, 1, -l_os, 0]])
 
 
-def followed(held: Held, tilted: Held) -> Array:
+def fit_answers(held: Held, tilted: Held) -> Array:
     """The same as found: each reading's answer to the four set points, by least squares."""
     n, m = len(held), len(tilted)
     design = np.zeros((n + m, 5))
     design[:n, 0], design[:n, 1] = held.labels["y_m"], held.labels["z_m"]
     design[n:, 2], design[n:, 3] = tilted.labels["psi_rad"], tilted.labels["theta_rad"]
     design[:, 4] = 1
-    read = np.array([np.concatenate([held.mean[c], tilted.mean[c]]) for c in POSITIONS])
+    read = np.array([np.concatenate([held.mean[c], tilted.mean[c]]) for c in held.machine.positions])
     out: Array = np.linalg.lstsq(design, read.T, rcond=None)[0][:4].T
     return out
 
 
 def of_wiring(held: Held, tilted: Held, rig: RigFile) -> Iterator[Finding]:
     """Each reading follows its own set points: not another axis', not the other plane's, not backwards."""
-    want, have = expected(rig), followed(held, tilted)
+    want, have = model_answers(rig), fit_answers(held, tilted)
     scale = np.array([1, 1, *[0.5 * np.abs(want[:, 2:]).max()] * 2])
 
     def off(row: Array, model: Array) -> float:
         return float(np.abs((row - model) / scale).max())
 
-    for k in range(len(AXES)):
+    for k in range(len(held.machine.axes)):
         if off(have[k], want[k]) <= FOLLOWS:
             continue
         least, j, sign = min((off(have[k], s * want[j]), j, s) for j in range(4) for s in (1, -1))
-        yield _answers(k, have[k]) if least > FOLLOWS else _answers_as(k, j, sign)
+        yield _answers(held.machine, k, have[k]) if least > FOLLOWS else _answers_as(held.machine, k, j, sign)
 
 
-def _answers(k: int, row: Array) -> Finding:
+def _answers(machine: AmbRotor, k: int, row: Array) -> Finding:
     """A reading that answers as none of this rig should."""
+    name = machine.positions[k]
     text = (
-        f"pos_{AXES[k]} follows y by {row[0]:+.2f}, z by {row[1]:+.2f}, psi by {row[2] * 1e3:+.0f} µm/mrad and "
+        f"{name} follows y by {row[0]:+.2f}, z by {row[1]:+.2f}, psi by {row[2] * 1e3:+.0f} µm/mrad and "
         f"theta by {row[3] * 1e3:+.0f} µm/mrad; no reading of this rig should. A sensor clips, sticks or is "
         "miscalibrated, or the controller does not hold."
     )
-    return Finding("set-point-not-followed", text, f"pos_{AXES[k]}", Effect.ERROR)
+    return Finding("set-point-not-followed", text, name, Effect.ERROR)
 
 
-def _answers_as(k: int, j: int, sign: int) -> Finding:
+def _answers_as(machine: AmbRotor, k: int, j: int, sign: int) -> Finding:
     """A reading of axis k that answers as the one of axis j should, or its reverse."""
-    name, other = f"pos_{AXES[k]}", f"pos_{AXES[j]}"
+    name, other = machine.positions[k], machine.positions[j]
     if j == k:
         text = f"{name} answers its set points backwards: the probe's polarity is wrong."
         return Finding("sensor-polarity", text, name, Effect.ERROR)
-    what = "planes" if AXES[j][0] == AXES[k][0] else "axes"
+    what = "planes" if machine.axes[j][0] == machine.axes[k][0] else "axes"
     text = (
         f"{name} answers as {other} should{' and backwards' if sign < 0 else ''}: "
         f"{what} are exchanged in the wiring or in the map."
@@ -98,10 +93,10 @@ class Wiring:
     gravity: int = 1
 
 
-def wirings(k: int) -> list[Wiring]:
+def wirings(machine: AmbRotor, k: int) -> list[Wiring]:
     """What else axis k could be."""
-    axis = AXES[k]
-    swapped = f"as if the coils i_{axis}_p and i_{axis}_n were exchanged"
+    axis = machine.axes[k]
+    swapped = f"as if the coils {' and '.join(machine.pair(axis))} were exchanged"
     turned = (
         "as if gravity pulled the other way along this axis: it is turned by 180°, or both the coils "
         "and the probe of this axis are the other way round"
@@ -112,7 +107,7 @@ def wirings(k: int) -> list[Wiring]:
         Wiring("gravity-reversed", turned, k, gravity=-1),
         *(
             Wiring("coils-exchanged", by_other.format(axis=axis, other=other), j)
-            for j, other in enumerate(AXES)
+            for j, other in enumerate(machine.axes)
             if j != k
         ),
     ]
@@ -135,7 +130,7 @@ class Judged:
         return float(np.abs(self.residuals).max())
 
 
-def _judged(s: Statics, k: int, gap: float, coils_of: int, coils: int) -> Judged:
+def _judge(s: Statics, k: int, gap: float, coils_of: int, coils: int) -> Judged:
     """Axis k with the coils of axis `coils_of`, p and n exchanged where `coils` is below zero."""
     j = coils_of
     p, n = (s.p[j], s.n[j]) if coils > 0 else (s.n[j], s.p[j])
@@ -148,27 +143,30 @@ def _judged(s: Statics, k: int, gap: float, coils_of: int, coils: int) -> Judged
     return Judged(fit.chi2, beta, offset, beta > 0 and inside, fit.residuals)
 
 
-def of_models(held: Held, tilted: Held, rig: RigFile, plan: Tolerances) -> Iterator[Finding]:
+def of_models(held: Held, tilted: Held, rig: RigFile, plan: Plan) -> Iterator[Finding]:
     """Does the model describe each axis as it is wired, and would another wiring do so better? At the drawing's gap.
 
     The tilts count: without them both planes of an axis move alike, and their coils could be exchanged unseen."""
     one, two = held.means(), tilted.means()
-    means = Positions(*(np.concatenate(x, axis=1) for x in ((one.read, two.read), (one.p, two.p), (one.n, two.n))))
+    read, p, n = (np.concatenate(x, axis=1) for x in ((one.read, two.read), (one.p, two.p), (one.n, two.n)))
+    means = Positions(read, p, n, held.machine)
     values = {name: e.value for name, e in fit_inputs(rig, plan.coupled).items()}
     by_gravity = {g: magnetics.statics(means, values | {"gravity": g * values["gravity"]}) for g in (1, -1)}
-    for k in range(len(AXES)):
+    for k in range(len(held.machine.axes)):
         load = float(np.abs(by_gravity[1].force[k]).mean())
-        found = _judged(by_gravity[1], k, values["gap"], k, 1)
+        found = _judge(by_gravity[1], k, values["gap"], k, 1)
         if not found.sane or found.worst > SUSPECT * load:
-            yield from _explained(k, found, by_gravity, values["gap"], load)
+            yield from _explain(held.machine, k, found, by_gravity, values["gap"], load)
 
 
-def _explained(k: int, found: Judged, by_gravity: dict[int, Statics], gap: float, load: float) -> Iterator[Finding]:
+def _explain(
+    machine: AmbRotor, k: int, found: Judged, by_gravity: dict[int, Statics], gap: float, load: float
+) -> Iterator[Finding]:
     """What is wrong with axis k, which fits as `found`: another wiring, or no magnet at all; else the adjustment shows it."""
-    axis = AXES[k]
+    axis = machine.axes[k]
     least, best = found.chi2 / BETTER if found.sane else float("inf"), None
-    for w in wirings(k):
-        other = _judged(by_gravity[w.gravity], k, gap, w.coils_of, w.coils)
+    for w in wirings(machine, k):
+        other = _judge(by_gravity[w.gravity], k, gap, w.coils_of, w.coils)
         if other.sane and other.worst <= 2 * SUSPECT * load and other.chi2 < least:
             least, best = other.chi2, w
     if best:

@@ -25,7 +25,7 @@ def reductions(results: Results) -> list[tuple[Result, Estimate]]:
     return out
 
 
-def told(results: Results, found: Reductions, judged_to: float) -> Iterator[Finding]:
+def describe(results: Results, found: Reductions, judged_to: float) -> Iterator[Finding]:
     """What is not judged: beyond the range, and the observer as printed; what the shaft itself still does."""
     for r, e in found:
         if r.dwell.variant == "literal" or r.dwell.speed > judged_to:

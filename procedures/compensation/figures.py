@@ -9,14 +9,13 @@ import numpy as np
 from bench.figures import Figure, Series
 from bench.uncertainty import Estimate, coverage_factor
 from bench.units import RPM
-from procedures.amb_rotor.channels import AXES
 from procedures.compensation.switching import WITHIN_S, Switched
 from procedures.unbalance.estimates import Result
 
 MOST_POINTS = 4000
 
 
-def reductions(found: Sequence[tuple[Result, Estimate]]) -> Iterator[Figure]:
+def draw_reductions(found: Sequence[tuple[Result, Estimate]]) -> Iterator[Figure]:
     """Reduction of what the probes read over the speed, by setting."""
     series = []
     for variant in dict.fromkeys(r.dwell.variant for r, _ in found):
@@ -30,7 +29,7 @@ def reductions(found: Sequence[tuple[Result, Estimate]]) -> Iterator[Figure]:
                  lines=(("90 %", 90.0),))  # fmt: skip
 
 
-def switched(s: Switched) -> Iterator[Figure]:
+def draw_switch(s: Switched) -> Iterator[Figure]:
     """The amplitude over time, and the four readings."""
     t, size = s.course()
     rpm = f"{s.speed * RPM:.0f} r/min"
@@ -41,7 +40,7 @@ def switched(s: Switched) -> Iterator[Figure]:
                   Series(f"{WITHIN_S * 1e3:.0f} ms", np.full(2, 1e3 * WITHIN_S), np.array([0.0, 1e6 * size.max()]), "guide")),
                  lines=(("20 %", 0.2e6 * float(size[t < -3 * s.turn].mean())),))  # fmt: skip
     part = slice(None, None, max(1, -(-len(s.t) // MOST_POINTS)))
-    places = zip(AXES, s.positions, strict=True)
+    places = zip(s.axes, s.positions, strict=True)
     series = tuple(Series(a, 1e3 * s.t[part], 1e6 * x[part] - 40 * k) for k, (a, x) in enumerate(places))
     yield Figure("switch-readings", f"Switched on at {rpm}: the readings", "As read, noise and runout included; "
                  "each one below the one before, 40 µm apart.", "time (ms)", "reading (µm)",

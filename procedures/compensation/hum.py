@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from bench.findings import Effect, Finding
 from bench.uncertainty import Estimate, interval
 from procedures.compensation.switching import TURNS_AT, TURNS_LEFT, WITHIN_S, Switched, rms
-from procedures.synchronous.hum import REACH, Heard, leaked, told
+from procedures.synchronous.hum import REACH, Heard, describe, leak_over
 
 
 def of_switch(found: Heard | None, s: Switched, switched: Mapping[str, Estimate], where: str) -> Iterator[Finding]:
@@ -22,9 +22,9 @@ def of_switch(found: Heard | None, s: Switched, switched: Mapping[str, Estimate]
     ):
         lasts, known = turns * s.turn, interval(switched[name]).U
         lines = found.lines(1 / s.turn - REACH / lasts, 1 / s.turn + REACH / lasts)
-        off = [(x.size * leaked(s.tacho, begin, lasts, x.hz) / over, x) for x in lines]
+        off = [(x.size * leak_over(s.tacho, begin, lasts, x.hz) / over, x) for x in lines]
         worst = max(off, key=lambda o: o[0], default=None)
         if worst is not None and worst[0] > known:
-            text = (f"{told(worst[1])} At the switch, at {1 / s.turn:.2f} Hz, the {name} may be off by "
+            text = (f"{describe(worst[1])} At the switch, at {1 / s.turn:.2f} Hz, the {name} may be off by "
                     f"{worst[0] / known:.1f} times its U.")  # fmt: skip
             yield Finding("hum", text, where, Effect.INDETERMINATE, (f"{name}@{where}",))

@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
-from pydantic import Field
-
 from bench.errors import AnalysisError
 from bench.figures import Shown
 from bench.findings import Effect, Finding, Findings
@@ -23,16 +21,18 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from bench.units import RPM
 from procedures.amb_rotor import lift
+from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
 from procedures.compensation import checks, switching
 from procedures.compensation import figures as drawn
 from procedures.compensation.hum import of_switch
+from procedures.compensation.plan import Plan
 from procedures.compensation.switching import SWITCH, Switched
 from procedures.shared import assumptions
-from procedures.synchronous import dwelling
-from procedures.synchronous.dwelling import SETTINGS, Law, Variant
-from procedures.synchronous.hum import heard
+from procedures.synchronous import bearings, dwelling
+from procedures.synchronous.hum import listen
 from procedures.unbalance import figures as unbalance_figures
 from procedures.unbalance import procedure as unbalance
+from procedures.unbalance import sequence
 from procedures.unbalance.estimates import Results
 
 REDUCTION = Quantity(
@@ -49,29 +49,7 @@ RESIDUAL = Quantity(
     title="reading after the switch",
 )
 MEASURES = (*unbalance.MEASURES, REDUCTION, DROP, RESIDUAL)
-WAITING = {"observer": 1.0, "compensate": 0.0, "integral": 0.0}  # the estimates run and do nothing
 AFTER_ARM_S = 0.05
-SAME = 1e-6  # of a speed
-
-
-class Plan(unbalance.Plan):
-    """Settings, SI; those of `unbalance` and some more."""
-
-    law: Law = "CCS"
-    variants: tuple[Variant, ...] = Field(("off", "corrected"), min_length=2)
-    literal_rad_s: tuple[float, ...] = (
-        2000 / RPM,
-        10000 / RPM,
-    )  # of these, where there is a dwell, the observer as printed too
-    judged_to_rad_s: float = Field(10001 / RPM, gt=0)  # the range of T 3.5; above it the reduction is told, not judged
-    switch_rad_s: float = Field(10000 / RPM, gt=0)
-    before_s: float = Field(0.2, ge=0.05)
-    after_s: float = Field(0.8, ge=0.2)
-
-    def at(self, speed: float) -> tuple[Variant, ...]:
-        """With the literal observer where the plan says so."""
-        tried = any(abs(speed / s - 1) < SAME for s in self.literal_rad_s)
-        return (*self.variants, "literal") if tried else self.variants
 
 
 def settings(plan: Plan) -> dict[str, float]:
@@ -86,24 +64,26 @@ def step_count(plan: Plan) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Slow roll, dwells with each setting, the switch, the lowest speed again."""
-    if not dwelling.rolled(rig, plan, record):
+    if not sequence.begin(rig, plan, record):
         return
-    if dwelling.dwelt(rig, plan, record) and _switched(rig, plan, record):
-        dwelling.repeated(rig, plan, record)
-    dwelling.finished(rig)
+    if sequence.dwell(rig, plan, record) and _switch(rig, plan, record):
+        sequence.repeat_lowest(rig, plan, record)
+    dwelling.stop(rig)
 
 
-def _switched(rig: Rig, plan: Plan, record: Recorder) -> bool:
+def _switch(rig: Rig, plan: Plan, record: Recorder) -> bool:
     """Switch the compensation on while the controller records."""
-    dwelling.put(rig, dwelling.SETTINGS["off"])
-    if rig.capture is None or not lift.turned(rig, record, plan.switch_rad_s, plan.settle_s):
+    machine = conventions(rig.file)
+    dwelling.put(rig, machine.variants["off"])
+    if rig.capture is None or not lift.bring_to_speed(rig, record, plan.switch_rad_s, plan.settle_s):
         return False
-    dwelling.put(rig, WAITING)
+    compensating = machine.variants["corrected"]
+    dwelling.put(rig, {**compensating, machine.compensate: 0.0})  # the estimates run and do nothing
     rig.clock.sleep(plan.settle_s)
     with record.step(SWITCH, speed_rad_s=plan.switch_rad_s):
-        rig.capture.arm(switching.RECORDED, seconds=plan.before_s + AFTER_ARM_S + plan.after_s)
+        rig.capture.arm(switching.captured_channels(machine), seconds=plan.before_s + AFTER_ARM_S + plan.after_s)
         rig.clock.sleep(plan.before_s)
-        rig.levitation.set("compensate", dwelling.SETTINGS["corrected"]["compensate"])
+        rig.levitation.set(machine.compensate, compensating[machine.compensate])
         rig.capture.wait(plan.after_s + 5.0)
     rig.capture.upload(switch=1)
     return True
@@ -124,14 +104,14 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Compared:
     """The dwells as in `unbalance`, the reductions, and the switch where it was captured."""
     results = unbalance.evaluate(recording, findings)
     reductions = checks.reductions(results)
-    findings.add(checks.told(results, reductions, recording.plan.judged_to_rad_s))
+    findings.add(checks.describe(results, reductions, recording.plan.judged_to_rad_s))
     try:
         captured = switching.read_switch(recording)
         switched = switching.of_switch(captured, recording.rig)
     except AnalysisError as error:
         findings.add([Finding("no-switch", str(error), "", Effect.ERROR)])
         return Compared(recording.plan, results, reductions)
-    findings.add(of_switch(heard(recording, results.slow), captured, switched, _switched_at(recording.plan)))
+    findings.add(of_switch(listen(recording, results.slow), captured, switched, _switched_at(recording.plan)))
     return Compared(recording.plan, results, reductions, captured, switched)
 
 
@@ -168,9 +148,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def figures(found: Compared, recording: Recording[Plan]) -> Iterable[Shown]:
     """Those of `unbalance`, the reduction over the speed, and the switch."""
-    yield from drawn.reductions(found.reductions)
+    yield from drawn.draw_reductions(found.reductions)
     if found.captured is not None:
-        yield from drawn.switched(found.captured)
+        yield from drawn.draw_switch(found.captured)
     yield from unbalance_figures.all_figures(found.results, recording.rig)
 
 
@@ -184,11 +164,11 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=replace(unbalance.REQUIRES, parameters=(*unbalance.REQUIRES.parameters, *SETTINGS["corrected"])),
+    requires=replace(unbalance.REQUIRES, parameters=(*unbalance.REQUIRES.parameters, *AMB_ROTOR.variants["corrected"])),
     check=check,
     settings=settings,
     step_count=step_count,
-    needs=unbalance.needs,
+    needs=lambda plan: bearings.needs(plan.bearings),
     assumes=assumptions.UNBALANCE,
     method=f"{unbalance.procedure.method}\n{read_method(__file__)}",
 )

@@ -19,25 +19,26 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from bench.uncertainty.estimate import merged
-from procedures.amb_rotor.channels import AXES, POSITIONS
+from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.shared.certificates import certified
 
 Array = npt.NDArray[np.float64]
 SWITCH = "switch"
-RECORDED = (*POSITIONS, "pulses", "pulse_age")
 WITHIN_S = 0.15  # T 3.5
 TURNS_AT, TURNS_LEFT = 6, 50  # that the amplitude then is read over, and the steady state at least
 
 
 @dataclass(frozen=True)
 class Switched:
-    """The capture: `t` (n,) s from the switch, `positions` (4, n) m, its tachometer on the same time; speed rad/s."""
+    """The capture: `t` (n,) s from the switch, `positions` (4, n) m, its tachometer on the same time;
+    speed rad/s; the probes' `axes`."""
 
     t: Array
     positions: Array
     tacho: Tachometer
     rate: float
     speed: float
+    axes: tuple[str, ...]
 
     def between(self, begin: float, end: float, channels: tuple[int, ...] = (0, 1, 2, 3)) -> tuple[Vectors, Array]:
         """Vectors of order 1 and means of the turns between two times."""
@@ -65,24 +66,30 @@ def rms(vectors: Vectors) -> float:
     return math.sqrt(float((np.abs(vectors.values) ** 2).mean()))
 
 
+def captured_channels(machine: AmbRotor) -> tuple[str, ...]:
+    """What is captured about the switch."""
+    return (*machine.positions, "pulses", "pulse_age")
+
+
 def read_switch(recording: Recording[Any]) -> Switched:
     """The capture about the switch; its time is that of the parameter's write.
 
     Raises:
         AnalysisError: there is none.
     """
+    machine = conventions(recording.rig)
     found, steps = recording.captures(switch=1), list(recording.steps(SWITCH))
     if not found or not steps:
         raise AnalysisError("found no capture about the switch; expected one (was the run stopped early?)")
     written = [e["t_ns"] for e in recording.events("parameter")
-               if e["name"] == "compensate" and steps[0].start_ns <= e["t_ns"] <= steps[0].end_ns]  # fmt: skip
+               if e["name"] == machine.compensate and steps[0].start_ns <= e["t_ns"] <= steps[0].end_ns]  # fmt: skip
     if not written:
         raise AnalysisError("found no write of `compensate` within the step")
-    data: Mapping[str, Array] = found[0].arrays(*RECORDED)
+    data: Mapping[str, Array] = found[0].arrays(*captured_channels(machine))
     t = data["t_s"] - (written[0] - recording.start_ns) * 1e-9
     tacho = tachometer(*counted(t, data["pulses"], data["pulse_age"]))
-    positions = np.array([data[p] for p in POSITIONS])
-    return Switched(t, positions, tacho, found[0].rate_hz, float(np.nanmedian(tacho.speed(t))))
+    positions = np.array([data[p] for p in machine.positions])
+    return Switched(t, positions, tacho, found[0].rate_hz, float(np.nanmedian(tacho.speed(t))), machine.axes)
 
 
 def of_switch(s: Switched, rig: RigFile) -> dict[str, Estimate]:
@@ -92,7 +99,8 @@ def of_switch(s: Switched, rig: RigFile) -> dict[str, Estimate]:
     Raises:
         AnalysisError: the capture does not hold enough turns.
     """
-    gains = [certified(f"sensors/pos_{a}/gain", rig.sensors[f"pos_{a}"].gain, f"gain of pos_{a}") for a in AXES]
+    names = conventions(rig).positions
+    gains = [certified(f"sensors/{name}/gain", rig.sensors[name].gain, f"gain of {name}") for name in names]
     last = float(s.t[-1])
     if last - WITHIN_S < (TURNS_LEFT + 2) * s.turn:
         raise AnalysisError(

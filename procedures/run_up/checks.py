@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,13 +15,13 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.uncertainty import interval
 from bench.units import RPM
-from procedures.amb_rotor.channels import AXES, CONTACT, CURRENT_LIMIT, PLANES, RANGE, VOLTAGE_LIMIT
 from procedures.run_up.estimates import DAMPED, Peak, Run, asked_margin
 from procedures.run_up.hum import of_peaks
+from procedures.run_up.plan import Passing
 from procedures.run_up.steps import LEAST_TURNS, MISSED, PASSAGE, Passage
 from procedures.shared import signals
 from procedures.synchronous import fitting
-from procedures.synchronous.hum import heard
+from procedures.synchronous.hum import listen
 from procedures.unbalance import checks
 from procedures.unbalance.checks import HELD
 from procedures.unbalance.hum import of_dwells
@@ -38,27 +38,11 @@ FEWEST_TURNS = (WINDOW + 1) * LEAST_TURNS  # the local models of the curve take 
 UPLOAD_S = 1.2
 LARGE = 0.5  # of the clearance
 BY_THE_RING = 0.95  # of the clearance: probes, whose zeros are known to 5 µm, tell no more whether the shaft touches
-INBOARD, OUTBOARD, AXIAL = 4, 8, 32
 BESIDE = 0.05  # of a speed: what happens there may be in its turns
 OF_CRITICALS = ("critical_speed", "amplification_factor", "critical_amplitude", "separation")
 
 
-class Settings(fitting.Settings, Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def top_rad_s(self) -> float: ...
-    @property
-    def bottom_rad_s(self) -> float: ...
-    @property
-    def running_rad_s(self) -> float: ...
-    @property
-    def blocks(self) -> int: ...
-    @property
-    def rate_rad_s2(self) -> float: ...
-
-
-def of_plan(rig: RigFile, plan: Settings) -> Iterable[str]:
+def of_plan(rig: RigFile, plan: Passing) -> Iterable[str]:
     """What cannot work, before anything starts."""
     most = rig.envelope.max_speed_rad_s
     landing = rig.parameters["landing_speed"].default if "landing_speed" in rig.parameters else 0.0
@@ -87,7 +71,9 @@ def of_plan(rig: RigFile, plan: Settings) -> Iterable[str]:
     drives = [d for d in rig.devices.values() if "drive" in d.roles]
     if plan.rate_rad_s2 and not any("acceleration" in d.registers for d in drives):
         yield "devices: found a drive without a register acceleration; a ramp needs one"
-    yield from fitting.of_plan(rig, plan)
+    yield from fitting.of_speeds(rig, plan.speeds_rad_s)
+    yield from fitting.of_slow_roll(plan.slow_rad_s, plan.slow_s, plan.speeds_rad_s)
+    yield from fitting.of_captures(rig, plan.capture_s, plan.rate_hz, plan.orders, plan.speeds_rad_s)
 
 
 def before(recording: Recording[Any]) -> Iterator[Finding]:
@@ -96,7 +82,7 @@ def before(recording: Recording[Any]) -> Iterator[Finding]:
         yield Finding("no-passage", "no run through the speeds was recorded", "", Effect.ERROR)
 
 
-def of_passage(p: Passage, recording: Recording[Any], plan: Settings) -> Iterator[Finding]:
+def of_passage(p: Passage, recording: Recording[Any], plan: Passing) -> Iterator[Finding]:
     """Lost samples, pulses, probes that clip or stand still, contact, limits, captures, where it ended."""
     yield from signals.losses(np.array([p.lost]), np.array([p.expected]), plan.max_lost, lambda _: p.name)
     for name in p.stuck:
@@ -141,12 +127,12 @@ def _speed_at(p: Passage, t: float) -> float:
     return float(np.interp(t, *p.driven))
 
 
-def _at(p: Passage, speed: float, plan: Settings) -> str:
+def _at(p: Passage, speed: float, plan: Passing) -> str:
     """What is measured at a speed, as findings name it."""
     return f"@{speed * RPM:.0f} r/min, {p.direction}, {plan.law}"
 
 
-def _doubted(p: Passage, samples: Mask, plan: Settings) -> tuple[str, ...]:
+def _doubted(p: Passage, samples: Mask, plan: Passing) -> tuple[str, ...]:
     """What `samples` (n,) put in doubt: what is read off the curve, and what is measured beside the speeds at which they were
     read, in its turns or in the local models that take the lag off. All, where the fastest of these is among them: the runout
     rests on it."""
@@ -158,9 +144,10 @@ def _doubted(p: Passage, samples: Mask, plan: Settings) -> tuple[str, ...]:
     return () if max(plan.speeds_rad_s) in near else (*(_at(p, s, plan) for s in sorted(near)), *OF_CRITICALS)
 
 
-def _limits(p: Passage, plan: Settings) -> Iterator[Finding]:
+def _limits(p: Passage, plan: Passing) -> Iterator[Finding]:
+    m = p.machine
     beyond, touched, current, voltage = (
-        (p.flags & bits) != 0 for bits in (RANGE, CONTACT, CURRENT_LIMIT, VOLTAGE_LIMIT)
+        (p.flags & bits) != 0 for bits in (m.sensor_range, m.contact, m.current_limit, m.voltage_limit)
     )
     if p.clips >= HELD or beyond.any():
         text = (
@@ -168,9 +155,9 @@ def _limits(p: Passage, plan: Settings) -> Iterator[Finding]:
         )
         yield Finding("sensor-clipped", text, p.name, Effect.ERROR)
     if touched.any():
-        rings = [name for bit, name in ((INBOARD, "the inboard ring"), (OUTBOARD, "the outboard ring"),
-                                        (AXIAL, "the axial stop")) if (p.flags & bit).any()]  # fmt: skip
-        text = f"the shaft touched {' and '.join(rings)}{_when(p, touched)}: this is not its response to unbalance."
+        places = {**{f"the {plane} ring": bit for plane, bit in m.rings.items()}, "the axial stop": m.axial_stop}
+        hit = [place for place, bit in places.items() if (p.flags & bit).any()]
+        text = f"the shaft touched {' and '.join(hit)}{_when(p, touched)}: this is not its response to unbalance."
         yield Finding("contact", text, p.name, Effect.INDETERMINATE, _doubted(p, touched, plan))
     if current.any():
         text = f"a coil current was at its limit{_when(p, current)}: the response is not linear."
@@ -180,12 +167,12 @@ def _limits(p: Passage, plan: Settings) -> Iterator[Finding]:
         yield Finding("voltage-saturated", text, p.name, Effect.INDETERMINATE, _doubted(p, voltage, plan))
 
 
-def _silent(p: Passage, rig: RigFile, plan: Settings) -> Iterator[Finding]:
+def _silent(p: Passage, rig: RigFile, plan: Passing) -> Iterator[Finding]:
     """A controller may not tell of contact; the probes show where the shaft went."""
     clear = rig.geometry["clearance"].value
-    far = np.max([np.hypot(p.data[y], p.data[z]) for y, z in PLANES.values()], axis=0)
+    far = np.max([np.hypot(p.data[y], p.data[z]) for y, z in p.machine.planes.values()], axis=0)
     near = far > BY_THE_RING * clear
-    if near.any() and not (p.flags & CONTACT).any():
+    if near.any() and not (p.flags & p.machine.contact).any():
         text = (
             f"the probes show the shaft up to {far.max() * 1e6:.0f} µm off their zero{_when(p, near)}, with rings at "
             f"{clear * 1e6:.0f} µm: it may have touched, though the controller tells of no contact. Balance first."
@@ -202,22 +189,22 @@ def _when(p: Passage, samples: Mask) -> str:
     return f", first at {first:.0f} and last at {last:.0f} r/min"
 
 
-def of_run(run: Run, recording: Recording[Any], plan: Settings) -> Iterator[Finding]:
+def of_run(run: Run, recording: Recording[Any], plan: Passing) -> Iterator[Finding]:
     """What the turns about the captures say of wiring and zones; then the criticals, as notes."""
     if run.near is None:
         text = "the shaft came through none of the speeds at which vectors were asked for."
         yield Finding("no-vectors", text, run.passage.name, Effect.ERROR)
         return
-    yield from checks.sampling([r.dwell for r in run.near.dwells], plan)
-    yield from checks.of_results(run.near, plan)
-    sound = heard(recording, run.slow)
+    yield from checks.sampling([r.dwell for r in run.near.dwells], plan.orders)
+    yield from checks.of_results(run.near)
+    sound = listen(recording, run.slow)
     yield from of_dwells(sound, run.near.dwells)
     yield from of_peaks(sound, [p for p in run.peaks if p.critical])
     yield from _criticals(run, plan)
     yield from _passed(run)
 
 
-def _criticals(run: Run, plan: Settings) -> Iterator[Finding]:
+def _criticals(run: Run, plan: Passing) -> Iterator[Finding]:
     """What is critical, what is too well damped for that, and where nothing is."""
     speed = run.curve.speed * RPM
     found = [p for p in run.peaks if p.critical]
@@ -268,7 +255,9 @@ def _passed(run: Run) -> Iterator[Finding]:
     c, up = run.curve, run.passage.direction == "up"
     rate, ends = np.abs(c.acceleration) * RPM, c.speed[[0, -1] if up else [-1, 0]] * RPM
     most = [(np.abs(run.shaft[k]).max() * 1e6, c.speed[int(np.argmax(np.abs(run.shaft[k])))] * RPM) for k in range(4)]
-    greatest = ", ".join(f"{a} {size:.1f} µm at {at:.0f}" for a, (size, at) in zip(AXES, most, strict=True))
+    greatest = ", ".join(
+        f"{a} {size:.1f} µm at {at:.0f}" for a, (size, at) in zip(run.passage.machine.axes, most, strict=True)
+    )
     text = (f"from {ends[0]:.0f} to {ends[1]:.0f} r/min at {rate.min():.0f} to {rate.max():.0f} r/min per second, "
             f"{c.speed.size} blocks of {np.median(c.width) * RPM:.0f} r/min; "
             f"greatest amplitudes of the shaft {greatest} r/min.")  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,14 +14,13 @@ from bench.analysis import transient
 from bench.analysis.criticals import Critical, criticals, moved
 from bench.analysis.peaks import Smoother
 from bench.analysis.vectors import complexes, estimates, parts
-from bench.calibration import Calibration
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.estimate import merged
-from procedures.amb_rotor.channels import AXES
 from procedures.run_up import linear_model
 from procedures.run_up.line import DRAWS, Line
+from procedures.run_up.plan import Passing
 from procedures.run_up.steps import Curve, Passage, curve, near
 from procedures.synchronous import bearings
 from procedures.synchronous.dwells import Dwell
@@ -40,25 +39,6 @@ HARMONICS = "harmonics"
 BENDING = (*(f"{name}_{k}" for name in ("beta", "offset", "zero", "gain") for k in range(4)), "gap", "mass", "inertia",
            "l_ia", "l_oa", "l_is", "l_os")  # fmt: skip
 """What the bend of the forces rests on; what else there is of it changes it by less than a twentieth."""
-
-
-class Settings(Protocol):
-    """The part of a plan that the estimates need."""
-
-    @property
-    def law(self) -> str: ...
-    @property
-    def parameters(self) -> Mapping[str, float]: ...
-    @property
-    def speeds_rad_s(self) -> tuple[float, ...]: ...
-    @property
-    def running_rad_s(self) -> float: ...
-    @property
-    def blocks(self) -> int: ...
-    @property
-    def beta_share(self) -> float: ...
-    @property
-    def offset_u_m(self) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -103,10 +83,8 @@ class Run:
     clearance: float = field(default=math.nan)
 
 
-def run(
-    passage: Passage, slow: Dwell | None, recording: Recording[Any], plan: Settings, model: Calibration | None = None
-) -> Run:
-    """All estimates of a passage; `model` is the bearings' adopted calibration."""
+def run(passage: Passage, slow: Dwell | None, recording: Recording[Any], plan: Passing, known: bearings.Known) -> Run:
+    """All estimates of a passage, with what is known of the bearings."""
     rig = recording.rig
     found = curve(passage, plan.blocks)
     passed = [n for s in sorted(plan.speeds_rad_s) if (n := near(passage, recording, s, plan.law)) is not None]
@@ -119,20 +97,20 @@ def run(
         still, rest = _still(found, models, dwell, width)
         dwells.append(still)
         left.append(rest)
-    results = unbalance_estimates.results([*([] if slow is None else [slow]), *dwells], rig, plan, model)
+    results = unbalance_estimates.results([*([] if slow is None else [slow]), *dwells], rig, known)
     results = replace(results, dwells=tuple(_with(r, rest) for r, rest in zip(results.dwells, left, strict=True)))
-    inputs = bearings.stated(rig, plan, model)
+    inputs = bearings.collect_inputs(rig, known)
     large = _large(found, inputs, results.runouts, plan.law, gains(rig, plan))
     shaft, peaks = [], []
-    for k in range(4):
-        line = Line(found, k, inputs[f"gain_{k}"].value, results.runouts[1.0])
+    for k, axis in enumerate(passage.machine.axes):
+        line = Line(found, k, axis, inputs[f"gain_{k}"].value, results.runouts[1.0])
         series = line.series()
         shaft.append(series[-1])
         peaks += _peaks(line, series, {name: bent[k] for name, bent in large.items()}, inputs, plan.running_rad_s)
     return Run(passage, found, np.array(shaft), tuple(peaks), results, slow, clearance)
 
 
-def gains(rig: RigFile, plan: Settings) -> dict[str, float]:
+def gains(rig: RigFile, plan: Passing) -> dict[str, float]:
     """The controller's parameters while the speeds are passed, SI, by name."""
     return {name: p.default for name, p in rig.parameters.items()} | dict(plan.parameters)
 
@@ -155,7 +133,7 @@ def _peaks(
     """Of small orbits, with the influences of the scatter, of the runout, of the probe's gain, of what the bearings' bend rests
     on, and of what is left of the lag and of that bend: no more than what the last term of the one and the second harmonics in
     the other change. The amplitude is that of the orbit as it was."""
-    axis, gain, out = AXES[line.k], inputs[f"gain_{line.k}"], []
+    axis, gain, out = line.axis, inputs[f"gain_{line.k}"], []
     raw, once, best = (z - large[""] for z in series)
     runout = [
         (p, p.u * (1j if j else 1.0)) for j, p in enumerate(line.runout.parts[2 * line.k : 2 * line.k + 2]) if p.u
@@ -242,7 +220,7 @@ def _at(speed: Array, values: Complex, where: float) -> complex:
 def _with(r: Result, left: Complex) -> Result:
     """With what is left of the lag in the budget of the vectors and half axes."""
     out: dict[tuple[str, str], Estimate] = dict(r.estimates)
-    for k, axis in enumerate(AXES):
+    for k, axis in enumerate(r.dwell.machine.axes):
         half = abs(left[k]) / math.sqrt(3)
         rest = Influence(f"lag/{r.dwell.where}/{axis}", LAG, half, "m", "B", "rectangular")
         for name in ("vector_cos", "vector_sin"):

@@ -15,7 +15,6 @@ from bench.figures import Figure, Series, Sheet, Shown
 from bench.rigfile import RigFile
 from bench.uncertainty import interval, stated
 from bench.units import RPM
-from procedures.amb_rotor.channels import AXES, PLANES
 from procedures.run_up.estimates import Run, asked_margin
 from procedures.run_up.steps import Passage
 from procedures.unbalance import figures
@@ -31,15 +30,16 @@ EVERY_RPM = 1000.0
 def all_figures(run: Run, rig: RigFile, running: float) -> Iterator[Shown]:
     """In the order of the report."""
     p = run.passage
+    planes = p.machine.planes
     yield _criticals(run, running)
-    for plane in PLANES:
+    for plane in planes:
         yield _bode(run, plane)
-    for plane in PLANES:
+    for plane in planes:
         yield _polar(run, plane)
     probe = _loudest(run)
     part = p.moving
     x = p.data[probe, part]
-    name = f"pos_{AXES[probe]}"
+    name = p.machine.positions[probe]
     shown = waterfall(p.t[part], x, p.tacho, p.sampling, segment=_segment(p), count=SPECTRA)
     yield pictures.waterfall("waterfall", f"Waterfall of {name}, {p.name}", shown, HIGHEST_HZ, (1.0, 2.0, 3.0))
     turns = TURNS_ORDER if abs(_rate(p)) < 100 else TURNS_ORDER // 2
@@ -52,10 +52,10 @@ def all_figures(run: Run, rig: RigFile, running: float) -> Iterator[Shown]:
     if run.near is not None:
         yield figures.farthest(run.near)
         for result in run.near.dwells[-1:]:
-            for plane in PLANES:
+            for plane in planes:
                 yield figures.orbits(result, plane, run.clearance)
             if result.dwell.full is not None:
-                for plane in PLANES:
+                for plane in planes:
                     yield figures.spectrum(result, plane)
 
 
@@ -75,7 +75,8 @@ def _loudest(run: Run) -> int:
 
 
 def _curves(run: Run, plane: str) -> list[pictures.Curve]:
-    return [pictures.Curve(AXES[k], run.curve.speed, run.shaft[k]) for k in PLANES[plane]]
+    machine = run.passage.machine
+    return [pictures.Curve(machine.axes[k], run.curve.speed, run.shaft[k]) for k in machine.planes[plane]]
 
 
 def _bode(run: Run, plane: str) -> Figure:
@@ -88,9 +89,10 @@ def _bode(run: Run, plane: str) -> Figure:
         "lag from the once-per-turn mark to the high spot. Criticals, where there are any, are marked; the legend has their "
         "amplification factors (AF).",
     )
-    series = list(figure.series)
+    series, machine = list(figure.series), run.passage.machine
+    inside = [machine.axes[k] for k in machine.planes[plane]]
     for peak in run.peaks:
-        if peak.critical and peak.factor is not None and AXES.index(peak.axis) in PLANES[plane]:
+        if peak.critical and peak.factor is not None and peak.axis in inside:
             i = interval(peak.amplitude)
             x, y = RPM * peak.speed.value, 1e6 * peak.amplitude.value
             half = np.array([1e6 * (i.high - i.low) / 2])
@@ -146,7 +148,7 @@ def _polar(run: Run, plane: str) -> Figure:
 def _currents(run: Run, rig: RigFile) -> Figure:
     """Mean and order 1 of the coil that needs most."""
     c, series = run.curve, []
-    for plane, (y, z) in PLANES.items():
+    for plane, (y, z) in run.passage.machine.planes.items():
         coils = [4 + 2 * k + side for k in (y, z) for side in (0, 1)]
         most = np.max([c.means[:, k] + np.abs(c.values[k]) for k in coils], axis=0)
         series.append(Series(plane, RPM * c.speed, most))
@@ -157,7 +159,7 @@ def _currents(run: Run, rig: RigFile) -> Figure:
 
 def _volts(run: Run) -> Figure:
     c = run.curve
-    series = tuple(Series(plane, RPM * c.speed, c.volts[:, k]) for k, plane in enumerate(PLANES))
+    series = tuple(Series(plane, RPM * c.speed, c.volts[:, k]) for k, plane in enumerate(run.passage.machine.planes))
     return Figure("use-voltage", "Greatest coil voltage over the speed", "Either way, of all coils of a bearing, as the "
                   "controller tells it.", "speed (r/min)", "voltage (V)", series)  # fmt: skip
 

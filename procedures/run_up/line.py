@@ -21,10 +21,11 @@ USUAL = 30  # of them say how far a curve of the known noise is off its models
 
 @dataclass(frozen=True)
 class Line:
-    """A probe's vectors over speed, less its runout."""
+    """The vectors over speed of the `k`-th probe, that of `axis`, less its runout."""
 
     found: Curve
     k: int
+    axis: str
     gain: float
     runout: Runout
 

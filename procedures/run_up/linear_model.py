@@ -23,7 +23,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from procedures.amb_rotor.channels import AXES
 from procedures.run_up.steps import Curve
 from procedures.synchronous.runout import SCALE, Stand, arms, impedance
 
@@ -116,7 +115,7 @@ def _beyond(s: Stand, t: _Turns, k: tuple[Array, Array, Array], x1: Complex, x2:
 
 def _inverted(s: Stand, c: Curve, gains: Mapping[str, float], late: Complex) -> Complex:
     """N as the law takes it off (4, b): with its own gap and magnetic offsets, at what the probes read, late."""
-    offset = np.array([gains[f"model_offset_{a}"] for a in AXES])
+    offset = np.array([gains[c.machine.model_offset(axis)] for axis in c.machine.axes])
     idea = replace(s, gap=gains["model_gap"], offset=offset, gain=np.ones(4), zero=np.zeros(4))
     t = _turns(idea, c, {1.0: np.zeros(4, complex), 2.0: np.zeros(4, complex)})
     return _beyond(idea, t, _slopes(idea, t), t.x1 * late, t.x2 * late**2)

@@ -7,14 +7,12 @@ critical speeds, their amplification factors, and how far they stand off the run
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any, Literal
-
-from pydantic import Field
+from typing import Any
 
 from bench.errors import AnalysisError, BenchError
 from bench.figures import Shown
 from bench.findings import Effect, Finding, Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
@@ -23,16 +21,18 @@ from bench.rigfile import RigFile
 from bench.rigfile.capture import at_speed
 from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
+from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
 from procedures.amb_rotor.lift import NO_SPEED
 from procedures.run_up import checks, estimates
 from procedures.run_up import figures as drawn
 from procedures.run_up.estimates import Run
+from procedures.run_up.plan import Passing, Plan
 from procedures.run_up.steps import MISSED, PASSAGE, read_passage
 from procedures.shared import assumptions
 from procedures.synchronous import bearings, dwelling
-from procedures.synchronous.coil_peaks import uncertified
-from procedures.synchronous.dwelling import CODES, Law, put
-from procedures.synchronous.dwells import RECORDED, SLOW, read_dwell
+from procedures.synchronous.coil_peaks import find_uncertified
+from procedures.synchronous.dwelling import put
+from procedures.synchronous.dwells import SLOW, captured_channels, read_dwell
 from procedures.unbalance import checks as unbalance_checks
 from procedures.unbalance import procedure as unbalance
 from procedures.unbalance.procedure import CURRENT, D_MAX, MAJOR, READ, SHARE, VOLTAGE
@@ -55,61 +55,10 @@ HOLD_S = 0.5
 AFTER_S = 5.0  # the drive has passed a speed: a capture that has not come by then does not come
 
 
-class Passing(BenchPlan):
-    """Settings of both directions, SI."""
-
-    law: Law = "CCS"
-    parameters: dict[str, float] = Field(default_factory=dict)  # of the controller, while the speeds are passed
-    top_rad_s: float = Field(14000 / RPM, gt=0)
-    bottom_rad_s: float = Field(600 / RPM, gt=0)
-    running_rad_s: float = Field(14000 / RPM, gt=0)  # from which criticals must stand off
-    speeds_rad_s: tuple[float, ...] = Field((3000 / RPM, 8000 / RPM, 13000 / RPM), min_length=1)  # captures, vectors
-    slow_rad_s: float = Field(300 / RPM, ge=0)  # 0: no slow roll
-    slow_s: float = Field(10.0, ge=1)
-    settle_s: float = Field(1.5, ge=0.2)
-    capture_s: float = Field(0.3, ge=0.05)
-    rate_hz: float = Field(10000.0, gt=0)  # of the captures
-    orders: int = Field(4, ge=1, le=10)  # that the full spectrum must show
-    blocks: int = Field(150, ge=30, le=1000)  # of equal width in speed
-    bearings: Literal["adopted", "plan"] = (
-        "adopted"  # what is known of them: the adopted bearing-model, where there is one
-    )
-    beta_share: float = Field(0.05, ge=0)  # half width: how far the controller's betas may be off the bearings'
-    offset_u_m: float = Field(10e-6, ge=0)  # of its magnetic offsets, standard uncertainty
-    max_lost: float = Field(1e-3, ge=0)  # share of the samples
-    max_speed_error: float = Field(0.01, gt=0)  # share of the speed, at slow roll
-
-    @property
-    def observed(self) -> bool:
-        """Nothing is compensated."""
-        return False
-
-    @property
-    def variants(self) -> tuple[str, ...]:
-        """Of the compensation."""
-        return ("off",)
-
-    @property
-    def rate_rad_s2(self) -> float:
-        """Of the drive's ramp; 0 where it coasts."""
-        return 0.0
-
-
-class Plan(Passing):
-    """Settings of the run-up, SI."""
-
-    acceleration_rad_s2: float = Field(24.5, gt=0)  # 14 000 r/min in a minute
-
-    @property
-    def rate_rad_s2(self) -> float:
-        """Of the drive's ramp."""
-        return self.acceleration_rad_s2
-
-
 def settings(plan: Passing) -> dict[str, float]:
     """Lifted by the PID, which needs no model."""
     del plan
-    return {"law": CODES["PID"], "observer": 0.0, "compensate": 0.0}
+    return AMB_ROTOR.lifting
 
 
 def step_count(plan: Passing) -> int:
@@ -119,15 +68,22 @@ def step_count(plan: Passing) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Look at the shaft on its rings, lift it, nudge it, roll it slowly, run it up, and stop it."""
-    if not dwelling.rolled(rig, plan, record):
+    if not begin(rig, plan, record):
         return
+    if lift.bring_to_speed(rig, record, plan.bottom_rad_s, plan.settle_s):
+        pass_speeds(rig, plan, record, "up", plan.top_rad_s)
+    end(rig, plan)
+
+
+def begin(rig: Rig, plan: Passing, record: Recorder) -> bool:
+    """Lift, nudge and slow roll, then set the controller as planned; False where the run ends here."""
+    if not dwelling.roll_slowly(rig, record, plan.law, plan.slow_rad_s, plan.slow_s, plan.settle_s):
+        return False
     put(rig, plan.parameters)
-    if lift.turned(rig, record, plan.bottom_rad_s, plan.settle_s):
-        passed(rig, plan, record, "up", plan.top_rad_s)
-    ended(rig, plan)
+    return True
 
 
-def ended(rig: Rig, plan: Passing) -> None:
+def end(rig: Rig, plan: Passing) -> None:
     """Stop the shaft, and give the controller its own settings again."""
     if rig.drive is not None:
         rig.drive.stop()
@@ -135,10 +91,10 @@ def ended(rig: Rig, plan: Passing) -> None:
         if plan.rate_rad_s2:
             rig.drive.set_acceleration(0.0)
     put(rig, {name: rig.file.parameters[name].default for name in plan.parameters})
-    dwelling.finished(rig)
+    dwelling.stop(rig)
 
 
-def passed(rig: Rig, plan: Passing, record: Recorder, direction: str, goal: float) -> None:
+def pass_speeds(rig: Rig, plan: Passing, record: Recorder, direction: str, goal: float) -> None:
     """Through all speeds to `goal` in rad/s, with captures on the way; the drive coasts where the plan gives no rate."""
     drive, rate = rig.drive, plan.rate_rad_s2
     assert drive is not None
@@ -182,8 +138,9 @@ def passed(rig: Rig, plan: Passing, record: Recorder, direction: str, goal: floa
 
 def _arm(rig: Rig, plan: Passing, speed: float) -> None:
     if rig.capture is not None:
+        names = captured_channels(conventions(rig.file))
         rig.capture.arm(
-            RECORDED, seconds=plan.capture_s, before_s=plan.capture_s / 2, rate_hz=plan.rate_hz, trigger=at_speed(speed)
+            names, seconds=plan.capture_s, before_s=plan.capture_s / 2, rate_hz=plan.rate_hz, trigger=at_speed(speed)
         )
 
 
@@ -207,18 +164,20 @@ def evaluate(recording: Recording[Any], findings: Findings) -> Run:
     plan = recording.plan
     slow = next((read_dwell(recording, s) for s in recording.steps(SLOW)), None)
     # what a steady speed shows, a changing one may hide
-    findings.gate(unbalance_checks.of_signals([slow], plan) if slow else unbalance_checks.slow_roll([], plan))
+    rolls = [slow] if slow else []
+    findings.gate([*(unbalance_checks.of_signals(rolls, plan.max_lost, plan.max_speed_error) if slow else ()),
+                   *unbalance_checks.slow_roll(rolls, plan.speeds_rad_s)])  # fmt: skip
     try:
         passage = read_passage(recording)
     except AnalysisError as error:
         findings.end(Finding("no-passage", str(error), "", Effect.ERROR))
     findings.gate(checks.of_passage(passage, recording, plan))
-    model = bearings.adopted_bearings(recording)
+    known = bearings.Known.of(recording.calibrations, plan.beta_share, plan.offset_u_m)
     try:
-        run = estimates.run(passage, slow, recording, plan, model)
+        run = estimates.run(passage, slow, recording, plan, known)
     except AnalysisError as error:  # a drive that was faster than it was told: too few turns for a curve
         findings.end(Finding("no-passage", str(error), passage.name, Effect.ERROR))
-    findings.add((bearings.told(model, plan), *uncertified(recording.rig)))
+    findings.add((bearings.describe(known), *find_uncertified(recording.rig)))
     findings.add(checks.of_run(run, recording, plan))
     return run
 
@@ -262,7 +221,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
-    needs=unbalance.needs,
+    needs=lambda plan: bearings.needs(plan.bearings),
     optional=CRITICAL,
     assumes=assumptions.PASSAGE,
     method=read_method(__file__),

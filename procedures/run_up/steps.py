@@ -17,9 +17,9 @@ from bench.analysis.tachometer import Tachometer, age, counted, tachometer
 from bench.analysis.vectors import parts
 from bench.errors import AnalysisError
 from bench.recording import Recording
-from procedures.amb_rotor.channels import CURRENTS, POSITIONS
+from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.shared.signals import clips
-from procedures.synchronous.dwells import TOLD, Dwell, full_rate
+from procedures.synchronous.dwells import Dwell, full_rate, telemetry_channels
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -37,8 +37,8 @@ NEAR_TURNS = 10  # and at least so many
 
 @dataclass(frozen=True)
 class Passage:
-    """The whole passage. `t` (n,) s; `data` (12, n) positions and coil currents; `volts` (2, n) greatest of each bearing;
-    `flags` (n,); `driven` times and speeds of the drive (m,) each; `moving` the samples of the ramp itself."""
+    """The whole passage of a `machine`. `t` (n,) s; `data` (12, n) positions and coil currents; `volts` (2, n) greatest of each
+    bearing; `flags` (n,); `driven` times and speeds of the drive (m,) each; `moving` the samples of the ramp itself."""
 
     direction: str
     wanted: float
@@ -54,6 +54,7 @@ class Passage:
     clips: int
     lost: int
     expected: int
+    machine: AmbRotor
 
     @property
     def speeds(self) -> Array:
@@ -81,6 +82,7 @@ class Curve:
     volts: Array
     second: Complex
     dof: Array
+    machine: AmbRotor
 
 
 def read_passage(recording: Recording[Any]) -> Passage:
@@ -92,14 +94,15 @@ def read_passage(recording: Recording[Any]) -> Passage:
     steps = list(recording.steps(PASSAGE))
     if not steps:
         raise AnalysisError("found no passage through the speeds; expected one (was the run stopped early?)")
-    step, tick = steps[0], recording.rig.devices["controller"].tick_s
-    data = step.read(*TOLD, *VOLTAGES)
+    step, tick, machine = steps[0], recording.rig.devices["controller"].tick_s, conventions(recording.rig)
+    names = (*machine.positions, *machine.currents)
+    data = step.read(*telemetry_channels(machine), *VOLTAGES)
     t = (data["t_ns"] - recording.start_ns) * 1e-9
     if t.size < 100:
         raise AnalysisError(f"passage: found {t.size} samples; expected 100 or more")
     ticks = round(recording.streams["telemetry"].period_ns * 1e-9 / tick)
     tacho = tachometer(*counted(t - tick, data["pulses"], age(data["angle"], data["speed"])))
-    wide = np.array([data[c] for c in (*POSITIONS, *CURRENTS)])
+    wide = np.array([data[c] for c in names])
     drive = recording.channel(DRIVEN, step.start_ns, step.end_ns)
     labels = step.labels
     return Passage(
@@ -113,10 +116,11 @@ def read_passage(recording: Recording[Any]) -> Passage:
         data["flags"].astype(np.int64),
         ((drive["t_ns"] - recording.start_ns) * 1e-9, drive[DRIVEN]),
         _moving(tacho.speed(t)),
-        tuple(c for c, x in zip((*POSITIONS, *CURRENTS), wide, strict=True) if np.ptp(x) == 0),
+        tuple(c for c, x in zip(names, wide, strict=True) if np.ptp(x) == 0),
         clips(wide[:4]),
         step.lost(),
         step.expected(),
+        machine,
     )
 
 
@@ -161,7 +165,7 @@ def curve(p: Passage, blocks: int) -> Curve:
     if not rows:
         raise AnalysisError("passage: found no block of four turns")
     joined = [np.concatenate(parts_, axis=0) for parts_ in zip(*rows, strict=True)]
-    return _ordered(joined)
+    return _ordered(joined, p.machine)
 
 
 def _piece(p: Passage, angle: Array, first: int, last: int, turns: int) -> tuple[Any, ...]:
@@ -184,7 +188,7 @@ def _piece(p: Passage, angle: Array, first: int, last: int, turns: int) -> tuple
     return track.t, track.speed, width, track.values[:, :, 0], covariance, alone, whole, track.means, volts, second, dof
 
 
-def _ordered(joined: Sequence[Any]) -> Curve:
+def _ordered(joined: Sequence[Any], machine: AmbRotor) -> Curve:
     t, speed, width, values, covariance, alone, whole, means, volts, second, dof = joined
     for kind in (slice(0, 4), slice(4, 12)):  # positions, currents
         covariance[:, kind] *= serial.inflation(alone[:, kind], whole[:, kind])[:, None, None, None]
@@ -201,6 +205,7 @@ def _ordered(joined: Sequence[Any]) -> Curve:
         volts[rising],
         second[rising].T,
         dof[rising],
+        machine,
     )
 
 
@@ -220,10 +225,11 @@ def near(p: Passage, recording: Recording[Any], speed: float, law: str) -> tuple
     orders = [n for n in (1.0, 2.0, 3.0) if n == 1 or n * speed / turn < 0.4 / (p.sampling.ticks * p.sampling.tick)]
     track = synchronous(p.t[part], p.data[:, part], p.tacho, p.sampling, orders=orders)
     captures = recording.captures(passed_rad_s=speed)
+    full = full_rate(captures[0], p.machine) if captures else None
     driven = float(np.interp(p.t[k], *p.driven))
     dwell = Dwell(
-        PASSAGE, f"{p.direction}, {law}", speed, driven, False, p.tacho, track, full_rate(captures[0]) if captures else None,
+        PASSAGE, f"{p.direction}, {law}", speed, driven, False, p.tacho, track, full,
         int(np.bitwise_or.reduce(p.flags[part])), 0, (), 0, 1, recording.start_ns + round(p.t[k] * 1e9),
-        p.sampling,
+        p.sampling, p.machine,
     )  # fmt: skip
     return dwell, abs(float(w[part.stop - 1] - w[part.start]))

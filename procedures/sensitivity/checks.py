@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -14,17 +14,13 @@ from bench.recording import Recording
 from bench.uncertainty import coverage_factor
 from bench.units import RPM
 from procedures.sensitivity.estimates import Peak, Result
+from procedures.sensitivity.plan import Plan
 from procedures.sensitivity.steps import (
-    AXES,
-    CONTACT,
-    CURRENT_LIMIT,
     INJECT,
-    RANGE,
-    VOLTAGE_LIMIT,
     Taken,
     folds,
     grid_of,
-    named,
+    name_speed,
 )
 from procedures.shared import signals
 
@@ -42,21 +38,6 @@ UNEXPLAINED = 1e-3  # probability below which no model explains the lines about 
 SURE = 4.0  # standard deviations of a line above the refined maximum
 
 
-class Settings(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def amplitude_A(self) -> float: ...
-    @property
-    def max_lost(self) -> float: ...
-    @property
-    def max_speed_error(self) -> float: ...
-    @property
-    def max_change(self) -> float: ...
-    @property
-    def min_coherence(self) -> float: ...
-
-
 def before(recording: Recording[Any]) -> Iterator[Finding]:
     """Nothing to evaluate, captures too slow for their lines, or none of the injection in them."""
     steps = list(recording.steps(INJECT))
@@ -64,7 +45,7 @@ def before(recording: Recording[Any]) -> Iterator[Finding]:
         yield Finding("no-injection", "no injection was recorded", "", Effect.ERROR)
     for step in steps:
         captured = recording.captures(number=step.labels["number"])
-        where = f"{step.labels['axis']}, {named(float(step.labels['speed_rad_s']))}"
+        where = f"{step.labels['axis']}, {name_speed(float(step.labels['speed_rad_s']))}"
         if not captured:
             yield Finding("no-capture", "an injection was not captured.", where, Effect.ERROR)
             return
@@ -82,7 +63,7 @@ def before(recording: Recording[Any]) -> Iterator[Finding]:
             return
 
 
-def of_signals(taken: Sequence[Taken], plan: Settings) -> Iterator[Finding]:
+def of_signals(taken: Sequence[Taken], plan: Plan) -> Iterator[Finding]:
     """Lost samples, probes, contact, limits, the injection itself and where it went."""
     lost, expected = np.array([(t.lost, t.expected) for t in taken], dtype=float).T
     yield from signals.losses(lost, expected, plan.max_lost, lambda share: taken[int(np.argmax(share))].where)
@@ -95,17 +76,18 @@ def of_signals(taken: Sequence[Taken], plan: Settings) -> Iterator[Finding]:
 
 
 def _limits(t: Taken) -> Iterator[Finding]:
-    if t.flags & RANGE or t.clips >= HELD:
+    if t.flags & t.machine.sensor_range or t.clips >= HELD:
         yield Finding(
             "sensor-clipped",
             "a position sensor stood at the end of its range: the loop was cut.",
             t.where,
             Effect.ERROR,
         )
+    m = t.machine
     for bits, code, text in (
-        (CONTACT, "contact", "the shaft touched a ring or the axial stop: this is not the levitated loop."),
-        (CURRENT_LIMIT, "current-saturated", "a coil current was at its limit: the loop was not linear. Inject less."),
-        (VOLTAGE_LIMIT, "voltage-saturated", "an amplifier's voltage was at its limit: this is not S of small motions."),
+        (m.contact, "contact", "the shaft touched a ring or the axial stop: this is not the levitated loop."),
+        (m.current_limit, "current-saturated", "a coil current was at its limit: the loop was not linear. Inject less."),
+        (m.voltage_limit, "voltage-saturated", "an amplifier's voltage was at its limit: this is not S of small motions."),
     ):  # fmt: skip
         if t.flags & bits:
             yield Finding(code, text, t.where, Effect.INDETERMINATE, (f"@{t.where}",))
@@ -135,7 +117,8 @@ def _followed(t: Taken) -> Iterator[Finding]:
     """The coils of the axis that was asked for must follow the reference with the injection, and with its sign."""
     if t.follows is None:
         return
-    own = t.follows[AXES.index(t.axis)]
+    axes = t.machine.all_axes
+    own = t.follows[axes.index(t.axis)]
     if FOLLOWS[0] < own.real < FOLLOWS[1] and abs(own) < FOLLOWS[1]:
         return
     k = int(np.abs(t.follows).argmax())
@@ -146,12 +129,12 @@ def _followed(t: Taken) -> Iterator[Finding]:
         yield Finding("coils-exchanged", text, t.where, Effect.ERROR)
         return
     text = f"the coils of {t.axis} do not follow the reference with the injection ({abs(own):.2f} of it)"
-    if k != AXES.index(t.axis) and FOLLOWS[0] < abs(t.follows[k]) < FOLLOWS[1]:
-        text += f"; those of {AXES[k]} do: it went into that axis, or the channels are exchanged."
+    if k != axes.index(t.axis) and FOLLOWS[0] < abs(t.follows[k]) < FOLLOWS[1]:
+        text += f"; those of {axes[k]} do: it went into that axis, or the channels are exchanged."
     yield Finding("wrong-axis", f"{text.rstrip('.')}.", t.where, Effect.ERROR)
 
 
-def _turning(t: Taken, plan: Settings) -> Iterator[Finding]:
+def _turning(t: Taken, plan: Plan) -> Iterator[Finding]:
     off = abs(t.turning / t.speed - 1) if t.speed else 0.0
     if off > plan.max_speed_error:
         yield Finding(
@@ -163,7 +146,7 @@ def _turning(t: Taken, plan: Settings) -> Iterator[Finding]:
         )
 
 
-def of_results(results: Sequence[Result], plan: Settings) -> Iterator[Finding]:
+def of_results(results: Sequence[Result], plan: Plan) -> Iterator[Finding]:
     """Is the greatest value where the grid is fine, explained, coherent and independent of the amplitude? Then notes."""
     for r in results:
         if not r.peaks:
@@ -195,7 +178,7 @@ def _covered(r: Result) -> Iterator[Finding]:
         yield Finding("peak-not-refined", text, r.where, Effect.INDETERMINATE, (f"@{r.where}",))
 
 
-def _of_peak(p: Peak, plan: Settings) -> Iterator[Finding]:
+def _of_peak(p: Peak, plan: Plan) -> Iterator[Finding]:
     where, half = p.taken.where, p.top.width / 2
     if p.taken.grid.step > half:
         text = (f"lines stand {p.taken.grid.step:g} Hz apart at {p.top.at:.4g} Hz; half of the half-power width there is "
@@ -215,7 +198,7 @@ def _of_peak(p: Peak, plan: Settings) -> Iterator[Finding]:
         yield Finding("not-linear", text, where, Effect.INDETERMINATE, (f"@{where}",))
 
 
-def _notes(results: Sequence[Result], plan: Settings) -> Iterator[Finding]:
+def _notes(results: Sequence[Result], plan: Plan) -> Iterator[Finding]:
     for r in results:
         if not r.peaks or "s_max" not in r.estimates:
             continue

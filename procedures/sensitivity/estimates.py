@@ -13,7 +13,7 @@ from bench.analysis.rational import Rational, Top, averaged, fitted, orders, top
 from bench.analysis.responses import Response, image_distance
 from bench.uncertainty import Estimate, Influence
 from procedures.sensitivity.margins import margins, merged
-from procedures.sensitivity.steps import HALF, MODE, REFINED, SURVEY, WIRING, Taken, named, shared_noise
+from procedures.sensitivity.steps import HALF, MODE, REFINED, SURVEY, WIRING, Taken, name_speed, shared_noise
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -75,7 +75,7 @@ class Result:
     @property
     def where(self) -> str:
         """How it is named to the reader."""
-        return f"{self.axis}, {named(self.speed)}"
+        return f"{self.axis}, {name_speed(self.speed)}"
 
     @property
     def excluded(self) -> list[float]:
@@ -129,7 +129,7 @@ def results(taken: Sequence[Taken]) -> list[Result]:
 
 def _result(axis: str, speed: float, taken: Sequence[Taken]) -> Result:
     found = sorted(found_peaks(taken), key=lambda p: -p.top.value)
-    where = f"{axis}/{named(speed)}"
+    where = f"{axis}/{name_speed(speed)}"
     estimates: dict[str, Estimate] = {}
     if found:
         best = found[0]

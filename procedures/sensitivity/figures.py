@@ -13,7 +13,7 @@ from bench.figures import Figure, Series
 from bench.uncertainty import interval
 from procedures.sensitivity.checks import ZONES
 from procedures.sensitivity.estimates import Result
-from procedures.sensitivity.steps import SURVEY, named
+from procedures.sensitivity.steps import SURVEY, name_speed
 
 CLEAR = 0.97  # coherence below which a line is not drawn in the Nyquist plot
 
@@ -24,12 +24,15 @@ def all_figures(results: Sequence[Result]) -> Iterator[Figure]:
         some = [r for r in results if r.speed == speed and r.curve.hz.size]
         if some:
             key = f"{speed * 30 / np.pi:.0f}"
-            yield _zones(some, key, named(speed))
-            yield _bode(some, key, named(speed))
+            yield _zones(some, key, name_speed(speed))
+            yield _bode(some, key, name_speed(speed))
             yield loop_pictures.nyquist(
-                f"nyquist-{key}", f"Open loop, {named(speed)}", [(r.axis, loop(_survey(r))) for r in some], ZONES[0]
+                f"nyquist-{key}",
+                f"Open loop, {name_speed(speed)}",
+                [(r.axis, loop(_survey(r))) for r in some],
+                ZONES[0],
             )
-            yield _coherence(some, key, named(speed))
+            yield _coherence(some, key, name_speed(speed))
 
 
 def _zones(some: Sequence[Result], key: str, name: str) -> Figure:

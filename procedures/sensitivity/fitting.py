@@ -4,39 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any, Protocol
 
 from bench.errors import BenchError
 from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
 from bench.rigfile.envelope import Envelope
 from bench.units import RPM
-from procedures.sensitivity.injection import Comb, refused
-from procedures.sensitivity.steps import REFINED, channels
+from procedures.amb_rotor.conventions import conventions
+from procedures.sensitivity.injection import Comb, find_refusal
+from procedures.sensitivity.plan import Plan
+from procedures.sensitivity.steps import REFINED, captured_channels
 
 LEAST_S = 4.0  # of a capture of the second grid: four periods of the finest
 
 
-class Settings(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def axes(self) -> tuple[Any, ...]: ...
-    @property
-    def speeds_rad_s(self) -> tuple[float, ...]: ...
-    @property
-    def rate_hz(self) -> float: ...
-    @property
-    def low_hz(self) -> float: ...
-    @property
-    def high_step_hz(self) -> float: ...
-    @property
-    def periods(self) -> int: ...
-    @property
-    def amplitude_A(self) -> float: ...
-
-
-def of_plan(rig: RigFile, plan: Settings, combs: Sequence[tuple[str, Comb]]) -> Iterator[str]:
+def of_plan(rig: RigFile, plan: Plan, combs: Sequence[tuple[str, Comb]]) -> Iterator[str]:
     """What the plan asks too much of: key, found, expected."""
     if max(plan.speeds_rad_s) > 0 and not any("drive" in d.roles for d in rig.devices.values()):
         yield "speeds_rad_s: the rig file has no device in the role drive, so that nothing turns the shaft; expected 0"
@@ -45,10 +27,10 @@ def of_plan(rig: RigFile, plan: Settings, combs: Sequence[tuple[str, Comb]]) -> 
     yield from _speeds(rig, plan)
 
 
-def _injection(rig: RigFile, plan: Settings, combs: Sequence[tuple[str, Comb]]) -> Iterator[str]:
+def _injection(rig: RigFile, plan: Plan, combs: Sequence[tuple[str, Comb]]) -> Iterator[str]:
     refined = Comb(plan.low_hz, plan.low_hz, 128, plan.amplitude_A)  # at most, in the second pass
     greatest = max([*(c for _, c in combs), refined], key=lambda c: c.peak)
-    if why := refused(Envelope(rig), greatest):
+    if why := find_refusal(Envelope(rig), greatest):
         yield f"amplitude_A: found {plan.amplitude_A:g} A for each line; expected less: {why}"
     for key, value in (("low_hz", plan.low_hz), ("high_step_hz", plan.high_step_hz)):
         if math.log2(value) % 1:
@@ -62,14 +44,15 @@ def _injection(rig: RigFile, plan: Settings, combs: Sequence[tuple[str, Comb]]) 
     yield from _memory(rig, plan, combs)
 
 
-def _memory(rig: RigFile, plan: Settings, combs: Sequence[tuple[str, Comb]]) -> Iterator[str]:
+def _memory(rig: RigFile, plan: Plan, combs: Sequence[tuple[str, Comb]]) -> Iterator[str]:
     assert rig.capture is not None
     speed = max(plan.speeds_rad_s)
     slowest = min((s for s in plan.speeds_rad_s if s > 0), default=0.0)
     extra = 0.1 + 4 * math.pi / slowest if slowest else 0.0
     for kind, seconds in [*((k, plan.periods * c.period_s) for k, c in combs), (REFINED, LEAST_S)]:
         try:
-            size = Layout.of(rig.capture, channels(kind, speed)).sample.itemsize * (seconds + extra) * plan.rate_hz
+            names = captured_channels(conventions(rig), kind, speed)
+            size = Layout.of(rig.capture, names).sample.itemsize * (seconds + extra) * plan.rate_hz
         except BenchError as error:
             yield str(error)
             return
@@ -79,7 +62,7 @@ def _memory(rig: RigFile, plan: Settings, combs: Sequence[tuple[str, Comb]]) -> 
             return
 
 
-def _speeds(rig: RigFile, plan: Settings) -> Iterator[str]:
+def _speeds(rig: RigFile, plan: Plan) -> Iterator[str]:
     highest, landing = (
         rig.envelope.max_speed_rad_s,
         rig.parameters["landing_speed"].default if "landing_speed" in rig.parameters else 0.0,

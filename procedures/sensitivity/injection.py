@@ -11,8 +11,8 @@ from fractions import Fraction
 from bench.errors import BenchError
 from bench.procedure.rig import Rig
 from bench.rigfile.envelope import Envelope
+from procedures.amb_rotor.conventions import conventions
 
-AXES = ("yi", "zi", "yo", "zo", "x")  # by their number in `inject_axis`
 PARAMETERS = ("inject_axis", "inject_amplitude", "inject_hz", "inject_lines", "inject_step")
 MOST_LINES = 128
 CREST = 1.1  # greatest of Schroeder's phases over sqrt(2 lines) amplitudes: 1.08 at three lines, less elsewhere
@@ -54,7 +54,7 @@ def combs(first: float, step: float, last: float, amplitude: float) -> list[Comb
     return out
 
 
-def wanted(comb: Comb) -> dict[str, float]:
+def parameters_of(comb: Comb) -> dict[str, float]:
     """The controller's parameters that make it."""
     return {
         "inject_hz": comb.first,
@@ -64,14 +64,14 @@ def wanted(comb: Comb) -> dict[str, float]:
     }
 
 
-def refused(envelope: Envelope, comb: Comb) -> str:
+def find_refusal(envelope: Envelope, comb: Comb) -> str:
     """Why the envelope refuses it; empty where it does not."""
-    problems = [*envelope.problems_of(wanted(comb)), envelope.injection_problem(comb.peak)]
+    problems = [*envelope.problems_of(parameters_of(comb)), envelope.injection_problem(comb.peak)]
     return "; ".join(p for p in problems if p)
 
 
 @contextmanager
-def injected(rig: Rig, axis: str, comb: Comb, settle_s: float) -> Iterator[None]:
+def inject(rig: Rig, axis: str, comb: Comb, settle_s: float) -> Iterator[None]:
     """With the injection into an axis, settled; off again in the end, whatever happens.
 
     Raises:
@@ -79,10 +79,10 @@ def injected(rig: Rig, axis: str, comb: Comb, settle_s: float) -> Iterator[None]
     """
     Envelope(rig.file).check_injection(comb.peak)
     write = rig.levitation.set
-    for name, value in wanted(comb).items():
+    for name, value in parameters_of(comb).items():
         write(name, value)
     try:
-        write("inject_axis", float(AXES.index(axis)))
+        write("inject_axis", float(conventions(rig.file).all_axes.index(axis)))
         rig.clock.sleep(settle_s)
         yield
     except BaseException:

@@ -7,16 +7,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from bench.analysis.responses import Response, image_distance
 from bench.errors import AnalysisError
 from bench.figures import Figure
 from bench.findings import Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
@@ -24,14 +23,14 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
-from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
+from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
 from procedures.sensitivity import checks, estimates, fitting
 from procedures.sensitivity import figures as drawn
 from procedures.sensitivity.estimates import Candidate, Result
-from procedures.sensitivity.injection import PARAMETERS, Comb, combs, injected
+from procedures.sensitivity.injection import PARAMETERS, Comb, combs, inject
+from procedures.sensitivity.plan import Plan
 from procedures.sensitivity.steps import (
-    CURRENTS,
     HALF,
     INJECT,
     LOOP,
@@ -39,19 +38,16 @@ from procedures.sensitivity.steps import (
     PULSED,
     REFINED,
     SURVEY,
-    TOLD,
     WIRING,
-    channels,
+    captured_channels,
     folds,
     grid_of,
     read_taken,
     sensitivity,
+    telemetry_channels,
 )
 from procedures.shared import assumptions
 
-Law = Literal["PID", "CCS"]
-Axis = Literal["yi", "zi", "yo", "zo", "x"]
-CODES: dict[Law, float] = {"PID": 0.0, "CCS": 1.0}
 S_MAX = Quantity("s_max", "1", "greatest |V1/E| of an axis, all other loops closed (ISO 14839-3)", title="S_max")
 AT = Quantity("s_max_hz", "Hz", "frequency of the greatest |V1/E|", title="frequency of S_max")
 PHASE = Quantity("phase_margin", "rad", "least angle of the open loop L = 1/S - 1 from -1 where |L| = 1, either way")
@@ -60,33 +56,6 @@ RISE = Quantity("gain_increase", "1", "factor to which the loop's gain may rise 
 MEASURES = (S_MAX, AT, PHASE, FALL, RISE)
 MARGIN_S = 0.1  # of a capture, for the first and last pulse
 FOLLOWED_HZ, FOLLOWED = 8.0, 12  # lines at its odd multiples: below 200 Hz coils follow their references
-STANDS_S = 1.0  # the controller knows half a second after the last pulse that the shaft stands
-
-
-class Plan(BenchPlan):
-    """Settings of the injections, SI."""
-
-    law: Law = "PID"
-    axes: tuple[Axis, ...] = Field(("yi", "zi", "yo", "zo", "x"), min_length=1)
-    speeds_rad_s: tuple[float, ...] = Field((0.0, 10000 / RPM), min_length=1)
-    amplitude_A: float = Field(4e-3, gt=0)  # of each line, 0-pk
-    low_hz: float = Field(2.0, gt=0)
-    middle_hz: float = Field(256.0, gt=0)  # up to here the odd multiples of low_hz; above it every high_step_hz
-    high_step_hz: float = Field(16.0, gt=0)
-    high_hz: float = Field(2000.0, gt=0)
-    modes_hz: tuple[float, ...] = (650.0, 1240.0)  # bending modes, about which a finer grid is laid
-    mode_within_hz: float = Field(26.0, gt=0)  # to either side
-    mode_damping: float = Field(2e-3, gt=0)  # least that is expected of them
-    periods: int = Field(4, ge=3)  # of the survey
-    refined_periods: int = Field(8, ge=4)
-    settle_s: float = Field(8.0, ge=0.5)  # under the law, before anything is injected
-    start_s: float = Field(0.5, ge=0.1)  # of each injection
-    survey_start_s: float = Field(1.5, ge=0.1)  # of the survey: a slow integrator answers its lowest lines
-    rate_hz: float = Field(10000.0, gt=0)  # of the captures
-    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
-    max_speed_error: float = Field(0.01, gt=0)  # share of the speed
-    max_change: float = Field(0.05, gt=0)  # of S_max, at half the amplitude: linear enough
-    min_coherence: float = Field(0.9, gt=0, lt=1)  # at the lines about the peak
 
 
 def surveys(plan: Plan, speed: float) -> list[tuple[str, float, Comb]]:
@@ -120,13 +89,13 @@ def refinements(plan: Plan, about: Candidate, speed: float) -> list[tuple[str, f
 def size(rig: RigFile, kind: str, speed: float) -> int:
     """Bytes of a sample of what is captured."""
     assert rig.capture is not None
-    return Layout.of(rig.capture, channels(kind, speed)).sample.itemsize
+    return Layout.of(rig.capture, captured_channels(conventions(rig), kind, speed)).sample.itemsize
 
 
 def settings(plan: Plan) -> dict[str, float]:
     """Lifted by the PID, which needs no model; nothing compensated, nothing injected."""
     del plan
-    return {"law": CODES["PID"], "observer": 0.0, "compensate": 0.0, "inject_axis": -1.0}
+    return {**AMB_ROTOR.lifting, "inject_axis": -1.0}
 
 
 def step_count(plan: Plan) -> int:
@@ -136,38 +105,39 @@ def step_count(plan: Plan) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Lift the shaft, nudge it, and at each speed inject into each axis: the survey, then finer where it peaks."""
-    if not lift.probed(rig, record):
+    if not lift.lift_and_nudge(rig, record):
         return
-    rig.levitation.set("law", CODES[plan.law])
+    machine = conventions(rig.file)
+    rig.levitation.set(machine.law, machine.laws[plan.law])
     rig.clock.sleep(plan.settle_s)
     number = 0
     for speed in sorted(plan.speeds_rad_s):
-        if speed and not lift.turned(rig, record, speed, plan.settle_s):
+        if speed and not lift.bring_to_speed(rig, record, speed, plan.settle_s):
             break
         for axis in plan.axes:
             number = _axis(rig, plan, record, speed, axis, number)
     if rig.drive is not None and max(plan.speeds_rad_s) > 0:
         rig.drive.stop()
         rig.drive.coast()
-        rig.clock.sleep(STANDS_S)
-    rig.levitation.set("law", CODES["PID"])
+        rig.clock.sleep(machine.stands_s)
+    rig.levitation.set(machine.law, machine.laws["PID"])
 
 
 def _axis(rig: Rig, plan: Plan, record: Recorder, speed: float, axis: str, number: int) -> int:
     """Both passes of an axis; the number of the next capture."""
     seen: list[Response] = []
     for kind, about, comb in surveys(plan, speed):
-        found = _taken(rig, plan, record, speed, axis, kind, about, comb, number)
+        found = _take(rig, plan, record, speed, axis, kind, about, comb, number)
         seen += [found] if found is not None and kind != WIRING else []
         number += 1
     for candidate in estimates.candidates(seen):
         for kind, about, comb in refinements(plan, candidate, speed):
-            _taken(rig, plan, record, speed, axis, kind, about, comb, number)
+            _take(rig, plan, record, speed, axis, kind, about, comb, number)
             number += 1
     return number
 
 
-def _taken(
+def _take(
     rig: Rig, plan: Plan, record: Recorder, speed: float, axis: str, kind: str, about: float, comb: Comb, number: int
 ) -> Response | None:
     """Inject, capture, upload; what S seems to be, for deciding how to go on; None where that cannot be told."""
@@ -182,9 +152,10 @@ def _taken(
         most = rig.capture.memory_bytes / size(rig.file, kind, speed) / plan.rate_hz - pulses
         seconds = comb.period_s * min(plan.refined_periods, math.floor(most / comb.period_s))
     seconds += pulses
-    with injected(rig, axis, comb, plan.survey_start_s if kind == SURVEY else plan.start_s):
+    with inject(rig, axis, comb, plan.survey_start_s if kind == SURVEY else plan.start_s):
         with record.step(INJECT, **labels):
-            rig.capture.arm(channels(kind, speed), seconds=seconds, rate_hz=plan.rate_hz)
+            names = captured_channels(conventions(rig.file), kind, speed)
+            rig.capture.arm(names, seconds=seconds, rate_hz=plan.rate_hz)
             rig.capture.wait(seconds + 5.0)
     data, grid = rig.capture.upload(None, **labels), grid_of(labels)
     if folds(grid, data.rate_hz):
@@ -237,7 +208,11 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=Requires(channels=TOLD, parameters=(*PARAMETERS, "law"), capture=(*LOOP, *PULSED, *CURRENTS)),
+    requires=Requires(
+        channels=telemetry_channels(AMB_ROTOR),
+        parameters=(*PARAMETERS, AMB_ROTOR.law),
+        capture=(*LOOP, *PULSED, *AMB_ROTOR.all_currents),
+    ),
     check=check,
     settings=settings,
     step_count=step_count,

@@ -15,20 +15,17 @@ from bench.analysis.tachometer import counted, tachometer
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.units import RPM
+from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.shared.signals import clips
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 INJECT, NOT_REACHED = "inject", "not-reached"
 WIRING, SURVEY, MODE, REFINED, HALF = "wiring", "survey", "mode", "refined", "half"
-AXES = ("yi", "zi", "yo", "zo", "x")
-TOLD = (*(f"pos_{a}" for a in AXES), "flags", "speed")
 LOOP = ("inject", "before", "after")
 PULSED = ("pulses", "pulse_age")
-CURRENTS = tuple(f"i_{a}_{side}" for a in AXES for side in "pn")
 ORDERS = (1.0, 2.0, 3.0, 4.0)
 CLEAR_HZ = 3.0  # to either side of an order of the shaft's speed
-CURRENT_LIMIT, VOLTAGE_LIMIT, CONTACT, RANGE = 1, 2, 4 | 8 | 32, 64  # bits of the telemetry signal `flags`
 WHOLE = 1e-6  # of the samples of a period: how far they may be from a whole number
 SHARING, FEW = 15, 4  # lines to either side that share a noise; at the ends of a grid
 
@@ -71,11 +68,12 @@ class Taken:
     clips: int
     lost: int
     expected: int
+    machine: AmbRotor
 
     @property
     def where(self) -> str:
         """How it is named to the reader."""
-        return f"{self.axis}, {named(self.speed)}"
+        return f"{self.axis}, {name_speed(self.speed)}"
 
     @property
     def noise(self) -> Array:
@@ -103,14 +101,19 @@ def shared_noise(r: Response) -> Array:
     return np.asarray(np.array(near) * size)
 
 
-def named(speed: float) -> str:
+def name_speed(speed: float) -> str:
     """A speed, for the reader."""
     return f"{speed * RPM:.0f} r/min" if speed else "at rest"
 
 
-def channels(kind: str, speed: float) -> tuple[str, ...]:
+def telemetry_channels(machine: AmbRotor) -> tuple[str, ...]:
+    """What is read of the telemetry."""
+    return (*machine.all_positions, "flags", "speed")
+
+
+def captured_channels(machine: AmbRotor, kind: str, speed: float) -> tuple[str, ...]:
     """What is captured: first of all also the coil currents, which tell where the injection goes."""
-    return (*LOOP, *(CURRENTS if kind == WIRING else ()), *(PULSED if speed else ()))
+    return (*LOOP, *(machine.all_currents if kind == WIRING else ()), *(PULSED if speed else ()))
 
 
 def folds(grid: Grid, rate: float) -> bool:
@@ -128,7 +131,7 @@ def sensitivity(columns: Mapping[str, Array], t: Array, rate: float, grid: Grid)
     data = np.array([columns["inject"], columns["after"]])
     hz, near = grid.hz, grid.hz[:0]
     if "pulses" in columns:
-        angle, speed, inside = turned(columns, t)
+        angle, speed, inside = track_angle(columns, t)
         data = np.concatenate([data[:1, inside], without_orders(data[1:, inside], angle[inside], ORDERS)])
         free = clear_of_orders(hz, speed, CLEAR_HZ, ORDERS)
         hz, near = hz[free], hz[~free]
@@ -136,7 +139,7 @@ def sensitivity(columns: Mapping[str, Array], t: Array, rate: float, grid: Grid)
     return response(found, 1, 0), np.abs(found.values[:, 0]).mean(axis=0), near
 
 
-def turned(columns: Mapping[str, Array], t: Array) -> tuple[Array, float, npt.NDArray[np.bool_]]:
+def track_angle(columns: Mapping[str, Array], t: Array) -> tuple[Array, float, npt.NDArray[np.bool_]]:
     """Angle (n,) rad by the pulses, mean speed rad/s, and where the angle is known, (n,)."""
     tacho = tachometer(*counted(t, columns["pulses"], columns["pulse_age"]))
     angle = tacho.angle(t)
@@ -166,7 +169,8 @@ def grid_of(labels: Mapping[str, Any]) -> Grid:
 
 
 def _read(recording: Recording[Any], step: Step) -> Taken:
-    labels, told = step.labels, step.read(*TOLD)
+    machine = conventions(recording.rig)
+    labels, data = step.labels, step.read(*telemetry_channels(machine))
     captured = recording.captures(number=labels["number"])
     if not captured:
         raise AnalysisError(f"injection {dict(labels)}: found no capture")
@@ -174,21 +178,21 @@ def _read(recording: Recording[Any], step: Step) -> Taken:
     columns = captured[0].arrays(*captured[0].channels)
     found, injected, excluded = sensitivity(columns, columns["t_s"], rate, grid)
     clipped = float(np.abs(columns["after"] - columns["before"] - columns["inject"]).max())
-    follows = _follows(columns, rate, grid) if kind == WIRING else None
-    turning = turned(columns, columns["t_s"])[1] if "pulses" in columns else 0.0
-    flags = int(np.bitwise_or.reduce(told["flags"].astype(np.int64)))
+    follows = _follows(columns, machine, rate, grid) if kind == WIRING else None
+    turning = track_angle(columns, columns["t_s"])[1] if "pulses" in columns else 0.0
+    flags = int(np.bitwise_or.reduce(data["flags"].astype(np.int64)))
     return Taken(
         str(labels["axis"]), float(labels["speed_rad_s"]), turning, kind, float(labels["about_hz"]), grid, found, excluded,
         injected, float(np.abs(columns["inject"]).max()), clipped, follows, rate, flags,
-        clips([told[f"pos_{a}"] for a in AXES]), step.lost(), step.expected(),
+        clips([data[name] for name in machine.all_positions]), step.lost(), step.expected(), machine,
     )  # fmt: skip
 
 
-def _follows(columns: Mapping[str, Array], rate: float, grid: Grid) -> Complex | None:
+def _follows(columns: Mapping[str, Array], machine: AmbRotor, rate: float, grid: Grid) -> Complex | None:
     """Differential current of each axis per `after`, by the whole of the lines: (5,)."""
-    if any(c not in columns for c in CURRENTS):
+    if any(c not in columns for c in machine.all_currents):
         return None
-    pairs = np.array([(columns[f"i_{a}_p"] - columns[f"i_{a}_n"]) / 2 for a in AXES])
+    pairs = np.array([(columns[p] - columns[n]) / 2 for p, n in map(machine.pair, machine.all_axes)])
     data = np.concatenate([columns["after"][None], pairs])
     spectra = lines(data - data.mean(axis=1, keepdims=True), rate, round(grid.period * rate), grid.hz).values.mean(
         axis=0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +13,8 @@ from bench.recording import Recording
 from bench.uncertainty import Estimate, interval
 from procedures.shared import signals
 from procedures.step.estimates import Result
-from procedures.step.steps import CLIPPED, COIL_LIMIT, CONTACT, STEP, VOLTAGE_LIMIT, Case, Done
+from procedures.step.plan import Plan
+from procedures.step.steps import STEP, Case, Done
 
 FATAL = (
     "current-sign",
@@ -33,17 +34,6 @@ AFTER_S = 0.1  # that a record goes on after the position has settled
 ASIDE = 0.5  # of the step, that the other axis may move for good
 
 
-class Tolerances(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def max_lost(self) -> float: ...
-    @property
-    def max_speed_error(self) -> float: ...
-    @property
-    def band(self) -> float: ...
-
-
 def before(recording: Recording[Any]) -> Iterator[Finding]:
     """A speed that was not reached; steps that were not recorded."""
     for event in recording.events("not-reached"):
@@ -57,26 +47,28 @@ def before(recording: Recording[Any]) -> Iterator[Finding]:
         yield Finding("no-steps", "no set-point step was recorded", "", Effect.ERROR)
 
 
-def of_steps(steps: Sequence[Done], plan: Tolerances) -> Iterator[Finding]:
+def of_steps(steps: Sequence[Done], plan: Plan) -> Iterator[Finding]:
     """Signals, speed, and whether the step that was asked for is the step that came."""
     yield from _signals(steps, plan)
     yield from _speed(steps, plan)
     yield from _came(steps)
 
 
-def _signals(steps: Sequence[Done], plan: Tolerances) -> Iterator[Finding]:
+def _signals(steps: Sequence[Done], plan: Plan) -> Iterator[Finding]:
     lost, expected = np.array([(d.lost, d.expected) for d in steps], dtype=float).T
     yield from signals.losses(lost, expected, plan.max_lost, lambda share: steps[int(np.argmax(share))].case.where)
     for channel in sorted({c for d in steps for c in d.stuck}):
         text = f"{channel} does not move at all; a live sensor has noise."
         yield Finding("stuck-channel", text, channel, Effect.ERROR)
+    m = steps[0].machine
     for bits, code, effect, text in (
-        (CLIPPED, "sensor-clipped", Effect.ERROR,
+        (m.sensor_range, "sensor-clipped", Effect.ERROR,
          "a position sensor read beyond its range: what it shows of the swing is cut off"),
-        (CONTACT, "contact", Effect.INDETERMINATE,
+        (m.contact, "contact", Effect.INDETERMINATE,
          "the shaft touched a ring or the axial stop: the response is not that of the loop"),
-        (COIL_LIMIT, "current-saturated", Effect.INDETERMINATE, "a coil current was at its limit: the response is not linear"),
-        (VOLTAGE_LIMIT, "voltage-saturated", Effect.INDETERMINATE,
+        (m.current_limit, "current-saturated", Effect.INDETERMINATE,
+         "a coil current was at its limit: the response is not linear"),
+        (m.voltage_limit, "voltage-saturated", Effect.INDETERMINATE,
          "an amplifier's voltage was at its limit: the currents slewed, "
          "and the response is not linear; steps are too large, the supply too low or the coils' inductance too high"),
     ):  # fmt: skip
@@ -94,7 +86,7 @@ def touched(hit: Sequence[Done], steps: Sequence[Done]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(f"@{place}" for place in places))
 
 
-def _speed(steps: Sequence[Done], plan: Tolerances) -> Iterator[Finding]:
+def _speed(steps: Sequence[Done], plan: Plan) -> Iterator[Finding]:
     off = [(max(abs(v - d.case.speed) for v in d.speeds) / d.case.speed, d) for d in steps if d.case.speed > 0]
     if off and (most := max(off, key=lambda o: o[0]))[0] > plan.max_speed_error:
         low, high = (v * 30 / math.pi for v in most[1].speeds)
@@ -165,7 +157,7 @@ def _came(steps: Sequence[Done]) -> Iterator[Finding]:
 
 
 def of_results(
-    results: Mapping[Case, Result], groups: Mapping[str, Mapping[str, Estimate]], plan: Tolerances
+    results: Mapping[Case, Result], groups: Mapping[str, Mapping[str, Estimate]], plan: Plan
 ) -> Iterator[Finding]:
     """Steps that do not settle, bands that noise has widened, responses without an oscillation."""
     for case, result in results.items():
@@ -203,7 +195,7 @@ def _longer(result: Result) -> str:
             f"record_s of {math.ceil(2 * enough) / 2:g} s shows it settle")  # fmt: skip
 
 
-def compared(results: Mapping[Case, Result], names: tuple[str, str]) -> Iterator[Finding]:
+def compare(results: Mapping[Case, Result], names: tuple[str, str]) -> Iterator[Finding]:
     """One setting against the other, at the largest step upwards of each axis and speed."""
     for case, first in results.items():
         other = results.get(Case(names[1], case.speed, case.axis, case.size, case.way))

@@ -20,7 +20,8 @@ from scipy.special import stdtrit
 
 from bench.findings import Effect, Finding
 from bench.recording import Recording, Step
-from procedures.step.steps import ORDERS, PLANES, STEP, TURNING_RAD_S
+from procedures.amb_rotor.conventions import conventions
+from procedures.step.steps import ORDERS, STEP, TURNING_RAD_S
 
 Array = npt.NDArray[np.float64]
 FALSE_ALARM = 1e-4
@@ -28,14 +29,14 @@ BACK = 3  # samples of a reading that a current can answer
 FEWEST = 50  # samples of a step's rest
 
 
-def exchanged(recording: Recording[Any]) -> Iterator[Finding]:
+def find_exchanged(recording: Recording[Any]) -> Iterator[Finding]:
     """A finding for each axis whose readings of the two planes answer for each other's bearings."""
     for axis in dict.fromkeys(str(s.labels["axis"]) for s in recording.steps(STEP)):
         steps = [s for s in recording.steps(STEP) if s.labels["axis"] == axis]
         alike: dict[tuple[str, float], list[Step]] = {}
         for step in steps if axis != "x" else ():
             alike.setdefault((str(step.labels["setting"]), float(step.labels["speed_rad_s"])), []).append(step)
-        if any(crossed([rested(step, axis) for step in of]) for of in alike.values()):
+        if any(is_crossed([read_rest(step, axis) for step in of]) for of in alike.values()):
             text = (
                 f"while the shaft rests, the {axis} currents of each bearing answer the readings of the other plane: "
                 f"readings or currents of {axis} are exchanged between the planes."
@@ -43,15 +44,16 @@ def exchanged(recording: Recording[Any]) -> Iterator[Finding]:
             yield Finding("planes-exchanged", text, axis, Effect.ERROR)
 
 
-def rested(step: Step, axis: str) -> Array:
+def read_rest(step: Step, axis: str) -> Array:
     """Before a step, without what turns with the shaft: readings (m) and control currents (A) of both planes, (4, n)."""
-    names = tuple(f"i_{axis}{b}_{side}" for b in PLANES for side in "pn")
-    data = step.read(*(f"pos_{axis}{b}" for b in PLANES), *names, "angle", "speed")
+    machine = conventions(step.recording.rig)
+    along = machine.along(axis)
+    places, pairs = [machine.position(a) for a in along], [machine.pair(a) for a in along]
+    data = step.read(*places, *(name for pair in pairs for name in pair), "angle", "speed")
     written = [e["t_ns"] for e in step.recording.events("parameter")
-               if e["name"] == f"ref_{axis}" and step.start_ns <= e["t_ns"] < step.end_ns]  # fmt: skip
+               if e["name"] == machine.set_points[axis] and step.start_ns <= e["t_ns"] < step.end_ns]  # fmt: skip
     rest = data["t_ns"] <= (written[-1] if written else step.start_ns)
-    x = np.array([*(data[f"pos_{axis}{b}"] for b in PLANES),
-                  *(data[f"i_{axis}{b}_p"] - data[f"i_{axis}{b}_n"] for b in PLANES)])[:, rest]  # fmt: skip
+    x = np.array([*(data[name] for name in places), *(data[p] - data[n] for p, n in pairs)])[:, rest]
     t, phase = np.linspace(-1, 1, x.shape[1]), np.unwrap(data["angle"][rest])
     turning = rest.any() and float(np.median(data["speed"][rest])) > TURNING_RAD_S
     orders = [f(n * phase) for n in ORDERS for f in (np.cos, np.sin)] if turning else []
@@ -59,7 +61,7 @@ def rested(step: Step, axis: str) -> Array:
     return np.asarray(x - (design @ np.linalg.lstsq(design, x.T, rcond=None)[0]).T)
 
 
-def crossed(steps: Sequence[Array]) -> bool:
+def is_crossed(steps: Sequence[Array]) -> bool:
     """Of steps at rest (4, n): whether the currents answer the other plane, and do so beyond chance."""
     used = [x for x in steps if x.shape[1] >= FEWEST]
     if len(used) < 3:

@@ -8,14 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
-
-from pydantic import Field
 
 from bench.errors import NotReached
 from bench.figures import Figure
 from bench.findings import Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
@@ -24,12 +21,14 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from bench.units import RPM
+from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
 from procedures.shared import assumptions
 from procedures.step import checks, estimates, planes
 from procedures.step import figures as drawn
 from procedures.step.estimates import Result
+from procedures.step.plan import Plan
 from procedures.step.record_length import enough_s, faded_s
-from procedures.step.steps import CHANNELS, STEP, TURNING_RAD_S, Case, Done, cases, read_steps
+from procedures.step.steps import STEP, TURNING_RAD_S, Case, Done, cases, channels, read_steps
 
 OVERSHOOT = Quantity("overshoot", "1", "greatest position beyond the step, as a share of it")
 RISE = Quantity("rise_time", "s", "10 to 90 % of the step")
@@ -50,38 +49,11 @@ WAY = Quantity(
     "way_effect", "1", "overshoot upwards less that downwards, at the largest step", title="effect of the direction"
 )
 MEASURES = (OVERSHOOT, RISE, SETTLING, ERROR, BANDWIDTH, DAMPING, FREQUENCY, SIZE, WAY)
-Axis = Literal["y", "z", "x"]
-MODEL = ("model_beta_{}", "model_offset_{}")
-RADIAL = ("yi", "zi", "yo", "zo")
-PULSES_S = 1.0  # until the speed by the pulses, and with it the controller's state, says that the shaft stands
 SETTLED_S = 0.5  # after the last ramp of a speed
 MARGIN = 0.8  # of the clearance that a step with its overshoot may use
 
 
-class Plan(BenchPlan):
-    """Settings of the steps, SI."""
-
-    axes: tuple[Axis, ...] = Field(("y", "z"), min_length=1)
-    sizes_m: tuple[float, ...] = Field((10e-6, 20e-6), min_length=2)  # one alone says nothing of linearity
-    speeds_rad_s: tuple[float, ...] = Field((0.0,), min_length=1)
-    repeats: int = Field(2, ge=2)  # of: up, back, down, back
-    a: dict[str, float] = Field(default_factory=lambda: {"law": 1.0})  # parameters of the controller
-    b: dict[str, float] = Field(default_factory=dict)  # the other setting; empty: nothing is compared
-    names: tuple[str, str] = ("A", "B")
-    warm: dict[str, float] = Field(default_factory=dict)  # on top of either setting until it is warm
-    warm_s: float = Field(4.0, ge=0)
-    settle_s: float = Field(5.0, ge=0.1)  # with the setting itself
-    model_error: float = Field(
-        0.0, gt=-0.5, lt=1.0
-    )  # share by which the controller's betas and offsets are made too large
-    rest_s: float = Field(0.3, ge=0.1)  # before each step
-    record_s: float | None = Field(None, ge=0.2)  # after it; by default until the law's integrator has arrived
-    band: float = Field(0.02, gt=0)  # of settling, as a share of the step
-    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
-    max_speed_error: float = Field(0.02, gt=0)  # share of the speed
-
-
-def chosen(plan: Plan) -> dict[str, dict[str, float]]:
+def list_settings(plan: Plan) -> dict[str, dict[str, float]]:
     """The settings by name."""
     first = {plan.names[0]: plan.a}
     return first | {plan.names[1]: plan.b} if plan.b else first
@@ -89,20 +61,21 @@ def chosen(plan: Plan) -> dict[str, dict[str, float]]:
 
 def model(rig: RigFile, plan: Plan) -> dict[str, float]:
     """The controller's idea of the bearings, wrong by what the plan says; what the rig file says where that is nothing."""
-    names = [m.format(a) for m in MODEL for a in RADIAL]
-    return {n: rig.parameters[n].default * (1 + plan.model_error) for n in names} if plan.model_error else {}
+    return {n: rig.parameters[n].default * (1 + plan.model_error) for n in model_names(rig, plan)}
 
 
 def recorded_s(rig: RigFile, plan: Plan) -> float:
     """How long each step is recorded, s: what the plan says, or as long as the slowest of its laws takes."""
     if plan.record_s is not None:
         return plan.record_s
-    return enough_s([{**_usual(rig), **s} for s in chosen(plan).values()], plan.axes, plan.band)
+    return enough_s(
+        conventions(rig), [{**_usual(rig), **s} for s in list_settings(plan).values()], plan.axes, plan.band
+    )
 
 
 def waited_s(rig: RigFile, plan: Plan, setting: str, axis: str) -> float:
     """Before the rest of each step, s, until what the one before it leaves is nothing."""
-    needed = faded_s({**_usual(rig), **chosen(plan)[setting]}, axis, plan.band)
+    needed = faded_s(conventions(rig), {**_usual(rig), **list_settings(plan)[setting]}, axis, plan.band)
     return max(needed - recorded_s(rig, plan) - plan.rest_s, 0.0)
 
 
@@ -112,12 +85,12 @@ def _usual(rig: RigFile) -> dict[str, float]:
 
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records, for the progress display."""
-    return 4 * plan.repeats * len(list(cases(tuple(chosen(plan)), plan.speeds_rad_s, plan.axes, plan.sizes_m)))
+    return 4 * plan.repeats * len(list(cases(tuple(list_settings(plan)), plan.speeds_rad_s, plan.axes, plan.sizes_m)))
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Up, back, down and back for every case; the shaft stands and the controller has its own settings again in the end."""
-    write, settings = rig.levitation.set, chosen(plan)
+    write, settings, machine = rig.levitation.set, list_settings(plan), conventions(rig.file)
     used: dict[str, float] = {}
     record_s = recorded_s(rig.file, plan)
     for name, value in model(rig.file, plan).items():
@@ -144,13 +117,13 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
                     repeat=repeat,
                 ):
                     rig.clock.sleep(plan.rest_s)
-                    write(f"ref_{axis}", end)
+                    write(machine.set_points[axis], end)
                     rig.clock.sleep(record_s)
     if rig.drive is not None and max(plan.speeds_rad_s) > 0:
         rig.drive.stop()
         rig.drive.coast()
-        rig.clock.sleep(PULSES_S)
-    for name in ("slew", *sorted({*used} - {"law"}), *model(rig.file, plan)):
+        rig.clock.sleep(machine.stands_s)
+    for name in ("slew", *sorted({*used} - {machine.law}), *model(rig.file, plan)):
         write(name, rig.file.parameters[name].default)
 
 
@@ -193,14 +166,14 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """The response of each case, and what the cases of an axis have in common."""
     before = list(checks.before(recording))
     findings.gate(before)
-    exchanged = [] if before else list(planes.exchanged(recording))
+    exchanged = [] if before else list(planes.find_exchanged(recording))
     plan, steps = recording.plan, read_steps(recording)
     findings.gate(exchanged, so_far=Results(steps))
     findings.gate(checks.of_steps(steps, plan), checks.FATAL, Results(steps))
     by_case = estimates.by_case(steps, recording.rig, plan.band)
     by_group = estimates.by_group(steps, by_case)
     findings.add(checks.of_results(by_case, by_group, plan))
-    findings.add(checks.compared(by_case, plan.names))
+    findings.add(checks.compare(by_case, plan.names))
     return Results(steps, by_case, by_group)
 
 
@@ -215,14 +188,15 @@ def measured(results: Results) -> Iterator[Measured]:
             yield known[name].measured(estimate, where)
 
 
-def model_names(plan: Plan) -> list[str]:
+def model_names(rig: RigFile, plan: Plan) -> tuple[str, ...]:
     """Parameters that `model_error` changes."""
-    return [m.format(a) for m in MODEL for a in RADIAL] if plan.model_error else []
+    return conventions(rig).model_parameters if plan.model_error else ()
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    needed = ["slew", *(f"ref_{a}" for a in plan.axes), *model_names(plan), *plan.a, *plan.b, *plan.warm]
+    points = conventions(rig).set_points
+    needed = ["slew", *(points[a] for a in plan.axes), *model_names(rig, plan), *plan.a, *plan.b, *plan.warm]
     for name in dict.fromkeys(needed):
         if name not in rig.parameters:
             yield f"parameters: found no {name}; needed are the set points, slew and those of the plan's settings"
@@ -264,8 +238,8 @@ procedure = Procedure(
     measured=measured,
     figures=figures,
     requires=Requires(
-        channels=CHANNELS,
-        sensors=tuple(n for n in CHANNELS if n.startswith(("pos_", "i_"))),
+        channels=channels(AMB_ROTOR),
+        sensors=(*AMB_ROTOR.all_positions, *AMB_ROTOR.all_currents),
         parameters=("slew", "model_rate", "model_l_is", "model_l_os"),
         geometry=("clearance",),
     ),

@@ -12,38 +12,39 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
+from procedures.amb_rotor.conventions import AmbRotor
+
 LEAST_S = 1.5  # the flatness laws know the negative stiffness: little is left to their integrators
 MOST_S = 10.0  # a slower integrator is for `warm`, or for `record_s`
 LEFT = 1 / 3  # of the band that may be left at the end
 NOTHING = 1e-3  # of the band: with a third of it the next step's level is 0.4 % off, and its settling time by 50 ms
 ROUNDED_S = 0.5
-PID = 0.0
 
 
-def enough_s(settings: Iterable[Mapping[str, float]], axes: Iterable[str], band: float) -> float:
+def enough_s(machine: AmbRotor, settings: Iterable[Mapping[str, float]], axes: Iterable[str], band: float) -> float:
     """For the slowest of `settings`, each with all parameters of the controller; s."""
-    slowest = max((_left_s(s, axis, LEFT * band) for axis in axes for s in settings), default=LEAST_S)
+    slowest = max((_left_s(machine, s, axis, LEFT * band) for axis in axes for s in settings), default=LEAST_S)
     return math.ceil(min(max(slowest, LEAST_S), MOST_S) / ROUNDED_S - 1e-9) * ROUNDED_S
 
 
-def faded_s(settings: Mapping[str, float], axis: str, band: float) -> float:
+def faded_s(machine: AmbRotor, settings: Mapping[str, float], axis: str, band: float) -> float:
     """From a step to where the next may begin, s: 0 where the law has no slow integrator."""
-    return min(_left_s(settings, axis, NOTHING * band), 2 * MOST_S) if settings.get("ki") else 0.0
+    return min(_left_s(machine, settings, axis, NOTHING * band), 2 * MOST_S) if settings.get("ki") else 0.0
 
 
-def _left_s(of: Mapping[str, float], axis: str, share: float) -> float:
+def _left_s(machine: AmbRotor, of: Mapping[str, float], axis: str, share: float) -> float:
     """Until what the integrator has still to do is that share of the step; 0 where there is nothing to do for it."""
-    if of.get("law") != PID or any(n not in of for n in ("kp", "ki", "bias")):
+    if of.get(machine.law) != machine.laws["PID"] or any(n not in of for n in ("kp", "ki", "bias")):
         return 0.0
-    softer = of["bias"] * max(_stiffness(of, plane) for plane in ((axis,) if axis == "x" else (f"{axis}i", f"{axis}o")))
+    softer = of["bias"] * max(_stiffness(machine, of, one) for one in machine.along(axis))
     if not 0 < softer < of["kp"]:
         return 0.0
     beyond, constant = softer / (of["kp"] - softer), (of["kp"] - softer) / of["ki"] if of["ki"] else math.inf
     return constant * max(math.log(beyond / share), 0.0)
 
 
-def _stiffness(of: Mapping[str, float], plane: str) -> float:
-    """K_s/K_i of a bearing over its bias, 1/m."""
-    gap = of.get("model_gap_x" if plane == "x" else "model_gap", math.inf)
-    near, far = (gap - sign * of.get(f"model_offset_{plane}", 0.0) for sign in (1, -1))
+def _stiffness(machine: AmbRotor, of: Mapping[str, float], axis: str) -> float:
+    """K_s/K_i of an axis' magnets over their bias, 1/m."""
+    gap = of.get("model_gap_x" if axis == machine.axial else "model_gap", math.inf)
+    near, far = (gap - sign * of.get(machine.model_offset(axis), 0.0) for sign in (1, -1))
     return (near**-3 + far**-3) / (near**-2 + far**-2) if min(near, far) > 0 and math.isfinite(gap) else 0.0

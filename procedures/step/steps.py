@@ -14,16 +14,12 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
+from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.amb_rotor.onset import onset
 from procedures.step.response import trailing
 
 Array = npt.NDArray[np.float64]
 STEP = "set-point"
-PLANES = ("i", "o")
-POSITIONS = ("pos_yi", "pos_zi", "pos_yo", "pos_zo", "pos_x")
-COILS = tuple(f"i_{a}_{s}" for a in ("yi", "zi", "yo", "zo", "x") for s in "pn")
-CHANNELS = (*POSITIONS, *COILS, "angle", "speed", "flags")
-COIL_LIMIT, VOLTAGE_LIMIT, CONTACT, CLIPPED = 1, 2, 4 | 8 | 32, 64  # bits of the telemetry signal `flags`
 ORDERS = (1, 2, 3, 4)  # per turn: unbalance and the runout of the journals
 TURNING_RAD_S = 20.0
 ANSWER = 0.25  # of the greatest change of the control current: where it first gets there, the step began
@@ -59,7 +55,7 @@ class Done:
     """One recorded step from the set point `begin` m. `t` s from where the set point acts (n,), with some samples before it;
     `y`, `tilt`, `across` m along the way of the step: from where they rested, what turns with the shaft taken away; `raw` as
     `y` with it; `rest` m the same before the step; `control` A, difference of the coils, both bearings; `answered`: it did;
-    `kicks` A, of each bearing's at first. `noise` m of the mean over `samples`."""
+    `kicks` A, of each bearing's at first. `noise` m of the mean over `samples`. The `machine`."""
 
     case: Case
     begin: float
@@ -81,6 +77,12 @@ class Done:
     stuck: tuple[str, ...]
     lost: int
     expected: int
+    machine: AmbRotor
+
+
+def channels(machine: AmbRotor) -> tuple[str, ...]:
+    """What is read of a step."""
+    return (*machine.all_positions, *machine.all_currents, "angle", "speed", "flags")
 
 
 def read_steps(recording: Recording[Any]) -> list[Done]:
@@ -113,18 +115,21 @@ def by_group(steps: list[Done]) -> dict[str, list[Done]]:
 
 def shares(rig: RigFile, axis: str) -> dict[str, float]:
     """Of which sensors the position along an axis is made at the centre of mass, and how."""
-    if axis == "x":
-        return {"pos_x": 1.0}
-    l_is, l_os = (rig.parameters[f"model_l_{b}s"].default for b in PLANES)
-    return {f"pos_{axis}i": l_os / (l_is + l_os), f"pos_{axis}o": l_is / (l_is + l_os)}
+    machine = conventions(rig)
+    names = [machine.position(a) for a in machine.along(axis)]
+    if len(names) == 1:
+        return {names[0]: 1.0}
+    l_is, l_os = (rig.parameters[name].default for name in ("model_l_is", "model_l_os"))
+    return {names[0]: l_os / (l_is + l_os), names[1]: l_is / (l_is + l_os)}
 
 
 def _read(recording: Recording[Any], step: Step) -> Done:
-    data, labels = _whole(step.read(*CHANNELS)), step.labels
+    machine = conventions(recording.rig)
+    data, labels = _whole(step.read(*channels(machine))), step.labels
     axis, signed = str(labels["axis"]), float(labels["step_m"])
     case = Case(str(labels["setting"]), float(labels["speed_rad_s"]), axis, abs(signed), 1 if signed > 0 else -1)
     written = [e["t_ns"] for e in recording.events("parameter")
-               if e["name"] == f"ref_{axis}" and step.start_ns <= e["t_ns"] < step.end_ns]  # fmt: skip
+               if e["name"] == machine.set_points[axis] and step.start_ns <= e["t_ns"] < step.end_ns]  # fmt: skip
     if not written:
         raise AnalysisError(f"{case.where}: found no write of the set point within the step")
     rest = data["t_ns"] <= written[-1]
@@ -150,15 +155,16 @@ def _whole(data: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
 def _done(
     rig: RigFile, step: Step, case: Case, data: Mapping[str, npt.NDArray[Any]], rest: npt.NDArray[np.bool_]
 ) -> Done:
-    axis, other = case.axis, {"y": "z", "z": "y", "x": "y"}[case.axis]
+    axis, other, machine = case.axis, {"y": "z", "z": "y", "x": "y"}[case.axis], conventions(rig)
     raw = sum((w * data[c] for c, w in shares(rig, axis).items()), np.zeros(len(rest)))
     across = sum((w * data[c] for c, w in shares(rig, other).items()), np.zeros(len(rest)))
-    tilt = (data[f"pos_{axis}o"] - data[f"pos_{axis}i"]) / 2 if axis != "x" else np.zeros(len(rest))
-    planes = [f"{axis}{b}" for b in PLANES] if axis != "x" else ["x"]
-    control = sum((data[f"i_{p}_p"] - data[f"i_{p}_n"] for p in planes), np.zeros(len(rest)))
+    along = machine.along(axis)
+    ends = [data[machine.position(a)] for a in along]
+    tilt = (ends[1] - ends[0]) / 2 if len(ends) > 1 else np.zeros(len(rest))
+    ones = [data[p] - data[n] for p, n in map(machine.pair, along)]
+    control = sum(ones, np.zeros(len(rest)))
     t = (data["t_ns"] - data["t_ns"][0]) * 1e-9
     turning = float(np.median(data["speed"])) > TURNING_RAD_S
-    ones = [data[f"i_{p}_p"] - data[f"i_{p}_n"] for p in planes]
     signals = np.array([raw, tilt, across, control, *ones])
     clean, amplitude = _still(t, signals, data["angle"], rest) if turning else (signals, np.zeros(len(signals)))
     clean = case.way * (clean - clean[:, rest].mean(axis=1, keepdims=True))
@@ -177,7 +183,8 @@ def _done(
         float(trailing(level, samples)[round(samples) :].std()), samples, float(amplitude[0]), slope, answered,
         tuple(float(c[first : first + 3].sum()) for c in clean[4:]),
         (float(data["speed"].min()), float(data["speed"].max())), int(np.bitwise_or.reduce(flags)),
-        tuple(c for c in (*POSITIONS, *COILS) if np.ptp(data[c]) == 0), step.lost(), step.expected(),
+        tuple(c for c in (*machine.all_positions, *machine.all_currents) if np.ptp(data[c]) == 0), step.lost(), step.expected(),
+        machine,
     )  # fmt: skip
 
 

@@ -4,60 +4,55 @@ plan."""
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Protocol
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from bench.calibration import Calibration
+from bench.calibration import Calibration, Need
 from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.estimate import merged
-from procedures.amb_rotor.channels import AXES, COILS
+from procedures.amb_rotor.conventions import conventions
 from procedures.shared.certificates import certified
 from procedures.synchronous.runout import arms
 
 BEARING_MODEL = "bearing-model"
 
 
-class Settings(Protocol):
-    """The part of a plan that the estimates need."""
+@dataclass(frozen=True)
+class Known:
+    """What is known of the bearings: an adopted `calibration`; where there is none, how far the controller's betas (half width
+    `beta_share`, of them) and magnetic offsets (standard uncertainty `offset_u_m`, m) may be off."""
 
-    @property
-    def beta_share(self) -> float: ...
-    @property
-    def offset_u_m(self) -> float: ...
+    calibration: Calibration | None
+    beta_share: float
+    offset_u_m: float
 
-
-class Calibrated(Protocol):
-    """A recording, or one under way."""
-
-    @property
-    def calibrations(self) -> tuple[Calibration, ...]: ...
-
-
-def adopted_bearings(recording: Calibrated) -> Calibration | None:
-    """The bearings' calibration that a run used, if it used one."""
-    return next((c for c in recording.calibrations if c.procedure == BEARING_MODEL), None)
+    @classmethod
+    def of(cls, calibrations: Iterable[Calibration], beta_share: float, offset_u_m: float) -> Known:
+        """By the calibrations that a run uses, and the plan's numbers where none of them is of the bearings."""
+        return cls(next((c for c in calibrations if c.procedure == BEARING_MODEL), None), beta_share, offset_u_m)
 
 
-def told(model: Calibration | None, plan: Settings) -> Finding:
+def needs(bearings: str) -> tuple[Need, ...]:
+    """The bearings' model, where the rig has one and the plan, by its key `bearings`, does not say otherwise."""
+    return (Need(BEARING_MODEL, optional=True),) if bearings == "adopted" else ()
+
+
+def describe(known: Known) -> Finding:
     """A note on what the forces rest on."""
-    if model is None:
-        text = (f"no calibration bearing-model was used: betas are the controller's within ±{plan.beta_share:.1%}, magnetic "
-                f"offsets the controller's with u = {plan.offset_u_m * 1e6:.3g} µm, as the plan says")  # fmt: skip
-    else:
+    if (model := known.calibration) is not None:
         text = f"betas and magnetic offsets are those of {model.run_id}, {model.date[:10]}, with its influences"
+    else:
+        text = (f"no calibration bearing-model was used: betas are the controller's within ±{known.beta_share:.1%}, magnetic "
+                f"offsets the controller's with u = {known.offset_u_m * 1e6:.3g} µm, as the plan says")  # fmt: skip
     return Finding("bearings", text, "", Effect.NOTE)
 
 
-STATED = tuple(f"model_{what}_{a}" for what in ("beta", "offset") for a in AXES)
-"""Parameters that say what the controller knows of the bearings, where no calibration does."""
-
-
-def stated(rig: RigFile, plan: Settings, model: Calibration | None = None) -> dict[str, Estimate]:
-    """What the rig file and the plan, or the bearings' calibration, say of the stand (`runout.Stand`)."""
+def collect_inputs(rig: RigFile, known: Known) -> dict[str, Estimate]:
+    """What the rig file says of the stand (`runout.Stand`), with what is known of its bearings."""
     g = rig.geometry
     out = _probes_and_coils(rig)
     for name, key in (("gap", "amb_gap"), ("coupling", "coupling_stiffness"), ("l_ia", "com_to_inboard_amb"),
@@ -67,28 +62,32 @@ def stated(rig: RigFile, plan: Settings, model: Calibration | None = None) -> di
         out[name] = certified(f"geometry/{key}", g[key], key.replace("_", " "))
     for name, key in (("mass", "mass"), ("inertia", "transverse_inertia"), ("polar", "polar_inertia")):
         out[name] = certified(f"machine/{key}", rig.machine[key], key.replace("_", " "))
-    return out | (_planned(rig, plan) if model is None else _calibrated(out, model))
+    return out | (
+        _planned(rig, known)
+        if known.calibration is None
+        else _calibrated(out, conventions(rig).axes, known.calibration)
+    )
 
 
-def _planned(rig: RigFile, plan: Settings) -> dict[str, Estimate]:
+def _planned(rig: RigFile, known: Known) -> dict[str, Estimate]:
     """The controller's betas and magnetic offsets, as far off as the plan says."""
-    out, p = {}, rig.parameters
-    for k, a in enumerate(AXES):
-        beta, offset = p[f"model_beta_{a}"].default, p[f"model_offset_{a}"].default
+    out, p, machine = {}, rig.parameters, conventions(rig)
+    for k, a in enumerate(machine.axes):
+        beta, offset = (p[name].default for name in (machine.model_beta(a), machine.model_offset(a)))
         out[f"beta_{k}"] = _bound(
-            f"model/beta_{a}", f"beta of {a}", beta, plan.beta_share * beta / math.sqrt(3), "rectangular"
+            f"model/beta_{a}", f"beta of {a}", beta, known.beta_share * beta / math.sqrt(3), "rectangular"
         )
-        out[f"offset_{k}"] = _bound(f"model/offset_{a}", f"magnetic offset of {a}", offset, plan.offset_u_m, "normal")
+        out[f"offset_{k}"] = _bound(f"model/offset_{a}", f"magnetic offset of {a}", offset, known.offset_u_m, "normal")
     return out
 
 
-def _calibrated(known: Mapping[str, Estimate], model: Calibration) -> dict[str, Estimate]:
+def _calibrated(known: Mapping[str, Estimate], axes: Sequence[str], model: Calibration) -> dict[str, Estimate]:
     """Those of a calibration. Its offsets lead to where the probes read zero, these to the rings' centre: less what the
     zeros are at the bearings' planes, which then does not act on the forces any more."""
     v = {name: known[name].value for name in ("l_ia", "l_oa", "l_is", "l_os")}
     at_bearing = arms(v["l_ia"], v["l_oa"]) @ np.linalg.inv(arms(v["l_is"], v["l_os"]))
     out = {}
-    for k, a in enumerate(AXES):
+    for k, a in enumerate(axes):
         out[f"beta_{k}"] = model.values[f"beta_{a}"]
         terms = [(float(at_bearing[k, j]) / known[f"gain_{j}"].value, known[f"zero_{j}"]) for j in range(4)]
         offset = model.values[f"offset_{a}"]
@@ -99,14 +98,12 @@ def _calibrated(known: Mapping[str, Estimate], model: Calibration) -> dict[str, 
 
 def _probes_and_coils(rig: RigFile) -> dict[str, Estimate]:
     out: dict[str, Estimate] = {}
-    for k, a in enumerate(AXES):
-        sensor = rig.sensors[f"pos_{a}"]
-        out[f"gain_{k}"] = certified(f"sensors/pos_{a}/gain", sensor.gain, f"gain of pos_{a}")
-        out[f"zero_{k}"] = certified(f"sensors/pos_{a}/offset", sensor.offset, f"zero of pos_{a}")
-    for k, c in enumerate(COILS):
-        sensor = rig.sensors[f"i_{c}"]
-        out[f"i_gain_{k}"] = certified(f"sensors/i_{c}/gain", sensor.gain, f"gain of i_{c}")
-        out[f"i_zero_{k}"] = certified(f"sensors/i_{c}/offset", sensor.offset, f"zero of i_{c}")
+    machine = conventions(rig)
+    for start, names in (("", machine.positions), ("i_", machine.currents)):
+        for k, name in enumerate(names):
+            sensor = rig.sensors[name]
+            out[f"{start}gain_{k}"] = certified(f"sensors/{name}/gain", sensor.gain, f"gain of {name}")
+            out[f"{start}zero_{k}"] = certified(f"sensors/{name}/offset", sensor.offset, f"zero of {name}")
     return out
 
 

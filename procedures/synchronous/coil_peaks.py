@@ -17,7 +17,7 @@ import numpy.typing as npt
 from bench.findings import Finding
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
-from procedures.amb_rotor.channels import COILS, CURRENTS, PLANES, VOLTAGES
+from procedures.amb_rotor.conventions import conventions
 from procedures.shared.certificates import certified
 from procedures.synchronous.dwells import Dwell, Full
 
@@ -38,7 +38,7 @@ class Exceeded:
     sign: float
 
 
-def exceeded(x: Array, edges: npt.NDArray[np.intp]) -> Exceeded:
+def find_exceeded(x: Array, edges: npt.NDArray[np.intp]) -> Exceeded:
     """Of readings (n,), in blocks of whole turns between the indices `edges` (b + 1,), b at least 2."""
     inside = x[edges[0] : edges[-1]]
     size = np.abs(inside)
@@ -63,32 +63,33 @@ def peaks(d: Dwell, inputs: Mapping[str, Estimate], plane: str, rig: RigFile) ->
     nothing without a capture."""
     if d.full is None:
         return {}
-    first, edges = 2 * PLANES[plane][0], blocks(d.full)
+    first, edges = 2 * d.machine.planes[plane][0], blocks(d.full)
     of = range(first, first + 4)
 
     def greatest(readings: Array) -> tuple[int, Exceeded]:
-        found = {k: exceeded(readings[k], edges) for k in of}
+        found = {k: find_exceeded(readings[k], edges) for k in of}
         k = max(of, key=lambda k: found[k].value)
         return k, found[k]
 
     k, seen = greatest(d.full.currents)
     where = f"{d.where}/{plane}"
     current = _scattered(seen, f"current/{where}", "A") + _noise(d.full.currents[k], where)
-    current = (current + _resolution(rig, CURRENTS[k], where) - inputs[f"i_zero_{k}"]) / inputs[f"i_gain_{k}"]
+    current = (current + _resolution(rig, d.machine.currents[k], where) - inputs[f"i_zero_{k}"]) / inputs[f"i_gain_{k}"]
     j, seen = greatest(d.full.voltages)
-    voltage = _scattered(seen, f"voltage/{where}", "V") + _resolution(rig, VOLTAGES[j], where)
-    if (sensor := rig.sensors.get(VOLTAGES[j])) is not None:
+    name = d.machine.voltages[j]
+    voltage = _scattered(seen, f"voltage/{where}", "V") + _resolution(rig, name, where)
+    if (sensor := rig.sensors.get(name)) is not None:
         zero, gain = (
-            certified(f"sensors/{VOLTAGES[j]}/{what}", t, f"{what} of {VOLTAGES[j]}")
+            certified(f"sensors/{name}/{what}", t, f"{what} of {name}")
             for what, t in (("offset", sensor.offset), ("gain", sensor.gain))
         )
         voltage = (voltage - seen.sign * zero) / gain
     return {("current_peak", plane): replace(current, unit="A"), ("voltage_peak", plane): replace(voltage, unit="V")}
 
 
-def uncertified(rig: RigFile) -> Iterator[Finding]:
+def find_uncertified(rig: RigFile) -> Iterator[Finding]:
     """Whether the voltages are no more than what the amplifiers say."""
-    missing = [f"u_{c}" for c in COILS if f"u_{c}" not in rig.sensors]
+    missing = [name for name in conventions(rig).voltages if name not in rig.sensors]
     if missing:
         text = (
             f"no certificates of {', '.join(missing)}: voltages are as the amplifiers read them, without gain and zero"

@@ -18,14 +18,12 @@ from bench.analysis.vectors import Vectors
 from bench.errors import AnalysisError
 from bench.recording import Captured, Recording, Step
 from bench.units import RPM
-from procedures.amb_rotor.channels import CURRENTS, POSITIONS, VOLTAGES
+from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.shared.signals import clips
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 DWELL, SLOW, AGAIN = "dwell", "slow-roll", "again"
-TOLD = (*POSITIONS, *CURRENTS, "angle", "speed", "pulses", "flags")
-RECORDED = (*POSITIONS, *CURRENTS, *VOLTAGES, "pulses", "pulse_age")
 ORDERS = (1.0, 2.0, 3.0)
 
 
@@ -45,7 +43,7 @@ class Full:
 class Dwell:
     """The shaft at one speed with one setting of the controller. `wanted` rad/s as planned, `driven` as the drive says, `speed`
     by the pulses; `track` of the four positions and eight coil currents, `sampling` of these; `flags` ORed; `stuck` channels;
-    `again`: a repeat at the end. `full` None where nothing was captured."""
+    `again`: a repeat at the end. `full` None where nothing was captured. `machine` has the names of all these."""
 
     kind: str
     variant: str
@@ -62,6 +60,7 @@ class Dwell:
     expected: int
     start_ns: int
     sampling: Sampling
+    machine: AmbRotor
 
     @property
     def speed(self) -> float:
@@ -93,6 +92,16 @@ class Dwell:
         return np.asarray(self.track.means[0])
 
 
+def telemetry_channels(machine: AmbRotor) -> tuple[str, ...]:
+    """What is read of the telemetry of a dwell."""
+    return (*machine.positions, *machine.currents, "angle", "speed", "pulses", "flags")
+
+
+def captured_channels(machine: AmbRotor) -> tuple[str, ...]:
+    """What is captured in a dwell."""
+    return (*machine.positions, *machine.currents, *machine.voltages, "pulses", "pulse_age")
+
+
 def read_dwells(recording: Recording[Any]) -> list[Dwell]:
     """Slow roll and dwells in time order.
 
@@ -111,27 +120,28 @@ def read_dwell(recording: Recording[Any], step: Step) -> Dwell:
     Raises:
         AnalysisError: it has no turns.
     """
-    tick = recording.rig.devices["controller"].tick_s
-    data = step.read(*TOLD)
+    tick, machine = recording.rig.devices["controller"].tick_s, conventions(recording.rig)
+    names = (*machine.positions, *machine.currents)
+    data = step.read(*telemetry_channels(machine))
     t = (data["t_ns"] - recording.start_ns) * 1e-9
     ticks = round(recording.streams["telemetry"].period_ns * 1e-9 / tick)
     sampling = Sampling(tick, ticks, tick)
     if len(t) < 100:
         raise AnalysisError(f"{step.kind} {dict(step.labels)}: found {len(t)} samples; expected 100 or more")
     tacho = tachometer(*counted(t - tick, data["pulses"], age(data["angle"], data["speed"])))
-    wide = np.array([data[c] for c in (*POSITIONS, *CURRENTS)])
+    wide = np.array([data[c] for c in names])
     track = synchronous(t, wide, tacho, sampling, orders=_seen(ORDERS, float(step.labels["speed_rad_s"]), ticks * tick))
     labels, flags = step.labels, data["flags"].astype(np.int64)
     captures = recording.captures(dwell=labels["number"]) if step.kind == DWELL else ()
-    full = full_rate(captures[0]) if captures else None
+    full = full_rate(captures[0], machine) if captures else None
     held = max(
         clips(wide[:4]), clips(full.positions) if full else 0
     )  # a turn at speed is a few samples of the telemetry
     return Dwell(
         step.kind, str(labels["variant"]), float(labels["speed_rad_s"]), float(labels["driven_rad_s"]),
         bool(labels["again"]), tacho, track, full, int(np.bitwise_or.reduce(flags)), held,
-        tuple(c for c, x in zip((*POSITIONS, *CURRENTS), wide, strict=True) if np.ptp(x) == 0),
-        step.lost(), step.expected(), step.start_ns, sampling,
+        tuple(c for c, x in zip(names, wide, strict=True) if np.ptp(x) == 0),
+        step.lost(), step.expected(), step.start_ns, sampling, machine,
     )  # fmt: skip
 
 
@@ -140,14 +150,15 @@ def _seen(orders: Sequence[float], speed: float, period: float) -> tuple[float, 
     return tuple(n for n in orders if n == 1 or n * speed / (2 * math.pi) < 0.4 / period)
 
 
-def full_rate(captured: Captured) -> Full:
+def full_rate(captured: Captured, machine: AmbRotor) -> Full:
     """A capture as arrays.
 
     Raises:
         AnalysisError: it has fewer than four pulses, or samples are missing.
     """
-    data: Mapping[str, Array] = captured.arrays(*RECORDED)
+    data: Mapping[str, Array] = captured.arrays(*captured_channels(machine))
     t = data["t_s"]
     tacho = tachometer(*counted(t, data["pulses"], data["pulse_age"]))
-    three = [np.array([data[c] for c in names]) for names in (POSITIONS, CURRENTS, VOLTAGES)]
+    kinds = (machine.positions, machine.currents, machine.voltages)
+    three = [np.array([data[c] for c in names]) for names in kinds]
     return Full(t, three[0], three[1], three[2], captured.rate_hz, tacho)

@@ -20,7 +20,7 @@ import numpy as np
 
 from bench.analysis.tachometer import Tachometer
 from bench.recording import Recording
-from procedures.amb_rotor.channels import AXES, POSITIONS
+from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.lift import PROBE
 from procedures.synchronous.dwells import SLOW, Array, Complex, Dwell
 
@@ -37,9 +37,10 @@ BESIDE_HZ = (7.0, 10.0, 13.0, 16.0, 19.0)  # where that noise is looked at
 
 @dataclass(frozen=True)
 class Line:
-    """A line at `hz`: its amplitude `size` m as the `probe`-th reads it, over `noise` m of its surroundings."""
+    """A line at `hz`: its amplitude `size` m as the `probe`-th reads it, that of `axis`, over `noise` m of its surroundings."""
 
     probe: int
+    axis: str
     hz: float
     size: float
     noise: float
@@ -48,7 +49,7 @@ class Line:
 @dataclass(frozen=True)
 class Heard:
     """The slow roll's spectrum: `hz` (n,), amplitudes `values` (4, n) m, complex; the width of a line, its speed in
-    Hz and by how much that wandered; the standing shaft: of each step times (m,) s and readings (4, m) m."""
+    Hz and by how much that wandered; the standing shaft: of each step times (m,) s and readings (4, m) m; the probes' axes."""
 
     hz: Array
     values: Complex
@@ -56,6 +57,7 @@ class Heard:
     speed: float
     wandered: float
     standing: tuple[tuple[Array, Array], ...]
+    axes: tuple[str, ...]
 
     def lines(self, low: float, high: float) -> Iterator[Line]:
         """What stands out of the noise between two frequencies in Hz, and is no order of the slow roll."""
@@ -67,7 +69,7 @@ class Heard:
                 noise = float(np.median(row[max(i - beside, 0) : i + beside])) / MEDIAN
                 size = self._less_order(k, float(self.hz[i]), float(row[i])) if row[i] > CLEAR * noise else 0.0
                 if size:
-                    yield Line(k, float(self.hz[i]), size, noise)
+                    yield Line(k, self.axes[k], float(self.hz[i]), size, noise)
 
     def at(self, hz: float) -> Complex:
         """What the four probes read at a frequency, (4,) m, 0-pk; their phases against each other hold at any time."""
@@ -99,14 +101,15 @@ class Heard:
         return float(np.hypot(*np.linalg.lstsq(np.concatenate(waves), np.concatenate(read), rcond=None)[0]))
 
 
-def heard(recording: Recording[Any], slow: Dwell | None) -> Heard | None:
+def listen(recording: Recording[Any], slow: Dwell | None) -> Heard | None:
     """What the slow roll of a recording and the shaft before it let hear; None without a slow roll."""
     if slow is None:
         return None
+    machine = conventions(recording.rig)
 
     def read(step: Any) -> tuple[Array, Array]:
-        data = step.read(*POSITIONS)
-        return (data["t_ns"] - recording.start_ns) * 1e-9, np.array([data[name] for name in POSITIONS])
+        data = step.read(*machine.positions)
+        return (data["t_ns"] - recording.start_ns) * 1e-9, np.array([data[name] for name in machine.positions])
 
     t, x = read(next(iter(recording.steps(SLOW))))
     period = float(np.median(np.diff(t)))
@@ -120,16 +123,16 @@ def heard(recording: Recording[Any], slow: Dwell | None) -> Heard | None:
     wandered = float(np.nanmax(speeds) - np.nanmin(speeds)) / (4 * math.pi)
     standing = tuple(read(step) for step in recording.steps(PROBE))
     hz = np.arange(values.shape[1]) / (count * period)
-    return Heard(hz, values, 1 / float(t[-1] - t[0]), slow.speed / (2 * math.pi), wandered, standing)
+    return Heard(hz, values, 1 / float(t[-1] - t[0]), slow.speed / (2 * math.pi), wandered, standing, machine.axes)
 
 
 def leak(d: Dwell, hz: float) -> float:
     """The share of a line's amplitude that is in a dwell's vectors of order 1."""
     lasts = duration(d)
-    return leaked(d.tacho, float(d.track.t[0]) - lasts / 2, lasts, hz)
+    return leak_over(d.tacho, float(d.track.t[0]) - lasts / 2, lasts, hz)
 
 
-def leaked(tacho: Tachometer, begin: float, lasts: float, hz: float) -> float:
+def leak_over(tacho: Tachometer, begin: float, lasts: float, hz: float) -> float:
     """The mean of exp(j (2 pi f t - theta)) over the turns from `begin` on: 1 where a line cannot be told from the speed. The
     speed of a passage goes on meanwhile: then it is less."""
     t = begin + lasts * (np.arange(4096) + 0.5) / 4096
@@ -142,8 +145,8 @@ def duration(d: Dwell) -> float:
     return 2 * math.pi * d.track.turns / d.speed
 
 
-def told(line: Line) -> str:
+def describe(line: Line) -> str:
     """What was heard, for the reader."""
-    return (f"at slow roll {AXES[line.probe]} reads a line of {line.size * 1e6:.3f} µm at {line.hz:.2f} Hz, over "
+    return (f"at slow roll {line.axis} reads a line of {line.size * 1e6:.3f} µm at {line.hz:.2f} Hz, over "
             f"{line.noise * 1e6:.3f} µm of noise, that does not turn with the shaft: suspect mains hum in probes or "
             "cables.")  # fmt: skip

@@ -107,14 +107,14 @@ def slopes(s: Stand, means: Array) -> tuple[Array, Array, Array]:
     )
 
 
-def carried(s: Stand, means: Array) -> Array:
+def mean_forces(s: Stand, means: Array) -> Array:
     """Mean forces of the four axes, N, at mean readings (12,), by T (2.4b)."""
     k_p, k_n, _ = slopes(s, means)
     i = (means[4:] - s.i_zero) / s.i_gain
     return np.asarray((k_p * i[::2] + k_n * i[1::2]) / 2)
 
 
-def pushed(s: Stand, turning: Turning) -> tuple[Complex, Array]:
+def control_forces(s: Stand, turning: Turning) -> tuple[Complex, Array]:
     """Forces and moments (4,) of the control currents, and K_x (4,)."""
     k_p, k_n, k_x = slopes(s, turning.means)
     i = turning.vectors[4:] / s.i_gain
@@ -122,14 +122,14 @@ def pushed(s: Stand, turning: Turning) -> tuple[Complex, Array]:
     if turning.higher:
         orders = {1.0: turning.vectors, **turning.higher}
         at = {n: Turning(turning.speed, turning.means, v) for n, v in orders.items()}
-        force = force + bent(s, at, {n: v[:4] / s.gain for n, v in orders.items()})[1.0]
+        force = force + forces_beyond_slopes(s, at, {n: v[:4] / s.gain for n, v in orders.items()})[1.0]
     return np.asarray(arms(s.l_ia, s.l_oa).T @ force), k_x
 
 
 def unbalances(s: Stand, turning: Turning, runout: Complex, more: Complex | None = None) -> tuple[Complex, float]:
     """Unbalance (2,) kg m, e^(j angle from the mark), by least squares; the share of the forces that it leaves unexplained.
     `more` (4,) N at the AMBs, beyond the slopes."""
-    force, k_x = pushed(s, turning)
+    force, k_x = control_forces(s, turning)
     if more is not None:
         force = force + arms(s.l_ia, s.l_oa).T @ more
     w = turning.speed
@@ -159,9 +159,9 @@ def as_unbalance(s: Stand, means: Array, runout: Complex, w: float) -> Complex:
     return equivalent(s, impedance(s, k_x, w, w) @ np.linalg.solve(arms(s.l_is, s.l_os), runout), w)[0]
 
 
-def moved(s: Stand, turning: Turning, order: float, unbalance: Complex, more: Complex | None = None) -> Complex:
+def shaft_motion(s: Stand, turning: Turning, order: float, unbalance: Complex, more: Complex | None = None) -> Complex:
     """What the shaft itself does at the probes (4,) m, by the balance of forces; `more` (4,) N at the AMBs."""
-    force, k_x = pushed(s, turning)
+    force, k_x = control_forces(s, turning)
     if more is not None:
         force = force + arms(s.l_ia, s.l_oa).T @ more
     w = order * turning.speed
@@ -190,27 +190,29 @@ class Mixed:
     fast: Complex
 
 
-def found(s: Stand, slow: Mapping[float, Turning], fast: Turning | None, more: Mixed | None = None) -> Found:
+def find_runout(s: Stand, slow: Mapping[float, Turning], fast: Turning | None, more: Mixed | None = None) -> Found:
     """Runout of every order of `slow`."""
     unbalance, misfit = np.zeros(2, complex), 0.0
     more = more or Mixed({n: np.zeros(4, complex) for n in slow}, np.zeros(4, complex))
-    shaft = {n: moved(s, at, n, unbalance, more.slow[n]) for n, at in slow.items()}
+    shaft = {n: shaft_motion(s, at, n, unbalance, more.slow[n]) for n, at in slow.items()}
     for _ in range(ROUNDS if fast is not None and 1.0 in slow else 0):
         runout = slow[1.0].vectors[:4] / s.gain - shaft[1.0]
         unbalance, misfit = unbalances(s, fast, runout, more.fast)  # type: ignore[arg-type]
-        shaft[1.0] = moved(s, slow[1.0], 1.0, unbalance, more.slow[1.0])
+        shaft[1.0] = shaft_motion(s, slow[1.0], 1.0, unbalance, more.slow[1.0])
     return Found({n: at.vectors[:4] / s.gain - shaft[n] for n, at in slow.items()}, shaft, unbalance, misfit)
 
 
-def mixed(s: Stand, slow: Mapping[float, Turning], fast: Mapping[float, Turning]) -> Mixed:
+def mixed_forces(s: Stand, slow: Mapping[float, Turning], fast: Mapping[float, Turning]) -> Mixed:
     """What the slopes leave out, at slow roll and at a fast dwell, whose orders are given too."""
-    first = found(s, slow, fast.get(1.0))
+    first = find_runout(s, slow, fast.get(1.0))
     moving = {n: at.vectors[:4] / s.gain - first.runout[n] for n, at in fast.items() if n in slow}
-    there = bent(s, {n: fast[n] for n in moving}, moving).get(1.0) if moving else None
-    return Mixed(bent(s, slow, first.shaft), np.zeros(4, complex) if there is None else there)
+    there = forces_beyond_slopes(s, {n: fast[n] for n in moving}, moving).get(1.0) if moving else None
+    return Mixed(forces_beyond_slopes(s, slow, first.shaft), np.zeros(4, complex) if there is None else there)
 
 
-def bent(s: Stand, slow: Mapping[float, Turning], shaft: Mapping[float, Complex]) -> dict[float, Complex]:
+def forces_beyond_slopes(
+    s: Stand, slow: Mapping[float, Turning], shaft: Mapping[float, Complex]
+) -> dict[float, Complex]:
     """What T (2.4b) gives of each order beyond its slopes, (4,) N at the AMBs: i^2 and 1/gap^2 make of order 1 times order 2
     another order 1, a percent of it."""
     to_amb = arms(s.l_ia, s.l_oa) @ np.linalg.inv(arms(s.l_is, s.l_os))

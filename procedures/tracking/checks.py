@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Protocol
 
 import numpy as np
 
 from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
 from bench.uncertainty import Estimate
-from procedures.amb_rotor.channels import CURRENT_LIMIT, POSITIONS, RANGE, VOLTAGE_LIMIT
 from procedures.amb_rotor.geometry import centre, nominal
 from procedures.shared import signals
 from procedures.shared.sines import known_frequency, unknown_frequency
 from procedures.tracking.drift import Drift, drift
 from procedures.tracking.estimates import TIMING_TICKS
-from procedures.tracking.steps import CONTACT, LOWER, UPPER, Orbit
+from procedures.tracking.plan import Plan
+from procedures.tracking.steps import Orbit, upper_and_lower
 
 FATAL = (
     "stuck-channel",
@@ -34,28 +33,16 @@ STEADY = 0.01  # of the speed
 PARTS = 0.02  # share of samples at a limit that a smooth reference does not explain
 
 
-class Settings(Protocol):
-    """The part of a plan that these checks need."""
-
-    @property
-    def laws(self) -> tuple[Any, ...]: ...
-    @property
-    def speed_rad_s(self) -> float: ...
-    @property
-    def max_lower_A(self) -> float: ...
-    @property
-    def max_lost(self) -> float: ...
-
-
-def of_signals(orbits: Sequence[Orbit], plan: Settings) -> Iterator[Finding]:
+def of_signals(orbits: Sequence[Orbit], plan: Plan) -> Iterator[Finding]:
     """Lost samples, channels that stand still or clip, a reference that is not what was planned."""
     lost, expected = np.array([(o.step.lost(), o.step.expected()) for o in orbits], dtype=float).T
     yield from signals.losses(lost, expected, plan.max_lost, lambda share: orbits[int(np.argmax(share))].where)
     for o in orbits:
+        upper, lower = upper_and_lower(o.machine)
         rows = (
-            *zip(POSITIONS, o.path.readings, strict=True),
-            *zip(UPPER, o.upper, strict=True),
-            *zip(LOWER, o.lower, strict=True),
+            *zip(o.machine.positions, o.path.readings, strict=True),
+            *zip(upper, o.upper, strict=True),
+            *zip(lower, o.lower, strict=True),
         )
         for name, values in rows:
             if np.ptp(values) == 0:
@@ -77,7 +64,7 @@ def of_signals(orbits: Sequence[Orbit], plan: Settings) -> Iterator[Finding]:
 def _clipping(o: Orbit) -> Iterator[Finding]:
     """A live sensor has noise also where it is greatest; one that clips repeats its limit."""
     found = False
-    for name, x in zip(POSITIONS, o.path.readings, strict=True):
+    for name, x in zip(o.machine.positions, o.path.readings, strict=True):
         for limit in (x.max(), x.min()):
             if signals.longest_at(x, limit) >= HELD:
                 found = True
@@ -87,7 +74,7 @@ def _clipping(o: Orbit) -> Iterator[Finding]:
                     name,
                     Effect.ERROR,
                 )
-    if not found and (o.flags & RANGE).any():
+    if not found and (o.flags & o.machine.sensor_range).any():
         yield Finding(
             "sensor-range", "the controller reports a position sensor beyond its range.", o.where, Effect.ERROR
         )
@@ -128,7 +115,7 @@ def _of_reference(o: Orbit, judged: bool) -> Iterator[Finding]:
             o.where,
             Effect.ERROR,
         )
-    elif judged and not (o.flags & CONTACT).any():
+    elif judged and not (o.flags & o.machine.contact).any():
         yield from _of_drift(o, drift(o.whole, facts))
 
 
@@ -144,14 +131,13 @@ def _of_drift(o: Orbit, found: Drift | None) -> Iterator[Finding]:
     yield Finding("reference-frequency", text, o.where, Effect.ERROR)
 
 
-def of_results(
-    orbits: Sequence[Orbit], results: Mapping[str, Mapping[str, Estimate]], plan: Settings
-) -> Iterator[Finding]:
+def of_results(orbits: Sequence[Orbit], results: Mapping[str, Mapping[str, Estimate]], plan: Plan) -> Iterator[Finding]:
     """Contact, saturation, coils that should be off, and the laws side by side."""
     for o in orbits:
         judged = o.law in plan.laws
         yield from _of_contact(o, results[o.law]["ring_distance"], Effect.INDETERMINATE if judged else Effect.NOTE)
-        for bit, text in ((CURRENT_LIMIT, "a coil's current"), (VOLTAGE_LIMIT, "a coil's voltage")):
+        current, voltage = o.machine.current_limit, o.machine.voltage_limit
+        for bit, text in ((current, "a coil's current"), (voltage, "a coil's voltage")):
             share = float((o.flags & bit != 0).mean())
             if share > 0:
                 bad = judged and share > PARTS
@@ -176,18 +162,17 @@ def of_results(
 
 
 def _of_contact(o: Orbit, left: Estimate, effect: Effect) -> Iterator[Finding]:
-    told = float((o.flags & CONTACT != 0).mean())
+    told = float((o.flags & o.machine.contact != 0).mean())
     if told > 0:
-        sides = " and ".join(s for bit, s in ((4, "inboard"), (8, "outboard")) if (o.flags & bit).any())
-        yield Finding(
-            "contact",
-            f"the rotor touches the {sides} ring in {told:.1%} of the samples; by its positions "
-            f"{left.value * 1e6:.1f} ± {2 * left.u * 1e6:.1f} µm are left to it.",
-            o.where,
-            effect,
-            (f"@{o.where}",),
-        )
-        if left.value > 3 * left.u:
+        sides = [plane for plane, bit in o.machine.rings.items() if (o.flags & bit).any()]
+        places = [f"the {' and '.join(sides)} ring"] if sides else []
+        places += ["the axial stop"] if (o.flags & o.machine.axial_stop).any() else []
+        text = f"the rotor touches {' and '.join(places)} in {told:.1%} of the samples"
+        if sides:
+            room = f"{left.value * 1e6:.1f} ± {2 * left.u * 1e6:.1f} µm"
+            text += f"; by its positions {room} are left to {'the ring' if len(places) > 1 else 'it'}"
+        yield Finding("contact", f"{text}.", o.where, effect, (f"@{o.where}",))
+        if sides and left.value > 3 * left.u:  # of the axial stop the positions say nothing
             yield Finding(
                 "contact-not-seen",
                 "the controller reports contact, the positions show none: look at the "
@@ -215,5 +200,5 @@ def _said(o: Orbit, r: Mapping[str, Estimate]) -> str:
         f"{o.law}: peaks {y.value * 1e6:.1f} ± {2 * y.u * 1e6:.1f} µm in y, {z.value * 1e6:.1f} ± "
         f"{2 * z.u * 1e6:.1f} µm in z, "
         f"tilts {psi.value * 1e6:.0f} and {theta.value * 1e6:.0f} µrad, lower coils up to {low.value:.2f} A, "
-        f"contact in {float((o.flags & CONTACT != 0).mean()):.0%} of the samples"
+        f"contact in {float((o.flags & o.machine.contact != 0).mean()):.0%} of the samples"
     )

@@ -12,11 +12,11 @@ from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.series import batch_means
-from procedures.amb_rotor.channels import AXES
+from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.geometry import Facts, nominal
 from procedures.shared.certificates import certified
 from procedures.tracking.ellipse import Turns, quantities, revolutions, turns
-from procedures.tracking.steps import LOWER, UPPER, Orbit
+from procedures.tracking.steps import Orbit, upper_and_lower
 
 TIMING_TICKS = 0.5  # half width: how the reference's zero of phase stands to the answer of the currents
 UNITS = {"error": "m", "amplitude": "1", "phase": "rad", "tilt": "rad", "ring": "m"}
@@ -54,11 +54,11 @@ def _one(kind: str) -> Moved:
 def inputs(rig: RigFile, tick_s: float, runout_m: float) -> list[Input]:
     """Everything that the facts are uncertain by."""
     out = []
-    for k, axis in enumerate(AXES):
-        s = rig.sensors[f"pos_{axis}"]
+    for k, name in enumerate(conventions(rig).positions):
+        s = rig.sensors[name]
         out += [
-            Input(f"sensors/pos_{axis}/gain", f"gain of pos_{axis}", s.gain, _at(k, "gains")),
-            Input(f"sensors/pos_{axis}/offset", f"zero of pos_{axis}", s.offset, _at(k, "offsets")),
+            Input(f"sensors/{name}/gain", f"gain of {name}", s.gain, _at(k, "gains")),
+            Input(f"sensors/{name}/offset", f"zero of {name}", s.offset, _at(k, "offsets")),
         ]
         if runout_m > 0:
             allowed = Toleranced(
@@ -70,7 +70,7 @@ def inputs(rig: RigFile, tick_s: float, runout_m: float) -> list[Input]:
                 distribution="rectangular",
                 source="plan: runout_m",
             )
-            out.append(Input(f"runout/pos_{axis}", f"runout at pos_{axis}", allowed, _at(k, "offsets")))
+            out.append(Input(f"runout/{name}", f"runout at {name}", allowed, _at(k, "offsets")))
     for name, kind in (
         ("com_to_inboard_sensor", "l_is"),
         ("com_to_outboard_sensor", "l_os"),
@@ -167,7 +167,8 @@ def _small(identity: str, name: str, u: float, unit: str) -> Estimate:
 def _of_coils(orbit: Orbit, rig: RigFile) -> dict[str, Estimate]:
     out, per = {}, revolutions(orbit.path)
     batches = max(2, min(16, len(per) // 2))
-    for quantity, names, currents in (("lower_current", LOWER, orbit.lower), ("upper_current", UPPER, orbit.upper)):
+    upper, lower = upper_and_lower(orbit.machine)
+    for quantity, names, currents in (("lower_current", lower, orbit.lower), ("upper_current", upper, orbit.upper)):
         means = currents.mean(axis=1)
         k = int(np.argmax(means))
         s = rig.sensors[names[k]]

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from bench.figures import Figure, Series
-from procedures.amb_rotor.channels import AXES
 from procedures.amb_rotor.geometry import Facts, centre
 from procedures.tracking.ellipse import errors, revolutions
 from procedures.tracking.steps import Orbit
@@ -114,7 +113,8 @@ def _coils(o: Orbit) -> Figure:
     """Eight curves in one panel could not be told apart."""
     use, t = _two(o), o.path.t - o.path.t[0]
     upper, lower = (
-        tuple(Series(axis, t[use], currents[k, use]) for k, axis in enumerate(AXES)) for currents in (o.upper, o.lower)
+        tuple(Series(axis, t[use], currents[k, use]) for k, axis in enumerate(o.machine.axes))
+        for currents in (o.upper, o.lower)
     )
     key = f"coils-{o.law.lower()}"
     below = Figure(f"{key}-lower", "", "", "time (s)", "lower coils (A)", lower)

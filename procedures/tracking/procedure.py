@@ -9,13 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
-
-from pydantic import Field
 
 from bench.figures import Figure
 from bench.findings import Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
@@ -25,14 +22,13 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
-from procedures.amb_rotor.channels import POSITIONS
+from procedures.amb_rotor.conventions import AMB_ROTOR, Law, conventions
 from procedures.amb_rotor.geometry import nominal
 from procedures.tracking import checks, estimates
 from procedures.tracking import figures as drawn
-from procedures.tracking.steps import CHANNELS, GROWN, ORBIT, START, STARTED, Orbit, read_orbits
+from procedures.tracking.plan import Plan
+from procedures.tracking.steps import GROWN, ORBIT, START, STARTED, Orbit, channels, read_orbits
 
-Law = Literal["PID", "CCS", "CAC"]
-CODES: dict[Law, float] = {"PID": 0.0, "CCS": 1.0, "CAC": 2.0}
 PEAK_Y = Quantity(
     "error_peak_y", "m", "greatest error of the centre of mass in the mean revolution of the reference, y"
 )
@@ -50,48 +46,19 @@ DISTANCE = Quantity("ring_distance", "m", "least distance that is left to a touc
 LOW = Quantity("lower_current", "A", "mean current of the lower coil that carries most")
 HIGH = Quantity("upper_current", "A", "mean current of the upper coil that carries most")
 MEASURES = (PEAK_Y, PEAK_Z, PLANE, RMS_Y, RMS_Z, RATIO_Y, RATIO_Z, LAG_Y, LAG_Z, PSI, THETA, DISTANCE, LOW, HIGH)
-OBSERVED = {"observer": 1.0, "compensate": 3.0, "integral": 0.0, "k1": 2e5, "k2_ccs": 400.0, "k2_cac": 400.0}
+OBSERVED = {**AMB_ROTOR.variants["corrected"], **AMB_ROTOR.poles}
 REFERENCE = ("ellipse_on", "ellipse_y", "ellipse_z", "ellipse_hz", "ellipse_phase", "ellipse_ramp_s", "ellipse_ratio")
-PARAMETERS = ("law", "ref_y", "ref_theta", "model_rate", *REFERENCE)
+PARAMETERS = (AMB_ROTOR.law, AMB_ROTOR.set_points["y"], AMB_ROTOR.set_points["theta"], "model_rate", *REFERENCE)
 LENGTHS = ("com_to_inboard_sensor", "com_to_outboard_sensor", "clearance")
 UM = 1e6
 MARK_M = 15e-6  # of the jump that the reference starts with
 GROW, GROW_S = 25, 0.02
-STANDS_S = 1.0  # the controller knows half a second after the last pulse that the shaft stands
 NEAR = 0.95  # of the ring's clearance: no reference may go further
-
-
-class Plan(BenchPlan):
-    """Settings of the tracking test, SI."""
-
-    laws: tuple[Law, ...] = Field(("CCS", "CAC"), min_length=1)  # judged
-    compare: tuple[Law, ...] = ("PID",)  # only reported beside them; one that is judged is there already
-    hz: float = Field(10.0, gt=0, le=50)
-    y_m: float = Field(50e-6, gt=0)
-    z_m: float = Field(80e-6, gt=0)
-    ratio: int = Field(1, ge=1, le=5)  # turns of z in one of y: other figures of Lissajous
-    speed_rad_s: float = Field(0.0, ge=0)  # 0: at rest
-    observer: bool | None = None  # disturbance compensation; by default while it turns
-    revolutions: int = Field(24, ge=6)  # of the reference
-    settle_s: float = Field(3.0, gt=0)  # before and after the reference has grown
-    runout_m: float = Field(4e-6, ge=0)  # of the journals, at most: counts against the ring's distance
-    max_lower_A: float = Field(0.05, gt=0)  # of CAC
-    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
-
-    @property
-    def observed(self) -> bool:
-        """Whether disturbances are compensated."""
-        return self.speed_rad_s > 0 if self.observer is None else self.observer
-
-    @property
-    def order(self) -> tuple[Law, ...]:
-        """All laws in the order in which they are done: one that touches comes last."""
-        return (*self.laws, *(law for law in self.compare if law not in self.laws))
 
 
 def settings(plan: Plan) -> dict[str, float]:
     """Lifted by the PID, which needs no model; with the poles of T 3.5 where disturbances are compensated."""
-    return {"law": CODES["PID"], "ellipse_on": 0.0, **(OBSERVED if plan.observed else {})}
+    return {**AMB_ROTOR.select("PID"), "ellipse_on": 0.0, **(OBSERVED if plan.observed else {})}
 
 
 def step_count(plan: Plan) -> int:
@@ -101,21 +68,24 @@ def step_count(plan: Plan) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Look at the rotor on its rings, lift it, nudge it, spin it up, and let it follow the reference with each law."""
-    if not lift.probed(rig, record):
+    if not lift.lift_and_nudge(rig, record):
         return
-    _started(rig, plan, record)
-    if plan.speed_rad_s and not lift.turned(rig, record, plan.speed_rad_s, plan.settle_s):
+    _start(rig, plan, record)
+    if plan.speed_rad_s and not lift.bring_to_speed(rig, record, plan.speed_rad_s, plan.settle_s):
         return
+    machine = conventions(rig.file)
     for law in plan.order:
+        rig.levitation.set(machine.law, machine.laws[law])
+        rig.clock.sleep(plan.settle_s)
         _orbit(rig, plan, record, law)
     rig.levitation.set("ellipse_on", 0.0)
     if plan.speed_rad_s and rig.drive is not None:
         rig.drive.stop()
-    rig.levitation.set("law", CODES["PID"])
-    rig.clock.sleep(STANDS_S)
+    rig.levitation.set(machine.law, machine.laws["PID"])
+    rig.clock.sleep(machine.stands_s)
 
 
-def _started(rig: Rig, plan: Plan, record: Recorder) -> None:
+def _start(rig: Rig, plan: Plan, record: Recorder) -> None:
     """The reference starts at rest with a small jump of z, whose time the currents tell. From here on it never stops: its phase
     is known for every law, at any speed."""
     write = rig.levitation.set
@@ -138,8 +108,6 @@ def _started(rig: Rig, plan: Plan, record: Recorder) -> None:
 
 def _orbit(rig: Rig, plan: Plan, record: Recorder, law: Law) -> None:
     """The reference grows, settles, and shrinks to its mark again."""
-    rig.levitation.set("law", CODES[law])
-    rig.clock.sleep(plan.settle_s)
     for part in range(1, GROW + 1):
         _size(rig, plan, part / GROW)
     with record.step(GROWN, law=law):  # the longer, the better it tells the reference's frequency
@@ -225,7 +193,9 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=Requires(channels=CHANNELS, sensors=POSITIONS, parameters=PARAMETERS, geometry=LENGTHS),
+    requires=Requires(
+        channels=channels(AMB_ROTOR), sensors=AMB_ROTOR.positions, parameters=PARAMETERS, geometry=LENGTHS
+    ),
     check=check,
     settings=settings,
     step_count=step_count,

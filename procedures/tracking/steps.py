@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
-from procedures.amb_rotor.channels import AXES, POSITIONS
+from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.amb_rotor.geometry import Facts, distances
 from procedures.amb_rotor.onset import onset
 from procedures.tracking.ellipse import Path, Wave
@@ -19,16 +20,13 @@ from procedures.tracking.ellipse import Path, Wave
 Array = npt.NDArray[np.float64]
 START, GROWN, ORBIT = "start", "grown", "orbit"
 STARTED = "reference-started"
-UPPER, LOWER = (tuple(f"i_{axis}_{side}" for axis in AXES) for side in "pn")
-CHANNELS = (*POSITIONS, *UPPER, *LOWER, "speed", "flags")
-CONTACT = 12  # bits of the telemetry signal `flags`
 
 
 @dataclass(frozen=True)
 class Orbit:
-    """One law's orbit: its path, the `whole` one from where the reference had grown, coil currents (4, n) A of both sides,
-    flags (n,), speed (n,) rad/s, the reference's zero of phase in s on the path's time, and the start's jump of current over
-    its noise."""
+    """One law's orbit of a `machine`: its path, the `whole` one from where the reference had grown, coil currents (4, n) A of
+    both sides, flags (n,), speed (n,) rad/s, the reference's zero of phase in s on the path's time, and the start's jump of
+    current over its noise."""
 
     law: str
     path: Path
@@ -40,6 +38,7 @@ class Orbit:
     t_0: float
     clear: float
     step: Step
+    machine: AmbRotor
 
     def ring_distance(self, facts: Facts) -> float:
         """The least distance to a ring that the readings show, as they stand: m, below zero inside it."""
@@ -54,7 +53,19 @@ class Orbit:
         return f"{self.law}, {figure}, {w.y * 1e6:g} × {w.z * 1e6:g} µm, {turning}"
 
 
-def sampled(rig: RigFile, hz: float, y: float, z: float, period_ns: int, ratio: int = 1) -> Wave:
+def upper_and_lower(machine: AmbRotor) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Channels of the currents in the coils that carry the weight, and in those below."""
+    upper, lower = zip(*map(machine.pair, machine.axes), strict=True)
+    return upper, lower
+
+
+def channels(machine: AmbRotor) -> tuple[str, ...]:
+    """What is read of an orbit."""
+    upper, lower = upper_and_lower(machine)
+    return (*machine.positions, *upper, *lower, "speed", "flags")
+
+
+def sample_reference(rig: RigFile, hz: float, y: float, z: float, period_ns: int, ratio: int = 1) -> Wave:
     """The reference, as this rig's telemetry samples it."""
     tick = rig.devices["controller"].tick_s
     return Wave(hz, y, z, tick, round(period_ns * 1e-9 / tick), ratio)
@@ -77,19 +88,20 @@ def read_orbits(recording: Recording[Any]) -> list[Orbit]:
 
 def _wave(recording: Recording[Any], step: Step) -> Wave:
     labels, period_ns = step.labels, recording.streams["telemetry"].period_ns
-    return sampled(recording.rig, float(labels["hz"]), float(labels["y_m"]), float(labels["z_m"]), period_ns,
+    return sample_reference(recording.rig, float(labels["hz"]), float(labels["y_m"]), float(labels["z_m"]), period_ns,
                    int(labels["ratio"]))  # fmt: skip
 
 
 def _start(recording: Recording[Any], start: Step, wave: Wave) -> tuple[float, float]:
     """When the reference's phase was zero, s from the step's start, and how clear the currents tell it."""
-    begun = start.read(*CHANNELS)
+    machine = conventions(recording.rig)
+    begun = start.read(*channels(machine))
     inside = [e for e in recording.events() if start.start_ns <= e["t_ns"] < start.end_ns]
     written = [e["t_ns"] for e in inside if e["kind"] == "parameter" and e["name"] == "ellipse_on"]
     answered = [e["t_ns"] for e in inside if e["kind"] == STARTED]
     if not written or not answered or len(begun["t_ns"]) < 20:
         raise AnalysisError("found no start of the reference; expected its write within the step, and samples about it")
-    current = np.sum([begun[f"i_z{b}_p"] - begun[f"i_z{b}_n"] for b in "io"], axis=0)
+    current = np.sum([begun[p] - begun[n] for p, n in map(machine.pair, machine.along("z"))], axis=0)
     lag = 1 / recording.rig.parameters["model_rate"].default
     earliest, latest = ((t - start.start_ns) * 1e-9 for t in (written[0], answered[0]))
     at = (begun["t_ns"] - start.start_ns) * 1e-9
@@ -97,7 +109,8 @@ def _start(recording: Recording[Any], start: Step, wave: Wave) -> tuple[float, f
 
 
 def _read(recording: Recording[Any], step: Step, grown: Step | None, origin: int, t_0: float, clear: float) -> Orbit:
-    labels, data = step.labels, step.read(*CHANNELS)
+    machine = conventions(recording.rig)
+    labels, data = step.labels, step.read(*channels(machine))
     if len(data["t_ns"]) < 20:
         raise AnalysisError(f"{labels['law']}: found {len(data['t_ns'])} samples; expected a whole orbit")
     speed = data["speed"]
@@ -105,16 +118,17 @@ def _read(recording: Recording[Any], step: Step, grown: Step | None, origin: int
     path = Path(
         _wave(recording, step),
         (data["t_ns"] - origin) * 1e-9,
-        np.array([data[c] for c in POSITIONS]),
+        np.array([data[c] for c in machine.positions]),
         2 * np.pi / float(np.median(speed)) if turning else 0.0,
     )
-    whole = path if grown is None else _joined(grown, path, origin)
-    upper, lower = (np.array([data[c] for c in names]) for names in (UPPER, LOWER))
-    return Orbit(str(labels["law"]), path, whole, upper, lower, data["flags"].astype(np.int64), speed, t_0, clear, step)
+    whole = path if grown is None else _join(grown, path, machine.positions, origin)
+    upper, lower = (np.array([data[c] for c in names]) for names in upper_and_lower(machine))
+    flags = data["flags"].astype(np.int64)
+    return Orbit(str(labels["law"]), path, whole, upper, lower, flags, speed, t_0, clear, step, machine)
 
 
-def _joined(grown: Step, path: Path, origin: int) -> Path:
+def _join(grown: Step, path: Path, names: Sequence[str], origin: int) -> Path:
     """A path with what was recorded before it."""
-    data = grown.read(*POSITIONS)
+    data = grown.read(*names)
     t = np.concatenate([(data["t_ns"] - origin) * 1e-9, path.t])
-    return replace(path, t=t, readings=np.concatenate([np.array([data[c] for c in POSITIONS]), path.readings], axis=1))
+    return replace(path, t=t, readings=np.concatenate([np.array([data[c] for c in names]), path.readings], axis=1))

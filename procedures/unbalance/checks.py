@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -14,11 +14,10 @@ from bench.analysis.vectors import radius2
 from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.units import RPM
-from procedures.amb_rotor.channels import AXES, CONTACT, CURRENT_LIMIT, PLANES, RANGE, VOLTAGE_LIMIT
 from procedures.shared import signals
-from procedures.synchronous.dwells import DWELL, SLOW, Array, Dwell
-from procedures.synchronous.fitting import PER_TURN, Settings, too_fast
-from procedures.unbalance.estimates import Results
+from procedures.synchronous.dwells import DWELL, SLOW, Dwell
+from procedures.synchronous.fitting import PER_TURN, too_fast
+from procedures.unbalance.estimates import ForceBalance, Results
 
 HELD = 8  # samples in a row at an extreme: a probe that clips
 UNEXPLAINED = 0.1  # share of the forces that two unbalances leave over: a channel is not what its name says
@@ -49,13 +48,13 @@ def its_own(d: Dwell) -> tuple[str, ...]:
 
 
 def of_signals(
-    dwells: Sequence[Dwell], plan: Settings, doubts: Doubts = its_own, runout: tuple[str, ...] = ()
+    dwells: Sequence[Dwell], max_lost: float, max_speed_error: float, doubts: Doubts = its_own
 ) -> Iterator[Finding]:
-    """Lost samples, pulses, probes that clip or stand still, contact, limits, sampling, speed. `doubts` are the quantities
-    that a dwell's data are in, `runout` those that the slow roll is in; none is all of them."""
+    """Lost samples (a share of them is allowed), pulses, probes that clip or stand still, contact, limits, speed (a share of
+    which it may be off). `doubts` are the quantities that a dwell's data are in; none is all of them."""
     lost, expected = np.array([(d.lost, d.expected) for d in dwells], dtype=float).T
-    for f in signals.losses(lost, expected, plan.max_lost, lambda share: dwells[int(np.argmax(share))].where):
-        hit = [doubts(d) for d in dwells if d.lost > plan.max_lost * max(d.expected, 1)]
+    for f in signals.losses(lost, expected, max_lost, lambda share: dwells[int(np.argmax(share))].where):
+        hit = [doubts(d) for d in dwells if d.lost > max_lost * max(d.expected, 1)]
         yield replace(f, concerns=tuple(q for some in hit for q in some) if all(hit) else ())
     for d in dwells:
         for name in d.stuck:
@@ -63,11 +62,9 @@ def of_signals(
         yield from _pulses(d)
         yield from _limits(d, doubts)
         off = abs(d.speed / d.wanted - 1)
-        if off > plan.max_speed_error:
+        if off > max_speed_error:
             text = f"the pulses say {d.speed * RPM:.0f} r/min, {off:.1%} off."
             yield Finding("speed-off", text, d.where, Effect.INDETERMINATE, doubts(d))
-    yield from sampling(dwells, plan)
-    yield from slow_roll(dwells, plan, runout)
 
 
 def _pulses(d: Dwell) -> Iterator[Finding]:
@@ -82,14 +79,18 @@ def _pulses(d: Dwell) -> Iterator[Finding]:
 
 
 def _limits(d: Dwell, doubts: Doubts) -> Iterator[Finding]:
-    if d.flags & RANGE or d.clips >= HELD:
+    if d.flags & d.machine.sensor_range or d.clips >= HELD:
         text = "a position sensor stood at the end of its range: what it shows of the orbit is cut off."
         yield Finding("sensor-clipped", text, d.where, Effect.ERROR)
     for bits, code, text in (
-        (CONTACT, "contact", "the shaft touched a ring or the axial stop: this is not its response to unbalance."),
-        (CURRENT_LIMIT, "current-saturated", "a coil current was at its limit: the response is not linear."),
         (
-            VOLTAGE_LIMIT,
+            d.machine.contact,
+            "contact",
+            "the shaft touched a ring or the axial stop: this is not its response to unbalance.",
+        ),
+        (d.machine.current_limit, "current-saturated", "a coil current was at its limit: the response is not linear."),
+        (
+            d.machine.voltage_limit,
             "voltage-saturated",
             "an amplifier's voltage was at its limit: the currents slewed (T Fig. 2.9).",
         ),
@@ -98,55 +99,45 @@ def _limits(d: Dwell, doubts: Doubts) -> Iterator[Finding]:
             yield Finding(code, text, d.where, Effect.INDETERMINATE, doubts(d))
 
 
-def sampling(dwells: Sequence[Dwell], plan: Settings) -> Iterator[Finding]:
-    """The capture must be fast enough for the orders asked."""
+def sampling(dwells: Sequence[Dwell], orders: int) -> Iterator[Finding]:
+    """The capture must be fast enough for the highest of the orders asked."""
     for d in dwells:
         if d.full is None:
             continue
-        need = PER_TURN * plan.orders * d.speed / (2 * math.pi)
+        need = PER_TURN * orders * d.speed / (2 * math.pi)
         if d.full.rate < need:
-            text = (f"captured at {d.full.rate:g} Hz; order {plan.orders} needs {need:.0f} Hz: what is above half of the rate "
+            text = (f"captured at {d.full.rate:g} Hz; order {orders} needs {need:.0f} Hz: what is above half of the rate "
                     "appears at other frequencies, and D_max misses peaks.")  # fmt: skip
             yield Finding("aliasing", text, d.where, Effect.ERROR)
 
 
-def slow_roll(dwells: Sequence[Dwell], plan: Settings, runout: tuple[str, ...] = ()) -> Iterator[Finding]:
-    """Is there a slow roll, and was it slow? `runout` are the quantities that it is in."""
+def slow_roll(dwells: Sequence[Dwell], speeds: Sequence[float], runout: tuple[str, ...] = ()) -> Iterator[Finding]:
+    """Is there a slow roll, and was it slow beside the speeds in rad/s? `runout` are the quantities that it is in; none is
+    all of them."""
     slow = [d for d in dwells if d.kind == SLOW]
     if not slow:
         text = "no slow roll: what the probes read of the journals' runout is in every vector, as if it were unbalance."
         yield Finding("no-slow-roll", text, "", Effect.INDETERMINATE, runout)
-    elif slow[0].speed > 1.02 * too_fast(plan):
-        text = (f"the slow roll was made at {slow[0].speed * RPM:.0f} r/min; above {too_fast(plan) * RPM:.0f} r/min unbalance "
-                "and the loop's own response are in it.")  # fmt: skip
+    elif slow[0].speed > 1.02 * too_fast(speeds):
+        text = (f"the slow roll was made at {slow[0].speed * RPM:.0f} r/min; above {too_fast(speeds) * RPM:.0f} r/min "
+                "unbalance and the loop's own response are in it.")  # fmt: skip
         yield Finding("slow-roll-too-fast", text, slow[0].where, Effect.INDETERMINATE, runout)
 
 
-def of_results(results: Results, plan: Settings) -> Iterator[Finding]:
+def of_results(results: Results) -> Iterator[Finding]:
     """Do forces and motion agree? Is a repeat the same? Then zones and the runout, as notes."""
-    yield from channels(results.dwells)
-    yield from weight(results.dwells)
+    forces = [ForceBalance(r.dwell, r.misfit, r.carried) for r in results.dwells]
+    yield from channels(forces)
+    yield from weight(forces)
     yield from _beside(results)
     yield from _folded(results)
     yield from _repeats(results)
     yield from _told(results)
-    if plan.variants:
-        yield from _regions(results)
-        yield from _zones(results)
+    yield from _regions(results)
+    yield from _zones(results)
 
 
-class Balanced(Protocol):
-    """A dwell with the share of the forces left over, and what each axis carries of its share of the weight (4,)."""
-
-    @property
-    def dwell(self) -> Dwell: ...
-    @property
-    def misfit(self) -> float: ...
-    @property
-    def carried(self) -> Array: ...
-
-
-def channels(dwells: Sequence[Balanced]) -> Iterator[Finding]:
+def channels(dwells: Sequence[ForceBalance]) -> Iterator[Finding]:
     """Two unbalances must explain motion less control forces of all four axes: they do not where channels are exchanged."""
     worst = max(dwells, key=lambda r: r.misfit)
     if worst.misfit > UNEXPLAINED:
@@ -156,13 +147,14 @@ def channels(dwells: Sequence[Balanced]) -> Iterator[Finding]:
         yield Finding("forces-disagree", text, worst.dwell.where, Effect.ERROR)
 
 
-def weight(dwells: Sequence[Balanced]) -> Iterator[Finding]:
+def weight(dwells: Sequence[ForceBalance]) -> Iterator[Finding]:
     """The mean coil forces must carry the weight; they do not where the two coils of an axis are exchanged."""
     for r in dwells:
         off = np.abs(r.carried - 1)
         k = int(np.argmax(off))
         if off[k] > CARRIED:
-            text = (f"by their currents the coils of {AXES[k]} carry {r.carried[k]:.2f} of their share of the weight: "
+            axis = r.dwell.machine.axes[k]
+            text = (f"by their currents the coils of {axis} carry {r.carried[k]:.2f} of their share of the weight: "
                     "suspect the coils of an axis exchanged, a current sensor, or a wrong model of the bearing.")  # fmt: skip
             yield Finding("weight-not-carried", text, r.dwell.where, Effect.ERROR)
             return
@@ -173,7 +165,7 @@ def _beside(results: Results) -> Iterator[Finding]:
     clearance = results.clearance.value
     for r in results.dwells:
         if r.beside.max() > BESIDE * clearance:
-            plane, far = list(PLANES)[int(r.beside.argmax())], float(r.beside.max())
+            plane, far = list(r.dwell.machine.planes)[int(r.beside.argmax())], float(r.beside.max())
             text = (f"{plane} the shaft moves by up to {far * 1e6:.1f} µm that does not turn with it ({far / clearance:.0%} of "
                     f"the clearance; {BESIDE:.0%} is allowed): D_max holds what that may add to the orbit. Suspect a loop near "
                     "its limit of stability, a rub, or a shaker: see the spectrum.")  # fmt: skip
@@ -188,9 +180,9 @@ def _folded(results: Results) -> Iterator[Finding]:
         known = np.sqrt(np.maximum(whole - off**2 / 2, 1e-24))  # without it
         k = int(np.argmax(off / known))
         if off[k] > 2 * known[k]:
-            period = r.dwell.sampling.ticks * r.dwell.sampling.tick
+            period, axis = r.dwell.sampling.ticks * r.dwell.sampling.tick, r.dwell.machine.axes[k]
             text = (f"at {r.dwell.speed * RPM:.0f} r/min the telemetry, a sample every {period * 1e3:g} ms, shows order {n} as "
-                    f"order 1: the vector of {AXES[k]} may be off by {off[k] * 1e6:.2f} µm, which its interval holds. "
+                    f"order 1: the vector of {axis} may be off by {off[k] * 1e6:.2f} µm, which its interval holds. "
                     "Dwell at a speed that is a percent away.")  # fmt: skip
             yield Finding("aliasing", text, r.dwell.where, Effect.INDETERMINATE, its_own(r.dwell))
 
@@ -238,7 +230,7 @@ def _regions(results: Results) -> Iterator[Finding]:
     for variant in results.variants:
         some = []
         for r in results.of(variant):
-            for k, axis in enumerate(AXES):
+            for k, axis in enumerate(r.dwell.machine.axes):
                 one = r.vectors.one(k)
                 sizes = np.sqrt(radius2(one.dof) * np.linalg.eigvalsh(one.covariance))
                 some.append((float(sizes[1]), float(sizes[0]), f"{axis}, {r.dwell.where}"))

@@ -11,14 +11,13 @@ import numpy.typing as npt
 
 from bench.analysis.orbits import Ellipse, ellipse
 from bench.analysis.vectors import Vectors, estimates
-from bench.calibration import Calibration
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate, welch_satterthwaite
 from bench.uncertainty.estimate import merged
-from procedures.amb_rotor.channels import AXES, PLANES
+from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.shared.certificates import certified
 from procedures.synchronous import coil_peaks, runout
-from procedures.synchronous.bearings import Settings, stated
+from procedures.synchronous.bearings import Known, collect_inputs
 from procedures.synchronous.dwells import ORDERS, SLOW, Dwell
 from procedures.synchronous.nonsynchronous import beside_orders, folds
 from procedures.synchronous.runout import Stand, Turning
@@ -27,7 +26,6 @@ from procedures.unbalance.d_max import farthest
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 LSB_RAD = 2 * math.pi / 65536  # of the angle in the telemetry
-PARTS = [f"{a}{part}" for a in AXES for part in ("re", "im")]
 
 
 @dataclass(frozen=True)
@@ -40,6 +38,16 @@ class Runout:
     shaft: Complex
     reading: Complex
     known: bool
+
+
+@dataclass(frozen=True)
+class ForceBalance:
+    """Of a `dwell`: `misfit`, the share of the forces that two unbalances do not explain; `carried` (4,), of what each axis
+    should carry of the weight."""
+
+    dwell: Dwell
+    misfit: float
+    carried: Array
 
 
 @dataclass(frozen=True)
@@ -80,13 +88,18 @@ class Results:
         """In the order in which they were done."""
         return list(dict.fromkeys(r.dwell.variant for r in self.dwells))
 
+    @property
+    def machine(self) -> AmbRotor:
+        """Whose dwells they are."""
+        return self.dwells[0].dwell.machine
 
-def results(dwells: Sequence[Dwell], rig: RigFile, plan: Settings, model: Calibration | None = None) -> Results:
-    """Estimates of every dwell; `model` is the bearings' adopted calibration."""
+
+def results(dwells: Sequence[Dwell], rig: RigFile, known: Known) -> Results:
+    """Estimates of every dwell, with what is known of the bearings."""
     slow = next((d for d in dwells if d.kind == SLOW), None)
     turning = [d for d in dwells if d.kind != SLOW]
     fast = max((d for d in turning if d.variant == turning[0].variant), key=lambda d: d.speed)
-    inputs = stated(rig, plan, model)
+    inputs = collect_inputs(rig, known)
     nominal = Stand.of({name: e.value for name, e in inputs.items()})
     runouts = _runouts(inputs, rig, slow, fast)
     clearance = certified("geometry/clearance", rig.geometry["clearance"], "least clearance")
@@ -116,25 +129,35 @@ def _runouts(inputs: Mapping[str, Estimate], rig: RigFile, slow: Dwell | None, f
 
     values = {name: e.value for name, e in {**inputs, **scatter}.items()}
     others = {n: Turning(fast.speed, fast.means, fast.both(n).values) for n in orders if n in fast.track.orders}
-    more = runout.mixed(Stand.of(values), at(values), others)  # so small that what is not known of it does not count
+    more = runout.mixed_forces(
+        Stand.of(values), at(values), others
+    )  # so small that what is not known of it does not count
+
+    names = _parts(conventions(rig))
 
     def model(v: dict[str, float]) -> dict[str, float]:
-        made = runout.found(Stand.of(v), at(v), high, more)
-        return {f"{n:g}{p}": x for n in orders for p, x in zip(PARTS, made.runout[n].view(float), strict=True)}
+        made = runout.find_runout(Stand.of(v), at(v), high, more)
+        return {f"{n:g}{p}": x for n in orders for p, x in zip(names, made.runout[n].view(float), strict=True)}
 
     out = propagate(model, {**inputs, **scatter})
-    made = runout.found(Stand.of(values), at(values), high, more)
+    made = runout.find_runout(Stand.of(values), at(values), high, more)
 
     def of(n: float) -> Runout:
-        parts = tuple(Estimate(out[f"{n:g}{p}"].value, "m", out[f"{n:g}{p}"].sensitivities) for p in PARTS)
+        parts = tuple(Estimate(out[f"{n:g}{p}"].value, "m", out[f"{n:g}{p}"].sensitivities) for p in names)
         return Runout(parts, made.runout[n], made.shaft[n], read[n].values[:4], known=True)
 
     return {**lacking, **{n: of(n) for n in orders}}
 
 
+def _parts(machine: AmbRotor) -> list[str]:
+    """Names of the components of the four probes' vectors."""
+    return [f"{axis}{part}" for axis in machine.axes for part in ("re", "im")]
+
+
 def _unknown(rig: RigFile, order: float) -> Runout:
     u, nothing = rig.machine["runout"].standard_uncertainty, np.zeros(4, complex)
-    some = [Influence(f"runout/{order:g}/{p}", "runout, no slow roll", u, "m", "B", "normal") for p in PARTS]
+    names = _parts(conventions(rig))
+    some = [Influence(f"runout/{order:g}/{p}", "runout, no slow roll", u, "m", "B", "normal") for p in names]
     return Runout(tuple(Estimate.of(0.0, i) for i in some), nothing, nothing, nothing, known=False)
 
 
@@ -154,10 +177,10 @@ def _result(
     u, misfit = runout.unbalances(nominal, Turning(d.speed, d.means, d.both().values), runouts[1.0].values)
     out: dict[tuple[str, str], Estimate] = {}
     orbits, centres = {}, {}
-    for k, a in enumerate(AXES):
+    for k, a in enumerate(d.machine.axes):
         out["vector_cos", a] = parts[1.0][2 * k]
         out["vector_sin", a] = -parts[1.0][2 * k + 1]
-    for more, (plane, (y, z)) in zip(beside, PLANES.items(), strict=True):
+    for more, (plane, (y, z)) in zip(beside, d.machine.planes.items(), strict=True):
         chosen = [2 * y, 2 * y + 1, 2 * z, 2 * z + 1]
         orbits[plane] = ellipse(Vectors(values[[y, z]], vectors.covariance[np.ix_(chosen, chosen)], vectors.dof))
         out["major_half_axis", plane] = _major([parts[1.0][k] for k in chosen])
@@ -169,7 +192,7 @@ def _result(
         out["d_max_share", plane] = _unit(far / clearance, "1")
         out |= coil_peaks.peaks(d, inputs, plane, rig)
     out["reading", ""] = _reading(d, inputs)
-    weight = runout.carried(nominal, d.means) / shares(rig, nominal)
+    weight = runout.mean_forces(nominal, d.means) / shares(rig, nominal)
     return Result(d, vectors, orbits, centres, misfit, weight, u, beside, folded, out)
 
 
@@ -205,7 +228,7 @@ def _folded(d: Dwell, parts: Sequence[Estimate], off: Array) -> list[Estimate]:
     out = []
     for k, e in enumerate(parts):
         size = float(off[k // 2])
-        i = Influence(f"folded/{d.where}/{AXES[k // 2]}/{'ri'[k % 2]}", "higher order that shows as order 1",
+        i = Influence(f"folded/{d.where}/{d.machine.axes[k // 2]}/{'ri'[k % 2]}", "higher order that shows as order 1",
                       size / math.sqrt(2), "m", "B", "arcsine")  # fmt: skip
         out.append(Estimate(e.value, "m", merged([(1.0, e), (1.0, Estimate.of(0.0, i))])) if size else e)
     return out

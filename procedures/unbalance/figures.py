@@ -12,7 +12,6 @@ from bench.figures import Figure, Series, Sheet, Shown
 from bench.rigfile import RigFile
 from bench.uncertainty import coverage_factor, interval
 from bench.units import RPM
-from procedures.amb_rotor.channels import AXES, PLANES
 from procedures.unbalance.checks import ZONES
 from procedures.unbalance.estimates import Result, Results
 
@@ -23,15 +22,16 @@ SHOWN_TURNS = 4
 def all_figures(results: Results, rig: RigFile) -> Iterator[Shown]:
     """In the order of the report."""
     clearance = rig.geometry["clearance"].value
-    drawn = [orbits(results.of(variant)[-1], plane, clearance) for plane in PLANES for variant in results.variants]
+    planes = results.machine.planes
+    drawn = [orbits(results.of(variant)[-1], plane, clearance) for plane in planes for variant in results.variants]
     yield _dwells(results)
     yield drawn[0]
     yield farthest(results)
     yield from drawn[1:]
-    for plane in PLANES:
+    for plane in planes:
         yield _bode(results, plane)
         yield _polar(results, plane)
-    for plane in PLANES:
+    for plane in planes:
         for variant in results.variants:
             shown = results.of(variant)[-1]
             if shown.dwell.full is not None:
@@ -42,12 +42,12 @@ def all_figures(results: Results, rig: RigFile) -> Iterator[Shown]:
 
 def _dwells(results: Results) -> Sheet:
     """What each speed was, and how far the shaft moved there, peak to peak as shops say it."""
-    rows = []
+    rows, planes = [], results.machine.planes
     for variant in results.variants:
         for r in results.of(variant):
-            widest = [f"{2e6 * float(np.abs(r.vectors.values[list(PLANES[plane])]).max()):.1f}" for plane in PLANES]
+            widest = [f"{2e6 * float(np.abs(r.vectors.values[list(pair)]).max()):.1f}" for pair in planes.values()]
             rows.append((f"{RPM * r.dwell.wanted:.0f}", f"{RPM * r.dwell.speed:.1f}", variant, *widest))
-    head = ("asked (r/min)", "driven (r/min)", "variant", *(f"{plane} (µm pk-pk)" for plane in PLANES))
+    head = ("asked (r/min)", "driven (r/min)", "variant", *(f"{plane} (µm pk-pk)" for plane in planes))
     return Sheet("dwells", "Speeds", "Driven: by the once-per-turn pulses. Order 1 of the shaft's centre at the probe of a "
                  "plane where it is greatest, runout subtracted.", head, tuple(rows), (0, 1, 3, 4))  # fmt: skip
 
@@ -58,7 +58,7 @@ def _key(r: Result) -> str:
 
 def orbits(r: Result, plane: str, clearance: float) -> Figure:
     """The highest speed: some turns as read, and the shaft's own order 1 about its mean place."""
-    y, z = PLANES[plane]
+    y, z = r.dwell.machine.planes[plane]
     x1 = x2 = None
     if r.dwell.full is not None:
         count = round(SHOWN_TURNS * 2 * np.pi / r.dwell.speed * r.dwell.full.rate)
@@ -77,10 +77,11 @@ def _bode(results: Results, plane: str) -> Figure:
 def _curves(results: Results, plane: str, variant: str) -> Iterator[pictures.Curve]:
     some = results.of(variant)
     speed = np.array([r.dwell.speed for r in some])
-    for k in PLANES[plane]:
+    for k in results.machine.planes[plane]:
         values = np.array([r.vectors.values[k] for r in some])
         u = np.array([coverage_factor(r.vectors.dof) * r.vectors.u_amplitude[k] for r in some])
-        name = AXES[k] if len(results.variants) == 1 else f"{AXES[k]}, {variant}"
+        axis = results.machine.axes[k]
+        name = axis if len(results.variants) == 1 else f"{axis}, {variant}"
         yield pictures.Curve(name, speed, values, u)
 
 
@@ -90,7 +91,7 @@ def _polar(results: Results, plane: str) -> Figure:
 
 
 def spectrum(r: Result, plane: str) -> Figure:
-    y, z = PLANES[plane]
+    y, z = r.dwell.machine.planes[plane]
     assert r.dwell.full is not None
     found = full(r.dwell.full.positions[y], r.dwell.full.positions[z], r.dwell.full.rate)
     title = f"Full spectrum {plane}, {r.dwell.where}"
@@ -101,7 +102,7 @@ def farthest(results: Results) -> Figure:
     """D_max over the speed within the zones of ISO 14839-2."""
     series = []
     for variant in results.variants:
-        for plane in PLANES:
+        for plane in results.machine.planes:
             some = [r for r in results.of(variant) if ("d_max_share", plane) in r.estimates]
             found = [r.estimates["d_max_share", plane] for r in some]
             x = np.array([RPM * r.dwell.speed for r in some])
@@ -119,7 +120,7 @@ def farthest(results: Results) -> Figure:
 def _use(results: Results, name: str, unit: str, what: str) -> Figure:
     series = []
     for variant in results.variants:
-        for plane in PLANES:
+        for plane in results.machine.planes:
             some = [r for r in results.of(variant) if (name, plane) in r.estimates]
             x = np.array([RPM * r.dwell.speed for r in some])
             series.append(

@@ -7,33 +7,29 @@ D_max and its share of the clearance (ISO 14839-2), currents and voltages of the
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any, Literal, Protocol
+from typing import Any
 
-from pydantic import Field
-
-from bench.calibration import Need
 from bench.figures import Shown
 from bench.findings import Findings
-from bench.procedure import BenchPlan, Measured, Procedure, Quantity, read_method
+from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
+from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.shared import assumptions
 from procedures.synchronous import bearings, dwelling, fitting
-from procedures.synchronous.bearings import BEARING_MODEL, STATED, adopted_bearings
-from procedures.synchronous.coil_peaks import uncertified
-from procedures.synchronous.dwelling import CODES, POLES, SETTINGS, Law, Variant
-from procedures.synchronous.dwells import RECORDED, TOLD, read_dwells
-from procedures.synchronous.hum import heard
-from procedures.unbalance import checks, estimates
+from procedures.synchronous.coil_peaks import find_uncertified
+from procedures.synchronous.dwells import captured_channels, read_dwells, telemetry_channels
+from procedures.synchronous.hum import listen
+from procedures.unbalance import checks, estimates, sequence
 from procedures.unbalance import figures as drawn
 from procedures.unbalance.estimates import Results
 from procedures.unbalance.hum import of_dwells
+from procedures.unbalance.plan import Plan
 
 COSINE = Quantity(
     "vector_cos",
@@ -65,64 +61,14 @@ CURRENT = Quantity("current_peak", "A", "coil current of a plane that is exceede
 VOLTAGE = Quantity("voltage_peak", "V", "coil voltage of a plane that is exceeded for 1 % of the time, either way")
 MEASURES = (COSINE, SINE, MAJOR, D_MAX, SHARE, READ, CURRENT, VOLTAGE)
 LESS_RUNOUT = tuple(q.name for q in (COSINE, SINE, MAJOR, D_MAX, SHARE))
-PARAMETERS = ("law", "ref_y", "ref_theta")
+PARAMETERS = (AMB_ROTOR.law, AMB_ROTOR.set_points["y"], AMB_ROTOR.set_points["theta"])
 LENGTHS = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_inboard_amb", "com_to_outboard_amb", "com_to_coupling",
            "com_to_inboard_balance", "com_to_outboard_balance", "coupling_stiffness", "amb_gap", "clearance")  # fmt: skip
 
 
-class Plan(BenchPlan):
-    """Settings of the dwells, SI."""
-
-    law: Law = "CCS"
-    speeds_rad_s: tuple[float, ...] = Field((2000 / RPM, 4000 / RPM, 7000 / RPM, 10000 / RPM), min_length=1)
-    variants: tuple[Variant, ...] = Field(("off",), min_length=1)
-    slow_rad_s: float = Field(300 / RPM, ge=0)  # 0: no slow roll
-    slow_s: float = Field(10.0, ge=1)
-    settle_s: float = Field(1.5, ge=0.2)  # at a speed, and with a setting
-    dwell_s: float = Field(3.0, ge=0.5)
-    capture_s: float = Field(0.3, ge=0.05)
-    rate_hz: float = Field(10000.0, gt=0)  # of the capture
-    orders: int = Field(4, ge=1, le=10)  # that the full spectrum must show
-    repeat: bool = True  # the lowest speed again, at the end
-    bearings: Literal["adopted", "plan"] = (
-        "adopted"  # what is known of them: the adopted bearing-model, where there is one
-    )
-    beta_share: float = Field(0.05, ge=0)  # half width: how far the controller's betas may be off the bearings'
-    offset_u_m: float = Field(10e-6, ge=0)  # of its magnetic offsets, standard uncertainty
-    max_lost: float = Field(1e-3, ge=0)  # share of a dwell's samples
-    max_speed_error: float = Field(0.01, gt=0)  # share of the speed
-
-    @property
-    def observed(self) -> bool:
-        """Whether disturbances are compensated in some variant."""
-        return any(v != "off" for v in self.variants)
-
-    def at(self, speed: float) -> tuple[Variant, ...]:
-        """Variants at a speed in rad/s."""
-        del speed
-        return self.variants
-
-    @property
-    def dwells(self) -> int:
-        """How many there are, the repeat not counted."""
-        return sum(len(self.at(s)) for s in self.speeds_rad_s)
-
-
-class Resting(Protocol):
-    """The part of a plan that says what the forces rest on."""
-
-    @property
-    def bearings(self) -> str: ...
-
-
 def settings(plan: Plan) -> dict[str, float]:
     """Lifted by the PID, which needs no model."""
-    return {"law": CODES["PID"], "observer": 0.0, "compensate": 0.0, **(POLES if plan.observed else {})}
-
-
-def needs(plan: Resting) -> tuple[Need, ...]:
-    """The bearings' model, where the rig has one and the plan does not say otherwise."""
-    return (Need(BEARING_MODEL, optional=True),) if plan.bearings == "adopted" else ()
+    return {**AMB_ROTOR.lifting, **(AMB_ROTOR.poles if plan.observed else {})}
 
 
 def step_count(plan: Plan) -> int:
@@ -132,23 +78,24 @@ def step_count(plan: Plan) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Look at the shaft on its rings, lift it, nudge it, roll it slowly, and let it dwell at each speed with each setting."""
-    if not dwelling.rolled(rig, plan, record):
+    if not sequence.begin(rig, plan, record):
         return
-    if dwelling.dwelt(rig, plan, record):
-        dwelling.repeated(rig, plan, record)
-    dwelling.finished(rig)
+    if sequence.dwell(rig, plan, record):
+        sequence.repeat_lowest(rig, plan, record)
+    dwelling.stop(rig)
 
 
 def evaluate(recording: Recording[Any], findings: Findings) -> Results:
     """Vectors, orbits, D_max and what the coils need, of each dwell."""
     findings.gate([*wiring.before_orbits(recording), *checks.before(recording)])
     dwells, plan = read_dwells(recording), recording.plan
-    findings.gate(checks.of_signals(dwells, plan, runout=LESS_RUNOUT))
-    model = adopted_bearings(recording)
-    results = estimates.results(dwells, recording.rig, plan, model)
-    findings.add((bearings.told(model, plan), *uncertified(recording.rig)))
-    findings.add(of_dwells(heard(recording, results.slow), results.dwells))
-    findings.add(checks.of_results(results, plan))
+    findings.gate([*checks.of_signals(dwells, plan.max_lost, plan.max_speed_error), *checks.sampling(dwells, plan.orders),
+                   *checks.slow_roll(dwells, plan.speeds_rad_s, LESS_RUNOUT)])  # fmt: skip
+    known = bearings.Known.of(recording.calibrations, plan.beta_share, plan.offset_u_m)
+    results = estimates.results(dwells, recording.rig, known)
+    findings.add((bearings.describe(known), *find_uncertified(recording.rig)))
+    findings.add(of_dwells(listen(recording, results.slow), results.dwells))
+    findings.add(checks.of_results(results))
     return results
 
 
@@ -163,18 +110,22 @@ def measured(results: Results) -> Iterator[Measured]:
 
 REQUIRES = Requires(
     roles=("levitation", "drive"),
-    channels=TOLD,
-    sensors=tuple(n for n in TOLD if n.startswith(("pos_", "i_"))),
-    parameters=(*PARAMETERS, *SETTINGS["off"], *POLES, *STATED),
+    channels=telemetry_channels(AMB_ROTOR),
+    sensors=(*AMB_ROTOR.positions, *AMB_ROTOR.currents),
+    parameters=(*PARAMETERS, *AMB_ROTOR.variants["off"], *AMB_ROTOR.poles, *AMB_ROTOR.model_parameters),
     geometry=LENGTHS,
     machine=("mass", "transverse_inertia", "polar_inertia", "radial_axes", "runout"),
-    capture=RECORDED,
+    capture=captured_channels(AMB_ROTOR),
 )
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    yield from fitting.of_plan(rig, plan)
+    yield from fitting.of_speeds(rig, plan.speeds_rad_s)
+    if len(set(plan.variants)) < len(plan.variants) or (plan.observed and plan.law == "PID"):
+        yield "variants: expected each once, and with law PID off alone: only the flatness laws compensate"
+    yield from fitting.of_slow_roll(plan.slow_rad_s, plan.slow_s, plan.speeds_rad_s)
+    yield from fitting.of_captures(rig, plan.capture_s, plan.rate_hz, plan.orders, plan.speeds_rad_s)
 
 
 def figures(results: Results, recording: Recording[Plan]) -> Iterable[Shown]:
@@ -196,7 +147,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
-    needs=needs,
+    needs=lambda plan: bearings.needs(plan.bearings),
     assumes=assumptions.UNBALANCE,
     method=read_method(__file__),
 )

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from balanced import ONE, RIG, RPM, SEED, SHORT, Balancing, done, runs_of
-from bearing_facts import bearings
+from bearing_facts import bearings, known
 
 from bench.analysis.balance import G_MM
 from bench.analysis.vectors import Vectors, contains
@@ -99,7 +99,7 @@ def test_a_run_says_the_same_of_the_forces_however_large(sound: Balancing) -> No
     rig, plan = sound.recording.rig, sound.recording.plan
 
     def codes(run: Run, w: Weight) -> set[str]:
-        return {f.code for f in decision.of_trial(decision.shown(base, run, w, rig, plan))}
+        return {f.code for f in decision.of_trial(decision.observe(base, run, w, rig, known(plan)))}
 
     assert codes(having, weight) == set()
     assert codes(dataclasses.replace(base, name="trial inboard"), weight) == {"trial-moved-nothing"}
@@ -112,15 +112,18 @@ def test_a_run_says_the_same_of_the_forces_however_large(sound: Balancing) -> No
         low, vectors=dataclasses.replace(low.vectors, values=start + turn * (low.vectors.values - start))
     )
     assert codes(dataclasses.replace(having, reads=(slipped, high)), weight) == {"weight-loose"}
-    assert not list(decision.slipped(having))
-    assert {f.code for f in decision.slipped(dataclasses.replace(having, again=slipped))} == {"weight-loose"}
-    assert {f.code for f in decision.slipped(dataclasses.replace(base, again=low))} == {"response-changed"}
+    assert not list(decision.find_slips(having))
+    assert {f.code for f in decision.find_slips(dataclasses.replace(having, again=slipped))} == {"weight-loose"}
+    assert {f.code for f in decision.find_slips(dataclasses.replace(base, again=low))} == {"response-changed"}
 
 
 def test_scales_that_disagree_and_corrections_that_act_otherwise(sound: Balancing) -> None:
     rig, plan, runs, b = sound.recording.rig, sound.recording.plan, runs_of(sound), sound.found.balance
     assert b is not None
-    shown = [decision.shown(runs[BASE], runs[f"trial {s}"], runs[f"trial {s}"].weights[-1], rig, plan) for s in SIDES]
+    shown = [
+        decision.observe(runs[BASE], runs[f"trial {s}"], runs[f"trial {s}"].weights[-1], rig, known(plan))
+        for s in SIDES
+    ]
     assert not list(decision.of_trials(*shown))
     turned = dataclasses.replace(shown[1], added=shown[1].added * np.exp(0.3j))
     assert [f.code for f in decision.of_trials(shown[0], turned)] == ["weight-angle"]
@@ -140,16 +143,16 @@ def test_refitting_and_speeds_that_differ(sound: Balancing) -> None:
     assert b is not None
     assert found is not None
     rig, plan, runs = sound.recording.rig, sound.recording.plan, runs_of(sound)
-    again = estimates.balanced(
-        found.slow, [runs[BASE]], b.trials, rig, plan.model_copy(update={"refit_u_kg_m": 0.2 * G_MM})
+    again = estimates.solve_runs(
+        found.slow, [runs[BASE]], b.trials, rig, plan.model_copy(update={"refit_u_kg_m": 0.2 * G_MM}), known(plan)
     )
     before, after = (x.unbalance[BASE].u_amplitude for x in (b, again))
     assert (after > 2 * before).all()
     fast = dataclasses.replace(runs["check 1"], reads=tuple(
         dataclasses.replace(r, speed=1.003 * r.speed) for r in runs["check 1"].reads))  # fmt: skip
     changed = dataclasses.replace(found, runs=(*found.runs[:-1], fast))
-    assert {f.code for f in checks.of_runs(changed, rig, plan)} == {"speeds-differ"}
-    assert not list(checks.of_runs(found, rig, plan))
+    assert {f.code for f in checks.of_runs(changed, rig, plan, known(plan))} == {"speeds-differ"}
+    assert not list(checks.of_runs(found, rig, plan, known(plan)))
 
 
 def test_corrections_at_positions_and_those_too_heavy(sound: Balancing) -> None:
@@ -198,14 +201,17 @@ def test_trial_weights_left_on_say_the_same(sound: Balancing) -> None:
     trials = decision.trials_of([base, inboard, both], rig, leave=True)
     assert trials is not None
     assert (trials.before, trials.weights) == ((base, inboard), (inboard.weights[0], outboard.weights[0]))
-    left = estimates.balanced(recorded.slow, [base, both], trials, rig, plan)
+    left = estimates.solve_runs(recorded.slow, [base, both], trials, rig, plan, known(plan))
     assert np.abs(left.unbalance[BASE].values - b.unbalance[BASE].values).max() < 0.02 * G_MM
     more = left.unbalance[both.name].values - left.unbalance[BASE].values
-    assert np.abs(more - estimates.fixed(both.weights, left.radius)).max() < 0.02 * G_MM
+    assert np.abs(more - estimates.sum_weights(both.weights, left.radius)).max() < 0.02 * G_MM
     # taken for a run without the first weight, the second column is wrong by it
     wrong = decision.trials_of([base, inboard, both], rig, leave=False)
     assert wrong is not None
-    assert estimates.balanced(recorded.slow, [base], wrong, rig, plan).solved.condition > 1.3 * b.solved.condition
+    assert (
+        estimates.solve_runs(recorded.slow, [base], wrong, rig, plan, known(plan)).solved.condition
+        > 1.3 * b.solved.condition
+    )
 
 
 def test_bending_and_adopted_bearings_are_in_what_is_left(sound: Balancing) -> None:
@@ -215,19 +221,19 @@ def test_bending_and_adopted_bearings_are_in_what_is_left(sound: Balancing) -> N
     assert recorded is not None
     rig, plan = sound.recording.rig, sound.recording.plan
     last = [runs["check 1"]]
-    rigid = estimates.balanced(
-        recorded.slow, last, b.trials, rig, plan.model_copy(update={"bending_hz": 0.0}))  # fmt: skip
+    rigid = estimates.solve_runs(
+        recorded.slow, last, b.trials, rig, plan.model_copy(update={"bending_hz": 0.0}), known(plan))  # fmt: skip
     bent, straight = (x.parts["check 1"][0] for x in (b, rigid))
     share = sum(c**2 for i, c in bent.contributions.items() if i.startswith("bending/")) / bent.u**2
     assert 0.002 < share < 0.3
     assert straight.u == pytest.approx(bent.u * math.sqrt(1 - share), rel=1e-3)
-    known = estimates.balanced(
-        recorded.slow, last, b.trials, rig, plan, bearings(rig, draw(rig, SEED).plant))  # fmt: skip
-    part = known.parts["check 1"][0]
+    better = estimates.solve_runs(
+        recorded.slow, last, b.trials, rig, plan, known(plan, bearings(rig, draw(rig, SEED).plant)))  # fmt: skip
+    part = better.parts["check 1"][0]
     assert {"beta-yi", "offset-zo"} <= {i.id for i in part.sensitivities}
     assert not any(i.id.startswith("model/") for i in part.sensitivities)
     assert part.u < 0.8 * bent.u
-    assert contains(known.unbalance["check 1"].one(0), complex(sound.true[-1][0]), 0.999)
+    assert contains(better.unbalance["check 1"].one(0), complex(sound.true[-1][0]), 0.999)
 
 
 def test_a_runout_reads_like_the_unbalance_it_is_taken_for() -> None:
@@ -309,7 +315,7 @@ def test_the_force_of_coils_that_pull_in_turns_needs_the_higher_orders() -> None
     means = np.concatenate([np.zeros(4), coils.mean(axis=1)])
     per_square = 2 * 7e-7 / 5e-4**2 * 2.0**2  # of both bearings
     for higher, share in (({}, 2 / np.pi), ({2.0: vectors[2.0]}, 8 / (3 * np.pi))):
-        force, _ = runout.pushed(stand, Turning(1000.0, means, vectors[1.0], higher))
+        force, _ = runout.control_forces(stand, Turning(1000.0, means, vectors[1.0], higher))
         assert force[0] == pytest.approx(share * per_square, rel=1e-3)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from balanced import HEAVY, ONE, RIG, RPM, SHORT, Balancing, done, runs_of
-from bearing_facts import bearings
+from bearing_facts import bearings, known
 
 from bench.analysis.balance import G_MM
 from bench.analysis.vectors import contains
@@ -87,9 +87,9 @@ def test_corrections_under_way_rest_on_the_adopted_bearings(tmp_path: Path) -> N
     b, recorded = run.found.balance, run.found.recorded
     assert b is not None
     assert recorded is not None
-    mounted = estimates.fixed([w for w, purpose in recorded.fixed if purpose == "correction 1"], b.radius)
-    plain = estimates.balanced(
-        recorded.slow, [b.trials.base], b.trials, run.recording.rig, run.recording.plan)  # fmt: skip
+    mounted = estimates.sum_weights([w for w, purpose in recorded.fixed if purpose == "correction 1"], b.radius)
+    plain = estimates.solve_runs(
+        recorded.slow, [b.trials.base], b.trials, run.recording.rig, run.recording.plan, known(run.recording.plan))  # fmt: skip
     apart = [float(np.abs(mounted + x.unbalance[BASE].values).max()) / G_MM for x in (b, plain)]
     assert apart[0] < 0.07
     assert apart[1] > 2 * 0.07

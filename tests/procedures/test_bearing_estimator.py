@@ -11,7 +11,8 @@ import pytest
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, Influence
 from procedures.amb_rotor import magnetics
-from procedures.amb_rotor.magnetics import AXES, COILS, Positions
+from procedures.amb_rotor.conventions import AMB_ROTOR
+from procedures.amb_rotor.magnetics import Positions
 from procedures.amb_rotor.rings import exchanges, of_readings, unexplained
 from procedures.bearing_model.adjustment import Adjusted, adjust
 
@@ -31,8 +32,8 @@ PLANE = {
     "relaxed_z": 0.0,
     "gap": GAP,
 }
-SOUND = (PLANE | {f"{k}_{a}": v for a in AXES for k, v in (("gain", 1.0), ("zero", 0.0), ("runout", 0.0))}
-         | {f"{k}_{c}": v for c in COILS for k, v in (("gain", 1.0), ("offset", 0.0))})  # fmt: skip
+SOUND = (PLANE | {f"{k}_{a}": v for a in AMB_ROTOR.axes for k, v in (("gain", 1.0), ("zero", 0.0), ("runout", 0.0))}
+         | {f"{k}_{c}": v for c in AMB_ROTOR.coils for k, v in (("gain", 1.0), ("offset", 0.0))})  # fmt: skip
 PLACES = np.array(
     [(y, z) for y in np.linspace(-80e-6, 80e-6, 9) for z in np.linspace(-80e-6, 80e-6, 9) if math.hypot(y, z) < 82e-6]
 ).T
@@ -71,7 +72,7 @@ OFFSETS = (115e-6, 100e-6, 130e-6, 90e-6)
 def test_exact_data_give_the_truth() -> None:
     d = positions(OFFSETS)
     fits = magnetics.fits(d, SOUND)
-    for axis, offset in zip(AXES, OFFSETS, strict=True):
+    for axis, offset in zip(AMB_ROTOR.axes, OFFSETS, strict=True):
         assert fits[axis].beta == pytest.approx(BETA, rel=1e-7)
         assert fits[axis].offset == pytest.approx(offset, abs=1e-11)
 
@@ -79,14 +80,14 @@ def test_exact_data_give_the_truth() -> None:
 def test_gains_and_zeros_are_taken_off() -> None:
     d = positions(OFFSETS)
     p = dict(SOUND)
-    gains = {a: 1 + 0.01 * (k - 1.5) for k, a in enumerate(AXES)}
-    for k, a in enumerate(AXES):
+    gains = {a: 1 + 0.01 * (k - 1.5) for k, a in enumerate(AMB_ROTOR.axes)}
+    for k, a in enumerate(AMB_ROTOR.axes):
         p[f"gain_{a}"], p[f"runout_{a}"] = gains[a], 1e-6 * (k + 1)
         d.read[k] = gains[a] * (d.read[k] + p[f"runout_{a}"])
         for s, c in (("p", d.p), ("n", d.n)):
             p[f"gain_{a}_{s}"], p[f"offset_{a}_{s}"] = 1.004, 3e-3 * (k - 2)
             c[k] = 1.004 * c[k] + 3e-3 * (k - 2)
-    for axis, offset in zip(AXES, OFFSETS, strict=True):
+    for axis, offset in zip(AMB_ROTOR.axes, OFFSETS, strict=True):
         fit = magnetics.fits(d, p)[axis]
         assert (fit.beta, fit.offset) == (pytest.approx(BETA, rel=1e-3), pytest.approx(offset, abs=1e-7))
 
@@ -95,7 +96,7 @@ def test_erratum_the_sign_of_the_offset_goes_with_gravity() -> None:
     """T (2.6) with g_y above zero and an offset of -115 um is g_y below zero with +115 um: the same machine seen from below."""
     down, up = positions((115e-6,) * 4), positions((-115e-6,) * 4, gravity=G)
     mirrored = magnetics.fits(Positions(-down.read, down.n, down.p), SOUND | {"gravity": -G})
-    for axis in AXES:
+    for axis in AMB_ROTOR.axes:
         literal = magnetics.fits(up, SOUND | {"gravity": -G})[axis]
         assert literal.offset == pytest.approx(-115e-6, abs=1e-10)
         assert mirrored[axis].offset == pytest.approx(-115e-6, abs=1e-10)
@@ -188,7 +189,7 @@ def test_a_coupling_out_of_line_acts_on_the_force_constants_as_another_weight_wo
         inboard, rel=0.3
     )  # a little more: the spring is a part of the load
     assert found["yo"].beta / BETA - 1 == pytest.approx(outboard, rel=0.15)
-    for axis, offset in zip(AXES, OFFSETS, strict=True):
+    for axis, offset in zip(AMB_ROTOR.axes, OFFSETS, strict=True):
         assert found[axis].offset == pytest.approx(offset, abs=0.6e-6)
 
 
@@ -201,7 +202,7 @@ def test_the_spring_tells_a_part_of_how_far_its_coupling_is_out_of_line() -> Non
 
 
 def on_rings(**changed: float) -> dict[str, float]:
-    return {f"pos_{a}": -70.7e-6 for a in AXES} | {f"pos_{a}": v for a, v in changed.items()}
+    return {f"pos_{a}": -70.7e-6 for a in AMB_ROTOR.axes} | {f"pos_{a}": v for a, v in changed.items()}
 
 
 def test_readings_on_the_rings_forbid_the_lift() -> None:

@@ -19,11 +19,12 @@ from bench.record.limits import Verdict, judge
 from bench.record.specs import load_spec
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, interval
-from procedures.amb_rotor.magnetics import AXES
+from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.amb_rotor.places import Held
 from procedures.bearing_model import adjustment, checks, wiring
 from procedures.bearing_model.estimates import evaluate
-from procedures.bearing_model.procedure import MEASURES, Plan, check, grid, procedure, read, step_count
+from procedures.bearing_model.plan import Plan
+from procedures.bearing_model.procedure import MEASURES, check, grid, procedure, read, step_count
 from reports.figures import draw as draw_figure
 from reports.unseen import is_reached
 from sim_backend.truth import nominal
@@ -65,7 +66,7 @@ def test_a_sound_rig_is_recovered_within_its_intervals(sound: Simulated) -> None
     assert serious(sound) == {}
     values, limits = found(sound), load_spec(RIG, NAME)
     assert {m.quantity.name for m in sound.results if isinstance(m, Measured)} == {q.name for q in MEASURES}
-    for axis in AXES:
+    for axis in AMB_ROTOR.axes:
         for name in (f"beta_{axis}", f"offset_{axis}"):
             assert abs(values[name].value - sound.truth[name]) < 3 * values[name].u, name
             assert judge(interval(values[name]), limits[name]) is Verdict.PASS
@@ -99,11 +100,11 @@ def test_the_printed_effect_at_the_printed_machine(
 
 def test_offsets_against_gravity_hide_the_effect_and_do_not_pass(tmp_path: Path) -> None:
     """T's -115 um with gravity downwards: found as it is, named, and the linear model is nearly right."""
-    truth = {f"offset_{a}": -115e-6 for a in AXES} | {f"pos_{a}.offset": 0.0 for a in AXES}
+    truth = {f"offset_{a}": -115e-6 for a in AMB_ROTOR.axes} | {f"pos_{a}.offset": 0.0 for a in AMB_ROTOR.axes}
     run = measure(tmp_path, truth, settle_s=1.5, biases_A=(1.2, 1.0))  # less bias could not carry the shaft
     assert "offset-against-load" in serious(run)
     values = found(run)
-    for axis in AXES:
+    for axis in AMB_ROTOR.axes:
         assert abs(values[f"offset_{axis}"].value + 115e-6) < 3 * values[f"offset_{axis}"].u
     for where in ("inboard", "outboard"):
         assert values[f"misfit_ratio{where}"].value < 20
@@ -133,7 +134,7 @@ def test_what_is_said_to_be_reached_is_contradicted_before_it_matters(sound: Sim
     a = evaluate(sound.recording, read(sound.recording)[0])
     known = {_id(a.inputs[n]): a.adjusted.moved[n] / pull for n, pull in a.adjusted.pulls.items()}
     worst: dict[str, float] = {}
-    for name in (f"{what}_{axis}" for what in ("beta", "offset") for axis in AXES):
+    for name in (f"{what}_{axis}" for what in ("beta", "offset") for axis in AMB_ROTOR.axes):
         e = a.estimates[name]
         for i, c in e.sensitivities.items():
             if i.kind == "B":

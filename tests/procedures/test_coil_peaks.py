@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bench.uncertainty import coverage_factor
-from procedures.synchronous.coil_peaks import Exceeded, exceeded
+from procedures.synchronous.coil_peaks import Exceeded, find_exceeded
 
 TURN, PHI = 100, 0.8  # samples; of the noise from one to the next
 
@@ -24,7 +24,7 @@ def noisy(rng: np.random.Generator, turns: int, amplitude: float, noise: float) 
 
 
 def found(x: np.ndarray, blocks: int = 16) -> Exceeded:
-    return exceeded(x, np.round(np.linspace(0, len(x) // TURN, blocks + 1)).astype(np.intp) * TURN)
+    return find_exceeded(x, np.round(np.linspace(0, len(x) // TURN, blocks + 1)).astype(np.intp) * TURN)
 
 
 @pytest.mark.parametrize(("amplitude", "noise"), [(1.0, 0.2), (0.1, 0.2), (1.0, 0.02)])

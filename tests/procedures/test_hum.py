@@ -12,8 +12,9 @@ import pytest
 
 from bench.cli.virtual import simulated_run
 from bench.findings import Effect, Finding
+from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.synchronous.dwells import SLOW, read_dwell
-from procedures.synchronous.hum import Heard, heard, leaked
+from procedures.synchronous.hum import Heard, leak_over, listen
 
 RPM = math.pi / 30
 DWELLS = {"slow_s": 5.0, "dwell_s": 1.5, "capture_s": 0.2, "settle_s": 1.0, "repeat": False}
@@ -95,7 +96,7 @@ def test_hum_at_the_speed_of_a_balancing_is_found(tmp_path: Path, hum: float, ma
 def test_the_amplitude_heard_is_that_of_the_line(tmp_path: Path) -> None:
     """At 400 Hz, beyond what the loop answers to, less what the mean of ten readings leaves: 0.76."""
     run = simulated_run("unbalance", "amb5dof", 1, ONE, tmp_path / "r.mcap", {"hum": 5e-7, "hum_hz": 400.0})
-    sound = heard(run.recording, read_dwell(run.recording, next(iter(run.recording.steps(SLOW)))))
+    sound = listen(run.recording, read_dwell(run.recording, next(iter(run.recording.steps(SLOW)))))
     assert sound is not None
     lines = list(sound.lines(395.0, 405.0))
     assert {x.probe for x in lines} == {0, 1, 2, 3}
@@ -114,9 +115,11 @@ def test_of_a_line_within_the_width_of_an_order_counts_what_the_standing_shaft_s
     values[1, np.argmin(np.abs(hz - 50.0))] = 1e-7
     for there, size in ((0.0, None), (2e-8, 2e-8), (6e-8, 1e-7)):
         still = tuple((t + k, there * np.sin(100 * math.pi * (t + k)) + noise[k]) for k in range(4))
-        lines = [x.size for x in Heard(hz, values, 0.1, 5.0, 0.0, still).lines(49.0, 51.0)]
+        lines = [x.size for x in Heard(hz, values, 0.1, 5.0, 0.0, still, AMB_ROTOR.axes).lines(49.0, 51.0)]
         assert lines == ([] if size is None else [pytest.approx(size, rel=0.1)])
-        assert len(list(Heard(hz, values, 0.1, 4.9, 0.0, still).lines(49.0, 51.0))) == 1  # order 10 lies at 49 Hz
+        assert (
+            len(list(Heard(hz, values, 0.1, 4.9, 0.0, still, AMB_ROTOR.axes).lines(49.0, 51.0))) == 1
+        )  # order 10 lies at 49 Hz
 
 
 class Steady:
@@ -130,4 +133,4 @@ class Steady:
     ("hz", "share"), [(50.0, 1.0), (50.1, math.sin(0.3 * math.pi) / (0.3 * math.pi)), (50 + 1 / 3, 0.0)]
 )
 def test_what_leaks_is_what_the_turns_do_not_tell_apart(hz: float, share: float) -> None:
-    assert leaked(Steady(), 7.0, 3.0, hz) == pytest.approx(share, abs=1e-3)  # type: ignore[arg-type]
+    assert leak_over(Steady(), 7.0, 3.0, hz) == pytest.approx(share, abs=1e-3)  # type: ignore[arg-type]

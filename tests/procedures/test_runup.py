@@ -26,12 +26,12 @@ from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, correlation, interval, welch_satterthwaite
 from bench.units import RPM
+from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.coast_down import procedure as coast_down
 from procedures.run_up import checks, estimates, figures
 from procedures.run_up import procedure as run_up
 from procedures.run_up.estimates import Run
 from procedures.run_up.steps import Passage, read_passage
-from procedures.synchronous.dwelling import CODES, SETTINGS
 from reports.figures import draw as draw_figure
 from sim_backend.machines.amb5dof import truth_unbalance
 from sim_backend.machines.amb5dof.params import AmbParams
@@ -72,7 +72,7 @@ def settled(plant: AmbParams, run: Run, law: str, **parameters: float) -> np.nda
     """What the shaft does at the captures' speeds when the speed stands, (n, 4)."""
     assert run.near is not None
     defaults = {n: p.default for n, p in load_rig("amb5dof").parameters.items()}
-    settings = {**defaults, **SETTINGS["off"], **parameters, "law": CODES[law]}  # type: ignore[index]
+    settings = {**defaults, **AMB_ROTOR.variants["off"], **parameters, **AMB_ROTOR.select(law)}  # type: ignore[arg-type]
     return truth_unbalance.response(plant, settings, np.array([r.dwell.speed for r in run.near.dwells]))
 
 
@@ -233,7 +233,7 @@ def test_up_and_down_agree_on_criticals_and_with_the_truth(tmp_path: Path) -> No
     rig = load_rig("amb5dof")
     defaults = {n: p.default for n, p in rig.parameters.items()}
     speeds = np.linspace(300, 620, 50)
-    settings = {**defaults, **SETTINGS["off"], **parameters, "law": CODES["PID"]}
+    settings = {**defaults, **AMB_ROTOR.variants["off"], **parameters, **AMB_ROTOR.select("PID")}
     plant = draw(rig, SEED, truth).plant
     little = {name: tuple(0.02 * x for x in getattr(plant, name)) for name in ("unbalance", "runout")}
     true = truth_unbalance.response(dataclasses.replace(plant, **little), settings, speeds)  # small orbits

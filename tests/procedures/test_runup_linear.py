@@ -6,12 +6,14 @@ import dataclasses
 
 import numpy as np
 import pytest
+from bearing_facts import known
 
 from bench.rigfile import load_rig
+from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.run_up import procedure
 from procedures.run_up.linear_model import bend
 from procedures.run_up.steps import Curve
-from procedures.synchronous.bearings import stated
+from procedures.synchronous.bearings import collect_inputs
 from procedures.synchronous.runout import Stand, arms, impedance
 
 RIG = load_rig("amb5dof")
@@ -22,7 +24,7 @@ W = 450.0
 
 def stand(**changed: object) -> Stand:
     """The nominal one, with magnetic fields that stand about the rings' centre."""
-    s = Stand.of({name: e.value for name, e in stated(RIG, procedure.Plan()).items()})
+    s = Stand.of({name: e.value for name, e in collect_inputs(RIG, known(procedure.Plan())).items()})
     return dataclasses.replace(s, offset=np.zeros(4), **changed)  # type: ignore[arg-type]
 
 
@@ -32,7 +34,16 @@ def passing(shaft: np.ndarray, currents: np.ndarray, means: float = 1.0) -> Curv
     still = np.concatenate([np.zeros(4), np.full(8, means)])[None]
     one = np.array([W])
     return Curve(
-        one, one, one, values, np.zeros((12, 1, 2, 2)), still, np.zeros((1, 2)), np.full((12, 1), np.nan + 0j), one
+        one,
+        one,
+        one,
+        values,
+        np.zeros((12, 1, 2, 2)),
+        still,
+        np.zeros((1, 2)),
+        np.full((12, 1), np.nan + 0j),
+        one,
+        AMB_ROTOR,
     )
 
 

@@ -24,10 +24,12 @@ from bench.rigfile import load_rig
 from bench.rigfile.envelope import Envelope
 from bench.uncertainty import Estimate
 from bench.units import RPM
+from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.sensitivity import checks, estimates, margins
 from procedures.sensitivity.injection import Comb, combs
-from procedures.sensitivity.procedure import CODES, Plan, check, procedure
-from procedures.sensitivity.steps import AXES, REFINED, WIRING, Taken, read_taken
+from procedures.sensitivity.plan import Plan
+from procedures.sensitivity.procedure import check, procedure
+from procedures.sensitivity.steps import REFINED, WIRING, Taken, read_taken
 from reports.figures import draw as draw_figure
 from sim_backend.machines.amb5dof import truth_sensitivity
 from sim_backend.truth import draw
@@ -66,7 +68,7 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 @pytest.fixture(scope="module")
 def settings() -> dict[str, float]:
-    return {n: p.default for n, p in load_rig("amb5dof").parameters.items()} | {"law": CODES["PID"]}
+    return {n: p.default for n, p in load_rig("amb5dof").parameters.items()} | AMB_ROTOR.select("PID")
 
 
 def test_nothing_is_found_on_a_sound_stand(sound: Run) -> None:
@@ -118,7 +120,7 @@ def test_figures(sound: Run) -> None:
 
 def _follow(axis: str, value: complex) -> Any:
     out = np.zeros(5, complex)
-    out[AXES.index(axis)] = value
+    out[AMB_ROTOR.all_axes.index(axis)] = value
     return out
 
 

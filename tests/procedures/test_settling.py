@@ -15,6 +15,7 @@ from bench.cli.virtual import simulated_run
 from bench.errors import AnalysisError
 from bench.procedure import Measured
 from bench.uncertainty import interval
+from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.step import settling
 from procedures.step.estimates import settling_estimate
 from procedures.step.oscillation import shrinks
@@ -50,7 +51,7 @@ def made(
                 )
                 zero = np.zeros(len(t))
                 out.append(Done(case, begin, t, y, y, zero, zero, zero, zero[:100], noise / math.sqrt(WINDOW), WINDOW, 0.0, 0.0,
-                                True, (1.0,), (0.0, 0.0), 0, (), 0, 500))  # fmt: skip
+                                True, (1.0,), (0.0, 0.0), 0, (), 0, 500, AMB_ROTOR))  # fmt: skip
     return out
 
 

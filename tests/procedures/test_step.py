@@ -21,10 +21,12 @@ from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, interval
 from bench.uncertainty.coverage import ensemble
+from procedures.amb_rotor.conventions import Flag
 from procedures.amb_rotor.onset import onset
 from procedures.step import checks, estimates, oscillation, planes, response, settling
 from procedures.step import steps as step_steps
-from procedures.step.procedure import MEASURES, Plan, check, procedure, recorded_s, step_count, waited_s
+from procedures.step.plan import Plan
+from procedures.step.procedure import MEASURES, check, procedure, recorded_s, step_count, waited_s
 from reports.figures import draw as draw_figure
 
 SHORT = {"axes": ("y",), "sizes_m": (10e-6, 20e-6), "record_s": 0.4, "settle_s": 3.0}
@@ -166,7 +168,7 @@ def test_a_finding_about_one_axis_leaves_the_other_alone(tmp_path: Path) -> None
     assert all(f.concerns == (f"settling_time@{f.where}",) for f in open_ones)
     recording = Recording.open(tmp_path / "recording.mcap", Plan)
     steps = step_steps.read_steps(recording)
-    hit = [dataclasses.replace(d, flags=step_steps.CONTACT if d.case.axis == "z" else 0) for d in steps]
+    hit = [dataclasses.replace(d, flags=Flag.CONTACT_AXIAL if d.case.axis == "z" else 0) for d in steps]
     (touch,) = (f for f in checks.of_steps(hit, recording.plan) if f.code == "contact")
     sizes = [f"{um} µm {way}" for um in (10, 20) for way in ("up", "down")]
     assert {*touch.concerns} == {"@A, z, 0 r/min", *(f"@A, z, 0 r/min, {size}" for size in sizes)}
@@ -255,10 +257,10 @@ def test_planes_that_answer_alike_are_called_exchanged_by_chance_only() -> None:
         x = rng.normal(size=(8, 2, 60))
         return [np.concatenate([a, own * a + other * a[::-1] + rng.normal(size=(2, 60))]) for a in x]
 
-    assert not any(planes.crossed(steps(1.0, 1.0)) for _ in range(300))
-    assert not planes.crossed(steps(1.0, 0.2))
-    assert planes.crossed(steps(0.2, 1.0))
-    assert not planes.crossed([x[:, :20] for x in steps(0.2, 1.0)])
+    assert not any(planes.is_crossed(steps(1.0, 1.0)) for _ in range(300))
+    assert not planes.is_crossed(steps(1.0, 0.2))
+    assert planes.is_crossed(steps(0.2, 1.0))
+    assert not planes.is_crossed([x[:, :20] for x in steps(0.2, 1.0)])
 
 
 def second_order(w: float, z: float, shift: float, seconds: float = 0.4) -> tuple[np.ndarray, np.ndarray]:

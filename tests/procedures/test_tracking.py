@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bearing_facts import known
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
@@ -22,13 +23,16 @@ from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate
+from procedures.amb_rotor.conventions import AMB_ROTOR, Flag
 from procedures.amb_rotor.geometry import Facts
 from procedures.synchronous import bearings
-from procedures.tracking import drift, estimates
+from procedures.tracking import checks, drift, estimates
 from procedures.tracking import ellipse as estimator
 from procedures.tracking.ellipse import Path as Orbit
 from procedures.tracking.ellipse import Wave
-from procedures.tracking.procedure import CODES, MEASURES, OBSERVED, Plan, check, procedure, step_count
+from procedures.tracking.plan import Plan
+from procedures.tracking.procedure import MEASURES, OBSERVED, check, procedure, step_count
+from procedures.tracking.steps import read_orbits
 from procedures.unbalance import procedure as unbalance
 from reports.figures import draw as draw_figure
 from sim_backend.machines.amb5dof import truth_track
@@ -53,7 +57,7 @@ def agree(
 ) -> None:
     """Every quantity but the distance to the rings is that of the same machine without noise, within 3.5 u."""
     rig = load_rig("amb5dof")
-    settings = {name: p.default for name, p in rig.parameters.items()} | more | {"law": CODES[law]}
+    settings = {name: p.default for name, p in rig.parameters.items()} | more | AMB_ROTOR.select(law)
     for name, value in truth_track.truth(draw(rig, seed).plant, settings, settle_s=1.5, **orbit).items():
         e = measured[name, law]
         assert e.value == pytest.approx(value, abs=3.5 * e.u), (name, law)
@@ -151,6 +155,20 @@ def test_contact_that_the_controller_does_not_report_is_named(tmp_path: Path) ->
 def test_contact_of_a_law_under_test_never_passes(tmp_path: Path) -> None:
     _, findings = tracked(tmp_path, 1, laws=("PID",), compare=())
     assert {f.code: f.effect for f in findings}["contact"] is Effect.INDETERMINATE
+
+
+def test_a_touch_of_the_axial_stop_is_contact(tmp_path: Path) -> None:
+    """As in every other procedure of the stand; the radial probes, which cannot show it, do not speak against it."""
+    run = simulated_run("tracking", "amb5dof", 1, {**QUICK, **ONE}, tmp_path / "recording.mcap")
+    (orbit,), plan = read_orbits(run.recording), run.recording.plan
+    flags = orbit.flags | np.where(np.arange(orbit.flags.size) < orbit.flags.size // 10, Flag.CONTACT_AXIAL, 0)
+    results = estimates.by_law([orbit], run.recording.rig, plan.runout_m)
+    found = {f.code: f for f in checks.of_results([replace(orbit, flags=flags)], results, plan)}
+    assert found["contact"].effect is Effect.INDETERMINATE
+    assert "the axial stop in 10.0%" in found["contact"].text
+    assert "ring" not in found["contact"].text
+    assert "contact in 10%" in found["laws-compared"].text
+    assert "contact-not-seen" not in found
 
 
 def test_a8_the_error_at_speed_is_within_two_and_a_half_micrometres(tmp_path: Path) -> None:
@@ -256,6 +274,6 @@ def test_a_certificate_has_one_name_in_all_procedures() -> None:
     """Else results that share a probe would count as independent."""
     rig = load_rig("amb5dof")
     here = {i.id for i in estimates.inputs(rig, 1e-4, 0.0)} - {"timing/start", "geometry/clearance"}
-    there = {i.id for e in bearings.stated(rig, unbalance.Plan()).values() for i in e.sensitivities}
+    there = {i.id for e in bearings.collect_inputs(rig, known(unbalance.Plan())).values() for i in e.sensitivities}
     assert here
     assert here <= there

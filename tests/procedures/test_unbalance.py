@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from bearing_facts import bearings
+from bearing_facts import bearings, known
 
 from bench.analysis.vectors import radius2
 from bench.cli.virtual import given, simulated_run
@@ -25,12 +25,11 @@ from bench.record.specs import applied, load_spec
 from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, Influence, interval
-from procedures.amb_rotor.channels import AXES
+from procedures.amb_rotor.conventions import AMB_ROTOR, Flag
 from procedures.compensation import procedure as compensation
-from procedures.synchronous import bearings as unbalance_bearings
-from procedures.synchronous import runout
-from procedures.synchronous.coil_peaks import blocks, uncertified
-from procedures.synchronous.dwelling import CODES, POLES, SETTINGS
+from procedures.synchronous import dwells, runout
+from procedures.synchronous.bearings import describe
+from procedures.synchronous.coil_peaks import blocks, find_uncertified
 from procedures.synchronous.dwells import SLOW, read_dwells
 from procedures.unbalance import checks, estimates
 from procedures.unbalance import d_max as unbalance_d_max
@@ -67,7 +66,7 @@ def done(folder: Path, procedure: str, plan: Mapping[str, Any], truth: Mapping[s
     measured = {(m.quantity.name, m.where): m.estimate for m in run.results if isinstance(m, Measured)}
     findings = [f for f in run.results if isinstance(f, Finding)]
     plan_ = run.recording.plan
-    results = estimates.results(read_dwells(run.recording), run.recording.rig, plan_)
+    results = estimates.results(read_dwells(run.recording), run.recording.rig, known(plan_))
     return Run(measured, findings, run.recording, results, draw(load_rig("amb5dof"), SEED, truth).plant)
 
 
@@ -99,9 +98,9 @@ def test_vectors_are_what_the_shaft_really_does(compared: Run) -> None:
     for r in compared.results.dwells:
         if r.dwell.variant == "literal":
             continue  # its limit cycle is not the other plant's
-        settings = {**defaults, **POLES, **SETTINGS[r.dwell.variant], "law": CODES["CCS"]}  # type: ignore[index]
+        settings = {**defaults, **AMB_ROTOR.poles, **AMB_ROTOR.variants[r.dwell.variant], **AMB_ROTOR.select("CCS")}  # type: ignore[index]
         true = truth_unbalance.motion(compared.plant, settings, r.dwell.speed)
-        for k, axis in enumerate(AXES):
+        for k, axis in enumerate(AMB_ROTOR.axes):
             for name, value in (("vector_cos", true.shaft[k].real), ("vector_sin", -true.shaft[k].imag)):
                 e = r.estimates[name, axis]
                 away.append((e.value - value) / e.u)
@@ -141,9 +140,9 @@ def test_peaks_of_the_coils_are_known_by_more_than_their_resolution(compared: Ru
 
 def test_voltages_without_certificates_are_told() -> None:
     rig = load_rig("amb5dof")
-    assert list(uncertified(rig)) == []
+    assert list(find_uncertified(rig)) == []
     bare = rig.model_copy(update={"sensors": {n: s for n, s in rig.sensors.items() if n != "u_zo_n"}})
-    (found,) = uncertified(bare)
+    (found,) = find_uncertified(bare)
     assert (found.code, found.effect) == ("voltage-not-certified", Effect.NOTE)
     assert "u_zo_n" in found.text
     assert draw(bare, SEED).plant.voltage_gain[7] == 1.0
@@ -242,7 +241,8 @@ def test_a_clipping_probe_shows_in_the_capture_where_the_controller_does_not_tel
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """At 4000 r/min a turn is 15 samples of the telemetry: none of them stays at the limit for eight."""
-    monkeypatch.setattr(checks, "RANGE", 0)
+    silent = replace(AMB_ROTOR, sensor_range=Flag(0))
+    monkeypatch.setattr(dwells, "conventions", lambda _: silent)
     truth = {"position_range": 78e-6, "unbalance_i": 1.05e-5, "unbalance_o": 1.05e-5}
     plan = {**ONE, "speeds_rad_s": (4000 * RPM,)}
     run = simulated_run("unbalance", "amb5dof", SEED, plan, tmp_path / "recording.mcap", truth)
@@ -268,7 +268,7 @@ def test_a_finding_of_one_speed_leaves_the_others_alone(tmp_path: Path) -> None:
 
 def test_without_a_slow_roll_readings_and_currents_stand(compared: Run) -> None:
     slow = [d for d in read_dwells(compared.recording) if d.kind != SLOW]
-    found = list(checks.slow_roll(slow, compared.recording.plan, unbalance.LESS_RUNOUT))
+    found = list(checks.slow_roll(slow, compared.recording.plan.speeds_rad_s, unbalance.LESS_RUNOUT))
     assert [f.code for f in found] == ["no-slow-roll"]
     assert set(found[0].concerns) == {"vector_cos", "vector_sin", "major_half_axis", "d_max", "d_max_share"}
 
@@ -307,7 +307,7 @@ def test_an_order_that_the_telemetry_takes_for_order_1_is_named(tmp_path: Path, 
 def test_motion_that_does_not_turn_with_the_shaft_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """D_max is of what turns with the shaft: at 47 Hz beside it the shaft went to 45 µm, and D_max said 16 in zone A."""
     shaken = {"inject_amplitude": 0.1, "inject_hz": 47.0, "inject_lines": 1.0, "inject_axis": 0.0}
-    monkeypatch.setitem(SETTINGS, "off", SETTINGS["off"] | shaken)
+    monkeypatch.setitem(AMB_ROTOR.variants, "off", {**AMB_ROTOR.variants["off"], **shaken})
     run = simulated_run("unbalance", "amb5dof", SEED, ONE, tmp_path / "recording.mcap", {})
     found = [f for f in run.results if isinstance(f, Finding) and f.code == "not-synchronous"]
     assert found[0].effect is Effect.INDETERMINATE
@@ -368,9 +368,9 @@ def test_runout_by_forces_is_exact_on_its_own_model() -> None:
         i = np.array([0.01, 0.02j, -0.01, 0.005 + 0.001j])
         vectors = np.concatenate([np.zeros(4), np.stack([i, -i], axis=1).ravel()])
         turning = runout.Turning(speed, means, vectors)
-        at = runout.moved(stand, turning, 1.0, u) + true
+        at = runout.shaft_motion(stand, turning, 1.0, u) + true
         made.append(runout.Turning(speed, means, np.concatenate([at, vectors[4:]])))
-    found = runout.found(stand, {1.0: made[0]}, made[1])
+    found = runout.find_runout(stand, {1.0: made[0]}, made[1])
     assert np.abs(found.runout[1.0] - true).max() < 1e-11
     assert np.abs(found.shaft[1.0] - made[0].vectors[:4] + true).max() < 1e-11
     assert np.abs(found.unbalance - u).max() < 1e-10
@@ -389,7 +389,7 @@ def test_orders_mix_in_forces_that_are_not_linear() -> None:
     means, first, second = np.zeros(12), np.zeros(12, complex), np.zeros(12, complex)
     means[4], first[4], second[4] = 1.5, 0.05, 0.02j
     slow = {1.0: runout.Turning(31.4, means, first), 2.0: runout.Turning(31.4, means, second)}
-    found = runout.bent(stand, slow, {n: np.zeros(4, complex) for n in slow})
+    found = runout.forces_beyond_slopes(stand, slow, {n: np.zeros(4, complex) for n in slow})
     scale = 6.95e-7 / 5.25e-4**2
     assert found[1.0][0] == pytest.approx(scale * 0.05 * 0.02j)
     assert found[2.0][0] == pytest.approx(scale * 0.05**2 / 2)
@@ -436,7 +436,7 @@ def test_adopted_bearings_take_the_plan_s_place(compared: Run) -> None:
     """The runout is known better, by the calibration's influences and not by the plan's; the probes' zeros drop out of it."""
     rig, model = compared.recording.rig, bearings(compared.recording.rig, compared.plant)
     dwells = read_dwells(compared.recording)
-    found = estimates.results(dwells, rig, compared.recording.plan, model).runouts[1.0]
+    found = estimates.results(dwells, rig, known(compared.recording.plan, model)).runouts[1.0]
     before, true = compared.results.runouts[1.0], truth_unbalance.first(compared.plant)
     for k, part in enumerate(found.parts):
         value = true[k // 2].imag if k % 2 else true[k // 2].real
@@ -449,13 +449,13 @@ def test_adopted_bearings_take_the_plan_s_place(compared: Run) -> None:
     assert max(p.u for p in found.parts) < 0.8 * max(p.u for p in before.parts)
     (said,) = [f.text for f in compared.findings if f.code == "bearings"]
     assert "no calibration bearing-model was used" in said
-    assert "bearing-model-1, 2026-02-03" in unbalance_bearings.told(model, compared.recording.plan).text
+    assert "bearing-model-1, 2026-02-03" in describe(known(compared.recording.plan, model)).text
 
 
 def test_bearings_are_used_where_there_are_some_and_not_missed_where_there_are_none() -> None:
     rig = load_rig("amb5dof")
-    (need,) = unbalance.needs(unbalance.Plan())
-    assert unbalance.needs(unbalance.Plan(bearings="plan")) == ()
+    (need,) = unbalance.procedure.needs(unbalance.Plan())
+    assert unbalance.procedure.needs(unbalance.Plan(bearings="plan")) == ()
     assert compensation.procedure.needs(compensation.Plan()) == (need,)
     model = bearings(rig, draw(rig, SEED).plant)
     assert given([need], {}) == []

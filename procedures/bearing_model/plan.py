@@ -1,0 +1,26 @@
+"""Settings of the grid of positions."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from bench.procedure import BenchPlan
+
+
+class Plan(BenchPlan):
+    """Settings, SI. Positions are a grid of the centre of mass in y and z, within a circle."""
+
+    spacing_m: float = Field(20e-6, gt=0)
+    radius_m: float = Field(82e-6, gt=0)
+    tilt_rad: float = Field(3e-4, gt=0)  # of the check of the wiring
+    biases_A: tuple[float, ...] = Field(
+        (1.15, 0.8), min_length=1
+    )  # of each pass; T Table 2.2 is compared with the first
+    coupled: bool = True  # False: the operator has taken the coupling off
+    settle_s: float = Field(0.6, gt=0)
+    average_s: float = Field(0.5, ge=0.1)
+    batches: int = Field(5, ge=2)  # parts of a step; longer than the loop's swings
+    max_speed_m_s: float = Field(5e-6, gt=0)  # a shaft that moves faster is not at rest
+    max_misfit: float = Field(0.005, gt=0)  # a position's residual over the mean load of its axis
+    min_ratio: float = Field(20.0, gt=1)  # of the residual sums, over samples and over batch means
+    max_lost: float = Field(1e-3, ge=0)  # share of a step's samples
