@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, NoReturn
 
-Codes = Mapping[str, tuple[str, str]]
-"""Codes of findings, each with the effects that it may have and what it says in a line."""
 SIMULATED_CONTROLLER = "simulated-controller"  # a live run whose controller says that it is a simulated one
 
 

@@ -1,20 +1,17 @@
-"""The page of all finding codes, docs/reference/findings.md, made from the registers of the engine and of the rooms.
+"""The page of all finding codes, docs/reference/findings.md, made from the registers: `findings.toml` of the engine and of each
+room, a code with the effects that it may have and what it says in a line.
 
-python -m bench.cli.findings_page docs/reference/findings.md
+    python -m bench.cli.findings_page docs/reference/findings.md
 """
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 import sys
-from collections.abc import Iterator
+import tomllib
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-import procedures
-from bench import finding_codes
-from bench.findings import Codes
-
+ROOT = Path(__file__).resolve().parents[2]
 HEAD = """\
 # Findings
 
@@ -26,12 +23,11 @@ of the procedures say when each is told, and what to look at. Codes are stable: 
 """
 
 
-def registers() -> Iterator[tuple[str, Codes]]:
-    """The name of each register's room, and its codes: the engine's first."""
-    yield "engine", finding_codes.CODES
-    for room in sorted(m.name for m in pkgutil.iter_modules(procedures.__path__) if m.ispkg):
-        if "findings" in {m.name for m in pkgutil.iter_modules([str(Path(procedures.__path__[0]) / room)])}:
-            yield room, importlib.import_module(f"procedures.{room}.findings").CODES
+def registers() -> Iterator[tuple[str, Mapping[str, tuple[str, str]]]]:
+    """The name of each register's room, and its codes with effects and meaning: the engine's first."""
+    for path in (ROOT / "bench" / "findings.toml", *sorted((ROOT / "procedures").glob("*/findings.toml"))):
+        codes = tomllib.loads(path.read_text(encoding="utf-8"))
+        yield path.parent.name, {code: (effects, text) for code, (effects, text) in codes.items()}
 
 
 def page() -> str:

@@ -47,7 +47,7 @@ def _at_rest(recording: Recording[Any], machine: AmbRotor) -> Iterator[Finding]:
             mean = float(np.mean(data[name]))
             if mean > 0:
                 yield Finding(
-                    "probe-polarity",
+                    "sensor-polarity",
                     f"{name} reads {mean * 1e6:+.0f} µm while the rotor lies on its "
                     f"rings, below the "
                     "middle: its polarity is wrong. It was not lifted.",

@@ -38,7 +38,7 @@ def of_signals(moves: Sequence[Done], machine: Servomotor, plan: Plan) -> Iterat
         )
     for bits, of, code, text in (
         (machine.contact, "flags", "contact", "the rotor touched a touchdown bearing"),
-        (machine.amb_limit, "flags", "saturated", "an AMB amplifier was at its limit"),
+        (machine.amb_limit, "flags", "current-saturated", "an AMB amplifier was at its limit"),
         (machine.segment_limit, "rest_flags", "saturated-at-rest",
          "a segment of the motor was at its limit before the step: it carries more than it should"),
     ):  # fmt: skip

@@ -98,7 +98,7 @@ def fewest_steps(plan: Plan) -> int:
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """Unbalance as found and as left, and the influence coefficients at the highest speed."""
     findings.gate([*wiring.before_orbits(recording), *unbalance_checks.before(recording), *checks.refusals(recording)],
-                  ("no-dwells", "probe-polarity", "lift-lost", "stuck-channel"))  # fmt: skip
+                  ("no-dwells", "sensor-polarity", "lift-lost", "stuck-channel"))  # fmt: skip
     plan, rig = recording.plan, recording.rig
     recorded = read_runs(recording, plan.speeds_rad_s)
     # every run is in all results

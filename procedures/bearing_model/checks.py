@@ -18,7 +18,7 @@ from procedures.shared import signals
 
 FATAL = (
     "stuck-channel",
-    "clipped",
+    "sensor-clipped",
     "contact",
     "sensor-polarity",
     "planes-exchanged",
@@ -49,12 +49,12 @@ def of_signals(held: Held, tilted: Held, plan: Plan) -> Iterator[Finding]:
 
 def _meanings(m: AmbRotor) -> Iterator[tuple[int, str, str]]:
     """Flags that speak against a position: bits, the finding's code, its words."""
-    yield m.current_limit, "saturated", "a coil was at its current limit"
-    yield m.voltage_limit, "saturated", "a coil was at its voltage limit"
+    yield m.current_limit, "current-saturated", "a coil was at its current limit"
+    yield m.voltage_limit, "voltage-saturated", "a coil was at its voltage limit"
     for plane, bit in m.rings.items():
         yield bit, "contact", f"the shaft touched the {plane} touchdown ring"
     yield m.axial_stop, "contact", "the shaft touched the axial stop"
-    yield m.sensor_range, "clipped", "a position sensor was beyond its range"
+    yield m.sensor_range, "sensor-clipped", "a position sensor was beyond its range"
 
 
 def _flags(held: Held, tilted: Held) -> Iterator[Finding]:

@@ -131,7 +131,7 @@ def lack_of_fit(axis: str, bent: bool, worst_N: float, suspect: str) -> Iterator
             suspect or "a coil or a segment saturates, or the calibration is of another angle, bias or rotor position"
         )
         yield Finding(
-            "lack-of-fit",
+            "misfit",
             f"the force along {axis} is not proportional to the current: {worst_N:.2f} N at the extreme levels, more than "
             f"the calibration and the scatter allow: {hint}.",
             axis,

@@ -104,8 +104,8 @@ def of_signals(data: MapData, machine: Servomotor, plan: Plan) -> Iterator[Findi
             text = f"{channel} does not move at all in {count} of {len(data)} points; a live sensor has noise."
             yield Finding("stuck-channel", text, channel, Effect.ERROR)
     for bits, code, text in (
-        (machine.amb_limit, "saturated", "an AMB amplifier was at its limit"),
-        (machine.segment_limit, "saturated", "a segment of the motor was at its limit"),
+        (machine.amb_limit, "current-saturated", "an AMB amplifier was at its limit"),
+        (machine.segment_limit, "current-saturated", "a segment of the motor was at its limit"),
         (machine.contact, "contact", "the rotor touched a touchdown bearing"),
     ):
         if hit := int(((table.flags & bits) != 0).sum()):

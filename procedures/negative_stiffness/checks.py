@@ -104,7 +104,7 @@ def _disagreement(estimates: Mapping[str, Estimate]) -> Iterator[Finding]:
         yield Finding("methods-agree", text, "alpha_x_prime, alpha_x_prime_amb")
     elif abs(d.value) <= ONE_IN_A_THOUSAND * U:
         why = "; more than U, which one sound rig in twenty exceeds"
-        yield Finding("methods-differ", text + why, "alpha_x_prime, alpha_x_prime_amb")
+        yield Finding("methods-disagree", text + why, "alpha_x_prime, alpha_x_prime_amb")
     else:
         why = (
             "; beyond what one sound rig in a thousand shows. Suspect the force constants: the motor's acts on the first "

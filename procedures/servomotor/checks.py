@@ -34,8 +34,8 @@ def of_signals(
 def limits(machine: Servomotor) -> tuple[signals.Meaning, ...]:
     """Flags that stand for a limit that was reached, with what they are called."""
     return (
-        (machine.amb_limit, "saturated", "an AMB amplifier was at its limit"),
-        (machine.segment_limit, "saturated", "a motor segment was at its limit"),
+        (machine.amb_limit, "current-saturated", "an AMB amplifier was at its limit"),
+        (machine.segment_limit, "current-saturated", "a motor segment was at its limit"),
         (machine.contact_inboard, "contact", "the rotor touched the inboard touchdown bearing"),
         (machine.contact_outboard, "contact", "the rotor touched the outboard touchdown bearing"),
     )

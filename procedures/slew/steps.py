@@ -82,7 +82,8 @@ def of_signals(recording: Recording[Plan]) -> Iterator[Finding]:
         flags = int(np.bitwise_or.reduce(data["flags"].astype(np.int64))) if len(data["flags"]) else 0
         for channel in (c for c in names[:-1] if np.ptp(data[c]) == 0):
             yield Finding("stuck-channel", f"{channel} does not move at all during a swing.", channel, Effect.ERROR)
-        for bits, code, text in ((machine.amb_limit | machine.segment_limit, "saturated", "an amplifier was at its limit"),
+        limits = machine.amb_limit | machine.segment_limit
+        for bits, code, text in ((limits, "current-saturated", "an amplifier was at its limit"),
                                  (machine.contact, "contact", "the rotor touched a touchdown bearing")):  # fmt: skip
             if flags & bits:
                 yield Finding(code, f"{text} during a swing", where, Effect.INDETERMINATE)

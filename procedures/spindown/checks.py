@@ -73,7 +73,7 @@ def of_runs(runs: Sequence[RunDown], machine: Servomotor, plan: Plan) -> Iterato
             "load, cable, gateway."
         )
         yield Finding("missing-samples", text, runs[int(np.argmax(lost))].where, Effect.INDETERMINATE)
-    for bit, code, text in ((machine.amb_limit, "saturated", "an AMB amplifier was at its limit"),
+    for bit, code, text in ((machine.amb_limit, "current-saturated", "an AMB amplifier was at its limit"),
                             (machine.contact, "contact", "the rotor touched a touchdown bearing")):  # fmt: skip
         hit = [r for r in runs if r.flags & bit]
         if hit:

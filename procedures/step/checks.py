@@ -24,7 +24,7 @@ FATAL = (
     "wrong-way",
     "wrong-size",
     "sensor-clipped",
-    "speed-lost",
+    "speed-off",
 )
 CAME = 0.2  # of the step: less is no step
 SIZE_OFF = 0.4  # of the step: what a stiff integrator-less loop may be off, and no more
@@ -91,7 +91,7 @@ def _speed(steps: Sequence[Done], plan: Plan) -> Iterator[Finding]:
     if off and (most := max(off, key=lambda o: o[0]))[0] > plan.max_speed_error:
         low, high = (v * 30 / math.pi for v in most[1].speeds)
         yield Finding(
-            "speed-lost",
+            "speed-off",
             f"the pulses say {low:.0f} to {high:.0f} r/min during a step at {most[1].case.speed * 30 / math.pi:.0f} "
             f"r/min: the drive "
             "does not hold the speed, or pulses are missing or doubled.", most[1].case.where, Effect.ERROR,

@@ -45,8 +45,8 @@ def of_signals(data: TorqueData, machine: Servomotor, plan: Plan) -> Iterator[Fi
 
 def _limits(machine: Servomotor) -> tuple[signals.Meaning, ...]:
     return (
-        (machine.amb_limit, "saturated", "an AMB amplifier was at its limit"),
-        (machine.segment_limit, "saturated", "a segment's amplifier was at its limit"),
+        (machine.amb_limit, "current-saturated", "an AMB amplifier was at its limit"),
+        (machine.segment_limit, "current-saturated", "a segment's amplifier was at its limit"),
         (machine.contact, "contact", "the rotor touched a touchdown bearing"),
     )
 
@@ -178,7 +178,7 @@ def _detent(b: Balance, held: Detent) -> Iterator[Finding]:
     least = float(np.abs(b.torque[b.torque != 0]).min())
     if torque > 0.25 * least:
         yield Finding(
-            "detent-large",
+            "large-detent",
             f"the detent is {torque:.2f} N m 0-pk, the smallest load {least:.2f} N m: a count of the encoder off home is "
             f"{torque * held.order * 1.5e-3:.3f} N m, and what the loads show is the detent.", "detent", Effect.INDETERMINATE,
         )  # fmt: skip

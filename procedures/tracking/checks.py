@@ -23,7 +23,7 @@ FATAL = (
     "reference-missing",
     "reference-frequency",
     "axes-exchanged",
-    "sensor-range",
+    "sensor-clipped",
     "start-not-seen",
 )
 APPLIED, OFF_HZ = 0.3, 2e-3  # share of the amplitude, relative error of the frequency
@@ -53,7 +53,7 @@ def of_signals(orbits: Sequence[Orbit], plan: Plan) -> Iterator[Finding]:
             off = float(np.abs(o.speed - plan.speed_rad_s).max()) / plan.speed_rad_s
             if off > STEADY:
                 yield Finding(
-                    "speed-not-steady",
+                    "speed-off",
                     f"the speed is up to {off:.1%} off {plan.speed_rad_s * 30 / math.pi:.0f} r/min.",
                     o.where,
                     Effect.INDETERMINATE,
@@ -69,14 +69,14 @@ def _clipping(o: Orbit) -> Iterator[Finding]:
             if signals.longest_at(x, limit) >= HELD:
                 found = True
                 yield Finding(
-                    "sensor-range",
+                    "sensor-clipped",
                     f"{name} stays at {limit * 1e6:+.1f} µm for {HELD} samples and more: it clips there.",
                     name,
                     Effect.ERROR,
                 )
     if not found and (o.flags & o.machine.sensor_range).any():
         yield Finding(
-            "sensor-range", "the controller reports a position sensor beyond its range.", o.where, Effect.ERROR
+            "sensor-clipped", "the controller reports a position sensor beyond its range.", o.where, Effect.ERROR
         )
 
 
@@ -137,13 +137,13 @@ def of_results(orbits: Sequence[Orbit], results: Mapping[str, Mapping[str, Estim
         judged = o.law in plan.laws
         yield from _of_contact(o, results[o.law]["ring_distance"], Effect.INDETERMINATE if judged else Effect.NOTE)
         current, voltage = o.machine.current_limit, o.machine.voltage_limit
-        for bit, text in ((current, "a coil's current"), (voltage, "a coil's voltage")):
+        for bit, what in ((current, "current"), (voltage, "voltage")):
             share = float((o.flags & bit != 0).mean())
             if share > 0:
                 bad = judged and share > PARTS
                 yield Finding(
-                    "saturated",
-                    f"{text} was at its limit in {share:.2%} of the samples.",
+                    f"{what}-saturated",
+                    f"a coil's {what} was at its limit in {share:.2%} of the samples.",
                     o.where,
                     Effect.INDETERMINATE if bad else Effect.NOTE,
                     (f"@{o.where}",),

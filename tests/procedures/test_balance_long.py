@@ -105,7 +105,7 @@ def test_corrections_under_way_rest_on_the_adopted_bearings(tmp_path: Path) -> N
         ({"weight_turned": 3.0, "weight_turned_rad": 0.5}, ONE, "correction-not-as-stated", Effect.INDETERMINATE),
         ({"weight_astray": 4.0}, ONE, "correction-not-as-stated", Effect.INDETERMINATE),
         ({"weight_heavy": 1.0, "weight_heavy_by": 0.12}, ONE, "correction-not-as-stated", Effect.INDETERMINATE),
-        ({"position_sign_yi": -1.0}, ONE, "probe-polarity", Effect.ERROR),
+        ({"position_sign_yi": -1.0}, ONE, "sensor-polarity", Effect.ERROR),
         ({"told_planes": 1.0}, ONE, "planes-exchanged", Effect.ERROR),
         ({"current_sign_i": -1.0}, ONE, "coils-exchanged", Effect.ERROR),
         ({"pulse_missing": 3.0}, ONE, "pulse-missing", Effect.ERROR),

@@ -206,7 +206,7 @@ def test_exchanged_coils_of_two_axes_and_flags_are_named(sound: Simulated) -> No
         wrong = list(wiring.of_models(*other, sound.recording.rig, sound.recording.plan))
         assert {(f.code, f.where) for f in wrong} == {("coils-exchanged", a), ("coils-exchanged", b)}
         assert f"of {a} and {b}" in wrong[0].text
-    for bit, code in ((64, "clipped"), (4, "contact"), (1, "saturated")):
+    for bit, code in ((64, "sensor-clipped"), (4, "contact"), (1, "current-saturated")):
         hit = replace(held, flags=held.flags | bit)
         assert code in {f.code for f in checks.of_signals(hit, tilted, sound.recording.plan)}
 

@@ -156,7 +156,9 @@ def test_a_coil_that_cannot_reach_its_current_does_not_pass(
             data, table=replace(data.table, flags=np.where(data.table.each(lambda at: at.i_y_A) == -2, bit, 0))
         )
         found = list(checks.of_signals(flagged, SERVOMOTOR, Plan()))
-        assert [(f.code, f.effect) for f in found] == [("contact" if bit == 8 else "saturated", Effect.INDETERMINATE)]
+        assert [(f.code, f.effect) for f in found] == [
+            ("contact" if bit == 8 else "current-saturated", Effect.INDETERMINATE)
+        ]
         assert named in found[0].text
         assert "i_y -2 A" in found[0].where
 
@@ -180,7 +182,7 @@ def test_a_calibration_of_other_angles_is_named(sound: Simulated, calibration: C
 
     wrong = altered(calibration, next_angle)
     found = {f.code: f.text for f in serious(reanalysed(sound, {CALIBRATION: wrong}))}
-    assert set(found) & {"rows-disagree", "lack-of-fit"}
+    assert set(found) & {"rows-disagree", "misfit"}
     assert any("further on" in text for text in found.values()), found
 
 
@@ -188,7 +190,7 @@ def test_a_calibration_of_other_angles_is_named(sound: Simulated, calibration: C
 def test_a_calibration_of_another_rig_does_not_pass(tmp_path: Path) -> None:
     """The runner refuses it; where it comes through all the same, forces and moments contradict each other."""
     other = calibrated(tmp_path, SEED + 1)
-    assert {f.code for f in serious(measure(tmp_path, other))} & {"rows-disagree", "lack-of-fit"}
+    assert {f.code for f in serious(measure(tmp_path, other))} & {"rows-disagree", "misfit"}
 
 
 def test_eight_angles_cannot_tell_the_ripple(tmp_path: Path) -> None:

@@ -62,7 +62,7 @@ def test_the_position_sensor_carries_the_budget_and_cancels_in_the_comparison(so
     assert found.contributions["sensors/pos_yo/gain"] ** 2 > 0.8 * found.u**2
     assert interval(found).method == "monte-carlo"
     assert evaluate(sound.recording, *read(sound.recording)).estimates["difference"].u < 0.35 * found.u
-    assert {"methods-agree", "methods-differ"} & set(notes(sound))
+    assert {"methods-agree", "methods-disagree"} & set(notes(sound))
 
 
 def test_the_inboard_amb_drops_out(

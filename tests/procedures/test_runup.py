@@ -278,7 +278,7 @@ def test_a3_twelve_volts_lose_where_forty_eight_hold(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("truth", "plan", "code", "effect"),
     [
-        ({"position_sign_yi": -1.0}, {}, "probe-polarity", Effect.ERROR),
+        ({"position_sign_yi": -1.0}, {}, "sensor-polarity", Effect.ERROR),
         ({"told_planes": 1.0}, {}, "planes-exchanged", Effect.ERROR),
         ({"pulse_missing": 5.0}, {}, "pulse-missing", Effect.ERROR),
         ({"pulse_missing": 2.0}, {}, "pulse-missing", Effect.ERROR),

@@ -225,7 +225,7 @@ def test_no_injection_leaves_the_envelope() -> None:
 @pytest.mark.parametrize(
     ("truth", "plan", "code", "effect"),
     [
-        ({"position_sign_zi": -1.0}, {}, "probe-polarity", Effect.ERROR),
+        ({"position_sign_zi": -1.0}, {}, "sensor-polarity", Effect.ERROR),
         ({"told_planes": 1.0}, {}, "planes-exchanged", Effect.ERROR),
         ({"told_axes": 1.0}, {}, "axes-exchanged", Effect.ERROR),
         ({"factor_inject_axis": 2.0}, {}, "wrong-axis", Effect.ERROR),

@@ -146,7 +146,7 @@ def test_sizes_and_ways_are_compared(tmp_path: Path) -> None:
         ({"position_range": 30e-6}, {}, "sensor-clipped"),
         ({"geometry.clearance": 26e-6}, {}, "contact"),
         ({"supply_V": 12.0, "inductance": 60e-3}, {}, "voltage-saturated"),
-        ({"pulse_missing": 3.0}, {"speeds_rad_s": (FAST,)}, "speed-lost"),
+        ({"pulse_missing": 3.0}, {"speeds_rad_s": (FAST,)}, "speed-off"),
         pytest.param({"drop_fraction": 0.005}, {}, "missing-samples", marks=pytest.mark.long),
     ],
 )

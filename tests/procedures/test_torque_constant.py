@@ -67,7 +67,7 @@ def test_the_result_follows_the_truth(tmp_path: Path) -> None:
         ({"lever_slip": 0.05}, "lever-slips", "slips"),
         pytest.param({"segment_drift_2": 0.001}, "current-drift", "i_m3", marks=pytest.mark.long),
         ({"segment_scale_drift": 1e-4}, "drifting-scale", "drifts by -0.4"),
-        ({"detent": 3}, "detent-large", "detent"),
+        ({"detent": 3}, "large-detent", "detent"),
         ({"geometry.lever_left": 0.231}, "arms-disagree", "arm"),
         pytest.param({"drop_fraction": 0.005}, "missing-samples", "missing", marks=pytest.mark.long),
     ],
@@ -100,7 +100,7 @@ def test_a_wrong_mass_is_named(tmp_path: Path, mass: str, error: float) -> None:
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_a_detent_as_large_as_the_load_never_passes(tmp_path: Path, seed: int) -> None:
     """Whatever its phase: where it is steepest the rotor is off home, where it is flat the current without load is large."""
-    assert {"detent-large", "rotor-does-not-turn"} & set(serious(calibrate(tmp_path, seed, {"detent": 3})))
+    assert {"large-detent", "rotor-does-not-turn"} & set(serious(calibrate(tmp_path, seed, {"detent": 3})))
 
 
 def test_too_short_a_time_to_settle_is_told(tmp_path: Path) -> None:

@@ -112,17 +112,17 @@ def test_a_wide_ring_shows_the_pids_error_without_contact(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("defect", "code", "named"),
     [
-        ({"position_sign_zo": -1}, "probe-polarity", "polarity"),
+        ({"position_sign_zo": -1}, "sensor-polarity", "polarity"),
         ({"exchange_planes": 1}, "lift-lost", "planes"),
         ({"exchange_axes": 1}, "lift-lost", "y and z"),
         ({"told_planes": 1}, "planes-exchanged", "planes"),
         ({"told_axes": 1}, "axes-exchanged", "y and z"),
-        pytest.param({"position_range": 76e-6}, "sensor-range", "clips", marks=pytest.mark.long),
+        pytest.param({"position_range": 76e-6}, "sensor-clipped", "clips", marks=pytest.mark.long),
         ({"position_range": 60e-6}, "stuck-channel", "range"),
         ({"factor_ellipse_on": 0}, "reference-missing", "not applied"),
         ({"factor_ellipse_hz": 1.02}, "reference-frequency", "10.2 Hz"),
         ({"factor_ellipse_hz": 1.00002}, "reference-frequency", "10.000"),  # 0.1 ms and 6 mrad since the start
-        ({"supply_V": 12.0, "inductance": 60e-3}, "saturated", "voltage"),
+        ({"supply_V": 12.0, "inductance": 60e-3}, "voltage-saturated", "voltage"),
         pytest.param({"drop_fraction": 0.005}, "missing-samples", "missing", marks=pytest.mark.long),
     ],
     ids=lambda x: "-".join(x) if isinstance(x, dict) else "",

@@ -206,7 +206,7 @@ def test_a2_at_14000(tmp_path: Path, law: str) -> None:
 @pytest.mark.parametrize(
     ("truth", "plan", "code", "effect"),
     [
-        ({"position_sign_yi": -1.0}, {}, "probe-polarity", Effect.ERROR),
+        ({"position_sign_yi": -1.0}, {}, "sensor-polarity", Effect.ERROR),
         ({"told_planes": 1.0}, {}, "planes-exchanged", Effect.ERROR),
         ({"told_axes": 1.0}, {}, "axes-exchanged", Effect.ERROR),
         ({"current_sign_i": -1.0}, {}, "coils-exchanged", Effect.ERROR),
