@@ -85,19 +85,8 @@ def solve_runs(
     speeds = np.array([r.speed for r in trials.base.reads])
     near = (speeds / (2 * math.pi * plan.bending_hz)) ** 2 if plan.bending_hz else 0 * speeds
 
-    def solve_for(v: Mapping[str, float]) -> tuple[Stand, Solved]:
-        s = Stand.of(v)
-        some = [(complex(v[f"kg_{p}"] * v["radius"] * np.exp(1j * v[f"angle_{p}"])), _turnings(trials.before[p]),
-                 _turnings(trials.having[p])) for p in (0, 1)]  # fmt: skip
-        found = solve(s, None if slow is None else slow.turning, some, _turnings(trials.base))
-        if slow is None:
-            lost = runout_as_unbalance(s, _turnings(trials.base), _unknown(v), found.mark)
-            found = replace(found, taken=found.taken + lost)
-        bent = np.array([[v[f"bending_{j}{k}"] for k in (0, 1)] for j in (0, 1)])
-        return s, replace(found, taken=found.taken + near[:, None] * (found.taken @ bent.T))
-
     def parted(v: dict[str, float]) -> dict[str, float]:
-        s, found = solve_for(v)
+        s, found = _solve_with(v, slow, trials, near)
         out: dict[str, float] = {}
         for run in runs:
             u = found.unbalance(_readings(run) / s.gain)
@@ -107,7 +96,7 @@ def solve_runs(
         return out
 
     out = propagate(parted, inputs)
-    stand, nominal = solve_for({name: e.value for name, e in inputs.items()})
+    stand, nominal = _solve_with({name: e.value for name, e in inputs.items()}, slow, trials, near)
     parts = {}
     for run in runs:
         scatter = balance_scatter.of_run(stand, nominal, slow, run, trials, plan.refit_u_kg_m)
@@ -115,14 +104,21 @@ def solve_runs(
             Estimate(e.value, "kg m", merged(((1.0, e), *more)))
             for e, more in zip((out[f"{run.name}/{k}"] for k in range(4)), scatter, strict=True)
         )
-    return Balanced(
-        trials,
-        nominal,
-        {name: _vectors(p) for name, p in parts.items()},
-        parts,
-        permissible_of_planes(rig, plan),
-        radius,
-    )
+    unbalance = {name: _vectors(p) for name, p in parts.items()}
+    return Balanced(trials, nominal, unbalance, parts, permissible_of_planes(rig, plan), radius)
+
+
+def _solve_with(v: Mapping[str, float], slow: Read | None, trials: Trials, near: Array) -> tuple[Stand, Solved]:
+    """The stand and the solution with these inputs; `near` (s,), each speed over the first bending mode's, squared."""
+    s = Stand.of(v)
+    some = [(complex(v[f"kg_{p}"] * v["radius"] * np.exp(1j * v[f"angle_{p}"])), _turnings(trials.before[p]),
+             _turnings(trials.having[p])) for p in (0, 1)]  # fmt: skip
+    found = solve(s, None if slow is None else slow.turning, some, _turnings(trials.base))
+    if slow is None:
+        lost = runout_as_unbalance(s, _turnings(trials.base), _unknown(v), found.mark)
+        found = replace(found, taken=found.taken + lost)
+    bent = np.array([[v[f"bending_{j}{k}"] for k in (0, 1)] for j in (0, 1)])
+    return s, replace(found, taken=found.taken + near[:, None] * (found.taken @ bent.T))
 
 
 def _turnings(run: Run) -> list[Turning]:
