@@ -1,6 +1,6 @@
 """What a run shows while it goes on: the part it is in, steps done and to do, time left, and questions to a person.
 
-A line that is drawn anew on a terminal, plain lines elsewhere. `bench.described` puts a step's labels into words.
+A line that is drawn anew on a terminal, plain lines elsewhere. `bench.display_units` puts a step's labels into words.
 """
 
 from __future__ import annotations

@@ -52,20 +52,6 @@ SUFFIXES: dict[str, str] = {
 """What may stand after the last underscores of a key, and the unit it means."""
 
 
-HABIT: dict[str, tuple[tuple[str, float], ...]] = {
-    "kg m": (("g mm", math.inf),), "m/(kg m)": (("um/(g mm)", math.inf),), "m": (("um", 1e-3),),
-    "rad/s": (("r/min", math.inf),), "s": (("ms", 0.1),), "rad": (("urad", 3e-4), ("deg", math.inf)),
-}  # fmt: skip
-"""The units in which the field states results in an SI unit, each where they are smaller than so much. Of angles, tilts of
-a shaft are small ones and phases are not."""
-
-
-def habit(si: str, size: float) -> tuple[str, float]:
-    """Symbol of the unit in which a result of about `size` is told, and what one of it is in SI."""
-    symbol = next((symbol for symbol, below in HABIT.get(si, ()) if abs(size) < below), None)
-    return (si, 1.0) if symbol is None else (symbol, UNITS[symbol].factor)
-
-
 def unit(symbol: str) -> Unit:
     """The table's entry.
 

@@ -10,6 +10,7 @@ from itertools import takewhile
 from types import MappingProxyType
 from typing import Any
 
+from bench import display_units
 from reports import tables, text
 from reports.view import BudgetRow, BudgetTable
 
@@ -173,7 +174,7 @@ def _input(entry: Content, unit: str, inputs: Mapping[str, Content]) -> tuple[st
     c = float(c or 0.0)
     size, si = float(entry["standard_uncertainty"]) if curved else contribution / abs(c), str(entry.get("unit") or "")
     stored = _stored(str(entry.get("influence")), inputs)
-    symbol, one = tables.written(si, abs(float(stored["value"])) or size if stored else size)
+    symbol, one = display_units.of_certificate(si, abs(float(stored["value"])) or size if stored else size)
     ratio = units_over(unit, symbol)
     slope = NOT_LINEAR if curved else text.with_unit(text.significant(c * one, 3), ratio)
     if stored is None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench import units
+from bench import display_units
 from bench.campaign.bands import Failure, Quantity, Unable
 from bench.campaign.speed import Speed
 from reports import campaign_figures, text
@@ -127,7 +127,7 @@ def _table(quantities: Sequence[Quantity]) -> Grid:
             high = f"{c.width_range[1]:.2f}" if np.isfinite(c.width_range[1]) else "∞"
             reach = f"{c.width_range[0]:.2f} to {high}"
         verdict = q.verdict.value
-        unit, one = units.habit(q.unit, c.mean_U or 0.0)
+        unit, one = display_units.of_result(q.unit, c.mean_U or 0.0)
         mean = None if c.mean_U is None else c.mean_U / one
         rows.append((
             Cell(symbol=symbol(q.name), small=_about(q)),

@@ -7,10 +7,9 @@ import re
 from markupsafe import Markup, escape
 
 from reports import text
+from reports.text import GREEK
 from reports.view import Symbol
 
-GREEK = {"alpha": ("α", r"\alpha"), "beta": ("β", r"\beta"), "gamma": ("γ", r"\gamma"), "tau": ("τ", r"\tau"),
-         "theta": ("θ", r"\theta")}  # fmt: skip
 _NAME = re.compile(rf"({'|'.join(GREEK)})(?:_(\w+?))?(_prime)?(?:_(amb))?")
 
 
@@ -21,8 +20,8 @@ def symbol(name: str) -> Symbol:
     if match is None:
         letter, subscript = text.symbol(base)
         return Symbol(base, letter, subscript)
-    subscript = ",".join(GREEK.get(part, (part, ""))[0] for part in (match[2], match[4]) if part)
-    letter = GREEK[match[1]][0] + ("′" if match[3] else "")
+    subscript = ",".join(GREEK.get(part, part) for part in (match[2], match[4]) if part)
+    letter = GREEK[match[1]] + ("′" if match[3] else "")
     return Symbol(letter, letter, subscript)
 
 
@@ -37,9 +36,9 @@ def axis_label(name: str) -> str:
         if len(letter) > 1:
             return base.replace("$", "")
         return f"${letter}_{{\\mathrm{{{subscript}}}}}$" if subscript else f"${letter}$"
-    parts = [GREEK[p][1] if p in GREEK else rf"\mathrm{{{p}}}" for p in (match[2], match[4]) if p]
+    parts = [rf"\{p}" if p in GREEK else rf"\mathrm{{{p}}}" for p in (match[2], match[4]) if p]
     prime = "'" if match[3] else ""
-    return f"${GREEK[match[1]][1]}{prime}_{{{','.join(parts)}}}$" if parts else f"${GREEK[match[1]][1]}{prime}$"
+    return f"$\\{match[1]}{prime}_{{{','.join(parts)}}}$" if parts else f"$\\{match[1]}{prime}$"
 
 
 def place(name: str) -> str:

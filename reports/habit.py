@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from bench import units
+from bench import display_units
 
 Content = Mapping[str, Any]
 LIMIT_DIGITS = 5
@@ -15,7 +15,7 @@ def told(measurement: Content) -> Content:
     """A measurement of record.json with every number of its unit in the field's own."""
     numbers = [measurement.get("value"), measurement.get("expanded_uncertainty")]
     largest = max((abs(x) for x in numbers if isinstance(x, int | float)), default=0.0)
-    symbol, one = units.habit(str(measurement.get("unit") or ""), largest)
+    symbol, one = display_units.of_result(str(measurement.get("unit") or ""), largest)
     if one == 1.0 and symbol == measurement.get("unit"):
         return measurement
     return {

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
-from bench import units
+from bench import display_units
 from reports import text
 from reports.view import Correlations, Fact, Symbol, Table
 
@@ -16,12 +15,6 @@ PAGE_WIDTH = 14  # columns of a correlation matrix
 NARROW_NAME = 6  # letters that the head of such a column holds
 SMALL_CORRELATION = 0.05
 MOST_PAIRS = 40
-_WRITTEN = {"m": (("um", 1e-4), ("mm", 1.0)), "kg": (("mg", 1e-4), ("g", 1e-2)), "rad": (("deg", math.inf),)}
-# Ends of the names of settings, SI and told: a plan takes either.
-_SETTINGS = (
-    ("_rad_s", "rad/s", (("_rpm", math.inf),)), ("_rad", "rad", (("_mrad", 0.02), ("_deg", math.inf))),
-    ("_m", "m", (("_um", 1e-3),)), ("_kg", "kg", (("_g", 1e-2),)), ("_A", "A", (("_mA", 0.1),)),
-)  # fmt: skip
 # Identities of influences that are not the path of their number in the rig file's content.
 RENAMED = {"masses/hanger": "hanger", "masses/density": "mass_density"}
 NOT_INPUTS = ("simulation", "plans", "envelope", "parameters", "laboratory", "settling")
@@ -105,15 +98,9 @@ def _told(entry: Content) -> Content:
     si = str(entry.get("unit") or "")
     stated_as = [abs(float(entry[key])) for key in ("value", "u", "half_width") if entry.get(key) is not None]
     size = next((x for x in stated_as if x), 0.0)
-    symbol, one = written(si, size)
+    symbol, one = display_units.of_certificate(si, size)
     numbers = {k: entry[k] / one for k in ("value", "u", "half_width") if isinstance(entry.get(k), int | float)}
     return {**entry, **numbers, "unit": symbol}
-
-
-def written(si: str, size: float) -> tuple[str, float]:
-    """Symbol of the unit in which a number of about `size` is written in a certificate, and what one of it is in SI."""
-    symbol = next((symbol for symbol, below in _WRITTEN.get(si, ()) if 0 < size < below), si)
-    return symbol, units.unit(symbol).factor if symbol != si else 1.0
 
 
 def _group_name(paths: Sequence[tuple[str, ...]]) -> str:
@@ -213,16 +200,8 @@ def _setting(key: str, value: Any) -> tuple[str, Any]:
     many = value if isinstance(value, list | tuple) else [value]
     if not many or any(isinstance(v, bool) or not isinstance(v, int | float) for v in many):
         return key, value
-    for end, si, written in _SETTINGS:
-        if key.endswith(end) and not key.endswith("_kg_m"):
-            size = max(abs(v) for v in many)
-            told = next((other for other, below in written if size < below), "")
-            if not told:
-                break
-            one = units.unit(units.SUFFIXES[told[1:]]).factor / units.unit(si).factor
-            numbers = [float(f"{v / one:.12g}") for v in many]
-            return key.removesuffix(end) + told, numbers if isinstance(value, list | tuple) else numbers[0]
-    return key, value
+    name, numbers = display_units.of_setting(key, many)
+    return name, value if name == key else numbers if isinstance(value, list | tuple) else numbers[0]
 
 
 def inline(value: Any) -> str:

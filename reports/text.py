@@ -17,7 +17,7 @@ MINUS = "\u2212"
 TIMES = "\u00d7"
 DASH = "\u2013"
 _SUPERSCRIPTS = str.maketrans("0123456789-+", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺")
-_GREEK = {"alpha": "α", "beta": "β", "gamma": "γ", "rho": "ρ", "tau": "τ"}
+GREEK = {"alpha": "α", "beta": "β", "gamma": "γ", "rho": "ρ", "tau": "τ", "theta": "θ"}
 SYMBOL = re.compile(r"\b(alpha|beta|gamma|rho|[αβγρ]′?|d?[A-Z]|d?i)_([A-Za-z0-9]{1,3}(?:,[A-Za-z])?)\b")
 """A symbol as prose writes it, `alpha_dx`, `K_i`, `dF_y`: letter and subscript. The PDF's template has the same."""
 _UNIT = r"(?:[mµukM]?(?:rad|Hz|min|kg|m|N|A|V|g|s|W|T)|°C|r/min|%)(?:[²³]|\b|(?<=%))"
@@ -222,7 +222,7 @@ def symbols(said: str) -> list[tuple[str, str]]:
     end = 0
     for found in SYMBOL.finditer(said):
         parts += [(said[end : found.start()], "")] if found.start() > end else []
-        parts.append((_GREEK.get(found[1], found[1]), _GREEK.get(found[2], found[2])))
+        parts.append((GREEK.get(found[1], found[1]), GREEK.get(found[2], found[2])))
         end = found.end()
     return [*parts, (said[end:], "")] if end < len(said) else parts
 
@@ -231,8 +231,8 @@ def symbol(name: str) -> tuple[str, str]:
     """A quantity's name as (letter, subscript): `K_i` -> K, i; `K2_o` -> K, 2,o; `alpha_d` -> α, d; a word stays whole, no
     subscript."""
     greek, _, below = name.partition("_")
-    if greek in _GREEK and re.fullmatch(r"[A-Za-z0-9]{1,3}", below):
-        return _GREEK[greek], _GREEK.get(below, below)
+    if greek in GREEK and re.fullmatch(r"[A-Za-z0-9]{1,3}", below):
+        return GREEK[greek], GREEK.get(below, below)
     # A letter behind a capital is a subscript too: `Kw_i` -> K, w,i.
     match = re.fullmatch(r"([A-Za-z])(\d*)(?:_([A-Za-z0-9]{1,6}))?", name) or re.fullmatch(
         r"([A-Z])([a-z])_([A-Za-z0-9]{1,6})", name

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from bench import units
+from bench import display_units
 from reports import tables, text
 from reports.view import Table
 
@@ -63,7 +63,7 @@ def _row(cosine: Content, sine: Content, r: float) -> tuple[str, ...]:
     size = math.hypot(c, s)
     along = math.sqrt(max(0.0, (c * u) ** 2 + (s * v) ** 2 + 2 * r * c * s * u * v)) / size if size else max(u, v)
     across = math.sqrt(max(0.0, (s * u) ** 2 + (c * v) ** 2 - 2 * r * c * s * u * v)) / size**2 if size else math.inf
-    symbol, one = units.habit(str(cosine.get("unit") or ""), size)
+    symbol, one = display_units.of_result(str(cosine.get("unit") or ""), size)
     known = across <= MOST_ANGLE
     return (
         str(cosine["name"]).removesuffix(COS).replace("_", " "),

@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from bench.described import described
+from bench.display_units import of_labels
 from bench.progress import PlainProgress, shown_on
 from bench.progress_text import clock_text
 
@@ -72,12 +72,12 @@ def test_a_pipe_gets_no_control_characters() -> None:
 def test_labels_are_in_the_fields_units() -> None:
     labels = {"speed_rad_s": 1047.1975512, "z_m": -6e-5, "angle_rad": 0.7853981634, "judged": True, "name": "", "n": 2,
               "period_s": 0.125, "low_m": -0.0}  # fmt: skip
-    assert described(labels) == ("speed 10000 r/min, z -60 µm, angle 45°, judged, n 2, period 0.125 s, low 0 µm")
+    assert of_labels(labels) == ("speed 10000 r/min, z -60 µm, angle 45°, judged, n 2, period 0.125 s, low 0 µm")
 
 
 def test_a_load_and_its_branch_are_told_in_words() -> None:
-    assert described({"angle_rad": 0.0, "load": "M1", "branch": -1}) == "angle 0°, M1, unloading"
-    assert described({"load": "", "branch": 1, "again": False}) == "no load, loading"
+    assert of_labels({"angle_rad": 0.0, "load": "M1", "branch": -1}) == "angle 0°, M1, unloading"
+    assert of_labels({"load": "", "branch": 1, "again": False}) == "no load, loading"
 
 
 LABELS = "passage direction up, acceleration 234 r/min/s, from 598.1 r/min, to 14000 r/min, variant compensated"

@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from bench import units
+from bench import display_units
 from bench.findings import Effect
 from bench.record.limits import Verdict
 from bench.record.outcomes import Outcome, outranking
@@ -94,7 +94,7 @@ def _name(m: Measurement) -> str:
 def _value(m: Measurement) -> str:
     if m.value is None or m.expanded_uncertainty is None:
         return "not measured"
-    symbol, one = units.habit(m.unit, max(abs(m.value), m.expanded_uncertainty))
+    symbol, one = display_units.of_result(m.unit, max(abs(m.value), m.expanded_uncertainty))
     return f"{stated(m.value / one, m.expanded_uncertainty / one)}{_unit(symbol)}".replace("+-", "±")
 
 
@@ -102,7 +102,7 @@ def _limit(limit: LimitEntry | None) -> str:
     """Its range in the unit in which its ends are told."""
     if limit is None:
         return ""
-    symbol, one = units.habit(limit.unit, max(abs(x) for x in (limit.low, limit.high) if x is not None))
+    symbol, one = display_units.of_result(limit.unit, max(abs(x) for x in (limit.low, limit.high) if x is not None))
     unit = _unit(symbol)
     low, high = (None if x is None else f"{x / one:.4g}" for x in (limit.low, limit.high))
     if low is None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from bench import runlog
-from bench.described import described
+from bench.display_units import of_labels
 from bench.errors import (
     Aborted,
     AnotherHost,
@@ -175,7 +175,7 @@ class WatchedSteps:
 
     @contextmanager
     def step(self, kind: str, **labels: Any) -> Iterator[None]:
-        self._progress.step(f"{kind} {described(labels)}".rstrip())
+        self._progress.step(f"{kind} {of_labels(labels)}".rstrip())
         with self._recorder.step(kind, **labels):
             yield
         self._catch_up()

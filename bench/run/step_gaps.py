@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from bench.described import described
+from bench.display_units import of_labels
 from bench.findings import Effect, Finding
 from bench.procedure import Procedure
 from bench.recording import Recording
@@ -18,7 +18,7 @@ def incomplete_steps(recording: Recording[Any]) -> Iterator[Finding]:
     if not any((recording.integrity or {}).get("lost", {}).values()):
         return
     found = [
-        f"step {number} ({step.kind} {described(step.labels)}): {lost} of {max(lost, step.expected(stream))} samples of "
+        f"step {number} ({step.kind} {of_labels(step.labels)}): {lost} of {max(lost, step.expected(stream))} samples of "
         f"{stream} are missing"
         for number, step in enumerate(recording.all_steps(), 1)
         for stream in recording.streams

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bench import units
+from bench import display_units
 from reports import habit
 
 
@@ -34,10 +34,10 @@ def test_unbalance_is_told_in_g_mm_with_its_interval_limit_and_budget() -> None:
 
 
 def test_motion_is_told_in_um_below_a_millimetre_and_other_units_stay() -> None:
-    assert units.habit("m", 12e-6) == ("um", 1e-6)
-    assert units.habit("m", -0.097) == ("m", 1.0)
-    assert units.habit("m/(kg m)", 2.5) == ("um/(g mm)", 1.0)
-    assert units.habit("N/A", 23.0) == ("N/A", 1.0)
+    assert display_units.of_result("m", 12e-6) == ("um", 1e-6)
+    assert display_units.of_result("m", -0.097) == ("m", 1.0)
+    assert display_units.of_result("m/(kg m)", 2.5) == ("um/(g mm)", 1.0)
+    assert display_units.of_result("N/A", 23.0) == ("N/A", 1.0)
     same = {"name": "K", "unit": "N/A", "value": 23.0, "expanded_uncertainty": None}
     assert habit.told(same) is same
     missing = habit.told({"name": "d", "unit": "m", "value": None, "expanded_uncertainty": None})

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from report_samples import measurement, record
 
-from bench import units
+from bench import display_units
 from reports import budgets, compose, html, many, pdf, tables, vectors
 from reports.text import DASH
 
@@ -53,10 +53,10 @@ def test_places_are_kept_apart_and_what_is_missing_is_left_out() -> None:
 
 
 def test_angles_and_times_are_told_in_the_fields_units() -> None:
-    assert units.habit("rad", 0.33) == ("deg", math.pi / 180)
-    assert units.habit("rad", 27e-6) == ("urad", 1e-6)
-    assert units.habit("s", 2.9e-3) == ("ms", 1e-3)
-    assert units.habit("s", 67.0) == ("s", 1.0)
+    assert display_units.of_result("rad", 0.33) == ("deg", math.pi / 180)
+    assert display_units.of_result("rad", 27e-6) == ("urad", 1e-6)
+    assert display_units.of_result("s", 2.9e-3) == ("ms", 1e-3)
+    assert display_units.of_result("s", 67.0) == ("s", 1.0)
 
 
 @pytest.mark.parametrize(
