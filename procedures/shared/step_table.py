@@ -140,7 +140,9 @@ def reduced(data: Samples, channels: Sequence[str], labels: Mapping[str, Any]) -
     if half == 0:
         raise AnalysisError(f"step {dict(labels)}: found {x.shape[1]} samples of {channels[0]}; expected at least 2")
     drift = x[:, half:].mean(axis=1) - x[:, :half].mean(axis=1)
-    found = (("mean", x.mean(axis=1)), ("drift", drift), ("spread", x.std(axis=1)), ("ptp", np.ptp(x, axis=1)))
+    ptp = np.ptp(x, axis=1)
+    spread = np.where(ptp > 0, x.std(axis=1), 0.0)  # of a constant the mean is rounded, and it would not be nothing
+    found = (("mean", x.mean(axis=1)), ("drift", drift), ("spread", spread), ("ptp", ptp))
     out: dict[str, Any] = {kind: dict(zip(channels, values, strict=True)) for kind, values in found}
     out["flags"] = int(np.bitwise_or.reduce(data["flags"].astype(np.int64)))
     return out

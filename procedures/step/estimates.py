@@ -231,6 +231,8 @@ def _oscillation(group: str, results: Sequence[Result]) -> dict[str, Estimate]:
     except AnalysisError:
         return {}
     first = _first_order(results)
+    shares = np.array([o.weight**2 for o in ones])
+    shares /= shares.sum()
     out = {}
     made: tuple[tuple[str, str, Callable[[Swing], float], tuple[float, float]], ...] = (
         ("damping", "1", lambda s: s.damping, SIZE_DAMPING),
@@ -238,8 +240,7 @@ def _oscillation(group: str, results: Sequence[Result]) -> dict[str, Estimate]:
     )
     for name, unit, of, (low, high) in made:
         value = of(whole)
-        within, dof = _alike(kinds, np.array([of(s) for s in left]))
-        u = (n - 1) * math.sqrt(within / dof / n)
+        u = math.sqrt(left_out(kinds, np.array([of(s) for s in left]), shares))
         jackknife = Influence(
             id=f"scatter/{name}/{group}",
             name="scatter of the steps",
@@ -255,6 +256,19 @@ def _oscillation(group: str, results: Sequence[Result]) -> dict[str, Estimate]:
         out[name] += bound(f"start/{name}/{group}", "start of the step", moved, unit)
         out[name] += bound(f"size/{name}/{group}", "size of the steps", (high - low) / 2 * first**2 * value, unit)
     return out
+
+
+def left_out(kinds: Sequence[Hashable], values: Array, shares: Array) -> float:
+    """Variance of a fit to n steps, from the values (n,) that it has without each of them; scatter is told among steps of a
+    kind. `shares` (n,) are what each has of the fit's squared weights, 1 in all: without one of share h the fit moves by
+    h/(1 - h) of its residual, and h is its part. Kinds of one step tell nothing, and are taken for as good as the others."""
+    total = told = 0.0
+    for kind in dict.fromkeys(kinds):
+        mine = np.array([k == kind for k in kinds])
+        if (many := int(mine.sum())) > 1:
+            parts = (values[mine] - values[mine].mean()) * (1 - shares[mine])
+            total, told = total + many / (many - 1) * float((parts**2).sum()), told + float(shares[mine].sum())
+    return total / told
 
 
 def _weighed(kinds: Sequence[tuple[Case, float]]) -> float:

@@ -15,7 +15,7 @@ from bench.errors import AnalysisError
 from bench.recording.recorder import Recorder
 from bench.recording.steps import Step, Steps
 from procedures.servomotor.loads import load_index
-from procedures.shared.step_table import Labels, StepTable, by_angle, record_step, tabulate
+from procedures.shared.step_table import Labels, StepTable, by_angle, record_step, reduced, tabulate
 
 MS = 1_000_000
 
@@ -118,3 +118,10 @@ def test_a_load_that_is_not_in_the_plan_is_told() -> None:
     assert load_index(["", "M2", "M1"], ("M1", "M2"), "hanger").tolist() == [-1, 1, 0]
     with pytest.raises(AnalysisError, match="masses: found M9 on the lever; expected those of the plan, M1, M2"):
         load_index(["M1", "M9"], ("M1", "M2"), "lever")
+
+
+@pytest.mark.parametrize("value", [1e-3, 20e-9, 2.9985, -7.31e-5])
+def test_a_constant_has_no_spread(value: float) -> None:
+    """The mean of 1000 equal numbers is rounded, and their standard deviation then some 1e-19: a stuck sensor would be live."""
+    data = {"x": np.full(1000, value), "flags": np.zeros(1000, int)}
+    assert reduced(data, ("x",), {})["spread"] == {"x": 0.0}
