@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 from bench.figures import Sheet
@@ -23,9 +23,11 @@ from reports.view import (
     NO_RESULTS,
     SIMULATED,
     STATEMENTS,
+    BudgetTable,
     Fact,
     FindingRow,
     ReportView,
+    ResultRow,
     Table,
 )
 
@@ -70,9 +72,7 @@ def view_of(record: Content, around: Surroundings, shown: Sequence[Drawn | Sheet
     rows = tuple(resultrows.row(m, around.definitions, around.titles) for m in measurements)
     judged_title, judged, judged_note = front.judged(rows)
     like = many.names(measurements)
-    few = [m for m in measurements if m.get("budget") and m.get("name") not in like]
-    chosen = front.budgeted(few)
-    budgeted = [(m in chosen, budgets.budget_table(m, around.rig, around.titles)) for m in few]
+    first_budgets, more_budgets = _budgets(measurements, like, around)
     rig_name = str(around.rig.get("name") or record.get("rig") or text.DASH)
     return ReportView(
         title=around.title,
@@ -91,9 +91,7 @@ def view_of(record: Content, around: Surroundings, shown: Sequence[Drawn | Sheet
         judged_title=judged_title,
         judged_note=judged_note,
         sheets=front.sheets(shown),
-        results=resultrows.told_once(
-            [r for m, r in zip(measurements, rows, strict=True) if str(m.get("name", "")) not in like]
-        ),
+        results=resultrows.told_once(_few(measurements, rows, like)),
         vectors=vectors.table(record),
         about_vectors=ABOUT_VECTORS,
         no_results="" if rows else NO_RESULTS,
@@ -104,7 +102,7 @@ def view_of(record: Content, around: Surroundings, shown: Sequence[Drawn | Sheet
         assumed=tuple(_prose(a, around) for a in around.assumes) if rows else (),
         notes=tuple(f for f in findings if not f.loud),
         figures=front.entries(shown),
-        budgets=tuple(table for told, table in budgeted if told),
+        budgets=first_budgets,
         method=tuple(_prose(p, around) for p in _paragraphs(around.method)),
         conditions=_conditions(around),
         traceability=tables.traceability(around.rig, budgets.identities(measurements)),
@@ -114,7 +112,7 @@ def view_of(record: Content, around: Surroundings, shown: Sequence[Drawn | Sheet
         statements=STATEMENTS,
         many=many.grouped(measurements, rows),
         about_many=ABOUT_MANY,
-        more_budgets=tuple(table for told, table in budgeted if not told),
+        more_budgets=more_budgets,
         link=_link(record.get("link"), around),
         link_note=f"{_link_note(around)} {clean(_mapping(record.get('link')))}".strip(),
         correlations=tables.correlations(record, around.titles),
@@ -123,6 +121,21 @@ def view_of(record: Content, around: Surroundings, shown: Sequence[Drawn | Sheet
         recording=_recording(record.get("recording")),
         end=f"End of report {record.get('run_id') or ''}".rstrip(),
     )
+
+
+def _few(measurements: Sequence[Content], rows: Sequence[ResultRow], like: Collection[str]) -> list[ResultRow]:
+    """The rows of quantities that have few results."""
+    return [r for m, r in zip(measurements, rows, strict=True) if str(m.get("name", "")) not in like]
+
+
+def _budgets(
+    measurements: Sequence[Content], like: Collection[str], around: Surroundings
+) -> tuple[tuple[BudgetTable, ...], tuple[BudgetTable, ...]]:
+    """The budgets that stand in the report's body, and those of its annex."""
+    few = [m for m in measurements if m.get("budget") and m.get("name") not in like]
+    chosen = front.budgeted(few)
+    tables_of = [(m in chosen, budgets.budget_table(m, around.rig, around.titles)) for m in few]
+    return tuple(t for told, t in tables_of if told), tuple(t for told, t in tables_of if not told)
 
 
 def _prose(said: str, around: Surroundings) -> str:

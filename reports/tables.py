@@ -128,20 +128,24 @@ def correlations(record: Content, titles: Mapping[str, str]) -> Correlations | N
 
     Accepts a square list of rows in the order of the measurements, or the same under `names` and `matrix`.
     """
-    found = record.get("correlations")
-    names = [str(m.get("name", "")) for m in record.get("measurements") or ()]
-    if isinstance(found, Mapping):
-        names, found = [str(n) for n in found.get("names", names)], found.get("matrix")
-    if not found or len(names) < 2 or len(found) != len(names):
+    names, found = _matrix(record)
+    if len(names) < 2 or len(found) != len(names):
         return None
-    if len(names) > PAGE_WIDTH:
-        return _pairs(names, found, titles)
-    if all(r is None or abs(r) < SMALL_CORRELATION for a, row in enumerate(found) for r in row[:a]):
+    small = all(r is None or abs(r) < SMALL_CORRELATION for a, row in enumerate(found) for r in row[:a])
+    if small or len(names) > PAGE_WIDTH:
         return _pairs(names, found, titles)
     heads = tuple(_placed(name, titles) for name in names)
     narrow = all(not place and (symbol.subscript or len(symbol.plain) < NARROW_NAME) for symbol, place in heads)
     columns = tuple(s if narrow else symbol_of(str(k)) for k, (s, _) in enumerate(heads, 1))
     return Correlations(columns, tuple(tuple(_coefficient(r) for r in row) for row in found), heads)
+
+
+def _matrix(record: Content) -> tuple[list[str], Sequence[Sequence[float | None]]]:
+    found = record.get("correlations")
+    names = [str(m.get("name", "")) for m in record.get("measurements") or ()]
+    if isinstance(found, Mapping):
+        names, found = [str(n) for n in found.get("names", names)], found.get("matrix")
+    return names, found or ()
 
 
 def _pairs(names: Sequence[str], matrix: Sequence[Sequence[float | None]], titles: Mapping[str, str]) -> Correlations:

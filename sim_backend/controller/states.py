@@ -20,6 +20,12 @@ WITHOUT_CURRENT = ("OFF", "FAULT")
 MOVING = ("LIFTING", "LANDING", "COASTING")
 HELD = ("LEVITATED", "SPINNING")
 TURNING = (*HELD, "COASTING")
+ANY = (*AT_REST, *MOVING, *HELD)
+OBEYED = {
+    "IDENTIFY": ANY, "MAKE_SAFE": ANY, "RELEASE": WITHOUT_CURRENT, "CLEAR_FAULT": ("FAULT",), "ENABLE": ("OFF",),
+    "DISABLE": RESTING, "LEVITATE": ("READY",), "LAND": ("LEVITATED",), "SPIN": HELD, "STOP": HELD,
+}  # fmt: skip
+"""In which states each command is."""
 
 
 class States:
@@ -164,36 +170,38 @@ class States:
 
     def obey(self, name: str) -> bool:
         """Carry out a command, or refuse it in this state."""
-        state, plant = self.state, self._plant
-        if name == "IDENTIFY":
-            return True
-        if name == "MAKE_SAFE":
-            self._leaving = True
-            self._safe()
-            return True
-        if name == "RELEASE" and state in WITHOUT_CURRENT:
-            self._owner.release()
-        elif name == "CLEAR_FAULT" and state == "FAULT":
-            self.fault = "NONE"
-            plant.clear_trips()
-            self._enter("OFF")
-        elif name == "ENABLE" and state == "OFF":
-            self._leaving = False
-            self._owner.arm(plant.tick)
-            plant.mode = core.READY
-            self._enter("READY")
-        elif name == "DISABLE" and state in RESTING:
-            self._switch_off("OFF")
-        elif name == "LEVITATE" and state == "READY":
-            self._torque(1.0)
-            plant.mode = core.LIFT
-            self._enter("LIFTING")
-        elif name == "LAND" and state == "LEVITATED" and abs(plant.speed) <= self._own["landing_speed"]:
-            self._let_down(0.0)  # who asks for it has switched the drive off
-        elif name == "SPIN" and state in HELD and self._machine.turns:
-            plant.set("speed_ref", self._own["speed_ref"])
-        elif name == "STOP" and state in HELD:
-            self._brake()
-        else:
+        plant = self._plant
+        if self.state not in OBEYED.get(name, ()):
             return False
+        match name:
+            case "MAKE_SAFE":
+                self._leaving = True
+                self._safe()
+            case "RELEASE":
+                self._owner.release()
+            case "CLEAR_FAULT":
+                self.fault = "NONE"
+                plant.clear_trips()
+                self._enter("OFF")
+            case "ENABLE":
+                self._leaving = False
+                self._owner.arm(plant.tick)
+                plant.mode = core.READY
+                self._enter("READY")
+            case "DISABLE":
+                self._switch_off("OFF")
+            case "LEVITATE":
+                self._torque(1.0)
+                plant.mode = core.LIFT
+                self._enter("LIFTING")
+            case "LAND" if abs(plant.speed) > self._own["landing_speed"]:
+                return False
+            case "LAND":
+                self._let_down(0.0)  # who asks for it has switched the drive off
+            case "SPIN" if not self._machine.turns:
+                return False
+            case "SPIN":
+                plant.set("speed_ref", self._own["speed_ref"])
+            case "STOP":
+                self._brake()
         return True

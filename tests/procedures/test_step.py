@@ -23,7 +23,7 @@ from bench.uncertainty import Estimate, interval
 from bench.uncertainty.coverage import ensemble
 from procedures.amb_rotor.conventions import Flag
 from procedures.amb_rotor.onset import onset
-from procedures.step import checks, estimates, oscillation, planes, response, settling
+from procedures.step import checks, estimates, oscillation, planes, response, scatter, settling
 from procedures.step import steps as step_steps
 from procedures.step.plan import Plan
 from procedures.step.procedure import MEASURES, check, procedure, recorded_s, step_count, waited_s
@@ -329,5 +329,5 @@ def test_the_scatter_of_a_fit_that_large_steps_carry() -> None:
     shares = np.repeat([1.0, 4.0], 3) / 15
     draws = rng.normal(size=(4000, 6)) * np.repeat([1.0, 0.5], 3)
     left = (draws @ shares)[:, None] - shares / (1 - shares) * (draws - (draws @ shares)[:, None])
-    found = [estimates.left_out(kinds, row, shares) for row in left]
+    found = [scatter.left_out(kinds, row, shares) for row in left]
     assert np.mean(found) == pytest.approx(1 / 15, rel=0.03)

@@ -62,13 +62,7 @@ def _with_options(c: Campaign, r: CampaignRequest) -> Campaign:
     many = r.count is not None or r.first_seed is not None
     if many and r.seed is not None:
         raise ConfigError("--seed: one virtual rig; --count and --first-seed: many. Expected one or the other")
-    changes: dict[str, Any] = {}
-    if many:
-        count = r.count if r.count is not None else c.virtual.count if c.virtual else None
-        first = r.first_seed if r.first_seed is not None else c.virtual.first_seed if c.virtual else 0
-        if count is None:
-            raise ConfigError("--first-seed: found no number of rigs; expected --count too, or [virtual] in the file")
-        changes |= {"virtual": Virtual(first_seed=first, count=count), "seed": None}
+    changes: dict[str, Any] = {"virtual": _virtual(c, r), "seed": None} if many else {}
     if r.seed is not None:
         changes |= {"virtual": None, "seed": r.seed}
     if r.backend == "live":
@@ -86,6 +80,15 @@ def _with_options(c: Campaign, r: CampaignRequest) -> Campaign:
     if r.links and made.backend != "live":
         raise ConfigError("--link: simulated rigs run in this process; expected --backend live, or leave it out")
     return made
+
+
+def _virtual(c: Campaign, r: CampaignRequest) -> Virtual:
+    """Which virtual rigs: what is not asked for is the file's."""
+    count = r.count if r.count is not None else c.virtual.count if c.virtual else None
+    first = r.first_seed if r.first_seed is not None else c.virtual.first_seed if c.virtual else 0
+    if count is None:
+        raise ConfigError("--first-seed: found no number of rigs; expected --count too, or [virtual] in the file")
+    return Virtual(first_seed=first, count=count)
 
 
 def _refuse_scheduler(c: Campaign, r: CampaignRequest) -> None:
