@@ -6,6 +6,7 @@ from bench.errors import DeviceFault, FrozenError, StateContradicts
 from bench.link.stillness import STILL_S
 from bench.link.telemetry import TelemetryDecoder
 from bench.rigfile import RigFile
+from bench.rigfile.binding import UNKNOWN
 from drivers import advice
 
 SET_DOWN = ("LAND", "DISABLE", "MAKE_SAFE")
@@ -30,7 +31,7 @@ class Condition:
         if not self._telemetry.latest:
             return "OFF"
         name = self._states.get(int(self._telemetry.latest.get("state", 0)))
-        return (self._binding.mode(name) if name is not None else None) or "UNKNOWN"
+        return (self._binding.mode(name) if name is not None else None) or UNKNOWN
 
     def fault_text(self) -> str:
         """The latched fault and what to do about it."""
@@ -123,7 +124,7 @@ class Condition:
     def _lost_its_name(self) -> bool:
         """Whether the state has had no name for a second of frames."""
         now = self._telemetry.stillness.newest_ns
-        if self.mode != "UNKNOWN":
+        if self.mode != UNKNOWN:
             self._unknown_ns = None
         elif self._unknown_ns is None:
             self._unknown_ns = now

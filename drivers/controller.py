@@ -13,6 +13,7 @@ from bench.link.telemetry import TelemetryDecoder
 from bench.procedure.roles import RigState
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
+from bench.rigfile.binding import UNKNOWN
 from bench.rigfile.envelope import Envelope
 from drivers import advice, handshake, unheard, waiting
 from drivers.capture import ControllerCapture
@@ -28,7 +29,7 @@ FIRST_S = 1.5  # for the first telemetry, and for the last owner to be gone
 BEHIND_S = 15.0  # a controller further behind the host's clock is not waited for
 STATES = {"OFF": RigState.OFF, "READY": RigState.READY, "LIFTING": RigState.READY, "LEVITATED": RigState.LEVITATED,
           "SPINNING": RigState.SPINNING, "LANDING": RigState.LEVITATED, "COASTING": RigState.SPINNING,
-          "FAULT": RigState.OFF, "UNKNOWN": RigState.SPINNING}  # fmt: skip
+          "FAULT": RigState.OFF, UNKNOWN: RigState.SPINNING}  # fmt: skip
 
 
 class Controller:

@@ -11,11 +11,10 @@ from bench.link.codec import Decoder
 from bench.link.frames import ERROR, FrameBatch
 from bench.link.telemetry import TelemetryDecoder
 from bench.rigfile import RigFile
+from bench.rigfile.binding import UNKNOWN, UNSEEN
 from bench.samples import SampleBlock
 from drivers.waiting import SILENCE_S
 
-UNSEEN = "UNSEEN"
-UNKNOWN = "UNKNOWN"
 REPLY = "CommandReply"
 SLOWEST_WINDOW_S = 1.0  # over which pulses are counted
 

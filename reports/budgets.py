@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import Any
 
 from bench import display_units
+from bench.uncertainty.maineffects import drawn_over_u
 from reports import tables, text
 from reports.view import BudgetRow, BudgetTable
 
@@ -191,8 +192,7 @@ def _not_linear(entry: Content) -> bool:
         return False
     contribution, linear = (abs(float(x or 0.0)) for x in (entry.get("contribution"), entry.get("sensitivity")))
     linear *= float(u)
-    wider = math.sqrt(dof / (dof - 2)) if 2 < dof < math.inf else 1.0
-    return all(abs(contribution - linear * w) > LINEAR * contribution for w in (1.0, wider))
+    return all(abs(contribution - linear * w) > LINEAR * contribution for w in (1.0, drawn_over_u(dof)))
 
 
 def sensitivity(entry: Content, unit: str) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from bench.clock import Clock
 from bench.errors import LinkError
 from bench.procedure.roles import Drive
+from bench.rigfile.binding import UNKNOWN, UNSEEN
 
 if TYPE_CHECKING:
     from drivers.controller import Controller
@@ -27,7 +28,7 @@ class Patience:
     def __init__(self, controller: Controller, clock: Clock, drive: Drive | None) -> None:
         self._controller, self._clock, self._drive = controller, clock, drive
         self._progress_ns = clock.now_ns()
-        self._modes = {"UNSEEN", "UNKNOWN", controller.sight.mode}
+        self._modes = {UNSEEN, UNKNOWN, controller.sight.mode}
         self._least: float | None = None
         self._drive_rad_s, self._drive_ns = self._reading(), -1
         self._waits, self._begun_ns, self._told_s = "", 0, 0.0
@@ -78,7 +79,7 @@ class Patience:
         speed = self.speed_rad_s
         if speed is None:
             return sight.came_down
-        return speed < self._controller.landing_speed and sight.mode in ("LEVITATED", "UNSEEN")
+        return speed < self._controller.landing_speed and sight.mode in ("LEVITATED", UNSEEN)
 
     def every(self, period_s: float, action: Callable[[], None]) -> None:
         """Do something that often; a link that is lost for now does not count."""

@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING
 
 from bench import runlog
 from bench.cli.patience import Patience
-from bench.cli.witness import RESTING, UNKNOWN, Witness
+from bench.cli.witness import RESTING, Witness
 from bench.errors import BenchError, InterlockError, LinkError, Refused
 from bench.findings import Finding
 from bench.procedure.roles import Drive
+from bench.rigfile.binding import UNKNOWN, UNSEEN
 from bench.run.job import WatchedClock
 from bench.run.supervisor import SafeStep
 
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger("bench.make-safe")
 SAFE = ("OFF", "FAULT")
-UNTOLD = ("UNSEEN", UNKNOWN)
+UNTOLD = (UNSEEN, UNKNOWN)
 GIVE_UP_S = 10.0  # without progress, until the next means
 END_S = 3 * GIVE_UP_S  # and until nothing more is waited for
 LOOK_S, ASK_S = 0.05, 0.5

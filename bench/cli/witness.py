@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 from bench.cli.patience import Patience
 from bench.findings import Effect, Finding
+from bench.rigfile.binding import UNSEEN
 
 if TYPE_CHECKING:
     from drivers.controller import Controller
 
 RESTING = ("OFF", "READY", "FAULT")
-UNKNOWN = "UNKNOWN"
 WHERE = "make safe"
 
 
@@ -84,7 +84,7 @@ class Witness:
         c = self._controller
         speed = patience.speed_rad_s
         turning = "" if speed is None else f", a speed of {speed:.1f} rad/s"
-        if c.sight.answered != "UNSEEN" and c.sight.answered != c.sight.mode:
+        if c.sight.answered != UNSEEN and c.sight.answered != c.sight.mode:
             self._doubt = self._doubt or (
                 f"telemetry says {c.sight.mode}, the controller's answers say {c.sight.answered}: one of them is wrong"
             )
@@ -94,7 +94,7 @@ class Witness:
                 "Switch the amplifiers off by hand once you see that the shaft stands"
             )
         answer = "; nothing was answered" if c.sight.answers else ""
-        answer = answer if c.sight.answered == "UNSEEN" else f"; the last answer said {c.sight.answered}"
+        answer = answer if c.sight.answered == UNSEEN else f"; the last answer said {c.sight.answered}"
         return (
             f"telemetry says {c.sight.mode}{turning}{answer}. Take the rotor to be up until you see that the shaft stands; "
             "then switch the amplifiers off by hand"

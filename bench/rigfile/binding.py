@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 Mode = Literal["OFF", "READY", "LIFTING", "LEVITATED", "SPINNING", "LANDING", "COASTING", "FAULT"]
 MODES: tuple[Mode, ...] = ("OFF", "READY", "LIFTING", "LEVITATED", "SPINNING", "LANDING", "COASTING", "FAULT")
+UNKNOWN, UNSEEN = "UNKNOWN", "UNSEEN"  # a state that has no name, and one that nothing tells
 COMMANDS = ("ENABLE", "DISABLE", "LEVITATE", "LAND", "SPIN", "STOP", "MAKE_SAFE", "CLEAR_FAULT", "IDENTIFY", "RELEASE")
 
 

@@ -32,9 +32,12 @@ def spread(influence: Influence) -> float:
     """Standard deviation of an influence as it is drawn: of a t distribution sqrt(nu/(nu - 2)) times its u (JCGM 101, 6.4.9.4).
 
     For two degrees of freedom or fewer there is none; then it is u."""
-    if math.isinf(influence.dof) or influence.dof <= FEW:
-        return influence.u
-    return influence.u * math.sqrt(influence.dof / (influence.dof - 2))
+    return influence.u * drawn_over_u(influence.dof)
+
+
+def drawn_over_u(dof: float) -> float:
+    """Standard deviation of a t distribution of `dof` degrees of freedom over its scale; 1 where it has none."""
+    return math.sqrt(dof / (dof - 2)) if FEW < dof < math.inf else 1.0
 
 
 def straight(sensitivities: Mapping[Influence, float]) -> dict[str, float]:
