@@ -1,4 +1,4 @@
-"""The controller driver: Levitation and Rotation over any link, by the messages and parameters of the rig file."""
+"""The controller driver: Levitation, and Rotation by `rotation`, over any link, by the rig file's messages and parameters."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Controller:
         self.envelope = Envelope(rig)
         self.telemetry = TelemetryDecoder(rig)
         self._recorder: Recorder | None = None
-        self._dialogue = Dialogue(rig, link, base.now_ns)
+        self.requests = Dialogue(rig, link, base.now_ns)
         self.clock = PumpedClock(base, self.poll, slice_s, lambda: self.telemetry.host.lag_ns)
         self.guarded = True
         self.watch = Watch(
@@ -56,15 +56,15 @@ class Controller:
         self.sight = Sight(rig, self.telemetry, lambda: self.mode, base.now_ns)
         self.cut_ns = 0  # the most that a step lacked of its telemetry when it was left
         self.companions: list[Callable[[], None]] = []  # polled with it: other devices of the rig
-        self._orders = Orders(rig, self._dialogue, session, self.envelope, lambda: self.mode, self._wait)
-        self._turning = Turning(
+        self._orders = Orders(rig, self.requests, session, self.envelope, lambda: self.mode, self._wait)
+        self.rotation = Turning(
             rig, self._orders, self.telemetry, self.clock, base.now_ns, lambda: self.sight.speeds_rad_s()
         )
         self.capture: ControllerCapture | None = None
         if rig.capture is not None:
-            upload = Upload(rig, link, self._dialogue, self.clock)
+            upload = Upload(rig, link, self.requests, self.clock)
             self.capture = ControllerCapture(
-                rig, rig.capture, self._dialogue, upload, session, self.telemetry, self.clock, self._wait
+                rig, rig.capture, self.requests, upload, session, self.telemetry, self.clock, self._wait
             )
 
     @property
@@ -74,7 +74,7 @@ class Controller:
 
     @recorder.setter
     def recorder(self, recorder: Recorder | None) -> None:
-        self._recorder = self._dialogue.recorder = self._orders.recorder = recorder
+        self._recorder = self.requests.recorder = self._orders.recorder = recorder
         if self.capture is not None:
             self.capture.recorder = recorder
         if recorder is not None:
@@ -94,7 +94,7 @@ class Controller:
                 fault that somebody should look at.
         """
         self.guarded = False
-        if not self._dialogue.has("Claim"):
+        if not self.requests.has("Claim"):
             self.clock.sleep(handshake.LISTEN_S)
             handshake.alone(self.watch.hosts.seen, self.link.name)
             self._own()
@@ -103,9 +103,9 @@ class Controller:
             self.link, begun, FIRST_S,
             f"no telemetry within {FIRST_S:g} s. Is the controller on, the port right, the bit rate that of the bus?",
         ))  # fmt: skip
-        handshake.claim(self._dialogue, self.rig, self._session, self.clock, self._wait)
+        handshake.claim(self.requests, self.rig, self._session, self.clock, self._wait)
         self._own()
-        self.serial = handshake.identify(self._dialogue, self.rig, self._session, self._wait)
+        self.serial = handshake.identify(self.requests, self.rig, self._session, self._wait)
         self.watch.simulated = self.serial == 0
         if self.mode == "FAULT":
             advice.may_clear("controller", self.fault, clear_fault)
@@ -137,7 +137,7 @@ class Controller:
         self.guarded, self.companions = False, []  # the rig's other devices are closed by now
         self.recorder = None  # and so is the recording
         heard = self.watch.silent_s < self.watch.patience_s
-        if self._dialogue.has("Claim") and heard and {self.mode, self.sight.answered} & {"OFF", "FAULT"}:
+        if self.requests.has("Claim") and heard and {self.mode, self.sight.answered} & {"OFF", "FAULT"}:
             self._orders.command("RELEASE")
 
     def poll(self) -> None:
@@ -153,7 +153,7 @@ class Controller:
         batch = self.watch.hosts.marked(self.link.receive())
         if self._recorder is not None:
             self._recorder.frames(self.link.name, batch, lag_ns=self.telemetry.host.lag_ns)
-        self._dialogue.take(batch)
+        self.requests.take(batch)
         self.sight.frames(batch)
         if self.capture is not None:
             self.capture.take(batch)
@@ -187,24 +187,9 @@ class Controller:
             InterlockError: it does not.
         """
         turning = self.sight.speeds_rad_s().get("angle", 0.0)  # within milliseconds: coarser than the speed channel
-        speed = turning if turning >= self.landing_speed else abs(self.speed_rad_s)
+        speed = turning if turning >= self.rotation.landing_speed else abs(self.rotation.speed_rad_s)
         if self.mode not in ("OFF", "READY") or speed > TOUCHED:
             raise InterlockError(f"nobody may touch the shaft in state {self.mode} at {speed:.1f} rad/s: land it first")
-
-    @property
-    def round_trip_ns(self) -> int | None:
-        """The least time from a request to its answer."""
-        return self._dialogue.round_trip_ns
-
-    @property
-    def repeats(self) -> int:
-        """Requests that were sent again because no reply had come."""
-        return self._dialogue.repeats
-
-    @property
-    def replies_wrong_length(self) -> int:
-        """Replies that do not have the length of the DBC."""
-        return self._dialogue.wrong_length
 
     @property
     def mode(self) -> str:
@@ -228,11 +213,11 @@ class Controller:
 
     def levitate(self) -> None:
         """READY to LEVITATED."""
-        self._command("LEVITATE", "LEVITATED", self._lift_s + 6.0, self._default("lift_time_s"))
+        self._command("LEVITATE", "LEVITATED", self._lift_s() + 6.0, self._lift_s(0.0))
 
     def land(self) -> None:
         """LEVITATED to READY."""
-        self._command("LAND", "READY", self._lift_s + 3.0, self._default("lift_time_s"))
+        self._command("LAND", "READY", self._lift_s() + 3.0, self._lift_s(0.0))
 
     def disable(self) -> None:
         """READY to OFF."""
@@ -257,61 +242,22 @@ class Controller:
         without noise do not change in READY: there the speed channel counts while its telemetry goes on."""
         speeds = list(self.sight.speeds_rad_s().values())
         if not speeds and self.mode == "READY" and not self.watch.condition.stands:
-            speeds = [abs(self.speed_rad_s)]
-        return bool(speeds) and max(speeds) < self.landing_speed
+            speeds = [abs(self.rotation.speed_rad_s)]
+        return bool(speeds) and max(speeds) < self.rotation.landing_speed
 
     def ask_state(self) -> None:
         """Ask for a reply, which tells the state, where the controller has one; nothing is waited for."""
         self._orders.ask_state()
 
     @property
-    def _lift_s(self) -> float:
-        p = self.rig.parameters.get("lift_time_s")
-        return p.default if p else 5.0
-
-    @property
-    def speed_rad_s(self) -> float:
-        """Rotor speed."""
-        return self._turning.speed_rad_s
-
-    @property
-    def landing_speed(self) -> float:
-        """Below this the rotor may be landed, rad/s."""
-        return self._turning.landing_speed
-
-    def point(self, angle_rad: float) -> None:
-        """Turn the rotor the shorter way to an angle and wait until it stands there.
-
-        Raises:
-            RotorNotArrived: it does not arrive in time.
-        """
-        self._turning.point(angle_rad)
-
-    def spin(self, rad_s: float) -> None:
-        """Turn the rotor at a speed; returns when it has kept within 2 % or 0.3 rad/s of it for a tenth of a second.
-
-        Raises:
-            RotorNotArrived: it does not get there in time.
-        """
-        self._turning.spin(rad_s)
-
-    def stop(self) -> None:
-        """Brake to a stop, and wait until the rotor is below the landing speed.
-
-        Raises:
-            RotorNotArrived: it does not get there in time.
-        """
-        self._turning.stop()
-
-    @property
     def landing_s(self) -> float:
         """How long a landing takes: until a shaft of which no pulse comes is known to be slow, and until it is down."""
-        return self._lift_s + 2 * math.pi / self.landing_speed
+        return self._lift_s() + 2 * math.pi / self.rotation.landing_speed
 
-    def _default(self, parameter: str) -> float:
-        """What a parameter is set to unless a plan says otherwise; 0 where the rig has none."""
-        p = self.rig.parameters.get(parameter)
-        return p.default if p else 0.0
+    def _lift_s(self, unknown: float = 5.0) -> float:
+        """How long the controller takes to lift or to lower the rotor; `unknown` where the rig file does not say."""
+        p = self.rig.parameters.get("lift_time_s")
+        return p.default if p else unknown
 
     def set(self, parameter: str, value: float) -> None:
         """Write a parameter (SI) and check what the controller reads back; `drivers.orders.Orders.set` has the errors."""

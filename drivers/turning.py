@@ -40,7 +40,11 @@ class Turning:
         return p.default if p else 1.0
 
     def point(self, angle_rad: float) -> None:
-        """`Controller.point`."""
+        """Turn the rotor the shorter way to an angle and wait until it stands there.
+
+        Raises:
+            RotorNotArrived: it does not arrive in time.
+        """
         here = self._telemetry.latest.get("angle", 0.0)
         turn = (angle_rad - here + math.pi) % (2 * math.pi) - math.pi
         self._angle += (angle_rad - self._angle + math.pi) % (2 * math.pi) - math.pi
@@ -58,7 +62,11 @@ class Turning:
                    lambda: f"the rotor did not reach {angle_rad:.3f} rad: it stands {off():+.4f} rad off")  # fmt: skip
 
     def spin(self, rad_s: float) -> None:
-        """`Controller.spin`."""
+        """Turn the rotor at a speed; returns when it has kept within 2 % or 0.3 rad/s of it for a tenth of a second.
+
+        Raises:
+            RotorNotArrived: it does not get there in time.
+        """
         self._orders.set("speed_ref", rad_s)
         self._orders.command("SPIN")
         tolerance = max(0.02 * abs(rad_s), 0.3)
@@ -73,7 +81,11 @@ class Turning:
                    f"{self.speed_rad_s:.1f} rad/s")  # fmt: skip
 
     def stop(self) -> None:
-        """`Controller.stop`."""
+        """Brake to a stop, and wait until the rotor is below the landing speed.
+
+        Raises:
+            RotorNotArrived: it does not get there in time.
+        """
         self._orders.command("STOP")
         limit = self.landing_speed
         approach = self._approach(0.0)

@@ -131,7 +131,7 @@ def test_a_run_outlives_replies_that_are_lost(lost_s: float) -> None:
     controller.connect()
     controller.clock.sleep(1.0 - machine.now_ns() % 1_000_000_000 * 1e-9 + 0.05)
     controller.enable()
-    assert controller.repeats >= 1
+    assert controller.requests.repeats >= 1
     assert controller.mode == "READY"
 
 

@@ -271,12 +271,12 @@ def _opened(
         telemetry = controller.telemetry
         others = {name: line.stats for name, line in lines.items()}
         return Health(telemetry.counters, controller.link.stats, telemetry.host.drift(), telemetry.host.latest_ns,
-                      controller.watch.host_age_s, controller.round_trip_ns, others,
-                      repeats=controller.repeats, cut_ns=controller.cut_ns, beyond_drift=telemetry.host.beyond,
+                      controller.watch.host_age_s, controller.requests.round_trip_ns, others,
+                      repeats=controller.requests.repeats, cut_ns=controller.cut_ns, beyond_drift=telemetry.host.beyond,
                       unknown_s=telemetry.host.unknown_s, gained_ns=telemetry.host.rate.gained_ns,
-                      replies_wrong_length=controller.replies_wrong_length, stuck=controller.watch.stuck.found)  # fmt: skip
+                      replies_wrong_length=controller.requests.wrong_length, stuck=controller.watch.stuck.found)  # fmt: skip
 
-    rig = Rig(controller.rig, controller.clock, controller, controller, operators[0], controller.telemetry.counters,
+    rig = Rig(controller.rig, controller.clock, controller, controller.rotation, operators[0], controller.telemetry.counters,
               health, controller.link.close, bus.drive, bus.supply, bus.thermal, controller.capture)  # fmt: skip
     found = [fault_injection.announced(injected)] if injected else []
     if controller.cleared:

@@ -70,7 +70,7 @@ class Patience:
     def fast(self) -> bool:
         """Whether the shaft is seen to turn at the landing speed or faster."""
         speed = self.speed_rad_s
-        return speed is not None and speed >= self._controller.landing_speed
+        return speed is not None and speed >= self._controller.rotation.landing_speed
 
     @property
     def slow(self) -> bool:
@@ -79,7 +79,7 @@ class Patience:
         speed = self.speed_rad_s
         if speed is None:
             return sight.came_down
-        return speed < self._controller.landing_speed and sight.mode in ("LEVITATED", UNSEEN)
+        return speed < self._controller.rotation.landing_speed and sight.mode in ("LEVITATED", UNSEEN)
 
     def every(self, period_s: float, action: Callable[[], None]) -> None:
         """Do something that often; a link that is lost for now does not count."""

@@ -125,7 +125,7 @@ class _Way:
             if self.driven and p.fast:
                 self._brake(self.drive)
             self.off = self.drive.confirm_off()
-        limit = c.landing_speed
+        limit = c.rotation.landing_speed
         self._until(lambda: p.slow or self._rests(fast=p.fast), GIVE_UP_S, f"under {limit:g} rad/s")
 
     def _rests(self, *, fast: bool) -> bool:

@@ -73,7 +73,7 @@ class Witness:
             return
         speeds = c.sight.speeds_rad_s()
         turning = [f"{source} {speed:.1f} rad/s" for source, speed in speeds.items()]
-        if patience.fast and not any(speed >= c.landing_speed for speed in speeds.values()):
+        if patience.fast and not any(speed >= c.rotation.landing_speed for speed in speeds.values()):
             turning.append(f"the drive {patience.speed_rad_s or 0.0:.1f} rad/s")
         why = ["it held the rotor and nobody asked it to land"] if c.watch.condition.unasked else []
         why += [f"there is {', '.join(turning)}"] if patience.fast else []

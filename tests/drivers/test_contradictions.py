@@ -55,7 +55,7 @@ def test_a_state_of_rest_is_not_believed_while_the_rotor_was_not_asked_to_land(s
     """STOP brakes a turning one first, MAKE_SAFE lands it, and the answers tell when it is down."""
     bench = Bench()
     if speed:
-        bench.controller.spin(speed)
+        bench.controller.rotation.spin(speed)
     sent = watched(bench)
     found, took_s = bench.made_safe(says(state), 0.05)
     assert [name for name, _ in sent if name != "IDENTIFY"] == [*(["STOP"] if speed else []), "MAKE_SAFE"]
@@ -69,7 +69,7 @@ def test_a_state_of_rest_is_not_believed_while_the_rotor_was_not_asked_to_land(s
 def test_amplifiers_are_not_switched_off_at_speed_though_the_rotor_was_asked_to_land() -> None:
     """LAND was sent, something drives the shaft up again, and telemetry says READY."""
     bench = Bench()
-    bench.controller.spin(FAST_RAD_S)
+    bench.controller.rotation.spin(FAST_RAD_S)
     bench.controller.watch.condition.commanded("LAND")
     sent = watched(bench)
     found, _ = bench.made_safe(says("READY"), 0.05)
@@ -81,7 +81,7 @@ def test_amplifiers_are_not_switched_off_at_speed_though_the_rotor_was_asked_to_
 @pytest.mark.parametrize("state", ["OFF", "READY"])
 def test_a_run_ends_at_once_when_its_controller_says_that_a_held_rotor_rests(state: str) -> None:
     bench = Bench()
-    bench.controller.spin(FAST_RAD_S)
+    bench.controller.rotation.spin(FAST_RAD_S)
     bench.link.change = says(state)
     begin = bench.machine.now_ns()
     with pytest.raises(
@@ -93,18 +93,18 @@ def test_a_run_ends_at_once_when_its_controller_says_that_a_held_rotor_rests(sta
 
 def test_nobody_reaches_into_a_machine_whose_angle_turns_though_its_speed_says_nothing() -> None:
     bench = Bench()
-    bench.controller.spin(FAST_RAD_S)
+    bench.controller.rotation.spin(FAST_RAD_S)
     bench.link.change = Telemetry(TSBS, {"state": CODES["READY"], "speed": 0.0}, frozen=(), stuck=False)
     with contextlib.suppress(StateContradicts):
         bench.controller.clock.sleep(0.1)
-    assert (bench.controller.mode, bench.controller.speed_rad_s) == ("READY", 0.0)
+    assert (bench.controller.mode, bench.controller.rotation.speed_rad_s) == ("READY", 0.0)
     with pytest.raises(InterlockError, match=r"nobody may touch the shaft in state READY at 4\d"):
         bench.controller.require_landed()
 
 
 def test_a_landing_that_was_refused_is_no_leave_to_rest() -> None:
     bench = Bench()
-    bench.controller.spin(FAST_RAD_S)
+    bench.controller.rotation.spin(FAST_RAD_S)
     with pytest.raises(Refused):
         bench.controller.command("LAND")
     bench.link.change = says("READY")
@@ -129,7 +129,7 @@ def test_a_rotor_that_was_asked_to_land_may_rest() -> None:
 def test_a_fault_while_the_machine_is_made_safe_is_told(fault: str) -> None:
     """Levitation that is lost at speed takes the brake away too; the run was stopped by something else."""
     bench = Bench()
-    bench.controller.spin(FAST_RAD_S)
+    bench.controller.rotation.spin(FAST_RAD_S)
     begun: list[int] = []
 
     def trip(batch: FrameBatch) -> FrameBatch:
@@ -216,7 +216,7 @@ def test_a_speed_that_stands_at_zero_while_the_angle_turns_is_named() -> None:
     bench.link.change = Telemetry(TSBS, {"speed": 0.0}, frozen=(), stuck=False)
     begin = bench.machine.now_ns()
     with pytest.raises(SpeedContradicts, match=r"the speed channel says 0\.0 rad/s, and the angle turns at [3-6]\d"):
-        bench.controller.spin(60.0)
+        bench.controller.rotation.spin(60.0)
     assert bench.machine.now_ns() - begin < 10e9
 
 
@@ -225,7 +225,7 @@ def test_a_rotor_that_does_not_come_nearer_is_told_and_not_waited_for_long(caplo
     bench.machine.device.states.obey = lambda name: True  # type: ignore[method-assign] # SPIN is accepted, not executed
     begin = bench.machine.now_ns()
     with caplog.at_level(logging.INFO, "drivers"), pytest.raises(RotorNotArrived, match="came no nearer for 20 s"):
-        bench.controller.spin(60.0)
+        bench.controller.rotation.spin(60.0)
     assert bench.machine.now_ns() - begin < 25e9
     lines = [r.getMessage() for r in caplog.records if hasattr(r, "shown")]
     assert lines[0] == "waiting 5 s for 60 rad/s; the rotor turns at 0.0 rad/s; no nearer for 5 s, 15 s left"
@@ -237,7 +237,7 @@ def test_readings_that_all_stand_end_a_run() -> None:
     bench.link.change = Telemetry(TSBS, {}, frozen=())
     begin = bench.machine.now_ns()
     with pytest.raises(ReadingsStand) as caught:
-        bench.controller.spin(60.0)
+        bench.controller.rotation.spin(60.0)
     assert bench.machine.now_ns() - begin < 2e9
     assert cause_of(caught.value)[1].code == "stuck-channel"
 

@@ -25,7 +25,7 @@ def test_a_sound_machine_is_landed_and_switched_off_at_once() -> None:
 
 def test_a_turning_rotor_is_braked_before_it_is_landed() -> None:
     bench = Bench()
-    bench.controller.spin(40.0)
+    bench.controller.rotation.spin(40.0)
     found, _ = bench.made_safe(unchanged, 0.1)
     assert (found, bench.said, bench.state) == ((), ["STOP", "LAND", "DISABLE"], "OFF")
 
@@ -80,7 +80,7 @@ def test_readings_that_stand_at_rest_do_not_say_that_the_shaft_is_slow() -> None
     bench.link.change = still
     bench.controller.clock.sleep(0.1)
     bench.link.change = unchanged
-    bench.controller.spin(60.0)
+    bench.controller.rotation.spin(60.0)
     bench.made_safe(still)
     assert bench.said[0] == "MAKE_SAFE"
     assert "LAND" not in bench.said
@@ -88,7 +88,7 @@ def test_readings_that_stand_at_rest_do_not_say_that_the_shaft_is_slow() -> None
 
 def test_a_speed_that_stands_at_zero_while_the_angle_turns_is_not_believed() -> None:
     bench = Bench()
-    bench.controller.spin(60.0)
+    bench.controller.rotation.spin(60.0)
     landed: list[float] = []
     send = bench.link.send
 

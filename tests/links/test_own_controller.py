@@ -218,9 +218,9 @@ def test_the_rotor_spins_and_stops() -> None:
     bench = Bench()
     bench.controller.connect()
     transition(bench.rig, RigState.LEVITATED)
-    bench.controller.spin(8.0)
+    bench.controller.rotation.spin(8.0)
     assert bench.controller.mode == "SPINNING"
-    assert bench.controller.speed_rad_s == pytest.approx(8.0, abs=0.3)
+    assert bench.controller.rotation.speed_rad_s == pytest.approx(8.0, abs=0.3)
     transition(bench.rig, RigState.OFF)
     assert bench.link.refused == []
 

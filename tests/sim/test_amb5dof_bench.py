@@ -84,7 +84,7 @@ def session(seed: int) -> Stand:
         drive.reach(speed)
         controller.clock.sleep(0.2)
         assert controller.mode == "SPINNING"
-        assert controller.speed_rad_s == pytest.approx(speed, rel=0.01)
+        assert controller.rotation.speed_rad_s == pytest.approx(speed, rel=0.01)
         assert drive.speed_rad_s == pytest.approx(speed, rel=0.01)
         assert bus.supply.voltage_V == 48.0
         pulses = stand.reading("pulses")[0]
@@ -97,7 +97,7 @@ def session(seed: int) -> Stand:
             if controller.mode == "LEVITATED":
                 break
             controller.clock.sleep(0.5)
-        assert controller.speed_rad_s < controller.landing_speed
+        assert controller.rotation.speed_rad_s < controller.rotation.landing_speed
         controller.land()
         assert controller.mode == "READY"
         controller.disable()
@@ -139,9 +139,9 @@ def test_the_controller_cannot_turn_the_rotor() -> None:
     assert "speed_ref" not in RIG.parameters
     with pytest.raises(BenchError, match="refuses SPIN: WRONG_STATE"):
         stand.controller._orders.command("SPIN")
-    stand.controller.stop()
+    stand.controller.rotation.stop()
     with pytest.raises(InterlockError, match="speed_ref"):
-        stand.controller.spin(10.0)
+        stand.controller.rotation.spin(10.0)
     assert stand.controller.mode == "LEVITATED"
 
 
@@ -160,7 +160,7 @@ def test_without_a_host_the_drive_lets_go_and_the_rotor_coasts_and_lands() -> No
     assert list(dict.fromkeys(seen)) == ["COASTING", "LANDING", "FAULT"]
     assert stand.machine.device.fault == "HEARTBEAT_LOST"
     assert stand.bank.drives["drive"].fault == "COMMUNICATION"
-    assert stand.plant.shaft_speed < stand.controller.landing_speed
+    assert stand.plant.shaft_speed < stand.controller.rotation.landing_speed
 
 
 def test_a_capture_at_speed(tmp_path: Path) -> None:
