@@ -9,13 +9,13 @@ READY := .venv/.ready
 # Tests start hundreds of processes: without its bytecode every one of them would compile the project again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check format ci-long faults fuzz campaigns plants sound moved golden bench clean lock setup
+.PHONY: demo test check format ci-long faults links fuzz campaigns plants sound moved golden bench clean lock setup
 
 demo: setup
 	$(BIN)/bench run amb-calibration --rig tsbs12 --seed 1
 
 test: setup
-	$(BIN)/python -m pytest -q -m "not long and not faults" -n 2 --dist loadgroup
+	$(BIN)/python -m pytest -q -m "not long and not faults and not links" -n 2 --dist loadgroup
 
 check: setup
 	$(BIN)/ruff format --check .
@@ -25,10 +25,14 @@ check: setup
 	$(MAKE) test
 
 ci-long: setup
-	$(BIN)/python -m pytest -q -m long -n 2 --dist loadgroup tests
+	$(BIN)/python -m pytest -q -m "long and not links" -n 2 --dist loadgroup tests
 
 faults: setup
 	$(BIN)/python -m pytest -q -m faults tests/firmware/test_misbehaviours.py
+
+# The first step of the chain on every link that `make ci-long` leaves out: in real time, one by one.
+links: setup
+	$(BIN)/python -m pytest -q -m links tests/links/test_chain.py
 
 fuzz: setup
 	$(BIN)/python -m pytest -q -m "hypothesis and not long" -n 2 --hypothesis-profile=search --timeout 600

@@ -1,5 +1,5 @@
-"""The identification chain over CAN as one campaign, and its first step on every other link, with server and bench as
-processes of their own, against the same rig in one process.
+"""The identification chain over CAN as one campaign, and its first step on every other link (`make links`), with server
+and bench as processes of their own, against the same rig in one process.
 
 The bound: both runs see the same machine, so all that is certified or stated by the rig file is common to them. What
 differs is noise, the seats of the straps at other instants of the drift, and the host's timing; the budgets call it
@@ -82,9 +82,10 @@ def type_a(measurement: Mapping[str, Any]) -> float:
     return math.sqrt(sum(i["contribution"] ** 2 for i in measurement["budget"] if i["type"] == "A"))
 
 
-@pytest.mark.long
 @pytest.mark.timeout(2 * RUN_S)
-@pytest.mark.parametrize("link", LINKS)
+@pytest.mark.parametrize(
+    "link", [pytest.param(link, marks=pytest.mark.long if n > 1 else pytest.mark.links) for link, n in LINKS.items()]
+)
 def test_equal_results(link: str, tmp_path: Path, in_one_process: Records) -> None:
     chain = over(tmp_path, link, LINKS[link])
     assert len(chain) == LINKS[link]
