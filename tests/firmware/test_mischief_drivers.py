@@ -79,14 +79,14 @@ def test_a_levitate_of_which_the_reply_is_lost_is_executed_once(mischief: Path, 
     with controller_that(mischief, "lostlevitate", *firmware) as c:
         levitated(c)
         assert c.mode == "LEVITATED"
-        assert c.repeats == 1
+        assert c.requests.repeats == 1
 
 
 def test_a_rotor_that_does_not_turn_has_not_arrived(mischief: Path) -> None:
     with controller_that(mischief, "stuckangle") as c:
         levitated(c)
         with pytest.raises(BenchError) as caught:
-            c.point(0.785)
+            c.rotation.point(0.785)
     assert called(caught.value) == ("rotor-not-arrived", "the rotor did not reach 0.785 rad: it stands -0.7850 rad off")
 
 

@@ -73,7 +73,7 @@ class Bench:
         self.controller = Controller(PLAIN, self.link, self.machine, SIMULATED)
         self.operator = LineOperator(self.machine.request, self.controller.clock, self.controller.envelope)
         counters = self.controller.telemetry.counters
-        self.rig = Rig(PLAIN, self.controller.clock, self.controller, self.controller, self.operator, counters,
+        self.rig = Rig(PLAIN, self.controller.clock, self.controller, self.controller.rotation, self.operator, counters,
                        lambda: Health(counters, self.link.stats, None, 0), self.link.close)  # fmt: skip
 
     def _hear(self, batch: FrameBatch) -> None:
