@@ -15,7 +15,7 @@ demo: setup
 	$(BIN)/bench run amb-calibration --rig tsbs12 --seed 1
 
 test: setup
-	$(BIN)/python -m pytest -q -m "not long and not faults and not links" -n 2 --dist loadgroup
+	$(BIN)/python -m pytest -q -m "not long and not faults and not links" -n 3 --dist loadgroup
 
 check: setup
 	$(BIN)/ruff format --check .

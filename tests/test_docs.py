@@ -48,9 +48,10 @@ COPIED = ("bench", "drivers", "procedures", "reports", "sim_backend", "rigs", "s
 
 
 LONG = (
-    "add-a-device", "amb-calibration", "angle-step", "balance", "change-a-plan", "coast-down", "compensation",
-    "connect-a-rig", "force-constant", "force-coupling", "force-map", "model", "negative-stiffness", "run-a-campaign",
-    "run-up", "sensitivity", "slew", "spindown", "step", "torque-constant", "tracking", "unbalance", "use-in-ci",
+    "add-a-device", "amb-calibration", "angle-step", "balance", "bearing-model", "change-a-plan", "coast-down",
+    "compensation", "connect-a-rig", "force-constant", "force-coupling", "force-map", "inject-faults", "model",
+    "negative-stiffness", "run-a-campaign", "run-up", "sensitivity", "slew", "spindown", "step", "torque-constant",
+    "tracking", "unbalance", "use-in-ci",
 )  # fmt: skip
 """Pages that take long, or that only run a procedure: by default `tests/procedures` takes each through its whole path and
 draws its figures, and the tutorial and `adopt-a-calibration` the same commands with their reports and calibrations."""
@@ -151,6 +152,7 @@ def tree_lines(page: Path) -> list[str]:
     return lines
 
 
+@pytest.mark.long
 @pytest.mark.timeout(300)
 def test_guides_that_add_to_the_tree_work(tmp_path: Path) -> None:
     """One after the other, each going on from what the one before has left, with the scratch copy in front of the clone."""

@@ -48,12 +48,6 @@ class Vectors:
         """Standard uncertainty of the amplitudes, (m,): along each vector."""
         return self._along(self.values)
 
-    @property
-    def u_lag_deg(self) -> Array:
-        """Standard uncertainty of the phase lags, degrees (m,): across each vector, over its length."""
-        length = np.maximum(np.abs(self.values), 1e-300)
-        return np.asarray(np.degrees(self._along(1j * self.values) / length))
-
     def _along(self, direction: Complex) -> Array:
         unit = np.where(np.abs(direction) > 0, direction / np.maximum(np.abs(direction), 1e-300), 1.0)
         pairs = parts(unit).reshape(-1, 2)

@@ -74,10 +74,10 @@ class Procedure:
     """A procedure. `acquire` moves the machine, `evaluate` is pure and sees only the closed file.
 
     `requires` is what a rig must have, whatever the plan. `check` looks at a plan against a rig that has it, before anything
-    starts, and names what cannot work. `settings` are the
-    controller parameters (SI) that the runner writes in READY, before it levitates. `step_count` is how many steps
-    `acquire` will record, for the progress display; 0 is unknown. `fewest_steps` is how many a run that goes to its end has
-    at least, where these are fewer.
+    starts, and names what cannot work. `settings` are the controller parameters (SI) that the runner writes in READY, before
+    it levitates. `optional` of the measures are those that a sound machine may lack: not missing where no limit asks.
+    `step_count` is how many steps `acquire` will record, for the progress display; 0 is unknown. `fewest_steps` is how many a
+    run that goes to its end has at least, where these are fewer.
     `evaluate` makes of a recording what all that follows needs, once, and tells its findings as it goes; it ends where one
     that is told at a gate is an error, and then nothing is measured nor drawn. Without it the recording itself is what
     follows needs. `measured` yields the quantities of it in the order of the report. `figures` come in the order in which
@@ -109,12 +109,10 @@ class Procedure:
     needs: Callable[[Any], tuple[Need, ...]] = field(default=_no_needs)
     facts: Callable[[Any], Mapping[str, Estimate]] | None = None
     holds_for: Callable[[Any], Mapping[str, float]] = field(default=_numbers_of)
-    optional: tuple[
-        Quantity, ...
-    ] = ()  # of the measures, what a sound machine may not have: not missing where no limit asks
+    optional: tuple[Quantity, ...] = ()
     reached: tuple[str, ...] = ()
     assumes: tuple[str, ...] = ()
-    method: str = ""  # the report's method section: plain paragraphs, blank-line separated
+    method: str = ""  # the report's section: plain paragraphs, parted by empty lines
 
     def problems(self, rig: RigFile, plan: Any) -> tuple[str, ...]:
         """What cannot work, found before anything starts: what the rig lacks, else what the plan asks too much of it."""

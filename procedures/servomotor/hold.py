@@ -6,8 +6,6 @@ ready to take over where the rotor is.
 
 from __future__ import annotations
 
-import math
-
 from bench.procedure.rig import Rig
 from bench.recording.recorder import Recorder
 
@@ -47,8 +45,3 @@ def probe(rig: Rig, record: Recorder) -> None:
             rig.clock.sleep(PROBE_S)
         release(rig)
     rig.levitation.set("angle_ref", 0.0)
-
-
-def within_a_turn(angle: float) -> float:
-    """The same angle in -pi..pi."""
-    return math.remainder(angle, 2 * math.pi)

@@ -133,9 +133,7 @@ def reduced(data: Samples, channels: Sequence[str], labels: Mapping[str, Any]) -
     Raises:
         AnalysisError: a channel has fewer than two samples.
     """
-    x = np.array(
-        [data[channel] for channel in channels]
-    )  # all channels at once: a look at each costs more than the sums
+    x = np.array([data[c] for c in channels])  # all at once: a look at each channel costs more than the sums
     half = x.shape[1] // 2
     if half == 0:
         raise AnalysisError(f"step {dict(labels)}: found {x.shape[1]} samples of {channels[0]}; expected at least 2")

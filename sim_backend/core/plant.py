@@ -86,11 +86,6 @@ class CorePlant:
         """Whether the lift or landing has run its course."""
         return bool(self._s.law.lift_clock >= self._c.lift_time_s)
 
-    @property
-    def age_ticks(self) -> int:
-        """Ticks run since the last completed telemetry period."""
-        return int(self._s.in_period)
-
     def set(self, name: str, value: float) -> None:
         """Set a parameter of the law by its name, SI.
 

@@ -111,7 +111,7 @@ def test_a_planted_defect_is_named_and_never_passes(
     ("defect", "code"),
     [
         ({"drift_2": 5e-4}, "drifting-sensor"),
-        ({"segment_drift_0": 2e-3}, "drifting-sensor"),
+        pytest.param({"segment_drift_0": 2e-3}, "drifting-sensor", marks=pytest.mark.long),
         ({"lever_slip": 0.05}, "lever-slips"),
     ],
 )

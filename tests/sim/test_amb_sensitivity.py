@@ -69,7 +69,7 @@ def test_python_control_finds_the_same() -> None:
     assert np.abs(np.asarray(control.poles(closed))).max() < 1
 
 
-@pytest.mark.parametrize("law", [0.0, 1.0])
+@pytest.mark.parametrize("law", [pytest.param(0.0, marks=pytest.mark.long), 1.0])
 def test_the_peak_of_the_turning_machine_is_the_closed_form_without_an_orbit(law: float) -> None:
     """Lines into the core at 6000 r/min. With the orbit of the drawn unbalance the peak is off by tenths of a percent."""
     settings, speed = {**SETTINGS, "law": law}, 6000 * math.pi / 30
