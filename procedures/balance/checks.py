@@ -29,10 +29,10 @@ from procedures.balance.steps import (
     Run,
     captured_channels,
 )
+from procedures.synchronous import checks as dwell_checks
 from procedures.synchronous import fitting
 from procedures.synchronous.bearings import Known
 from procedures.synchronous.dwells import SLOW, telemetry_channels
-from procedures.unbalance import checks as unbalance_checks
 
 MOST_RPM = 10000.0  # influence runs
 RATE_HZ = 1e4  # of the captures, the controller's own; order 1 alone is read
@@ -112,8 +112,8 @@ def of_runs(recorded: Recorded, rig: RigFile, plan: Plan, known: Known) -> Itera
     yield from _speeds(recorded)
     off = decision.slow_runout(recorded.slow, base, rig, known)
     looked = [estimates.balance_forces(d, off, rig, known) for d in recorded.dwells if d.kind != SLOW]
-    yield from unbalance_checks.channels(looked)
-    yield from unbalance_checks.weight(looked)
+    yield from dwell_checks.channels(looked)
+    yield from dwell_checks.weight(looked)
     shown: list[decision.Shown] = []
     named = {r.name: r for r in recorded.runs}
     before = base

@@ -21,12 +21,11 @@ from procedures.balance.solution import Solved, Trials, runout_as_unbalance, sol
 from procedures.balance.steps import SIDES, Read, Recorded, Run, Weight, read_dwell
 from procedures.balance.vector_length import amount
 from procedures.shared.certificates import certified
-from procedures.synchronous import bearings, runout
+from procedures.synchronous import bearings, estimates, runout
 from procedures.synchronous.bearings import Known
 from procedures.synchronous.dwells import Dwell
+from procedures.synchronous.estimates import ForceBalance
 from procedures.synchronous.runout import Stand, Turning
-from procedures.unbalance import estimates
-from procedures.unbalance.estimates import ForceBalance
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

@@ -25,9 +25,9 @@ from procedures.balance.plan import Plan
 from procedures.balance.steps import BASE, SIDES, read_runs
 from procedures.shared import assumptions
 from procedures.synchronous import bearings
+from procedures.synchronous import checks as dwell_checks
 from procedures.synchronous.dwells import SLOW
 from procedures.synchronous.hum import listen
-from procedures.unbalance import checks as unbalance_checks
 
 FOUND_COS = Quantity(
     "unbalance_cos",
@@ -97,13 +97,13 @@ def fewest_steps(plan: Plan) -> int:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """Unbalance as found and as left, and the influence coefficients at the highest speed."""
-    findings.gate([*wiring.before_orbits(recording), *unbalance_checks.before(recording), *checks.refusals(recording)],
+    findings.gate([*wiring.before_orbits(recording), *dwell_checks.before(recording), *checks.refusals(recording)],
                   ("no-dwells", "sensor-polarity", "lift-lost", "stuck-channel"))  # fmt: skip
     plan, rig = recording.plan, recording.rig
     recorded = read_runs(recording, plan.speeds_rad_s)
     # every run is in all results
-    findings.add(unbalance_checks.of_signals(recorded.dwells, plan.max_lost, plan.max_speed_error, doubts=lambda _: ()))
-    findings.add(unbalance_checks.slow_roll(recorded.dwells, plan.speeds_rad_s))
+    findings.add(dwell_checks.of_signals(recorded.dwells, plan.max_lost, plan.max_speed_error, doubts=lambda _: ()))
+    findings.add(dwell_checks.slow_roll(recorded.dwells, plan.speeds_rad_s))
     known = bearings.Known.of(recording.calibrations, plan.beta_share, plan.offset_u_m)
     findings.add(checks.of_runs(recorded, rig, plan, known))
     trials = decision.trials_of(recorded.runs, rig, plan.leave)

@@ -9,7 +9,7 @@ import numpy as np
 from bench.findings import Finding
 from bench.uncertainty import Estimate, coverage_factor
 from bench.units import RPM
-from procedures.unbalance.estimates import Result, Results
+from procedures.synchronous.estimates import Result, Results
 
 Reductions = Sequence[tuple[Result, Estimate]]
 

@@ -10,7 +10,7 @@ from bench.figures import Figure, Series
 from bench.uncertainty import Estimate, coverage_factor
 from bench.units import RPM
 from procedures.compensation.switching import WITHIN_S, Switched
-from procedures.unbalance.estimates import Result
+from procedures.synchronous.estimates import Result
 
 MOST_POINTS = 4000
 

@@ -29,11 +29,11 @@ from procedures.compensation.plan import Plan
 from procedures.compensation.switching import SWITCH, Switched
 from procedures.shared import assumptions
 from procedures.synchronous import bearings, dwelling
+from procedures.synchronous.estimates import Results
 from procedures.synchronous.hum import listen
 from procedures.unbalance import figures as unbalance_figures
 from procedures.unbalance import procedure as unbalance
 from procedures.unbalance import sequence
-from procedures.unbalance.estimates import Results
 
 REDUCTION = Quantity(
     "reduction",

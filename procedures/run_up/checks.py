@@ -20,11 +20,9 @@ from procedures.run_up.hum import of_peaks
 from procedures.run_up.plan import Passing
 from procedures.run_up.steps import LEAST_TURNS, MISSED, PASSAGE, Passage
 from procedures.shared import signals
-from procedures.synchronous import fitting
-from procedures.synchronous.hum import listen
-from procedures.unbalance import checks
-from procedures.unbalance.checks import HELD
-from procedures.unbalance.hum import of_dwells
+from procedures.synchronous import checks, fitting
+from procedures.synchronous.checks import HELD
+from procedures.synchronous.hum import listen, of_dwells
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]

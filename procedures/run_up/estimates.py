@@ -23,10 +23,10 @@ from procedures.run_up.line import DRAWS, Line
 from procedures.run_up.plan import Passing
 from procedures.run_up.steps import Curve, Passage, curve, near
 from procedures.synchronous import bearings
+from procedures.synchronous import estimates as dwell_estimates
 from procedures.synchronous.dwells import Dwell
+from procedures.synchronous.estimates import Result, Results, Runout
 from procedures.synchronous.runout import Stand
-from procedures.unbalance import estimates as unbalance_estimates
-from procedures.unbalance.estimates import Result, Results, Runout
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -97,7 +97,7 @@ def run(passage: Passage, slow: Dwell | None, recording: Recording[Any], plan: P
         still, rest = _still(found, models, dwell, width)
         dwells.append(still)
         left.append(rest)
-    results = unbalance_estimates.results([*([] if slow is None else [slow]), *dwells], rig, known)
+    results = dwell_estimates.results([*([] if slow is None else [slow]), *dwells], rig, known)
     results = replace(results, dwells=tuple(_with(r, rest) for r, rest in zip(results.dwells, left, strict=True)))
     inputs = bearings.collect_inputs(rig, known)
     large = _large(found, inputs, results.runouts, plan.law, gains(rig, plan))

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from bench.analysis import transient
 from bench.analysis.peaks import WINDOW, Smoother, noise, pooled_covariance
 from procedures.run_up.steps import Curve
-from procedures.unbalance.estimates import Runout
+from procedures.synchronous.estimates import Runout
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

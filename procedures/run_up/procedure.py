@@ -30,10 +30,10 @@ from procedures.run_up.plan import Passing, Plan
 from procedures.run_up.steps import MISSED, PASSAGE, read_passage
 from procedures.shared import assumptions
 from procedures.synchronous import bearings, dwelling
+from procedures.synchronous import checks as dwell_checks
 from procedures.synchronous.coil_peaks import find_uncertified
 from procedures.synchronous.dwelling import put
 from procedures.synchronous.dwells import SLOW, captured_channels, read_dwell
-from procedures.unbalance import checks as unbalance_checks
 from procedures.unbalance import procedure as unbalance
 from procedures.unbalance.procedure import CURRENT, D_MAX, MAJOR, READ, SHARE, VOLTAGE
 
@@ -165,8 +165,8 @@ def evaluate(recording: Recording[Any], findings: Findings) -> Run:
     slow = next((read_dwell(recording, s) for s in recording.steps(SLOW)), None)
     # what a steady speed shows, a changing one may hide
     rolls = [slow] if slow else []
-    findings.gate([*(unbalance_checks.of_signals(rolls, plan.max_lost, plan.max_speed_error) if slow else ()),
-                   *unbalance_checks.slow_roll(rolls, plan.speeds_rad_s)])  # fmt: skip
+    findings.gate([*(dwell_checks.of_signals(rolls, plan.max_lost, plan.max_speed_error) if slow else ()),
+                   *dwell_checks.slow_roll(rolls, plan.speeds_rad_s)])  # fmt: skip
     try:
         passage = read_passage(recording)
     except AnalysisError as error:

@@ -12,17 +12,21 @@ close to be told apart (3000 r/min is order 10 of 300), the shaft that stood bef
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from bench.analysis.tachometer import Tachometer
+from bench.findings import Effect, Finding
 from bench.recording import Recording
+from bench.uncertainty import interval
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.lift import PROBE
+from procedures.synchronous.checks import its_own
 from procedures.synchronous.dwells import SLOW, Array, Complex, Dwell
+from procedures.synchronous.estimates import Result
 
 FINER = 8  # points of the spectrum within a line of the slow roll, at least
 CLEAR = 7.0  # standard deviations of a component of the noise: exp(-7^2/2) for each of some thousand points, 1e-7 a run
@@ -150,3 +154,24 @@ def describe(line: Line) -> str:
     return (f"at slow roll {line.axis} reads a line of {line.size * 1e6:.3f} µm at {line.hz:.2f} Hz, over "
             f"{line.noise * 1e6:.3f} µm of noise, that does not turn with the shaft: suspect mains hum in probes or "
             "cables.")  # fmt: skip
+
+
+def of_dwells(found: Heard | None, results: Sequence[Result]) -> Iterator[Finding]:
+    """Dwells whose vectors a line may move by more than their expanded uncertainty."""
+    if found is None:
+        return
+    for r in results:
+        d = r.dwell
+        reach = REACH / duration(d)
+        turns = d.speed / (2 * math.pi)
+        known = [min(interval(r.estimates[name, a]).U for name in ("vector_cos", "vector_sin")) for a in d.machine.axes]
+        off = [(x.size * leak(d, x.hz), x) for x in found.lines(turns - reach, turns + reach)]
+        worst = max(off, key=lambda o: o[0] / known[o[1].probe], default=None)
+        if worst is None or worst[0] <= known[worst[1].probe]:
+            continue
+        size, line = worst
+        low, high = (60 * (line.hz + side * reach) for side in (-1, 1))
+        text = (f"{describe(line)} Here, at {turns:.2f} Hz, the vector may be off by {size * 1e6:.3f} µm, "
+                f"{size / known[line.probe]:.1f} times its U. Below {low:.0f} and above {high:.0f} r/min it is told "
+                "apart.")  # fmt: skip
+        yield Finding("hum", text, d.where, Effect.INDETERMINATE, its_own(d))

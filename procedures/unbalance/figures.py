@@ -12,8 +12,8 @@ from bench.figures import Figure, Series, Sheet, Shown
 from bench.rigfile import RigFile
 from bench.uncertainty import coverage_factor, interval
 from bench.units import RPM
-from procedures.unbalance.checks import ZONES
-from procedures.unbalance.estimates import Result, Results
+from procedures.synchronous.checks import ZONES
+from procedures.synchronous.estimates import Result, Results
 
 Y_DEG = 45.0  # both radial axes stand at 45 degrees to the vertical; where y stands, seen along the shaft
 SHOWN_TURNS = 4

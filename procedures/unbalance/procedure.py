@@ -21,14 +21,13 @@ from bench.rigfile import RigFile
 from procedures.amb_rotor import lift, wiring
 from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.shared import assumptions
-from procedures.synchronous import bearings, dwelling, fitting
+from procedures.synchronous import bearings, checks, dwelling, estimates, fitting
 from procedures.synchronous.coil_peaks import find_uncertified
 from procedures.synchronous.dwells import captured_channels, read_dwells, telemetry_channels
-from procedures.synchronous.hum import listen
-from procedures.unbalance import checks, estimates, sequence
+from procedures.synchronous.estimates import Results
+from procedures.synchronous.hum import listen, of_dwells
 from procedures.unbalance import figures as drawn
-from procedures.unbalance.estimates import Results
-from procedures.unbalance.hum import of_dwells
+from procedures.unbalance import sequence
 from procedures.unbalance.plan import Plan
 
 COSINE = Quantity(

@@ -27,14 +27,13 @@ from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, Influence, interval
 from procedures.amb_rotor.conventions import AMB_ROTOR, Flag
 from procedures.compensation import procedure as compensation
-from procedures.synchronous import dwells, runout
+from procedures.synchronous import checks, dwells, estimates, runout
+from procedures.synchronous import d_max as unbalance_d_max
 from procedures.synchronous.bearings import describe
 from procedures.synchronous.coil_peaks import blocks, find_uncertified
 from procedures.synchronous.dwells import SLOW, read_dwells
-from procedures.unbalance import checks, estimates
-from procedures.unbalance import d_max as unbalance_d_max
+from procedures.synchronous.estimates import Results
 from procedures.unbalance import procedure as unbalance
-from procedures.unbalance.estimates import Results
 from procedures.unbalance.procedure import check
 from reports.figures import draw as draw_figure
 from sim_backend.machines.amb5dof import truth_unbalance

@@ -16,8 +16,8 @@ from bench.recording import Recording
 from bench.units import RPM
 from procedures.shared import signals
 from procedures.synchronous.dwells import DWELL, SLOW, Dwell
+from procedures.synchronous.estimates import ForceBalance, Results
 from procedures.synchronous.fitting import PER_TURN, too_fast
-from procedures.unbalance.estimates import ForceBalance, Results
 
 HELD = 8  # samples in a row at an extreme: a probe that clips
 UNEXPLAINED = 0.1  # share of the forces that two unbalances leave over: a channel is not what its name says

@@ -18,10 +18,10 @@ from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.shared.certificates import certified
 from procedures.synchronous import coil_peaks, runout
 from procedures.synchronous.bearings import Known, collect_inputs
+from procedures.synchronous.d_max import farthest
 from procedures.synchronous.dwells import ORDERS, SLOW, Dwell
 from procedures.synchronous.nonsynchronous import beside_orders, folds
 from procedures.synchronous.runout import Stand, Turning
-from procedures.unbalance.d_max import farthest
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
