@@ -18,7 +18,11 @@ DIVISOR = {"rectangular": math.sqrt(3), "triangular": math.sqrt(6), "arcsine": m
 
 
 class Toleranced(Part):
-    """A number with what is known of its error: `u` (with its coverage factor `k`), or `half_width`. SI after reading."""
+    """A number with what is known of its error: `u` (with its coverage factor `k`), or `half_width`. SI after reading.
+
+    `id` is what budgets and calibrations know it by, where that is not its place in the file; `certificate` a key of
+    [certificates].
+    """
 
     value: float
     unit: str
@@ -27,6 +31,8 @@ class Toleranced(Part):
     half_width: float | None = Field(None, ge=0)
     distribution: Distribution
     source: str = Field(min_length=1)
+    id: str = Field("", pattern=r"^([\w.-]+(/[\w.-]+)+)?$")
+    certificate: str = ""
 
     @model_validator(mode="before")
     @classmethod
