@@ -18,6 +18,7 @@ from bench.samples import SampleBlock
 RIGS = Path(__file__).resolve().parent.parent / "rigs"
 TOML = (RIGS / "tsbs12.toml").read_text(encoding="utf-8")
 DBC = (RIGS / "tsbs12.dbc").read_text(encoding="utf-8")
+OF_LEVERS = ("lever_", "left =", "right =", "motor_to_", '"geometry/motor_to_')
 SPAN = 'amb_span = { value = 125.0, unit = "mm", u = 0.05, distribution = "normal", source = "certificate SIM-L-102" }'
 
 
@@ -26,6 +27,13 @@ def changed(text: str, *changes: tuple[str, str]) -> str:
         assert text.count(old) >= 1, old
         text = text.replace(old, new, 1)
     return text
+
+
+def of_schema_1(toml: str) -> str:
+    """One of the shipped rigs as schema 1 had it: without the tables of its machine."""
+    begin = toml.index("# The machine (docs")
+    end = min(toml.index(f"\n[{table}]\n") + 1 for table in ("masses", "sensors") if f"\n[{table}]\n" in toml)
+    return changed(toml[:begin] + toml[end:], ("schema = 2", "schema = 1"))
 
 
 def written(folder: Path, toml: str = TOML, dbc: str = DBC) -> str:
@@ -65,7 +73,7 @@ def test_the_shipped_rig_has_no_problem_and_is_si() -> None:
 
 def test_a_rig_may_have_no_lever_and_no_intervals(tmp_path: Path) -> None:
     """What only some procedures need is theirs to ask for; calibrations hold for a time that a table may state."""
-    plain = "\n".join(line for line in TOML.splitlines() if not line.startswith(("lever_", "motor_to_")))
+    plain = "\n".join(line for line in TOML.splitlines() if not line.startswith(OF_LEVERS))
     assert check_rig(written(tmp_path, plain))[0] == ()
     rig = RigFile.parse(TOML, DBC)
     assert rig.calibration.interval_days.get("amb-calibration", 365) == 365
@@ -85,6 +93,7 @@ def test_a_rig_on_which_nothing_hangs_needs_neither_hook_nor_hanger(tmp_path: Pa
         "M2 =",
         "M3 =",
         "M4 =",
+        "hook = {",
     )
     bare = "\n".join(line for line in TOML.splitlines() if not line.startswith(hung))
     assert check_rig(written(tmp_path, bare))[0] == ()
@@ -92,6 +101,7 @@ def test_a_rig_on_which_nothing_hangs_needs_neither_hook_nor_hanger(tmp_path: Pa
     assert (rig.hanger.value, rig.envelope.max_hung_kg) == (0, 0)
     with pytest.raises(InterlockError):
         Envelope(rig).check_load("M1")
+    bare = of_schema_1(bare)
     motorless = changed(
         bare,
         ('"levitation", "rotation"', '"levitation"'),
@@ -169,11 +179,11 @@ def test_a_rig_file_is_frozen() -> None:
         ('125.0, unit = "mm"', '125.0, unit = "furlong"', "geometry.amb_span.unit", "a known unit: one of 1, %"),
         ('125.0, unit = "mm"', '125.0, unit = "kg"', "geometry.amb_span.unit", "the kind of m"),
         ("125.0, unit", "nan, unit", "geometry.amb_span.value", "finite number"),
-        ("amb_span =", "amb_spam =", "geometry.amb_span", "AMB plane to AMB plane, with its certificate"),
+        ("amb_span =", "amb_spam =", "bearings.inboard.at.by", "a number, such as geometry/amb_spam"),
         ("amb_span =", "amb_spam =", "geometry.amb_spam", "did you mean amb_span?"),
-        ("value = 125.0", "value = 140.0", "geometry.amb_span.value", "within 1 mm of"),
+        ("value = 125.0", "value = 140.0", "geometry.com_to_inboard_amb.value", "130 mm from centre_of_mass to"),
         ("com_to_motor = { value = 122", "com_to_motor = { value = -122", "geometry.com_to_motor.value", "a positive"),
-        ("clearance = { value = 0.25", "clearance = { value = 0.6", "geometry.clearance.value", "less than amb_gap"),
+        ("clearance = { value = 0.25", "clearance = { value = 0.6", "geometry.clearance.value", "less than geometry/amb_gap"),
         ("M4 = { value = 3.0", "M4 = { value = 30.0", "masses.M4.value", "at most envelope.max_hung_kg"),
         ("M4 = { value = 3.0", "M4 = { value = -3.0", "masses.M4.value", "a positive mass"),
         ("default = 3, low = 0, high = 5", "default = 6, low = 0, high = 5", "parameters.bias_i.default", "0 to 5"),
@@ -281,16 +291,32 @@ def test_loading_names_every_problem_in_its_message(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("old", "new", "key", "expected"),
+    [
+        ("amb_span =", "amb_spam =", "geometry.amb_span", "AMB plane to AMB plane, with its certificate"),
+        ("amb_span =", "amb_spam =", "geometry.amb_spam", "did you mean amb_span?"),
+        ("value = 125.0", "value = 140.0", "geometry.amb_span.value", "within 1 mm of"),
+        ("clearance = { value = 0.25", "clearance = { value = 0.6", "geometry.clearance.value", "less than amb_gap"),
+    ],
+)
+def test_a_mistake_in_a_file_of_schema_1_has_its_old_name(
+    tmp_path: Path, old: str, new: str, key: str, expected: str
+) -> None:
+    found = problems(tmp_path, changed(of_schema_1(TOML), (old, new)))
+    assert expected in found[key].expected
+
+
+@pytest.mark.parametrize(
     ("schema", "message"),
     [
-        ("schema = 2", "schema: found 2; expected 1; it was written for a newer Levbench"),
-        ('schema = "1"', "schema: found '1'; expected 1"),
-        ("", "schema: found None; expected 1"),
-        ("schema = 0", "schema: found 0; no way from there to 1"),
+        ("schema = 3", "schema: found 3; expected 2; it was written for a newer Levbench"),
+        ('schema = "1"', "schema: found '1'; expected 2"),
+        ("", "schema: found None; expected 2"),
+        ("schema = 0", "schema: found 0; no way from there to 2"),
     ],
 )
 def test_another_schema_is_refused(tmp_path: Path, schema: str, message: str) -> None:
-    path = written(tmp_path, changed(TOML, ("schema = 1", schema)))
+    path = written(tmp_path, changed(TOML, ("schema = 2", schema)))
     with pytest.raises(ConfigError) as caught:
         load_rig(path)
     assert message in str(caught.value)
@@ -327,13 +353,13 @@ def test_an_older_schema_is_migrated_step_by_step(tmp_path: Path, monkeypatch: p
 
     monkeypatch.setattr(text, "SCHEMA", 3)
     monkeypatch.setattr(text, "MIGRATIONS", {1: renamed, 2: rounded})
-    rig = load_rig(written(tmp_path, changed(TOML, ('title = "Toothless', 'heading = "Toothless'))))
+    rig = load_rig(written(tmp_path, changed(of_schema_1(TOML), ('title = "Toothless', 'heading = "Toothless'))))
     assert rig.schema_ == 3
     assert rig.title.startswith("Toothless self-bearing")
     assert rig.title.endswith("!")
     monkeypatch.setattr(text, "MIGRATIONS", {1: renamed})
     with pytest.raises(ConfigError, match="found 2; no way from there to 3"):
-        load_rig(written(tmp_path))
+        load_rig(written(tmp_path, of_schema_1(TOML)))
 
 
 def test_an_unknown_rig_is_refused_with_the_known_ones() -> None:

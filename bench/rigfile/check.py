@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import difflib
+import math
 from collections.abc import Iterator
 
 from bench import units
@@ -13,40 +14,15 @@ from bench.rigfile.busload import BusLoad, bus_load
 from bench.rigfile.check_binding import find, fits, signal_at
 from bench.rigfile.check_binding import problems_of as problems_of_binding
 from bench.rigfile.check_capture import problems_of as problems_of_capture
+from bench.rigfile.check_machine import problems_of as problems_of_machine
+from bench.rigfile.check_numbers import MACHINE
+from bench.rigfile.check_numbers import problems_of as problems_of_numbers
 from bench.rigfile.messages import MessageMap
 from bench.rigfile.model import RigFile
 from bench.rigfile.possible import impossible
 from bench.rigfile.rest import rest_of
 from bench.rigfile.text import RigText, read_rig
 from bench.units import Unit
-
-GEOMETRY = {"amb_gap": "air gap of the radial AMBs", "clearance": "clearance of the touchdown bearings"}
-SHAFT_GEOMETRY = {
-    "amb_span": "AMB plane to AMB plane",
-    "com_to_outboard_amb": "centre of mass to outboard AMB",
-    "com_to_inboard_amb": "centre of mass to inboard AMB",
-    "com_to_outboard_sensor": "centre of mass to outboard sensors",
-    "com_to_inboard_sensor": "centre of mass to inboard sensors",
-}
-"""Of a shaft in two radial AMBs: a rig that states one of them states them all."""
-HOOK_GEOMETRY = {"hook_to_outboard": "hook plane to outboard AMB plane"}
-MOTOR_GEOMETRY = {"com_to_motor": "centre of mass to motor", "motor_stiffness": "negative stiffness of the motor"}
-"""Of a rig on which masses hang, and of one whose controller turns the rotor."""
-SOME_GEOMETRY = {
-    "motor_to_outboard_amb": "motor plane to outboard AMB plane",
-    "lever_left": "shaft axis to the left end of the lever",
-    "lever_right": "shaft axis to the right end of the lever",
-    "axial_gap": "air gap of the axial AMB",
-    "com_to_inboard_balance": "centre of mass to the inboard balancing plane",
-    "com_to_outboard_balance": "centre of mass to the outboard balancing plane",
-    "balance_radius": "shaft axis to where weights are fixed in the balancing planes",
-    "com_to_coupling": "centre of mass to the coupling of an external motor",
-    "coupling_stiffness": "radial stiffness of that coupling",
-}
-"""Lengths that a rig may have; the procedures that need one say so."""
-MACHINE = {"pole_pairs": "1", "polar_inertia": "kg m^2", "ring_inertia": "kg m^2", "amb_asymmetry": "1",
-           "radial_axes": "rad", "runout": "m", "coupling_offset": "m", "mass": "kg", "transverse_inertia": "kg m^2",
-           "weight_mass": "kg", "weight_angle": "rad", "drive_drag": "N m"}  # fmt: skip
 
 
 def check_rig(rig: str) -> tuple[tuple[Problem, ...], BusLoad | None]:
@@ -77,6 +53,7 @@ def _behind(text: RigText, problems: tuple[Problem, ...]) -> Iterator[Problem]:
     for p in problems_of(rest):
         first, *_ = p.key.split(".")
         judged_by_another = first == "site" and any(key.startswith("site.") for key in told)  # gravity by the latitude
+        judged_by_another |= p.found.strip("'").replace("/", ".") in entries  # who refers to a number that is left out
         if p.key not in told and ".".join(p.key.split(".")[:2]) not in entries and not judged_by_another:
             yield p
 
@@ -100,11 +77,12 @@ def problems_of(rig: RigFile) -> list[Problem]:
         *_devices(rig),
         *_links(rig),
         *_units(rig),
-        *_geometry(rig),
+        *problems_of_numbers(rig),
         *_masses(rig),
         *_envelope(rig),
         *_parameters(rig),
         *impossible(rig),
+        *(problems_of_machine(rig) if rig.written_in > 1 else ()),
     ]
     if not any(p.key.startswith("devices") for p in found):
         try:
@@ -182,33 +160,6 @@ def _is_si(unit: Unit) -> bool:
     return (unit.factor, unit.offset) == (1.0, 0.0)
 
 
-def _geometry(rig: RigFile) -> Iterator[Problem]:
-    g, needed = rig.geometry, dict(GEOMETRY)
-    needed |= SHAFT_GEOMETRY if SHAFT_GEOMETRY.keys() & g.keys() else {}
-    needed |= HOOK_GEOMETRY if rig.masses else {}
-    needed |= MOTOR_GEOMETRY if any("rotation" in d.roles for d in rig.devices.values()) else {}
-    for key in sorted(needed.keys() - g.keys()):
-        yield Problem(rig.path, f"geometry.{key}", "nothing", f"{needed[key]}, with its certificate")
-    for key in sorted(rig.machine.keys() - MACHINE.keys()):
-        yield Problem(rig.path, f"machine.{key}", "a number nobody asks for", f"one of {', '.join(MACHINE)}")
-    known = GEOMETRY | SHAFT_GEOMETRY | HOOK_GEOMETRY | MOTOR_GEOMETRY | SOME_GEOMETRY
-    for key in sorted(g.keys() - known.keys()):
-        close = difflib.get_close_matches(key, known, 1)
-        yield Problem(rig.path, f"geometry.{key}", "a length nobody asks for",
-                      f"did you mean {close[0]}?" if close else "no such key")  # fmt: skip
-    for key, length in g.items():
-        if length.value <= 0:
-            yield Problem(rig.path, f"geometry.{key}.value", f"{length.value:g} {length.unit}", "a positive number")
-    if {"com_to_inboard_amb", "com_to_outboard_amb", "amb_span"} <= g.keys():
-        span = g["com_to_inboard_amb"].value + g["com_to_outboard_amb"].value
-        if abs(span - g["amb_span"].value) > 1e-3:
-            yield Problem(rig.path, "geometry.amb_span.value", f"{g['amb_span'].value:g} m",
-                          f"within 1 mm of com_to_inboard_amb + com_to_outboard_amb = {span:g} m")  # fmt: skip
-    if {"clearance", "amb_gap"} <= g.keys() and g["clearance"].value >= g["amb_gap"].value:
-        yield Problem(rig.path, "geometry.clearance.value", f"{g['clearance'].value:g} m",
-                      f"less than amb_gap = {g['amb_gap'].value:g} m, or the journal strikes the AMB first")  # fmt: skip
-
-
 def _masses(rig: RigFile) -> Iterator[Problem]:
     if not rig.masses:
         return
@@ -222,7 +173,14 @@ def _masses(rig: RigFile) -> Iterator[Problem]:
 
 
 def _envelope(rig: RigFile) -> Iterator[Problem]:
-    """Channels that a rig file puts under protection by name exist; the ones it does not name are protected if they do."""
+    """What the machine has is bounded; channels that a rig file puts under protection by name exist."""
+    si = {units.UNITS[c.unit].si for c in rig.channels.values() if c.unit in units.UNITS}
+    roles = {role for device in rig.devices.values() for role in device.roles}
+    has = {"max_current_A": "A" in si, "max_temperature_K": "K" in si or "thermal" in roles,
+           "max_speed_rad_s": "speed" in rig.channels or "drive" in roles,
+           "max_levitated_position_m": "levitation" in roles}  # fmt: skip
+    for key in (key for key, there in has.items() if there and math.isinf(getattr(rig.envelope, key))):
+        yield Problem(rig.path, f"envelope.{key}", "nothing", "a value")
     if "positions" in rig.envelope.model_fields_set:
         for name in rig.envelope.positions:
             if name not in rig.channels:

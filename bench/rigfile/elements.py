@@ -12,8 +12,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from bench.rigfile.numbers import TAGS, Number
+from bench.rigfile.numbers import Reference
 from bench.rigfile.part import Part
+from bench.rigfile.toleranced import Toleranced
 
 ORIGIN = "origin"
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][\w-]*$")]
@@ -23,7 +24,7 @@ class From(Part):
     """A place counted from another element's: `by` is how far towards the far end."""
 
     from_: str = Field(alias="from")
-    by: Number
+    by: Toleranced | Reference
 
 
 class Of(Part):
@@ -33,26 +34,29 @@ class Of(Part):
     plus_deg: float = Field(ge=-360, le=360)
 
 
-def _place(value: Any) -> str:
-    return "a place" if isinstance(value, dict) and "from" in value else "a length"
-
-
-def _direction(value: Any) -> str:
-    return "a direction" if isinstance(value, dict) and "of" in value else "an angle"
-
-
-Place = Annotated[Annotated[From, Tag("a place")] | Annotated[Number, Tag("a length")], Discriminator(_place)]
-Direction = Annotated[
-    Annotated[Of, Tag("a direction")] | Annotated[Number, Tag("an angle")], Discriminator(_direction)
-]
-CHOICES = (*TAGS, "a place", "a length", "a direction", "an angle")
+FORMS = ("a number", "an identity", "a part")
 """What pydantic puts into the path of an error to say which form it took a value for."""
+
+
+def _form(value: Any) -> str:
+    if isinstance(value, str):
+        return FORMS[1]
+    named = isinstance(value, From | Of) or (isinstance(value, dict) and ("from" in value or "of" in value))
+    return FORMS[2] if named else FORMS[0]
+
+
+Stated = Annotated[Toleranced, Tag(FORMS[0])]
+Referred = Annotated[Reference, Tag(FORMS[1])]
+Number = Annotated[Stated | Referred, Discriminator(_form)]
+"""A number with its tolerance, or the identity of one."""
+Place = Annotated[Stated | Referred | Annotated[From, Tag(FORMS[2])], Discriminator(_form)]
+Direction = Annotated[Stated | Referred | Annotated[Of, Tag(FORMS[2])], Discriminator(_form)]
 
 
 class Shaft(Part):
     """What turns, or moves. `tilt` is how far its far end stands above the horizontal: 0 where it lies, 90 degrees where it
-    stands with the far end up. `sense`: which way the speed counts, -1 for clockwise from outside the far end. `ends`: from
-    where to where it reaches."""
+    stands with the far end up. `zero_at` says where directions have their 0 if that is not up. `sense`: which way the speed
+    counts, -1 for clockwise seen from outside the far end. `ends`: from where to where the shaft reaches."""
 
     mass: Number | None = None
     polar_inertia: Number | None = None
@@ -61,7 +65,7 @@ class Shaft(Part):
     far_end: str
     near_end: str = ""
     tilt: Number | None = None
-    zero: str = "up"
+    zero_at: str = "up"
     sense: Literal[-1, 1] = 1
     ends: tuple[Place, Place] | None = None
     runout: Number | None = None
@@ -111,8 +115,9 @@ class Mark(Part):
 
 
 class Ring(Part):
-    """A touchdown bearing; `clearance` is how far the centred shaft is from it. Without `at` it is an axial stop."""
+    """A touchdown bearing, or an axial stop; `clearance` is how far the centred shaft is from it."""
 
+    kind: Literal["radial", "axial"] = "radial"
     clearance: Number
     at: Place | None = None
 
@@ -131,7 +136,8 @@ class BalancingPlane(Part):
 
 
 class Coupling(Part):
-    """A flexible coupling to what turns the shaft: its radial stiffness, N/m, and where it is relaxed, m, off the rings' centre."""
+    """A flexible coupling to what turns the shaft: its radial stiffness, N/m; `offset` is how far off the rings' centre it
+    holds the shaft when it is relaxed, m."""
 
     at: Place
     stiffness: Number | None = None
@@ -190,7 +196,7 @@ class Certificate(Part):
     due: str = Field("", pattern=r"^(\d{4}-\d{2}-\d{2})?$")
 
 
-class Machine(Part):
+class MachineTables(Part):
     """The tables of a rig file that describe the machine; `spans` are lengths between two of its elements that were measured as
     such, by identity."""
 

@@ -6,6 +6,7 @@ The `[simulation]` table is parsed like the rest and read by the simulated backe
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Mapping
 from functools import cached_property, lru_cache
 from typing import Annotated, Any, Literal
@@ -16,10 +17,11 @@ from bench import units
 from bench.errors import ConfigError, Problem
 from bench.rigfile.binding import Binding
 from bench.rigfile.capture import CaptureSpec
+from bench.rigfile.elements import FORMS, MachineTables
 from bench.rigfile.messages import MessageMap, load_messages
 from bench.rigfile.part import Part
 from bench.rigfile.registers import Register
-from bench.rigfile.text import migrated, parse_text
+from bench.rigfile.text import SCHEMA, migrated, parse_text
 from bench.rigfile.toleranced import UNKNOWN_UNIT, Toleranced, simulated
 from bench.schema import expected_of
 
@@ -50,7 +52,7 @@ class LinkSpec(Part):
     heartbeat: Literal["process", "thread"] = "process"
 
 
-Role = Literal["levitation", "rotation", "operator", "drive", "supply", "thermal"]
+Role = Literal["levitation", "rotation", "motion", "operator", "drive", "supply", "thermal"]
 
 
 class Device(Part):
@@ -99,14 +101,14 @@ class Sensor(Part):
 
 
 class Envelope(Part):
-    """Protection range. `positions` are the channels that `max_levitated_position_m` bounds while the rotor is held; the
-    supply's voltage is bounded then too."""
+    """Protection range; what the machine does not have needs no limit. `positions` are the channels that
+    `max_levitated_position_m` bounds while the rotor is held; the supply's voltage is bounded then too."""
 
     max_hung_kg: float = Field(ge=0)
-    max_current_A: float = Field(gt=0)
-    max_speed_rad_s: float = Field(gt=0)
-    max_temperature_K: float = Field(gt=0)
-    max_levitated_position_m: float = Field(gt=0)
+    max_current_A: float = Field(math.inf, gt=0)
+    max_speed_rad_s: float = Field(math.inf, gt=0)
+    max_temperature_K: float = Field(math.inf, gt=0)
+    max_levitated_position_m: float = Field(math.inf, gt=0)
     max_trial_weight_kg: float = Field(0.0, ge=0)  # in a balancing plane
     max_injection_A: float = Field(0.0, ge=0)  # into the current reference of an axis, greatest value of the sum
     min_supply_V: float | None = Field(None, gt=0)
@@ -121,7 +123,7 @@ class CalibrationTable(Part):
     interval_days: Mapping[str, int] = {}
 
 
-class RigFile(Part):
+class RigFile(MachineTables):
     """A whole rig file. Lengths of `geometry` are distances, all positive. A rig without `masses` may leave out what
     belongs to them."""
 
@@ -134,13 +136,13 @@ class RigFile(Part):
     links: Mapping[str, LinkSpec]
     devices: Mapping[str, Device]
     channels: Mapping[str, Channel]
-    parameters: Mapping[str, Parameter]
-    geometry: Mapping[str, Toleranced]
+    parameters: Mapping[str, Parameter] = {}
+    geometry: Mapping[str, Toleranced] = {}
     masses: Mapping[str, Toleranced] = {}
     mass_density: Toleranced
     hanger: Toleranced
     hook_seat: Toleranced
-    sensors: Mapping[str, Sensor]
+    sensors: Mapping[str, Sensor] = {}
     machine: Mapping[str, Toleranced] = {}
     calibration: CalibrationTable = CalibrationTable()
     capture: CaptureSpec | None = None
@@ -150,6 +152,7 @@ class RigFile(Part):
     toml_text: str = Field("", exclude=True)
     dbc_text: str = Field("", exclude=True)
     path: str = Field("", exclude=True)
+    written_in: int = Field(SCHEMA, exclude=True)  # the schema that the text has
 
     @model_validator(mode="before")
     @classmethod
@@ -209,16 +212,18 @@ class RigFile(Part):
 @lru_cache(maxsize=8)
 def _parsed(toml_text: str, dbc_text: str, path: str) -> RigFile:
     """A rig file is frozen, and a chain of virtual runs reads the same one a dozen times."""
-    data = migrated(parse_text(toml_text, path), path)
+    stated = parse_text(toml_text, path)
+    data = migrated(stated, path)
+    around = {"toml_text": toml_text, "dbc_text": dbc_text, "path": path, "written_in": stated["schema"]}
     try:
-        return RigFile.model_validate({**data, "toml_text": toml_text, "dbc_text": dbc_text, "path": path})
+        return RigFile.model_validate({**data, **around})
     except ValidationError as error:
         problems = tuple(_problem(e, path) for e in error.errors(include_url=False))
         raise ConfigError(f"rig file {path} cannot be used:", problems) from error
 
 
 def _problem(error: Any, path: str) -> Problem:
-    key = ".".join(str(part) for part in error["loc"] if part != "schema_") or "(file)"
+    key = ".".join(str(part) for part in error["loc"] if part not in ("schema_", *FORMS)) or "(file)"
     if error["type"] == UNKNOWN_UNIT:
         return Problem(path, f"{key}.unit", repr(error["ctx"]["symbol"]), units.KNOWN)
     found = "nothing" if error["type"] == "missing" else repr(error.get("input"))

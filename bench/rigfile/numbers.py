@@ -10,20 +10,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Field
 
 from bench.rigfile.toleranced import Toleranced
 
 Reference = Annotated[str, Field(pattern=r"^-?\s*[\w.-]+(/[\w.-]+)*$")]
-TAGS = ("a number", "an identity")
-
-
-def _kind(value: Any) -> str:
-    return TAGS[1] if isinstance(value, str) else TAGS[0]
-
-
-Number = Annotated[Annotated[Toleranced, Tag(TAGS[0])] | Annotated[Reference, Tag(TAGS[1])], Discriminator(_kind)]
-"""A number with its tolerance, or the identity of one."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +63,9 @@ def numbers_in(tree: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, Tol
     elif isinstance(tree, Mapping):
         for name, branch in tree.items():
             yield from numbers_in(branch, (*path, str(name)))
+    elif isinstance(tree, tuple):
+        for k, branch in enumerate(tree):
+            yield from numbers_in(branch, (*path, str(k)))
     elif hasattr(type(tree), "model_fields"):
         for name, field in type(tree).model_fields.items():
             yield from numbers_in(getattr(tree, name), (*path, field.alias or name))

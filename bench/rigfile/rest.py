@@ -22,8 +22,7 @@ STAND_INS: Mapping[str, Any] = {
              "air_density": {"value": 1.2, "unit": "kg/m^3", **_SURE}},
     "mass_density": {"value": 8000, "unit": "kg/m^3", **_SURE}, "hanger": {"value": 1e-3, "unit": "kg", **_SURE},
     "hook_seat": {"value": 0, "unit": "m", **_SURE},
-    "envelope": {"max_hung_kg": 1e9, "max_current_A": 1e9, "max_speed_rad_s": 1e9, "max_temperature_K": 1e9,
-                 "max_levitated_position_m": 1.0},
+    "envelope": {"max_hung_kg": 1e9},
 }  # fmt: skip
 """What must be there: values that no other check objects to."""
 TABLES = ("uut", "site", "envelope")

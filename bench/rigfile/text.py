@@ -10,13 +10,14 @@ from typing import Any
 from bench import catalogue
 from bench.errors import ConfigError
 from bench.inputfile import TomlError, decoded, parse_toml, read_regular
+from bench.rigfile.migration import to_schema_2
 
-SCHEMA = 1
+SCHEMA = 2
 MOST_TOML = 1 << 20
 MOST_DBC = 16_000_000
 """Bytes of a rig file, and of its DBC wherever it lies."""
 
-MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
+MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {1: to_schema_2}
 """From an older schema to the next one."""
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -31,7 +31,7 @@ class Toleranced(Part):
     half_width: float | None = Field(None, ge=0)
     distribution: Distribution
     source: str = Field(min_length=1)
-    id: str = Field("", pattern=r"^([\w.-]+(/[\w.-]+)+)?$")
+    id: Annotated[str, Field(pattern=r"^([\w.-]+(/[\w.-]+)+)?$")] = ""
     certificate: str = ""
 
     @model_validator(mode="before")

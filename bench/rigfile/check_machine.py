@@ -1,0 +1,257 @@
+"""What is wrong with the machine that a rig file describes: places that contradict each other, axes that are no frame, numbers
+of the wrong kind, channels that are not there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from datetime import date
+from itertools import combinations
+from typing import Any
+
+from bench import units
+from bench.errors import Problem
+from bench.rigfile.elements import From, Of
+from bench.rigfile.model import RigFile
+from bench.rigfile.numbers import Sum, Term
+from bench.rigfile.places import CENTRE, PlaceError, Places
+from bench.rigfile.toleranced import Toleranced
+
+APART_M = 1e-3  # two bearings of a kind that are nearer are one, or a slip
+APART_RAD = math.radians(10)  # two axes of a bearing that are nearer leave a direction unheld
+AGREE = 3.0  # standard uncertainties of a span and of the places that it lies between, and
+AGREE_M = 1e-4  # what a drawing is rounded to
+KINDS = {"at": "m", "by": "m", "gap": "m", "clearance": "m", "radius": "m", "length": "m", "offset": "m", "runout": "m",
+         "centre_of_mass": "m", "ends": "m", "direction": "rad", "pull": "rad", "zero": "rad", "tilt": "rad",
+         "weight_angle": "rad", "misalignment": "rad", "mass": "kg", "weight_mass": "kg", "polar_inertia": "kg m^2",
+         "transverse_inertia": "kg m^2", "stiffness": "N/m", "asymmetry": "1", "pole_pairs": "1", "friction": "1"}  # fmt: skip
+POSITIVE = ("gap", "clearance", "radius", "length", "mass", "polar_inertia", "transverse_inertia")
+TABLES = (
+    "shaft",
+    "bearings",
+    "probes",
+    "mark",
+    "rings",
+    "balancing",
+    "coupling",
+    "hooks",
+    "levers",
+    "motors",
+    "encoders",
+)
+
+Found = tuple[str, str, str]
+
+
+def problems_of(rig: RigFile) -> Iterator[Problem]:
+    """All of the machine's tables at once."""
+    for key, found, expected in _all(rig):
+        yield Problem(rig.path, key, found, expected)
+
+
+def _all(rig: RigFile) -> Iterator[Found]:
+    places = Places(rig)
+    yield from places.problems()
+    yield from _numbers(rig, places)
+    yield from _channels(rig)
+    yield from _axes(rig)
+    yield from _certificates(rig)
+    for contradictions in (_apart, _parallel, _ends, _spans, _rings):
+        yield from contradictions(rig, places)
+
+
+def _numbers(rig: RigFile, places: Places) -> Iterator[Found]:
+    """Each is of the kind that is asked for there, and lengths that can only be positive are."""
+    for key, name, stated in (found for table in TABLES for found in _stated(getattr(rig, table), (table,))):
+        try:
+            term = places.number(stated, key)
+        except PlaceError as error:
+            if name not in ("at", "by", "direction", "pull", "ends", CENTRE):  # those are told by the places
+                yield error.key, error.found, error.expected
+            continue
+        if term.number.unit != KINDS[name]:
+            yield key, f"{term.identity} in {term.number.unit}", f"a unit of the kind of {KINDS[name]}"
+        elif name in POSITIVE and term.factor * term.number.value <= 0:
+            yield key, f"{term.factor * term.number.value:g} {term.number.unit}", "a positive number"
+
+
+def _stated(tree: Any, path: tuple[str, ...]) -> Iterator[tuple[str, str, Toleranced | str]]:
+    """Key, what it says and the number or reference, of all numbers in a table."""
+    if tree is None or isinstance(tree, Of):
+        return
+    if isinstance(tree, Toleranced) or (isinstance(tree, str) and path[-1] in KINDS):
+        yield ".".join(path), next(p for p in reversed(path) if p in KINDS), tree
+    elif isinstance(tree, From):
+        yield from _stated(tree.by, (*path, "by"))
+    elif isinstance(tree, tuple):
+        for k, entry in enumerate(tree):
+            yield from _stated(entry, (*path, str(k)) if isinstance(entry, Toleranced) else path)
+    elif hasattr(tree, "items"):
+        for name, entry in tree.items():
+            yield from _stated(entry, (*path, name))
+    elif hasattr(type(tree), "model_fields"):
+        for name in type(tree).model_fields:
+            yield from _stated(getattr(tree, name), (*path, name))
+
+
+def references_in(rig: RigFile) -> set[str]:
+    """Identities of the numbers that the machine's tables refer to."""
+    found = (stated for table in TABLES for _, _, stated in _stated(getattr(rig, table), (table,)))
+    return {text.removeprefix("-").strip() for text in found if isinstance(text, str)} | {*rig.spans}
+
+
+def _channels(rig: RigFile) -> Iterator[Found]:
+    """They are there, in a unit of the kind, and each is one thing only."""
+    taken: dict[str, str] = {}
+    for key, channel, si in _named(rig):
+        known = rig.channels.get(channel)
+        if known is None:
+            yield key, channel, "a channel of this rig"
+            continue
+        if known.unit in units.UNITS and units.UNITS[known.unit].si != si:
+            yield key, f"{channel} in {known.unit}", f"a channel in a unit of the kind of {si}"
+        if channel in taken:
+            yield key, channel, f"a channel of its own: it is that of {taken[channel]}"
+        taken.setdefault(channel, key)
+
+
+def _named(rig: RigFile) -> Iterator[Found]:
+    """Key, channel and SI unit."""
+    for b, bearing in rig.bearings.items():
+        for a, axis in bearing.axes.items():
+            yield from ((f"bearings.{b}.axes.{a}.coils", name, "A") for name in axis.coils)
+            yield from ((f"bearings.{b}.axes.{a}.voltages", name, "V") for name in axis.voltages)
+    yield from ((f"probes.{p}.channel", probe.channel, "m") for p, probe in rig.probes.items())
+    for m, motor in rig.motors.items():
+        yield from ((f"motors.{m}.currents", name, "A") for name in motor.currents)
+    for e, encoder in rig.encoders.items():
+        yield f"encoders.{e}.channel", encoder.channel, "rad" if encoder.measures == "angle" else "m"
+    if rig.mark is not None:
+        for name, si in (("angle", "rad"), ("speed", "rad/s"), ("pulses", "1"), ("edge", "s")):
+            if channel := getattr(rig.mark, name):
+                yield f"mark.{name}", channel, si
+
+
+def _axes(rig: RigFile) -> Iterator[Found]:
+    for b, bearing in rig.bearings.items():
+        if bearing.kind == "radial" and bearing.at is None:
+            yield f"bearings.{b}.at", "nothing", "where it is along the shaft"
+        for a, axis in bearing.axes.items():
+            key = f"bearings.{b}.axes.{a}.direction"
+            if bearing.kind == "radial" and axis.direction is None:
+                yield key, "nothing", "the angle around the shaft at which it pulls (docs/reference/angles.md)"
+            if bearing.kind == "axial" and axis.direction is not None:
+                yield key, "a direction", "none: an axial bearing pulls along the shaft"
+    for p, probe in rig.probes.items():
+        if probe.direction is not None and probe.at is None:
+            yield f"probes.{p}.at", "nothing", "where it is along the shaft"
+    needs = [name for name in ("bearings", "probes", "balancing", "hooks") if getattr(rig, name)]
+    if needs and rig.shaft is None:
+        yield "shaft", "nothing", f'[shaft] with far_end = "NAME": {needs[0]} are placed along it'
+
+
+def _certificates(rig: RigFile) -> Iterator[Found]:
+    for identity, number in Places(rig).known.items():
+        if number.certificate and number.certificate not in rig.certificates:
+            known = ", ".join(rig.certificates) or "(none)"
+            yield f"{identity.replace('/', '.')}.certificate", number.certificate, f"one of [certificates]: {known}"
+    for name, c in rig.certificates.items():
+        for key, text in (("date", c.date), ("due", c.due)):
+            if text and _day(text) is None:
+                yield f"certificates.{name}.{key}", text, "a day, as 2026-11-23"
+        day, due = _day(c.date), _day(c.due)
+        if day and due and due < day:
+            yield f"certificates.{name}.due", c.due, f"no day before its date, {c.date}"
+
+
+def _day(text: str) -> date | None:
+    try:
+        return date.fromisoformat(text)
+    except ValueError:
+        return None
+
+
+def _told(look: Callable[[Any], Sum], part: Any) -> Sum | None:
+    """None where it cannot be told, which is told elsewhere."""
+    try:
+        return look(part)
+    except PlaceError:
+        return None
+
+
+def _apart(rig: RigFile, places: Places) -> Iterator[Found]:
+    """Two bearings of a kind are not in one place."""
+    told = [(n, b.kind, _told(places.place, f"bearings/{n}")) for n, b in rig.bearings.items() if b.at is not None]
+    placed = [(name, kind, at.value) for name, kind, at in told if at is not None]
+    for (one, kind, a), (other, another, b) in combinations(placed, 2):
+        if kind == another and abs(a - b) < APART_M:
+            yield f"bearings.{other}.at", f"{b * 1e3:g} mm, where {one} is", "a place of its own"
+
+
+def _parallel(rig: RigFile, places: Places) -> Iterator[Found]:
+    """The axes of a bearing look in different directions."""
+    for bearing, part in rig.bearings.items():
+        told = [(axis, _told(places.direction, f"bearings/{bearing}/{axis}")) for axis in part.axes]
+        for (one, a), (other, b) in combinations([(axis, d.value) for axis, d in told if d is not None], 2):
+            if abs(math.sin(a - b)) < math.sin(APART_RAD):
+                yield (f"bearings.{bearing}.axes.{other}.direction", f"{math.degrees(b):g}°, along {one}",
+                       f"an axis that is {math.degrees(APART_RAD):g}° or more from parallel")  # fmt: skip
+
+
+def _ends(rig: RigFile, places: Places) -> Iterator[Found]:
+    """Nothing is beyond the shaft's ends."""
+    if rig.shaft is None or rig.shaft.ends is None:
+        return
+    near, far = (_told(places.end, k) for k in (0, 1))
+    if near is None or far is None:
+        return
+    low, high = near.value, far.value
+    if low >= high:
+        yield "shaft.ends", f"{low * 1e3:g} to {high * 1e3:g} mm", "the near end first"
+        return
+    for part in dict.fromkeys((CENTRE, *places.parts)):
+        at = _told(places.place, part)
+        if at is not None and not low <= at.value <= high:
+            key = f"shaft.{CENTRE}" if part == CENTRE else f"{part.replace('/', '.')}.at"
+            yield key, f"{at.value * 1e3:g} mm, beyond the shaft", f"{low * 1e3:g} to {high * 1e3:g} mm"
+
+
+def _spans(rig: RigFile, places: Places) -> Iterator[Found]:
+    """A length that was measured between two parts agrees with their places."""
+    for identity, (one, other) in rig.spans.items():
+        a, b, span = _told(places.place, one), _told(places.place, other), places.known.get(identity)
+        if a is None or b is None or span is None:
+            continue
+        between = b - a
+        if between.terms and all(t.identity == identity for t in between.terms):
+            continue
+        spread = math.hypot(span.standard_uncertainty, *(t.number.standard_uncertainty for t in between.terms))
+        if abs(abs(between.value) - span.value) > AGREE * spread + AGREE_M:
+            lengths = " and ".join(t.identity for t in between.terms)
+            yield (_value_of(identity), f"{span.value * 1e3:g} mm", f"{abs(between.value) * 1e3:g} mm from {one} to {other}, "
+                   f"which {lengths} give, within their tolerances")  # fmt: skip
+
+
+def _rings(rig: RigFile, places: Places) -> Iterator[Found]:
+    """The rings catch the shaft before it strikes a magnet."""
+    stated = [(f"bearings.{n}.gap", b.gap) for n, b in rig.bearings.items() if b.kind == "radial" and b.gap is not None]
+    gaps = [t for key, gap in stated for t in _terms(places, gap, key)]
+    least = min(gaps, key=lambda gap: gap.number.value, default=None)
+    rings = {t.identity: t.number.value for n, r in rig.rings.items() if r.kind == "radial"
+             for t in _terms(places, r.clearance, f"rings.{n}.clearance")}  # fmt: skip
+    for identity, clearance in rings.items():
+        if least is not None and clearance >= least.number.value:
+            yield (_value_of(identity), f"{clearance:g} m",
+                   f"less than {least.identity} = {least.number.value:g} m, or the journal strikes the AMB first")  # fmt: skip
+
+
+def _terms(places: Places, stated: Toleranced | str, key: str) -> tuple[Term, ...]:
+    """The number, or nothing where there is none of that identity."""
+    try:
+        return (places.number(stated, key),)
+    except PlaceError:
+        return ()
+
+
+def _value_of(identity: str) -> str:
+    return f"{identity.replace('/', '.')}.value"

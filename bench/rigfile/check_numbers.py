@@ -1,0 +1,77 @@
+"""The named numbers of a rig file, [geometry] and [machine]: names that something asks for, values that can be."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+
+from bench.errors import Problem
+from bench.rigfile.check_machine import references_in
+from bench.rigfile.model import RigFile
+
+GEOMETRY = {"amb_gap": "air gap of the radial AMBs", "clearance": "clearance of the touchdown bearings"}
+SHAFT_GEOMETRY = {
+    "amb_span": "AMB plane to AMB plane",
+    "com_to_outboard_amb": "centre of mass to outboard AMB",
+    "com_to_inboard_amb": "centre of mass to inboard AMB",
+    "com_to_outboard_sensor": "centre of mass to outboard sensors",
+    "com_to_inboard_sensor": "centre of mass to inboard sensors",
+}
+"""Of a shaft in two radial AMBs: a rig that states one of them states them all."""
+HOOK_GEOMETRY = {"hook_to_outboard": "hook plane to outboard AMB plane"}
+MOTOR_GEOMETRY = {"com_to_motor": "centre of mass to motor", "motor_stiffness": "negative stiffness of the motor"}
+"""Of a rig on which masses hang, and of one whose controller turns the rotor."""
+SOME_GEOMETRY = {
+    "motor_to_outboard_amb": "motor plane to outboard AMB plane",
+    "lever_left": "shaft axis to the left end of the lever",
+    "lever_right": "shaft axis to the right end of the lever",
+    "axial_gap": "air gap of the axial AMB",
+    "com_to_inboard_balance": "centre of mass to the inboard balancing plane",
+    "com_to_outboard_balance": "centre of mass to the outboard balancing plane",
+    "balance_radius": "shaft axis to where weights are fixed in the balancing planes",
+    "com_to_coupling": "centre of mass to the coupling of an external motor",
+    "coupling_stiffness": "radial stiffness of that coupling",
+}
+"""Lengths that a rig may have; the procedures that need one say so."""
+MACHINE = {"pole_pairs": "1", "polar_inertia": "kg m^2", "ring_inertia": "kg m^2", "amb_asymmetry": "1",
+           "radial_axes": "rad", "runout": "m", "coupling_offset": "m", "mass": "kg", "transverse_inertia": "kg m^2",
+           "weight_mass": "kg", "weight_angle": "rad", "drive_drag": "N m"}  # fmt: skip
+
+
+def problems_of(rig: RigFile) -> Iterator[Problem]:
+    """Names that are there for something, lengths that can be; of schema 1, which had no other place for them, all it asks."""
+    g, needed = rig.geometry, dict[str, str]()
+    if rig.written_in == 1:
+        needed |= GEOMETRY | (SHAFT_GEOMETRY if SHAFT_GEOMETRY.keys() & g.keys() else {})
+        needed |= HOOK_GEOMETRY if rig.masses else {}
+        needed |= MOTOR_GEOMETRY if any("rotation" in d.roles for d in rig.devices.values()) else {}
+    for key in sorted(needed.keys() - g.keys()):
+        yield Problem(rig.path, f"geometry.{key}", "nothing", f"{needed[key]}, with its certificate")
+    used = references_in(rig)
+    for key in sorted(rig.machine.keys() - MACHINE.keys()):
+        if f"machine/{key}" not in used:
+            yield Problem(rig.path, f"machine.{key}", "a number nobody asks for", f"one of {', '.join(MACHINE)}")
+    known = GEOMETRY | SHAFT_GEOMETRY | HOOK_GEOMETRY | MOTOR_GEOMETRY | SOME_GEOMETRY
+    for key in sorted(g.keys() - known.keys()):
+        if f"geometry/{key}" not in used:
+            close = difflib.get_close_matches(key, known, 1)
+            yield Problem(rig.path, f"geometry.{key}", "a length nobody asks for",
+                          f"did you mean {close[0]}?" if close else "no such key")  # fmt: skip
+    yield from _lengths(rig)
+
+
+def _lengths(rig: RigFile) -> Iterator[Problem]:
+    g = rig.geometry
+    for key, length in g.items():
+        if length.value <= 0:
+            yield Problem(rig.path, f"geometry.{key}.value", f"{length.value:g} {length.unit}", "a positive number")
+    if rig.written_in > 1:
+        return
+    if {"com_to_inboard_amb", "com_to_outboard_amb", "amb_span"} <= g.keys():
+        span = g["com_to_inboard_amb"].value + g["com_to_outboard_amb"].value
+        if abs(span - g["amb_span"].value) > 1e-3:
+            yield Problem(rig.path, "geometry.amb_span.value", f"{g['amb_span'].value:g} m",
+                          f"within 1 mm of com_to_inboard_amb + com_to_outboard_amb = {span:g} m")  # fmt: skip
+    if {"clearance", "amb_gap"} <= g.keys() and g["clearance"].value >= g["amb_gap"].value:
+        yield Problem(rig.path, "geometry.clearance.value", f"{g['clearance'].value:g} m",
+                      f"less than amb_gap = {g['amb_gap'].value:g} m, or the journal strikes the AMB first")  # fmt: skip
