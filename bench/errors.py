@@ -58,6 +58,14 @@ class ConfigError(BenchError):
         self.problems = problems
 
 
+class Lacking(ConfigError):
+    """What a rig does not have, by the tables of its file: `lines`."""
+
+    def __init__(self, *lines: str) -> None:
+        super().__init__("; ".join(lines))
+        self.lines = lines
+
+
 class LinkError(BenchError):
     """A link is lost, silent past its timeout, or delivers bytes that cannot be right."""
 

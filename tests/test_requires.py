@@ -10,6 +10,7 @@ from bench import catalogue
 from bench.cli.compose import load_procedure
 from bench.procedure import Procedure
 from bench.rigfile import RigFile, load_rig
+from bench.rigfile.check_machine import references_in
 
 OF = {
     "tsbs12": ("amb-calibration", "force-constant", "negative-stiffness", "force-coupling", "torque-constant", "spindown",
@@ -25,7 +26,7 @@ TABLES = ("channels", "sensors", "parameters", "geometry", "machine")
 def test_each_rig_can_run_its_procedures_and_no_others(rig: str) -> None:
     procedures = {entry.name: load_procedure(entry.name) for entry in catalogue.PROCEDURES}
     assert set(OF["tsbs12"]) | set(OF["amb5dof"]) == set(procedures)
-    assert tuple(n for n, p in procedures.items() if not p.requires.lacking(load_rig(rig))) == OF[rig]
+    assert tuple(n for n, p in procedures.items() if not p.lacking(load_rig(rig))) == OF[rig]
 
 
 def without(rig: RigFile, table: str, name: str) -> RigFile:
@@ -44,17 +45,18 @@ def without(rig: RigFile, table: str, name: str) -> RigFile:
 
 @pytest.mark.parametrize(("rig", "name"), PAIRS)
 def test_whatever_is_taken_away_is_named(rig: str, name: str) -> None:
-    requires, whole = load_procedure(name).requires, load_rig(rig)
+    procedure, whole = load_procedure(name), load_rig(rig)
+    requires = procedure.requires(whole)
     assert requires.channels
     for table in (f.name for f in fields(requires) if f.name != "masses"):
         for one in getattr(requires, table):
-            (said,) = requires.lacking(without(whole, table, one))
+            (said,) = procedure.lacking(without(whole, table, one))
             assert one in said
     if requires.masses:
-        (said,) = requires.lacking(whole.model_copy(update={"masses": {}}))
+        (said,) = procedure.lacking(whole.model_copy(update={"masses": {}}))
         assert said.startswith("masses")
     if requires.capture:
-        (said,) = requires.lacking(whole.model_copy(update={"capture": None}))
+        (said,) = procedure.lacking(whole.model_copy(update={"capture": None}))
         assert said.startswith("capture")
 
 
@@ -68,7 +70,10 @@ def test_a_plan_can_be_checked_with_what_is_declared(rig: str, name: str) -> Non
         "parameters": named,
         "machine": {"polar_inertia"} if name == "spindown" else set(),
     }  # else that of a ring
-    kept = {t: {*getattr(procedure.requires, t), *by_plan.get(t, ())} for t in TABLES}
+    referred = references_in(whole)  # what the tables of the machine are made of
+    kept = {t: {*getattr(procedure.requires(whole), t), *by_plan.get(t, ())} for t in TABLES}
+    for table in ("geometry", "machine"):
+        kept[table] |= {identity.partition("/")[2] for identity in referred if identity.startswith(f"{table}/")}
     bare = {t: {k: v for k, v in getattr(whole, t).items() if k in kept[t]} for t in TABLES}
     assert procedure.problems(whole.model_copy(update=bare), plan) == ()
 

@@ -46,7 +46,7 @@ def abilities(rig: RigFile, only: str = "") -> list[Ability]:
 
 
 def _ability(rig: RigFile, procedure: Procedure) -> Ability:
-    if lacking := procedure.requires.lacking(rig):
+    if lacking := procedure.lacking(rig):
         return Ability(procedure.name, lacking)
     problems: list[Problem] = []
     plan: BenchPlan | None = None

@@ -49,7 +49,7 @@ def calibrations_command(rig: str, calibrations: Path | None) -> int:
 
 def first_to_run(rig: RigFile) -> str:
     """The first procedure that the rig can run and whose calibration another one uses there; else the first that it can run."""
-    able = [p for p in map(load_procedure, (e.name for e in catalogue.PROCEDURES)) if not p.requires.lacking(rig)]
+    able = [p for p in map(load_procedure, (e.name for e in catalogue.PROCEDURES)) if not p.lacking(rig)]
     used = {need.procedure for p in able for need in p.needs(p.plan())}
     return next((p.name for p in able if p.name in used), able[0].name if able else "")
 

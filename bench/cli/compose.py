@@ -74,7 +74,7 @@ def planned(request: Request) -> tuple[Procedure, RigFile, BenchPlan]:
     _refuse_mixed_backends(request)
     procedure = load_procedure(request.procedure)
     rig = with_links(load_rig(request.rig), request.links)
-    if lacking := procedure.requires.lacking(rig):
+    if lacking := procedure.lacking(rig):
         raise ConfigError("\n  ".join([f"{rig.name} cannot run {procedure.name}; nothing was started:", *lacking]))
     defaults = (f"{rig.path} [plans.{procedure.name}]", rig.plans.get(procedure.name, {}))
     plan = plans.assemble(procedure.plan, defaults, request.plan_file, request.plan)

@@ -60,7 +60,7 @@ class Suite:
 
     def lacking(self, procedure: str) -> tuple[str, ...]:
         """What the rig lacks to run a procedure at all; nothing where it can."""
-        return load_procedure(procedure).requires.lacking(load_rig(self.asked.rig))
+        return load_procedure(procedure).lacking(load_rig(self.asked.rig))
 
     def run(self, procedure: str) -> RunResult:
         """Run a procedure, and before it what it needs and nobody has calibrated yet.
@@ -142,7 +142,7 @@ def by_procedure(assignments: Sequence[str], rig: str) -> dict[str, tuple[str, .
         key, _ = assignment(setting)
         if not given and not able:
             able = {e.name: load_procedure(e.name) for e in catalogue.PROCEDURES}
-            able = {n: p for n, p in able.items() if not p.requires.lacking(load_rig(rig))}
+            able = {n: p for n, p in able.items() if not p.lacking(load_rig(rig))}
         procedures = {given: load_procedure(given)} if given else able
         suited = [n for n, p in procedures.items() if _has(key, tuple(p.plan.model_fields))]
         if not suited:

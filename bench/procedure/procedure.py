@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from bench.errors import Lacking
 from bench.figures import Shown
 from bench.findings import Ended, Finding, Findings
 from bench.plan import BenchPlan
@@ -43,6 +44,10 @@ def _no_problems(_rig: RigFile, _plan: Any) -> Iterable[str]:
     return ()
 
 
+def _levitation(_: RigFile) -> Requires:
+    return Requires()
+
+
 def _no_settings(_: Any) -> Mapping[str, float]:
     return {}
 
@@ -73,11 +78,11 @@ class Evaluated:
 class Procedure:
     """A procedure. `acquire` moves the machine, `evaluate` is pure and sees only the closed file.
 
-    `requires` is what a rig must have, whatever the plan. `check` looks at a plan against a rig that has it, before anything
-    starts, and names what cannot work. `settings` are the controller parameters (SI) that the runner writes in READY, before
-    it levitates. `optional` of the measures are those that a sound machine may lack: not missing where no limit asks.
-    `step_count` is how many steps `acquire` will record, for the progress display; 0 is unknown. `fewest_steps` is how many a
-    run that goes to its end has at least, where these are fewer.
+    `requires` is what a rig must have, whatever the plan, by the names that its own file has. `check` looks at a plan against
+    a rig that has it, before anything starts, and names what cannot work. `settings` are the controller parameters (SI) that
+    the runner writes in READY, before it levitates. `optional` of the measures are those that a sound machine may lack: not
+    missing where no limit asks. `step_count` is how many steps `acquire` will record, for the progress display; 0 is unknown.
+    `fewest_steps` is how many a run that goes to its end has at least, where these are fewer.
     `evaluate` makes of a recording what all that follows needs, once, and tells its findings as it goes; it ends where one
     that is told at a gate is an error, and then nothing is measured nor drawn. Without it the recording itself is what
     follows needs. `measured` yields the quantities of it in the order of the report. `figures` come in the order in which
@@ -101,7 +106,7 @@ class Procedure:
     measured: Callable[[Any], Iterator[Measured | Finding]]
     evaluate: Callable[[Recording[Any], Findings], Any] = field(default=_as_recorded)
     figures: Callable[[Any, Recording[Any]], Iterable[Shown]] = field(default=_no_figures)
-    requires: Requires = field(default=Requires())
+    requires: Callable[[RigFile], Requires] = field(default=_levitation)
     check: Callable[[RigFile, Any], Iterable[str]] = field(default=_no_problems)
     settings: Callable[[Any], Mapping[str, float]] = field(default=_no_settings)
     step_count: Callable[[Any], int] = field(default=_unknown_count)
@@ -116,7 +121,14 @@ class Procedure:
 
     def problems(self, rig: RigFile, plan: Any) -> tuple[str, ...]:
         """What cannot work, found before anything starts: what the rig lacks, else what the plan asks too much of it."""
-        return self.requires.lacking(rig) or tuple(self.check(rig, plan))
+        return self.lacking(rig) or tuple(self.check(rig, plan))
+
+    def lacking(self, rig: RigFile) -> tuple[str, ...]:
+        """What the rig does not have, one line a table of its file; nothing where it can run the procedure."""
+        try:
+            return self.requires(rig).lacking(rig)
+        except Lacking as error:
+            return error.lines
 
     def evaluated(self, recording: Recording[Any]) -> Evaluated:
         """What `evaluate` makes of a recording and what it finds in it, made the first time it is asked for."""

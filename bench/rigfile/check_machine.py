@@ -103,8 +103,9 @@ def references_in(rig: RigFile) -> set[str]:
 def _channels(rig: RigFile) -> Iterator[Found]:
     """They are there, in a unit of the kind, and each is one thing only."""
     taken: dict[str, str] = {}
+    captured = {} if rig.capture is None else rig.capture.channels
     for key, channel, si in _named(rig):
-        known = rig.channels.get(channel)
+        known = rig.channels.get(channel) or captured.get(channel)
         if known is None:
             yield key, channel, "a channel of this rig"
             continue

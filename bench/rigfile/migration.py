@@ -21,7 +21,7 @@ def to_schema_2(data: Content) -> Content:
     """The content of a rig file of schema 1 with the tables of its machine; those that it has already are its own."""
     g, m, channels = (_table(data, name) for name in ("geometry", "machine", "channels"))
     made: Content = {"shaft": _shaft(m)}
-    made["bearings"] = _bearings(g, m, channels)
+    made["bearings"] = _bearings(g, m, {**_table(_table(data, "capture"), "channels"), **channels})
     made["probes"] = _probes(g, channels)
     made["mark"] = {key: key for key in ("angle", "speed", "pulses") if key in channels}
     made["rings"] = _rings(g)

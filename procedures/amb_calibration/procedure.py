@@ -33,7 +33,7 @@ from procedures.amb_calibration.hypotheses import Contradiction
 from procedures.amb_calibration.plan import Plan
 from procedures.amb_calibration.scatter import OUTPUTS, Scatter, covariance_by_angle, covariance_over_a_turn, scatter
 from procedures.amb_calibration.steps import AXES, VERTICAL, Hang, HangingData, channels, read_hangings
-from procedures.servomotor.conventions import SERVOMOTOR, Servomotor, conventions
+from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.servomotor.loads import certified_masses, certified_weighing, check_masses
 from procedures.shared import assumptions
 from procedures.shared.certificates import certified, certified_sensors
@@ -213,6 +213,19 @@ def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
     return drawn.all_figures(recording, a.data, a.fit, values)
 
 
+def requires(rig: RigFile) -> Requires:
+    """By the names that the rig's machine has."""
+    machine = conventions(rig)
+    return Requires(
+        roles=("levitation", "rotation"),
+        channels=(*channels(machine), "flags"),
+        sensors=machine.coils_of(*VERTICAL),
+        parameters=("bias_i", "bias_o", "angle_ref"),
+        geometry=("hook_to_outboard", "amb_span", "amb_gap", "com_to_motor", "motor_stiffness", *machine.levers),
+        masses=True,
+    )
+
+
 procedure = Procedure(
     name="amb-calibration",
     title="Force-current constants of the radial AMBs by hanging known masses",
@@ -223,14 +236,7 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=Requires(
-        roles=("levitation", "rotation"),
-        channels=(*channels(SERVOMOTOR), "flags"),
-        sensors=SERVOMOTOR.coils_of(*VERTICAL),
-        parameters=("bias_i", "bias_o", "angle_ref"),
-        geometry=("hook_to_outboard", "amb_span", "amb_gap", "com_to_motor", "motor_stiffness", *SERVOMOTOR.levers),
-        masses=True,
-    ),
+    requires=requires,
     check=check,
     settings=settings,
     step_count=step_count,

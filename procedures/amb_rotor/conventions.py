@@ -1,19 +1,21 @@
 """What an AMB rotor's stand calls its things: axes, planes, channels, the bits of its flags, its laws and parameters.
 
-A procedure asks for them once, `machine = conventions(rig)`, and hands them on; only what is declared before there is a rig
-(quantities by axis, requirements, defaults of plans) takes the one machine there is.
+A procedure asks for them once, `machine = conventions(rig)`, and hands them on: bearings, axes and channels are those of the
+rig file. Flags, laws and parameters are those of the one controller there is, AMB_ROTOR, which is also what a declaration
+takes that has no rig (quantities by axis, defaults of plans).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntFlag
 from functools import reduce
 from operator import or_
 from typing import Literal
 
 from bench.rigfile import RigFile
+from bench.rigfile.supports import axial_support, once_per_rig, two_planes
 
 Law = Literal["PID", "CCS", "CAC"]
 Variant = Literal["off", "corrected", "literal"]
@@ -35,8 +37,10 @@ class Flag(IntFlag):
 class AmbRotor:
     """The names of one machine.
 
-    `axes` are the four radial ones, in the order of every array of four, `axial` is the fifth. `planes` has by name where their
-    y and z stand among the axes; `rings` has by plane the flag of a touch there, `axial_stop` is that of the axial one.
+    `axes` are the four radial ones, in the order of every array of four, `axial` is the fifth. `planes` has by name where
+    their y and z stand among the axes; `rings` has by plane the flag of a touch there, `axial_stop` is that of the axial one.
+    By axis, `probes` has the channel of its position, `pulls` those of the currents that pull to its positive and to its
+    negative side, `coil_voltages` those of the same coils.
 
     Of the controller: `law` is the parameter that chooses among `laws`, by name the value it takes; `set_points` are the
     parameters by coordinate; `variants` the parameters that set how disturbances are compensated, with the estimator's `poles`;
@@ -47,6 +51,9 @@ class AmbRotor:
     axial: str
     planes: Mapping[str, tuple[int, int]]
     rings: Mapping[str, Flag]
+    probes: Mapping[str, str]
+    pulls: Mapping[str, tuple[str, str]]
+    coil_voltages: Mapping[str, tuple[str, str]]
     axial_stop: Flag
     current_limit: Flag
     voltage_limit: Flag
@@ -82,14 +89,9 @@ class AmbRotor:
         return tuple(map(self.position, self.all_axes))
 
     @property
-    def coils(self) -> tuple[str, ...]:
-        """Of the radial axes, in each the one that pulls to the positive side first."""
-        return tuple(f"{axis}_{side}" for axis in self.axes for side in "pn")
-
-    @property
     def currents(self) -> tuple[str, ...]:
-        """Channels of the radial coils' current sensors."""
-        return tuple(f"i_{coil}" for coil in self.coils)
+        """Channels of the radial coils' currents, of each axis the one that pulls to the positive side first."""
+        return tuple(name for axis in self.axes for name in self.pair(axis))
 
     @property
     def all_currents(self) -> tuple[str, ...]:
@@ -98,8 +100,10 @@ class AmbRotor:
 
     @property
     def voltages(self) -> tuple[str, ...]:
-        """Channels of the radial coils' voltages."""
-        return tuple(f"u_{coil}" for coil in self.coils)
+        """Channels of the radial coils' voltages; none where the rig does not tell them all."""
+        if not all(axis in self.coil_voltages for axis in self.axes):
+            return ()
+        return tuple(name for axis in self.axes for name in self.coil_voltages[axis])
 
     @property
     def model_parameters(self) -> tuple[str, ...]:
@@ -116,16 +120,18 @@ class AmbRotor:
         return {self.law: self.laws[law]}
 
     def along(self, direction: str) -> tuple[str, ...]:
-        """The axes along y, z (inboard, outboard) or x."""
-        return tuple(axis for axis in self.all_axes if axis[0] == direction)
+        """The axes along y, z (near end first) or x."""
+        if direction == "x":
+            return (self.axial,)
+        return tuple(self.axes[pair["yz".index(direction)]] for pair in self.planes.values())
 
     def position(self, axis: str) -> str:
         """Channel of an axis' position sensor."""
-        return f"pos_{axis}"
+        return self.probes[axis]
 
     def pair(self, axis: str) -> tuple[str, str]:
         """Channels of the currents that pull an axis to its positive and to its negative side."""
-        return f"i_{axis}_p", f"i_{axis}_n"
+        return self.pulls[axis]
 
     def model_beta(self, axis: str) -> str:
         """The parameter with the controller's force constant of an axis, N m^2/A^2."""
@@ -136,11 +142,15 @@ class AmbRotor:
         return f"model_offset_{axis}"
 
 
+_AXES = ("yi", "zi", "yo", "zo", "x")
 AMB_ROTOR = AmbRotor(
     axes=("yi", "zi", "yo", "zo"),
     axial="x",
     planes={"inboard": (0, 1), "outboard": (2, 3)},
     rings={"inboard": Flag.CONTACT_INBOARD, "outboard": Flag.CONTACT_OUTBOARD},
+    probes={axis: f"pos_{axis}" for axis in _AXES},
+    pulls={axis: (f"i_{axis}_p", f"i_{axis}_n") for axis in _AXES},
+    coil_voltages={axis: (f"u_{axis}_p", f"u_{axis}_n") for axis in _AXES},
     axial_stop=Flag.CONTACT_AXIAL,
     current_limit=Flag.CURRENT_LIMIT,
     voltage_limit=Flag.VOLTAGE_LIMIT,
@@ -162,7 +172,26 @@ AMB_ROTOR = AmbRotor(
 """The AMB stand of the thesis, rigs/amb5dof.dbc."""
 
 
+@once_per_rig
 def conventions(rig: RigFile) -> AmbRotor:
-    """What the rig's machine calls its things."""
-    del rig  # there is one such machine
-    return AMB_ROTOR
+    """What the rig's machine calls its things: two radial bearings, from the near end to the far one, and an axial one.
+
+    Raises:
+        Lacking: the rig has other bearings, or one of them without what belongs to an axis.
+    """
+    planes, axial = two_planes(rig), axial_support(rig)
+    axes = [axis for plane in planes for axis in plane.axes]
+    everywhere = [*axes, *([axial] if axial is not None else [])]
+    first, second, third, fourth = (axis.name for axis in axes)
+    return replace(
+        AMB_ROTOR,
+        axes=(first, second, third, fourth),
+        axial=axial.name if axial is not None else "",
+        planes={plane.name: (2 * k, 2 * k + 1) for k, plane in enumerate(planes)},
+        rings={plane.name: flag for plane, flag in zip(planes, AMB_ROTOR.rings.values(), strict=True)},
+        probes={axis.name: axis.position for axis in everywhere if axis.position},
+        pulls={axis.name: (axis.coils[0], axis.coils[1]) for axis in everywhere if len(axis.coils) == 2},
+        coil_voltages={
+            axis.name: (axis.voltages[0], axis.voltages[1]) for axis in everywhere if len(axis.voltages) == 2
+        },
+    )

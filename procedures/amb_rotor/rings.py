@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,34 @@ TOUCHES = 0.85  # of the clearance
 FRICTION = 0.15  # of a ring's force
 CLEARLY = 0.5  # of what another wiring leaves
 ALIKE_N = 0.5  # that two exchanges may differ by, both being named
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """Readings taken for each other: pairs of numbers of radial axes."""
+
+    swaps: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def kind(self) -> str:
+        """Of planes, of axes, or none."""
+        return "" if not self.swaps else "planes" if self.swaps[0][1] - self.swaps[0][0] == 2 else "axes"
+
+    @property
+    def order(self) -> tuple[int, ...]:
+        """Which reading each radial axis takes."""
+        order = list(range(4))
+        for a, b in self.swaps:
+            order[a], order[b] = order[b], order[a]
+        return tuple(order)
+
+    def told(self, axes: tuple[str, ...]) -> str:
+        """By the names of the axes."""
+        return " and ".join(f"{axes[a]} with {axes[b]}" for a, b in self.swaps)
+
+
+AS_WIRED = Exchange()
+EXCHANGES = (AS_WIRED, *map(Exchange, (((0, 2),), ((1, 3),), ((0, 2), (1, 3)), ((0, 1),), ((2, 3),), ((0, 1), (2, 3)))))
 
 
 def room(rig: RigFile) -> float:
@@ -110,43 +139,24 @@ def _of_lift(step: Step, fault: str, rig: RigFile) -> Finding:
     if len(last):
         read = np.array([data[name][last].mean() for name in machine.positions])
         p, n = (np.array([data[name][last].mean() for name in names]) for names in zip(*pairs, strict=True))
-        left = {names: unexplained(read[list(order)], p, n, rig) for names, order in exchanges().items()}
-        by_kind = {kind: min(left[e] for e in left if kind_of(e) == kind) for kind in ("planes", "axes", "")}
+        left = {e: unexplained(read[list(e.order)], p, n, rig) for e in EXCHANGES}
+        by_kind = {kind: min(left[e] for e in left if e.kind == kind) for kind in ("planes", "axes", "")}
         what, least = min(by_kind.items(), key=lambda kv: kv[1])
         if what and least < CLEARLY * min(v for kind, v in by_kind.items() if kind != what):
-            alike = [e for e in left if kind_of(e) == what and left[e] < least + ALIKE_N]
-            said = ", or ".join(" and ".join(e.split("+")).replace("-", " with ") for e in alike)
+            alike = [e for e in left if e.kind == what and left[e] < least + ALIKE_N]
+            said = ", or ".join(e.told(machine.axes) for e in alike)
             text = (
                 f"{text}. It lies against its rings where the coils and its weight press it if the readings of {said} are "
-                f"exchanged ({least:.1f} N unexplained, as wired {left['']:.1f} N): look at the probes, or the coils, of the "
-                f"two {what}."
+                f"exchanged ({least:.1f} N unexplained, as wired {left[AS_WIRED]:.1f} N): look at the probes, or the coils, "
+                f"of the two {what}."
             )
-            return Finding(f"{what}-exchanged", text, f"pos_{alike[0][:2]}", Effect.ERROR)
+            return Finding(f"{what}-exchanged", text, machine.positions[alike[0].swaps[0][0]], Effect.ERROR)
     return Finding("lift-lost", f"{text}; where it lies points to no exchange of probes.", "lift", Effect.ERROR)
-
-
-def kind_of(exchange: str) -> str:
-    """Of planes, of axes, or none."""
-    return "" if not exchange else "planes" if exchange[0] == exchange[3] else "axes"
 
 
 def recording_period(step: Step) -> float:
     """Of the telemetry, s."""
     return step.recording.streams["telemetry"].period_ns * 1e-9
-
-
-def exchanges() -> dict[str, tuple[int, ...]]:
-    """By name ("" for none), which reading each radial axis takes."""
-    yi, zi, yo, zo = range(4)
-    pairs = {"": (), "yi-yo": ((yi, yo),), "zi-zo": ((zi, zo),), "yi-yo+zi-zo": ((yi, yo), (zi, zo)), "yi-zi": ((yi, zi),),
-             "yo-zo": ((yo, zo),), "yi-zi+yo-zo": ((yi, zi), (yo, zo))}  # fmt: skip
-    out = {}
-    for name, swaps in pairs.items():
-        order = list(range(4))
-        for a, b in swaps:
-            order[a], order[b] = order[b], order[a]
-        out[name] = tuple(order)
-    return out
 
 
 def unexplained(read: Array, p: Array, n: Array, rig: RigFile) -> float:

@@ -27,7 +27,7 @@ from procedures.angle_step.plan import Plan
 from procedures.angle_step.response import Loop
 from procedures.angle_step.steps import STEP, Case, Done, cases, channels, positions, read_moves
 from procedures.servomotor import carrying, hold, segments, wiring
-from procedures.servomotor.conventions import SERVOMOTOR, conventions
+from procedures.servomotor.conventions import conventions
 from procedures.servomotor.direction import of_probe
 from procedures.shared import assumptions
 
@@ -153,6 +153,18 @@ def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     return drawn.all_figures(results.moves, results.by_case, recording.rig)
 
 
+def requires(rig: RigFile) -> Requires:
+    """By the names that the rig's machine has."""
+    machine = conventions(rig)
+    return Requires(
+        roles=("levitation", "rotation"),
+        channels=(*channels(machine), *wiring.channels(machine)),
+        sensors=positions(machine),
+        parameters=(*hold.PARAMETERS, *wiring.PARAMETERS, *NEEDED),
+        machine=("polar_inertia",),
+    )
+
+
 procedure = Procedure(
     name="angle-step",
     title="Angle step with the motor carrying the shaft: static and priority input transformation",
@@ -163,13 +175,7 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=Requires(
-        roles=("levitation", "rotation"),
-        channels=(*channels(SERVOMOTOR), *wiring.channels(SERVOMOTOR)),
-        sensors=positions(SERVOMOTOR),
-        parameters=(*hold.PARAMETERS, *wiring.PARAMETERS, *NEEDED),
-        machine=("polar_inertia",),
-    ),
+    requires=requires,
     check=check,
     settings=settings,
     step_count=step_count,

@@ -15,7 +15,7 @@ from bench.procedure.requires import Requires
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.units import RPM
-from procedures.amb_rotor.conventions import AMB_ROTOR
+from procedures.amb_rotor.conventions import conventions
 from procedures.balance import decision, estimates
 from procedures.balance.estimates import Balanced
 from procedures.balance.plan import Plan
@@ -48,16 +48,27 @@ NEEDED = (
 )
 
 
-REQUIRES = Requires(
-    roles=("levitation", "drive"),
-    channels=telemetry_channels(AMB_ROTOR),
-    sensors=(*AMB_ROTOR.positions, *AMB_ROTOR.currents),
-    parameters=(AMB_ROTOR.law, AMB_ROTOR.set_points["y"], AMB_ROTOR.set_points["theta"], "bias", "kp", "kd", *AMB_ROTOR.poles,
-                *AMB_ROTOR.model_parameters),
-    geometry=NEEDED,
-    machine=("mass", "transverse_inertia", "polar_inertia", "radial_axes", "runout", "weight_mass", "weight_angle"),
-    capture=captured_channels(AMB_ROTOR),
-)  # fmt: skip
+def requires(rig: RigFile) -> Requires:
+    """By the names that the rig's machine has."""
+    machine = conventions(rig)
+    return Requires(
+        roles=("levitation", "drive"),
+        channels=telemetry_channels(machine),
+        sensors=(*machine.positions, *machine.currents),
+        parameters=(
+            machine.law,
+            machine.set_points["y"],
+            machine.set_points["theta"],
+            "bias",
+            "kp",
+            "kd",
+            *machine.poles,
+            *machine.model_parameters,
+        ),
+        geometry=NEEDED,
+        machine=("mass", "transverse_inertia", "polar_inertia", "radial_axes", "runout", "weight_mass", "weight_angle"),
+        capture=captured_channels(machine),
+    )
 
 
 def of_plan(rig: RigFile, plan: Plan) -> Iterable[str]:

@@ -11,7 +11,6 @@ from bench.uncertainty import Estimate, Influence, coverage_factor, welch_satter
 from procedures.amb_rotor import magnetics
 from procedures.amb_rotor.conventions import AmbRotor
 from procedures.amb_rotor.places import Held
-from procedures.bearing_model.comparison import BEARINGS
 from procedures.bearing_model.estimates import Analysis
 from procedures.bearing_model.plan import Plan
 from procedures.shared import signals
@@ -79,7 +78,7 @@ def of_results(a: Analysis, plan: Plan) -> Iterator[Finding]:
                 "changed, or a sign is wrong (T Table 2.2 prints one that goes with gravity above zero)."
             )
             yield Finding("offset-against-load", text, axis, Effect.INDETERMINATE, (f"beta_{axis}", f"offset_{axis}"))
-    for end, where in BEARINGS.items():
+    for where, plane in a.held.machine.planes.items():
         ratio = min(a.estimates[f"{k}_{where}"].value for k in ("misfit_ratio", "misfit_ratio_means"))
         if ratio < plan.min_ratio:
             text = (
@@ -87,7 +86,7 @@ def of_results(a: Analysis, plan: Plan) -> Iterator[Finding]:
                 f"{plan.min_ratio:g} is expected: the offset does not show at this bias, or the nonlinear model fits no "
                 "better."
             )
-            axes = [name for name in a.held.machine.axes if name.endswith(end)]
+            axes = [a.held.machine.axes[k] for k in plane]
             doubted = tuple(
                 f"{q}_{name}" for q in ("beta", "offset") for name in axes
             )  # the ratio itself is what it is
@@ -134,7 +133,7 @@ def _adjustments(a: Analysis, plan: Plan) -> Iterator[Finding]:
                 f"adjusted ({plan.max_misfit:.1%} allowed), at {a.held.where(left)}. A position that was disturbed, or a "
                 "reading that is not proportional."
             )
-            place = BEARINGS[axis[-1]]
+            place = next(where for where, plane in a.held.machine.planes.items() if k in plane)
             doubted = (f"beta_{axis}", f"offset_{axis}", f"misfit_ratio@{place}", f"misfit_ratio_means@{place}")
             yield Finding("misfit", text, axis, Effect.INDETERMINATE, doubted)
     gap, drawing = a.adjusted.estimates["gap"], a.inputs["gap"]

@@ -15,11 +15,11 @@ import numpy.typing as npt
 
 from bench.uncertainty import Estimate, Influence
 from procedures.amb_rotor import magnetics
+from procedures.amb_rotor.conventions import AmbRotor
 from procedures.amb_rotor.magnetics import AxisFit, Statics
 from procedures.amb_rotor.places import Held
 
 Array = npt.NDArray[np.float64]
-BEARINGS = {"i": "inboard", "o": "outboard"}
 COMPARED = ("k_linear", "stiffness_linear", "misfit", "misfit_linear", "misfit_ratio", "misfit_ratio_means")
 
 
@@ -81,11 +81,11 @@ class Sums:
         return Estimate.of(value, noise)
 
 
-def by_bearing(e: dict[str, Estimate]) -> dict[str, Estimate]:
+def by_bearing(e: dict[str, Estimate], machine: AmbRotor) -> dict[str, Estimate]:
     """By AMB, as T Table 2.2: the linear model's slopes as means of both axes, sums of squares of both."""
     out = {}
-    for b, where in BEARINGS.items():
-        y, z = f"y{b}", f"z{b}"
+    for where, (first, second) in machine.planes.items():
+        y, z = machine.axes[first], machine.axes[second]
         for k in ("k_linear", "stiffness_linear"):
             out[f"{k}_{where}"] = (e[f"{k}_{y}"] + e[f"{k}_{z}"]) * 0.5
         total = {k: e[f"{k}_{y}"] + e[f"{k}_{z}"] for k in ("misfit", "misfit_linear", "quiet", "quiet_linear")}

@@ -72,7 +72,7 @@ def evaluate(recording: Recording[Any], held: Held) -> Analysis:
         sums = Sums.of(chosen, found.values, k, fits[a])
         estimates |= sums.estimates(a)
         noise[a] = sums.noise_N
-    estimates |= comparison.by_bearing(estimates)
+    estimates |= comparison.by_bearing(estimates, held.machine)
     return Analysis(held, s, compared, fits, inputs, found, estimates, noise, bias, len(chosen.of_step))
 
 
@@ -107,14 +107,15 @@ def fit_inputs(rig: RigFile, coupled: bool) -> dict[str, Estimate]:
         name = f"machine/coupling_offset/{d}"
         inputs[f"relaxed_{d}"] = certified(name, m["coupling_offset"], f"where the coupling is relaxed, {d}")
     for a in machine.axes:
-        sensor, name = rig.sensors[f"pos_{a}"], f"sensors/pos_{a}"
-        inputs[f"gain_{a}"] = certified(f"{name}/gain", sensor.gain, f"gain of pos_{a}")
-        inputs[f"zero_{a}"] = certified(f"{name}/offset", sensor.offset, f"zero of pos_{a}")
+        probe = machine.position(a)
+        inputs[f"gain_{a}"] = certified(f"sensors/{probe}/gain", rig.sensors[probe].gain, f"gain of {probe}")
+        inputs[f"zero_{a}"] = certified(f"sensors/{probe}/offset", rig.sensors[probe].offset, f"zero of {probe}")
         inputs[f"runout_{a}"] = certified(
-            f"machine/runout/{a}", m["runout"], f"runout of pos_{a} where the shaft rests"
+            f"machine/runout/{a}", m["runout"], f"runout of {probe} where the shaft rests"
         )
-    for c in machine.coils:
-        sensor, name = rig.sensors[f"i_{c}"], f"sensors/i_{c}"
-        inputs[f"gain_{c}"] = certified(f"{name}/gain", sensor.gain, f"gain of i_{c}")
-        inputs[f"offset_{c}"] = certified(f"{name}/offset", sensor.offset, f"offset of i_{c}")
+    for c, channel in ((f"{a}_{side}", channel) for a in machine.axes
+                       for side, channel in zip("pn", machine.pair(a), strict=True)):  # fmt: skip
+        sensor = rig.sensors[channel]
+        inputs[f"gain_{c}"] = certified(f"sensors/{channel}/gain", sensor.gain, f"gain of {channel}")
+        inputs[f"offset_{c}"] = certified(f"sensors/{channel}/offset", sensor.offset, f"offset of {channel}")
     return inputs

@@ -27,7 +27,7 @@ from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
 from procedures.amb_rotor.places import HOLD, LIFT, LIFT_LOST, REST, TILT, Held, channels, read_steps
 from procedures.bearing_model import checks, estimates, wiring
 from procedures.bearing_model import figures as drawn
-from procedures.bearing_model.comparison import BEARINGS, COMPARED
+from procedures.bearing_model.comparison import COMPARED
 from procedures.bearing_model.estimates import Analysis
 from procedures.bearing_model.plan import Plan
 from procedures.shared import assumptions
@@ -173,7 +173,7 @@ def measured(a: Analysis) -> Iterator[Measured]:
     for axis in a.held.machine.axes:
         yield BETA[axis].measured(a.estimates[f"beta_{axis}"])
         yield OFFSET[axis].measured(a.estimates[f"offset_{axis}"])
-    for where in BEARINGS.values():
+    for where in a.held.machine.planes:
         for name in COMPARED:
             yield OF_LINEAR[name].measured(a.estimates[f"{name}_{where}"], where)
 
@@ -220,6 +220,18 @@ def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
     return drawn.all_figures(a, recording.rig)
 
 
+def requires(rig: RigFile) -> Requires:
+    """By the names that the rig's machine has."""
+    machine = conventions(rig)
+    return Requires(
+        channels=channels(machine),
+        sensors=(*machine.positions, *machine.currents),
+        parameters=PARAMETERS,
+        geometry=GEOMETRY,
+        machine=MACHINE,
+    )
+
+
 procedure = Procedure(
     name="bearing-model",
     title="Force constants and magnetic offsets of the radial AMBs by eccentric positioning",
@@ -230,13 +242,7 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=Requires(
-        channels=channels(AMB_ROTOR),
-        sensors=(*AMB_ROTOR.positions, *AMB_ROTOR.currents),
-        parameters=PARAMETERS,
-        geometry=GEOMETRY,
-        machine=MACHINE,
-    ),
+    requires=requires,
     check=check,
     settings=settings,
     step_count=step_count,

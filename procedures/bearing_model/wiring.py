@@ -74,7 +74,7 @@ def _answers_as(machine: AmbRotor, k: int, j: int, sign: int) -> Finding:
     if j == k:
         text = f"{name} answers its set points backwards: the probe's polarity is wrong."
         return Finding("sensor-polarity", text, name, Effect.ERROR)
-    what = "planes" if machine.axes[j][0] == machine.axes[k][0] else "axes"
+    what = "planes" if j % 2 == k % 2 else "axes"
     text = (
         f"{name} answers as {other} should{' and backwards' if sign < 0 else ''}: "
         f"{what} are exchanged in the wiring or in the map."

@@ -13,6 +13,7 @@ from bench.errors import AnalysisError
 from bench.figures import Shown
 from bench.findings import Effect, Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
+from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
@@ -21,7 +22,7 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from bench.units import RPM
 from procedures.amb_rotor import lift
-from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
+from procedures.amb_rotor.conventions import conventions
 from procedures.compensation import checks, switching
 from procedures.compensation import figures as drawn
 from procedures.compensation.hum import of_switch
@@ -154,6 +155,12 @@ def figures(found: Compared, recording: Recording[Plan]) -> Iterable[Shown]:
     yield from unbalance_figures.all_figures(found.results, recording.rig)
 
 
+def requires(rig: RigFile) -> Requires:
+    """What the unbalance response needs, and a controller that compensates."""
+    needed = unbalance.requires(rig)
+    return replace(needed, parameters=(*needed.parameters, *conventions(rig).variants["corrected"]))
+
+
 procedure = Procedure(
     name="compensation",
     title="Compensation of unbalance: with and without it, and switched on",
@@ -164,7 +171,7 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=replace(unbalance.REQUIRES, parameters=(*unbalance.REQUIRES.parameters, *AMB_ROTOR.variants["corrected"])),
+    requires=requires,
     check=check,
     settings=settings,
     step_count=step_count,

@@ -29,7 +29,7 @@ from procedures.force_constant import checks, estimates, fit, load_at_rest
 from procedures.force_constant import figures as drawn
 from procedures.force_constant.estimates import AxisResult
 from procedures.force_constant.fit import TIME
-from procedures.force_constant.fitting import REQUIRES, check
+from procedures.force_constant.fitting import check, requires
 from procedures.force_constant.plan import Plan
 from procedures.force_constant.steps import AtLevel, RampData, read_ramps
 from procedures.servomotor.conventions import conventions
@@ -233,7 +233,7 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=REQUIRES,
+    requires=requires,
     check=check,
     settings=settings,
     step_count=step_count,

@@ -29,7 +29,7 @@ from procedures.force_coupling.estimates import Analysis
 from procedures.force_coupling.plan import Plan
 from procedures.force_coupling.steps import Phase
 from procedures.servomotor import carrying, checks
-from procedures.servomotor.conventions import SERVOMOTOR, Servomotor, conventions, radial_currents
+from procedures.servomotor.conventions import Servomotor, conventions, radial_currents
 from procedures.servomotor.steps import POSITIONS, channels, read_steps
 from procedures.shared import assumptions
 from procedures.shared.step_table import StepTable, record_step
@@ -145,6 +145,19 @@ def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
     return drawn.all_figures(a.data, a, recording.rig.machine["pole_pairs"].value)
 
 
+def requires(rig: RigFile) -> Requires:
+    """By the names that the rig's machine has."""
+    machine = conventions(rig)
+    return Requires(
+        roles=("levitation", "rotation"),
+        channels=(*channels(machine), "flags"),
+        sensors=(*machine.segments, *machine.positions_of(*POSITIONS)),
+        parameters=(*carrying.PARAMETERS, "gamma", "segment_max"),
+        geometry=GEOMETRY,
+        machine=("pole_pairs",),
+    )
+
+
 procedure = Procedure(
     name="force-coupling",
     title="Force coupling of the motor over the phase angle",
@@ -155,14 +168,7 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=Requires(
-        roles=("levitation", "rotation"),
-        channels=(*channels(SERVOMOTOR), "flags"),
-        sensors=(*SERVOMOTOR.segments, *SERVOMOTOR.positions_of(*POSITIONS)),
-        parameters=(*carrying.PARAMETERS, "gamma", "segment_max"),
-        geometry=GEOMETRY,
-        machine=("pole_pairs",),
-    ),
+    requires=requires,
     check=check,
     step_count=step_count,
     needs=needs,

@@ -31,7 +31,7 @@ from procedures.force_map.fit import ABOUT, UNITS
 from procedures.force_map.plan import Plan
 from procedures.force_map.steps import AtPoint, MapData, channels, positions, read_points
 from procedures.servomotor import carrying, hold, segments, wiring
-from procedures.servomotor.conventions import SERVOMOTOR, conventions
+from procedures.servomotor.conventions import conventions
 from procedures.servomotor.direction import of_probe
 from procedures.shared import assumptions
 from procedures.shared.step_table import record_step
@@ -197,6 +197,20 @@ def figures(found: tuple[MapData, Result], recording: Recording[Plan]) -> Iterab
     return force_map_figures.rig_figures(*found)
 
 
+def requires(rig: RigFile) -> Requires:
+    """By the names that the rig's machine has."""
+    machine = conventions(rig)
+    return Requires(
+        roles=("levitation", "rotation"),
+        channels=(*channels(machine), "flags", *wiring.channels(machine)),
+        sensors=(*machine.coils["yi"], *machine.segments, *positions(machine)),
+        parameters=(*hold.PARAMETERS, *wiring.PARAMETERS, *NEEDED),
+        geometry=GEOMETRY,
+        machine=("pole_pairs",),
+        masses=True,
+    )
+
+
 procedure = Procedure(
     name="force-map",
     title="Force map of the motor by displacement, currents and load",
@@ -207,15 +221,7 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=Requires(
-        roles=("levitation", "rotation"),
-        channels=(*channels(SERVOMOTOR), "flags", *wiring.channels(SERVOMOTOR)),
-        sensors=(*SERVOMOTOR.coils["yi"], *SERVOMOTOR.segments, *positions(SERVOMOTOR)),
-        parameters=(*hold.PARAMETERS, *wiring.PARAMETERS, *NEEDED),
-        geometry=GEOMETRY,
-        machine=("pole_pairs",),
-        masses=True,
-    ),
+    requires=requires,
     check=check,
     settings=settings,
     step_count=step_count,

@@ -30,7 +30,7 @@ from procedures.negative_stiffness.estimates import Analysis
 from procedures.negative_stiffness.plan import Plan
 from procedures.negative_stiffness.steps import Displaced, HeldByAmbs, HeldByMotor
 from procedures.servomotor import carrying, checks
-from procedures.servomotor.conventions import SERVOMOTOR, conventions, radial_currents
+from procedures.servomotor.conventions import conventions, radial_currents
 from procedures.servomotor.steps import POSITIONS, channels, read_steps
 from procedures.shared.step_table import StepTable, record_step
 
@@ -212,6 +212,19 @@ def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
     return drawn.all_figures(a, conventions(recording.rig), recording.plan)
 
 
+def requires(rig: RigFile) -> Requires:
+    """By the names that the rig's machine has."""
+    machine = conventions(rig)
+    return Requires(
+        roles=("levitation", "rotation"),
+        channels=(*channels(machine), "flags"),
+        sensors=(*machine.segments, *machine.coils["yo"], *machine.positions_of(*POSITIONS)),
+        parameters=(*carrying.PARAMETERS, "ref_yo", "bias_i", "bias_o", "segment_max"),
+        geometry=GEOMETRY,
+        machine=("pole_pairs",),
+    )
+
+
 procedure = Procedure(
     name="negative-stiffness",
     title="Negative stiffness of the motor by eccentric positioning",
@@ -222,14 +235,7 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=Requires(
-        roles=("levitation", "rotation"),
-        channels=(*channels(SERVOMOTOR), "flags"),
-        sensors=(*SERVOMOTOR.segments, *SERVOMOTOR.coils["yo"], *SERVOMOTOR.positions_of(*POSITIONS)),
-        parameters=(*carrying.PARAMETERS, "ref_yo", "bias_i", "bias_o", "segment_max"),
-        geometry=GEOMETRY,
-        machine=("pole_pairs",),
-    ),
+    requires=requires,
     check=check,
     settings=settings,
     step_count=step_count,

@@ -198,6 +198,16 @@ def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[F
     return drawn.all_figures(results)
 
 
+def requires(rig: RigFile) -> Requires:
+    """By the names that the rig's machine has."""
+    machine = conventions(rig)
+    return Requires(
+        channels=telemetry_channels(machine),
+        parameters=(*PARAMETERS, machine.law),
+        capture=(*LOOP, *PULSED, *machine.all_currents),
+    )
+
+
 procedure = Procedure(
     name="sensitivity",
     title="Sensitivity of the control loops",
@@ -208,11 +218,7 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=Requires(
-        channels=telemetry_channels(AMB_ROTOR),
-        parameters=(*PARAMETERS, AMB_ROTOR.law),
-        capture=(*LOOP, *PULSED, *AMB_ROTOR.all_currents),
-    ),
+    requires=requires,
     check=check,
     settings=settings,
     step_count=step_count,

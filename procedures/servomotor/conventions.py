@@ -1,20 +1,23 @@
 """What the servomotor's controller calls its signals, what the bits of its flags mean, and where the shaft's planes lie.
 
-Whatever looks at a recording or drives a rig gets them from `conventions(rig)` and names no signal by itself; only what a
-procedure declares before there is a rig (`requires`) names those of SERVOMOTOR.
+Whatever looks at a recording or drives a rig gets them from `conventions(rig)` and names no signal by itself: channels are
+those of the rig file. Flags are those of the one controller there is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntFlag
+from itertools import chain
 from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.rigfile import RigFile
+from bench.rigfile.supports import Support, SupportedAxis, once_per_rig, two_planes
 
 Array = npt.NDArray[np.float64]
 Value = TypeVar("Value", float, Array)
@@ -32,13 +35,13 @@ class Flag(IntFlag):
 
 @dataclass(frozen=True)
 class Servomotor:
-    """Signals by axis: "x" or "y" with the bearing, inboard "i" or outboard "o". `coils` has of each axis the one that pulls
-    towards the positive end first. `segments` in the order of T (6.9). `sensors` and `ambs` are the inboard and the outboard
-    lever from the centre of mass, by their names in the rig file's geometry. Then the flags by what they mean."""
+    """Signals by axis: "x" or, upwards, "y" with the bearing, inboard "i" or outboard "o". `coils` has of each axis the one
+    that pulls towards the positive end first. `segments` in the order of T (6.9). `sensors` and `ambs` are the inboard and
+    the outboard lever from the centre of mass, by their names in the rig file's geometry. Then the flags by what they mean."""
 
     positions: Mapping[str, str]
     coils: Mapping[str, tuple[str, str]]
-    segments: tuple[str, str, str, str]
+    segments: tuple[str, ...]
     sensors: tuple[str, str]
     ambs: tuple[str, str]
     amb_limit: int
@@ -79,24 +82,34 @@ class Servomotor:
         return sensor_share(z, l_is, l_os)
 
 
-_AXES = ("yi", "yo", "xi", "xo")
-SERVOMOTOR = Servomotor(
-    positions={axis: f"pos_{axis}" for axis in _AXES},
-    coils={axis: (f"i_{axis}_p", f"i_{axis}_n") for axis in _AXES},
-    segments=("i_m1", "i_m2", "i_m3", "i_m4"),
-    sensors=("com_to_inboard_sensor", "com_to_outboard_sensor"),
-    ambs=("com_to_inboard_amb", "com_to_outboard_amb"),
-    amb_limit=Flag.AMB_LIMIT,
-    segment_limit=Flag.SEGMENT_LIMIT,
-    contact_inboard=Flag.CONTACT_INBOARD,
-    contact_outboard=Flag.CONTACT_OUTBOARD,
-)
+ROLES = ("yi", "yo", "xi", "xo")
 
 
+@once_per_rig
 def conventions(rig: RigFile) -> Servomotor:
-    """Those of a rig."""
-    del rig  # there is one such machine so far
-    return SERVOMOTOR
+    """Those of a rig with two radial bearings: the one nearer to the near end is the inboard one.
+
+    Raises:
+        Lacking: the rig has other bearings, or one of them without what belongs to an axis.
+    """
+    axes = dict(chain.from_iterable(_of(plane, end) for end, plane in zip("io", two_planes(rig), strict=True)))
+    return Servomotor(
+        positions={role: axes[role].position for role in ROLES},
+        coils={role: (axes[role].coils[0], axes[role].coils[1]) for role in ROLES},
+        segments=next((m.currents for m in rig.motors.values() if "radial force" in m.gives), ()),
+        sensors=("com_to_inboard_sensor", "com_to_outboard_sensor"),
+        ambs=("com_to_inboard_amb", "com_to_outboard_amb"),
+        amb_limit=Flag.AMB_LIMIT,
+        segment_limit=Flag.SEGMENT_LIMIT,
+        contact_inboard=Flag.CONTACT_INBOARD,
+        contact_outboard=Flag.CONTACT_OUTBOARD,
+    )
+
+
+def _of(plane: Support, end: str) -> Iterator[tuple[str, SupportedAxis]]:
+    """The axes of a bearing by what they are here: y is the one that stands steeper."""
+    up = max(plane.axes, key=lambda axis: round(abs(math.cos(axis.direction)), 6))
+    return ((f"{'y' if axis is up else 'x'}{end}", axis) for axis in plane.axes)
 
 
 def sensor_share(z: float, l_is: float, l_os: float) -> float:

@@ -20,7 +20,7 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.servomotor import carrying, hold, segments, wiring
-from procedures.servomotor.conventions import SERVOMOTOR
+from procedures.servomotor.conventions import conventions
 from procedures.servomotor.direction import of_probe
 from procedures.shared import assumptions
 from procedures.slew import estimates, fit, steps
@@ -136,6 +136,17 @@ def figures(result: Result, recording: Recording[Plan]) -> Iterable[Figure]:
     return drawn.all_figures(result, recording.plan.detent_order)
 
 
+def requires(rig: RigFile) -> Requires:
+    """By the names that the rig's machine has."""
+    machine = conventions(rig)
+    return Requires(
+        roles=("levitation", "rotation"),
+        channels=(*channels(machine), *wiring.channels(machine)),
+        parameters=(*hold.PARAMETERS, *wiring.PARAMETERS, *NEEDED, "segment_max"),
+        machine=("polar_inertia",),
+    )
+
+
 procedure = Procedure(
     name="slew",
     title="Slewing: following a slow sine of the angle, with detent",
@@ -146,12 +157,7 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=Requires(
-        roles=("levitation", "rotation"),
-        channels=(*channels(SERVOMOTOR), *wiring.channels(SERVOMOTOR)),
-        parameters=(*hold.PARAMETERS, *wiring.PARAMETERS, *NEEDED, "segment_max"),
-        machine=("polar_inertia",),
-    ),
+    requires=requires,
     check=check,
     settings=settings,
     step_count=step_count,

@@ -21,7 +21,7 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from procedures.servomotor import hold
-from procedures.servomotor.conventions import SERVOMOTOR, conventions
+from procedures.servomotor.conventions import conventions
 from procedures.shared import assumptions
 from procedures.spindown import checks, estimates
 from procedures.spindown import figures as drawn
@@ -200,6 +200,17 @@ def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
     return drawn.all_figures(a.runs, a.angle, recording.plan.speed_rad_s)
 
 
+def requires(rig: RigFile) -> Requires:
+    """By the names that the rig's machine has."""
+    machine = conventions(rig)
+    return Requires(
+        roles=("levitation", "rotation"),
+        channels=channels(machine),
+        sensors=coils(machine),
+        parameters=(*hold.PARAMETERS, "bias_i", "bias_o", "speed_ref"),
+    )
+
+
 procedure = Procedure(
     name="spindown",
     title="Drag of the levitated rotor by spindown",
@@ -210,12 +221,7 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=Requires(
-        roles=("levitation", "rotation"),
-        channels=channels(SERVOMOTOR),
-        sensors=coils(SERVOMOTOR),
-        parameters=(*hold.PARAMETERS, "bias_i", "bias_o", "speed_ref"),
-    ),
+    requires=requires,
     check=check,
     settings=settings,
     step_count=step_count,

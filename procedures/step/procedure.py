@@ -21,7 +21,7 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from bench.units import RPM
-from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
+from procedures.amb_rotor.conventions import conventions
 from procedures.shared import assumptions
 from procedures.step import checks, estimates, planes
 from procedures.step import figures as drawn
@@ -226,6 +226,17 @@ def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     return drawn.all_figures(results.steps, results.by_case) if results.by_case else drawn.raw_figures(results.steps)
 
 
+def requires(rig: RigFile) -> Requires:
+    """By the names that the rig's machine has."""
+    machine = conventions(rig)
+    return Requires(
+        channels=channels(machine),
+        sensors=(*machine.all_positions, *machine.all_currents),
+        parameters=("slew", "model_rate", "model_l_is", "model_l_os"),
+        geometry=("clearance",),
+    )
+
+
 procedure = Procedure(
     name="step",
     title="Set-point steps of the levitated shaft",
@@ -237,12 +248,7 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=Requires(
-        channels=channels(AMB_ROTOR),
-        sensors=(*AMB_ROTOR.all_positions, *AMB_ROTOR.all_currents),
-        parameters=("slew", "model_rate", "model_l_is", "model_l_os"),
-        geometry=("clearance",),
-    ),
+    requires=requires,
     check=check,
     step_count=step_count,
     assumes=assumptions.STEP,

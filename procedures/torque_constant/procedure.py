@@ -24,7 +24,7 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate
 from procedures.servomotor import hold
-from procedures.servomotor.conventions import SERVOMOTOR, conventions
+from procedures.servomotor.conventions import conventions
 from procedures.servomotor.direction import of_probe
 from procedures.servomotor.loads import check_masses
 from procedures.shared import assumptions
@@ -211,6 +211,20 @@ def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
     return drawn.all_figures(recording, a.data, a.balance, a.detent, recording.rig.machine["pole_pairs"].value)
 
 
+def requires(rig: RigFile) -> Requires:
+    """By the names that the rig's machine has."""
+    machine = conventions(rig)
+    return Requires(
+        roles=("levitation", "rotation"),
+        channels=channels(machine),
+        sensors=machine.segments,
+        parameters=(*hold.PARAMETERS, "gamma", "i_x", "i_y", "i_ramp", "bias_i", "bias_o"),
+        geometry=tuple(f"lever_{s}" for s in SIDES),
+        machine=("pole_pairs",),
+        masses=True,
+    )
+
+
 procedure = Procedure(
     name="torque-constant",
     title="Torque constant of the motor over the phase angle by weights on a lever",
@@ -221,15 +235,7 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=Requires(
-        roles=("levitation", "rotation"),
-        channels=channels(SERVOMOTOR),
-        sensors=SERVOMOTOR.segments,
-        parameters=(*hold.PARAMETERS, "gamma", "i_x", "i_y", "i_ramp", "bias_i", "bias_o"),
-        geometry=tuple(f"lever_{s}" for s in SIDES),
-        machine=("pole_pairs",),
-        masses=True,
-    ),
+    requires=requires,
     check=check,
     settings=settings,
     step_count=step_count,

@@ -183,6 +183,12 @@ def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     return drawn.all_figures(results.orbits, facts)
 
 
+def requires(rig: RigFile) -> Requires:
+    """By the names that the rig's machine has."""
+    machine = conventions(rig)
+    return Requires(channels=channels(machine), sensors=machine.positions, parameters=PARAMETERS, geometry=LENGTHS)
+
+
 procedure = Procedure(
     name="tracking",
     title="Tracking: the centre of mass follows an ellipse",
@@ -193,9 +199,7 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=Requires(
-        channels=channels(AMB_ROTOR), sensors=AMB_ROTOR.positions, parameters=PARAMETERS, geometry=LENGTHS
-    ),
+    requires=requires,
     check=check,
     settings=settings,
     step_count=step_count,

@@ -19,7 +19,7 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.amb_rotor import lift, wiring
-from procedures.amb_rotor.conventions import AMB_ROTOR
+from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
 from procedures.shared import assumptions
 from procedures.synchronous import bearings, checks, dwelling, estimates, fitting
 from procedures.synchronous.coil_peaks import find_uncertified
@@ -107,15 +107,18 @@ def measured(results: Results) -> Iterator[Measured]:
                 yield known[name].measured(estimate, f"{place}, {result.dwell.where}" if place else result.dwell.where)
 
 
-REQUIRES = Requires(
-    roles=("levitation", "drive"),
-    channels=telemetry_channels(AMB_ROTOR),
-    sensors=(*AMB_ROTOR.positions, *AMB_ROTOR.currents),
-    parameters=(*PARAMETERS, *AMB_ROTOR.variants["off"], *AMB_ROTOR.poles, *AMB_ROTOR.model_parameters),
-    geometry=LENGTHS,
-    machine=("mass", "transverse_inertia", "polar_inertia", "radial_axes", "runout"),
-    capture=captured_channels(AMB_ROTOR),
-)
+def requires(rig: RigFile) -> Requires:
+    """By the names that the rig's machine has."""
+    machine = conventions(rig)
+    return Requires(
+        roles=("levitation", "drive"),
+        channels=telemetry_channels(machine),
+        sensors=(*machine.positions, *machine.currents),
+        parameters=(*PARAMETERS, *machine.variants["off"], *machine.poles, *machine.model_parameters),
+        geometry=LENGTHS,
+        machine=("mass", "transverse_inertia", "polar_inertia", "radial_axes", "runout"),
+        capture=captured_channels(machine),
+    )
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
@@ -142,7 +145,7 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=REQUIRES,
+    requires=requires,
     check=check,
     settings=settings,
     step_count=step_count,

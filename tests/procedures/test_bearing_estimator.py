@@ -13,7 +13,7 @@ from bench.uncertainty import Estimate, Influence
 from procedures.amb_rotor import magnetics
 from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.amb_rotor.magnetics import Positions
-from procedures.amb_rotor.rings import exchanges, of_readings, unexplained
+from procedures.amb_rotor.rings import EXCHANGES, of_readings, unexplained
 from procedures.bearing_model.adjustment import Adjusted, adjust
 
 GAP, BETA, BIAS = 5.25e-4, 6.95e-7, 1.0
@@ -32,8 +32,9 @@ PLANE = {
     "relaxed_z": 0.0,
     "gap": GAP,
 }
+COILS = tuple(f"{a}_{side}" for a in AMB_ROTOR.axes for side in "pn")
 SOUND = (PLANE | {f"{k}_{a}": v for a in AMB_ROTOR.axes for k, v in (("gain", 1.0), ("zero", 0.0), ("runout", 0.0))}
-         | {f"{k}_{c}": v for c in AMB_ROTOR.coils for k, v in (("gain", 1.0), ("offset", 0.0))})  # fmt: skip
+         | {f"{k}_{c}": v for c in COILS for k, v in (("gain", 1.0), ("offset", 0.0))})  # fmt: skip
 PLACES = np.array(
     [(y, z) for y in np.linspace(-80e-6, 80e-6, 9) for z in np.linspace(-80e-6, 80e-6, 9) if math.hypot(y, z) < 82e-6]
 ).T
@@ -220,7 +221,7 @@ def test_where_a_failed_lift_presses_the_shaft_tells_the_exchange() -> None:
     rig = load_rig("amb5dof")
     p, n = np.array([0.0, 1.0, 2.0, 1.0]), np.array([2.0, 1.0, 0.0, 1.0])
     truth = np.array([-99e-6, -10e-6, 99e-6, 3e-6])
-    left = {name: unexplained(truth[list(order)], p, n, rig) for name, order in exchanges().items()}
+    left = {e.told(("yi", "zi", "yo", "zo")): unexplained(truth[list(e.order)], p, n, rig) for e in EXCHANGES}
     assert left[""] < 0.5
     assert min(left, key=lambda k: left[k]) == ""
-    assert left["yi-yo"] > 4
+    assert left["yi with yo"] > 4

@@ -9,11 +9,12 @@ import pytest
 
 from bench.findings import Effect
 from bench.rigfile import load_rig
-from procedures.servomotor.conventions import SERVOMOTOR
+from procedures.servomotor.conventions import conventions
 from procedures.spindown import checks, estimates, fit
 from procedures.spindown.plan import Plan
 from procedures.spindown.steps import ANGLE_LAGS, SPEED_LAGS, RunDown, coils
 
+MACHINE = conventions(load_rig("tsbs12"))
 J, COUNT = 0.033, 2 * np.pi / 4096
 
 
@@ -30,7 +31,7 @@ def made(
     seen = speed_scale * ((fit.speed(t, rate, c, start) + c / rate) * scale - c / rate) + 0.01 * rng.normal(size=len(t))
     return RunDown(
         bias, direction, repeat, False, t, seen, angle - angle[0], fit.of_speed(t, seen, SPEED_LAGS),
-        fit.of_angle(t, angle - angle[0], ANGLE_LAGS), dict.fromkeys(coils(SERVOMOTOR), bias), np.zeros(4), 0, 1000, 0,
+        fit.of_angle(t, angle - angle[0], ANGLE_LAGS), dict.fromkeys(coils(MACHINE), bias), np.zeros(4), 0, 1000, 0,
     )  # fmt: skip
 
 
@@ -41,7 +42,7 @@ def sound() -> list[RunDown]:
 def codes(runs: list[RunDown]) -> set[str]:
     rig, plan = load_rig("tsbs12"), Plan()
     angle, speed = (estimates.evaluate(runs, rig, m, 3.0, 4.0) for m in ("angle", "speed"))
-    found = [*checks.of_runs(runs, SERVOMOTOR, plan), *checks.of_result(runs, angle, speed, plan)]
+    found = [*checks.of_runs(runs, MACHINE, plan), *checks.of_result(runs, angle, speed, plan)]
     return {f.code for f in found if f.effect is not Effect.NOTE}
 
 
