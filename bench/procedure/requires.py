@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 class Requires:
     """Names that the rig file must have: roles of its devices, channels, sensors with certificates, parameters of the
     controller, lengths and stiffnesses of `geometry`, numbers of `machine`, channels that the controller can `capture` in its
-    own memory, and, with `masses`, certified ones to hang."""
+    own memory, and, with `masses`, certified ones to hang. `lacks` is what else was found missing, a line each."""
 
     roles: tuple[str, ...] = ("levitation",)
     channels: tuple[str, ...] = ()
@@ -24,6 +24,7 @@ class Requires:
     machine: tuple[str, ...] = ()
     capture: tuple[str, ...] = ()
     masses: bool = False
+    lacks: tuple[str, ...] = ()
 
     def lacking(self, rig: RigFile) -> tuple[str, ...]:
         """What the rig does not have, one line a table; nothing where it can run the procedure."""
@@ -49,3 +50,4 @@ class Requires:
                 yield f"{table}: found no {', '.join(missing)}"
         if self.masses and not rig.masses:
             yield "masses: found none; expected certified masses to hang"
+        yield from self.lacks

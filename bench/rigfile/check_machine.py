@@ -119,6 +119,8 @@ def _channels(rig: RigFile) -> Iterator[Found]:
 def _named(rig: RigFile) -> Iterator[Found]:
     """Key, channel and SI unit."""
     for b, bearing in rig.bearings.items():
+        if bearing.voltage:
+            yield f"bearings.{b}.voltage", bearing.voltage, "V"
         for a, axis in bearing.axes.items():
             yield from ((f"bearings.{b}.axes.{a}.coils", name, "A") for name in axis.coils)
             yield from ((f"bearings.{b}.axes.{a}.voltages", name, "V") for name in axis.voltages)

@@ -83,13 +83,14 @@ class Axis(Part):
 
 
 class Bearing(Part):
-    """A magnetic bearing. `gap` is its air gap, m; `bias` names the parameter that sets it."""
+    """A magnetic bearing. `gap` is its air gap, m; `voltage` the channel of its greatest coil voltage."""
 
     kind: Literal["radial", "axial"]
     at: Place | None = None
     gap: Number | None = None
     axes: Mapping[Name, Axis] = Field(min_length=1)
     asymmetry: Number | None = None
+    voltage: str = ""
 
 
 class Probe(Part):

@@ -64,10 +64,12 @@ def _bearings(g: Content, m: Content, channels: Content) -> Content:
                 for a in (first, second) if f"i_{a}{letter}_p" in channels}  # fmt: skip
         if axes and f"com_to_{end}_amb" in g:
             out[end] = {"kind": "radial", "at": _at_bearing(end, g), "axes": axes, **_refer("gap", "geometry/amb_gap", g),
-                        **_refer("asymmetry", "machine/amb_asymmetry", m)}  # fmt: skip
+                        **_refer("asymmetry", "machine/amb_asymmetry", m),
+                        **({"voltage": f"u_{letter}"} if f"u_{letter}" in channels else {})}  # fmt: skip
     if f"i_{axial}_p" in channels:
         out["axial"] = {"kind": "axial", "axes": {axial: _coils(axial, channels)},
-                        **_refer("gap", "geometry/axial_gap", g)}  # fmt: skip
+                        **_refer("gap", "geometry/axial_gap", g),
+                        **({"voltage": f"u_{axial}"} if f"u_{axial}" in channels else {})}  # fmt: skip
     return out
 
 

@@ -48,11 +48,12 @@ class SupportedAxis:
 
 @dataclass(frozen=True)
 class Support:
-    """A magnetic bearing; `at` its place along the shaft, m."""
+    """A magnetic bearing; `at` its place along the shaft, m; `voltage` the channel of its greatest coil voltage, if told."""
 
     name: str
     at: float
     axes: tuple[SupportedAxis, ...]
+    voltage: str = ""
 
 
 def radial_supports(rig: RigFile) -> tuple[Support, ...]:
@@ -110,7 +111,7 @@ def _radial(rig: RigFile, places: Places, name: str) -> Support:
         way = places.direction(f"bearings/{name}/{axis}").value
         probe = _nearest(rig, places, looking, name, way)
         axes.append(SupportedAxis(axis, name, way, a.coils, a.voltages, probe))
-    return Support(name, at, tuple(axes))
+    return Support(name, at, tuple(axes), rig.bearings[name].voltage)
 
 
 def _nearest(rig: RigFile, places: Places, looking: dict[str, Probe], bearing: str, way: float) -> str:

@@ -40,7 +40,8 @@ class AmbRotor:
     `axes` are the four radial ones, in the order of every array of four, `axial` is the fifth. `planes` has by name where
     their y and z stand among the axes; `rings` has by plane the flag of a touch there, `axial_stop` is that of the axial one.
     By axis, `probes` has the channel of its position, `pulls` those of the currents that pull to its positive and to its
-    negative side, `coil_voltages` those of the same coils.
+    negative side, `coil_voltages` those of the same coils. `plane_voltages` are the channels of the greatest coil voltage of
+    each plane, none where they are not told.
 
     Of the controller: `law` is the parameter that chooses among `laws`, by name the value it takes; `set_points` are the
     parameters by coordinate; `variants` the parameters that set how disturbances are compensated, with the estimator's `poles`;
@@ -54,6 +55,7 @@ class AmbRotor:
     probes: Mapping[str, str]
     pulls: Mapping[str, tuple[str, str]]
     coil_voltages: Mapping[str, tuple[str, str]]
+    plane_voltages: tuple[str, ...]
     axial_stop: Flag
     current_limit: Flag
     voltage_limit: Flag
@@ -151,6 +153,7 @@ AMB_ROTOR = AmbRotor(
     probes={axis: f"pos_{axis}" for axis in _AXES},
     pulls={axis: (f"i_{axis}_p", f"i_{axis}_n") for axis in _AXES},
     coil_voltages={axis: (f"u_{axis}_p", f"u_{axis}_n") for axis in _AXES},
+    plane_voltages=("u_i", "u_o"),
     axial_stop=Flag.CONTACT_AXIAL,
     current_limit=Flag.CURRENT_LIMIT,
     voltage_limit=Flag.VOLTAGE_LIMIT,
@@ -183,6 +186,7 @@ def conventions(rig: RigFile) -> AmbRotor:
     axes = [axis for plane in planes for axis in plane.axes]
     everywhere = [*axes, *([axial] if axial is not None else [])]
     first, second, third, fourth = (axis.name for axis in axes)
+    told = tuple(plane.voltage for plane in planes)
     return replace(
         AMB_ROTOR,
         axes=(first, second, third, fourth),
@@ -194,4 +198,5 @@ def conventions(rig: RigFile) -> AmbRotor:
         coil_voltages={
             axis.name: (axis.voltages[0], axis.voltages[1]) for axis in everywhere if len(axis.voltages) == 2
         },
+        plane_voltages=told if all(told) else (),
     )

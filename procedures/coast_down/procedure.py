@@ -14,7 +14,6 @@ from procedures.coast_down.plan import Plan
 from procedures.run_up import procedure as run_up
 from procedures.shared import assumptions
 from procedures.synchronous import bearings
-from procedures.unbalance import procedure as unbalance
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
@@ -36,7 +35,7 @@ procedure = Procedure(
     evaluate=run_up.evaluate,
     measured=run_up.measured,
     figures=run_up.figures,
-    requires=unbalance.requires,
+    requires=run_up.requires,
     check=run_up.check,
     settings=run_up.settings,
     step_count=run_up.step_count,

@@ -7,12 +7,14 @@ critical speeds, their amplification factors, and how far they stand off the run
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Any
 
 from bench.errors import AnalysisError, BenchError
 from bench.figures import Shown
 from bench.findings import Effect, Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
+from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording import Recording
@@ -207,6 +209,13 @@ def figures(run: Run, recording: Recording[Any]) -> Iterable[Shown]:
     return drawn.all_figures(run, recording.rig, recording.plan.running_rad_s)
 
 
+def requires(rig: RigFile) -> Requires:
+    """What the unbalance response needs, and the greatest coil voltage of each bearing."""
+    needed, told = unbalance.requires(rig), conventions(rig).plane_voltages
+    lacks = () if told else ("bearings: found a radial one without the voltage channel of its coils",)
+    return replace(needed, channels=(*needed.channels, *told), lacks=lacks)
+
+
 procedure = Procedure(
     name="run-up",
     title="Run-up of the levitated shaft",
@@ -217,7 +226,7 @@ procedure = Procedure(
     evaluate=evaluate,
     measured=measured,
     figures=figures,
-    requires=unbalance.requires,
+    requires=requires,
     check=check,
     settings=settings,
     step_count=step_count,

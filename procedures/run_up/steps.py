@@ -27,7 +27,6 @@ Integers = npt.NDArray[np.int64]
 PASSAGE = "passage"
 MISSED = "capture-missed"
 DRIVEN = "drive_actual_speed"
-VOLTAGES = ("u_i", "u_o")
 LEAST_TURNS = 4  # of a block
 TOGETHER = 8  # blocks of equal turns
 ENDS = 0.004  # of the way, left out at either end: there the drive begins and ends its ramp
@@ -96,7 +95,7 @@ def read_passage(recording: Recording[Any]) -> Passage:
         raise AnalysisError("found no passage through the speeds; expected one (was the run stopped early?)")
     step, tick, machine = steps[0], recording.rig.devices["controller"].tick_s, conventions(recording.rig)
     names = (*machine.positions, *machine.currents)
-    data = step.read(*telemetry_channels(machine), *VOLTAGES)
+    data = step.read(*telemetry_channels(machine), *machine.plane_voltages)
     t = (data["t_ns"] - recording.start_ns) * 1e-9
     if t.size < 100:
         raise AnalysisError(f"passage: found {t.size} samples; expected 100 or more")
@@ -112,7 +111,7 @@ def read_passage(recording: Recording[Any]) -> Passage:
         Sampling(tick, ticks, tick),
         t,
         wide,
-        np.array([data[c] for c in VOLTAGES]),
+        np.array([data[c] for c in machine.plane_voltages]),
         data["flags"].astype(np.int64),
         ((drive["t_ns"] - recording.start_ns) * 1e-9, drive[DRIVEN]),
         _moving(tacho.speed(t)),

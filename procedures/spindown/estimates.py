@@ -11,7 +11,7 @@ mean over the directions, and half of the difference of c is that torque over J.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -110,6 +110,7 @@ def evaluate(runs: Sequence[RunDown], rig: RigFile, method: str, bias_A: float, 
         name: {c: float(np.mean([r.coils[c] for r in members])) for c in members[0].coils}
         for name, members in groups.items()
     }
+    pairs = conventions(rig).coils.values()
 
     def model(p: dict[str, float]) -> dict[str, float]:
         inertia, c = p.get("inertia", 0.0), p["c_low"]
@@ -117,7 +118,7 @@ def evaluate(runs: Sequence[RunDown], rig: RigFile, method: str, bias_A: float, 
         if "ring" in found:
             inertia = out["J_z"] = inertia_from_ring(p["b_low"], p["b_ring"], p["ring"])
             c = (c + (1 + p["ring"] / inertia) * p["c_ring"]) / 2
-        q = {name: _square(currents[name], p) for name in ("low", "high")}
+        q = {name: _square(currents[name], pairs, p) for name in ("low", "high")}
         slope = (p["b_high"] - p["b_low"]) / (q["high"] - q["low"])
         at = {
             k: inertia * (p["b_low"] + slope * (bias**2 - q["low"]))
@@ -169,8 +170,7 @@ def _type_a(group: str, method: str, r: Rates) -> dict[str, Estimate]:
     return {f"b_{group}": b, f"c_{group}": c}
 
 
-def _square(currents: Mapping[str, float], p: Mapping[str, float]) -> float:
+def _square(currents: Mapping[str, float], pairs: Collection[tuple[str, str]], p: Mapping[str, float]) -> float:
     """Mean over the four radial axes of the squared mean current of both coils, A^2, freed of the sensors' errors."""
     true = {c: (i - p[f"offset_{c}"]) / p[f"gain_{c}"] for c, i in currents.items()}
-    axes = {c[:-2] for c in true}
-    return math.fsum(((true[f"{a}_p"] + true[f"{a}_n"]) / 2) ** 2 for a in axes) / len(axes)
+    return math.fsum(((true[one] + true[other]) / 2) ** 2 for one, other in pairs) / len(pairs)

@@ -17,6 +17,7 @@ from bench.wire.isotp import Sender, TransferError
 from bench.wire.packet import LIMIT, MESSAGE, PAYLOAD_LIMIT
 from sim_backend.controller.capture_memory import CaptureMemory, Order
 from sim_backend.controller.ownership import Ownership
+from sim_backend.spoken import reading_of
 
 TICK_NS = 100_000
 BAUDRATE = 3_000_000  # of a serial port that does not say
@@ -36,7 +37,8 @@ class CapturePort:
 
     def __init__(self, rig: RigFile, messages: MessageMap, names: Sequence[str]) -> None:
         assert rig.capture is not None
-        self.memory = CaptureMemory(rig.capture, names)
+        called = {reading_of(rig, channel): channel for channel in rig.capture.channels}
+        self.memory = CaptureMemory(rig.capture, [called.get(name, name) for name in names])
         self._capacity = rig.capture.memory_bytes
         self._map = messages
         self._spacing = {"CaptureBlock": _can_ns(rig), "CaptureData": _serial_ns(rig)}

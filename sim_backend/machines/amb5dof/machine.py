@@ -15,6 +15,7 @@ from sim_backend.machines.amb5dof.operator import Balancer
 from sim_backend.machines.amb5dof.params import AmbParams, runout
 from sim_backend.machines.amb5dof.plant import AXES, CHANNELS, COILS, TRACE, AmbPlant
 from sim_backend.machines.amb5dof.quantities import quantities
+from sim_backend.spoken import channels_by_reading
 
 Array = npt.NDArray[np.float64]
 Numbers = Mapping[str, float]
@@ -57,9 +58,11 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
     for name in ("machine.weight_mass", "machine.weight_angle"):  # drawn for each weight that is fixed
         out.pop(name, None)
     out |= dict.fromkeys(("coupling_offset_y", "coupling_offset_z"), out.pop("machine.coupling_offset"))
+    channel = channels_by_reading(rig)
     read = [f"u_{coil}" for coil in COILS if f"u_{coil}" in rig.sensors]
     for name in (*read, *(f"i_{coil}" for coil in COILS), *(f"pos_{axis}" for axis in AXES)):
-        out |= {f"{name}.gain": rig.sensors[name].gain, f"{name}.offset": rig.sensors[name].offset}
+        sensor = rig.sensors[channel.get(name, name)]
+        out |= {f"{name}.gain": sensor.gain, f"{name}.offset": sensor.offset}
     for name, value in rig.simulation.items():
         if isinstance(value, Toleranced):
             out |= dict.fromkeys(SHARED.get(name, (name,)), value)

@@ -16,6 +16,7 @@ from sim_backend.machines.tsbs import quantities as of
 from sim_backend.machines.tsbs.operator import SimulatedOperator
 from sim_backend.machines.tsbs.params import PlantParams, beta_of
 from sim_backend.machines.tsbs.plant import CHANNELS, Plant
+from sim_backend.spoken import channels_by_reading
 
 AXES = ("xi", "yi", "xo", "yo", "z")
 COILS = tuple(f"i_{axis}_{coil}" for axis in AXES for coil in "pn")
@@ -44,13 +45,14 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
         out[f"amb_gap_{b}"] = rig.geometry["amb_gap"]
         if "amb_asymmetry" in rig.machine:
             out[f"asymmetry_{b}"] = rig.machine["amb_asymmetry"]
-    currents = [s for name, s in rig.sensors.items() if name.startswith("i_")]
+    channel = channels_by_reading(rig)
+    currents = [s for s in rig.sensors.values() if s.offset.unit == "A"]
     for coil in (*COILS, *SEGMENTS):
-        sensor = rig.sensors.get(coil, currents[0])
+        sensor = rig.sensors.get(channel.get(coil, coil), currents[0])
         out |= {f"{coil}.gain": sensor.gain, f"{coil}.offset": sensor.offset}
     out |= {f"drift_{k}": rig.simulation["drift"] for k in range(len(COILS))}
     for axis in AXES:
-        certified = rig.sensors.get(f"pos_{axis}")
+        certified = rig.sensors.get(channel.get(f"pos_{axis}", f"pos_{axis}"))
         out[f"position_gain_{axis}"] = certified.gain if certified else rig.simulation["position_gain"]
         out[f"position_offset_{axis}"] = certified.offset if certified else rig.simulation["position_offset"]
     for k in range(4):
