@@ -17,5 +17,5 @@ class Plan(tiny_procedures.Plan):
 
 procedure: Any = dataclasses.replace(
     tiny_procedures.levitated, name="tiny-lacking", plan=Plan,
-    requires=Requires(roles=("levitation", "winch"), channels=("supply", "pos_zi")),
+    requires=lambda _: Requires(roles=("levitation", "winch"), channels=("supply", "pos_zi")),
 )  # fmt: skip
