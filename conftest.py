@@ -35,6 +35,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--rig", metavar="RIG", help="a rig file, or its name in rigs/")
     group.addoption("--backend", choices=("sim", "live"), default="sim", help="the simulated rig, or the real one")
     group.addoption("--seed", type=int, help="which virtual rig (simulation only)")
+    group.addoption("--visit", type=int, help="the same virtual rig on which day (simulation only)")
     group.addoption("--plan", action="append", default=[], metavar="[PROCEDURE:]KEY=VALUE",
                     help="a setting, of one procedure or of each that has it; repeatable")  # fmt: skip
     group.addoption("--fault", action="append", default=[], metavar="FAULT", help="a fault to inject; repeatable")
@@ -85,6 +86,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
             xml.add_global_property(f"levbench.{name}", str(config.getoption(f"--{name}")))
         if suite.seed is not None:
             xml.add_global_property("levbench.seed", str(suite.seed))
+            xml.add_global_property("levbench.visit", str(suite.visit))
         xml.add_global_property("levbench.version", __version__)
         xml.add_global_property("python", sys.version.split()[0])
 
@@ -99,6 +101,7 @@ def _suite(config: pytest.Config, folder: Path) -> Suite:
         rig=option("--rig"),
         backend=option("--backend"),
         seed=option("--seed"),
+        visit=option("--visit"),
         faults=tuple(option("--fault")),
         out=option("--out"),
         report=not option("--no-report"),
@@ -113,8 +116,8 @@ def _suite(config: pytest.Config, folder: Path) -> Suite:
 def inject(tmp_path: Path) -> Callable[..., RunResult]:
     """Runs a procedure on the simulated rig while faults happen: `inject("stall@12", procedure="amb-calibration")`.
 
-    Further keywords are those of `bench.cli.compose.Request`: `rig`, `seed`, `plan`, `truth`, `backend`, `links`. The run
-    directory lies in `tmp_path`; what comes back is a `bench.run.runner.RunResult`.
+    Further keywords are those of `bench.cli.compose.Request`: `rig`, `seed`, `visit`, `plan`, `truth`, `backend`, `links`.
+    The run directory lies in `tmp_path`; what comes back is a `bench.run.runner.RunResult`.
     """
     from bench.cli.compose import Request
     from bench.cli.run import execute
@@ -157,7 +160,7 @@ class ProcedureItem(pytest.Item):
                 self.result = suite.run(self.name)
         except BenchError as error:
             pytest.fail(str(error), pytrace=False)  # in the set-up: an error
-        self.user_properties += properties(self.result, suite.seed)
+        self.user_properties += properties(self.result)
         self.user_properties += [(f"needs.{name}", str(run)) for name, run in suite.made_for(self.name).items()]
         if self.result.stopped_by_signal:
             self.session.shouldstop = self.result.reason

@@ -33,6 +33,7 @@ OF_THE_RUN = (
     "run_id",
     "started",
     "ended",
+    "visit",
     "versions",
     "recording",
     "calibrations",

@@ -60,6 +60,7 @@ class CoverageContent:
     steps: tuple[tuple[str, str, float], ...]  # procedure, plan, mean wall time
     rig_s: float
     speed: Speed | None
+    visit: int = 0
 
 
 def view_of(c: CoverageContent) -> SummaryView:
@@ -82,7 +83,8 @@ def view_of(c: CoverageContent) -> SummaryView:
         title=c.title, campaign=c.campaign, simulated=SIMULATED, outcome=outcome, tone=TONES.get(c.verdict, "none"),
         outcome_text=said,
         identification=(
-            Fact("Rig", c.rig), Fact("Virtual rigs", f"{c.rigs}, from seed {c.first_seed}"), Fact("Made", text.moment(c.date)),
+            Fact("Rig", c.rig), Fact("Virtual rigs", f"{c.rigs}, from seed {c.first_seed}, visit {c.visit}"),
+            Fact("Made", text.moment(c.date)),
         ),
         sections=tuple(_sections(c, _Numbers())), end=f"End of summary {c.campaign}",
     )  # fmt: skip

@@ -56,7 +56,7 @@ def view_of(c: ChainContent) -> SummaryView:
     uut = ", ".join(str(v) for v in model.uut.values()) or text.DASH
     identification = [Fact("Item under test", uut), Fact("Rig", model.rig), Fact("Made", text.moment(model.created))]
     if model.seed is not None:
-        identification.append(Fact("Virtual rig", f"seed {model.seed}"))
+        identification.append(Fact("Virtual rig", f"seed {model.seed}, visit {model.visit or 0}"))
     numbered = _Numbers()
     return SummaryView(
         title=model.title or model.name, campaign=c.campaign, simulated=SIMULATED if model.simulated else "",

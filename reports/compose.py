@@ -171,7 +171,7 @@ def _identification(record: Content, around: Surroundings, rig_name: str) -> tup
     rig_title = str(around.rig.get("title") or "")
     site = around.rig.get("site")
     site_name = str(site.get("place") or "") if isinstance(site, Mapping) else ""
-    seed = record.get("seed")
+    seed, visit = record.get("seed"), record.get("visit") or 0
     found = [
         Fact("Item under test", _uut(record.get("uut"))),
         Fact("Rig", f"{rig_name} – {rig_title}" if rig_title else rig_name),
@@ -180,7 +180,7 @@ def _identification(record: Content, around: Surroundings, rig_name: str) -> tup
         Fact("Location", site_name, blank=not site_name),  # 7.8.2.1 c
     ]
     if seed is not None:
-        found.append(Fact("Virtual rig", f"seed {seed}"))
+        found.append(Fact("Virtual rig", f"seed {seed}, visit {visit}"))
     return tuple(found)
 
 

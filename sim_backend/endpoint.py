@@ -30,7 +30,7 @@ class SimulatedRig:
         rig: the rig file.
         truth: which machine it is.
         session: of its heartbeat.
-        faults: of its controller and of its link (`bench.link.fault_injection`); the truth's seed says which frames they hit.
+        faults: of its controller and of its link (`bench.link.fault_injection`); the truth's noise says which frames they hit.
         substeps: integration steps of the plant in a tick.
     """
 
@@ -77,8 +77,8 @@ class InProcessLink:
         self.name = rig.devices["controller"].link
         self._reconnect_s = rig.link.reconnect_s
         self._counts = LinkStats()
-        self._inward = FrameFaults(faults, clock.truth.seed)
-        self._outward = FrameFaults([f for f in faults if f.kind in ("stall", *CUTS)], clock.truth.seed)
+        self._inward = FrameFaults(faults, clock.truth.noise)
+        self._outward = FrameFaults([f for f in faults if f.kind in ("stall", *CUTS)], clock.truth.noise)
 
     @property
     def stats(self) -> LinkStats:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
 from sim_backend.core import DriveLaw
+from sim_backend.draws import noise_seed
 
 Array = npt.NDArray[np.float64]
 Numbers = Mapping[str, float]
@@ -62,11 +63,12 @@ class Machine:
 
     Attributes:
         stated: every toleranced number of a rig file that is drawn, by its name.
+        daily: names among them that belong to the day and not to the machine: drawn anew on each visit.
         defects: planted defects and their harmless values.
         params: the plant's parameters, of drawn values and defects.
         quantities: the true quantities, of the plant's parameters and the controller's.
         targets: quantities that can be set directly, and the drawn value that each is proportional to.
-        make: the plant, of its parameters, a seed and integration steps in a tick.
+        make: the plant, of its parameters, the seed of its noise and integration steps in a tick.
         radial: columns of the plant's rows that come to rest at the end of a lift.
         integral_gains: parameters that the defect `integrator_factor` scales.
         turns: whether the controller can turn the rotor by itself.
@@ -98,11 +100,12 @@ class Machine:
     copper_W: Callable[[Any], float]
     operator: Callable[[RigFile, Any, Truth], OperatorLine]
     traced: Callable[[Numbers], tuple[str, ...]] = lambda _: ()
+    daily: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
 class Truth:
-    """Every drawn value by name, planted defects, and what follows from them."""
+    """Every drawn value by name, planted defects, and what follows from them. `seed` says which machine, `visit` which day."""
 
     seed: int
     values: Mapping[str, float]
@@ -110,6 +113,20 @@ class Truth:
     plant: Any  # parameters of the machine's plant
     quantities: Mapping[str, float]
     machine: Machine
+    visit: int = 0
+
+    @property
+    def noise(self) -> int:
+        """Seed of all noise: of the plant, and of which frames a fault hits."""
+        return noise_seed(self.seed, self.visit)
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """As `truth.json` has it."""
+        return {
+            "schema": 1, "seed": self.seed, "visit": self.visit, "quantities": dict(self.quantities),
+            "values": dict(self.values), "defects": dict(self.defects),
+        }  # fmt: skip
 
     @property
     def supply_V(self) -> float:

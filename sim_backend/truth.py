@@ -21,9 +21,12 @@ def draw(
     seed: int,
     overrides: Mapping[str, float] | None = None,
     settings: Mapping[str, float] | None = None,
+    *,
+    visit: int = 0,
 ) -> Truth:
     """Draw a rig. `overrides` set drawn values or defects by name, or the truth of the machine's `targets` directly.
-    `settings` are the controller parameters that a procedure will write: the measurands hold for the bias among them.
+    `settings` are the controller parameters that a procedure will write: the measurands hold for the bias among them. Another
+    `visit` is the same machine on another day.
 
     Raises:
         ConfigError: an override names nothing, or the rig file has nothing to simulate.
@@ -36,7 +39,7 @@ def draw(
     if lacking := tuple(unspoken(rig, machine)):
         raise ConfigError(f"rig {rig.name} cannot be simulated:", lacking)
     tolerances = machine.stated(rig)
-    values = {name: draw_one(t, seed, name) for name, t in tolerances.items()}
+    values = {n: draw_one(t, seed, n, visit if n in machine.daily else 0) for n, t in tolerances.items()}
     values |= {k: float(v) for k, v in rig.simulation.items() if isinstance(v, int | float)}
     defects = dict(machine.defects)
     wanted = dict(overrides or {})
@@ -54,7 +57,7 @@ def draw(
     for name, value in targets.items():
         values[machine.targets[name]] *= value / machine.quantities(machine.params(values, defects), used)[name]
     plant = machine.params(values, defects)
-    return Truth(seed, values, defects, plant, machine.quantities(plant, used), machine)
+    return Truth(seed, values, defects, plant, machine.quantities(plant, used), machine, visit)
 
 
 def nominal(rig: RigFile) -> Mapping[str, float]:

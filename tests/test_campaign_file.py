@@ -52,6 +52,7 @@ def test_every_problem_is_named_at_once_with_its_place() -> None:
         schema = 1
         name = "A campaign"
         seed = -1
+        visit = -1
         colour = "blue"
         [[step]]
         procedure = "amb-calib"
@@ -62,7 +63,7 @@ def test_every_problem_is_named_at_once_with_its_place() -> None:
         count = 0
     """)
     assert set(found) == {
-        "name", "rig", "seed", "colour", "step.1.plan", "step.1.procedure", "step.2.procedure", "virtual.count",
+        "name", "rig", "seed", "visit", "colour", "step.1.plan", "step.1.procedure", "step.2.procedure", "virtual.count",
     }  # fmt: skip
     assert "amb-calibration" in found["step.1.procedure"]
 
@@ -73,6 +74,7 @@ def test_every_problem_is_named_at_once_with_its_place() -> None:
         ("seed = 3\n[virtual]\ncount = 2", "seed"),
         ('backend = "live"\n[virtual]\ncount = 2', "virtual"),
         ('backend = "live"\nseed = 3', "seed"),
+        ('backend = "live"\nvisit = 0', "visit"),
         ('backend = "live"\n[truth]\ncoulomb = 0.1', "truth"),
     ],
 )

@@ -125,6 +125,12 @@ def test_a_seed_that_is_no_number(tmp_path: Path) -> None:
         _ = opened(tmp_path / "a.mcap", {}, {"run": {"seed": "seven"}}).seed
 
 
+@pytest.mark.parametrize(("run", "visit"), [({}, None), ({"seed": "0"}, 0), ({"seed": "0", "visit": "3"}, 3)])
+def test_the_visit_of_a_virtual_rig(tmp_path: Path, run: dict[str, str], visit: int | None) -> None:
+    """Recordings that say nothing are of visit 0; a real rig has none."""
+    assert opened(tmp_path / "a.mcap", {}, {"run": run}).visit == visit
+
+
 @pytest.mark.parametrize("version", ["", "one", "-1", "1.5", "\u00b2"])
 def test_a_layout_version_that_is_no_number(tmp_path: Path, version: str) -> None:
     with (tmp_path / "a.mcap").open("wb") as file:

@@ -81,6 +81,17 @@ def test_the_shipped_schema_is_the_one_of_the_code() -> None:
     assert json.loads(SCHEMA_FILE.read_text()) == json_schema()
 
 
+def test_who_says_no_visit() -> None:
+    """Records of virtual rigs of before there were visits are of visit 0; a real rig has none."""
+    content = json.loads(to_json(start()))
+    assert list(content)[8:10] == ["seed", "visit"]
+    for seed, visit in ((1, 0), (None, None)):
+        old = {key: value for key, value in content.items() if key != "visit"} | {"seed": seed}
+        jsonschema.validate(old, json.loads(SCHEMA_FILE.read_text()))
+        assert from_json(json.dumps(old)).visit == visit
+    assert from_json(json.dumps(content | {"visit": 3})).visit == 3
+
+
 def test_unfinished() -> None:
     record = start()
     assert record.outcome == Outcome.ERROR

@@ -122,8 +122,10 @@ def _created(out: Path, name: str, identity: Mapping[str, Any]) -> CampaignDirec
 
 
 def _read(path: Path) -> Any:
+    """What a campaign was started with. Those of before there were visits are of visit 0."""
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        found = json.loads(path.read_text(encoding="utf-8"))
+        return {"visit": 0} | found if isinstance(found, dict) and found.get("backend") == "sim" else found
     except (OSError, ValueError) as error:
         raise ConfigError(f"{path}: cannot be read: {error}. Next: --new starts another campaign") from error
 

@@ -54,7 +54,8 @@ class Equation(_Table):
 
 
 class Campaign(_Table):
-    """A campaign file. Without `virtual` it is one rig: the real one, or the simulated one of `seed`."""
+    """A campaign file. Without `virtual` it is one rig: the real one, or the simulated one of `seed`. `visit` is the day of
+    virtual rigs."""
 
     schema_: int = Field(alias="schema")
     name: str = Field(pattern=r"^[a-z0-9][a-z0-9-]*$", max_length=60)
@@ -62,6 +63,7 @@ class Campaign(_Table):
     rig: str = Field(min_length=1)
     backend: Literal["sim", "live"] = "sim"
     seed: int | None = Field(None, ge=0)
+    visit: int | None = Field(None, ge=0)
     virtual: Virtual | None = None
     truth: Mapping[str, float] = {}
     step: tuple[Step, ...] = Field((), strict=False)
@@ -152,9 +154,10 @@ def _contradictions(c: Campaign, path: str) -> list[Problem]:
     if c.virtual is not None and c.seed is not None:
         found.append(Problem(path, "seed", str(c.seed), "none beside [virtual], which has first_seed"))
     if c.backend == "live":
-        given = {"virtual": c.virtual is not None, "seed": c.seed is not None, "truth": bool(c.truth)}
+        given = {"virtual": c.virtual is not None, "seed": c.seed is not None, "visit": c.visit is not None,
+                 "truth": bool(c.truth)}  # fmt: skip
         found += [
-            Problem(path, key, "one", "none: a real rig has no seed and no truth")
+            Problem(path, key, "one", "none: a real rig has no seed, no visit and no truth")
             for key, is_set in given.items()
             if is_set
         ]

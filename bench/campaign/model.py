@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -112,6 +112,7 @@ class Model:
     rig_sha256: str
     simulated: bool
     seed: int | None
+    visit: int | None = field(default=None, kw_only=True)
     created: str
     complete: bool
     constants: tuple[Constant, ...]

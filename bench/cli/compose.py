@@ -40,6 +40,7 @@ class Request:
     rig: str
     backend: str = "sim"
     seed: int | None = None
+    visit: int | None = None
     plan: tuple[str, ...] = ()
     plan_file: Path | None = None
     truth: tuple[str, ...] = ()
@@ -112,8 +113,11 @@ def prepare(request: Request, asking: Asking = quietly) -> tuple[Job, Connect]:
         return job, live(rig, kind, injected, request.clear_fault, asking)
     overrides = dict(plans.assignment(text) for text in request.truth)
     _refuse_words(overrides)
-    connect = simulated(rig, seed, overrides, request.operator or "auto", procedure.settings(plan), injected, asking)
-    return Job(procedure, rig, plan, limits, request.backend, seed, None, used, judged), connect
+    visit = request.visit or 0
+    connect = simulated(
+        rig, seed, overrides, request.operator or "auto", procedure.settings(plan), injected, asking, visit=visit
+    )
+    return Job(procedure, rig, plan, limits, request.backend, seed, None, used, judged, visit), connect
 
 
 def remedy(request: Request, need: Need) -> str:
@@ -123,10 +127,10 @@ def remedy(request: Request, need: Need) -> str:
     words = ["bench", "run", need.procedure, "--rig", request.rig]
     if request.backend == "live":
         words += ["--backend", "live"]
-    elif request.seed is not None:
-        words += ["--seed", str(request.seed)]
-    given = (("--link", request.links), ("--truth", request.truth), ("--plan", settings))
-    words += [word for option, values in given for value in values for word in (option, value)]
+    which = (("--seed", request.seed), ("--visit", request.visit))
+    words += [word for option, given in which if given is not None for word in (option, str(given))]
+    more = (("--link", request.links), ("--truth", request.truth), ("--plan", settings))
+    words += [word for option, values in more for value in values for word in (option, value)]
     where = [] if request.calibrations is None else ["--calibrations", str(request.calibrations)]
     run, adopt = shlex.join([*words, *where]), shlex.join(["bench", "adopt", "RUN", *where])
     return f"`{run}`, then `{adopt}` with the folder that it prints"
@@ -134,10 +138,11 @@ def remedy(request: Request, need: Need) -> str:
 
 def _refuse_mixed_backends(request: Request) -> None:
     if request.backend == "live":
-        given = [name for name, value in (("--truth", request.truth), ("--seed", request.seed is not None)) if value]
-        if given:
+        asked = {"--truth": request.truth, "--seed": request.seed is not None, "--visit": request.visit is not None}
+        if given := [name for name, value in asked.items() if value]:
             raise ConfigError(
-                f"{' and '.join(given)}: a real rig has no seed and no truth to set; expected --backend sim, or none of these"
+                f"{' and '.join(given)}: a real rig has no seed, no visit and no truth to set; "
+                "expected --backend sim, or none of these"
             )
     elif request.links:
         raise ConfigError("--link: the simulated rig runs in this process; expected --backend live, or leave it out")

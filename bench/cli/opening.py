@@ -49,6 +49,8 @@ def simulated(
     settings: Mapping[str, float] | None = None,
     injected: Sequence[Fault] = (),
     asking: console.Asking = console.quietly,
+    *,
+    visit: int = 0,
 ) -> Connect:
     """How to open a simulated rig. The truth is drawn now, so that a wrong override is found before the start.
 
@@ -57,7 +59,7 @@ def simulated(
     """
     from sim_backend.truth import draw
 
-    return of_truth(rig, draw(rig, seed, overrides, settings), operator, injected, asking)
+    return of_truth(rig, draw(rig, seed, overrides, settings, visit=visit), operator, injected, asking)
 
 
 def of_truth(
@@ -71,11 +73,6 @@ def of_truth(
         slice_s: the longest sleep in one piece; links, envelope and supervisor are looked at after each.
     """
     from sim_backend.endpoint import SimulatedRig
-
-    facts = {
-        "schema": 1, "seed": truth.seed, "quantities": dict(truth.quantities), "values": dict(truth.values),
-        "defects": dict(truth.defects),
-    }  # fmt: skip
 
     @contextmanager
     def connect(supervisor: Supervisor) -> Iterator[OpenRig]:
@@ -93,7 +90,7 @@ def of_truth(
             controller.connect()
             with open_devices(rig, bank.port, controller.clock, controller.envelope) as bus:
                 hands = _operators(operator, line, controller, lambda _: console.blocking(supervisor, asking))
-                yield _opened(controller, base, bus, hands, facts, injected)
+                yield _opened(controller, base, bus, hands, truth.facts, injected)
         finally:
             machine.link.close()
 

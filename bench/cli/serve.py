@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from bench.cli.compose import with_links
 from bench.clock import WallClock
@@ -35,6 +35,7 @@ class ServeRequest:
 
     rig: str
     seed: int = 0
+    visit: int = 0
     truth: tuple[str, ...] = ()
     bind: str = LOOPBACK
     truth_file: Path | None = None
@@ -60,9 +61,9 @@ def serve_command(request: ServeRequest) -> int:
     on_link, in_device = fault_injection.divided(
         [fault_injection.parse(text) for text in request.faults], simulated=True
     )
-    truth = draw(rig, request.seed, _overrides(request.truth))
+    truth = draw(rig, request.seed, _overrides(request.truth), visit=request.visit)
     controller = SimulatedController(rig, truth, in_device)
-    wire = WireFaults(on_link, request.seed, [rig.messages[name].identifier for name in rig.binding.telemetry])
+    wire = WireFaults(on_link, truth.noise, [rig.messages[name].identifier for name in rig.binding.telemetry])
     stopped: list[str] = []
     with ExitStack() as stack:
         stack.enter_context(delivered_to(stopped.append))
@@ -164,12 +165,8 @@ def write_truth(path: Path, truth: Truth) -> None:
     Raises:
         ConfigError: the file cannot be written.
     """
-    facts: dict[str, Any] = {
-        "schema": 1, "seed": truth.seed, "quantities": dict(truth.quantities), "values": dict(truth.values),
-        "defects": dict(truth.defects),
-    }  # fmt: skip
     try:
-        path.write_text(json.dumps(facts, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        path.write_text(json.dumps(truth.facts, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"--truth-file {path}: cannot be written: {error.strerror or error}") from error
 

@@ -58,6 +58,11 @@ class Suite:
         """The seed in force; None for a real rig."""
         return self._seed
 
+    @property
+    def visit(self) -> int | None:
+        """The visit in force; None for a real rig."""
+        return None if self._seed is None else self.asked.visit or 0
+
     def lacking(self, procedure: str) -> tuple[str, ...]:
         """What the rig lacks to run a procedure at all; nothing where it can."""
         return load_procedure(procedure).lacking(load_rig(self.asked.rig))
@@ -160,11 +165,11 @@ def _has(key: str, fields: tuple[str, ...]) -> bool:
     return True
 
 
-def properties(result: RunResult, seed: int | None) -> list[tuple[str, str]]:
+def properties(result: RunResult) -> list[tuple[str, str]]:
     """A run as named texts, each name once: of a quantity `name.value` and so on, with its place as `name@place.value`."""
     record = result.record
     named = [("run", str(result.directory)), ("outcome", result.outcome.value.lower())]
-    named += [] if seed is None else [("seed", str(seed))]
+    named += [] if record.seed is None else [("seed", str(record.seed)), ("visit", str(record.visit))]
     if record.findings:
         named.append(("findings", ", ".join(dict.fromkeys(f.code for f in record.findings))))
     for m in record.measurements:

@@ -57,10 +57,10 @@ class Simulated:
         return self.drawn.quantities
 
     def calibration(self) -> Calibration:
-        """What `bench adopt` would make of this run; its run id and its date follow from the seed, so that a chain of
+        """What `bench adopt` would make of this run; its run id and its date follow from seed and visit, so that a chain of
         such runs gives the same numbers each time. The file's digest is left out."""
         facts = self.procedure.stated(self.recording)
-        run_id = f"{self.procedure.name}-sim-{self.seed}"
+        run_id = f"{self.procedure.name}-sim-{self.seed}" + (f"-{self.drawn.visit}" if self.drawn.visit else "")
         return calibration_of(self.procedure, self.recording, facts, run_id=run_id)
 
 
@@ -108,6 +108,8 @@ def flown(
     truth: Mapping[str, float] | None = None,
     calibrations: Mapping[str, Calibration] | None = None,
     knobs: Knobs = QUICK,
+    *,
+    visit: int = 0,
 ) -> Flown:
     """Draw a rig and take it through the machine's part of a run; what ended that early is in it.
 
@@ -117,8 +119,8 @@ def flown(
     chosen, file = load_procedure(procedure), load_rig(rig)
     settings = chosen.plan.model_validate({**file.plans.get(procedure, {}), **plan})
     used = given(chosen.needs(settings), calibrations or {})
-    drawn = draw(file, seed, truth, chosen.settings(settings))
-    job = Job(chosen, file, settings, {}, "sim", seed, calibrations=tuple(used))
+    drawn = draw(file, seed, truth, chosen.settings(settings), visit=visit)
+    job = Job(chosen, file, settings, {}, "sim", seed, calibrations=tuple(used), visit=visit)
     supervisor = Supervisor()
     with opening.of_truth(file, drawn, "auto", substeps=knobs.substeps, slice_s=knobs.slice_s)(supervisor) as live:
         machine = acquired(job, path, live, supervisor, Silent(), plain=knobs.plain)
@@ -134,6 +136,8 @@ def simulated_run(
     truth: Mapping[str, float] | None = None,
     calibrations: Mapping[str, Calibration] | None = None,
     knobs: Knobs = QUICK,
+    *,
+    visit: int = 0,
 ) -> Simulated:
     """As `simulate`; the result can also be adopted. `calibrations` are by procedure; those that are needed are used. What
     ends a run early is raised, after the machine was made safe.
@@ -142,7 +146,7 @@ def simulated_run(
         ConfigError: a calibration that is needed is not given, or was made at other settings.
         BenchError: what ended the run early.
     """
-    done = flown(procedure, rig, seed, plan, path, truth, calibrations, knobs)
+    done = flown(procedure, rig, seed, plan, path, truth, calibrations, knobs, visit=visit)
     if done.machine.cause is not None:
         raise done.machine.cause
     return done.analysed()

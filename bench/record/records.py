@@ -7,7 +7,7 @@ import json
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -130,7 +130,8 @@ class Correlations:
 
 @dataclass(frozen=True)
 class Record:
-    """`record.json`. Times are ISO 8601 UTC; `seed` is None for a real rig; `plan` is in SI."""
+    """`record.json`. Times are ISO 8601 UTC; `seed` and `visit` are None for a real rig; `plan` is in SI. Older records of
+    virtual rigs do not say the visit, which was 0."""
 
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
     schema: Literal[1, 2]
@@ -142,6 +143,7 @@ class Record:
     started: str
     ended: str | None
     seed: int | None
+    visit: int | None = field(default=None, kw_only=True)
     plan: Mapping[str, Any]
     calibrations: tuple[Used, ...]
     versions: Mapping[str, str]
@@ -179,10 +181,11 @@ def from_json(text: str, name: str = "record") -> Record:
     """
     require_schema(text, name, "record", SCHEMA, oldest=1)
     try:
-        return _RECORD.validate_json(text)
+        found = _RECORD.validate_json(text)
     except ValidationError as error:
         listed = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors(include_url=False)]
         raise ConfigError("\n  ".join([f"{name}: not a record of schema {SCHEMA}:", *listed])) from error
+    return found if found.seed is None or found.visit is not None else replace(found, visit=0)
 
 
 def write_record(path: Path, record: Record) -> None:
@@ -209,15 +212,16 @@ def read_record(path: Path) -> Record:
 
 def unfinished(
     *, run_id: str, procedure: str, rig: str, uut: Mapping[str, Any], started: str, seed: int | None,
-    plan: Mapping[str, Any], versions: Mapping[str, str], calibrations: Sequence[Calibration] = (),
+    plan: Mapping[str, Any], versions: Mapping[str, str], calibrations: Sequence[Calibration] = (), visit: int = 0,
 ) -> Record:  # fmt: skip
     """What is written before anything moves: if the run dies, this is what it says."""
     text = "The run did not end: its process was killed, lost power or could write nothing any more."
     said = Finding("unfinished", text, "", Effect.ERROR)
     return Record(
         schema=2, run_id=run_id, procedure=procedure, rig=rig, uut=uut, outcome=Outcome.ERROR, started=started,
-        ended=None, seed=seed, plan=plan, calibrations=tuple(c.summary for c in calibrations), versions=versions,
-        recording=None, link=LinkCounts(), findings=findings_of([said]), measurements=(), correlations=Correlations((), ()),
+        ended=None, seed=seed, visit=None if seed is None else visit, plan=plan,
+        calibrations=tuple(c.summary for c in calibrations), versions=versions, recording=None, link=LinkCounts(),
+        findings=findings_of([said]), measurements=(), correlations=Correlations((), ()),
     )  # fmt: skip
 
 

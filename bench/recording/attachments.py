@@ -112,7 +112,7 @@ class Attachments(Generic[P]):
 
     @property
     def run(self) -> dict[str, str]:
-        """Procedure, backend and seed as strings."""
+        """Procedure, backend, seed and visit as strings."""
         return self._file.metadata.get("run", {})
 
     @property
@@ -126,11 +126,20 @@ class Attachments(Generic[P]):
 
     @property
     def seed(self) -> int | None:
-        text = self.run.get("seed", "")
+        """Which virtual rig; None for a real one."""
+        return self._whole("seed")
+
+    @property
+    def visit(self) -> int | None:
+        """On which day, 0 where nothing is said; None for a real rig."""
+        return None if self.seed is None else self._whole("visit") or 0
+
+    def _whole(self, name: str) -> int | None:
+        text = self.run.get(name, "")
         try:
             return int(text) if text else None
         except ValueError as error:
-            raise RecordingError(f"recording {self.path}: seed: found {text[:40]!r}; expected an integer") from error
+            raise RecordingError(f"recording {self.path}: {name}: found {text[:40]!r}; expected an integer") from error
 
     def attachment(self, name: str) -> str:
         """An attached text.

@@ -50,7 +50,7 @@ def _sound(record: Record, again: Record) -> bool:
 
 def _facts(record: Record, again: Record) -> Iterator[Problem]:
     """Whose run it is, and when it was."""
-    for name in ("run_id", "procedure", "rig", "seed", "started", "ended"):
+    for name in ("run_id", "procedure", "rig", "seed", "visit", "started", "ended"):
         said, found = getattr(record, name), getattr(again, name)
         if said != found:
             yield _problem(name, said, found, "which the recording has")

@@ -14,7 +14,7 @@ from bench.record.records import read_record
 from bench.rundir import RunDirectory, runs_in
 
 NAME = "index.sqlite"
-VERSION = 1  # of the table; another one is rebuilt
+VERSION = 2  # of the table; another one is rebuilt
 log = logging.getLogger(__name__)
 
 
@@ -29,6 +29,7 @@ class IndexEntry:
     started: str
     ended: str | None
     seed: int | None
+    visit: int | None
 
 
 _COLUMNS = ", ".join(f.name for f in fields(IndexEntry))
@@ -73,7 +74,7 @@ def _entry(run: RunDirectory) -> IndexEntry:
     record = read_record(run.record)
     # The directory's name, not the record's: a copied directory is another run to whoever looks for it.
     return IndexEntry(run.run_id, record.procedure, record.rig, record.outcome.value, record.started, record.ended,
-                      record.seed)  # fmt: skip
+                      record.seed, record.visit)  # fmt: skip
 
 
 def _sound(root: Path) -> None:

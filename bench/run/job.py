@@ -21,9 +21,9 @@ from bench.samples import StreamLayout
 
 @dataclass(frozen=True)
 class Job:
-    """What is to be run. `seed` is None on a real rig; `lock` is what others must not share, None in simulation;
-    `calibrations` are those that the procedure needs, looked up and found fit. With `require_verdict` a run
-    that judged nothing is an error."""
+    """What is to be run. `seed` is None on a real rig, where `visit` means nothing; `lock` is what others must not share,
+    None in simulation; `calibrations` are those that the procedure needs, looked up and found fit. With `require_verdict` a
+    run that judged nothing is an error."""
 
     procedure: Procedure
     rig: RigFile
@@ -34,6 +34,7 @@ class Job:
     lock: AbstractContextManager[Any] | None = None
     calibrations: tuple[Calibration, ...] = ()
     require_verdict: bool = False
+    visit: int = 0
 
 
 @dataclass(frozen=True)

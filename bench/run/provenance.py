@@ -1,4 +1,4 @@
-"""Provenance: what the recording says of itself, apart from what differs between two runs of one seed."""
+"""Provenance: what the recording says of itself, apart from what differs between two runs of one seed and visit."""
 
 from __future__ import annotations
 
@@ -30,9 +30,11 @@ def versions() -> dict[str, str]:
 
 
 def header(job: Job) -> RunHeader:
-    """Rig file, plan, limits, calibrations, versions and seed, as they stand first in the file."""
+    """Rig file, plan, limits, calibrations, versions, seed and visit, as they stand first in the file. Visit 0 is not said, so
+    that its recordings are those of before there were visits."""
     seed = "" if job.seed is None else str(job.seed)
     limits = {name: asdict(limit) for name, limit in job.limits.items()}
+    visit = {"visit": str(job.visit)} if job.visit else {}
     asked = {"verdict": "required"} if job.require_verdict else {}
     return RunHeader(
         metadata={
@@ -41,6 +43,7 @@ def header(job: Job) -> RunHeader:
                 "rig": job.rig.name,
                 "backend": job.backend,
                 "seed": seed,
+                **visit,
                 **asked,
             },
             "versions": versions(),
@@ -61,7 +64,7 @@ def now() -> str:
 
 
 def wall(directory: RunDirectory, started: datetime, rig_file: str) -> dict[str, str]:
-    """What differs between two runs of one seed: dates, names, durations, where the rig file lay."""
+    """What differs between two runs of one seed and visit: dates, names, durations, where the rig file lay."""
     took = (datetime.now(UTC) - started).total_seconds()
     return {
         "run_id": directory.run_id, "host": socket.gethostname(), "started": started.isoformat(timespec="seconds"),

@@ -83,7 +83,8 @@ def run(
             record = _unfinished(job, directory, started)
             write_record(directory.record, record)
             stack.enter_context(runlog.to_file(directory.log))
-            logger.info("run %s on rig %s, backend %s, seed %s", directory.run_id, job.rig.name, job.backend, job.seed)
+            which = "" if job.seed is None else f", seed {job.seed}, visit {job.visit}"
+            logger.info("run %s on rig %s, backend %s%s", directory.run_id, job.rig.name, job.backend, which)
             progress.stage(f"{job.procedure.name} on {job.rig.name} ({job.backend}), run {directory.run_id}")
             wall = partial(provenance.wall, directory, started, job.rig.path)
             machine = acquired(job, directory.recording, live, supervisor, progress, wall=wall)
@@ -119,7 +120,7 @@ def _same_kind(job: Job, live: OpenRig) -> None:
 def _unfinished(job: Job, directory: RunDirectory, started: datetime) -> Record:
     return unfinished(
         run_id=directory.run_id, procedure=job.procedure.name, rig=job.rig.name, uut=job.rig.uut.model_dump(),
-        started=started.isoformat(timespec="seconds"), seed=job.seed, plan=job.plan.model_dump(mode="json"),
+        started=started.isoformat(timespec="seconds"), seed=job.seed, visit=job.visit, plan=job.plan.model_dump(mode="json"),
         versions=provenance.versions(), calibrations=job.calibrations,
     )  # fmt: skip
 

@@ -46,7 +46,7 @@ class SimulatedController:
         self._handlers = {m.identifier: (Decoder(m), handlers.get(m.name)) for m in host}
         self.truth = truth
         self._machine = truth.machine
-        self.plant = self._machine.make(truth.plant, truth.seed, substeps)
+        self.plant = self._machine.make(truth.plant, truth.noise, substeps)
         self.plant.run(REST_TICKS)
         self.faults = DeviceFaults(rig, faults) if faults else None
         self.captures: CapturePort | None = None

@@ -75,7 +75,8 @@ class TelemetryEncoder:
         payloads["words"] = raw.astype(np.int64)  # two's complement where negative
         dropped = self._truth.defects["drop_fraction"]
         if dropped:
-            keep = [uniform(self._truth.seed, f"drop:{start + k}") >= dropped for k in range(n)]
+            seed, visit = self._truth.seed, self._truth.visit
+            keep = [uniform(seed, f"drop:{start + k}", visit) >= dropped for k in range(n)]
             batch = batch[np.array(keep, dtype=bool)]
         return batch
 

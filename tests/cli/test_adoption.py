@@ -87,6 +87,18 @@ def test_a_record_with_another_name_or_seed(bench: Bench) -> None:
     assert "seed: found 7; expected 0" in said
 
 
+def test_a_record_of_another_visit_and_an_old_one_without(bench: Bench) -> None:
+    directory = run(bench, "--visit", "2")
+    rewrite(directory, visit=3)
+    assert "visit: found 3; expected 2, which the recording has" in refused(bench, directory)
+    directory = run(bench)
+    path = Path(directory) / "record.json"
+    record = json.loads(path.read_text(encoding="utf-8"))
+    assert record.pop("visit") == 0
+    path.write_text(json.dumps(record), encoding="utf-8")
+    assert bench("adopt", directory)[0] == 0
+
+
 def test_a_record_that_judged_nothing_does_not_say_pass(bench: Bench) -> None:
     directory = run(bench)
     rewrite(directory, outcome="PASS")

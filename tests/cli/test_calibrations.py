@@ -64,6 +64,19 @@ def test_analyse_uses_only_what_is_in_the_file(bench: Bench) -> None:
     assert after["measurements"] == before["measurements"]
 
 
+def test_another_visit_is_the_same_machine(bench: Bench) -> None:
+    """What helps is offered for the same day."""
+    assert "--seed 0 --visit 2" in chained(bench, "--seed", "0", "--visit", "2")
+    adopted(bench)
+    directory = Path(chained(bench, "--visit", "2", status=0))
+    record, truth = (json.loads((directory / name).read_text()) for name in ("record.json", "truth.json"))
+    assert [(said["seed"], said["visit"]) for said in (record, truth)] == [(0, 2)] * 2
+    status, out, _ = bench("analyse", str(directory))
+    assert status == 0
+    again = json.loads((Path(out.splitlines()[-1]) / "record.json").read_text())
+    assert (again["visit"], again["measurements"]) == (2, record["measurements"])
+
+
 def test_another_seed_is_another_machine(bench: Bench) -> None:
     adopted(bench)
     said = chained(bench, "--seed", "4")

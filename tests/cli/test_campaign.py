@@ -175,6 +175,28 @@ def test_a_changed_campaign_is_refused_with_the_remedy(bench: Bench, tmp_path: P
     assert fresh != out
 
 
+def test_another_visit_is_another_campaign(bench: Bench, tmp_path: Path) -> None:
+    text = HEAD + TWO.replace('"tiny-levitated"\n', '"tiny-levitated"\nplan = { then = "doubt" }\n', 1)
+    _, out, _ = bench(text, "--no-report")
+    status, _, err = bench(text, "--no-report", "--visit", "2")
+    assert status == 2
+    assert "visit: started with 0, now 2" in err
+    started = tmp_path / out.strip() / "campaign.json"
+    old = json.loads(started.read_text())
+    assert old.pop("visit") == 0
+    started.write_text(json.dumps(old))  # of before there were visits
+    assert "visit: started with 0, now 2" in bench(text, "--no-report", "--visit", "2")[2]
+    assert bench(text, "--no-report")[:2] == (5, out)
+    status, fresh, err = bench(HEAD + "visit = 1\n" + TWO, "--no-report", "--visit", "2", "--new")
+    assert status == 0, err
+    steps = [e for e in journal(tmp_path / fresh.strip()) if e["kind"] == "step"]
+    records = [json.loads((tmp_path / fresh.strip() / e["run"] / "record.json").read_text()) for e in steps]
+    assert [(r["seed"], r["visit"]) for r in records] == [(0, 2), (0, 2)]
+    model = json.loads((tmp_path / fresh.strip() / "model.json").read_text())
+    jsonschema.validate(model, json.loads(SCHEMA_FILE.read_text()))
+    assert (model["seed"], model["visit"]) == (0, 2)
+
+
 def test_the_truth_is_the_same_machine_in_every_step(bench: Bench, tmp_path: Path) -> None:
     status, out, err = bench(HEAD + TWO + "[truth]\ncoulomb = 0.07\n", "--no-report")
     assert status == 0, err
@@ -190,6 +212,7 @@ def test_the_truth_is_the_same_machine_in_every_step(bench: Bench, tmp_path: Pat
         (("--seed", "1", "--count", "3"), "one or the other"),
         (("--first-seed", "5"), "expected --count too"),
         (("--backend", "live", "--count", "3"), "--backend live"),
+        (("--backend", "live", "--visit", "1"), "--backend live: a real rig has no seed, no visit and no truth"),
         (("--link", "controller=can:vcan0"), "--link"),
         (("--rig", "tsbs21"), "unknown rig"),
         (("--jobs", "0"), "--jobs"),
@@ -203,11 +226,14 @@ def test_options_that_contradict_each_other(bench: Bench, arguments: tuple[str, 
 
 def test_many_rigs_go_through_the_chain_and_are_noted(bench_process: Bench, tmp_path: Path) -> None:
     """The truth holds no supply: nothing can be judged."""
-    status, out, err = bench_process(HEAD + TWO, "--count", "2", "--first-seed", "7", "--jobs", "2", "--keep", "all")
+    status, out, err = bench_process(HEAD + TWO, "--count", "2", "--first-seed", "7", "--visit", "3", "--jobs", "2",
+                                      "--keep", "all")  # fmt: skip
     assert status == 5, err
     lines = journal(tmp_path / out.strip())
     rigs = {e["seed"]: e for e in lines if e["kind"] == "rig"}
     assert sorted(rigs) == [7, 8]
+    assert [rig["visit"] for rig in rigs.values()] == [3, 3]
+    assert "2 rigs from seed 7, visit 3, " in err
     assert lines[-1] == {"kind": "done"}
     for rig in rigs.values():
         assert [v["name"] for v in rig["values"]] == ["supply", "double"]
@@ -218,7 +244,8 @@ def test_many_rigs_go_through_the_chain_and_are_noted(bench_process: Bench, tmp_
     assert kept[:2] == ["recordings/7/1-tiny-levitated.mcap", "recordings/7/2-tiny-needing.mcap"]
     assert len(kept) == 4
     assert not (folder / "work").exists()
-    assert json.loads((folder / "coverage.json").read_text())["verdict"] == "indeterminate"
+    told = json.loads((folder / "coverage.json").read_text())
+    assert (told["first_seed"], told["visit"], told["verdict"]) == (7, 3, "indeterminate")
     assert "Nothing could be judged" in (folder / "summary.html").read_text()
 
 

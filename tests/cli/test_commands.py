@@ -118,6 +118,11 @@ USAGE = [
     (run("--seed", "-1"), "--seed"),
     (run("--backend", "cloud"), "--backend"),
     (run("--backend", "live", "--seed", "1"), "no seed"),
+    (
+        run("--backend", "live", "--visit", "0"),
+        "--visit: a real rig has no seed, no visit and no truth to set; expected",
+    ),
+    (run("--visit", "-1"), "--visit"),
     (run("--backend", "live", "--truth", "K_i=70"), "no truth"),
     (run("--backend", "live", "--link", "controller=inprocess:"), "inprocess"),
     (run("--backend", "live", "--link", "controller=slcam:/dev/ttyACM0"), "did you mean 'slcan:/dev/ttyACM0'?"),
@@ -227,13 +232,13 @@ def test_check_names_an_unknown_unit_beside_the_other_problems(bench: Bench, tmp
 
 def test_runs_lists_them_and_rebuilds_a_lost_index(bench: Bench, tmp_path: Path) -> None:
     assert bench("runs") == (0, "", "no runs in runs\n")
-    _, out, _ = bench(*run("--seed", "7"))
+    _, out, _ = bench(*run("--seed", "7", "--visit", "2"))
     directory = out.splitlines()[-1]
     for _ in range(2):
         status, out, _ = bench("runs")
         assert status == 0
         assert out.startswith("DONE")
-        assert "seed 7" in out
+        assert "seed 7, visit 2" in out
         assert directory in out
         (tmp_path / "runs" / "index.sqlite").unlink()
 

@@ -104,7 +104,7 @@ def identify(token: int) -> tuple[int, bytes]:
 
 
 def test_hosts_on_tcp_and_an_operator_at_one_rig_until_ctrl_c(tmp_path: Path) -> None:
-    with serving(tmp_path, "--seed", "4", "--truth", "K_i=70", "--truth-file", "truth.json") as rig:
+    with serving(tmp_path, "--seed", "4", "--visit", "2", "--truth", "K_i=70", "--truth-file", "truth.json") as rig:
         with (
             rig.connected("controller slcan:socket://") as can,
             rig.connected("controller serial:socket://") as serial,
@@ -132,7 +132,7 @@ def test_hosts_on_tcp_and_an_operator_at_one_rig_until_ctrl_c(tmp_path: Path) ->
     assert "received 2 (unknown 0)" in last
     assert "overruns" in last
     truth = json.loads((tmp_path / "truth.json").read_text())
-    assert truth["seed"] == 4
+    assert (truth["seed"], truth["visit"]) == (4, 2)
     assert truth["quantities"]["K_i"] == pytest.approx(70)
 
 

@@ -56,14 +56,14 @@ class Done:
 
 
 def test_what_is_missing_is_made_and_what_the_rig_lacks_is_skipped(tmp_path: Path) -> None:
-    done = Done(tmp_path, "--rig", "tsbs12", NEEDING, LACKING)
+    done = Done(tmp_path, "--rig", "tsbs12", "--visit", "3", NEEDING, LACKING)
     assert done.status == 0, done.output
     assert "role winch" in done.said("tiny-lacking", "skipped")
     assert "channels: found no pos_zi" in done.said("tiny-lacking", "skipped")
     told = done.properties("tiny-needing")
     assert len(told) == len(dict(told))
     named = dict(told)
-    assert (named["outcome"], named["seed"], named["double.verdict"]) == ("done", "0", "none")
+    assert (named["outcome"], named["seed"], named["visit"], named["double.verdict"]) == ("done", "0", "3", "none")
     assert float(named["double.value"]) == pytest.approx(2 * 148, abs=4)
     assert Path(named["needs.tiny-levitated"]).is_dir()
     assert not (ROOT / "rigs" / "tsbs12.calibrations").exists()  # the rig's own store is left alone
@@ -150,12 +150,12 @@ def test_junit_is_told_place_limit_and_seed_once_each(tmp_path: Path) -> None:
         for where in ("y, 20 µm", "z, 20 µm")
     ]
     record: Any = unfinished(run_id="r", procedure="step", rig="amb5dof", uut={}, started="2026-01-01T00:00:00Z", seed=0,
-                             plan={}, versions={})  # fmt: skip
+                             visit=3, plan={}, versions={})  # fmt: skip
     result = RunResult(tmp_path, replace(record, outcome=Outcome.PASS, measurements=tuple(made)))
-    told = properties(result, 0)
+    told = properties(result)
     assert len(told) == len(dict(told))
     named = dict(told)
-    assert (named["outcome"], named["seed"]) == ("pass", "0")
+    assert (named["outcome"], named["seed"], named["visit"]) == ("pass", "0", "3")
     assert named["rise_time@y, 20 µm.where"] == "y, 20 µm"
     assert named["rise_time@z, 20 µm.limit_high"] == "0.05"
     assert "rise_time@z, 20 µm.limit_low" not in named

@@ -299,6 +299,12 @@ def test_simulated_is_marked_even_for_seed_zero_and_never_on_a_real_rig() -> Non
     assert view(seed=0).simulated == SIMULATED
 
 
+@pytest.mark.parametrize(("said", "shown"), [({}, "seed 1, visit 0"), ({"visit": 3}, "seed 1, visit 3")])
+def test_a_virtual_rig_is_named_by_seed_and_visit(said: dict[str, int], shown: str) -> None:
+    """Records of before there were visits are of visit 0."""
+    assert {f.label: f.text for f in view(**said).identification}["Virtual rig"] == shown
+
+
 def test_findings_that_affect_the_outcome_are_loud() -> None:
     loud = {"code": "mass-suspect", "text": "M3 is off the line.", "where": "M3", "effect": "indeterminate"}
     made = view(findings=[loud], outcome="INDETERMINATE")

@@ -35,7 +35,7 @@ def chain(names: tuple[str, ...] = ("K_i", "alpha_x_prime", "B@by speed"), outco
     n = len(names)
     model = Model(
         schema=1, name="c", title=NASTY, rig="r", uut={"model": "M", "serial": "1"}, rig_sha256="0" * 64, simulated=True,
-        seed=3, created=DATE, complete=outcome == "PASS", constants=tuple(constant(name) for name in names),
+        seed=3, visit=1, created=DATE, complete=outcome == "PASS", constants=tuple(constant(name) for name in names),
         correlations=Matrix(names, tuple(tuple(float(a == b) for b in range(n)) for a in range(n))),
         given=(Given("mass", "kg", 10.2, 0.0, "normal", NASTY),),
     )  # fmt: skip
@@ -58,7 +58,7 @@ def many(n: int = 100, judged: bool = True) -> CoverageContent:
     return CoverageContent(
         "c.campaign-x", NASTY, "r", n, 0, DATE, "fail", (quantity, empty), (Failure(1, "p", "code", "error", 2, 7, NASTY),),
         (Unable(1, "p", n, ((1, NASTY),)),),
-        (("p", NASTY, 1.2),), 1.2, Speed(80, 2, 60.0, 1.1, 0.9, 0.97, 0.95, 0.93),
+        (("p", NASTY, 1.2),), 1.2, Speed(80, 2, 60.0, 1.1, 0.9, 0.97, 0.95, 0.93), 2,
     )  # fmt: skip
 
 
@@ -94,7 +94,7 @@ def test_many_rigs_in_both_outputs(tmp_path: Path, n: int) -> None:
     page = (tmp_path / "summary.html").read_text()
     assert "<script>" not in page
     assert "Outside a band" in page
-    assert f"{n}, from seed 0" in page
+    assert f"{n}, from seed 0, visit 2" in page
     assert page.count("<svg") == 3
 
 

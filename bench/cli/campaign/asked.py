@@ -21,6 +21,7 @@ class CampaignRequest:
     rig: str | None = None
     backend: str | None = None
     seed: int | None = None
+    visit: int | None = None
     count: int | None = None
     first_seed: int | None = None
     links: tuple[str, ...] = ()

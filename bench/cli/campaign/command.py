@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -65,16 +65,21 @@ def _with_options(c: Campaign, r: CampaignRequest) -> Campaign:
     changes: dict[str, Any] = {"virtual": _virtual(c, r), "seed": None} if many else {}
     if r.seed is not None:
         changes |= {"virtual": None, "seed": r.seed}
+    if r.visit is not None:
+        changes["visit"] = r.visit
     if r.backend == "live":
-        if many or r.seed is not None or c.truth:
-            raise ConfigError("--backend live: a real rig has no seed and no truth to set; leave these out")
-        changes |= {"backend": "live", "seed": None, "virtual": None}
+        if many or r.seed is not None or r.visit is not None or c.truth:
+            raise ConfigError("--backend live: a real rig has no seed, no visit and no truth to set; leave these out")
+        changes |= {"backend": "live", "seed": None, "visit": None, "virtual": None}
     if r.backend == "sim":
         changes["backend"] = "sim"
     if r.rig is not None:
         changes["rig"] = r.rig
     made = c.model_copy(update=changes)
     _refuse_scheduler(made, r)
+    if made.backend == "live" and (r.seed is not None or r.visit is not None):
+        given = "--seed" if r.visit is None else "--visit"
+        raise ConfigError(f"{given}: a real rig has no seed and no visit; expected --backend sim, or leave it out")
     if many and made.backend == "live":
         raise ConfigError("--count: a real rig is one; expected --backend sim, or leave it out")
     if r.links and made.backend != "live":
@@ -105,10 +110,12 @@ def _refuse_scheduler(c: Campaign, r: CampaignRequest) -> None:
 def identity(asked: Asked) -> dict[str, Any]:
     """What a campaign must be gone on with: all that decides its numbers. How many rigs may grow."""
     c = asked.campaign
-    which: Mapping[str, Any] = {"seed": c.seed or 0} if c.backend == "sim" else {"links": list(asked.request.links)}
+    which: dict[str, Any] = {"seed": c.seed or 0} if c.backend == "sim" else {"links": list(asked.request.links)}
+    which = {"first_seed": c.virtual.first_seed} if c.virtual else which
+    which |= {"visit": c.visit or 0} if c.backend == "sim" else {}
     return {
         "schema": 2, "name": c.name, "rig": {"name": asked.rig.name, "sha256": asked.rig.digest},
-        "backend": c.backend, **({"first_seed": c.virtual.first_seed} if c.virtual else which), "truth": dict(c.truth),
+        "backend": c.backend, **which, "truth": dict(c.truth),
         "steps": [
             {"procedure": s.procedure.name, "plan": s.plan.model_dump(mode="json"), "adopt": s.adopt,
              "judged": list(s.judged)}
@@ -128,6 +135,7 @@ def _many(asked: Asked, directory: CampaignDirectory, progress: Progress) -> tup
     task = RigTask(
         rig=str(Path(asked.rig.path).resolve()), rig_sha256=asked.rig.digest, steps=step_tasks(asked.steps),
         truth=dict(asked.campaign.truth), keep=asked.request.keep or "missed", folder=str(task_folder(directory)),
+        visit=asked.campaign.visit or 0,
     )  # fmt: skip
     scheduler, wanted = asked.request.scheduler, asked.request.jobs or cores()
     with workers_of(scheduler, asked.rig) if scheduler else pool(wanted) as (executor, jobs):

@@ -40,10 +40,11 @@ class Result:
     rig_s: float
     speed: Speed | None
     verdict: Verdict
+    visit: int = 0
 
     def text(self) -> str:
         """The table as lines."""
-        lines = [f"{self.rigs} rigs from seed {self.first_seed}, {self.rig_s:.2f} s a rig"]
+        lines = [f"{self.rigs} rigs from seed {self.first_seed}, visit {self.visit}, {self.rig_s:.2f} s a rig"]
         widest = max((len(row.name) for row in self.rows), default=0)
         if self.rows:
             lines.append(f"  {'':{widest}}  coverage  width   >2U   >3U  >10U")
@@ -86,7 +87,7 @@ def judged(campaign: Campaign, steps: Sequence[Planned], entries: Sequence[Entry
         times.setdefault(f"{s['step']} {names[s['step']]}", []).append(s["wall_s"])
     walls = [e["ended"] - e["began"] for e in entries]
     return Result(
-        rigs=len(entries), first_seed=min((e["seed"] for e in entries), default=0), rows=rows,
+        rigs=len(entries), first_seed=min((e["seed"] for e in entries), default=0), visit=campaign.visit or 0, rows=rows,
         failures=tuple(_failures(entries, names)), unable=unable,
         stopped=dict(Counter(e["stopped"] for e in entries if e["stopped"]).most_common()),
         step_s={k: sum(v) / len(v) for k, v in times.items()}, rig_s=sum(walls) / len(walls) if walls else 0.0,
@@ -187,7 +188,7 @@ def write(directory: CampaignDirectory, asked: Asked, result: Result, report: bo
     """`coverage.json`, and the summary if wanted."""
     content = {
         "schema": 1, "name": asked.campaign.name, "rig": asked.rig.name, "rigs": result.rigs,
-        "first_seed": result.first_seed, "verdict": result.verdict.value,
+        "first_seed": result.first_seed, "visit": result.visit, "verdict": result.verdict.value,
         "quantities": [_entry(row) for row in result.rows],
         "findings": [dataclasses.asdict(f) for f in result.failures], "stopped": dict(result.stopped),
         "unable": [_unable_entry(u) for u in result.unable], "step_s": dict(result.step_s), "rig_s": result.rig_s,
@@ -209,7 +210,7 @@ def _summary(directory: CampaignDirectory, asked: Asked, result: Result) -> None
     ]
     content = page.CoverageContent(
         campaign=directory.path.name, title=asked.campaign.title or asked.campaign.name, rig=asked.rig.name,
-        rigs=result.rigs, first_seed=result.first_seed, date=now, verdict=result.verdict.value,
+        rigs=result.rigs, first_seed=result.first_seed, visit=result.visit, date=now, verdict=result.verdict.value,
         quantities=result.rows, failures=result.failures, unable=result.unable,
         steps=tuple((s.procedure.name, _plan(s), wall) for s, wall in numbered), rig_s=result.rig_s, speed=result.speed,
     )  # fmt: skip

@@ -46,7 +46,7 @@ def simulated_step(
     Raises:
         AnalysisError: the data do not allow the numbers.
     """
-    done = flown(step.procedure, task.rig, seed, step.plan, path, task.truth, known)
+    done = flown(step.procedure, task.rig, seed, step.plan, path, task.truth, known, visit=task.visit)
     cause = done.machine.cause
     if cause is not None and not isinstance(cause, BenchError):
         raise cause
@@ -69,7 +69,8 @@ def request_of(asked: Asked, directory: CampaignDirectory, step: Planned) -> Req
     live = c.backend == "live"
     return Request(
         procedure=step.procedure.name, rig=asked.rig.path, backend=c.backend, seed=None if live else c.seed or 0,
-        plan=step.assignments, truth=tuple(f"{key}={value!r}" for key, value in c.truth.items()), links=r.links,
+        visit=None if live else c.visit or 0, plan=step.assignments,
+        truth=tuple(f"{key}={value!r}" for key, value in c.truth.items()), links=r.links,
         out=directory.runs, operator=r.operator, report=r.report, calibrations=directory.calibrations,
     )  # fmt: skip
 

@@ -28,6 +28,7 @@ class _Line:
     """What is noted of one rig; see docs/reference/campaign.md."""
 
     seed: int
+    visit: int
     began: float
     ended: float = 0.0
     cpu_s: float = 0.0
@@ -72,7 +73,7 @@ def run_rig(task: RigTask, seed: int) -> dict[str, Any]:
         ConfigError: the rig file is not the one that the campaign was started with.
     """
     _refuse_another_rig(task)
-    line = _Line(seed, time.time())
+    line = _Line(seed, task.visit, time.time())
     cpu = time.process_time()
     work = Path(task.folder) / "work" / str(seed)
     work.mkdir(parents=True, exist_ok=True)

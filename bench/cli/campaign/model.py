@@ -51,9 +51,10 @@ def _model(asked: Asked, sources: Sequence[Source], records: Sequence[Record], d
     for name in ("geometry", "machine"):
         tables |= {f"{name}.{key}": value for key, value in (getattr(rig, name, None) or {}).items()}
     told = any(f.code == "simulated-controller" for r in records for f in r.findings)
+    seed, visit = (c.seed or 0, c.visit or 0) if c.backend == "sim" else (None, None)
     return Model(
         schema=1, name=c.name, title=c.title, rig=rig.name, uut=rig.uut.model_dump(), rig_sha256=rig.digest,
-        simulated=c.backend == "sim" or told, seed=c.seed or 0 if c.backend == "sim" else None, created=provenance.now(),
+        simulated=c.backend == "sim" or told, seed=seed, visit=visit, created=provenance.now(),
         complete=len(done) == len(asked.steps) and all(d.passed for d in done),
         constants=campaign_model.constants_of(sources, c.equations),
         correlations=campaign_model.correlations_of(sources), given=campaign_model.given(tables),

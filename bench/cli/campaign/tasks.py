@@ -23,7 +23,8 @@ class StepTask:
 
 @dataclass(frozen=True)
 class RigTask:
-    """What every rig of a campaign goes through. `folder` takes recordings while they are needed, and kept ones."""
+    """What every rig of a campaign goes through, and on which visit. `folder` takes recordings while they are needed, and
+    kept ones."""
 
     rig: str
     rig_sha256: str
@@ -31,3 +32,4 @@ class RigTask:
     truth: Mapping[str, float]
     keep: Keep
     folder: str
+    visit: int = 0

@@ -43,11 +43,11 @@ class Balancer:
 
     def _attach(self, plane: int, mass: float, angle: float) -> None:
         self._fixed += 1
+        seed, visit, defects = self._truth.seed, self._truth.visit, self._truth.defects
         off = [
-            draw_one(t, self._truth.seed, f"weight:{k}:{self._fixed}") if t is not None else 0.0
+            draw_one(t, seed, f"weight:{k}:{self._fixed}", visit) if t is not None else 0.0
             for k, t in enumerate(self._errors)
         ]
-        defects = self._truth.defects
         if self._fixed == defects["weight_astray"]:
             plane = 1 - plane
         if self._fixed == defects["weight_turned"]:

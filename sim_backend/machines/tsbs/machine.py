@@ -35,6 +35,11 @@ DEFECTS = {
 """Planted defects and their harmless values. Mass errors are relative; `factor_...` is what the controller makes of a
 parameter, over what it was told; `segment_scale_drift` is relative, 1/s, of all four segments' sensors."""
 
+DAILY = frozenset(
+    ("site.air_density", *(f"drift_{k}" for k in range(len(COILS))), *(f"segment_drift_{k}" for k in range(4)))
+)
+"""The weather, and how fast each current sensor drifts."""
+
 
 def stated(rig: RigFile) -> dict[str, Toleranced]:
     """Every toleranced number of a rig file by its name; one that holds for several sensors once for each."""
@@ -217,5 +222,5 @@ TSBS = Machine(
     integral_gains=frozenset(("ki_i", "ki_o", "ki_z", "ki_m")), turns=True,
     channels=CHANNELS, places=places, spoil=spoil,
     supply_V=148.0, windings={"temp_i": 0.0, "temp_o": 2.0, "temp_m": -3.0}, copper_W=copper_W,
-    operator=operator,
+    operator=operator, daily=DAILY,
 )  # fmt: skip
