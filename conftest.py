@@ -35,7 +35,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--rig", metavar="RIG", help="a rig file, or its name in rigs/")
     group.addoption("--backend", choices=("sim", "live"), default="sim", help="the simulated rig, or the real one")
     group.addoption("--seed", type=int, help="which virtual rig (simulation only)")
-    group.addoption("--visit", type=int, help="the same virtual rig on which day (simulation only)")
+    group.addoption("--visit", type=int, help="another day of the same virtual rig (simulation only)")
     group.addoption("--plan", action="append", default=[], metavar="[PROCEDURE:]KEY=VALUE",
                     help="a setting, of one procedure or of each that has it; repeatable")  # fmt: skip
     group.addoption("--fault", action="append", default=[], metavar="FAULT", help="a fault to inject; repeatable")

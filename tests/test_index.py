@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import shutil
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -46,6 +48,14 @@ def test_missing_or_corrupt_is_rebuilt(tmp_path: Path) -> None:
         index.add(run(tmp_path, 2))
         assert outcomes(tmp_path) == ["PASS", "PASS"]
         shutil.rmtree(run(tmp_path, 2))
+
+
+def test_an_index_of_before_there_were_visits_is_rebuilt(tmp_path: Path) -> None:
+    run(tmp_path, 1)
+    with closing(sqlite3.connect(tmp_path / index.NAME)) as db, db:
+        db.execute("CREATE TABLE runs (run_id, procedure, rig, outcome, started, ended, seed, PRIMARY KEY (run_id))")
+        db.execute("PRAGMA user_version = 1")
+    assert outcomes(tmp_path) == ["PASS"]
 
 
 def test_a_corrupt_run_is_skipped_with_a_message(tmp_path: Path) -> None:

@@ -68,7 +68,7 @@ def run(
     backend: Annotated[Backend, typer.Option(help="The simulated rig, or the real one.")] = Backend.SIM,
     seed: Annotated[int | None, typer.Option(min=0, help="Which virtual rig (simulation only; default 0).")] = None,
     visit: Annotated[
-        int | None, typer.Option(min=0, help="The same virtual rig on which day (simulation only; default 0).")
+        int | None, typer.Option(min=0, help="Another day of the same virtual rig (simulation only; default 0).")
     ] = None,
     plan: Annotated[list[str] | None, typer.Option(metavar="KEY=VALUE", help="A setting; repeatable.")] = None,
     plan_file: Annotated[Path | None, typer.Option("--plan-file", help="Settings from a TOML file.")] = None,
@@ -138,7 +138,9 @@ def campaign(
     rig: Annotated[str | None, typer.Option("--rig", metavar="RIG", help="Another rig than the file's.")] = None,
     backend: Annotated[Backend | None, typer.Option(help="The simulated rig, or the real one.")] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="One virtual rig: which.")] = None,
-    visit: Annotated[int | None, typer.Option(min=0, help="Virtual rigs: on which day; default the file's.")] = None,
+    visit: Annotated[
+        int | None, typer.Option(min=0, help="Another day of the same virtual rigs; default the file's.")
+    ] = None,
     count: Annotated[int | None, typer.Option(min=1, help="Many virtual rigs: how many.")] = None,
     first_seed: Annotated[int | None, typer.Option("--first-seed", min=0, help="Many: the first seed.")] = None,
     link: Annotated[
@@ -194,7 +196,7 @@ for of_stored_runs in (stored.adopt, stored.calibrations, stored.analyse, stored
 def serve(
     rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig file, or its name in rigs/.")],
     seed: Annotated[int, typer.Option(min=0, help="Which virtual rig.")] = 0,
-    visit: Annotated[int, typer.Option(min=0, help="The same virtual rig on which day.")] = 0,
+    visit: Annotated[int, typer.Option(min=0, help="Another day of the same virtual rig.")] = 0,
     truth: Annotated[
         list[str] | None, typer.Option("--truth", metavar="KEY=VALUE", help="Fix what the simulator draws; repeatable.")
     ] = None,

@@ -224,6 +224,13 @@ def test_options_that_contradict_each_other(bench: Bench, arguments: tuple[str, 
     assert said in err
 
 
+@pytest.mark.parametrize("option", ["--seed", "--visit"])
+def test_a_campaign_file_for_a_real_rig_has_no_virtual_one(bench: Bench, option: str) -> None:
+    status, _, err = bench(HEAD + 'backend = "live"\n' + TWO, option, "1")
+    assert status == 2
+    assert f"{option}: a real rig has no seed and no visit; expected --backend sim" in err
+
+
 def test_many_rigs_go_through_the_chain_and_are_noted(bench_process: Bench, tmp_path: Path) -> None:
     """The truth holds no supply: nothing can be judged."""
     status, out, err = bench_process(HEAD + TWO, "--count", "2", "--first-seed", "7", "--visit", "3", "--jobs", "2",
