@@ -19,6 +19,7 @@ from bench.campaign.model import SCHEMA_FILE, json_schema
 from bench.cli.campaign.job import run_rig
 from bench.cli.campaign.tasks import RigTask
 from bench.errors import ConfigError
+from bench.recording import Recording
 from bench.rigfile import load_rig
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -250,6 +251,7 @@ def test_many_rigs_go_through_the_chain_and_are_noted(bench_process: Bench, tmp_
     kept = sorted(p.relative_to(folder).as_posix() for p in (folder / "recordings").rglob("*.mcap"))
     assert kept[:2] == ["recordings/7/1-tiny-levitated.mcap", "recordings/7/2-tiny-needing.mcap"]
     assert len(kept) == 4
+    assert {Recording[Any].open(folder / path).visit for path in kept} == {3}
     assert not (folder / "work").exists()
     told = json.loads((folder / "coverage.json").read_text())
     assert (told["first_seed"], told["visit"], told["verdict"]) == (7, 3, "indeterminate")
