@@ -16,7 +16,7 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import serial
 
@@ -49,7 +49,7 @@ class BytePort:
     _closed: bool = False
 
     @classmethod
-    def open(cls, where: str, *, baudrate: int | None = None, exclusive: bool = True) -> BytePort:
+    def open(cls, where: str, *, baudrate: int | None = None, exclusive: bool = True) -> Self:
         """Open a device (`/dev/ttyACM0`, `COM3`), `socket://HOST:PORT` or `rfc2217://HOST:PORT`.
 
         Raises:

@@ -142,6 +142,18 @@ def open_bus(
     Raises:
         ConfigError: it cannot be opened.
     """
+    arguments = arguments_of(spec, name, identifiers)
+    bus = open_interface(name, arguments, now_ns)
+    brs = arguments["fd"] and arguments.get("data_bitrate") not in (None, arguments.get("bitrate"))
+    return CanBus(name, bus, arguments, now_ns, brs)
+
+
+def arguments_of(spec: LinkSpec, name: str, identifiers: Sequence[int] = ()) -> dict[str, Any]:
+    """What opens the CAN bus of a link: arguments of `can.Bus`, `open_bus` says which come from where.
+
+    Raises:
+        ConfigError: no such interface, or settings that it cannot have.
+    """
     url = linkurl.parse(spec.url)
     options = {**{k: _typed(v) for k, v in url.query.items()}, **spec.options}
     options.update({k: int(v) for k in ("bitrate", "data_bitrate") if (v := getattr(spec, k)) is not None})
@@ -153,17 +165,19 @@ def open_bus(
             raise ConfigError(f"link {name}: SLCAN has no option {', '.join(unknown)}; expected among {expected}")
         if "bitrate" not in options:
             raise ConfigError(f"link {name}: SLCAN needs a bit rate; expected `bitrate` in [links.{name}]")
-        arguments: dict[str, Any] = {"interface": "slcan_batch", "channel": url.rest, "fd": fd, **options}
-    else:
-        arguments = {**_interface(name, url.rest), "fd": fd, **options}
-        if identifiers and filters not in (False, "off"):
-            arguments["can_filters"] = [_filter(i) for i in identifiers]
-    bus = _open(name, arguments, now_ns)
-    brs = fd and options.get("data_bitrate") not in (None, options.get("bitrate"))
-    return CanBus(name, bus, arguments, now_ns, brs)
+        return {"interface": "slcan_batch", "channel": url.rest, "fd": fd, **options}
+    arguments = {**_interface(name, url.rest), "fd": fd, **options}
+    if identifiers and filters not in (False, "off"):
+        arguments["can_filters"] = [_filter(i) for i in identifiers]
+    return arguments
 
 
-def _open(name: str, arguments: Mapping[str, Any], now_ns: Callable[[], int]) -> can.BusABC:
+def open_interface(name: str, arguments: Mapping[str, Any], now_ns: Callable[[], int]) -> can.BusABC:
+    """The interface that these arguments open.
+
+    Raises:
+        ConfigError: it cannot be opened.
+    """
     try:
         if arguments["interface"] == "slcan_batch":
             return SlcanBatchBus(now_ns=now_ns, **{k: v for k, v in arguments.items() if k != "interface"})

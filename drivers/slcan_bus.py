@@ -107,12 +107,12 @@ class SlcanBatchBus(can.BusABC):
         """
         self._write(b"\r\r" + slcan.CLOSE + slcan.VERSION)  # CRs end whatever an earlier user left half written
         self._await(lambda s: bool(s.replies))
-        self._refuse_noise(channel)
+        refuse_noise(channel, self.stream, self._came)
         self.stream.refused = 0
         self.stream.replies.clear()
         self._write(self._setup + slcan.VERSION)
         self._await(lambda s: bool(s.replies))
-        self._refuse_noise(channel)  # a byte of it may look like a refusal
+        refuse_noise(channel, self.stream, self._came)  # a byte of it may look like a refusal
         if self.stream.refused:
             lines = ", ".join(line.decode() for line in self._setup.split())
             raise ConfigError(
@@ -130,14 +130,6 @@ class SlcanBatchBus(can.BusABC):
                 "the bit rates of the bus, and a bus that is connected and terminated"
             )
         return status is not None
-
-    def _refuse_noise(self, channel: str) -> None:
-        """More that is no SLCAN than frames: now and then noise has the form of a frame, or of an answer."""
-        if (strange := self.stream.malformed) > STRANGE and strange > self._came:
-            raise ConfigError(
-                f"port {channel}: {strange} pieces came that are no SLCAN, and {self._came or 'no'} frames; expected an SLCAN "
-                "adapter. Next: is it another device, or a controller that sends packets (serial: in place of slcan:)?"
-            )
 
     def _await(self, came: Callable[[SlcanStream], bool]) -> None:
         """Read until the answer came, or the time for it is over."""
@@ -246,6 +238,19 @@ class SlcanBatchBus(can.BusABC):
             with contextlib.suppress(LinkError):  # it is gone already
                 self.port.write(slcan.CLOSE)
             self.port.close()
+
+
+def refuse_noise(channel: str, stream: SlcanStream, frames: int) -> None:
+    """See that what came while an adapter was set up is SLCAN: now and then noise has the form of a frame, or of an answer.
+
+    Raises:
+        ConfigError: more pieces are none than there were frames.
+    """
+    if (strange := stream.malformed) > STRANGE and strange > frames:
+        raise ConfigError(
+            f"port {channel}: {strange} pieces came that are no SLCAN, and {frames or 'no'} frames; expected an SLCAN "
+            "adapter. Next: is it another device, or a controller that sends packets (serial: in place of slcan:)?"
+        )
 
 
 def _passing(filters: Sequence[dict[str, Any]]) -> Callable[[FrameBatch], Any]:

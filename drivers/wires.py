@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from bench.clock import WallClock
 from bench.errors import ConfigError, LinkError
@@ -174,14 +174,22 @@ def open_wire(
     if url.scheme in ("slcan", "can"):
         return CanWire(open_bus(spec, name, identifiers, clock))
     if url.scheme == "serial":
-        return PacketWire(_port(name, url), clock)
+        return PacketWire(open_port(name, url, BytePort), clock)
     raise ConfigError(f"link {name}: found {spec.url!r}; expected a URL that starts with slcan:, can: or serial:")
 
 
-def _port(name: str, url: linkurl.LinkUrl) -> BytePort:
+P = TypeVar("P", bound=BytePort)
+
+
+def open_port(name: str, url: linkurl.LinkUrl, kind: type[P]) -> P:
+    """The byte stream of a link `serial:`, with the baud rate of its URL.
+
+    Raises:
+        ConfigError: it cannot be opened, or the URL has other settings.
+    """
     baudrate = _baudrate(name, url.query)
     try:
-        return BytePort.open(url.rest, baudrate=baudrate)
+        return kind.open(url.rest, baudrate=baudrate)
     except ConfigError as error:
         raise ConfigError(f"link {name}: {error}") from error
 

@@ -16,7 +16,8 @@ import cantools
 import numpy as np
 import pytest
 
-from bench.cli.compose import Request, load_procedure
+from bench.cli.compose import Request
+from bench.cli.loading import load_procedure
 from bench.cli.run import execute
 from bench.link.frames import SENT
 from bench.procedure import Measured

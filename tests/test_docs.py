@@ -25,8 +25,8 @@ from typing import Any
 import pytest
 import typer
 
-from bench.cli import compose
 from bench.cli.__main__ import app
+from bench.cli.loading import load_procedure
 from bench.procedure import plans
 from bench.rigfile import load_rig
 
@@ -174,7 +174,7 @@ def test_commands_are_understood(page: Path) -> None:
         asked = chosen.make_context(words[0], words[1:]).params
         if words[0] != "run" or not well or asked["rig"] not in RIGS:
             continue
-        procedure, rig = compose.load_procedure(asked["procedure"]), load_rig(asked["rig"])
+        procedure, rig = load_procedure(asked["procedure"]), load_rig(asked["rig"])
         defaults = ("rig", rig.plans.get(procedure.name, {}))
         plan = plans.assemble(procedure.plan, defaults, None, tuple(asked["plan"] or ()))
         assert procedure.problems(rig, plan) == ()

@@ -7,7 +7,7 @@ from dataclasses import fields
 import pytest
 
 from bench import catalogue
-from bench.cli.compose import load_procedure
+from bench.cli.loading import load_procedure
 from bench.procedure import Procedure
 from bench.rigfile import RigFile, load_rig
 from bench.rigfile.check_machine import references_in

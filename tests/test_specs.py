@@ -12,7 +12,7 @@ from typing import Literal
 import pytest
 
 from bench import catalogue
-from bench.cli.compose import load_procedure
+from bench.cli.loading import load_procedure
 from bench.errors import ConfigError
 from bench.findings import Effect
 from bench.procedure import BenchPlan, Measured, Procedure, Quantity

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import fft
-from scipy.interpolate import CubicSpline
 
 from bench.analysis.sampling import Array, Sampling, increasing, rows
 from bench.analysis.tachometer import TURN, Tachometer
@@ -49,6 +47,9 @@ def order_map(
     Raises:
         AnalysisError: the record is shorter than a block.
     """
+    from scipy import fft
+    from scipy.interpolate import CubicSpline
+
     at, data = increasing(t, "order map"), rows(x, np.size(t))[0]
     read = at - sampling.late
     first = max(float(tacho.angle(max(read[0], tacho.times[0]))), TURN * float(tacho.turns[0]))

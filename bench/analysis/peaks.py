@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import uniform_filter1d
 
 from bench.analysis.sampling import Array, Complex
 from bench.analysis.vectors import complexes
@@ -114,6 +113,8 @@ class Smoother:
         return np.asarray(found / usual.mean(axis=0))
 
     def _scatter(self, values: Complex) -> Array:
+        from scipy.ndimage import uniform_filter1d
+
         around = min(WINDOWS[-1], values.shape[-1])
         return np.asarray(uniform_filter1d(_misfit(values, self._windows, self._weight), around, mode="nearest"))
 

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtrc, fdtrc
 
 from bench.analysis.sampling import Array, Complex
 from bench.errors import AnalysisError
@@ -85,6 +84,8 @@ def fitted(x: Array, z: Complex, power: Array, dof: float) -> Rational:
 def orders(x: Array, z: Complex, power: Array, dof: float) -> list[Rational]:
     """All orders that the lines can carry, the likeliest first; arguments and errors as those of `fitted`. One with a pole
     between two lines, narrower than they can show, is passed over: noise makes such poles."""
+    from scipy.special import chdtrc, fdtrc
+
     if x.size < 6 or z.shape != x.shape or power.shape != x.shape:
         raise AnalysisError(
             f"rational model: found {x.size} lines and {power.size} variances; expected six or more of each"

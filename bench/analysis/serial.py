@@ -11,7 +11,6 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from bench.analysis.sampling import Array, Complex
 
@@ -36,6 +35,8 @@ def variances(moves: Complex) -> tuple[Array, Array]:
 def inflation(alone: Array, whole: Array) -> Array:
     """The ratio (b,) of `whole` to `alone` (b, c), of channels that see the same motion, over the blocks about each in their
     order."""
+    from scipy.ndimage import uniform_filter1d
+
     above, below = (uniform_filter1d(v.sum(axis=1), min(AROUND, len(v)), mode="nearest") for v in (whole, alone))
     return np.asarray(np.maximum(above / np.maximum(below, 1e-300), FLOOR))
 

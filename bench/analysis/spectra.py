@@ -7,7 +7,6 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy import fft
 
 from bench.analysis.sampling import Array, Sampling, rows
 from bench.analysis.tachometer import Tachometer
@@ -76,6 +75,8 @@ def density(x: npt.ArrayLike, rate: float, *, segment: int, window: str = "hann"
 
 def _averaged(x: npt.ArrayLike, rate: float, segment: int | None, window: str) -> tuple[Array, Array, Array, int]:
     """Mean square of the segments' windowed transforms (c, m), Hz (m,), the window, the number of segments."""
+    from scipy import fft
+
     data = rows(x)
     size = segment or data.shape[1]
     if not 8 <= size <= data.shape[1]:
@@ -111,6 +112,8 @@ def waterfall(
     scaling: Scaling = "0-pk",
 ) -> Waterfall:
     """Amplitude spectra of one channel (n,), `count` of them at equal steps of speed (of time where it is constant)."""
+    from scipy import fft
+
     at, data = np.asarray(t, np.float64), rows(x, np.size(t))[0]
     rate = (at.size - 1) / float(at[-1] - at[0])
     if at.size < segment:
@@ -160,6 +163,8 @@ def full(
 
     A circle of radius r reads r (0-pk) on one side only, a straight line of amplitude a reads a/2 on both.
     """
+    from scipy import fft
+
     both = rows(np.array([np.asarray(x, np.float64), np.asarray(y, np.float64)]))
     z = both[0] + 1j * (both[1] if x_to_y else -both[1])
     w = get_window(window, z.size)

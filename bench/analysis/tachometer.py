@@ -9,14 +9,17 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicSpline
 
 from bench.analysis.pulses import repaired
 from bench.analysis.sampling import Array, increasing
 from bench.errors import AnalysisError
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 Integers = npt.NDArray[np.int64]
 TURN = 2 * math.pi
@@ -39,10 +42,14 @@ class Tachometer:
 
     @cached_property
     def _angle(self) -> CubicSpline:
+        from scipy.interpolate import CubicSpline
+
         return CubicSpline(self.times, TURN * self.turns)
 
     @cached_property
     def _time(self) -> CubicSpline:
+        from scipy.interpolate import CubicSpline
+
         return CubicSpline(TURN * self.turns, self.times)
 
     def angle(self, t: npt.ArrayLike) -> Array:

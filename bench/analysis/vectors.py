@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import fdtri
 
 from bench.analysis.sampling import Array, Complex, lag_deg
 from bench.errors import AnalysisError
@@ -92,6 +91,8 @@ def complexes(pairs: npt.ArrayLike) -> Complex:
 def radius2(dof: float, probability: float = 0.95) -> float:
     """Squared Mahalanobis radius of a vector's region: Hotelling's 2 nu/(nu - 1) F(2, nu - 1); 5.99 (k = 2.45) where the
     covariance is known."""
+    from scipy.special import fdtri
+
     if math.isinf(dof):
         return -2 * math.log(1 - probability)
     if dof <= 1:

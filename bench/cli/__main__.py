@@ -43,11 +43,15 @@ def options(
 
 
 @app.command("list")
-def list_() -> int:
-    """Show the procedures and rigs that are there."""
-    from bench.cli.check import show_list
+def list_(
+    rig: Annotated[
+        str, typer.Option("--rig", metavar="RIG", help="Which procedures this rig can run, and what the others lack.")
+    ] = "",
+) -> int:
+    """Show the procedures and rigs that are there, or what one rig can run."""
+    from bench.cli.check import show_abilities, show_list
 
-    return show_list()
+    return show_abilities(rig) if rig else show_list()
 
 
 @app.command()
@@ -190,6 +194,41 @@ def campaign(
 
 for of_stored_runs in (stored.adopt, stored.calibrations, stored.analyse, stored.report, stored.runs, stored.export):
     app.command()(of_stored_runs)
+
+
+@app.command()
+def listen(
+    rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig file, or its name in rigs/.")],
+    link: Annotated[
+        list[str] | None, typer.Option("--link", metavar="NAME=URL", help="Another address for a link; repeatable.")
+    ] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.1, help="End by itself; default: on Ctrl-C.")] = None,
+    record: Annotated[bool, typer.Option("--record", help="Keep what came, in a run directory.")] = False,
+    out: Out = Path("runs"),
+    poll: Annotated[
+        bool, typer.Option("--poll", help="Read the register devices too: a request each time; nothing is written.")
+    ] = False,
+    acknowledge: Annotated[
+        bool, typer.Option("--acknowledge", help="CAN: acknowledge frames, where no other node does; none is sent.")
+    ] = False,
+) -> int:
+    """Listen to a rig's controller and show what it says. Sends nothing, not even a heartbeat.
+
+    With --record the last line on standard output is the run directory.
+    """
+    from bench.cli.listen.command import ListenRequest, listen_command
+
+    return listen_command(
+        ListenRequest(
+            rig=rig,
+            links=tuple(link or ()),
+            seconds=seconds,
+            record=record,
+            out=out,
+            poll=poll,
+            acknowledge=acknowledge,
+        )
+    )
 
 
 @app.command()

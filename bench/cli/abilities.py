@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from bench import catalogue
-from bench.cli.compose import load_procedure
+from bench.cli.loading import load_procedure
 from bench.errors import ConfigError, Problem
 from bench.procedure import BenchPlan, Procedure
 from bench.procedure.plans import assemble
@@ -83,12 +83,28 @@ def told(found: list[Ability], rig: str) -> str:
     unable = [a for a in found if not a.able]
     lines += ["cannot run:"] if unable else []
     for a in unable:
-        said = [*_short(a.lacking), *a.unfit, *(str(p) for p in a.problems)]
-        lines += textwrap.wrap(f"{a.procedure}: {'; '.join(said)}", WIDTH, initial_indent="  ",
+        lines += textwrap.wrap(f"{a.procedure}: {_why(a)}", WIDTH, initial_indent="  ",
                                subsequent_indent="    ", break_on_hyphens=False)  # fmt: skip
     if any(a.lacking for a in unable):
         lines.append(f"all that a procedure lacks: `bench check {rig} PROCEDURE`")
     return "\n".join(lines) + "\n"
+
+
+def listed(found: list[Ability], rig: str) -> str:
+    """Each procedure with yes or what is missing, as lines of at most 80 columns."""
+    wide = max(len(a.procedure) for a in found)
+    lines = []
+    for a in found:
+        said = "yes" if a.able else f"no: {_why(a)}"
+        lines += textwrap.wrap(said, WIDTH, initial_indent=f"  {a.procedure:{wide}}  ",
+                               subsequent_indent=" " * (wide + 8), break_on_hyphens=False)  # fmt: skip
+    if any(a.lacking for a in found):
+        lines.append(f"all that a procedure lacks: `bench check {rig} PROCEDURE`")
+    return "\n".join(lines) + "\n"
+
+
+def _why(a: Ability) -> str:
+    return "; ".join([*_short(a.lacking), *a.unfit, *(str(p) for p in a.problems)])
 
 
 def _short(lacking: tuple[str, ...]) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from bench import catalogue
 from bench.calibration import Calibration
 from bench.calibration.store import Store, named
-from bench.cli.compose import load_procedure
+from bench.cli.loading import load_procedure
 from bench.record.outcomes import SOUND
 from bench.rigfile import load_rig
 from bench.run.adoption import Adoption, due, refuse_other_rig

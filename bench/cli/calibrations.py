@@ -13,7 +13,7 @@ from bench.calibration import Calibration, changed_certificates, number
 from bench.calibration import file as calibration_file
 from bench.calibration.store import Store, base_of, machine, stores_of
 from bench.cli.adopt import values
-from bench.cli.compose import load_procedure
+from bench.cli.loading import load_procedure
 from bench.errors import ConfigError
 from bench.record.outcomes import SOUND
 from bench.rigfile import RigFile, load_rig

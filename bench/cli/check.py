@@ -28,6 +28,20 @@ def show_list() -> int:
     return PASS
 
 
+def show_abilities(rig: str) -> int:
+    """Which procedures a rig can run, and what the others lack. Imports no numerics: procedures bring them where they compute.
+
+    Raises:
+        ConfigError: there is no such rig, or its file has problems; every one is in it.
+    """
+    from bench.cli.abilities import abilities, listed
+    from bench.rigfile import load_rig
+
+    loaded = load_rig(rig)
+    sys.stdout.write(f"procedures on {loaded.name}\n{listed(abilities(loaded), rig)}")
+    return PASS
+
+
 def _table(title: str, rows: list[tuple[str, str]]) -> None:
     width = max(len(name) for name, _ in rows)
     sys.stdout.write(f"{title}\n")

@@ -16,11 +16,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from bench import catalogue
 from bench.calibration import Need, number
 from bench.calibration.lookup import Lookup
 from bench.calibration.store import Store
 from bench.cli.console import Asking, quietly
+from bench.cli.loading import load_procedure
 from bench.cli.opening import live, simulated
 from bench.errors import ConfigError
 from bench.link import fault_injection
@@ -30,6 +30,8 @@ from bench.record.specs import load_spec, misnamed
 from bench.rigfile import RigFile, linkurl, load_rig
 from bench.rigfile.envelope import Envelope
 from bench.run.job import Connect, Job
+
+NUMERICS = ("fft", "interpolate", "linalg", "ndimage", "optimize", "signal", "special")
 
 
 @dataclass(frozen=True)
@@ -54,16 +56,6 @@ class Request:
     allow_expired: bool = False
     spec: Path | None = None
     require_verdict: bool = False
-
-
-def load_procedure(name: str) -> Procedure:
-    """The procedure of that name in the catalogue.
-
-    Raises:
-        ConfigError: there is none.
-    """
-    found: Procedure = importlib.import_module(catalogue.entry(name).module).procedure
-    return found
 
 
 def planned(request: Request) -> tuple[Procedure, RigFile, BenchPlan]:
@@ -107,6 +99,7 @@ def prepare(request: Request, asking: Asking = quietly) -> tuple[Job, Connect]:
     used = lookup.found(procedure.name, procedure.needs(plan))
     injected = [fault_injection.parse(text) for text in request.faults]
     if seed is None:
+        _load_numerics()
         kind = request.operator or ("console" if sys.stdin.isatty() else "auto")
         job = Job(procedure, rig, plan, limits, "live", None, rig_lock(rig.link.url.partition("?")[0]), used,
                   judged)  # fmt: skip
@@ -118,6 +111,13 @@ def prepare(request: Request, asking: Asking = quietly) -> tuple[Job, Connect]:
         rig, seed, overrides, request.operator or "auto", procedure.settings(plan), injected, asking, visit=visit
     )
     return Job(procedure, rig, plan, limits, request.backend, seed, None, used, judged, visit), connect
+
+
+def _load_numerics() -> None:
+    """Procedures import scipy where they compute. In a live run that would take up to a second while the machine moves, as
+    long as the heartbeat's lease."""
+    for name in NUMERICS:
+        importlib.import_module(f"scipy.{name}")
 
 
 def remedy(request: Request, need: Need) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Literal, cast
 
 from bench import rundir
-from bench.cli.compose import load_procedure
+from bench.cli.loading import load_procedure
 from bench.cli.reporting import figures
 from bench.errors import BenchError, RecordingError
 from bench.record.records import read_record

@@ -10,7 +10,7 @@ from typing import Any
 
 from bench import rundir, runlog
 from bench.cli import reporting
-from bench.cli.compose import load_procedure
+from bench.cli.loading import load_procedure
 from bench.cli.run import STATUS
 from bench.cli.summary import summary
 from bench.errors import BenchError, ConfigError, RecordingError

@@ -14,7 +14,8 @@ from bench import catalogue
 from bench.calibration import Need, number, settings_differ
 from bench.calibration.store import Store, machine
 from bench.cli.adopt import adopt
-from bench.cli.compose import Request, load_procedure, planned
+from bench.cli.compose import Request, planned
+from bench.cli.loading import load_procedure
 from bench.cli.run import execute
 from bench.errors import BenchError, ConfigError
 from bench.procedure import Procedure

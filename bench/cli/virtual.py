@@ -12,7 +12,7 @@ from typing import Any
 
 from bench.calibration import Calibration, Need, settings_differ
 from bench.cli import opening
-from bench.cli.compose import load_procedure
+from bench.cli.loading import load_procedure
 from bench.errors import ConfigError
 from bench.findings import Finding
 from bench.procedure import Measured, Procedure

@@ -31,6 +31,9 @@ class Signal:
     unit: str
     choices: Mapping[int, str]
     comment: str
+    low: float | None = None
+    high: float | None = None
+    """The range that the DBC states, in `unit`; None where it states none."""
 
 
 @dataclass(frozen=True)
@@ -129,6 +132,8 @@ def _signal(s: Any) -> Signal:
         unit=s.unit or "",
         choices=choices,
         comment=_text(s.comment),
+        low=None if s.minimum is None else float(s.minimum),
+        high=None if s.maximum is None else float(s.maximum),
     )
 
 

@@ -10,7 +10,6 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
-from scipy.special import ndtri, stdtrit
 
 from bench.errors import AnalysisError
 from bench.uncertainty.estimate import Array, Estimate, Influence
@@ -84,6 +83,8 @@ def ensemble(i: Influence) -> str:
 
 def coverage_factor(dof: float) -> float:
     """k = t_0.975(dof), for 95 % (GUM G.3.4)."""
+    from scipy.special import ndtri, stdtrit
+
     tail = (1 + PROBABILITY) / 2
     return float(ndtri(tail)) if math.isinf(dof) else float(stdtrit(dof, tail))
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.special import ndtr, stdtr
 
 from bench.uncertainty.estimate import Array
 
@@ -20,6 +19,8 @@ Tails = tuple[float, ...]
 def tails_of_t(k: float, dof: float) -> Tails:
     """P(|T| > m k) for the multiples m of a half width of k standard uncertainties: Student's t, normal with infinite
     degrees of freedom."""
+    from scipy.special import ndtr, stdtr
+
     return tuple(2 * float(ndtr(-m * k) if math.isinf(dof) else stdtr(dof, -m * k)) for m in MULTIPLES)
 
 

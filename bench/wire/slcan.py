@@ -1,7 +1,7 @@
 """CAN over a byte stream in Lawicel ASCII (SLCAN), with the CANable 2.0 dialect for CAN FD. Bytes only.
 
-Source: Lawicel CANUSB manual 1.0D (t, T, r, R, S, O, C, F, V, N, Z) and the CANable 2.0 firmware's command list
-(d, D, b, B, Y). Every line ends with CR; BEL alone is the adapter's refusal.
+Source: Lawicel CANUSB manual 1.0D (t, T, r, R, S, O, L, C, F, V, N, Z) and the CANable 2.0 firmware's command list
+(d, D, b, B, Y, M). Every line ends with CR; BEL alone is the adapter's refusal.
 
     tIIIL..   TIIIIIIIIL..   classic data frame, 11 and 29 bit identifier    rIIIL  RIIIIIIIIL   remote frames
     dIIIL..   DIIIIIIIIL..   CAN FD without bit-rate switch                  bIIIL..  BIIIIIIIIL..   with it
@@ -40,6 +40,11 @@ BITRATES: Final = {
 }
 DATA_BITRATES: Final = {2_000_000: "Y2", 5_000_000: "Y5"}
 OPEN: Final = b"O\r"
+LISTEN: Final = b"L\r"
+"""Opens it for listening: it acknowledges nothing and sends nothing on the bus (Lawicel CAN232 and CANUSB)."""
+SILENT: Final = b"M1\r"
+NORMAL: Final = b"M0\r"
+"""The same in the CANable firmware, which knows no L: a mode that is set before O, and that stays until M0 or power-off."""
 CLOSE: Final = b"C\r"
 STATUS: Final = b"F\r"
 VERSION: Final = b"V\r"
@@ -111,12 +116,19 @@ def setup(bitrate: int, data_bitrate: int | None = None, *, timestamp: bool = Fa
     Raises:
         ConfigError: the protocol has no code for a rate.
     """
-    lines = ["C", _rate_code(bitrate, BITRATES, "bit rate")]
+    return CLOSE + rates(bitrate, data_bitrate) + (b"Z1\r" if timestamp else b"") + OPEN
+
+
+def rates(bitrate: int, data_bitrate: int | None = None) -> bytes:
+    """The lines that set the rates in bit/s, which only a closed channel takes.
+
+    Raises:
+        ConfigError: the protocol has no code for a rate.
+    """
+    lines = [_rate_code(bitrate, BITRATES, "bit rate")]
     if data_bitrate is not None:
         lines.append(_rate_code(data_bitrate, DATA_BITRATES, "data bit rate"))
-    if timestamp:
-        lines.append("Z1")
-    return "".join(f"{text}\r" for text in (*lines, "O")).encode()
+    return "".join(f"{text}\r" for text in lines).encode()
 
 
 def _rate_code(rate: int, codes: dict[int, str], what: str) -> str:

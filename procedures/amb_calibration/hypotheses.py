@@ -12,7 +12,6 @@ from itertools import combinations
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special
 
 from procedures.amb_calibration import fit
 from procedures.amb_calibration.fit import Fit, Hangings
@@ -43,6 +42,8 @@ class Contradiction:
     @property
     def probability(self) -> float:
         """Of as much by chance: of the whole, or of what wrong masses can make, whichever is less."""
+        from scipy import special
+
         pulls, _ = self.of_masses()
         return min(
             self.chance(self.total), float(special.fdtrc(len(pulls), self.dof, float(pulls @ pulls) / len(pulls)))
@@ -58,6 +59,8 @@ class Contradiction:
 
     def chance(self, chi2: float, fitted: int = 0) -> float:
         """Probability of as much by chance where `fitted` terms were adjusted; the scatter is known with `dof` (F test)."""
+        from scipy import special
+
         parts = len(self.seen) - fitted
         return float(special.fdtrc(parts, self.dof, chi2 / parts))
 
@@ -138,6 +141,8 @@ def scatter_of_set(c: Contradiction) -> float:
     """Relative standard deviation of each hung mass, beside its certificate, that makes the contradiction an ordinary one
     (chi-squared equal to its degrees of freedom; Mandel and Paule, Anal. Chem. 42, 1194 (1970)). 0 where it is ordinary
     anyway: its probability by chance is `DOUBT` or more."""
+    from scipy import special
+
     pulls, spread = c.of_masses()
     count = len(pulls)
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import signal
 
 from bench.errors import AnalysisError
 
@@ -114,6 +113,8 @@ def _crossing(t: Array, y: Array, level: float) -> tuple[float, float]:
 
 def smoothed(orbit: Array) -> Array:
     """(2, n): each sample from a parabola through its neighbours (Savitzky and Golay)."""
+    from scipy import signal
+
     if orbit.shape[1] < SMOOTH:
         return orbit
     out: Array = signal.savgol_filter(orbit, SMOOTH, 2, axis=1)

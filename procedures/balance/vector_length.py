@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.special import chndtr, ndtr
 
 from bench.uncertainty import Estimate
 from bench.uncertainty.estimate import Array, Deviations, merged
@@ -24,6 +23,8 @@ def amount(x: Estimate, y: Estimate) -> Estimate:
     """Length of the vector (x, y), in their unit: the measured one, with the influences of its components along it and the
     interval by Monte Carlo. Components of unlike uncertainty count as two of their mean variance; one shorter than that is
     taken for as long, lest chance make an interval of nothing."""
+    from scipy.special import chndtr, ndtr
+
     r = math.hypot(x.value, y.value)
     way = (x.value / r, y.value / r) if r else (1.0, 0.0)
     along = Estimate(0.0, x.unit, merged([(way[0], x), (way[1], y)]))

@@ -20,7 +20,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import linalg
 
 from bench.errors import AnalysisError
 from bench.uncertainty import Estimate
@@ -128,6 +127,8 @@ def _inverse(design: Array) -> Array:
     Raises:
         AnalysisError: columns that depend on each other.
     """
+    from scipy import linalg
+
     scale = np.sqrt((design**2).sum(axis=0))
     r = np.linalg.qr(design / scale, mode="r")
     if np.abs(np.diag(r)).min() < 1e-9:

@@ -10,7 +10,6 @@ from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special
 
 from bench.findings import Effect, Finding
 from bench.uncertainty import Estimate
@@ -102,6 +101,8 @@ def exchanged(axis: str, terms: Array) -> Iterator[Finding]:
 
 def beyond(chi2: float, parts: int, dof: int) -> bool:
     """Whether a chi-squared of that many parts is none by chance, its scatter being known with `dof` (F test)."""
+    from scipy import special
+
     return bool(chi2 / parts > special.fdtri(parts, dof, 1 - CHANCE))
 
 

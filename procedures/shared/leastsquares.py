@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import linalg, optimize, special
 
 from bench.errors import AnalysisError
 
@@ -38,6 +37,8 @@ class Fit:
     @property
     def p_value(self) -> float:
         """Probability of a chi-squared this large by chance; means something where the scatter was stated."""
+        from scipy import special
+
         return float(special.chdtrc(self.dof, self.chi2)) if self.dof > 0 else 1.0
 
 
@@ -76,6 +77,8 @@ def linear(design: npt.ArrayLike, observed: npt.ArrayLike, covariance: npt.Array
 
 
 def _whitened(x: Array, y: Array, covariance: npt.ArrayLike | None) -> tuple[Array, Array]:
+    from scipy import linalg
+
     if covariance is None:
         return x, y
     v = np.asarray(covariance, np.float64)
@@ -115,6 +118,8 @@ def lack_of_fit(fit: Fit, groups: npt.ArrayLike) -> LackOfFit:
     Raises:
         AnalysisError: no repeats, or no more groups than terms.
     """
+    from scipy import special
+
     labels, member = np.unique(np.asarray(groups), return_inverse=True)
     r, levels, p = fit.residuals, len(labels), len(fit.terms)
     repeats, model = len(r) - levels, levels - p
@@ -189,6 +194,8 @@ def nonlinear(
     Raises:
         AnalysisError: no convergence, fewer observations than terms, or terms that the observations do not determine.
     """
+    from scipy import optimize
+
     y = np.asarray(observed, np.float64)
     p0 = np.asarray(start, np.float64)
     weight = np.ones_like(y) if u is None else 1 / np.asarray(u, np.float64)

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special
 
 from bench.findings import Effect, Finding
 from bench.recording import Recording
@@ -140,6 +139,8 @@ def _agreement(angle: Drag, speed: Drag) -> Iterator[Finding]:
 
 
 def _repeats(drag: Drag) -> Iterator[Finding]:
+    from scipy import special
+
     for name, r in drag.rates.items():
         if r.ratio_dof and r.ratio > max(special.chdtri(r.ratio_dof, 1e-5) / r.ratio_dof, 1) * 3:
             yield Finding(

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import ndtr
 
 from bench.errors import AnalysisError
 from bench.rigfile import RigFile
@@ -119,6 +118,8 @@ def _curve(done: Sequence[Done]) -> Curve:
 
 def settling_estimate(case: Case, settled: Settling) -> Estimate:
     """The expected time with all that are possible: a distribution of its own (JCGM 101, 6.5)."""
+    from scipy.special import ndtr
+
     noise = Influence(
         id=f"scatter/settling_time/{case.where}",
         name="noise of the mean response",

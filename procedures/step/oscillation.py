@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import optimize
 
 from bench.errors import AnalysisError
 
@@ -104,6 +103,8 @@ def swing(steps: Sequence[One], start: Complex | None = None) -> Swing:
     Raises:
         AnalysisError: no oscillation fits.
     """
+    from scipy import optimize
+
     near = [(s.t > FROM_S) & (s.t < UNTIL_S) for s in steps]
     t = np.concatenate([s.t[m] for s, m in zip(steps, near, strict=True)])
     data = np.concatenate([s.weight * s.both[:, m] for s, m in zip(steps, near, strict=True)], axis=1).T

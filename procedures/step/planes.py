@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import stdtrit
 
 from bench.findings import Effect, Finding
 from bench.recording import Recording, Step
@@ -63,6 +62,8 @@ def read_rest(step: Step, axis: str) -> Array:
 
 def is_crossed(steps: Sequence[Array]) -> bool:
     """Of steps at rest (4, n): whether the currents answer the other plane, and do so beyond chance."""
+    from scipy.special import stdtrit
+
     used = [x for x in steps if x.shape[1] >= FEWEST]
     if len(used) < 3:
         return False

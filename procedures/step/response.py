@@ -12,7 +12,6 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
-from scipy import interpolate
 
 from bench.errors import AnalysisError
 from procedures.step.oscillation import One, Swing
@@ -26,6 +25,8 @@ SCAN_HZ = np.arange(20.0, 480.0, 2.0)
 
 def curve(t: Array, y: Array) -> tuple[Array, Array]:
     """Times and values of the curve of which `y` (n,) at equally spaced `t` are the means over the period before."""
+    from scipy import interpolate
+
     period = float(t[1] - t[0])
     edges = np.concatenate(([t[0] - period], t))
     total = np.concatenate(([0.0], np.cumsum(y) * period))

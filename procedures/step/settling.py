@@ -18,7 +18,6 @@ from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
-from scipy import linalg
 
 from bench.errors import AnalysisError
 from procedures.step.oscillation import shrinks
@@ -167,6 +166,8 @@ def _order(design: Array, faded: Array) -> int:
 
 def _propagated(left: Array, made: Array) -> Array:
     """Covariance (n, n) of terms fitted with `made` (m, n) to samples with the stationary noise of `left` (k, m)."""
+    from scipy import linalg
+
     k, m = left.shape
     power = (np.abs(np.fft.rfft(left, 2 * m, axis=1)) ** 2).sum(axis=0)
     correlation = np.fft.irfft(power)[:m] / (k * (m - made.shape[1]))
@@ -176,6 +177,8 @@ def _propagated(left: Array, made: Array) -> Array:
 
 def settling(curve: Curve, case: Case, steps: Sequence[Done], band: float, seed: int = 0) -> Settling:
     """Of the mean of a case's steps, averaged as its noise is, into the band; five times that noise at least."""
+    from scipy import linalg
+
     window = float(np.mean([d.samples for d in steps])) * float(steps[0].t[1] - steps[0].t[0])
     noise = math.sqrt(float(np.mean([d.noise**2 for d in steps]))) / case.size / math.sqrt(len(steps))
     within = max(band, BAND_NOISE * noise)

@@ -34,7 +34,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import optimize
 
 from bench.errors import AnalysisError
 from procedures.shared.leastsquares import Fit, linear, nonlinear
@@ -169,6 +168,8 @@ def uneven(b: Balance, s: Steps) -> Array:
     variance is 1 - h of its step's, h the leverage; near 1 the fit follows the step and says nothing of its scatter
     (MacKinnon and White, J. Econometrics 29, 305 (1985), HC2).
     """
+    from scipy import optimize
+
     q, _ = np.linalg.qr(b.fit.jacobian / b.u[:, None])
     scatter = b.fit.residuals**2 / np.maximum(1 - (q**2).sum(axis=1), 0.1)
     square = s.spread**2

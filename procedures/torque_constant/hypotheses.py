@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy import special
 
 from procedures.torque_constant.fit import Array, Balance, Extra, Steps
 
@@ -47,6 +46,8 @@ def shape_over_gamma(b: Balance, s: Steps) -> tuple[float, float]:
     gamma_0)), to first order) nor a drift of the scale (the time of each) can make. What the arms and each mass are off by
     is fitted along: it is no matter of gamma.
     """
+    from scipy import special
+
     angles, index = np.unique(s.gamma, return_inverse=True)
     when = np.array([s.time[index == k].mean() for k in range(len(angles))])
     taken = np.column_stack([np.ones_like(angles), np.tan(b.pole_pairs * (angles - b.gamma_0)), when - when.mean()])

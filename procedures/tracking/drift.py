@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import stdtrit
 
 from bench.errors import AnalysisError
 from procedures.amb_rotor.geometry import Facts
@@ -38,6 +37,8 @@ class Drift:
     @property
     def plain(self) -> bool:
         """Whether scatter explains it less often than FALSE_ALARM."""
+        from scipy.special import stdtrit
+
         return abs(self.off) > float(stdtrit(self.dof, 1 - FALSE_ALARM / 2)) * self.u
 
 

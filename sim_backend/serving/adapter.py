@@ -33,6 +33,7 @@ class SlcanAdapter:
     ) -> None:
         self.answers = bytearray()
         self.open = False
+        self._mute = False  # opened by L
         self.refused = 0
         self._bus = (bitrate, data_bitrate)
         self._rates: list[float] = [0, DEFAULT_DATA_BITRATE]
@@ -86,8 +87,8 @@ class SlcanAdapter:
             self._rates[line[:1] == b"Y"] = RATES[line]
         elif line in (b"Z0", b"Z1"):
             self._stamped = line == b"Z1"
-        elif line == b"O" and self._rates[0]:
-            self.open = True
+        elif line in (b"O", b"L") and self._rates[0]:
+            self.open, self._mute = True, line == b"L"
         else:
             return REFUSED
         return OK
@@ -98,7 +99,7 @@ class SlcanAdapter:
         return slcan.BUS_ERROR if wrong else 0
 
     def _send(self, line: bytes, t_ns: int, frames: list[FrameBatch]) -> bytes:
-        parsed = slcan.parse(line) if self.open else None
+        parsed = slcan.parse(line) if self.open and not self._mute else None
         if parsed is None:
             return REFUSED
         if self.hears:

@@ -282,7 +282,7 @@ def test_a_report_can_be_built_again(bench: Bench) -> None:
 
 
 def test_the_catalogue_tells_the_truth() -> None:
-    from bench.cli.compose import load_procedure
+    from bench.cli.loading import load_procedure
 
     for entry in catalogue.PROCEDURES:
         assert load_procedure(entry.name).name == entry.name

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.cli.compose import load_procedure
+from bench.cli.loading import load_procedure
 from bench.cli.opening import simulated
 from bench.link import fault_injection
 from bench.link.fault_injection import Fault

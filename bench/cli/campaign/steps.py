@@ -9,7 +9,7 @@ from typing import Any
 
 from bench.calibration import Need, settings_differ
 from bench.campaign import Campaign, Step
-from bench.cli.compose import load_procedure
+from bench.cli.loading import load_procedure
 from bench.errors import ConfigError, Problem
 from bench.procedure import BenchPlan, Procedure, plans
 from bench.rigfile import RigFile

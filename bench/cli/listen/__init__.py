@@ -1,0 +1,1 @@
+"""`bench listen`: what a controller says, without a word to it."""
