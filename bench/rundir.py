@@ -13,6 +13,9 @@ from bench.errors import ConfigError
 
 NAME = re.compile(r"[a-z0-9-]+-\d{8}t\d{6}z-[0-9a-f]{4}", re.IGNORECASE)
 
+LISTENED = "listen"
+"""In the place of a procedure's name: a recording of `bench listen`, which is no run and has no record."""
+
 
 @dataclass(frozen=True, slots=True)
 class RunDirectory:
@@ -117,9 +120,9 @@ def existing(path: Path) -> RunDirectory:
 
 
 def runs_in(out: Path) -> Iterator[RunDirectory]:
-    """Every run directory directly under `out`, by name; none if `out` does not exist."""
+    """Every directory of a run directly under `out`, by name; none if `out` does not exist."""
     if not out.is_dir():
         return
     for path in sorted(out.iterdir()):
-        if NAME.fullmatch(path.name) and path.is_dir():
+        if NAME.fullmatch(path.name) and not path.name.startswith(f"{LISTENED}-") and path.is_dir():
             yield RunDirectory(path)

@@ -12,6 +12,7 @@ from bench.rigfile import RigFile
 from bench.rigfile.messages import Message
 
 RECENT_S = 2.0  # over which a rate is told
+SETTLED_S = 0.5  # what had waited somewhere has come by then; a mean rate begins there
 
 
 @dataclass
@@ -22,9 +23,9 @@ class Tally:
     first_ns: int
     last_ns: int
     count: int = 0
-    at_first: int = 0  # of them, as many came with the first
     lengths: Counter[int] = field(default_factory=Counter)
     _recent: deque[tuple[int, int]] = field(default_factory=deque)  # time and count of the batches of RECENT_S
+    _settled: tuple[int, int] | None = None  # time, and how many had come by then
 
     def add(self, t_ns: int, lengths: Counter[int]) -> None:
         """Frames that came together."""
@@ -32,6 +33,8 @@ class Tally:
         self.count += n
         self.lengths += lengths
         self.last_ns = t_ns
+        if self._settled is None and t_ns >= self.first_ns + SETTLED_S * 1e9:
+            self._settled = t_ns, self.count
         self._recent.append((t_ns, n))
         while self._recent[0][0] < t_ns - RECENT_S * 1e9:
             self._recent.popleft()
@@ -44,9 +47,10 @@ class Tally:
 
     @property
     def mean_hz(self) -> float:
-        """Frames a second from the first to the last; 0.0 for one batch."""
-        spanned = (self.last_ns - self.first_ns) * 1e-9
-        return (self.count - self.at_first) / spanned if spanned > 0 else 0.0
+        """Frames a second up to the last; 0.0 where too few came."""
+        begin_ns, before = self._settled or (self.first_ns, 1)
+        spanned = (self.last_ns - begin_ns) * 1e-9
+        return (self.count - before) / spanned if spanned > 0 else 0.0
 
 
 def named(identifier: int) -> str:
@@ -77,8 +81,7 @@ class Census:
             first, last = int(mine["t_ns"][0]), int(mine["t_ns"][-1])
             tally = self.by_id.get(identifier)
             if tally is None:
-                together = int((mine["t_ns"] == first).sum())
-                tally = self.by_id[identifier] = Tally(identifier, first, last, at_first=together)
+                tally = self.by_id[identifier] = Tally(identifier, first, last)
             tally.add(last, Counter(mine["length"].tolist()))
 
     def of(self, message: Message) -> Tally | None:

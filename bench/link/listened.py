@@ -14,7 +14,7 @@ from bench.link.telemetry import TelemetryDecoder
 from bench.rigfile import RigFile
 from bench.samples import SampleBlock
 
-APART = 0.05
+APART = 0.1
 """Share by which a rate or a tick may be off before it is told."""
 
 

@@ -27,10 +27,11 @@ NARROW = 8  # bits: a signal of fewer is a code
 
 @dataclass(frozen=True)
 class Scale:
-    """A channel's signal in SI: ends of what its bits hold, and of the range that the DBC states, both opened by half a
-    count; infinite where there are none."""
+    """A channel's signal in SI: what a count is (0 where it is a floating-point number), ends of what its bits hold, and of the
+    range that the DBC states, both opened by half a count; infinite where there are none."""
 
     unit: str
+    count: float
     least: float
     greatest: float
     low: float
@@ -54,7 +55,7 @@ class Scale:
             low, least, high, greatest = -math.inf, -math.inf, math.inf, math.inf
         half = 0.5 * count
         told = (least + half, greatest - half, low - half, high + half)
-        return cls(u.si, *(x * u.factor + u.offset for x in told))
+        return cls(u.si, 0.0 if signal.is_float else count * u.factor, *(x * u.factor + u.offset for x in told))
 
 
 @dataclass

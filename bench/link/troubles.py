@@ -7,10 +7,12 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from bench.link.census import Tally, named
+from bench.link.clockrate import described
 from bench.link.listened import APART, Listened
 from bench.link.readings import Reading
 
-PATIENCE_S = 1.0  # before silence is told
+PATIENCE_S, RATE_S = 1.0, 3.0  # before silence is told, and a rate
+DRIFT_PPM = 200.0  # of two crystals less; a run asks for no more
 SOME = 6  # of a list, on a line
 FEW = 3  # bytes: a delimiter, and what opening a port may stir up
 
@@ -127,7 +129,7 @@ def _sound(heard: Listened) -> bool:
 def _rates(heard: Listened) -> Iterator[Trouble]:
     """The telemetry's rate and the tick against the host's clock."""
     rate, due, tick_s = heard.mean_hz, heard.due_hz, heard.rig.devices["controller"].tick_s
-    if heard.seconds < 2 * PATIENCE_S or not _sound(heard):
+    if heard.seconds < RATE_S or not _sound(heard):
         return
     if rate and abs(rate / due - 1) > APART:
         yield Trouble("rate", f"telemetry comes {rate:.4g} times a second without a gap, the DBC says {due:.4g}. Next: correct "
@@ -135,6 +137,9 @@ def _rates(heard: Listened) -> Iterator[Trouble]:
     if (seen := heard.tick_s) is not None and abs(seen / tick_s - 1) > APART:
         yield Trouble("tick", f"a tick takes {seen:.3g} s by this host's clock, the rig file says {tick_s:.3g} s. Next: tick_s "
                       "under [devices.controller], or does another signal hold the tick?")  # fmt: skip
+    elif (drift := heard.drift_ppm) is not None and abs(drift[0]) - drift[1] > DRIFT_PPM:
+        yield Trouble("drift", f"{described(drift[0])} (U = {drift[1]:.0f} ppm). Next: tick_s, the controller's crystal, or, "
+                      "of a served rig, whether its computer keeps up")  # fmt: skip
 
 
 def _losses(heard: Listened) -> Iterator[Trouble]:

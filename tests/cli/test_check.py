@@ -3,15 +3,30 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
+from bench import catalogue
 from bench.cli.__main__ import main
 from bench.errors import ConfigError
 from bench.rigfile import load_rig
 from sim_backend.truth import draw
 
+HEAVY = (
+    "scipy",
+    "pandas",
+    "matplotlib",
+    "pyarrow",
+    "jinja2",
+    "pymodbus",
+    "serial",
+    "sim_backend",
+    "drivers",
+    "reports",
+)
 RIGS = Path(__file__).resolve().parents[2] / "rigs"
 
 
@@ -28,6 +43,30 @@ def test_a_rig_is_told_what_it_can_run(capsys: pytest.CaptureFixture[str]) -> No
     assert "  step: channels: found no pos_zi, pos_zo, pos_x and 6 more; also sensors,\n    parameters\n" in unable
     assert "amb-calibration" not in unable
     assert max(map(len, out.splitlines())) <= 80
+
+
+def test_a_rigs_procedures_are_listed_with_what_is_missing(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(("list", "--rig", "tsbs12")) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert "  amb-calibration     yes\n" in out
+    assert "  step                no: channels: found no pos_zi, pos_zo, pos_x and 6 more;\n" in out
+    assert [x.split()[0] for x in out.splitlines() if "  yes" in x or "  no: " in x] == [
+        entry.name for entry in catalogue.PROCEDURES
+    ]
+    assert max(map(len, out.splitlines())) <= 80
+    assert main(("list", "--rig", "tsbs13")) == 2
+    assert "Did you mean tsbs12?" in capsys.readouterr().err
+
+
+def test_listing_them_imports_no_numerics() -> None:
+    """It is to take half a second: what computes is imported where it computes. A live run imports it before it starts."""
+    code = (
+        "import sys; from bench.cli.__main__ import main; main(['list', '--rig', 'tsbs12']); "
+        f"print(*sorted({{m.partition('.')[0] for m in sys.modules}} & {set(HEAVY)!r}))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == ""
 
 
 def test_one_procedure_is_told_whole(capsys: pytest.CaptureFixture[str]) -> None:

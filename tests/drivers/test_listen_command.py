@@ -84,7 +84,9 @@ def test_a_recording_is_kept_and_exported(listen: Callable[..., Listened], capsy
         assert main(("export", str(directory), "--to", to)) == 0
         assert (directory / "export" / name).stat().st_size > 100
     assert main(("runs", "--out", "heard")) == 0
-    assert "no runs in heard" in capsys.readouterr().err
+    assert capsys.readouterr().err == "no runs in heard\n"
+    assert main(("analyse", str(directory))) == 2
+    assert "recorded by `bench listen`, which measures nothing. Next: `bench export`" in capsys.readouterr().err
 
 
 def test_nothing_that_comes_is_an_error_where_a_time_was_asked_for(listen: Callable[..., Listened]) -> None:

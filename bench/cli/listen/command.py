@@ -10,9 +10,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from bench import units
 from bench.cli.compose import with_links
 from bench.cli.listen.screen import line, screen
 from bench.cli.listen.summary import summary
+from bench.cli.listen.words import told_unit
 from bench.clock import WallClock
 from bench.errors import LinkError
 from bench.link.listened import Ear, Listened
@@ -160,15 +162,13 @@ def _kept(request: ListenRequest, session: Session, stack: ExitStack) -> Path | 
 
 
 def _device_line(rig: RigFile, reading: Reading) -> str:
-    from bench import units
-
     if reading.values is None:
         return str(reading.error)
     registers = rig.devices[reading.device].registers
     told = []
     for name, value in reading.values.items():
-        si = units.UNITS[registers[name].unit].si
-        told.append(f"{name} {value:.4g}{f' {si}' if si != '1' else ''}")
+        symbol, one = told_unit(units.UNITS[registers[name].unit].si, abs(value))
+        told.append(f"{name} {value / one + 0.0:.4g} {symbol}".rstrip())
     return ", ".join(told)
 
 

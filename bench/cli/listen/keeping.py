@@ -15,8 +15,6 @@ from bench.rigfile import RigFile
 from bench.run.provenance import now, versions
 from bench.samples import StreamLayout
 
-NAME = "listen"
-
 
 @contextmanager
 def keeping(
@@ -29,9 +27,12 @@ def keeping(
         RecordingError: the recording cannot be written.
     """
     started = datetime.now(UTC)
-    directory = rundir.create(out, NAME, started)
+    directory = rundir.create(out, rundir.LISTENED, started)
     header = RunHeader(
-        metadata={"run": {"procedure": NAME, "rig": rig.name, "backend": "live", "seed": ""}, "versions": versions()},
+        metadata={
+            "run": {"procedure": rundir.LISTENED, "rig": rig.name, "backend": "live", "seed": ""},
+            "versions": versions(),
+        },
         attachments={"rig.toml": rig.toml_text.encode(), "rig.dbc": rig.dbc_text.encode()},
     )
     with Recorder(directory.recording, clock=clock, streams=streams, header=header, live=True) as recorder:

@@ -10,6 +10,7 @@ from bench.link.readings import Reading
 from bench.link.stillness import CODES
 
 DIGITS = 4
+SMALL_A = 0.1
 USUALLY_LARGE = ("rad", "s")  # an angle that stands at zero is one of the shaft, in degrees
 
 
@@ -18,7 +19,12 @@ def unit_of(reading: Reading) -> tuple[str, float]:
     size = max(abs(reading.low), abs(reading.high)) if reading.low <= reading.high else 0.0
     if size == 0 and reading.scale.unit in USUALLY_LARGE:
         size = 1.0
-    symbol, one = display_units.of_result(reading.scale.unit, size)
+    return told_unit(reading.scale.unit, size)
+
+
+def told_unit(si: str, size: float) -> tuple[str, float]:
+    """Symbol and size in SI of the unit in which people are told something of about `size`."""
+    symbol, one = ("mA", 1e-3) if si == "A" and 0 < size < SMALL_A else display_units.of_result(si, size)
     return ("" if symbol == "1" else symbol.replace("um", "µm").replace("urad", "µrad")), one
 
 
@@ -28,6 +34,8 @@ def number(value: float, reading: Reading, one: float) -> str:
         return "-" if math.isinf(value) else "NaN"
     size = max(abs(reading.low), abs(reading.high)) / one
     places = DIGITS - 1 - (math.floor(math.log10(size)) if size > 0 else 0)
+    if reading.scale.count:  # none that only the count makes
+        places = min(places, math.ceil(-math.log10(reading.scale.count / one) - 1e-9))
     return f"{value / one + 0.0:.{min(max(places, 0), 5)}f}"
 
 
@@ -44,7 +52,9 @@ def shown(name: str, reading: Reading, heard: Listened) -> tuple[str, str]:
 
 
 def rate(hz: float) -> str:
-    """`1000/s`, `49.8/s`."""
+    """`1000/s`, `49.8/s`; `-` where there is none."""
+    if not hz:
+        return "-"
     return f"{hz:.0f}/s" if hz >= 99.95 else f"{hz:.3g}/s"
 
 
