@@ -13,6 +13,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import date, datetime
+from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -77,7 +78,10 @@ class _File:
     digest: str | None = None
 
 
-_FILE: TypeAdapter[_File] = TypeAdapter(_File)
+@cache
+def _adapter() -> TypeAdapter[_File]:
+    """Made when a file is read: most of what imports this reads none."""
+    return TypeAdapter(_File)
 
 
 def to_json(calibration: Calibration) -> str:
@@ -145,7 +149,7 @@ def from_json(text: str, name: str = "calibration") -> Calibration:
     """
     require_schema(text, name, "calibration", SCHEMA)
     try:
-        file = _FILE.validate_json(text)
+        file = _adapter().validate_json(text)
     except (ValidationError, UnicodeEncodeError) as error:
         listed = [str(error)]
         if isinstance(error, ValidationError):

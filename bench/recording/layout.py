@@ -13,7 +13,6 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
-from google.protobuf import descriptor_pb2
 
 from bench.errors import RecordingError
 from bench.samples import StreamLayout
@@ -64,6 +63,8 @@ def type_name(kind: str, stream: str) -> str:
 
 def _file(name: str, fields: list[tuple[str, int, int, bool]]) -> bytes:
     """A FileDescriptorSet with one message of (name, number, type, repeated) fields."""
+    from google.protobuf import descriptor_pb2  # slow to import, and only what is recorded needs it
+
     file = descriptor_pb2.FileDescriptorProto(name=f"{name}.proto", package="levbench", syntax="proto3")
     message = file.message_type.add(name=name)
     for field, number, kind, repeated in fields:
@@ -77,6 +78,8 @@ def _file(name: str, fields: list[tuple[str, int, int, bool]]) -> bytes:
 
 
 def _kind(name: str) -> int:
+    from google.protobuf import descriptor_pb2
+
     return int(getattr(descriptor_pb2.FieldDescriptorProto, name))
 
 

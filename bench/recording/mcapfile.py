@@ -18,7 +18,6 @@ import numpy as np
 import numpy.typing as npt
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, DataEnd, Footer, Header, Metadata
 
 from bench.errors import RecordingError
 from bench.recording import layout
@@ -99,6 +98,8 @@ class McapFile:
 
     def _learn(self, data: bytes) -> None:
         """A channel's description: it may come again, but only the same."""
+        from mcap.records import Channel  # slow to import, and only who reads a file needs it
+
         with sound(self.path):
             c = Channel.read(ReadDataStream(BytesIO(data)))
             described = (c.topic, dict(c.metadata))
@@ -139,6 +140,8 @@ class McapFile:
         if opcode == Opcode.CHANNEL:
             self._learn(data)
             return
+        from mcap.records import Attachment, Header, Metadata
+
         stream = ReadDataStream(BytesIO(data))
         if opcode == Opcode.HEADER:
             self.profile = Header.read(stream).profile or "none"
@@ -201,10 +204,14 @@ def _scan(out: McapFile, file: BinaryIO, size: int) -> bool:
             raise RecordingError(f"{where}: a record of {length} bytes; expected at most {MAX_CHUNK}")
         data = file.read(length)
         if head[0] == Opcode.DATA_END:
+            from mcap.records import DataEnd
+
             if DataEnd.read(ReadDataStream(BytesIO(data))).data_section_crc not in (0, crc):
                 raise RecordingError(f"{where}: fails its CRC; {DAMAGED}")
             crc = 0  # that of the summary begins here
         elif head[0] == Opcode.FOOTER:
+            from mcap.records import Footer
+
             crc = zlib.crc32(data[:16], zlib.crc32(head, crc))
             if Footer.read(ReadDataStream(BytesIO(data))).summary_crc not in (0, crc):
                 raise RecordingError(f"{where}: its summary fails its CRC; {DAMAGED}")

@@ -11,7 +11,6 @@ from typing import Any, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
-from mcap.writer import CompressionType, IndexType, Writer
 
 from bench.link.frames import FrameBatch
 from bench.recording import layout
@@ -39,6 +38,8 @@ class McapWriter:
         *,
         view: bool = True,
     ) -> None:
+        from mcap.writer import CompressionType, IndexType, Writer
+
         self._file, self._view = file, view
         self._streams: dict[str, StreamLayout] = {}
         self.blocks: dict[str, int] = {}
