@@ -4,19 +4,25 @@ from __future__ import annotations
 
 import dataclasses
 import re
+import shutil
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 import pytest
-from heard import START_NS, hear, listening, readings, telemetry
+from heard import SILENT, START_NS, hear, listening, readings, telemetry
 
 from bench.cli.listen.screen import line, screen
 from bench.cli.listen.summary import summary
+from bench.cli.listen.unfinished import listenable
+from bench.errors import ConfigError
 from bench.link.codec import encode
 from bench.link.frames import ERROR, EXTENDED, FrameBatch, batch_of, empty_batch, frame, joined, packed
-from bench.link.listened import Listened
+from bench.link.listened import Ear, Listened
 from bench.link.readings import Scale
 from bench.link.troubles import remark, troubles
+
+ROOT = Path(__file__).resolve().parents[1]
 
 
 def texts(heard: Listened) -> dict[str, str]:
@@ -207,7 +213,7 @@ def test_a_reading_outside_of_the_dbcs_range_and_codes_without_a_name() -> None:
 
 def plainamb(count: int, without: str = "", counter: int = 0) -> FrameBatch:
     """Of the example with five messages a sample; `counter` is added to what each further message counts."""
-    rig = listening("examples/own-controller/plainamb.toml").rig
+    rig = listening(str(ROOT / "examples/own-controller/plainamb.toml")).rig
     out = []
     for k in range(count):
         for name in rig.binding.telemetry:
@@ -222,10 +228,10 @@ def plainamb(count: int, without: str = "", counter: int = 0) -> FrameBatch:
 
 
 def test_a_sample_of_several_messages() -> None:
-    heard = hear(listening("examples/own-controller/plainamb.toml"), plainamb(2500), 2.5)
+    heard = hear(listening(str(ROOT / "examples/own-controller/plainamb.toml")), plainamb(2500), 2.5)
     assert texts(heard) == {}
     assert "Standby (OFF)   fault Ok" in shown(heard)
-    heard = hear(listening("examples/own-controller/plainamb.toml"), plainamb(2500, without="AmbRest"), 2.5)
+    heard = hear(listening(str(ROOT / "examples/own-controller/plainamb.toml")), plainamb(2500, without="AmbRest"), 2.5)
     found = texts(heard)
     assert "telemetry never had AmbRest (0x093): no sample is whole" in found["part-absent"]
     assert heard.readings.by_name["pos_xi"].moves
@@ -239,3 +245,25 @@ def test_readings_that_are_no_numbers_are_counted_and_left_out() -> None:
     reading.take(np.array([np.inf]), held=False)
     assert (reading.count, reading.numberless, reading.low, reading.high) == (3, 2, 1.0, 1.0)
     assert remark(reading) == "no number"
+
+
+def test_a_rig_file_that_is_not_finished_can_be_listened_with(tmp_path: Path) -> None:
+    """Links, the controller's telemetry and channels, and nothing else."""
+    example = ROOT / "examples/own-controller"
+    text = (example / "plainamb.toml").read_text(encoding="utf-8")
+    before, links = text.split("[uut]")[0], text[text.index("[links.controller]") : text.index("[geometry]")]
+    links = re.sub(r"(?s)\[devices\.controller\.binding\.commands\].*?\n\n", "", links)
+    channels = text[text.index("[channels]") : text.index("[parameters]")]
+    bare = tmp_path / "bare.toml"
+    bare.write_text(re.sub(r"(?m)^(mass_density|hanger|hook_seat) .*", "", before) + links + channels, encoding="utf-8")
+    shutil.copy(example / "plainamb.dbc", tmp_path)
+    rig, problems = listenable(str(bare))
+    assert problems > 10
+    heard = Listened(rig, Ear("controller", rig.link.url, SILENT, START_NS))
+    hear(heard, plainamb(2500), 2.5)
+    assert texts(heard) == {}
+    assert "Standby (OFF)   fault Ok" in shown(heard)
+    bare.write_text(bare.read_text().replace("AmbPos.XA", "AmbPos.XQ").replace('"SeqNo"', '"SeqN"'), encoding="utf-8")
+    with pytest.raises(ConfigError) as caught:
+        listenable(str(bare))
+    assert [p.key for p in caught.value.problems] == ["channels.pos_xi.signal", "devices.controller.binding.sequence"]

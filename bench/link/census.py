@@ -67,8 +67,9 @@ class Census:
         self.errors = 0
         self.known: dict[int, Message] = {m.identifier: m for m in rig.messages.messages.values()}
         self.telemetry: tuple[Message, ...] = tuple(rig.messages[name] for name in b.telemetry)
-        self._host = rig.messages[b.heartbeat].sender
-        self._heartbeat = rig.messages[b.heartbeat].identifier
+        heartbeat = rig.messages.messages.get(b.heartbeat)  # a rig file that is not finished may have none
+        self._host = heartbeat.sender if heartbeat is not None else ""
+        self._heartbeat = heartbeat.identifier if heartbeat is not None else -1
 
     def take(self, batch: FrameBatch) -> None:
         """Count them."""

@@ -125,8 +125,9 @@ class Readings:
             for name, s in signals.items()
         }
         self._parts = [_part(rig.messages[m], signals, owners) for m in rig.binding.telemetry]
+        codes = rig.choices("state") if "state" in rig.channels else {}
         self._held = {
-            code for code, name in rig.choices("state").items() if rig.binding.mode(name) in HELD
+            code for code, name in codes.items() if rig.binding.mode(name) in HELD
         }  # fmt: skip
 
     def take(self, batch: FrameBatch) -> None:
@@ -144,13 +145,13 @@ class Readings:
     @property
     def held(self) -> bool:
         """Whether the controller says that it holds the rotor."""
-        value = self.by_name["state"].value
+        value = self.by_name["state"].value if "state" in self.by_name else math.nan
         return math.isfinite(value) and int(value) in self._held
 
     def code(self, channel: str) -> str:
         """The name of a channel's newest code, `7 (no name in the DBC)` where it has none, "" before the first."""
-        reading = self.by_name[channel]
-        if not reading.count or not math.isfinite(reading.value):
+        reading = self.by_name.get(channel)
+        if reading is None or not reading.count or not math.isfinite(reading.value):
             return ""
         return self._rig.choices(channel).get(int(reading.value), f"{int(reading.value)} (no name in the DBC)")
 

@@ -14,13 +14,14 @@ from bench import units
 from bench.cli.compose import with_links
 from bench.cli.listen.screen import line, screen
 from bench.cli.listen.summary import summary
+from bench.cli.listen.unfinished import listenable
 from bench.cli.listen.words import told_unit
 from bench.clock import WallClock
 from bench.errors import LinkError
 from bench.link.listened import Ear, Listened
 from bench.link.troubles import Trouble, troubles
 from bench.os_signals import delivered_to
-from bench.rigfile import RigFile, load_rig
+from bench.rigfile import RigFile
 
 if TYPE_CHECKING:
     from bench.recording.recorder import Recorder
@@ -56,7 +57,12 @@ def listen_command(request: ListenRequest) -> int:
         ConfigError: usage, rig file, or the port or interface cannot be opened.
         RecordingError: the recording cannot be written.
     """
-    rig = with_links(load_rig(request.rig), request.links)
+    file, unfinished = listenable(request.rig)
+    rig = with_links(file, request.links)
+    if unfinished:
+        sys.stderr.write(
+            f"{file.path} has {unfinished} problems that do not hinder listening: `bench check {request.rig}`\n"
+        )
     clock, stopped = WallClock(), list[str]()
     with ExitStack() as stack:
         stack.enter_context(delivered_to(stopped.append))
@@ -74,7 +80,9 @@ def listen_command(request: ListenRequest) -> int:
         sys.stderr.write(f"bench: {lost}\n")
     if kept is not None:
         sys.stdout.write(f"{kept}\n")
-    nothing = request.seconds is not None and not stopped and not session.heard.readings.by_name["state"].count
+    nothing = (
+        request.seconds is not None and not stopped and not session.heard.census.of(session.heard.census.telemetry[0])
+    )
     return ERROR if lost or nothing else 0
 
 
