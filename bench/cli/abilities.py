@@ -82,8 +82,11 @@ def told(found: list[Ability], rig: str) -> str:
                           break_on_hyphens=False)  # fmt: skip
     unable = [a for a in found if not a.able]
     lines += ["cannot run:"] if unable else []
+    reasons: dict[str, list[str]] = {}
     for a in unable:
-        lines += textwrap.wrap(f"{a.procedure}: {_why(a)}", WIDTH, initial_indent="  ",
+        reasons.setdefault(_why(a), []).append(a.procedure)
+    for why, names in reasons.items():
+        lines += textwrap.wrap(f"{', '.join(names)}: {why}", WIDTH, initial_indent="  ",
                                subsequent_indent="    ", break_on_hyphens=False)  # fmt: skip
     if any(a.lacking for a in unable):
         lines.append(f"all that a procedure lacks: `bench check {rig} PROCEDURE`")
