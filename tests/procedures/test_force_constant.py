@@ -25,7 +25,7 @@ from procedures.force_constant.fitting import check, predicted_controls
 from procedures.force_constant.plan import Plan
 from procedures.force_constant.procedure import procedure
 from procedures.force_constant.steps import read_ramps
-from procedures.servomotor.conventions import SERVOMOTOR
+from procedures.servomotor.conventions import conventions
 
 NAME, CALIBRATION = "force-constant", "amb-calibration"
 SHORT = {"settle_s": 0.15}
@@ -155,7 +155,7 @@ def test_a_coil_that_cannot_reach_its_current_does_not_pass(
         flagged = replace(
             data, table=replace(data.table, flags=np.where(data.table.each(lambda at: at.i_y_A) == -2, bit, 0))
         )
-        found = list(checks.of_signals(flagged, SERVOMOTOR, Plan()))
+        found = list(checks.of_signals(flagged, conventions(load_rig("tsbs12")), Plan()))
         assert [(f.code, f.effect) for f in found] == [
             ("contact" if bit == 8 else "current-saturated", Effect.INDETERMINATE)
         ]
@@ -248,6 +248,6 @@ def test_predicted_controls_by_hand() -> None:
 def test_what_the_rig_file_lacks_is_told_before_anything_starts(kind: str) -> None:
     rig = load_rig("tsbs12")
     name = {"sensors": "i_m3", "channels": "flags", "parameters": "i_ramp", "machine": "pole_pairs",
-            "geometry": "amb_span"}[kind]  # fmt: skip
+            "geometry": "motor_to_outboard_amb"}[kind]  # fmt: skip
     table = {k: v for k, v in getattr(rig, kind).items() if k != name}
     assert procedure.problems(rig.model_copy(update={kind: table}), Plan()) == (f"{kind}: found no {name}",)
