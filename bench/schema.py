@@ -46,11 +46,13 @@ def expected_of(error: Mapping[str, Any]) -> str:
             return f"at least {_counted(count['min_length'], 'entry', 'entries')}"
         case "too_long":
             return f"at most {_counted(count['max_length'], 'entry', 'entries')}"
+        case "model_type":
+            return "a table, as in { key = 1 }"
         case "tuple_type":
             return "a list, as in [1, 2]"
         case "string_too_short":
             return f"at least {_counted(count['min_length'], 'character', 'characters')}"
-    return str(error["msg"]).removeprefix("Input should be ").removeprefix("Value error, ")
+    return str(error["msg"]).removeprefix("Input should be ").removeprefix("Value error, ").removeprefix("expected ")
 
 
 def _counted(number: int, one: str, more: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from bench import units
-from bench.rigfile.envelope import AMBIENT
+from bench.rigfile.protection import AMBIENT
 from drivers.registerdevice import RegisterDevice
 
 Latest = Callable[[str], Mapping[str, float]]

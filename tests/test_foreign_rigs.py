@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -18,7 +19,7 @@ from bench.inputfile import DEPTH, TomlError, parse_toml
 from bench.rigfile import load_rig, read_rig
 from bench.rigfile.check import check_rig
 from bench.rigfile.messages import load_messages
-from bench.units import KNOWN
+from bench.units import KNOWN, UNITS
 
 ROOT = Path(__file__).resolve().parent.parent
 DBC_LINE = 'dbc = "tsbs12.dbc"'
@@ -149,14 +150,39 @@ def test_a_dbc_in_another_encoding_names_the_key(tmp_path: Path) -> None:
 def test_an_unknown_unit_is_answered_by_the_list(tmp_path: Path) -> None:
     found = problems(tmp_path, changed(TOML, ('125.0, unit = "mm"', '125.0, unit = "inch"')))
     assert (found["geometry.amb_span.unit"].found, found["geometry.amb_span.unit"].expected) == ("'inch'", KNOWN)
-    found = problems(tmp_path, dbc=changed(DBC, ('"r/min"', '"1/min"') if '"r/min"' in DBC else ('"rad/s"', '"1/min"')))
-    assert any(p.expected == KNOWN and "1/min" in p.found for p in found.values())
+    found = problems(tmp_path, dbc=changed(DBC, ('"rad/s"', '"furlong"')))
+    assert any(p.expected == KNOWN and "furlong" in p.found for p in found.values())
+    found = problems(tmp_path, changed(TOML, ('scale = 0.01, unit = "r/min"', 'scale = 0.01, unit = "r/mim"')))
+    (p,) = found.values()
+    assert p.key == "devices.drive.registers.target_speed.unit"
+    assert (p.found, p.expected) == ("'r/mim'", f"{KNOWN}. Did you mean 'r/min'?")
 
 
-def test_the_page_lists_the_units() -> None:
+@pytest.mark.parametrize("symbol", ["1/min", "U/min", "min-1", "°/s", "deg/s"])
+def test_a_dbc_may_write_a_speed_as_europe_does(tmp_path: Path, symbol: str) -> None:
+    assert check_rig(written(tmp_path, dbc=DBC.replace('"rad/s"', f'"{symbol}"')))[0] == ()
+
+
+def test_a_grad_is_refused_for_it_is_two_units(tmp_path: Path) -> None:
+    said = "a unit that means one thing: write deg or gon (grad is a degree in German, a gon in English)"
+    at = DBC.index(" SG_ angle :")
+    found = problems(tmp_path, dbc=DBC[:at] + DBC[at:].replace('"rad"', '"Grad"', 1))
+    assert [(p.key, p.found, p.expected) for p in found.values()] == [("Telemetry.angle", "unit 'Grad'", said)]
+    angle = 'signal = "Telemetry.angle", unit = "rad"'
+    found = problems(tmp_path, changed(TOML, (angle, angle.replace('"rad"', '"grad"'))))
+    assert (found["channels.angle.unit"].found, found["channels.angle.unit"].expected) == ("'grad'", said)
+    assert check_rig(written(tmp_path, dbc=DBC[:at] + DBC[at:].replace('"rad"', '"gon"', 1)))[0] == ()
+
+
+def test_the_page_has_the_table_of_units() -> None:
+    """Row by row what `bench.units` knows: the SI unit, and the symbols of its kind."""
     page = (ROOT / "docs" / "reference" / "rig-file.md").read_text(encoding="utf-8")
-    listed = page[page.index("## Units") :]
-    assert all(f"`{symbol}`" in listed for symbol in KNOWN.removeprefix("a known unit: one of ").split(", "))
+    rows = re.findall(r"^\| [^|]+ \| `([^`]+)` \| ([^|]+) \|$", page[page.index("## Units") :], flags=re.M)
+    listed = {si: re.findall(r"`([^`]+)`", symbols) for si, symbols in rows}
+    known: dict[str, list[str]] = {}
+    for symbol in KNOWN.removeprefix("a known unit: one of ").split(", "):
+        known.setdefault(UNITS[symbol].si, []).append(symbol)
+    assert listed == known
 
 
 def test_only_files_in_the_rigs_own_folder_travel(tmp_path: Path) -> None:

@@ -128,9 +128,7 @@ def test_a_rig_on_which_nothing_hangs_needs_neither_hook_nor_hanger(tmp_path: Pa
 
 
 def test_protected_positions_are_those_that_the_rig_file_names(tmp_path: Path) -> None:
-    named = changed(
-        TOML, ("max_levitated_position_m = 150e-6", 'max_levitated_position_m = 150e-6\npositions = ["pos_z"]')
-    )
+    named = changed(TOML, ('positions = ["pos_xi", "pos_yi", "pos_xo", "pos_yo"]', 'positions = ["pos_z"]'))
     assert check_rig(written(tmp_path, named))[0] == ()
     rig = RigFile.parse(named, DBC)
     levitated = next(code for code, name in rig.choices("state").items() if name == "LEVITATED")
@@ -171,7 +169,7 @@ def test_a_rig_file_is_frozen() -> None:
          "the kind of rad/s"),
         (', source = "certificate SIM-L-102"', "", "geometry.amb_span.source", "a value"),
         ('source = "certificate SIM-L-102"', 'source = ""', "geometry.amb_span.source", "at least 1 character"),
-        ('125.0, unit = "mm", u = 0.05', '125.0, unit = "mm"', "geometry.amb_span", "expected either u"),
+        ('125.0, unit = "mm", u = 0.05', '125.0, unit = "mm"', "geometry.amb_span", "either u"),
         ('u = 0.05, distribution = "normal", source = "certificate SIM-L-102"',
          'u = 0.05, distribution = "rectangular", source = "x"', "geometry.amb_span", "goes with half_width"),
         ('half_width = 0.02, distribution = "rectangular", source = "groove',
@@ -248,6 +246,15 @@ def test_a_mistake_in_the_dbc_is_named(tmp_path: Path, old: str, new: str, key: 
     found = problems(tmp_path, dbc=changed(DBC, (old, new)))
     assert key in found, found
     assert expected in found[key].expected
+
+
+def test_a_signal_that_is_two_channels_is_named_with_both(tmp_path: Path) -> None:
+    """Two sensors that agree to the last bit would be one."""
+    found = problems(tmp_path, changed(TOML, ('"Telemetry.i_z_n"', '"Telemetry.i_xi_p"')))
+    assert list(found) == ["channels.i_z_n.signal"]
+    (p,) = found.values()
+    assert p.found == "Telemetry.i_xi_p, which channels.i_xi_p is bound to"
+    assert p.expected == "a signal of its own for i_z_n, or one of the two"
 
 
 def test_an_overfilled_bus_is_refused_with_its_load(tmp_path: Path) -> None:

@@ -27,6 +27,21 @@ from bench.units import SUFFIXES, UNITS, split_suffix, to_si, unit
         (2.65, "mH", 2.65e-3, "H"),
         (3.0, "g mm", 3e-6, "kg m"),
         (7.0, "", 7.0, "1"),
+        (3000.0, "1/min", 100 * math.pi, "rad/s"),
+        (3000.0, "U/min", 100 * math.pi, "rad/s"),
+        (3000.0, "min-1", 100 * math.pi, "rad/s"),
+        (360.0, "°/s", 2 * math.pi, "rad/s"),
+        (90.0, "°", math.pi / 2, "rad"),
+        (100.0, "gon", math.pi / 2, "rad"),
+        (1.0, "mil", 25.4e-6, "m"),
+        (40.0, "nm", 4e-8, "m"),
+        (5.0, "μm", 5e-6, "m"),  # the Greek letter
+        (7.0, "mm/s", 7e-3, "m/s"),
+        (250.0, "mNm", 0.25, "N m"),
+        (1.5, "kN", 1500.0, "N"),
+        (80.0, "mT", 0.08, "T"),
+        (0.4, "Ω", 0.4, "Ohm"),
+        (2.0, "kW", 2000.0, "W"),
     ],
 )
 def test_a_value_becomes_si(value: float, symbol: str, si: float, si_unit: str) -> None:
@@ -44,6 +59,14 @@ def test_every_unit_leads_to_one_that_is_si_itself() -> None:
 def test_an_unknown_unit_names_itself_and_the_known_ones() -> None:
     with pytest.raises(ConfigError, match=r"unknown unit 'furlong'; expected one of 1, %, m, mm"):
         to_si(1.0, "furlong")
+
+
+@pytest.mark.parametrize("symbol", ["grad", "Grad"])
+def test_a_unit_that_means_two_is_refused_with_what_to_write(symbol: str) -> None:
+    with pytest.raises(
+        ConfigError, match=f"unknown unit '{symbol}'; expected a unit that means one thing: write deg or gon"
+    ):
+        unit(symbol)
 
 
 @pytest.mark.parametrize(

@@ -46,8 +46,7 @@ def abilities(rig: RigFile, only: str = "") -> list[Ability]:
 
 
 def _ability(rig: RigFile, procedure: Procedure) -> Ability:
-    if lacking := procedure.lacking(rig):
-        return Ability(procedure.name, lacking)
+    lacking = procedure.lacking(rig)
     problems: list[Problem] = []
     plan: BenchPlan | None = None
     defaults = f"{rig.path} [plans.{procedure.name}]"
@@ -59,8 +58,8 @@ def _ability(rig: RigFile, procedure: Procedure) -> Ability:
         load_spec(rig.name, procedure.name, procedure)
     except ConfigError as error:
         problems += error.problems or (Problem("specs", f"limits.{procedure.name}", str(error), "limits"),)
-    if plan is None:
-        return Ability(procedure.name, problems=tuple(problems))
+    if plan is None or lacking:
+        return Ability(procedure.name, lacking, problems=tuple(problems))
     unfit = (*procedure.check(rig, plan), *Envelope(rig).problems_of(dict(procedure.settings(plan))))
     return Ability(procedure.name, unfit=unfit, problems=tuple(problems))
 

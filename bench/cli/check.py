@@ -58,8 +58,9 @@ def _load_line(load: BusLoad) -> str:
 
 
 def check_rig_file(rig: str, procedure: str = "") -> int:
-    """Every problem of a rig file with file, key, found and expected, on standard error, and which procedures it can run;
-    2 if there is a problem, or if it cannot run the one that is asked for."""
+    """Every problem of a rig file with file, key, found and expected, on standard error, what protects it and which
+    procedures it can run; 2 if there is a problem, or if it cannot run the one that is asked for."""
+    from bench.cli import protected
     from bench.cli.abilities import Ability, abilities, told, unknown_plans
     from bench.rigfile.check import as_far_as_read, check_rig
 
@@ -84,6 +85,7 @@ def check_rig_file(rig: str, procedure: str = "") -> int:
         lines = [line for a in able for line in (*a.lacking, *a.unfit)]
         sys.stdout.write("\n  ".join([f"{path} {'cannot' if lines else 'can'} run {procedure}", *lines]) + "\n")
         return USAGE if problems or lines else PASS
+    sys.stdout.write(protected.told(file) if file is not None and not problems else "")
     sys.stdout.write(told(able, rig) if able else "")
     return USAGE if problems else PASS
 

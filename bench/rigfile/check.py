@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from bench import units
 from bench.errors import ConfigError, Problem
-from bench.rigfile import busload, linkurl
+from bench.rigfile import busload, check_protection, linkurl
 from bench.rigfile.busload import BusLoad, bus_load
 from bench.rigfile.check_binding import find, fits, signal_at
 from bench.rigfile.check_binding import problems_of as problems_of_binding
@@ -20,7 +20,7 @@ from bench.rigfile.check_numbers import problems_of as problems_of_numbers
 from bench.rigfile.messages import MessageMap
 from bench.rigfile.model import RigFile
 from bench.rigfile.possible import impossible
-from bench.rigfile.rest import rest_of
+from bench.rigfile.rest import follows, rest_of
 from bench.rigfile.text import RigText, read_rig
 from bench.units import Unit
 
@@ -48,14 +48,7 @@ def _behind(text: RigText, problems: tuple[Problem, ...]) -> Iterator[Problem]:
     """What else is wrong with a file that breaks the types: the entries at fault are left out and the rest checked."""
     if (rest := rest_of(text, problems)) is None:
         return
-    told = {p.key for p in problems}
-    entries = {".".join(key.split(".")[:2]) for key in told}
-    for p in problems_of(rest):
-        first, *_ = p.key.split(".")
-        judged_by_another = first == "site" and any(key.startswith("site.") for key in told)  # gravity by the latitude
-        judged_by_another |= p.found.strip("'").replace("/", ".") in entries  # who refers to a number that is left out
-        if p.key not in told and ".".join(p.key.split(".")[:2]) not in entries and not judged_by_another:
-            yield p
+    yield from (p for p in problems_of(rest) if not follows(p, problems))
 
 
 def as_far_as_read(rig: str) -> RigFile | None:
@@ -79,12 +72,13 @@ def problems_of(rig: RigFile) -> list[Problem]:
         *_units(rig),
         *problems_of_numbers(rig),
         *_masses(rig),
-        *_envelope(rig),
+        *check_protection.problems_of(rig),
         *_parameters(rig),
         *impossible(rig),
         *(problems_of_machine(rig) if rig.written_in > 1 else ()),
     ]
-    if not any(p.key.startswith("devices") for p in found):
+    controller = rig.devices.get("controller")
+    if controller is not None and controller.link in rig.links and rig.link.dbc:
         try:
             messages = rig.messages
         except ConfigError as error:
@@ -144,8 +138,7 @@ def _units(rig: RigFile) -> Iterator[Problem]:
                 rig.path, key, symbol, f"{units.UNITS[symbol].si}: default and range are in SI; the DBC may differ"
             )
         if symbol not in units.UNITS:
-            close = difflib.get_close_matches(symbol, units.UNITS, 1)
-            yield Problem(rig.path, key, repr(symbol), units.KNOWN + (f". Did you mean {close[0]!r}?" if close else ""))
+            yield Problem(rig.path, key, repr(symbol), units.expected(symbol))
     kinds = {f"geometry.{n}": (g, "N/m" if n.endswith("_stiffness") else "m") for n, g in rig.geometry.items()}
     kinds |= {f"masses.{n}": (m, "kg") for n, m in rig.masses.items()}
     kinds |= {f"machine.{n}": (m, MACHINE[n]) for n, m in rig.machine.items() if n in MACHINE}
@@ -172,24 +165,6 @@ def _masses(rig: RigFile) -> Iterator[Problem]:
                           f"at most envelope.max_hung_kg = {rig.envelope.max_hung_kg:g} kg")  # fmt: skip
 
 
-def _envelope(rig: RigFile) -> Iterator[Problem]:
-    """What the machine has is bounded; channels that a rig file puts under protection by name exist."""
-    si = {units.UNITS[c.unit].si for c in rig.channels.values() if c.unit in units.UNITS}
-    roles = {role for device in rig.devices.values() for role in device.roles}
-    has = {"max_current_A": "A" in si, "max_temperature_K": "K" in si or "thermal" in roles,
-           "max_speed_rad_s": "speed" in rig.channels or "drive" in roles,
-           "max_levitated_position_m": "levitation" in roles}  # fmt: skip
-    for key in (key for key, there in has.items() if there and math.isinf(getattr(rig.envelope, key))):
-        yield Problem(rig.path, f"envelope.{key}", "nothing", "a value")
-    if "positions" in rig.envelope.model_fields_set:
-        for name in rig.envelope.positions:
-            if name not in rig.channels:
-                yield Problem(rig.path, "envelope.positions", name, "a channel of this rig")
-    low, high = rig.envelope.min_supply_V or 0.0, rig.envelope.max_supply_V
-    if high is not None and high <= low:
-        yield Problem(rig.path, "envelope.max_supply_V", f"{high:g}", f"more than min_supply_V = {low:g}")
-
-
 def _parameters(rig: RigFile) -> Iterator[Problem]:
     taken: dict[int, str] = {}
     for name, p in rig.parameters.items():
@@ -206,6 +181,7 @@ def _parameters(rig: RigFile) -> Iterator[Problem]:
 
 
 def _bindings(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
+    yield from _bound_twice(rig)
     for name, channel in rig.channels.items():
         message, _, signal = channel.signal.partition(".")
         known = {s.name: s for s in messages.messages[message].signals} if message in messages.messages else {}
@@ -216,13 +192,25 @@ def _bindings(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
             continue
         dbc_unit = known[signal].unit
         if dbc_unit not in units.UNITS:
-            yield Problem(rig.link.dbc, channel.signal, f"unit {dbc_unit!r}", units.KNOWN)
+            yield Problem(rig.link.dbc, channel.signal, f"unit {dbc_unit!r}", units.expected(dbc_unit))
         elif channel.unit in units.UNITS and units.UNITS[dbc_unit].si != units.UNITS[channel.unit].si:
             yield Problem(rig.path, f"channels.{name}.unit", channel.unit, f"the kind of {dbc_unit} ({channel.signal})")
     yield from _signals_of_parameters(rig, messages)
     captures = problems_of_capture(rig.capture, messages) if rig.capture is not None else ()
     for key, found, expected in (*problems_of_binding(rig, messages), *captures):
         yield Problem(rig.path, key, found, expected)
+
+
+def _bound_twice(rig: RigFile) -> Iterator[Problem]:
+    """A signal is one reading: as two channels it would pass for two sensors that agree."""
+    taken: dict[str, str] = {}
+    for name, channel in rig.channels.items():
+        first = taken.setdefault(channel.signal, name)
+        if first != name:
+            found = f"{channel.signal}, which channels.{first} is bound to"
+            yield Problem(
+                rig.path, f"channels.{name}.signal", found, f"a signal of its own for {name}, or one of the two"
+            )
 
 
 def _signals_of_parameters(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
@@ -242,7 +230,7 @@ def _signals_of_parameters(rig: RigFile, messages: MessageMap) -> Iterator[Probl
         taken.setdefault(p.signal, name)
         unit = units.UNITS.get(signal.unit)
         if unit is None:
-            yield Problem(rig.link.dbc, p.signal, f"unit {signal.unit!r}", units.KNOWN)
+            yield Problem(rig.link.dbc, p.signal, f"unit {signal.unit!r}", units.expected(signal.unit))
         elif p.unit in units.UNITS and unit.si != units.UNITS[p.unit].si:
             yield Problem(rig.path, f"parameters.{name}.unit", p.unit, f"the kind of {signal.unit} ({p.signal})")
         elif not all(fits(signal, (x - unit.offset) / unit.factor) for x in (p.low, p.high, p.default)):

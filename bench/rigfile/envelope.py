@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,15 +9,14 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from bench import units
 from bench.errors import InterlockError
+from bench.rigfile import protection
 from bench.rigfile.model import RigFile
+from bench.rigfile.protection import Protected
 from bench.samples import SampleBlock
 
 Values = npt.NDArray[np.float64]
 HELD = ("LEVITATED", "SPINNING")
-LEAST_V = 0.1  # a supply that gives less is off, whatever it says and whatever the rig file states
-AMBIENT = "ambient"  # of a thermal monitor's registers the one that is no winding's
 
 
 @dataclass(frozen=True)
@@ -34,19 +32,17 @@ class Envelope:
         return [code for code, name in choices.items() if self.rig.binding.mode(name) in HELD]
 
     @cached_property
-    def _limits(self) -> tuple[list[str], Values, Values, int]:
+    def _limits(self) -> tuple[tuple[Protected, ...], Values, Values, int]:
         """Protected channels with what they may be at least and at most (channels, 1), and where those begin that count
         only while the rotor is held."""
-        e, known = self.rig.envelope, self.rig.channels
-        limits = {n: (-e.max_current_A, e.max_current_A) for n in known if n.startswith("i_")}
-        limits |= {n: (-np.inf, e.max_temperature_K) for n in known if n.startswith("temp_")}
-        limits["speed"] = (-e.max_speed_rad_s, e.max_speed_rad_s)
-        first = len(limits)
-        if "supply" in known and (e.min_supply_V, e.max_supply_V) != (None, None):
-            limits["supply"] = self._supply
-        limits |= {n: (-e.max_levitated_position_m, e.max_levitated_position_m) for n in e.positions if n in known}
-        low, high = np.array(list(limits.values())).T[:, :, None]
-        return list(limits), low, high, first
+        found = protection.of_channels(self.rig)
+        low, high = (np.array(x, np.float64).reshape(-1, 1) for x in ([p.low for p in found], [p.high for p in found]))
+        return found, low, high, sum(not p.held for p in found)
+
+    @cached_property
+    def _readings(self) -> dict[str, dict[str, Protected]]:
+        """Protected registers of each device."""
+        return {device: protection.of_registers(self.rig, device) for device in self.rig.devices}
 
     @property
     def bounds(self) -> Mapping[str, tuple[float, float, bool]]:
@@ -123,65 +119,39 @@ class Envelope:
         Raises:
             InterlockError: a channel has left its range; the text names it, its value and the time.
         """
-        names, low, high, held = self._limits
-        x = np.array([block.columns[name] for name in names])
+        found, low, high, held = self._limits
+        x = np.array([block.columns[p.name] for p in found]).reshape(len(found), len(block))
         inside = (low <= x) & (x <= high)  # NaN has left its range too
         if not inside.all():  # a rotor that is not held may lie anywhere
             inside[held:] |= ~np.isin(block.columns["state"], self._held)
         if not inside.all():
             row = int(np.argmin(inside.all(axis=1)))
-            k, name = int(np.argmin(inside[row])), names[row]
-            unit = units.UNITS[self.rig.channels[name].unit].si
-            raise InterlockError(
-                _left(name, x[row, k], f" at tick {int(block.ticks[k])}", low[row, 0], high[row, 0], unit)
-            )
-
-    @property
-    def _supply(self) -> tuple[float, float]:
-        """What the supply's voltage may be while the rotor is held, V: what the rig file states, and never nothing."""
-        e = self.rig.envelope
-        return e.min_supply_V or LEAST_V, e.max_supply_V or math.inf
+            k = int(np.argmin(inside[row]))
+            raise InterlockError(_left(found[row], x[row, k], f" at tick {int(block.ticks[k])}"))
 
     def check_reading(self, device: str, values: Mapping[str, float], held: bool) -> None:
         """Trip on a reading of a register device, SI by register; `held`: whether the rotor is.
 
         Raises:
-            InterlockError: a winding is too hot, the shaft too fast, the drive's torque too great, or the rotor is held
-                and the supply is off or out of its range; the text names the register and its value.
+            InterlockError: a register has left its range (a winding is too hot, the shaft too fast, the drive's torque too
+                great), or the rotor is held and the supply is off or out of its range; the text names the register and
+                its value.
         """
-        spec = self.rig.devices[device]
-        for name, (low, high) in self._readings[device].items():
-            if name in values and not low <= values[name] <= high:
-                unit = units.UNITS[spec.registers[name].unit].si
-                raise InterlockError(_left(f"{device} {name}", values[name], "", low, high, unit))
-        if not held or "supply" not in spec.roles:
+        limits = self._readings[device]
+        for name, p in limits.items():
+            if not p.held and name in values and not p.low <= values[name] <= p.high:
+                raise InterlockError(_left(p, values[name], ""))
+        if not held:
             return
-        if not values.get("state", 1.0):
+        if "supply" in self.rig.devices[device].roles and not values.get("state", 1.0):
             raise InterlockError(f"interlock: {device} says that it is off while the rotor is held; look at it first")
-        low, high = self._supply
-        if "voltage" in values and not low <= values["voltage"] <= high:
-            raise InterlockError(
-                _left(f"{device} voltage", values["voltage"], " while the rotor is held", low, high, "V")
-            )
-
-    @cached_property
-    def _readings(self) -> dict[str, dict[str, tuple[float, float]]]:
-        """What the registers of each device may be in every state: temperatures of windings, and what a drive measures."""
-        e, out = self.rig.envelope, dict[str, dict[str, tuple[float, float]]]()
-        for device, spec in self.rig.devices.items():
-            kelvin = [n for n, r in spec.registers.items() if units.unit(r.unit).si == "K"]
-            hot = [n for n in kelvin if n.startswith("temp_") or ("thermal" in spec.roles and n != AMBIENT)]
-            limits = dict.fromkeys(hot, (-math.inf, e.max_temperature_K))
-            if "drive" in spec.roles:
-                limits["actual_speed"] = (-e.max_speed_rad_s, e.max_speed_rad_s)
-                torque = e.max_drive_torque_Nm or math.inf
-                limits["torque"] = (-torque, torque)
-            out[device] = limits
-        return out
+        for name, p in limits.items():
+            if p.held and name in values and not p.low <= values[name] <= p.high:
+                raise InterlockError(_left(p, values[name], " while the rotor is held"))
 
 
-def _left(name: str, value: float, where: str, low: float, high: float, unit: str) -> str:
+def _left(p: Protected, value: float, where: str) -> str:
     """What a trip says."""
-    if value < low and low > 0:
-        return f"interlock: {name} fell to {value:.4g} {unit}{where}; the envelope asks for at least {low:g} {unit}"
-    return f"interlock: {name} reached {abs(value):.4g} {unit}{where}; the envelope allows {high:g} {unit}"
+    if value < p.low and p.low != -p.high:
+        return f"interlock: {p.name} fell to {value:.4g} {p.unit}{where}; the envelope asks for at least {p.low:g} {p.unit}"
+    return f"interlock: {p.name} reached {abs(value):.4g} {p.unit}{where}; the envelope allows {p.high:g} {p.unit}"

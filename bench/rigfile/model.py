@@ -20,7 +20,7 @@ from bench.rigfile.capture import CaptureSpec
 from bench.rigfile.elements import FORMS, MachineTables
 from bench.rigfile.messages import MessageMap, load_messages
 from bench.rigfile.part import Part
-from bench.rigfile.registers import Register
+from bench.rigfile.registers import Bounds, Register
 from bench.rigfile.text import SCHEMA, migrated, parse_text
 from bench.rigfile.toleranced import UNKNOWN_UNIT, Toleranced, simulated
 from bench.schema import expected_of
@@ -74,12 +74,15 @@ class Device(Part):
 
 
 class Channel(Part):
-    """`noise`: the least standard deviation of its readings while the rotor is held, SI."""
+    """`noise`: the least standard deviation of its readings while the rotor is held, SI. `protect`: a limit of its own, in
+    place of its kind's; `unprotected`: why it has none (see `bench.rigfile.protection`)."""
 
     signal: str
     unit: str
     about: str = ""
     noise: float | None = Field(None, gt=0)
+    protect: Bounds | None = None
+    unprotected: str = ""
 
 
 class Parameter(Part):
@@ -101,8 +104,9 @@ class Sensor(Part):
 
 
 class Envelope(Part):
-    """Protection range; what the machine does not have needs no limit. `positions` are the channels that
-    `max_levitated_position_m` bounds while the rotor is held; the supply's voltage is bounded then too."""
+    """Protection range: limits of kinds; what the machine does not have needs none. `positions` are the channels that
+    `max_levitated_position_m` bounds while the rotor is held (None: every position); the supply's voltage, channel `supply`,
+    is bounded then too."""
 
     max_hung_kg: float = Field(ge=0)
     max_current_A: float = Field(math.inf, gt=0)
@@ -114,7 +118,8 @@ class Envelope(Part):
     min_supply_V: float | None = Field(None, gt=0)
     max_supply_V: float | None = Field(None, gt=0)
     max_drive_torque_Nm: float | None = Field(None, gt=0)
-    positions: tuple[str, ...] = ("pos_xi", "pos_yi", "pos_xo", "pos_yo")
+    positions: tuple[str, ...] | None = None
+    supply: str = "supply"
 
 
 class CalibrationTable(Part):
@@ -225,7 +230,8 @@ def _parsed(toml_text: str, dbc_text: str, path: str) -> RigFile:
 def _problem(error: Any, path: str) -> Problem:
     key = ".".join(str(part) for part in error["loc"] if part not in ("schema_", *FORMS)) or "(file)"
     if error["type"] == UNKNOWN_UNIT:
-        return Problem(path, f"{key}.unit", repr(error["ctx"]["symbol"]), units.KNOWN)
+        symbol = error["ctx"]["symbol"]
+        return Problem(path, f"{key}.unit", repr(symbol), units.expected(symbol))
     found = "nothing" if error["type"] == "missing" else repr(error.get("input"))
     if error["type"] != "missing" and isinstance(error.get("input"), dict):
         found = "a table with " + ", ".join(error["input"])

@@ -11,10 +11,12 @@ from functools import cached_property
 from typing import Literal, Protocol
 
 from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
 
 from bench import units
 from bench.errors import ConfigError, LinkError
 from bench.rigfile.part import Part
+from bench.rigfile.toleranced import UNKNOWN_UNIT
 
 Table = Literal["holding", "input"]
 WordOrder = Literal["big", "little"]
@@ -56,8 +58,18 @@ class RegisterPort(Protocol):
         ...
 
 
+class Bounds(Part):
+    """What a reading may be at least and at most, SI, and when; by default positions and the supply while the rotor is held,
+    all others always."""
+
+    low: float | None = None
+    high: float | None = None
+    when: Literal["always", "held"] | None = None
+
+
 class Register(Part):
-    """One value: value = raw * scale + offset in `unit`. 32-bit types take two registers, words in the device's order."""
+    """One value: value = raw * scale + offset in `unit`. 32-bit types take two registers, words in the device's order.
+    `protect` and `unprotected` as a channel's."""
 
     address: int = Field(ge=0, le=65535)
     type: Literal["u16", "i16", "u32", "i32", "f32"] = "u16"
@@ -67,13 +79,15 @@ class Register(Part):
     unit: str = "1"
     writable: bool = False
     about: str = ""
+    protect: Bounds | None = None
+    unprotected: str = ""
 
     @model_validator(mode="after")
     def _usable(self) -> Register:
         try:
             units.unit(self.unit)
-        except ConfigError as error:  # a ValueError is reported with its key and next to the other problems
-            raise ValueError(str(error)) from None
+        except ConfigError as error:  # reported with its key and next to the other problems
+            raise PydanticCustomError(UNKNOWN_UNIT, "unknown unit", {"symbol": self.unit}) from error
         if self.scale == 0:
             raise ValueError("expected a scale that is not zero")
         if self.writable and self.table == "input":

@@ -4,13 +4,13 @@ so that everything else that is wrong is told at once."""
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from pydantic import ValidationError
 
 from bench.errors import Problem
-from bench.inputfile import parse_toml
+from bench.inputfile import DEPTH, parse_toml
 from bench.rigfile.model import RigFile
 from bench.rigfile.text import RigText, migrated
 
@@ -31,22 +31,42 @@ Content = dict[str, Any]
 
 
 def rest_of(text: RigText, problems: tuple[Problem, ...]) -> RigFile | None:
-    """The rig file without what the problems are about; None where that cannot be told apart from the rest."""
-    data = migrated(parse_toml(text.toml), str(text.path))
-    cuts: tuple[Callable[[Content], Content], ...] = (
-        lambda d: _without(d, [p.key.split(".") for p in problems]),
-        lambda d: _without(d, [p.key.split(".")[:2] for p in problems if p.expected != "no such key"]),
-    )
-    left = copy.deepcopy(data)
-    for cut in cuts:
-        left = _filled(cut(left))
+    """The rig file without what the problems are about, and without what cannot be without that; None where that cannot be told
+    apart from the rest."""
+    left: Content = copy.deepcopy(migrated(parse_toml(text.toml), str(text.path)))
+    keys = [p.key.split(".") for p in problems]
+    for _ in range(DEPTH):
+        left = _filled(_without(left, keys))
         try:
             return RigFile.model_validate(
                 {**left, "toml_text": text.toml, "dbc_text": text.dbc, "path": str(text.path)}
             )
-        except ValidationError:
-            continue
+        except ValidationError as error:
+            keys = [_at_fault(e) for e in error.errors(include_url=False)]
     return None
+
+
+def follows(p: Problem, problems: tuple[Problem, ...]) -> bool:
+    """Whether a problem of the rest is one of those before, or may be there only because something was left out."""
+    keys = [other.key for other in problems]
+    entries = {_entry(other.key) for other in problems if other.expected != "no such key"}
+    gravity = p.key.startswith("site.") and any(key.startswith("site.") for key in keys)  # judged by the latitude
+    for_device = p.expected.startswith("a URL for") and any(e.endswith((".link", ".roles")) for e in entries)
+    refers = p.found.strip("'").replace("/", ".") in entries  # to a number that was left out
+    return p.key in keys or _entry(p.key) in entries or gravity or for_device or refers
+
+
+def _entry(key: str) -> str:
+    """What is read and understood as one: `channels.NAME`, `devices.NAME.link`, `devices.NAME.registers.NAME`."""
+    parts = key.split(".")
+    depth = 2 if parts[0] != "devices" else 4 if parts[2:3] == ["registers"] else 3
+    return ".".join(parts[:depth])
+
+
+def _at_fault(error: Mapping[str, Any]) -> list[str]:
+    """Where to cut: at the key, or where one is missing at the table that lacks it."""
+    path = [str(part) for part in error["loc"]]
+    return path[:-1] if error["type"] == "missing" else path
 
 
 def _without(data: Content, keys: list[list[str]]) -> Content:
@@ -59,7 +79,7 @@ def _without(data: Content, keys: list[list[str]]) -> Content:
                 path = [*path[: path.index(key)], key]
                 break
             table = found
-        table.pop(path[-1], None)
+        table.pop(path[-1] if path else "", None)
     return data
 
 

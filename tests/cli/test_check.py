@@ -138,3 +138,57 @@ def test_plans_limits_and_the_simulated_machine_are_checked_too(
         "limits.spindown.B.at.bias",
     ):
         assert said in err
+
+
+WRONG = {
+    "uut.colour": ('serial = "SIM-0001"', 'serial = "SIM-0001"\ncolour = "red"'),
+    "site.latitude_deg": ("latitude_deg = 53.527", 'latitude_deg = "north"'),
+    "geometry.hook_to_outboard.unit": ('150.0, unit = "mm"', '150.0, unit = "furlong"'),
+    "geometry.clearance.value": ("clearance = { value = 0.25", "clearance = { value = 0.6"),
+    "geometry.motor_stiffness.value": ("motor_stiffness = { value = 242.6", "motor_stiffness = { value = 0"),
+    "envelope.max_temperature_K": ("max_temperature_K = 353.0\n", ""),
+    "envelope.positions": ('positions = ["pos_xi"', 'positions = ["pos_q"'),
+    "envelope.max_supply_V": ("min_supply_V = 130.0", "min_supply_V = 230.0"),
+    "devices.drive.registers.target_speed": (
+        'scale = 0.01, unit = "r/min", writable',
+        'scale = 0, unit = "r/min", writable',
+    ),
+    "devices.drive.registers.torque.unit": ('scale = 0.01, unit = "N m"', 'scale = 0.01, unit = "Newton"'),
+    "devices.drive.link": ('link = "fieldbus"\nroles = ["drive"]', 'link = "feldbus"\nroles = ["drive"]'),
+    "devices.supply.poll_s": (
+        'roles = ["supply"]\nunit = 2\npoll_s = 0.5',
+        'roles = ["supply"]\nunit = 2\npoll_s = 0.001',
+    ),
+    "devices.supply.registers.voltage.protect": (
+        'about = "output voltage"',
+        'about = "", protect = { low = 2, high = 1 }',
+    ),
+    "devices.thermal.roles.0": ('roles = ["thermal"]', 'roles = ["thermometer"]'),
+    "links.fieldbus.url": ('url = "modbus-tcp:127.0.0.1:28503"', 'url = "modbus:127.0.0.1"'),
+    "channels.i_z_n.signal": ('"Telemetry.i_z_n"', '"Telemetry.i_xi_p"'),
+    "channels.temp_m.signal": ('"Telemetry.temp_m"', '"Telemetry.temp_q"'),
+    "parameters.bias_i.defualt": ("default = 3, low = 0", "default = 9, defualt = 3, low = 0"),
+    "parameters.bias_i.default": ("", ""),  # of the same line
+    "[plans.amb-calibration]: angels": ("[plans.amb-calibration]\n", "[plans.amb-calibration]\nangels = 9\n"),
+    "simulation.machine": ("[simulation]\n", '[simulation]\nmachine = "mine"\n'),
+}
+
+
+def test_all_that_is_wrong_is_told_in_one_pass(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """Unlike errors, of types, of values, of what belongs together, in the file, its plans and its DBC: none hides another, and
+    what is only a consequence of one that is told is not told beside it."""
+    text = (RIGS / "tsbs12.toml").read_text(encoding="utf-8")
+    for old, new in WRONG.values():
+        assert old in text
+        text = text.replace(old, new, 1)
+    dbc = (RIGS / "tsbs12.dbc").read_text(encoding="utf-8")
+    dbc = dbc.replace('[-0.00065536|0.00065534] "m" Host', '[-0.00065536|0.00065534] "thou" Host', 1)
+    dbc = dbc.replace("BO_ 16 Heartbeat:", "BO_ 16 Heartbeet:", 1)
+    (tmp_path / "rig.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "tsbs12.dbc").write_text(dbc, encoding="utf-8")
+    status, _, err = check(capsys, str(tmp_path / "rig.toml"))
+    assert status == 2
+    *problems, last = err.splitlines()
+    keys = [line.partition(": found ")[0].split(maxsplit=1)[-1].split("rig.toml: ")[-1] for line in problems]
+    assert sorted(keys) == sorted([*WRONG, "Telemetry.pos_xi", "devices.controller.binding.heartbeat"])
+    assert last.endswith(f"{len(WRONG) + 2} problems")
