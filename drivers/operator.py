@@ -95,3 +95,8 @@ class LineOperator:
         answer = self._request(f"ask {question}")
         self._note(action="ask", question=question, answer=answer)
         return answer.strip().lower() in ("yes", "y")
+
+    def goes_on(self, wrong: str) -> bool:
+        """Whether a run goes on that shows something wrong: nobody is there to look after it, so no."""
+        self._note(action="goes-on", question=wrong, answer="no")
+        return False

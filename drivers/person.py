@@ -122,6 +122,14 @@ class ConsoleOperator:
             answer = self._answer(f"{_unknown(answer)}\n{asked}")
         return answer in YES
 
+    def goes_on(self, wrong: str) -> bool:
+        """Whether a run goes on that shows something wrong.
+
+        Raises:
+            OperatorAbort: the person answered stop.
+        """
+        return self.ask(f"{wrong}\nThat is an error of this run. Go on all the same?")
+
     def _loaded(self, what: str, load: Load) -> Load:
         """What hangs after the person was asked for `load`."""
         labels = ", ".join(self._envelope.rig.masses)

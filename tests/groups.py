@@ -19,7 +19,8 @@ GROUPS = {
     # They begin with the same calibrations, which are made once.
     "identified": ("tests/procedures/test_amb_calibration.py", "tests/procedures/test_amb_facts.py",
                    "tests/procedures/test_force_constant.py", "tests/procedures/test_force_coupling.py",
-                   "tests/procedures/test_force_map.py", "tests/procedures/test_negative_stiffness.py"),
+                   "tests/procedures/test_force_map.py", "tests/procedures/test_negative_stiffness.py",
+                   "tests/procedures/test_first_look.py"),
     # Their pages begin with the same commands, which are executed once.
     "chained pages": ("test_docs.py::test_commands_work[force-constant]",
                       "test_docs.py::test_commands_work[force-coupling]",

@@ -73,6 +73,7 @@ class Operator(Protocol):
     # on the plane's scale, counted from y towards z while its zero faces y; the shaft must be landed
     def detach(self, plane: Plane) -> None: ...  # every weight of that plane; the shaft must be landed
     def ask(self, question: str) -> bool: ...  # yes or no
+    def goes_on(self, wrong: str) -> bool: ...  # whether a run goes on that shows this; where nobody is, it does not
 
 
 class Drive(Protocol):

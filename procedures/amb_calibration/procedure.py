@@ -35,7 +35,7 @@ from procedures.amb_calibration.scatter import OUTPUTS, Scatter, covariance_by_a
 from procedures.amb_calibration.steps import AXES, VERTICAL, Hang, HangingData, channels, read_hangings
 from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.servomotor.loads import certified_masses, certified_weighing, check_masses
-from procedures.shared import assumptions
+from procedures.shared import assumptions, first_look
 from procedures.shared.certificates import certified, certified_sensors
 from procedures.shared.step_table import record_step
 from procedures.shared.weight import weight
@@ -77,7 +77,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     rig.clock.sleep(plan.settle_s)
     changes = {axis: after - before[axis] for axis, after in _controls(rig, machine).items()}
     rig.operator.hang(NOTHING)
-    if max(map(abs, changes.values())) > CLEAR_A and any(checks.wiring(**changes)):
+    if max(map(abs, changes.values())) > CLEAR_A and not first_look.goes_on(rig, checks.wiring(**changes)):
         record.event(checks.WIRED_WRONG, changes=changes)  # an hour of hangings would say no more
         return
     for turn in range(plan.angles):

@@ -1,6 +1,6 @@
 """Before the AMB stand turns: how its shaft lies on the rings, its lift, and small nudges that show whose reading is whose.
 
-What is recorded here is judged by `procedures.amb_rotor.wiring.before_orbits`.
+What is recorded here is judged by `procedures.amb_rotor.wiring.before_orbits`; the nudges are judged here already.
 """
 
 from __future__ import annotations
@@ -10,17 +10,20 @@ from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.procedure.states import transition
 from bench.recording.recorder import Recorder
-from procedures.amb_rotor import rings
-from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.amb_rotor import nudges, rings
+from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.nudges import PROBE, Nudge
+from procedures.shared import first_look
 
-REST, LIFT, PROBE = "rest", "lift", "probe"
+REST, LIFT = "rest", "lift"
 LIFT_LOST, NO_SPEED = "lift-lost", "no-speed"
 NUDGES = (("y", 10e-6), ("theta", 100e-6))  # of the set points, m and rad
 STEPS = 2 + 2 * len(NUDGES)  # that `lift_and_nudge` records
 
 
 def lift_and_nudge(rig: Rig, record: Recorder) -> bool:
-    """Lift the shaft from its rings and nudge it; False where it must not or cannot be lifted, which the analysis tells."""
+    """Lift the shaft from its rings and nudge it; False where it must not or cannot be lifted, or where nudges show that it is
+    wired wrong and nobody says to go on: the analysis tells."""
     machine = conventions(rig.file)
     with record.step(REST):
         rig.clock.sleep(0.3)
@@ -28,8 +31,7 @@ def lift_and_nudge(rig: Rig, record: Recorder) -> bool:
         return False  # it lies below, on its rings: a probe that says otherwise may close a loop the wrong way round
     if not _lift(rig, record):
         return False
-    _nudge(rig, machine, record)
-    return True
+    return first_look.passes(rig, record, nudges.judge(_nudge(rig, record), rig.file))
 
 
 def bring_to_speed(rig: Rig, record: Recorder, rad_s: float, settle_s: float) -> bool:
@@ -56,13 +58,17 @@ def _lift(rig: Rig, record: Recorder) -> bool:
     return True
 
 
-def _nudge(rig: Rig, machine: AmbRotor, record: Recorder) -> None:
+def _nudge(rig: Rig, record: Recorder) -> list[Nudge]:
+    machine, made = conventions(rig.file), []
+    names = nudges.watched(machine, tuple(rig.file.channels))
     for coordinate, aside in NUDGES:
-        name = machine.set_points[coordinate]
+        name, read = machine.set_points[coordinate], []
         for value in (0.0, aside):
             rig.levitation.set(name, value)
             rig.clock.sleep(0.5)
             with record.step(PROBE, name=name, value=value):
-                rig.clock.sleep(0.2)
+                read.append(first_look.mean_readings(rig, names, 0.2))
         rig.levitation.set(name, 0.0)
+        made.append(Nudge(name, aside, *read))
     rig.clock.sleep(0.5)
+    return made

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -92,6 +93,19 @@ class Held:
 def channels(machine: AmbRotor) -> tuple[str, ...]:
     """What is read of a step."""
     return (*machine.positions, *machine.currents, "flags")
+
+
+def of_readings(
+    labels: Mapping[str, Sequence[float]], readings: Sequence[Mapping[str, float]], machine: AmbRotor
+) -> Held:
+    """Positions as a run sees them while it goes on: a reading of each channel in the place of means, one batch each; nothing
+    drifts, scatters or is lost."""
+    mean = {c: np.array([r[c] for r in readings]) for c in readings[0]}
+    count = len(readings)
+    none = np.zeros(count)
+    nothing, batches = dict.fromkeys(mean, none), {c: v[:, None] for c, v in mean.items()}
+    return Held(mean, nothing, nothing, batches, mean, np.arange(count), {k: np.array(v) for k, v in labels.items()},
+                none, none, none.astype(np.int64), ("",) * count, machine)  # fmt: skip
 
 
 def read_steps(recording: Recording[Any], kind: str, labels: tuple[str, ...], batches: int) -> Held:

@@ -10,14 +10,11 @@ import numpy as np
 
 from bench.findings import Effect, Finding
 from bench.recording import Recording
-from procedures.amb_rotor import rings
+from procedures.amb_rotor import nudges, rings
 from procedures.amb_rotor.conventions import AmbRotor, conventions
-from procedures.amb_rotor.geometry import centre, nominal
-from procedures.amb_rotor.lift import LIFT, LIFT_LOST, NO_SPEED, PROBE, REST
+from procedures.amb_rotor.lift import LIFT, LIFT_LOST, NO_SPEED, REST
 
-OWN, OTHER = 0.5, 0.3  # shares of a nudge
 UNEVEN = 0.6  # of the rise
-ANSWERS_A = 5e-3  # a nudge of 10 µm takes some 20 mA, and noise leaves 0.2 mA in a step
 
 
 def before_orbits(recording: Recording[Any]) -> Iterator[Finding]:
@@ -31,8 +28,7 @@ def before_orbits(recording: Recording[Any]) -> Iterator[Finding]:
     if lost:
         yield from _of_lift(recording, machine, str(lost[0]["fault"]))
         return
-    yield from _of_nudges(recording, machine)
-    yield from _of_coils(recording, machine)
+    yield from nudges.judge(nudges.recorded(recording), recording.rig)
     for event in recording.events(NO_SPEED):
         text = f"the shaft does not reach {event['wanted'] * 30 / math.pi:.0f} r/min: {event['why']}"
         yield Finding("speed-not-reached", text, "drive", Effect.ERROR)
@@ -101,45 +97,3 @@ def _of_lift(recording: Recording[Any], machine: AmbRotor, fault: str) -> Iterat
         where,
         Effect.ERROR,
     )
-
-
-def _of_nudges(recording: Recording[Any], machine: AmbRotor) -> Iterator[Finding]:
-    steps = list(recording.steps(PROBE))
-    facts = nominal(recording.rig, 0.0)
-    for before, after in zip(steps[::2], steps[1::2], strict=False):
-        wanted, name = float(after.labels["value"]), str(after.labels["name"])
-        means = [np.array([[s.mean(p)] for p in machine.positions]) for s in (before, after)]
-        y, z, _, theta = (centre(means[1], facts) - centre(means[0], facts))[:, 0]
-        if name == machine.set_points["theta"]:
-            if theta < OWN * wanted:
-                text = (
-                    f"a tilt about z by {wanted * 1e6:g} µrad shows as {theta * 1e6:+.0f} µrad: suspect the readings of the "
-                    "two planes exchanged, or a set point that does not act."
-                )
-                yield Finding("planes-exchanged", text, name, Effect.ERROR)
-        elif y < OWN * wanted or abs(z) > OTHER * wanted:
-            text = (
-                f"a nudge of y by {wanted * 1e6:g} µm shows as {y * 1e6:+.1f} µm in y and {z * 1e6:+.1f} µm in z: suspect the "
-                "readings of y and z exchanged, or a set point that does not act."
-            )
-            yield Finding("axes-exchanged", text, name, Effect.ERROR)
-
-
-def _of_coils(recording: Recording[Any], machine: AmbRotor) -> Iterator[Finding]:
-    """A shaft that is held nearer to a magnet is pulled more by it, so that its coil carries less. That tells the coils of an
-    axis apart even where the mean currents do not: where the magnetic offset carries the weight they are nearly alike."""
-    told = {c.name for stream in recording.streams.values() for c in stream.channels}
-    steps = [s for s in recording.steps(PROBE) if s.labels["name"] == machine.set_points["y"]]
-    for before, after in zip(steps[::2], steps[1::2], strict=False):
-        for axis in machine.along("y"):
-            (p, n), place = machine.pair(axis), machine.position(axis)
-            if not {p, n} <= told:
-                continue
-            moved = after.mean(place) - before.mean(place)
-            answer = (after.mean(p) - before.mean(p) - after.mean(n) + before.mean(n)) / 2
-            if moved > OWN * float(after.labels["value"]) and answer > ANSWERS_A:
-                text = (
-                    f"nearer by {moved * 1e6:.1f} µm to the upper magnet of {axis}, the shaft asks {answer * 1e3:+.1f} mA of "
-                    "it, as if it pulled the other way: suspect the two coils or their current sensors exchanged."
-                )
-                yield Finding("coils-exchanged", text, axis, Effect.ERROR)

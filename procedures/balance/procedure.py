@@ -23,7 +23,7 @@ from procedures.balance.estimates import Result
 from procedures.balance.hum import of_balance
 from procedures.balance.plan import Plan
 from procedures.balance.steps import BASE, SIDES, read_runs
-from procedures.shared import assumptions
+from procedures.shared import assumptions, first_look
 from procedures.synchronous import bearings
 from procedures.synchronous import checks as dwell_checks
 from procedures.synchronous.dwells import SLOW
@@ -97,6 +97,7 @@ def fewest_steps(plan: Plan) -> int:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     """Unbalance as found and as left, and the influence coefficients at the highest speed."""
+    first_look.gate(recording, findings, wiring.before_orbits(recording))
     findings.gate([*wiring.before_orbits(recording), *dwell_checks.before(recording), *checks.refusals(recording)],
                   ("no-dwells", "sensor-polarity", "lift-lost", "stuck-channel"))  # fmt: skip
     plan, rig = recording.plan, recording.rig

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from bench.errors import DeviceFault, OperatorAbort
 from bench.figures import Figure
@@ -24,13 +24,13 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.amb_rotor import rings
 from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
-from procedures.amb_rotor.places import HOLD, LIFT, LIFT_LOST, REST, TILT, Held, channels, read_steps
+from procedures.amb_rotor.places import HOLD, LIFT, LIFT_LOST, REST, TILT, Held, channels, of_readings, read_steps
 from procedures.bearing_model import checks, estimates, wiring
 from procedures.bearing_model import figures as drawn
 from procedures.bearing_model.comparison import COMPARED
 from procedures.bearing_model.estimates import Analysis
 from procedures.bearing_model.plan import Plan
-from procedures.shared import assumptions
+from procedures.shared import assumptions, first_look
 
 AXES = AMB_ROTOR.axes
 BETA = {a: Quantity(f"beta_{a}", "N m^2/A^2", f"force constant of axis {a}, at the same gap for all") for a in AXES}
@@ -104,16 +104,20 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     if any(rings.of_readings(readings, rig.file)) or not _lift(rig, record):
         return
     rig.clock.sleep(3 * plan.settle_s)
-    _tilt(rig, plan, record)
+    tilted = _tilt(rig, plan, record)
     ref_y, ref_z = machine.set_points["y"], machine.set_points["z"]
     for k, bias in enumerate(plan.biases_A):
         _set_bias(rig, plan, bias)
+        held = []
         for y, z in grid(plan) if k % 2 == 0 else reversed(grid(plan)):
             rig.levitation.set(ref_y, y)
             rig.levitation.set(ref_z, z)
             rig.clock.sleep(plan.settle_s)
             with record.step(HOLD, y_m=y, z_m=z, bias_A=bias):
                 rig.clock.sleep(plan.average_s)
+            held.append(_read(rig))
+        if k == 0 and not first_look.passes(rig, record, _of_first(rig.file, plan, held, tilted)):
+            return
     rig.levitation.set(ref_y, 0.0)
     rig.levitation.set(ref_z, 0.0)
     rig.clock.sleep(plan.settle_s)
@@ -139,7 +143,25 @@ def _set_bias(rig: Rig, plan: Plan, bias: float) -> None:
     rig.clock.sleep(plan.settle_s if count else 0.0)
 
 
-def _tilt(rig: Rig, plan: Plan, record: Recorder) -> None:
+def _read(rig: Rig) -> dict[str, float]:
+    """Positions and currents as they are now, SI."""
+    machine = conventions(rig.file)
+    return {name: rig.levitation.reading(name) for name in (*machine.positions, *machine.currents)}
+
+
+def _of_first(
+    rig: RigFile, plan: Plan, held: Sequence[Mapping[str, float]], tilted: Sequence[Mapping[str, float]]
+) -> list[Finding]:
+    """What the positions at the first bias show of the wiring, by what was read in each."""
+    (y, z), (psi, theta) = zip(*grid(plan), strict=True), zip(*tilts(plan), strict=True)
+    machine = conventions(rig)
+    places = of_readings({"y_m": y, "z_m": z}, held, machine)
+    tilt = of_readings({"psi_rad": psi, "theta_rad": theta}, tilted, machine)
+    return list(wiring.of_wiring(places, tilt, rig)) or list(wiring.of_models(places, tilt, rig, plan))
+
+
+def _tilt(rig: Rig, plan: Plan, record: Recorder) -> list[dict[str, float]]:
+    seen = []
     write, points = rig.levitation.set, conventions(rig.file).set_points
     for psi, theta in tilts(plan):
         write(points["psi"], psi)
@@ -147,7 +169,9 @@ def _tilt(rig: Rig, plan: Plan, record: Recorder) -> None:
         rig.clock.sleep(plan.settle_s)
         with record.step(TILT, psi_rad=psi, theta_rad=theta):
             rig.clock.sleep(plan.average_s)
+        seen.append(_read(rig))
     write(points["theta"], 0.0)
+    return seen
 
 
 def read(recording: Recording[Plan]) -> tuple[Held, Held]:
@@ -162,7 +186,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """The adjustment of all positions, and both models compared."""
     findings.gate(rings.before(recording))
     held, tilted = read(recording)
-    findings.gate(_of_data(recording, held, tilted), checks.FATAL)
+    findings.gate(first_look.with_first(recording, _of_data(recording, held, tilted)), checks.FATAL)
     a = estimates.evaluate(recording, held)
     findings.add(checks.of_results(a, recording.plan))
     return a

@@ -39,10 +39,10 @@ def of_signals(data: RampData, machine: Servomotor, plan: Plan) -> Iterator[Find
     yield from servomotor_checks.of_signals(table, machine, tuple(table.mean), plan.max_lost)
     axes = {machine.positions[axis]: machine.coils[axis] for axis in AXES}
     yield from signals.settled(table.mean, table.drift, axes, plan.max_position_m, plan.max_drift_A, table.where)
-    yield from _segments(table, machine)
+    yield from segments(table, machine)
 
 
-def _segments(table: StepTable[AtLevel], machine: Servomotor) -> Iterator[Finding]:
+def segments(table: StepTable[AtLevel], machine: Servomotor) -> Iterator[Finding]:
     """Each segment's current follows its command (T 6.9), and no level asks the angle control for torque."""
     level_y, level_x = table.each(lambda at: at.i_y_A), table.each(lambda at: at.i_x_A)
     design = np.stack([np.ones_like(level_y), level_y, level_x], axis=-1).reshape(-1, 3)

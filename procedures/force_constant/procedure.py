@@ -25,20 +25,20 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
-from procedures.force_constant import checks, estimates, fit, load_at_rest
+from procedures.force_constant import checks, estimates, first_angle, fit, load_at_rest
 from procedures.force_constant import figures as drawn
 from procedures.force_constant.estimates import AxisResult
+from procedures.force_constant.first_angle import CALIBRATION
 from procedures.force_constant.fit import TIME
 from procedures.force_constant.fitting import check, requires
 from procedures.force_constant.plan import Plan
 from procedures.force_constant.steps import AtLevel, RampData, read_ramps
 from procedures.servomotor.conventions import conventions
-from procedures.shared import assumptions
+from procedures.shared import assumptions, first_look
 from procedures.shared.step_table import record_step
 
 Array = npt.NDArray[np.float64]
 
-CALIBRATION = "amb-calibration"
 ALPHA_D = Quantity("alpha_d", "N/A", "motor: dF_y/di_y at gamma = 0, mean over a turn")
 ALPHA_DX = Quantity("alpha_dx", "N/A", "motor: dF_x/di_x at gamma = 0, mean over a turn, with K_x = K_y of the AMBs")
 MEASURES = (ALPHA_D, ALPHA_DX)
@@ -100,13 +100,17 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     for turn in range(plan.angles):
         angle = 2 * math.pi * turn / plan.angles
         rig.rotation.point(angle)
+        seen: list[tuple[AtLevel, dict[str, float], int]] = []
         for level in sequence(plan):
             ramp(i_y=level.i_y, i_x=level.i_x)
             rig.clock.sleep(plan.settle_s)
             labels = AtLevel(angle, level.i_y, level.i_x, level.branch_y, level.branch_x)
             with record_step(record, labels):
                 rig.clock.sleep(plan.average_s)
+            seen.append((labels, first_angle.reading(rig), rig.clock.now_ns()))
         ramp(i_y=0.0, i_x=0.0)
+        if turn == 0 and not first_angle.passes(rig, plan, record, seen):
+            return
 
 
 @dataclass(frozen=True)
@@ -124,9 +128,10 @@ class Analysis:
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """Both axes with their influences."""
     plan, rig, data = recording.plan, recording.rig, read_ramps(recording)
+    facts = recording.calibration(CALIBRATION).values
+    first_look.gate(recording, findings, first_angle.judge(data, rig, facts, plan))
     signals = list(checks.of_signals(data, conventions(rig), plan))
     findings.gate(signals, checks.FATAL)
-    facts = recording.calibration(CALIBRATION).values
     count = len(data.vertical.angles)
     shared = estimates.fact_inputs(facts, count)
     y_inputs = {**estimates.rig_inputs(rig, "y"), **shared}

@@ -58,10 +58,15 @@ def read_ramps(recording: Recording[Any]) -> RampData:
     """
     steps, shape = by_angle(recording.steps(AtLevel.kind), "steps")
     table = tabulate(steps, AtLevel, channels(conventions(recording.rig)), shape=shape)
-    duration_s = (steps[-1].end_ns - steps[0].start_ns) * 1e-9
-    y = _ramps(table, recording.rig, "y", table.each(lambda at: at.i_y_A), table.each(lambda at: at.branch_y))
-    x = _ramps(table, recording.rig, "x", table.each(lambda at: at.i_x_A), table.each(lambda at: at.branch_x))
-    return RampData(y, x, table, duration_s)
+    return ramps(table, recording.rig)
+
+
+def ramps(table: StepTable[AtLevel], rig: RigFile) -> RampData:
+    """The ramps of a table (A, P) of their steps."""
+    duration_s = (table.end_ns.flat[-1] - table.start_ns.flat[0]) * 1e-9
+    y = _ramps(table, rig, "y", table.each(lambda at: at.i_y_A), table.each(lambda at: at.branch_y))
+    x = _ramps(table, rig, "x", table.each(lambda at: at.i_x_A), table.each(lambda at: at.branch_x))
+    return RampData(y, x, table, float(duration_s))
 
 
 def _ramps(table: StepTable[AtLevel], rig: RigFile, axis: str, level: Array, branch: Array) -> Ramps:

@@ -30,7 +30,7 @@ from procedures.run_up import figures as drawn
 from procedures.run_up.estimates import Run
 from procedures.run_up.plan import Passing, Plan
 from procedures.run_up.steps import MISSED, PASSAGE, read_passage
-from procedures.shared import assumptions
+from procedures.shared import assumptions, first_look
 from procedures.synchronous import bearings, dwelling
 from procedures.synchronous import checks as dwell_checks
 from procedures.synchronous.coil_peaks import find_uncertified
@@ -162,6 +162,7 @@ def _fetch(rig: Rig, plan: Passing, record: Recorder, speed: float) -> None:
 
 def evaluate(recording: Recording[Any], findings: Findings) -> Run:
     """The passage's curves with their criticals, and the vectors at the captures' speeds."""
+    first_look.gate(recording, findings, wiring.before_orbits(recording))
     findings.gate([*wiring.before_orbits(recording), *checks.before(recording)])
     plan = recording.plan
     slow = next((read_dwell(recording, s) for s in recording.steps(SLOW)), None)

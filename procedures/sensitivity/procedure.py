@@ -46,7 +46,7 @@ from procedures.sensitivity.steps import (
     sensitivity,
     telemetry_channels,
 )
-from procedures.shared import assumptions
+from procedures.shared import assumptions, first_look
 
 S_MAX = Quantity("s_max", "1", "greatest |V1/E| of an axis, all other loops closed (ISO 14839-3)", title="S_max")
 AT = Quantity("s_max_hz", "Hz", "frequency of the greatest |V1/E|", title="frequency of S_max")
@@ -169,6 +169,7 @@ def _take(
 
 def evaluate(recording: Recording[Any], findings: Findings) -> list[Result]:
     """S, its peak and the margins, of each axis and speed."""
+    first_look.gate(recording, findings, wiring.before_orbits(recording))
     findings.gate([*wiring.before_orbits(recording), *checks.before(recording)])
     plan, taken = recording.plan, read_taken(recording)
     findings.gate(checks.of_signals(taken, plan))

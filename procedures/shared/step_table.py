@@ -109,6 +109,22 @@ def tabulate(
     )  # fmt: skip
 
 
+def of_readings(
+    labels: Sequence[Read],
+    readings: Sequence[Mapping[str, float]],
+    t_ns: Sequence[int],
+    *,
+    shape: tuple[int, ...] = (-1,),
+) -> StepTable[Read]:
+    """Steps as a run sees them while it goes on: a reading of each channel in the place of means, at `t_ns`; nothing drifts,
+    scatters or is lost."""
+    mean = {c: np.array([r[c] for r in readings]).reshape(shape) for c in readings[0]}
+    none = np.zeros(len(labels)).reshape(shape)
+    nothing = dict.fromkeys(mean, none)
+    at = np.array(t_ns, np.int64).reshape(shape)
+    return StepTable(mean, nothing, nothing, nothing, tuple(labels), at, at, none, none, none.astype(np.int64))
+
+
 def by_angle(steps: Steps, what: str) -> tuple[list[Step], tuple[int, int]]:
     """The steps, those of one angle after those of the other, and how many angles and steps per angle (A, P) there are.
 

@@ -23,7 +23,7 @@ from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.uncertainty import interval
 from procedures.amb_rotor.conventions import conventions
-from procedures.amb_rotor.lift import PROBE
+from procedures.amb_rotor.nudges import PROBE
 from procedures.synchronous.checks import its_own
 from procedures.synchronous.dwells import SLOW, Array, Complex, Dwell
 from procedures.synchronous.estimates import Result

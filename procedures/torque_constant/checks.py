@@ -38,8 +38,9 @@ def of_signals(data: TorqueData, machine: Servomotor, plan: Plan) -> Iterator[Fi
     table = data.table
     yield from signals.losses(table.lost, table.expected, plan.max_lost, table.where)
     yield from signals.flagged(table.flags, _limits(machine), table.where)
-    yield from _segments(data, machine)
-    yield from _wiring(data.wiring)
+    yield from _stuck(data, machine)
+    yield from segments(data.steps.segments, machine)
+    yield from wiring(data.wiring)
     yield from _settled(data, plan)
 
 
@@ -51,16 +52,18 @@ def _limits(machine: Servomotor) -> tuple[signals.Meaning, ...]:
     )
 
 
-def _segments(data: TorqueData, machine: Servomotor) -> Iterator[Finding]:
-    """At home without i_x and i_y all four segments carry the torque current."""
+def _stuck(data: TorqueData, machine: Servomotor) -> Iterator[Finding]:
     for channel in machine.segments:
         if (data.table.spread[channel] == 0).any():
             yield Finding("stuck-channel", f"{channel} does not move at all in some step; a live sensor has noise.", channel,
                           Effect.ERROR)  # fmt: skip
-    s = data.steps
-    drive = np.median(s.segments, axis=1)
+
+
+def segments(currents: Array, machine: Servomotor) -> Iterator[Finding]:
+    """At home without i_x and i_y all four segments carry the torque current: `currents` (n, 4) A under different loads."""
+    drive = np.median(currents, axis=1)
     drive = drive - drive.mean()
-    share = drive @ s.segments / float(drive @ drive)
+    share = drive @ currents / float(drive @ drive)
     for k, channel in enumerate(machine.segments):
         if share[k] < -0.5:
             yield Finding("segment-sign", f"{channel} reads the torque current with the wrong sign ({share[k]:+.2f} times the "
@@ -70,8 +73,9 @@ def _segments(data: TorqueData, machine: Servomotor) -> Iterator[Finding]:
                           Effect.INDETERMINATE)  # fmt: skip
 
 
-def _wiring(seen: Array) -> Iterator[Finding]:
-    """The outboard AMB answers i_x in x and i_y in y, alike; two exchanged segments mix or turn that."""
+def wiring(seen: Array) -> Iterator[Finding]:
+    """The outboard AMB answers i_x in x and i_y in y, alike; two exchanged segments mix or turn that. `seen` (2, 2): its
+    control currents x, y in A per A of i_x, i_y."""
     scale = float(np.abs(seen).sum())
     if scale == 0:
         return

@@ -14,7 +14,7 @@ import numpy as np
 
 from bench.errors import RotorNotArrived
 from bench.figures import Figure
-from bench.findings import Findings
+from bench.findings import Finding, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
@@ -27,14 +27,23 @@ from procedures.servomotor import hold
 from procedures.servomotor.conventions import conventions
 from procedures.servomotor.direction import of_probe
 from procedures.servomotor.loads import check_masses
-from procedures.shared import assumptions
-from procedures.shared.step_table import record_step
+from procedures.shared import assumptions, first_look
+from procedures.shared.step_table import of_readings, record_step
 from procedures.torque_constant import checks, fit
 from procedures.torque_constant import figures as drawn
 from procedures.torque_constant.fit import NO_DETENT, Balance, Detent
 from procedures.torque_constant.inputs import SIDES, arms_u, fit_inputs, masses_u
 from procedures.torque_constant.plan import Plan
-from procedures.torque_constant.steps import OnLever, OverDetent, Sideways, TorqueData, channels, read_torques
+from procedures.torque_constant.steps import (
+    OnLever,
+    OverDetent,
+    Sideways,
+    TorqueData,
+    channels,
+    read_torques,
+    read_wiring,
+    wiring,
+)
 
 ALPHA_TAU = Quantity("alpha_tau", "N m/A", "torque per mean true segment current at the home angle, peak over gamma")
 GAMMA_0T = Quantity("gamma_0t", "rad", "phase angle at which the torque per current is largest")
@@ -77,7 +86,8 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     hold.hold(rig, plan.ki_theta)
     if not _at_home(rig, record, 0.0):
         return
-    _wiring(rig, plan, record)
+    if not _wiring(rig, plan, record):
+        return
     for k in range(plan.detent_angles):
         angle = 2 * math.pi / detent_order(rig.file) * k / plan.detent_angles
         if not _at_home(rig, record, angle):
@@ -89,7 +99,8 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         return
     for gamma in visits(plan):
         rig.levitation.set("gamma", gamma)
-        _loads(rig, plan, record, gamma)
+        if not _loads(rig, plan, record, gamma):
+            return
     rig.levitation.set("gamma", 0.0)
     hold.hold(rig)
 
@@ -105,21 +116,30 @@ def _at_home(rig: Rig, record: Recorder, angle: float) -> bool:
     return True
 
 
-def _wiring(rig: Rig, plan: Plan, record: Recorder) -> None:
-    """Sideways currents of both signs, to see in the outboard AMB's currents which segment is which."""
-    ramp = rig.file.parameters["i_ramp"].default
+def _wiring(rig: Rig, plan: Plan, record: Recorder) -> bool:
+    """Sideways currents of both signs, to see in the outboard AMB's currents which segment is which; False where two are
+    exchanged and nobody says to go on."""
+    ramp, machine = rig.file.parameters["i_ramp"].default, conventions(rig.file)
+    seen: list[tuple[Sideways, dict[str, float], int]] = []
     for name, other in (("i_x", "i_y"), ("i_y", "i_x")):
         for value in (plan.wiring_A, -plan.wiring_A):
             rig.levitation.set(name, value)
             rig.clock.sleep(2 * plan.wiring_A / ramp + min(plan.settle_s, 0.5))
-            with record.step(Sideways.kind, **{name: value, other: 0.0}):
-                rig.clock.sleep(0.2)
+            asked = Sideways(**{name: value, other: 0.0})
+            with record_step(record, asked):
+                read = first_look.mean_readings(rig, machine.coils_of("xo", "yo"), 0.2)
+            answer = {f"side_{axis}": machine.control(f"{axis}o", read.__getitem__) for axis in "xy"}
+            seen.append((asked, answer, rig.clock.now_ns()))
         rig.levitation.set(name, 0.0)
     rig.clock.sleep(plan.wiring_A / ramp + min(plan.settle_s, 0.5))
+    return first_look.passes(rig, record, checks.wiring(wiring(of_readings(*zip(*seen, strict=True)))))
 
 
-def _loads(rig: Rig, plan: Plan, record: Recorder, gamma: float) -> None:
-    hanging = ""
+def _loads(rig: Rig, plan: Plan, record: Recorder, gamma: float) -> bool:
+    """All loads at one phase angle; False where those on the left, at the first angle, show a wrong sign and nobody says to
+    go on."""
+    hanging, machine = "", conventions(rig.file)
+    seen: list[list[float]] = []
     for side, load in sequence(plan):
         if hanging and hanging != side:
             rig.operator.lever("left" if hanging == "left" else "right", NOTHING)
@@ -129,6 +149,11 @@ def _loads(rig: Rig, plan: Plan, record: Recorder, gamma: float) -> None:
         rig.clock.sleep(plan.settle_s)
         with record_step(record, OnLever(gamma, side, load.label)):
             rig.clock.sleep(plan.average_s)
+        seen.append([rig.levitation.reading(name) for name in machine.segments])
+        first = gamma == visits(plan)[0] and len(seen) == len(plan.masses) + 2
+        if first and not first_look.passes(rig, record, checks.segments(np.array(seen), machine)):
+            return False
+    return True
 
 
 def detent_order(rig: RigFile) -> float:
@@ -151,6 +176,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """The balance of torques, with its fit and estimates."""
     findings.gate([*of_probe(recording), *checks.of_events(recording)])
     plan, machine = recording.plan, conventions(recording.rig)
+    first_look.gate(recording, findings, _sideways(recording))
     data = read_torques(recording)
     findings.gate(checks.of_signals(data, machine, plan))
     a = _fitted(recording, data)
@@ -158,6 +184,11 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     mass_u = masses_u(recording.rig, plan.masses)
     findings.add(checks.of_fit(data, machine, a.balance, a.detent, values, mass_u, arms_u(recording.rig), plan))
     return a
+
+
+def _sideways(recording: Recording[Plan]) -> Iterator[Finding]:
+    """What the sideways currents show, read when it is asked for."""
+    yield from checks.wiring(read_wiring(recording))
 
 
 def measured(a: Analysis) -> Iterator[Measured]:

@@ -95,7 +95,7 @@ def read_torques(recording: Recording[Plan]) -> TorqueData:
     detent = _table(recording, OverDetent)
     return TorqueData(
         steps, masses, table, detent.mean["angle"], detent.stack(segments).mean(axis=0),
-        _wiring(_table(recording, Sideways)),
+        read_wiring(recording),
     )  # fmt: skip
 
 
@@ -116,7 +116,12 @@ def _table(recording: Recording[Plan], kind: type[Read]) -> StepTable[Read]:
     return tabulate(list(recording.steps(kind.kind)), kind, reduced, read=samples)
 
 
-def _wiring(table: StepTable[Sideways]) -> Array:
+def read_wiring(recording: Recording[Plan]) -> Array:
+    """The outboard AMB's answers (2, 2) in the steps, A per A."""
+    return wiring(_table(recording, Sideways))
+
+
+def wiring(table: StepTable[Sideways]) -> Array:
     """Slopes of the outboard AMB's control currents over i_x and i_y, from the steps at plus and minus."""
     if not len(table):
         return np.zeros((2, 2))

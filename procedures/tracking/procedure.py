@@ -24,6 +24,7 @@ from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
 from procedures.amb_rotor.conventions import AMB_ROTOR, Law, conventions
 from procedures.amb_rotor.geometry import nominal
+from procedures.shared import first_look
 from procedures.tracking import checks, estimates
 from procedures.tracking import figures as drawn
 from procedures.tracking.plan import Plan
@@ -136,6 +137,7 @@ class Results:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     """Errors, tilts and distances of each law's orbit."""
+    first_look.gate(recording, findings, wiring.before_orbits(recording))
     findings.gate(wiring.before_orbits(recording))
     plan, orbits = recording.plan, read_orbits(recording)
     findings.gate(checks.of_signals(orbits, plan), checks.FATAL)

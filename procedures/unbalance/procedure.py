@@ -20,7 +20,7 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.amb_rotor import lift, wiring
 from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
-from procedures.shared import assumptions
+from procedures.shared import assumptions, first_look
 from procedures.synchronous import bearings, checks, dwelling, estimates, fitting
 from procedures.synchronous.coil_peaks import find_uncertified
 from procedures.synchronous.dwells import captured_channels, read_dwells, telemetry_channels
@@ -86,6 +86,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 
 def evaluate(recording: Recording[Any], findings: Findings) -> Results:
     """Vectors, orbits, D_max and what the coils need, of each dwell."""
+    first_look.gate(recording, findings, wiring.before_orbits(recording))
     findings.gate([*wiring.before_orbits(recording), *checks.before(recording)])
     dwells, plan = read_dwells(recording), recording.plan
     findings.gate([*checks.of_signals(dwells, plan.max_lost, plan.max_speed_error), *checks.sampling(dwells, plan.orders),

@@ -1,0 +1,66 @@
+"""What the first data of a run show: where its analysis would call them an error, nobody need wait for the rest.
+
+The judgement is the analysis' own function, of the readings as they come. A person is asked whether to go on; without one the
+run ends, and its recording is analysed as far as it goes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+from bench.findings import Effect, Finding, Findings
+from bench.procedure.rig import Rig
+from bench.recording import Recording
+from bench.recording.recorder import Recorder
+
+ENDED = "ended-by-first-look"  # event: the findings by which the run ended
+LOOKS = 16  # readings of a mean: no hum of 50 or 60 Hz is left in 0.2 s
+
+
+def goes_on(rig: Rig, found: Iterable[Finding]) -> bool:
+    """Whether the run goes on: nothing that was found is an error, or the operator says that it shall."""
+    wrong = [f.text for f in found if f.effect is Effect.ERROR]
+    return not wrong or rig.operator.goes_on("\n".join(wrong))
+
+
+def passes(rig: Rig, record: Recorder, found: Iterable[Finding]) -> bool:
+    """As `goes_on`; where the run ends, what it ended by is put into the recording."""
+    found = list(found)
+    if goes_on(rig, found):
+        return True
+    told = [{"code": f.code, "text": f.text, "where": f.where} for f in found if f.effect is Effect.ERROR]
+    record.event(ENDED, findings=told)
+    return False
+
+
+def with_first(recording: Recording[Any], found: Iterable[Finding]) -> Iterator[Finding]:
+    """What was found in the steps, and what the run ended by if they do not show it."""
+    known = set()
+    for finding in found:
+        known.add((finding.code, finding.where))
+        yield finding
+    for event in recording.events(ENDED):
+        for f in event["findings"]:
+            if (f["code"], f["where"]) not in known:
+                yield Finding(f["code"], f["text"], f["where"], Effect.ERROR)
+
+
+def gate(recording: Recording[Any], findings: Findings, found: Iterable[Finding]) -> None:
+    """Where the run ended by its first data, what was found in them ends the evaluation too.
+
+    Raises:
+        Ended: the run ended so.
+    """
+    if recording.events(ENDED):
+        findings.gate(with_first(recording, found))
+
+
+def mean_readings(rig: Rig, names: Sequence[str], seconds: float) -> dict[str, float]:
+    """Means of the newest readings while the clock sleeps for some time, SI."""
+    total = dict.fromkeys(names, 0.0)
+    for _ in range(LOOKS):
+        rig.clock.sleep(seconds / LOOKS)
+        for name in names:
+            total[name] += rig.levitation.reading(name) / LOOKS
+    return total
