@@ -80,6 +80,7 @@ class Recorder:
         self.path, self._clock, self._live, self._plain = path, clock, live, plain
         self.integrity = Integrity()
         self._newest: tuple[int, frozenset[str]] = (-1, frozenset())  # step: its number and its labels
+        self._watched: dict[str, tuple[float, int]] = {}  # by channel: sum and number of samples
         self._header = header
         self.wall: dict[str, str] = {}
         self._streams = {s.name: s for s in streams}
@@ -138,6 +139,9 @@ class Recorder:
         self._check(block)
         if len(block):
             self._put("samples", block)
+            for name in self._watched if self._watched.keys() <= block.columns.keys() else ():
+                total, count = self._watched[name]
+                self._watched[name] = total + float(block.columns[name].sum()), count + len(block)
             _add(self.integrity.samples, block.stream, len(block))
             _add(self.integrity.lost, block.stream, block.lost_before)
 
@@ -156,6 +160,16 @@ class Recorder:
         self.event("step-begin", step=index, name=kind, labels=labels)
         yield
         self.event("step-end", step=index, name=kind)
+
+    @contextmanager
+    def watching(self, channels: Sequence[str]) -> Iterator[dict[str, float]]:
+        """Within, samples that come are also averaged: what is given has the mean of each of `channels` afterwards, SI, or
+        nothing where no sample of them all came. For decisions under way, never for a result."""
+        means: dict[str, float] = {}
+        self._watched = dict.fromkeys(channels, (0.0, 0))
+        yield means
+        means |= {name: total / count for name, (total, count) in self._watched.items() if count}
+        self._watched = {}
 
     def correct(self, **labels: Any) -> bool:
         """Other labels for the newest step, as a person tells them who was there; False where it has no such labels."""

@@ -67,7 +67,7 @@ def _nudge(rig: Rig, record: Recorder) -> list[Nudge]:
             rig.levitation.set(name, value)
             rig.clock.sleep(0.5)
             with record.step(PROBE, name=name, value=value):
-                read.append(first_look.mean_readings(rig, names, 0.2))
+                read.append(first_look.watched(rig, record, names, 0.2))
         rig.levitation.set(name, 0.0)
         made.append(Nudge(name, aside, *read))
     rig.clock.sleep(0.5)

@@ -114,8 +114,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
             rig.levitation.set(ref_z, z)
             rig.clock.sleep(plan.settle_s)
             with record.step(HOLD, y_m=y, z_m=z, bias_A=bias):
-                rig.clock.sleep(plan.average_s)
-            held.append(_read(rig))
+                held.append(_watched(rig, plan, record))
         if k == 0 and not first_look.passes(rig, record, _of_first(rig.file, plan, held, tilted)):
             return
     rig.levitation.set(ref_y, 0.0)
@@ -143,10 +142,10 @@ def _set_bias(rig: Rig, plan: Plan, bias: float) -> None:
     rig.clock.sleep(plan.settle_s if count else 0.0)
 
 
-def _read(rig: Rig) -> dict[str, float]:
-    """Positions and currents as they are now, SI."""
+def _watched(rig: Rig, plan: Plan, record: Recorder) -> dict[str, float]:
+    """Positions and currents at a place, as they come while the step is recorded, SI."""
     machine = conventions(rig.file)
-    return {name: rig.levitation.reading(name) for name in (*machine.positions, *machine.currents)}
+    return first_look.watched(rig, record, (*machine.positions, *machine.currents), plan.average_s)
 
 
 def _of_first(
@@ -168,8 +167,7 @@ def _tilt(rig: Rig, plan: Plan, record: Recorder) -> list[dict[str, float]]:
         write(points["theta"], theta)
         rig.clock.sleep(plan.settle_s)
         with record.step(TILT, psi_rad=psi, theta_rad=theta):
-            rig.clock.sleep(plan.average_s)
-        seen.append(_read(rig))
+            seen.append(_watched(rig, plan, record))
     write(points["theta"], 0.0)
     return seen
 

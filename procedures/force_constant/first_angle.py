@@ -14,18 +14,13 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from procedures.force_constant import checks, estimates, fit
 from procedures.force_constant.plan import Plan
-from procedures.force_constant.steps import AtLevel, RampData, channels, ramps
+from procedures.force_constant.steps import AtLevel, RampData, ramps
 from procedures.servomotor.conventions import conventions
 from procedures.shared import first_look
 from procedures.shared.step_table import of_readings
 
 CALIBRATION = "amb-calibration"
 SIGN, EXCHANGED = "segment-sign", "segments-exchanged"
-
-
-def reading(rig: Rig) -> dict[str, float]:
-    """What a level shows at its end, SI by channel."""
-    return {name: rig.levitation.reading(name) for name in channels(conventions(rig.file))}
 
 
 def passes(rig: Rig, plan: Plan, record: Recorder, seen: Sequence[tuple[AtLevel, Mapping[str, float], int]]) -> bool:

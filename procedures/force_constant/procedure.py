@@ -32,7 +32,7 @@ from procedures.force_constant.first_angle import CALIBRATION
 from procedures.force_constant.fit import TIME
 from procedures.force_constant.fitting import check, requires
 from procedures.force_constant.plan import Plan
-from procedures.force_constant.steps import AtLevel, RampData, read_ramps
+from procedures.force_constant.steps import AtLevel, RampData, channels, read_ramps
 from procedures.servomotor.conventions import conventions
 from procedures.shared import assumptions, first_look
 from procedures.shared.step_table import record_step
@@ -106,8 +106,8 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
             rig.clock.sleep(plan.settle_s)
             labels = AtLevel(angle, level.i_y, level.i_x, level.branch_y, level.branch_x)
             with record_step(record, labels):
-                rig.clock.sleep(plan.average_s)
-            seen.append((labels, first_angle.reading(rig), rig.clock.now_ns()))
+                read = first_look.watched(rig, record, channels(conventions(rig.file)), plan.average_s)
+            seen.append((labels, read, rig.clock.now_ns()))
         ramp(i_y=0.0, i_x=0.0)
         if turn == 0 and not first_angle.passes(rig, plan, record, seen):
             return

@@ -1,7 +1,7 @@
 """What the first data of a run show: where its analysis would call them an error, nobody need wait for the rest.
 
-The judgement is the analysis' own function, of the readings as they come. A person is asked whether to go on; without one the
-run ends, and its recording is analysed as far as it goes.
+The judgement is the analysis' own function, of the means of the samples as they come. A person is asked whether to go on;
+without one the run ends, and its recording is analysed as far as it goes.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 
 ENDED = "ended-by-first-look"  # event: the findings by which the run ended
-LOOKS = 16  # readings of a mean: no hum of 50 or 60 Hz is left in 0.2 s
 
 
 def goes_on(rig: Rig, found: Iterable[Finding]) -> bool:
@@ -56,11 +55,8 @@ def gate(recording: Recording[Any], findings: Findings, found: Iterable[Finding]
         findings.gate(with_first(recording, found))
 
 
-def mean_readings(rig: Rig, names: Sequence[str], seconds: float) -> dict[str, float]:
-    """Means of the newest readings while the clock sleeps for some time, SI."""
-    total = dict.fromkeys(names, 0.0)
-    for _ in range(LOOKS):
-        rig.clock.sleep(seconds / LOOKS)
-        for name in names:
-            total[name] += rig.levitation.reading(name) / LOOKS
-    return total
+def watched(rig: Rig, record: Recorder, names: Sequence[str], seconds: float) -> dict[str, float]:
+    """Means of the samples that come while the clock sleeps for some time, SI; the newest where none comes."""
+    with record.watching(names) as means:
+        rig.clock.sleep(seconds)
+    return {name: means[name] if name in means else rig.levitation.reading(name) for name in names}

@@ -127,7 +127,7 @@ def _wiring(rig: Rig, plan: Plan, record: Recorder) -> bool:
             rig.clock.sleep(2 * plan.wiring_A / ramp + min(plan.settle_s, 0.5))
             asked = Sideways(**{name: value, other: 0.0})
             with record_step(record, asked):
-                read = first_look.mean_readings(rig, machine.coils_of("xo", "yo"), 0.2)
+                read = first_look.watched(rig, record, machine.coils_of("xo", "yo"), 0.2)
             answer = {f"side_{axis}": machine.control(f"{axis}o", read.__getitem__) for axis in "xy"}
             seen.append((asked, answer, rig.clock.now_ns()))
         rig.levitation.set(name, 0.0)
@@ -148,8 +148,8 @@ def _loads(rig: Rig, plan: Plan, record: Recorder, gamma: float) -> bool:
         hanging = side
         rig.clock.sleep(plan.settle_s)
         with record_step(record, OnLever(gamma, side, load.label)):
-            rig.clock.sleep(plan.average_s)
-        seen.append([rig.levitation.reading(name) for name in machine.segments])
+            read = first_look.watched(rig, record, machine.segments, plan.average_s)
+        seen.append([read[name] for name in machine.segments])
         first = gamma == visits(plan)[0] and len(seen) == len(plan.masses) + 2
         if first and not first_look.passes(rig, record, checks.segments(np.array(seen), machine)):
             return False

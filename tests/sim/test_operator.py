@@ -121,6 +121,18 @@ def test_a_wrong_answer_is_explained_and_the_question_comes_again(machine: Simul
     assert asked[2].startswith("Another mass hangs: type its label (M1, M2, M3, M4, - for none).")
 
 
+def test_who_is_there_is_asked_whether_to_go_on_and_nobody_says_no(machine: SimulatedRig, hands: LineOperator) -> None:
+    person, asked = person_answering("hm", "yes", "no", "stop", machine=machine, hands=hands)
+    assert person.goes_on("M4 hangs, and the current falls.")
+    assert asked[0].splitlines() == ["M4 hangs, and the current falls.", "That is an error of this run. Go on all the same?",
+                                     "Type yes or no, or stop to end the run."]  # fmt: skip
+    assert asked[1].endswith(asked[0])
+    assert not person.goes_on("The same.")
+    with pytest.raises(OperatorAbort):
+        person.goes_on("The same.")
+    assert not hands.goes_on("The same.")
+
+
 def test_nothing_is_asked_twice(machine: SimulatedRig, hands: LineOperator) -> None:
     person, asked = person_answering("", "", "", machine=machine, hands=hands)
     for load in (NOTHING, NOTHING, Load("M1"), NOTHING):
