@@ -31,7 +31,7 @@ from procedures.force_coupling.steps import Phase
 from procedures.servomotor import carrying, checks
 from procedures.servomotor.conventions import Servomotor, conventions, radial_currents
 from procedures.servomotor.steps import POSITIONS, channels, read_steps
-from procedures.shared import assumptions
+from procedures.shared import assumptions, first_look
 from procedures.shared.step_table import StepTable, record_step
 
 RATIO = Quantity(
@@ -65,13 +65,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     for gamma in carrying.approach(plan.gamma_rad):
         rig.levitation.set("gamma", gamma)
         rig.clock.sleep(plan.settle_s)
-    for branch, gammas in ((1, plan.gamma_rad), (-1, plan.gamma_rad[::-1])):
-        carrying.to_edge(rig, branch, plan.count_rad)
-        for gamma in gammas:
-            rig.levitation.set("gamma", gamma)
-            rig.clock.sleep(plan.settle_s)
-            with record_step(record, Phase(gamma, branch)):
-                rig.clock.sleep(plan.average_s)
+    _visit(rig, plan, record)
     carrying.leave_edge(rig)
     for gamma in (*reversed(carrying.approach(plan.gamma_rad)), 0.0):
         rig.levitation.set("gamma", gamma)
@@ -79,9 +73,25 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     carrying.give_back(rig, plan.settle_s)
 
 
+def _visit(rig: Rig, plan: Plan, record: Recorder) -> None:
+    """Each phase angle from either edge; no more than the first where that shows a wrong sign and nobody says to go on."""
+    machine, first = conventions(rig.file), True
+    for branch, gammas in ((1, plan.gamma_rad), (-1, plan.gamma_rad[::-1])):
+        carrying.to_edge(rig, branch, plan.count_rad)
+        for gamma in gammas:
+            rig.levitation.set("gamma", gamma)
+            rig.clock.sleep(plan.settle_s)
+            with record_step(record, Phase(gamma, branch)):
+                mean = first_look.watched(rig, record, machine.segments, plan.average_s)
+            if first and not first_look.passes(rig, record, checks.segments(mean, machine)):
+                return
+            first = False
+
+
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """The currents over the phase angle with their fit."""
     data = read(recording)
+    first_look.gate(recording, findings, checks.segments(data.mean, conventions(recording.rig)))
     findings.gate(_of_signals(data, conventions(recording.rig), recording.plan), FATAL)
     a = estimates.evaluate(recording, data, recording.plan.count_rad)
     findings.add(force_coupling_checks.of_fit(data, a.fit, recording.plan))
@@ -105,7 +115,7 @@ def read(recording: Recording[Plan]) -> StepTable[Phase]:
 def _of_signals(data: StepTable[Phase], machine: Servomotor, plan: Plan) -> Iterator[Finding]:
     positions = machine.positions_of(*POSITIONS)
     yield from checks.of_signals(data, machine, (*machine.segments, *positions), plan.max_lost)
-    yield from checks.segments(data, machine)
+    yield from checks.segments(data.mean, machine)
     yield from checks.at_edge(data, plan.count_rad)
     i_x, i_y = radial_currents(*(data.drift[c] for c in machine.segments))
     yield from checks.settled(

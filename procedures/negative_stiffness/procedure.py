@@ -32,6 +32,7 @@ from procedures.negative_stiffness.steps import Displaced, HeldByAmbs, HeldByMot
 from procedures.servomotor import carrying, checks
 from procedures.servomotor.conventions import conventions, radial_currents
 from procedures.servomotor.steps import POSITIONS, channels, read_steps
+from procedures.shared import first_look
 from procedures.shared.step_table import StepTable, record_step
 
 Array = npt.NDArray[np.float64]
@@ -73,9 +74,11 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     carrying.carry(rig, plan.settle_s)
     carrying.to_edge(rig, 1, plan.count_rad)
     # The inboard AMB's plane goes with the displacement as far as keeps the inboard sensor at zero.
-    _walk(rig, plan, record, HeldByMotor, {"ref_ym": 1.0, "ref_yi": inboard}, plan.bias_A)
+    passed = _walk(rig, plan, record, HeldByMotor, {"ref_ym": 1.0, "ref_yi": inboard}, plan.bias_A)
     carrying.leave_edge(rig)
     carrying.give_back(rig, plan.settle_s)
+    if not passed:
+        return
     for bias in (plan.bias_A, plan.bias_high_A):
         if bias != plan.bias_A:
             transition(rig, RigState.READY)
@@ -89,7 +92,11 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 
 def _walk(
     rig: Rig, plan: Plan, record: Recorder, kind: type[Displaced], references: Mapping[str, float], bias: float
-) -> None:
+) -> bool:
+    """Up and down through the levels; no further than the first, and False, where the motor's currents show a wrong sign there
+    and nobody says to go on."""
+    machine, passed = conventions(rig.file), True
+
     def go(level: float) -> None:
         for name, factor in references.items():
             rig.levitation.set(name, factor * level)
@@ -97,11 +104,16 @@ def _walk(
 
     for level in carrying.approach(plan.levels_m):
         go(level)
-    for level, branch in carrying.mirrored(plan.levels_m):
+    for number, (level, branch) in enumerate(carrying.mirrored(plan.levels_m)):
         go(level)
         with record_step(record, kind(level, branch, bias)):
-            rig.clock.sleep(plan.average_s)
+            mean = first_look.watched(rig, record, machine.segments, plan.average_s)
+        if kind is HeldByMotor and number == 0:
+            passed = first_look.passes(rig, record, checks.segments(mean, machine))
+            if not passed:
+                break
     go(0.0)
+    return passed
 
 
 def _amb_shares(rig: RigFile) -> tuple[float, float]:
@@ -120,6 +132,7 @@ def _tilt(rig: RigFile) -> float:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """The stiffness both ways, by the motor's current and by the AMB's."""
+    first_look.gate(recording, findings, _of_first(recording))
     motor, ambs = read(recording)
     findings.gate(_of_signals(recording, motor, ambs), checks.FATAL)
     a = estimates.evaluate(recording, motor, ambs)
@@ -139,6 +152,11 @@ def read(recording: Recording[Plan]) -> tuple[StepTable[HeldByMotor], StepTable[
     return read_steps(recording, HeldByMotor), read_steps(recording, HeldByAmbs)
 
 
+def _of_first(recording: Recording[Plan]) -> Iterator[Finding]:
+    """What the motor's currents show of signs, read when it is asked for."""
+    yield from checks.segments(read_steps(recording, HeldByMotor).mean, conventions(recording.rig))
+
+
 def _of_signals(
     recording: Recording[Plan], motor: StepTable[HeldByMotor], ambs: StepTable[HeldByAmbs]
 ) -> Iterator[Finding]:
@@ -151,7 +169,7 @@ def _of_signals(
         (motor, machine.segments, 0.0, {"i_y": i_y, "i_x": i_x}),
         (ambs, machine.coils["yo"], -inboard / (1 - inboard), {"i_yo": i_yo}),
     )
-    yield from checks.segments(motor, machine)
+    yield from checks.segments(motor.mean, machine)
     yield from checks.at_edge(motor, plan.count_rad)
     for data, currents, follow, drifts in ways:
         yield from checks.of_signals(data, machine, (*currents, *positions), plan.max_lost)

@@ -41,11 +41,11 @@ def limits(machine: Servomotor) -> tuple[signals.Meaning, ...]:
     )
 
 
-def segments(data: StepTable[Labels], machine: Servomotor) -> Iterator[Finding]:
-    """Signs of the segments' currents while the motor carries: opposite ones carry opposite currents (T 6.9; at rest there is
-    hardly a torque current), and segment 1 a positive one, because it lifts."""
+def segments(mean: Mapping[str, Array | float], machine: Servomotor) -> Iterator[Finding]:
+    """Signs of the segments' `mean` currents in A while the motor carries: opposite ones carry opposite currents (T 6.9; at
+    rest there is hardly a torque current), and segment 1 a positive one, because it lifts."""
     names = machine.segments
-    one, two, three, four = (float(data.mean[c].mean()) for c in names)
+    one, two, three, four = (float(np.mean(mean[c])) for c in names)
     for a, b, name_a, name_b, lifts in (
         (one, three, names[0], names[2], True), (four, two, names[3], names[1], False)
     ):  # fmt: skip

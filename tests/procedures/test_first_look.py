@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from identified import SEED, WEIGH, calibrated
+from identified import SEED, WEIGH, calibrated, identified
 
 from bench.calibration import Calibration
 from bench.cli.__main__ import main
@@ -23,6 +23,7 @@ from procedures.shared.first_look import ENDED
 
 CURRENTS = {"current_sign_i": -1.0}
 GRID = {"spacing_m": 40e-6, "settle_s": 0.5, "average_s": 0.3}
+MOTOR = ("amb-calibration", "force-constant", "torque-constant", "force-coupling", "negative-stiffness")
 LEVER = {"masses": ["M2", "M3"], "settle_s": 0.7, "average_s": 0.3}
 
 
@@ -30,7 +31,7 @@ def run(
     folder: Path, procedure: str, truth: Mapping[str, float], plan: Mapping[str, Any], seed: int = 1,
     calibrations: Mapping[str, Calibration] | None = None,
 ) -> Simulated:  # fmt: skip
-    rig = "tsbs12" if procedure in ("amb-calibration", "force-constant", "torque-constant") else "amb5dof"
+    rig = "tsbs12" if procedure in MOTOR else "amb5dof"
     return simulated_run(procedure, rig, seed, plan, folder / "recording.mcap", truth, calibrations)
 
 
@@ -95,6 +96,16 @@ def test_the_first_angle_shows_a_motor_that_is_wired_wrong(
     found = run(tmp_path, "force-constant", truth, WEIGH, SEED, known)
     assert {c for c, _ in ended_by(found)} == {code}
     assert {s.labels["angle_rad"] for s in found.recording.all_steps()} == {0.0}
+
+
+@pytest.mark.parametrize("procedure", ["force-coupling", "negative-stiffness"])
+def test_the_first_step_shows_a_segment_that_reads_backwards(
+    tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, procedure: str
+) -> None:
+    known = identified(tmp_path_factory.mktemp("identified"))
+    found = run(tmp_path, procedure, {"segment_sign_1": -1.0}, {"settle_s": 1.0, "average_s": 0.3}, SEED, known)
+    assert ended_by(found) == {("segment-sign", "i_m1")}
+    assert len(found.recording.all_steps()) == 1
 
 
 SHORT = ("--plan", "settle_s=0.3", "--plan", "average_s=0.2")
