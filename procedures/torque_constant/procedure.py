@@ -125,11 +125,11 @@ def _wiring(rig: Rig, plan: Plan, record: Recorder) -> bool:
         for value in (plan.wiring_A, -plan.wiring_A):
             rig.levitation.set(name, value)
             rig.clock.sleep(2 * plan.wiring_A / ramp + min(plan.settle_s, 0.5))
-            asked = Sideways(**{name: value, other: 0.0})
-            with record_step(record, asked):
+            asked = {name: value, other: 0.0}
+            with record.step(Sideways.kind, **asked):
                 read = first_look.watched(rig, record, machine.coils_of("xo", "yo"), 0.2)
             answer = {f"side_{axis}": machine.control(f"{axis}o", read.__getitem__) for axis in "xy"}
-            seen.append((asked, answer, rig.clock.now_ns()))
+            seen.append((Sideways(**asked), answer, rig.clock.now_ns()))
         rig.levitation.set(name, 0.0)
     rig.clock.sleep(plan.wiring_A / ramp + min(plan.settle_s, 0.5))
     return first_look.passes(rig, record, checks.wiring(wiring(of_readings(*zip(*seen, strict=True)))))
