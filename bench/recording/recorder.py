@@ -17,6 +17,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from bench.calibration import Calibration
 from bench.calibration.file import attached
 from bench.clock import Clock
@@ -80,7 +83,7 @@ class Recorder:
         self.path, self._clock, self._live, self._plain = path, clock, live, plain
         self.integrity = Integrity()
         self._newest: tuple[int, frozenset[str]] = (-1, frozenset())  # step: its number and its labels
-        self._watched: dict[str, tuple[float, int]] = {}  # by channel: sum and number of samples
+        self._watched: dict[str, list[npt.NDArray[np.float64]]] = {}  # by channel: what came of it
         self._header = header
         self.wall: dict[str, str] = {}
         self._streams = {s.name: s for s in streams}
@@ -140,8 +143,7 @@ class Recorder:
         if len(block):
             self._put("samples", block)
             for name in self._watched if self._watched.keys() <= block.columns.keys() else ():
-                total, count = self._watched[name]
-                self._watched[name] = total + float(block.columns[name].sum()), count + len(block)
+                self._watched[name].append(np.array(block.columns[name], np.float64))
             _add(self.integrity.samples, block.stream, len(block))
             _add(self.integrity.lost, block.stream, block.lost_before)
 
@@ -162,13 +164,13 @@ class Recorder:
         self.event("step-end", step=index, name=kind)
 
     @contextmanager
-    def watching(self, channels: Sequence[str]) -> Iterator[dict[str, float]]:
-        """Within, samples that come are also averaged: what is given has the mean of each of `channels` afterwards, SI, or
+    def watching(self, channels: Sequence[str]) -> Iterator[dict[str, npt.NDArray[np.float64]]]:
+        """Within, samples that come are also kept: what is given has those of each of `channels` afterwards, (n,) SI, or
         nothing where no sample of them all came. For decisions under way, never for a result."""
-        means: dict[str, float] = {}
-        self._watched = dict.fromkeys(channels, (0.0, 0))
-        yield means
-        means |= {name: total / count for name, (total, count) in self._watched.items() if count}
+        seen: dict[str, npt.NDArray[np.float64]] = {}
+        self._watched = {name: [] for name in channels}
+        yield seen
+        seen |= {name: np.concatenate(parts) for name, parts in self._watched.items() if parts}
         self._watched = {}
 
     def correct(self, **labels: Any) -> bool:

@@ -87,7 +87,7 @@ class Register(Part):
         try:
             units.unit(self.unit)
         except ConfigError as error:  # reported with its key and next to the other problems
-            raise PydanticCustomError(UNKNOWN_UNIT, "unknown unit", {"symbol": self.unit}) from error
+            raise PydanticCustomError(UNKNOWN_UNIT, "unknown unit '{symbol}'", {"symbol": self.unit}) from error
         if self.scale == 0:
             raise ValueError("expected a scale that is not zero")
         if self.writable and self.table == "input":

@@ -37,9 +37,14 @@ def of_signals(data: RampData, machine: Servomotor, plan: Plan) -> Iterator[Find
     """Checks that need no fit: losses, stuck channels, saturation, contact, settling, segments that do as commanded."""
     table = data.table
     yield from servomotor_checks.of_signals(table, machine, tuple(table.mean), plan.max_lost)
+    yield from settled(table, machine, plan)
+    yield from segments(table, machine)
+
+
+def settled(table: StepTable[AtLevel], machine: Servomotor, plan: Plan) -> Iterator[Finding]:
+    """Shaft and control currents stand while a level is held."""
     axes = {machine.positions[axis]: machine.coils[axis] for axis in AXES}
     yield from signals.settled(table.mean, table.drift, axes, plan.max_position_m, plan.max_drift_A, table.where)
-    yield from segments(table, machine)
 
 
 def segments(table: StepTable[AtLevel], machine: Servomotor) -> Iterator[Finding]:

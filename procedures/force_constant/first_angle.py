@@ -7,6 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+import numpy as np
+import numpy.typing as npt
+
 from bench.findings import Effect, Finding
 from bench.procedure.rig import Rig
 from bench.recording.recorder import Recorder
@@ -17,15 +20,16 @@ from procedures.force_constant.plan import Plan
 from procedures.force_constant.steps import AtLevel, RampData, ramps
 from procedures.servomotor.conventions import conventions
 from procedures.shared import first_look
-from procedures.shared.step_table import of_readings
+from procedures.shared.step_table import of_samples
 
+Array = npt.NDArray[np.float64]
 CALIBRATION = "amb-calibration"
 SIGN, EXCHANGED = "segment-sign", "segments-exchanged"
 
 
-def passes(rig: Rig, plan: Plan, record: Recorder, seen: Sequence[tuple[AtLevel, Mapping[str, float], int]]) -> bool:
-    """Whether the run goes on after the first angle: each of its levels, what was read there, and when in ns."""
-    table = of_readings(*zip(*seen, strict=True), shape=(1, -1))
+def passes(rig: Rig, plan: Plan, record: Recorder, seen: Sequence[tuple[AtLevel, Mapping[str, Array], int]]) -> bool:
+    """Whether the run goes on after the first angle: each of its levels, what came there, and when in ns."""
+    table = of_samples(*zip(*seen, strict=True), shape=(1, -1))
     facts = next(c.values for c in record.calibrations if c.procedure == CALIBRATION)
     return first_look.passes(rig, record, judge(ramps(table, rig.file), rig.file, facts, plan))
 
@@ -36,6 +40,8 @@ def judge(data: RampData, rig: RigFile, facts: Mapping[str, Estimate], plan: Pla
     if found:
         yield from (f for f in found if f.code == SIGN)
         return
+    if list(checks.settled(data.table, conventions(rig), plan)):
+        return  # else the wires would be blamed for what moves
     for axis, of_axis in (("y", data.vertical), ("x", data.horizontal)):
         inputs = {**estimates.rig_inputs(rig, axis), **estimates.fact_inputs(facts, len(of_axis.angles))}
         values = {name: e.value for name, e in inputs.items()}

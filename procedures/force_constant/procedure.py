@@ -100,13 +100,13 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     for turn in range(plan.angles):
         angle = 2 * math.pi * turn / plan.angles
         rig.rotation.point(angle)
-        seen: list[tuple[AtLevel, dict[str, float], int]] = []
+        seen: list[tuple[AtLevel, dict[str, Array], int]] = []
         for level in sequence(plan):
             ramp(i_y=level.i_y, i_x=level.i_x)
             rig.clock.sleep(plan.settle_s)
             labels = AtLevel(angle, level.i_y, level.i_x, level.branch_y, level.branch_x)
             with record_step(record, labels):
-                read = first_look.watched(rig, record, channels(conventions(rig.file)), plan.average_s)
+                read = first_look.samples(rig, record, channels(conventions(rig.file)), plan.average_s)
             seen.append((labels, read, rig.clock.now_ns()))
         ramp(i_y=0.0, i_x=0.0)
         if turn == 0 and not first_angle.passes(rig, plan, record, seen):

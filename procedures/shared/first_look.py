@@ -9,6 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from bench.findings import Effect, Finding, Findings
 from bench.procedure.rig import Rig
 from bench.recording import Recording
@@ -57,6 +60,11 @@ def gate(recording: Recording[Any], findings: Findings, found: Iterable[Finding]
 
 def watched(rig: Rig, record: Recorder, names: Sequence[str], seconds: float) -> dict[str, float]:
     """Means of the samples that come while the clock sleeps for some time, SI; the newest where none comes."""
-    with record.watching(names) as means:
+    return {name: float(x.mean()) for name, x in samples(rig, record, names, seconds).items()}
+
+
+def samples(rig: Rig, record: Recorder, names: Sequence[str], seconds: float) -> dict[str, npt.NDArray[np.float64]]:
+    """The samples (n,) that come while the clock sleeps for some time, SI; the newest where none comes."""
+    with record.watching(names) as seen:
         rig.clock.sleep(seconds)
-    return {name: means[name] if name in means else rig.levitation.reading(name) for name in names}
+    return {name: seen[name] if name in seen else np.array([rig.levitation.reading(name)]) for name in names}

@@ -109,20 +109,25 @@ def tabulate(
     )  # fmt: skip
 
 
-def of_readings(
+def of_samples(
     labels: Sequence[Read],
-    readings: Sequence[Mapping[str, float]],
+    samples: Sequence[Mapping[str, Array]],
     t_ns: Sequence[int],
     *,
     shape: tuple[int, ...] = (-1,),
 ) -> StepTable[Read]:
-    """Steps as a run sees them while it goes on: a reading of each channel in the place of means, at `t_ns`; nothing drifts,
-    scatters or is lost."""
-    mean = {c: np.array([r[c] for r in readings]).reshape(shape) for c in readings[0]}
-    none = np.zeros(len(labels)).reshape(shape)
-    nothing = dict.fromkeys(mean, none)
-    at = np.array(t_ns, np.int64).reshape(shape)
-    return StepTable(mean, nothing, nothing, nothing, tuple(labels), at, at, none, none, none.astype(np.int64))
+    """Steps as a run sees them while it goes on, from the samples (n,) of each channel and the time at which they were there:
+    means and drifts; nothing scatters or is lost."""
+
+    def each(of: Callable[[Array], float]) -> dict[str, Array]:
+        return {c: np.array([of(step[c]) for step in samples]).reshape(shape) for c in samples[0]}
+
+    def drift(x: Array) -> float:
+        return float(x[len(x) // 2 :].mean() - x[: len(x) // 2].mean()) if len(x) > 1 else 0.0
+
+    mean, none = each(lambda x: float(x.mean())), np.zeros(len(labels)).reshape(shape)
+    nothing, at = dict.fromkeys(mean, none), np.array(t_ns, np.int64).reshape(shape)
+    return StepTable(mean, each(drift), nothing, nothing, tuple(labels), at, at, none, none, none.astype(np.int64))
 
 
 def by_angle(steps: Steps, what: str) -> tuple[list[Step], tuple[int, int]]:

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from bench.errors import RotorNotArrived
 from bench.figures import Figure
@@ -28,7 +29,7 @@ from procedures.servomotor.conventions import conventions
 from procedures.servomotor.direction import of_probe
 from procedures.servomotor.loads import check_masses
 from procedures.shared import assumptions, first_look
-from procedures.shared.step_table import of_readings, record_step
+from procedures.shared.step_table import of_samples, record_step
 from procedures.torque_constant import checks, fit
 from procedures.torque_constant import figures as drawn
 from procedures.torque_constant.fit import NO_DETENT, Balance, Detent
@@ -45,6 +46,7 @@ from procedures.torque_constant.steps import (
     wiring,
 )
 
+Array = npt.NDArray[np.float64]
 ALPHA_TAU = Quantity("alpha_tau", "N m/A", "torque per mean true segment current at the home angle, peak over gamma")
 GAMMA_0T = Quantity("gamma_0t", "rad", "phase angle at which the torque per current is largest")
 MEASURES = (ALPHA_TAU, GAMMA_0T)
@@ -120,19 +122,19 @@ def _wiring(rig: Rig, plan: Plan, record: Recorder) -> bool:
     """Sideways currents of both signs, to see in the outboard AMB's currents which segment is which; False where two are
     exchanged and nobody says to go on."""
     ramp, machine = rig.file.parameters["i_ramp"].default, conventions(rig.file)
-    seen: list[tuple[Sideways, dict[str, float], int]] = []
+    seen: list[tuple[Sideways, dict[str, Array], int]] = []
     for name, other in (("i_x", "i_y"), ("i_y", "i_x")):
         for value in (plan.wiring_A, -plan.wiring_A):
             rig.levitation.set(name, value)
             rig.clock.sleep(2 * plan.wiring_A / ramp + min(plan.settle_s, 0.5))
             asked = {name: value, other: 0.0}
             with record.step(Sideways.kind, **asked):
-                read = first_look.watched(rig, record, machine.coils_of("xo", "yo"), 0.2)
+                read = first_look.samples(rig, record, machine.coils_of("xo", "yo"), 0.2)
             answer = {f"side_{axis}": machine.control(f"{axis}o", read.__getitem__) for axis in "xy"}
             seen.append((Sideways(**asked), answer, rig.clock.now_ns()))
         rig.levitation.set(name, 0.0)
     rig.clock.sleep(plan.wiring_A / ramp + min(plan.settle_s, 0.5))
-    return first_look.passes(rig, record, checks.wiring(wiring(of_readings(*zip(*seen, strict=True)))))
+    return first_look.passes(rig, record, checks.wiring(wiring(of_samples(*zip(*seen, strict=True)))))
 
 
 def _loads(rig: Rig, plan: Plan, record: Recorder, gamma: float) -> bool:
