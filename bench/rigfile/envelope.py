@@ -47,8 +47,8 @@ class Envelope:
     @property
     def bounds(self) -> Mapping[str, tuple[float, float, bool]]:
         """Protected channels: least and greatest value, SI, and whether they count only while the rotor is held."""
-        names, low, high, held = self._limits
-        return {n: (float(low[k, 0]), float(high[k, 0]), k >= held) for k, n in enumerate(names)}
+        found, low, high, held = self._limits
+        return {p.name: (float(low[k, 0]), float(high[k, 0]), k >= held) for k, p in enumerate(found)}
 
     def check_parameter(self, name: str, value: float) -> None:
         """Refuse a parameter write out of its range.
