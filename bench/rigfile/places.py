@@ -14,6 +14,17 @@ from bench.rigfile.numbers import Sum, Term, numbers_in, referred
 from bench.rigfile.toleranced import Toleranced
 
 CENTRE = "centre_of_mass"
+WITHOUT_NUMBERS = (
+    "simulation",
+    "channels",
+    "parameters",
+    "devices",
+    "links",
+    "capture",
+    "envelope",
+    "plans",
+    "calibration",
+)
 PLACED = ("bearings", "probes", "rings", "balancing", "hooks", "levers", "motors")
 """Tables of parts that have a place, if they have any, of their own."""
 
@@ -35,8 +46,8 @@ class Places:
     @cached_property
     def known(self) -> Mapping[str, Toleranced]:
         """Every number by its identity, but what only the simulator draws from."""
-        tables = {name: getattr(self.tables, name) for name in type(self.tables).model_fields if name != "simulation"}
-        return dict(numbers_in(tables))
+        fields = type(self.tables).model_fields
+        return dict(numbers_in({name: getattr(self.tables, name) for name in fields if name not in WITHOUT_NUMBERS}))
 
     @cached_property
     def _stated(self) -> dict[str, Any]:
