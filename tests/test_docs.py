@@ -1,6 +1,6 @@
 """The console blocks of the documentation, executed page by page, in order, in a folder of their own.
 
-The default run executes the tutorial, most guides and one page of each machine; every other page is `LONG`. Commands,
+The default run executes the guides that are quick and one page of each machine; every other page is `LONG`. Commands,
 options and plans of all pages are checked there, without starting one.
 
 Pages of procedures that build on others begin with the same runs and adoptions. What such a sequence of commands leaves in a
@@ -48,13 +48,13 @@ COPIED = ("bench", "drivers", "procedures", "reports", "sim_backend", "rigs", "s
 
 
 LONG = (
-    "add-a-device", "amb-calibration", "angle-step", "balance", "bearing-model", "change-a-plan", "coast-down",
-    "compensation", "connect-a-rig", "force-constant", "force-coupling", "force-map", "inject-faults", "model",
-    "negative-stiffness", "run-a-campaign", "run-up", "sensitivity", "slew", "spindown", "step", "torque-constant",
-    "tracking", "unbalance", "use-in-ci",
+    "add-a-device", "adopt-a-calibration", "amb-calibration", "angle-step", "balance", "bearing-model",
+    "change-a-plan", "coast-down", "compensation", "connect-a-rig", "first-calibration", "force-constant",
+    "force-coupling", "force-map", "inject-faults", "model", "negative-stiffness", "run-a-campaign", "run-up",
+    "sensitivity", "slew", "spindown", "step", "torque-constant", "tracking", "unbalance", "use-in-ci",
 )  # fmt: skip
 """Pages that take long, or that only run a procedure: by default `tests/procedures` takes each through its whole path and
-draws its figures, and the tutorial and `adopt-a-calibration` the same commands with their reports and calibrations."""
+draws its figures, and `tests/cli` the same commands with their reports and calibrations."""
 
 
 def test_there_are_pages_to_execute() -> None:

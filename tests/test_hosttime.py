@@ -25,6 +25,7 @@ def fed(ppm: float, seed: int, seconds: int = 60, first_late_ms: float = 0.0, st
     return host
 
 
+@pytest.mark.long
 def test_drift_with_an_interval_that_holds() -> None:
     """95 % of the intervals hold the truth, whatever the drift, the latency and the first sample's lateness."""
     cases = [(ppm, late, seed) for ppm in (-80.0, 0.0, 35.0) for late in (0.0, 25.0) for seed in range(50)]

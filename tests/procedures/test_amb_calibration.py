@@ -99,10 +99,12 @@ def test_the_constants_hold_for_the_bias_of_the_plan(tmp_path: Path) -> None:
         ({"current_sign_o": -1}, "wrong-sign", "outboard"),
         pytest.param({"current_sign_i": -1}, "wrong-sign", "inboard", marks=pytest.mark.long),
         pytest.param({"exchange_current_axes": 1}, "axes-exchanged", "x and y", marks=pytest.mark.long),
-        ({"exchange_current_bearings": 1}, "bearings-exchanged", "inboard and outboard"),
+        pytest.param(
+            {"exchange_current_bearings": 1}, "bearings-exchanged", "inboard and outboard", marks=pytest.mark.long
+        ),
         ({"mass_error_M1": 0.02}, "load-inconsistent", "M1"),
         pytest.param({"mass_error_M3": -0.02}, "load-inconsistent", "M3", marks=pytest.mark.long),
-        ({"hanger_off_at_zero": 1}, "load-inconsistent", "hanger"),
+        pytest.param({"hanger_off_at_zero": 1}, "load-inconsistent", "hanger", marks=pytest.mark.long),
         pytest.param(
             {"drop_fraction": 0.005}, "missing-samples", "missing", marks=pytest.mark.long
         ),  # see injected faults

@@ -16,7 +16,7 @@ def measured(x: float, y: float, u: float = 1.0) -> Estimate:
     return amount(*(Estimate.of(v, Influence(f"noise/{n}", n, u, "m", "B", "normal")) for v, n in ((x, "x"), (y, "y"))))
 
 
-@pytest.mark.parametrize("true", [0.0, *(pytest.param(x, marks=pytest.mark.long) for x in (0.5, 2.0, 6.0)), 1.0])
+@pytest.mark.parametrize("true", [1.0, *(pytest.param(x, marks=pytest.mark.long) for x in (0.0, 0.5, 2.0, 6.0))])
 def test_the_interval_holds_the_length_however_short(true: float) -> None:
     """100 measurements; by quantiles, so that chance has little part in it. Draws about the measured length hold 0 never."""
     shares = (np.arange(100) + 0.5) / 100

@@ -106,11 +106,17 @@ def test_the_response_is_that_of_the_loop_with_the_true_machine(tmp_path: Path) 
     ("defect", "plan", "code", "named"),
     [
         ({"encoder_sign": -1}, {}, "encoder-direction", "encoder"),
-        ({"exchange_segments": 1}, {}, "segments-exchanged", "exchanged"),
+        pytest.param({"exchange_segments": 1}, {}, "segments-exchanged", "exchanged", marks=pytest.mark.long),
         ({"segment_sign_1": -1}, {}, "segment-sign", "segment 1"),
-        ({"detent": 1.0}, {}, "holding-torque", "detent"),
+        pytest.param({"detent": 1.0}, {}, "holding-torque", "detent", marks=pytest.mark.long),
         ({"alpha_d": 7.0}, {"filters_hz": (20.0,), "steps_rad": (SMALL,)}, "saturated-small-step", "carries more"),
-        ({"drop_fraction": 0.01}, {"allocations": ("priority",)}, "missing-samples", "missing"),
+        pytest.param(
+            {"drop_fraction": 0.01},
+            {"allocations": ("priority",)},
+            "missing-samples",
+            "missing",
+            marks=pytest.mark.long,
+        ),
     ],
 )
 def test_a_planted_defect_is_named_and_never_passes(

@@ -127,13 +127,13 @@ def test_a_current_sensor_that_changed_since_the_calibration_is_found_by_the_loa
     [
         ({"exchange_segments": 1}, "segments-exchanged", "1 and 2"),
         pytest.param({"segment_sign_1": -1}, "segment-sign", "segment 1", marks=pytest.mark.long),
-        ({"segment_drift_0": 2e-3}, "drifting-sensor", "segment 1 or 3"),
+        pytest.param({"segment_drift_0": 2e-3}, "drifting-sensor", "segment 1 or 3", marks=pytest.mark.long),
         pytest.param({"drift_2": 1e-3}, "drifting-sensor", "inboard AMB, axis y", marks=pytest.mark.long),
         pytest.param({"drift_6": 1e-3}, "drifting-sensor", "outboard AMB, axis y", marks=pytest.mark.long),
         pytest.param({"drop_fraction": 0.005}, "missing-samples", "missing", marks=pytest.mark.long),
         ({"integrator_factor": 0.05}, "unsettled", "integrator"),
         pytest.param({"stuck_current_yo_p": 1}, "stuck-channel", "i_yo_p", marks=pytest.mark.long),
-        ({"asymmetry_o": 0.15}, "rows-disagree", "K_x of an AMB"),
+        pytest.param({"asymmetry_o": 0.15}, "rows-disagree", "K_x of an AMB", marks=pytest.mark.long),
     ],
 )
 def test_a_defect_is_named_and_does_not_pass(

@@ -94,7 +94,7 @@ def test_figures_and_steps(sound: Simulated) -> None:
     ("defect", "code", "named"),
     [
         ({"encoder_sign": -1}, "encoder-direction", "encoder"),
-        ({"exchange_segments": 1}, "segments-exchanged", "exchanged"),
+        pytest.param({"exchange_segments": 1}, "segments-exchanged", "exchanged", marks=pytest.mark.long),
         pytest.param({"segment_sign_1": -1}, "segment-sign", "segment 1", marks=pytest.mark.long),
     ],
 )

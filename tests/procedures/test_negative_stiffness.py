@@ -109,13 +109,13 @@ def test_the_result_follows_the_truth(known: dict[str, Calibration], tmp_path: P
     ("defect", "code", "named"),
     [
         ({"segment_sign_1": -1}, "segment-sign", "i_m1"),
-        ({"segment_drift_0": 1e-3}, "drifting-sensor", "segments 1 and 3"),
+        pytest.param({"segment_drift_0": 1e-3}, "drifting-sensor", "segments 1 and 3", marks=pytest.mark.long),
         pytest.param({"segment_drift_3": -1e-3}, "drifting-sensor", "segments 2 and 4", marks=pytest.mark.long),
         ({"drift_6": 1e-3}, "drifting-sensor", "i_yo"),
-        ({"position_gain_yo": 1.2}, "gap-inconsistent", "pos_yo"),
+        pytest.param({"position_gain_yo": 1.2}, "gap-inconsistent", "pos_yo", marks=pytest.mark.long),
         pytest.param({"position_gain_yo": 0.8}, "gap-inconsistent", "pos_yo", marks=pytest.mark.long),
         ({"gamma_zero": 0.04}, "axes-coupled", "commutation"),
-        ({"integrator_factor": 0.02}, "unsettled", "integrator"),
+        pytest.param({"integrator_factor": 0.02}, "unsettled", "integrator", marks=pytest.mark.long),
         pytest.param({"drop_fraction": 0.005}, "missing-samples", "missing", marks=pytest.mark.long),
     ],
 )

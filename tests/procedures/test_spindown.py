@@ -97,10 +97,15 @@ def test_the_result_follows_the_truth(tmp_path: Path) -> None:
     ("defect", "said", "run_up"),
     [
         ({"encoder_sign": -1}, {"encoder-direction": "backwards"}, "drive"),
-        ({"encoder_sign": -1}, {"encoder-direction": "backwards", "speed-not-reached": "did not reach"}, "motor"),
+        pytest.param(
+            {"encoder_sign": -1},
+            {"encoder-direction": "backwards", "speed-not-reached": "did not reach"},
+            "motor",
+            marks=pytest.mark.long,
+        ),
         ({"drive_brakes": 0.15}, {"braked": "brake"}, "drive"),
         pytest.param({"drop_fraction": 0.005}, {"missing-samples": "missing"}, "drive", marks=pytest.mark.long),
-        ({"detent": 3}, {"drag-not-linear": "another shape"}, "drive"),
+        pytest.param({"detent": 3}, {"drag-not-linear": "another shape"}, "drive", marks=pytest.mark.long),
         ({"segment_drift_1": 0.003}, {"constant-torque": "forward"}, "drive"),
     ],
 )
@@ -113,7 +118,7 @@ def test_a_defect_is_named_and_does_not_pass(
         assert named in found[code].text
 
 
-@pytest.mark.parametrize("brake", [0.0, 0.015, 0.02, pytest.param(0.04, marks=pytest.mark.long)])
+@pytest.mark.parametrize("brake", [0.0, 0.02, *(pytest.param(x, marks=pytest.mark.long) for x in (0.015, 0.04))])
 def test_a_drive_that_brakes_while_coasting_is_named(tmp_path: Path, brake: float) -> None:
     """What the drive gives to hold its speeds has no room for a torque that acts only while it coasts, but for the drag that
     the rig file states."""

@@ -53,7 +53,7 @@ def stepped(folder: Path, seed: int = 1, truth: Mapping[str, float] | None = Non
     ("seed", "plan"),
     [
         (4, {**SHORT, "a": {"law": 0.0}, "settle_s": 5.0, "record_s": None}),  # as long as PID's integrator takes
-        (4, {**SHORT, "a": {"law": 1.0}, "settle_s": 5.0}),
+        pytest.param(4, {**SHORT, "a": {"law": 1.0}, "settle_s": 5.0}, marks=pytest.mark.long),
         (4, {**SHORT, "a": {"law": 2.0}, "settle_s": 5.0}),
         (0, {"axes": ("z",), "speeds_rad_s": (10000 * math.pi / 30,)}),  # its second oscillation is below the noise
     ],
@@ -139,13 +139,13 @@ def test_sizes_and_ways_are_compared(tmp_path: Path) -> None:
     [
         ({"factor_ref_y": 0.0}, {}, "no-step"),
         pytest.param({"factor_ref_y": 0.5}, {}, "wrong-size", marks=pytest.mark.long),
-        ({"factor_ref_y": -1.0}, {}, "wrong-way"),
+        pytest.param({"factor_ref_y": -1.0}, {}, "wrong-way", marks=pytest.mark.long),
         ({"current_sign_i": -1.0}, {}, "current-sign"),
-        ({"told_planes": 1.0}, {}, "planes-exchanged"),
+        pytest.param({"told_planes": 1.0}, {}, "planes-exchanged", marks=pytest.mark.long),
         ({"told_planes": 1.0}, {"speeds_rad_s": (FAST,)}, "planes-exchanged"),
-        ({"position_range": 30e-6}, {}, "sensor-clipped"),
+        pytest.param({"position_range": 30e-6}, {}, "sensor-clipped", marks=pytest.mark.long),
         ({"geometry.clearance": 26e-6}, {}, "contact"),
-        ({"supply_V": 12.0, "inductance": 60e-3}, {}, "voltage-saturated"),
+        pytest.param({"supply_V": 12.0, "inductance": 60e-3}, {}, "voltage-saturated", marks=pytest.mark.long),
         ({"pulse_missing": 3.0}, {"speeds_rad_s": (FAST,)}, "speed-off"),
         pytest.param({"drop_fraction": 0.005}, {}, "missing-samples", marks=pytest.mark.long),
     ],

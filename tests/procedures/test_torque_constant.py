@@ -62,13 +62,13 @@ def test_the_result_follows_the_truth(tmp_path: Path) -> None:
     ("defect", "code", "named"),
     [
         ({"exchange_segments": 1}, "segments-exchanged", "segments 1 and 2"),
-        ({"encoder_sign": -1}, "encoder-direction", "backwards"),
+        pytest.param({"encoder_sign": -1}, "encoder-direction", "backwards", marks=pytest.mark.long),
         pytest.param({"segment_sign_1": -1}, "segment-sign", "i_m1", marks=pytest.mark.long),
         ({"lever_slip": 0.05}, "lever-slips", "slips"),
         pytest.param({"segment_drift_2": 0.001}, "current-drift", "i_m3", marks=pytest.mark.long),
-        ({"segment_scale_drift": 1e-4}, "drifting-scale", "drifts by -0.4"),
+        pytest.param({"segment_scale_drift": 1e-4}, "drifting-scale", "drifts by -0.4", marks=pytest.mark.long),
         ({"detent": 3}, "large-detent", "detent"),
-        ({"geometry.lever_left": 0.231}, "arms-disagree", "arm"),
+        pytest.param({"geometry.lever_left": 0.231}, "arms-disagree", "arm", marks=pytest.mark.long),
         pytest.param({"drop_fraction": 0.005}, "missing-samples", "missing", marks=pytest.mark.long),
     ],
 )
