@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from pathlib import Path
 
 import pytest
 
@@ -27,6 +28,21 @@ def test_each_rig_can_run_its_procedures_and_no_others(rig: str) -> None:
     procedures = {entry.name: load_procedure(entry.name) for entry in catalogue.PROCEDURES}
     assert set(OF["tsbs12"]) | set(OF["amb5dof"]) == set(procedures)
     assert tuple(n for n, p in procedures.items() if not p.lacking(load_rig(rig))) == OF[rig]
+
+
+@pytest.mark.parametrize("example", ["own-controller/plainamb", "one-axis/oneaxis"])
+def test_a_rig_of_other_bearings_is_told_what_it_lacks(example: str) -> None:
+    """One without a probe along the shaft, and one of a single axis."""
+    rig = load_rig(str(Path(__file__).resolve().parents[1] / "examples" / f"{example}.toml"))
+    lacking = {entry.name: load_procedure(entry.name).lacking(rig) for entry in catalogue.PROCEDURES}
+    assert (
+        lacking["step"]
+        == {
+            "own-controller/plainamb": ("probes: found none that looks along z",),
+            "one-axis/oneaxis": ("bearings: found 1 radial; expected two",),
+        }[example]
+    )
+    assert all(said.partition(":")[0] for lines in lacking.values() for said in lines)
 
 
 def without(rig: RigFile, table: str, name: str) -> RigFile:

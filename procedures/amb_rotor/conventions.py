@@ -14,6 +14,7 @@ from functools import reduce
 from operator import or_
 from typing import Literal
 
+from bench.errors import Lacking
 from bench.rigfile import RigFile
 from bench.rigfile.supports import axial_support, once_per_rig, two_planes
 
@@ -128,11 +129,23 @@ class AmbRotor:
         return tuple(self.axes[pair["yz".index(direction)]] for pair in self.planes.values())
 
     def position(self, axis: str) -> str:
-        """Channel of an axis' position sensor."""
+        """Channel of an axis' position sensor.
+
+        Raises:
+            Lacking: it has none.
+        """
+        if axis not in self.probes:
+            raise Lacking(f"probes: found none that looks along {axis or 'the shaft'}")
         return self.probes[axis]
 
     def pair(self, axis: str) -> tuple[str, str]:
-        """Channels of the currents that pull an axis to its positive and to its negative side."""
+        """Channels of the currents that pull an axis to its positive and to its negative side.
+
+        Raises:
+            Lacking: it has not two.
+        """
+        if axis not in self.pulls:
+            raise Lacking(f"bearings: found none with two coils along {axis or 'the shaft'}")
         return self.pulls[axis]
 
     def model_beta(self, axis: str) -> str:
