@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from test_rigfile import DBC, TOML, changed, of_schema_1, problems, written
 
+from bench.cli.loading import load_procedure
 from bench.rigfile import RigFile, load_rig
 from bench.rigfile.check_machine import problems_of
 from bench.rigfile.elements import MachineTables
@@ -173,6 +174,26 @@ def test_a_part_that_is_not_there_is_refused_by_name() -> None:
         places.place("hooks/hok")
     with pytest.raises(PlaceError, match="expected what has a direction: one of bearings/inboard/yi"):
         places.direction("hooks/hook")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('{ value = 0, unit = "deg", half_width = 0.3', '{ value = 30, unit = "deg", half_width = 0.3',
+         "bearings: found axes yi at 30°, xi at -60°, yo at 30°, xo at -60°; expected them at 0° and -90°"),
+        ('xi = { channel = "pos_xi", ', 'xi = { sign = -1, channel = "pos_xi", ', "probes.xi.sign: found -1"),
+        (FAR, FAR + "sense = -1\n", "shaft.sense: found -1"),
+        (FAR, FAR + 'tilt = { value = 90, unit = "deg", half_width = 1, distribution = "rectangular", source = "level" }\n',
+         "shaft.tilt: found a shaft that does not lie"),
+    ],
+)  # fmt: skip
+def test_what_procedures_do_not_take_yet_is_refused_before_a_run(tmp_path: Path, old: str, new: str, said: str) -> None:
+    """A rig file may say it; a procedure that would take it for something else does not run."""
+    rig = load_rig(written(tmp_path, changed(TOML, (old, new))))
+    for name in ("amb-calibration", "spindown", "force-map"):
+        (told,) = load_procedure(name).lacking(rig)
+        assert told.startswith(said)
+    assert load_procedure("amb-calibration").lacking(load_rig("tsbs12")) == ()
 
 
 def test_a_number_inline_has_its_place_or_its_id_for_identity(tmp_path: Path) -> None:

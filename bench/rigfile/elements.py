@@ -79,7 +79,6 @@ class Axis(Part):
     direction: Direction | None = None
     coils: tuple[str, ...] = Field((), max_length=2)
     voltages: tuple[str, ...] = Field((), max_length=2)
-    max_current_A: float | None = Field(None, gt=0)
 
 
 class Bearing(Part):
@@ -101,7 +100,6 @@ class Probe(Part):
     at: Place | None = None
     direction: Direction | None = None
     sign: Literal[-1, 1] = 1
-    limit_m: float | None = Field(None, gt=0)
 
 
 class Mark(Part):

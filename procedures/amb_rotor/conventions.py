@@ -7,6 +7,7 @@ takes that has no rig (quantities by axis, defaults of plans).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import IntFlag
@@ -16,7 +17,7 @@ from typing import Literal
 
 from bench.errors import Lacking
 from bench.rigfile import RigFile
-from bench.rigfile.supports import axial_support, once_per_rig, two_planes
+from bench.rigfile.supports import axial_support, once_per_rig, two_planes, unlike
 
 Law = Literal["PID", "CCS", "CAC"]
 Variant = Literal["off", "corrected", "literal"]
@@ -70,6 +71,7 @@ class AmbRotor:
     variants: Mapping[Variant, Mapping[str, float]]
     poles: Mapping[str, float]
     stands_s: float
+    lacks: tuple[str, ...] = ()  # where the rig is not as these procedures take it
 
     @property
     def contact(self) -> Flag:
@@ -200,6 +202,7 @@ def conventions(rig: RigFile) -> AmbRotor:
     everywhere = [*axes, *([axial] if axial is not None else [])]
     first, second, third, fourth = (axis.name for axis in axes)
     told = tuple(plane.voltage for plane in planes)
+    lean = rig.machine["radial_axes"].value if "radial_axes" in rig.machine else math.pi / 4
     return replace(
         AMB_ROTOR,
         axes=(first, second, third, fourth),
@@ -212,4 +215,5 @@ def conventions(rig: RigFile) -> AmbRotor:
             axis.name: (axis.voltages[0], axis.voltages[1]) for axis in everywhere if len(axis.voltages) == 2
         },
         plane_voltages=told if all(told) else (),
+        lacks=unlike(rig, planes, (-lean, math.pi / 2 - lean)),
     )

@@ -52,6 +52,7 @@ def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
     return Requires(
+        lacks=machine.lacks,
         roles=("levitation", "drive"),
         channels=telemetry_channels(machine),
         sensors=(*machine.positions, *machine.currents),

@@ -246,6 +246,7 @@ def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
     return Requires(
+        lacks=machine.lacks,
         channels=channels(machine),
         sensors=(*machine.positions, *machine.currents),
         parameters=PARAMETERS,

@@ -20,6 +20,7 @@ def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
     return Requires(
+        lacks=machine.lacks,
         roles=("levitation", "rotation"),
         channels=(*channels(machine), "flags"),
         sensors=(*machine.coils_of(*AXES), *machine.segments),

@@ -201,6 +201,7 @@ def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
     return Requires(
+        lacks=machine.lacks,
         roles=("levitation", "rotation"),
         channels=(*channels(machine), "flags", *wiring.channels(machine)),
         sensors=(*machine.coils["yi"], *machine.segments, *positions(machine)),

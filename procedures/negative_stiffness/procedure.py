@@ -234,6 +234,7 @@ def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
     return Requires(
+        lacks=machine.lacks,
         roles=("levitation", "rotation"),
         channels=(*channels(machine), "flags"),
         sensors=(*machine.segments, *machine.coils["yo"], *machine.positions_of(*POSITIONS)),

@@ -214,7 +214,7 @@ def requires(rig: RigFile) -> Requires:
     """What the unbalance response needs, and the greatest coil voltage of each bearing."""
     needed, told = unbalance.requires(rig), conventions(rig).plane_voltages
     lacks = () if told else ("bearings: found a radial one without the voltage channel of its coils",)
-    return replace(needed, channels=(*needed.channels, *told), lacks=lacks)
+    return replace(needed, channels=(*needed.channels, *told), lacks=(*needed.lacks, *lacks))
 
 
 procedure = Procedure(

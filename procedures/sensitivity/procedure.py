@@ -203,6 +203,7 @@ def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
     return Requires(
+        lacks=machine.lacks,
         channels=telemetry_channels(machine),
         parameters=(*PARAMETERS, machine.law),
         capture=(*LOOP, *PULSED, *machine.all_currents),

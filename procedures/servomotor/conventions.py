@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntFlag
 from itertools import chain
 from typing import TypeVar
@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.rigfile import RigFile
-from bench.rigfile.supports import Support, SupportedAxis, once_per_rig, two_planes
+from bench.rigfile.supports import Support, SupportedAxis, once_per_rig, two_planes, unlike
 
 Array = npt.NDArray[np.float64]
 Value = TypeVar("Value", float, Array)
@@ -48,6 +48,7 @@ class Servomotor:
     segment_limit: int
     contact_inboard: int
     contact_outboard: int
+    lacks: tuple[str, ...] = ()  # where the rig is not as these procedures take it
 
     @property
     def contact(self) -> int:
@@ -92,7 +93,10 @@ def conventions(rig: RigFile) -> Servomotor:
     Raises:
         Lacking: the rig has other bearings, or one of them without what belongs to an axis.
     """
-    axes = dict(chain.from_iterable(_of(plane, end) for end, plane in zip("io", two_planes(rig), strict=True)))
+    planes = two_planes(rig)
+    axes = dict(chain.from_iterable(_of(plane, end) for end, plane in zip("io", planes, strict=True)))
+    frame = [(axes[f"y{end}"], axes[f"x{end}"]) for end in "io"]
+    upright = replace(planes[0], axes=frame[0]), replace(planes[1], axes=frame[1])
     return Servomotor(
         positions={role: axes[role].position for role in ROLES},
         coils={role: (axes[role].coils[0], axes[role].coils[1]) for role in ROLES},
@@ -103,6 +107,7 @@ def conventions(rig: RigFile) -> Servomotor:
         segment_limit=Flag.SEGMENT_LIMIT,
         contact_inboard=Flag.CONTACT_INBOARD,
         contact_outboard=Flag.CONTACT_OUTBOARD,
+        lacks=unlike(rig, upright, (0.0, -math.pi / 2)),
     )
 
 

@@ -140,6 +140,7 @@ def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
     return Requires(
+        lacks=machine.lacks,
         roles=("levitation", "rotation"),
         channels=(*channels(machine), *wiring.channels(machine)),
         parameters=(*hold.PARAMETERS, *wiring.PARAMETERS, *NEEDED, "segment_max"),

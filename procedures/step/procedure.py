@@ -230,6 +230,7 @@ def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
     return Requires(
+        lacks=machine.lacks,
         channels=channels(machine),
         sensors=(*machine.all_positions, *machine.all_currents),
         parameters=("slew", "model_rate", "model_l_is", "model_l_os"),

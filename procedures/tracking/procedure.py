@@ -188,7 +188,10 @@ def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
 def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
-    return Requires(channels=channels(machine), sensors=machine.positions, parameters=PARAMETERS, geometry=LENGTHS)
+    return Requires(
+        channels=channels(machine), sensors=machine.positions, parameters=PARAMETERS, geometry=LENGTHS,
+        lacks=machine.lacks,
+    )  # fmt: skip
 
 
 procedure = Procedure(

@@ -40,7 +40,7 @@ def test_a_rig_is_told_what_it_can_run(capsys: pytest.CaptureFixture[str]) -> No
     assert (status, err) == (0, "")
     able, _, unable = out.partition("cannot run:\n")
     assert "can run: amb-calibration, force-constant" in able
-    assert "  step: sensors: found no pos_z, i_z_p, i_z_n; also parameters\n" in unable
+    assert "  step: sensors: found no pos_z, i_z_p, i_z_n; also parameters, bearings\n" in unable
     assert "amb-calibration" not in unable
     assert max(map(len, out.splitlines())) <= 80
 
@@ -50,7 +50,7 @@ def test_a_rigs_procedures_are_listed_with_what_is_missing(capsys: pytest.Captur
     out, err = capsys.readouterr()
     assert err == ""
     assert "  amb-calibration     yes\n" in out
-    assert "  step                no: sensors: found no pos_z, i_z_p, i_z_n; also parameters\n" in out
+    assert "  step                no: sensors: found no pos_z, i_z_p, i_z_n; also\n" in out
     assert [x.split()[0] for x in out.splitlines() if "  yes" in x or "  no: " in x] == [
         entry.name for entry in catalogue.PROCEDURES
     ]
