@@ -18,7 +18,7 @@ from bench.rigfile import LinkSpec, linkurl
 from drivers.byteport import BytePort
 from drivers.canbus import CanBus, arguments_of, open_interface
 from drivers.slcan_reception import SlcanReception
-from drivers.wires import open_port
+from drivers.wires import open_port, read_packets
 
 LISTEN_ONLY: Mapping[str, Mapping[str, Any]] = {
     "pcan": {"state": can.BusState.PASSIVE}, "systec": {"state": can.BusState.PASSIVE}, "kvaser": {"driver_mode": False},
@@ -83,13 +83,7 @@ class PacketReception:
 
     def read(self, timeout_s: float) -> FrameBatch:
         """As Reception says."""
-        data = self._port.read(timeout_s)
-        batch = self._stream.feed(data, self._now_ns())
-        s = self._stream
-        self.stats.received += len(batch)
-        self.stats.octets += len(data)
-        self.stats.crc_errors, self.stats.malformed, self.stats.packets_lost = s.crc_errors, s.malformed, s.packets_lost
-        return batch
+        return read_packets(self._port.read(timeout_s), self._stream, self._now_ns(), self.stats)
 
     def cancel(self) -> None:
         """As Reception says."""

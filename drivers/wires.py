@@ -62,6 +62,15 @@ class Wire(Protocol):
         ...
 
 
+def read_packets(data: bytes, stream: PacketStream, now_ns: int, stats: LinkStats) -> FrameBatch:
+    """The frames that bytes of a packet stream complete, stamped with `now_ns`; `stats` counts on."""
+    batch = stream.feed(data, now_ns)
+    stats.received += len(batch)
+    stats.octets += len(data)
+    stats.crc_errors, stats.malformed, stats.packets_lost = stream.crc_errors, stream.malformed, stream.packets_lost
+    return batch
+
+
 class PacketWire:
     """Messages in COBS packets on a byte stream."""
 
@@ -74,13 +83,7 @@ class PacketWire:
 
     def read(self, timeout_s: float) -> FrameBatch:
         """As Wire says."""
-        data = self._port.read(timeout_s)
-        batch = self._stream.feed(data, self._now_ns())
-        s = self._stream
-        self.stats.received += len(batch)
-        self.stats.octets += len(data)
-        self.stats.crc_errors, self.stats.malformed, self.stats.packets_lost = s.crc_errors, s.malformed, s.packets_lost
-        return batch
+        return read_packets(self._port.read(timeout_s), self._stream, self._now_ns(), self.stats)
 
     def write(self, batch: FrameBatch) -> None:
         """As Wire says; a frame that no packet can hold is a LinkError too."""

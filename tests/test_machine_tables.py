@@ -185,6 +185,8 @@ def test_a_part_that_is_not_there_is_refused_by_name() -> None:
         (FAR, FAR + "sense = -1\n", "shaft.sense: found -1"),
         (FAR, FAR + 'tilt = { value = 90, unit = "deg", half_width = 1, distribution = "rectangular", source = "level" }\n',
          "shaft.tilt: found a shaft that does not lie"),
+        ('at = "-geometry/com_to_inboard_sensor"', 'at = "-geometry/com_to_inboard_amb"',
+         "geometry.com_to_inboard_sensor: found 161 mm, but probes/yi stands 115 mm to the inboard side"),
     ],
 )  # fmt: skip
 def test_what_procedures_do_not_take_yet_is_refused_before_a_run(tmp_path: Path, old: str, new: str, said: str) -> None:
@@ -194,6 +196,24 @@ def test_what_procedures_do_not_take_yet_is_refused_before_a_run(tmp_path: Path,
         (told,) = load_procedure(name).lacking(rig)
         assert told.startswith(said)
     assert load_procedure("amb-calibration").lacking(load_rig("tsbs12")) == ()
+
+
+def test_a_mark_whose_channels_have_other_names_is_refused(tmp_path: Path) -> None:
+    renamed = changed(TOML, ('angle = "angle"', 'angle = "gamma"'), ("\nangle = { signal", "\ngamma = { signal"))
+    told = load_procedure("spindown").lacking(load_rig(written(tmp_path, renamed)))
+    assert any(line.startswith("mark.angle: found channel gamma") for line in told)
+
+
+def test_what_one_procedure_does_not_take_is_refused_by_it_alone(tmp_path: Path) -> None:
+    """A hook over a pulley, a scale the other way round: another procedure does not read them."""
+    hook = 'hook = { pull = { of = "bearings/inboard/yi", plus_deg = 90 }, '
+    pulled = load_rig(written(tmp_path, changed(TOML, ("hook = { ", hook))))
+    assert load_procedure("amb-calibration").lacking(pulled)[0].startswith("hooks.hook.pull: found a side pull")
+    assert load_procedure("spindown").lacking(pulled) == ()
+    toml, dbc = RIGS["amb5dof"]
+    turned = RigFile.parse(changed(toml, ("[balancing]\ninboard = { ", "[balancing]\ninboard = { sense = -1, ")), dbc)
+    assert load_procedure("balance").lacking(turned)[0].startswith("balancing.inboard.sense: found -1")
+    assert load_procedure("unbalance").lacking(turned) == ()
 
 
 def test_a_number_inline_has_its_place_or_its_id_for_identity(tmp_path: Path) -> None:

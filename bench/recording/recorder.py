@@ -169,9 +169,11 @@ class Recorder:
         nothing where no sample of them all came. For decisions under way, never for a result."""
         seen: dict[str, npt.NDArray[np.float64]] = {}
         self._watched = {name: [] for name in channels}
-        yield seen
-        seen |= {name: np.concatenate(parts) for name, parts in self._watched.items() if parts}
-        self._watched = {}
+        try:
+            yield seen
+            seen |= {name: np.concatenate(parts) for name, parts in self._watched.items() if parts}
+        finally:
+            self._watched = {}
 
     def correct(self, **labels: Any) -> bool:
         """Other labels for the newest step, as a person tells them who was there; False where it has no such labels."""

@@ -15,7 +15,6 @@ from bench.rigfile.model import RigFile
 from bench.rigfile.places import PlaceError, Places
 
 T = TypeVar("T")
-TURNED_RAD = math.radians(5.0)  # from where an axis should be: the tolerance of a mounting is less
 ALONG_RAD = math.radians(1.0)  # a probe that looks another way than an axis by more is not the axis' own
 
 
@@ -102,26 +101,6 @@ def two_planes(rig: RigFile) -> tuple[Support, Support]:
     if lines:
         raise Lacking(*lines)
     return found[0], found[1]
-
-
-def unlike(rig: RigFile, planes: tuple[Support, Support], frame: tuple[float, float]) -> tuple[str, ...]:
-    """Where a rig is not as procedures take it, a line each: axes of both planes at the angles of a `frame` in rad, a shaft
-    that lies and turns counter-clockwise, probes that grow along their axis."""
-    pairs = [pair for plane in planes for pair in zip(plane.axes, frame, strict=True)]
-    found = []
-    if any(abs(math.remainder(axis.direction - angle, 2 * math.pi)) > TURNED_RAD for axis, angle in pairs):
-        turned = ", ".join(f"{axis.name} at {math.degrees(axis.direction):.3g}°" for axis, _ in pairs)
-        first, second = (f"{math.degrees(angle):.3g}°" for angle in frame)
-        found.append(f"bearings: found axes {turned}; expected them at {first} and {second}")
-    found += [f"probes.{name}.sign: found -1; this procedure takes readings that grow along the axis: give the DBC's factor "
-              "its sign" for name, probe in rig.probes.items() if probe.sign < 0]  # fmt: skip
-    if rig.shaft is not None and rig.shaft.sense < 0:
-        found.append("shaft.sense: found -1; this procedure takes a speed that is positive counter-clockwise")
-    if rig.shaft is not None and rig.shaft.tilt is not None:
-        tilt = Places(rig).number(rig.shaft.tilt, "shaft.tilt")
-        if abs(tilt.factor * tilt.number.value) > TURNED_RAD:
-            found.append("shaft.tilt: found a shaft that does not lie; this procedure takes one that does")
-    return tuple(found)
 
 
 def _radial(rig: RigFile, places: Places, name: str) -> Support:

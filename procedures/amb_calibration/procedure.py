@@ -38,6 +38,7 @@ from procedures.servomotor.loads import certified_masses, certified_weighing, ch
 from procedures.shared import assumptions, first_look
 from procedures.shared.certificates import certified, certified_sensors
 from procedures.shared.step_table import record_step
+from procedures.shared.unsupported import of_hooks
 from procedures.shared.weight import weight
 
 K_I = Quantity("K_i", "N/A", "inboard AMB: dF/di at zero control current, mean over a turn")
@@ -217,7 +218,7 @@ def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
     return Requires(
-        lacks=machine.lacks,
+        lacks=(*machine.lacks, *of_hooks(rig)),
         roles=("levitation", "rotation"),
         channels=(*channels(machine), "flags"),
         sensors=machine.coils_of(*VERTICAL),

@@ -17,7 +17,8 @@ from typing import Literal
 
 from bench.errors import Lacking
 from bench.rigfile import RigFile
-from bench.rigfile.supports import axial_support, once_per_rig, two_planes, unlike
+from bench.rigfile.supports import axial_support, once_per_rig, two_planes
+from procedures.shared.unsupported import unlike
 
 Law = Literal["PID", "CCS", "CAC"]
 Variant = Literal["off", "corrected", "literal"]

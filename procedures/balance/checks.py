@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -29,10 +30,11 @@ from procedures.balance.steps import (
     Run,
     captured_channels,
 )
+from procedures.shared.unsupported import of_scales
 from procedures.synchronous import checks as dwell_checks
 from procedures.synchronous import fitting
 from procedures.synchronous.bearings import Known
-from procedures.synchronous.dwells import SLOW, telemetry_channels
+from procedures.synchronous.dwells import SLOW, required
 
 MOST_RPM = 10000.0  # influence runs
 RATE_HZ = 1e4  # of the captures, the controller's own; order 1 alone is read
@@ -51,11 +53,9 @@ NEEDED = (
 def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
-    return Requires(
-        lacks=machine.lacks,
-        roles=("levitation", "drive"),
-        channels=telemetry_channels(machine),
-        sensors=(*machine.positions, *machine.currents),
+    return replace(
+        required(machine),
+        lacks=(*machine.lacks, *of_scales(rig)),
         parameters=(
             machine.law,
             machine.set_points["y"],

@@ -9,6 +9,7 @@ from bench.rigfile import RigFile
 from procedures.force_constant.plan import Plan
 from procedures.force_constant.steps import AXES, channels
 from procedures.servomotor.conventions import conventions
+from procedures.shared.unsupported import of_motors
 
 # What the levels are checked with before anything starts; no result uses these.
 WEIGHT_N, COM_TO_OUTBOARD = 10.2 * 9.81, 0.010  # T Table 6.1
@@ -20,7 +21,7 @@ def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
     return Requires(
-        lacks=machine.lacks,
+        lacks=(*machine.lacks, *of_motors(rig)),
         roles=("levitation", "rotation"),
         channels=(*channels(machine), "flags"),
         sensors=(*machine.coils_of(*AXES), *machine.segments),

@@ -33,6 +33,7 @@ from procedures.servomotor.conventions import Servomotor, conventions, radial_cu
 from procedures.servomotor.steps import POSITIONS, channels, read_steps
 from procedures.shared import assumptions, first_look
 from procedures.shared.step_table import StepTable, record_step
+from procedures.shared.unsupported import of_motors
 
 RATIO = Quantity(
     "alpha_ratio", "1", "alpha_d/alpha_c, direct over coupled force constant at the home angle", title="α_d/α_c"
@@ -159,7 +160,7 @@ def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
     return Requires(
-        lacks=machine.lacks,
+        lacks=(*machine.lacks, *of_motors(rig)),
         roles=("levitation", "rotation"),
         channels=(*channels(machine), "flags"),
         sensors=(*machine.segments, *machine.positions_of(*POSITIONS)),

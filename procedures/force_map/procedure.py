@@ -35,6 +35,7 @@ from procedures.servomotor.conventions import conventions
 from procedures.servomotor.direction import of_probe
 from procedures.shared import assumptions
 from procedures.shared.step_table import record_step
+from procedures.shared.unsupported import of_motors
 
 CALIBRATION = "amb-calibration"
 SHOWN = ("alpha_1", "alpha_2", "alpha_3", "alpha_4", "alpha_5", "alpha_6", "alpha_8", "alpha_9")
@@ -201,7 +202,7 @@ def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
     return Requires(
-        lacks=machine.lacks,
+        lacks=(*machine.lacks, *of_motors(rig)),
         roles=("levitation", "rotation"),
         channels=(*channels(machine), "flags", *wiring.channels(machine)),
         sensors=(*machine.coils["yi"], *machine.segments, *positions(machine)),

@@ -34,7 +34,7 @@ OFF = 0.05  # share of the amplitude asked for by which that found may differ
 NOTHING = 0.1  # of a line's amplitude: less, and there is no line to divide by
 SAME = 1e-5  # A: what single precision makes of after - before - inject
 FOLLOWS = (0.4, 1.6)  # shares of `after` that the injected axis' coils may follow below 200 Hz, lag and delay included
-UNEXPLAINED = 1e-3  # probability below which no model explains the lines about a peak
+UNEXPLAINED = 1e-3  # chance that a sound run has a peak so badly explained by its model, all its peaks together
 SURE = 4.0  # standard deviations of a line above the refined maximum
 
 
@@ -148,6 +148,7 @@ def _turning(t: Taken, plan: Plan) -> Iterator[Finding]:
 
 def of_results(results: Sequence[Result], plan: Plan) -> Iterator[Finding]:
     """Is the greatest value where the grid is fine, explained, coherent and independent of the amplitude? Then notes."""
+    count = sum(len(r.peaks) for r in results)
     for r in results:
         if not r.peaks:
             text = "no maximum was refined: the survey found none."
@@ -155,7 +156,7 @@ def of_results(results: Sequence[Result], plan: Plan) -> Iterator[Finding]:
             continue
         yield from _covered(r)
         for p in r.peaks:
-            yield from _of_peak(p, plan)
+            yield from _of_peak(p, plan, UNEXPLAINED / count)
     yield from _notes(results, plan)
 
 
@@ -178,13 +179,13 @@ def _covered(r: Result) -> Iterator[Finding]:
         yield Finding("peak-not-refined", text, r.where, Effect.INDETERMINATE, (f"@{r.where}",))
 
 
-def _of_peak(p: Peak, plan: Plan) -> Iterator[Finding]:
+def _of_peak(p: Peak, plan: Plan, chance: float) -> Iterator[Finding]:
     where, half = p.taken.where, p.top.width / 2
     if p.taken.grid.step > half:
         text = (f"lines stand {p.taken.grid.step:g} Hz apart at {p.top.at:.4g} Hz; half of the half-power width there is "
                 f"{half:.2g} Hz: the maximum may lie between them.")  # fmt: skip
         yield Finding("grid-too-coarse", text, where, Effect.INDETERMINATE, (f"@{where}",))
-    if p.model.probability < UNEXPLAINED:
+    if p.model.probability < chance:
         text = (f"no model of up to four resonances explains the lines about {p.top.at:.4g} Hz (misfit "
                 f"{p.model.misfit:.1f}): the loop changed while it was measured, or something else shakes it.")  # fmt: skip
         yield Finding("not-explained", text, where, Effect.INDETERMINATE, (f"@{where}",))

@@ -17,7 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.rigfile import RigFile
-from bench.rigfile.supports import Support, SupportedAxis, once_per_rig, two_planes, unlike
+from bench.rigfile.supports import Support, SupportedAxis, once_per_rig, two_planes
+from procedures.shared.unsupported import unlike
 
 Array = npt.NDArray[np.float64]
 Value = TypeVar("Value", float, Array)

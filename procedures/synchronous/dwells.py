@@ -16,6 +16,7 @@ from bench.analysis.sampling import Sampling
 from bench.analysis.tachometer import Tachometer, age, counted, tachometer
 from bench.analysis.vectors import Vectors
 from bench.errors import AnalysisError
+from bench.procedure.requires import Requires
 from bench.recording import Captured, Recording, Step
 from bench.units import RPM
 from procedures.amb_rotor.conventions import AmbRotor, conventions
@@ -100,6 +101,17 @@ def telemetry_channels(machine: AmbRotor) -> tuple[str, ...]:
 def captured_channels(machine: AmbRotor) -> tuple[str, ...]:
     """What is captured in a dwell."""
     return (*machine.positions, *machine.currents, *machine.voltages, "pulses", "pulse_age")
+
+
+def required(machine: AmbRotor) -> Requires:
+    """What every procedure needs that watches the shaft while it turns."""
+    return Requires(
+        lacks=machine.lacks,
+        roles=("levitation", "drive"),
+        channels=telemetry_channels(machine),
+        sensors=(*machine.positions, *machine.currents),
+        capture=captured_channels(machine),
+    )
 
 
 def read_dwells(recording: Recording[Any]) -> list[Dwell]:

@@ -7,6 +7,7 @@ D_max and its share of the clearance (ISO 14839-2), currents and voltages of the
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Any
 
 from bench.figures import Shown
@@ -23,7 +24,7 @@ from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
 from procedures.shared import assumptions, first_look
 from procedures.synchronous import bearings, checks, dwelling, estimates, fitting
 from procedures.synchronous.coil_peaks import find_uncertified
-from procedures.synchronous.dwells import captured_channels, read_dwells, telemetry_channels
+from procedures.synchronous.dwells import read_dwells, required
 from procedures.synchronous.estimates import Results
 from procedures.synchronous.hum import listen, of_dwells
 from procedures.unbalance import figures as drawn
@@ -111,15 +112,11 @@ def measured(results: Results) -> Iterator[Measured]:
 def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
-    return Requires(
-        lacks=machine.lacks,
-        roles=("levitation", "drive"),
-        channels=telemetry_channels(machine),
-        sensors=(*machine.positions, *machine.currents),
+    return replace(
+        required(machine),
         parameters=(*PARAMETERS, *machine.variants["off"], *machine.poles, *machine.model_parameters),
         geometry=LENGTHS,
         machine=("mass", "transverse_inertia", "polar_inertia", "radial_axes", "runout"),
-        capture=captured_channels(machine),
     )
 
 

@@ -172,6 +172,9 @@ def test_what_is_wrong_with_a_peak_is_named(sound: Run) -> None:
     assert codes(replace(peak, change=0.2, u_change=0.01)) == {"not-linear"}
     assert codes(replace(peak, top=replace(peak.top, inside=False))) == {"peak-not-refined"}
     assert codes(replace(peak, model=replace(peak.model, probability=1e-6))) == {"not-explained"}
+    unlikely = replace(peak, model=replace(peak.model, probability=7e-4))  # of one peak, but not of the worst of two
+    assert codes(unlikely) == {"not-explained"}
+    assert not codes(unlikely, peak)
     elsewhere = replace(result.curve, values=np.where(result.curve.hz > 300, 9.0, result.curve.values))
     found = checks.of_results([replace(result, curve=elsewhere)], plan)
     assert "peak-not-refined" in {f.code for f in found}
