@@ -85,10 +85,10 @@ def test_where_the_rotor_was_before_does_not_matter(
     monkeypatch.setattr(carrying, "home", lambda rig: swung(rig, swing))
     run = measure(tmp_path, known, {"alpha_3": 0.3})
     count = Plan().count_rad
-    readings = read(run.recording)[0].mean["angle"] / count
+    readings = read(run.recording)[0].mean[ANGLE] / count
     assert np.all((readings > 0.05) & (readings < 0.95)), readings
     assert [f for f in serious(run) if f.code != "methods-disagree"] == []  # alpha_d was calibrated with another ripple
-    at_rest = read(sound.recording)[0].mean["angle"] / count
+    at_rest = read(sound.recording)[0].mean[ANGLE] / count
     assert readings.mean() == pytest.approx(at_rest.mean(), abs=0.04)
 
 
