@@ -17,6 +17,7 @@ from bench.errors import ConfigError, DeviceFault, InterlockError, RotorNotArriv
 from bench.record.limits import Verdict, judge
 from bench.record.specs import load_spec
 from bench.rigfile import load_rig
+from bench.rigfile.roles import ANGLE
 from bench.uncertainty import interval
 from procedures.negative_stiffness import procedure as negative_stiffness
 from procedures.negative_stiffness.estimates import evaluate
