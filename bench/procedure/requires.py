@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 from bench.rigfile import RigFile
+from bench.rigfile.capabilities import is_bound as can
 from bench.rigfile.roles import is_bound, resolved
 
 
@@ -13,8 +14,8 @@ from bench.rigfile.roles import is_bound, resolved
 class Requires:
     """Names that the rig file must have: roles of its devices, channels (or roles of readings, `bench.rigfile.roles`), sensors
     with certificates, parameters of the controller, lengths and stiffnesses of `geometry`, numbers of `machine`, channels that
-    the controller can `capture` in its own memory, and, with `masses`, certified ones to hang. `lacks` is what else was found
-    missing, a line each."""
+    the controller can `capture` in its own memory, `capabilities` by their keys (`bench.rigfile.capabilities`), and, with
+    `masses`, certified ones to hang. `lacks` is what else was found missing, a line each."""
 
     roles: tuple[str, ...] = ("levitation",)
     channels: tuple[str, ...] = ()
@@ -23,6 +24,7 @@ class Requires:
     geometry: tuple[str, ...] = ()
     machine: tuple[str, ...] = ()
     capture: tuple[str, ...] = ()
+    capabilities: tuple[str, ...] = ()
     masses: bool = False
     lacks: tuple[str, ...] = ()
 
@@ -51,6 +53,8 @@ class Requires:
                 yield "capture: found none; expected a controller that records at its full rate"
             elif missing := [n for n in dict.fromkeys(names) if n not in found]:
                 yield f"{table}: found no {', '.join(missing)}"
+        if unbound := [key for key in dict.fromkeys(self.capabilities) if not can(rig.capabilities, key)]:
+            yield f"capabilities: found no {', '.join(unbound)}"
         if self.masses and not rig.masses:
             yield "masses: found none; expected certified masses to hang"
         yield from self.lacks

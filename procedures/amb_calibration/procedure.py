@@ -52,7 +52,7 @@ MEASURES = (K_I, K_O, K2_I, K2_O, KW_I, KW_O)
 CLEAR_A = 0.1  # a change of a control current that is no noise
 
 
-def settings(plan: Plan) -> dict[str, float]:
+def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Controller parameters that the runner writes before levitation."""
     return {"bias_i": plan.bias_A, "bias_o": plan.bias_A}
 

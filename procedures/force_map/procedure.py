@@ -75,7 +75,7 @@ def loaded_points(plan: Plan) -> list[Point]:
     return [Point(), *half, *(Point(-p.i_y, -p.i_x, -p.y, -p.x) for p in half), Point()]
 
 
-def settings(plan: Plan) -> dict[str, float]:
+def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Lifted at the calibration's bias with the angle released: no loop closes before the encoder's direction is known."""
     return {"bias_i": plan.bias_A, "bias_o": plan.bias_A, "i_ramp": plan.ramp_A_s, **hold.RELEASED}
 

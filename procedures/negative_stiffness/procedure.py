@@ -53,7 +53,7 @@ GEOMETRY = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_inboard_a
             "motor_to_outboard_amb", "amb_span", "amb_gap", "motor_stiffness")  # fmt: skip
 
 
-def settings(plan: Plan) -> dict[str, float]:
+def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Controller parameters that the runner writes before levitation."""
     return {"bias_i": plan.bias_A, "bias_o": plan.bias_A}
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
+from bench.rigfile.places import CENTRE, Places
 from bench.rigfile.roles import ANGLE, SPEED, STATUS
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.amb_rotor.onset import onset
@@ -120,8 +121,19 @@ def shares(rig: RigFile, axis: str) -> dict[str, float]:
     names = [machine.position(a) for a in machine.along(axis)]
     if len(names) == 1:
         return {names[0]: 1.0}
-    l_is, l_os = (rig.parameters[name].default for name in ("model_l_is", "model_l_os"))
+    l_is, l_os = _probe_arms(rig)
     return {names[0]: l_os / (l_is + l_os), names[1]: l_is / (l_is + l_os)}
+
+
+def _probe_arms(rig: RigFile) -> tuple[float, float]:
+    """Of the near and the far probes from the centre of mass, m: as the controller knows them, or by the rig file."""
+    known = rig.capabilities.model
+    if {"l_is", "l_os"} <= known.keys():
+        return rig.parameters[known["l_is"]].default, rig.parameters[known["l_os"]].default
+    machine, places = conventions(rig), Places(rig)
+    by_channel = {probe.channel: name for name, probe in rig.probes.items()}
+    near, far = (places.distance(CENTRE, f"probes/{by_channel[machine.position(a)]}").value for a in machine.along("y"))
+    return -near, far
 
 
 def _read(recording: Recording[Any], step: Step) -> Done:
@@ -130,7 +142,7 @@ def _read(recording: Recording[Any], step: Step) -> Done:
     axis, signed = str(labels["axis"]), float(labels["step_m"])
     case = Case(str(labels["setting"]), float(labels["speed_rad_s"]), axis, abs(signed), 1 if signed > 0 else -1)
     written = [e["t_ns"] for e in recording.events("parameter")
-               if e["name"] == machine.set_points[axis] and step.start_ns <= e["t_ns"] < step.end_ns]  # fmt: skip
+               if e["name"] in machine.point(axis, 0.0) and step.start_ns <= e["t_ns"] < step.end_ns]  # fmt: skip
     if not written:
         raise AnalysisError(f"{case.where}: found no write of the set point within the step")
     rest = data["t_ns"] <= written[-1]
@@ -202,7 +214,7 @@ def _answer(control: Array, rest: npt.NDArray[np.bool_]) -> tuple[int, bool]:
 def _acted(rig: RigFile, t: Array, control: Array, first: int, period: float) -> float:
     """When the set point changed, s: finer than a period, by the control currents."""
     tick = rig.devices["controller"].tick_s
-    ticks, lag = round(period / tick), 1 / rig.parameters["model_rate"].default
+    ticks, lag = round(period / tick), conventions(rig).lag_s
     return onset(t, control, t[first] - 1.8 * period, t[first] - 0.5 * period, tick=tick, ticks=ticks, lag_s=lag)[0]
 
 

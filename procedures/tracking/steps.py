@@ -96,14 +96,14 @@ def _wave(recording: Recording[Any], step: Step) -> Wave:
 def _start(recording: Recording[Any], start: Step, wave: Wave) -> tuple[float, float]:
     """When the reference's phase was zero, s from the step's start, and how clear the currents tell it."""
     machine = conventions(recording.rig)
-    begun = start.read(*channels(machine))
+    begun, path = start.read(*channels(machine)), machine.can.path
     inside = [e for e in recording.events() if start.start_ns <= e["t_ns"] < start.end_ns]
-    written = [e["t_ns"] for e in inside if e["kind"] == "parameter" and e["name"] == "ellipse_on"]
+    written = [e["t_ns"] for e in inside if e["kind"] == "parameter" and path is not None and e["name"] == path.on]
     answered = [e["t_ns"] for e in inside if e["kind"] == STARTED]
     if not written or not answered or len(begun["t_ns"]) < 20:
         raise AnalysisError("found no start of the reference; expected its write within the step, and samples about it")
     current = np.sum([begun[p] - begun[n] for p, n in map(machine.pair, machine.along("z"))], axis=0)
-    lag = 1 / recording.rig.parameters["model_rate"].default
+    lag = conventions(recording.rig).lag_s
     earliest, latest = ((t - start.start_ns) * 1e-9 for t in (written[0], answered[0]))
     at = (begun["t_ns"] - start.start_ns) * 1e-9
     return onset(at, current, earliest, latest, tick=wave.tick, ticks=wave.ticks, lag_s=lag)

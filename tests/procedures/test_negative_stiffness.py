@@ -70,7 +70,7 @@ def test_the_inboard_amb_drops_out(
     sound: Simulated, known: dict[str, Calibration], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Another inboard controller, the same answer: its force has no arm about its own plane."""
-    written = lambda plan: {**negative_stiffness.settings(plan), "kp_i": 60e3, "ki_i": 0.6e6, "kd_i": 60.0}  # noqa: E731
+    written = lambda rig, plan: {**negative_stiffness.settings(rig, plan), "kp_i": 60e3, "ki_i": 0.6e6, "kd_i": 60.0}  # noqa: E731
     monkeypatch.setattr(negative_stiffness, "procedure", replace(negative_stiffness.procedure, settings=written))
     other = measure(tmp_path, known)
     ratio = estimates(other)["alpha_x_prime"].value / estimates(sound)["alpha_x_prime"].value

@@ -41,6 +41,7 @@ A7 = {
     "model_error": 0.2, "record_s": 1.5,
 }  # fmt: skip
 Found = tuple[dict[tuple[str, str], Estimate], list[Finding]]
+CCS: dict[str, Any] = {"a": {"law": 1.0}}
 
 
 def stepped(folder: Path, seed: int = 1, truth: Mapping[str, float] | None = None, **plan: Any) -> Found:
@@ -230,7 +231,7 @@ def test_plans_that_cannot_work_are_refused() -> None:
     ],
 )
 def test_a_record_is_as_long_as_the_slowest_law_takes(plan: Mapping[str, Any], seconds: float) -> None:
-    assert recorded_s(load_rig("amb5dof"), Plan(**plan)) == seconds
+    assert recorded_s(load_rig("amb5dof"), Plan(**{**CCS, **plan})) == seconds
 
 
 @pytest.mark.parametrize(
@@ -246,7 +247,7 @@ def test_a_record_is_as_long_as_the_slowest_law_takes(plan: Mapping[str, Any], s
     ],
 )
 def test_a_step_begins_when_nothing_is_left_of_the_one_before(plan: Mapping[str, Any], seconds: float) -> None:
-    assert waited_s(load_rig("amb5dof"), Plan(**plan), "A", "y") == pytest.approx(seconds, abs=0.6e-3)
+    assert waited_s(load_rig("amb5dof"), Plan(**{**CCS, **plan}), "A", "y") == pytest.approx(seconds, abs=0.6e-3)
 
 
 def test_planes_that_answer_alike_are_called_exchanged_by_chance_only() -> None:

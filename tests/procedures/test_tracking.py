@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amb_stand import AMB_ROTOR
 from bearing_facts import known
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -24,7 +25,6 @@ from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.rigfile.roles import Status
 from bench.uncertainty import Estimate
-from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.amb_rotor.geometry import Facts
 from procedures.synchronous import bearings
 from procedures.tracking import checks, drift, estimates
@@ -32,12 +32,14 @@ from procedures.tracking import ellipse as estimator
 from procedures.tracking.ellipse import Path as Orbit
 from procedures.tracking.ellipse import Wave
 from procedures.tracking.plan import Plan
-from procedures.tracking.procedure import MEASURES, OBSERVED, check, procedure, step_count
+from procedures.tracking.procedure import MEASURES, check, procedure, step_count
 from procedures.tracking.steps import read_orbits
 from procedures.unbalance import procedure as unbalance
 from reports.figures import draw as draw_figure
 from sim_backend.machines.amb5dof import truth_track
 from sim_backend.truth import draw
+
+OBSERVED = {**AMB_ROTOR.variants["corrected"], **AMB_ROTOR.poles}
 
 RIGS = Path(__file__).parents[2] / "rigs"
 QUICK = {"revolutions": 8, "settle_s": 1.5}
