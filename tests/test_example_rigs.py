@@ -19,6 +19,8 @@ from bench.rigfile import RigFile, load_rig, protection
 from bench.rigfile.busload import bus_load
 from bench.rigfile.check import check_rig
 from bench.rigfile.messages import Signal
+from bench.rigfile.places import Places
+from bench.rigfile.toleranced import Toleranced
 from drivers.dialogue import commanded
 from drivers.sight import Sight
 
@@ -147,6 +149,43 @@ def test_what_matters_is_protected_and_a_trip_fits_its_signal(path: Path) -> Non
         stated = [x for x in (protected[name].low, protected[name].high) if math.isfinite(x)]
         assert any(low < x < high for x in stated), name
     assert all(u.why for u in protection.without(rig))
+
+
+def pull(rig: RigFile, key: str, bearing: str, current: float, away: float = 0.0) -> float:
+    """What a coil of a bearing pulls with, N; `away`: how much farther than its gap the shaft is, m."""
+    beta, gap = rig.simulation[key], rig.bearings[bearing].gap
+    gap = Places(rig).number(gap, "gap").number if gap is not None else gap
+    assert isinstance(beta, Toleranced)
+    assert isinstance(gap, Toleranced)
+    return beta.value * (current / (gap.value + away)) ** 2
+
+
+def weight(rig: RigFile) -> float:
+    assert rig.shaft is not None
+    assert isinstance(rig.shaft.mass, Toleranced)
+    return rig.shaft.mass.value * rig.site.gravity.value
+
+
+def test_the_spindle_can_fly() -> None:
+    """A quarter of what its axial bearing gives, carried below the bias, and lifted from the stop by twice the bias."""
+    rig = load_rig(str(SPINDLE))
+    bias = rig.parameters["BiasThrust"].default
+    assert weight(rig) == pytest.approx(
+        0.25 * pull(rig, "beta_Thrust", "thrust", rig.simulation["current_limit"]), rel=0.01
+    )
+    assert weight(rig) < pull(rig, "beta_Thrust", "thrust", 2 * bias)
+    assert 1.5 * weight(rig) < pull(rig, "beta_Thrust", "thrust", 2 * bias, 150e-6)
+
+
+def test_the_stand_can_fly() -> None:
+    """Of two bearings 130 mm before and 150 mm behind the centre of mass the front one carries 150/280."""
+    rig = load_rig(str(STAND))
+    places, bias = Places(rig), rig.parameters["VormagnetVorn"].default
+    at = {name: places.place(f"bearings/{name}").value for name in ("vorn", "hinten")}
+    front = weight(rig) * -at["hinten"] / (at["vorn"] - at["hinten"])
+    assert front == pytest.approx(16.81, abs=0.01)
+    assert front == pytest.approx(0.25 * pull(rig, "beta", "vorn", rig.simulation["current_limit"]), rel=0.02)
+    assert 1.3 * front < pull(rig, "beta", "vorn", 2 * bias, 200e-6)
 
 
 @RIGS
