@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from bench.rigfile.binding import COMMANDS, MODES
 from bench.rigfile.messages import MessageMap, Signal
 from bench.rigfile.model import RigFile
+from bench.rigfile.turned import turned
 
 NEEDED = ("ENABLE", "DISABLE", "LEVITATE", "LAND", "STOP", "MAKE_SAFE")
 """Commands that no run and no make-safe can do without; the others are asked for only where the controller has them."""
@@ -207,7 +208,7 @@ def _protocol(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
 
 def _channels(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
     telemetry = rig.binding.telemetry
-    for name in ("state", "fault", "speed"):
+    for name in ("state", "fault", *(("speed",) if turned(rig) else ())):
         if name not in rig.channels:
             yield f"channels.{name}", "nothing", f"the channel `{name}`: the bench watches it while the machine moves"
     for name, channel in rig.channels.items():
