@@ -1,10 +1,19 @@
-"""What a rig file calls the readings of a simulated machine: the machine speaks its own DBC, a rig file has its own names."""
+"""What a rig file calls the readings of a simulated machine: a machine has its own names, a rig file has its."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
+from bench import units
 from bench.rigfile import RigFile
+from bench.rigfile.binding import COMMANDS, MODES, Binding
+from bench.rigfile.messages import Message, MessageMap
+from sim_backend.machine import Machine
+
+TELEMETRY = "Telemetry"
+MESSAGES = (TELEMETRY, "Heartbeat", "Command", "CommandReply", "ParamSet", "ParamGet", "ParamReply")
+CONTROLLER = ("state", "fault", "flags", "host_age", "supply")
+WORDS, WORD = 48, 16  # the machine's own telemetry: where its sixteen-bit numbers begin, after sequence and tick
 
 
 def channels_by_reading(rig: RigFile) -> Mapping[str, str]:
@@ -13,7 +22,62 @@ def channels_by_reading(rig: RigFile) -> Mapping[str, str]:
     return {c.signal.partition(".")[2]: name for name, c in rig.channels.items()}
 
 
-def reading_of(rig: RigFile, channel: str) -> str:
-    """The machine's own name of a channel."""
-    bound = rig.channels.get(channel)
+def reading_of(rig: RigFile, channel: str, own: bool = True) -> str:
+    """The machine's own name of a channel; `own`: the DBC has the machine's names."""
+    bound = rig.channels.get(channel) if own else None
     return channel if bound is None else bound.signal.partition(".")[2]
+
+
+def own_words(messages: MessageMap, machine: Machine, binding: Binding) -> bool:
+    """Whether a DBC has all that the simulated controller says by names of its own, where it says it: messages of
+    docs/reference/protocol.md, and telemetry in one message of sixteen-bit numbers."""
+    if any(name not in messages.messages for name in MESSAGES) or binding != Binding():
+        return False
+    known = {s.name: s for s in messages[TELEMETRY].signals}
+    if any(name not in known for name in (*machine.channels, *machine.windings, *CONTROLLER)):
+        return False
+    codes = (("state", MODES), ("fault", ("NONE",)))
+    if any(name not in known[signal].choices.values() for signal, names in codes for name in names):
+        return False
+    commands = {s.name: s for s in messages["Command"].signals}
+    named = set(commands["code"].choices.values()) if "code" in commands else set()
+    return set(COMMANDS) <= named and _in_words(messages[TELEMETRY])
+
+
+def _in_words(message: Message) -> bool:
+    first, second, *rest = message.signals
+    counters = [(s.name, s.start, s.length, s.little_endian) for s in (first, second)]
+    words = [(s.start, s.length, s.little_endian, s.is_float) for s in rest]
+    return (
+        counters == [("seq", 0, 16, True), ("tick", 16, 32, True)]
+        and message.length == 64
+        and words == [(WORDS + WORD * k, WORD, True, False) for k in range(len(rest))]
+    )
+
+
+def tellable(rig: RigFile, machine: Machine) -> frozenset[str]:
+    """Names of all that a simulated machine and its controller can tell, for the channels of a rig file."""
+    if machine.columns is not None:
+        return frozenset((*machine.columns(rig), *warming(rig, machine), *CONTROLLER))
+    base = (*machine.channels, *machine.windings, *CONTROLLER)
+    names = tuple(dict.fromkeys((*base, *rig.channels)))
+    _, goals = machine.places(machine.defects, {name: k for k, name in enumerate(names)})
+    return frozenset((*base, *(names[k] for k in goals)))
+
+
+def warming(rig: RigFile, machine: Machine) -> Mapping[str, float]:
+    """Temperatures that the controller tells, and how far each is above the first, K. Where the rows are the rig's channels,
+    these are its other channels in kelvin."""
+    if machine.columns is None:
+        return machine.windings
+    told = machine.columns(rig)
+    kelvin = (n for n, c in rig.channels.items() if c.unit in units.UNITS and units.UNITS[c.unit].si == "K")
+    return {name: 0.0 for name in kelvin if name not in told}
+
+
+def told_as(rig: RigFile, channel: str, known: frozenset[str]) -> str | None:
+    """The reading that a bound controller tells as a channel: the one of the channel's name; for the channel that the
+    envelope watches as the supply `supply`; None where the machine has none."""
+    if channel in known:
+        return channel
+    return "supply" if channel == rig.envelope.supply else None

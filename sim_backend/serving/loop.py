@@ -11,10 +11,9 @@ import numpy as np
 from bench.clock import Clock
 from bench.link.frames import FrameBatch
 from bench.rigfile import RigFile
-from bench.rigfile.messages import load_messages
 from sim_backend.controller.controller import SimulatedController
 from sim_backend.serving.connection import Connection
-from sim_backend.serving.pacing import TICK_NS, Pacer
+from sim_backend.serving.pacing import Pacer
 from sim_backend.serving.peers import Sent, joined
 from sim_backend.serving.ports import Port
 from sim_backend.serving.service import Service
@@ -44,15 +43,14 @@ class Server:
         faults: WireFaults | None = None,
     ) -> None:  # fmt: skip
         self.controller, self.ports, self.services = controller, ports, services
-        self.pacer = Pacer(clock.now_ns())
+        self.pacer = Pacer(clock.now_ns(), controller.tick_ns)
         self.heard = self.sent = self.unknown = 0
         self._lost = 0  # frames that clients no longer here did not read
         self._selector, self._clock, self._say = selector, clock, say
         self._faults = faults or WireFaults()
         self._plugged = True
         self._own_ports = [p for p in ports if p.link == rig.devices["controller"].link]
-        messages = load_messages(rig.dbc_text).messages.values()
-        self._known = np.array([m.identifier for m in messages if m.sender == "Host"], np.uint32)
+        self._known = np.array([*controller.hears], np.uint32)
         self._brs = rig.link.data_bitrate is not None
         self._shown = (controller.state, controller.fault)
         self._look_ns = self._told_ns = clock.now_ns()
@@ -90,7 +88,7 @@ class Server:
     def _advance(self, now: int, heard: list[tuple[Connection, FrameBatch]]) -> None:
         """Run the controller up to now; frames reach it at the tick at which they came."""
         ticks = self.pacer.due(now)
-        begin = self.pacer.bench_ns() - ticks * TICK_NS
+        begin = self.pacer.bench_ns() - ticks * self.pacer.tick_ns
         frames = joined([batch for _, batch in heard])
         self.heard += len(frames)
         frames = self._faults.heard(frames, now)
@@ -159,7 +157,7 @@ class Server:
                 self._say(self.statistics())
 
     def _bench_s(self) -> float:
-        return self.pacer.ticks * TICK_NS * 1e-9
+        return self.pacer.ticks * self.pacer.tick_ns * 1e-9
 
     @property
     def unread(self) -> int:
