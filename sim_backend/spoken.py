@@ -19,7 +19,14 @@ WORDS, WORD = 48, 16  # the machine's own telemetry: where its sixteen-bit numbe
 def channels_by_reading(rig: RigFile) -> Mapping[str, str]:
     """The rig's channel of each reading, by the signal that it is bound to. A reading that is no signal of the telemetry, but
     recorded inside the controller alone, goes by its own name."""
-    return {c.signal.partition(".")[2]: name for name, c in rig.channels.items()}
+    by_signal = {c.signal.partition(".")[2]: name for name, c in rig.channels.items()}
+    return by_signal | {reading: name for name, reading in stated_readings(rig).items()}
+
+
+def stated_readings(rig: RigFile) -> Mapping[str, str]:
+    """The machine's reading of a channel, where `[simulation.readings]` says it."""
+    stated = rig.simulation.get("readings", {})
+    return {str(k): str(v) for k, v in stated.items()} if isinstance(stated, dict) else {}
 
 
 def reading_of(rig: RigFile, channel: str, own: bool = True) -> str:
@@ -76,8 +83,11 @@ def warming(rig: RigFile, machine: Machine) -> Mapping[str, float]:
 
 
 def told_as(rig: RigFile, channel: str, known: frozenset[str]) -> str | None:
-    """The reading that a bound controller tells as a channel: the one of the channel's name; for the channel that the
-    envelope watches as the supply `supply`; None where the machine has none."""
-    if channel in known:
-        return channel
-    return "supply" if channel == rig.envelope.supply else None
+    """The reading that a bound controller tells as a channel: what `[simulation.readings]` says, else the one of the channel's
+    own name, else of its signal's; for what the envelope watches as the supply `supply`. None where the machine has none."""
+    stated = stated_readings(rig)
+    if channel in stated:
+        return stated[channel] if stated[channel] in known else None
+    signal = rig.channels[channel].signal.partition(".")[2]
+    found = next((name for name in (channel, signal) if name in known), None)
+    return "supply" if found is None and channel == rig.envelope.supply else found

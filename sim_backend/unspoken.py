@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 
 from bench.errors import ConfigError, Problem
 from bench.rigfile import RigFile
@@ -24,10 +25,10 @@ def unspoken(rig: RigFile, machine: Machine) -> Iterator[Problem]:
         return
     known = tellable(rig, machine)
     lacking = [name for name in rig.channels if told_as(rig, name, known) is None]
+    free = ", ".join(sorted(known - {told_as(rig, n, known) for n in rig.channels}))
     for name in lacking:
-        told = ", ".join(sorted(known - {n for n in rig.channels if n in known}))
-        expected = f"a channel called as one of its readings ({told}), or none: --backend live needs no simulation"
-        yield Problem(rig.path, f"channels.{name}", f"what the simulated {machine.name} does not tell", expected)
+        expected = f'`{name} = "READING"` under [simulation.readings], with one of {free}; or a run with --backend live'
+        yield Problem(rig.path, f"channels.{name}", f"what the simulated {machine.name} has no reading for", expected)
     if machine.columns is None:
         yield from _of_time(rig, messages, machine)
     yield from _of_faults(rig)
@@ -44,7 +45,9 @@ def _of_time(rig: RigFile, messages: MessageMap, machine: Machine) -> Iterator[P
 
 def _of_faults(rig: RigFile) -> Iterator[Problem]:
     stated = rig.simulation.get("faults", {})
-    names = set(rig.choices("fault").values()) if "fault" in rig.channels else set()
+    names = set[str]()
+    with suppress(KeyError):  # told by bench.rigfile.check
+        names = set(rig.choices("fault").values())
     for fault, name in stated.items() if isinstance(stated, dict) else ():
         if fault not in FAULTS:
             yield Problem(

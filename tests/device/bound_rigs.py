@@ -6,6 +6,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 OWN = ROOT / "examples" / "own-controller"
+OPERATOR = '[links.operator]\nurl = "line:127.0.0.1:0"\n\n[devices.operator]\nlink = "operator"\nroles = ["operator"]\n'
 SIMULATION = '[simulation]\nmachine = "tsbs"\n'
 
 
@@ -18,6 +19,7 @@ def plain_text() -> str:
     machine = native[native.index("[machine]\n") : native.index("# The machine (docs")]
     drawn = native[native.index("[simulation]\n") :].replace("[simulation]\n", SIMULATION, 1)
     plain = plain.replace("[masses]\n", f"{machine}\n[masses]\n", 1)
+    plain = plain.replace("[devices.controller]\n", f"{OPERATOR}\n[devices.controller]\n", 1)
     return f"{plain}\n{drawn}"
 
 
