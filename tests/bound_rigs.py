@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parent.parent
 OWN = ROOT / "examples" / "own-controller"
 OPERATOR = '[links.operator]\nurl = "line:127.0.0.1:0"\n\n[devices.operator]\nlink = "operator"\nroles = ["operator"]\n'
 SIMULATION = '[simulation]\nmachine = "tsbs"\n'
