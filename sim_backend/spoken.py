@@ -57,7 +57,6 @@ def _in_words(message: Message) -> bool:
     words = [(s.start, s.length, s.little_endian, s.is_float) for s in rest]
     return (
         counters == [("seq", 0, 16, True), ("tick", 16, 32, True)]
-        and message.length == 64
         and words == [(WORDS + WORD * k, WORD, True, False) for k in range(len(rest))]
     )
 
