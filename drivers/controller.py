@@ -12,7 +12,7 @@ from bench.link.session import Session
 from bench.link.telemetry import TelemetryDecoder
 from bench.procedure.roles import RigState
 from bench.recording.recorder import Recorder
-from bench.rigfile import RigFile
+from bench.rigfile import RigFile, roles
 from bench.rigfile.binding import UNKNOWN
 from bench.rigfile.envelope import Envelope
 from drivers import advice, handshake, unheard, waiting
@@ -268,13 +268,16 @@ class Controller:
         return self._orders.get(parameter)
 
     def reading(self, channel: str) -> float:
-        """The newest sample of a channel, SI.
+        """The newest sample of a channel or role, SI.
 
         Raises:
             BenchError: the telemetry has no such channel.
         """
+        latest = self.telemetry.latest
         try:
-            return self.telemetry.latest[channel]
+            if "." not in channel:
+                return latest[channel]
+            return roles.read_now(self.rig, channel, latest)
         except KeyError:
             raise BenchError(f"the telemetry has no channel {channel}") from None
 

@@ -30,10 +30,12 @@ def changed(text: str, *changes: tuple[str, str]) -> str:
 
 
 def of_schema_1(toml: str) -> str:
-    """One of the shipped rigs as schema 1 had it: without the tables of its machine."""
+    """One of the shipped rigs as schema 1 had it: without the tables of its machine and of its controller."""
     begin = toml.index("# The machine (docs")
     end = min(toml.index(f"\n[{table}]\n") + 1 for table in ("masses", "sensors") if f"\n[{table}]\n" in toml)
-    return changed(toml[:begin] + toml[end:], ("schema = 2", "schema = 1"))
+    machine = toml[:begin] + toml[end:]
+    begin, end = machine.index("[capabilities]"), machine.index("[parameters]")
+    return changed(machine[:begin] + machine[end:], ("schema = 2", "schema = 1"))
 
 
 def written(folder: Path, toml: str = TOML, dbc: str = DBC) -> str:

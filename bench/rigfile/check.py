@@ -12,6 +12,7 @@ from bench.rigfile import busload, check_protection, linkurl
 from bench.rigfile.busload import BusLoad, bus_load
 from bench.rigfile.check_binding import find, fits, signal_at
 from bench.rigfile.check_binding import problems_of as problems_of_binding
+from bench.rigfile.check_capabilities import problems_of as problems_of_capabilities
 from bench.rigfile.check_capture import problems_of as problems_of_capture
 from bench.rigfile.check_machine import problems_of as problems_of_machine
 from bench.rigfile.check_numbers import MACHINE
@@ -74,7 +75,7 @@ def problems_of(rig: RigFile) -> list[Problem]:
         *check_protection.problems_of(rig),
         *_parameters(rig),
         *impossible(rig),
-        *(problems_of_machine(rig) if rig.written_in > 1 else ()),
+        *((*problems_of_machine(rig), *problems_of_capabilities(rig)) if rig.written_in > 1 else ()),
     ]
     controller = rig.devices.get("controller")
     if controller is not None and controller.link in rig.links and rig.link.dbc:

@@ -16,6 +16,7 @@ from pydantic import BeforeValidator, Field, ValidationError, model_validator
 from bench import units
 from bench.errors import ConfigError, Problem
 from bench.rigfile.binding import Binding
+from bench.rigfile.capabilities import Capabilities
 from bench.rigfile.capture import CaptureSpec
 from bench.rigfile.elements import FORMS, MachineTables
 from bench.rigfile.messages import MessageMap, load_messages
@@ -152,6 +153,7 @@ class RigFile(MachineTables):
     calibration: CalibrationTable = CalibrationTable()
     capture: CaptureSpec | None = None
     envelope: Envelope
+    capabilities: Capabilities = Capabilities()
     plans: Mapping[str, Mapping[str, Any]] = {}
     simulation: Annotated[Mapping[str, Any], BeforeValidator(simulated)] = {}
     toml_text: str = Field("", exclude=True)

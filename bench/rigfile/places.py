@@ -22,6 +22,7 @@ WITHOUT_NUMBERS = (
     "links",
     "capture",
     "envelope",
+    "capabilities",
     "plans",
     "calibration",
 )

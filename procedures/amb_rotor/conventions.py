@@ -10,30 +10,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from enum import IntFlag
 from functools import reduce
 from operator import or_
 from typing import Literal
 
 from bench.errors import Lacking
 from bench.rigfile import RigFile
+from bench.rigfile.roles import Status
 from bench.rigfile.supports import axial_support, once_per_rig, two_planes
 from procedures.shared.unsupported import unlike
 
 Law = Literal["PID", "CCS", "CAC"]
 Variant = Literal["off", "corrected", "literal"]
-
-
-class Flag(IntFlag):
-    """Bits of the telemetry signal `flags`, as rigs/amb5dof.dbc has them."""
-
-    CURRENT_LIMIT = 1
-    VOLTAGE_LIMIT = 2
-    CONTACT_INBOARD = 4
-    CONTACT_OUTBOARD = 8
-    WATCHDOG_ARMED = 16
-    CONTACT_AXIAL = 32
-    SENSOR_RANGE = 64
 
 
 @dataclass(frozen=True)
@@ -54,15 +42,15 @@ class AmbRotor:
     axes: tuple[str, str, str, str]
     axial: str
     planes: Mapping[str, tuple[int, int]]
-    rings: Mapping[str, Flag]
+    rings: Mapping[str, Status]
     probes: Mapping[str, str]
     pulls: Mapping[str, tuple[str, str]]
     coil_voltages: Mapping[str, tuple[str, str]]
     plane_voltages: tuple[str, ...]
-    axial_stop: Flag
-    current_limit: Flag
-    voltage_limit: Flag
-    sensor_range: Flag
+    axial_stop: Status
+    current_limit: Status
+    voltage_limit: Status
+    sensor_range: Status
     law: str
     laws: Mapping[Law, float]
     set_points: Mapping[str, str]
@@ -75,7 +63,7 @@ class AmbRotor:
     lacks: tuple[str, ...] = ()  # where the rig is not as these procedures take it
 
     @property
-    def contact(self) -> Flag:
+    def contact(self) -> Status:
         """A touch anywhere."""
         return reduce(or_, self.rings.values(), self.axial_stop)
 
@@ -165,15 +153,15 @@ AMB_ROTOR = AmbRotor(
     axes=("yi", "zi", "yo", "zo"),
     axial="x",
     planes={"inboard": (0, 1), "outboard": (2, 3)},
-    rings={"inboard": Flag.CONTACT_INBOARD, "outboard": Flag.CONTACT_OUTBOARD},
+    rings={"inboard": Status.CONTACT_NEAR, "outboard": Status.CONTACT_FAR},
     probes={axis: f"pos_{axis}" for axis in _AXES},
     pulls={axis: (f"i_{axis}_p", f"i_{axis}_n") for axis in _AXES},
     coil_voltages={axis: (f"u_{axis}_p", f"u_{axis}_n") for axis in _AXES},
     plane_voltages=("u_i", "u_o"),
-    axial_stop=Flag.CONTACT_AXIAL,
-    current_limit=Flag.CURRENT_LIMIT,
-    voltage_limit=Flag.VOLTAGE_LIMIT,
-    sensor_range=Flag.SENSOR_RANGE,
+    axial_stop=Status.CONTACT_AXIAL,
+    current_limit=Status.CURRENT_LIMIT,
+    voltage_limit=Status.VOLTAGE_LIMIT,
+    sensor_range=Status.SENSOR_RANGE,
     law="law",
     laws={"PID": 0.0, "CCS": 1.0, "CAC": 2.0},
     set_points={"y": "ref_y", "z": "ref_z", "psi": "ref_psi", "theta": "ref_theta", "x": "ref_x"},
@@ -209,7 +197,7 @@ def conventions(rig: RigFile) -> AmbRotor:
         axes=(first, second, third, fourth),
         axial=axial.name if axial is not None else "",
         planes={plane.name: (2 * k, 2 * k + 1) for k, plane in enumerate(planes)},
-        rings={plane.name: flag for plane, flag in zip(planes, AMB_ROTOR.rings.values(), strict=True)},
+        rings=dict(zip((plane.name for plane in planes), AMB_ROTOR.rings.values(), strict=True)),
         probes={axis.name: axis.position for axis in everywhere if axis.position},
         pulls={axis.name: (axis.coils[0], axis.coils[1]) for axis in everywhere if len(axis.coils) == 2},
         coil_voltages={

@@ -24,6 +24,7 @@ from bench.procedure.roles import NOTHING, Load, RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
+from bench.rigfile.roles import STATUS
 from procedures.force_map import estimates, steps
 from procedures.force_map import figures as force_map_figures
 from procedures.force_map.estimates import CROSS, Result
@@ -204,7 +205,7 @@ def requires(rig: RigFile) -> Requires:
     return Requires(
         lacks=(*machine.lacks, *of_motors(rig)),
         roles=("levitation", "rotation"),
-        channels=(*channels(machine), "flags", *wiring.channels(machine)),
+        channels=(*channels(machine), STATUS, *wiring.channels(machine)),
         sensors=(*machine.coils["yi"], *machine.segments, *positions(machine)),
         parameters=(*hold.PARAMETERS, *wiring.PARAMETERS, *NEEDED),
         geometry=GEOMETRY,

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
+from bench.rigfile.roles import ANGLE, SPEED, STATUS
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.amb_rotor.onset import onset
 from procedures.step.response import trailing
@@ -82,7 +83,7 @@ class Done:
 
 def channels(machine: AmbRotor) -> tuple[str, ...]:
     """What is read of a step."""
-    return (*machine.all_positions, *machine.all_currents, "angle", "speed", "flags")
+    return (*machine.all_positions, *machine.all_currents, ANGLE, SPEED, STATUS)
 
 
 def read_steps(recording: Recording[Any]) -> list[Done]:
@@ -146,8 +147,8 @@ def _whole(data: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
         return data
     every = np.arange(index[0], index[-1] + 1)
     held = np.searchsorted(index, every, "right") - 1
-    out = {c: x[held] if c == "flags" else np.interp(every, index, x) for c, x in data.items()}
-    out["angle"] = np.interp(every, index, np.unwrap(data["angle"]))
+    out = {c: x[held] if c == STATUS else np.interp(every, index, x) for c, x in data.items()}
+    out[ANGLE] = np.interp(every, index, np.unwrap(data[ANGLE]))
     out["t_ns"] = np.interp(every, index, data["t_ns"] - data["t_ns"][0]).round().astype(np.int64) + data["t_ns"][0]
     return out
 
@@ -164,25 +165,25 @@ def _done(
     ones = [data[p] - data[n] for p, n in map(machine.pair, along)]
     control = sum(ones, np.zeros(len(rest)))
     t = (data["t_ns"] - data["t_ns"][0]) * 1e-9
-    turning = float(np.median(data["speed"])) > TURNING_RAD_S
+    turning = float(np.median(data[SPEED])) > TURNING_RAD_S
     signals = np.array([raw, tilt, across, control, *ones])
-    clean, amplitude = _still(t, signals, data["angle"], rest) if turning else (signals, np.zeros(len(signals)))
+    clean, amplitude = _still(t, signals, data[ANGLE], rest) if turning else (signals, np.zeros(len(signals)))
     clean = case.way * (clean - clean[:, rest].mean(axis=1, keepdims=True))
     first, answered = _answer(clean[4:], rest)
     period = float(np.median(np.diff(t)))
-    samples = 2 * math.pi / float(np.median(data["speed"])) / period if turning else AT_REST_S / period
+    samples = 2 * math.pi / float(np.median(data[SPEED])) / period if turning else AT_REST_S / period
     since = t - _acted(rig, t, clean[3], first, period) - EARLY_TICKS * rig.devices["controller"].tick_s
     keep = slice(max(first - 20, 0), None)
     quiet = clean[0][rest]
     slope = float(np.polyfit(t[rest], quiet, 1)[0])
     level = quiet - slope * (t[rest] - t[rest].mean())
-    flags = data["flags"].astype(np.int64)
+    flags = data[STATUS].astype(np.int64)
     return Done(
         case, float(step.labels["begin_m"]), since[keep], clean[0][keep], (case.way * (raw - raw[rest].mean()))[keep],
         clean[1][keep], clean[2][keep], clean[3][keep], quiet,
         float(trailing(level, samples)[round(samples) :].std()), samples, float(amplitude[0]), slope, answered,
         tuple(float(c[first : first + 3].sum()) for c in clean[4:]),
-        (float(data["speed"].min()), float(data["speed"].max())), int(np.bitwise_or.reduce(flags)),
+        (float(data[SPEED].min()), float(data[SPEED].max())), int(np.bitwise_or.reduce(flags)),
         tuple(c for c in (*machine.all_positions, *machine.all_currents) if np.ptp(data[c]) == 0), step.lost(), step.expected(),
         machine,
     )  # fmt: skip

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
+from bench.rigfile.roles import SPEED, STATUS
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.amb_rotor.geometry import Facts, distances
 from procedures.amb_rotor.onset import onset
@@ -62,7 +63,7 @@ def upper_and_lower(machine: AmbRotor) -> tuple[tuple[str, ...], tuple[str, ...]
 def channels(machine: AmbRotor) -> tuple[str, ...]:
     """What is read of an orbit."""
     upper, lower = upper_and_lower(machine)
-    return (*machine.positions, *upper, *lower, "speed", "flags")
+    return (*machine.positions, *upper, *lower, SPEED, STATUS)
 
 
 def sample_reference(rig: RigFile, hz: float, y: float, z: float, period_ns: int, ratio: int = 1) -> Wave:
@@ -113,7 +114,7 @@ def _read(recording: Recording[Any], step: Step, grown: Step | None, origin: int
     labels, data = step.labels, step.read(*channels(machine))
     if len(data["t_ns"]) < 20:
         raise AnalysisError(f"{labels['law']}: found {len(data['t_ns'])} samples; expected a whole orbit")
-    speed = data["speed"]
+    speed = data[SPEED]
     turning = float(labels["speed_rad_s"]) > 0 and float(np.median(speed)) > 0
     path = Path(
         _wave(recording, step),
@@ -123,7 +124,7 @@ def _read(recording: Recording[Any], step: Step, grown: Step | None, origin: int
     )
     whole = path if grown is None else _join(grown, path, machine.positions, origin)
     upper, lower = (np.array([data[c] for c in names]) for names in upper_and_lower(machine))
-    flags = data["flags"].astype(np.int64)
+    flags = data[STATUS].astype(np.int64)
     return Orbit(str(labels["law"]), path, whole, upper, lower, flags, speed, t_0, clear, step, machine)
 
 

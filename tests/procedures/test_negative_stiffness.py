@@ -17,6 +17,7 @@ from bench.errors import ConfigError, DeviceFault, InterlockError, RotorNotArriv
 from bench.record.limits import Verdict, judge
 from bench.record.specs import load_spec
 from bench.rigfile import load_rig
+from bench.rigfile.roles import ANGLE
 from bench.uncertainty import interval
 from procedures.negative_stiffness import procedure as negative_stiffness
 from procedures.negative_stiffness.estimates import evaluate
@@ -85,10 +86,10 @@ def test_where_the_rotor_was_before_does_not_matter(
     monkeypatch.setattr(carrying, "home", lambda rig: swung(rig, swing))
     run = measure(tmp_path, known, {"alpha_3": 0.3})
     count = Plan().count_rad
-    readings = read(run.recording)[0].mean["angle"] / count
+    readings = read(run.recording)[0].mean[ANGLE] / count
     assert np.all((readings > 0.05) & (readings < 0.95)), readings
     assert [f for f in serious(run) if f.code != "methods-disagree"] == []  # alpha_d was calibrated with another ripple
-    at_rest = read(sound.recording)[0].mean["angle"] / count
+    at_rest = read(sound.recording)[0].mean[ANGLE] / count
     assert readings.mean() == pytest.approx(at_rest.mean(), abs=0.04)
 
 

@@ -19,9 +19,9 @@ from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
+from bench.rigfile.roles import Status
 from bench.uncertainty import Estimate, interval
 from bench.uncertainty.coverage import ensemble
-from procedures.amb_rotor.conventions import Flag
 from procedures.amb_rotor.onset import onset
 from procedures.step import checks, estimates, oscillation, planes, response, scatter, settling
 from procedures.step import steps as step_steps
@@ -168,7 +168,7 @@ def test_a_finding_about_one_axis_leaves_the_other_alone(tmp_path: Path) -> None
     assert all(f.concerns == (f"settling_time@{f.where}",) for f in open_ones)
     recording = Recording.open(tmp_path / "recording.mcap", Plan)
     steps = step_steps.read_steps(recording)
-    hit = [dataclasses.replace(d, flags=Flag.CONTACT_AXIAL if d.case.axis == "z" else 0) for d in steps]
+    hit = [dataclasses.replace(d, flags=Status.CONTACT_AXIAL if d.case.axis == "z" else 0) for d in steps]
     (touch,) = (f for f in checks.of_steps(hit, recording.plan) if f.code == "contact")
     sizes = [f"{um} µm {way}" for um in (10, 20) for way in ("up", "down")]
     assert {*touch.concerns} == {"@A, z, 0 r/min", *(f"@A, z, 0 r/min, {size}" for size in sizes)}

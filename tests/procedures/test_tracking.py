@@ -22,8 +22,9 @@ from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
+from bench.rigfile.roles import Status
 from bench.uncertainty import Estimate
-from procedures.amb_rotor.conventions import AMB_ROTOR, Flag
+from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.amb_rotor.geometry import Facts
 from procedures.synchronous import bearings
 from procedures.tracking import checks, drift, estimates
@@ -161,7 +162,7 @@ def test_a_touch_of_the_axial_stop_is_contact(tmp_path: Path) -> None:
     """As in every other procedure of the stand; the radial probes, which cannot show it, do not speak against it."""
     run = simulated_run("tracking", "amb5dof", 1, {**QUICK, **ONE}, tmp_path / "recording.mcap")
     (orbit,), plan = read_orbits(run.recording), run.recording.plan
-    flags = orbit.flags | np.where(np.arange(orbit.flags.size) < orbit.flags.size // 10, Flag.CONTACT_AXIAL, 0)
+    flags = orbit.flags | np.where(np.arange(orbit.flags.size) < orbit.flags.size // 10, Status.CONTACT_AXIAL, 0)
     results = estimates.by_law([orbit], run.recording.rig, plan.runout_m)
     found = {f.code: f for f in checks.of_results([replace(orbit, flags=flags)], results, plan)}
     assert found["contact"].effect is Effect.INDETERMINATE

@@ -24,8 +24,9 @@ from bench.record.records import measurement
 from bench.record.specs import applied, load_spec
 from bench.recording import Recording
 from bench.rigfile import load_rig
+from bench.rigfile.roles import Status
 from bench.uncertainty import Estimate, Influence, interval
-from procedures.amb_rotor.conventions import AMB_ROTOR, Flag
+from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.compensation import procedure as compensation
 from procedures.synchronous import checks, dwells, estimates, runout
 from procedures.synchronous import d_max as unbalance_d_max
@@ -240,7 +241,7 @@ def test_a_clipping_probe_shows_in_the_capture_where_the_controller_does_not_tel
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """At 4000 r/min a turn is 15 samples of the telemetry: none of them stays at the limit for eight."""
-    silent = replace(AMB_ROTOR, sensor_range=Flag(0))
+    silent = replace(AMB_ROTOR, sensor_range=Status(0))
     monkeypatch.setattr(dwells, "conventions", lambda _: silent)
     truth = {"position_range": 78e-6, "unbalance_i": 1.05e-5, "unbalance_o": 1.05e-5}
     plan = {**ONE, "speeds_rad_s": (4000 * RPM,)}

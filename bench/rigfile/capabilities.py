@@ -1,0 +1,158 @@
+"""What a controller can be asked to do, bound to its parameters and signals as commands and states are. Schema 2.
+
+Each is optional: what a controller does not do is left out, and a procedure that needs it says so. Parameters are named as
+`[parameters]` has them, channels as `[channels]`, axes, bearings and rings as the machine's tables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Literal
+
+from pydantic import Field
+
+from bench.rigfile.elements import Name
+from bench.rigfile.part import Part
+
+Coordinate = Literal["x", "y", "z", "psi", "theta"]
+
+
+class SetPoints(Part):
+    """Where the rotor is held: `axes` by bearing axis, m at the bearing's plane; `shaft` by coordinate, m of the centre of mass
+    and rad about y and z, where y and z are along the axes of the first bearing. `slew` and `slew_tilt`, m/s and rad/s, are
+    how fast they are followed (0, or no such parameter: at once)."""
+
+    axes: Mapping[Name, str] = {}
+    shaft: Mapping[Coordinate, str] = {}
+    slew: str = ""
+    slew_tilt: str = ""
+
+
+class Path(Part):
+    """An ellipse on top of the set points: y = `y` sin, z = `z` cos at `hz`, from `phase`, growing in `ramp_s`; `ratio`, turns
+    of z in one of y."""
+
+    on: str
+    y: str
+    z: str
+    hz: str
+    phase: str = ""
+    ramp_s: str = ""
+    ratio: str = ""
+
+
+class Injection(Part):
+    """A current that is added to the reference of one axis: parameter `axis` chooses by the value that `axes` has for each,
+    `off` none. `amplitude` A of each line, the first at `hz`; `lines` of them, `step` Hz apart; without these, one sine."""
+
+    axis: str
+    axes: Mapping[Name, float] = Field(min_length=1)
+    off: float = -1.0
+    amplitude: str
+    hz: str
+    lines: str = ""
+    step: str = ""
+
+
+class Holding(Part):
+    """A motor that holds an angle: `ref` rad, followed no faster than `slew` rad/s; `speed` rad/s for what turns; `kp` A/rad,
+    `ki` A/(rad s), `kd` A s/rad of its PID."""
+
+    ref: str
+    slew: str = ""
+    speed: str = ""
+    kp: str = ""
+    ki: str = ""
+    kd: str = ""
+
+
+class Gains(Part):
+    """Of the PID that holds each axis: a parameter of all axes, or one by bearing axis. A/m, A/(m s), A s/m."""
+
+    kp: str | Mapping[Name, str] = ""
+    ki: str | Mapping[Name, str] = ""
+    kd: str | Mapping[Name, str] = ""
+
+
+class MotorForce(Part):
+    """A motor that gives a radial force beside its torque: currents `along` the first axis of the bearings and `across` it, A,
+    which follow no faster than `ramp` A/s; `phase` rad by which its field is turned; `share` of the load that it carries in the
+    place of a bearing, which changes no faster than `share_slew` 1/s; `segment_limit`, A; `sine` rad at `sine_hz` on the
+    angle."""
+
+    along: str = ""
+    across: str = ""
+    ramp: str = ""
+    phase: str = ""
+    share: str = ""
+    share_slew: str = ""
+    segment_limit: str = ""
+    allocation: str = ""
+    sine: str = ""
+    sine_hz: str = ""
+
+
+class Bit(Part):
+    """What a channel says: any of the bits of `mask`, or, without one, that it is not zero."""
+
+    channel: str
+    mask: int | None = Field(None, gt=0)
+
+
+class Status(Part):
+    """What the controller says of the machine, by its meaning; what it does not say is judged from positions and currents."""
+
+    contact: Mapping[Name, Bit] = {}
+    current_limit: Bit | None = None
+    voltage_limit: Bit | None = None
+    sensor_range: Bit | None = None
+    segment_limit: Bit | None = None
+
+
+class Capabilities(Part):
+    """`bias` is by bearing; `settings` are by kind ("law", "compensation") and name: the parameters that choose it. `model` is
+    what the controller knows of the machine, by meaning. `loop_delay_s` is from a reading to the current that follows it."""
+
+    set_points: SetPoints = SetPoints()
+    path: Path | None = None
+    injection: Injection | None = None
+    bias: Mapping[Name, str] = {}
+    settings: Mapping[Name, Mapping[Name, Mapping[str, float]]] = {}
+    angle: Holding | None = None
+    motor: MotorForce = MotorForce()
+    gains: Gains = Gains()
+    status: Status = Status()
+    model: Mapping[Name, str] = {}
+    landing_speed: str = ""
+    lift_time: str = ""
+    watchdog: str = ""
+    loop_delay_s: float | None = Field(default=None, gt=0)
+
+
+def parameters_named(c: Capabilities) -> Iterator[tuple[str, str]]:
+    """Key and parameter of every one that is bound, in the order of the file's tables."""
+    for key, stated in _tables(c):
+        if isinstance(stated, str):
+            yield from [(key, stated)] if stated else ()
+        else:
+            yield from ((f"{key}.{name}", parameter) for name, parameter in stated.items())
+
+
+def _tables(c: Capabilities) -> Iterator[tuple[str, str | Mapping[str, str]]]:
+    points, path, injection, angle = c.set_points, c.path, c.injection, c.angle
+    yield from (("set_points.axes", points.axes), ("set_points.shaft", {str(k): p for k, p in points.shaft.items()}))
+    yield from (("set_points.slew", points.slew), ("set_points.slew_tilt", points.slew_tilt))
+    if path is not None:
+        yield from ((f"path.{key}", value) for key, value in path)
+    if injection is not None:
+        yield from ((f"injection.{key}", value) for key, value in injection if key not in ("axes", "off"))
+    yield "bias", c.bias
+    for kind, names in c.settings.items():
+        for name, values in names.items():
+            yield f"settings.{kind}.{name}", {parameter: parameter for parameter in values}
+    if angle is not None:
+        yield from ((f"angle.{key}", value) for key, value in angle)
+    yield from ((f"motor.{key}", value) for key, value in c.motor)
+    yield from ((f"gains.{key}", value) for key, value in c.gains)
+    yield "model", c.model
+    yield from (("landing_speed", c.landing_speed), ("lift_time", c.lift_time), ("watchdog", c.watchdog))

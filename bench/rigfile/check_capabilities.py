@@ -1,0 +1,107 @@
+"""Capabilities that lead somewhere: parameters, channels, axes, bearings and rings that a rig file has, values in range."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Collection, Iterator
+
+from bench import units
+from bench.errors import Problem
+from bench.rigfile.capabilities import Bit, parameters_named
+from bench.rigfile.model import RigFile
+
+CODES = ("state", "fault")
+"""Channels whose numbers are names, no bits."""
+
+
+def problems_of(rig: RigFile) -> Iterator[Problem]:
+    """Each with its key, what was found and what is expected."""
+    for key, found, expected in (*_parameters(rig), *_names(rig), *_values(rig), *_status(rig), *_units(rig)):
+        yield Problem(rig.path, f"capabilities.{key}", found, expected)
+
+
+Line = tuple[str, str, str]
+KINDS = {"set_points.axes": "m", "set_points.slew": "m/s", "set_points.slew_tilt": "rad/s", "path.y": "m", "path.z": "m",
+         "path.hz": "Hz", "path.phase": "rad", "path.ramp_s": "s", "injection.amplitude": "A", "injection.hz": "Hz",
+         "injection.step": "Hz", "bias": "A", "angle.ref": "rad", "angle.slew": "rad/s", "angle.speed": "rad/s",
+         "landing_speed": "rad/s", "lift_time": "s", "watchdog": "s"}  # fmt: skip
+COORDINATES = {"x": "m", "y": "m", "z": "m", "psi": "rad", "theta": "rad"}
+
+
+def _parameters(rig: RigFile) -> Iterator[Line]:
+    for key, parameter in parameters_named(rig.capabilities):
+        if parameter not in rig.parameters:
+            yield key, repr(parameter), f"a parameter of this file{near(parameter, rig.parameters)}"
+
+
+def _units(rig: RigFile) -> Iterator[Line]:
+    """A set point in another unit than its kind's would be taken for it."""
+    for key, name in parameters_named(rig.capabilities):
+        table, _, last = key.rpartition(".")
+        si = COORDINATES.get(last) if table == "set_points.shaft" else KINDS.get(key, KINDS.get(table, ""))
+        parameter = rig.parameters.get(name)
+        if si and parameter is not None and parameter.unit in units.UNITS and units.UNITS[parameter.unit].si != si:
+            yield key, f"{name}, in {parameter.unit}", f"a parameter in {si}"
+
+
+def _names(rig: RigFile) -> Iterator[Line]:
+    c = rig.capabilities
+    axes = [axis for bearing in rig.bearings.values() for axis in bearing.axes]
+    injected = () if c.injection is None else c.injection.axes
+    gains = [(f"gains.{key}", table) for key, table in c.gains if not isinstance(table, str)]
+    for key, named, known in (("set_points.axes", c.set_points.axes, axes), ("injection.axes", injected, axes),
+                              *((key, table, axes) for key, table in gains), ("bias", c.bias, rig.bearings),
+                              ("status.contact", c.status.contact, _stops(rig))):  # fmt: skip
+        for name in named:
+            if name not in known:
+                what = "an axis" if known is axes else "a bearing" if known is rig.bearings else "a ring"
+                yield f"{key}.{name}", name, f"{what} of this file: {', '.join(known) or '(there is none)'}"
+
+
+def _stops(rig: RigFile) -> tuple[str, ...]:
+    """What the shaft can touch: the rings, and the axial bearing's stop by the bearing's name."""
+    return (*rig.rings, *(name for name, b in rig.bearings.items() if b.kind == "axial" and name not in rig.rings))
+
+
+def _values(rig: RigFile) -> Iterator[Line]:
+    c = rig.capabilities
+    for kind, names in c.settings.items():
+        for name, values in names.items():
+            if not values:
+                yield f"settings.{kind}.{name}", "no values", "the parameters that choose it, with their values"
+            for parameter, value in values.items():
+                yield from _ranged(rig, f"settings.{kind}.{name}.{parameter}", parameter, value)
+    if c.injection is not None:
+        for axis, value in (*c.injection.axes.items(), ("off", c.injection.off)):
+            key = "injection.off" if axis == "off" else f"injection.axes.{axis}"
+            yield from _ranged(rig, key, c.injection.axis, value)
+        taken: dict[float, str] = {}
+        for axis, value in (("off", c.injection.off), *c.injection.axes.items()):
+            if (first := taken.setdefault(value, axis)) != axis:
+                yield f"injection.axes.{axis}", f"{value:g}", f"a value of its own: it is that of {first}"
+
+
+def _ranged(rig: RigFile, key: str, parameter: str, value: float) -> Iterator[Line]:
+    p = rig.parameters.get(parameter)
+    if p is not None and not p.low <= value <= p.high:
+        yield key, f"{value:g}", f"{p.low:g} to {p.high:g}, the range of {parameter}"
+
+
+def _status(rig: RigFile) -> Iterator[Line]:
+    status = rig.capabilities.status
+    bits: list[tuple[str, Bit]] = [(f"status.contact.{ring}", bit) for ring, bit in status.contact.items()]
+    bits += [(f"status.{key}", bit) for key, bit in status if isinstance(bit, Bit)]
+    taken: dict[tuple[str, int | None], str] = {}
+    for key, bit in bits:
+        if bit.channel not in rig.channels:
+            yield f"{key}.channel", repr(bit.channel), f"a channel of this file{near(bit.channel, rig.channels)}"
+        elif bit.channel in CODES or units.UNITS.get(rig.channels[bit.channel].unit, units.UNITS["1"]).si != "1":
+            yield f"{key}.channel", f"{bit.channel}, in {rig.channels[bit.channel].unit}", "a channel of bits, in 1"
+        if (first := taken.setdefault((bit.channel, bit.mask), key)) != key:
+            yield key, f"{bit.channel}, mask {bit.mask}", f"a bit of its own: it is that of {first}"
+
+
+def near(name: str, known: Collection[str]) -> str:
+    """The nearest of the names that there are, for a message."""
+    close = difflib.get_close_matches(name, known, 1)
+    return f", such as {close[0]}" if close else ""

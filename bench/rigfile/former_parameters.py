@@ -1,0 +1,86 @@
+"""What the names of parameters meant in schema 1, written out as the capabilities of schema 2."""
+
+from __future__ import annotations
+
+from typing import Any
+
+Content = dict[str, Any]
+BIAS = {"inboard": ("bias", "bias_i"), "outboard": ("bias", "bias_o"), "axial": ("bias_z",)}
+GAINS = {"yi": "i", "xi": "i", "yo": "o", "xo": "o", "z": "z"}
+PATH = {"on": "on", "y": "y", "z": "z", "hz": "hz", "phase": "phase", "ramp_s": "ramp_s", "ratio": "ratio"}
+INJECTION = {"amplitude": "amplitude", "hz": "hz", "lines": "lines", "step": "step"}
+MOTOR = {
+    "along": "i_y", "across": "i_x", "ramp": "i_ramp", "phase": "gamma", "share": "motor_share", "share_slew": "share_slew",
+    "segment_limit": "segment_max", "allocation": "allocation", "sine": "sine_amplitude", "sine_hz": "sine_hz",
+}  # fmt: skip
+ANGLE = {"slew": "angle_slew", "speed": "speed_ref", "kp": "kp_theta", "ki": "ki_theta", "kd": "kd_theta"}
+LAWS = {"PID": {"law": 0}, "CCS": {"law": 1}, "CAC": {"law": 2}}
+COMPENSATION = {
+    "off": {"observer": 0, "compensate": 0, "integral": 1},
+    "corrected": {"observer": 1, "compensate": 3, "integral": 0},
+    "literal": {"observer": 2, "compensate": 3, "integral": 0},
+}
+STAND = {
+    "contact": {"inboard": 4, "outboard": 8, "axial": 32},
+    "current_limit": 1,
+    "voltage_limit": 2,
+    "sensor_range": 64,
+}
+SERVOMOTOR = {"contact": {"inboard": 4, "outboard": 8}, "current_limit": 1, "segment_limit": 2}
+
+
+def capabilities(parameters: Content, channels: Content, bearings: Content, rings: Content) -> Content:
+    """The table of a rig file of schema 1, by the parameters and channels that it has, and the machine's tables made for it."""
+    p = parameters
+    axes = [axis for bearing in bearings.values() for axis in bearing["axes"]]
+    out: Content = {key: name for key, name in (("landing_speed", "landing_speed"), ("lift_time", "lift_time_s"),
+                                                ("watchdog", "watchdog_s")) if name in p}  # fmt: skip
+    out["bias"] = {b: found for b, names in BIAS.items() if b in bearings and (found := _first(names, p))}
+    out["gains"] = {key: made for key in ("kp", "ki", "kd") if (made := _gain(key, axes, p))}
+    out["set_points"] = _set_points(axes, p)
+    out["settings"] = _settings(p)
+    out["model"] = {name.removeprefix("model_"): name for name in p if name.startswith("model_")}
+    out["motor"] = {key: name for key, name in MOTOR.items() if name in p}
+    if {"ellipse_on", "ellipse_y", "ellipse_z", "ellipse_hz"} <= p.keys():
+        out["path"] = {key: f"ellipse_{name}" for key, name in PATH.items() if f"ellipse_{name}" in p}
+    if {"inject_axis", "inject_amplitude", "inject_hz"} <= p.keys() and axes:
+        fields = {key: f"inject_{name}" for key, name in INJECTION.items() if f"inject_{name}" in p}
+        out["injection"] = {"axis": "inject_axis", "axes": {a: k for k, a in enumerate(axes)}, "off": -1, **fields}
+    if "angle_ref" in p:
+        out["angle"] = {"ref": "angle_ref", **{key: name for key, name in ANGLE.items() if name in p}}
+    out["status"] = _status(STAND if "law" in p else SERVOMOTOR, bearings, rings) if "flags" in channels else {}
+    return {key: made for key, made in out.items() if made}
+
+
+def _first(names: tuple[str, ...], p: Content) -> str:
+    return next((name for name in names if name in p), "")
+
+
+def _gain(key: str, axes: list[str], p: Content) -> Any:
+    if key in p:
+        return key
+    return {axis: name for axis in axes if (name := f"{key}_{GAINS.get(axis, '')}") in p}
+
+
+def _set_points(axes: list[str], p: Content) -> Content:
+    """By coordinate of the shaft where the parameters say so, else by axis."""
+    if "ref_psi" in p:
+        shaft = {name: f"ref_{name}" for name in ("x", "y", "z", "psi", "theta") if f"ref_{name}" in p}
+        return {"shaft": shaft, **{name: name for name in ("slew", "slew_tilt") if name in p}}
+    found = {axis: f"ref_{axis}" for axis in axes if f"ref_{axis}" in p}
+    return {"axes": found} if found else {}
+
+
+def _settings(p: Content) -> Content:
+    out: Content = {"law": LAWS} if "law" in p else {}
+    if {"observer", "compensate", "integral"} <= p.keys():
+        out["compensation"] = COMPENSATION
+    return out
+
+
+def _status(bits: Content, bearings: Content, rings: Content) -> Content:
+    """The bits of channel `flags`; contact where the shaft has something to touch."""
+    stops = {**rings, **{name: None for name, b in bearings.items() if b["kind"] == "axial"}}
+    contact = {name: {"channel": "flags", "mask": mask} for name, mask in bits["contact"].items() if name in stops}
+    single = {key: {"channel": "flags", "mask": mask} for key, mask in bits.items() if key != "contact"}
+    return {**({"contact": contact} if contact else {}), **single}
