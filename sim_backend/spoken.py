@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from bench import units
 from bench.rigfile import RigFile
 from bench.rigfile.binding import COMMANDS, MODES, Binding
+from bench.rigfile.capabilities import Bit
 from bench.rigfile.messages import Message, MessageMap
 from sim_backend.machine import Machine
 
@@ -55,20 +56,28 @@ def _in_words(message: Message) -> bool:
     first, second, *rest = message.signals
     counters = [(s.name, s.start, s.length, s.little_endian) for s in (first, second)]
     words = [(s.start, s.length, s.little_endian, s.is_float) for s in rest]
-    return (
-        counters == [("seq", 0, 16, True), ("tick", 16, 32, True)]
-        and words == [(WORDS + WORD * k, WORD, True, False) for k in range(len(rest))]
-    )
+    return counters == [("seq", 0, 16, True), ("tick", 16, 32, True)] and words == [
+        (WORDS + WORD * k, WORD, True, False) for k in range(len(rest))
+    ]
 
 
 def tellable(rig: RigFile, machine: Machine) -> frozenset[str]:
     """Names of all that a simulated machine and its controller can tell, for the channels of a rig file."""
     if machine.columns is not None:
-        return frozenset((*machine.columns(rig), *warming(rig, machine), *CONTROLLER))
+        return frozenset(
+            (*machine.columns(rig), *warming(rig, machine), *CONTROLLER, *(b.channel for b in bits(rig).values()))
+        )
     base = (*machine.channels, *machine.windings, *CONTROLLER)
     names = tuple(dict.fromkeys((*base, *rig.channels)))
     _, goals = machine.places(machine.defects, {name: k for k, name in enumerate(names)})
     return frozenset((*base, *(names[k] for k in goals)))
+
+
+def bits(rig: RigFile) -> Mapping[str, Bit]:
+    """Where the rig file's capabilities say each status: `status.contact.RING`, `status.current_limit` and the like."""
+    status = rig.capabilities.status
+    said = {f"status.contact.{ring}": bit for ring, bit in status.contact.items()}
+    return said | {f"status.{key}": bit for key, bit in status if isinstance(bit, Bit)}
 
 
 def warming(rig: RigFile, machine: Machine) -> Mapping[str, float]:

@@ -17,7 +17,7 @@ from bench.rigfile.messages import Message, MessageMap
 from sim_backend.controller.meanings import fault_codes, state_codes
 from sim_backend.controller.telemetry import Readings, Span, kept
 from sim_backend.machine import SimulatedPlant, Truth
-from sim_backend.spoken import CONTROLLER, tellable, told_as, warming
+from sim_backend.spoken import CONTROLLER, bits, tellable, told_as, warming
 
 Ints = npt.NDArray[np.int64]
 CODES = ("state", "fault", "flags")  # whole numbers that stand for themselves
@@ -64,6 +64,9 @@ class BoundTelemetry:
         self._readings = Readings(
             truth, self._place, codes, plant.period_ticks, plant.tick_s, columns, warming(rig, machine)
         )
+        said = {} if columns is None else bits(rig)
+        self._bits = [(self._place[name], bit) for name, bit in said.items() if name in self._place]
+        self._codes = {*CODES, *(bit.channel for bit in said.values())}
         self._tick_ns = round(plant.tick_s * 1e9)
         self._truth, self._sequence = truth, plant.tick // plant.period_ticks
         self._parts = []
@@ -83,7 +86,7 @@ class BoundTelemetry:
             if owner != message.name or reading is None:
                 continue
             s, unit = message.signal(signal), units.UNITS[message.signal(signal).unit]
-            if name in CODES:
+            if name in self._codes:
                 codes[signal] = self._place[reading]
                 continue
             around = float(2**s.length) * abs(s.scale) if name in (self._mark.pulses, self._mark.edge) else 0.0
@@ -101,6 +104,8 @@ class BoundTelemetry:
         if not n:
             return empty_batch()
         ticks, values = self._readings.of(spans, n)
+        for column, bit in self._bits:
+            values[:, self._place[bit.channel]] += (bit.mask or 1) * (values[:, column] != 0)
         sequence = np.arange(self._sequence, self._sequence + n)
         self._sequence += n
         batch = np.zeros((n, len(self._parts)), FRAME)

@@ -27,9 +27,9 @@ class Parameters:
     def __init__(self, rig: RigFile, truth: Truth, plant: SimulatedPlant, strict: bool = True) -> None:
         self._truth, self._plant, self._strict, self._parameters = truth, plant, strict, rig.parameters
         self._names = {p.index: name for name, p in rig.parameters.items() if p.index is not None}
-        self._controls = controls(rig)
+        self._controls = controls(rig, truth.machine)
         self.own = {name: truth.values.get(name, value) for name, value in OWN.items()}
-        if "lift_time_s" not in {c for chosen in self._controls.values() for c in chosen}:
+        if "lift_time_s" not in {c.name for chosen in self._controls.values() for c in chosen}:
             plant.set("lift_time_s", self.own["lift_time_s"])
         self.values = {name: p.default for name, p in rig.parameters.items()}
         for name, value in self.values.items():
@@ -63,10 +63,11 @@ class Parameters:
 
     def _apply(self, name: str, value: float) -> None:
         for control in self._controls.get(name, ()):
-            if control in OWN:
-                self.own[control] = value
-            if control not in INTERFACE:
-                self._act(control, value)
+            acting = control.of(value)
+            if control.name in OWN:
+                self.own[control.name] = acting
+            if control.name not in INTERFACE:
+                self._act(control.name, acting)
 
     def _act(self, control: str, value: float) -> None:
         defects = self._truth.defects

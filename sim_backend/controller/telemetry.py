@@ -55,6 +55,7 @@ class Readings:
         else:
             source = [k for k, name in enumerate(columns) if name in place]
             goal = [place[columns[k]] for k in source]
+        self._armed = WATCHDOG_ARMED if columns is None else 0  # in the machine's own status word alone
         self._moves = _moves(source, goal)
         self._truth, self._place, self._codes = truth, place, codes
         self._period_ticks, self._tick_s = period_ticks, tick_s
@@ -70,7 +71,7 @@ class Readings:
         machine.spoil(values, at, self._truth.defects)
         ticks = (spans[0].first_tick // period + np.arange(1, n + 1)) * period
         states, faults = self._codes["state"], self._codes["fault"]
-        told = [(states[s.state], faults[s.fault], WATCHDOG_ARMED * s.armed, s.heartbeat_tick) for s in spans]
+        told = [(states[s.state], faults[s.fault], self._armed * s.armed, s.heartbeat_tick) for s in spans]
         state, fault, armed, beats = np.repeat(told, [len(s.rows) for s in spans], axis=0).T
         values[:, at["state"]], values[:, at["fault"]] = state, fault
         values[:, at["flags"]] += armed
