@@ -101,6 +101,7 @@ IN_DBC = [
     ("Demand : 0|8@1+ (1,0)", "Demand : 0|8@1+ (0.5,0)", f"{KEY}.commands.ENABLE", "scale 1"),
     ('"Tripped" ;', '"Tripped" 8 "Testing" ;', f"{KEY}.states.Testing", "what Testing amounts to"),
     (ALIVE, f"{EXTRA.format('Claim', 'session')}{ALIVE}", "message Claim", "Owner too"),
+    (ALIVE, f"{EXTRA.format('Own', 'x').replace('20', '2047')}{ALIVE}", "BO_ Own", "the sign of a served simulation"),
     (ALIVE, f"{EXTRA.format('Identity', 'what')}{ALIVE}", "message Identity", "Identity"),
     ('(0.025,0) [-409.6|409.575] "um"', '(0.025,0) [-409.6|409.575] "parsec"', "AmbPos.XA", "a known unit"),
     ('"mA" PlainAmb', '"furlong" PlainAmb', "HostTuning.BiasA", "a known unit"),

@@ -9,8 +9,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from bench.clock import Clock
-from bench.link.frames import FrameBatch
+from bench.link.frames import FrameBatch, empty_batch, frame
 from bench.rigfile import RigFile
+from bench.wire import sign
 from sim_backend.controller.controller import SimulatedController
 from sim_backend.serving.connection import Connection
 from sim_backend.serving.pacing import Pacer
@@ -57,6 +58,7 @@ class Server:
         self._cpu = time.process_time()
         self._told = (0, 0)
         self._drops = 0
+        self._sign_ns = 0  # when the sign of a simulation is due
 
     def run(self, stopped: Callable[[], bool]) -> None:
         """Serve until told to stop; a signal ends the wait of at most a slice."""
@@ -97,10 +99,18 @@ class Server:
         if ticks or len(known):
             said = self.controller.advance(ticks, known, begin)
             self.sent += len(said)
-            self._deliver(said, now)
+            self._deliver(joined([said, self._sign()]), now)
         for source, batch in heard:
             if len(batch) and source.peer.on_bus:
                 self._pass_on(source, Sent(batch, 0, self._brs))
+
+    def _sign(self) -> FrameBatch:
+        """What says that this is a simulation, when it is due."""
+        now = self.pacer.bench_ns()
+        if now < self._sign_ns:
+            return empty_batch()
+        self._sign_ns = now + round(sign.PERIOD_S * 1e9)
+        return frame(sign.IDENTIFIER, sign.PAYLOAD, t_ns=now)
 
     def _deliver(self, said: FrameBatch, now: int) -> None:
         """What the controller sent, to everybody who listens."""

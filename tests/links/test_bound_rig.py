@@ -45,6 +45,7 @@ def test_a_served_rig_of_its_own_dbc_is_levitated_by_the_bench(tmp_path: Path, p
         status, record = processes.run(tmp_path, rig, port, "tiny-levitated", "--no-report", name="plainamb")
         states = [line.partition(": ")[2] for line in rig.state_lines()]
     assert (status, record["outcome"]) == (0, "DONE"), record["findings"]
+    assert "simulated-controller" in [f["code"] for f in record["findings"]]  # by no message of its DBC
     assert record["link"]["errors"] == record["link"]["gaps"] == 0
     assert states[:3] == ["OFF -> READY", "READY -> LIFTING", "LIFTING -> LEVITATED"]
     assert states[-1].endswith("-> OFF")
