@@ -32,7 +32,9 @@ def stated_readings(rig: RigFile) -> Mapping[str, str]:
 
 def reading_of(rig: RigFile, channel: str, own: bool = True) -> str:
     """The machine's own name of a channel; `own`: the DBC has the machine's names."""
-    bound = rig.channels.get(channel) if own else None
+    if not own:
+        return stated_readings(rig).get(channel, channel)
+    bound = rig.channels.get(channel)
     return channel if bound is None else bound.signal.partition(".")[2]
 
 

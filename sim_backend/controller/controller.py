@@ -114,7 +114,7 @@ class SimulatedController:
         traced = self._machine.traced(self.truth.defects)
         self.captures = None
         if self._rig.capture is not None and traced:
-            names = [c if not self._own_words else reading_of(self._rig, c) for c in self._rig.capture.channels]
+            names = [reading_of(self._rig, c, self._own_words) for c in self._rig.capture.channels]
             called = dict(zip(names, self._rig.capture.channels, strict=True))
             self.captures = CapturePort(self._rig, self._map, [called.get(n, n) for n in traced], self.plant.tick_s)
         self._requests = Requests(
