@@ -106,7 +106,7 @@ class Controller:
         handshake.claim(self.requests, self.rig, self._session, self.clock, self._wait)
         self._own()
         self.serial = handshake.identify(self.requests, self.rig, self._session, self._wait)
-        self.watch.simulated = self.serial == 0
+        self.watch.simulated |= self.serial == 0
         if self.mode == "FAULT":
             advice.may_clear("controller", self.fault, clear_fault)
             self.cleared = self.fault
@@ -150,7 +150,7 @@ class Controller:
             FrozenError, ReadingsStand, StateContradicts, AnotherHost: as `Watch.check` says.
         """
         self.watch.polled()
-        batch = self.watch.hosts.marked(self.link.receive())
+        batch = self.watch.taken(self.link.receive())
         if self._recorder is not None:
             self._recorder.frames(self.link.name, batch, lag_ns=self.telemetry.host.lag_ns)
         self.requests.take(batch)
