@@ -18,7 +18,6 @@ Array = npt.NDArray[np.float64]
 Two = tuple[float, float]
 FREE_BEAM = (4.730040744862704, 7.853204624095838)  # roots of cos b cosh b = 1
 TELLS_APART = 1e-6  # of the greatest singular value: what is less is a motion that axes or probes do not see
-SPREAD_M = 1e-3  # radial axes that are nearer to each other along the shaft cannot hold a tilt
 
 
 @dataclass(frozen=True)
@@ -127,8 +126,7 @@ class Columns:
         rows = np.array([self.axis(a)[:4] for a in self.layout.radial])
         length = max(float(np.abs(rows[:, 2:]).max()), 1e-3)
         scaled = rows / np.array([1.0, 1.0, length, length])
-        stations = [self.geometry.station(f"bearings/{a.bearing}") for a in self.layout.radial]
-        if max(stations) - min(stations) > SPREAD_M:
+        if self.nominal.tilts:
             if (held := rank(scaled)) == 4:
                 return Free(True, (1.0, 0.0, 1.0), np.eye(4))
             raise ConfigError(f"rig {self.rig.name}: bearings: their axes hold {held} of the four radial motions; expected all four, or "

@@ -77,9 +77,8 @@ def control_of(n: Nominal) -> TwinControl:
         ConfigError: an axis cannot carry its share of the weight, or no probe sees what it holds.
     """
     columns = Columns(n.geometry, n, {})
-    masses, forces = _shares(n, columns)
-    axes = n.layout.axes
-    points = [working_point(n, k, force) for k, force in enumerate(forces)]
+    masses, axes = _masses(n, columns), n.layout.axes
+    points = [working_point(n, k, force) for k, force in enumerate(n.carried)]
     low_pass = n.set("derivative_hz", 0.2 / n.tick_s)
     amplifier = n.set("amplifier_hz", min(max(0.1 / n.tick_s, 200.0), 2000.0))
     delay = 1.5 * n.tick_s + (1 / amplifier + 1 / low_pass) / (2 * math.pi)
@@ -97,21 +96,13 @@ def control_of(n: Nominal) -> TwinControl:
     )  # fmt: skip
 
 
-def _shares(n: Nominal, columns: Columns) -> tuple[list[float], list[float]]:
-    """Of each axis, the mass it feels and its part of the force that holds the shaft against gravity: the least squares of all."""
-    a = radial_rows(columns)
+def _masses(n: Nominal, columns: Columns) -> list[float]:
+    """Of each axis, what the loop is laid out for, kg."""
     basis, m = columns.free.basis, n.mass
-    rows = a @ basis
+    rows = radial_rows(columns) @ basis
     inverse = np.linalg.inv(basis.T @ np.diag([m, m, transverse(n), transverse(n)]) @ basis)
     felt = np.einsum("ki,ij,kj->k", rows, inverse, rows)
-    masses = [basis.shape[1] / len(a) / float(x) for x in felt]
-    tilt = n.tilt
-    weight = np.array([-m * n.gravity * math.cos(tilt), 0.0, 0.0, 0.0])
-    forces = np.linalg.lstsq(rows.T, -basis.T @ weight, rcond=None)[0].tolist()
-    if n.layout.axial is not None:
-        masses.append(m)
-        forces.append(m * n.gravity * math.sin(tilt))
-    return masses, forces
+    return [*(basis.shape[1] / len(rows) / float(x) for x in felt), *((m,) if n.layout.axial is not None else ())]
 
 
 def radial_rows(columns: Columns) -> Array:

@@ -8,13 +8,16 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from bench.rigfile import RigFile
 from bench.rigfile.places import CENTRE, PLACED
 from bench.rigfile.toleranced import Toleranced
 from sim_backend.machines.twin.layout import Geometry, Layout, layout_of
 
 STEEL = 7850.0  # kg/m^3
-CAPACITY = 5.0  # times its share of the weight that an axis pulls at its current limit
+SPREAD_M = 1e-3  # radial axes that are nearer to each other along the shaft cannot hold a tilt
+CAPACITY = 6.0  # times its share of the weight, or of what it is to accelerate by 1 g, that an axis pulls at its current limit
 
 
 def set_in(rig: RigFile, key: str, where: str) -> Toleranced | float | None:
@@ -111,7 +114,8 @@ class Nominal:
         """Of an axis: F = beta (ip^2/(gap - xi)^2 - in^2/(gap + xi)^2); as set, else so that the axis pulls CAPACITY times its share
         of the weight at its gap and current limit."""
         axis = self.layout.axes[k]
-        rule = CAPACITY * self.shares[k] * self.gravity * (self.gap(axis.bearing) / self.current_limit) ** 2
+        most = max(self.shares[k] * self.gravity, abs(self.carried[k]))
+        rule = CAPACITY * most * (self.gap(axis.bearing) / self.current_limit) ** 2
         return self.set("beta", rule, axis.name)
 
     def offset(self, k: int) -> float:
@@ -141,13 +145,31 @@ class Nominal:
         )
 
     @cached_property
+    def tilts(self) -> bool:
+        """Whether the radial axes pull in more than one plane, and tilts are free."""
+        at = [self.geometry.station(f"bearings/{a.bearing}") for a in self.layout.radial]
+        return max(at) - min(at) > SPREAD_M
+
+    @cached_property
     def shares(self) -> tuple[float, ...]:
         """Of each axis, the mass it feels: what a force at its place and along it accelerates as, kg."""
         m, inertia = self.mass, transverse(self)
         at = [self.geometry.station(f"bearings/{a.bearing}") for a in self.layout.radial]
-        tilts = max(at) - min(at) > 1e-3
-        radial = [1 / (1 / m + (s * s / inertia if tilts else 0.0)) for s in at]
+        radial = [1 / (1 / m + (s * s / inertia if self.tilts else 0.0)) for s in at]
         return (*radial, *((m,) if self.layout.axial is not None else ()))
+
+    @cached_property
+    def carried(self) -> tuple[float, ...]:
+        """Of each axis, the force that holds the shaft against gravity, the least squares of all, N."""
+        n = 4 if self.tilts else 2
+        rows = []
+        for a in self.layout.radial:
+            s, angle = self.geometry.station(f"bearings/{a.bearing}"), self.geometry.angle(a.part)
+            rows.append([math.cos(angle), math.sin(angle), -s * math.sin(angle), s * math.cos(angle)][:n])
+        weight = self.mass * self.gravity
+        up = np.array([weight * math.cos(self.tilt), 0.0, 0.0, 0.0])[:n]
+        held = np.linalg.lstsq(np.array(rows).T, up, rcond=None)[0].tolist()
+        return (*held, *((weight * math.sin(self.tilt),) if self.layout.axial is not None else ()))
 
 
 def transverse(n: Nominal) -> float:
