@@ -4,7 +4,8 @@ The rule (docs/reference/twin.md): an axis k with the row a_k in q'' = M^-1 sum 
 of d free motions and n radial axes, so that the mean of the squared frequencies of decentralised feedback is w^2. With the
 slopes K_i = dF/di and K_x = dF/dx where the axis carries its share of the weight,
     K_i kp = m_k w^2 + K_x,  K_i kd = 2 z m_k w,  K_i ki = m_k w^3 / 30,  w = 1/(4 T), z = 0.6,
-where T is the loop's delay: one and a half ticks, the amplifier and the derivative's low-pass.
+where T is the loop's delay: one and a half ticks, the amplifier and the derivative's low-pass. w is less where kp would ask for
+more than twice the bias at the touchdown ring, or else the lift is lost in the limits.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ ROOM = 0.25  # rad: of phase that the loop's delay takes at the frequency w
 DAMPING = 0.6
 SLOWER = 30.0  # times that the integrator is slower than w
 BIAS = 0.4  # of the current limit
+REACH = 2.0  # times the bias, at the touchdown ring
+STIFFER = 1.5  # times the field's own slope, at least
 COORDINATES = ("x", "y", "z", "psi", "theta")
 
 
@@ -82,9 +85,10 @@ def control_of(n: Nominal) -> TwinControl:
     low_pass = n.set("derivative_hz", 0.2 / n.tick_s)
     amplifier = n.set("amplifier_hz", min(max(0.1 / n.tick_s, 200.0), 2000.0))
     delay = 1.5 * n.tick_s + (1 / amplifier + 1 / low_pass) / (2 * math.pi)
-    w = n.set("bandwidth", ROOM / delay / (2 * math.pi)) * 2 * math.pi
+    most = n.set("bandwidth", ROOM / delay / (2 * math.pi)) * 2 * math.pi
     kp, ki, kd = [], [], []
     for axis, m, point in zip(axes, masses, points, strict=True):
+        w = _limited(most, m, point, columns.stop if axis is n.layout.axial else min(n.clearances))
         kp.append(n.set("kp", (m * w * w + point.per_metre) / point.per_current, axis.name))
         ki.append(n.set("ki", m * w**3 / SLOWER / point.per_current, axis.name))
         kd.append(n.set("kd", 2 * DAMPING * m * w / point.per_current, axis.name))
@@ -94,6 +98,12 @@ def control_of(n: Nominal) -> TwinControl:
         bias=tuple(p.bias for p in points), hold=tuple(hold), derivative_hz=low_pass,
         lift_time_s=n.set("lift_time", 1.0), current_limit=n.current_limit,
     )  # fmt: skip
+
+
+def _limited(w: float, m: float, point: Point, away: float) -> float:
+    """rad/s: no more than the current gives room for, and no less than what the field's own slope asks for."""
+    held = REACH * point.bias * point.per_current / away - point.per_metre
+    return min(w, math.sqrt(max(held, STIFFER * point.per_metre) / m))
 
 
 def _masses(n: Nominal, columns: Columns) -> list[float]:

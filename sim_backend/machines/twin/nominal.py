@@ -16,6 +16,7 @@ from bench.rigfile.toleranced import Toleranced
 from sim_backend.machines.twin.layout import Geometry, Layout, layout_of
 
 STEEL = 7850.0  # kg/m^3
+SLENDER = 0.2  # of the transverse inertia, a shaft and no disc
 SPREAD_M = 1e-3  # radial axes that are nearer to each other along the shaft cannot hold a tilt
 CAPACITY = 6.0  # times its share of the weight, or of what it is to accelerate by 1 g, that an axis pulls at its current limit
 
@@ -181,8 +182,9 @@ def transverse(n: Nominal) -> float:
 
 
 def polar(n: Nominal) -> float:
-    """About the shaft, kg m^2: as stated, else of a steel cylinder of the shaft's length and mass."""
+    """About the shaft, kg m^2: as stated, else of a steel cylinder of the shaft's length and mass, at most SLENDER times the
+    transverse one."""
     shaft = n.rig.shaft
     if shaft is not None and shaft.polar_inertia is not None:
         return n.geometry.number(shaft.polar_inertia, "shaft.polar_inertia")
-    return n.set("polar_inertia", n.mass**2 / (2 * math.pi * STEEL * n.length))
+    return n.set("polar_inertia", min(n.mass**2 / (2 * math.pi * STEEL * n.length), SLENDER * transverse(n)))
