@@ -71,8 +71,9 @@ def probe(name: str, at_mm: float = 0.0, deg: float | None = None, sign: int = 1
     return "\n".join(lines)
 
 
-def rig(name: str, parts: Iterable[str], *, tick: float = 1e-4, current: float = 6.0, speed: float = 2000.0, hung: float = 0.0) -> RigFile:
-    text = "\n".join([HEAD.format(name=name, tick=tick, current=current, speed=speed, hung=hung), *parts])
+def rig(name: str, parts: Iterable[str], *, tick: float = 1e-4, current: float = 6.0, speed: float = 2000.0, hung: float = 0.0, top: str = "") -> RigFile:
+    """`parts` are tables, `top` keys that stand before the first."""
+    text = top + "\n".join([HEAD.format(name=name, tick=tick, current=current, speed=speed, hung=hung), *parts])
     data = tomllib.loads(text)
     channels = [p["channel"] for p in data.get("probes", {}).values()]
     units = dict.fromkeys(channels, "m")

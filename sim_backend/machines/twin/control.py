@@ -82,9 +82,8 @@ def control_of(n: Nominal) -> TwinControl:
     columns = Columns(n.geometry, n, {})
     masses, axes = _masses(n, columns), n.layout.axes
     points = [working_point(n, k, force) for k, force in enumerate(n.carried)]
-    low_pass = n.set("derivative_hz", 0.2 / n.tick_s)
-    amplifier = n.set("amplifier_hz", min(max(0.1 / n.tick_s, 200.0), 2000.0))
-    delay = 1.5 * n.tick_s + (1 / amplifier + 1 / low_pass) / (2 * math.pi)
+    low_pass = n.set("derivative_hz", min(0.2 / n.tick_s, 2000.0))
+    delay = 1.5 * n.tick_s + (1 / n.amplifier_hz + 1 / low_pass) / (2 * math.pi)
     most = n.set("bandwidth", ROOM / delay / (2 * math.pi)) * 2 * math.pi
     kp, ki, kd = [], [], []
     for axis, m, point in zip(axes, masses, points, strict=True):

@@ -94,6 +94,11 @@ class Nominal:
         return self.set("current_limit", 0.9 * most if math.isfinite(most) else 5.0)
 
     @cached_property
+    def amplifier_hz(self) -> float:
+        """Bandwidth of the current loops: as set, else a tenth of the tick's rate, 200 Hz to 1 kHz."""
+        return self.set("amplifier_hz", min(max(0.1 / self.tick_s, 200.0), 1000.0))
+
+    @cached_property
     def tilt(self) -> float:
         """How far the far end stands above the horizontal, rad: as stated, else 0."""
         shaft = self.rig.shaft

@@ -86,7 +86,7 @@ BY_JOURNAL: Mapping[str, Rule] = {
 }
 ONCE: Mapping[str, Rule] = {
     "resistance": _constant(1.0, "Ohm", 0.05),
-    "amplifier_hz": _of(lambda n: min(max(0.1 / n.tick_s, 200.0), 2000.0), "Hz", 0.05),
+    "amplifier_hz": _of(lambda n: n.amplifier_hz, "Hz", 0.05),
     "viscous": _of(lambda n: polar(n) / 100.0, "N m s/rad", 0.2),
     "coulomb": _of(lambda n: 0.2 * polar(n), "N m", 0.2),
     "drive_gain": _of(lambda n: 20.0 * polar(n), "N m s/rad", 0.1),
