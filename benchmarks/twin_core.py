@@ -1,5 +1,5 @@
-"""Speed of the twin's core beside the AMB stand's, in one run: the same rotor on the same five axes at the same tick, 60 s of bench
-time at 10 000 r/min, noise included, PID, two integration steps per tick.
+"""Speed of the twin's core beside the AMB stand's, in one run: the same rotor on the same five axes at the same tick, 60 s
+of bench time at 10 000 r/min, noise included, PID, two integration steps per tick.
 
     python benchmarks/twin_core.py
 
@@ -46,7 +46,10 @@ def turning(plant: AmbPlant | TwinPlant) -> AmbPlant | TwinPlant:
 def main() -> None:
     """Run and print."""
     stand, twin = draw(rigid("amb5dof"), 1), draw(rigid("twin"), 1)
-    plants = {"AMB stand": turning(AmbPlant(stand.plant, 1, control=AmbControl(law=0))), "twin": turning(TwinPlant(twin.plant, 1))}
+    plants = {
+        "AMB stand": turning(AmbPlant(stand.plant, 1, control=AmbControl(law=0))),
+        "twin": turning(TwinPlant(twin.plant, 1)),
+    }
     best = dict.fromkeys(plants, math.inf)
     for _ in range(5):
         for name, plant in plants.items():

@@ -13,7 +13,8 @@ MACHINES = {machine.name: machine for machine in (TSBS, AMB5DOF)}
 
 
 def machine_of(rig: RigFile) -> Machine:
-    """The machine that `machine` in a rig file's simulation table names; a TSBS where it names none; a twin is made of the rig file.
+    """The machine that `machine` in a rig file's simulation table names; a TSBS where it names none; a twin is made of the
+    rig file.
 
     Raises:
         ConfigError: there is no such machine, or no twin can be made of the rig file.
@@ -22,5 +23,7 @@ def machine_of(rig: RigFile) -> Machine:
     if name == TWIN:
         return twin(rig)
     if name not in MACHINES:
-        raise ConfigError(f"rig {rig.name}: simulation.machine: found {name!r}; expected one of {', '.join((*MACHINES, TWIN))}")
+        raise ConfigError(
+            f"rig {rig.name}: simulation.machine: found {name!r}; expected one of {', '.join((*MACHINES, TWIN))}"
+        )
     return MACHINES[name]

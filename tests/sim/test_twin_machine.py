@@ -93,7 +93,9 @@ def test_gains_by_the_rule() -> None:
 
 
 def test_simulation_sets_one_axis_or_all() -> None:
-    table = '[simulation]\nbeta = 5e-6\nbeta_yr = 9e-6\nbias = 2.0\nmagnetic_offset = { value = 10, unit = "um", u = 1, '
+    table = (
+        '[simulation]\nbeta = 5e-6\nbeta_yr = 9e-6\nbias = 2.0\nmagnetic_offset = { value = 10, unit = "um", u = 1, '
+    )
     table += 'distribution = "normal", source = "test" }\n[simulation.kp]\nxl = 12345.0\n'
     r = rig("set", (*STAND, table))
     t = nominal(r)
@@ -119,7 +121,7 @@ def test_what_a_map_of_probes_sees_is_what_the_bearings_hold() -> None:
     [
         ((STAND[0], *STAND[2:]), "shaft.mass: found nothing"),
         (STAND[:4] + STAND[5:6], "probes: found none that see"),
-        (('[shaft]\nfar_end = "f"', STAND[1], bearing("a", -50, {"p": 0}), bearing("b", 50, {"q": 0}), *STAND[4:]), "hold 2 of the four"),
+        ((*STAND[:2], bearing("a", -50, {"p": 0}), bearing("b", 50, {"q": 0}), *STAND[4:]), "hold 2 of the four"),
         (('[shaft]\nfar_end = "f"\ntilt = ' + number(90, "deg"), *ONE_AXIS[1:]), "axes.y.coils: found one"),
         ((*STAND[:3], bearing("rechts", 100, {"xr": 90, "yl": 0}), *STAND[4:]), "the name of an axis of links too"),
         ((*STAND, "[simulation]\nbias = 0.2"), "with a bias of 0.2 A"),
@@ -182,8 +184,8 @@ def test_masses_hang_down_or_pull_over_a_pulley() -> None:
 
 
 def test_weights_are_fixed_on_the_planes_own_scale() -> None:
-    """The disc's scale begins 20 degrees on from the mark and runs clockwise, as the spindle's speed does: 30 degrees on it are 20
-    - 30 counter-clockwise of the mark, and 10 in the sense of the speed."""
+    """The disc's scale begins 20 degrees on from the mark and runs clockwise, as the spindle's speed does: 30 degrees on it
+    are 20 - 30 counter-clockwise of the mark, and 10 in the sense of the speed."""
     fitter, plant = at_work(SPINDLE_RIG)
     assert fitter.request(f"attach disc 1e-3 {math.radians(30)!r}").startswith("ok")
     s = plant._s  # type: ignore[attr-defined]
@@ -220,5 +222,12 @@ def test_weights_that_go_wrong(defects: dict[str, float], planes: list[int]) -> 
 def test_the_core_has_the_places_that_are_told() -> None:
     """Constants that stand in two languages."""
     header = (ROOT / "sim_backend/machines/twin/twin.h").read_text(encoding="utf-8")
-    for name in ("AT_CURRENT = 16", "AT_VOLTAGE = 48", "AT_PEAK = 80", "AT_ANGLE = 96", "AT_CONTACT_AXIAL = 112", "AT_END = 116"):
+    for name in (
+        "AT_CURRENT = 16",
+        "AT_VOLTAGE = 48",
+        "AT_PEAK = 80",
+        "AT_ANGLE = 96",
+        "AT_CONTACT_AXIAL = 112",
+        "AT_END = 116",
+    ):
         assert name in header

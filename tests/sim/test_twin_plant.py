@@ -43,7 +43,10 @@ def test_columns_are_the_rigs_channels() -> None:
     coils = [f"amp_{a}_{c}" for a in ("u1", "v1", "u2", "v2", "w") for c in "pn"]
     positions = ["pos_u1", "pos_v1", "pos_u2", "pos_v2", "pos_w"]
     marked = ["ang", "rate", "count", "edge", "pulse_age", "inject", "before", "after"]
-    status = [f"status.{n}" for n in ("contact.low", "contact.high", "contact.axial", "current_limit", "voltage_limit", "sensor_range")]
+    status = [
+        f"status.{n}"
+        for n in ("contact.low", "contact.high", "contact.axial", "current_limit", "voltage_limit", "sensor_range")
+    ]
     assert list(plant.channels) == [*positions, *coils, "volt_lower", "volt_upper", *marked, *status]
     assert list(plant.trace_channels) == [*positions, *coils, *marked]
     rows, readings = plant.run(100, 5)
@@ -81,7 +84,8 @@ def still(plant: TwinPlant) -> np.ndarray[Any, Any]:
 
 
 def test_a_set_point_moves_its_own_axis_alone() -> None:
-    """Bearings at -150 and 100 mm, probes at -120 and 130: what the probes read when the right bearing alone goes up by 20 um."""
+    """Bearings at -150 and 100 mm, probes at -120 and 130: what the probes read when the right bearing alone goes up by 20
+    um."""
     plant = levitated(nominal(STAND_RIG))
     before = still(plant)
     plant.set("ref.yr", 20e-6)
@@ -101,8 +105,8 @@ def test_a_set_point_moves_its_own_axis_alone() -> None:
     ],
 )
 def test_set_points_of_the_shaft(name: str, size: float, expected: dict[str, float]) -> None:
-    """y is along the first axis of the first bearing, here xl to the left, and z along its second, here yl upwards: a turn by psi
-    about the left takes the far end up, one by theta about up takes it to the right."""
+    """y is along the first axis of the first bearing, here xl to the left, and z along its second, here yl upwards: a turn
+    by psi about the left takes the far end up, one by theta about up takes it to the right."""
     plant = levitated(nominal(STAND_RIG))
     before = still(plant)
     plant.set(name, size)
@@ -193,14 +197,18 @@ def lost(t: Any) -> bool:
     return bool(levitated(t, 0.5).trips & 1)
 
 
-@pytest.mark.parametrize("defect", [{"probe_sign__yl": -1.0}, {"exchange_coils__yr": 1.0}, {"exchange_probes__xl__yl": 1.0}])
+@pytest.mark.parametrize(
+    "defect", [{"probe_sign__yl": -1.0}, {"exchange_coils__yr": 1.0}, {"exchange_probes__xl__yl": 1.0}]
+)
 def test_miswired_it_is_lost(defect: dict[str, float]) -> None:
     assert not lost(truth(STAND_RIG))
     assert lost(truth(STAND_RIG, **defect))
 
 
 def test_exchanged_where_it_is_told_alone() -> None:
-    right, wrong = (levitated(truth(STAND_RIG, **d)).run(100)[-1] for d in ({}, {"told_coils__yl": 1.0, "told_probes__xl__xr": 1.0}))
+    right, wrong = (
+        levitated(truth(STAND_RIG, **d)).run(100)[-1] for d in ({}, {"told_coils__yl": 1.0, "told_probes__xl__xr": 1.0})
+    )
     names = plant_of(truth(STAND_RIG)).channels
     a, b = (dict(zip(names, row.tolist(), strict=True)) for row in (right, wrong))
     assert (a["amp_yl_p"], a["amp_yl_n"]) == (b["amp_yl_n"], b["amp_yl_p"])

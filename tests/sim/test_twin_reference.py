@@ -1,4 +1,5 @@
-"""The twin's core against vectors in the rig file's own frame: every place, angle, sense and sign on the way into its tables."""
+"""The twin's core against vectors in the rig file's own frame: every place, angle, sense and sign on the way into its
+tables."""
 
 from __future__ import annotations
 
@@ -13,13 +14,19 @@ from sim_backend.machines.twin.plant import derivative, follow
 from sim_backend.machines.twin.reference import Rotor
 from sim_backend.machines.twin.reference import derivative as by_vectors
 
-RINGS = (f'[rings.l]\nclearance = {number(0.1, "mm")}\nat = {number(-140, "mm")}', f'[balancing.b]\nat = {number(0, "mm")}\nradius = {number(9, "mm")}')
+RINGS = (
+    f"[rings.l]\nclearance = {number(0.1, 'mm')}\nat = {number(-140, 'mm')}",
+    f"[balancing.b]\nat = {number(0, 'mm')}\nradius = {number(9, 'mm')}",
+)
 RIGS = {
     "spindle": rig("spindle", SPINDLE),
     "stand": rig("stand", (*STAND, *RINGS)),
     "threes": rig("threes", (*THREES, RINGS[1])),
     "shipped": shipped(),
-    "slanted": rig("slanted", ('[shaft]\nfar_end = "far"', f"mass = {number(2, 'kg')}\ntilt = {number(35, 'deg')}", *STAND[2:], *RINGS)),
+    "slanted": rig(
+        "slanted",
+        ('[shaft]\nfar_end = "far"', f"mass = {number(2, 'kg')}\ntilt = {number(35, 'deg')}", *STAND[2:], *RINGS),
+    ),
 }
 
 
@@ -67,8 +74,9 @@ def test_amplifiers_are_exact_under_and_at_the_voltage_limit() -> None:
 def test_a_bending_mode_rings_at_its_frequency() -> None:
     """By hand: q'' = -2 d w q' - w^2 q + f/m at a place whose shape is 1."""
     table = "[simulation]\nmode_1_on = 1\nmode_1 = 300.0\nmode_damping = 0.01"
-    r = rig("bent", ('[shaft]\nfar_end = "far"', f"mass = {number(2, 'kg')}", f'ends = [{number(-150, "mm")}, {number(100, "mm")}]',
-                     bearing("a", -150, {"x1": 90, "y1": 0}), bearing("b", 100, {"x2": 90, "y2": 0}), *STAND[4:], table))  # fmt: skip
+    ends = f"ends = [{number(-150, 'mm')}, {number(100, 'mm')}]"
+    bearings = bearing("a", -150, {"x1": 90, "y1": 0}), bearing("b", 100, {"x2": 90, "y2": 0})
+    r = rig("bent", (STAND[0], STAND[1], ends, *bearings, *STAND[4:], table))
     p = nominal(r).plant
     s, coil = np.zeros(20), np.zeros(32)
     s[12], s[16] = 1e-6, 1e-3

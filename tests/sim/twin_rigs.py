@@ -56,22 +56,32 @@ def bearing(name: str, at_mm: float, axes: Mapping[str, float], *, gap_mm: float
              f'voltage = "volt_{name}"']  # fmt: skip
     for axis, deg in axes.items():
         used = ", ".join(f'"amp_{axis}_{c}"' for c in "pn"[:coils])
-        lines.append(f'axes.{axis} = {{ direction = {number(deg, "deg", 0.3)}, coils = [{used}] }}')
+        lines.append(f"axes.{axis} = {{ direction = {number(deg, 'deg', 0.3)}, coils = [{used}] }}")
     return "\n".join(lines)
 
 
 def thrust(name: str = "thrust", axis: str = "w") -> str:
-    return f'[bearings.{name}]\nkind = "axial"\ngap = {number(0.6, "mm")}\naxes.{axis} = {{ coils = ["amp_{axis}_p", "amp_{axis}_n"] }}'
+    coils = f'axes.{axis} = {{ coils = ["amp_{axis}_p", "amp_{axis}_n"] }}'
+    return f'[bearings.{name}]\nkind = "axial"\ngap = {number(0.6, "mm")}\n{coils}'
 
 
 def probe(name: str, at_mm: float = 0.0, deg: float | None = None, sign: int = 1) -> str:
     lines = [f"[probes.{name}]", f'channel = "pos_{name}"', f"sign = {sign}"]
     if deg is not None:
-        lines += [f'at = {number(at_mm, "mm", 0.2)}', f'direction = {number(deg, "deg", 0.3)}']
+        lines += [f"at = {number(at_mm, 'mm', 0.2)}", f"direction = {number(deg, 'deg', 0.3)}"]
     return "\n".join(lines)
 
 
-def rig(name: str, parts: Iterable[str], *, tick: float = 1e-4, current: float = 6.0, speed: float = 2000.0, hung: float = 0.0, top: str = "") -> RigFile:
+def rig(
+    name: str,
+    parts: Iterable[str],
+    *,
+    tick: float = 1e-4,
+    current: float = 6.0,
+    speed: float = 2000.0,
+    hung: float = 0.0,
+    top: str = "",
+) -> RigFile:
     """`parts` are tables, `top` keys that stand before the first."""
     text = top + "\n".join([HEAD.format(name=name, tick=tick, current=current, speed=speed, hung=hung), *parts])
     data = tomllib.loads(text)
@@ -81,14 +91,17 @@ def rig(name: str, parts: Iterable[str], *, tick: float = 1e-4, current: float =
         units |= {c: "A" for a in b["axes"].values() for c in a["coils"]}
         units |= {b["voltage"]: "V"} if "voltage" in b else {}
     mark = data.get("mark", {})
-    units |= {mark[k]: u for k, u in (("angle", "rad"), ("speed", "rad/s"), ("pulses", "1"), ("edge", "s")) if k in mark}
+    units |= {
+        mark[k]: u for k, u in (("angle", "rad"), ("speed", "rad/s"), ("pulses", "1"), ("edge", "s")) if k in mark
+    }
     lines = [f'{c} = {{ signal = "T.{c}", unit = "{u}" }}' for c, u in units.items()]
     return RigFile.parse("\n".join([text, "[channels]", *lines]), "", f"{name}.toml")
 
 
 SPINDLE = (
     '[shaft]\nfar_end = "top"\nsense = -1',
-    f"mass = {number(4.0, 'kg', 0.02)}\npolar_inertia = {number(4e-3, 'kg m^2')}\ntransverse_inertia = {number(3e-2, 'kg m^2')}",
+    f"mass = {number(4.0, 'kg', 0.02)}\npolar_inertia = {number(4e-3, 'kg m^2')}",
+    f"transverse_inertia = {number(3e-2, 'kg m^2')}",
     f"tilt = {number(90, 'deg')}\ncentre_of_mass = {number(20, 'mm', 0.5)}",
     bearing("lower", -90, {"u1": 30, "v1": 120}), bearing("upper", 110, {"u2": 30, "v2": 120}), thrust(),
     probe("u1", -60, 30), probe("v1", -60, 120, -1), probe("u2", 80, 75), probe("v2", 80, 165), probe("w"),
@@ -121,7 +134,7 @@ HUNG = (
     f'[hooks.h]\nat = {number(0, "mm")}\n[hooks.side]\nat = {number(50, "mm")}\npull = {number(60, "deg")}',
     f'pulley = {{ friction = {number(0.02, "1")}, misalignment = {number(1.5, "deg")} }}',
 )  # fmt: skip
-TOP = f'mass_density = {number(8000, "kg/m^3")}\nhanger = {number(0.1, "kg")}\nhook_seat = {number(0, "mm")}\n'
+TOP = f"mass_density = {number(8000, 'kg/m^3')}\nhanger = {number(0.1, 'kg')}\nhook_seat = {number(0, 'mm')}\n"
 
 
 def shipped(**replaced: str) -> RigFile:
@@ -179,6 +192,12 @@ def nominal(rig: RigFile, **changes: float) -> Truth:
     silent = (0.0,) * 16
     still = (0.0,) * 64
     plant = dataclasses.replace(
-        t.plant, position_noise=silent, current_noise=0.0, runout_c=still, runout_s=still, position_lsb=0.0, current_lsb=0.0
+        t.plant,
+        position_noise=silent,
+        current_noise=0.0,
+        runout_c=still,
+        runout_s=still,
+        position_lsb=0.0,
+        current_lsb=0.0,
     )
     return dataclasses.replace(t, plant=plant)

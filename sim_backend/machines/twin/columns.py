@@ -22,8 +22,8 @@ TELLS_APART = 1e-6  # of the greatest singular value: what is less is a motion t
 
 @dataclass(frozen=True)
 class Free:
-    """What of the radial motion is free: `tilts`, and the projector yy, yz, zz on the directions in which the shaft moves. `basis`
-    (4, n) spans it, of y, z, psi, theta."""
+    """What of the radial motion is free: `tilts`, and the projector yy, yz, zz on the directions in which the shaft moves.
+    `basis` (4, n) spans it, of y, z, psi, theta."""
 
     tilts: bool
     radial: tuple[float, float, float]
@@ -129,8 +129,8 @@ class Columns:
         if self.nominal.tilts:
             if (held := rank(scaled)) == 4:
                 return Free(True, (1.0, 0.0, 1.0), np.eye(4))
-            raise ConfigError(f"rig {self.rig.name}: bearings: their axes hold {held} of the four radial motions; expected all four, or "
-                              f"axes in one plane alone, whose twin has no tilts")  # fmt: skip
+            found = f"rig {self.rig.name}: bearings: their axes hold {held} of the four radial motions"
+            raise ConfigError(f"{found}; expected all four, or axes in one plane alone, whose twin has no tilts")
         if rank(rows[:, :2]) == 2:
             return Free(False, (1.0, 0.0, 1.0), np.eye(4)[:, :2])
         c, d = rows[0, :2] / np.linalg.norm(rows[0, :2])

@@ -1,8 +1,8 @@
 """How the twin's controller begins: a PID for each axis by the rig file's nominal numbers, and where its probes look.
 
-The rule (docs/reference/twin.md): an axis k with the row a_k in q'' = M^-1 sum a_k F_k feels the mass m_k = (d/n)/(a_k M^-1 a_k'),
-of d free motions and n radial axes, so that the mean of the squared frequencies of decentralised feedback is w^2. With the
-slopes K_i = dF/di and K_x = dF/dx where the axis carries its share of the weight,
+The rule (docs/reference/twin.md): an axis k with the row a_k in q'' = M^-1 sum a_k F_k feels the mass m_k = (d/n)/(a_k M^-1
+a_k'), of d free motions and n radial axes, so that the mean of the squared frequencies of decentralised feedback is w^2.
+With the slopes K_i = dF/di and K_x = dF/dx where the axis carries its share of the weight,
     K_i kp = m_k w^2 + K_x,  K_i kd = 2 z m_k w,  K_i ki = m_k w^3 / 30,  w = 1/(4 T), z = 0.6,
 where T is the loop's delay: one and a half ticks, the amplifier and the derivative's low-pass. w is less where kp would ask for
 more than twice the bias at the touchdown ring, or else the lift is lost in the limits.
@@ -34,8 +34,8 @@ COORDINATES = ("x", "y", "z", "psi", "theta")
 
 @dataclass(frozen=True)
 class TwinControl:
-    """The law's parameters. Arrays are by axis, the axial one last; `map` is from probes to axes, `steer` from set points of the
-    shaft; `hold` is what of i_p^2 - i_n^2 carries the weight at the centre, A^2."""
+    """The law's parameters. Arrays are by axis, the axial one last; `map` is from probes to axes, `steer` from set points
+    of the shaft; `hold` is what of i_p^2 - i_n^2 carries the weight at the centre, A^2."""
 
     map: Many
     steer: Many
@@ -91,7 +91,10 @@ def control_of(n: Nominal) -> TwinControl:
         kp.append(n.set("kp", (m * w * w + point.per_metre) / point.per_current, axis.name))
         ki.append(n.set("ki", m * w**3 / SLOWER / point.per_current, axis.name))
         kd.append(n.set("kd", 2 * DAMPING * m * w / point.per_current, axis.name))
-    hold = [(p.bias + p.current) ** 2 if len(a.coils) == 1 else 4 * p.bias * p.current for a, p in zip(axes, points, strict=True)]
+    hold = [
+        (p.bias + p.current) ** 2 if len(a.coils) == 1 else 4 * p.bias * p.current
+        for a, p in zip(axes, points, strict=True)
+    ]
     return TwinControl(
         map=_map(n, columns), steer=_steer(n, columns), kp=tuple(kp), ki=tuple(ki), kd=tuple(kd),
         bias=tuple(p.bias for p in points), hold=tuple(hold), derivative_hz=low_pass,
@@ -129,8 +132,8 @@ def bias_of(n: Nominal, bearing: str) -> float:
 
 
 def working_point(n: Nominal, k: int, force: float) -> Point:
-    """Where an axis gives `force`, at its centre: F = beta ((b + i)^2/near^2 - (b - i)^2/far^2), solved for i as T (2.25) is; one
-    coil carries it with its bias.
+    """Where an axis gives `force`, at its centre: F = beta ((b + i)^2/near^2 - (b - i)^2/far^2), solved for i as T (2.25)
+    is; one coil carries it with its bias.
 
     Raises:
         ConfigError: it cannot.
@@ -141,29 +144,33 @@ def working_point(n: Nominal, k: int, force: float) -> Point:
     key = f"rig {n.rig.name}: bearings.{axis.bearing}.axes.{axis.name}"
     if len(axis.coils) == 1:
         if force <= 0.02 * n.mass * n.gravity:
-            raise ConfigError(f"{key}.coils: found one, against which {force:.3g} N of the weight pull; expected two coils, or a "
-                              f"weight that the coil can pull against")  # fmt: skip
+            found = f"{key}.coils: found one, against which {force:.3g} N of the weight pull"
+            raise ConfigError(f"{found}; expected two coils, or a weight that the coil can pull against")
         bias = near * math.sqrt(force / beta)
         if bias > 0.8 * n.current_limit:
-            raise ConfigError(f"{key}: carries {force:.3g} N with {bias:.3g} A; expected 0.8 of its current limit of "
-                              f"{n.current_limit:.3g} A at most: set simulation.beta or simulation.current_limit")  # fmt: skip
+            found = f"{key}: carries {force:.3g} N with {bias:.3g} A; expected 0.8 of its current limit of "
+            raise ConfigError(
+                f"{found}{n.current_limit:.3g} A at most: set simulation.beta or simulation.current_limit"
+            )
         return Point(bias, 0.0, 2 * beta * bias / near**2, 2 * beta * bias**2 / near**3)
     bias = bias_of(n, axis.bearing)
     most, least = 4 * beta * bias**2 / near**2, -4 * beta * bias**2 / far**2
     if bias <= 0 or not 0.9 * least < force < 0.9 * most:
-        raise ConfigError(f"{key}: carries {force:.3g} N of the weight and gives {least:.3g} to {most:.3g} N with a bias of {bias:.3g} A; "
-                          f"expected room of a tenth: set simulation.beta or simulation.bias")  # fmt: skip
+        found = f"{key}: carries {force:.3g} N of the weight and gives {least:.3g} to {most:.3g} N with a bias of {bias:.3g} A"
+        raise ConfigError(f"{found}; expected room of a tenth: set simulation.beta or simulation.bias")
     low, high = -bias, bias
     for _ in range(60):
         i = (low + high) / 2
         low, high = (i, high) if beta * (((bias + i) / near) ** 2 - ((bias - i) / far) ** 2) < force else (low, i)
     plus, minus = bias + i, bias - i
-    return Point(bias, i, 2 * beta * (plus / near**2 + minus / far**2), 2 * beta * (plus**2 / near**3 + minus**2 / far**3))
+    return Point(
+        bias, i, 2 * beta * (plus / near**2 + minus / far**2), 2 * beta * (plus**2 / near**3 + minus**2 / far**3)
+    )
 
 
 def located(columns: Columns) -> tuple[Array, Array, float]:
-    """From readings of the radial probes to the free motions (n, probes), the basis of those (4, n), and the worst part of a motion
-    of an axis that no probe sees."""
+    """From readings of the radial probes to the free motions (n, probes), the basis of those (4, n), and the worst part of
+    a motion of an axis that no probe sees."""
     basis = columns.free.basis
     seen = np.array([columns.probe(name)[:4] for name in columns.layout.looking]) @ basis
     rows = radial_rows(columns) @ basis
@@ -177,15 +184,16 @@ def _map(n: Nominal, columns: Columns) -> Many:
     layout, rig = n.layout, n.rig
     back, basis, unseen = located(columns)
     if unseen > 1e-3:
-        axis = layout.radial[0]
-        raise ConfigError(f"rig {rig.name}: probes: found none that see all that the radial bearings hold; expected as many planes and "
-                          f"directions as bearings.{axis.bearing} and the others have")  # fmt: skip
+        found = f"rig {rig.name}: probes: found none that see all that the radial bearings hold"
+        raise ConfigError(f"{found}; expected probes in as many planes and directions as their axes have")
     table = np.zeros((16, 16))
     signs = np.array([rig.probes[name].sign for name in layout.probes], float)
     table[: len(layout.looking), : len(layout.radial)] = (radial_rows(columns) @ basis @ back).T
     if layout.axial is not None:
         if not layout.along:
-            raise ConfigError(f"rig {rig.name}: probes: found none along the shaft; expected one for bearings.{layout.axial.bearing}")
+            raise ConfigError(
+                f"rig {rig.name}: probes: found none along the shaft; expected one for bearings.{layout.axial.bearing}"
+            )
         table[len(layout.looking) : len(layout.probes), len(layout.radial)] = 1 / len(layout.along)
     table[: len(layout.probes)] *= signs[:, None]
     return tuple(table.ravel().tolist())

@@ -147,7 +147,9 @@ def _lacking(rig: RigFile) -> Iterator[Problem]:
         return
     counts = {"radial axes": len(list(_axes(rig, "radial"))), "axial axes": len(list(_axes(rig, "axial"))),
               "probes": len(rig.probes), "rings": len(list(_rings(rig))), "balancing planes": len(rig.balancing)}  # fmt: skip
-    yield from (problem(what, str(n), f"at most {MOST[what]} in a twin") for what, n in counts.items() if n > MOST[what])
+    yield from (
+        problem(what, str(n), f"at most {MOST[what]} in a twin") for what, n in counts.items() if n > MOST[what]
+    )
     taken: dict[str, str] = {}
     for axis in (*_axes(rig, "radial"), *_axes(rig, "axial")):
         key = f"bearings.{axis.bearing}.axes.{axis.name}"

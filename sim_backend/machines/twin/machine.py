@@ -1,5 +1,5 @@
-"""The twin of a rig behind the simulated controller: what is drawn for it, its plant, its wiring, who works on it. Each rig file
-makes a machine of its own."""
+"""The twin of a rig behind the simulated controller: what is drawn for it, its plant, its wiring, who works on it. Each rig
+file makes a machine of its own."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ PLAIN = {
     "weight_heavy_by": 0.0, "hum": 0.0, "hum_hz": 50.0, "hum_probe": 0.0, "hanger_off_at_zero": 0.0, "contact_silent": 0.0,
     "drop_fraction": 0.0, "integrator_factor": 1.0, "dead_after_s": 0.0, "fault_after_s": 0.0, "drive_fault_after_s": 0.0,
 }  # fmt: skip
-"""Planted defects that any rig can have, and their harmless values: as those of `amb5dof`. `defects_of` has those of one rig."""
+"""Planted defects that any rig can have, and their harmless values: as those of `amb5dof`. `defects_of` has those of one
+rig."""
 
 
 @once_per_rig
@@ -43,7 +44,8 @@ def twin(rig: RigFile) -> Machine:
     """
     layout, nominal = layout_of(rig), Nominal(rig)
     return Machine(
-        name=TWIN, stated=stated, defects=defects_of(rig), params=partial(params, rig), quantities=partial(quantities, rig), targets={},
+        name=TWIN, stated=stated, defects=defects_of(rig), params=partial(params, rig), quantities=partial(quantities, rig),
+        targets={},
         make=make, radial=slice(0, len(layout.looking)), integral_gains=_integral_gains(rig), turns=False, channels=(),
         places=partial(places, rig), spoil=spoil, supply_V=nominal.set("supply_V", 48.0), windings={}, copper_W=copper_W,
         operator=operator, traced=partial(traced, rig),
@@ -51,14 +53,14 @@ def twin(rig: RigFile) -> Machine:
 
 
 def stated(rig: RigFile) -> dict[str, Toleranced]:
-    """Every toleranced number of a rig file by its identity, "/" written as ".", gains and offsets by channel, and what the twin
-    draws beside them."""
+    """Every toleranced number of a rig file by its identity, "/" written as ".", gains and offsets by channel, and what the
+    twin draws beside them."""
     return dict(drawn(rig))
 
 
 def defects_of(rig: RigFile) -> dict[str, float]:
-    """Planted defects of a rig by name, and their harmless values. `exchange_*` is how it is wired, `told_*` acts on what is told
-    alone; `factor_*` scales a parameter that the controller is told before it acts."""
+    """Planted defects of a rig by name, and their harmless values. `exchange_*` is how it is wired, `told_*` acts on what
+    is told alone; `factor_*` scales a parameter that the controller is told before it acts."""
     layout = layout_of(rig)
     out = dict(PLAIN)
     out |= {f"probe_sign.{name}": 1.0 for name in layout.probes}

@@ -18,13 +18,19 @@ from sim_backend.machines.twin.layout import Geometry, Layout, layout_of
 STEEL = 7850.0  # kg/m^3
 SLENDER = 0.2  # of the transverse inertia, a shaft and no disc
 SPREAD_M = 1e-3  # radial axes that are nearer to each other along the shaft cannot hold a tilt
-CAPACITY = 6.0  # times its share of the weight, or of what it is to accelerate by 1 g, that an axis pulls at its current limit
+CAPACITY = (
+    6.0  # times its share of the weight, or of what it is to accelerate by 1 g, that an axis pulls at its current limit
+)
 
 
 def set_in(rig: RigFile, key: str, where: str) -> Toleranced | float | None:
     """What `[simulation]` says of a key, for one axis, bearing, probe or plane first."""
     table: Any = rig.simulation.get(key)
-    for found in (table.get(where) if isinstance(table, Mapping) else None, rig.simulation.get(f"{key}_{where}"), table):
+    for found in (
+        table.get(where) if isinstance(table, Mapping) else None,
+        rig.simulation.get(f"{key}_{where}"),
+        table,
+    ):
         if isinstance(found, Toleranced | int | float):
             return found
     return None
@@ -117,8 +123,8 @@ class Nominal:
         return default if stated is None else stated.value if isinstance(stated, Toleranced) else float(stated)
 
     def beta(self, k: int) -> float:
-        """Of an axis: F = beta (ip^2/(gap - xi)^2 - in^2/(gap + xi)^2); as set, else so that the axis pulls CAPACITY times its share
-        of the weight at its gap and current limit."""
+        """Of an axis: F = beta (ip^2/(gap - xi)^2 - in^2/(gap + xi)^2); as set, else so that the axis pulls CAPACITY times
+        its share of the weight at its gap and current limit."""
         axis = self.layout.axes[k]
         most = max(self.shares[k] * self.gravity, abs(self.carried[k]))
         rule = CAPACITY * most * (self.gap(axis.bearing) / self.current_limit) ** 2
@@ -146,7 +152,9 @@ class Nominal:
         """Of each plane where the shaft can touch, m: as stated, else four tenths of the smallest radial gap."""
         smallest = min(self.gap(a.bearing) for a in self.layout.radial)
         return tuple(
-            self.geometry.number(self.rig.rings[r.ring].clearance, f"rings.{r.ring}.clearance") if r.ring else 0.4 * smallest
+            self.geometry.number(self.rig.rings[r.ring].clearance, f"rings.{r.ring}.clearance")
+            if r.ring
+            else 0.4 * smallest
             for r in self.layout.rings
         )
 

@@ -34,9 +34,9 @@ class Fitter:
             plant.weights(0, truth.defects["loose_weight"], 0.0)
 
     def request(self, line: str) -> str:
-        """One line: `hang M2`, `hang -`, `hang HOOK M2`, `attach PLANE KG RAD` (on the plane's scale), `detach PLANE`, `turn DEG` (the
-        mark so far on from where it is told, as the speed counts), `mount ring`, `mount -`, `ask TEXT`. Answers `ok SECONDS` (when
-        it is done), `yes` or `error TEXT`."""
+        """One line: `hang M2`, `hang -`, `hang HOOK M2`, `attach PLANE KG RAD` (on the plane's scale), `detach PLANE`,
+        `turn DEG` (the mark so far on from where it is told, as the speed counts), `mount ring`, `mount -`, `ask TEXT`.
+        Answers `ok SECONDS` (when it is done), `yes` or `error TEXT`."""
         hooks, planes = self._rig.hooks, list(self._rig.balancing)
         match line.split():
             case ["ask", *_]:
@@ -79,14 +79,18 @@ class Fitter:
             along, angle, across = 0.0, g.angle(f"hooks/{name}") + off, newtons * kept
         fy, fz = across * math.cos(angle), across * math.sin(angle)
         one, two = self._columns.shape(station)
-        self._plant.load((along, fy, fz, -station * fz, station * fy, one * fy, one * fz, two * fy, two * fz), HAND_OVER_S)
+        self._plant.load(
+            (along, fy, fz, -station * fz, station * fy, one * fy, one * fz, two * fy, two * fz), HAND_OVER_S
+        )
 
     def _pulley(self, hook: Hook, name: str) -> tuple[float, float]:
         """What share of the weight it hands on, and by how much it is off, rad."""
         if hook.pulley is None:
             return 1.0, 0.0
         key, g = f"hooks.{name}.pulley", self._geometry
-        return 1 - g.number(hook.pulley.friction, f"{key}.friction"), g.number(hook.pulley.misalignment, f"{key}.misalignment")
+        return 1 - g.number(hook.pulley.friction, f"{key}.friction"), g.number(
+            hook.pulley.misalignment, f"{key}.misalignment"
+        )
 
     def _attach(self, k: int, mass: float, angle: float) -> None:
         self._fixed += 1
@@ -111,7 +115,11 @@ class Fitter:
         for k, key in enumerate(("weight_mass", "weight_angle")):
             stated = getattr(plane, key)
             found = None if stated is None else self._geometry.places.number(stated, f"balancing.{name}.{key}")
-            draw = 0.0 if found is None else draw_one(found.number, self._truth.seed, f"weight:{k}:{self._fixed}", self._truth.visit)
+            draw = (
+                0.0
+                if found is None
+                else draw_one(found.number, self._truth.seed, f"weight:{k}:{self._fixed}", self._truth.visit)
+            )
             out.append(draw)
         return out[0], out[1]
 

@@ -20,8 +20,8 @@ AXES, PROBES, PLANES, RINGS = 16, 16, 4, 8
 
 @dataclass(frozen=True)
 class TwinParams:
-    """One machine. Axes: the radial ones, then the axial one; probes: those that look from the side, then those along the shaft;
-    `TwinControl` is how its controller begins, `Told` what it tells and by which names.
+    """One machine. Axes: the radial ones, then the axial one; probes: those that look from the side, then those along the
+    shaft; `TwinControl` is how its controller begins, `Told` what it tells and by which names.
 
     Left out: what the axial motion moves of the stations, motional emf, eddy currents, hysteresis, the amplifiers' ripple, the
     gyroscopic split of the bending modes, the mass of what hangs.
@@ -122,8 +122,8 @@ def params(rig: RigFile, v: Numbers, d: Numbers) -> TwinParams:
     columns = Columns(Geometry(rig, layout, v), n, v)
     free = columns.free
     parts: dict[str, object] = {
-        **_shaft(columns, v), **_bearings(columns, v, d), **_planes(columns, v), **_contact(columns, v), **_flexible(columns, v),
-        **_amplifiers(columns, v), **_probes(columns, v, d), **_mark(columns, v, d),
+        **_shaft(columns, v), **_bearings(columns, v, d), **_planes(columns, v), **_contact(columns, v),
+        **_flexible(columns, v), **_amplifiers(columns, v), **_probes(columns, v, d), **_mark(columns, v, d),
     }  # fmt: skip
     return TwinParams(
         control=control_of(n), names=told_of(rig, d), radial=len(layout.radial), axial=int(layout.axial is not None),
@@ -223,7 +223,10 @@ def _flexible(c: Columns, v: Numbers) -> dict[str, object]:
 
 def _amplifiers(c: Columns, v: Numbers) -> dict[str, object]:
     def sided(channels: Callable[[AxisPart], tuple[str, ...]], key: str, other: float) -> Many:
-        sides = [[v.get(f"{channels(a)[k]}.{key}", other) if k < len(channels(a)) else other for a in c.layout.axes] for k in (0, 1)]
+        sides = [
+            [v.get(f"{channels(a)[k]}.{key}", other) if k < len(channels(a)) else other for a in c.layout.axes]
+            for k in (0, 1)
+        ]
         return tuple(x for side in sides for x in padded(side, AXES, other))
 
     n = c.nominal
@@ -248,7 +251,9 @@ def _probes(c: Columns, v: Numbers, d: Numbers) -> dict[str, object]:
     waves = [[c.runout(name, order) for name in seen] for order in ORDERS]
     channels = [rig.probes[name].channel for name in layout.probes]
     lsb = c.nominal.set("position_lsb", 2 * v["position_range"] / 65536)
-    hummed = [d["hum"] * (d["hum_probe"] in (0, k + 1)) * (name in layout.looking) for k, name in enumerate(layout.probes)]
+    hummed = [
+        d["hum"] * (d["hum_probe"] in (0, k + 1)) * (name in layout.looking) for k, name in enumerate(layout.probes)
+    ]
     return {
         "probe": columnwise([row[:8] for row in rows], PROBES, 8), "probe_x": padded([row[8] for row in rows], PROBES),
         "position_gain": padded([v[f"{ch}.gain"] for ch in channels], PROBES, 1.0),

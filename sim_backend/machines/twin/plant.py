@@ -26,7 +26,8 @@ class TwinPlant(CorePlant):
 
     Attributes:
         axes: names of the bearings' axes, the axial one last: what `inject.axis` counts.
-        channels: columns of the rows of `run`: means over a telemetry period of positions, currents, voltages and injection; the
+        channels: columns of the rows of `run`: means over a telemetry period of positions, currents, voltages and
+        injection; the
             greatest |voltage| of each bearing; what the mark tells as of the period's last reading; `status.*`, 1 where it was
             so at any time of the period.
         trace_channels: columns of the readings of a tick.
@@ -43,8 +44,7 @@ class TwinPlant(CorePlant):
         self._p: Any = _ffi.new("twin_params *")
         self._c: Any = _ffi.new("twin_control *")
         self._s: Any = _ffi.new("twin_state *")
-        fill(self._p, core_fields(params))
-        self._p.substeps = max(1, substeps)
+        fill(self._p, {**core_fields(params), "substeps": max(1, substeps)})
         fill(self._c, vars(params.control))
         names = params.names
         self.axes, self.tick_s, self.period_ticks = names.axes, names.tick_s, params.period
@@ -56,8 +56,9 @@ class TwinPlant(CorePlant):
         _lib.twin_start(self._p, self._s, seed & (2**64 - 1))
 
     def set(self, name: str, value: float) -> None:
-        """Set a parameter of the law, SI: `ref.axis.AXIS`, `ref.shaft.x` (y, z, psi, theta), each without its second word too, `slew`, `slew_tilt`, `bias.BEARING`, `kp.AXIS`
-        (ki, kd), `inject.*`, `path.*`, `lift_time_s`, `current_limit`, `derivative_hz`.
+        """Set a parameter of the law, SI: `ref.axis.AXIS`, `ref.shaft.x` (y, z, psi, theta), each without its second word
+        too, `slew`, `slew_tilt`, `bias.BEARING`, `kp.AXIS` (ki, kd), `inject.*`, `path.*`, `lift_time_s`, `current_limit`,
+        `derivative_hz`.
 
         Raises:
             KeyError: the law has no such parameter.
@@ -97,7 +98,9 @@ class TwinPlant(CorePlant):
     def turn_s(self) -> float | None:
         """The longer one of the last two times between pulses: one may be doubled. None before there are three pulses."""
         t = self._s.tacho
-        return float(max(t.last - t.before, t.before - t.earlier)) if self.params.names.marked and t.pulses >= 3 else None
+        return (
+            float(max(t.last - t.before, t.before - t.earlier)) if self.params.names.marked and t.pulses >= 3 else None
+        )
 
     @property
     def phase(self) -> float:
@@ -105,8 +108,8 @@ class TwinPlant(CorePlant):
         return float(self._s.law.phase)
 
     def weights(self, plane: int, unbalance: float, angle: float) -> None:
-        """Mount a weight in addition to what is there: the plane's number; mass times radius, kg m; its angle from the shaft's mark
-        in the sense in which the shaft turns, rad."""
+        """Mount a weight in addition to what is there: the plane's number; mass times radius, kg m; its angle from the
+        shaft's mark in the sense in which the shaft turns, rad."""
         self._s.weight_c[plane] += unbalance * np.cos(angle)
         self._s.weight_s[plane] += unbalance * np.sin(angle)
 
@@ -116,7 +119,8 @@ class TwinPlant(CorePlant):
         self._s.loose = 0
 
     def load(self, wrench: tuple[float, ...], ramp_s: float) -> None:
-        """Let forces on x, y, z, moments psi, theta and four modal forces (N, N m) take the place of what acted, in `ramp_s`."""
+        """Let forces on x, y, z, moments psi, theta and four modal forces (N, N m) take the place of what acted, in
+        `ramp_s`."""
         ticks = max(1, round(ramp_s / self.tick_s))
         self._s.load_rate[0:9] = [(new - old) / ticks for new, old in zip(wrench, self._s.load, strict=True)]
         self._s.load_ticks = ticks
@@ -161,7 +165,9 @@ class TwinPlant(CorePlant):
         """A ring that stands in several planes is touched where it is in any."""
         if self._several is None:
             return rows
-        return np.array([rows[:, where].max(axis=1) for where in self._several]).T.reshape(len(rows), len(self.channels))
+        return np.array([rows[:, where].max(axis=1) for where in self._several]).T.reshape(
+            len(rows), len(self.channels)
+        )
 
     def twin(self) -> TwinPlant:
         """Another one in the same state, whose noise goes on as this one's does."""
@@ -220,8 +226,7 @@ def derivative(p: TwinParams, s: Array, coil: Array, load: Array, torque: float 
     """Right-hand side of the mechanics, (20,), for tests against the reference: of the state (20,), currents (32,), what hangs
     (9,) and `torque` N m on the shaft."""
     core, out = _ffi.new("twin_params *"), _ffi.new("double[20]")
-    fill(core, core_fields(p))
-    core.substeps = 2
+    fill(core, {**core_fields(p), "substeps": 2})
     _lib.twin_derivative(core, _vector(s), _vector(coil), _vector(load), torque, out)
     return np.array(list(out))
 

@@ -18,10 +18,10 @@ from sim_backend.machines.twin.rules import short
 
 
 def quantities(rig: RigFile, p: TwinParams, settings: Mapping[str, float]) -> dict[str, float]:
-    """By axis `beta` (N m^2/A^2), `K_i` (N/A) and `K_x` (N/m), the slopes of the force at the magnetic centre where both coils carry
-    the bias that the controller's `settings` say, and `offset` (m, from the magnetic centre to where the probes read zero); by
-    balancing plane `unbalance` (kg m) and `unbalance_phase` (rad from the shaft's mark, in the sense in which it turns);
-    `eccentricity` (m)."""
+    """By axis `beta` (N m^2/A^2), `K_i` (N/A) and `K_x` (N/m), the slopes of the force at the magnetic centre where both
+    coils carry the bias that the controller's `settings` say, and `offset` (m, from the magnetic centre to where the probes
+    read zero); by balancing plane `unbalance` (kg m) and `unbalance_phase` (rad from the shaft's mark, in the sense in
+    which it turns); `eccentricity` (m)."""
     out: dict[str, float] = {}
     layout, zero = layout_of(rig), offsets(p)
     for k, axis in enumerate(layout.axes):

@@ -1,5 +1,5 @@
-"""The twin's mechanics once more, for tests: vectors in the rig file's own frame, from the rig file's own places and directions.
-Nothing of it is shared with the core, nor with what makes the core's tables.
+"""The twin's mechanics once more, for tests: vectors in the rig file's own frame, from the rig file's own places and
+directions. Nothing of it is shared with the core, nor with what makes the core's tables.
 
 x towards the far end, y up, z a quarter turn on counter-clockwise seen from there. The shaft's centre line is at
 r + t x p e_x for a place p from the centre of mass, t the small rotation. With the spin momentum H = I_p w e along the tilted
@@ -80,8 +80,8 @@ class Motion:
 def motion(s: Array, sense: int) -> Motion:
     """Of the core's state: its frame is turned half about the vertical where the speed counts clockwise."""
     turn = np.array([sense, 1.0, sense])
-    return Motion(turn * s[:3], turn * np.array([0, s[3], s[4]]), turn * s[6:9], turn * np.array([0, s[9], s[10]]), sense * s[5],
-                  sense * s[11])  # fmt: skip
+    tilt, turning = (turn * np.array([0, s[k], s[k + 1]]) for k in (3, 9))
+    return Motion(turn * s[:3], tilt, turn * s[6:9], turning, sense * s[5], sense * s[11])
 
 
 def attraction(beta: float, gap: float, xi: float, pair: tuple[float, float]) -> float:
@@ -131,13 +131,14 @@ def touching(rotor: Rotor, m: Motion) -> Iterator[tuple[float, Array, float]]:
 
 
 def derivative(rotor: Rotor, s: Array, coil: Array, torque: float = 0.0) -> Array:
-    """Of the core's state, (12,): positions x y z psi theta and angle, and their rates; a rigid shaft with rings that have places.
-    `torque` N m along the speed, drag in the bearings apart."""
+    """Of the core's state, (12,): positions x y z psi theta and angle, and their rates; a rigid shaft with rings that have
+    places. `torque` N m along the speed, drag in the bearings apart."""
     rig, v, m = rotor.rig, rotor.v, motion(s, rotor.sense)
     shaft = rig.shaft
     assert shaft is not None
     mass, polar, inertia = (
-        rotor.number(getattr(shaft, key), f"shaft.{key}", v.get(key, 0.0)) for key in ("mass", "polar_inertia", "transverse_inertia")
+        rotor.number(getattr(shaft, key), f"shaft.{key}", v.get(key, 0.0))
+        for key in ("mass", "polar_inertia", "transverse_inertia")
     )
     met = list(touching(rotor, m))
     rate = (rotor.sense * torque - v["viscous"] * m.spin + sum(t for *_, t in met)) / polar

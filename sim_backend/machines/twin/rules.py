@@ -26,7 +26,18 @@ ORDERS = (1, 2, 3, 4)
 
 def rectangular(value: float, unit: str, half_width: float = 0.0) -> Toleranced:
     """A number by rule."""
-    return Toleranced(value=value, unit=unit, half_width=abs(half_width), distribution="rectangular", source=BY_RULE)
+    return _toleranced(value, unit, half_width, BY_RULE)
+
+
+def _toleranced(value: float, unit: str, half_width: float, source: str) -> Toleranced:
+    stated = {
+        "value": value,
+        "unit": unit,
+        "half_width": abs(half_width),
+        "distribution": "rectangular",
+        "source": source,
+    }
+    return Toleranced.model_validate(stated)
 
 
 def _beta(n: Nominal, k: int) -> Toleranced:
@@ -106,8 +117,8 @@ ONCE: Mapping[str, Rule] = {
     "position_range": _of(lambda n: 2.5 * max(n.clearances), "m"),
     "supply_V": _of(lambda n: 48.0, "V"),
 }
-"""Each is a key of `[simulation]` too. Toleranced by rule, drawn by the key's name, for axes, planes and journals with a dot and
-theirs."""
+"""Each is a key of `[simulation]` too. Toleranced by rule, drawn by the key's name, for axes, planes and journals with a
+dot and theirs."""
 
 
 @once_per_rig
@@ -170,4 +181,4 @@ def _stated(n: Nominal, key: str, where: str, rule: Toleranced) -> Toleranced:
         return found
     if found is None:
         return rule
-    return Toleranced(value=found, unit=rule.unit, half_width=0.0, distribution="rectangular", source="[simulation]")
+    return _toleranced(found, rule.unit, 0.0, "[simulation]")

@@ -17,8 +17,8 @@ Column = tuple[str, int]
 
 @dataclass(frozen=True)
 class Told:
-    """Names of axes and bearings in the core's order; columns of a telemetry period's rows and of a tick's readings, each with its
-    place in the core; `clear` says whether the rig has a mark."""
+    """Names of axes and bearings in the core's order; columns of a telemetry period's rows and of a tick's readings, each
+    with its place in the core; `clear` says whether the rig has a mark."""
 
     axes: tuple[str, ...]
     bearings: tuple[str, ...]
@@ -79,7 +79,8 @@ def _mark(rig: RigFile) -> Iterator[Column]:
 
 
 def _status(rig: RigFile) -> Iterator[Column]:
-    """One column for each plane where the shaft can touch: a ring without a place has several, which `TwinPlant` puts together."""
+    """One column for each plane where the shaft can touch: a ring without a place has several, which `TwinPlant` puts
+    together."""
     layout = layout_of(rig)
     yield from ((f"status.contact.{r.ring}", CONTACT + k) for k, r in enumerate(layout.rings) if r.ring)
     if layout.axial is not None:
