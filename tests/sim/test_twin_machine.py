@@ -145,15 +145,14 @@ def test_true_quantities() -> None:
 
 
 def test_offsets_are_where_the_probes_read_zero() -> None:
-    """By the plant itself: levitated at readings of zero, the true shaft is so far from the magnetic centres."""
-    t = truth(STAND_RIG, 2)
+    """By the plant itself: held where the probes read zero, the true shaft is so far from the magnetic centres."""
+    t = nominal(STAND_RIG, magnetic_offset__yl=3e-5, pos_yl__offset=1e-5, pos_xr__gain=1.02, pos_xr__offset=-4e-6)
     plant = levitated(t, 3.0)
-    plant.run(1000)
     s = plant.state()["s"][1:5]
     rows = np.array(t.plant.axis).reshape(8, 16)[:4].T[:4]
     found = rows @ s + np.array(t.plant.offset[:4])
-    runout = np.abs(np.array(t.plant.runout_c)).sum() / 4
-    assert found == pytest.approx([t.quantities[f"offset@{a}"] for a in t.plant.names.axes], abs=2e-6 + 4 * runout)
+    assert found == pytest.approx([t.quantities[f"offset@{a}"] for a in t.plant.names.axes], abs=2e-8)
+    assert t.quantities["offset@yl"] == pytest.approx(3e-5 - 1e-5 * 280 / 250)
 
 
 HOOKED: RigFile = rig("hooked", (*STAND, *HUNG), hung=2.0, top=TOP)

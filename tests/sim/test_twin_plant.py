@@ -230,14 +230,31 @@ def test_pulses_missing_doubled_and_ended() -> None:
 
 
 def test_runout_is_seen_by_every_probe_of_a_journal_in_turn() -> None:
-    """Order 2 of 1.5 um alone: what u2 reads, v2 a quarter turn on reads with 180 degrees more."""
-    table = {f"runout_{n}__u2": 0.0 for n in (1, 3, 4)} | {"runout_2__u2": 1.5e-6}
-    t = truth(SPINDLE_RIG, **table)
-    u2, v2 = (np.array([t.plant.runout_c[16 + k], t.plant.runout_s[16 + k]]) for k in (2, 3))
-    assert np.hypot(*u2) == pytest.approx(1.5e-6)
-    between = (t.values["probes.v2.direction"] - t.values["probes.u2.direction"]) * 2
-    turned = np.array([[math.cos(between), -math.sin(between)], [math.sin(between), math.cos(between)]])
-    assert np.hypot(*(u2 - v2)) == pytest.approx(np.hypot(*(u2 - turned @ u2)))
+    """Orders 1 and 2 alone. The speed counts clockwise, so that a spot of the journal comes from v2 at 165 degrees to u2 at
+    75: what v2 reads, u2 reads a quarter turn later."""
+    t = truth(SPINDLE_RIG, runout_3__u2=0.0, runout_4__u2=0.0)
+    turn = np.linspace(0, 2 * math.pi, 73)
+
+    def reads(k: int, angle: np.ndarray[Any, Any]) -> Any:
+        c, s = (np.array(x).reshape(4, 16)[:, k] for x in (t.plant.runout_c, t.plant.runout_s))
+        return sum(c[n - 1] * np.cos(n * angle) + s[n - 1] * np.sin(n * angle) for n in (1, 2))
+
+    later = t.values["probes.v2.direction"] - t.values["probes.u2.direction"]
+    assert later == pytest.approx(math.pi / 2, abs=0.02)
+    assert reads(2, turn + later) == pytest.approx(reads(3, turn), abs=1e-12)
+
+
+def test_a_lift_begins_with_the_current_that_carries_the_weight() -> None:
+    t = nominal(STAND_RIG)
+    plant, p = plant_of(t), t.plant
+    plant.run(3000)
+    plant.mode = core.READY
+    plant.run(100)
+    plant.mode = core.LIFT
+    row = plant.run(50, 1)[1][-1]
+    bias = plant.get("bias.rechts")
+    i = 0.6 * 8.0 * 9.81175 * p.gap[3] ** 2 / (4 * p.beta[3] * bias)
+    assert row[plant.trace_channels.index("amp_yr_p")] - bias == pytest.approx(i, rel=0.1)
 
 
 def test_hum_is_no_motion() -> None:
