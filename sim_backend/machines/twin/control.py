@@ -4,7 +4,8 @@ The rule (docs/reference/twin.md): an axis k with the row a_k in q'' = M^-1 sum 
 a_k'), of d free motions and n radial axes, so that the mean of the squared frequencies of decentralised feedback is w^2.
 With the slopes K_i = dF/di and K_x = dF/dx where the axis carries its share of the weight,
     K_i kp = m_k w^2 + K_x,  K_i kd = 2 z m_k w,  K_i ki = m_k w^3 / 30,  w = 1/(4 T), z = 0.6,
-where T is the loop's delay: one and a half ticks, the amplifier and the derivative's low-pass. w is less where kp would ask for
+where T is the loop's delay: one and a half ticks, the amplifier, the derivative's low-pass and a notch filter at each bending
+mode. w is less where kp would ask for
 more than twice the bias at the touchdown ring, or else the lift is lost in the limits.
 """
 
@@ -47,6 +48,7 @@ class TwinControl:
     derivative_hz: float
     lift_time_s: float
     current_limit: float
+    notch: Many = (0.0,) * 6
     slew: float = 1e-3
     slew_tilt: float = 1e-2
     path_on: float = 0.0
@@ -83,7 +85,9 @@ def control_of(n: Nominal) -> TwinControl:
     masses, axes = _masses(n, columns), n.layout.axes
     points = [working_point(n, k, force) for k, force in enumerate(n.carried)]
     low_pass = n.set("derivative_hz", min(0.2 / n.tick_s, 2000.0))
-    delay = 1.5 * n.tick_s + (1 / n.amplifier_hz + 1 / low_pass) / (2 * math.pi)
+    notches = [(n.set(f"mode_{k}", 1.0), n.set("notch_q", 1.0)) for k in (1, 2) if n.set(f"mode_{k}_on", 0.0)]
+    slow = 1 / n.amplifier_hz + 1 / low_pass + sum(1 / (hz * q) for hz, q in notches)
+    delay = 1.5 * n.tick_s + slow / (2 * math.pi)
     most = n.set("bandwidth", ROOM / delay / (2 * math.pi)) * 2 * math.pi
     kp, ki, kd = [], [], []
     for axis, m, point in zip(axes, masses, points, strict=True):
@@ -99,7 +103,18 @@ def control_of(n: Nominal) -> TwinControl:
         map=_map(n, columns), steer=_steer(n, columns), kp=tuple(kp), ki=tuple(ki), kd=tuple(kd),
         bias=tuple(p.bias for p in points), hold=tuple(hold), derivative_hz=low_pass,
         lift_time_s=n.set("lift_time", 1.0), current_limit=n.current_limit,
+        notch=tuple(x for hz, q in notches for x in notch(hz, q, n.tick_s)),
     )  # fmt: skip
+
+
+def notch(hz: float, q: float, tick_s: float) -> Many:
+    """b0 = b2, b1 = a1 and a2 of (s^2 + w^2)/(s^2 + s w/Q + w^2) by the bilinear transform, prewarped at w; none above half the
+    tick's rate, of which the controller sees nothing."""
+    if hz * tick_s >= 0.5:
+        return 0.0, 0.0, 0.0
+    g = math.tan(math.pi * hz * tick_s)
+    a = 1 / (1 + g / q + g * g)
+    return (1 + g * g) * a, 2 * (g * g - 1) * a, (1 - g / q + g * g) * a
 
 
 def _limited(w: float, m: float, point: Point, away: float) -> float:

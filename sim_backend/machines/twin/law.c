@@ -1,5 +1,5 @@
 /* The controller's law, a pure function of the readings, its own state and its parameters, called every tick: a PID for each
- * axis on the displacement at that axis, which the probes' readings give by a fixed map. */
+ * axis on the displacement at that axis, which the probes' readings give by a fixed map, less what notch filters take of it. */
 #include <math.h>
 #include <string.h>
 #include "twin.h"
@@ -12,6 +12,25 @@ static void locate(const twin_params *p, int blocks, const twin_control *c, cons
         v4 sum = {0};
         for (int k = 0; k < p->probes; k++) sum += *(const v4 *)(c->map + 16 * k + 4 * b) * position[k];
         *(v4 *)(at + 4 * b) = sum;
+    }
+}
+
+/* (s^2 + w^2)/(s^2 + s w/Q + w^2), transposed direct form II; a fresh one starts settled */
+static void notched(const twin_control *c, twin_law_state *l, int axes, double *at) {
+    for (int m = 0; m < 2; m++) {
+        const double *f = c->notch + 3 * m;
+        if (f[0] == 0) continue;
+        for (int k = 0; k < axes; k++) {
+            double *past = l->past + 32 * m + 2 * k, in = at[k];
+            if (l->fresh) {
+                past[1] = (f[0] - f[2]) * in;
+                past[0] = (1 - f[0]) * in;
+            }
+            double out = f[0] * in + past[0];
+            past[0] = f[1] * in - f[1] * out + past[1];
+            past[1] = f[0] * in - f[2] * out;
+            at[k] = out;
+        }
     }
 }
 
@@ -64,6 +83,7 @@ void twin_law(const twin_params *p, const twin_derived *d, const twin_control *c
     memset(out, 0, sizeof *out);
     if (l->mode < LIFT && !l->fresh) return;
     locate(p, d->law_blocks, c, position, at);
+    notched(c, l, d->axes, at);
     if (l->fresh) start(p, c, l, at);
     for (int k = 0; k < 4 * d->law_blocks; k++) {
         l->filtered[k] = keep * l->filtered[k] + gain * (at[k] - l->previous[k]);

@@ -43,7 +43,7 @@ typedef struct {
     /* from probes to axes, probe by probe; axes' displacements by the shaft's set points x y z psi theta */
     double map[256], steer[80];
     double kp[16], ki[16], kd[16], bias[16], hold[16]; /* hold: i_p^2 - i_n^2 that carries the weight at the centre, A^2 */
-    double derivative_hz, lift_time_s, current_limit;
+    double derivative_hz, lift_time_s, current_limit, notch[6]; /* b0 = b2, b1 = a1 and a2 of each notch filter; b0 0: none */
     double ref_axis[16], ref[5], slew, slew_tilt;
     double path_on, path_y, path_z, path_hz, path_phase, path_ramp_s, path_ratio;
     double inject_axis, inject_amplitude, inject_hz, inject_lines, inject_step;
@@ -56,7 +56,7 @@ typedef struct {
 } twin_tones;
 
 typedef struct {
-    double rest[16], set_axis[16], set[5], share, phase, lift_clock, filtered[16], previous[16], sum[16];
+    double rest[16], set_axis[16], set[5], share, phase, lift_clock, filtered[16], previous[16], sum[16], past[64];
     twin_tones tones;
     int32_t mode, fresh;
 } twin_law_state;
