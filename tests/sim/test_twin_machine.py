@@ -75,7 +75,7 @@ def test_what_is_left_open_follows_the_rules() -> None:
     assert stated["transverse_inertia"].value == pytest.approx(8.0 * (3 * radius**2 + length**2) / 12)
     assert stated["polar_inertia"].value == pytest.approx(8.0 * radius**2 / 2)
     assert stated["unbalance.links"].value == pytest.approx(0.75 * 8.0 * 2.5e-3 / 2000 / 2)
-    assert stated["position_range"].value == pytest.approx(2.5 * 0.4 * 0.4e-3)
+    assert stated["position_range"].value == pytest.approx(2.5 * 0.4 * 0.4e-3)  # no axial bearing
     assert stated["current_noise"].value == pytest.approx(5.4 / 1500)
 
 
@@ -218,6 +218,11 @@ def test_weights_that_go_wrong(defects: dict[str, float], planes: list[int]) -> 
         assert math.hypot(s.weight_c[0], s.weight_s[0]) == pytest.approx(1.5e-3 * 0.03)
 
 
+def test_temperatures_are_those_that_the_rig_has() -> None:
+    assert machine_of(shipped()).windings == {"temp_i": 0.0, "temp_o": 0.0, "temp_x": 0.0}
+    assert twin(STAND_RIG).windings == {}
+
+
 def test_the_core_has_the_places_that_are_told() -> None:
     """Constants that stand in two languages."""
     header = (ROOT / "sim_backend/machines/twin/twin.h").read_text(encoding="utf-8")
@@ -227,6 +232,6 @@ def test_the_core_has_the_places_that_are_told() -> None:
         "AT_PEAK = 80",
         "AT_ANGLE = 96",
         "AT_CONTACT_AXIAL = 112",
-        "AT_END = 116",
+        "AT_NOTHING = 116",
     ):
         assert name in header

@@ -230,6 +230,12 @@ def test_pulses_missing_doubled_and_ended() -> None:
     assert counted(pulse_last=3.0) == 0
 
 
+def test_contact_is_told_or_kept_silent() -> None:
+    for defects, told in (({}, 1.0), ({"contact_silent": 1.0}, 0.0)):
+        plant = plant_of(truth(SPINDLE_RIG, **defects))
+        assert column(plant, plant.run(3000), "status.contact.axial")[-1] == told
+
+
 def test_runout_is_seen_by_every_probe_of_a_journal_in_turn() -> None:
     """Orders 1 and 2 alone. The speed counts clockwise, so that a spot of the journal comes from v2 at 165 degrees to u2 at
     75: what v2 reads, u2 reads a quarter turn later."""

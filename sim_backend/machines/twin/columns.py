@@ -12,7 +12,7 @@ import numpy.typing as npt
 from bench.errors import ConfigError
 from bench.rigfile import RigFile
 from sim_backend.machines.twin.layout import AxisPart, Geometry, Layout, Numbers
-from sim_backend.machines.twin.nominal import Nominal
+from sim_backend.machines.twin.nominal import Nominal, stop_of
 
 Array = npt.NDArray[np.float64]
 Two = tuple[float, float]
@@ -86,11 +86,8 @@ class Columns:
 
     @property
     def stop(self) -> float:
-        """How far the shaft may move along itself, m: the axial ring's clearance, else four tenths of the axial gap."""
-        for name, ring in self.rig.rings.items():
-            if ring.kind == "axial":
-                return self.geometry.number(ring.clearance, f"rings.{name}.clearance")
-        return self.nominal.set("stop", 0.4 * self.gap(self.layout.axial) if self.layout.axial is not None else 1.0)
+        """How far the shaft may move along itself, m."""
+        return stop_of(self.nominal, self.geometry)
 
     def noise(self, channel: str) -> float:
         """Of a probe's reading in one tick, m rms: as set, else 0.3 um, and so much that the means of a telemetry period have

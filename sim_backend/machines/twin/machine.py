@@ -10,6 +10,7 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 
+from bench import units
 from bench.rigfile import RigFile
 from bench.rigfile.supports import once_per_rig
 from bench.rigfile.toleranced import Toleranced
@@ -25,6 +26,7 @@ from sim_backend.machines.twin.told import told_of
 
 Array = npt.NDArray[np.float64]
 TWIN = "twin"
+DAILY = frozenset(("site.air_density", "start_angle"))
 PLAIN = {
     "pulse_missing": 0.0, "pulse_doubled": 0.0, "pulse_last": 0.0, "loose_speed": 0.0, "loose_shift": 0.0, "loose_weight": 0.0,
     "weight_lost": 0.0, "weight_astray": 0.0, "weight_turned": 0.0, "weight_turned_rad": 0.0, "weight_heavy": 0.0,
@@ -47,8 +49,9 @@ def twin(rig: RigFile) -> Machine:
         name=TWIN, stated=stated, defects=defects_of(rig), params=partial(params, rig), quantities=partial(quantities, rig),
         targets={},
         make=make, radial=slice(0, len(layout.looking)), integral_gains=_integral_gains(rig), turns=False, channels=(),
-        places=partial(places, rig), spoil=spoil, supply_V=nominal.set("supply_V", 48.0), windings={}, copper_W=copper_W,
-        operator=operator, traced=partial(traced, rig),
+        places=partial(places, rig), spoil=spoil, supply_V=nominal.set("supply_V", 48.0), windings=windings_of(rig),
+        copper_W=copper_W,
+        operator=operator, traced=partial(traced, rig), daily=DAILY,
     )  # fmt: skip
 
 
@@ -76,6 +79,14 @@ def _integral_gains(rig: RigFile) -> frozenset[str]:
     gains = rig.capabilities.gains
     bound = gains.ki if gains is not None else ""
     return frozenset(own | (set(bound.values()) if isinstance(bound, Mapping) else {bound} - {""}))
+
+
+def windings_of(rig: RigFile) -> dict[str, float]:
+    """Temperatures that channels tell or registers of a thermal monitor, all the same."""
+    told = [name for name, c in rig.channels.items() if units.UNITS[c.unit].si == "K"]
+    devices = [d for d in rig.devices.values() if "thermal" in d.roles]
+    read = [name for d in devices for name, r in d.registers.items() if units.UNITS[r.unit].si == "K"]
+    return {name: 0.0 for name in (*told, *read) if name != "ambient"}
 
 
 def make(p: TwinParams, seed: int, substeps: int) -> TwinPlant:

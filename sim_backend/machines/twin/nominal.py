@@ -159,6 +159,12 @@ class Nominal:
         )
 
     @cached_property
+    def reach(self) -> float:
+        """The largest way that the shaft has, across or along itself, m."""
+        along = () if self.layout.axial is None else (stop_of(self, self.geometry),)
+        return max(*self.clearances, *along, 0.0)
+
+    @cached_property
     def tilts(self) -> bool:
         """Whether the radial axes pull in more than one plane, and tilts are free."""
         at = [self.geometry.station(f"bearings/{a.bearing}") for a in self.layout.radial]
@@ -184,6 +190,17 @@ class Nominal:
         up = np.array([weight * math.cos(self.tilt), 0.0, 0.0, 0.0])[:n]
         held = np.linalg.lstsq(np.array(rows).T, up, rcond=None)[0].tolist()
         return (*held, *((weight * math.sin(self.tilt),) if self.layout.axial is not None else ()))
+
+
+def stop_of(n: Nominal, geometry: Geometry) -> float:
+    """How far the shaft may move along itself, m: the axial ring's clearance, else four tenths of the axial gap; 1 m
+    without an axial bearing, which then holds it."""
+    if n.layout.axial is None:
+        return 1.0
+    for name, ring in n.rig.rings.items():
+        if ring.kind == "axial":
+            return geometry.number(ring.clearance, f"rings.{name}.clearance")
+    return n.set("stop", 0.4 * n.gap(n.layout.axial.bearing))
 
 
 def transverse(n: Nominal) -> float:

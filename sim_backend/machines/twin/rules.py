@@ -114,7 +114,7 @@ ONCE: Mapping[str, Rule] = {
     "mode_2": _of(lambda n: n.set("mode_2", 1.0), "Hz"),
     "mode_damping": _constant(2e-3, "1", 0.5),
     "current_noise": _of(lambda n: n.current_limit / 1500, "A"),
-    "position_range": _of(lambda n: 2.5 * max(n.clearances), "m"),
+    "position_range": _of(lambda n: 2.5 * n.reach, "m"),
     "supply_V": _of(lambda n: 48.0, "V"),
 }
 """Each is a key of `[simulation]` too. Toleranced by rule, drawn by the key's name, for axes, planes and journals with a

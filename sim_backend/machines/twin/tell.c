@@ -43,7 +43,7 @@ void twin_report(const twin_params *p, const twin_derived *d, twin_state *st, do
     all[AT_INJECT] = st->inject / p->period;
     all[AT_BEFORE] = st->before / p->period;
     all[AT_AFTER] = st->after / p->period;
-    for (int k = 0; k < AT_END - AT_CONTACT; k++) all[AT_CONTACT + k] = st->flags >> k & 1;
+    for (int k = 0; k < AT_NOTHING - AT_CONTACT; k++) all[AT_CONTACT + k] = st->flags >> k & 1;
     for (int k = 0; k < p->told; k++) row[k] = all[p->tell[k]];
     memset(st->sums, 0, sizeof st->sums);
     memset(st->peak, 0, sizeof st->peak);

@@ -11,6 +11,7 @@ from sim_backend.machines.twin.nominal import Nominal
 
 POSITION, PLUS, MINUS, VOLTS_PLUS, VOLTS_MINUS, PEAK = 0, 16, 32, 48, 64, 80
 ANGLE, SPEED, PULSES, EDGE, AGE, INJECT, BEFORE, AFTER, CONTACT, AXIAL_CONTACT = (*range(96, 105), 112)
+NOTHING = 116  # always 0
 LIMITS = {"status.current_limit": 113, "status.voltage_limit": 114, "status.sensor_range": 115}
 Column = tuple[str, int]
 
@@ -36,7 +37,7 @@ def told_of(rig: RigFile, defects: Numbers) -> Told:
     told = [*_positions(rig, defects), *_coils(rig, defects), *_voltages(rig)]
     angle = list(_mark(rig))
     inner = [("inject", INJECT), ("before", BEFORE), ("after", AFTER)]
-    rows = [*told, *_peaks(rig), *angle, *inner, *_status(rig)]
+    rows = [*told, *_peaks(rig), *angle, *inner, *_status(rig, bool(defects.get("contact_silent")))]
     return Told(
         axes=tuple(a.name for a in layout.axes), bearings=tuple(rig.bearings),
         of_bearing=tuple(a.bearing for a in layout.axes), rows=tuple(rows), ticks=(*told, *angle, *inner),
@@ -78,11 +79,11 @@ def _mark(rig: RigFile) -> Iterator[Column]:
     yield "pulse_age", AGE
 
 
-def _status(rig: RigFile) -> Iterator[Column]:
+def _status(rig: RigFile, silent: bool) -> Iterator[Column]:
     """One column for each plane where the shaft can touch: a ring without a place has several, which `TwinPlant` puts
     together."""
     layout = layout_of(rig)
-    yield from ((f"status.contact.{r.ring}", CONTACT + k) for k, r in enumerate(layout.rings) if r.ring)
-    if layout.axial is not None:
-        yield "status.contact.axial", AXIAL_CONTACT
+    touched = [(f"status.contact.{r.ring}", CONTACT + k) for k, r in enumerate(layout.rings) if r.ring]
+    touched += [("status.contact.axial", AXIAL_CONTACT)] if layout.axial is not None else []
+    yield from ((name, NOTHING if silent else place) for name, place in touched)
     yield from LIMITS.items()
