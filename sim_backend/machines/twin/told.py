@@ -1,0 +1,89 @@
+"""What the twin tells and by which names: the rig's channels, and places in the core's tables (`AT_...` in twin.h)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from bench.rigfile import RigFile
+from sim_backend.machines.twin.layout import Numbers, layout_of
+from sim_backend.machines.twin.nominal import Nominal
+
+POSITION, PLUS, MINUS, VOLTS_PLUS, VOLTS_MINUS, PEAK = 0, 16, 32, 48, 64, 80
+ANGLE, SPEED, PULSES, EDGE, AGE, INJECT, BEFORE, AFTER, CONTACT, AXIAL_CONTACT = (*range(96, 105), 112)
+NOTHING = 116  # always 0
+LIMITS = {"status.current_limit": 113, "status.voltage_limit": 114, "status.sensor_range": 115}
+Column = tuple[str, int]
+
+
+@dataclass(frozen=True)
+class Told:
+    """Names of axes and bearings in the core's order; columns of a telemetry period's rows and of a tick's readings, each
+    with its place in the core; `clear` says whether the rig has a mark."""
+
+    axes: tuple[str, ...]
+    bearings: tuple[str, ...]
+    of_bearing: tuple[str, ...]
+    rows: tuple[Column, ...]
+    ticks: tuple[Column, ...]
+    marked: bool
+    radial_columns: int
+    tick_s: float
+
+
+def told_of(rig: RigFile, defects: Numbers) -> Told:
+    """Of a rig; planted defects exchange what is told, and nothing else, of two coils or two probes."""
+    layout = layout_of(rig)
+    told = [*_positions(rig, defects), *_coils(rig, defects), *_voltages(rig)]
+    angle = list(_mark(rig))
+    inner = [("inject", INJECT), ("before", BEFORE), ("after", AFTER)]
+    rows = [*told, *_peaks(rig), *angle, *inner, *_status(rig, bool(defects.get("contact_silent")))]
+    return Told(
+        axes=tuple(a.name for a in layout.axes), bearings=tuple(rig.bearings),
+        of_bearing=tuple(a.bearing for a in layout.axes), rows=tuple(rows), ticks=(*told, *angle, *inner),
+        marked=rig.mark is not None, radial_columns=len(layout.looking), tick_s=Nominal(rig).tick_s,
+    )  # fmt: skip
+
+
+def _positions(rig: RigFile, defects: Numbers) -> Iterator[Column]:
+    probes = list(layout_of(rig).probes)
+    at = list(range(len(probes)))
+    for k, one in enumerate(probes):
+        for j, other in enumerate(probes[k + 1 :], k + 1):
+            if defects.get(f"told_probes.{one}.{other}"):
+                at[k], at[j] = at[j], at[k]
+    yield from ((rig.probes[name].channel, POSITION + k) for name, k in zip(probes, at, strict=True))
+
+
+def _coils(rig: RigFile, defects: Numbers) -> Iterator[Column]:
+    for k, axis in enumerate(layout_of(rig).axes):
+        places = (MINUS, PLUS) if defects.get(f"told_coils.{axis.name}") and len(axis.coils) == 2 else (PLUS, MINUS)
+        yield from ((channel, place + k) for channel, place in zip(axis.coils, places, strict=False))
+
+
+def _voltages(rig: RigFile) -> Iterator[Column]:
+    for k, axis in enumerate(layout_of(rig).axes):
+        yield from ((name, place + k) for name, place in zip(axis.voltages, (VOLTS_PLUS, VOLTS_MINUS), strict=False))
+
+
+def _peaks(rig: RigFile) -> Iterator[Column]:
+    yield from ((b.voltage, PEAK + k) for k, b in enumerate(rig.bearings.values()) if b.voltage)
+
+
+def _mark(rig: RigFile) -> Iterator[Column]:
+    if rig.mark is None:
+        return
+    for name, place in (("angle", ANGLE), ("speed", SPEED), ("pulses", PULSES), ("edge", EDGE)):
+        if channel := getattr(rig.mark, name):
+            yield channel, place
+    yield "pulse_age", AGE
+
+
+def _status(rig: RigFile, silent: bool) -> Iterator[Column]:
+    """One column for each plane where the shaft can touch: a ring without a place has several, which `TwinPlant` puts
+    together."""
+    layout = layout_of(rig)
+    touched = [(f"status.contact.{r.ring}", CONTACT + k) for k, r in enumerate(layout.rings) if r.ring]
+    touched += [("status.contact.axial", AXIAL_CONTACT)] if layout.axial is not None else []
+    yield from ((name, NOTHING if silent else place) for name, place in touched)
+    yield from LIMITS.items()
