@@ -13,7 +13,7 @@ from bench.rigfile import RigFile
 from sim_backend.machines.twin import linear
 from sim_backend.machines.twin.control import bias_of
 from sim_backend.machines.twin.layout import layout_of
-from sim_backend.machines.twin.nominal import Nominal
+from sim_backend.machines.twin.nominal import nominal_of
 from sim_backend.machines.twin.params import TwinParams
 from sim_backend.machines.twin.rules import short
 
@@ -57,7 +57,7 @@ def _loop(rig: RigFile, p: TwinParams, settings: Mapping[str, float], zero: tupl
 def _bias(rig: RigFile, bearing: str, settings: Mapping[str, float]) -> float:
     """A: what the parameter says that the capabilities bind, else what the controller begins with."""
     parameter = rig.capabilities.bias.get(bearing, "")
-    return settings[parameter] if parameter in settings else bias_of(Nominal(rig), bearing)
+    return settings[parameter] if parameter in settings else bias_of(nominal_of(rig), bearing)
 
 
 def offsets(p: TwinParams) -> tuple[float, ...]:
