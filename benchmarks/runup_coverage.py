@@ -24,7 +24,7 @@ from bench.findings import Effect, Finding
 from bench.rigfile import load_rig
 from bench.uncertainty import interval
 from bench.units import RPM
-from procedures.amb_rotor.conventions import AMB_ROTOR
+from procedures.amb_rotor.conventions import conventions
 from sim_backend.machines.amb5dof import truth_passage, truth_unbalance
 from sim_backend.truth import draw
 
@@ -35,6 +35,7 @@ NARROW: dict[str, Any] = {
     "speeds_rad_s": (2500 / RPM, 5000 / RPM),
 }  # where the rigid modes are
 Hits = dict[str, list[tuple[bool, float, float]]]
+AMB_ROTOR = conventions(load_rig("amb5dof"))
 
 
 def one(name: str, seed: int, plan: dict[str, Any], folder: Path, hits: Hits) -> None:

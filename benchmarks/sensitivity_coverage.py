@@ -24,7 +24,7 @@ from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.uncertainty import coverage_factor, interval
 from bench.units import RPM
-from procedures.amb_rotor.conventions import AMB_ROTOR
+from procedures.amb_rotor.conventions import conventions
 from procedures.sensitivity import estimates
 from procedures.sensitivity.injection import Comb, parameters_of
 from procedures.sensitivity.plan import Plan
@@ -41,6 +41,7 @@ PLAN: dict[str, Any] = {"modes_hz": (), "refined_periods": 4, "start_s": 0.3}
 Row = tuple[float, float, float, float]
 """Error, half width, standard uncertainty and true value."""
 Found = Iterator[tuple[str, str, float, float, float]]  # axis, quantity, value, half width, standard uncertainty
+AMB_ROTOR = conventions(load_rig("amb5dof"))
 
 
 def light(p: AmbParams, settings: Mapping[str, float], plan: Plan, seed: int) -> Found:

@@ -12,7 +12,7 @@ from bench.link.session import Session
 from bench.link.telemetry import TelemetryDecoder
 from bench.procedure.roles import RigState
 from bench.recording.recorder import Recorder
-from bench.rigfile import RigFile
+from bench.rigfile import RigFile, roles
 from bench.rigfile.binding import UNKNOWN
 from bench.rigfile.envelope import Envelope
 from drivers import advice, handshake, unheard, waiting
@@ -106,7 +106,7 @@ class Controller:
         handshake.claim(self.requests, self.rig, self._session, self.clock, self._wait)
         self._own()
         self.serial = handshake.identify(self.requests, self.rig, self._session, self._wait)
-        self.watch.simulated = self.serial == 0
+        self.watch.simulated |= self.serial == 0
         if self.mode == "FAULT":
             advice.may_clear("controller", self.fault, clear_fault)
             self.cleared = self.fault
@@ -150,7 +150,7 @@ class Controller:
             FrozenError, ReadingsStand, StateContradicts, AnotherHost: as `Watch.check` says.
         """
         self.watch.polled()
-        batch = self.watch.hosts.marked(self.link.receive())
+        batch = self.watch.taken(self.link.receive())
         if self._recorder is not None:
             self._recorder.frames(self.link.name, batch, lag_ns=self.telemetry.host.lag_ns)
         self.requests.take(batch)
@@ -268,13 +268,16 @@ class Controller:
         return self._orders.get(parameter)
 
     def reading(self, channel: str) -> float:
-        """The newest sample of a channel, SI.
+        """The newest sample of a channel or role, SI.
 
         Raises:
             BenchError: the telemetry has no such channel.
         """
+        latest = self.telemetry.latest
         try:
-            return self.telemetry.latest[channel]
+            if "." not in channel:
+                return latest[channel]
+            return roles.read_now(self.rig, channel, latest)
         except KeyError:
             raise BenchError(f"the telemetry has no channel {channel}") from None
 

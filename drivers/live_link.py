@@ -91,6 +91,11 @@ class LiveLink:
         return total
 
     @property
+    def simulated(self) -> bool:
+        """Whether the transport says by itself that a simulation is at its other end."""
+        return self._wire.simulated
+
+    @property
     def reopening(self) -> bool:
         """As bench.link.Link says."""
         return self._down

@@ -12,6 +12,7 @@ from bench.link.frames import ERROR, FrameBatch
 from bench.link.telemetry import TelemetryDecoder
 from bench.rigfile import RigFile
 from bench.rigfile.binding import UNKNOWN, UNSEEN
+from bench.rigfile.turned import turned
 from bench.samples import SampleBlock
 from drivers.waiting import SILENCE_S
 
@@ -31,6 +32,7 @@ class Sight:
     ) -> None:
         self._telemetry, self._mode_told, self._now_ns = telemetry, mode, now_ns
         self._binding, self._states = rig.binding, rig.choices("state")
+        self._turned = turned(rig)
         messages = rig.messages.messages
         replies = REPLY in messages and any(s.name == "state" for s in messages[REPLY].signals)
         self._reply = Decoder(messages[REPLY]) if replies else None
@@ -108,9 +110,12 @@ class Sight:
         return self._answered_ns
 
     def speeds_rad_s(self) -> Mapping[str, float]:
-        """Speeds by source, each without its sign, of the sources that change."""
+        """Speeds by source, each without its sign, of the sources that change. A shaft that nothing turns rests as long as
+        the telemetry goes on: without this nobody could say that it is slow, and it would never be landed."""
         if not self.alive:
             return {}
+        if not self._turned:
+            return {"nothing turns it": 0.0}
         latest, out = self._telemetry.latest, dict[str, float]()
         if "speed" in latest:
             out["speed"] = abs(latest["speed"])

@@ -23,7 +23,7 @@ from bench.clock import WallClock
 from bench.errors import BenchError, ConfigError, LinkError
 from bench.link.frames import EXTENDED, REMOTE, FrameBatch, empty_batch
 from bench.link.slcanstream import SlcanStream, encode
-from bench.wire import slcan
+from bench.wire import sign, slcan
 from drivers.byteport import BytePort
 from drivers.canframes import messages_of
 
@@ -72,6 +72,7 @@ class SlcanBatchBus(can.BusABC):
         self._ask: Callable[[bytes], None] = self._write
         self._waiting: deque[can.Message] = deque()
         self.octets = 0  # that came since it was set up, without what the adapter itself answers
+        self.simulated = False  # whether the adapter says that it is that of a served simulation
         self._came = 0  # frames while it was set up
         self._filter: Callable[[FrameBatch], Any] | None = None
         self.stream = SlcanStream(timestamp=timestamp, remotes=True)
@@ -112,6 +113,7 @@ class SlcanBatchBus(can.BusABC):
         self.stream.replies.clear()
         self._write(self._setup + slcan.VERSION)
         self._await(lambda s: bool(s.replies))
+        self.simulated = sign.SLCAN_VERSION in self.stream.replies
         refuse_noise(channel, self.stream, self._came)  # a byte of it may look like a refusal
         if self.stream.refused:
             lines = ", ".join(line.decode() for line in self._setup.split())

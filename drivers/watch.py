@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from bench.errors import ClockWrong, ReadingsStand
+import numpy as np
+
+from bench.errors import ClockWrong, ReadingsStand, StateContradicts
 from bench.link import Link, clockrate
+from bench.link.frames import FrameBatch, payload
 from bench.link.health import CHECK
 from bench.link.stillness import STILL_S, StuckChannels
 from bench.link.telemetry import TelemetryDecoder
 from bench.rigfile import RigFile
 from bench.samples import SampleBlock
+from bench.wire import sign
 from drivers import unheard, waiting
 from drivers.condition import Condition
 from drivers.hosts import HostFrames
@@ -28,7 +32,8 @@ class Watch:
         host_age_s: the greatest age of a heartbeat while the machine was on.
         stuck: channels whose readings stood.
         patience_s: how long a controller may say nothing.
-        simulated: whether the controller says that it is: its clock is that of a computer, which may run evenly slow.
+        simulated: whether the controller says that it is, by its serial number or the sign of a served one: its clock is that
+            of a computer, which may run evenly slow.
     """
 
     def __init__(
@@ -46,12 +51,19 @@ class Watch:
         self.stuck = StuckChannels(rig)
         self.patience_s = waiting.patience_s(rig)
         self.host_age_s = 0.0
-        self.simulated = False
+        self.simulated = self._simulated = False
         self._last_ns = self._polled_ns = now_ns()
         self._heard = unheard.Heard.of(link)  # what had come when telemetry came last
 
+    def taken(self, batch: FrameBatch) -> FrameBatch:
+        """What the link brought, with the frames of hosts marked as sent."""
+        for k in np.flatnonzero(batch["id"] == sign.IDENTIFIER):
+            self.simulated = self.simulated or sign.simulated(int(batch["id"][k]), payload(batch[k]))
+        return self.hosts.marked(batch)
+
     def begin(self) -> None:
-        """The controller is ours from now on."""
+        """The controller is ours from now on, and what it is is known."""
+        self._simulated = self.simulated
         self.hosts.forget()
         self._last_ns = self._now_ns()
 
@@ -85,7 +97,8 @@ class Watch:
             LinkError: no telemetry for half a second (`drivers.waiting.patience_s`); BytesUnreadable where bytes come.
             AnotherHost: `HostFrames.check`.
             ClockWrong: the clock of a real controller is off by a per cent or more; a simulated one's is told in the end.
-            DeviceFault, FrozenError, StateContradicts: `Condition.check`.
+            StateContradicts: a simulation says only now that it is one; and as `Condition.check` says.
+            DeviceFault, FrozenError: `Condition.check`.
             ReadingsStand: readings had noise, and all have stood for a second.
         """
         patience_s = self.patience_s + (self._rig.link.reconnect_s if self._link.reopening else 0.0)
@@ -93,6 +106,10 @@ class Watch:
             text = f"no telemetry for {self.silent_s:.2f} s; the link or the controller is lost"
             raise unheard.error(self._link, self._heard, self.silent_s, text)
         self.hosts.check()
+        if self.simulated and not self._simulated:
+            raise StateContradicts(
+                "the controller says that it is a simulated one, and did not when the run began: nobody knows what was measured"
+            )
         self.condition.check()
         if not self.simulated and (ppm := self._telemetry.host.rate.certain_ppm) is not None:
             raise ClockWrong(f"{clockrate.described(ppm)}. {CHECK}")

@@ -28,6 +28,11 @@ class Wire(Protocol):
         """Counts since it was opened."""
         ...
 
+    @property
+    def simulated(self) -> bool:
+        """Whether the transport itself says that a simulation is at its other end."""
+        ...
+
     def read(self, timeout_s: float) -> FrameBatch:
         """Frames that came, after waiting no longer than that; empty without.
 
@@ -73,6 +78,8 @@ def read_packets(data: bytes, stream: PacketStream, now_ns: int, stats: LinkStat
 
 class PacketWire:
     """Messages in COBS packets on a byte stream."""
+
+    simulated = False  # a byte stream says nothing by itself
 
     def __init__(self, port: BytePort, now_ns: Callable[[], int]) -> None:
         self._port, self._now_ns = port, now_ns
@@ -124,6 +131,11 @@ class CanWire:
     def stats(self) -> LinkStats:
         """As Wire says."""
         return self._can.stats
+
+    @property
+    def simulated(self) -> bool:
+        """As Wire says: SLCAN adapters tell."""
+        return self._can.slcan is not None and self._can.slcan.simulated
 
     def read(self, timeout_s: float) -> FrameBatch:
         """As Wire says."""

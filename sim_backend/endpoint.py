@@ -12,14 +12,14 @@ from bench.link.codec import encode
 from bench.link.fault_injection import CUTS, Fault, divided
 from bench.link.frame_faults import FrameFaults, lost
 from bench.link.frames import ERROR, FD, SENT, FrameBatch, batch_of, by_time, empty_batch, joined, packed
+from bench.link.payloads import put
 from bench.rigfile import RigFile
 from bench.rigfile.messages import load_messages
 from sim_backend.controller.controller import SimulatedController
 from sim_backend.machine import Truth
 
 EPOCH_NS = 1_767_225_600 * 10**9  # 2026-01-01T00:00:00Z
-TICK_NS = 100_000
-HEARTBEAT_NS = 20_000_000
+HEARTBEAT_S = 0.02  # where the DBC states no period
 LEASE_NS = 1_000_000_000
 
 
@@ -50,10 +50,10 @@ class SimulatedRig:
 
     def sleep(self, seconds: float) -> None:
         """Advance the machine. Frames queued on the link are applied at their due tick."""
-        ticks = round(seconds * 1e9 / TICK_NS)
+        ticks = round(seconds * 1e9 / self.device.tick_ns)
         if ticks:
             self.link.exchange(self.device, ticks, self._now)
-            self._now += ticks * TICK_NS
+            self._now += ticks * self.device.tick_ns
 
     def request(self, line: str) -> str:
         """The operator's line: `hang M2`, `hang -`, `ask TEXT`."""
@@ -65,9 +65,12 @@ class InProcessLink:
 
     def __init__(self, rig: RigFile, clock: SimulatedRig, session: int, faults: Sequence[Fault] = ()) -> None:
         self._clock = clock
-        self._heartbeat = load_messages(rig.dbc_text)["Heartbeat"]
-        self._beat = encode(self._heartbeat, {"session": session})
-        self._counter_at = self._heartbeat.signal("counter").start // 8  # 16 bits, little endian
+        self._heartbeat = message = load_messages(rig.dbc_text)[rig.binding.heartbeat]
+        owned = {"session": session} if any(s.name == "session" for s in message.signals) else {}
+        self._beat = np.frombuffer(encode(message, owned), np.uint8)[None]
+        self._count_at = message.signal(rig.binding.heartbeat_counter)
+        self._period_ns = round((message.period_s or HEARTBEAT_S) * 1e9)
+        self._flags = SENT | (FD if message.fd else 0)
         self._queued: list[FrameBatch] = []
         self._arrived: list[FrameBatch] = []
         self._lease_until = 0
@@ -135,7 +138,7 @@ class InProcessLink:
 
     def exchange(self, device: SimulatedController, ticks: int, now_ns: int) -> None:
         """One slice: queued frames and heartbeats to the device, what it sends back."""
-        end = now_ns + ticks * TICK_NS
+        end = now_ns + ticks * device.tick_ns
         beats = self._beats(now_ns, end)
         self._counts.heartbeats += len(beats)
         self._counts.sent += len(beats)
@@ -154,9 +157,11 @@ class InProcessLink:
         beats = []
         while self._next_beat < end_ns:
             if begin_ns <= self._next_beat <= self._lease_until and not self._dead:
-                self._counter = (self._counter + 1) & 0xFFFF
-                payload = bytearray(self._beat)
-                payload[self._counter_at : self._counter_at + 2] = self._counter.to_bytes(2, "little")
-                beats.append(packed(self._heartbeat.identifier, bytes(payload), t_ns=self._next_beat, flags=FD | SENT))
-            self._next_beat += HEARTBEAT_NS
+                self._counter += 1
+                payload = self._beat.copy()
+                put(payload, self._count_at, np.array([self._counter], np.uint64))
+                beats.append(
+                    packed(self._heartbeat.identifier, payload.tobytes(), t_ns=self._next_beat, flags=self._flags)
+                )
+            self._next_beat += self._period_ns
         return batch_of(beats)

@@ -24,6 +24,10 @@ class SimulatedPlant(Protocol):
     mode: int  # OFF, READY, LIFT, LEVITATE or LAND
 
     @property
+    def tick_s(self) -> float: ...  # from control tick to control tick
+    @property
+    def period_ticks(self) -> int: ...  # ticks of a telemetry period
+    @property
     def tick(self) -> int: ...
     @property
     def moved(self) -> bool: ...  # the lift or landing has run its course
@@ -80,6 +84,8 @@ class Machine:
         copper_W: what the windings dissipate at the present.
         operator: who works on it.
         traced: the channels of a tick's readings, for captures; none where the plant gives no such readings.
+        columns: of a machine whose rows are channels of the rig file, their names there; `channels` and `places` say nothing
+            then.
     """
 
     name: str
@@ -101,6 +107,7 @@ class Machine:
     operator: Callable[[RigFile, Any, Truth], OperatorLine]
     traced: Callable[[Numbers], tuple[str, ...]] = lambda _: ()
     daily: frozenset[str] = frozenset()
+    columns: Callable[[RigFile], tuple[str, ...]] | None = None
 
 
 @dataclass(frozen=True)

@@ -1,34 +1,58 @@
-"""What a rig's DBC must call by the simulated machine's own names, so that the machine can be simulated over it."""
+"""What of a rig file and its DBC no simulated machine can speak, so that `bench check` and a run say it before the start."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 
 from bench.errors import ConfigError, Problem
 from bench.rigfile import RigFile
 from bench.rigfile.messages import MessageMap, load_messages
+from sim_backend.controller.meanings import FAULTS
+from sim_backend.core import PERIOD_TICKS, TICK_S
 from sim_backend.machine import Machine
-
-TELEMETRY = "Telemetry"
-MESSAGES = (TELEMETRY, "Heartbeat", "Command", "CommandReply", "ParamSet", "ParamGet", "ParamReply")
-CONTROLLER = ("state", "fault", "flags", "host_age", "supply")
+from sim_backend.spoken import own_words, tellable, told_as
 
 
 def unspoken(rig: RigFile, machine: Machine) -> Iterator[Problem]:
-    """Messages and signals of telemetry that the DBC lacks by the names that the simulated controller uses."""
+    """Channels that the machine has no reading for, a tick or period that is not its own, faults that nobody knows. A binding
+    that leads nowhere is told by `bench.rigfile.check`."""
     try:
         messages = load_messages(rig.dbc_text)
     except ConfigError:  # told by whoever reads the rig file
         return
-    expected = (
-        f"those names, which the simulated {machine.name} speaks; a machine with its own runs with --backend live"
-    )
-    if lacking := [name for name in MESSAGES if name not in messages.messages]:
-        yield Problem(rig.link.dbc, "BO_", f"no message {', '.join(lacking)}", expected)
-    elif lacking := _signals(messages, machine):
-        yield Problem(rig.link.dbc, f"BO_ {TELEMETRY}", f"no signal {', '.join(lacking)}", expected)
+    if own_words(messages, machine, rig.binding):
+        return
+    known = tellable(rig, machine)
+    lacking = [name for name in rig.channels if told_as(rig, name, known) is None]
+    free = ", ".join(sorted(known - {told_as(rig, n, known) for n in rig.channels}))
+    for name in lacking:
+        expected = f'`{name} = "READING"` under [simulation.readings], with one of {free}; or a run with --backend live'
+        yield Problem(rig.path, f"channels.{name}", f"what the simulated {machine.name} has no reading for", expected)
+    if machine.columns is None:
+        yield from _of_time(rig, messages, machine)
+    yield from _of_faults(rig)
 
 
-def _signals(messages: MessageMap, machine: Machine) -> list[str]:
-    there = {s.name for s in messages[TELEMETRY].signals}
-    return [name for name in (*machine.channels, *machine.windings, *CONTROLLER) if name not in there]
+def _of_time(rig: RigFile, messages: MessageMap, machine: Machine) -> Iterator[Problem]:
+    tick_s, first = rig.devices["controller"].tick_s, messages.messages.get(rig.binding.telemetry[0])
+    if abs(tick_s - TICK_S) > 1e-9:
+        yield Problem(rig.path, "devices.controller.tick_s", f"{tick_s:g} s", f"{TICK_S:g} s, that of {machine.name}")
+    if first is not None and abs(first.period_s - PERIOD_TICKS * TICK_S) > 1e-9:
+        expected = f"{PERIOD_TICKS * TICK_S:g} s, that of {machine.name}"
+        yield Problem(rig.link.dbc, f'BA_ "GenMsgCycleTime" of {first.name}', f"{first.period_s:g} s", expected)
+
+
+def _of_faults(rig: RigFile) -> Iterator[Problem]:
+    stated = rig.simulation.get("faults", {})
+    names = set[str]()
+    with suppress(KeyError):  # told by bench.rigfile.check
+        names = set(rig.choices("fault").values())
+    for fault, name in stated.items() if isinstance(stated, dict) else ():
+        if fault not in FAULTS:
+            yield Problem(
+                rig.path, f"simulation.faults.{fault}", "no fault of the simulation", f"one of {', '.join(FAULTS)}"
+            )
+        elif name not in names:
+            expected = f"a name of the value table of the channel fault: {', '.join(sorted(names)) or 'it has none'}"
+            yield Problem(rig.path, f"simulation.faults.{fault}", repr(name), expected)

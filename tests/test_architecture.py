@@ -22,6 +22,7 @@ from bench.cli.run import execute
 from bench.link.frames import SENT
 from bench.procedure import Measured
 from bench.recording import Recording
+from bench.rigfile.roles import STATUS
 from procedures.shared.step_table import reduced
 from reports import resultrows
 
@@ -128,8 +129,8 @@ def test_the_fit_is_made_of_means_of_steps(walked: Walked) -> None:
     inboard_upper = walked.result.data.hangings.currents[0, 0]
     for turn, (_, steps) in enumerate(walked.recording.steps("hang").by("angle_rad")):
         for point, step in enumerate(steps):
-            samples = step.read(CHANNEL, "flags")
-            mean = reduced(samples, (CHANNEL, "flags"), step.labels)["mean"][CHANNEL]
+            samples = step.read(CHANNEL, STATUS)
+            mean = reduced(samples, (CHANNEL,), step.labels)["mean"][CHANNEL]
             assert mean == pytest.approx(inboard_upper[turn, point], rel=1e-14)
 
 

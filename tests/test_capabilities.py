@@ -9,7 +9,7 @@ from test_machine_tables import RIGS
 from test_rigfile import changed, of_schema_1
 
 from bench.rigfile import RigFile
-from bench.rigfile.capabilities import parameters_named
+from bench.rigfile.capabilities import is_bound, parameters_named
 from bench.rigfile.check_capabilities import problems_of
 
 SCHEMA_1 = {name: of_schema_1(toml) for name, (toml, _) in RIGS.items()}
@@ -57,6 +57,17 @@ def test_the_shipped_rigs_bind_what_they_can(name: str) -> None:
 def test_what_leads_nowhere_is_told_with_its_place(old: str, new: str, key: str, expected: str) -> None:
     toml, dbc = RIGS["amb5dof"]
     assert said(changed(toml, (old, new)), dbc) == [f"rig.toml: capabilities.{key}; expected {expected}"]
+
+
+def test_what_is_bound_is_told_by_key() -> None:
+    stand, motor = (RigFile.parse(*RIGS[name]).capabilities for name in ("amb5dof", "tsbs12"))
+    for key in ("set_points", "set_points.slew", "injection", "injection.lines", "path", "settings.law", "model.rate"):
+        assert is_bound(stand, key)
+    for key in ("angle", "motor.share", "bias", "gains.kp", "set_points.axes"):
+        assert is_bound(motor, key)
+    assert not any(
+        is_bound(motor, key) for key in ("injection", "injection.lines", "settings.law", "model.rate", "path")
+    )
 
 
 def test_every_problem_is_told_at_once() -> None:

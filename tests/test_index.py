@@ -10,9 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from bench.cli.runs import runs_command
 from bench.errors import ConfigError
+from bench.findings import SIMULATED_CONTROLLER, Finding
 from bench.record.outcomes import Outcome
-from bench.record.records import unfinished, write_record
+from bench.record.records import findings_of, read_record, unfinished, write_record
 from bench.run import index
 
 
@@ -36,6 +38,17 @@ def test_add_and_bring_up_to_date(tmp_path: Path) -> None:
     index.add(run(tmp_path, 2, Outcome.PASS))
     assert outcomes(tmp_path) == ["FAIL", "PASS"]
     assert index.entries(tmp_path)[0].run_id == "amb-calibration-20260101T000001Z-3f2a"
+
+
+def test_a_live_run_on_a_simulation_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for second, found in ((1, ()), (2, (Finding(SIMULATED_CONTROLLER, "it says so", "controller"),))):
+        path = run(tmp_path, second)
+        record = dataclasses.replace(read_record(path / "record.json"), findings=findings_of(found))
+        write_record(path / "record.json", record)
+        index.add(path)
+    assert [bool(e.served) for e in index.entries(tmp_path)] == [False, True]
+    runs_command(tmp_path)
+    assert ["served simulation" in line for line in capsys.readouterr().out.splitlines()] == [False, True]
 
 
 def test_missing_or_corrupt_is_rebuilt(tmp_path: Path) -> None:

@@ -60,7 +60,7 @@ def _ability(rig: RigFile, procedure: Procedure) -> Ability:
         problems += error.problems or (Problem("specs", f"limits.{procedure.name}", str(error), "limits"),)
     if plan is None or lacking:
         return Ability(procedure.name, lacking, problems=tuple(problems))
-    unfit = (*procedure.check(rig, plan), *Envelope(rig).problems_of(dict(procedure.settings(plan))))
+    unfit = (*procedure.check(rig, plan), *Envelope(rig).problems_of(dict(procedure.settings(rig, plan))))
     return Ability(procedure.name, unfit=unfit, problems=tuple(problems))
 
 

@@ -71,7 +71,7 @@ def planned(request: Request) -> tuple[Procedure, RigFile, BenchPlan]:
         raise ConfigError("\n  ".join([f"{rig.name} cannot run {procedure.name}; nothing was started:", *lacking]))
     defaults = (f"{rig.path} [plans.{procedure.name}]", rig.plans.get(procedure.name, {}))
     plan = plans.assemble(procedure.plan, defaults, request.plan_file, request.plan)
-    problems = [*procedure.check(rig, plan), *Envelope(rig).problems_of(dict(procedure.settings(plan)))]
+    problems = [*procedure.check(rig, plan), *Envelope(rig).problems_of(dict(procedure.settings(rig, plan)))]
     if problems:
         raise ConfigError("\n  ".join(["the plan does not fit the rig; nothing was started:", *problems]))
     return procedure, rig, plan
@@ -108,7 +108,7 @@ def prepare(request: Request, asking: Asking = quietly) -> tuple[Job, Connect]:
     _refuse_words(overrides)
     visit = request.visit or 0
     connect = simulated(
-        rig, seed, overrides, request.operator or "auto", procedure.settings(plan), injected, asking, visit=visit
+        rig, seed, overrides, request.operator or "auto", procedure.settings(rig, plan), injected, asking, visit=visit
     )
     return Job(procedure, rig, plan, limits, request.backend, seed, None, used, judged, visit), connect
 

@@ -36,7 +36,7 @@ def _settings(done: Simulated, *more: Mapping[str, float]) -> dict[str, float]:
     """Every parameter of the controller: the rig file's defaults, then what a procedure writes."""
     rig = done.recording.rig
     known = {name: p.default for name, p in rig.parameters.items()}
-    for changed in (done.procedure.settings(done.recording.plan), *more):
+    for changed in (done.procedure.settings(done.recording.rig, done.recording.plan), *more):
         known |= changed
     return known
 
@@ -82,7 +82,7 @@ def _tracking(done: Simulated) -> Found:
     plan: Any = done.recording.plan
     for orbit in read_orbits(done.recording):
         if orbit.law in plan.laws:
-            settings = _settings(done, orbit.machine.select(orbit.law))  # type: ignore[arg-type]
+            settings = _settings(done, orbit.machine.select(orbit.law))
             true = truth_track.truth(
                 done.drawn.plant, settings, hz=plan.hz, y=plan.y_m, z=plan.z_m, ratio=plan.ratio, speed=plan.speed_rad_s,
                 settle_s=plan.settle_s,
@@ -113,7 +113,7 @@ def _unbalance(done: Simulated) -> Found:
             continue
         machine = dwell.machine
         law = {**(machine.poles if plan.observed else {}), **machine.select(plan.law)}
-        settings = _settings(done, law, machine.variants[dwell.variant])  # type: ignore[index]
+        settings = _settings(done, law, machine.variants[dwell.variant])
         true = truth_unbalance.motion(done.drawn.plant, settings, dwell.speed)
         yield from _vectors(machine.axes, true.shaft, dwell.where)
         yield from _distances(machine.planes, true.d_max, done.drawn.plant.clearance, dwell.where)

@@ -26,6 +26,7 @@ from bench.rigfile.envelope import HELD
 from bench.rigfile.registers import RegisterPort
 from bench.run.job import Connect, OpenRig, WatchedClock
 from bench.run.supervisor import Supervisor
+from bench.wire import sign
 
 if TYPE_CHECKING:
     from drivers.controller import Controller
@@ -137,6 +138,7 @@ def live(
 
             base = WatchedClock(wall, renew, supervisor.check)
             controller = Controller(rig, link, base, session, LIVE_SLICE_S)
+            controller.watch.simulated = real.simulated
             controller.connect(clear_fault)
             stack.callback(_released, controller)
             hands = _operator_on_a_line(rig, controller, stack) if operator != "console" else None
@@ -163,7 +165,7 @@ def _live_link(rig: RigFile, session: Session, wall: Clock) -> LiveLink:
     from drivers.wires import open_wire
 
     spec, name = rig.link, rig.devices["controller"].link
-    identifiers = [m.identifier for m in rig.messages.messages.values()]
+    identifiers = [sign.IDENTIFIER, *(m.identifier for m in rig.messages.messages.values())]
     return LiveLink(name, lambda: open_wire(spec, name, identifiers, wall.now_ns), beat_of(rig, session),
                     heartbeat=spec.heartbeat, reconnect_s=spec.reconnect_s)  # fmt: skip
 
@@ -280,7 +282,7 @@ def _opened(
         found.append(
             Finding("fault-cleared", f"fault {controller.cleared} of an earlier run was cleared", "controller")
         )
-    if truth is None and controller.serial == 0:
+    if truth is None and controller.watch.simulated:
         text = "the controller says that it is a simulated one: no machine was measured"
         found.append(Finding(SIMULATED_CONTROLLER, text, "controller"))
     if controller.restored:

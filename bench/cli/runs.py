@@ -67,7 +67,7 @@ def runs_command(out: Path) -> int:
     except (sqlite3.Error, OSError) as error:
         raise BenchError(f"{out / index.NAME}: the index cannot be used: {error}") from error
     for e in found:
-        which = "" if e.seed is None else f"seed {e.seed}, visit {e.visit}"
+        which = "served simulation" if e.served else "" if e.seed is None else f"seed {e.seed}, visit {e.visit}"
         sys.stdout.write(f"{e.outcome:13} {e.started:25} {e.rig:12} {which:17} {out / e.run_id}\n")
     if not found:
         sys.stderr.write(f"no runs in {out}\n")

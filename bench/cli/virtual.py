@@ -119,7 +119,7 @@ def flown(
     chosen, file = load_procedure(procedure), load_rig(rig)
     settings = chosen.plan.model_validate({**file.plans.get(procedure, {}), **plan})
     used = given(chosen.needs(settings), calibrations or {})
-    drawn = draw(file, seed, truth, chosen.settings(settings), visit=visit)
+    drawn = draw(file, seed, truth, chosen.settings(file, settings), visit=visit)
     job = Job(chosen, file, settings, {}, "sim", seed, calibrations=tuple(used), visit=visit)
     supervisor = Supervisor()
     with opening.of_truth(file, drawn, "auto", substeps=knobs.substeps, slice_s=knobs.slice_s)(supervisor) as live:

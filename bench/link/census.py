@@ -10,6 +10,7 @@ import numpy as np
 from bench.link.frames import ERROR, EXTENDED, FrameBatch
 from bench.rigfile import RigFile
 from bench.rigfile.messages import Message
+from bench.wire import sign
 
 RECENT_S = 2.0  # over which a rate is told
 SETTLED_S = 0.5  # what had waited somewhere has come by then; a mean rate begins there
@@ -91,8 +92,13 @@ class Census:
 
     @property
     def unknown(self) -> list[Tally]:
-        """Those that the DBC does not know, by identifier."""
-        return [t for i, t in sorted(self.by_id.items()) if i not in self.known]
+        """Those that the DBC does not know, by identifier; the sign of a simulation is nobody's."""
+        return [t for i, t in sorted(self.by_id.items()) if i not in self.known and i != sign.IDENTIFIER]
+
+    @property
+    def simulated(self) -> bool:
+        """Whether the sign of a served simulation came."""
+        return sign.IDENTIFIER in self.by_id
 
     @property
     def strange(self) -> int:

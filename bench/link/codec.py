@@ -22,7 +22,7 @@ Array = npt.NDArray[np.float64]
 Payloads = npt.NDArray[np.uint8]
 Raw = npt.NDArray[Any]
 Extractor = Callable[[Payloads], Raw]
-_FLOATS: Final = {16: "<e", 32: "<f", 64: "<d"}
+FLOATS: Final = {16: "<e", 32: "<f", 64: "<d"}
 
 
 class Decoder:
@@ -30,7 +30,7 @@ class Decoder:
 
     def __init__(self, message: Message) -> None:
         self.message = message
-        groups = _groups(message)
+        groups = grouped(message)
         self._extractors = [_extractor(group) for group in groups]
         self._signals = [s for group in groups for s in group]
         self.names = tuple(s.name for s in self._signals)
@@ -89,7 +89,7 @@ class Decoder:
         return values
 
 
-def _fast(s: Signal) -> str:
+def aligned_type(s: Signal) -> str:
     """numpy type of a signal that a view can read, or ""."""
     if not s.little_endian or s.start % 8 or s.length not in (8, 16, 32, 64):
         return ""
@@ -97,25 +97,28 @@ def _fast(s: Signal) -> str:
     return f"<{kind}{s.length // 8}" if kind != "f" or s.length > 8 else ""
 
 
-def _groups(message: Message) -> list[list[Signal]]:
+def grouped(message: Message) -> list[list[Signal]]:
     """Signals in payload order, with neighbours that one view can read together."""
     ordered = sorted(message.signals, key=lambda s: s.start)
     place = {s.name: s.start - k * s.length for k, s in enumerate(ordered)}
-    return [list(g) for _, g in groupby(ordered, key=lambda s: (_fast(s) or s.name, place[s.name] if _fast(s) else 0))]
+    return [
+        list(g)
+        for _, g in groupby(ordered, key=lambda s: (aligned_type(s) or s.name, place[s.name] if aligned_type(s) else 0))
+    ]
 
 
 def _extractor(group: list[Signal]) -> tuple[int, Extractor]:
     """How many signals are read together, and what reads their raw values."""
-    first, kind = group[0], _fast(group[0])
+    first, kind = group[0], aligned_type(group[0])
     if not kind:
-        return 1, lambda payloads: _bits(payloads, first)
+        return 1, lambda payloads: bits_of(payloads, first)
     low, high = first.start // 8, (group[-1].start + group[-1].length) // 8
     return len(group), lambda payloads: payloads[:, low:high].view(kind).T
 
 
-def _bits(payloads: Payloads, s: Signal) -> Raw:
+def bits_of(payloads: Payloads, s: Signal) -> Raw:
     """A signal at any place: its bytes are gathered into a 64-bit word (and a ninth byte where it straddles)."""
-    first_bit, order = _layout(s)
+    first_bit, order = bytes_of(s)
     word = np.zeros(len(payloads), np.uint64)
     for k, byte in enumerate(order):  # least significant first
         shift = 8 * k - first_bit
@@ -142,11 +145,11 @@ def _shift(s: Signal, length: int) -> int:
 
 def _float(s: Signal, raw: int) -> float:
     """The floating-point number that a signal's bits are."""
-    value: float = struct.unpack(_FLOATS[s.length], raw.to_bytes(s.length // 8, "little"))[0]
+    value: float = struct.unpack(FLOATS[s.length], raw.to_bytes(s.length // 8, "little"))[0]
     return value
 
 
-def _layout(s: Signal) -> tuple[int, list[int]]:
+def bytes_of(s: Signal) -> tuple[int, list[int]]:
     """Bit of the first byte where the signal's least significant bit lies, and its bytes, least significant first."""
     if s.little_endian:
         return s.start % 8, list(range(s.start // 8, (s.start + s.length - 1) // 8 + 1))
@@ -177,7 +180,7 @@ def _raw(message: Message, s: Signal, value: float) -> int:
     scaled = (value - s.offset) / s.scale
     if s.is_float:
         try:
-            packed = struct.pack(_FLOATS[s.length], scaled)
+            packed = struct.pack(FLOATS[s.length], scaled)
         except OverflowError:
             raise ConfigError(f"{message.name}.{s.name}: {value:g} {s.unit} is too large for its float") from None
         return int.from_bytes(packed, "little")

@@ -16,6 +16,7 @@ from bench.link.stillness import CODES, Stillness
 from bench.link.unwrapping import Unwrapping, signed
 from bench.rigfile import RigFile
 from bench.samples import ChannelInfo, SampleBlock, StreamLayout
+from bench.wire import sign
 
 Integers = npt.NDArray[np.int64]
 STREAM = "telemetry"
@@ -67,7 +68,7 @@ class TelemetryDecoder:
         self._first = self.rig.messages[self.rig.binding.telemetry[0]]
         self._tick_ns = round(self.rig.devices["controller"].tick_s * 1e9)
         self._ticks = self._first.period_s * 1e9 / self._tick_ns  # of a sample
-        self._known = {m.identifier for m in self.rig.messages.messages.values()}
+        self._known = {sign.IDENTIFIER, *(m.identifier for m in self.rig.messages.messages.values())}
         self._segment: _Segment | None = None
         self._index = 0
         self._stale, self._stale_tick = 0, 0  # samples in a row that were old, and the tick of the last

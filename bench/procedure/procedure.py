@@ -48,7 +48,7 @@ def _levitation(_: RigFile) -> Requires:
     return Requires()
 
 
-def _no_settings(_: Any) -> Mapping[str, float]:
+def _no_settings(_rig: RigFile, _plan: Any) -> Mapping[str, float]:
     return {}
 
 
@@ -79,10 +79,10 @@ class Procedure:
     """A procedure. `acquire` moves the machine, `evaluate` is pure and sees only the closed file.
 
     `requires` is what a rig must have, whatever the plan, by the names that its own file has. `check` looks at a plan against
-    a rig that has it, before anything starts, and names what cannot work. `settings` are the controller parameters (SI) that
-    the runner writes in READY, before it levitates. `optional` of the measures are those that a sound machine may lack: not
-    missing where no limit asks. `step_count` is how many steps `acquire` will record, for the progress display; 0 is unknown.
-    `fewest_steps` is how many a run that goes to its end has at least, where these are fewer.
+    a rig that has it, before anything starts, and names what cannot work. `settings` are the parameters of the rig's
+    controller, SI, that the runner writes in READY, before it levitates. `optional` of the measures are those that a sound
+    machine may lack: not missing where no limit asks. `step_count` is how many steps `acquire` will record, for the progress
+    display; 0 is unknown. `fewest_steps` is how many a run that goes to its end has at least, where these are fewer.
     `evaluate` makes of a recording what all that follows needs, once, and tells its findings as it goes; it ends where one
     that is told at a gate is an error, and then nothing is measured nor drawn. Without it the recording itself is what
     follows needs. `measured` yields the quantities of it in the order of the report. `figures` come in the order in which
@@ -108,7 +108,7 @@ class Procedure:
     figures: Callable[[Any, Recording[Any]], Iterable[Shown]] = field(default=_no_figures)
     requires: Callable[[RigFile], Requires] = field(default=_levitation)
     check: Callable[[RigFile, Any], Iterable[str]] = field(default=_no_problems)
-    settings: Callable[[Any], Mapping[str, float]] = field(default=_no_settings)
+    settings: Callable[[RigFile, Any], Mapping[str, float]] = field(default=_no_settings)
     step_count: Callable[[Any], int] = field(default=_unknown_count)
     fewest_steps: Callable[[Any], int] | None = None
     needs: Callable[[Any], tuple[Need, ...]] = field(default=_no_needs)

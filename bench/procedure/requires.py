@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from bench.rigfile import RigFile
+from bench.rigfile import RigFile
+from bench.rigfile.capabilities import is_bound as can
+from bench.rigfile.roles import is_bound, resolved
 
 
 @dataclass(frozen=True)
 class Requires:
-    """Names that the rig file must have: roles of its devices, channels, sensors with certificates, parameters of the
-    controller, lengths and stiffnesses of `geometry`, numbers of `machine`, channels that the controller can `capture` in its
-    own memory, and, with `masses`, certified ones to hang. `lacks` is what else was found missing, a line each."""
+    """Names that the rig file must have: roles of its devices, channels (or roles of readings, `bench.rigfile.roles`), sensors
+    with certificates, parameters of the controller, lengths and stiffnesses of `geometry`, numbers of `machine`, channels that
+    the controller can `capture` in its own memory, `capabilities` by their keys (`bench.rigfile.capabilities`), and, with
+    `masses`, certified ones to hang. `lacks` is what else was found missing, a line each."""
 
     roles: tuple[str, ...] = ("levitation",)
     channels: tuple[str, ...] = ()
@@ -23,6 +24,7 @@ class Requires:
     geometry: tuple[str, ...] = ()
     machine: tuple[str, ...] = ()
     capture: tuple[str, ...] = ()
+    capabilities: tuple[str, ...] = ()
     masses: bool = False
     lacks: tuple[str, ...] = ()
 
@@ -35,8 +37,11 @@ class Requires:
         if missing := [r for r in self.roles if r not in roles]:
             yield f"devices: found none in the role {' and none in the role '.join(missing)}"
         captured = () if rig.capture is None else rig.capture.channels
+        needed = resolved(rig, (name for name in self.channels if "." not in name or is_bound(rig, name)))
+        if absent := [role.partition(".")[2] for role in self.channels if "." in role and not is_bound(rig, role)]:
+            yield f"mark: found no channel for {', '.join(dict.fromkeys(absent))}"
         tables: tuple[tuple[str, tuple[str, ...], Collection[str]], ...] = (
-            ("channels", self.channels, rig.channels),
+            ("channels", needed, rig.channels),
             ("sensors", self.sensors, rig.sensors),
             ("parameters", self.parameters, rig.parameters),
             ("geometry", self.geometry, rig.geometry),
@@ -48,6 +53,8 @@ class Requires:
                 yield "capture: found none; expected a controller that records at its full rate"
             elif missing := [n for n in dict.fromkeys(names) if n not in found]:
                 yield f"{table}: found no {', '.join(missing)}"
+        if unbound := [key for key in dict.fromkeys(self.capabilities) if not can(rig.capabilities, key)]:
+            yield f"capabilities: found no {', '.join(unbound)}"
         if self.masses and not rig.masses:
             yield "masses: found none; expected certified masses to hang"
         yield from self.lacks

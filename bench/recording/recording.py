@@ -25,6 +25,7 @@ from bench.recording.mcapchunk import sound
 from bench.recording.mcapfile import McapFile, index
 from bench.recording.readlimits import MB
 from bench.recording.steps import Step, Steps
+from bench.rigfile import roles
 from bench.samples import StreamLayout
 
 __all__ = ["Captured", "Recording", "Step", "Steps"]
@@ -122,12 +123,20 @@ class Recording(Attachments[P]):
         return kept[1]
 
     def read(self, channels: tuple[str, ...], start_ns: int, end_ns: int) -> dict[str, npt.NDArray[Any]]:
-        """Samples with start <= t < end: float64 by channel, `t_ns`, and `index` (counts lost samples too).
+        """Samples with start <= t < end: float64 by channel or role (`bench.rigfile.roles`), `t_ns`, and `index` (counts lost
+        samples too).
 
         Raises:
             AnalysisError: a channel was not recorded, or the channels are of different streams.
+            Lacking: the rig has no channel for a role.
             RecordingError: more numbers than the limits allow.
         """
+        if not any("." in name for name in channels):
+            return self._read(channels, start_ns, end_ns)
+        found = self._read(roles.resolved(self.rig, channels), start_ns, end_ns)
+        return roles.answered(self.rig, (*channels, "t_ns", "index"), found)
+
+    def _read(self, channels: tuple[str, ...], start_ns: int, end_ns: int) -> dict[str, npt.NDArray[Any]]:
         stream = self._stream_of(channels)
         count = 0
         parts: dict[str, list[npt.NDArray[Any]]] = {name: [] for name in (*channels, "t_ns", "index")}

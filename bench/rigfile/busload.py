@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from bench.errors import Problem
 from bench.rigfile.messages import Message, MessageMap
 from bench.rigfile.model import RigFile
+from bench.wire import sign
 
 REFUSE, WARN = 0.90, 0.70
 FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
@@ -76,6 +77,9 @@ def problems_of(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
             shown = f"identifier {m.identifier & ~(1 << 31):#x}, which {owner[m.identifier]} has too"
             yield Problem(rig.link.dbc, f"BO_ {m.name}", shown, "one of its own: nobody could tell the two apart")
         owner.setdefault(m.identifier, m.name)
+        if m.identifier == sign.IDENTIFIER:
+            yield Problem(rig.link.dbc, f"BO_ {m.name}", f"identifier {m.identifier:#x}, which is {sign.NAME}",
+                          "another one: a controller with it would pass for a simulation")  # fmt: skip
         if m.length not in FD_LENGTHS:
             yield Problem(rig.link.dbc, m.name, f"{m.length} bytes", f"a CAN FD length: {FD_LENGTHS}")
     if rig.link.bitrate is None:

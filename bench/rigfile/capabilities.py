@@ -7,7 +7,7 @@ Each is optional: what a controller does not do is left out, and a procedure tha
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field
 
@@ -74,6 +74,17 @@ class Gains(Part):
     kd: str | Mapping[Name, str] = ""
 
 
+class Flatness(Part):
+    """A law that inverts the bearings' forces by the controller's model of them: it makes s^3 + k2 s^2 + k1 s + k0 of each
+    degree of freedom. Parameters: 1/s^3, 1/s^2, 1/s; `integral`, 1 where k0 acts; `derivative_hz`, low-pass of the rates."""
+
+    k0: str = ""
+    k1: str
+    k2: str
+    integral: str = ""
+    derivative_hz: str = ""
+
+
 class MotorForce(Part):
     """A motor that gives a radial force beside its torque: currents `along` the first axis of the bearings and `across` it, A,
     which follow no faster than `ramp` A/s; `phase` rad by which its field is turned; `share` of the load that it carries in the
@@ -110,8 +121,10 @@ class Status(Part):
 
 
 class Capabilities(Part):
-    """`bias` is by bearing; `settings` are by kind ("law", "compensation") and name: the parameters that choose it. `model` is
-    what the controller knows of the machine, by meaning. `loop_delay_s` is from a reading to the current that follows it."""
+    """`bias` is by bearing; `settings` are by kind and name: the parameters that choose it; of kind "law" the first is what a
+    lift and a stop go by, unless "lift" says more. `gains` are of the
+    laws that are no `flatness`, which is by the name of a law. `model` is what the controller knows of the machine, by meaning.
+    `loop_delay_s` is from a reading to the current that follows it."""
 
     set_points: SetPoints = SetPoints()
     path: Path | None = None
@@ -121,11 +134,13 @@ class Capabilities(Part):
     angle: Holding | None = None
     motor: MotorForce = MotorForce()
     gains: Gains = Gains()
+    flatness: Mapping[Name, Flatness] = {}
     status: Status = Status()
     model: Mapping[Name, str] = {}
     landing_speed: str = ""
     lift_time: str = ""
     watchdog: str = ""
+    current_limit: str = ""
     loop_delay_s: float | None = Field(default=None, gt=0)
 
 
@@ -154,5 +169,18 @@ def _tables(c: Capabilities) -> Iterator[tuple[str, str | Mapping[str, str]]]:
         yield from ((f"angle.{key}", value) for key, value in angle)
     yield from ((f"motor.{key}", value) for key, value in c.motor)
     yield from ((f"gains.{key}", value) for key, value in c.gains)
+    for law, flat in c.flatness.items():
+        yield from ((f"flatness.{law}.{key}", value) for key, value in flat)
     yield "model", c.model
-    yield from (("landing_speed", c.landing_speed), ("lift_time", c.lift_time), ("watchdog", c.watchdog))
+    for key in ("landing_speed", "lift_time", "watchdog", "current_limit"):
+        yield key, getattr(c, key)
+
+
+def is_bound(c: Capabilities, key: str) -> bool:
+    """Whether a capability is there, by its key: `set_points`, `injection`, `settings.law`, `model.rate`, `bias`, ..."""
+    found: Any = c
+    for part in key.split("."):
+        found = found.get(part) if isinstance(found, Mapping) else getattr(found, part)
+        if found is None:
+            return False
+    return bool(found.axes or found.shaft) if isinstance(found, SetPoints) else bool(found)

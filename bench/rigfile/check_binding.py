@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import itertools
+from collections.abc import Iterable, Iterator, Mapping
 
 from bench.rigfile.binding import COMMANDS, MODES
 from bench.rigfile.messages import MessageMap, Signal
 from bench.rigfile.model import RigFile
+from bench.rigfile.turned import turned
 
 NEEDED = ("ENABLE", "DISABLE", "LEVITATE", "LAND", "STOP", "MAKE_SAFE")
 """Commands that no run and no make-safe can do without; the others are asked for only where the controller has them."""
@@ -47,6 +49,7 @@ def problems_of(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
     """Key, found and expected of everything in the binding that leads nowhere, or where it must not."""
     yield from _names(rig, messages)
     yield from _commands(rig, messages)
+    yield from _told_apart(rig, messages)
     yield from _counters(rig, messages)
     yield from _heartbeat(rig, messages)
     yield from _protocol(rig, messages)
@@ -125,6 +128,31 @@ def _commands(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
                     )
             elif not fits(signal, float(value)):
                 yield key, f"{path} = {value!r}", "a value that its bits can hold"
+
+
+def _told_apart(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
+    """No command may be asked for by the way, by all the values of another one."""
+    asked = {n: _codes(rig.binding.command(n), messages) for n in COMMANDS if rig.binding.knows(n, messages)}
+    known = {name: codes for name, codes in asked.items() if codes}
+    for one, other in itertools.permutations(known, 2):
+        same = known[one] == known[other]
+        if known[one].items() <= known[other].items() and (not same or one < other):
+            found = f"the same values as {other}" if same else f"values that are all among those of {other}"
+            yield (f"{KEY}.commands.{one}", found, f"a signal that has another value in {one} than in {other}: a controller "
+                   "could not tell which is meant")  # fmt: skip
+
+
+def _codes(binding: Mapping[str, int | float | str], messages: MessageMap) -> dict[str, float]:
+    """Raw values by path; empty where one leads nowhere."""
+    out: dict[str, float] = {}
+    for path, value in binding.items():
+        s = signal_at(messages, path)
+        if s is None or (isinstance(value, str) and value not in s.choices.values()):
+            return {}
+        number = next(k for k, v in s.choices.items() if v == value) if isinstance(value, str) else value
+        raw = (float(number) - s.offset) / s.scale
+        out[path] = raw if s.is_float else round(raw)
+    return out
 
 
 def fits(s: Signal, value: float) -> bool:
@@ -207,7 +235,7 @@ def _protocol(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
 
 def _channels(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
     telemetry = rig.binding.telemetry
-    for name in ("state", "fault", "speed"):
+    for name in ("state", "fault", *(("speed",) if turned(rig) else ())):
         if name not in rig.channels:
             yield f"channels.{name}", "nothing", f"the channel `{name}`: the bench watches it while the machine moves"
     for name, channel in rig.channels.items():

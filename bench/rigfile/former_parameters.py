@@ -1,10 +1,12 @@
-"""What the names of parameters meant in schema 1, written out as the capabilities of schema 2."""
+"""What the protocol's own names of parameters and bits mean, for a rig file that does not say what its controller can do."""
 
 from __future__ import annotations
 
 from typing import Any
 
 Content = dict[str, Any]
+TIMES = {"landing_speed": "landing_speed", "lift_time": "lift_time_s", "watchdog": "watchdog_s",
+         "current_limit": "current_limit"}  # fmt: skip
 BIAS = {"inboard": ("bias", "bias_i"), "outboard": ("bias", "bias_o"), "axial": ("bias_z",)}
 GAINS = {"yi": "i", "xi": "i", "yo": "o", "xo": "o", "z": "z"}
 PATH = {"on": "on", "y": "y", "z": "z", "hz": "hz", "phase": "phase", "ramp_s": "ramp_s", "ratio": "ratio"}
@@ -15,10 +17,15 @@ MOTOR = {
 }  # fmt: skip
 ANGLE = {"slew": "angle_slew", "speed": "speed_ref", "kp": "kp_theta", "ki": "ki_theta", "kd": "kd_theta"}
 LAWS = {"PID": {"law": 0}, "CCS": {"law": 1}, "CAC": {"law": 2}}
+FLATNESS = ("k0", "k1", "integral", "derivative_hz")
+LIFT = {"plain": {"law": 0, "observer": 0, "compensate": 0}}
+POLES = {"observed": {"k1": 2e5, "k2_ccs": 400, "k2_cac": 400}}
+INTEGRATOR = {"on": {"integral": 1}}
 COMPENSATION = {
     "off": {"observer": 0, "compensate": 0, "integral": 1},
     "corrected": {"observer": 1, "compensate": 3, "integral": 0},
     "literal": {"observer": 2, "compensate": 3, "integral": 0},
+    "waiting": {"observer": 1, "compensate": 0, "integral": 0},
 }
 STAND = {
     "contact": {"inboard": 4, "outboard": 8, "axial": 32},
@@ -29,17 +36,30 @@ STAND = {
 SERVOMOTOR = {"contact": {"inboard": 4, "outboard": 8}, "current_limit": 1, "segment_limit": 2}
 
 
-def capabilities(parameters: Content, channels: Content, bearings: Content, rings: Content) -> Content:
-    """The table of a rig file of schema 1, by the parameters and channels that it has, and the machine's tables made for it."""
-    p = parameters
-    axes = [axis for bearing in bearings.values() for axis in bearing["axes"]]
-    out: Content = {key: name for key, name in (("landing_speed", "landing_speed"), ("lift_time", "lift_time_s"),
-                                                ("watchdog", "watchdog_s")) if name in p}  # fmt: skip
+def with_capabilities(data: Content) -> Content:
+    """The content of a rig file of schema 2; where it has no table `capabilities`, one by the names of its parameters,
+    channels, bearings and rings."""
+    if "capabilities" in data:
+        return data
+    p, channels, bearings, rings = (
+        table if isinstance(table := data.get(name), dict) else {}
+        for name in ("parameters", "channels", "bearings", "rings")
+    )
+    axes = [axis for b in bearings.values() if isinstance(b, dict) for axis in b.get("axes", ())]
+    return {**data, "capabilities": _capabilities(p, channels, bearings, rings, axes)}
+
+
+def _capabilities(p: Content, channels: Content, bearings: Content, rings: Content, axes: list[str]) -> Content:
+    out: Content = {key: name for key, name in TIMES.items() if name in p}
     out["bias"] = {b: found for b, names in BIAS.items() if b in bearings and (found := _first(names, p))}
     out["gains"] = {key: made for key in ("kp", "ki", "kd") if (made := _gain(key, axes, p))}
     out["set_points"] = _set_points(axes, p)
     out["settings"] = _settings(p)
     out["model"] = {name.removeprefix("model_"): name for name in p if name.startswith("model_")}
+    if {"law", "k0", "k1", "k2_ccs", "k2_cac"} <= p.keys():
+        out["flatness"] = {
+            law: {"k2": f"k2_{law.lower()}", **{key: key for key in FLATNESS if key in p}} for law in ("CCS", "CAC")
+        }
     out["motor"] = {key: name for key, name in MOTOR.items() if name in p}
     if {"ellipse_on", "ellipse_y", "ellipse_z", "ellipse_hz"} <= p.keys():
         out["path"] = {key: f"ellipse_{name}" for key, name in PATH.items() if f"ellipse_{name}" in p}
@@ -75,12 +95,19 @@ def _settings(p: Content) -> Content:
     out: Content = {"law": LAWS} if "law" in p else {}
     if {"observer", "compensate", "integral"} <= p.keys():
         out["compensation"] = COMPENSATION
+        out["integrator"] = INTEGRATOR
+        out |= {"lift": LIFT} if "law" in p else {}
+    if {"k1", "k2_ccs", "k2_cac"} <= p.keys():
+        out["poles"] = POLES
     return out
 
 
 def _status(bits: Content, bearings: Content, rings: Content) -> Content:
     """The bits of channel `flags`; contact where the shaft has something to touch."""
-    stops = {**rings, **{name: None for name, b in bearings.items() if b["kind"] == "axial"}}
+    stops = {
+        **rings,
+        **{name: None for name, b in bearings.items() if isinstance(b, dict) and b.get("kind") == "axial"},
+    }
     contact = {name: {"channel": "flags", "mask": mask} for name, mask in bits["contact"].items() if name in stops}
     single = {key: {"channel": "flags", "mask": mask} for key, mask in bits.items() if key != "contact"}
     return {**({"contact": contact} if contact else {}), **single}

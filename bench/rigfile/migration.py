@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from bench.rigfile.former_parameters import capabilities
-
 Content = dict[str, Any]
 ENDS = {"inboard": "i", "outboard": "o"}
 SPANS = {
@@ -33,7 +31,6 @@ def to_schema_2(data: Content) -> Content:
     made["levers"] = {side: {"length": f"geometry/lever_{side}", "side": sign}
                       for side, sign in (("left", 1), ("right", -1)) if f"lever_{side}" in g}  # fmt: skip
     made["motors"] = _motors(g, m, channels)
-    made["capabilities"] = capabilities(_table(data, "parameters"), channels, made["bearings"], made["rings"])
     placed = {
         f"{table}/{name}" for table in ("bearings", "motors") for name, part in made[table].items() if "at" in part
     }

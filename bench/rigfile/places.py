@@ -131,6 +131,10 @@ class Places:
         """
         for identity, pair in self.tables.spans.items():
             if set(pair) == {one, other}:
+                if identity not in self.known:
+                    raise PlaceError(
+                        f"spans.{identity}", repr(identity), f"the identity of a number{_near(identity, self.known)}"
+                    )
                 span = Term(identity, self.known[identity])
                 ahead = (self.place(other) - self.place(one)).value > 0
                 return Sum((span if ahead else -span,))

@@ -10,11 +10,12 @@ from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 
 from bench.errors import ConfigError
+from bench.findings import SIMULATED_CONTROLLER
 from bench.record.records import read_record
 from bench.rundir import RunDirectory, runs_in
 
 NAME = "index.sqlite"
-VERSION = 2  # of the table; another one is rebuilt
+VERSION = 3  # of the table; another one is rebuilt
 log = logging.getLogger(__name__)
 
 
@@ -30,6 +31,7 @@ class IndexEntry:
     ended: str | None
     seed: int | None
     visit: int | None
+    served: bool  # live, on a controller that says that it is a simulated one
 
 
 _COLUMNS = ", ".join(f.name for f in fields(IndexEntry))
@@ -74,7 +76,7 @@ def _entry(run: RunDirectory) -> IndexEntry:
     record = read_record(run.record)
     # The directory's name, not the record's: a copied directory is another run to whoever looks for it.
     return IndexEntry(run.run_id, record.procedure, record.rig, record.outcome.value, record.started, record.ended,
-                      record.seed, record.visit)  # fmt: skip
+                      record.seed, record.visit, any(f.code == SIMULATED_CONTROLLER for f in record.findings))  # fmt: skip
 
 
 def _sound(root: Path) -> None:

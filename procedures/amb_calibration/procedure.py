@@ -22,6 +22,7 @@ from bench.procedure.roles import NOTHING, Load, RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
+from bench.rigfile.roles import STATUS
 from bench.uncertainty import Estimate, propagate
 from procedures.amb_calibration import both_coils, checks, hypotheses
 from procedures.amb_calibration import by_angle as amb_calibration_by_angle
@@ -51,7 +52,7 @@ MEASURES = (K_I, K_O, K2_I, K2_O, KW_I, KW_O)
 CLEAR_A = 0.1  # a change of a control current that is no noise
 
 
-def settings(plan: Plan) -> dict[str, float]:
+def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Controller parameters that the runner writes before levitation."""
     return {"bias_i": plan.bias_A, "bias_o": plan.bias_A}
 
@@ -220,7 +221,7 @@ def requires(rig: RigFile) -> Requires:
     return Requires(
         lacks=(*machine.lacks, *of_hooks(rig)),
         roles=("levitation", "rotation"),
-        channels=(*channels(machine), "flags"),
+        channels=(*channels(machine), STATUS),
         sensors=machine.coils_of(*VERTICAL),
         parameters=("bias_i", "bias_o", "angle_ref"),
         geometry=("hook_to_outboard", "amb_span", "amb_gap", "com_to_motor", "motor_stiffness", *machine.levers),

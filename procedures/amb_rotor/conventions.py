@@ -1,39 +1,31 @@
-"""What an AMB rotor's stand calls its things: axes, planes, channels, the bits of its flags, its laws and parameters.
+"""What an AMB rotor's stand calls its things: axes, planes, channels, status bits, laws and parameters.
 
-A procedure asks for them once, `machine = conventions(rig)`, and hands them on: bearings, axes and channels are those of the
-rig file. Flags, laws and parameters are those of the one controller there is, AMB_ROTOR, which is also what a declaration
-takes that has no rig (quantities by axis, defaults of plans).
+A procedure asks for them once, `machine = conventions(rig)`, and hands them on: all are those of the rig file. AMB_ROTOR, the
+stand of the thesis, is what a declaration takes that has no rig (quantities by axis).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from enum import IntFlag
 from functools import reduce
 from operator import or_
-from typing import Literal
 
 from bench.errors import Lacking
 from bench.rigfile import RigFile
+from bench.rigfile.capabilities import Capabilities
+from bench.rigfile.places import CENTRE, PlaceError, Places
+from bench.rigfile.roles import Status
 from bench.rigfile.supports import axial_support, once_per_rig, two_planes
 from procedures.shared.unsupported import unlike
 
-Law = Literal["PID", "CCS", "CAC"]
-Variant = Literal["off", "corrected", "literal"]
-
-
-class Flag(IntFlag):
-    """Bits of the telemetry signal `flags`, as rigs/amb5dof.dbc has them."""
-
-    CURRENT_LIMIT = 1
-    VOLTAGE_LIMIT = 2
-    CONTACT_INBOARD = 4
-    CONTACT_OUTBOARD = 8
-    WATCHDOG_ARMED = 16
-    CONTACT_AXIAL = 32
-    SENSOR_RANGE = 64
+UNKNOWN_LAG = 4.0  # ticks: an amplifier of some 400 Hz behind a controller of 10 kHz
+Law = str
+"""Of the controller, by the name that the rig file gives it; "": as the controller is set."""
+Variant = str
+"""How the controller compensates disturbances, by the rig file's name."""
 
 
 @dataclass(frozen=True)
@@ -46,36 +38,31 @@ class AmbRotor:
     negative side, `coil_voltages` those of the same coils. `plane_voltages` are the channels of the greatest coil voltage of
     each plane, none where they are not told.
 
-    Of the controller: `law` is the parameter that chooses among `laws`, by name the value it takes; `set_points` are the
-    parameters by coordinate; `variants` the parameters that set how disturbances are compensated, with the estimator's `poles`;
-    `stands_s` is how long after the last pulse it knows that the shaft stands, s.
+    `can` is what its controller can be asked to do. `arms` are the places of both bearings from the centre of mass, m, towards
+    the far end; `stands_s` is how long after the last pulse the controller knows that the shaft stands, s.
     """
 
     axes: tuple[str, str, str, str]
     axial: str
     planes: Mapping[str, tuple[int, int]]
-    rings: Mapping[str, Flag]
+    rings: Mapping[str, Status]
     probes: Mapping[str, str]
     pulls: Mapping[str, tuple[str, str]]
     coil_voltages: Mapping[str, tuple[str, str]]
     plane_voltages: tuple[str, ...]
-    axial_stop: Flag
-    current_limit: Flag
-    voltage_limit: Flag
-    sensor_range: Flag
-    law: str
-    laws: Mapping[Law, float]
-    set_points: Mapping[str, str]
-    observer: str
-    compensate: str
-    integral: str
-    variants: Mapping[Variant, Mapping[str, float]]
-    poles: Mapping[str, float]
+    axial_stop: Status
+    current_limit: Status
+    voltage_limit: Status
+    sensor_range: Status
+    can: Capabilities
+    arms: tuple[float, float]
     stands_s: float
+    lag_s: float  # by which currents follow their references, as the controller knows it, or as the rig file says
+    gaps: Mapping[str, float]  # air gap by axis, m, as far as it is told
     lacks: tuple[str, ...] = ()  # where the rig is not as these procedures take it
 
     @property
-    def contact(self) -> Flag:
+    def contact(self) -> Status:
         """A touch anywhere."""
         return reduce(or_, self.rings.values(), self.axial_stop)
 
@@ -112,18 +99,81 @@ class AmbRotor:
         return tuple(name for axis in self.axes for name in self.coil_voltages[axis])
 
     @property
+    def laws(self) -> tuple[str, ...]:
+        """The controller's, by the rig file's names; none where there is no choice. The first is what it lifts and stops by."""
+        return tuple(self.can.settings.get("law", ()))
+
+    @property
+    def variants(self) -> Mapping[Variant, Mapping[str, float]]:
+        """How disturbances are compensated: the parameters that set it, by name; "off" alone where nothing is."""
+        return self.can.settings.get("compensation", {"off": {}})
+
+    @property
+    def poles(self) -> Mapping[str, float]:
+        """Parameters of the laws where disturbances are observed."""
+        return self.can.settings.get("poles", {}).get("observed", {})
+
+    @property
     def model_parameters(self) -> tuple[str, ...]:
-        """What the controller knows of the radial bearings: force constants, then magnetic offsets."""
-        return (*map(self.model_beta, self.axes), *map(self.model_offset, self.axes))
+        """What the controller knows of the radial bearings: force constants, then magnetic offsets, as far as it does."""
+        return tuple(self.can.model[f"{kind}_{axis}"] for kind in ("beta", "offset") for axis in self.axes
+                     if f"{kind}_{axis}" in self.can.model)  # fmt: skip
+
+    @property
+    def biases(self) -> tuple[str, ...]:
+        """The parameters of the radial bearings' bias currents, each once."""
+        return tuple(dict.fromkeys(self.can.bias[plane] for plane in self.planes if plane in self.can.bias))
 
     @property
     def lifting(self) -> dict[str, float]:
-        """The PID, which needs no model, with nothing compensated."""
-        return {**self.select("PID"), self.observer: 0.0, self.compensate: 0.0}
+        """What the controller is set to before a lift: a law that needs no model, nothing compensated."""
+        plain = self.can.settings.get("lift", {})
+        return dict(next(iter(plain.values()))) if plain else self.select(self.plain_law)
+
+    @property
+    def plain_law(self) -> Law:
+        """The law that it lifts and stops by."""
+        return next(iter(self.laws), "")
 
     def select(self, law: Law) -> dict[str, float]:
-        """The parameter that selects a law."""
-        return {self.law: self.laws[law]}
+        """The parameters that select a law; nothing where the controller stays as it is set."""
+        return dict(self.can.settings.get("law", {}).get(law, {}))
+
+    def gain(self, key: str, axis: str) -> str:
+        """The parameter of a gain of the laws that are no flatness; "" where there is none."""
+        bound: str | Mapping[str, str] = getattr(self.can.gains, key)
+        return bound if isinstance(bound, str) else bound.get(axis, "")
+
+    def point(self, coordinate: str, value: float) -> dict[str, float]:
+        """The set points, by parameter, that hold the shaft at a coordinate: m along x, y or z (of the centre of mass), rad of
+        a tilt about y or z, by T (2.17): at l_k from it y_k = y + l_k theta and z_k = z - l_k psi.
+
+        Raises:
+            Lacking: the controller takes no set point there.
+        """
+        points = self.can.set_points
+        shaft: Mapping[str, str] = {str(name): parameter for name, parameter in points.shaft.items()}
+        if coordinate in shaft:
+            return {shaft[coordinate]: value}
+        near, far = self.arms
+        by = {"y": (1.0, 1.0), "z": (1.0, 1.0), "theta": (near, far), "psi": (-near, -far)}.get(coordinate, (1.0,))
+        axes = self.along({"theta": "y", "psi": "z"}.get(coordinate, coordinate))
+        pairs = list(zip(axes, by, strict=True))
+        if missing := [axis or "the shaft" for axis, _ in pairs if axis not in points.axes]:
+            raise Lacking(f"capabilities.set_points: found none for {', '.join(missing)}")
+        return {points.axes[axis]: factor * value for axis, factor in pairs}
+
+    def moved_by(self, parameter: str) -> str | None:
+        """The coordinate whose only set point a parameter is; None where it is none, or one of several."""
+        coordinates = ("y", "theta", "z", "psi", "x")
+        return next((c for c in coordinates if self.can_point(c) and [*self.point(c, 0.0)] == [parameter]), None)
+
+    def can_point(self, coordinate: str) -> bool:
+        """Whether the controller takes set points along a coordinate."""
+        try:
+            return bool(self.point(coordinate, 0.0))
+        except Lacking:
+            return False
 
     def along(self, direction: str) -> tuple[str, ...]:
         """The axes along y, z (near end first) or x."""
@@ -152,12 +202,12 @@ class AmbRotor:
         return self.pulls[axis]
 
     def model_beta(self, axis: str) -> str:
-        """The parameter with the controller's force constant of an axis, N m^2/A^2."""
-        return f"model_beta_{axis}"
+        """The parameter with the controller's force constant of an axis, N m^2/A^2; "" where it has none."""
+        return self.can.model.get(f"beta_{axis}", "")
 
     def model_offset(self, axis: str) -> str:
-        """The parameter with the controller's magnetic offset of an axis, m."""
-        return f"model_offset_{axis}"
+        """The parameter with the controller's magnetic offset of an axis, m; "" where it has none."""
+        return self.can.model.get(f"offset_{axis}", "")
 
 
 _AXES = ("yi", "zi", "yo", "zo", "x")
@@ -165,28 +215,20 @@ AMB_ROTOR = AmbRotor(
     axes=("yi", "zi", "yo", "zo"),
     axial="x",
     planes={"inboard": (0, 1), "outboard": (2, 3)},
-    rings={"inboard": Flag.CONTACT_INBOARD, "outboard": Flag.CONTACT_OUTBOARD},
+    rings={"inboard": Status.CONTACT_NEAR, "outboard": Status.CONTACT_FAR},
     probes={axis: f"pos_{axis}" for axis in _AXES},
     pulls={axis: (f"i_{axis}_p", f"i_{axis}_n") for axis in _AXES},
     coil_voltages={axis: (f"u_{axis}_p", f"u_{axis}_n") for axis in _AXES},
     plane_voltages=("u_i", "u_o"),
-    axial_stop=Flag.CONTACT_AXIAL,
-    current_limit=Flag.CURRENT_LIMIT,
-    voltage_limit=Flag.VOLTAGE_LIMIT,
-    sensor_range=Flag.SENSOR_RANGE,
-    law="law",
-    laws={"PID": 0.0, "CCS": 1.0, "CAC": 2.0},
-    set_points={"y": "ref_y", "z": "ref_z", "psi": "ref_psi", "theta": "ref_theta", "x": "ref_x"},
-    observer="observer",
-    compensate="compensate",
-    integral="integral",
-    variants={
-        "off": {"observer": 0.0, "compensate": 0.0, "integral": 1.0},
-        "corrected": {"observer": 1.0, "compensate": 3.0, "integral": 0.0},
-        "literal": {"observer": 2.0, "compensate": 3.0, "integral": 0.0},
-    },
-    poles={"k1": 2e5, "k2_ccs": 400.0, "k2_cac": 400.0},  # T 3.5
+    axial_stop=Status.CONTACT_AXIAL,
+    current_limit=Status.CURRENT_LIMIT,
+    voltage_limit=Status.VOLTAGE_LIMIT,
+    sensor_range=Status.SENSOR_RANGE,
+    can=Capabilities(),
+    arms=(-0.097, 0.081),
     stands_s=1.0,  # it knows half a second after the last pulse
+    lag_s=1 / (800 * math.pi),
+    gaps={},
 )
 """The AMB stand of the thesis, rigs/amb5dof.dbc."""
 
@@ -209,12 +251,40 @@ def conventions(rig: RigFile) -> AmbRotor:
         axes=(first, second, third, fourth),
         axial=axial.name if axial is not None else "",
         planes={plane.name: (2 * k, 2 * k + 1) for k, plane in enumerate(planes)},
-        rings={plane.name: flag for plane, flag in zip(planes, AMB_ROTOR.rings.values(), strict=True)},
+        rings=dict(zip((plane.name for plane in planes), AMB_ROTOR.rings.values(), strict=True)),
         probes={axis.name: axis.position for axis in everywhere if axis.position},
         pulls={axis.name: (axis.coils[0], axis.coils[1]) for axis in everywhere if len(axis.coils) == 2},
         coil_voltages={
             axis.name: (axis.voltages[0], axis.voltages[1]) for axis in everywhere if len(axis.voltages) == 2
         },
         plane_voltages=told if all(told) else (),
+        can=rig.capabilities,
+        arms=(_from_centre(rig, planes[0].name), _from_centre(rig, planes[1].name)),
+        lag_s=_lag_s(rig),
+        gaps=_gaps(rig),
         lacks=unlike(rig, planes, (-lean, math.pi / 2 - lean)),
     )
+
+
+def _from_centre(rig: RigFile, bearing: str) -> float:
+    try:
+        return Places(rig).distance(CENTRE, f"bearings/{bearing}").value
+    except PlaceError as error:
+        raise Lacking(str(error)) from error
+
+
+def _lag_s(rig: RigFile) -> float:
+    can = rig.capabilities
+    if "rate" in can.model:
+        return 1 / rig.parameters[can.model["rate"]].default
+    return can.loop_delay_s or UNKNOWN_LAG * rig.devices["controller"].tick_s
+
+
+def _gaps(rig: RigFile) -> dict[str, float]:
+    places, out = Places(rig), dict[str, float]()
+    for name, bearing in rig.bearings.items():
+        if bearing.gap is not None:
+            with suppress(PlaceError):  # who needs it asks for it
+                gap = places.number(bearing.gap, f"bearings.{name}.gap")
+                out |= dict.fromkeys(bearing.axes, gap.factor * gap.number.value)
+    return out

@@ -5,6 +5,8 @@ What is recorded here is judged by `procedures.amb_rotor.wiring.before_orbits`; 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from bench.errors import DeviceFault, NotReached
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
@@ -17,7 +19,7 @@ from procedures.shared import first_look
 
 REST, LIFT = "rest", "lift"
 LIFT_LOST, NO_SPEED = "lift-lost", "no-speed"
-NUDGES = (("y", 10e-6), ("theta", 100e-6))  # of the set points, m and rad
+NUDGES: tuple[tuple[str, float], ...] = (("y", 10e-6), ("theta", 100e-6))  # of the set points, m and rad
 STEPS = 2 + 2 * len(NUDGES)  # that `lift_and_nudge` records
 
 
@@ -32,6 +34,12 @@ def lift_and_nudge(rig: Rig, record: Recorder) -> bool:
     if not _lift(rig, record):
         return False
     return first_look.passes(rig, record, nudges.judge(_nudge(rig, record), rig.file))
+
+
+def write(rig: Rig, values: Mapping[str, float]) -> None:
+    """Write parameters of the controller, in that order."""
+    for name, value in values.items():
+        rig.levitation.set(name, value)
 
 
 def bring_to_speed(rig: Rig, record: Recorder, rad_s: float, settle_s: float) -> bool:
@@ -62,13 +70,14 @@ def _nudge(rig: Rig, record: Recorder) -> list[Nudge]:
     machine, made = conventions(rig.file), []
     names = nudges.watched(machine, tuple(rig.file.channels))
     for coordinate, aside in NUDGES:
-        name, read = machine.set_points[coordinate], []
+        points, read = machine.point(coordinate, 0.0), []
+        name = next(iter(points)) if len(points) == 1 else coordinate  # as the recording has it
         for value in (0.0, aside):
-            rig.levitation.set(name, value)
+            write(rig, machine.point(coordinate, value))
             rig.clock.sleep(0.5)
             with record.step(PROBE, name=name, value=value):
                 read.append(first_look.watched(rig, record, names, 0.2))
-        rig.levitation.set(name, 0.0)
+        write(rig, points)
         made.append(Nudge(name, aside, *read))
     rig.clock.sleep(0.5)
     return made

@@ -65,14 +65,14 @@ def _readings(nudges: Sequence[Nudge], machine: AmbRotor, rig: RigFile) -> Itera
         wanted, name = nudge.wanted, nudge.name
         means = [np.array([[read[p]] for p in machine.positions]) for read in (nudge.before, nudge.after)]
         y, z, _, theta = (centre(means[1], facts) - centre(means[0], facts))[:, 0]
-        if name == machine.set_points["theta"]:
+        if (coordinate := machine.moved_by(name) or name) == "theta":
             if theta < OWN * wanted:
                 text = (
                     f"a tilt about z by {wanted * 1e6:g} µrad shows as {theta * 1e6:+.0f} µrad: suspect the readings of the "
                     "two planes exchanged, or a set point that does not act."
                 )
                 yield Finding("planes-exchanged", text, name, Effect.ERROR)
-        elif y < OWN * wanted or abs(z) > OTHER * wanted:
+        elif coordinate == "y" and (y < OWN * wanted or abs(z) > OTHER * wanted):
             text = (
                 f"a nudge of y by {wanted * 1e6:g} µm shows as {y * 1e6:+.1f} µm in y and {z * 1e6:+.1f} µm in z: suspect the "
                 "readings of y and z exchanged, or a set point that does not act."
@@ -84,7 +84,7 @@ def _coils(nudges: Sequence[Nudge], machine: AmbRotor) -> Iterator[Finding]:
     """A shaft that is held nearer to a magnet is pulled more by it, so that its coil carries less. That tells the coils of an
     axis apart even where the mean currents do not: where the magnetic offset carries the weight they are nearly alike."""
     for nudge in nudges:
-        if nudge.name != machine.set_points["y"]:
+        if (machine.moved_by(nudge.name) or nudge.name) != "y":
             continue
         for axis in machine.along("y"):
             (p, n), place = machine.pair(axis), machine.position(axis)

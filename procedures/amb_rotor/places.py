@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
+from bench.rigfile.roles import STATUS
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.amb_rotor.magnetics import Positions
 from procedures.shared.step_table import reduced
@@ -92,7 +93,7 @@ class Held:
 
 def channels(machine: AmbRotor) -> tuple[str, ...]:
     """What is read of a step."""
-    return (*machine.positions, *machine.currents, "flags")
+    return (*machine.positions, *machine.currents, STATUS)
 
 
 def of_readings(
@@ -128,7 +129,7 @@ def read_steps(recording: Recording[Any], kind: str, labels: tuple[str, ...], ba
         drift,
         spread,
         parts,
-        {c: np.concatenate([r["every"][c] for r in read]) for c in names if c != "flags"},
+        {c: np.concatenate([r["every"][c] for r in read]) for c in names if c != STATUS},
         np.repeat(np.arange(len(read)), [r["samples"] for r in read]),
         {key: np.array([float(s.labels[key]) for s in steps]) for key in labels},
         np.array([float(s.lost()) for s in steps]),
@@ -147,11 +148,11 @@ def _name(kind: str, labels: dict[str, Any]) -> str:
 
 def _read(step: Step, names: tuple[str, ...], batches: int) -> dict[str, Any]:
     data = step.read(*names)
-    count = len(data["flags"])
+    count = len(data[STATUS])
     if count < 2 * batches:
         raise AnalysisError(f"step {dict(step.labels)}: found {count} samples; expected {2 * batches} or more")
     out = reduced(data, names, step.labels)
     out["batches"] = {c: np.array([part.mean() for part in np.array_split(data[c], batches)]) for c in names}
-    out["every"] = {c: data[c] for c in names if c != "flags"}
+    out["every"] = {c: data[c] for c in names if c != STATUS}
     out["samples"] = count
     return out

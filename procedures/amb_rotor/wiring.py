@@ -10,6 +10,7 @@ import numpy as np
 
 from bench.findings import Effect, Finding
 from bench.recording import Recording
+from bench.rigfile.roles import STATUS
 from procedures.amb_rotor import nudges, rings
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.amb_rotor.lift import LIFT, LIFT_LOST, NO_SPEED, REST
@@ -37,8 +38,8 @@ def before_orbits(recording: Recording[Any]) -> Iterator[Finding]:
 def _at_rest(recording: Recording[Any], machine: AmbRotor) -> Iterator[Finding]:
     """On the rings the rotor lies below the middle on both axes, at the clearance over the square root of two."""
     for step in recording.steps(REST):
-        data = step.read(*machine.positions, "flags")
-        beyond = bool((data["flags"].astype(np.int64) & machine.sensor_range).any())
+        data = step.read(*machine.positions, STATUS)
+        beyond = bool((data[STATUS].astype(np.int64) & machine.sensor_range).any())
         for name in machine.positions:
             mean = float(np.mean(data[name]))
             if mean > 0:

@@ -54,7 +54,7 @@ NEEDED = (
 CODES = {"static": 0.0, "priority": 1.0}
 
 
-def settings(_: Plan) -> dict[str, float]:
+def settings(_rig: RigFile, _: Plan) -> dict[str, float]:
     """Lifted with the angle released: no loop is closed before the encoder's direction is known."""
     return dict(hold.RELEASED)
 

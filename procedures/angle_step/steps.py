@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
+from bench.rigfile.roles import ANGLE, STATUS
 from procedures.angle_step.response import Move
 from procedures.servomotor.conventions import Servomotor, conventions, displacement
 
@@ -26,7 +27,7 @@ def positions(machine: Servomotor) -> tuple[str, ...]:
 
 def channels(machine: Servomotor) -> tuple[str, ...]:
     """What is recorded of a step."""
-    return ("angle", *positions(machine), *machine.segments, "flags")
+    return (ANGLE, *positions(machine), *machine.segments, STATUS)
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,7 @@ def _read(recording: Recording[Any], step: Step, machine: Servomotor, share: flo
                             f"{int((~rest).sum())} after; expected at least 20 and 100")  # fmt: skip
     labels = step.labels
     case = Case(str(labels["allocation"]), float(labels["size_rad"]), float(labels["filter_hz"]))
-    flags = data["flags"].astype(np.int64)
+    flags = data[STATUS].astype(np.int64)
     return Done(
         case,
         _move(data, rest, labels, machine, share),
@@ -115,7 +116,7 @@ def _move(
         raise AnalysisError(f"a step of {np.degrees(step):.2f} deg: the torque current never answers")
     first = max(int(answers[0]) - 1, int(np.flatnonzero(~rest)[0]))
     after = slice(first, None)
-    angle = np.unwrap(data["angle"]) - (float(labels["target_rad"]) - step)
+    angle = np.unwrap(data[ANGLE]) - (float(labels["target_rad"]) - step)
     angle -= 2 * np.pi * np.round(angle[rest].mean() / (2 * np.pi))
     inboard, outboard = (np.array([data[c] for c in machine.positions_of(f"x{b}", f"y{b}")]) for b in "io")
     motor = displacement(inboard, outboard, share)
@@ -126,7 +127,7 @@ def _move(
         orbit=outboard[:, after],
         motor=motor[:, after],
         segments=segments[:, after],
-        saturated=(data["flags"][after].astype(np.int64) & machine.segment_limit) != 0,
+        saturated=(data[STATUS][after].astype(np.int64) & machine.segment_limit) != 0,
         rest_orbit=outboard[:, rest],
         rest_motor=motor[:, rest],
         rest_segments=segments[:, rest],

@@ -56,15 +56,12 @@ def requires(rig: RigFile) -> Requires:
     return replace(
         required(machine),
         lacks=(*machine.lacks, *of_scales(rig)),
-        parameters=(
-            machine.law,
-            machine.set_points["y"],
-            machine.set_points["theta"],
+        capabilities=(
+            "set_points",
             "bias",
-            "kp",
-            "kd",
-            *machine.poles,
-            *machine.model_parameters,
+            "gains.kp",
+            "gains.kd",
+            *(f"model.{kind}_{axis}" for kind in ("beta", "offset") for axis in machine.axes),
         ),
         geometry=NEEDED,
         machine=("mass", "transverse_inertia", "polar_inertia", "radial_axes", "runout", "weight_mass", "weight_angle"),

@@ -17,6 +17,7 @@ from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
 from bench.uncertainty import propagate
 from bench.units import RPM
+from procedures.amb_rotor.conventions import conventions
 from procedures.balance.estimates import Balanced
 from procedures.balance.plan import Plan
 from procedures.balance.solution import Trials
@@ -43,13 +44,15 @@ def gain(rig: RigFile, plan: Plan, plane: int) -> float:
     known = bearings.Known(None, plan.beta_share, plan.offset_u_m)
     stand = Stand.of({n: e.value for n, e in bearings.collect_inputs(rig, known).items()})
     p = {n: q.default for n, q in rig.parameters.items()}
-    if plan.law == "PID":
-        means = np.concatenate([np.zeros(4), np.full(8, p["bias"])])
+    machine = conventions(rig)
+    if (flat := machine.can.flatness.get(plan.law)) is None:
+        means = np.concatenate([np.zeros(4), np.full(8, p[machine.biases[0]])])
+        kp, kd = (p[machine.gain(key, machine.axes[0])] for key in ("kp", "kd"))
         plus, minus, k_x = runout.slopes(stand, means)
         force = float((plus - minus)[[0, 2]].sum())
-        k1, k2 = (force * p["kp"] - float(k_x[[0, 2]].sum())) / stand.mass, force * p["kd"] / stand.mass
+        k1, k2 = (force * kp - float(k_x[[0, 2]].sum())) / stand.mass, force * kd / stand.mass
     else:
-        k1, k2 = p["k1"], p[f"k2_{plan.law.lower()}"]
+        k1, k2 = p[flat.k1], p[flat.k2]
     w = np.linspace(1.0, max(plan.speeds_rad_s), 400)
     most = float((w**2 / np.abs(k1 - w**2 + 1j * w * k2)).max())
     arm = (-stand.l_iu, stand.l_ou)[plane]

@@ -14,7 +14,7 @@ from procedures.amb_rotor.conventions import Law
 class Plan(BenchPlan):
     """Settings of a balancing, SI."""
 
-    law: Law = "CCS"
+    law: Law = ""
     speeds_rad_s: tuple[float, ...] = Field((4000 / RPM, 10000 / RPM), min_length=1)  # of every run
     slow_rad_s: float = Field(300 / RPM, ge=0)  # 0: no slow roll
     slow_s: float = Field(10.0, ge=1)

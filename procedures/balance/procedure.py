@@ -16,7 +16,8 @@ from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
-from procedures.amb_rotor.conventions import AMB_ROTOR
+from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.laws import of_laws
 from procedures.balance import checks, decision, estimates, sequence
 from procedures.balance import figures as drawn
 from procedures.balance.estimates import Result
@@ -77,10 +78,10 @@ SINE = Quantity(
 MEASURES = (FOUND_COS, FOUND_SIN, LEFT_COS, LEFT_SIN, SHARE, PERMITTED, COSINE, SINE)
 
 
-def settings(plan: Plan) -> dict[str, float]:
+def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Lifted by the PID, nothing compensated."""
     del plan
-    return AMB_ROTOR.lifting
+    return conventions(rig).lifting
 
 
 def step_count(plan: Plan) -> int:
@@ -143,6 +144,7 @@ def measured(result: Result) -> Iterator[Measured]:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
+    yield from of_laws(conventions(rig), "law", [plan.law])
     yield from checks.of_plan(rig, plan)
 
 

@@ -9,6 +9,7 @@ from bench.procedure.rig import Rig
 from bench.procedure.roles import Plane, RigState
 from bench.procedure.states import transition
 from bench.recording.recorder import Recorder
+from bench.rigfile.roles import STATUS
 from procedures.amb_rotor import lift
 from procedures.amb_rotor.conventions import conventions
 from procedures.balance import decision, estimates
@@ -127,7 +128,7 @@ def _dwell(
         rig.capture.wait(capture_s + 5.0)
         rig.clock.sleep(max(seconds - capture_s, MARGIN_S))
     work.dwells += 1
-    touched = int(rig.levitation.reading("flags")) & machine.contact
+    touched = int(rig.levitation.reading(STATUS)) & machine.contact
     data = rig.capture.upload(run=name, speed_rad_s=speed)
     try:
         return None if touched else read_capture(data, machine, kind == SLOW)

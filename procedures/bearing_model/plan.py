@@ -5,11 +5,13 @@ from __future__ import annotations
 from pydantic import Field
 
 from bench.procedure import BenchPlan
+from procedures.amb_rotor.conventions import Law
 
 
 class Plan(BenchPlan):
     """Settings, SI. Positions are a grid of the centre of mass in y and z, within a circle."""
 
+    law: Law = ""  # of the controller's, one that holds a place exactly; as it is set where none is named
     spacing_m: float = Field(20e-6, gt=0)
     radius_m: float = Field(82e-6, gt=0)
     tilt_rad: float = Field(3e-4, gt=0)  # of the check of the wiring

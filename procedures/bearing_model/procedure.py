@@ -22,8 +22,9 @@ from bench.procedure.states import transition
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from procedures.amb_rotor import rings
+from procedures.amb_rotor import lift, rings
 from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
+from procedures.amb_rotor.laws import of_laws
 from procedures.amb_rotor.places import HOLD, LIFT, LIFT_LOST, REST, TILT, Held, channels, of_readings, read_steps
 from procedures.bearing_model import checks, estimates, wiring
 from procedures.bearing_model import figures as drawn
@@ -54,8 +55,6 @@ MEASURES = (*BETA.values(), *OFFSET.values(), *OF_LINEAR.values())
 REST_S = 0.3
 BIAS_STEP_A = 0.1
 MARGIN = 5e-6  # of the radius: noise, and what the controller swings on the way
-POINTS = tuple(AMB_ROTOR.set_points[name] for name in ("y", "z", "psi", "theta"))
-PARAMETERS = (AMB_ROTOR.law, "bias", AMB_ROTOR.integral, *POINTS, "slew", "current_limit")
 GEOMETRY = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_outboard_amb", "amb_span", "amb_gap", "clearance",
             "com_to_coupling", "coupling_stiffness")  # fmt: skip
 MACHINE = ("mass", "radial_axes", "runout", "coupling_offset")
@@ -66,9 +65,11 @@ result's standard uncertainty is less than what the positions say of it, both as
 ASKED = "Is the motor's coupling taken off the shaft, so that nothing but the AMBs holds it?"
 
 
-def settings(plan: Plan) -> dict[str, float]:
+def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Controller parameters that the runner writes before levitation: flatness with constant current sum."""
-    return {**AMB_ROTOR.select("CCS"), "bias": plan.biases_A[0], AMB_ROTOR.integral: 1.0}
+    machine = conventions(rig)
+    integrating = machine.can.settings.get("integrator", {}).get("on", {})
+    return {**machine.select(plan.law), **dict.fromkeys(machine.biases, plan.biases_A[0]), **integrating}
 
 
 def grid(plan: Plan) -> list[tuple[float, float]]:
@@ -105,20 +106,17 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         return
     rig.clock.sleep(3 * plan.settle_s)
     tilted = _tilt(rig, plan, record)
-    ref_y, ref_z = machine.set_points["y"], machine.set_points["z"]
     for k, bias in enumerate(plan.biases_A):
         _set_bias(rig, plan, bias)
         held = []
         for y, z in grid(plan) if k % 2 == 0 else reversed(grid(plan)):
-            rig.levitation.set(ref_y, y)
-            rig.levitation.set(ref_z, z)
+            lift.write(rig, {**machine.point("y", y), **machine.point("z", z)})
             rig.clock.sleep(plan.settle_s)
             with record.step(HOLD, y_m=y, z_m=z, bias_A=bias):
                 held.append(_watched(rig, plan, record))
         if k == 0 and not first_look.passes(rig, record, _of_first(rig.file, plan, held, tilted)):
             return
-    rig.levitation.set(ref_y, 0.0)
-    rig.levitation.set(ref_z, 0.0)
+    lift.write(rig, {**machine.point("y", 0.0), **machine.point("z", 0.0)})
     rig.clock.sleep(plan.settle_s)
 
 
@@ -134,10 +132,11 @@ def _lift(rig: Rig, record: Recorder) -> bool:
 
 def _set_bias(rig: Rig, plan: Plan, bias: float) -> None:
     """In small steps: each one is a push, until the integrators have taken it up."""
-    before = rig.levitation.get("bias")
+    biases = conventions(rig.file).biases
+    before = rig.levitation.get(biases[0])
     count = math.ceil(abs(bias - before) / BIAS_STEP_A - 1e-3)
     for k in range(count):
-        rig.levitation.set("bias", before + (bias - before) * (k + 1) / count)
+        lift.write(rig, dict.fromkeys(biases, before + (bias - before) * (k + 1) / count))
         rig.clock.sleep(plan.settle_s / 2)
     rig.clock.sleep(plan.settle_s if count else 0.0)
 
@@ -161,14 +160,13 @@ def _of_first(
 
 def _tilt(rig: Rig, plan: Plan, record: Recorder) -> list[dict[str, float]]:
     seen = []
-    write, points = rig.levitation.set, conventions(rig.file).set_points
+    machine = conventions(rig.file)
     for psi, theta in tilts(plan):
-        write(points["psi"], psi)
-        write(points["theta"], theta)
+        lift.write(rig, {**machine.point("psi", psi), **machine.point("theta", theta)})
         rig.clock.sleep(plan.settle_s)
         with record.step(TILT, psi_rad=psi, theta_rad=theta):
             seen.append(_watched(rig, plan, record))
-    write(points["theta"], 0.0)
+    lift.write(rig, machine.point("theta", 0.0))
     return seen
 
 
@@ -210,6 +208,7 @@ def _of_data(recording: Recording[Plan], held: Held, tilted: Held) -> Iterator[F
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
+    yield from of_laws(conventions(rig), "law", [plan.law])
     places = len(grid(plan))
     if places < 9:
         yield f"spacing_m, radius_m: found {places} positions; expected nine or more"
@@ -220,15 +219,16 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
             f"radius_m: found {plan.radius_m * 1e6:.1f} µm; the ring, the sensors' zeros and their runout leave "
             f"{room * 1e6:.1f} µm"
         )
-    points = conventions(rig).set_points
-    for name in (points["y"], points["z"]):
+    machine = conventions(rig)
+    for name in (*machine.point("y", 0.0), *machine.point("z", 0.0)):
         if plan.radius_m > rig.parameters[name].high:
             yield f"radius_m: found {plan.radius_m * 1e6:.1f} µm; {name} goes to {rig.parameters[name].high * 1e6:.0f} µm"
     arm = max(g[k].value for k in ("com_to_inboard_sensor", "com_to_outboard_sensor"))
-    if plan.tilt_rad > rig.parameters[points["psi"]].high or plan.tilt_rad * arm > room:
+    tilted = machine.point("psi", plan.tilt_rad)
+    if any(abs(value) > rig.parameters[name].high for name, value in tilted.items()) or plan.tilt_rad * arm > room:
         yield f"tilt_rad: found {plan.tilt_rad * 1e6:.0f} µrad; reference and ring allow less"
-    allowed = rig.parameters["bias"]
-    low, high = allowed.low, min(allowed.high, rig.parameters["current_limit"].default / 2)
+    allowed, limit = rig.parameters[machine.biases[0]], rig.parameters[machine.can.current_limit].default
+    low, high = allowed.low, min(allowed.high, limit / 2)
     for bias in plan.biases_A:
         if not low <= bias <= high:
             yield (
@@ -249,7 +249,7 @@ def requires(rig: RigFile) -> Requires:
         lacks=machine.lacks,
         channels=channels(machine),
         sensors=(*machine.positions, *machine.currents),
-        parameters=PARAMETERS,
+        capabilities=("set_points", "bias", "current_limit"),
         geometry=GEOMETRY,
         machine=MACHINE,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from bench.units import RPM
-from procedures.amb_rotor.conventions import Law, Variant
+from procedures.amb_rotor.conventions import Variant
 from procedures.unbalance import plan as unbalance
 
 SAME = 1e-6  # of a speed
@@ -14,7 +14,6 @@ SAME = 1e-6  # of a speed
 class Plan(unbalance.Plan):
     """Settings, SI; those of `unbalance` and some more."""
 
-    law: Law = "CCS"
     variants: tuple[Variant, ...] = Field(("off", "corrected"), min_length=2)
     # of these, where there is a dwell, the observer as printed too
     literal_rad_s: tuple[float, ...] = (2000 / RPM, 10000 / RPM)

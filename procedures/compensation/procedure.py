@@ -53,9 +53,9 @@ MEASURES = (*unbalance.MEASURES, REDUCTION, DROP, RESIDUAL)
 AFTER_ARM_S = 0.05
 
 
-def settings(plan: Plan) -> dict[str, float]:
+def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """As for `unbalance`, with the poles of T 3.5."""
-    return unbalance.settings(plan)
+    return unbalance.settings(rig, plan)
 
 
 def step_count(plan: Plan) -> int:
@@ -75,16 +75,15 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 def _switch(rig: Rig, plan: Plan, record: Recorder) -> bool:
     """Switch the compensation on while the controller records."""
     machine = conventions(rig.file)
-    dwelling.put(rig, machine.variants["off"])
+    lift.write(rig, machine.variants["off"])
     if rig.capture is None or not lift.bring_to_speed(rig, record, plan.switch_rad_s, plan.settle_s):
         return False
-    compensating = machine.variants["corrected"]
-    dwelling.put(rig, {**compensating, machine.compensate: 0.0})  # the estimates run and do nothing
+    lift.write(rig, machine.variants["waiting"])  # the estimates run and do nothing
     rig.clock.sleep(plan.settle_s)
     with record.step(SWITCH, speed_rad_s=plan.switch_rad_s):
         rig.capture.arm(switching.captured_channels(machine), seconds=plan.before_s + AFTER_ARM_S + plan.after_s)
         rig.clock.sleep(plan.before_s)
-        rig.levitation.set(machine.compensate, compensating[machine.compensate])
+        lift.write(rig, switching.switched(machine))
         rig.capture.wait(plan.after_s + 5.0)
     rig.capture.upload(switch=1)
     return True
@@ -135,8 +134,8 @@ def _switched_at(plan: Plan) -> str:
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
     yield from unbalance.check(rig, plan)
-    if plan.variants[:2] != ("off", "corrected") or plan.law == "PID":
-        yield "variants: expected off, then corrected, with law CCS or CAC; something must be compared"
+    if plan.variants[:2] != ("off", "corrected") or plan.law in ("", conventions(rig).plain_law):
+        yield "variants: expected off, then corrected, with a law that compensates; something must be compared"
     if min(plan.speeds_rad_s) > plan.judged_to_rad_s:
         yield (f"judged_to_rad_s: found {plan.judged_to_rad_s * RPM:.0f} r/min; every speed of the plan is above it, and no "
                f"reduction would be measured: set it above {min(plan.speeds_rad_s) * RPM:.0f} r/min")  # fmt: skip
@@ -158,7 +157,9 @@ def figures(found: Compared, recording: Recording[Plan]) -> Iterable[Shown]:
 def requires(rig: RigFile) -> Requires:
     """What the unbalance response needs, and a controller that compensates."""
     needed = unbalance.requires(rig)
-    return replace(needed, parameters=(*needed.parameters, *conventions(rig).variants["corrected"]))
+    return replace(
+        needed, capabilities=(*needed.capabilities, "settings.compensation.corrected", "settings.compensation.waiting")
+    )
 
 
 procedure = Procedure(

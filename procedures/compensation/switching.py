@@ -66,6 +66,12 @@ def rms(vectors: Vectors) -> float:
     return math.sqrt(float((np.abs(vectors.values) ** 2).mean()))
 
 
+def switched(machine: AmbRotor) -> dict[str, float]:
+    """The parameters that switch the compensation on while its estimates run."""
+    waiting = machine.variants["waiting"]
+    return {name: value for name, value in machine.variants["corrected"].items() if waiting.get(name) != value}
+
+
 def captured_channels(machine: AmbRotor) -> tuple[str, ...]:
     """What is captured about the switch."""
     return (*machine.positions, "pulses", "pulse_age")
@@ -82,9 +88,9 @@ def read_switch(recording: Recording[Any]) -> Switched:
     if not found or not steps:
         raise AnalysisError("found no capture about the switch; expected one (was the run stopped early?)")
     written = [e["t_ns"] for e in recording.events("parameter")
-               if e["name"] == machine.compensate and steps[0].start_ns <= e["t_ns"] <= steps[0].end_ns]  # fmt: skip
+               if e["name"] in switched(machine) and steps[0].start_ns <= e["t_ns"] <= steps[0].end_ns]  # fmt: skip
     if not written:
-        raise AnalysisError("found no write of `compensate` within the step")
+        raise AnalysisError("found no write that switches the compensation within the step")
     data: Mapping[str, Array] = found[0].arrays(*captured_channels(machine))
     t = data["t_s"] - (written[0] - recording.start_ns) * 1e-9
     tacho = tachometer(*counted(t, data["pulses"], data["pulse_age"]))

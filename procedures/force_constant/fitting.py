@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from bench.procedure.requires import Requires
 from bench.rigfile import RigFile
+from bench.rigfile.roles import STATUS
 from procedures.force_constant.plan import Plan
 from procedures.force_constant.steps import AXES, channels
 from procedures.servomotor.conventions import conventions
@@ -23,7 +24,7 @@ def requires(rig: RigFile) -> Requires:
     return Requires(
         lacks=(*machine.lacks, *of_motors(rig)),
         roles=("levitation", "rotation"),
-        channels=(*channels(machine), "flags"),
+        channels=(*channels(machine), STATUS),
         sensors=(*machine.coils_of(*AXES), *machine.segments),
         parameters=("bias_i", "bias_o", "i_ramp", "i_x", "i_y"),
         geometry=("amb_span", "motor_to_outboard_amb", "amb_gap", "motor_stiffness", *machine.levers),

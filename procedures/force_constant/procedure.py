@@ -44,7 +44,7 @@ ALPHA_DX = Quantity("alpha_dx", "N/A", "motor: dF_x/di_x at gamma = 0, mean over
 MEASURES = (ALPHA_D, ALPHA_DX)
 
 
-def settings(plan: Plan) -> dict[str, float]:
+def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Controller parameters that the runner writes before levitation."""
     return {"bias_i": plan.bias_A, "bias_o": plan.bias_A, "i_ramp": plan.ramp_A_s}
 

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.recording import Recording
+from bench.rigfile.roles import ANGLE
 from bench.uncertainty import Estimate, Influence
 from procedures.force_coupling import fit as force_coupling_fit
 from procedures.force_coupling.fit import CouplingFit, Sweep
@@ -44,7 +45,7 @@ def evaluate(recording: Recording[Any], data: StepTable[Phase], count_rad: float
     machine = conventions(recording.rig)
     y, x = (data.stack(machine.positions_of(f"{axis}i", f"{axis}o")) for axis in "yx")
     sweep = Sweep(data.stack(machine.segments), y, x,
-                  data.each(lambda step: step.gamma_rad), rotor_angle(data.mean["angle"], count_rad), data.time_s)  # fmt: skip
+                  data.each(lambda step: step.gamma_rad), rotor_angle(data.mean[ANGLE], count_rad), data.time_s)  # fmt: skip
 
     def model(p: dict[str, float]) -> dict[str, float]:
         return outputs(force_coupling_fit.fit_sweep(sweep, p), p)

@@ -22,6 +22,7 @@ from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
+from bench.rigfile.roles import STATUS
 from procedures.force_coupling import checks as force_coupling_checks
 from procedures.force_coupling import estimates
 from procedures.force_coupling import figures as drawn
@@ -162,7 +163,7 @@ def requires(rig: RigFile) -> Requires:
     return Requires(
         lacks=(*machine.lacks, *of_motors(rig)),
         roles=("levitation", "rotation"),
-        channels=(*channels(machine), "flags"),
+        channels=(*channels(machine), STATUS),
         sensors=(*machine.segments, *machine.positions_of(*POSITIONS)),
         parameters=(*carrying.PARAMETERS, "gamma", "segment_max"),
         geometry=GEOMETRY,

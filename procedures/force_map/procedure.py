@@ -24,6 +24,7 @@ from bench.procedure.roles import NOTHING, Load, RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
+from bench.rigfile.roles import STATUS
 from procedures.force_map import estimates, steps
 from procedures.force_map import figures as force_map_figures
 from procedures.force_map.estimates import CROSS, Result
@@ -74,7 +75,7 @@ def loaded_points(plan: Plan) -> list[Point]:
     return [Point(), *half, *(Point(-p.i_y, -p.i_x, -p.y, -p.x) for p in half), Point()]
 
 
-def settings(plan: Plan) -> dict[str, float]:
+def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Lifted at the calibration's bias with the angle released: no loop closes before the encoder's direction is known."""
     return {"bias_i": plan.bias_A, "bias_o": plan.bias_A, "i_ramp": plan.ramp_A_s, **hold.RELEASED}
 
@@ -204,7 +205,7 @@ def requires(rig: RigFile) -> Requires:
     return Requires(
         lacks=(*machine.lacks, *of_motors(rig)),
         roles=("levitation", "rotation"),
-        channels=(*channels(machine), "flags", *wiring.channels(machine)),
+        channels=(*channels(machine), STATUS, *wiring.channels(machine)),
         sensors=(*machine.coils["yi"], *machine.segments, *positions(machine)),
         parameters=(*hold.PARAMETERS, *wiring.PARAMETERS, *NEEDED),
         geometry=GEOMETRY,

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
 from bench.recording import Recording, Step
+from bench.rigfile.roles import STATUS
 from procedures.force_map.plan import Plan
 from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.shared.step_table import Labels, Samples, StepTable, tabulate
@@ -76,8 +77,8 @@ def read_points(recording: Recording[Any]) -> MapData:
     read = channels(machine)
 
     def samples(step: Step) -> Samples:
-        data = step.read(*read, "flags")
-        if len(data["flags"]) < 2:
+        data = step.read(*read, STATUS)
+        if len(data[STATUS]) < 2:
             raise AnalysisError(f"point {dict(step.labels)}: found no samples")
         return data | {"control": machine.control("yi", data.__getitem__)}
 

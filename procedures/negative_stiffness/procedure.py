@@ -23,6 +23,7 @@ from bench.procedure.states import transition
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
+from bench.rigfile.roles import STATUS
 from procedures.negative_stiffness import checks as negative_stiffness_checks
 from procedures.negative_stiffness import estimates
 from procedures.negative_stiffness import figures as drawn
@@ -52,7 +53,7 @@ GEOMETRY = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_inboard_a
             "motor_to_outboard_amb", "amb_span", "amb_gap", "motor_stiffness")  # fmt: skip
 
 
-def settings(plan: Plan) -> dict[str, float]:
+def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Controller parameters that the runner writes before levitation."""
     return {"bias_i": plan.bias_A, "bias_o": plan.bias_A}
 
@@ -236,7 +237,7 @@ def requires(rig: RigFile) -> Requires:
     return Requires(
         lacks=machine.lacks,
         roles=("levitation", "rotation"),
-        channels=(*channels(machine), "flags"),
+        channels=(*channels(machine), STATUS),
         sensors=(*machine.segments, *machine.coils["yo"], *machine.positions_of(*POSITIONS)),
         parameters=(*carrying.PARAMETERS, "ref_yo", "bias_i", "bias_o", "segment_max"),
         geometry=GEOMETRY,

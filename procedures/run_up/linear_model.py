@@ -23,13 +23,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from bench.rigfile.capabilities import Flatness
 from procedures.run_up.steps import Curve
 from procedures.synchronous.runout import SCALE, Stand, arms, impedance
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 TURN = np.arange(24) * (2 * np.pi / 24)
-INTEGRATOR, PROPORTIONAL, DERIVATIVE = "k0", "k1", {"CCS": "k2_ccs", "CAC": "k2_cac"}
 
 
 @dataclass(frozen=True)
@@ -54,16 +54,16 @@ def bend(s: Stand, c: Curve, runouts: Mapping[float, Complex], law: str, gains: 
         s: what the forces rest on.
         c: the passage.
         runouts: by order, (4,) m; orders 1 and 2.
-        law: PID, CCS or CAC.
+        law: of the controller, "" as it is set: a flatness, or else the one that holds each axis by itself.
         gains: of the controller, by name, SI.
     """
     t = _turns(s, c, runouts)
     k_p, k_n, k_x = _slopes(s, t)
     whole = _beyond(s, t, (k_p, k_n, k_x), t.x1, t.x2)
-    if law == "PID":
+    if (flat := c.machine.can.flatness.get(law)) is None:
         loop = _decentral(s, t, k_p, k_n, k_x)
     else:
-        loop, late = _flat(s, t, (k_p, k_n, k_x), whole, law, gains)
+        loop, late = _flat(s, t, (k_p, k_n, k_x), whole, flat, gains)
         whole = whole - _inverted(s, c, gains, late)
     at_amb, at_probe = arms(s.l_ia, s.l_oa), arms(s.l_is, s.l_os)
     return np.asarray(at_probe @ np.linalg.solve(loop, (at_amb.T @ whole).T[..., None])[..., 0].T)
@@ -116,7 +116,7 @@ def _beyond(s: Stand, t: _Turns, k: tuple[Array, Array, Array], x1: Complex, x2:
 def _inverted(s: Stand, c: Curve, gains: Mapping[str, float], late: Complex) -> Complex:
     """N as the law takes it off (4, b): with its own gap and magnetic offsets, at what the probes read, late."""
     offset = np.array([gains[c.machine.model_offset(axis)] for axis in c.machine.axes])
-    idea = replace(s, gap=gains["model_gap"], offset=offset, gain=np.ones(4), zero=np.zeros(4))
+    idea = replace(s, gap=gains[c.machine.can.model["gap"]], offset=offset, gain=np.ones(4), zero=np.zeros(4))
     t = _turns(idea, c, {1.0: np.zeros(4, complex), 2.0: np.zeros(4, complex)})
     return _beyond(idea, t, _slopes(idea, t), t.x1 * late, t.x2 * late**2)
 
@@ -130,7 +130,7 @@ def _decentral(s: Stand, t: _Turns, k_p: Array, k_n: Array, k_x: Array) -> Compl
 
 
 def _flat(
-    s: Stand, t: _Turns, k: tuple[Array, Array, Array], whole: Complex, law: str, gains: Mapping[str, float]
+    s: Stand, t: _Turns, k: tuple[Array, Array, Array], whole: Complex, flat: Flatness, gains: Mapping[str, float]
 ) -> tuple[Complex, Complex]:
     """Z (b, 4, 4) where the law asks for accelerations, and by how much it is late, e^(-j angle) (b,)."""
     at_amb, mass = arms(s.l_ia, s.l_oa), np.diag([s.mass, s.mass, s.inertia, s.inertia])
@@ -141,8 +141,8 @@ def _flat(
     asked, made = SCALE[:, None] * (mass @ q), SCALE[:, None] * (force - held @ q)
     g = -(asked.conj() * made).sum(axis=0) / (np.abs(asked) ** 2).sum(axis=0)
     w = t.speed
-    rate = 1j * w / (1 + 1j * w / (2 * math.pi * gains["derivative_hz"]))
-    meant = gains[PROPORTIONAL] + gains[DERIVATIVE[law]] * rate + gains["integral"] * gains[INTEGRATOR] / (1j * w)
+    rate = 1j * w / (1 + 1j * w / (2 * math.pi * gains[flat.derivative_hz]))
+    meant = gains[flat.k1] + gains[flat.k2] * rate + gains[flat.integral] * gains[flat.k0] / (1j * w)
     turned = g / meant
     free = np.array([impedance(s, np.zeros(4), x, x) for x in w])
     return free - held + g[:, None, None] * mass, turned / np.abs(turned)

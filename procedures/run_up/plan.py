@@ -14,7 +14,7 @@ from procedures.amb_rotor.conventions import Law
 class Passing(BenchPlan):
     """Settings of both directions, SI."""
 
-    law: Law = "CCS"
+    law: Law = ""
     parameters: dict[str, float] = Field(default_factory=dict)  # of the controller, while the speeds are passed
     top_rad_s: float = Field(14000 / RPM, gt=0)
     bottom_rad_s: float = Field(600 / RPM, gt=0)

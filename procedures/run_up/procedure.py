@@ -23,7 +23,8 @@ from bench.rigfile import RigFile
 from bench.rigfile.capture import at_speed
 from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
-from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
+from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.laws import of_laws
 from procedures.amb_rotor.lift import NO_SPEED
 from procedures.run_up import checks, estimates
 from procedures.run_up import figures as drawn
@@ -34,7 +35,6 @@ from procedures.shared import assumptions, first_look
 from procedures.synchronous import bearings, dwelling
 from procedures.synchronous import checks as dwell_checks
 from procedures.synchronous.coil_peaks import find_uncertified
-from procedures.synchronous.dwelling import put
 from procedures.synchronous.dwells import SLOW, captured_channels, read_dwell
 from procedures.unbalance import procedure as unbalance
 from procedures.unbalance.procedure import CURRENT, D_MAX, MAJOR, READ, SHARE, VOLTAGE
@@ -57,10 +57,10 @@ HOLD_S = 0.5
 AFTER_S = 5.0  # the drive has passed a speed: a capture that has not come by then does not come
 
 
-def settings(plan: Passing) -> dict[str, float]:
+def settings(rig: RigFile, plan: Passing) -> dict[str, float]:
     """Lifted by the PID, which needs no model."""
     del plan
-    return AMB_ROTOR.lifting
+    return conventions(rig).lifting
 
 
 def step_count(plan: Passing) -> int:
@@ -81,7 +81,7 @@ def begin(rig: Rig, plan: Passing, record: Recorder) -> bool:
     """Lift, nudge and slow roll, then set the controller as planned; False where the run ends here."""
     if not dwelling.roll_slowly(rig, record, plan.law, plan.slow_rad_s, plan.slow_s, plan.settle_s):
         return False
-    put(rig, plan.parameters)
+    lift.write(rig, plan.parameters)
     return True
 
 
@@ -92,7 +92,7 @@ def end(rig: Rig, plan: Passing) -> None:
         rig.drive.coast()
         if plan.rate_rad_s2:
             rig.drive.set_acceleration(0.0)
-    put(rig, {name: rig.file.parameters[name].default for name in plan.parameters})
+    lift.write(rig, {name: rig.file.parameters[name].default for name in plan.parameters})
     dwelling.stop(rig)
 
 
@@ -202,6 +202,7 @@ def measured(run: Run) -> Iterator[Measured]:
 def check(rig: RigFile, plan: Passing) -> Iterable[str]:
     """What cannot work before anything starts."""
     lacking = [f"parameters: the rig has no {name}" for name in plan.parameters if name not in rig.parameters]
+    yield from of_laws(conventions(rig), "law", [plan.law])
     yield from lacking or checks.of_plan(rig, plan)
 
 

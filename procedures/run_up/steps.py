@@ -17,6 +17,7 @@ from bench.analysis.tachometer import Tachometer, age, counted, tachometer
 from bench.analysis.vectors import parts
 from bench.errors import AnalysisError
 from bench.recording import Recording
+from bench.rigfile.roles import ANGLE, PULSES, SPEED, STATUS
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.shared.signals import clips
 from procedures.synchronous.dwells import Dwell, full_rate, telemetry_channels
@@ -100,7 +101,7 @@ def read_passage(recording: Recording[Any]) -> Passage:
     if t.size < 100:
         raise AnalysisError(f"passage: found {t.size} samples; expected 100 or more")
     ticks = round(recording.streams["telemetry"].period_ns * 1e-9 / tick)
-    tacho = tachometer(*counted(t - tick, data["pulses"], age(data["angle"], data["speed"])))
+    tacho = tachometer(*counted(t - tick, data[PULSES], age(data[ANGLE], data[SPEED])))
     wide = np.array([data[c] for c in names])
     drive = recording.channel(DRIVEN, step.start_ns, step.end_ns)
     labels = step.labels
@@ -112,7 +113,7 @@ def read_passage(recording: Recording[Any]) -> Passage:
         t,
         wide,
         np.array([data[c] for c in machine.plane_voltages]),
-        data["flags"].astype(np.int64),
+        data[STATUS].astype(np.int64),
         ((drive["t_ns"] - recording.start_ns) * 1e-9, drive[DRIVEN]),
         _moving(tacho.speed(t)),
         tuple(c for c, x in zip(names, wide, strict=True) if np.ptp(x) == 0),

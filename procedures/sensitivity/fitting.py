@@ -30,7 +30,8 @@ def of_plan(rig: RigFile, plan: Plan, combs: Sequence[tuple[str, Comb]]) -> Iter
 def _injection(rig: RigFile, plan: Plan, combs: Sequence[tuple[str, Comb]]) -> Iterator[str]:
     refined = Comb(plan.low_hz, plan.low_hz, 128, plan.amplitude_A)  # at most, in the second pass
     greatest = max([*(c for _, c in combs), refined], key=lambda c: c.peak)
-    if why := find_refusal(Envelope(rig), greatest):
+    can = rig.capabilities.injection
+    if can is not None and (why := find_refusal(Envelope(rig), can, greatest)):
         yield f"amplitude_A: found {plan.amplitude_A:g} A for each line; expected less: {why}"
     for key, value in (("low_hz", plan.low_hz), ("high_step_hz", plan.high_step_hz)):
         if math.log2(value) % 1:

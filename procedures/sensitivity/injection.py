@@ -8,12 +8,11 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from fractions import Fraction
 
-from bench.errors import BenchError
+from bench.errors import BenchError, Lacking
 from bench.procedure.rig import Rig
+from bench.rigfile.capabilities import Injection
 from bench.rigfile.envelope import Envelope
-from procedures.amb_rotor.conventions import conventions
 
-PARAMETERS = ("inject_axis", "inject_amplitude", "inject_hz", "inject_lines", "inject_step")
 MOST_LINES = 128
 CREST = 1.1  # greatest of Schroeder's phases over sqrt(2 lines) amplitudes: 1.08 at three lines, less elsewhere
 
@@ -54,19 +53,20 @@ def combs(first: float, step: float, last: float, amplitude: float) -> list[Comb
     return out
 
 
-def parameters_of(comb: Comb) -> dict[str, float]:
+def parameters_of(can: Injection, comb: Comb) -> dict[str, float]:
     """The controller's parameters that make it."""
-    return {
-        "inject_hz": comb.first,
-        "inject_step": comb.step,
-        "inject_lines": float(comb.count),
-        "inject_amplitude": comb.amplitude,
-    }
+    values = (
+        (can.hz, comb.first),
+        (can.step, comb.step),
+        (can.lines, float(comb.count)),
+        (can.amplitude, comb.amplitude),
+    )
+    return {name: value for name, value in values if name}
 
 
-def find_refusal(envelope: Envelope, comb: Comb) -> str:
+def find_refusal(envelope: Envelope, can: Injection, comb: Comb) -> str:
     """Why the envelope refuses it; empty where it does not."""
-    problems = [*envelope.problems_of(parameters_of(comb)), envelope.injection_problem(comb.peak)]
+    problems = [*envelope.problems_of(parameters_of(can, comb)), envelope.injection_problem(comb.peak)]
     return "; ".join(p for p in problems if p)
 
 
@@ -78,15 +78,17 @@ def inject(rig: Rig, axis: str, comb: Comb, settle_s: float) -> Iterator[None]:
         InterlockError: the envelope does not allow it; nothing was sent.
     """
     Envelope(rig.file).check_injection(comb.peak)
-    write = rig.levitation.set
-    for name, value in parameters_of(comb).items():
+    write, can = rig.levitation.set, rig.file.capabilities.injection
+    if can is None:
+        raise Lacking("capabilities.injection: found none")
+    for name, value in parameters_of(can, comb).items():
         write(name, value)
     try:
-        write("inject_axis", float(conventions(rig.file).all_axes.index(axis)))
+        write(can.axis, can.axes[axis])
         rig.clock.sleep(settle_s)
         yield
     except BaseException:
         with suppress(BenchError):
-            write("inject_axis", -1.0)
+            write(can.axis, can.off)
         raise
-    write("inject_axis", -1.0)
+    write(can.axis, can.off)

@@ -8,15 +8,15 @@ from pydantic import Field
 
 from bench.procedure import BenchPlan
 from bench.units import RPM
+from procedures.amb_rotor.conventions import Law
 
-Law = Literal["PID", "CCS"]
 Axis = Literal["yi", "zi", "yo", "zo", "x"]
 
 
 class Plan(BenchPlan):
     """Settings of the injections, SI."""
 
-    law: Law = "PID"
+    law: Law = ""
     axes: tuple[Axis, ...] = Field(("yi", "zi", "yo", "zo", "x"), min_length=1)
     speeds_rad_s: tuple[float, ...] = Field((0.0, 10000 / RPM), min_length=1)
     amplitude_A: float = Field(4e-3, gt=0)  # of each line, 0-pk

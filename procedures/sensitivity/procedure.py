@@ -24,11 +24,12 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
 from procedures.amb_rotor import lift, wiring
-from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
+from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.laws import of_laws
 from procedures.sensitivity import checks, estimates, fitting
 from procedures.sensitivity import figures as drawn
 from procedures.sensitivity.estimates import Candidate, Result
-from procedures.sensitivity.injection import PARAMETERS, Comb, combs, inject
+from procedures.sensitivity.injection import Comb, combs, inject
 from procedures.sensitivity.plan import Plan
 from procedures.sensitivity.steps import (
     HALF,
@@ -92,10 +93,11 @@ def size(rig: RigFile, kind: str, speed: float) -> int:
     return Layout.of(rig.capture, captured_channels(conventions(rig), kind, speed)).sample.itemsize
 
 
-def settings(plan: Plan) -> dict[str, float]:
+def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Lifted by the PID, which needs no model; nothing compensated, nothing injected."""
     del plan
-    return {**AMB_ROTOR.lifting, "inject_axis": -1.0}
+    can = rig.capabilities.injection
+    return {**conventions(rig).lifting, **({can.axis: can.off} if can is not None else {})}
 
 
 def step_count(plan: Plan) -> int:
@@ -108,7 +110,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     if not lift.lift_and_nudge(rig, record):
         return
     machine = conventions(rig.file)
-    rig.levitation.set(machine.law, machine.laws[plan.law])
+    lift.write(rig, machine.select(plan.law))
     rig.clock.sleep(plan.settle_s)
     number = 0
     for speed in sorted(plan.speeds_rad_s):
@@ -120,7 +122,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         rig.drive.stop()
         rig.drive.coast()
         rig.clock.sleep(machine.stands_s)
-    rig.levitation.set(machine.law, machine.laws["PID"])
+    lift.write(rig, machine.select(machine.plain_law))
 
 
 def _axis(rig: Rig, plan: Plan, record: Recorder, speed: float, axis: str, number: int) -> int:
@@ -188,6 +190,7 @@ def measured(results: Sequence[Result]) -> Iterator[Measured]:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
+    yield from of_laws(conventions(rig), "law", [plan.law])
     yield from fitting.of_plan(
         rig, plan, [(kind, comb) for s in plan.speeds_rad_s for kind, _, comb in surveys(plan, s)]
     )
@@ -205,7 +208,7 @@ def requires(rig: RigFile) -> Requires:
     return Requires(
         lacks=machine.lacks,
         channels=telemetry_channels(machine),
-        parameters=(*PARAMETERS, machine.law),
+        capabilities=("set_points", "injection", "injection.lines", "injection.step"),
         capture=(*LOOP, *PULSED, *machine.all_currents),
     )
 

@@ -14,6 +14,7 @@ from bench.analysis.responses import Response, clear_of_orders, lines, response,
 from bench.analysis.tachometer import counted, tachometer
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
+from bench.rigfile.roles import SPEED, STATUS
 from bench.units import RPM
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.shared.signals import clips
@@ -108,7 +109,7 @@ def name_speed(speed: float) -> str:
 
 def telemetry_channels(machine: AmbRotor) -> tuple[str, ...]:
     """What is read of the telemetry."""
-    return (*machine.all_positions, "flags", "speed")
+    return (*machine.all_positions, STATUS, SPEED)
 
 
 def captured_channels(machine: AmbRotor, kind: str, speed: float) -> tuple[str, ...]:
@@ -180,7 +181,7 @@ def _read(recording: Recording[Any], step: Step) -> Taken:
     clipped = float(np.abs(columns["after"] - columns["before"] - columns["inject"]).max())
     follows = _follows(columns, machine, rate, grid) if kind == WIRING else None
     turning = track_angle(columns, columns["t_s"])[1] if "pulses" in columns else 0.0
-    flags = int(np.bitwise_or.reduce(data["flags"].astype(np.int64)))
+    flags = int(np.bitwise_or.reduce(data[STATUS].astype(np.int64)))
     return Taken(
         str(labels["axis"]), float(labels["speed_rad_s"]), turning, kind, float(labels["about_hz"]), grid, found, excluded,
         injected, float(np.abs(columns["inject"]).max()), clipped, follows, rate, flags,

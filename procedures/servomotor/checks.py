@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.findings import Effect, Finding
+from bench.rigfile.roles import ANGLE
 from procedures.servomotor.conventions import Servomotor
 from procedures.shared import signals
 from procedures.shared.step_table import Labels, StepTable
@@ -74,7 +75,7 @@ def at_edge(data: StepTable[Labels], count_rad: float) -> Iterator[Finding]:
     A reading that is 0 or one count c, the latter with probability p, has the mean p c and the variance p (1 - p) c^2: from
     both follows c.
     """
-    mean, spread = np.abs(data.mean["angle"]), data.spread["angle"]
+    mean, spread = np.abs(data.mean[ANGLE]), data.spread[ANGLE]
     between = spread > 0.05 * count_rad
     found = float(np.median((spread**2 + mean**2)[between] / mean[between])) if between.any() else 0.0
     if between.mean() < 0.8 or abs(found / count_rad - 1) > 0.05:

@@ -1,7 +1,7 @@
-"""What the servomotor's controller calls its signals, what the bits of its flags mean, and where the shaft's planes lie.
+"""What the servomotor's controller calls its signals, what the bits of its status mean, and where the shaft's planes lie.
 
 Whatever looks at a recording or drives a rig gets them from `conventions(rig)` and names no signal by itself: channels are
-those of the rig file. Flags are those of the one controller there is.
+those of the rig file.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from enum import IntFlag
 from itertools import chain
 from typing import TypeVar
 
@@ -17,21 +16,12 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.rigfile import RigFile
+from bench.rigfile.roles import Status
 from bench.rigfile.supports import Support, SupportedAxis, once_per_rig, two_planes
 from procedures.shared.unsupported import unlike
 
 Array = npt.NDArray[np.float64]
 Value = TypeVar("Value", float, Array)
-
-
-class Flag(IntFlag):
-    """Bits of the telemetry signal `flags`."""
-
-    AMB_LIMIT = 1
-    SEGMENT_LIMIT = 2
-    CONTACT_INBOARD = 4
-    CONTACT_OUTBOARD = 8
-    WATCHDOG_ARMED = 16
 
 
 @dataclass(frozen=True)
@@ -104,10 +94,10 @@ def conventions(rig: RigFile) -> Servomotor:
         segments=next((m.currents for m in rig.motors.values() if "radial force" in m.gives), ()),
         sensors=("com_to_inboard_sensor", "com_to_outboard_sensor"),
         ambs=("com_to_inboard_amb", "com_to_outboard_amb"),
-        amb_limit=Flag.AMB_LIMIT,
-        segment_limit=Flag.SEGMENT_LIMIT,
-        contact_inboard=Flag.CONTACT_INBOARD,
-        contact_outboard=Flag.CONTACT_OUTBOARD,
+        amb_limit=Status.CURRENT_LIMIT,
+        segment_limit=Status.SEGMENT_LIMIT,
+        contact_inboard=Status.CONTACT_NEAR,
+        contact_outboard=Status.CONTACT_FAR,
         lacks=unlike(rig, upright, (0.0, -math.pi / 2)),
     )
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from bench.findings import Effect, Finding
 from bench.recording import Recording, Step
+from bench.rigfile.roles import ANGLE
 from procedures.servomotor.conventions import Servomotor, conventions
 
 MOVED_RAD = 0.03
@@ -54,8 +55,8 @@ def of_probe(recording: Recording[Any]) -> Iterator[Finding]:
 
 
 def _movement(step: Step, machine: Servomotor) -> Movement | None:
-    data = step.read("angle", *machine.segments)
-    angle = np.unwrap(data["angle"])
+    data = step.read(ANGLE, *machine.segments)
+    angle = np.unwrap(data[ANGLE])
     if len(angle) < 20:
         return None
     current = np.mean([data[c] for c in machine.segments], axis=0)

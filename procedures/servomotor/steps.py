@@ -8,6 +8,7 @@ import numpy as np
 
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
+from bench.rigfile.roles import ANGLE, STATUS
 from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.shared.step_table import Read, Samples, StepTable, tabulate
 
@@ -17,7 +18,7 @@ POSITIONS = ("yi", "yo", "xi", "xo")
 
 def channels(machine: Servomotor) -> tuple[str, ...]:
     """What is recorded of a displaced shaft, besides the flags."""
-    return (*machine.segments, *machine.coils_of("yi", "yo"), *machine.positions_of(*POSITIONS), "angle")
+    return (*machine.segments, *machine.coils_of("yi", "yo"), *machine.positions_of(*POSITIONS), ANGLE)
 
 
 def read_steps(recording: Recording[Any], kind: type[Read]) -> StepTable[Read]:
@@ -32,8 +33,8 @@ def read_steps(recording: Recording[Any], kind: type[Read]) -> StepTable[Read]:
     read = channels(conventions(recording.rig))
 
     def samples(step: Step) -> Samples:
-        data = step.read(*read, "flags")
-        data["angle"] = (data["angle"] + np.pi) % (2 * np.pi) - np.pi  # home is angle 0: no mean across the turn's end
+        data = step.read(*read, STATUS)
+        data[ANGLE] = (data[ANGLE] + np.pi) % (2 * np.pi) - np.pi  # home is angle 0: no mean across the turn's end
         return data
 
     return tabulate(steps, kind, read, read=samples)

@@ -10,6 +10,7 @@ import math
 
 from bench.procedure.rig import Rig
 from bench.recording.recorder import Recorder
+from bench.rigfile.roles import ANGLE
 from procedures.servomotor import hold
 from procedures.servomotor.conventions import Servomotor, conventions
 
@@ -25,7 +26,7 @@ STEPS = 4  # that `sound` records
 
 def channels(machine: Servomotor) -> tuple[str, ...]:
     """What the checks read."""
-    return ("angle", *machine.coils_of("xo", "yo"))
+    return (ANGLE, *machine.coils_of("xo", "yo"))
 
 
 def sound(rig: Rig, record: Recorder) -> bool:
@@ -47,12 +48,12 @@ def sound(rig: Rig, record: Recorder) -> bool:
 
 def _turned(rig: Rig, record: Recorder) -> float:
     """How far a weak proportional gain turns the released rotor towards a reference ahead of it, rad; it is let go again."""
-    before = rig.levitation.reading("angle")
+    before = rig.levitation.reading(ANGLE)
     with record.step("probe", reference_rad=before + TURN_RAD):
         rig.levitation.set("angle_ref", before + TURN_RAD)
         rig.levitation.set("kp_theta", hold.PROBE_GAIN)
         rig.clock.sleep(TURN_S)
-        moved = math.remainder(rig.levitation.reading("angle") - before, 2 * math.pi)
+        moved = math.remainder(rig.levitation.reading(ANGLE) - before, 2 * math.pi)
     hold.release(rig)
     return moved
 

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.recording.recorder import Recorder
 from bench.recording.steps import Step, Steps
+from bench.rigfile.roles import STATUS
 
 Array = npt.NDArray[np.float64]
 Samples = Mapping[str, npt.NDArray[Any]]
@@ -91,7 +92,7 @@ def tabulate(
     Raises:
         AnalysisError: a step holds fewer than two samples.
     """
-    read = read or (lambda step: step.read(*channels, "flags"))
+    read = read or (lambda step: step.read(*channels, STATUS))
     rows = [reduced(read(step), channels, step.labels) for step in steps]
 
     def array(values: Sequence[Any]) -> npt.NDArray[Any]:
@@ -163,5 +164,5 @@ def reduced(data: Samples, channels: Sequence[str], labels: Mapping[str, Any]) -
     spread = np.where(ptp > 0, x.std(axis=1), 0.0)  # of a constant the mean is rounded, and it would not be nothing
     found = (("mean", x.mean(axis=1)), ("drift", drift), ("spread", spread), ("ptp", ptp))
     out: dict[str, Any] = {kind: dict(zip(channels, values, strict=True)) for kind, values in found}
-    out["flags"] = int(np.bitwise_or.reduce(data["flags"].astype(np.int64)))
+    out["flags"] = int(np.bitwise_or.reduce(data[STATUS].astype(np.int64)))
     return out

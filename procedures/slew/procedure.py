@@ -42,7 +42,7 @@ FADE = 20
 DESIGN_NM_A = 2.87  # T Table 6.2; with a tenth of it either way where no calibration is used
 
 
-def settings(_: Plan) -> dict[str, float]:
+def settings(_rig: RigFile, _: Plan) -> dict[str, float]:
     """Lifted with the angle released: no loop is closed before the encoder's direction is known."""
     return dict(hold.RELEASED)
 

@@ -9,6 +9,7 @@ import numpy as np
 from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
 from bench.recording import Recording, Step
+from bench.rigfile.roles import ANGLE, STATUS
 from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.slew.fit import Swing
 from procedures.slew.plan import Plan
@@ -18,7 +19,7 @@ STEP, STARTED = "swing", "sine-started"
 
 def channels(machine: Servomotor) -> tuple[str, ...]:
     """What is recorded of a swing."""
-    return ("angle", *machine.segments, "flags")
+    return (ANGLE, *machine.segments, STATUS)
 
 
 def read_swings(recording: Recording[Plan]) -> list[Swing]:
@@ -49,7 +50,7 @@ def _read(recording: Recording[Plan], step: Step) -> Swing:
         return (t_ns - origin) * 1e-9
 
     moved = [e for e in inside if e["kind"] == "parameter" and e["name"] == "angle_ref"]
-    angle = np.unwrap(data["angle"])
+    angle = np.unwrap(data[ANGLE])
     return Swing(
         float(step.labels["hz"]),
         float(step.labels["amplitude_rad"]),
@@ -79,7 +80,7 @@ def of_signals(recording: Recording[Plan]) -> Iterator[Finding]:
                 where, Effect.INDETERMINATE,
             )  # fmt: skip
         data = step.read(*names)
-        flags = int(np.bitwise_or.reduce(data["flags"].astype(np.int64))) if len(data["flags"]) else 0
+        flags = int(np.bitwise_or.reduce(data[STATUS].astype(np.int64))) if len(data[STATUS]) else 0
         for channel in (c for c in names[:-1] if np.ptp(data[c]) == 0):
             yield Finding("stuck-channel", f"{channel} does not move at all during a swing.", channel, Effect.ERROR)
         limits = machine.amb_limit | machine.segment_limit

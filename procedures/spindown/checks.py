@@ -15,6 +15,7 @@ import numpy.typing as npt
 from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.rigfile import RigFile
+from bench.rigfile.roles import SPEED
 from bench.uncertainty import Estimate
 from procedures.servomotor.conventions import Servomotor
 from procedures.servomotor.direction import of_probe
@@ -51,7 +52,7 @@ def before_fits(recording: Recording[Any]) -> Iterator[Finding]:
             str(event["by"]), Effect.ERROR,
         )  # fmt: skip
     for step in recording.steps("spin"):
-        data = step.read("speed")["speed"]
+        data = step.read(SPEED)[SPEED]
         wanted = float(step.labels["speed_rad_s"])
         if len(data) and abs(data.mean() - wanted) > 0.05 * abs(wanted):
             wrong_way = data.mean() * wanted < 0

@@ -39,7 +39,7 @@ RAMP_S = 0.25  # what is left of the run-up's ramp when the speed is nearly ther
 SLOW = (0.1, 0.15, 0.2, 0.25, 0.3)  # shares of the speed that the drive also holds: they tell its constant torque
 
 
-def settings(plan: Plan) -> dict[str, float]:
+def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Lifted at the first bias and with the angle released: no loop is closed before the encoder's direction is known."""
     return {"bias_i": plan.bias_A, "bias_o": plan.bias_A, **hold.RELEASED}
 

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
+from bench.rigfile.roles import ANGLE, SPEED, STATUS
 from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.spindown import fit
 from procedures.spindown.fit import Coast
@@ -30,7 +31,7 @@ def coils(machine: Servomotor) -> tuple[str, ...]:
 
 def channels(machine: Servomotor) -> tuple[str, ...]:
     """What is recorded of a coast."""
-    return ("angle", "speed", "flags", *machine.segments, *coils(machine))
+    return (ANGLE, SPEED, STATUS, *machine.segments, *coils(machine))
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def _read(step: Step, machine: Servomotor, delay_s: float, end: float) -> RunDow
     data = step.read(*channels(machine))
     name = f"{labels['bias_A']:g} A, {'forward' if direction > 0 else 'backward'}, run {int(labels['repeat']) + 1}"
     t = (data["t_ns"] - data["t_ns"][0]).astype(np.float64) * 1e-9 if len(data["t_ns"]) else np.zeros(0)
-    speed, angle = direction * data["speed"], direction * np.unwrap(data["angle"])
+    speed, angle = direction * data[SPEED], direction * np.unwrap(data[ANGLE])
     used = _span(t, speed, delay_s, end)
     if used.stop - used.start < SMALLEST_SAMPLES:
         raise AnalysisError(_too_short(name, t, used, delay_s, end))
@@ -90,7 +91,7 @@ def _read(step: Step, machine: Servomotor, delay_s: float, end: float) -> RunDow
         of_speed=fit.of_speed(t, speed, SPEED_LAGS), of_angle=fit.of_angle(t, angle - angle[0], ANGLE_LAGS),
         coils={c: float(data[c][used].mean()) for c in coils(machine)},
         segments=np.array([float(data[c][used].mean()) for c in machine.segments]),
-        lost=step.lost(), expected=step.expected(), flags=int(np.bitwise_or.reduce(data["flags"].astype(np.int64))),
+        lost=step.lost(), expected=step.expected(), flags=int(np.bitwise_or.reduce(data[STATUS].astype(np.int64))),
     )  # fmt: skip
 
 

@@ -7,7 +7,6 @@ from typing import Literal
 from pydantic import Field
 
 from bench.procedure import BenchPlan
-from procedures.amb_rotor.conventions import AMB_ROTOR
 
 Axis = Literal["y", "z", "x"]
 
@@ -19,7 +18,7 @@ class Plan(BenchPlan):
     sizes_m: tuple[float, ...] = Field((10e-6, 20e-6), min_length=2)  # one alone says nothing of linearity
     speeds_rad_s: tuple[float, ...] = Field((0.0,), min_length=1)
     repeats: int = Field(2, ge=2)  # of: up, back, down, back
-    a: dict[str, float] = Field(default_factory=lambda: AMB_ROTOR.select("CCS"))  # parameters of the controller
+    a: dict[str, float] = Field(default_factory=dict)  # parameters of the controller
     b: dict[str, float] = Field(default_factory=dict)  # the other setting; empty: nothing is compared
     names: tuple[str, str] = ("A", "B")
     warm: dict[str, float] = Field(default_factory=dict)  # on top of either setting until it is warm

@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from bench.findings import Effect, Finding
 from bench.recording import Recording, Step
+from bench.rigfile.roles import ANGLE, SPEED
 from procedures.amb_rotor.conventions import conventions
 from procedures.step.steps import ORDERS, STEP, TURNING_RAD_S
 
@@ -48,13 +49,13 @@ def read_rest(step: Step, axis: str) -> Array:
     machine = conventions(step.recording.rig)
     along = machine.along(axis)
     places, pairs = [machine.position(a) for a in along], [machine.pair(a) for a in along]
-    data = step.read(*places, *(name for pair in pairs for name in pair), "angle", "speed")
+    data = step.read(*places, *(name for pair in pairs for name in pair), ANGLE, SPEED)
     written = [e["t_ns"] for e in step.recording.events("parameter")
-               if e["name"] == machine.set_points[axis] and step.start_ns <= e["t_ns"] < step.end_ns]  # fmt: skip
+               if e["name"] in machine.point(axis, 0.0) and step.start_ns <= e["t_ns"] < step.end_ns]  # fmt: skip
     rest = data["t_ns"] <= (written[-1] if written else step.start_ns)
     x = np.array([*(data[name] for name in places), *(data[p] - data[n] for p, n in pairs)])[:, rest]
-    t, phase = np.linspace(-1, 1, x.shape[1]), np.unwrap(data["angle"][rest])
-    turning = rest.any() and float(np.median(data["speed"][rest])) > TURNING_RAD_S
+    t, phase = np.linspace(-1, 1, x.shape[1]), np.unwrap(data[ANGLE][rest])
+    turning = rest.any() and float(np.median(data[SPEED][rest])) > TURNING_RAD_S
     orders = [f(n * phase) for n in ORDERS for f in (np.cos, np.sin)] if turning else []
     design = np.array([np.ones_like(t), t, *orders]).T
     return np.asarray(x - (design @ np.linalg.lstsq(design, x.T, rcond=None)[0]).T)

@@ -21,6 +21,7 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from bench.units import RPM
+from procedures.amb_rotor import lift
 from procedures.amb_rotor.conventions import conventions
 from procedures.shared import assumptions
 from procedures.step import checks, estimates, planes
@@ -95,7 +96,8 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     record_s = recorded_s(rig.file, plan)
     for name, value in model(rig.file, plan).items():
         write(name, value)
-    write("slew", 0.0)
+    if machine.can.set_points.slew:
+        write(machine.can.set_points.slew, 0.0)
     now: tuple[str, float] | None = None
     for setting, speed, axis, size in cases(tuple(settings), plan.speeds_rad_s, plan.axes, plan.sizes_m):
         if (now is None or now[1] != speed) and not _at(rig, plan, record, speed):
@@ -117,13 +119,14 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
                     repeat=repeat,
                 ):
                     rig.clock.sleep(plan.rest_s)
-                    write(machine.set_points[axis], end)
+                    lift.write(rig, machine.point(axis, end))
                     rig.clock.sleep(record_s)
     if rig.drive is not None and max(plan.speeds_rad_s) > 0:
         rig.drive.stop()
         rig.drive.coast()
         rig.clock.sleep(machine.stands_s)
-    for name in ("slew", *sorted({*used} - {machine.law}), *model(rig.file, plan)):
+    slew = [machine.can.set_points.slew] if machine.can.set_points.slew else []
+    for name in (*slew, *sorted({*used} - {*machine.select(machine.plain_law)}), *model(rig.file, plan)):
         write(name, rig.file.parameters[name].default)
 
 
@@ -195,11 +198,15 @@ def model_names(rig: RigFile, plan: Plan) -> tuple[str, ...]:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    points = conventions(rig).set_points
-    needed = ["slew", *(points[a] for a in plan.axes), *model_names(rig, plan), *plan.a, *plan.b, *plan.warm]
+    machine = conventions(rig)
+    for axis in plan.axes:
+        if not machine.can_point(axis):
+            yield f"axes: found {axis}; expected one along which the controller takes set points"
+    points = [name for a in plan.axes if machine.can_point(a) for name in machine.point(a, 0.0)]
+    needed = [*points, *model_names(rig, plan), *plan.a, *plan.b, *plan.warm]
     for name in dict.fromkeys(needed):
         if name not in rig.parameters:
-            yield f"parameters: found no {name}; needed are the set points, slew and those of the plan's settings"
+            yield f"parameters: found no {name}; needed are those of the plan's settings"
         elif rig.parameters[name].when == "resting":
             yield f"{name}: can be written at rest only; a setting is changed while the shaft levitates"
     if 2 * max(plan.sizes_m) > MARGIN * rig.geometry["clearance"].value:
@@ -233,7 +240,7 @@ def requires(rig: RigFile) -> Requires:
         lacks=machine.lacks,
         channels=channels(machine),
         sensors=(*machine.all_positions, *machine.all_currents),
-        parameters=("slew", "model_rate", "model_l_is", "model_l_os"),
+        capabilities=("set_points",),
         geometry=("clearance",),
     )
 

@@ -29,22 +29,28 @@ def enough_s(machine: AmbRotor, settings: Iterable[Mapping[str, float]], axes: I
 
 def faded_s(machine: AmbRotor, settings: Mapping[str, float], axis: str, band: float) -> float:
     """From a step to where the next may begin, s: 0 where the law has no slow integrator."""
-    return min(_left_s(machine, settings, axis, NOTHING * band), 2 * MOST_S) if settings.get("ki") else 0.0
+    ki = machine.gain("ki", machine.along(axis)[0])
+    return min(_left_s(machine, settings, axis, NOTHING * band), 2 * MOST_S) if settings.get(ki) else 0.0
 
 
 def _left_s(machine: AmbRotor, of: Mapping[str, float], axis: str, share: float) -> float:
     """Until what the integrator has still to do is that share of the step; 0 where there is nothing to do for it."""
-    if of.get(machine.law) != machine.laws["PID"] or any(n not in of for n in ("kp", "ki", "bias")):
+    one = machine.along(axis)[0]
+    kp, ki = machine.gain("kp", one), machine.gain("ki", one)
+    biases = [name for name in machine.biases if name in of]
+    plain = all(of.get(name) == value for name, value in machine.select(machine.plain_law).items())
+    if not plain or not {kp, ki} <= of.keys() or not biases:
         return 0.0
-    softer = of["bias"] * max(_stiffness(machine, of, one) for one in machine.along(axis))
-    if not 0 < softer < of["kp"]:
+    softer = of[biases[0]] * max(_stiffness(machine, of, one) for one in machine.along(axis))
+    if not 0 < softer < of[kp]:
         return 0.0
-    beyond, constant = softer / (of["kp"] - softer), (of["kp"] - softer) / of["ki"] if of["ki"] else math.inf
+    beyond, constant = softer / (of[kp] - softer), (of[kp] - softer) / of[ki] if of[ki] else math.inf
     return constant * max(math.log(beyond / share), 0.0)
 
 
 def _stiffness(machine: AmbRotor, of: Mapping[str, float], axis: str) -> float:
     """K_s/K_i of an axis' magnets over their bias, 1/m."""
-    gap = of.get("model_gap_x" if axis == machine.axial else "model_gap", math.inf)
+    known = machine.can.model.get("gap_x" if axis == machine.axial else "gap", "")
+    gap = of.get(known, machine.gaps.get(axis, math.inf))
     near, far = (gap - sign * of.get(machine.model_offset(axis), 0.0) for sign in (1, -1))
     return (near**-3 + far**-3) / (near**-2 + far**-2) if min(near, far) > 0 and math.isfinite(gap) else 0.0

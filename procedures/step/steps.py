@@ -14,6 +14,8 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
+from bench.rigfile.places import CENTRE, Places
+from bench.rigfile.roles import ANGLE, SPEED, STATUS
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.amb_rotor.onset import onset
 from procedures.step.response import trailing
@@ -82,7 +84,7 @@ class Done:
 
 def channels(machine: AmbRotor) -> tuple[str, ...]:
     """What is read of a step."""
-    return (*machine.all_positions, *machine.all_currents, "angle", "speed", "flags")
+    return (*machine.all_positions, *machine.all_currents, ANGLE, SPEED, STATUS)
 
 
 def read_steps(recording: Recording[Any]) -> list[Done]:
@@ -119,8 +121,19 @@ def shares(rig: RigFile, axis: str) -> dict[str, float]:
     names = [machine.position(a) for a in machine.along(axis)]
     if len(names) == 1:
         return {names[0]: 1.0}
-    l_is, l_os = (rig.parameters[name].default for name in ("model_l_is", "model_l_os"))
+    l_is, l_os = _probe_arms(rig)
     return {names[0]: l_os / (l_is + l_os), names[1]: l_is / (l_is + l_os)}
+
+
+def _probe_arms(rig: RigFile) -> tuple[float, float]:
+    """Of the near and the far probes from the centre of mass, m: as the controller knows them, or by the rig file."""
+    known = rig.capabilities.model
+    if {"l_is", "l_os"} <= known.keys():
+        return rig.parameters[known["l_is"]].default, rig.parameters[known["l_os"]].default
+    machine, places = conventions(rig), Places(rig)
+    by_channel = {probe.channel: name for name, probe in rig.probes.items()}
+    near, far = (places.distance(CENTRE, f"probes/{by_channel[machine.position(a)]}").value for a in machine.along("y"))
+    return -near, far
 
 
 def _read(recording: Recording[Any], step: Step) -> Done:
@@ -129,7 +142,7 @@ def _read(recording: Recording[Any], step: Step) -> Done:
     axis, signed = str(labels["axis"]), float(labels["step_m"])
     case = Case(str(labels["setting"]), float(labels["speed_rad_s"]), axis, abs(signed), 1 if signed > 0 else -1)
     written = [e["t_ns"] for e in recording.events("parameter")
-               if e["name"] == machine.set_points[axis] and step.start_ns <= e["t_ns"] < step.end_ns]  # fmt: skip
+               if e["name"] in machine.point(axis, 0.0) and step.start_ns <= e["t_ns"] < step.end_ns]  # fmt: skip
     if not written:
         raise AnalysisError(f"{case.where}: found no write of the set point within the step")
     rest = data["t_ns"] <= written[-1]
@@ -146,8 +159,8 @@ def _whole(data: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
         return data
     every = np.arange(index[0], index[-1] + 1)
     held = np.searchsorted(index, every, "right") - 1
-    out = {c: x[held] if c == "flags" else np.interp(every, index, x) for c, x in data.items()}
-    out["angle"] = np.interp(every, index, np.unwrap(data["angle"]))
+    out = {c: x[held] if c == STATUS else np.interp(every, index, x) for c, x in data.items()}
+    out[ANGLE] = np.interp(every, index, np.unwrap(data[ANGLE]))
     out["t_ns"] = np.interp(every, index, data["t_ns"] - data["t_ns"][0]).round().astype(np.int64) + data["t_ns"][0]
     return out
 
@@ -164,25 +177,25 @@ def _done(
     ones = [data[p] - data[n] for p, n in map(machine.pair, along)]
     control = sum(ones, np.zeros(len(rest)))
     t = (data["t_ns"] - data["t_ns"][0]) * 1e-9
-    turning = float(np.median(data["speed"])) > TURNING_RAD_S
+    turning = float(np.median(data[SPEED])) > TURNING_RAD_S
     signals = np.array([raw, tilt, across, control, *ones])
-    clean, amplitude = _still(t, signals, data["angle"], rest) if turning else (signals, np.zeros(len(signals)))
+    clean, amplitude = _still(t, signals, data[ANGLE], rest) if turning else (signals, np.zeros(len(signals)))
     clean = case.way * (clean - clean[:, rest].mean(axis=1, keepdims=True))
     first, answered = _answer(clean[4:], rest)
     period = float(np.median(np.diff(t)))
-    samples = 2 * math.pi / float(np.median(data["speed"])) / period if turning else AT_REST_S / period
+    samples = 2 * math.pi / float(np.median(data[SPEED])) / period if turning else AT_REST_S / period
     since = t - _acted(rig, t, clean[3], first, period) - EARLY_TICKS * rig.devices["controller"].tick_s
     keep = slice(max(first - 20, 0), None)
     quiet = clean[0][rest]
     slope = float(np.polyfit(t[rest], quiet, 1)[0])
     level = quiet - slope * (t[rest] - t[rest].mean())
-    flags = data["flags"].astype(np.int64)
+    flags = data[STATUS].astype(np.int64)
     return Done(
         case, float(step.labels["begin_m"]), since[keep], clean[0][keep], (case.way * (raw - raw[rest].mean()))[keep],
         clean[1][keep], clean[2][keep], clean[3][keep], quiet,
         float(trailing(level, samples)[round(samples) :].std()), samples, float(amplitude[0]), slope, answered,
         tuple(float(c[first : first + 3].sum()) for c in clean[4:]),
-        (float(data["speed"].min()), float(data["speed"].max())), int(np.bitwise_or.reduce(flags)),
+        (float(data[SPEED].min()), float(data[SPEED].max())), int(np.bitwise_or.reduce(flags)),
         tuple(c for c in (*machine.all_positions, *machine.all_currents) if np.ptp(data[c]) == 0), step.lost(), step.expected(),
         machine,
     )  # fmt: skip
@@ -201,7 +214,7 @@ def _answer(control: Array, rest: npt.NDArray[np.bool_]) -> tuple[int, bool]:
 def _acted(rig: RigFile, t: Array, control: Array, first: int, period: float) -> float:
     """When the set point changed, s: finer than a period, by the control currents."""
     tick = rig.devices["controller"].tick_s
-    ticks, lag = round(period / tick), 1 / rig.parameters["model_rate"].default
+    ticks, lag = round(period / tick), conventions(rig).lag_s
     return onset(t, control, t[first] - 1.8 * period, t[first] - 0.5 * period, tick=tick, ticks=ticks, lag_s=lag)[0]
 
 

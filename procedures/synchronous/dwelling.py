@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from bench.procedure.rig import Rig
 from bench.recording.recorder import Recorder
 from procedures.amb_rotor import lift
@@ -35,21 +33,15 @@ def step_labels(rig: Rig, speed: float, variant: Variant, number: int = 0) -> di
 def stop(rig: Rig) -> None:
     """Compensate nothing, stop the drive, and leave the shaft standing under the PID."""
     machine = conventions(rig.file)
-    put(rig, machine.variants["off"])
+    lift.write(rig, machine.variants["off"])
     if rig.drive is not None:
         rig.drive.stop()
         rig.drive.coast()
-    put(rig, machine.select("PID"))
+    lift.write(rig, machine.select(machine.plain_law))
     rig.clock.sleep(machine.stands_s)
 
 
 def select(rig: Rig, law: Law) -> None:
     """Have the controller go by a law, nothing compensated."""
     machine = conventions(rig.file)
-    put(rig, {**machine.select(law), **machine.variants["off"]})
-
-
-def put(rig: Rig, values: Mapping[str, float]) -> None:
-    """Write parameters of the controller."""
-    for name, value in values.items():
-        rig.levitation.set(name, value)
+    lift.write(rig, {**machine.select(law), **machine.variants["off"]})

@@ -18,6 +18,7 @@ from bench.analysis.vectors import Vectors
 from bench.errors import AnalysisError
 from bench.procedure.requires import Requires
 from bench.recording import Captured, Recording, Step
+from bench.rigfile.roles import ANGLE, PULSES, SPEED, STATUS
 from bench.units import RPM
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.shared.signals import clips
@@ -95,7 +96,7 @@ class Dwell:
 
 def telemetry_channels(machine: AmbRotor) -> tuple[str, ...]:
     """What is read of the telemetry of a dwell."""
-    return (*machine.positions, *machine.currents, "angle", "speed", "pulses", "flags")
+    return (*machine.positions, *machine.currents, ANGLE, SPEED, PULSES, STATUS)
 
 
 def captured_channels(machine: AmbRotor) -> tuple[str, ...]:
@@ -140,10 +141,10 @@ def read_dwell(recording: Recording[Any], step: Step) -> Dwell:
     sampling = Sampling(tick, ticks, tick)
     if len(t) < 100:
         raise AnalysisError(f"{step.kind} {dict(step.labels)}: found {len(t)} samples; expected 100 or more")
-    tacho = tachometer(*counted(t - tick, data["pulses"], age(data["angle"], data["speed"])))
+    tacho = tachometer(*counted(t - tick, data[PULSES], age(data[ANGLE], data[SPEED])))
     wide = np.array([data[c] for c in names])
     track = synchronous(t, wide, tacho, sampling, orders=_seen(ORDERS, float(step.labels["speed_rad_s"]), ticks * tick))
-    labels, flags = step.labels, data["flags"].astype(np.int64)
+    labels, flags = step.labels, data[STATUS].astype(np.int64)
     captures = recording.captures(dwell=labels["number"]) if step.kind == DWELL else ()
     full = full_rate(captures[0], machine) if captures else None
     held = max(

@@ -52,7 +52,7 @@ GAMMA_0T = Quantity("gamma_0t", "rad", "phase angle at which the torque per curr
 MEASURES = (ALPHA_TAU, GAMMA_0T)
 
 
-def settings(plan: Plan) -> dict[str, float]:
+def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Lifted with the angle released: no loop is closed before the encoder's direction is known."""
     return {"bias_i": plan.bias_A, "bias_o": plan.bias_A, **hold.RELEASED}
 

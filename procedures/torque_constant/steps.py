@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
+from bench.rigfile.roles import ANGLE, STATUS
 from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.servomotor.loads import load_index
 from procedures.shared.step_table import Labels, Read, Samples, StepTable, tabulate
@@ -21,7 +22,7 @@ Array = npt.NDArray[np.float64]
 
 def channels(machine: Servomotor) -> tuple[str, ...]:
     """What is recorded while loads hang on the lever."""
-    return ("angle", *machine.segments, *machine.coils_of("xo", "yo"), "flags")
+    return (ANGLE, *machine.segments, *machine.coils_of("xo", "yo"), STATUS)
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ def read_torques(recording: Recording[Plan]) -> TorqueData:
     sides = {"left": 1, "right": -1, "": 0}
     steps = Steps(
         np.ascontiguousarray(table.stack(segments).T),
-        resting(table.mean["angle"], recording.plan.count_rad),
+        resting(table.mean[ANGLE], recording.plan.count_rad),
         table.each(lambda step: step.gamma_rad),
         ((table.start_ns + table.end_ns) / 2 - table.start_ns[0]) * 1e-9,
         np.array([sides[step.side] for step in table.labels]),
@@ -94,7 +95,7 @@ def read_torques(recording: Recording[Plan]) -> TorqueData:
     )
     detent = _table(recording, OverDetent)
     return TorqueData(
-        steps, masses, table, detent.mean["angle"], detent.stack(segments).mean(axis=0),
+        steps, masses, table, detent.mean[ANGLE], detent.stack(segments).mean(axis=0),
         read_wiring(recording),
     )  # fmt: skip
 
@@ -104,15 +105,15 @@ def _table(recording: Recording[Plan], kind: type[Read]) -> StepTable[Read]:
 
     def samples(step: Step) -> Samples:
         data = step.read(*channels(machine))
-        n = len(data["angle"])
+        n = len(data[ANGLE])
         if n < 20:
             raise AnalysisError(f"step {dict(step.labels)}: found {n} samples; expected 20 or more")
-        data["angle"] = np.unwrap(data["angle"])
+        data[ANGLE] = np.unwrap(data[ANGLE])
         data["torque"] = np.array([data[c] for c in machine.segments]).mean(axis=0)
         data |= {f"side_{axis}": machine.control(f"{axis}o", data.__getitem__) for axis in "xy"}
         return data
 
-    reduced = (*machine.segments, "angle", "torque", "side_x", "side_y")
+    reduced = (*machine.segments, ANGLE, "torque", "side_x", "side_y")
     return tabulate(list(recording.steps(kind.kind)), kind, reduced, read=samples)
 
 

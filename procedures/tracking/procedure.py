@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from bench.errors import Lacking
 from bench.figures import Figure
 from bench.findings import Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
@@ -19,11 +20,13 @@ from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
+from bench.rigfile.capabilities import Path
 from bench.uncertainty import Estimate
 from bench.units import RPM
 from procedures.amb_rotor import lift, wiring
-from procedures.amb_rotor.conventions import AMB_ROTOR, Law, conventions
+from procedures.amb_rotor.conventions import Law, conventions
 from procedures.amb_rotor.geometry import nominal
+from procedures.amb_rotor.laws import of_laws
 from procedures.shared import first_look
 from procedures.tracking import checks, estimates
 from procedures.tracking import figures as drawn
@@ -47,9 +50,6 @@ DISTANCE = Quantity("ring_distance", "m", "least distance that is left to a touc
 LOW = Quantity("lower_current", "A", "mean current of the lower coil that carries most")
 HIGH = Quantity("upper_current", "A", "mean current of the upper coil that carries most")
 MEASURES = (PEAK_Y, PEAK_Z, PLANE, RMS_Y, RMS_Z, RATIO_Y, RATIO_Z, LAG_Y, LAG_Z, PSI, THETA, DISTANCE, LOW, HIGH)
-OBSERVED = {**AMB_ROTOR.variants["corrected"], **AMB_ROTOR.poles}
-REFERENCE = ("ellipse_on", "ellipse_y", "ellipse_z", "ellipse_hz", "ellipse_phase", "ellipse_ramp_s", "ellipse_ratio")
-PARAMETERS = (AMB_ROTOR.law, AMB_ROTOR.set_points["y"], AMB_ROTOR.set_points["theta"], "model_rate", *REFERENCE)
 LENGTHS = ("com_to_inboard_sensor", "com_to_outboard_sensor", "clearance")
 UM = 1e6
 MARK_M = 15e-6  # of the jump that the reference starts with
@@ -57,9 +57,12 @@ GROW, GROW_S = 25, 0.02
 NEAR = 0.95  # of the ring's clearance: no reference may go further
 
 
-def settings(plan: Plan) -> dict[str, float]:
+def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Lifted by the PID, which needs no model; with the poles of T 3.5 where disturbances are compensated."""
-    return {**AMB_ROTOR.select("PID"), "ellipse_on": 0.0, **(OBSERVED if plan.observed else {})}
+    machine = conventions(rig)
+    observed = {**machine.variants.get("corrected", {}), **machine.poles} if plan.observed else {}
+    path = {} if machine.can.path is None else {machine.can.path.on: 0.0}
+    return {**machine.select(machine.plain_law), **path, **observed}
 
 
 def step_count(plan: Plan) -> int:
@@ -76,35 +79,36 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         return
     machine = conventions(rig.file)
     for law in plan.order:
-        rig.levitation.set(machine.law, machine.laws[law])
+        lift.write(rig, machine.select(law))
         rig.clock.sleep(plan.settle_s)
         _orbit(rig, plan, record, law)
-    rig.levitation.set("ellipse_on", 0.0)
+    lift.write(rig, {_path(rig).on: 0.0})
     if plan.speed_rad_s and rig.drive is not None:
         rig.drive.stop()
-    rig.levitation.set(machine.law, machine.laws["PID"])
+    lift.write(rig, machine.select(machine.plain_law))
     rig.clock.sleep(machine.stands_s)
 
 
 def _start(rig: Rig, plan: Plan, record: Recorder) -> None:
     """The reference starts at rest with a small jump of z, whose time the currents tell. From here on it never stops: its phase
     is known for every law, at any speed."""
-    write = rig.levitation.set
-    for name, value in (
-        ("ellipse_hz", plan.hz),
-        ("ellipse_ratio", plan.ratio),
-        ("ellipse_phase", 0.0),
-        ("ellipse_ramp_s", 0.0),
-        ("ellipse_y", 0.0),
-        ("ellipse_z", MARK_M),
-    ):
-        write(name, value)
+    path = _path(rig)
+    told = ((path.hz, plan.hz), (path.ratio, plan.ratio), (path.phase, 0.0), (path.ramp_s, 0.0), (path.y, 0.0),
+            (path.z, MARK_M))  # fmt: skip
+    lift.write(rig, {name: value for name, value in told if name})
     rig.clock.sleep(plan.settle_s)
     with record.step(START):
         rig.clock.sleep(0.1)
-        write("ellipse_on", 1.0)
+        rig.levitation.set(path.on, 1.0)
         record.event(STARTED)  # after the answer: with the write itself it brackets the start
         rig.clock.sleep(0.02)
+
+
+def _path(rig: Rig) -> Path:
+    path = rig.file.capabilities.path
+    if path is None:
+        raise Lacking("capabilities.path: found none")
+    return path
 
 
 def _orbit(rig: Rig, plan: Plan, record: Recorder, law: Law) -> None:
@@ -121,8 +125,8 @@ def _orbit(rig: Rig, plan: Plan, record: Recorder, law: Law) -> None:
 
 
 def _size(rig: Rig, plan: Plan, share: float) -> None:
-    rig.levitation.set("ellipse_y", plan.y_m * share)
-    rig.levitation.set("ellipse_z", max(plan.z_m * share, MARK_M))
+    path = _path(rig)
+    lift.write(rig, {path.y: plan.y_m * share, path.z: max(plan.z_m * share, MARK_M)})
     rig.clock.sleep(GROW_S)
 
 
@@ -156,9 +160,11 @@ def measured(results: Results) -> Iterator[Measured]:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    if missing := [n for n in OBSERVED if plan.observed and n not in rig.parameters]:
-        yield f"observer: the rig has no parameters {', '.join(missing)}; expected observer = false"
+    machine = conventions(rig)
+    if plan.observed and "corrected" not in machine.variants:
+        yield "observer: found no capabilities.settings.compensation.corrected; expected observer = false"
     for key, laws in (("laws", plan.laws), ("compare", plan.compare)):
+        yield from of_laws(machine, key, laws)
         if len(set(laws)) < len(laws):
             yield f"{key}: found one twice; expected each once"
     ring = NEAR * rig.geometry["clearance"].value
@@ -189,7 +195,8 @@ def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
     return Requires(
-        channels=channels(machine), sensors=machine.positions, parameters=PARAMETERS, geometry=LENGTHS,
+        channels=channels(machine), sensors=machine.positions, geometry=LENGTHS,
+        capabilities=("set_points", "path", "model.rate"),
         lacks=machine.lacks,
     )  # fmt: skip
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
+from bench.rigfile.roles import SPEED, STATUS
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.amb_rotor.geometry import Facts, distances
 from procedures.amb_rotor.onset import onset
@@ -62,7 +63,7 @@ def upper_and_lower(machine: AmbRotor) -> tuple[tuple[str, ...], tuple[str, ...]
 def channels(machine: AmbRotor) -> tuple[str, ...]:
     """What is read of an orbit."""
     upper, lower = upper_and_lower(machine)
-    return (*machine.positions, *upper, *lower, "speed", "flags")
+    return (*machine.positions, *upper, *lower, SPEED, STATUS)
 
 
 def sample_reference(rig: RigFile, hz: float, y: float, z: float, period_ns: int, ratio: int = 1) -> Wave:
@@ -95,14 +96,14 @@ def _wave(recording: Recording[Any], step: Step) -> Wave:
 def _start(recording: Recording[Any], start: Step, wave: Wave) -> tuple[float, float]:
     """When the reference's phase was zero, s from the step's start, and how clear the currents tell it."""
     machine = conventions(recording.rig)
-    begun = start.read(*channels(machine))
+    begun, path = start.read(*channels(machine)), machine.can.path
     inside = [e for e in recording.events() if start.start_ns <= e["t_ns"] < start.end_ns]
-    written = [e["t_ns"] for e in inside if e["kind"] == "parameter" and e["name"] == "ellipse_on"]
+    written = [e["t_ns"] for e in inside if e["kind"] == "parameter" and path is not None and e["name"] == path.on]
     answered = [e["t_ns"] for e in inside if e["kind"] == STARTED]
     if not written or not answered or len(begun["t_ns"]) < 20:
         raise AnalysisError("found no start of the reference; expected its write within the step, and samples about it")
     current = np.sum([begun[p] - begun[n] for p, n in map(machine.pair, machine.along("z"))], axis=0)
-    lag = 1 / recording.rig.parameters["model_rate"].default
+    lag = conventions(recording.rig).lag_s
     earliest, latest = ((t - start.start_ns) * 1e-9 for t in (written[0], answered[0]))
     at = (begun["t_ns"] - start.start_ns) * 1e-9
     return onset(at, current, earliest, latest, tick=wave.tick, ticks=wave.ticks, lag_s=lag)
@@ -113,7 +114,7 @@ def _read(recording: Recording[Any], step: Step, grown: Step | None, origin: int
     labels, data = step.labels, step.read(*channels(machine))
     if len(data["t_ns"]) < 20:
         raise AnalysisError(f"{labels['law']}: found {len(data['t_ns'])} samples; expected a whole orbit")
-    speed = data["speed"]
+    speed = data[SPEED]
     turning = float(labels["speed_rad_s"]) > 0 and float(np.median(speed)) > 0
     path = Path(
         _wave(recording, step),
@@ -123,7 +124,7 @@ def _read(recording: Recording[Any], step: Step, grown: Step | None, origin: int
     )
     whole = path if grown is None else _join(grown, path, machine.positions, origin)
     upper, lower = (np.array([data[c] for c in names]) for names in upper_and_lower(machine))
-    flags = data["flags"].astype(np.int64)
+    flags = data[STATUS].astype(np.int64)
     return Orbit(str(labels["law"]), path, whole, upper, lower, flags, speed, t_0, clear, step, machine)
 
 

@@ -14,7 +14,7 @@ from procedures.amb_rotor.conventions import Law, Variant
 class Plan(BenchPlan):
     """Settings of the dwells, SI."""
 
-    law: Law = "CCS"
+    law: Law = ""  # of the controller's; as it is set where none is named
     speeds_rad_s: tuple[float, ...] = Field((2000 / RPM, 4000 / RPM, 7000 / RPM, 10000 / RPM), min_length=1)
     variants: tuple[Variant, ...] = Field(("off",), min_length=1)
     slow_rad_s: float = Field(300 / RPM, ge=0)  # 0: no slow roll

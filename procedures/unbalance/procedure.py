@@ -20,7 +20,8 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.amb_rotor import lift, wiring
-from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
+from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.laws import of_laws, of_variants
 from procedures.shared import assumptions, first_look
 from procedures.synchronous import bearings, checks, dwelling, estimates, fitting
 from procedures.synchronous.coil_peaks import find_uncertified
@@ -61,14 +62,14 @@ CURRENT = Quantity("current_peak", "A", "coil current of a plane that is exceede
 VOLTAGE = Quantity("voltage_peak", "V", "coil voltage of a plane that is exceeded for 1 % of the time, either way")
 MEASURES = (COSINE, SINE, MAJOR, D_MAX, SHARE, READ, CURRENT, VOLTAGE)
 LESS_RUNOUT = tuple(q.name for q in (COSINE, SINE, MAJOR, D_MAX, SHARE))
-PARAMETERS = (AMB_ROTOR.law, AMB_ROTOR.set_points["y"], AMB_ROTOR.set_points["theta"])
 LENGTHS = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_inboard_amb", "com_to_outboard_amb", "com_to_coupling",
            "com_to_inboard_balance", "com_to_outboard_balance", "coupling_stiffness", "amb_gap", "clearance")  # fmt: skip
 
 
-def settings(plan: Plan) -> dict[str, float]:
+def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Lifted by the PID, which needs no model."""
-    return {**AMB_ROTOR.lifting, **(AMB_ROTOR.poles if plan.observed else {})}
+    machine = conventions(rig)
+    return {**machine.lifting, **(machine.poles if plan.observed else {})}
 
 
 def step_count(plan: Plan) -> int:
@@ -114,7 +115,7 @@ def requires(rig: RigFile) -> Requires:
     machine = conventions(rig)
     return replace(
         required(machine),
-        parameters=(*PARAMETERS, *machine.variants["off"], *machine.poles, *machine.model_parameters),
+        capabilities=("set_points", *(f"model.{kind}_{axis}" for kind in ("beta", "offset") for axis in machine.axes)),
         geometry=LENGTHS,
         machine=("mass", "transverse_inertia", "polar_inertia", "radial_axes", "runout"),
     )
@@ -122,9 +123,11 @@ def requires(rig: RigFile) -> Requires:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
+    yield from of_laws(conventions(rig), "law", [plan.law])
+    yield from of_variants(conventions(rig), "variants", plan.variants)
     yield from fitting.of_speeds(rig, plan.speeds_rad_s)
-    if len(set(plan.variants)) < len(plan.variants) or (plan.observed and plan.law == "PID"):
-        yield "variants: expected each once, and with law PID off alone: only the flatness laws compensate"
+    if len(set(plan.variants)) < len(plan.variants) or (plan.observed and plan.law in ("", conventions(rig).plain_law)):
+        yield "variants: expected each once, and with the plain law off alone: it compensates nothing"
     yield from fitting.of_slow_roll(plan.slow_rad_s, plan.slow_s, plan.speeds_rad_s)
     yield from fitting.of_captures(rig, plan.capture_s, plan.rate_hz, plan.orders, plan.speeds_rad_s)
 

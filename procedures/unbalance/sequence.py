@@ -6,7 +6,8 @@ from bench.procedure.rig import Rig
 from bench.recording.recorder import Recorder
 from procedures.amb_rotor import lift
 from procedures.amb_rotor.conventions import Variant, conventions
-from procedures.synchronous.dwelling import put, roll_slowly, step_labels
+from procedures.amb_rotor.lift import write
+from procedures.synchronous.dwelling import roll_slowly, step_labels
 from procedures.synchronous.dwells import DWELL, captured_channels
 from procedures.unbalance.plan import Plan
 
@@ -22,11 +23,11 @@ def dwell(rig: Rig, plan: Plan, record: Recorder) -> bool:
     """All dwells, the slowest first; False if a speed is not reached."""
     machine, number = conventions(rig.file), 0
     for speed in sorted(plan.speeds_rad_s):
-        put(rig, machine.variants[plan.variants[0]])
+        write(rig, machine.variants[plan.variants[0]])
         if not lift.bring_to_speed(rig, record, speed, plan.settle_s):
             return False
         for variant in plan.at(speed):
-            put(rig, machine.variants[variant])
+            write(rig, machine.variants[variant])
             rig.clock.sleep(plan.settle_s)
             _dwell(rig, plan, record, speed, variant, number)
             number += 1
@@ -38,7 +39,7 @@ def repeat_lowest(rig: Rig, plan: Plan, record: Recorder) -> None:
     speed = min(plan.speeds_rad_s)
     machine = conventions(rig.file)
     if plan.repeat and lift.bring_to_speed(rig, record, speed, plan.settle_s):
-        put(rig, machine.variants[plan.variants[0]])
+        write(rig, machine.variants[plan.variants[0]])
         rig.clock.sleep(plan.settle_s)
         _dwell(rig, plan, record, speed, plan.variants[0], -1)
 

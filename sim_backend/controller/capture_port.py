@@ -17,9 +17,7 @@ from bench.wire.isotp import Sender, TransferError
 from bench.wire.packet import LIMIT, MESSAGE, PAYLOAD_LIMIT
 from sim_backend.controller.capture_memory import CaptureMemory, Order
 from sim_backend.controller.ownership import Ownership
-from sim_backend.spoken import reading_of
 
-TICK_NS = 100_000
 BAUDRATE = 3_000_000  # of a serial port that does not say
 SERIAL_SHARE = 0.95  # of what telemetry leaves
 PACKET_BYTES = 20  # about a message in a packet: telemetry, one message a packet
@@ -32,16 +30,17 @@ class CapturePort:
     Args:
         rig: with its table `capture`.
         messages: the device's own map.
-        names: the channels of a tick's readings.
+        names: the channels of a tick's readings, by the rig file's names.
+        tick_s: from tick to tick.
     """
 
-    def __init__(self, rig: RigFile, messages: MessageMap, names: Sequence[str]) -> None:
+    def __init__(self, rig: RigFile, messages: MessageMap, names: Sequence[str], tick_s: float) -> None:
         assert rig.capture is not None
-        called = {reading_of(rig, channel): channel for channel in rig.capture.channels}
-        self.memory = CaptureMemory(rig.capture, [called.get(name, name) for name in names])
+        self.memory = CaptureMemory(rig.capture, names)
+        self._tick_ns = round(tick_s * 1e9)
         self._capacity = rig.capture.memory_bytes
         self._map = messages
-        self._spacing = {"CaptureBlock": _can_ns(rig), "CaptureData": _serial_ns(rig)}
+        self._spacing = {"CaptureBlock": _can_ns(rig) or self._tick_ns, "CaptureData": _serial_ns(rig)}
         self._sender: Sender | None = None
         self._message = "CaptureBlock"
         self._waiting: deque[bytes] = deque()  # payloads on their way out
@@ -72,13 +71,15 @@ class CapturePort:
 
     def sent(self, tick: int, clock: tuple[int, int]) -> FrameBatch:
         """What has gone out by a tick; `clock` is a time in ns and the tick it belongs to."""
-        now, spacing = tick * TICK_NS, self._spacing[self._message]
+        now, spacing = tick * self._tick_ns, self._spacing[self._message]
         if not self._waiting or self._free_ns >= now:
             return empty_batch()
         count = min(len(self._waiting), int((now - 1 - self._free_ns) // spacing) + 1)
         payloads = [self._waiting.popleft() for _ in range(count)]
         batch = np.zeros(count, FRAME)
-        batch["t_ns"] = self._free_ns + (np.arange(count) * spacing).astype(np.int64) + clock[0] - clock[1] * TICK_NS
+        batch["t_ns"] = (
+            self._free_ns + (np.arange(count) * spacing).astype(np.int64) + clock[0] - clock[1] * self._tick_ns
+        )
         batch["id"], batch["flags"] = self._map[self._message].identifier, FD
         batch["length"] = [len(p) for p in payloads]
         whole = b"".join(p.ljust(64, b"\0") for p in payloads)
@@ -124,7 +125,7 @@ class CapturePort:
 
     def _queue(self, message: str, payloads: Sequence[bytes], tick: int) -> None:
         self._message = message
-        self._free_ns = max(self._free_ns, tick * TICK_NS)
+        self._free_ns = max(self._free_ns, tick * self._tick_ns)
         self._waiting.extend(payloads)
 
     def _end(self) -> None:
@@ -142,9 +143,9 @@ class CapturePort:
 
 
 def _can_ns(rig: RigFile) -> float:
-    """From frame to frame on the CAN bus."""
+    """From frame to frame on the CAN bus; 0 where there is none."""
     link = rig.link
-    return 1e9 * upload_frame_seconds(rig.messages, link.bitrate, link.data_bitrate) if link.bitrate else TICK_NS
+    return 1e9 * upload_frame_seconds(rig.messages, link.bitrate, link.data_bitrate) if link.bitrate else 0.0
 
 
 def _serial_ns(rig: RigFile) -> float:

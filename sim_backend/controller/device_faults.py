@@ -11,13 +11,10 @@ import numpy.typing as npt
 from bench.errors import ConfigError
 from bench.link.fault_injection import DEVICE_ONLY, REBOOT_S, Fault
 from bench.link.frames import FrameBatch, empty_batch
+from bench.link.payloads import put, taken
 from bench.rigfile import RigFile
-from sim_backend.core import PERIOD_TICKS, TICK_S
+from bench.rigfile.messages import Signal
 from sim_backend.machine import SimulatedPlant
-
-TICK_NS = round(TICK_S * 1e9)
-PERIOD_NS = PERIOD_TICKS * TICK_NS
-STATUS_TICK = slice(24, 28)  # of CaptureStatus
 
 
 class Device(Protocol):
@@ -35,22 +32,30 @@ class DeviceFaults:
     Args:
         rig: for the names and places in its messages.
         faults: of the kinds reboot, stuck-heartbeat and mute.
+        plant: whose ticks count.
 
     Raises:
         ConfigError: another kind.
     """
 
-    def __init__(self, rig: RigFile, faults: Sequence[Fault]) -> None:
+    def __init__(self, rig: RigFile, faults: Sequence[Fault], plant: SimulatedPlant) -> None:
         if wrong := [str(f) for f in faults if f.kind not in (*DEVICE_ONLY, "mute")]:
             raise ConfigError(f"--fault {', '.join(wrong)}: happens on the link, not inside the controller")
         self._faults = tuple(faults)
         beat = rig.messages[rig.binding.heartbeat]
         self._beat = beat.identifier
-        self._counter = beat.signal(rig.binding.heartbeat_counter).start // 8
-        self._telemetry = rig.messages[rig.binding.telemetry[0]].identifier
+        self._counter = beat.signal(rig.binding.heartbeat_counter)
+        first, *others = (rig.messages[name] for name in rig.binding.telemetry)
+        self._first, self._others = first.identifier, [m.identifier for m in others]
+        self._sequences = {first.identifier: first.signal(rig.binding.sequence)}
+        self._sequences |= {m.identifier: m.signal(rig.binding.counter) for m in others}
+        self._ticks = {first.identifier: first.signal(rig.binding.tick)}
         status = rig.messages.messages.get("CaptureStatus")
-        self._status = status.identifier if status is not None else 0
-        self._last = np.zeros(2, np.uint8)  # the counter that a stuck heartbeat repeats
+        if status is not None and rig.capture is not None:
+            self._ticks[status.identifier] = status.signal("tick")
+        self._tick_ns, self._period_ticks = round(plant.tick_s * 1e9), plant.period_ticks
+        self._period_ns = self._period_ticks * self._tick_ns
+        self._last = np.zeros(1, np.uint64)  # the counter that a stuck heartbeat repeats
         self._origin: int | None = None
         self._done: set[Fault] = set()
         self._deaf_until = 0  # neither hears nor speaks while it starts
@@ -65,7 +70,7 @@ class DeviceFaults:
         if reboot is None:
             return self._part(device, ticks, incoming, t0_ns)
         fault, here = reboot
-        at = t0_ns + here * TICK_NS
+        at = t0_ns + here * self._tick_ns
         first = incoming["t_ns"] < at
         sent = [self._part(device, here, incoming[first], t0_ns)] if here else []
         self._restart(device, fault, at)
@@ -81,8 +86,8 @@ class DeviceFaults:
         for fault in self._faults:
             if fault.kind != "reboot" or fault in self._done:
                 continue
-            due = max(0, -((t0_ns - fault.window(self._origin)[0]) // TICK_NS))
-            due += -(tick + due) % PERIOD_TICKS
+            due = max(0, -((t0_ns - fault.window(self._origin)[0]) // self._tick_ns))
+            due += -(tick + due) % self._period_ticks
             if due <= ticks:
                 found.append((due, fault))
         if not found:
@@ -93,9 +98,9 @@ class DeviceFaults:
     def _restart(self, device: Device, fault: Fault, at_ns: int) -> None:
         self._done.add(fault)
         silent = fault.duration_s if fault.duration_s is not None else REBOOT_S
-        periods = max(1, round(silent * 1e9 / PERIOD_NS))
-        self._deaf_until = at_ns + periods * PERIOD_NS
-        self._first_tick, self._first_sequence = device.plant.tick + periods * PERIOD_TICKS, None
+        periods = max(1, round(silent * 1e9 / self._period_ns))
+        self._deaf_until = at_ns + periods * self._period_ns
+        self._first_tick, self._first_sequence = device.plant.tick + periods * self._period_ticks, None
         device.restart()
 
     def _part(self, device: Device, ticks: int, incoming: FrameBatch, t0_ns: int) -> FrameBatch:
@@ -106,13 +111,12 @@ class DeviceFaults:
         """What the controller makes of what the host sends."""
         out = incoming[incoming["t_ns"] > self._deaf_until].copy()
         beats = out["id"] == self._beat
-        counter = slice(self._counter, self._counter + 2)
         stuck = beats & self._during("stuck-heartbeat", out)
         for k in np.flatnonzero(beats):  # in order: a stuck one repeats the last that moved
             if stuck[k]:
-                out["data"][k, counter] = self._last
+                put(out["data"][k : k + 1], self._counter, self._last)
             else:
-                self._last = out["data"][k, counter].copy()
+                self._last = taken(out["data"][k : k + 1], self._counter)
         answered: FrameBatch = out[beats | ~self._during("mute", out)]
         return answered
 
@@ -125,22 +129,27 @@ class DeviceFaults:
         return hit
 
     def _renumbered(self, sent: FrameBatch) -> FrameBatch:
-        """Sequence and tick of the telemetry, and a capture's tick, count from the present boot (places as in
-        controller/telemetry.py and the DBC)."""
+        """Sequence, rolling counts and tick of the telemetry, and a capture's tick, count from the present boot. What is left
+        of a sample whose first message nobody heard is not sent."""
         if not self._first_tick:
             return sent
+        if self._first_sequence is None:
+            firsts = np.flatnonzero(sent["id"] == self._first)
+            if not len(firsts):
+                return sent[~np.isin(sent["id"], self._others)]
+            begun = np.arange(len(sent)) >= firsts[0]
+            sent = sent[begun | ~np.isin(sent["id"], self._others)]
         out = sent.copy()
-        mine = out["id"] == self._telemetry
-        sequence = np.ascontiguousarray(out["data"][mine, 0:2]).view("<u2")[:, 0]
-        tick = np.ascontiguousarray(out["data"][mine, 2:6]).view("<u4")[:, 0]
-        if len(sequence):
-            if self._first_sequence is None:
-                self._first_sequence = int(sequence[0])
-            sequence = (sequence.astype(np.int64) - self._first_sequence).astype("<u2")
-            tick = (tick.astype(np.int64) - self._first_tick).astype("<u4")
-            out["data"][mine, 0:2] = sequence.view(np.uint8).reshape(-1, 2)
-            out["data"][mine, 2:6] = tick.view(np.uint8).reshape(-1, 4)
-        for k in np.flatnonzero(out["id"] == self._status) if self._status else ():  # of a capture of this boot
-            told = int.from_bytes(out["data"][k, STATUS_TICK].tobytes(), "little") - self._first_tick
-            out["data"][k, STATUS_TICK] = np.frombuffer((told & 0xFFFFFFFF).to_bytes(4, "little"), np.uint8)
+        for identifier, s in self._sequences.items():
+            mine = np.flatnonzero(out["id"] == identifier)
+            if len(mine) and self._first_sequence is None:
+                self._first_sequence = int(taken(out["data"][mine[:1]], s)[0])
+            self._count_from(out, mine, s, self._first_sequence or 0)
+        for identifier, s in self._ticks.items():
+            self._count_from(out, np.flatnonzero(out["id"] == identifier), s, self._first_tick)
         return out
+
+    def _count_from(self, out: FrameBatch, mine: npt.NDArray[np.intp], s: Signal, first: int) -> None:
+        data = out["data"][mine]
+        put(data, s, taken(data, s).astype(np.int64) - first)
+        out["data"][mine] = data

@@ -21,6 +21,7 @@ class Ownership:
     heartbeat: int = 0
     counter: int = -1
     armed: bool = False
+    tick_s: float = TICK_S
     obeyed: dict[str, tuple[Mapping[str, float], str]] = field(default_factory=dict)
     """The owner's last request of a kind, and the status that it was answered with: one that comes again is not executed."""
 
@@ -36,7 +37,7 @@ class Ownership:
     def takes(self, session: int, tick: int, resting: bool) -> bool:
         """Whether a session may command. A free controller is taken by the first that asks; one whose owner has been
         silent for a second is free again while its rotor rests."""
-        gone = resting and (tick - self.heartbeat) * TICK_S > TAKEOVER_S
+        gone = resting and (tick - self.heartbeat) * self.tick_s > TAKEOVER_S
         if not session or (self.session not in (0, session) and not gone):
             return False
         if self.session != session:

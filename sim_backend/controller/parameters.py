@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from bench.rigfile import RigFile
+from sim_backend.controller.controls import OWN, controls
 from sim_backend.machine import SimulatedPlant, Truth
 
 INTERFACE = ("watchdog_s", "landing_speed", "speed_ref")  # the interface's own; speed_ref acts on SPIN
@@ -15,47 +16,68 @@ INTERFACE = ("watchdog_s", "landing_speed", "speed_ref")  # the interface's own;
 class Parameters:
     """The rig file's parameters in the device, as they are after power-on: every default, and it acts.
 
+    Args:
+        strict: whether every parameter must be a control of the plant (KeyError); else one that is none acts on nothing.
+
     Attributes:
-        values: in force, by name.
+        values: in force, by the rig file's names.
+        own: the controls of the controller itself (`sim_backend.controller.controls.OWN`), set or not.
     """
 
-    def __init__(self, rig: RigFile, truth: Truth, plant: SimulatedPlant) -> None:
-        self._truth, self._plant = truth, plant
-        self._by_index = {p.index: (name, p) for name, p in rig.parameters.items()}
-        self.values = {name: p.default for name, p in self._by_index.values()}
+    def __init__(self, rig: RigFile, truth: Truth, plant: SimulatedPlant, strict: bool = True) -> None:
+        self._truth, self._plant, self._strict, self._parameters = truth, plant, strict, rig.parameters
+        self._names = {p.index: name for name, p in rig.parameters.items() if p.index is not None}
+        self._controls = controls(rig, truth.machine)
+        self.own = {name: truth.values.get(name, value) for name, value in OWN.items()}
+        if "lift_time_s" not in {c.name for chosen in self._controls.values() for c in chosen}:
+            plant.set("lift_time_s", self.own["lift_time_s"])
+        self.values = {name: p.default for name, p in rig.parameters.items()}
         for name, value in self.values.items():
             self._apply(name, value)
 
     def read(self, index: int) -> tuple[str, float]:
         """Status and value in force."""
-        if index not in self._by_index:
+        if index not in self._names:
             return "UNKNOWN", 0.0
-        return "OK", self.values[self._by_index[index][0]]
+        return "OK", self.values[self._names[index]]
 
     def write(self, index: int, value: float, owner: bool, resting: bool) -> tuple[str, float]:
         """Status, and the value in force after it; `owner`: who writes owns the controller, `resting`: it holds no rotor."""
-        if index not in self._by_index:
+        if index not in self._names:
             return "UNKNOWN", 0.0
-        name, p = self._by_index[index]
+        name = self._names[index]
+        return self.set(name, value, owner, resting), self.values[name]
+
+    def set(self, name: str, value: float, owner: bool, resting: bool) -> str:
+        """Write a parameter by its name, if it may be; the status."""
+        p = self._parameters[name]
         if not owner:
-            status = "WRONG_SESSION"
-        elif not _within(value, p.low, p.high):
-            status = "OUT_OF_RANGE"
-        elif p.when == "resting" and not resting:
-            status = "WRONG_STATE"
-        else:
-            status = "OK"
-            self.values[name] = value
-            self._apply(name, value)
-        return status, self.values[name]
+            return "WRONG_SESSION"
+        if not _within(value, p.low, p.high):
+            return "OUT_OF_RANGE"
+        if p.when == "resting" and not resting:
+            return "WRONG_STATE"
+        self.values[name] = value
+        self._apply(name, value)
+        return "OK"
 
     def _apply(self, name: str, value: float) -> None:
-        if name in INTERFACE:
-            return
+        for control in self._controls.get(name, ()):
+            acting = control.of(value)
+            if control.name in OWN:
+                self.own[control.name] = acting
+            if control.name not in INTERFACE:
+                self._act(control.name, acting)
+
+    def _act(self, control: str, value: float) -> None:
         defects = self._truth.defects
-        if name in self._truth.machine.integral_gains:
+        if control in self._truth.machine.integral_gains:
             value *= defects["integrator_factor"]
-        self._plant.set(name, value * defects.get(f"factor_{name}", 1.0))
+        try:
+            self._plant.set(control, value * defects.get(f"factor_{control}", 1.0))
+        except KeyError:
+            if self._strict:
+                raise
 
 
 def _within(value: float, low: float, high: float) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from sim_backend.core import TICK_S
 from sim_backend.machine import SimulatedPlant
 
 DRIVE_GIVES_UP_S = 1.0  # a drive that nobody asks anything coasts by itself after so long
@@ -25,7 +24,7 @@ def slow(plant: SimulatedPlant, limit_rad_s: float, free_tick: int) -> bool:
         return abs(plant.speed) < limit_rad_s
     if pulses_lost(plant):
         return False
-    quiet_s = min(plant.pulse_age_s, (plant.tick - free_tick) * TICK_S)
+    quiet_s = min(plant.pulse_age_s, (plant.tick - free_tick) * plant.tick_s)
     return quiet_s > 2 * math.pi / limit_rad_s
 
 

@@ -9,7 +9,6 @@ import numpy as np
 from sim_backend import core
 from sim_backend.controller import setdown
 from sim_backend.controller.ownership import Ownership
-from sim_backend.core import PERIOD_TICKS, TICK_S
 from sim_backend.machine import Machine, SimulatedPlant
 
 SETTLED_M, SETTLED_S = 20e-6, 0.05
@@ -65,10 +64,10 @@ class States:
     def progress(self, rows: core.Array) -> None:
         """What it does by itself at the present, after `rows` of the plant: trips, watchdog, ends of movements."""
         plant, tick = self._plant, self._plant.tick
-        planted = self._planted_s and tick * TICK_S > self._planted_s
+        planted = self._planted_s and tick * plant.tick_s > self._planted_s
         if plant.trips or (self.fault == "NONE" and (planted or (self.state in HELD and setdown.pulses_lost(plant)))):
             self.fail(next((name for bit, name in core.TRIPS.items() if plant.trips & bit), "SENSOR"))
-        elif self.watching and (tick - self._owner.heartbeat) * TICK_S > self._own["watchdog_s"]:
+        elif self.watching and (tick - self._owner.heartbeat) * plant.tick_s > self._own["watchdog_s"]:
             self._lose_host()
         if self.state == "LIFTING" and len(rows):
             self._lifting(rows)
@@ -84,10 +83,10 @@ class States:
         plant = self._plant
         still = bool((np.abs(rows[:, self._machine.radial]) < SETTLED_M).all()) and plant.moved
         self._steady = self._steady + len(rows) if still else 0
-        if self._steady * PERIOD_TICKS * TICK_S >= SETTLED_S:
+        if self._steady * plant.period_ticks * plant.tick_s >= SETTLED_S:
             plant.mode = core.LEVITATE
             self._enter("LEVITATED")
-        elif (plant.tick - self._since) * TICK_S > LIFT_TIMEOUT_S + self._own["lift_time_s"]:
+        elif (plant.tick - self._since) * plant.tick_s > LIFT_TIMEOUT_S + self._own["lift_time_s"]:
             self.fail("LIFT_TIMEOUT")
 
     def _landing(self) -> None:
@@ -141,7 +140,7 @@ class States:
         """Land as soon as the shaft is slow; a drive may turn it for `driven_s` more."""
         self._torque(0.0)
         self._brake()
-        self._free = self._plant.tick + round(driven_s / TICK_S)
+        self._free = self._plant.tick + round(driven_s / self._plant.tick_s)
         if setdown.slow(self._plant, self._own["landing_speed"], self._free):
             self._land()
         else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -31,22 +32,72 @@ class Span(NamedTuple):
     armed: bool
 
 
+class Readings:
+    """What a machine and its controller have to tell, sample by sample, each in its place.
+
+    Args:
+        place: where among the values each reading goes, by its name.
+        codes: of states and of faults, by their names; under `state` and `fault`.
+        period_ticks, tick_s: of the telemetry.
+        columns: names of the rows' columns, where they are none of the machine's own.
+        windings: temperatures, and how far each is above the first, K; the machine's own where nothing is said.
+    """
+
+    def __init__(
+        self, truth: Truth, place: Mapping[str, int], codes: Mapping[str, Mapping[str, int]], period_ticks: int,
+        tick_s: float, columns: Sequence[str] | None = None, windings: Mapping[str, float] | None = None,
+    ) -> None:  # fmt: skip
+        machine = truth.machine
+        source: slice | list[int]
+        self._windings = machine.windings if windings is None else windings
+        if columns is None:
+            source, goal = machine.places(truth.defects, place)
+        else:
+            source = [k for k, name in enumerate(columns) if name in place]
+            goal = [place[columns[k]] for k in source]
+        self._armed = WATCHDOG_ARMED if columns is None else 0  # in the machine's own status word alone
+        self._moves = _moves(source, goal)
+        self._truth, self._place, self._codes = truth, place, codes
+        self._period_ticks, self._tick_s = period_ticks, tick_s
+
+    def of(self, spans: list[Span], n: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]:
+        """Ticks (n,) of the samples, and what there is to tell of them (n, places), SI."""
+        at, period = self._place, self._period_ticks
+        values = np.zeros((n, len(at)))
+        rows = np.concatenate([s.rows for s in spans])
+        for source, goal in self._moves:
+            values[:, goal] = rows[:, source]
+        machine = self._truth.machine
+        machine.spoil(values, at, self._truth.defects)
+        ticks = (spans[0].first_tick // period + np.arange(1, n + 1)) * period
+        states, faults = self._codes["state"], self._codes["fault"]
+        told = [(states[s.state], faults[s.fault], self._armed * s.armed, s.heartbeat_tick) for s in spans]
+        state, fault, armed, beats = np.repeat(told, [len(s.rows) for s in spans], axis=0).T
+        values[:, at["state"]], values[:, at["fault"]] = state, fault
+        values[:, at["flags"]] += armed
+        values[:, at["host_age"]] = np.maximum(ticks - beats, 0) * self._tick_s
+        values[:, at["supply"]] = self._truth.supply_V
+        warm = AMBIENT_K + RISE_K * (1 - np.exp(-ticks * self._tick_s / WARM_S))
+        for name, above in self._windings.items():
+            values[:, at[name]] = warm + above
+        return ticks, values
+
+
 class TelemetryEncoder:
     """Makes one message per row: sequence, tick, then sixteen-bit numbers, as many as the DBC has (29 in 64 bytes)."""
 
     def __init__(self, messages: MessageMap, truth: Truth, first_tick: int = 0) -> None:
         """`first_tick`: what ran before it was sent too, to nobody."""
         self._message = messages["Telemetry"]
-        self._codes = {
+        codes = {
             kind: {name: number for number, name in self._message.signal(kind).choices.items()}
             for kind in ("state", "fault")
         }
         signals = self._message.signals[2:]
-        self._names = [s.name for s in signals]
         self._payload = np.dtype({"names": ["sequence", "tick", "words"], "formats": ["<u2", "<u4", ("<u2", (len(signals),))],
                                   "offsets": [0, 2, 6], "itemsize": 64})  # fmt: skip
-        self._place = {name: k for k, name in enumerate(self._names)}
-        self._moves = _moves(*truth.machine.places(truth.defects, self._place))
+        place = {name: k for k, name in enumerate(s.name for s in signals)}
+        self._readings = Readings(truth, place, codes, PERIOD_TICKS, TICK_S)
         self._scale = np.array([s.scale for s in signals])
         self._offset = np.array([s.offset for s in signals])
         self._low = np.array([-32768.0 if s.signed else 0.0 for s in signals])
@@ -60,7 +111,7 @@ class TelemetryEncoder:
         n = sum(len(s.rows) for s in spans)
         if not n:
             return empty_batch()
-        ticks, values = self._values(spans, n)
+        ticks, values = self._readings.of(spans, n)
         values -= self._offset
         values /= self._scale
         raw = np.rint(values, out=values)
@@ -73,34 +124,17 @@ class TelemetryEncoder:
         payloads["sequence"] = np.arange(start, start + n) & 0xFFFF
         payloads["tick"] = ticks & 0xFFFFFFFF
         payloads["words"] = raw.astype(np.int64)  # two's complement where negative
-        dropped = self._truth.defects["drop_fraction"]
-        if dropped:
-            seed, visit = self._truth.seed, self._truth.visit
-            keep = [uniform(seed, f"drop:{start + k}", visit) >= dropped for k in range(n)]
-            batch = batch[np.array(keep, dtype=bool)]
-        return batch
+        return kept(batch, range(start, start + n), self._truth)
 
-    def _values(self, spans: list[Span], n: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]:
-        """Ticks (n,) of the samples, and what their signals say (n, signals)."""
-        at = self._place
-        values = np.zeros((n, len(at)))
-        rows = np.concatenate([s.rows for s in spans])
-        for source, goal in self._moves:
-            values[:, goal] = rows[:, source]
-        machine = self._truth.machine
-        machine.spoil(values, at, self._truth.defects)
-        ticks = (spans[0].first_tick // PERIOD_TICKS + np.arange(1, n + 1)) * PERIOD_TICKS
-        states, faults = self._codes["state"], self._codes["fault"]
-        told = [(states[s.state], faults[s.fault], WATCHDOG_ARMED * s.armed, s.heartbeat_tick) for s in spans]
-        state, fault, armed, beats = np.repeat(told, [len(s.rows) for s in spans], axis=0).T
-        values[:, at["state"]], values[:, at["fault"]] = state, fault
-        values[:, at["flags"]] += armed
-        values[:, at["host_age"]] = np.maximum(ticks - beats, 0) * TICK_S
-        values[:, at["supply"]] = self._truth.supply_V
-        warm = AMBIENT_K + RISE_K * (1 - np.exp(-ticks * TICK_S / WARM_S))
-        for name, above in machine.windings.items():
-            values[:, at[name]] = warm + above
-        return ticks, values
+
+def kept(batch: FrameBatch, sequence: Iterable[int], truth: Truth) -> FrameBatch:
+    """Samples (n, ...) without those that a planted loss takes, by their sequence numbers."""
+    dropped = truth.defects["drop_fraction"]
+    if not dropped:
+        return batch
+    keep = [uniform(truth.seed, f"drop:{number}", truth.visit) >= dropped for number in sequence]
+    left: FrameBatch = batch[np.array(keep, dtype=bool)]
+    return left
 
 
 def _moves(told: slice | list[int], columns: list[int]) -> list[tuple[slice, slice]]:

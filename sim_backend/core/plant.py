@@ -61,6 +61,16 @@ class CorePlant:
     _s: Any
 
     @property
+    def tick_s(self) -> float:
+        """From control tick to control tick."""
+        return TICK_S
+
+    @property
+    def period_ticks(self) -> int:
+        """Ticks of a telemetry period."""
+        return PERIOD_TICKS
+
+    @property
     def tick(self) -> int:
         """Control ticks since the start."""
         return int(self._s.tick)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from bench.errors import ConfigError
 from bench.rigfile import Device
-from sim_backend.core import TICK_S, DriveLaw
+from sim_backend.core import DriveLaw
 from sim_backend.machine import SimulatedPlant, Truth
 
 FAULTS = {"OVERSPEED": 1, "OVERLOAD": 2, "COMMUNICATION": 3, "EXTERNAL": 4}  # codes where the rig file names none
@@ -91,7 +91,7 @@ class SimulatedDrive:
     def follow(self) -> None:
         """What it does by itself: ends braking, and trips."""
         plant = self._plant
-        elapsed = plant.tick * TICK_S
+        elapsed = plant.tick * plant.tick_s
         if self._planted_s and elapsed > self._planted_s:
             self._planted_s = 0.0
             self._trip("EXTERNAL")
@@ -99,11 +99,11 @@ class SimulatedDrive:
             return
         if abs(plant.drive_torque) < 0.999 * self._law.limit:
             self._below_limit = plant.tick
-        if (plant.tick - self._asked) * TICK_S > SILENT_S:
+        if (plant.tick - self._asked) * plant.tick_s > SILENT_S:
             self._trip("COMMUNICATION")
         elif abs(plant.shaft_speed) > OVERSPEED * self._max:
             self._trip("OVERSPEED")
-        elif (plant.tick - self._below_limit) * TICK_S > OVERLOAD_S:
+        elif (plant.tick - self._below_limit) * plant.tick_s > OVERLOAD_S:
             self._trip("OVERLOAD")
         elif self.state == "stopping" and abs(plant.shaft_speed) < STANDSTILL_RAD_S:
             self._off()

@@ -15,7 +15,6 @@ from bench.errors import ConfigError
 from bench.rigfile import Device, RigFile
 from bench.rigfile.registers import RANGES, Register, RegisterRefused, Table, Words
 from sim_backend.controller.telemetry import AMBIENT_K, RISE_K, WARM_S
-from sim_backend.core import TICK_S
 from sim_backend.devices.drive import SimulatedDrive
 from sim_backend.machine import SimulatedPlant, Truth
 
@@ -190,7 +189,7 @@ class RegisterBank:
 
     def _thermal(self, name: str, spec: Device, rig: RigFile, truth: Truth) -> RegisterBankDevice:
         def values() -> Values:  # as the telemetry's temperatures, controller/telemetry.py
-            warm = AMBIENT_K + RISE_K * (1 - math.exp(-self._plant.tick * TICK_S / WARM_S))
+            warm = AMBIENT_K + RISE_K * (1 - math.exp(-self._plant.tick * self._plant.tick_s / WARM_S))
             return {n: warm + above for n, above in truth.machine.windings.items()} | {"ambient": AMBIENT_K}
 
         return RegisterBankDevice(name, spec, values, lambda _: True, lambda: None)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from bench.link.frames import FD, FrameBatch, frame
-from bench.wire import slcan
+from bench.wire import sign, slcan
 from sim_backend.serving.peers import Sent, joined
 
-VERSION, SERIAL = b"V1013", b"NSIM1"
+VERSION, SERIAL = sign.SLCAN_VERSION, b"NSIM1"
 OK, REFUSED = slcan.CR, slcan.BEL
 RATES = {code.encode(): rate for rate, code in {**slcan.BITRATES, **slcan.DATA_BITRATES}.items()}
 DEFAULT_DATA_BITRATE = 2_000_000  # of the CANable firmware, where Y was not sent

@@ -9,12 +9,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from bench.clock import Clock
-from bench.link.frames import FrameBatch
+from bench.link.frames import FrameBatch, empty_batch, frame
 from bench.rigfile import RigFile
-from bench.rigfile.messages import load_messages
+from bench.wire import sign
 from sim_backend.controller.controller import SimulatedController
 from sim_backend.serving.connection import Connection
-from sim_backend.serving.pacing import TICK_NS, Pacer
+from sim_backend.serving.pacing import Pacer
 from sim_backend.serving.peers import Sent, joined
 from sim_backend.serving.ports import Port
 from sim_backend.serving.service import Service
@@ -44,21 +44,21 @@ class Server:
         faults: WireFaults | None = None,
     ) -> None:  # fmt: skip
         self.controller, self.ports, self.services = controller, ports, services
-        self.pacer = Pacer(clock.now_ns())
+        self.pacer = Pacer(clock.now_ns(), controller.tick_ns)
         self.heard = self.sent = self.unknown = 0
         self._lost = 0  # frames that clients no longer here did not read
         self._selector, self._clock, self._say = selector, clock, say
         self._faults = faults or WireFaults()
         self._plugged = True
         self._own_ports = [p for p in ports if p.link == rig.devices["controller"].link]
-        messages = load_messages(rig.dbc_text).messages.values()
-        self._known = np.array([m.identifier for m in messages if m.sender == "Host"], np.uint32)
+        self._known = np.array([*controller.hears], np.uint32)
         self._brs = rig.link.data_bitrate is not None
         self._shown = (controller.state, controller.fault)
         self._look_ns = self._told_ns = clock.now_ns()
         self._cpu = time.process_time()
         self._told = (0, 0)
         self._drops = 0
+        self._sign_ns = 0  # when the sign of a simulation is due
 
     def run(self, stopped: Callable[[], bool]) -> None:
         """Serve until told to stop; a signal ends the wait of at most a slice."""
@@ -90,7 +90,7 @@ class Server:
     def _advance(self, now: int, heard: list[tuple[Connection, FrameBatch]]) -> None:
         """Run the controller up to now; frames reach it at the tick at which they came."""
         ticks = self.pacer.due(now)
-        begin = self.pacer.bench_ns() - ticks * TICK_NS
+        begin = self.pacer.bench_ns() - ticks * self.pacer.tick_ns
         frames = joined([batch for _, batch in heard])
         self.heard += len(frames)
         frames = self._faults.heard(frames, now)
@@ -99,10 +99,18 @@ class Server:
         if ticks or len(known):
             said = self.controller.advance(ticks, known, begin)
             self.sent += len(said)
-            self._deliver(said, now)
+            self._deliver(joined([said, self._sign()]), now)
         for source, batch in heard:
             if len(batch) and source.peer.on_bus:
                 self._pass_on(source, Sent(batch, 0, self._brs))
+
+    def _sign(self) -> FrameBatch:
+        """What says that this is a simulation, when it is due."""
+        now = self.pacer.bench_ns()
+        if now < self._sign_ns:
+            return empty_batch()
+        self._sign_ns = now + round(sign.PERIOD_S * 1e9)
+        return frame(sign.IDENTIFIER, sign.PAYLOAD, t_ns=now)
 
     def _deliver(self, said: FrameBatch, now: int) -> None:
         """What the controller sent, to everybody who listens."""
@@ -159,7 +167,7 @@ class Server:
                 self._say(self.statistics())
 
     def _bench_s(self) -> float:
-        return self.pacer.ticks * TICK_NS * 1e-9
+        return self.pacer.ticks * self.pacer.tick_ns * 1e-9
 
     @property
     def unread(self) -> int:

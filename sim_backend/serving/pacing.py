@@ -21,6 +21,7 @@ class Pacer:
     """
 
     start_ns: int
+    tick_ns: int = TICK_NS
     ticks: int = 0  # run since the start
     overruns: int = 0  # slices that started over 20 ms late
     worst_ns: int = 0  # the latest start of a slice
@@ -31,7 +32,7 @@ class Pacer:
 
     def bench_ns(self) -> int:
         """The wall time that the present tick stands for, UNIX ns."""
-        return self.start_ns + self.dropped_ns + self.ticks * TICK_NS
+        return self.start_ns + self.dropped_ns + self.ticks * self.tick_ns
 
     def due(self, now_ns: int) -> int:
         """Ticks to run now; they count as run. 0 when the next one is not due yet."""
@@ -46,8 +47,8 @@ class Pacer:
             self.dropped_ns += behind - SLICE_NS
             behind = SLICE_NS
         self._allowed_ns = min(self._allowed_ns + passed * 3 // 2, LONGEST_NS)
-        ticks = max(min(behind, self._allowed_ns), 0) // TICK_NS
-        self._allowed_ns -= ticks * TICK_NS
+        ticks = max(min(behind, self._allowed_ns), 0) // self.tick_ns
+        self._allowed_ns -= ticks * self.tick_ns
         self.ticks += ticks
         return ticks
 

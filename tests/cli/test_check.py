@@ -83,9 +83,19 @@ def test_one_procedure_is_told_whole(capsys: pytest.CaptureFixture[str]) -> None
 @pytest.mark.parametrize(
     ("rig", "old", "new", "said"),
     [
-        ("tsbs12", "pos_yi", "lage_yi", "BO_ Telemetry: found no signal pos_yi; expected those names"),
-        ("amb5dof", "pos_zo", "lage_zo", "BO_ Telemetry: found no signal pos_zo; expected those names"),
-        ("tsbs12", "Telemetry", "Messwerte", "BO_: found no message Telemetry; expected those names"),
+        (
+            "tsbs12",
+            "pos_yi",
+            "lage_yi",
+            "channels.lage_yi: found what the simulated tsbs has no reading for; expected `lage_yi = ",
+        ),
+        (
+            "amb5dof",
+            "pos_zo",
+            "lage_zo",
+            "channels.lage_zo: found what the simulated amb5dof has no reading for; expected",
+        ),
+        ("tsbs12", "Telemetry", "Messwerte", "binding.sequence: found no message 'Telemetry' in the DBC; expected"),
         (
             "tsbs12",
             "BO_ 16 Heartbeat",
@@ -103,7 +113,7 @@ def test_a_dbc_that_nothing_can_be_simulated_over_is_told(
     status, _, err = check(capsys, str(tmp_path / f"{rig}.toml"))
     assert status == 2
     assert said in err
-    if "no signal" in said:
+    if "no reading" in said:
         with pytest.raises(ConfigError, match="cannot be simulated"):
             draw(load_rig(str(tmp_path / f"{rig}.toml")), 1)
 

@@ -115,7 +115,7 @@ def test_hosts_on_tcp_and_an_operator_at_one_rig_until_ctrl_c(tmp_path: Path) ->
             serial.sendall(packet.packet(0, 0, [identify(2)]))
             stream = SlcanStream()
             check(heard(lambda: can.recv(65536), stream, 300))
-            assert (stream.replies, stream.status, stream.malformed, stream.refused) == ([b"V1013"], 0, 0, 0)
+            assert (stream.replies, stream.status, stream.malformed, stream.refused) == ([b"VSIM1"], 0, 0, 0)
             packets = PacketStream()
             check(heard(lambda: serial.recv(65536), packets, 300))
             assert (packets.crc_errors, packets.malformed, packets.packets_lost) == (0, 0, 0)

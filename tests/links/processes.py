@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -130,12 +130,13 @@ def patient_rig(folder: Path, rig: str = "tsbs12", patience_s: float = PATIENCE_
 
 @contextmanager
 def served(
-    folder: Path, *arguments: str, rig: str = "tsbs12", patience_s: float | None = PATIENCE_S
-) -> Iterator[Served]:
+    folder: Path, *arguments: str, rig: str = "tsbs12", patience_s: float | None = PATIENCE_S,
+    ports: Sequence[str] = ANY_PORT,
+) -> Iterator[Served]:  # fmt: skip
     """`bench serve` on free ports for the block; patient as `patient_rig` says, or as the rig file is."""
     if patience_s is not None:
         patient_rig(folder, rig, patience_s)
-    child = _start(folder, "-m", "bench.cli.__main__", "serve", rig, *ANY_PORT, *arguments)
+    child = _start(folder, "-m", "bench.cli.__main__", "serve", rig, *ports, *arguments)
     try:
         child.wait_for("ready")
         urls = [line.split(" ", 1)[1] for line in child.out if " " in line]
@@ -167,16 +168,18 @@ def bench(folder: Path, *arguments: str, stdin: int = subprocess.DEVNULL) -> Ite
         child.kill()
 
 
-def run(folder: Path, rig: Served, controller: str, procedure: str, *arguments: str) -> tuple[int, dict[str, Any]]:
+def run(
+    folder: Path, rig: Served, controller: str, procedure: str, *arguments: str, name: str = "tsbs12"
+) -> tuple[int, dict[str, Any]]:
     """A whole live run; exit status and record."""
-    with bench(folder, *live(rig, controller, procedure, *arguments)) as child:
+    with bench(folder, *live(rig, controller, procedure, *arguments, name=name)) as child:
         status = child.end()
         return status, record_in(folder, child)
 
 
-def live(rig: Served, controller: str, procedure: str, *arguments: str) -> tuple[str, ...]:
+def live(rig: Served, controller: str, procedure: str, *arguments: str, name: str = "tsbs12") -> tuple[str, ...]:
     """The arguments of a live run."""
-    given = ("run", procedure, "--rig", "tsbs12", "--backend", "live", "--operator", "auto")
+    given = ("run", procedure, "--rig", name, "--backend", "live", "--operator", "auto")
     return (*given, *rig.links(controller), *arguments)
 
 

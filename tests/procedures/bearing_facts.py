@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from amb_stand import AMB_ROTOR
 
 from bench.calibration import Calibration
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
-from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.synchronous import runout
 from procedures.synchronous.bearings import Known
 from sim_backend.machines.amb5dof.params import AmbParams

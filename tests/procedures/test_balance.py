@@ -329,7 +329,7 @@ def test_a_trial_weight_that_moved_nothing_is_refused(tmp_path: Path) -> None:
 
 def test_plans_that_cannot_work_are_refused() -> None:
     def why(**plan: Any) -> str:
-        return "; ".join(check(RIG, Plan(**plan)))
+        return "; ".join(check(RIG, Plan(**{"law": "CCS", **plan})))
 
     assert why() == ""
     assert "envelope" in why(speeds_rad_s=(1600.0,))
@@ -342,7 +342,7 @@ def test_plans_that_cannot_work_are_refused() -> None:
     assert "allowed are up to 0.5 g" in why(trial_kg=(0.6e-3, 1e-4))
     tight = why(trial_kg=(4e-4, 1e-4), max_share=0.2)
     assert "predicted response" in tight
-    allowed = decision.allowed_kg(RIG, Plan(max_share=0.2), 0)
+    allowed = decision.allowed_kg(RIG, Plan(law="CCS", max_share=0.2), 0)
     assert f"{allowed * 1e3:.3g} g" in tight
     assert why(trial_kg=(0.99 * allowed, 1e-4), max_share=0.2) == ""
     bare = RIG.model_copy(update={"devices": {k: d for k, d in RIG.devices.items() if k != "drive"}})

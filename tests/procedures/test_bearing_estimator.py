@@ -7,11 +7,11 @@ import math
 
 import numpy as np
 import pytest
+from amb_stand import AMB_ROTOR
 
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, Influence
 from procedures.amb_rotor import magnetics
-from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.amb_rotor.magnetics import Positions
 from procedures.amb_rotor.rings import EXCHANGES, of_readings, unexplained
 from procedures.bearing_model.adjustment import Adjusted, adjust

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from amb_stand import AMB_ROTOR
 from reanalysed import reanalysed
 
 from bench.cli.virtual import Simulated, simulated_run
@@ -19,7 +20,6 @@ from bench.record.limits import Verdict, judge
 from bench.record.specs import load_spec
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, interval
-from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.amb_rotor.places import Held
 from procedures.bearing_model import adjustment, checks, wiring
 from procedures.bearing_model.estimates import evaluate

@@ -151,7 +151,7 @@ def test_a_coil_that_cannot_reach_its_current_does_not_pass(
     with pytest.raises(DeviceFault, match="check"):
         measure(tmp_path, calibration, {"coil_limit_yo_p": 8.0})
     data = read_ramps(sound.recording)
-    for bit, named in ((1, "AMB"), (2, "motor"), (8, "outboard touchdown")):
+    for bit, named in ((1, "AMB"), (128, "motor"), (8, "outboard touchdown")):
         flagged = replace(
             data, table=replace(data.table, flags=np.where(data.table.each(lambda at: at.i_y_A) == -2, bit, 0))
         )

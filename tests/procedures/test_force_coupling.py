@@ -17,6 +17,7 @@ from bench.errors import ConfigError, DeviceFault, InterlockError, RotorNotArriv
 from bench.record.limits import Verdict, judge
 from bench.record.specs import load_spec
 from bench.rigfile import load_rig
+from bench.rigfile.roles import ANGLE
 from bench.uncertainty import interval
 from procedures.force_coupling.estimates import evaluate
 from procedures.force_coupling.fit import TERMS
@@ -95,7 +96,7 @@ def test_where_the_rotor_was_before_does_not_matter(
     monkeypatch.setattr(carrying, "home", lambda rig: swung(rig, swing))
     run = measure(tmp_path, known)
     data = read(run.recording)
-    readings = data.each(lambda step: step.branch) * data.mean["angle"] / Plan().count_rad
+    readings = data.each(lambda step: step.branch) * data.mean[ANGLE] / Plan().count_rad
     assert np.all((readings > 0.05) & (readings < 0.95)), readings
     assert serious(run) == []
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amb_stand import AMB_ROTOR
 
 from bench.cli.virtual import simulated_run
 from bench.findings import Effect, Finding
-from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.synchronous.dwells import SLOW, read_dwell
 from procedures.synchronous.hum import Heard, leak_over, listen
 

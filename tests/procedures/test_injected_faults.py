@@ -103,7 +103,7 @@ def run(rig: RigFile, case: Case, out: Path, monkeypatch: pytest.MonkeyPatch) ->
     used = rig.model_copy(update={"links": {**rig.links, name: link}})
     plan = CALIBRATION.plan.model_validate({**used.plans[CALIBRATION.name], **PLAN})
     job = Job(CALIBRATION, used, plan, load_spec(used.name, CALIBRATION.name), "sim", 3)
-    connect = simulated(used, 3, {}, "auto", CALIBRATION.settings(plan), parsed(case))
+    connect = simulated(used, 3, {}, "auto", CALIBRATION.settings(used, plan), parsed(case))
     with Supervisor().watching() as supervisor:
         return runner.run(job, out, connect, supervisor, PlainProgress(io.StringIO()), None)
 

@@ -17,6 +17,7 @@ from bench.errors import ConfigError, DeviceFault, InterlockError, RotorNotArriv
 from bench.record.limits import Verdict, judge
 from bench.record.specs import load_spec
 from bench.rigfile import load_rig
+from bench.rigfile.roles import ANGLE
 from bench.uncertainty import interval
 from procedures.negative_stiffness import procedure as negative_stiffness
 from procedures.negative_stiffness.estimates import evaluate
@@ -69,7 +70,7 @@ def test_the_inboard_amb_drops_out(
     sound: Simulated, known: dict[str, Calibration], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Another inboard controller, the same answer: its force has no arm about its own plane."""
-    written = lambda plan: {**negative_stiffness.settings(plan), "kp_i": 60e3, "ki_i": 0.6e6, "kd_i": 60.0}  # noqa: E731
+    written = lambda rig, plan: {**negative_stiffness.settings(rig, plan), "kp_i": 60e3, "ki_i": 0.6e6, "kd_i": 60.0}  # noqa: E731
     monkeypatch.setattr(negative_stiffness, "procedure", replace(negative_stiffness.procedure, settings=written))
     other = measure(tmp_path, known)
     ratio = estimates(other)["alpha_x_prime"].value / estimates(sound)["alpha_x_prime"].value
@@ -85,10 +86,10 @@ def test_where_the_rotor_was_before_does_not_matter(
     monkeypatch.setattr(carrying, "home", lambda rig: swung(rig, swing))
     run = measure(tmp_path, known, {"alpha_3": 0.3})
     count = Plan().count_rad
-    readings = read(run.recording)[0].mean["angle"] / count
+    readings = read(run.recording)[0].mean[ANGLE] / count
     assert np.all((readings > 0.05) & (readings < 0.95)), readings
     assert [f for f in serious(run) if f.code != "methods-disagree"] == []  # alpha_d was calibrated with another ripple
-    at_rest = read(sound.recording)[0].mean["angle"] / count
+    at_rest = read(sound.recording)[0].mean[ANGLE] / count
     assert readings.mean() == pytest.approx(at_rest.mean(), abs=0.04)
 
 

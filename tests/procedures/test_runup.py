@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amb_stand import AMB_ROTOR
 
 from bench.analysis.criticals import Critical
 from bench.analysis.tachometer import Tachometer
@@ -26,7 +27,6 @@ from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, correlation, interval, welch_satterthwaite
 from bench.units import RPM
-from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.coast_down import procedure as coast_down
 from procedures.run_up import checks, estimates, figures
 from procedures.run_up import procedure as run_up

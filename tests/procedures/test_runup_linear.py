@@ -6,10 +6,10 @@ import dataclasses
 
 import numpy as np
 import pytest
+from amb_stand import AMB_ROTOR
 from bearing_facts import known
 
 from bench.rigfile import load_rig
-from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.run_up import procedure
 from procedures.run_up.linear_model import bend
 from procedures.run_up.steps import Curve

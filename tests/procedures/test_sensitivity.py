@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amb_stand import AMB_ROTOR
 from scipy.optimize import brentq
 
 from bench.analysis import peaks
@@ -24,7 +25,6 @@ from bench.rigfile import load_rig
 from bench.rigfile.envelope import Envelope
 from bench.uncertainty import Estimate
 from bench.units import RPM
-from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.sensitivity import checks, estimates, margins
 from procedures.sensitivity.injection import Comb, combs
 from procedures.sensitivity.plan import Plan

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from bench.rigfile import load_rig
-from procedures.servomotor.conventions import Flag, conventions, displacement, radial_currents, sensor_share
+from bench.rigfile.roles import Status, bits
+from procedures.servomotor.conventions import conventions, displacement, radial_currents, sensor_share
 
 RIG = load_rig(Path("rigs/tsbs12.toml"))
 PROCEDURES = Path("procedures")
@@ -25,14 +26,14 @@ def test_the_bits_are_those_of_the_dbc() -> None:
     told = re.search(r'CM_ SG_ 256 flags "bits: (.*?);', RIG.dbc_text)
     assert told
     meanings = dict(re.findall(r"(\d) ([^,]+)", told[1]))
-    assert {1 << int(bit): text for bit, text in meanings.items()} == {
-        Flag.AMB_LIMIT: "AMB amplifier at its limit",
-        Flag.SEGMENT_LIMIT: "motor segment at its limit",
-        Flag.CONTACT_INBOARD: "contact inboard",
-        Flag.CONTACT_OUTBOARD: "contact outboard",
-        Flag.WATCHDOG_ARMED: "watchdog armed",
+    told_by = {1 << int(bit): text for bit, text in meanings.items()}
+    assert {told_by[bit.mask or 0]: flag for flag, bit in bits(RIG).items()} == {
+        "AMB amplifier at its limit": Status.CURRENT_LIMIT,
+        "motor segment at its limit": Status.SEGMENT_LIMIT,
+        "contact inboard": Status.CONTACT_NEAR,
+        "contact outboard": Status.CONTACT_FAR,
     }
-    assert conventions(RIG).contact == 4 | 8
+    assert conventions(RIG).contact == Status.CONTACT_NEAR | Status.CONTACT_FAR
 
 
 def test_planes_are_between_the_sensors_and_beyond() -> None:

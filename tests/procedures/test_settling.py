@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from amb_stand import AMB_ROTOR
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,7 +16,6 @@ from bench.cli.virtual import simulated_run
 from bench.errors import AnalysisError
 from bench.procedure import Measured
 from bench.uncertainty import interval
-from procedures.amb_rotor.conventions import AMB_ROTOR
 from procedures.step import settling
 from procedures.step.estimates import settling_estimate
 from procedures.step.oscillation import shrinks

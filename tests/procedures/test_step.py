@@ -19,9 +19,9 @@ from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
+from bench.rigfile.roles import Status
 from bench.uncertainty import Estimate, interval
 from bench.uncertainty.coverage import ensemble
-from procedures.amb_rotor.conventions import Flag
 from procedures.amb_rotor.onset import onset
 from procedures.step import checks, estimates, oscillation, planes, response, scatter, settling
 from procedures.step import steps as step_steps
@@ -41,6 +41,7 @@ A7 = {
     "model_error": 0.2, "record_s": 1.5,
 }  # fmt: skip
 Found = tuple[dict[tuple[str, str], Estimate], list[Finding]]
+CCS: dict[str, Any] = {"a": {"law": 1.0}}
 
 
 def stepped(folder: Path, seed: int = 1, truth: Mapping[str, float] | None = None, **plan: Any) -> Found:
@@ -168,7 +169,7 @@ def test_a_finding_about_one_axis_leaves_the_other_alone(tmp_path: Path) -> None
     assert all(f.concerns == (f"settling_time@{f.where}",) for f in open_ones)
     recording = Recording.open(tmp_path / "recording.mcap", Plan)
     steps = step_steps.read_steps(recording)
-    hit = [dataclasses.replace(d, flags=Flag.CONTACT_AXIAL if d.case.axis == "z" else 0) for d in steps]
+    hit = [dataclasses.replace(d, flags=Status.CONTACT_AXIAL if d.case.axis == "z" else 0) for d in steps]
     (touch,) = (f for f in checks.of_steps(hit, recording.plan) if f.code == "contact")
     sizes = [f"{um} µm {way}" for um in (10, 20) for way in ("up", "down")]
     assert {*touch.concerns} == {"@A, z, 0 r/min", *(f"@A, z, 0 r/min, {size}" for size in sizes)}
@@ -230,7 +231,7 @@ def test_plans_that_cannot_work_are_refused() -> None:
     ],
 )
 def test_a_record_is_as_long_as_the_slowest_law_takes(plan: Mapping[str, Any], seconds: float) -> None:
-    assert recorded_s(load_rig("amb5dof"), Plan(**plan)) == seconds
+    assert recorded_s(load_rig("amb5dof"), Plan(**{**CCS, **plan})) == seconds
 
 
 @pytest.mark.parametrize(
@@ -246,7 +247,7 @@ def test_a_record_is_as_long_as_the_slowest_law_takes(plan: Mapping[str, Any], s
     ],
 )
 def test_a_step_begins_when_nothing_is_left_of_the_one_before(plan: Mapping[str, Any], seconds: float) -> None:
-    assert waited_s(load_rig("amb5dof"), Plan(**plan), "A", "y") == pytest.approx(seconds, abs=0.6e-3)
+    assert waited_s(load_rig("amb5dof"), Plan(**{**CCS, **plan}), "A", "y") == pytest.approx(seconds, abs=0.6e-3)
 
 
 def test_planes_that_answer_alike_are_called_exchanged_by_chance_only() -> None:

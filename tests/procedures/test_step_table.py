@@ -14,6 +14,7 @@ import pytest
 from bench.errors import AnalysisError
 from bench.recording.recorder import Recorder
 from bench.recording.steps import Step, Steps
+from bench.rigfile.roles import STATUS
 from procedures.servomotor.loads import load_index
 from procedures.shared.step_table import Labels, StepTable, by_angle, record_step, reduced, tabulate
 
@@ -50,7 +51,7 @@ class Recorded:
     def read(self, channels: tuple[str, ...], start_ns: int, end_ns: int) -> dict[str, npt.NDArray[Any]]:
         n = round((end_ns - start_ns) / MS) - 1
         data = {c: np.arange(n) * (k + 1.0) for k, c in enumerate(channels)}
-        return data | {"flags": np.where(np.arange(n) == 3, self.flags, 0)}
+        return data | {STATUS: np.where(np.arange(n) == 3, self.flags, 0)}
 
     def lost(self, stream: str, start_ns: int, end_ns: int) -> int:
         return 1
@@ -123,5 +124,5 @@ def test_a_load_that_is_not_in_the_plan_is_told() -> None:
 @pytest.mark.parametrize("value", [1e-3, 20e-9, 2.9985, -7.31e-5])
 def test_a_constant_has_no_spread(value: float) -> None:
     """The mean of 1000 equal numbers is rounded, and their standard deviation then some 1e-19: a stuck sensor would be live."""
-    data = {"x": np.full(1000, value), "flags": np.zeros(1000, int)}
+    data = {"x": np.full(1000, value), STATUS: np.zeros(1000, int)}
     assert reduced(data, ("x",), {})["spread"] == {"x": 0.0}

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amb_stand import AMB_ROTOR
 from bearing_facts import known
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -22,8 +23,8 @@ from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
+from bench.rigfile.roles import Status
 from bench.uncertainty import Estimate
-from procedures.amb_rotor.conventions import AMB_ROTOR, Flag
 from procedures.amb_rotor.geometry import Facts
 from procedures.synchronous import bearings
 from procedures.tracking import checks, drift, estimates
@@ -31,12 +32,14 @@ from procedures.tracking import ellipse as estimator
 from procedures.tracking.ellipse import Path as Orbit
 from procedures.tracking.ellipse import Wave
 from procedures.tracking.plan import Plan
-from procedures.tracking.procedure import MEASURES, OBSERVED, check, procedure, step_count
+from procedures.tracking.procedure import MEASURES, check, procedure, step_count
 from procedures.tracking.steps import read_orbits
 from procedures.unbalance import procedure as unbalance
 from reports.figures import draw as draw_figure
 from sim_backend.machines.amb5dof import truth_track
 from sim_backend.truth import draw
+
+OBSERVED = {**AMB_ROTOR.variants["corrected"], **AMB_ROTOR.poles}
 
 RIGS = Path(__file__).parents[2] / "rigs"
 QUICK = {"revolutions": 8, "settle_s": 1.5}
@@ -161,7 +164,7 @@ def test_a_touch_of_the_axial_stop_is_contact(tmp_path: Path) -> None:
     """As in every other procedure of the stand; the radial probes, which cannot show it, do not speak against it."""
     run = simulated_run("tracking", "amb5dof", 1, {**QUICK, **ONE}, tmp_path / "recording.mcap")
     (orbit,), plan = read_orbits(run.recording), run.recording.plan
-    flags = orbit.flags | np.where(np.arange(orbit.flags.size) < orbit.flags.size // 10, Flag.CONTACT_AXIAL, 0)
+    flags = orbit.flags | np.where(np.arange(orbit.flags.size) < orbit.flags.size // 10, Status.CONTACT_AXIAL, 0)
     results = estimates.by_law([orbit], run.recording.rig, plan.runout_m)
     found = {f.code: f for f in checks.of_results([replace(orbit, flags=flags)], results, plan)}
     assert found["contact"].effect is Effect.INDETERMINATE

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from amb_stand import AMB_ROTOR
 from bearing_facts import bearings, known
 
 from bench.analysis.vectors import radius2
@@ -24,8 +25,8 @@ from bench.record.records import measurement
 from bench.record.specs import applied, load_spec
 from bench.recording import Recording
 from bench.rigfile import load_rig
+from bench.rigfile.roles import Status
 from bench.uncertainty import Estimate, Influence, interval
-from procedures.amb_rotor.conventions import AMB_ROTOR, Flag
 from procedures.compensation import procedure as compensation
 from procedures.synchronous import checks, dwells, estimates, runout
 from procedures.synchronous import d_max as unbalance_d_max
@@ -240,7 +241,7 @@ def test_a_clipping_probe_shows_in_the_capture_where_the_controller_does_not_tel
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """At 4000 r/min a turn is 15 samples of the telemetry: none of them stays at the limit for eight."""
-    silent = replace(AMB_ROTOR, sensor_range=Flag(0))
+    silent = replace(AMB_ROTOR, sensor_range=Status(0))
     monkeypatch.setattr(dwells, "conventions", lambda _: silent)
     truth = {"position_range": 78e-6, "unbalance_i": 1.05e-5, "unbalance_o": 1.05e-5}
     plan = {**ONE, "speeds_rad_s": (4000 * RPM,)}
@@ -275,7 +276,7 @@ def test_without_a_slow_roll_readings_and_currents_stand(compared: Run) -> None:
 def test_the_limit_of_the_steady_state_is_that_of_the_law_it_was_printed_for() -> None:
     """T Fig. 3.7 is CCS; under CAC a sound stand is left with 1.5 to 2.2 µm of mean and order 1."""
     limits = load_spec("amb5dof", "compensation")
-    assert "residual" in applied(limits, compensation.Plan())[0]
+    assert "residual" in applied(limits, compensation.Plan(law="CCS"))[0]
     held, notes = applied(limits, compensation.Plan(law="CAC"))
     assert set(limits) - set(held) == {"residual"}
     assert "law = CCS" in notes[0].text
@@ -332,7 +333,7 @@ def test_plans_that_cannot_work_are_refused() -> None:
     rig = load_rig("amb5dof")
 
     def why(**plan: Any) -> str:
-        return "; ".join(check(rig, unbalance.Plan(**plan)))
+        return "; ".join(check(rig, unbalance.Plan(**{"law": "CCS", **plan})))
 
     assert why() == ""
     assert why(speeds_rad_s=(14000 * RPM,)) == ""
@@ -342,15 +343,15 @@ def test_plans_that_cannot_work_are_refused() -> None:
     assert "20 turns" in why(slow_s=2.0)
     assert "folds back" in why(rate_hz=1000.0)
     assert "bytes" in why(capture_s=3.0)
-    assert "only the flatness laws" in why(law="PID", variants=("off", "corrected"))
+    assert "with the plain law off alone" in why(law="PID", variants=("off", "corrected"))
     bare = rig.model_copy(update={"devices": {k: d for k, d in rig.devices.items() if k != "drive"}})
     assert unbalance.procedure.problems(bare, unbalance.Plan()) == ("devices: found none in the role drive",)
-    assert list(compensation.check(rig, compensation.Plan())) == []
+    assert list(compensation.check(rig, compensation.Plan(law="CCS"))) == []
     assert "something must be compared" in "; ".join(compensation.check(rig, compensation.Plan(law="PID")))
-    assert "envelope" in "; ".join(compensation.check(rig, compensation.Plan(switch_rad_s=1600.0)))
-    beyond = compensation.Plan(speeds_rad_s=(14000 * RPM,))
+    assert "envelope" in "; ".join(compensation.check(rig, compensation.Plan(law="CCS", switch_rad_s=1600.0)))
+    beyond = compensation.Plan(law="CCS", speeds_rad_s=(14000 * RPM,))
     assert "no reduction would be measured" in "; ".join(compensation.check(rig, beyond))
-    raised = compensation.Plan(speeds_rad_s=(14000 * RPM,), judged_to_rad_s=14001 * RPM)
+    raised = compensation.Plan(law="CCS", speeds_rad_s=(14000 * RPM,), judged_to_rad_s=14001 * RPM)
     assert list(compensation.check(rig, raised)) == []
 
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from serving_clients import MS, PATIENCE_S, SECOND, T0, Bus, address_of
 
 from bench.link.packetstream import PacketStream
-from bench.wire import slcan
+from bench.wire import sign, slcan
 from sim_backend.serving import connection as connections
 from sim_backend.serving import loop
 from sim_backend.serving.pacing import DEBT_NS, TICK_NS, Pacer
@@ -100,7 +100,8 @@ def test_every_client_hears_the_same_thousand_messages_a_second(served: Served) 
     bus = served()
     clients = [bus.client(bus.slcan), bus.client(bus.slcan), bus.client(bus.serial)]
     bus.run(0.5)
-    bus.until(lambda: all(len(c.frames) == 500 for c in clients))
+    bus.until(lambda: all(len(c.of(0x100)) == 500 for c in clients))
+    assert {tuple(c.of(sign.IDENTIFIER)) for c in clients} == {(sign.PAYLOAD,) * 5}  # whoever listens sees what it is
     first = clients[0].sequences()
     assert first == list(range(first[0], first[0] + 500))
     assert {tuple(c.of(0x100)) for c in clients} == {tuple(clients[0].of(0x100))}
@@ -148,7 +149,7 @@ def test_a_client_that_does_not_read_costs_only_itself(served: Served, monkeypat
             break
     lost = bus.server.unread
     assert lost > 0
-    bus.until(lambda: len(good.frames) == bus.server.sent)
+    bus.until(lambda: len(good.of(0x100)) == bus.server.sent)
     assert f"not read {lost}" in bus.server.statistics()
     deaf.socket.close()
     bus.clients.remove(deaf)

@@ -31,7 +31,7 @@ def said(device: SlcanAdapter, data: bytes) -> bytes:
     ("asked", "answered"),
     [
         (b"\r", b"\r"),
-        (b"V\r", b"V1013\r"),
+        (b"V\r", b"VSIM1\r"),
         (b"N\r", b"NSIM1\r"),
         (b"O\r", b"\a"),  # no bit rate yet
         (b"F\r", b"\a"),  # closed
@@ -50,7 +50,7 @@ def said(device: SlcanAdapter, data: bytes) -> bytes:
         (SET_UP + b"tXYZ0\r", b"\r\r\r\a"),
         (SET_UP + b"r1000\r", b"\r\r\r\a"),  # remote frames are not for this bus
         (b"S9\rY3\rs0\rQ\rVV\r", b"\a\a\a\a\a"),
-        (b"x" * 400 + b"\rV\r", b"\aV1013\r"),
+        (b"x" * 400 + b"\rV\r", b"\aVSIM1\r"),
     ],
 )
 def test_answers_of_the_adapter(asked: bytes, answered: bytes) -> None:

@@ -48,7 +48,10 @@ def planned(campaign: Campaign, path: str, rig: RigFile, short: bool) -> tuple[P
             continue
         problems += [
             Problem(path, f"step.{number}.plan", "a plan that does not fit the rig", text)
-            for text in (*procedure.problems(rig, plan), *Envelope(rig).problems_of(dict(procedure.settings(plan))))
+            for text in (
+                *procedure.problems(rig, plan),
+                *Envelope(rig).problems_of(dict(procedure.settings(rig, plan))),
+            )
         ]
         names = tuple(q.name for q in procedure.measures)
         judged = names if step.judged is None else step.judged

@@ -49,7 +49,7 @@ def head(heard: Listened) -> list[str]:
         f"{heard.rig.name}  {heard.seconds:.0f} s  {heard.ear.link}: {heard.ear.url}",
         heard.ear.manner,
         f"telemetry  {seen}   lost {lost}   leapt {leapt}   tick {clock(heard)}",
-        f"state      {state}{meaning}   fault {fault}",
+        f"state      {state}{meaning}   fault {fault}{'   A SIMULATION' if heard.census.simulated else ''}",
         f"frames     {heard.frames}   unknown {heard.census.strange}   errors {_errors(heard)}   another host: {hosts}",
     ]
 

@@ -29,6 +29,8 @@ def summary(heard: Listened, found: Sequence[Trouble], devices: Devices, width: 
     lines += _labelled("samples", [_samples(heard)], width)
     lines += _labelled("clock", [_clock(heard)], width)
     lines += _labelled("state", [_state(heard)], width)
+    if heard.census.simulated:
+        lines += _labelled("machine", ["none: the controller says that it is a simulated one"], width)
     for name, text in devices.items():
         lines += _labelled(name[:LABEL], [text], width)
     lines += _labelled("wrong", [t.text for t in found] or ["nothing"], width)

@@ -1,0 +1,101 @@
+"""Payloads of whole batches from values: the inverse of `bench.link.codec.Decoder`, by the same places of bits."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.link.codec import FLOATS, Array, Payloads, aligned_type, bits_of, bytes_of, grouped
+from bench.rigfile.messages import Message, Signal
+
+Words = npt.NDArray[np.uint64]
+Codes = npt.NDArray[Any]
+_LARGEST: Final = {16: 65504.0, 32: float(2**128 - 2**104), 64: sys.float_info.max}
+
+
+class Encoder:
+    """Encodes payloads of one message. `names` are its signals in the order of the rows of a table, as a `Decoder` has them."""
+
+    def __init__(self, message: Message) -> None:
+        self.message = message
+        self._groups = grouped(message)
+        signals = [s for group in self._groups for s in group]
+        self.names = tuple(s.name for s in signals)
+        self._scales = np.array([s.scale for s in signals])[:, None]
+        self._offsets = np.array([s.offset for s in signals])[:, None]
+        self._shifted = bool(self._offsets.any())
+        limits = [_limits(s) for s in signals]
+        self._low, self._high = (np.array([x[k] for x in limits])[:, None] for k in (0, 1))
+        self._whole = np.array([not s.is_float for s in signals])
+        self._all_whole = bool(self._whole.all())
+
+    def table(self, values: Array) -> Payloads:
+        """Payloads (n, message.length) of values (signals, n) in the signals' units.
+
+        A value beyond what the bits can hold becomes the nearest that they can, as a converter at its end does; what is not
+        a number is that for a float, and raw zero for an integer.
+        """
+        raw = values - self._offsets if self._shifted else values.copy()
+        raw /= self._scales
+        if self._all_whole:
+            np.rint(raw, out=raw)
+        else:
+            raw[self._whole] = np.rint(raw[self._whole])
+        np.clip(raw, self._low, self._high, out=raw)
+        out = np.zeros((raw.shape[1], self.message.length), np.uint8)
+        row = 0
+        for group in self._groups:
+            _write(out, group, raw[row : row + len(group)])
+            row += len(group)
+        return out
+
+
+def put(payloads: Payloads, s: Signal, raw: Codes) -> None:
+    """Put the bits of one signal, whole numbers (n,) of any sign, into payloads (n, bytes); the others stay."""
+    first_bit, order = bytes_of(s)
+    word = raw.astype(np.uint64) if raw.dtype.kind == "u" else raw.astype(np.int64).view(np.uint64)  # two's complement
+    mask = (1 << s.length) - 1
+    word = word & np.uint64(mask)
+    for k, byte in enumerate(order):  # least significant first
+        shift = 8 * k - first_bit
+        held = (mask >> shift if shift >= 0 else mask << -shift) & 0xFF
+        part = word >> np.uint64(shift) if shift >= 0 else word << np.uint64(-shift)
+        payloads[:, byte] = (payloads[:, byte] & np.uint8(0xFF ^ held)) | (part & np.uint64(held)).astype(np.uint8)
+
+
+def taken(payloads: Payloads, s: Signal) -> Words:
+    """The bits of one signal of payloads, as whole numbers (n,) without a sign."""
+    plain = Signal(s.name, s.start, s.length, s.little_endian, False, False, 1.0, 0.0, "", {}, "")
+    out: Words = bits_of(payloads, plain).astype(np.uint64)
+    return out
+
+
+def _limits(s: Signal) -> tuple[float, float]:
+    """Least and greatest raw value; of long integers the last that a float64 holds inside the range."""
+    if s.is_float:
+        return -_LARGEST[s.length], _LARGEST[s.length]
+    low, high = (-(1 << s.length - 1), (1 << s.length - 1) - 1) if s.signed else (0, (1 << s.length) - 1)
+    top = float(high)
+    return float(low), top if top <= high else float(np.nextafter(top, 0.0))
+
+
+def _write(out: Payloads, group: list[Signal], raw: Array) -> None:
+    """Put neighbours of one aligned type in by one view, and what lies at any place bit by bit."""
+    first, kind = group[0], aligned_type(group[0])
+    if kind:
+        low, high = first.start // 8, (group[-1].start + group[-1].length) // 8
+        with np.errstate(invalid="ignore"):
+            numbers = raw if first.is_float else np.nan_to_num(raw, nan=0.0)
+            out[:, low:high].view(kind)[:] = numbers.T
+        return
+    numbers = raw[0]
+    if first.is_float:
+        bits = np.ascontiguousarray(numbers.astype(FLOATS[first.length])).view(f"<u{first.length // 8}")
+        put(out, first, bits.astype(np.uint64))
+    elif first.signed:
+        put(out, first, np.nan_to_num(numbers, nan=0.0).astype(np.int64))
+    else:
+        put(out, first, np.nan_to_num(numbers, nan=0.0).astype(np.uint64))

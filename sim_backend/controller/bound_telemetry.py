@@ -1,0 +1,136 @@
+"""Telemetry by any DBC: readings to the messages that the rig file's binding names, a whole batch at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from bench import units
+from bench.link.frames import FD, FRAME, FrameBatch, empty_batch
+from bench.link.payloads import Encoder, put
+from bench.rigfile import RigFile
+from bench.rigfile.busload import frame_seconds
+from bench.rigfile.elements import Mark
+from bench.rigfile.messages import Message, MessageMap
+from sim_backend.controller.meanings import fault_codes, state_codes
+from sim_backend.controller.telemetry import Readings, Span, kept
+from sim_backend.machine import SimulatedPlant, Truth
+from sim_backend.spoken import CONTROLLER, bits, tellable, told_as, warming
+
+Ints = npt.NDArray[np.int64]
+CODES = ("state", "fault", "flags")  # whole numbers that stand for themselves
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One telemetry message: its encoder; channels in its rows with the places of their readings, factors and offsets to the
+    signals' units, and how each comes round (0: it does not); codes by signal; when it has gone out after the first, ns."""
+
+    message: Message
+    encoder: Encoder
+    rest: npt.NDArray[np.float64]  # what signals say that nothing is bound to: raw zero
+    rows: list[int]
+    columns: list[int]
+    factors: npt.NDArray[np.float64]
+    offsets: npt.NDArray[np.float64]
+    rounds: npt.NDArray[np.float64]
+    codes: dict[str, int]
+    after_ns: int
+
+
+class BoundTelemetry:
+    """Makes the messages of every sample: sequence and tick in the first, its low bits in the others, which follow each other
+    as the bit rate allows.
+
+    Args:
+        rig: with channels and binding.
+        messages: the device's own map.
+        truth: of the machine.
+        plant: whose rows are told.
+    """
+
+    def __init__(self, rig: RigFile, messages: MessageMap, truth: Truth, plant: SimulatedPlant) -> None:
+        machine, self._binding, self._mark = truth.machine, rig.binding, rig.mark or Mark()
+        self._known = tellable(rig, machine)
+        names = tuple(dict.fromkeys((*machine.channels, *sorted(self._known), *CONTROLLER)))
+        self._place = {name: k for k, name in enumerate(names)}
+        codes = {
+            "state": state_codes(rig.binding, rig.choices("state")),
+            "fault": fault_codes(rig, rig.choices("fault")),
+        }
+        columns = None if machine.columns is None else machine.columns(rig)
+        self._readings = Readings(
+            truth, self._place, codes, plant.period_ticks, plant.tick_s, columns, warming(rig, machine)
+        )
+        said = {} if columns is None else bits(rig)
+        self._bits = [(self._place[name], bit) for name, bit in said.items() if name in self._place]
+        self._codes = {*CODES, *(bit.channel for bit in said.values())}
+        self._tick_ns = round(plant.tick_s * 1e9)
+        self._truth, self._sequence = truth, plant.tick // plant.period_ticks
+        self._parts = []
+        after_s = 0.0
+        for k, name in enumerate(rig.binding.telemetry):
+            bitrate = rig.link.bitrate
+            after_s += frame_seconds(messages[name], bitrate, rig.link.data_bitrate) if k and bitrate else 0.0
+            self._parts.append(self._part(rig, messages[name], round(after_s * 1e9)))
+
+    def _part(self, rig: RigFile, message: Message, after_ns: int) -> _Part:
+        encoder = Encoder(message)
+        told: list[tuple[int, int, float, float, float]] = []
+        codes = {}
+        for name, channel in rig.channels.items():
+            owner, _, signal = channel.signal.partition(".")
+            reading = told_as(rig, name, self._known)
+            if owner != message.name or reading is None:
+                continue
+            s, unit = message.signal(signal), units.UNITS[message.signal(signal).unit]
+            if name in self._codes:
+                codes[signal] = self._place[reading]
+                continue
+            around = float(2**s.length) * abs(s.scale) if name in (self._mark.pulses, self._mark.edge) else 0.0
+            if name == self._mark.angle and not s.signed and s.offset >= 0:
+                around = 2 * np.pi / unit.factor
+            told.append((encoder.names.index(signal), self._place[reading], unit.factor, unit.offset, around))
+        rest = np.array([s.offset for s in (message.signal(n) for n in encoder.names)])[:, None]
+        rows, columns = [x[0] for x in told], [x[1] for x in told]
+        factors, offsets, rounds = np.array([x[2:] for x in told]).reshape(len(told), 3).T[:, :, None]
+        return _Part(message, encoder, rest, rows, columns, factors, offsets, rounds, codes, after_ns)
+
+    def encode(self, spans: list[Span], clock: tuple[int, int]) -> FrameBatch:
+        """Frames for what ran, in order of their times, some of them a little after it: as `TelemetryEncoder.encode`."""
+        n = sum(len(s.rows) for s in spans)
+        if not n:
+            return empty_batch()
+        ticks, values = self._readings.of(spans, n)
+        for column, bit in self._bits:
+            values[:, self._place[bit.channel]] += (bit.mask or 1) * (values[:, column] != 0)
+        sequence = np.arange(self._sequence, self._sequence + n)
+        self._sequence += n
+        batch = np.zeros((n, len(self._parts)), FRAME)
+        for k, part in enumerate(self._parts):
+            batch["t_ns"][:, k] = clock[0] + (ticks - clock[1]) * self._tick_ns + part.after_ns
+            batch["id"][:, k], batch["flags"][:, k] = part.message.identifier, FD if part.message.fd else 0
+            batch["length"][:, k] = part.message.length
+            batch["data"][:, k, : part.message.length] = self._payloads(part, values, sequence, ticks)
+        return kept(batch, sequence, self._truth).reshape(-1)
+
+    def _payloads(
+        self, part: _Part, values: npt.NDArray[np.float64], sequence: Ints, ticks: Ints
+    ) -> npt.NDArray[np.uint8]:
+        table = np.repeat(part.rest, len(values), axis=1)
+        told = (values[:, part.columns].T - part.offsets) / part.factors
+        around = part.rounds[:, 0] > 0
+        told[around] %= part.rounds[around]
+        table[part.rows] = told
+        payloads = part.encoder.table(table)
+        b, message = self._binding, part.message
+        for signal, column in part.codes.items():
+            put(payloads, message.signal(signal), values[:, column].astype(np.int64))
+        if part is self._parts[0]:
+            put(payloads, message.signal(b.sequence), sequence)
+            put(payloads, message.signal(b.tick), ticks)
+        else:
+            put(payloads, message.signal(b.counter), sequence)
+        return payloads
