@@ -57,6 +57,13 @@ def test_numbers_keep_their_identity() -> None:
     assert "sensors.i_yi_p.gain" not in stated
 
 
+def test_what_is_set_for_all_axes_is_not_the_axial_ones_offset() -> None:
+    p = nominal(shipped()).plant
+    assert p.offset[:4] == pytest.approx((1.15e-4,) * 4)
+    assert p.offset_x == 0.0
+    assert p.control.hold[4] == pytest.approx(0.0, abs=1e-9)
+
+
 def test_places_follow_from_what_is_drawn() -> None:
     """The inboard AMB of the shipped stand is told from the outboard one by the certified span."""
     r = shipped()

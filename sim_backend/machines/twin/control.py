@@ -18,9 +18,10 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.errors import ConfigError
-from bench.rigfile.supports import radial_supports
+from bench.rigfile import RigFile
+from bench.rigfile.supports import once_per_rig, radial_supports
 from sim_backend.machines.twin.columns import TELLS_APART, Columns
-from sim_backend.machines.twin.nominal import Nominal, set_in, transverse
+from sim_backend.machines.twin.nominal import Nominal, nominal_of, set_in, transverse
 
 Array = npt.NDArray[np.float64]
 Many = tuple[float, ...]
@@ -75,12 +76,14 @@ class Point:
     per_metre: float
 
 
-def control_of(n: Nominal) -> TwinControl:
+@once_per_rig
+def control_of(rig: RigFile) -> TwinControl:
     """By the rules, where `[simulation]` sets nothing.
 
     Raises:
         ConfigError: an axis cannot carry its share of the weight, or no probe sees what it holds.
     """
+    n = nominal_of(rig)
     columns = Columns(n.geometry, n, {})
     masses, axes = _masses(n, columns), n.layout.axes
     points = [working_point(n, k, force) for k, force in enumerate(n.carried)]

@@ -167,6 +167,12 @@ def _looks(probe: Probe) -> bool:
     return probe.direction is not None
 
 
+@once_per_rig
+def places_of(rig: RigFile) -> Places:
+    """Of a rig file, whose numbers it looks for once."""
+    return Places(rig)
+
+
 @dataclass(frozen=True)
 class Geometry:
     """Places and angles of one machine, from the numbers `v` that were drawn for it; what is not among them is nominal."""
@@ -178,7 +184,7 @@ class Geometry:
     @cached_property
     def places(self) -> Places:
         """Of the rig file."""
-        return Places(self.rig)
+        return places_of(self.rig)
 
     def station(self, part: str) -> float:
         """Place of a part on the twin's x, m from the centre of mass."""

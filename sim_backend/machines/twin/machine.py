@@ -16,7 +16,7 @@ from bench.rigfile.supports import once_per_rig
 from bench.rigfile.toleranced import Toleranced
 from sim_backend.machine import Machine, Truth
 from sim_backend.machines.twin.layout import Numbers, layout_of
-from sim_backend.machines.twin.nominal import Nominal
+from sim_backend.machines.twin.nominal import nominal_of
 from sim_backend.machines.twin.operator import Fitter
 from sim_backend.machines.twin.params import TwinParams, params
 from sim_backend.machines.twin.plant import TwinPlant
@@ -44,7 +44,7 @@ def twin(rig: RigFile) -> Machine:
     Raises:
         ConfigError: a twin cannot be made of it.
     """
-    layout, nominal = layout_of(rig), Nominal(rig)
+    layout, nominal = layout_of(rig), nominal_of(rig)
     return Machine(
         name=TWIN, stated=stated, defects=defects_of(rig), params=partial(params, rig), quantities=partial(quantities, rig),
         targets={},

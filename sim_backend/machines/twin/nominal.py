@@ -12,6 +12,7 @@ import numpy as np
 
 from bench.rigfile import RigFile
 from bench.rigfile.places import CENTRE, PLACED
+from bench.rigfile.supports import once_per_rig
 from bench.rigfile.toleranced import Toleranced
 from sim_backend.machines.twin.layout import Geometry, Layout, layout_of
 
@@ -218,3 +219,9 @@ def polar(n: Nominal) -> float:
     if shaft is not None and shaft.polar_inertia is not None:
         return n.geometry.number(shaft.polar_inertia, "shaft.polar_inertia")
     return n.set("polar_inertia", min(n.mass**2 / (2 * math.pi * STEEL * n.length), SLENDER * transverse(n)))
+
+
+@once_per_rig
+def nominal_of(rig: RigFile) -> Nominal:
+    """Of a rig file, which is asked time and again."""
+    return Nominal(rig)

@@ -11,7 +11,7 @@ from sim_backend.draws import draw_one
 from sim_backend.machine import Truth
 from sim_backend.machines.twin.columns import Columns
 from sim_backend.machines.twin.layout import Geometry, layout_of
-from sim_backend.machines.twin.nominal import Nominal
+from sim_backend.machines.twin.nominal import nominal_of
 from sim_backend.machines.twin.plant import TwinPlant
 from sim_backend.machines.twin.rules import drawn
 
@@ -28,7 +28,7 @@ class Fitter:
     def __init__(self, rig: RigFile, plant: TwinPlant, truth: Truth) -> None:
         self._rig, self._plant, self._truth = rig, plant, truth
         self._geometry = Geometry(rig, layout_of(rig), truth.values)
-        self._columns = Columns(self._geometry, Nominal(rig), truth.values)
+        self._columns = Columns(self._geometry, nominal_of(rig), truth.values)
         self._fixed = self._hung = self._turned = 0
         if truth.defects.get("loose_weight"):
             plant.weights(0, truth.defects["loose_weight"], 0.0)

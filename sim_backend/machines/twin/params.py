@@ -10,7 +10,7 @@ from bench.rigfile import RigFile
 from sim_backend.machines.twin.columns import Columns
 from sim_backend.machines.twin.control import TwinControl, control_of
 from sim_backend.machines.twin.layout import AxisPart, Geometry, Numbers, layout_of
-from sim_backend.machines.twin.nominal import Nominal
+from sim_backend.machines.twin.nominal import nominal_of
 from sim_backend.machines.twin.rules import ORDERS, short
 from sim_backend.machines.twin.told import Told, told_of
 
@@ -118,7 +118,7 @@ def params(rig: RigFile, v: Numbers, d: Numbers) -> TwinParams:
     Raises:
         ConfigError: a rig file describes what cannot be held.
     """
-    n, layout = Nominal(rig), layout_of(rig)
+    n, layout = nominal_of(rig), layout_of(rig)
     columns = Columns(Geometry(rig, layout, v), n, v)
     free = columns.free
     parts: dict[str, object] = {
@@ -126,7 +126,7 @@ def params(rig: RigFile, v: Numbers, d: Numbers) -> TwinParams:
         **_flexible(columns, v), **_amplifiers(columns, v), **_probes(columns, v, d), **_mark(columns, v, d),
     }  # fmt: skip
     return TwinParams(
-        control=control_of(n), names=told_of(rig, d), radial=len(layout.radial), axial=int(layout.axial is not None),
+        control=control_of(rig), names=told_of(rig, d), radial=len(layout.radial), axial=int(layout.axial is not None),
         probes=len(layout.probes), rings=len(layout.rings), planes=len(layout.planes),
         bearings=len(rig.bearings), tick=n.tick_s, period=n.period_ticks, free_tilt=float(free.tilts), free_radial=free.radial,
         coil_limit=n.current_limit, trip_current=n.set("trip_current", 1.15 * n.current_limit),

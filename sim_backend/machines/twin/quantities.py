@@ -10,9 +10,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from bench.rigfile import RigFile
+from sim_backend.machines.twin import linear
 from sim_backend.machines.twin.control import bias_of
 from sim_backend.machines.twin.layout import layout_of
-from sim_backend.machines.twin.nominal import Nominal
+from sim_backend.machines.twin.nominal import nominal_of
 from sim_backend.machines.twin.params import TwinParams
 from sim_backend.machines.twin.rules import short
 
@@ -35,13 +36,28 @@ def quantities(rig: RigFile, p: TwinParams, settings: Mapping[str, float]) -> di
         whole += cmath.rect(p.unbalance[k], p.unbalance_phase[k])
         out |= {f"unbalance@{short(part)}": p.unbalance[k],
                 f"unbalance_phase@{short(part)}": math.remainder(p.unbalance_phase[k], 2 * math.pi)}  # fmt: skip
-    return out | {"eccentricity": abs(whole) / p.mass}
+    hz, damping = linear.slowest(p, _loop(rig, p, settings, zero))
+    return out | {"eccentricity": abs(whole) / p.mass, "frequency": hz, "damping": damping}
+
+
+def _loop(rig: RigFile, p: TwinParams, settings: Mapping[str, float], zero: tuple[float, ...]) -> linear.Loop:
+    """The radial axes as the controller's settings have them."""
+    radial, bound = layout_of(rig).radial, rig.capabilities.gains
+    gains = {}
+    for key in ("kp", "ki", "kd"):
+        named, own = getattr(bound, key), getattr(p.control, key)
+        names = [named if isinstance(named, str) else named.get(a.name, "") for a in radial]
+        gains[key] = np.array([settings.get(name, own[k]) for k, name in enumerate(names)])
+    bias = np.array(
+        [p.control.bias[k] if len(a.coils) == 1 else _bias(rig, a.bearing, settings) for k, a in enumerate(radial)]
+    )
+    return linear.loop(p, bias, gains, np.array(zero[: len(radial)]))
 
 
 def _bias(rig: RigFile, bearing: str, settings: Mapping[str, float]) -> float:
     """A: what the parameter says that the capabilities bind, else what the controller begins with."""
     parameter = rig.capabilities.bias.get(bearing, "")
-    return settings[parameter] if parameter in settings else bias_of(Nominal(rig), bearing)
+    return settings[parameter] if parameter in settings else bias_of(nominal_of(rig), bearing)
 
 
 def offsets(p: TwinParams) -> tuple[float, ...]:

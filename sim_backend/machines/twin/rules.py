@@ -15,7 +15,7 @@ from bench.rigfile.places import Places
 from bench.rigfile.supports import once_per_rig
 from bench.rigfile.toleranced import Toleranced
 from sim_backend.machines.twin.layout import drawn_as, layout_of
-from sim_backend.machines.twin.nominal import Nominal, polar, set_in, transverse
+from sim_backend.machines.twin.nominal import Nominal, nominal_of, polar, set_in, transverse
 
 BY_RULE = "docs/reference/twin.md, what a rig file leaves open"
 GRADE_M_S = 2.5e-3  # balancing grade G 2.5 of ISO 21940-11
@@ -126,7 +126,7 @@ def drawn(rig: RigFile) -> dict[str, Toleranced]:
     """Every number of the twin that is drawn, by its name: the rig file's by identity ("/" as "."), its sensors' by channel,
     and those of the tables above."""
     out = {drawn_as(name): t for name, t in Places(rig).known.items() if not name.startswith("sensors/")}
-    n = Nominal(rig)
+    n = nominal_of(rig)
     out |= dict(_sensors(n)) | dict(_shaft(n)) | dict(_open(n))
     return out
 
