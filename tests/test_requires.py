@@ -35,13 +35,16 @@ def test_each_rig_can_run_its_procedures_and_no_others(rig: str) -> None:
 
 @pytest.mark.parametrize("example", ["own-controller/plainamb", "one-axis/oneaxis"])
 def test_a_rig_of_other_bearings_is_told_what_it_lacks(example: str) -> None:
-    """One without a probe along the shaft, and one of a single axis."""
+    """One without certificates and set points, and one of a single axis."""
     rig = load_rig(str(Path(__file__).resolve().parents[1] / "examples" / f"{example}.toml"))
     lacking = {entry.name: load_procedure(entry.name).lacking(rig) for entry in catalogue.PROCEDURES}
     assert (
         lacking["step"]
         == {
-            "own-controller/plainamb": ("probes: found none that looks along z",),
+            "own-controller/plainamb": (
+                "sensors: found no pos_yi, pos_xi, pos_yo, pos_xo, i_xi_p, i_xi_n, i_xo_p, i_xo_n",
+                "capabilities: found no set_points",
+            ),
             "one-axis/oneaxis": ("bearings: found 1 radial; expected two",),
         }[example]
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import weakref
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import wraps
 from typing import TypeVar
@@ -77,6 +78,17 @@ def axial_support(rig: RigFile) -> SupportedAxis | None:
             along = [p.channel for p in rig.probes.values() if p.direction is None]
             return SupportedAxis(axis, name, 0.0, a.coils, a.voltages, along[0] if along else "")
     return None
+
+
+def least_clearance(rig: RigFile) -> float:
+    """Of the radial rings, m: how far the centred shaft is from the nearest; infinite where there is none or none is told."""
+    places, out = Places(rig), math.inf
+    for name, ring in rig.rings.items():
+        if ring.kind == "radial":
+            with suppress(PlaceError):
+                clearance = places.number(ring.clearance, f"rings.{name}.clearance")
+                out = min(out, abs(clearance.number.value))
+    return out
 
 
 def two_planes(rig: RigFile) -> tuple[Support, Support]:

@@ -17,9 +17,9 @@ from bench.errors import Lacking
 from bench.rigfile import RigFile
 from bench.rigfile.capabilities import Capabilities
 from bench.rigfile.places import CENTRE, PlaceError, Places
-from bench.rigfile.roles import Status
-from bench.rigfile.supports import axial_support, once_per_rig, two_planes
-from procedures.shared.unsupported import unlike
+from bench.rigfile.roles import ANGLE, SPEED, Status, is_bound
+from bench.rigfile.supports import axial_support, least_clearance, once_per_rig, two_planes
+from procedures.shared.unsupported import of_weight, unlike
 
 UNKNOWN_LAG = 4.0  # ticks: an amplifier of some 400 Hz behind a controller of 10 kHz
 Law = str
@@ -59,7 +59,10 @@ class AmbRotor:
     stands_s: float
     lag_s: float  # by which currents follow their references, as the controller knows it, or as the rig file says
     gaps: Mapping[str, float]  # air gap by axis, m, as far as it is told
+    marked: bool  # whether the angle and the speed are told by a mark
+    clearance: float  # the least of the rings', m; infinite where the rig has none
     lacks: tuple[str, ...] = ()  # where the rig is not as these procedures take it
+    unweighed: tuple[str, ...] = ()  # where it is not as those take it that go by the shaft's weight
 
     @property
     def contact(self) -> Status:
@@ -68,8 +71,8 @@ class AmbRotor:
 
     @property
     def all_axes(self) -> tuple[str, ...]:
-        """The radial ones, then the axial one."""
-        return (*self.axes, self.axial)
+        """The radial ones, then the axial one, if it is held and watched as they are."""
+        return (*self.axes, self.axial) if self.axial in self.probes and self.axial in self.pulls else self.axes
 
     @property
     def positions(self) -> tuple[str, ...]:
@@ -229,6 +232,8 @@ AMB_ROTOR = AmbRotor(
     stands_s=1.0,  # it knows half a second after the last pulse
     lag_s=1 / (800 * math.pi),
     gaps={},
+    marked=True,
+    clearance=1e-4,
 )
 """The AMB stand of the thesis, rigs/amb5dof.dbc."""
 
@@ -262,7 +267,10 @@ def conventions(rig: RigFile) -> AmbRotor:
         arms=(_from_centre(rig, planes[0].name), _from_centre(rig, planes[1].name)),
         lag_s=_lag_s(rig),
         gaps=_gaps(rig),
-        lacks=unlike(rig, planes, (-lean, math.pi / 2 - lean)),
+        lacks=unlike(rig, planes),
+        unweighed=of_weight(rig, planes, (-lean, math.pi / 2 - lean)),
+        marked=is_bound(rig, ANGLE) and is_bound(rig, SPEED),
+        clearance=least_clearance(rig),
     )
 
 

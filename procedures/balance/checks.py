@@ -55,7 +55,7 @@ def requires(rig: RigFile) -> Requires:
     machine = conventions(rig)
     return replace(
         required(machine),
-        lacks=(*machine.lacks, *of_scales(rig)),
+        lacks=(*machine.lacks, *machine.unweighed, *of_scales(rig)),
         capabilities=(
             "set_points",
             "bias",

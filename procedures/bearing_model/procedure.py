@@ -246,7 +246,7 @@ def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
     return Requires(
-        lacks=machine.lacks,
+        lacks=(*machine.lacks, *machine.unweighed),
         channels=channels(machine),
         sensors=(*machine.positions, *machine.currents),
         capabilities=("set_points", "bias", "current_limit"),

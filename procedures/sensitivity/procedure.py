@@ -206,7 +206,7 @@ def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
     return Requires(
-        lacks=machine.lacks,
+        lacks=(*machine.lacks, *machine.unweighed),
         channels=telemetry_channels(machine),
         capabilities=("set_points", "injection", "injection.lines", "injection.step"),
         capture=(*LOOP, *PULSED, *machine.all_currents),

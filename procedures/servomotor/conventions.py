@@ -18,7 +18,7 @@ import numpy.typing as npt
 from bench.rigfile import RigFile
 from bench.rigfile.roles import Status
 from bench.rigfile.supports import Support, SupportedAxis, once_per_rig, two_planes
-from procedures.shared.unsupported import unlike
+from procedures.shared.unsupported import of_weight, unlike
 
 Array = npt.NDArray[np.float64]
 Value = TypeVar("Value", float, Array)
@@ -98,7 +98,7 @@ def conventions(rig: RigFile) -> Servomotor:
         segment_limit=Status.SEGMENT_LIMIT,
         contact_inboard=Status.CONTACT_NEAR,
         contact_outboard=Status.CONTACT_FAR,
-        lacks=unlike(rig, upright, (0.0, -math.pi / 2)),
+        lacks=(*unlike(rig, upright), *of_weight(rig, upright, (0.0, -math.pi / 2))),
     )
 
 

@@ -12,14 +12,17 @@ from bench.rigfile.toleranced import Toleranced
 
 TURNED_RAD = math.radians(5.0)  # from where an axis should be: the tolerance of a mounting is less
 APART_M = 1e-3  # of a place by the machine's tables from that by `geometry`
-MARKED = ("angle", "speed", "pulses")
 
 
-def unlike(rig: RigFile, planes: tuple[Support, Support], frame: tuple[float, float]) -> tuple[str, ...]:
-    """For every procedure, a line each: axes of both planes at the angles of a `frame` in rad, a shaft that lies and turns
-    counter-clockwise, probes that grow along their axis, a mark whose channels have the names of their kinds, and numbers of
-    `geometry` that say what the machine's tables say."""
-    return (*_turned(planes, frame), *_shaft(rig), *_probes(rig), *_mark(rig), *_contradicted(rig, planes))
+def unlike(rig: RigFile, planes: tuple[Support, Support]) -> tuple[str, ...]:
+    """For every procedure, a line each: axes of one plane that look where those of the other do, probes that grow along their
+    axis, a shaft that turns counter-clockwise, and numbers of `geometry` that say what the machine's tables say."""
+    return (*_twisted(planes), *_sense(rig), *_probes(rig), *_contradicted(rig, planes))
+
+
+def of_weight(rig: RigFile, planes: tuple[Support, Support], frame: tuple[float, float]) -> tuple[str, ...]:
+    """For what goes by the shaft's weight: axes of both planes at the angles of a `frame` in rad, and a shaft that lies."""
+    return (*_turned(planes, frame), *_tilt(rig))
 
 
 def of_scales(rig: RigFile) -> tuple[str, ...]:
@@ -60,11 +63,22 @@ def _turned(planes: Sequence[Support], frame: tuple[float, float]) -> Iterator[s
         yield f"bearings: found axes {turned}; expected them at {first} and {second}"
 
 
-def _shaft(rig: RigFile) -> Iterator[str]:
+def _twisted(planes: Sequence[Support]) -> Iterator[str]:
+    one, other = planes
+    for a, b in zip(one.axes, other.axes, strict=True):
+        if abs(math.remainder(a.direction - b.direction, 2 * math.pi)) > TURNED_RAD:
+            told = f"{a.name} at {math.degrees(a.direction):.3g}°, {b.name} at {math.degrees(b.direction):.3g}°"
+            yield f"bearings: found axes {told}; expected the axes of both bearings at the same angles"
+
+
+def _sense(rig: RigFile) -> Iterator[str]:
+    if rig.shaft is not None and rig.shaft.sense < 0:
+        yield "shaft.sense: found -1; this procedure takes a speed that is positive counter-clockwise"
+
+
+def _tilt(rig: RigFile) -> Iterator[str]:
     if rig.shaft is None:
         return
-    if rig.shaft.sense < 0:
-        yield "shaft.sense: found -1; this procedure takes a speed that is positive counter-clockwise"
     if rig.shaft.tilt is not None and abs(_value(rig, rig.shaft.tilt, "shaft.tilt")) > TURNED_RAD:
         yield "shaft.tilt: found a shaft that does not lie; this procedure takes one that does"
 
@@ -74,12 +88,6 @@ def _probes(rig: RigFile) -> Iterator[str]:
         if probe.sign < 0:
             yield (f"probes.{name}.sign: found -1; this procedure takes readings that grow along the axis: give the DBC's "
                    "factor its sign")  # fmt: skip
-
-
-def _mark(rig: RigFile) -> Iterator[str]:
-    for kind in MARKED if rig.mark is not None else ():
-        if (found := getattr(rig.mark, kind)) not in ("", kind):
-            yield f"mark.{kind}: found channel {found}; this procedure takes one that is called {kind}"
 
 
 def _contradicted(rig: RigFile, planes: tuple[Support, Support]) -> Iterator[str]:

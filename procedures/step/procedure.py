@@ -209,9 +209,9 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
             yield f"parameters: found no {name}; needed are those of the plan's settings"
         elif rig.parameters[name].when == "resting":
             yield f"{name}: can be written at rest only; a setting is changed while the shaft levitates"
-    if 2 * max(plan.sizes_m) > MARGIN * rig.geometry["clearance"].value:
+    if 2 * max(plan.sizes_m) > MARGIN * machine.clearance:
         yield (f"sizes_m: found {max(plan.sizes_m) * 1e6:g} um; with its overshoot that needs more than {MARGIN:.0%} of the "
-               f"clearance, {rig.geometry['clearance'].value * 1e6:g} um")  # fmt: skip
+               f"clearance, {machine.clearance * 1e6:g} um")  # fmt: skip
     if min(plan.sizes_m) <= 0 or len({*plan.sizes_m}) < len(plan.sizes_m) or len({*plan.axes}) < len(plan.axes):
         yield "sizes_m, axes: expected sizes above 0, and each once"
     if plan.names[0] == plan.names[1]:
@@ -222,6 +222,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     most = rig.envelope.max_speed_rad_s
     if max(plan.speeds_rad_s) > most:
         yield f"speeds_rad_s: found {max(plan.speeds_rad_s) * RPM:.0f} r/min; the envelope allows {most * RPM:.0f} r/min"
+    if max(plan.speeds_rad_s) > 0 and not machine.marked:
+        yield "speeds_rad_s: the rig tells no angle and speed of the shaft; expected 0 alone"
     if max(plan.speeds_rad_s) > 0 and not any("drive" in d.roles for d in rig.devices.values()):
         yield "speeds_rad_s: the rig file has no device in the role drive, so that nothing turns the shaft"
 
@@ -241,7 +243,6 @@ def requires(rig: RigFile) -> Requires:
         channels=channels(machine),
         sensors=(*machine.all_positions, *machine.all_currents),
         capabilities=("set_points",),
-        geometry=("clearance",),
     )
 
 

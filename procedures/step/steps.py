@@ -84,7 +84,12 @@ class Done:
 
 def channels(machine: AmbRotor) -> tuple[str, ...]:
     """What is read of a step."""
-    return (*machine.all_positions, *machine.all_currents, ANGLE, SPEED, STATUS)
+    return (*machine.all_positions, *machine.all_currents, *marked(machine), STATUS)
+
+
+def marked(machine: AmbRotor) -> tuple[str, ...]:
+    """Roles that tell how the shaft turns, where the rig has them."""
+    return (ANGLE, SPEED) if machine.marked else ()
 
 
 def read_steps(recording: Recording[Any]) -> list[Done]:
@@ -138,7 +143,7 @@ def _probe_arms(rig: RigFile) -> tuple[float, float]:
 
 def _read(recording: Recording[Any], step: Step) -> Done:
     machine = conventions(recording.rig)
-    data, labels = _whole(step.read(*channels(machine))), step.labels
+    data, labels = _whole(at_rest_if_untold(step.read(*channels(machine)))), step.labels
     axis, signed = str(labels["axis"]), float(labels["step_m"])
     case = Case(str(labels["setting"]), float(labels["speed_rad_s"]), axis, abs(signed), 1 if signed > 0 else -1)
     written = [e["t_ns"] for e in recording.events("parameter")
@@ -150,6 +155,12 @@ def _read(recording: Recording[Any], step: Step) -> Done:
         raise AnalysisError(f"{case.where}: found {int(rest.sum())} samples before the step and {int((~rest).sum())} after; "
                             "expected at least 50 and 100")  # fmt: skip
     return _done(recording.rig, step, case, data, rest)
+
+
+def at_rest_if_untold(data: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
+    """With angle and speed of a shaft that rests, where the rig does not tell them."""
+    nothing = np.zeros(len(data["t_ns"]))
+    return {ANGLE: nothing, SPEED: nothing, **data}
 
 
 def _whole(data: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:

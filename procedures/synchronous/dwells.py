@@ -107,7 +107,7 @@ def captured_channels(machine: AmbRotor) -> tuple[str, ...]:
 def required(machine: AmbRotor) -> Requires:
     """What every procedure needs that watches the shaft while it turns."""
     return Requires(
-        lacks=machine.lacks,
+        lacks=(*machine.lacks, *machine.unweighed),
         roles=("levitation", "drive"),
         channels=telemetry_channels(machine),
         sensors=(*machine.positions, *machine.currents),
