@@ -19,7 +19,7 @@ from sim_backend.machines.twin.layout import Numbers, layout_of
 from sim_backend.machines.twin.nominal import nominal_of
 from sim_backend.machines.twin.operator import Fitter
 from sim_backend.machines.twin.params import TwinParams, params
-from sim_backend.machines.twin.plant import TwinPlant
+from sim_backend.machines.twin.plant import TwinPlant, settable
 from sim_backend.machines.twin.quantities import quantities
 from sim_backend.machines.twin.rules import drawn
 from sim_backend.machines.twin.told import told_of
@@ -51,7 +51,7 @@ def twin(rig: RigFile) -> Machine:
         make=make, radial=slice(0, len(layout.looking)), integral_gains=_integral_gains(rig), turns=False, channels=(),
         places=partial(places, rig), spoil=spoil, supply_V=nominal.set("supply_V", 48.0), windings=windings_of(rig),
         copper_W=copper_W,
-        operator=operator, traced=partial(traced, rig), daily=DAILY,
+        operator=operator, traced=partial(traced, rig), daily=DAILY, columns=columns,
     )  # fmt: skip
 
 
@@ -63,14 +63,14 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
 
 def defects_of(rig: RigFile) -> dict[str, float]:
     """Planted defects of a rig by name, and their harmless values. `exchange_*` is how it is wired, `told_*` acts on what
-    is told alone; `factor_*` scales a parameter that the controller is told before it acts."""
+    is told alone; `factor_*` scales what a parameter sets (`TwinPlant.set`) before it acts."""
     layout = layout_of(rig)
     out = dict(PLAIN)
     out |= {f"probe_sign.{name}": 1.0 for name in layout.probes}
     out |= {f"{way}_coils.{a.name}": 0.0 for a in layout.axes if len(a.coils) == 2 for way in ("exchange", "told")}
     out |= {f"{way}_probes.{a}.{b}": 0.0 for a, b in combinations(layout.probes, 2) for way in ("exchange", "told")}
     out |= {f"mass_error_{label}": 0.0 for label in rig.masses}
-    return out | {f"factor_{name}": 1.0 for name in rig.parameters}
+    return out | {f"factor_{name}": 1.0 for name, *_ in settable(told_of(rig, {}))}
 
 
 def _integral_gains(rig: RigFile) -> frozenset[str]:
@@ -104,9 +104,14 @@ def copper_W(plant: TwinPlant) -> float:
     return plant.params.resistance * sum(i * i for i in plant.currents)
 
 
+def columns(rig: RigFile) -> tuple[str, ...]:
+    """Names of the rows' columns."""
+    return tuple(dict.fromkeys(name for name, _ in told_of(rig, {}).rows))
+
+
 def places(rig: RigFile, defects: Numbers, at: Mapping[str, int]) -> tuple[list[int], list[int]]:
     """Which columns are told, and where each goes among the signals of a DBC with one message of telemetry."""
-    names = tuple(dict.fromkeys(name for name, _ in told_of(rig, defects).rows))
+    names = columns(rig)
     signals = [rig.channels[name].signal.partition(".")[2] if name in rig.channels else name for name in names]
     told = [k for k, signal in enumerate(signals) if signal in at]
     return told, [at[signals[k]] for k in told]

@@ -11,6 +11,7 @@ import numpy as np
 from sim_backend.core.plant import Array, CorePlant, fill, open_core
 from sim_backend.machines.twin.control import COORDINATES, TwinControl
 from sim_backend.machines.twin.params import TwinParams
+from sim_backend.machines.twin.told import Told
 
 COLUMNS: Final = 116
 GAINS: Final = ("kp", "ki", "kd")
@@ -31,7 +32,6 @@ class TwinPlant(CorePlant):
             greatest |voltage| of each bearing; what the mark tells as of the period's last reading; `status.*`, 1 where it was
             so at any time of the period.
         trace_channels: columns of the readings of a tick.
-        tick_s, period_ticks: of the controller; ticks between two rows.
 
     Args:
         params: the machine and how its controller begins.
@@ -47,13 +47,23 @@ class TwinPlant(CorePlant):
         fill(self._p, {**core_fields(params), "substeps": max(1, substeps)})
         fill(self._c, vars(params.control))
         names = params.names
-        self.axes, self.tick_s, self.period_ticks = names.axes, names.tick_s, params.period
+        self.axes = names.axes
         self.channels = tuple(dict.fromkeys(name for name, _ in names.rows))
         self.trace_channels = tuple(name for name, _ in names.ticks)
         self._several = _joined(names.rows)
         _told(self._p, names.rows, names.ticks)
-        self._settable = {name: (field, where) for name, field, where in _settable(params)}
+        self._settable = {name: (field, where) for name, field, where in settable(params.names)}
         _lib.twin_start(self._p, self._s, seed & (2**64 - 1))
+
+    @property
+    def tick_s(self) -> float:
+        """From control tick to control tick."""
+        return self.params.tick
+
+    @property
+    def period_ticks(self) -> int:
+        """Ticks of a telemetry period."""
+        return self.params.period
 
     def set(self, name: str, value: float) -> None:
         """Set a parameter of the law, SI: `ref.axis.AXIS`, `ref.shaft.x` (y, z, psi, theta), each without its second word
@@ -203,9 +213,8 @@ def _told(p: Any, rows: tuple[tuple[str, int], ...], ticks: tuple[tuple[str, int
     p.trace[0 : len(ticks)] = [place for _, place in ticks]
 
 
-def _settable(p: TwinParams) -> list[tuple[str, str, tuple[int, ...]]]:
+def settable(names: Told) -> list[tuple[str, str, tuple[int, ...]]]:
     """Names of the law's parameters, the field of each, and where in it."""
-    names = p.names
     out: list[tuple[str, str, tuple[int, ...]]] = [(name, name, ()) for name in PLAIN]
     for way in ("ref.shaft", "ref"):  # an axis may have the name of a coordinate: the longer names tell them apart
         out += [(f"{way}.{name}", "ref", (k,)) for k, name in enumerate(COORDINATES)]

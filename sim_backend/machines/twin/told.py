@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from bench.rigfile import RigFile
 from sim_backend.machines.twin.layout import Numbers, layout_of
-from sim_backend.machines.twin.nominal import nominal_of
 
 POSITION, PLUS, MINUS, VOLTS_PLUS, VOLTS_MINUS, PEAK = 0, 16, 32, 48, 64, 80
 ANGLE, SPEED, PULSES, EDGE, AGE, INJECT, BEFORE, AFTER, CONTACT, AXIAL_CONTACT = (*range(96, 105), 112)
@@ -28,7 +27,6 @@ class Told:
     ticks: tuple[Column, ...]
     marked: bool
     radial_columns: int
-    tick_s: float
 
 
 def told_of(rig: RigFile, defects: Numbers) -> Told:
@@ -41,7 +39,7 @@ def told_of(rig: RigFile, defects: Numbers) -> Told:
     return Told(
         axes=tuple(a.name for a in layout.axes), bearings=tuple(rig.bearings),
         of_bearing=tuple(a.bearing for a in layout.axes), rows=tuple(rows), ticks=(*told, *angle, *inner),
-        marked=rig.mark is not None, radial_columns=len(layout.looking), tick_s=nominal_of(rig).tick_s,
+        marked=rig.mark is not None, radial_columns=len(layout.looking),
     )  # fmt: skip
 
 
