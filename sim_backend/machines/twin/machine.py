@@ -51,7 +51,7 @@ def twin(rig: RigFile) -> Machine:
         make=make, radial=slice(0, len(layout.looking)), integral_gains=_integral_gains(rig), turns=False, channels=(),
         places=partial(places, rig), spoil=spoil, supply_V=nominal.set("supply_V", 48.0), windings=windings_of(rig),
         copper_W=copper_W,
-        operator=operator, traced=partial(traced, rig), daily=DAILY,
+        operator=operator, traced=partial(traced, rig), daily=DAILY, columns=columns,
     )  # fmt: skip
 
 
@@ -110,6 +110,11 @@ def places(rig: RigFile, defects: Numbers, at: Mapping[str, int]) -> tuple[list[
     signals = [rig.channels[name].signal.partition(".")[2] if name in rig.channels else name for name in names]
     told = [k for k, signal in enumerate(signals) if signal in at]
     return told, [at[signals[k]] for k in told]
+
+
+def columns(rig: RigFile) -> tuple[str, ...]:
+    """Names of the columns of the rows, by the rig's channels."""
+    return tuple(dict.fromkeys(name for name, _ in told_of(rig, {}).rows))
 
 
 def traced(rig: RigFile, defects: Numbers) -> tuple[str, ...]:
