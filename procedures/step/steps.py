@@ -24,6 +24,7 @@ Array = npt.NDArray[np.float64]
 STEP = "set-point"
 ORDERS = (1, 2, 3, 4)  # per turn: unbalance and the runout of the journals
 TURNING_RAD_S = 20.0
+GONE = 0.25  # of the way: until then the currents push
 ANSWER = 0.25  # of the greatest change of the control current: where it first gets there, the step began
 AT_REST_S = 6e-3  # what a position is averaged over where the shaft does not turn
 EARLY_TICKS = (
@@ -192,7 +193,8 @@ def _done(
     signals = np.array([raw, tilt, across, control, *ones])
     clean, amplitude = _still(t, signals, data[ANGLE], rest) if turning else (signals, np.zeros(len(signals)))
     clean = case.way * (clean - clean[:, rest].mean(axis=1, keepdims=True))
-    first, answered = _answer(clean[4:], rest)
+    pushed = _before_it_moves(clean[0], rest)
+    first, answered = _answer(clean[4:], rest, pushed)
     period = float(np.median(np.diff(t)))
     samples = 2 * math.pi / float(np.median(data[SPEED])) / period if turning else AT_REST_S / period
     since = t - _acted(rig, t, clean[3], first, period) - EARLY_TICKS * rig.devices["controller"].tick_s
@@ -205,17 +207,27 @@ def _done(
         case, float(step.labels["begin_m"]), since[keep], clean[0][keep], (case.way * (raw - raw[rest].mean()))[keep],
         clean[1][keep], clean[2][keep], clean[3][keep], quiet,
         float(trailing(level, samples)[round(samples) :].std()), samples, float(amplitude[0]), slope, answered,
-        tuple(float(c[first : first + 3].sum()) for c in clean[4:]),
+        tuple(float(c[first : max(min(first + 3, pushed), first + 1)].sum()) for c in clean[4:]),
         (float(data[SPEED].min()), float(data[SPEED].max())), int(np.bitwise_or.reduce(flags)),
         tuple(c for c in (*machine.all_positions, *machine.all_currents) if np.ptp(data[c]) == 0), step.lost(), step.expected(),
         machine,
     )  # fmt: skip
 
 
-def _answer(control: Array, rest: npt.NDArray[np.bool_]) -> tuple[int, bool]:
-    """The first sample at which a bearing's control current (k, n) shows the step; the one after the write, where none does."""
+def _before_it_moves(position: Array, rest: npt.NDArray[np.bool_]) -> int:
+    """The sample at which the shaft has gone a quarter of its way, at least two after the write: until then the currents push
+    it there, from then on they brake it, and hold it where the magnets' negative stiffness helps it along."""
     begin = int(np.flatnonzero(~rest)[0])
-    window = np.abs(control[:, begin : begin + 40]).max(axis=0)
+    way = float(position[-(len(position) - begin) // 4 :].mean())
+    gone = np.flatnonzero(position[begin:] > GONE * way) if way > 0 else np.zeros(0, np.int64)
+    return begin + max(int(gone[0]) + 1 if gone.size else 40, 2)
+
+
+def _answer(control: Array, rest: npt.NDArray[np.bool_], until: int) -> tuple[int, bool]:
+    """The first sample, before `until`, at which a bearing's control current (k, n) shows the step; the one after the write,
+    where none does."""
+    begin = int(np.flatnonzero(~rest)[0])
+    window = np.abs(control[:, begin:until]).max(axis=0)
     noise = float(control[:, rest].std(axis=1).max())
     if window.max() < 8 * noise:
         return begin, False

@@ -67,14 +67,14 @@ class Parameters:
             if control.name in OWN:
                 self.own[control.name] = acting
             if control.name not in INTERFACE:
-                self._act(control.name, acting)
+                self._act(name, control.name, acting)
 
-    def _act(self, control: str, value: float) -> None:
+    def _act(self, name: str, control: str, value: float) -> None:
         defects = self._truth.defects
         if control in self._truth.machine.integral_gains:
             value *= defects["integrator_factor"]
         try:
-            self._plant.set(control, value * defects.get(f"factor_{control}", 1.0))
+            self._plant.set(control, value * defects.get(f"factor_{name}", 1.0))
         except KeyError:
             if self._strict:
                 raise

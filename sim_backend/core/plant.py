@@ -56,19 +56,11 @@ class CorePlant:
     """What every machine's plant is, around its structs: parameters `_p`, the law's parameters `_c`, state `_s`."""
 
     settable: ClassVar[frozenset[str]]  # the law's parameters
+    tick_s: float = TICK_S  # from control tick to control tick
+    period_ticks: int = PERIOD_TICKS  # of a telemetry period
     _p: Any
     _c: Any
     _s: Any
-
-    @property
-    def tick_s(self) -> float:
-        """From control tick to control tick."""
-        return TICK_S
-
-    @property
-    def period_ticks(self) -> int:
-        """Ticks of a telemetry period."""
-        return PERIOD_TICKS
 
     @property
     def tick(self) -> int:
