@@ -52,7 +52,10 @@ def _own(rig: RigFile) -> Iterator[tuple[str, Control]]:
 def _of_plant(rig: RigFile) -> Iterator[tuple[str, Control]]:
     """Names as `[capabilities]` and the machine's tables have them."""
     c = rig.capabilities
-    axes = [axis for bearing in rig.bearings.values() for axis in bearing.axes]
+    bearings = sorted(
+        rig.bearings.values(), key=lambda b: b.kind == "axial"
+    )  # as the plant has them: the axial one last
+    axes = [axis for bearing in bearings for axis in bearing.axes]
     for table in (c.set_points.axes, c.set_points.shaft):
         yield from ((name, Control(f"ref.{where}")) for where, name in table.items())
     yield from ((c.set_points.slew, Control("slew")), (c.set_points.slew_tilt, Control("slew_tilt")))

@@ -22,11 +22,13 @@ from twin_rigs import (
     probe,
     rig,
     shipped,
+    thrust,
     truth,
 )
 
 from bench.errors import ConfigError
 from bench.rigfile import RigFile
+from sim_backend.controller.controls import controls
 from sim_backend.machines.table import machine_of
 from sim_backend.machines.twin.machine import twin
 from sim_backend.machines.twin.operator import Fitter
@@ -140,6 +142,21 @@ def test_what_no_twin_can_be_made_of_is_refused_by_name(parts: tuple[str, ...], 
     r = rig("refused", parts)
     with pytest.raises(ConfigError, match=told.replace(".", r"\.")):
         twin(r).params({n: t.value for n, t in twin(r).stated(r).items()}, twin(r).defects)
+
+
+def test_an_axis_is_injected_into_by_the_plants_own_number() -> None:
+    """The axial bearing stands first in the file, and last in the plant."""
+    units = {"Inject": "1", "A": "A", "F": "Hz"}
+    table = [
+        f'{n} = {{ index = {k}, unit = "{u}", default = 0, low = 0, high = 9 }}'
+        for k, (n, u) in enumerate(units.items())
+    ]
+    injection = 'axis = "Inject"\namplitude = "A"\nhz = "F"\noff = 0\naxes = { w = 1, yr = 2 }'
+    bound = "\n".join(["[parameters]", *table, "[capabilities.injection]", injection])
+    r = rig("first", (STAND[0], STAND[1], thrust(), *STAND[2:], probe("w"), bound))
+    names = plant_of(truth(r)).axes
+    (chosen,) = controls(r, twin(r))["Inject"]
+    assert (names[int(chosen.of(1))], names[int(chosen.of(2))], chosen.of(0)) == ("w", "yr", -1.0)
 
 
 def test_true_quantities() -> None:

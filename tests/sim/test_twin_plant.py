@@ -46,7 +46,15 @@ def test_columns_are_the_rigs_channels() -> None:
     marked = ["ang", "rate", "count", "edge", "pulse_age", "inject", "before", "after"]
     status = [
         f"status.{n}"
-        for n in ("contact.low", "contact.high", "contact.axial", "current_limit", "voltage_limit", "sensor_range")
+        for n in (
+            "contact.low",
+            "contact.high",
+            "contact.end",
+            "contact.axial",
+            "current_limit",
+            "voltage_limit",
+            "sensor_range",
+        )
     ]
     assert list(plant.channels) == [*positions, *coils, "volt_lower", "volt_upper", *marked, *status]
     assert list(plant.trace_channels) == [*positions, *coils, *marked]

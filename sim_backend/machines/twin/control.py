@@ -50,7 +50,7 @@ class TwinControl:
     lift_time_s: float
     current_limit: float
     notch: Many = (0.0,) * 6
-    slew: float = 0.0  # at once, as a controller without such a parameter follows its set points
+    slew: float = 0.0
     slew_tilt: float = 0.0
     path_on: float = 0.0
     path_y: float = 0.0
@@ -105,8 +105,8 @@ def control_of(rig: RigFile) -> TwinControl:
     return TwinControl(
         map=_map(n, columns), steer=_steer(n, columns), kp=tuple(kp), ki=tuple(ki), kd=tuple(kd),
         bias=tuple(p.bias for p in points), hold=tuple(hold), derivative_hz=low_pass,
-        lift_time_s=n.set("lift_time", 1.0), current_limit=n.current_limit,
-        slew=n.set("slew", 0.0), slew_tilt=n.set("slew_tilt", 0.0),
+        lift_time_s=n.set("lift_time", 1.0), slew=n.set("slew", 0.0), slew_tilt=n.set("slew_tilt", 0.0),
+        current_limit=n.current_limit,
         notch=tuple(x for hz, q in notches for x in notch(hz, q, n.tick_s)),
     )  # fmt: skip
 

@@ -82,6 +82,8 @@ def _status(rig: RigFile, silent: bool) -> Iterator[Column]:
     together."""
     layout = layout_of(rig)
     touched = [(f"status.contact.{r.ring}", CONTACT + k) for k, r in enumerate(layout.rings) if r.ring]
-    touched += [("status.contact.axial", AXIAL_CONTACT)] if layout.axial is not None else []
+    if layout.axial is not None:
+        stops = (name for name, ring in rig.rings.items() if ring.kind == "axial")
+        touched += [(f"status.contact.{name}", AXIAL_CONTACT) for name in dict.fromkeys((*stops, "axial"))]
     yield from ((name, NOTHING if silent else place) for name, place in touched)
     yield from LIMITS.items()
