@@ -27,6 +27,6 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
 
 procedure: Any = Procedure(
     name="tiny-chained", title="What differs from the calibrated supply", measures=(EXCESS,), state=RigState.LEVITATED,
-    plan=Plan, acquire=acquire, measured=analyse, settings=lambda plan: {"bias_i": plan.bias_A},
+    plan=Plan, acquire=acquire, measured=analyse, settings=lambda _, plan: {"bias_i": plan.bias_A},
     needs=lambda plan: (Need("tiny-levitated", {"bias_A": plan.bias_A}),),
 )  # fmt: skip

@@ -86,7 +86,7 @@ def analyse(recording: Recording[Plan]) -> Iterator[Measured | Finding]:
 def _made(name: str, state: RigState) -> Procedure:
     return Procedure(
         name=name, title=f"A look at the supply, {state}", measures=(SUPPLY,), state=state, plan=Plan, acquire=acquire,
-        measured=analyse, settings=lambda plan: {"bias_i": plan.bias_A}, step_count=lambda _: 2,
+        measured=analyse, settings=lambda _, plan: {"bias_i": plan.bias_A}, step_count=lambda _: 2,
     )  # fmt: skip
 
 

@@ -66,7 +66,7 @@ class Bench:
     """A foreign controller and the bench that is bound to it by its rig file."""
 
     def __init__(self, seed: int = 2026, **defects: float) -> None:
-        self.machine = SimulatedRig(NATIVE, draw(NATIVE, seed, defects, settings(SHORT)))
+        self.machine = SimulatedRig(NATIVE, draw(NATIVE, seed, defects, settings(NATIVE, SHORT)))
         self.heard = TelemetryDecoder(NATIVE)
         self.native: Recorder | None = None
         self.link = plainamb.PlainAmb(self.machine.link, self._hear)
