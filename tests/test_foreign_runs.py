@@ -1,0 +1,52 @@
+"""Procedures on the twins of another laboratory's rigs, by their own messages: a run, a refusal, what each lacks by name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from bench import catalogue
+from bench.cli.loading import load_procedure
+from bench.cli.virtual import Simulated, simulated_run
+from bench.findings import Effect, Finding
+from bench.procedure import Measured
+from bench.rigfile import load_rig
+
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+SPINDLE, STAND = str(EXAMPLES / "vertical-spindle/spindle.toml"), str(EXAMPLES / "plain-stand/stand.toml")
+
+
+def told(run: Simulated) -> dict[tuple[str, str], float]:
+    return {(m.quantity.name, m.where): m.estimate.value for m in run.results if isinstance(m, Measured)}
+
+
+def wrong(run: Simulated) -> list[str]:
+    return [f.code for f in run.results if isinstance(f, Finding) and f.effect is not Effect.NOTE]
+
+
+def test_a_standing_shaft_with_axes_at_30_degrees_is_stepped(tmp_path: Path) -> None:
+    """Set points by bearing axis in one message, telemetry at 2 kHz, no capture, no choice of law. Both planes are stepped
+    together, so that what swings is near the slowest mode that the linear model of the same twin has."""
+    run = simulated_run("step", SPINDLE, 1, {"axes": ["y"]}, tmp_path / "spindle.mcap")
+    assert wrong(run) == []
+    found = told(run)
+    assert found["natural_frequency", "A, y, 0 r/min"] == pytest.approx(run.truth["frequency"], rel=0.03)
+    assert found["damping", "A, y, 0 r/min"] == pytest.approx(run.truth["damping"], rel=0.05)
+
+
+def test_telemetry_that_is_too_slow_for_a_step_is_told_and_nothing_measured(tmp_path: Path) -> None:
+    """Two samples of 2 ms in a rise: an overshoot by them would be a guess."""
+    run = simulated_run("step", STAND, 1, {"axes": ["y"]}, tmp_path / "stand.mcap")
+    assert wrong(run) == ["telemetry-too-slow"]
+    assert told(run) == {}
+
+
+@pytest.mark.parametrize("path", [SPINDLE, STAND], ids=["spindle", "stand"])
+def test_what_a_procedure_lacks_is_told_by_tables_and_names(path: str) -> None:
+    rig = load_rig(path)
+    lacking = {entry.name: load_procedure(entry.name).lacking(rig) for entry in catalogue.PROCEDURES}
+    assert [name for name, lines in lacking.items() if not lines] == ["step"]
+    lines = [line for said in lacking.values() for line in said]
+    assert all(line.partition(": ")[2] for line in lines)
+    assert any("no injection," in line for line in lacking["sensitivity"]) == (path == SPINDLE)
