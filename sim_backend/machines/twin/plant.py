@@ -47,23 +47,13 @@ class TwinPlant(CorePlant):
         fill(self._p, {**core_fields(params), "substeps": max(1, substeps)})
         fill(self._c, vars(params.control))
         names = params.names
-        self.axes = names.axes
+        self.axes, self.tick_s, self.period_ticks = names.axes, params.tick, params.period
         self.channels = tuple(dict.fromkeys(name for name, _ in names.rows))
         self.trace_channels = tuple(name for name, _ in names.ticks)
         self._several = _joined(names.rows)
         _told(self._p, names.rows, names.ticks)
         self._settable = {name: (field, where) for name, field, where in settable(params.names)}
         _lib.twin_start(self._p, self._s, seed & (2**64 - 1))
-
-    @property
-    def tick_s(self) -> float:
-        """From control tick to control tick."""
-        return self.params.tick
-
-    @property
-    def period_ticks(self) -> int:
-        """Ticks of a telemetry period."""
-        return self.params.period
 
     def set(self, name: str, value: float) -> None:
         """Set a parameter of the law, SI: `ref.axis.AXIS`, `ref.shaft.x` (y, z, psi, theta), each without its second word
