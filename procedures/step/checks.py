@@ -25,7 +25,9 @@ FATAL = (
     "wrong-size",
     "sensor-clipped",
     "speed-off",
+    "telemetry-too-slow",
 )
+FEWEST_IN_RISE = 3  # samples
 CAME = 0.2  # of the step: less is no step
 SIZE_OFF = 0.4  # of the step: what a stiff integrator-less loop may be off, and no more
 DRIFT_S = 0.2  # in which a position before a step must not leave the band
@@ -52,6 +54,22 @@ def of_steps(steps: Sequence[Done], plan: Plan) -> Iterator[Finding]:
     yield from _signals(steps, plan)
     yield from _speed(steps, plan)
     yield from _came(steps)
+    yield from _resolved(steps)
+
+
+def _resolved(steps: Sequence[Done]) -> Iterator[Finding]:
+    """Samples from a tenth to nine tenths of the way: too few say nothing of the swing."""
+    rises = [d.y[d.t > 0] for d in steps if (d.t > 0).any()]
+    ways = [float(y[-len(y) // 4 :].mean()) for y in rises]
+    counts = [
+        int(np.argmax(y > 0.9 * way) - np.argmax(y > 0.1 * way)) for y, way in zip(rises, ways, strict=True) if way > 0
+    ]
+    if counts and np.median(counts) < FEWEST_IN_RISE:
+        period = float(np.median(np.diff(steps[0].t)))
+        text = (f"from a tenth to nine tenths of a step the telemetry has {np.median(counts):.0f} samples, "
+                f"{period * 1e3:.3g} ms apart; {FEWEST_IN_RISE} or more are needed to tell a swing: faster telemetry, or a "
+                "softer loop.")  # fmt: skip
+        yield Finding("telemetry-too-slow", text, steps[0].case.where, Effect.ERROR)
 
 
 def _signals(steps: Sequence[Done], plan: Plan) -> Iterator[Finding]:

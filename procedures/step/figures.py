@@ -111,7 +111,11 @@ def _sizes(results: Mapping[Case, Result]) -> Iterator[Figure]:
         for k, setting in enumerate(dict.fromkeys(c.setting for c in results)):
             shift = k * ASIDE * max(c.size for c in results)
             cases = sorted(
-                (c for c in results if (c.axis, c.speed, c.setting) == (axis, speed, setting)),
+                (
+                    c
+                    for c, r in results.items()
+                    if (c.axis, c.speed, c.setting) == (axis, speed, setting) and "overshoot" in r.estimates
+                ),
                 key=lambda c: c.way * c.size,
             )
             found = [results[c].estimates["overshoot"] for c in cases]

@@ -112,11 +112,6 @@ def places(rig: RigFile, defects: Numbers, at: Mapping[str, int]) -> tuple[list[
     return told, [at[signals[k]] for k in told]
 
 
-def columns(rig: RigFile) -> tuple[str, ...]:
-    """Names of the columns of the rows, by the rig's channels."""
-    return tuple(dict.fromkeys(name for name, _ in told_of(rig, {}).rows))
-
-
 def traced(rig: RigFile, defects: Numbers) -> tuple[str, ...]:
     """The names of the readings of a tick, for captures."""
     return tuple(name for name, _ in told_of(rig, defects).ticks)
