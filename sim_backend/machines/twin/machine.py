@@ -104,6 +104,11 @@ def copper_W(plant: TwinPlant) -> float:
     return plant.params.resistance * sum(i * i for i in plant.currents)
 
 
+def columns(rig: RigFile) -> tuple[str, ...]:
+    """Names of the rows' columns."""
+    return tuple(dict.fromkeys(name for name, _ in told_of(rig, {}).rows))
+
+
 def places(rig: RigFile, defects: Numbers, at: Mapping[str, int]) -> tuple[list[int], list[int]]:
     """Which columns are told, and where each goes among the signals of a DBC with one message of telemetry."""
     names = columns(rig)
