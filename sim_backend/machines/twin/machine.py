@@ -19,7 +19,7 @@ from sim_backend.machines.twin.layout import Numbers, layout_of
 from sim_backend.machines.twin.nominal import nominal_of
 from sim_backend.machines.twin.operator import Fitter
 from sim_backend.machines.twin.params import TwinParams, params
-from sim_backend.machines.twin.plant import TwinPlant, settable
+from sim_backend.machines.twin.plant import TwinPlant
 from sim_backend.machines.twin.quantities import quantities
 from sim_backend.machines.twin.rules import drawn
 from sim_backend.machines.twin.told import told_of
@@ -63,14 +63,14 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
 
 def defects_of(rig: RigFile) -> dict[str, float]:
     """Planted defects of a rig by name, and their harmless values. `exchange_*` is how it is wired, `told_*` acts on what
-    is told alone; `factor_*` scales what a parameter sets (`TwinPlant.set`) before it acts."""
+    is told alone; `factor_*` scales what a parameter sets before it acts."""
     layout = layout_of(rig)
     out = dict(PLAIN)
     out |= {f"probe_sign.{name}": 1.0 for name in layout.probes}
     out |= {f"{way}_coils.{a.name}": 0.0 for a in layout.axes if len(a.coils) == 2 for way in ("exchange", "told")}
     out |= {f"{way}_probes.{a}.{b}": 0.0 for a, b in combinations(layout.probes, 2) for way in ("exchange", "told")}
     out |= {f"mass_error_{label}": 0.0 for label in rig.masses}
-    return out | {f"factor_{name}": 1.0 for name, *_ in settable(told_of(rig, {}))}
+    return out | {f"factor_{name}": 1.0 for name in rig.parameters}
 
 
 def _integral_gains(rig: RigFile) -> frozenset[str]:
