@@ -64,11 +64,11 @@ def _swing(done: Sequence[Done], results: Mapping[Case, Result]) -> Figure:
         if fitted is not None:
             t = np.arange(FROM_S, SWING_S, 2e-4)
             series.append(Series(f"fit, {d.case.setting}", 1e3 * t, 1e6 * d.case.size * fitted.at(t)))
-    size = 1e6 * done[0].case.size
+    size, apart = 1e6 * done[0].case.size, 1e3 * (done[0].t[1] - done[0].t[0])
     return Figure(f"swing-{_key(done[0].case)}", f"First swing, {_title(done[0].case)}",
-                  "Points: means over 1 ms of one step, at their middles, without what turns with the shaft. Lines: the "
-                  "oscillations fitted to all steps of this size and direction, whose top is the overshoot. Rise is between "
-                  "the dashed levels of 10 and 90 %.",
+                  f"Points: means over {apart:.3g} ms of one step, at their middles, without what turns with the shaft. Lines: "
+                  "the oscillations fitted to all steps of this size and direction, whose top is the overshoot. Rise is "
+                  "between the dashed levels of 10 and 90 %.",
                   "time since the set point acts (ms)", "position (µm)", tuple(series),
                   lines=(("set point", size), ("90 %", 0.9 * size), ("10 %", 0.1 * size)))  # fmt: skip
 
