@@ -19,6 +19,7 @@ from bench.procedure import BenchPlan, Measured, Procedure, Quantity
 from bench.procedure.roles import RigState
 from bench.record.limits import Limit
 from bench.record.specs import INSTALLED, applied, in_unit, load_spec, misnamed, parse_spec
+from bench.rigfile import load_rig
 
 ENTRY = 'unit = "N/A", source = "house", verified = false'
 
