@@ -7,6 +7,7 @@ from bench.link.stillness import STILL_S
 from bench.link.telemetry import TelemetryDecoder
 from bench.rigfile import RigFile
 from bench.rigfile.binding import UNKNOWN
+from bench.rigfile.roles import SPEED, told_in
 from drivers import advice
 
 SET_DOWN = ("LAND", "DISABLE", "MAKE_SAFE")
@@ -19,6 +20,7 @@ class Condition:
     def __init__(self, rig: RigFile, telemetry: TelemetryDecoder) -> None:
         self._binding, self._telemetry = rig.binding, telemetry
         self._states, self._faults = rig.choices("state"), rig.choices("fault")
+        self._speed = told_in(rig, SPEED)
         self._reboots = 0
         self._code, self._since_ns = 0, 0  # of the state, and since when it is that
         self._unknown_ns: int | None = None  # since when its state has no name, by the frames that came
@@ -108,7 +110,7 @@ class Condition:
 
     def unasked_text(self, now_ns: int) -> str:
         """What is wrong with a state of rest that nobody asked for."""
-        speed = self._telemetry.latest.get("speed")
+        speed = self._telemetry.latest.get(self._speed)
         turning = "" if speed is None else f"; its speed channel says {speed:.1f} rad/s"
         return f"the controller says {self.described(now_ns)}, though it held the rotor and nobody asked it to land{turning}"
 

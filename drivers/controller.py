@@ -256,7 +256,7 @@ class Controller:
 
     def _lift_s(self, unknown: float = 5.0) -> float:
         """How long the controller takes to lift or to lower the rotor; `unknown` where the rig file does not say."""
-        p = self.rig.parameters.get("lift_time_s")
+        p = self.rig.parameters.get(self.rig.capabilities.lift_time)
         return p.default if p else unknown
 
     def set(self, parameter: str, value: float) -> None:

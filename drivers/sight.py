@@ -12,6 +12,7 @@ from bench.link.frames import ERROR, FrameBatch
 from bench.link.telemetry import TelemetryDecoder
 from bench.rigfile import RigFile
 from bench.rigfile.binding import UNKNOWN, UNSEEN
+from bench.rigfile.roles import ANGLE, PULSES, SPEED, told_in, wraps_at
 from bench.rigfile.turned import turned
 from bench.samples import SampleBlock
 from drivers.waiting import SILENCE_S
@@ -33,6 +34,8 @@ class Sight:
         self._telemetry, self._mode_told, self._now_ns = telemetry, mode, now_ns
         self._binding, self._states = rig.binding, rig.choices("state")
         self._turned = turned(rig)
+        self._angle, self._speed, self._count = (told_in(rig, role) for role in (ANGLE, SPEED, PULSES))
+        self._wraps = wraps_at(rig, self._count) if self._count else 0.0
         messages = rig.messages.messages
         replies = REPLY in messages and any(s.name == "state" for s in messages[REPLY].signals)
         self._reply = Decoder(messages[REPLY]) if replies else None
@@ -63,8 +66,8 @@ class Sight:
         """The newest samples, and the pulses of the last second where the rig has them."""
         for b in blocks:
             self._block = b if len(b) > 1 else self._block
-            if "pulses" in b.columns:
-                self._pulses.append((int(b.t_ns[-1]), float(b.columns["pulses"][-1])))
+            if self._count:
+                self._pulses.append((int(b.t_ns[-1]), float(b.columns[self._count][-1])))
                 while self._pulses[-1][0] - self._pulses[0][0] > SLOWEST_WINDOW_S * 1e9:
                     self._pulses.pop(0)
 
@@ -117,14 +120,14 @@ class Sight:
         if not self._turned:
             return {"nothing turns it": 0.0}
         latest, out = self._telemetry.latest, dict[str, float]()
-        if "speed" in latest:
-            out["speed"] = abs(latest["speed"])
+        if self._speed in latest:
+            out["speed"] = abs(latest[self._speed])
         b = self._block
-        if b is not None and "angle" in b.columns and (took := int(b.t_ns[-1] - b.t_ns[0])) > 0:
-            angle = np.unwrap(b.columns["angle"])
+        if b is not None and self._angle and (took := int(b.t_ns[-1] - b.t_ns[0])) > 0:
+            angle = np.unwrap(b.columns[self._angle])
             out["angle"] = abs(float(angle[-1] - angle[0])) / took * 1e9
         if len(self._pulses) > 1 and (took := self._pulses[-1][0] - self._pulses[0][0]) > 0:
-            turns = (self._pulses[-1][1] - self._pulses[0][1]) % 65536
+            turns = (self._pulses[-1][1] - self._pulses[0][1]) % self._wraps
             out["pulses"] = 2 * math.pi * max(turns - 1, 0.0) / took * 1e9  # at least so fast
         return out
 

@@ -6,9 +6,11 @@ import math
 from collections.abc import Callable, Mapping
 
 from bench.clock import Clock
-from bench.errors import RotorNotArrived
+from bench.errors import InterlockError, RotorNotArrived
 from bench.link.telemetry import TelemetryDecoder
 from bench.rigfile import RigFile
+from bench.rigfile.capabilities import Holding
+from bench.rigfile.roles import ANGLE, SPEED, told_in
 from drivers import waiting
 from drivers.arriving import Approach
 from drivers.orders import Orders
@@ -27,16 +29,17 @@ class Turning:
         self._speeds = speeds
         self._rig, self._orders, self._telemetry, self._clock, self._now_ns = rig, orders, telemetry, clock, now_ns
         self._angle = 0.0
+        self._told_angle, self._told_speed = told_in(rig, ANGLE), told_in(rig, SPEED)
 
     @property
     def speed_rad_s(self) -> float:
         """Rotor speed, as it was told last."""
-        return self._telemetry.latest.get("speed", 0.0)
+        return self._telemetry.latest.get(self._told_speed, 0.0)
 
     @property
     def landing_speed(self) -> float:
         """Below this the rotor may be landed, rad/s."""
-        p = self._rig.parameters.get("landing_speed")
+        p = self._rig.parameters.get(self._rig.capabilities.landing_speed)
         return p.default if p else 1.0
 
     def point(self, angle_rad: float) -> None:
@@ -45,15 +48,16 @@ class Turning:
         Raises:
             RotorNotArrived: it does not arrive in time.
         """
-        here = self._telemetry.latest.get("angle", 0.0)
+        here = self._telemetry.latest.get(self._told_angle, 0.0)
+        holding = self._holding()
         turn = (angle_rad - here + math.pi) % (2 * math.pi) - math.pi
         self._angle += (angle_rad - self._angle + math.pi) % (2 * math.pi) - math.pi
-        self._orders.set("angle_ref", self._angle)
-        slew = self._rig.parameters.get("angle_slew")
+        self._orders.set(holding.ref, self._angle)
+        slew = self._rig.parameters.get(holding.slew)
         travel_s = abs(turn) / (slew.default if slew and slew.default else SLOWEST_SLEW)
 
         def off() -> float:
-            return (self._telemetry.latest["angle"] - angle_rad + math.pi) % (2 * math.pi) - math.pi
+            return (self._telemetry.latest[self._told_angle] - angle_rad + math.pi) % (2 * math.pi) - math.pi
 
         def stands() -> bool:
             return abs(off()) < 4e-3 and abs(self.speed_rad_s) < 0.5
@@ -67,7 +71,7 @@ class Turning:
         Raises:
             RotorNotArrived: it does not get there in time.
         """
-        self._orders.set("speed_ref", rad_s)
+        self._orders.set(self._holding().speed, rad_s)
         self._orders.command("SPIN")
         tolerance = max(0.02 * abs(rad_s), 0.3)
         approach = self._approach(rad_s)
@@ -97,6 +101,14 @@ class Turning:
         waiting.until(slow, STOP_S, lambda: RotorNotArrived(
             f"the rotor did not slow to {limit:g} rad/s within {STOP_S:g} s: it turns at {self.speed_rad_s:.1f} rad/s"
         ), self._clock, self._now_ns)  # fmt: skip
+
+    def _holding(self) -> Holding:
+        holding = self._rig.capabilities.angle
+        if holding is None:
+            raise ConfigError(
+                f"{self._rig.path}: capabilities.angle: found none; expected parameters that turn the rotor"
+            )
+        return holding
 
     def _approach(self, rad_s: float) -> Approach:
         period_s = self._telemetry.period_ns * 1e-9

@@ -18,7 +18,7 @@ STALL_NS = 200_000_000  # no wait is that long in one piece: the bench stood sti
 
 def patience_s(rig: RigFile) -> float:
     """How long a controller may say nothing: half a second, or as long as it waits for a silent host itself."""
-    watchdog = rig.parameters.get("watchdog_s")
+    watchdog = rig.parameters.get(rig.capabilities.watchdog)
     return max(SILENCE_S, watchdog.default if watchdog else 0.0)
 
 

@@ -84,6 +84,7 @@ class Machine:
         copper_W: what the windings dissipate at the present.
         operator: who works on it.
         traced: the channels of a tick's readings, for captures; none where the plant gives no such readings.
+        controls: names of what can be set of its law, of a machine whose rig files may call them otherwise.
         columns: of a machine whose rows are channels of the rig file, their names there; `channels` and `places` say nothing
             then.
     """
@@ -108,6 +109,7 @@ class Machine:
     traced: Callable[[Numbers], tuple[str, ...]] = lambda _: ()
     daily: frozenset[str] = frozenset()
     columns: Callable[[RigFile], tuple[str, ...]] | None = None
+    controls: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 
 from bench.errors import ConfigError
 from bench.rigfile import RigFile
+from sim_backend.controller.controls import in_force
 from sim_backend.draws import draw_one
 from sim_backend.machine import Truth
 from sim_backend.machines.table import machine_of
@@ -43,7 +44,7 @@ def draw(
     values |= {k: float(v) for k, v in rig.simulation.items() if isinstance(v, int | float)}
     defects = dict(machine.defects)
     wanted = dict(overrides or {})
-    used = {**{n: p.default for n, p in rig.parameters.items()}, **(settings or {})}
+    used = in_force(rig, machine, settings or {})
     targets = {k: wanted.pop(k) for k in machine.targets if k in wanted}
     for name, value in wanted.items():
         table = defects if name in defects else values

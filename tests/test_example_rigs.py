@@ -206,10 +206,10 @@ def test_each_procedure_says_what_it_makes_of_the_rig(path: Path) -> None:
 def test_a_shaft_that_something_turns_has_a_speed_and_one_that_nothing_turns_has_none(tmp_path: Path) -> None:
     assert "speed" not in load_rig(str(STAND)).channels
     lines = SPINDLE.read_text(encoding="utf-8").splitlines()
-    toml = "\n".join(line for line in lines if not line.startswith("speed = {"))
+    toml = "\n".join(line for line in lines if not line.startswith("SpinRate = {"))
     (tmp_path / "spindle.toml").write_text(toml, encoding="utf-8")
     (tmp_path / "spindle.dbc").write_bytes((SPINDLE.parent / "spindle.dbc").read_bytes())
-    assert {"channels.speed", "mark.speed"} <= {p.key for p in check_rig(str(tmp_path / "spindle.toml"))[0]}
+    assert {"mark.speed"} <= {p.key for p in check_rig(str(tmp_path / "spindle.toml"))[0]}
 
 
 def test_a_shaft_that_nothing_turns_is_slow_while_telemetry_goes_on() -> None:

@@ -1,4 +1,4 @@
-"""The shipped rigs with channels of other names, as another laboratory would have them: the same runs, to the last digit."""
+"""The shipped rigs with other names of channels and parameters, as another laboratory has them: the same, to the last digit."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from bench.cli.virtual import simulated_run
 from bench.findings import Finding
 from bench.procedure import Measured
 from bench.rigfile import load_rig
+from bench.rigfile.capabilities import parameters_named
 
 RIGS = Path(__file__).resolve().parent.parent / "rigs"
 NAMED = re.compile(r"(pos|i|u)_\w+")
@@ -24,16 +25,25 @@ ALONE: tuple[Mapping[str, Any], ...] = (
 
 
 def renamed(rig: str, folder: Path) -> str:
-    """A rig file whose channels of positions, currents and voltages are called `k1`, `k2`, ...; its DBC is as it was."""
+    """A rig file whose channels of positions, currents and voltages are called `k1`, `k2`, ..., and whose parameters that do
+    something named `p1`, `p2`, ...; its DBC is as it was."""
     toml = (RIGS / f"{rig}.toml").read_text(encoding="utf-8")
-    new = {name: f"k{n}" for n, name in enumerate(filter(NAMED.fullmatch, load_rig(rig).channels), 1)}
+    file = load_rig(rig)
+    new = {name: f"k{n}" for n, name in enumerate(filter(NAMED.fullmatch, file.channels), 1)}
+    asked = {name: f"p{n}" for n, name in enumerate(dict(map(reversed, parameters_named(file.capabilities))), 1)}
     told, simulation, drawn = toml.partition("\n[simulation]")
-    lines = []
+    lines, section = [], ""
     for line in told.splitlines():
+        section = line if line.startswith("[") else section
         key = re.match(r"(\w+) = \{ (signal|index|gain)", line)
-        if key is not None and key[1] in new:
-            line = new[key[1]] + line[len(key[1]) :]
-        if "signal = " not in line:
+        names = asked if section == "[parameters]" else new
+        if key is not None and key[1] in names:
+            line = names[key[1]] + line[len(key[1]) :]
+        if section.startswith(("[capabilities.settings", "[plans")):
+            line = re.sub(r"(?<=[{,] )\w+(?= =)", lambda m: asked.get(m[0], m[0]), line)
+        elif section.startswith("[capabilities") and "channel" not in line:
+            line = re.sub(r'(?<=")\w+(?=")', lambda m: asked[m[0]], line)
+        elif "signal = " not in line:
             line = re.sub(r'(?<=")\w+(?=")', lambda m: new.get(m[0], m[0]), line)
         lines.append(line)
     (folder / f"{rig}.toml").write_text("\n".join(lines) + simulation + drawn, encoding="utf-8")
@@ -46,6 +56,10 @@ def test_no_old_name_is_left(rig: str, tmp_path: Path) -> None:
     other = load_rig(renamed(rig, tmp_path))
     assert not list(filter(NAMED.fullmatch, other.channels))
     assert len(other.channels) == len(load_rig(rig).channels)
+    bound = {name for _, name in parameters_named(load_rig(rig).capabilities)}
+    assert len(bound) > 20
+    assert not bound & other.parameters.keys()
+    assert other.parameters.keys() >= {name for _, name in parameters_named(other.capabilities)}
 
 
 @pytest.mark.timeout(300)

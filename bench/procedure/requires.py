@@ -13,9 +13,10 @@ from bench.rigfile.roles import is_bound, resolved
 @dataclass(frozen=True)
 class Requires:
     """Names that the rig file must have: roles of its devices, channels (or roles of readings, `bench.rigfile.roles`), sensors
-    with certificates, parameters of the controller, lengths and stiffnesses of `geometry`, numbers of `machine`, channels that
-    the controller can `capture` in its own memory, `capabilities` by their keys (`bench.rigfile.capabilities`), and, with
-    `masses`, certified ones to hang. `lacks` is what else was found missing, a line each."""
+    with certificates, parameters of the controller (with a dot: what none is bound to), lengths and stiffnesses of `geometry`,
+    numbers of `machine`, channels that the controller can `capture` in its own memory, `capabilities` by their keys
+    (`bench.rigfile.capabilities`), and, with `masses`, certified ones to hang. `lacks` is what else was found missing, a line
+    each."""
 
     roles: tuple[str, ...] = ("levitation",)
     channels: tuple[str, ...] = ()
@@ -43,7 +44,7 @@ class Requires:
         tables: tuple[tuple[str, tuple[str, ...], Collection[str]], ...] = (
             ("channels", needed, rig.channels),
             ("sensors", self.sensors, rig.sensors),
-            ("parameters", self.parameters, rig.parameters),
+            ("parameters", tuple(name for name in self.parameters if "." not in name), rig.parameters),
             ("geometry", self.geometry, rig.geometry),
             ("machine", self.machine, rig.machine),
             ("capture.channels", self.capture, captured),
@@ -53,7 +54,8 @@ class Requires:
                 yield "capture: found none; expected a controller that records at its full rate"
             elif missing := [n for n in dict.fromkeys(names) if n not in found]:
                 yield f"{table}: found no {', '.join(missing)}"
-        if unbound := [key for key in dict.fromkeys(self.capabilities) if not can(rig.capabilities, key)]:
+        unbound = [key for key in dict.fromkeys(self.capabilities) if not can(rig.capabilities, key)]
+        if unbound := [*unbound, *(name for name in dict.fromkeys(self.parameters) if "." in name)]:
             yield f"capabilities: found no {', '.join(unbound)}"
         if self.masses and not rig.masses:
             yield "masses: found none; expected certified masses to hang"

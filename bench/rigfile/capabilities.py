@@ -56,7 +56,7 @@ class Injection(Part):
 
 class Holding(Part):
     """A motor that holds an angle: `ref` rad, followed no faster than `slew` rad/s; `speed` rad/s for what turns; `kp` A/rad,
-    `ki` A/(rad s), `kd` A s/rad of its PID."""
+    `ki` A/(rad s), `kd` A s/rad of its PID; `low_pass_hz` of the angle's rate; `derivative_on_error`, 1 where kd acts on it."""
 
     ref: str
     slew: str = ""
@@ -64,6 +64,8 @@ class Holding(Part):
     kp: str = ""
     ki: str = ""
     kd: str = ""
+    low_pass_hz: str = ""
+    derivative_on_error: str = ""
 
 
 class Gains(Part):
@@ -87,7 +89,8 @@ class Flatness(Part):
 
 class MotorForce(Part):
     """A motor that gives a radial force beside its torque: currents `along` the first axis of the bearings and `across` it, A,
-    which follow no faster than `ramp` A/s; `phase` rad by which its field is turned; `share` of the load that it carries in the
+    which follow no faster than `ramp` A/s; `phase` rad by which its field is turned; `ref_along` and `ref_across`, m, where it
+    holds its end; `share` of the load that it carries in the
     place of a bearing, which changes no faster than `share_slew` 1/s; `segment_limit`, A; `sine` rad at `sine_hz` on the
     angle."""
 
@@ -95,6 +98,8 @@ class MotorForce(Part):
     across: str = ""
     ramp: str = ""
     phase: str = ""
+    ref_along: str = ""
+    ref_across: str = ""
     share: str = ""
     share_slew: str = ""
     segment_limit: str = ""

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from bench.rigfile.binding import COMMANDS, MODES
 from bench.rigfile.messages import MessageMap, Signal
 from bench.rigfile.model import RigFile
+from bench.rigfile.roles import SPEED, told_in
 from bench.rigfile.turned import turned
 
 NEEDED = ("ENABLE", "DISABLE", "LEVITATE", "LAND", "STOP", "MAKE_SAFE")
@@ -235,9 +236,11 @@ def _protocol(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
 
 def _channels(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
     telemetry = rig.binding.telemetry
-    for name in ("state", "fault", *(("speed",) if turned(rig) else ())):
+    for name in ("state", "fault"):
         if name not in rig.channels:
             yield f"channels.{name}", "nothing", f"the channel `{name}`: the bench watches it while the machine moves"
+    if turned(rig) and not told_in(rig, SPEED):
+        yield "mark.speed", "nothing", "the channel that tells the speed: the bench watches it while the machine moves"
     for name, channel in rig.channels.items():
         s = signal_at(messages, channel.signal)
         if s is None:

@@ -12,10 +12,12 @@ GAINS = {"yi": "i", "xi": "i", "yo": "o", "xo": "o", "z": "z"}
 PATH = {"on": "on", "y": "y", "z": "z", "hz": "hz", "phase": "phase", "ramp_s": "ramp_s", "ratio": "ratio"}
 INJECTION = {"amplitude": "amplitude", "hz": "hz", "lines": "lines", "step": "step"}
 MOTOR = {
-    "along": "i_y", "across": "i_x", "ramp": "i_ramp", "phase": "gamma", "share": "motor_share", "share_slew": "share_slew",
+    "along": "i_y", "across": "i_x", "ramp": "i_ramp", "phase": "gamma",
+    "ref_along": "ref_ym", "ref_across": "ref_xm", "share": "motor_share", "share_slew": "share_slew",
     "segment_limit": "segment_max", "allocation": "allocation", "sine": "sine_amplitude", "sine_hz": "sine_hz",
 }  # fmt: skip
-ANGLE = {"slew": "angle_slew", "speed": "speed_ref", "kp": "kp_theta", "ki": "ki_theta", "kd": "kd_theta"}
+ANGLE = {"slew": "angle_slew", "speed": "speed_ref", "kp": "kp_theta", "ki": "ki_theta", "kd": "kd_theta",
+         "low_pass_hz": "angle_hz", "derivative_on_error": "derivative_on_error"}  # fmt: skip
 LAWS = {"PID": {"law": 0}, "CCS": {"law": 1}, "CAC": {"law": 2}}
 FLATNESS = ("k0", "k1", "integral", "derivative_hz")
 LIFT = {"plain": {"law": 0, "observer": 0, "compensate": 0}}
@@ -46,10 +48,11 @@ def with_capabilities(data: Content) -> Content:
         for name in ("parameters", "channels", "bearings", "rings")
     )
     axes = [axis for b in bearings.values() if isinstance(b, dict) for axis in b.get("axes", ())]
-    return {**data, "capabilities": _capabilities(p, channels, bearings, rings, axes)}
+    return {**data, "capabilities": capabilities_by_name(p, channels, bearings, rings, axes)}
 
 
-def _capabilities(p: Content, channels: Content, bearings: Content, rings: Content, axes: list[str]) -> Content:
+def capabilities_by_name(p: Content, channels: Content, bearings: Content, rings: Content, axes: list[str]) -> Content:
+    """What parameters and bits are by their names in the protocol, for a machine with such parts."""
     out: Content = {key: name for key, name in TIMES.items() if name in p}
     out["bias"] = {b: found for b, names in BIAS.items() if b in bearings and (found := _first(names, p))}
     out["gains"] = {key: made for key in ("kp", "ki", "kd") if (made := _gain(key, axes, p))}

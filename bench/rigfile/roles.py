@@ -78,6 +78,22 @@ def is_bound(rig: RigFile, role: str) -> bool:
     return role == STATUS or bool(rig.mark is not None and getattr(rig.mark, role.partition(".")[2]))
 
 
+def told_in(rig: RigFile, role: str) -> str:
+    """The channel of a role of the mark as the bench itself watches it: the one that is bound, else one that is called so; ""
+    where there is none."""
+    if is_bound(rig, role):
+        return _channels(rig, role)[0]
+    plain = role.partition(".")[2]
+    return plain if plain in rig.channels else ""
+
+
+def wraps_at(rig: RigFile, channel: str) -> float:
+    """Where a counter begins anew: as many as its signal holds, in its own steps."""
+    message, _, name = rig.channels[channel].signal.partition(".")
+    signal = rig.messages[message].signal(name)
+    return float(2**signal.length) * abs(signal.scale)
+
+
 def status(rig: RigFile, samples: Samples) -> npt.NDArray[np.int64]:
     """The status word (n,), by the channels that the controller tells it in."""
     word: npt.NDArray[np.int64] | None = None

@@ -36,6 +36,7 @@ from procedures.amb_calibration.scatter import OUTPUTS, Scatter, covariance_by_a
 from procedures.amb_calibration.steps import AXES, VERTICAL, Hang, HangingData, channels, read_hangings
 from procedures.servomotor.conventions import Servomotor, conventions
 from procedures.servomotor.loads import certified_masses, certified_weighing, check_masses
+from procedures.servomotor.parameters import BIASES, named, needed
 from procedures.shared import assumptions, first_look
 from procedures.shared.certificates import certified, certified_sensors
 from procedures.shared.step_table import record_step
@@ -54,7 +55,7 @@ CLEAR_A = 0.1  # a change of a control current that is no noise
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Controller parameters that the runner writes before levitation."""
-    return {"bias_i": plan.bias_A, "bias_o": plan.bias_A}
+    return named(rig, dict.fromkeys(BIASES, plan.bias_A))
 
 
 def sequence(plan: Plan) -> list[tuple[Load, int]]:
@@ -223,7 +224,7 @@ def requires(rig: RigFile) -> Requires:
         roles=("levitation", "rotation"),
         channels=(*channels(machine), STATUS),
         sensors=machine.coils_of(*VERTICAL),
-        parameters=("bias_i", "bias_o", "angle_ref"),
+        parameters=needed(rig, *BIASES, "angle.ref"),
         geometry=("hook_to_outboard", "amb_span", "amb_gap", "com_to_motor", "motor_stiffness", *machine.levers),
         masses=True,
     )

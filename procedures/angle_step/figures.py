@@ -11,6 +11,7 @@ from bench.rigfile import RigFile
 from bench.uncertainty import coverage_factor
 from procedures.angle_step.estimates import Result
 from procedures.angle_step.steps import Case, Done
+from procedures.servomotor.parameters import stated
 
 SHOWN_S = 0.25  # after the step: the angle has swung by then, and the rotor is back
 
@@ -20,7 +21,7 @@ def all_figures(moves: Sequence[Done], results: Mapping[Case, Result], rig: RigF
     first = {done.case: done for done in reversed(moves)}  # the first move of each case
     cases = [c for c in results if c.filter_hz == next(iter(results)).filter_hz]
     largest = [c for c in cases if c.size == max(x.size for x in cases)]
-    limit = rig.parameters["segment_max"].high
+    limit = stated(rig, "motor.segment_limit").high
     return [
         _orbits([first[c] for c in largest], rig.geometry["clearance"].value),
         *(_angles([first[c] for c in cases if c.size == size]) for size in sorted({c.size for c in cases})),

@@ -29,6 +29,7 @@ from procedures.angle_step.steps import STEP, Case, Done, cases, channels, posit
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import conventions
 from procedures.servomotor.direction import of_probe
+from procedures.servomotor.parameters import named, needed, stated, write
 from procedures.shared import assumptions
 
 RISE = Quantity("rise_time", "s", "10 to 90 % of the step of the angle")
@@ -42,21 +43,21 @@ SATURATED = Quantity("saturated", "s", "how long an amplifier of the motor cut i
 MEASURES = (RISE, OVERSHOOT, SETTLING, FINAL, PEAK, PEAK_MOTOR, EXCESS, SATURATED)
 TORQUE_CONSTANT = 2.87  # N m/A, T Table 6.2; for predictions before a run, and for nothing that is measured
 NEEDED = (
-    "motor_share",
-    "share_slew",
-    "allocation",
-    "segment_max",
-    "angle_hz",
-    "derivative_on_error",
-    "angle_slew",
-    "i_ramp",
+    "motor.share",
+    "motor.share_slew",
+    "motor.allocation",
+    "motor.segment_limit",
+    "motor.ramp",
+    "angle.low_pass_hz",
+    "angle.derivative_on_error",
+    "angle.slew",
 )
 CODES = {"static": 0.0, "priority": 1.0}
 
 
-def settings(_rig: RigFile, _: Plan) -> dict[str, float]:
+def settings(rig: RigFile, _: Plan) -> dict[str, float]:
     """Lifted with the angle released: no loop is closed before the encoder's direction is known."""
-    return dict(hold.RELEASED)
+    return named(rig, hold.RELEASED)
 
 
 def planned(plan: Plan) -> list[Case]:
@@ -73,14 +74,12 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Step to and fro for every case; with the outboard AMB in charge again in the end."""
     if not wiring.sound(rig, record):
         return
-    write = rig.levitation.set
-    for name, value in (("kd_theta", plan.kd_theta), ("kp_theta", plan.kp_theta), ("ki_theta", plan.ki_theta),
-                        ("derivative_on_error", 1.0), ("angle_slew", rig.file.parameters["angle_slew"].high)):  # fmt: skip
-        write(name, value)
+    gains = {"angle.kd": plan.kd_theta, "angle.kp": plan.kp_theta, "angle.ki": plan.ki_theta}
+    slew = stated(rig.file, "angle.slew")
+    write(rig, {**gains, "angle.derivative_on_error": 1.0, "angle.slew": slew.high})
     carrying.carry(rig, plan.settle_s)
     for case in planned(plan):
-        write("allocation", CODES[case.allocation])
-        write("angle_hz", case.filter_hz)
+        write(rig, {"motor.allocation": CODES[case.allocation], "angle.low_pass_hz": case.filter_hz})
         rig.clock.sleep(plan.standstill_s)
         for repeat in range(2 * plan.repeats):
             step = case.size if repeat % 2 == 0 else -case.size
@@ -88,10 +87,10 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
             with record.step(STEP, allocation=case.allocation, size_rad=case.size, filter_hz=case.filter_hz, step_rad=step,
                              target_rad=target, repeat=repeat):  # fmt: skip
                 rig.clock.sleep(plan.standstill_s)
-                write("angle_ref", target)
+                write(rig, {"angle.ref": target})
                 rig.clock.sleep(plan.record_s)
     carrying.give_back(rig, 0.2)
-    write("angle_slew", rig.file.parameters["angle_slew"].default)
+    write(rig, {"angle.slew": slew.default})
 
 
 @dataclass(frozen=True)
@@ -122,7 +121,7 @@ def measured(results: Results) -> Iterator[Measured]:
 
 
 def _loop(rig: RigFile, plan: Plan, case: Case) -> Loop:
-    limit = rig.parameters["segment_max"].high
+    limit = stated(rig, "motor.segment_limit").high
     inertia = rig.machine["polar_inertia"].value
     return Loop(plan.kp_theta, plan.kd_theta, plan.ki_theta, case.filter_hz, inertia, TORQUE_CONSTANT, limit)
 
@@ -161,7 +160,7 @@ def requires(rig: RigFile) -> Requires:
         roles=("levitation", "rotation"),
         channels=(*channels(machine), *wiring.channels(machine)),
         sensors=positions(machine),
-        parameters=(*hold.PARAMETERS, *wiring.PARAMETERS, *NEEDED),
+        parameters=needed(rig, *hold.NEEDED, *wiring.NEEDED, *NEEDED),
         machine=("polar_inertia",),
     )
 

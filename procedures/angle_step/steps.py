@@ -14,6 +14,7 @@ from bench.recording import Recording, Step
 from bench.rigfile.roles import ANGLE, STATUS
 from procedures.angle_step.response import Move
 from procedures.servomotor.conventions import Servomotor, conventions, displacement
+from procedures.servomotor.parameters import parameter
 
 Array = npt.NDArray[np.float64]
 STEP = "move"
@@ -80,9 +81,9 @@ def by_case(moves: list[Done]) -> Mapping[Case, list[Done]]:
 
 
 def _read(recording: Recording[Any], step: Step, machine: Servomotor, share: float) -> Done:
-    data = step.read(*channels(machine))
+    data, reference = step.read(*channels(machine)), parameter(recording.rig, "angle.ref")
     written = [e["t_ns"] for e in recording.events("parameter")
-               if e["name"] == "angle_ref" and step.start_ns <= e["t_ns"] < step.end_ns]  # fmt: skip
+               if e["name"] == reference and step.start_ns <= e["t_ns"] < step.end_ns]  # fmt: skip
     if not written:
         raise AnalysisError(f"move {dict(step.labels)}: found no write of the angle's reference within it")
     rest = data["t_ns"] < written[-1]

@@ -10,6 +10,7 @@ from bench.rigfile.roles import STATUS
 from procedures.force_constant.plan import Plan
 from procedures.force_constant.steps import AXES, channels
 from procedures.servomotor.conventions import conventions
+from procedures.servomotor.parameters import BIASES, needed, parameter
 from procedures.shared.unsupported import of_motors
 
 # What the levels are checked with before anything starts; no result uses these.
@@ -26,7 +27,7 @@ def requires(rig: RigFile) -> Requires:
         roles=("levitation", "rotation"),
         channels=(*channels(machine), STATUS),
         sensors=(*machine.coils_of(*AXES), *machine.segments),
-        parameters=("bias_i", "bias_o", "i_ramp", "i_x", "i_y"),
+        parameters=needed(rig, *BIASES, "motor.ramp", "motor.across", "motor.along"),
         geometry=("amb_span", "motor_to_outboard_amb", "amb_gap", "motor_stiffness", *machine.levers),
         machine=("amb_asymmetry", "pole_pairs"),
     )
@@ -50,14 +51,15 @@ def _levels(plan: Plan) -> Iterator[str]:
 
 
 def _ranges(rig: RigFile, plan: Plan) -> Iterator[str]:
-    wanted = [("i_ramp", plan.ramp_A_s, "ramp_A_s")]
-    wanted += [(name, x, "levels_A") for name in ("i_y", "i_x") for x in (min(plan.levels_A), max(plan.levels_A))]
+    along, across, ramp = (parameter(rig, key) for key in ("motor.along", "motor.across", "motor.ramp"))
+    wanted = [(ramp, plan.ramp_A_s, "ramp_A_s")]
+    wanted += [(name, x, "levels_A") for name in (along, across) for x in (min(plan.levels_A), max(plan.levels_A))]
     for name, value, key in wanted:
         p = rig.parameters[name]
         if not p.low <= value <= p.high:
             more = "; a faster ramp comes close to a step, and a step of 4 A loses levitation within 17 ms"
             yield f"{key}: found {value:g} {p.unit}; expected {p.low:g} to {p.high:g}, the range of {name}" + (
-                more if name == "i_ramp" and value > p.high else ""
+                more if name == ramp and value > p.high else ""
             )
 
 

@@ -34,6 +34,7 @@ from procedures.force_constant.fitting import check, requires
 from procedures.force_constant.plan import Plan
 from procedures.force_constant.steps import AtLevel, RampData, channels, read_ramps
 from procedures.servomotor.conventions import conventions
+from procedures.servomotor.parameters import BIASES, CURRENTS, named, write
 from procedures.shared import assumptions, first_look
 from procedures.shared.step_table import record_step
 
@@ -46,7 +47,7 @@ MEASURES = (ALPHA_D, ALPHA_DX)
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Controller parameters that the runner writes before levitation."""
-    return {"bias_i": plan.bias_A, "bias_o": plan.bias_A, "i_ramp": plan.ramp_A_s}
+    return named(rig, {**dict.fromkeys(BIASES, plan.bias_A), "motor.ramp": plan.ramp_A_s})
 
 
 def needs(plan: Plan) -> tuple[Need, ...]:
@@ -92,8 +93,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 
     def ramp(**currents: float) -> None:
         way = max(abs(value - now[name]) for name, value in currents.items())
-        for name, value in currents.items():
-            rig.levitation.set(name, value)
+        write(rig, {CURRENTS[name]: value for name, value in currents.items()})
         now.update(currents)
         rig.clock.sleep(way / plan.ramp_A_s)
 

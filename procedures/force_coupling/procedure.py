@@ -31,6 +31,7 @@ from procedures.force_coupling.plan import Plan
 from procedures.force_coupling.steps import Phase
 from procedures.servomotor import carrying, checks
 from procedures.servomotor.conventions import Servomotor, conventions, radial_currents
+from procedures.servomotor.parameters import needed, stated, write
 from procedures.servomotor.steps import POSITIONS, channels, read_steps
 from procedures.shared import assumptions, first_look
 from procedures.shared.step_table import StepTable, record_step
@@ -65,12 +66,12 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     carrying.home(rig)
     carrying.carry(rig, plan.settle_s)
     for gamma in carrying.approach(plan.gamma_rad):
-        rig.levitation.set("gamma", gamma)
+        write(rig, {"motor.phase": gamma})
         rig.clock.sleep(plan.settle_s)
     _visit(rig, plan, record)
     carrying.leave_edge(rig)
     for gamma in (*reversed(carrying.approach(plan.gamma_rad)), 0.0):
-        rig.levitation.set("gamma", gamma)
+        write(rig, {"motor.phase": gamma})
         rig.clock.sleep(plan.settle_s)
     carrying.give_back(rig, plan.settle_s)
 
@@ -81,7 +82,7 @@ def _visit(rig: Rig, plan: Plan, record: Recorder) -> None:
     for branch, gammas in ((1, plan.gamma_rad), (-1, plan.gamma_rad[::-1])):
         carrying.to_edge(rig, branch, plan.count_rad)
         for gamma in gammas:
-            rig.levitation.set("gamma", gamma)
+            write(rig, {"motor.phase": gamma})
             rig.clock.sleep(plan.settle_s)
             with record_step(record, Phase(gamma, branch)):
                 mean = first_look.watched(rig, record, machine.segments, plan.average_s)
@@ -131,7 +132,8 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     if list(gammas) != sorted(set(gammas)) or gammas[0] >= 0 or gammas[-1] <= 0:
         yield f"gamma_rad: found {gammas}; expected different angles in ascending order, on both sides of zero"
         return
-    low, high = rig.parameters["gamma"].low, rig.parameters["gamma"].high
+    phase = stated(rig, "motor.phase")
+    low, high = phase.low, phase.high
     poles = rig.machine["pole_pairs"].value
     furthest = max(-gammas[0], gammas[-1])
     limit = min(-low, high, STEADY_RAD / poles)
@@ -147,7 +149,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         rig.geometry["motor_stiffness"].value * 30e-6
     )  # magnetic centre against the sensors' zero, two tolerances
     current = most * (carrying.gravity_share_N(rig) + off_centre) / carrying.ALPHA_D
-    allowed = carrying.MARGIN * rig.parameters["segment_max"].default
+    allowed = carrying.MARGIN * stated(rig, "motor.segment_limit").default
     if current > allowed:
         yield f"gamma_rad: the motor would need {current:.1f} A; expected at most {allowed:.1f} A"
 
@@ -165,7 +167,7 @@ def requires(rig: RigFile) -> Requires:
         roles=("levitation", "rotation"),
         channels=(*channels(machine), STATUS),
         sensors=(*machine.segments, *machine.positions_of(*POSITIONS)),
-        parameters=(*carrying.PARAMETERS, "gamma", "segment_max"),
+        parameters=needed(rig, *carrying.NEEDED, "motor.phase", "motor.segment_limit"),
         geometry=GEOMETRY,
         machine=("pole_pairs",),
     )

@@ -34,6 +34,7 @@ from procedures.force_map.steps import AtPoint, MapData, channels, positions, re
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import conventions
 from procedures.servomotor.direction import of_probe
+from procedures.servomotor.parameters import BIASES, named, needed, write
 from procedures.shared import assumptions
 from procedures.shared.step_table import record_step
 from procedures.shared.unsupported import of_motors
@@ -44,7 +45,7 @@ MEASURES = (
     *(Quantity(name, UNITS[name], ABOUT[name]) for name in SHOWN),
     Quantity(CROSS, "N/A", "vertical force of i_x, mean over an electrical period: the zero of the commutation"),
 )
-NEEDED = ("i_ramp", "bias_i", "bias_o", "ref_xi", "ref_yi", "ref_xo", "ref_yo")
+NEEDED = ("motor.ramp", *BIASES, "at.xi", "at.yi", "at.xo", "at.yo")
 GEOMETRY = ("amb_span", "motor_to_outboard_amb", "amb_gap", "lever_left", "lever_right")
 K_N_A, STIFFNESS_N_M = 74.4, 242.6e3  # T (6.12) and Table 6.2; for predictions before a run
 LEAST_TORQUE_A = 0.2
@@ -77,7 +78,7 @@ def loaded_points(plan: Plan) -> list[Point]:
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Lifted at the calibration's bias with the angle released: no loop closes before the encoder's direction is known."""
-    return {"bias_i": plan.bias_A, "bias_o": plan.bias_A, "i_ramp": plan.ramp_A_s, **hold.RELEASED}
+    return named(rig, {**dict.fromkeys(BIASES, plan.bias_A), "motor.ramp": plan.ramp_A_s, **hold.RELEASED})
 
 
 def needs(plan: Plan) -> tuple[Need, ...]:
@@ -110,8 +111,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 def _visit(rig: Rig, plan: Plan, record: Recorder, visited: list[Point], turn: int, side: str, load: Load) -> None:
     now = Point()
     for point in visited:
-        for name, value in (("i_y", point.i_y), ("i_x", point.i_x), ("ref_yo", point.y), ("ref_xo", point.x)):
-            rig.levitation.set(name, value)
+        write(rig, {"motor.along": point.i_y, "motor.across": point.i_x, "at.yo": point.y, "at.xo": point.x})
         rig.clock.sleep(max(abs(point.i_y - now.i_y), abs(point.i_x - now.i_x)) / plan.ramp_A_s + plan.settle_s)
         now = point
         labels = AtPoint(turn, side, load.label, point.i_y, point.i_x, point.y, point.x)
@@ -207,7 +207,7 @@ def requires(rig: RigFile) -> Requires:
         roles=("levitation", "rotation"),
         channels=(*channels(machine), STATUS, *wiring.channels(machine)),
         sensors=(*machine.coils["yi"], *machine.segments, *positions(machine)),
-        parameters=(*hold.PARAMETERS, *wiring.PARAMETERS, *NEEDED),
+        parameters=needed(rig, *hold.NEEDED, *wiring.NEEDED, *NEEDED),
         geometry=GEOMETRY,
         machine=("pole_pairs",),
         masses=True,

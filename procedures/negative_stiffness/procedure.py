@@ -32,6 +32,7 @@ from procedures.negative_stiffness.plan import Plan
 from procedures.negative_stiffness.steps import Displaced, HeldByAmbs, HeldByMotor
 from procedures.servomotor import carrying, checks
 from procedures.servomotor.conventions import conventions, radial_currents
+from procedures.servomotor.parameters import BIASES, named, needed, stated, write
 from procedures.servomotor.steps import POSITIONS, channels, read_steps
 from procedures.shared import first_look
 from procedures.shared.step_table import StepTable, record_step
@@ -55,7 +56,7 @@ GEOMETRY = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_inboard_a
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Controller parameters that the runner writes before levitation."""
-    return {"bias_i": plan.bias_A, "bias_o": plan.bias_A}
+    return named(rig, dict.fromkeys(BIASES, plan.bias_A))
 
 
 def needs(plan: Plan) -> tuple[Need, ...]:
@@ -75,7 +76,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     carrying.carry(rig, plan.settle_s)
     carrying.to_edge(rig, 1, plan.count_rad)
     # The inboard AMB's plane goes with the displacement as far as keeps the inboard sensor at zero.
-    passed = _walk(rig, plan, record, HeldByMotor, {"ref_ym": 1.0, "ref_yi": inboard}, plan.bias_A)
+    passed = _walk(rig, plan, record, HeldByMotor, {"motor.ref_along": 1.0, "at.yi": inboard}, plan.bias_A)
     carrying.leave_edge(rig)
     carrying.give_back(rig, plan.settle_s)
     if not passed:
@@ -83,12 +84,11 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     for bias in (plan.bias_A, plan.bias_high_A):
         if bias != plan.bias_A:
             transition(rig, RigState.READY)
-            rig.levitation.set("bias_i", bias)
-            rig.levitation.set("bias_o", bias)
+            write(rig, dict.fromkeys(BIASES, bias))
             transition(rig, RigState.LEVITATED)
             carrying.home(rig)
             rig.clock.sleep(plan.settle_s)
-        _walk(rig, plan, record, HeldByAmbs, {"ref_yo": _tilt(rig.file)}, bias)
+        _walk(rig, plan, record, HeldByAmbs, {"at.yo": _tilt(rig.file)}, bias)
 
 
 def _walk(
@@ -99,8 +99,7 @@ def _walk(
     machine, passed = conventions(rig.file), True
 
     def go(level: float) -> None:
-        for name, factor in references.items():
-            rig.levitation.set(name, factor * level)
+        write(rig, {key: factor * level for key, factor in references.items()})
         rig.clock.sleep(plan.settle_s)
 
     for level in carrying.approach(plan.levels_m):
@@ -196,11 +195,11 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 def _ranges(rig: RigFile, plan: Plan, furthest: float) -> Iterator[str]:
     limit = min(
-        rig.parameters["ref_ym"].high, rig.parameters["ref_yo"].high, MARGIN * rig.envelope.max_levitated_position_m
+        stated(rig, "motor.ref_along").high, stated(rig, "at.yo").high, MARGIN * rig.envelope.max_levitated_position_m
     )
     if furthest > limit:
         yield f"levels_m: found {furthest * 1e6:.0f} µm; references and envelope allow {limit * 1e6:.0f} µm"
-    for name in ("bias_i", "bias_o"):
+    for name in needed(rig, *BIASES):
         if plan.bias_high_A > rig.parameters[name].high:
             yield f"bias_high_A: found {plan.bias_high_A:g} A; {name} goes to {rig.parameters[name].high:g} A"
     g = rig.geometry
@@ -208,7 +207,7 @@ def _ranges(rig: RigFile, plan: Plan, furthest: float) -> Iterator[str]:
     pull = g["motor_stiffness"].value * share * furthest
     current, most = (
         (carrying.gravity_share_N(rig) + pull) / carrying.ALPHA_D,
-        MARGIN * rig.parameters["segment_max"].default,
+        MARGIN * stated(rig, "motor.segment_limit").default,
     )
     if current > most:
         yield f"levels_m: the motor would need {current:.1f} A at {furthest * 1e6:.0f} µm; expected at most {most:.1f} A"
@@ -239,7 +238,7 @@ def requires(rig: RigFile) -> Requires:
         roles=("levitation", "rotation"),
         channels=(*channels(machine), STATUS),
         sensors=(*machine.segments, *machine.coils["yo"], *machine.positions_of(*POSITIONS)),
-        parameters=(*carrying.PARAMETERS, "ref_yo", "bias_i", "bias_o", "segment_max"),
+        parameters=needed(rig, *carrying.NEEDED, "at.yo", *BIASES, "motor.segment_limit"),
         geometry=GEOMETRY,
         machine=("pole_pairs",),
     )

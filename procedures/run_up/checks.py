@@ -20,6 +20,7 @@ from procedures.run_up.hum import of_peaks
 from procedures.run_up.plan import Passing
 from procedures.run_up.steps import LEAST_TURNS, MISSED, PASSAGE, Passage
 from procedures.shared import signals
+from procedures.shared.limits import landing_speed
 from procedures.synchronous import checks, fitting
 from procedures.synchronous.checks import HELD
 from procedures.synchronous.hum import listen, of_dwells
@@ -43,7 +44,7 @@ OF_CRITICALS = ("critical_speed", "amplification_factor", "critical_amplitude", 
 def of_plan(rig: RigFile, plan: Passing) -> Iterable[str]:
     """What cannot work, before anything starts."""
     most = rig.envelope.max_speed_rad_s
-    landing = rig.parameters["landing_speed"].default if "landing_speed" in rig.parameters else 0.0
+    landing = landing_speed(rig)
     if plan.top_rad_s > most:
         yield f"top_rad_s: found {plan.top_rad_s * RPM:.0f} r/min; the envelope allows {most * RPM:.0f} r/min"
     if not 2 * landing < plan.bottom_rad_s < 0.5 * plan.top_rad_s:

@@ -17,6 +17,7 @@ from bench.uncertainty import interval, stated
 from bench.units import RPM
 from procedures.run_up.estimates import Run, asked_margin
 from procedures.run_up.steps import Passage
+from procedures.shared.limits import current_limit
 from procedures.unbalance import figures
 
 HIGHEST_HZ = 480.0
@@ -152,7 +153,7 @@ def _currents(run: Run, rig: RigFile) -> Figure:
         coils = [4 + 2 * k + side for k in (y, z) for side in (0, 1)]
         most = np.max([c.means[:, k] + np.abs(c.values[k]) for k in coils], axis=0)
         series.append(Series(plane, RPM * c.speed, most))
-    limit = rig.parameters["current_limit"].default if "current_limit" in rig.parameters else rig.envelope.max_current_A
+    limit = current_limit(rig)
     return Figure("use-current", "Greatest coil current over the speed", "Mean and order 1 of the coil of a plane that carries "
                   "most.", "speed (r/min)", "current (A)", tuple(series), lines=(("limit", limit),))  # fmt: skip
 

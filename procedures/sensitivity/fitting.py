@@ -14,6 +14,7 @@ from procedures.amb_rotor.conventions import conventions
 from procedures.sensitivity.injection import Comb, find_refusal
 from procedures.sensitivity.plan import Plan
 from procedures.sensitivity.steps import REFINED, captured_channels
+from procedures.shared.limits import landing_speed
 
 LEAST_S = 4.0  # of a capture of the second grid: four periods of the finest
 
@@ -66,7 +67,7 @@ def _memory(rig: RigFile, plan: Plan, combs: Sequence[tuple[str, Comb]]) -> Iter
 def _speeds(rig: RigFile, plan: Plan) -> Iterator[str]:
     highest, landing = (
         rig.envelope.max_speed_rad_s,
-        rig.parameters["landing_speed"].default if "landing_speed" in rig.parameters else 0.0,
+        landing_speed(rig),
     )
     if max(plan.speeds_rad_s) > highest:
         yield f"speeds_rad_s: found {max(plan.speeds_rad_s) * RPM:.0f} r/min; the envelope allows {highest * RPM:.0f} r/min"

@@ -8,8 +8,9 @@ from bench.errors import RotorNotArrived
 from bench.procedure.rig import Rig
 from bench.rigfile import RigFile
 from procedures.servomotor import hold
+from procedures.servomotor.parameters import stated, write
 
-PARAMETERS = ("motor_share", "share_slew", "ref_xm", "ref_ym", "ref_yi", *hold.PARAMETERS)
+NEEDED = ("motor.share", "motor.share_slew", "motor.ref_across", "motor.ref_along", "at.yi", *hold.NEEDED)
 SHAFT_N = 10.2 * 9.81  # T Table 6.1; for predictions before a run, and for nothing that is measured
 ALPHA_D = 12.1  # N/A, T Table 6.2; likewise
 MARGIN = (
@@ -41,8 +42,8 @@ def give_back(rig: Rig, settle_s: float) -> None:
 
 
 def _hand_over(rig: Rig, share: float, settle_s: float) -> None:
-    rig.levitation.set("motor_share", share)
-    rig.clock.sleep(1 / rig.file.parameters["share_slew"].default + settle_s)
+    write(rig, {"motor.share": share})
+    rig.clock.sleep(1 / stated(rig.file, "motor.share_slew").default + settle_s)
 
 
 def to_edge(rig: Rig, side: int, count_rad: float) -> None:
@@ -58,13 +59,13 @@ def to_edge(rig: Rig, side: int, count_rad: float) -> None:
     between them is the torque current that is needed (up to 25 mA with segments within 1 %), whatever was before.
     """
     hold.release(rig)
-    rig.levitation.set("angle_ref", side * count_rad / 2)
+    write(rig, {"angle.ref": side * count_rad / 2})
     hold.hold(rig, ki_theta=0.0)
 
 
 def leave_edge(rig: Rig) -> None:
     """Back to the middle of the count, with the integrator."""
-    rig.levitation.set("angle_ref", 0.0)
+    write(rig, {"angle.ref": 0.0})
     hold.hold(rig)
 
 

@@ -35,6 +35,8 @@ class Servomotor:
     segments: tuple[str, ...]
     sensors: tuple[str, str]
     ambs: tuple[str, str]
+    axes: Mapping[str, str]
+    bearings: tuple[str, str]
     amb_limit: int
     segment_limit: int
     contact_inboard: int
@@ -94,6 +96,8 @@ def conventions(rig: RigFile) -> Servomotor:
         segments=next((m.currents for m in rig.motors.values() if "radial force" in m.gives), ()),
         sensors=("com_to_inboard_sensor", "com_to_outboard_sensor"),
         ambs=("com_to_inboard_amb", "com_to_outboard_amb"),
+        axes={role: axes[role].name for role in ROLES},
+        bearings=(planes[0].name, planes[1].name),
         amb_limit=Status.CURRENT_LIMIT,
         segment_limit=Status.SEGMENT_LIMIT,
         contact_inboard=Status.CONTACT_NEAR,

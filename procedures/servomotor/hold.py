@@ -8,26 +8,25 @@ from __future__ import annotations
 
 from bench.procedure.rig import Rig
 from bench.recording.recorder import Recorder
+from procedures.servomotor.parameters import stated, write
 
-GAINS = ("kp_theta", "kd_theta", "ki_theta")
-PARAMETERS = (*GAINS, "angle_ref")
+GAINS = ("angle.kp", "angle.kd", "angle.ki")
+NEEDED = (*GAINS, "angle.ref")
 RELEASED = dict.fromkeys(GAINS, 0.0)
 PROBE_RAD, PROBE_GAIN, PROBE_S = 0.2, 5.0, 0.3  # one ampere at first, a tenth of the amplifiers
 
 
 def release(rig: Rig) -> None:
     """No torque from the motor: it coasts from here on."""
-    for name in GAINS:
-        rig.levitation.set(name, 0.0)
+    write(rig, RELEASED)
 
 
 def hold(rig: Rig, ki_theta: float | None = None) -> None:
     """The controller takes the angle up again, with the rig file's gains; damping first, so that it never swings."""
-    gains = {name: rig.file.parameters[name].default for name in ("kd_theta", "kp_theta", "ki_theta")}
+    gains = {key: stated(rig.file, key).default for key in ("angle.kd", "angle.kp", "angle.ki")}
     if ki_theta is not None:
-        gains["ki_theta"] = ki_theta
-    for name, gain in gains.items():
-        rig.levitation.set(name, gain)
+        gains["angle.ki"] = ki_theta
+    write(rig, gains)
 
 
 def probe(rig: Rig, record: Recorder) -> None:
@@ -38,10 +37,9 @@ def probe(rig: Rig, record: Recorder) -> None:
     judged in `procedures.servomotor.direction`.
     """
     for reference in (PROBE_RAD, -PROBE_RAD):
-        rig.levitation.set("angle_ref", 0.0)
+        write(rig, {"angle.ref": 0.0})
         with record.step("probe", reference_rad=reference):
-            rig.levitation.set("kp_theta", PROBE_GAIN)
-            rig.levitation.set("angle_ref", reference)
+            write(rig, {"angle.kp": PROBE_GAIN, "angle.ref": reference})
             rig.clock.sleep(PROBE_S)
         release(rig)
-    rig.levitation.set("angle_ref", 0.0)
+    write(rig, {"angle.ref": 0.0})

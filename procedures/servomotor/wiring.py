@@ -13,8 +13,9 @@ from bench.recording.recorder import Recorder
 from bench.rigfile.roles import ANGLE
 from procedures.servomotor import hold
 from procedures.servomotor.conventions import Servomotor, conventions
+from procedures.servomotor.parameters import stated, write
 
-PARAMETERS = ("i_x", "i_y")
+NEEDED = ("motor.across", "motor.along")
 NUDGE_A, NUDGE_S = 1.0, 0.3
 TURN_RAD, TURN_S = 0.2, 0.12  # a third of a swing at that gain: it is still on its way
 LEAST_RAD, LEAST_A = (
@@ -32,16 +33,15 @@ def channels(machine: Servomotor) -> tuple[str, ...]:
 def sound(rig: Rig, record: Recorder) -> bool:
     """Turn the released rotor a little, take up its angle, then push it up and sideways against the AMBs."""
     if _turned(rig, record) < LEAST_RAD:
-        rig.levitation.set("angle_ref", 0.0)
+        write(rig, {"angle.ref": 0.0})
         return False
-    rig.levitation.set("angle_ref", 0.0)
+    write(rig, {"angle.ref": 0.0})
     hold.hold(rig)
     rig.clock.sleep(1.0)
     rest = _nudged(rig, record, 0.0, 0.0)
     up = _nudged(rig, record, 0.0, NUDGE_A)
     right = _nudged(rig, record, NUDGE_A, 0.0)
-    for name in PARAMETERS:
-        rig.levitation.set(name, 0.0)
+    write(rig, dict.fromkeys(NEEDED, 0.0))
     rig.clock.sleep(_ramp_s(rig) + NUDGE_S)
     return _along(up[1] - rest[1], up[0] - rest[0]) and _along(right[0] - rest[0], right[1] - rest[1])
 
@@ -50,8 +50,7 @@ def _turned(rig: Rig, record: Recorder) -> float:
     """How far a weak proportional gain turns the released rotor towards a reference ahead of it, rad; it is let go again."""
     before = rig.levitation.reading(ANGLE)
     with record.step("probe", reference_rad=before + TURN_RAD):
-        rig.levitation.set("angle_ref", before + TURN_RAD)
-        rig.levitation.set("kp_theta", hold.PROBE_GAIN)
+        write(rig, {"angle.ref": before + TURN_RAD, "angle.kp": hold.PROBE_GAIN})
         rig.clock.sleep(TURN_S)
         moved = math.remainder(rig.levitation.reading(ANGLE) - before, 2 * math.pi)
     hold.release(rig)
@@ -65,8 +64,7 @@ def _along(own: float, across: float) -> bool:
 
 def _nudged(rig: Rig, record: Recorder, i_x: float, i_y: float) -> tuple[float, float]:
     """The outboard AMB's control currents (x, y) in A with open-loop currents in the motor."""
-    rig.levitation.set("i_x", i_x)
-    rig.levitation.set("i_y", i_y)
+    write(rig, {"motor.across": i_x, "motor.along": i_y})
     rig.clock.sleep(_ramp_s(rig) + NUDGE_S)
     with record.step("nudge", i_x_A=i_x, i_y_A=i_y):
         rig.clock.sleep(NUDGE_S)
@@ -75,5 +73,5 @@ def _nudged(rig: Rig, record: Recorder, i_x: float, i_y: float) -> tuple[float, 
 
 
 def _ramp_s(rig: Rig) -> float:
-    ramp = rig.file.parameters.get("i_ramp")
-    return 2 * NUDGE_A / (ramp.default if ramp else 2.0)
+    motor = rig.file.capabilities.motor
+    return 2 * NUDGE_A / (stated(rig.file, "motor.ramp").default if motor.ramp else 2.0)

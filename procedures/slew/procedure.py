@@ -22,6 +22,7 @@ from bench.rigfile import RigFile
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import conventions
 from procedures.servomotor.direction import of_probe
+from procedures.servomotor.parameters import named, needed, stated, write
 from procedures.shared import assumptions
 from procedures.slew import estimates, fit, steps
 from procedures.slew import figures as drawn
@@ -37,14 +38,15 @@ LAG = Quantity("lag", "s", "how much later than the reference the angle swings")
 DETENT = Quantity("detent", "N m", "amplitude of the torque that goes with 16 times the angle")
 FRICTION = Quantity("friction", "N m", "torque against the movement at the slowest frequency, mean over the swing")
 MEASURES = (RMS, PEAK, RATIO, LAG, DETENT, FRICTION)
-NEEDED = ("sine_amplitude", "sine_hz", "angle_hz", "derivative_on_error", "i_ramp", "motor_share", "allocation")
+NEEDED = ("motor.sine", "motor.sine_hz", "motor.ramp", "motor.share", "motor.allocation", "angle.low_pass_hz",
+          "angle.derivative_on_error")  # fmt: skip
 FADE = 20
 DESIGN_NM_A = 2.87  # T Table 6.2; with a tenth of it either way where no calibration is used
 
 
-def settings(_rig: RigFile, _: Plan) -> dict[str, float]:
+def settings(rig: RigFile, _: Plan) -> dict[str, float]:
     """Lifted with the angle released: no loop is closed before the encoder's direction is known."""
-    return dict(hold.RELEASED)
+    return named(rig, hold.RELEASED)
 
 
 def needs(plan: Plan) -> tuple[Need, ...]:
@@ -62,28 +64,26 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     period to period: else the counts would do the same in every one, and their scatter would tell nothing."""
     if not wiring.sound(rig, record):
         return
-    write = rig.levitation.set
-    for name, value in (("derivative_on_error", 1.0), ("angle_hz", plan.angle_hz), ("kd_theta", plan.kd_theta),
-                        ("kp_theta", plan.kp_theta), ("ki_theta", plan.ki_theta)):  # fmt: skip
-        write(name, value)
+    write(rig, {"angle.derivative_on_error": 1.0, "angle.low_pass_hz": plan.angle_hz, "angle.kd": plan.kd_theta,
+                "angle.kp": plan.kp_theta, "angle.ki": plan.ki_theta})  # fmt: skip
     if plan.motor_carries:
-        write("allocation", 1.0)  # force first
+        write(rig, {"motor.allocation": 1.0})  # force first
         carrying.carry(rig, 1.0)
     for hz in sorted(plan.frequencies_hz):
         rig.clock.sleep(plan.settle_s)
-        write("sine_hz", hz)
+        write(rig, {"motor.sine_hz": hz})
         with record.step(STEP, hz=hz, amplitude_rad=plan.amplitude_rad, periods=plan.periods):
             rig.clock.sleep(0.2)
-            write("sine_amplitude", plan.amplitude_rad)
+            write(rig, {"motor.sine": plan.amplitude_rad})
             record.event(STARTED, hz=hz)  # after the answer: with the write itself it brackets the start
             for shift in fit.shifts(plan.periods, 2 * math.pi / plan.encoder_counts):
-                write("angle_ref", shift)
+                write(rig, {"angle.ref": shift})
                 rig.clock.sleep(1 / hz)
             rig.clock.sleep(0.02)
         for part in range(FADE - 1, -1, -1):  # a step of the whole would be an angle step
-            write("sine_amplitude", plan.amplitude_rad * part / FADE)
+            write(rig, {"motor.sine": plan.amplitude_rad * part / FADE})
             rig.clock.sleep(0.02)
-        write("angle_ref", 0.0)
+        write(rig, {"angle.ref": 0.0})
     rig.clock.sleep(plan.settle_s)  # it stops from full speed
     if plan.motor_carries:
         carrying.give_back(rig, 0.2)
@@ -118,13 +118,14 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         yield (f"amplitude_rad: found {plan.amplitude_rad:g}; expected {math.pi / plan.detent_order:.3g} or more: the swing "
                f"must cover one of {plan.detent_order} periods per turn")  # fmt: skip
     hz = max(plan.frequencies_hz)
-    if min(plan.frequencies_hz) <= 0 or hz > rig.parameters["sine_hz"].high:
-        yield f"frequencies_hz: found {plan.frequencies_hz}; expected above 0, up to {rig.parameters['sine_hz'].high:g} Hz"
+    highest = stated(rig, "motor.sine_hz").high
+    if min(plan.frequencies_hz) <= 0 or hz > highest:
+        yield f"frequencies_hz: found {plan.frequencies_hz}; expected above 0, up to {stated(rig, 'motor.sine_hz').high:g} Hz"
     speed = 2 * math.pi * hz * plan.amplitude_rad
     if speed > carrying.MARGIN * rig.envelope.max_speed_rad_s:
         yield (f"frequencies_hz: {hz:g} Hz turns at up to {speed:.3g} rad/s; the envelope allows "
                f"{rig.envelope.max_speed_rad_s:g} rad/s")  # fmt: skip
-    most = rig.parameters["segment_max"].high - (4.0 if plan.motor_carries else 0.0)
+    most = stated(rig, "motor.segment_limit").high - (4.0 if plan.motor_carries else 0.0)
     current = rig.machine["polar_inertia"].value * (2 * math.pi * hz) ** 2 * plan.amplitude_rad / DESIGN_NM_A
     if current > carrying.MARGIN * most:
         yield (f"frequencies_hz: {hz:g} Hz takes {current:.3g} A of torque current by prediction; {carrying.MARGIN:.0%} of "
@@ -143,7 +144,7 @@ def requires(rig: RigFile) -> Requires:
         lacks=machine.lacks,
         roles=("levitation", "rotation"),
         channels=(*channels(machine), *wiring.channels(machine)),
-        parameters=(*hold.PARAMETERS, *wiring.PARAMETERS, *NEEDED, "segment_max"),
+        parameters=needed(rig, *hold.NEEDED, *wiring.NEEDED, *NEEDED, "motor.segment_limit"),
         machine=("polar_inertia",),
     )
 

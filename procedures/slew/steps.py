@@ -11,6 +11,7 @@ from bench.findings import Effect, Finding
 from bench.recording import Recording, Step
 from bench.rigfile.roles import ANGLE, STATUS
 from procedures.servomotor.conventions import Servomotor, conventions
+from procedures.servomotor.parameters import parameter
 from procedures.slew.fit import Swing
 from procedures.slew.plan import Plan
 
@@ -37,10 +38,9 @@ def read_swings(recording: Recording[Plan]) -> list[Swing]:
 def _read(recording: Recording[Plan], step: Step) -> Swing:
     machine = conventions(recording.rig)
     data = step.read(*channels(machine))
+    sine, reference = (parameter(recording.rig, key) for key in ("motor.sine", "angle.ref"))
     inside = [e for e in recording.events() if step.start_ns <= e["t_ns"] < step.end_ns]
-    written = [
-        e["t_ns"] for e in inside if e["kind"] == "parameter" and e["name"] == "sine_amplitude" and e["value"] > 0
-    ]
+    written = [e["t_ns"] for e in inside if e["kind"] == "parameter" and e["name"] == sine and e["value"] > 0]
     answered = [e["t_ns"] for e in inside if e["kind"] == STARTED]
     if not written or not answered or not len(data["t_ns"]):
         raise AnalysisError(f"swing {dict(step.labels)}: found no start of the sine within it")
@@ -49,7 +49,7 @@ def _read(recording: Recording[Plan], step: Step) -> Swing:
     def seconds(t_ns: int) -> float:
         return (t_ns - origin) * 1e-9
 
-    moved = [e for e in inside if e["kind"] == "parameter" and e["name"] == "angle_ref"]
+    moved = [e for e in inside if e["kind"] == "parameter" and e["name"] == reference]
     angle = np.unwrap(data[ANGLE])
     return Swing(
         float(step.labels["hz"]),

@@ -22,6 +22,7 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from procedures.servomotor import hold
 from procedures.servomotor.conventions import conventions
+from procedures.servomotor.parameters import BIASES, named, needed, write
 from procedures.shared import assumptions
 from procedures.spindown import checks, estimates
 from procedures.spindown import figures as drawn
@@ -41,7 +42,7 @@ SLOW = (0.1, 0.15, 0.2, 0.25, 0.3)  # shares of the speed that the drive also ho
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Lifted at the first bias and with the angle released: no loop is closed before the encoder's direction is known."""
-    return {"bias_i": plan.bias_A, "bias_o": plan.bias_A, **hold.RELEASED}
+    return named(rig, {**dict.fromkeys(BIASES, plan.bias_A), **hold.RELEASED})
 
 
 def groups(plan: Plan) -> tuple[tuple[str, float], ...]:
@@ -85,8 +86,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 def _at_rest(rig: Rig, bias: float, part: str) -> None:
     """Land, write the bias and have the part mounted, lift again: both are done at rest only."""
     transition(rig, RigState.READY)
-    for name in ("bias_i", "bias_o"):
-        rig.levitation.set(name, bias)
+    write(rig, dict.fromkeys(BIASES, bias))
     if part:
         rig.operator.mount(part)
     transition(rig, RigState.LEVITATED)
@@ -208,7 +208,7 @@ def requires(rig: RigFile) -> Requires:
         roles=("levitation", "rotation"),
         channels=channels(machine),
         sensors=coils(machine),
-        parameters=(*hold.PARAMETERS, "bias_i", "bias_o", "speed_ref"),
+        parameters=needed(rig, *hold.NEEDED, *BIASES, "angle.speed"),
     )
 
 

@@ -10,6 +10,7 @@ from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
 from bench.units import RPM
 from procedures.amb_rotor.conventions import conventions
+from procedures.shared.limits import landing_speed
 from procedures.synchronous.dwells import captured_channels
 
 SLOW_MOST = 0.15  # of the lowest speed of the plan, at slow roll, and of the loop's own frequency
@@ -21,7 +22,7 @@ PER_TURN = 4.0  # samples in a turn of the highest order
 def of_speeds(rig: RigFile, speeds: Sequence[float]) -> Iterator[str]:
     """Speeds in rad/s that the rig does not allow."""
     most = rig.envelope.max_speed_rad_s
-    landing = rig.parameters["landing_speed"].default if "landing_speed" in rig.parameters else 0.0
+    landing = landing_speed(rig)
     if max(speeds) > most:
         yield f"speeds_rad_s: found {max(speeds) * RPM:.0f} r/min; the envelope allows {most * RPM:.0f} r/min"
     if min(speeds) <= 2 * landing or len(set(speeds)) < len(speeds):

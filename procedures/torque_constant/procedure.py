@@ -28,6 +28,7 @@ from procedures.servomotor import hold
 from procedures.servomotor.conventions import conventions
 from procedures.servomotor.direction import of_probe
 from procedures.servomotor.loads import check_masses
+from procedures.servomotor.parameters import BIASES, CURRENTS, named, needed, stated, write
 from procedures.shared import assumptions, first_look
 from procedures.shared.step_table import of_samples, record_step
 from procedures.torque_constant import checks, fit
@@ -54,7 +55,7 @@ MEASURES = (ALPHA_TAU, GAMMA_0T)
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Lifted with the angle released: no loop is closed before the encoder's direction is known."""
-    return {"bias_i": plan.bias_A, "bias_o": plan.bias_A, **hold.RELEASED}
+    return named(rig, {**dict.fromkeys(BIASES, plan.bias_A), **hold.RELEASED})
 
 
 def visits(plan: Plan) -> list[float]:
@@ -100,10 +101,10 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     if not _at_home(rig, record, 0.0):
         return
     for gamma in visits(plan):
-        rig.levitation.set("gamma", gamma)
+        write(rig, {"motor.phase": gamma})
         if not _loads(rig, plan, record, gamma):
             return
-    rig.levitation.set("gamma", 0.0)
+    write(rig, {"motor.phase": 0.0})
     hold.hold(rig)
 
 
@@ -121,18 +122,18 @@ def _at_home(rig: Rig, record: Recorder, angle: float) -> bool:
 def _wiring(rig: Rig, plan: Plan, record: Recorder) -> bool:
     """Sideways currents of both signs, to see in the outboard AMB's currents which segment is which; False where two are
     exchanged and nobody says to go on."""
-    ramp, machine = rig.file.parameters["i_ramp"].default, conventions(rig.file)
+    ramp, machine = stated(rig.file, "motor.ramp").default, conventions(rig.file)
     seen: list[tuple[Sideways, dict[str, Array], int]] = []
     for name, other in (("i_x", "i_y"), ("i_y", "i_x")):
         for value in (plan.wiring_A, -plan.wiring_A):
-            rig.levitation.set(name, value)
+            write(rig, {CURRENTS[name]: value})
             rig.clock.sleep(2 * plan.wiring_A / ramp + min(plan.settle_s, 0.5))
             asked = {name: value, other: 0.0}
             with record.step(Sideways.kind, **asked):
                 read = first_look.samples(rig, record, machine.coils_of("xo", "yo"), 0.2)
             answer = {f"side_{axis}": machine.control(f"{axis}o", read.__getitem__) for axis in "xy"}
             seen.append((Sideways(**asked), answer, rig.clock.now_ns()))
-        rig.levitation.set(name, 0.0)
+        write(rig, {CURRENTS[name]: 0.0})
     rig.clock.sleep(plan.wiring_A / ramp + min(plan.settle_s, 0.5))
     return first_look.passes(rig, record, checks.wiring(wiring(of_samples(*zip(*seen, strict=True)))))
 
@@ -252,7 +253,7 @@ def requires(rig: RigFile) -> Requires:
         roles=("levitation", "rotation"),
         channels=channels(machine),
         sensors=machine.segments,
-        parameters=(*hold.PARAMETERS, "gamma", "i_x", "i_y", "i_ramp", "bias_i", "bias_o"),
+        parameters=needed(rig, *hold.NEEDED, "motor.phase", "motor.across", "motor.along", "motor.ramp", *BIASES),
         geometry=tuple(f"lever_{s}" for s in SIDES),
         machine=("pole_pairs",),
         masses=True,

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from bench.rigfile import RigFile
+from bench.rigfile.capabilities import Capabilities, parameters_named
+from bench.rigfile.former_parameters import capabilities_by_name
 from sim_backend.machine import Machine
 
 OWN: Final = {"watchdog_s": 0.08, "landing_speed": 5.0, "speed_ref": 0.0, "lift_time_s": 1.0}
@@ -31,14 +33,43 @@ def controls(rig: RigFile, machine: Machine) -> Mapping[str, tuple[Control, ...]
     """The controls that each parameter sets, by the parameter's name.
 
     What `[capabilities]` bind are the controller's own (OWN) and, for a machine that is made of the rig file, those of its
-    plant: `ref.AXIS`, `ref.x` to `ref.theta`, `slew`, `bias.BEARING`, `kp.AXIS`, `inject.axis`, `path.on` and the like. Any
-    other parameter is the control of its own name: with the machines `tsbs` and `amb5dof` that is each.
+    plant: `ref.AXIS`, `ref.x` to `ref.theta`, `slew`, `bias.BEARING`, `kp.AXIS`, `inject.axis`, `path.on` and the like. With
+    the machines `tsbs` and `amb5dof` they are those that the protocol's names mean. Any other parameter is the control of its
+    own name.
     """
     bound: dict[str, list[Control]] = {}
-    for name, control in (*_own(rig), *(_of_plant(rig) if machine.columns is not None else ())):
-        if name in rig.parameters:
+    of_plant = _of_plant(rig) if machine.columns is not None else _by_meaning(rig, machine)
+    for name, control in (*_own(rig), *of_plant):
+        if name in rig.parameters and control not in bound.get(name, ()):
             bound.setdefault(name, []).append(control)
     return {name: tuple(bound.get(name, (Control(name),))) for name in rig.parameters}
+
+
+def in_force(rig: RigFile, machine: Machine, settings: Mapping[str, float]) -> dict[str, float]:
+    """Parameters' values by the machine's own names beside the rig's: the file's defaults, then `settings`."""
+    used = {**{name: p.default for name, p in rig.parameters.items()}, **settings}
+    chosen = controls(rig, machine)
+    return {**used, **{c.name: c.of(value) for name, value in used.items() for c in chosen.get(name, ())}}
+
+
+def _by_meaning(rig: RigFile, machine: Machine) -> Iterator[tuple[str, Control]]:
+    """Where a rig file binds a capability to a parameter of another name than the machine's own has for it."""
+    axes = [axis for bearing in rig.bearings.values() for axis in bearing.axes]
+    bearings = {name: b.model_dump() for name, b in rig.bearings.items()}
+    own = capabilities_by_name(dict.fromkeys((*machine.controls, *OWN)), {}, bearings, {}, axes)
+    meant = _by_place(Capabilities.model_validate(own))
+    for place, name in _by_place(rig.capabilities).items():
+        if place in meant and name not in machine.controls:
+            yield name, Control(meant[place])
+
+
+def _by_place(c: Capabilities) -> dict[tuple[str, int], str]:
+    """Parameters by their key, those of a setting by their number in it: there the key has their own names."""
+    out: dict[tuple[str, int], str] = {}
+    for key, name in parameters_named(c):
+        place = key.removesuffix(f".{name}") if key.startswith("settings.") else key
+        out[place, sum(one == place for one, _ in out)] = name
+    return out
 
 
 def _own(rig: RigFile) -> Iterator[tuple[str, Control]]:

@@ -93,7 +93,7 @@ class Bench:
             self.controller.recorder, self.operator.recorder, self.native = foreign, both, native
             self.heard.start_counting()
             transition(self.rig, RigState.READY)
-            for name, value in settings(SHORT).items():
+            for name, value in settings(NATIVE, SHORT).items():
                 self.controller.set(name, value)
             transition(self.rig, procedure.state)
             procedure.acquire(self.rig, SHORT, both)

@@ -202,5 +202,5 @@ AMB5DOF = Machine(
     radial=slice(0, 4), integral_gains=frozenset(("ki", "k0")), turns=False,
     channels=NEEDED, places=places, spoil=spoil, supply_V=48.0,
     windings={"temp_i": 0.0, "temp_o": 2.0, "temp_x": -3.0}, copper_W=copper_W, operator=operator,
-    traced=traced,
+    traced=traced, controls=AmbPlant.settable,
 )  # fmt: skip

@@ -222,5 +222,5 @@ TSBS = Machine(
     integral_gains=frozenset(("ki_i", "ki_o", "ki_z", "ki_m")), turns=True,
     channels=CHANNELS, places=places, spoil=spoil,
     supply_V=148.0, windings={"temp_i": 0.0, "temp_o": 2.0, "temp_m": -3.0}, copper_W=copper_W,
-    operator=operator, daily=DAILY,
+    operator=operator, daily=DAILY, controls=Plant.settable,
 )  # fmt: skip
