@@ -105,9 +105,7 @@ class Turning:
     def _holding(self) -> Holding:
         holding = self._rig.capabilities.angle
         if holding is None:
-            raise ConfigError(
-                f"{self._rig.path}: capabilities.angle: found none; expected parameters that turn the rotor"
-            )
+            raise InterlockError("capabilities.angle: the rig file binds no parameter that turns the rotor")
         return holding
 
     def _approach(self, rad_s: float) -> Approach:

@@ -140,7 +140,7 @@ def test_the_controller_cannot_turn_the_rotor() -> None:
     with pytest.raises(BenchError, match="refuses SPIN: WRONG_STATE"):
         stand.controller._orders.command("SPIN")
     stand.controller.rotation.stop()
-    with pytest.raises(InterlockError, match="capabilities.angle"):
+    with pytest.raises(InterlockError, match=r"capabilities\.angle"):
         stand.controller.rotation.spin(10.0)
     assert stand.controller.mode == "LEVITATED"
 
