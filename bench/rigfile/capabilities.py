@@ -116,7 +116,7 @@ class Bit(Part):
 
 
 class Status(Part):
-    """What the controller says of the machine, by its meaning; what it does not say is judged from positions and currents."""
+    """What the controller says of the machine, by its meaning; what it does not say no procedure learns."""
 
     contact: Mapping[Name, Bit] = {}
     current_limit: Bit | None = None

@@ -9,8 +9,8 @@ TIMES = {"landing_speed": "landing_speed", "lift_time": "lift_time_s", "watchdog
          "current_limit": "current_limit"}  # fmt: skip
 BIAS = {"inboard": ("bias", "bias_i"), "outboard": ("bias", "bias_o"), "axial": ("bias_z",)}
 GAINS = {"yi": "i", "xi": "i", "yo": "o", "xo": "o", "z": "z"}
-PATH = {"on": "on", "y": "y", "z": "z", "hz": "hz", "phase": "phase", "ramp_s": "ramp_s", "ratio": "ratio"}
-INJECTION = {"amplitude": "amplitude", "hz": "hz", "lines": "lines", "step": "step"}
+PATH = ("on", "y", "z", "hz", "phase", "ramp_s", "ratio")
+INJECTION = ("amplitude", "hz", "lines", "step")
 MOTOR = {
     "along": "i_y", "across": "i_x", "ramp": "i_ramp", "phase": "gamma",
     "ref_along": "ref_ym", "ref_across": "ref_xm", "share": "motor_share", "share_slew": "share_slew",
@@ -65,9 +65,9 @@ def capabilities_by_name(p: Content, channels: Content, bearings: Content, rings
         }
     out["motor"] = {key: name for key, name in MOTOR.items() if name in p}
     if {"ellipse_on", "ellipse_y", "ellipse_z", "ellipse_hz"} <= p.keys():
-        out["path"] = {key: f"ellipse_{name}" for key, name in PATH.items() if f"ellipse_{name}" in p}
+        out["path"] = {key: f"ellipse_{key}" for key in PATH if f"ellipse_{key}" in p}
     if {"inject_axis", "inject_amplitude", "inject_hz"} <= p.keys() and axes:
-        fields = {key: f"inject_{name}" for key, name in INJECTION.items() if f"inject_{name}" in p}
+        fields = {key: f"inject_{key}" for key in INJECTION if f"inject_{key}" in p}
         out["injection"] = {"axis": "inject_axis", "axes": {a: k for k, a in enumerate(axes)}, "off": -1, **fields}
     if "angle_ref" in p:
         out["angle"] = {"ref": "angle_ref", **{key: name for key, name in ANGLE.items() if name in p}}
