@@ -139,6 +139,7 @@ def figures(results: Results, recording: Recording[Plan]) -> Iterable[Shown]:
 
 procedure = Procedure(
     name="unbalance",
+    places=("at rest",),
     title="Unbalance response of the turning shaft",
     measures=MEASURES,
     state=RigState.READY,
