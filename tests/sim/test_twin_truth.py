@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from bench.rigfile import RigFile, load_rig
-from sim_backend.machine import Truth
 from sim_backend.machines.twin.quiet import Sight, floating
 from sim_backend.machines.twin.truth_step import steps_asked
 from sim_backend.motion import StepsAsked
