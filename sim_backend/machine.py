@@ -17,6 +17,8 @@ from sim_backend.motion import NONE, Motions
 
 Array = npt.NDArray[np.float64]
 Numbers = Mapping[str, float]
+PLANTED_S = 1.0
+"""How long a planted reading lasts: a speed that always read too fast would never let the shaft be landed."""
 
 
 class SimulatedPlant(Protocol):
@@ -131,6 +133,12 @@ class Truth:
     def noise(self) -> int:
         """Seed of all noise: of the plant, and of which frames a fault hits."""
         return noise_seed(self.seed, self.visit)
+
+    def planted(self, device: str = "") -> dict[str, float]:
+        """What channels, or registers of a device, tell for PLANTED_S from when the shaft is held first, whatever they read;
+        SI by name."""
+        before = f"reading.{device}." if device else "reading."
+        return {k.removeprefix(before): v for k, v in self.defects.items() if v and k.startswith(before)}
 
     @property
     def facts(self) -> dict[str, Any]:
