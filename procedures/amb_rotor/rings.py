@@ -98,9 +98,8 @@ def _runout(rig: RigFile) -> float:
     return 0.0 if number is None else number.standard_uncertainty
 
 
-def expected(rig: RigFile) -> dict[str, float]:
+def expected(s: Stations) -> dict[str, float]:
     """By channel, what a probe reads of a shaft that lies on its rings, over their clearance: below zero below the middle."""
-    s = stations(rig)
     arms = sorted(r.arm.value for r in s.rings if r.arm is not None) or [p.arm.value for p in s.axes.values()]
     if min(arms) < 0 < max(arms):
         return {name: -p.row[0] * s.up[0] - p.row[1] * s.up[1] for name, p in s.probes.items()}
@@ -114,12 +113,12 @@ def expected(rig: RigFile) -> dict[str, float]:
 
 def unshown(rig: RigFile) -> tuple[str, ...]:
     """Channels of the probes of which gravity does not say which way they count."""
-    return tuple(name for name, share in expected(rig).items() if abs(share) < TELLS)
+    return tuple(name for name, share in expected(stations(rig)).items() if abs(share) < TELLS)
 
 
 def of_readings(readings: Mapping[str, float], rig: RigFile) -> Iterator[Finding]:
     """Readings (m) of a shaft that lies on its rings: what forbids to lift it."""
-    should = expected(rig)
+    should = expected(stations(rig))
     for alike in _alike(stations(rig)):
         above = [n for n in alike if abs(should[n]) >= TELLS and readings[n] * should[n] < 0]
         said = " and ".join(f"{name} reads {readings[name] * 1e6:+.0f} µm" for name in above)
@@ -155,7 +154,7 @@ def _way(s: Stations, channel: str) -> str:
 def of_rings(readings: Mapping[str, float], rig: RigFile) -> Iterator[Finding]:
     """Readings (m) of a shaft on its rings: is it where they and the sensors' zeros can have it? Below the middle they are
     touched; a shaft that stands is somewhere within them. Nothing where the rig states none of them."""
-    s, should = stations(rig), expected(rig)
+    s, should = stations(rig), expected(stations(rig))
     if not s.rings or not set(s.channels) <= set(rig.sensors):
         return
     wrong = {n for n, share in should.items() if abs(share) >= TELLS and readings[n] * share < 0}

@@ -38,7 +38,7 @@ def before_orbits(recording: Recording[Any]) -> Iterator[Finding]:
 
 def _at_rest(recording: Recording[Any], machine: AmbRotor) -> Iterator[Finding]:
     """On the rings the rotor lies below the middle along every axis that gravity pulls along."""
-    should = rings.expected(recording.rig)
+    should = rings.expected(machine.stations)
     names = machine.stations.channels
     for step in recording.steps(REST):
         data = step.read(*names, STATUS)
