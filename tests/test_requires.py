@@ -89,7 +89,7 @@ def test_whatever_is_taken_away_is_named(rig: str, name: str) -> None:
     procedure, whole = load_procedure(name), load_rig(rig)
     requires = procedure.requires(whole)
     assert requires.channels
-    for table in (f.name for f in fields(requires) if f.name not in ("masses", "lacks")):
+    for table in (f.name for f in fields(requires) if f.name not in ("masses", "lacks", "uses")):
         for one in getattr(requires, table):
             if table == "channels" and "." in one:
                 continue  # what stands behind a role: tests/test_roles.py

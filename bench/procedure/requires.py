@@ -16,7 +16,8 @@ class Requires:
     with certificates, parameters of the controller (with a dot: what none is bound to), lengths and stiffnesses of `geometry`,
     numbers of `machine`, channels that the controller can `capture` in its own memory, `capabilities` by their keys
     (`bench.rigfile.capabilities`), and, with `masses`, certified ones to hang. `lacks` is what else was found missing, a line
-    each."""
+    each. `uses` are the keys of capabilities, and "capture", that are merely used: without them less is measured, or as the
+    controller is set."""
 
     roles: tuple[str, ...] = ("levitation",)
     channels: tuple[str, ...] = ()
@@ -28,6 +29,7 @@ class Requires:
     capabilities: tuple[str, ...] = ()
     masses: bool = False
     lacks: tuple[str, ...] = ()
+    uses: tuple[str, ...] = ()
 
     def lacking(self, rig: RigFile) -> tuple[str, ...]:
         """What the rig does not have, one line a table; nothing where it can run the procedure."""

@@ -66,6 +66,7 @@ def requires(rig: RigFile) -> Requires:
         geometry=NEEDED,
         machine=("mass", "transverse_inertia", "polar_inertia", "radial_axes", "runout", "weight_mass", "weight_angle"),
         capture=captured_channels(machine),
+        uses=("settings.law", "flatness"),
     )
 
 

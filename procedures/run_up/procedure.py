@@ -215,7 +215,8 @@ def requires(rig: RigFile) -> Requires:
     """What the unbalance response needs, and the greatest coil voltage of each bearing."""
     needed, told = unbalance.requires(rig), conventions(rig).plane_voltages
     lacks = () if told else ("bearings: found a radial one without the voltage channel of its coils",)
-    return replace(needed, channels=(*needed.channels, *told), lacks=(*needed.lacks, *lacks))
+    return replace(needed, channels=(*needed.channels, *told), lacks=(*needed.lacks, *lacks),
+                   uses=(*needed.uses, "flatness", "gains"))  # fmt: skip
 
 
 procedure = Procedure(

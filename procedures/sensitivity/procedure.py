@@ -210,6 +210,7 @@ def requires(rig: RigFile) -> Requires:
         channels=telemetry_channels(machine),
         capabilities=("set_points", "injection", "injection.lines", "injection.step"),
         capture=(*LOOP, *PULSED, *machine.all_currents),
+        uses=("settings.law",),
     )
 
 

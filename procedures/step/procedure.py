@@ -243,6 +243,7 @@ def requires(rig: RigFile) -> Requires:
         channels=channels(machine),
         sensors=(*machine.all_positions, *machine.all_currents),
         capabilities=("set_points",),
+        uses=("settings.law", "gains", "bias", "model", "mark"),
     )
 
 

@@ -112,6 +112,7 @@ def required(machine: AmbRotor) -> Requires:
         channels=telemetry_channels(machine),
         sensors=(*machine.positions, *machine.currents),
         capture=captured_channels(machine),
+        uses=("settings.law", "settings.compensation"),
     )
 
 

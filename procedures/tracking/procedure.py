@@ -197,7 +197,7 @@ def requires(rig: RigFile) -> Requires:
     return Requires(
         channels=channels(machine), sensors=machine.positions, geometry=LENGTHS,
         capabilities=("set_points", "path", "model.rate"),
-        lacks=(*machine.lacks, *machine.unweighed),
+        lacks=(*machine.lacks, *machine.unweighed), uses=("settings.law", "settings.compensation"),
     )  # fmt: skip
 
 
