@@ -37,9 +37,8 @@ def lift_and_nudge(rig: Rig, record: Recorder) -> bool:
 
 
 def write(rig: Rig, values: Mapping[str, float]) -> None:
-    """Write parameters of the controller, in that order."""
-    for name, value in values.items():
-        rig.levitation.set(name, value)
+    """Write parameters of the controller, in that order; those of one message in one message."""
+    rig.levitation.write(values)
 
 
 def bring_to_speed(rig: Rig, record: Recorder, rad_s: float, settle_s: float) -> bool:
