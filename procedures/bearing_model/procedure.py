@@ -222,7 +222,7 @@ def requires(rig: RigFile) -> Requires:
 procedure = Procedure(
     name="bearing-model",
     title="Force constants and magnetic offsets of the radial AMBs by eccentric positioning",
-    measures=(*MEASURES, *BY_AXIS.values()),
+    measures=(*OF_AXES, *BY_AXIS.values(), *OF_LINEAR.values()),
     optional=(*OF_AXES, *BY_AXIS.values()),  # each rig has its own axes; one without a load has no force constant
     state=RigState.READY,
     plan=Plan,
