@@ -13,6 +13,7 @@ from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
 from sim_backend.core import DriveLaw
 from sim_backend.draws import noise_seed
+from sim_backend.motion import NONE, Motions
 
 Array = npt.NDArray[np.float64]
 Numbers = Mapping[str, float]
@@ -89,6 +90,7 @@ class Machine:
         controls: names of what can be set of its law, of a machine whose rig files may call them otherwise.
         columns: of a machine whose rows are channels of the rig file, their names there; `channels` and `places` say nothing
             then.
+        motions: what it truly does under a plan.
     """
 
     name: str
@@ -112,6 +114,7 @@ class Machine:
     daily: frozenset[str] = frozenset()
     columns: Callable[[RigFile], tuple[str, ...]] | None = None
     controls: frozenset[str] = frozenset()
+    motions: Motions = NONE
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from bench.rigfile.supports import once_per_rig
 from bench.rigfile.toleranced import Toleranced
 from sim_backend.machine import Machine, Truth
 from sim_backend.machines.twin.layout import Numbers, layout_of
+from sim_backend.machines.twin.motions import MOTIONS
 from sim_backend.machines.twin.nominal import nominal_of
 from sim_backend.machines.twin.operator import Fitter
 from sim_backend.machines.twin.params import TwinParams, params
@@ -51,7 +52,7 @@ def twin(rig: RigFile) -> Machine:
         make=make, radial=slice(0, len(layout.looking)), integral_gains=_integral_gains(rig), turns=False, channels=(),
         places=partial(places, rig), spoil=spoil, supply_V=nominal.set("supply_V", 48.0), windings=windings_of(rig),
         copper_W=copper_W,
-        operator=operator, traced=partial(traced, rig), daily=DAILY, columns=columns,
+        operator=operator, traced=partial(traced, rig), daily=DAILY, columns=columns, motions=MOTIONS,
     )  # fmt: skip
 
 
