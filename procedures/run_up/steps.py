@@ -13,13 +13,14 @@ import numpy.typing as npt
 from bench.analysis import serial
 from bench.analysis.orders import synchronous
 from bench.analysis.sampling import Sampling
-from bench.analysis.tachometer import Tachometer, age, counted, tachometer
+from bench.analysis.tachometer import Tachometer
 from bench.analysis.vectors import parts
 from bench.errors import AnalysisError
 from bench.recording import Recording
-from bench.rigfile.roles import ANGLE, PULSES, SPEED, STATUS
+from bench.rigfile.roles import STATUS
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.shared.signals import clips
+from procedures.synchronous import mark
 from procedures.synchronous.dwells import Dwell, full_rate, telemetry_channels
 
 Array = npt.NDArray[np.float64]
@@ -96,12 +97,12 @@ def read_passage(recording: Recording[Any]) -> Passage:
         raise AnalysisError("found no passage through the speeds; expected one (was the run stopped early?)")
     step, tick, machine = steps[0], recording.rig.devices["controller"].tick_s, conventions(recording.rig)
     names = (*machine.positions, *machine.currents)
-    data = step.read(*telemetry_channels(machine), *machine.plane_voltages)
+    data = step.read(*telemetry_channels(recording.rig), *machine.plane_voltages)
     t = (data["t_ns"] - recording.start_ns) * 1e-9
     if t.size < 100:
         raise AnalysisError(f"passage: found {t.size} samples; expected 100 or more")
     ticks = round(recording.streams["telemetry"].period_ns * 1e-9 / tick)
-    tacho = tachometer(*counted(t - tick, data[PULSES], age(data[ANGLE], data[SPEED])))
+    tacho = mark.tachometer_of(recording.rig, t, data)
     wide = np.array([data[c] for c in names])
     drive = recording.channel(DRIVEN, step.start_ns, step.end_ns)
     labels = step.labels
