@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from bench.clock import Clock, PumpedClock
 from bench.errors import BenchError, InterlockError, Refused, StateNotReached
@@ -49,8 +49,7 @@ class Controller:
         self.watch = Watch(
             rig, link, self.telemetry, session.number, base.now_ns, max(waiting.STALL_NS, round(2e9 * slice_s))
         )
-        self.cleared = ""
-        self.restored: tuple[str, ...] = ()
+        self.cleared, self.restored = "", tuple[str, ...]()
         self.serial: int | None = None
         self.owned = False  # until then heartbeats mean nothing, and would alarm its owner
         self.sight = Sight(rig, self.telemetry, lambda: self.mode, base.now_ns)
@@ -99,8 +98,7 @@ class Controller:
             handshake.alone(self.watch.hosts.seen, self.link.name)
             self._own()
         begun = unheard.Heard.of(self.link)
-        self.wait(lambda: bool(self.telemetry.latest), FIRST_S, lambda: unheard.error(
-            self.link, begun, FIRST_S,
+        self.wait(lambda: bool(self.telemetry.latest), FIRST_S, lambda: unheard.error(self.link, begun, FIRST_S,
             f"no telemetry within {FIRST_S:g} s. Is the controller on, the port right, the bit rate that of the bus?",
         ))  # fmt: skip
         handshake.claim(self.requests, self.rig, self._session, self.clock, self._wait)
@@ -186,8 +184,8 @@ class Controller:
         Raises:
             InterlockError: it does not.
         """
-        turning = self.sight.speeds_rad_s().get("angle", 0.0)  # within milliseconds: coarser than the speed channel
-        speed = turning if turning >= self.rotation.landing_speed else abs(self.rotation.speed_rad_s)
+        speed = self.sight.speeds_rad_s().get("angle", 0.0)  # within milliseconds: coarser than the speed channel
+        speed = speed if speed >= self.rotation.landing_speed else abs(self.rotation.speed_rad_s)
         if self.mode not in ("OFF", "READY") or speed > TOUCHED:
             raise InterlockError(f"nobody may touch the shaft in state {self.mode} at {speed:.1f} rad/s: land it first")
 
@@ -256,12 +254,15 @@ class Controller:
 
     def _lift_s(self, unknown: float = 5.0) -> float:
         """How long the controller takes to lift or to lower the rotor; `unknown` where the rig file does not say."""
-        p = self.rig.parameters.get(self.rig.capabilities.lift_time)
-        return p.default if p else unknown
+        return p.default if (p := self.rig.parameters.get(self.rig.capabilities.lift_time)) else unknown
 
     def set(self, parameter: str, value: float) -> None:
-        """Write a parameter (SI) and check what the controller reads back; `drivers.orders.Orders.set` has the errors."""
-        self._orders.set(parameter, value)
+        """Write a parameter, as `write`."""
+        self._orders.write({parameter: value})
+
+    def write(self, values: Mapping[str, float]) -> None:
+        """Write parameters (SI), those of one message in one; `drivers.orders.Orders.write` has the errors."""
+        self._orders.write(values)
 
     def get(self, parameter: str) -> float:
         """Read a parameter, SI; `drivers.orders.Orders.get` has the errors."""
@@ -273,11 +274,9 @@ class Controller:
         Raises:
             BenchError: the telemetry has no such channel.
         """
-        latest = self.telemetry.latest
+        told = self.telemetry.latest
         try:
-            if "." not in channel:
-                return latest[channel]
-            return roles.read_now(self.rig, channel, latest)
+            return roles.read_now(self.rig, channel, told) if "." in channel else told[channel]
         except KeyError:
             raise BenchError(f"the telemetry has no channel {channel}") from None
 

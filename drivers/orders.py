@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from bench import units
 from bench.errors import BenchError, NoReply, Refused
@@ -36,29 +36,57 @@ class Orders:
                 message, _, signal = p.signal.partition(".")
                 dialogue.hold(message, signal, self._raw(p.signal, p.default))
 
-    def set(self, parameter: str, value: float) -> None:
-        """Write a parameter (SI) and check what the controller reads back.
+    def write(self, values: Mapping[str, float]) -> None:
+        """Write parameters (SI) and check what the controller reads back. Those that are signals of one message go in one
+        message, at the place of the first of them; the others one after the other.
 
         Raises:
-            InterlockError: the envelope refuses; nothing was sent.
+            InterlockError: the envelope refuses one; nothing was sent.
             Refused: the controller refuses, or reads back something else.
             BenchError: the controller cannot be told now.
             NoReply: it does not answer.
         """
-        self._envelope.check_parameter(parameter, value)
-        p = self.rig.parameters[parameter]
-        if self.recorder is not None:
-            self.recorder.event("parameter", name=parameter, value=value)
-        if p.signal:
+        for parameter, value in values.items():
+            self._envelope.check_parameter(parameter, value)
+        for message, of_one in self._by_message(values):
+            if message:
+                self._write_signals(message, of_one)
+                continue
+            for parameter, value in of_one.items():
+                self._write_indexed(parameter, value)
+
+    def _by_message(self, values: Mapping[str, float]) -> list[tuple[str, dict[str, float]]]:
+        """Values with the message whose signals they are; "" for those that are asked by their index."""
+        out: list[tuple[str, dict[str, float]]] = []
+        for parameter, value in values.items():
+            message = (self.rig.parameters[parameter].signal or "").partition(".")[0]
+            there = next((of_one for name, of_one in out if name == message and message), None)
+            if there is None:
+                out.append((message, {parameter: value}))
+            else:
+                there[parameter] = value
+        return out
+
+    def _write_signals(self, message: str, values: Mapping[str, float]) -> None:
+        signals = {}
+        for parameter, value in values.items():
+            p = self.rig.parameters[parameter]
+            assert p.signal
             if p.when == "resting" and self._mode() not in STANDING:  # nobody answers: the refusal must be ours
                 raise BenchError(f"parameter {parameter} can be written at rest only; the controller is {self._mode()}")
-            message, _, signal = p.signal.partition(".")
-            self._send_held(message, {**self._standing(message), signal: self._raw(p.signal, value)})
-            return
-        values = {"index": float(p.index or 0), "value": value}
+            signals[p.signal.partition(".")[2]] = self._raw(p.signal, value)
+        standing = self._standing(message)
+        for parameter, value in values.items():
+            self._tell(parameter, value)
+        self._send_held(message, {**standing, **signals})
+
+    def _write_indexed(self, parameter: str, value: float) -> None:
+        self._tell(parameter, value)
+        p = self.rig.parameters[parameter]
+        request = {"index": float(p.index or 0), "value": value}
         if any(s.name == "session8" for s in self.rig.messages["ParamSet"].signals):
-            values["session8"] = self._session.low_byte
-        reply = self._dialogue.ask("ParamSet", values, "ParamReply", f"the reply to {parameter}", self._wait)
+            request["session8"] = self._session.low_byte
+        reply = self._dialogue.ask("ParamSet", request, "ParamReply", f"the reply to {parameter}", self._wait)
         status = status_of(self.rig.messages["ParamReply"], reply)
         if status != "OK":
             raise Refused(
@@ -67,6 +95,10 @@ class Orders:
             )
         if not _reads_back(reply["value"], value):
             raise Refused(f"{parameter}: wrote {value!r}, the controller reads back {reply['value']!r}")
+
+    def _tell(self, parameter: str, value: float) -> None:
+        if self.recorder is not None:
+            self.recorder.event("parameter", name=parameter, value=value)
 
     def restore(self) -> tuple[str, ...]:
         """Set every parameter that another host left elsewhere to the rig file's value, at rest; the names of those.
@@ -87,7 +119,7 @@ class Orders:
             reply = found[float(index)]
             known = status_of(self.rig.messages["ParamReply"], reply) == "OK"
             if known and not _reads_back(reply["value"], p.default):
-                self.set(name, p.default)
+                self.write({name: p.default})
                 other.append(f"{name} {reply['value']:g}")
         return tuple(other)
 

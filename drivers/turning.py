@@ -52,7 +52,7 @@ class Turning:
         holding = self._holding()
         turn = (angle_rad - here + math.pi) % (2 * math.pi) - math.pi
         self._angle += (angle_rad - self._angle + math.pi) % (2 * math.pi) - math.pi
-        self._orders.set(holding.ref, self._angle)
+        self._orders.write({holding.ref: self._angle})
         slew = self._rig.parameters.get(holding.slew)
         travel_s = abs(turn) / (slew.default if slew and slew.default else SLOWEST_SLEW)
 
@@ -71,7 +71,7 @@ class Turning:
         Raises:
             RotorNotArrived: it does not get there in time.
         """
-        self._orders.set(self._holding().speed, rad_s)
+        self._orders.write({self._holding().speed: rad_s})
         self._orders.command("SPIN")
         tolerance = max(0.02 * abs(rad_s), 0.3)
         approach = self._approach(rad_s)

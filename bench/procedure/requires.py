@@ -9,6 +9,9 @@ from bench.rigfile import RigFile
 from bench.rigfile.capabilities import is_bound as can
 from bench.rigfile.roles import is_bound, resolved
 
+TURNERS = frozenset(("drive", "rotation"))
+"""Roles of what turns a shaft."""
+
 
 @dataclass(frozen=True)
 class Requires:
@@ -16,7 +19,8 @@ class Requires:
     with certificates, parameters of the controller (with a dot: what none is bound to), lengths and stiffnesses of `geometry`,
     numbers of `machine`, channels that the controller can `capture` in its own memory, `capabilities` by their keys
     (`bench.rigfile.capabilities`), and, with `masses`, certified ones to hang. `lacks` is what else was found missing, a line
-    each."""
+    each. `uses` are the keys of capabilities, and "capture", that are merely used: without them less is measured, or as the
+    controller is set."""
 
     roles: tuple[str, ...] = ("levitation",)
     channels: tuple[str, ...] = ()
@@ -28,6 +32,7 @@ class Requires:
     capabilities: tuple[str, ...] = ()
     masses: bool = False
     lacks: tuple[str, ...] = ()
+    uses: tuple[str, ...] = ()
 
     def lacking(self, rig: RigFile) -> tuple[str, ...]:
         """What the rig does not have, one line a table; nothing where it can run the procedure."""
@@ -36,7 +41,12 @@ class Requires:
     def _lacking(self, rig: RigFile) -> Iterator[str]:
         roles = {role for device in rig.devices.values() for role in device.roles}
         if missing := [r for r in self.roles if r not in roles]:
-            yield f"devices: found none in the role {' and none in the role '.join(missing)}"
+            none = f"devices: found none in the role {' and none in the role '.join(missing)}"
+            yield (
+                f"nothing turns it; {none}"
+                if {"drive", "rotation"} & {*missing} and TURNERS.isdisjoint(roles)
+                else none
+            )
         captured = () if rig.capture is None else rig.capture.channels
         needed = resolved(rig, (name for name in self.channels if "." not in name or is_bound(rig, name)))
         if absent := [role.partition(".")[2] for role in self.channels if "." in role and not is_bound(rig, role)]:

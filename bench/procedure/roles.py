@@ -43,6 +43,7 @@ class Levitation(Protocol):
     def land(self) -> None: ...  # LEVITATED -> READY
     def disable(self) -> None: ...  # READY -> OFF
     def set(self, parameter: str, value: float) -> None: ...  # SI; passes the envelope; read back
+    def write(self, values: Mapping[str, float]) -> None: ...  # as `set`; those of one message in one message
     def get(self, parameter: str) -> float: ...  # SI
     def reading(
         self, channel: str

@@ -197,9 +197,9 @@ def _counters(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
 def _heartbeat(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
     b = rig.binding
     s = signal_at(messages, f"{b.heartbeat}.{b.heartbeat_counter}")
-    if s is not None and (s.start % 8 or s.length != 16 or not s.little_endian or not plain(s)):
-        yield (f"{KEY}.heartbeat_counter", f"{b.heartbeat}.{s.name}, {s.length} bits at {s.start}",
-               "16 bits at a whole byte, little endian, unsigned")  # fmt: skip
+    if s is not None and not plain(s):
+        yield (f"{KEY}.heartbeat_counter", f"{b.heartbeat}.{s.name} signed, scaled or a float",
+               "an unsigned whole number with scale 1 and offset 0")  # fmt: skip
     written = {path.partition(".")[0] for name in b.commands for path in b.command(name)}
     written |= {p.signal.partition(".")[0] for p in rig.parameters.values() if p.signal}
     if b.heartbeat in written:

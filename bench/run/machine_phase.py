@@ -125,8 +125,7 @@ def _moved(
             with supervisor.moving():
                 progress.stage(f"bring the rig to {procedure.state}")
                 transition(rig, RigState.READY)
-                for name, value in procedure.settings(job.rig, job.plan).items():
-                    rig.levitation.set(name, value)
+                rig.levitation.write(procedure.settings(job.rig, job.plan))
                 transition(rig, procedure.state)
                 up = True
                 progress.stage("acquire")

@@ -252,6 +252,7 @@ def requires(rig: RigFile) -> Requires:
         capabilities=("set_points", "bias", "current_limit"),
         geometry=GEOMETRY,
         machine=MACHINE,
+        uses=("settings.law",),
     )
 
 

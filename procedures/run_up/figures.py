@@ -48,7 +48,8 @@ def all_figures(run: Run, rig: RigFile, running: float) -> Iterator[Shown]:
     drawn = pictures.order_map("order-map", f"Order map of {name}, {p.name}", found)
     yield replace(drawn, caption=f"{drawn.caption} Faint curves that slant are higher orders that its means fold back.")
     yield _currents(run, rig)
-    yield _volts(run)
+    if p.machine.plane_voltages:
+        yield _volts(run)
     yield _speed(p)
     if run.near is not None:
         yield figures.farthest(run.near)

@@ -78,17 +78,16 @@ def inject(rig: Rig, axis: str, comb: Comb, settle_s: float) -> Iterator[None]:
         InterlockError: the envelope does not allow it; nothing was sent.
     """
     Envelope(rig.file).check_injection(comb.peak)
-    write, can = rig.levitation.set, rig.file.capabilities.injection
+    write, can = rig.levitation.write, rig.file.capabilities.injection
     if can is None:
         raise Lacking("capabilities.injection: found none")
-    for name, value in parameters_of(can, comb).items():
-        write(name, value)
+    write(parameters_of(can, comb))
     try:
-        write(can.axis, can.axes[axis])
+        write({can.axis: can.axes[axis]})
         rig.clock.sleep(settle_s)
         yield
     except BaseException:
         with suppress(BenchError):
-            write(can.axis, can.off)
+            write({can.axis: can.off})
         raise
-    write(can.axis, can.off)
+    write({can.axis: can.off})

@@ -210,11 +210,13 @@ def requires(rig: RigFile) -> Requires:
         channels=telemetry_channels(machine),
         capabilities=("set_points", "injection", "injection.lines", "injection.step"),
         capture=(*LOOP, *PULSED, *machine.all_currents),
+        uses=("settings.law",),
     )
 
 
 procedure = Procedure(
     name="sensitivity",
+    places=("at rest",),
     title="Sensitivity of the control loops",
     measures=MEASURES,
     state=RigState.READY,

@@ -66,10 +66,9 @@ def named(rig: RigFile, values: Mapping[str, float]) -> dict[str, float]:
 
 
 def write(rig: Rig, values: Mapping[str, float]) -> None:
-    """Write them, in that order.
+    """Write them, in that order; those of one message in one message.
 
     Raises:
         Lacking: the controller has none for one of them.
     """
-    for name, value in named(rig.file, values).items():
-        rig.levitation.set(name, value)
+    rig.levitation.write(named(rig.file, values))

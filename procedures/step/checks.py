@@ -27,6 +27,9 @@ FATAL = (
     "speed-off",
     "telemetry-too-slow",
 )
+# Of the rise. Two set points that far apart smear the step: the rise, 2.56 standard deviations of its slope, grows by 0.2 %
+# (sqrt(1 + 2.56^2 (0.05/2)^2)), a swing of that rise shrinks by 0.04 % (cos(w d/2) at w = 1.1/rise): less than they scatter.
+APART = 0.05
 FEWEST_IN_RISE = 2.0  # samples; the AMB stand under its PID, whose intervals hold, has 2.5 to 2.6
 CAME = 0.2  # of the step: less is no step
 SIZE_OFF = 0.4  # of the step: what a stiff integrator-less loop may be off, and no more
@@ -55,6 +58,27 @@ def of_steps(steps: Sequence[Done], plan: Plan) -> Iterator[Finding]:
     yield from _speed(steps, plan)
     yield from _came(steps)
     yield from _resolved(steps)
+    yield from _apart(steps)
+
+
+def _apart(steps: Sequence[Done]) -> Iterator[Finding]:
+    """Set points of one step that were written apart, beside the rise of its group: the shaft followed one, then the other."""
+    groups: dict[str, list[Done]] = {}
+    for d in steps:
+        groups.setdefault(d.case.group, []).append(d)
+    hit: list[tuple[Done, float]] = []
+    for of in groups.values():
+        rises = [n * float(np.median(np.diff(d.t))) for d in of if (n := _samples_in_rise(d)) is not None]
+        worst = max(of, key=lambda d: d.apart)
+        if rises and worst.apart > APART * float(np.median(rises)):
+            hit.append((worst, float(np.median(rises))))
+    if not hit:
+        return
+    worst, rise = max(hit, key=lambda h: h[0].apart)
+    text = (f"the set points of a step were written up to {worst.apart * 1e3:.2g} ms apart, and it rises in {rise * 1e3:.2g} "
+            "ms: the shaft followed one, then the other. Bind them to signals of one message, which the bench writes at "
+            "once, or give the set points in shaft coordinates (capabilities.set_points.shaft).")  # fmt: skip
+    yield Finding("set-points-apart", text, worst.case.where, Effect.INDETERMINATE, touched([d for d, _ in hit], steps))
 
 
 def _resolved(steps: Sequence[Done]) -> Iterator[Finding]:

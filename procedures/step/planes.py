@@ -53,7 +53,7 @@ def read_rest(step: Step, axis: str) -> Array:
     data = at_rest_if_untold(data)
     written = [e["t_ns"] for e in step.recording.events("parameter")
                if e["name"] in machine.point(axis, 0.0) and step.start_ns <= e["t_ns"] < step.end_ns]  # fmt: skip
-    rest = data["t_ns"] <= (written[-1] if written else step.start_ns)
+    rest = data["t_ns"] <= (written[0] if written else step.start_ns)
     x = np.array([*(data[name] for name in places), *(data[p] - data[n] for p, n in pairs)])[:, rest]
     t, phase = np.linspace(-1, 1, x.shape[1]), np.unwrap(data[ANGLE][rest])
     turning = rest.any() and float(np.median(data[SPEED][rest])) > TURNING_RAD_S

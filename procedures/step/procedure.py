@@ -91,13 +91,12 @@ def step_count(plan: Plan) -> int:
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Up, back, down and back for every case; the shaft stands and the controller has its own settings again in the end."""
-    write, settings, machine = rig.levitation.set, list_settings(plan), conventions(rig.file)
+    settings, machine = list_settings(plan), conventions(rig.file)
     used: dict[str, float] = {}
     record_s = recorded_s(rig.file, plan)
-    for name, value in model(rig.file, plan).items():
-        write(name, value)
+    lift.write(rig, model(rig.file, plan))
     if machine.can.set_points.slew:
-        write(machine.can.set_points.slew, 0.0)
+        lift.write(rig, {machine.can.set_points.slew: 0.0})
     now: tuple[str, float] | None = None
     for setting, speed, axis, size in cases(tuple(settings), plan.speeds_rad_s, plan.axes, plan.sizes_m):
         if (now is None or now[1] != speed) and not _at(rig, plan, record, speed):
@@ -126,8 +125,8 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         rig.drive.coast()
         rig.clock.sleep(machine.stands_s)
     slew = [machine.can.set_points.slew] if machine.can.set_points.slew else []
-    for name in (*slew, *sorted({*used} - {*machine.select(machine.plain_law)}), *model(rig.file, plan)):
-        write(name, rig.file.parameters[name].default)
+    changed = (*slew, *sorted({*used} - {*machine.select(machine.plain_law)}), *model(rig.file, plan))
+    lift.write(rig, {name: rig.file.parameters[name].default for name in changed})
 
 
 def _at(rig: Rig, plan: Plan, record: Recorder, speed: float) -> bool:
@@ -146,13 +145,11 @@ def _at(rig: Rig, plan: Plan, record: Recorder, speed: float) -> bool:
 def _put(rig: Rig, plan: Plan, setting: Mapping[str, float], used: dict[str, float]) -> None:
     """A setting of the controller: what the other one changed is undone; first warm, if there is anything to be warmed."""
     before = {n: rig.file.parameters[n].default for n in used if n not in setting}
-    for name, value in {**before, **setting, **plan.warm}.items():
-        rig.levitation.set(name, value)
-        used[name] = value
+    lift.write(rig, {**before, **setting, **plan.warm})
+    used |= {**before, **setting, **plan.warm}
     if plan.warm:
         rig.clock.sleep(plan.warm_s)
-        for name in plan.warm:
-            rig.levitation.set(name, setting.get(name, rig.file.parameters[name].default))
+        lift.write(rig, {n: setting.get(n, rig.file.parameters[n].default) for n in plan.warm})
     rig.clock.sleep(plan.settle_s)
 
 
@@ -243,6 +240,7 @@ def requires(rig: RigFile) -> Requires:
         channels=channels(machine),
         sensors=(*machine.all_positions, *machine.all_currents),
         capabilities=("set_points",),
+        uses=("settings.law", "gains", "bias", "model", "mark"),
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -58,7 +58,8 @@ class Done:
     """One recorded step from the set point `begin` m. `t` s from where the set point acts (n,), with some samples before it;
     `y`, `tilt`, `across` m along the way of the step: from where they rested, what turns with the shaft taken away; `raw` as
     `y` with it; `rest` m the same before the step; `control` A, difference of the coils, both bearings; `answered`: it did;
-    `kicks` A, of each bearing's at first. `noise` m of the mean over `samples`. The `machine`."""
+    `kicks` A, of each bearing's at first. `noise` m of the mean over `samples`. The `machine`.
+    `apart` s from the first to the last write of the step's set points."""
 
     case: Case
     begin: float
@@ -81,6 +82,7 @@ class Done:
     lost: int
     expected: int
     machine: AmbRotor
+    apart: float = 0.0
 
 
 def channels(machine: AmbRotor) -> tuple[str, ...]:
@@ -151,11 +153,11 @@ def _read(recording: Recording[Any], step: Step) -> Done:
                if e["name"] in machine.point(axis, 0.0) and step.start_ns <= e["t_ns"] < step.end_ns]  # fmt: skip
     if not written:
         raise AnalysisError(f"{case.where}: found no write of the set point within the step")
-    rest = data["t_ns"] <= written[-1]
+    rest = data["t_ns"] <= written[0]
     if rest.sum() < 50 or (~rest).sum() < 100:
         raise AnalysisError(f"{case.where}: found {int(rest.sum())} samples before the step and {int((~rest).sum())} after; "
                             "expected at least 50 and 100")  # fmt: skip
-    return _done(recording.rig, step, case, data, rest)
+    return replace(_done(recording.rig, step, case, data, rest), apart=(written[-1] - written[0]) * 1e-9)
 
 
 def at_rest_if_untold(data: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:

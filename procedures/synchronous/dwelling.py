@@ -41,7 +41,7 @@ def uncaptured(rig: RigFile) -> Iterator[Finding]:
         text = (f"the controller captures nothing of the turning shaft: nothing is stated above {hz:.0f} Hz, {TELLS:g} of its "
                 "telemetry's rate; no spectra, no needs of the coils, and D_max without motion that does not turn with the "
                 "shaft.")  # fmt: skip
-        yield Finding("no-capture", text)
+        yield Finding("telemetry-alone", text)
 
 
 def stop(rig: Rig) -> None:

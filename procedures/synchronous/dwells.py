@@ -127,6 +127,7 @@ def required(rig: RigFile) -> Requires:
         channels=(*machine.positions, *machine.currents, *mark.needed(rig), STATUS),
         sensors=(*machine.positions, *machine.currents),
         capabilities=("set_points",),
+        uses=("settings.law", "settings.compensation", "capture"),
     )
 
 

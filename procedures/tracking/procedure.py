@@ -197,12 +197,13 @@ def requires(rig: RigFile) -> Requires:
     return Requires(
         channels=channels(machine), sensors=machine.positions, geometry=LENGTHS,
         capabilities=("set_points", "path", "model.rate"),
-        lacks=(*machine.lacks, *machine.unweighed),
+        lacks=(*machine.lacks, *machine.unweighed), uses=("settings.law", "settings.compensation"),
     )  # fmt: skip
 
 
 procedure = Procedure(
     name="tracking",
+    places=("at rest",),
     title="Tracking: the centre of mass follows an ellipse",
     measures=MEASURES,
     state=RigState.READY,

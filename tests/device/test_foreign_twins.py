@@ -56,6 +56,40 @@ def test_a_foreign_rig_is_levitated_and_its_frames_say_what_its_plant_does(name:
     assert {v for k, v in vars(controller.telemetry.counters).items() if k != "unknown"} == {0}
 
 
+@pytest.mark.parametrize(
+    ("name", "message", "values"),
+    [
+        ("plain-stand/stand.toml", "VorgabeLage", {"SollYVorn": 2e-5, "SollYHinten": 2e-5}),
+        ("vertical-spindle/spindle.toml", "SpindleTarget", {}),
+    ],
+)
+def test_what_one_message_carries_is_written_at_once(name: str, message: str, values: dict[str, float]) -> None:
+    """One frame with both values; the plant is told both before its next tick."""
+    rig = load_rig(str(EXAMPLES / name))
+    values = values or {p: 1e-5 for a, p in rig.capabilities.set_points.axes.items() if a in ("LowU", "UppU")}
+    machine = SimulatedRig(rig, draw(rig, 1), 1)
+    controller = Controller(rig, machine.link, machine, Session(1, 1_767_225_600, "test"), 0.05)
+    controller.connect()
+    controller.enable()
+    controller.levitate()
+    sent: list[FrameBatch] = []
+    real, held = machine.link.send, machine.device.plant.set
+    machine.link.send = lambda batch: (sent.append(batch), real(batch))[1]  # type: ignore[method-assign]
+    told: dict[int, int] = {}
+    machine.device.plant.set = lambda control, value: (  # type: ignore[method-assign]
+        told.update({machine.now_ns(): told.get(machine.now_ns(), 0) + 1}), held(control, value))[1]  # fmt: skip
+    controller.write(values)
+    controller.clock.sleep(0.02)
+    frames = [one for batch in sent for one in batch if int(one["id"]) == rig.messages[message].identifier]
+    assert len(frames) == 1
+    assert list(told.values()) == [len(values)]
+    said = _read(rig.dbc_text, np.array(frames))
+    for parameter, value in values.items():
+        path = rig.parameters[parameter].signal
+        unit = units.UNITS[rig.messages[message].signal(path.partition(".")[2]).unit]
+        assert said[path][0] * unit.factor == pytest.approx(value, abs=1e-8)
+
+
 def _read(dbc: str, batch: FrameBatch) -> dict[str, list[float]]:
     """Values by "Message.signal", as cantools reads them, in order."""
     database: Any = cantools.database.load_string(dbc, database_format="dbc")
