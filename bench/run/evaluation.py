@@ -31,6 +31,7 @@ from bench.record.records import (
 from bench.record.specs import applied, in_unit
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
+from bench.run.certificates import overdue
 from bench.run.step_gaps import incomplete_steps, missing_steps
 
 logger = logging.getLogger("bench.run.evaluation")
@@ -125,6 +126,7 @@ def evaluate(
         for key, item in measured.items():
             entries[key] = measurement(item, limit_of(limits, item.quantity.name, item.where), recording.seed)
         correlations = correlations_of(list(measured.values()))
+        findings += overdue(recording, measured.values())
     except SignalAbort:
         raise
     except Exception as error:

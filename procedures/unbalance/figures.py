@@ -49,7 +49,7 @@ def where_y_is(rig: RigFile) -> float:
     """Of the first axis, degrees counter-clockwise from the right, seen along the shaft with up (or where directions have their
     zero) above."""
     s = stations(rig)
-    return 90.0 + s.hand * round(math.degrees(s.first), 6)
+    return 90.0 + s.hand * round(math.degrees(s.first.value), 6)
 
 
 def _dwells(results: Results) -> Sheet:
