@@ -213,12 +213,13 @@ def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[F
 def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
-    moves = tuple(f"capabilities.set_points: found none along {c}" for c, _ in lift.NUDGES if not machine.can_point(c))
+    moves = machine.unmoved([c for c, _ in lift.NUDGES])
     return Requires(
         lacks=(*machine.stations.lacks, *moves),
         channels=telemetry_channels(machine),
         capabilities=("set_points", "injection"),
         capture=(*LOOP, *(PULSED if machine.marked else ()), *machine.all_currents),
+        uses=("settings.law", "settings.lift", "injection.lines", "injection.step", "mark"),
     )
 
 
