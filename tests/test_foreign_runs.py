@@ -23,8 +23,8 @@ SPINDLE, STAND = str(EXAMPLES / "vertical-spindle/spindle.toml"), str(EXAMPLES /
 
 
 RUNNING = {
-    SPINDLE: {"step", "unbalance", "run-up", "coast-down"},
-    STAND: {"step", "bearing-model", "sensitivity"},
+    SPINDLE: {"step", "tracking", "unbalance", "run-up", "coast-down"},
+    STAND: {"step", "bearing-model", "sensitivity", "tracking"},
 }
 
 
