@@ -61,6 +61,8 @@ IN_TOML = [
     ('Rising = "LIFTING"', 'Rising = "UP"', f"{KEY}.states.Rising", "expected"),
     ('Rising = "LIFTING"', 'Rising = "LIFTING"\nResing = "OFF"', f"{KEY}.states.Resing", "does not have"),
     ('Armed = "READY"', 'Armed = "OFF"', f"{KEY}.states", "no state that amounts to READY"),
+    ('no_fault = ["Ok"]\n', "", f"{KEY}.no_fault", 'no_fault = ["Ok"]'),
+    ('no_fault = ["Ok"]', 'no_fault = ["Fine", "Ok"]', f"{KEY}.no_fault", "found Fine; expected names of the value table"),
     ('no_fault = ["Ok"]', 'no_foult = ["Ok"]', f"{KEY}.no_foult", "no such key"),
     ('signal = "AmbSync.Mode"', 'signal = "AmbPos.XA"', "channels.state.signal", "unsigned code"),
     ('state = { signal = "AmbSync.Mode", unit = "1", about = "state of the controller" }\n', "", "channels.state", "watches"),

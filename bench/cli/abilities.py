@@ -56,7 +56,7 @@ def _ability(rig: RigFile, procedure: Procedure) -> Ability:
     except ConfigError as error:
         problems += error.problems or (Problem(rig.path, f"plans.{procedure.name}", str(error), "a plan"),)
     try:
-        load_spec(rig.name, procedure.name, procedure)
+        load_spec(rig.name, procedure.name, procedure, rig=rig)
     except ConfigError as error:
         problems += error.problems or (Problem("specs", f"limits.{procedure.name}", str(error), "limits"),)
     if plan is None or lacking:

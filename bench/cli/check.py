@@ -99,9 +99,18 @@ def check_rig_file(rig: str, procedure: str = "") -> int:
         lines = [line for a in able for line in (*a.lacking, *a.unfit)]
         sys.stdout.write("\n  ".join([f"{path} {'cannot' if lines else 'can'} run {procedure}", *lines]) + "\n")
         return USAGE if problems or lines else PASS
-    sys.stdout.write(protected.told(file) if file is not None and not problems else "")
+    sys.stdout.write(protected.told(file) + _of_certificates(file) if file is not None and not problems else "")
     sys.stdout.write(told(able, rig) if able else "")
     return USAGE if problems else PASS
+
+
+def _of_certificates(rig: RigFile) -> str:
+    """A line for each certificate that does not hold today: results that rest on one say so."""
+    from datetime import UTC, datetime
+
+    from bench.rigfile.certificates import out_of_date
+
+    return "".join(f"{found}\n" for found in out_of_date(rig, datetime.now(UTC).date()))
 
 
 def _of_calibrations(rig: RigFile) -> Iterator[Problem]:

@@ -118,8 +118,8 @@ def slow_roll(dwells: Sequence[Dwell], speeds: Sequence[float], runout: tuple[st
     if not slow:
         text = "no slow roll: what the probes read of the journals' runout is in every vector, as if it were unbalance."
         yield Finding("no-slow-roll", text, "", Effect.INDETERMINATE, runout)
-    elif slow[0].speed > 1.02 * too_fast(speeds):
-        text = (f"the slow roll was made at {slow[0].speed * RPM:.0f} r/min; above {too_fast(speeds) * RPM:.0f} r/min "
+    elif slow[0].speed > 1.02 * (most := too_fast(speeds, slow[0].machine)):
+        text = (f"the slow roll was made at {slow[0].speed * RPM:.0f} r/min; above {most * RPM:.0f} r/min "
                 "unbalance and the loop's own response are in it.")  # fmt: skip
         yield Finding("slow-roll-too-fast", text, slow[0].where, Effect.INDETERMINATE, runout)
 
@@ -219,7 +219,8 @@ def _told(results: Results) -> Iterator[Finding]:
     def polar(values: np.ndarray) -> str:
         return ", ".join(f"{abs(v) * 1e6:.2f} µm ∠{-np.degrees(np.angle(v)) % 360:.0f}°" for v in values)
 
-    text = (f"of yi, zi, yo, zo (0-pk, phase lag), at {slow.speed * RPM:.0f} r/min, {slow.date}: the probes read "
+    axes = ", ".join(slow.machine.axes)
+    text = (f"of {axes} (0-pk, phase lag), at {slow.speed * RPM:.0f} r/min, {slow.date}: the probes read "
             f"{polar(first.reading)}; by the forces the shaft itself moved {polar(first.shaft)}; subtracted is the runout "
             f"{polar(first.values)}.")  # fmt: skip
     yield Finding("slow-roll", text, slow.where)
