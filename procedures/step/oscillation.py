@@ -235,11 +235,13 @@ def _poles(steps: Sequence[One]) -> Complex | None:
     u, size, v = np.linalg.svd(hankel[:, :-1], full_matrices=False)
     root = np.sqrt(size[:STATES])
     values = np.linalg.eigvals((u[:, :STATES].T @ hankel[:, 1:] @ v[:STATES].T) / np.outer(root, root))
-    found = np.log(values[np.abs(values) > 0].astype(complex)) / period
-    swings = found[(found.imag > 1 / FAST_S) & (found.real < 0) & (-found.real < HARD * np.abs(found))]
-    if not len(swings):
+    found = np.log(np.where(values == 0, 1e-9, values).astype(complex)) / period
+    parts = np.linalg.lstsq(np.exp(np.outer(t - t[0], found)), y[0].astype(complex), rcond=None)[0]
+    size = np.abs(found) / (2 * np.pi)
+    swings = (found.imag > 0) & (size > SLOW_HZ) & (size < FAST_HZ) & (-found.real < HARD * np.abs(found))
+    if not swings.any():
         return None
-    one = complex(swings[np.argmin(-swings.real / np.abs(swings))])
+    one = complex(found[np.argmax(np.where(swings, np.abs(parts), 0.0))])
     return np.array([one * f for f, _ in APART])
 
 
