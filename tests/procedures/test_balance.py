@@ -26,6 +26,7 @@ from procedures.synchronous.runout import Stand, Turning, arms
 from reports.figures import draw as draw_figure
 from sim_backend.truth import draw
 
+SIDES = ("inboard", "outboard")
 pytestmark = pytest.mark.xdist_group("balance")  # one worker makes the sound run once
 
 
