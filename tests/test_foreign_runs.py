@@ -26,7 +26,7 @@ SPINDLE, STAND = str(EXAMPLES / "vertical-spindle/spindle.toml"), str(EXAMPLES /
 
 
 RUNNING = {
-    SPINDLE: {"step", "unbalance", "run-up", "coast-down"},
+    SPINDLE: {"step", "unbalance", "run-up", "coast-down", "balance"},
     STAND: {"step", "bearing-model", "sensitivity"},
 }
 
