@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,9 +11,11 @@ from bench.errors import Lacking
 from bench.figures import Shown
 from bench.findings import Ended, Finding, Findings
 from bench.plan import BenchPlan
+from bench.procedure.names import by_names_of, quantities_on
 from bench.procedure.requires import Requires
 from bench.procedure.roles import RigState
 from bench.quantity import Measured, Quantity
+from bench.rigfile.aliases import known_as
 
 if TYPE_CHECKING:
     from bench.calibration import Need
@@ -96,6 +98,9 @@ class Procedure:
     one that matters. The others of Type B in its budgets are listed on the report as what no data can show, with the
     sentences of `assumes`: what is in no budget and no data of any size can show, each with its sensitivity.
 
+    `measures` are kinds of quantities, each at the places where it is measured; `on` a rig that has names of its own for them
+    they go by these, and `kinds` are what they were.
+
     `places` are words that stand in the `where` of what it measures, beside names of the rig and of the plan.
     """
 
@@ -120,7 +125,14 @@ class Procedure:
     reached: tuple[str, ...] = ()
     assumes: tuple[str, ...] = ()
     places: tuple[str, ...] = ()
+    kinds: tuple[Quantity, ...] = ()
     method: str = ""  # the report's section: plain paragraphs, parted by empty lines
+
+    def on(self, rig: RigFile) -> Procedure:
+        """With its quantities by the names that a rig has for them at its places."""
+        measures, optional = (quantities_on(rig.aliases, some) for some in (self.measures, self.optional))
+        return self if measures == self.measures else replace(
+            self, measures=measures, optional=optional, kinds=self.kinds or self.measures)  # fmt: skip
 
     def problems(self, rig: RigFile, plan: Any) -> tuple[str, ...]:
         """What cannot work, found before anything starts: what the rig lacks, else what the plan asks too much of it."""
@@ -146,11 +158,12 @@ class Procedure:
         return Evaluated(tuple(findings.told), result, ended)
 
     def analyse(self, recording: Recording[Any]) -> Iterator[Measured | Finding]:
-        """What a closed recording says: findings first, then what was measured."""
+        """What a closed recording says, by the names of its rig: findings first, then what was measured."""
         found = self.evaluated(recording)
-        yield from found.findings
+        aliases = recording.rig.aliases
+        yield from (by_names_of(aliases, f) for f in found.findings)
         if not found.ended:
-            yield from self.measured(found.result)
+            yield from (by_names_of(aliases, item) for item in self.measured(found.result))
 
     def drawn(self, recording: Recording[Any]) -> Iterable[Shown]:
         """The figures of a recording; none where its evaluation ended early and left nothing to draw."""
@@ -163,9 +176,9 @@ class Procedure:
         found = self.evaluated(recording)
         if found.ended:
             return {}
-        if self.facts is not None:
-            return self.facts(found.result)
-        return named(m for m in self.measured(found.result) if isinstance(m, Measured))
+        facts = self.facts(found.result) if self.facts is not None else named(
+            m for m in self.measured(found.result) if isinstance(m, Measured))  # fmt: skip
+        return {known_as(recording.rig.aliases, name): estimate for name, estimate in facts.items()}
 
 
 def named(measured: Iterable[Measured]) -> Mapping[str, Estimate]:

@@ -18,7 +18,7 @@ from bench.errors import ConfigError, Problem
 from bench.rigfile.binding import Binding
 from bench.rigfile.capabilities import Capabilities
 from bench.rigfile.capture import CaptureSpec
-from bench.rigfile.elements import FORMS, MachineTables
+from bench.rigfile.elements import FORMS, MachineTables, Name
 from bench.rigfile.former_parameters import with_capabilities
 from bench.rigfile.messages import MessageMap, load_messages
 from bench.rigfile.part import Part
@@ -157,6 +157,7 @@ class RigFile(MachineTables):
     capture: CaptureSpec | None = None
     envelope: Envelope
     capabilities: Capabilities = Capabilities()
+    aliases: Mapping[Name, Annotated[str, Field(pattern=r"^[^@]+@[^@]+$")]] = {}
     plans: Mapping[str, Mapping[str, Any]] = {}
     simulation: Annotated[Mapping[str, Any], BeforeValidator(simulated)] = {}
     toml_text: str = Field("", exclude=True)
