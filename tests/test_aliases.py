@@ -57,9 +57,16 @@ def test_what_is_measured_goes_by_the_rigs_name() -> None:
 
 
 @pytest.mark.parametrize("name", ["tsbs12", "amb5dof"])
-def test_a_rig_file_of_schema_1_has_the_names_of_then(name: str) -> None:
+def test_a_rig_file_without_the_table_has_the_names_of_before(name: str) -> None:
+    """In schema 2 and in schema 1, where the parts are called so; an empty table is none."""
     toml, dbc = ((RIGS / f"{name}.{x}").read_text(encoding="utf-8") for x in ("toml", "dbc"))
-    assert RigFile.parse(of_schema_1(toml), dbc).aliases == RigFile.parse(toml, dbc).aliases
+    stated = RigFile.parse(toml, dbc).aliases
+    begin, end = toml.index("[aliases]"), toml.index("[parameters]")
+    assert RigFile.parse(of_schema_1(toml), dbc).aliases == stated
+    assert RigFile.parse(toml[:begin] + toml[end:], dbc).aliases == stated
+    assert RigFile.parse(f"{toml[:begin]}[aliases]\n{toml[end:]}", dbc).aliases == {}
+    example = RIGS.parent / "examples" / "plain-stand" / "stand.toml"
+    assert load_rig(str(example)).aliases == {}
 
 
 @pytest.mark.parametrize(

@@ -76,6 +76,11 @@ class Attachments(Generic[P]):
             raise RecordingError(f"recording {self.path}: {error}") from error
 
     @property
+    def plan_schema(self) -> int:
+        """The schema of its plan.json; 1 where it says none."""
+        return storedplan.schema_of(self._json("plan.json", dict))
+
+    @property
     def spec(self) -> dict[str, Any]:
         """The acceptance limits that the run was made with, by quantity."""
         return self._json("spec.json", dict)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from bench.rigfile.former_names import aliases_of_schema_1
 from bench.rigfile.former_plans import plans_of_schema_1
 from bench.rigfile.people import typed_laboratory
 
@@ -43,7 +42,6 @@ def to_schema_2(data: Content) -> Content:
     people = (
         {"laboratory": typed_laboratory(_table(data, "laboratory"))} if isinstance(data.get("laboratory"), dict) else {}
     )
-    made["aliases"] = aliases_of_schema_1({**made, **data})
     return {**{name: table for name, table in made.items() if table}, **data, **people, **plans_of_schema_1(data)}
 
 
