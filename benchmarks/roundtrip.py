@@ -118,7 +118,7 @@ def linked(scheme: str, trips: int) -> tuple[list[float], int, int]:
     with other_end(scheme) as (where, _):
         rates = {"bitrate": 1e6, "data_bitrate": 5e6} if scheme == "slcan" else {}
         spec = LinkSpec.model_validate({"url": f"{scheme}:{where}", **rates})
-        link = LiveLink("controller", lambda: open_wire(spec, "controller"), Beat(0x010, bytes(8), 4, True))
+        link = LiveLink("controller", lambda: open_wire(spec, "controller"), Beat(0x010, bytes(8), range(32, 48), True))
         try:
             for k in range(trips):
                 time.sleep(PAUSE_S)

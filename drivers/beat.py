@@ -9,7 +9,7 @@ No numpy here: the heartbeat process imports this module.
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
@@ -34,28 +34,32 @@ Frame = tuple[int, bytes, int]
 class Beat:
     """A heartbeat message.
 
-    `payload` is its template, `counter_at` the byte offset of the u16 (little endian) that counts the heartbeats.
-    Without a renewal heartbeats end after `lease_s`.
+    `payload` is its template; `counter` are the places of the bits that count the heartbeats, the least significant first:
+    place n is bit n % 8 of byte n // 8, so that a little-endian word at byte 4 is range(32, 48). Without a renewal heartbeats
+    end after `lease_s`.
     """
 
     identifier: int
     payload: bytes
-    counter_at: int
+    counter: Sequence[int]
     fd: bool
     period_s: float = 0.02
     lease_s: float = 1.0
 
     def __post_init__(self) -> None:
-        if not 0 <= self.counter_at <= len(self.payload) - 2:
-            raise ConfigError(f"heartbeat counter at byte {self.counter_at}: the payload has {len(self.payload)} bytes")
+        if not self.counter or not all(0 <= at < 8 * len(self.payload) for at in self.counter):
+            found = f"at the bits {', '.join(map(str, self.counter))}" if self.counter else "without a bit"
+            raise ConfigError(f"heartbeat counter {found}: the payload has {len(self.payload)} bytes")
         if not 0.001 <= self.period_s <= self.lease_s:
             raise ConfigError(f"heartbeat period {self.period_s} s: expected 0.001 s up to the lease, {self.lease_s} s")
 
     def frame(self, counter: int) -> Frame:
-        """The heartbeat with this number, which wraps at 65536."""
-        at = self.counter_at
-        payload = self.payload[:at] + struct.pack("<H", counter & 0xFFFF) + self.payload[at + 2 :]
-        return self.identifier, payload, FD if self.fd else 0
+        """The heartbeat with this number, which wraps where its bits end."""
+        payload = bytearray(self.payload)
+        for n, at in enumerate(self.counter):
+            byte, bit = at >> 3, 1 << (at & 7)
+            payload[byte] = payload[byte] | bit if counter >> n & 1 else payload[byte] & ~bit
+        return self.identifier, bytes(payload), FD if self.fd else 0
 
 
 @dataclass(frozen=True)

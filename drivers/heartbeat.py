@@ -222,7 +222,7 @@ def _order(beat: Beat, writer: WriterSpec) -> dict[str, Any]:
     """The first line to the process."""
     return {
         "bench": os.getpid(),
-        "beat": {**asdict(beat), "payload": beat.payload.hex()},
+        "beat": {**asdict(beat), "payload": beat.payload.hex(), "counter": list(beat.counter)},
         "writer": {**asdict(writer), "arguments": dict(writer.arguments)},
     }
 

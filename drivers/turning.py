@@ -11,6 +11,7 @@ from bench.link.telemetry import TelemetryDecoder
 from bench.rigfile import RigFile
 from bench.rigfile.capabilities import Holding
 from bench.rigfile.roles import ANGLE, SPEED, told_in
+from bench.rigfile.turned import turned
 from drivers import waiting
 from drivers.arriving import Approach
 from drivers.orders import Orders
@@ -90,6 +91,8 @@ class Turning:
         Raises:
             RotorNotArrived: it does not get there in time.
         """
+        if not turned(self._rig):
+            return  # nothing but a hand does
         self._orders.command("STOP")
         limit = self.landing_speed
         approach = self._approach(0.0)

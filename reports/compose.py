@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 from bench.figures import Sheet
-from reports import budgets, front, habit, many, resultrows, tables, text, unseen, vectors
+from reports import budgets, front, habit, many, people, resultrows, tables, text, unseen, vectors
 from reports.counts import counts, words
 from reports.figures import Drawn
 from reports.linktable import clean, link_table
@@ -21,6 +21,7 @@ from reports.view import (
     EXPIRED,
     NO_CALIBRATIONS,
     NO_RESULTS,
+    OVERDUE,
     SIMULATED,
     STATEMENTS,
     BudgetTable,
@@ -32,18 +33,7 @@ from reports.view import (
 )
 
 Content = Mapping[str, Any]
-# What only people know: key in [laboratory] of the rig file, label, clause letter of 7.8.2.1.
-_PEOPLE = (
-    ("name", "Laboratory"),  # b
-    ("address", "Address"),  # b
-    ("customer", "Customer and contact"),  # e
-    ("item_condition", "Condition of the item"),  # g
-    ("received", "Item received on"),  # h
-    ("deviations", "Deviations from the method"),  # n
-    ("external_results", "Results from external providers"),  # p
-    ("issued", "Date of issue"),  # j
-    ("authorised_by", "Authorised by (name, signature)"),  # o
-)
+CERTIFICATES = ("certificate-overdue", "certificate-ahead")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,12 +71,13 @@ def view_of(record: Content, around: Surroundings, shown: Sequence[Drawn | Sheet
         uut=_uut(record.get("uut")),
         date=text.moment(record.get("started"))[:10],
         simulated=SIMULATED if _simulated(record) else "",
-        expired=EXPIRED if _expired(record) else "",
+        expired=" · ".join(_overdue(record)),
         outcome=outcome,
         tone=resultrows.TONES.get(outcome.lower(), "none"),
         outcome_text=outcome_text(record, rows, findings),
         identification=_identification(record, around, rig_name),
         decided=tuple(f for f in findings if f.loud),
+        warned=tuple(f for f in findings if f.code in CERTIFICATES),
         judged=judged,
         judged_title=judged_title,
         judged_note=judged_note,
@@ -100,7 +91,7 @@ def view_of(record: Content, around: Surroundings, shown: Sequence[Drawn | Sheet
         unseen=unseen.unseen(measurements, around.reached, around.titles),
         about_unseen=unseen.ABOUT,
         assumed=tuple(_prose(a, around) for a in around.assumes) if rows else (),
-        notes=tuple(f for f in findings if not f.loud),
+        notes=tuple(f for f in findings if not f.loud and f.code not in CERTIFICATES),
         figures=front.entries(shown),
         budgets=first_budgets,
         method=tuple(_prose(p, around) for p in _paragraphs(around.method)),
@@ -108,7 +99,7 @@ def view_of(record: Content, around: Surroundings, shown: Sequence[Drawn | Sheet
         traceability=tables.traceability(around.rig, budgets.identities(measurements)),
         calibrations=tables.calibrations(record.get("calibrations")),
         about_calibrations=CALIBRATIONS if record.get("calibrations") else NO_CALIBRATIONS,
-        laboratory=_laboratory(around.rig.get("laboratory")),
+        laboratory=people.facts(around.rig),
         statements=STATEMENTS,
         many=many.grouped(measurements, rows),
         about_many=ABOUT_MANY,
@@ -196,9 +187,13 @@ def _simulated(record: Content) -> bool:
     return record.get("seed") is not None or _has_finding(record, "simulated-controller")
 
 
-def _expired(record: Content) -> bool:
+def _overdue(record: Content) -> Iterable[str]:
+    """Banners of what was out of date."""
     used = [c for c in record.get("calibrations") or () if isinstance(c, Mapping)]
-    return any(c.get("state") == "expired" for c in used) or _has_finding(record, "calibration-expired")
+    if any(c.get("state") == "expired" for c in used) or _has_finding(record, "calibration-expired"):
+        yield EXPIRED
+    if any(_has_finding(record, code) for code in CERTIFICATES):
+        yield OVERDUE
 
 
 def _has_finding(record: Content, code: str) -> bool:
@@ -232,13 +227,6 @@ def _recording(recording: Any) -> tuple[Fact, ...]:
         Fact("File", str(recording.get("file") or text.DASH)),
         Fact("SHA-256", str(recording["sha256"])),
     )
-
-
-def _laboratory(given: Any) -> tuple[Fact, ...]:
-    known: Content = given if isinstance(given, Mapping) else {}
-    asked = {key for key, _ in _PEOPLE}
-    facts = [Fact(label, str(known.get(key) or ""), blank=not known.get(key)) for key, label in _PEOPLE]
-    return (*facts[:-2], *(Fact(words(k), tables.inline(v)) for k, v in known.items() if k not in asked), *facts[-2:])
 
 
 def _paragraphs(method: str) -> tuple[str, ...]:

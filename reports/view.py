@@ -13,6 +13,7 @@ Tone = Literal["pass", "fail", "indeterminate", "error", "none"]
 
 SIMULATED = "Simulated rig – not a calibration certificate"
 EXPIRED = "Made with an expired calibration"
+OVERDUE = "Rests on a certificate that is out of date"
 CALIBRATIONS = (
     "Earlier calibrations of the same machine that the results rest on. Their influences stand in the budgets: those of the "
     "rig file under its names, those of a calibration's own run with that run in brackets."
@@ -196,12 +197,13 @@ class ReportView:
     uut: str  # 7.8.2.1 g: unambiguous identification of the item
     date: str
     simulated: str  # the banner, empty for a real rig
-    expired: str  # another banner, empty where every calibration was in date
+    expired: str  # another banner, empty where every calibration and certificate was in date
     outcome: str
     tone: Tone
     outcome_text: str
     identification: tuple[Fact, ...]  # 7.8.2.1 c, g, i
     decided: tuple[FindingRow, ...]  # the findings that affect the outcome
+    warned: tuple[FindingRow, ...]  # notes of certificates that did not hold
     judged: tuple[ResultRow, ...]  # the results that were held against a limit, the worst first; else the first results
     judged_title: str
     judged_note: str

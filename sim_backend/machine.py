@@ -13,9 +13,12 @@ from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
 from sim_backend.core import DriveLaw
 from sim_backend.draws import noise_seed
+from sim_backend.motion import NONE, Motions
 
 Array = npt.NDArray[np.float64]
 Numbers = Mapping[str, float]
+PLANTED_S = 1.0
+"""How long a planted reading lasts: a speed that always read too fast would never let the shaft be landed."""
 
 
 class SimulatedPlant(Protocol):
@@ -87,6 +90,7 @@ class Machine:
         controls: names of what can be set of its law, of a machine whose rig files may call them otherwise.
         columns: of a machine whose rows are channels of the rig file, their names there; `channels` and `places` say nothing
             then.
+        motions: what it truly does under a plan.
     """
 
     name: str
@@ -110,6 +114,7 @@ class Machine:
     daily: frozenset[str] = frozenset()
     columns: Callable[[RigFile], tuple[str, ...]] | None = None
     controls: frozenset[str] = frozenset()
+    motions: Motions = NONE
 
 
 @dataclass(frozen=True)
@@ -128,6 +133,12 @@ class Truth:
     def noise(self) -> int:
         """Seed of all noise: of the plant, and of which frames a fault hits."""
         return noise_seed(self.seed, self.visit)
+
+    def planted(self, device: str = "") -> dict[str, float]:
+        """What channels, or registers of a device, tell for PLANTED_S from when the shaft is held first, whatever they read;
+        SI by name."""
+        before = f"reading.{device}." if device else "reading."
+        return {k.removeprefix(before): v for k, v in self.defects.items() if v and k.startswith(before)}
 
     @property
     def facts(self) -> dict[str, Any]:

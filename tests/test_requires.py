@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -137,3 +139,18 @@ def plan_parameters(procedure: Procedure) -> set[str]:
         return set()
     return {*getattr(plan, "a", {}), *getattr(plan, "b", {}), *getattr(plan, "warm", {}),
             *(f"ref_{a}" for a in getattr(plan, "axes", ()))}  # fmt: skip
+
+
+def test_what_is_required_is_known_without_numerics() -> None:
+    """`requires` of every procedure, on a rig: whatever computes is imported where it computes."""
+    code = (
+        "import sys\n"
+        "from bench import catalogue\n"
+        "from bench.cli.loading import load_procedure\n"
+        "from bench.rigfile import load_rig\n"
+        "rig = load_rig('tsbs12')\n"
+        "said = [load_procedure(entry.name).lacking(rig) for entry in catalogue.PROCEDURES]\n"
+        "print(len(said), *sorted({'scipy', 'pandas', 'matplotlib', 'can', 'cantools'} & sys.modules.keys()))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == [str(len(catalogue.PROCEDURES))]

@@ -264,6 +264,15 @@ def test_what_analyse_yields_decides(run: Run, then: Any, outcome: Outcome, code
     assert verdict is (Verdict.NONE if then == "doubt" else Verdict.MISSING)
 
 
+def test_a_limit_at_a_place_that_was_not_measured_is_a_missing_quantity(run: Run) -> None:
+    result = run(limits={"supply@hall": Limit(140, 160, "V", "test", True)})
+    assert result.outcome is Outcome.ERROR
+    assert [(m.where, m.verdict) for m in result.record.measurements] == [
+        ("", Verdict.NONE),
+        ("hall", Verdict.MISSING),
+    ]
+
+
 @pytest.mark.parametrize(
     ("low", "high", "outcome"),
     [(140, 160, Outcome.PASS), (160, 180, Outcome.FAIL), (148, 160, Outcome.INDETERMINATE)],

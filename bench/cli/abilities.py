@@ -51,11 +51,12 @@ def _ability(rig: RigFile, procedure: Procedure) -> Ability:
     plan: BenchPlan | None = None
     defaults = f"{rig.path} [plans.{procedure.name}]"
     try:
-        plan = assemble(procedure.plan, (defaults, rig.plans.get(procedure.name, {})))
+        if not lacking or procedure.name in rig.plans:
+            plan = assemble(procedure.plan, (defaults, rig.plans.get(procedure.name, {})))
     except ConfigError as error:
         problems += error.problems or (Problem(rig.path, f"plans.{procedure.name}", str(error), "a plan"),)
     try:
-        load_spec(rig.name, procedure.name, procedure)
+        load_spec(rig.name, procedure.name, procedure, rig=rig)
     except ConfigError as error:
         problems += error.problems or (Problem("specs", f"limits.{procedure.name}", str(error), "limits"),)
     if plan is None or lacking:

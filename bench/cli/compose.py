@@ -86,7 +86,7 @@ def prepare(request: Request, asking: Asking = quietly) -> tuple[Job, Connect]:
     procedure, rig, plan = planned(request)
     if unknown := tuple(misnamed(rig.name, file=request.spec)):
         raise ConfigError("the spec cannot be used; nothing was started:", unknown)
-    limits = load_spec(rig.name, procedure.name, procedure, file=request.spec)
+    limits = load_spec(rig.name, procedure.name, procedure, file=request.spec, rig=rig)
     judged = request.require_verdict or request.spec is not None
     seed = None if request.backend == "live" else request.seed or 0
     lookup = Lookup(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from bench.errors import BenchError
@@ -16,16 +17,16 @@ from bench.procedure import Measured
 
 if TYPE_CHECKING:
     from bench.cli.virtual import Simulated
+    from sim_backend.motion import Whirl
 
 MARGIN_POINTS = 20000
-OF_MACHINE = "amb5dof"  # whose plant these truths are of
 Found = Iterator[tuple[str, str, float]]  # name, where, value in SI
 
 
 def truth_of_motion(done: Simulated) -> dict[str, float]:
-    """By `name@where`; nothing for a procedure whose quantities are the machine's, for another machine, and where
-    a run gave nothing to compare."""
-    of = TRUTHS.get(done.procedure.name) if done.drawn.machine.name == OF_MACHINE else None
+    """By `name@where`; nothing for a procedure whose quantities are the machine's, for a machine that does not tell what
+    it does, and where a run gave nothing to compare."""
+    of = TRUTHS.get(done.procedure.name)
     try:
         if of is None or not any(isinstance(r, Measured) for r in done.results):
             return {}
@@ -44,28 +45,26 @@ def _settings(done: Simulated, *more: Mapping[str, float]) -> dict[str, float]:
 
 
 def _step(done: Simulated) -> Found:
+    from procedures.amb_rotor.conventions import conventions
     from procedures.step.procedure import list_settings, model, recorded_s, waited_s
     from procedures.step.steps import AT_REST_S, Case
-    from sim_backend.machines.amb5dof import truth_step
+    from sim_backend.motion import StepsAsked
 
     plan: Any = done.recording.plan
+    rig, steps = done.recording.rig, done.drawn.machine.motions.steps
+    if steps is None:
+        return
     other_band = {r.where for r in done.results if isinstance(r, Finding) and r.code == "band-widened"}
     for setting, changed in list_settings(plan).items():
-        settings = _settings(done, model(done.recording.rig, plan), changed)
+        settings = _settings(done, model(rig, plan), changed)
         for speed in plan.speeds_rad_s:
             window = 2 * math.pi / speed if speed else AT_REST_S
             for axis in plan.axes:
-                small, shown = truth_step.truth(
-                    done.drawn.plant,
-                    settings,
-                    axis,
-                    plan.sizes_m,
-                    speed=speed,
-                    rest_s=plan.rest_s,
-                    record_s=recorded_s(done.recording.rig, plan),
-                    wait_s=waited_s(done.recording.rig, plan, setting, axis),
-                    told=done.drawn.defects.get(f"factor_ref_{axis}", 1.0),
-                )
+                asked = StepsAsked(
+                    settings, axis, partial(conventions(rig).point, axis), plan.sizes_m, speed, plan.rest_s,
+                    record_s=recorded_s(rig, plan), wait_s=waited_s(rig, plan, setting, axis),
+                )  # fmt: skip
+                small, shown = steps(rig, done.drawn, asked)
                 cases = {key: Case(setting, speed, axis, *key) for key in shown}
                 group = next(iter(cases.values())).group
                 yield "damping", group, small.damping
@@ -79,17 +78,17 @@ def _step(done: Simulated) -> Found:
 
 def _tracking(done: Simulated) -> Found:
     from procedures.tracking.steps import read_orbits
-    from sim_backend.machines.amb5dof import truth_track
+    from sim_backend.motion import OrbitAsked
 
     plan: Any = done.recording.plan
+    of = done.drawn.machine.motions.orbit
     for orbit in read_orbits(done.recording):
-        if orbit.law in plan.laws:
-            settings = _settings(done, orbit.machine.select(orbit.law))
-            true = truth_track.truth(
-                done.drawn.plant, settings, hz=plan.hz, y=plan.y_m, z=plan.z_m, ratio=plan.ratio, speed=plan.speed_rad_s,
-                settle_s=plan.settle_s,
+        if orbit.law in plan.laws and of is not None:
+            asked = OrbitAsked(
+                _settings(done, orbit.machine.select(orbit.law)), hz=plan.hz, y=plan.y_m, z=plan.z_m, ratio=plan.ratio,
+                speed=plan.speed_rad_s, settle_s=plan.settle_s,
             )  # fmt: skip
-            for name, value in true.items():
+            for name, value in of(done.recording.rig, done.drawn, asked).items():
                 yield name, orbit.where, value
 
 
@@ -99,33 +98,35 @@ def _vectors(axes: Iterable[str], shaft: Iterable[complex], where: str) -> Found
         yield "vector_sin", f"{axis}, {where}", float(-vector.imag)
 
 
-def _distances(planes: Iterable[str], d_max: Iterable[float], clearance: float, where: str) -> Found:
-    for plane, far in zip(planes, d_max, strict=True):
+def _distances(planes: Iterable[str], whirl: Whirl, where: str) -> Found:
+    for plane, far, clearance in zip(planes, whirl.d_max, whirl.clearance, strict=True):
         yield "d_max", f"{plane}, {where}", far
         yield "d_max_share", f"{plane}, {where}", far / clearance
 
 
 def _unbalance(done: Simulated) -> Found:
     from procedures.synchronous.dwells import DWELL, read_dwells
-    from sim_backend.machines.amb5dof import truth_unbalance
 
     plan: Any = done.recording.plan
+    of = done.drawn.machine.motions.whirl
     for dwell in read_dwells(done.recording):
-        if dwell.kind != DWELL or dwell.again:
+        if dwell.kind != DWELL or dwell.again or of is None:
             continue
         machine = dwell.machine
         law = {**(machine.poles if plan.observed else {}), **machine.select(plan.law)}
         settings = _settings(done, law, machine.variants[dwell.variant])
-        true = truth_unbalance.motion(done.drawn.plant, settings, dwell.speed)
+        true = of(done.recording.rig, done.drawn, settings, dwell.speed)
         yield from _vectors(machine.axes, true.shaft, dwell.where)
-        yield from _distances(machine.planes, true.d_max, done.drawn.plant.clearance, dwell.where)
+        yield from _distances(machine.planes, true, dwell.where)
 
 
 def _balance(done: Simulated) -> Found:
     from procedures.balance.steps import SIDES
-    from sim_backend.machines.amb5dof import truth_balance
 
-    own = truth_balance.left(done.recording.rig, done.drawn, done.recording.events("operator"))
+    of = done.drawn.machine.motions.left
+    if of is None:
+        return
+    own = of(done.recording.rig, done.drawn, done.recording.events("operator"))
     for name, values in (("unbalance", own[0]), ("residual", own[-1])):
         for side, value in zip(SIDES, values, strict=True):
             yield f"{name}_cos", side, float(value.real)
@@ -135,26 +136,25 @@ def _balance(done: Simulated) -> Found:
 def _passage(done: Simulated) -> Found:
     """Vectors, orbits and D_max where the speed stands; what is critical at the speeds where the run found it."""
     from procedures.amb_rotor.conventions import conventions
-    from sim_backend.machines.amb5dof import truth_passage, truth_unbalance
 
     plan: Any = done.recording.plan
-    run = done.procedure.evaluated(done.recording).result
-    if run is None or run.near is None:
+    run, of = done.procedure.evaluated(done.recording).result, done.drawn.machine.motions
+    if run is None or run.near is None or of.whirl is None:
         return
-    plant, machine = done.drawn.plant, conventions(done.recording.rig)
+    rig, machine = done.recording.rig, conventions(done.recording.rig)
     settings = _settings(done, machine.variants["off"], plan.parameters, machine.select(plan.law))
     for result in run.near.dwells:
-        true, where = truth_unbalance.motion(plant, settings, result.dwell.speed), result.dwell.where
+        true, where = of.whirl(rig, done.drawn, settings, result.dwell.speed), result.dwell.where
         yield from _vectors(machine.axes, true.shaft, where)
-        yield from _distances(machine.planes, true.d_max, plant.clearance, where)
+        yield from _distances(machine.planes, true, where)
         for plane, (y, z) in machine.planes.items():
             a, b = true.shaft[y], true.shaft[z]
             yield "major_half_axis", f"{plane}, {where}", float(abs(a + 1j * b) + abs(a - 1j * b)) / 2
     peaks = [p for p in run.peaks if p.critical]
-    if not peaks:
+    if not peaks or of.passage is None:
         return
     ends = [x for p in run.peaks for x in (p.low, p.speed.value, p.high) if math.isfinite(x)]
-    held = truth_passage.curves(plant, settings, 0.85 * min(ends), 1.1 * max(ends))
+    held = of.passage(rig, done.drawn, settings, 0.85 * min(ends), 1.1 * max(ends))
     for p in peaks:
         speed, amplitude, factor = held.critical(machine.axes.index(p.axis), p.speed.value)
         yield "critical_speed", p.where, speed
@@ -169,25 +169,27 @@ def _sensitivity(done: Simulated) -> Found:
     from bench.units import RPM
     from procedures.amb_rotor.conventions import conventions
     from procedures.sensitivity.margins import fall, phase, rise
-    from sim_backend.machines.amb5dof import truth_sensitivity
 
     plan: Any = done.recording.plan
-    machine = conventions(done.recording.rig)
-    plant, settings = done.drawn.plant, _settings(done, machine.select(plan.law))
+    rig, machine, of = done.recording.rig, conventions(done.recording.rig), done.drawn.machine.motions
+    settings = _settings(done, machine.select(plan.law))
     for speed in plan.speeds_rad_s:
-        loop = None if speed else truth_sensitivity.loop(plant, settings)
+        if (of.peak if speed else of.loop) is None:
+            continue
+        loop = None if speed or of.loop is None else of.loop(rig, done.drawn, settings)
         for axis in plan.axes:
             k, where = machine.all_axes.index(axis), f"{axis}, {f'{speed * RPM:.0f} r/min' if speed else 'at rest'}"
             if loop is not None:
                 value, hz = loop.peak(k, plan.low_hz, plan.high_hz)
             else:
-                value, hz = truth_sensitivity.quiet_peak(plant, settings, k, speed)
+                assert of.peak is not None
+                value, hz = of.peak(rig, done.drawn, settings, k, speed)
             yield "s_max", where, value
             yield "s_max_hz", where, hz
             if loop is not None:
                 open_loop = 1 / loop.sensitivity(np.geomspace(plan.low_hz, plan.high_hz, MARGIN_POINTS))[:, k] - 1
-                for name, of in (("phase_margin", phase), ("gain_reduction", fall), ("gain_increase", rise)):
-                    yield name, where, of(open_loop)
+                for name, margin in (("phase_margin", phase), ("gain_reduction", fall), ("gain_increase", rise)):
+                    yield name, where, margin(open_loop)
 
 
 TRUTHS: Mapping[str, Callable[[Any], Found]] = {

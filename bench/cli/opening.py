@@ -207,25 +207,16 @@ def _operator_on_a_line(rig: RigFile, controller: Controller, stack: ExitStack) 
 
 
 def beat_of(rig: RigFile, session: Session) -> Any:
-    """The heartbeat that a rig's DBC describes.
-
-    Raises:
-        ConfigError: its counter is not a little-endian number of 16 bits at a whole byte.
-    """
-    from bench.link.codec import encode
+    """The heartbeat that a rig's DBC describes: its counter has any width and byte order."""
+    from bench.link.codec import encode, places_of
     from drivers.heartbeat import Beat
 
     b = rig.binding
     message = rig.messages[b.heartbeat]
     counter = message.signal(b.heartbeat_counter)
-    if counter.start % 8 or counter.length != 16 or not counter.little_endian:
-        raise ConfigError(
-            f"{rig.link.dbc}: {b.heartbeat}.{counter.name}: found {counter.length} bits at {counter.start}; expected 16 "
-            "bits, little endian, at a whole byte"
-        )
     owned = {"session": session.number} if any(s.name == "session" for s in message.signals) else {}
     period = message.period_s or 0.02
-    return Beat(message.identifier, encode(message, owned), counter.start // 8, message.fd, period_s=period)
+    return Beat(message.identifier, encode(message, owned), places_of(counter), message.fd, period_s=period)
 
 
 def _released(controller: Controller) -> None:

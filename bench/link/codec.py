@@ -158,6 +158,12 @@ def bytes_of(s: Signal) -> tuple[int, list[int]]:
     return 7 - last % 8, list(range(last // 8, top // 8 - 1, -1))
 
 
+def places_of(s: Signal) -> tuple[int, ...]:
+    """Places of a signal's bits in its message, the least significant first: place n is bit n % 8 of byte n // 8."""
+    first_bit, order = bytes_of(s)
+    return tuple(8 * order[n // 8] + n % 8 for n in range(first_bit, first_bit + s.length))
+
+
 def encode(message: Message, values: Mapping[str, float]) -> bytes:
     """The payload of a message; signals that are not given are zero raw.
 

@@ -96,6 +96,8 @@ class Procedure:
     `reached` are patterns of influences' identities ("!" takes away again): a check of the procedure sees an error of such a
     one that matters. The others of Type B in its budgets are listed on the report as what no data can show, with the
     sentences of `assumes`: what is in no budget and no data of any size can show, each with its sensitivity.
+
+    `places` are words that stand in the `where` of what it measures, beside names of the rig and of the plan.
     """
 
     name: str
@@ -119,6 +121,7 @@ class Procedure:
     measures_of: Callable[[RigFile], tuple[Quantity, ...]] | None = None
     reached: tuple[str, ...] = ()
     assumes: tuple[str, ...] = ()
+    places: tuple[str, ...] = ()
     method: str = ""  # the report's section: plain paragraphs, parted by empty lines
 
     def problems(self, rig: RigFile, plan: Any) -> tuple[str, ...]:

@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import difflib
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any, Literal, get_args, get_origin
 
 from bench.errors import ConfigError, Problem
 from bench.procedure import Procedure
 from bench.procedure.plans import field_of
+from bench.record.limited import unknown_parts
 from bench.record.limits import Limit, Setting
 
 
-def wrong_limits(limits: Mapping[str, Limit], of: Procedure, path: str) -> Iterator[Problem]:
-    """What would judge nothing, each with its key in the file at `path` and with what was expected."""
+def wrong_limits(
+    limits: Mapping[str, Limit], of: Procedure, path: str, words: Collection[str] = ()
+) -> Iterator[Problem]:
+    """What would judge nothing, each with its key in the file at `path` and with what was expected. `words` are those that
+    places may have; without any, places are not looked at."""
     units = {q.name: q.unit for q in of.measures}
     fields = {name: field.annotation for name, field in of.plan.model_fields.items()}
-    for name, limit in limits.items():
-        key = f"limits.{of.name}.{name}"
+    for stated_for, limit in limits.items():
+        key = f"limits.{of.name}.{stated_for}"
+        name, at, place = stated_for.partition("@")
         if name not in units:
-            yield Problem(path, key, name, f"one of {', '.join(units)}")
+            close = difflib.get_close_matches(name, units, 1)
+            hint = f". Did you mean {close[0]}{at}{place}?" if close else ""
+            yield Problem(path, key, name, f"one of {', '.join(units)}{hint}")
             continue
+        for part, expected in unknown_parts(place, words) if at and words else ():
+            yield Problem(path, key, repr(part), expected)
         if limit.unit != units[name]:
             yield Problem(path, f"{key}.unit", repr(limit.unit), f"{units[name]!r}, the unit of {name}")
         for setting, stated in limit.at.items():

@@ -16,8 +16,10 @@ from bench.findings import Effect, Finding
 from bench.inputfile import TomlError, parse_toml
 from bench.procedure import BenchPlan, Procedure, Quantity
 from bench.procedure.plans import field_of
+from bench.record.limited import words_of
 from bench.record.limits import Limit, Setting
 from bench.record.speccheck import wrong_limits
+from bench.rigfile import RigFile
 
 SCHEMA = 1
 NOT_APPLIED = "limit-not-applied"  # a note: the limit was stated for other settings
@@ -81,19 +83,22 @@ def load_spec(
     folders: Collection[Path] | None = None,
     *,
     file: Path | None = None,
+    rig: RigFile | None = None,
 ) -> Mapping[str, Limit]:
-    """Limits by quantity name, from `./specs`, else the installed `specs/`; empty if the rig or procedure has none.
-    `file` is one to be read instead.
+    """Limits by quantity, or by `quantity@place`, from `./specs`, else the installed `specs/`; empty if the rig or procedure
+    has none. `file` is one to be read instead.
 
     With `of`, the procedure itself, what would judge nothing or be found out after the run only is refused: other names than
-    those of its quantities, other units, settings that its plan does not have, and values that such a setting cannot take.
+    those of its quantities, other units, settings that its plan does not have, and values that such a setting cannot take. With
+    `rig` too, places that nothing is called.
 
     Raises:
         ConfigError: the file cannot be used; every problem is named.
     """
     path, found = _read(rig_name, folders, file)
     limits = found.get(procedure, {})
-    if of is not None and (problems := tuple(wrong_limits(limits, of, str(path)))):
+    words = words_of(rig, of) if rig is not None and of is not None else ()
+    if of is not None and (problems := tuple(wrong_limits(limits, of, str(path), words))):
         raise ConfigError(f"spec {path} cannot be used:", problems)
     return limits
 
@@ -146,8 +151,9 @@ def in_unit(
 ) -> tuple[Mapping[str, Limit], tuple[Finding, ...]]:
     """The limits that are in the unit of their quantity, and a finding for each other: a recording keeps the spec of its day,
     and a mistake in that is no reason to withhold what was measured."""
-    units = {q.name: q.unit for q in quantities}
-    wrong = [name for name, limit in limits.items() if limit.unit != units.get(name, limit.unit)]
+    by_name = {q.name: q.unit for q in quantities}
+    units = {name: by_name.get(name.partition("@")[0], limit.unit) for name, limit in limits.items()}
+    wrong = [name for name, limit in limits.items() if limit.unit != units[name]]
     found = (
         f"the limit of {name} is in {limits[name].unit!r}, the quantity in {units[name]!r}: it was not judged"
         for name in wrong

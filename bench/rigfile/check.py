@@ -17,6 +17,7 @@ from bench.rigfile.check_capture import problems_of as problems_of_capture
 from bench.rigfile.check_machine import problems_of as problems_of_machine
 from bench.rigfile.check_numbers import MACHINE
 from bench.rigfile.check_numbers import problems_of as problems_of_numbers
+from bench.rigfile.check_states import problems_of as problems_of_states
 from bench.rigfile.messages import MessageMap
 from bench.rigfile.model import RigFile
 from bench.rigfile.possible import impossible
@@ -197,7 +198,7 @@ def _bindings(rig: RigFile, messages: MessageMap) -> Iterator[Problem]:
             yield Problem(rig.path, f"channels.{name}.unit", channel.unit, f"the kind of {dbc_unit} ({channel.signal})")
     yield from _signals_of_parameters(rig, messages)
     captures = problems_of_capture(rig.capture, messages) if rig.capture is not None else ()
-    for key, found, expected in (*problems_of_binding(rig, messages), *captures):
+    for key, found, expected in (*problems_of_binding(rig, messages), *problems_of_states(rig, messages), *captures):
         yield Problem(rig.path, key, found, expected)
 
 

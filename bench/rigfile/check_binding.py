@@ -5,13 +5,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Iterator, Mapping
 
-from bench.rigfile.binding import COMMANDS, MODES
+from bench.rigfile.binding import COMMANDS
 from bench.rigfile.messages import MessageMap, Signal
 from bench.rigfile.model import RigFile
 from bench.rigfile.roles import SPEED, told_in
 from bench.rigfile.turned import turned
 
-NEEDED = ("ENABLE", "DISABLE", "LEVITATE", "LAND", "STOP", "MAKE_SAFE")
+NEEDED = ("ENABLE", "DISABLE", "LEVITATE", "LAND", "MAKE_SAFE")
 """Commands that no run and no make-safe can do without; the others are asked for only where the controller has them."""
 
 PROTOCOL = {
@@ -26,8 +26,6 @@ ANSWERS = {"ParamSet": "ParamReply", "ParamGet": "ParamReply", "Claim": "Owner",
 
 FEWEST_COUNT_BITS = 4
 
-GOALS = ("OFF", "READY", "LEVITATED", "FAULT")
-
 LONGEST_COUNTER = 48
 
 KEY = "devices.controller.binding"
@@ -35,6 +33,11 @@ KEY = "devices.controller.binding"
 Found = tuple[str, str, str]
 
 WRAP_S = 1.0  # counters must not come round within this: a loss, or a restart, would not show
+
+
+def _needed(rig: RigFile) -> tuple[str, ...]:
+    """NEEDED, and STOP where something may turn the shaft."""
+    return (*NEEDED, "STOP") if turned(rig) else NEEDED
 
 
 def find(messages: MessageMap, path: str) -> str:
@@ -55,7 +58,6 @@ def problems_of(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
     yield from _heartbeat(rig, messages)
     yield from _protocol(rig, messages)
     yield from _channels(rig, messages)
-    yield from _states(rig, messages)
     yield from _multiplexed(rig, messages)
 
 
@@ -64,7 +66,7 @@ def _multiplexed(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
     b = rig.binding
     used = [(f"{KEY}.telemetry", m) for m in b.telemetry] + [(f"{KEY}.heartbeat", b.heartbeat)]
     used += [(f"{KEY}.commands.{n}", path.partition(".")[0])
-             for n in dict.fromkeys((*NEEDED, *b.commands)) for path in b.command(n)]  # fmt: skip
+             for n in dict.fromkeys((*_needed(rig), *b.commands)) for path in b.command(n)]  # fmt: skip
     used += [(f"parameters.{n}.signal", p.signal.partition(".")[0]) for n, p in rig.parameters.items() if p.signal]
     used += [(f"message {m}", m) for m in PROTOCOL]
     yield from multiplexed(used, messages)
@@ -108,7 +110,7 @@ def _commands(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
     for name in b.commands:
         if name not in COMMANDS:
             yield f"{KEY}.commands.{name}", "an unknown command", f"one of {', '.join(COMMANDS)}"
-    for name in dict.fromkeys((*NEEDED, *b.commands)):
+    for name in dict.fromkeys((*_needed(rig), *b.commands)):
         key = f"{KEY}.commands.{name}"
         if not b.command(name):
             yield key, "no values", 'what to send, such as { "Control.mode" = 3 }'
@@ -197,9 +199,9 @@ def _counters(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
 def _heartbeat(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
     b = rig.binding
     s = signal_at(messages, f"{b.heartbeat}.{b.heartbeat_counter}")
-    if s is not None and (s.start % 8 or s.length != 16 or not s.little_endian or not plain(s)):
-        yield (f"{KEY}.heartbeat_counter", f"{b.heartbeat}.{s.name}, {s.length} bits at {s.start}",
-               "16 bits at a whole byte, little endian, unsigned")  # fmt: skip
+    if s is not None and not plain(s):
+        yield (f"{KEY}.heartbeat_counter", f"{b.heartbeat}.{s.name} signed, scaled or a float",
+               "an unsigned whole number with scale 1 and offset 0")  # fmt: skip
     written = {path.partition(".")[0] for name in b.commands for path in b.command(name)}
     written |= {p.signal.partition(".")[0] for p in rig.parameters.values() if p.signal}
     if b.heartbeat in written:
@@ -253,26 +255,3 @@ def _channels(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
                 f"{channel.signal}, signed, scaled or too long",
                 "an unsigned code of up to 16 bits",
             )
-
-
-def _states(rig: RigFile, messages: MessageMap) -> Iterator[Found]:
-    channel = rig.channels.get("state")
-    signal = None if channel is None else signal_at(messages, channel.signal)
-    if channel is None or signal is None:
-        return
-    meant = set()
-    for state in signal.choices.values():
-        mode = rig.binding.mode(state)
-        meant.add(mode)
-        if mode is None:
-            yield f"{KEY}.states.{state}", "nothing", f"what {state} amounts to: one of {', '.join(MODES)}"
-    for state in rig.binding.states:
-        if state not in signal.choices.values():
-            known = ", ".join(signal.choices.values()) or "none"
-            yield f"{KEY}.states.{state}", "a state that the controller does not have", f"one of {known}"
-    if None not in meant and (missing := [m for m in GOALS if m not in meant]):
-        yield (
-            f"{KEY}.states",
-            f"no state that amounts to {', '.join(missing)}",
-            f"VAL_ of {channel.signal} that names it",
-        )

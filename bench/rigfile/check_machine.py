@@ -56,6 +56,8 @@ def _all(rig: RigFile) -> Iterator[Found]:
     yield from _channels(rig)
     yield from _axes(rig)
     yield from _certificates(rig)
+    if rig.customer is not None and rig.laboratory is not None and rig.laboratory.customer:
+        yield "laboratory.customer", rig.laboratory.customer, "[customer] alone, where there is one"
     for contradictions in (_apart, _parallel, _ends, _spans, _rings):
         yield from contradictions(rig, places)
 

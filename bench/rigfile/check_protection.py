@@ -77,4 +77,4 @@ def _levitated(rig: RigFile) -> Iterator[Problem]:
     found = {p.unit for p in protection.of_channels(rig)}
     for si, (what, expected) in NEEDED.items():
         if si not in found and not (si == "m" and unknown):
-            yield Problem(rig.path, "channels", f"no {what} that is protected, though the rotor levitates", expected)
+            yield Problem(rig.path, "envelope", f"no {what} that is protected, though the rotor levitates", expected)

@@ -8,10 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
 
-import cantools
-import cantools.database.errors
-
 from bench.errors import ConfigError
+from bench.rigfile.dbcreader import database
 
 _PLACE = re.compile(r"line \d+, column \d+")
 
@@ -84,10 +82,10 @@ def load_messages(dbc: str, name: str = "dbc") -> MessageMap:
         ConfigError: it is not a DBC, or signals overlap or do not fit.
     """
     try:
-        database = _database(dbc)
+        read = _read(dbc)
     except Exception as error:  # cantools raises a dozen kinds, all meaning this
         raise ConfigError(f"{name}: not a usable DBC: {_why(error)}") from error
-    return MessageMap({m.name: _message(m) for m in database.messages})
+    return MessageMap({m.name: _message(m) for m in read.messages})
 
 
 def _why(error: Exception) -> str:
@@ -96,15 +94,13 @@ def _why(error: Exception) -> str:
     cause = getattr(error, "e_dbc", None) or error
     if found := _PLACE.search(str(cause)):
         return f"wrong syntax at {found[0]}"
-    return (
-        str(cause) if isinstance(cause, cantools.database.errors.Error) else "it breaks off, or holds what no DBC does"
-    )
+    return str(cause) if isinstance(cause, database.errors.Error) else "it breaks off, or holds what no DBC does"
 
 
 @lru_cache(maxsize=8)
-def _database(dbc: str) -> Any:
+def _read(dbc: str) -> Any:
     """Parsing takes longer than all else that opening a rig does, and a run does it at both ends of the link."""
-    return cantools.database.load_string(dbc, database_format="dbc", strict=True)
+    return database.load_string(dbc, database_format="dbc", strict=True)
 
 
 def _message(m: Any) -> Message:

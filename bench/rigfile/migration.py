@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from bench.rigfile.people import typed_laboratory
+
 Content = dict[str, Any]
 ENDS = {"inboard": "i", "outboard": "o"}
 SPANS = {
@@ -36,7 +38,10 @@ def to_schema_2(data: Content) -> Content:
     }
     made["spans"] = {f"geometry/{name}": pair for name, pair in SPANS.items()
                      if name in g and placed.issuperset(p for p in pair if "/" in p)}  # fmt: skip
-    return {**{name: table for name, table in made.items() if table}, **data}
+    people = (
+        {"laboratory": typed_laboratory(_table(data, "laboratory"))} if isinstance(data.get("laboratory"), dict) else {}
+    )
+    return {**{name: table for name, table in made.items() if table}, **data, **people}
 
 
 def _table(data: Content, name: str) -> Content:

@@ -22,6 +22,7 @@ from bench.rigfile.elements import FORMS, MachineTables
 from bench.rigfile.former_parameters import with_capabilities
 from bench.rigfile.messages import MessageMap, load_messages
 from bench.rigfile.part import Part
+from bench.rigfile.people import Customer, Laboratory
 from bench.rigfile.registers import Bounds, Register
 from bench.rigfile.text import SCHEMA, migrated, parse_text
 from bench.rigfile.toleranced import UNKNOWN_UNIT, Toleranced, simulated
@@ -139,7 +140,8 @@ class RigFile(MachineTables):
     title: str
     uut: Uut
     site: Site
-    laboratory: Mapping[str, str] = {}
+    laboratory: Laboratory | None = None
+    customer: Customer | None = None
     links: Mapping[str, LinkSpec]
     devices: Mapping[str, Device]
     channels: Mapping[str, Channel]

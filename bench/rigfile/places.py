@@ -25,6 +25,8 @@ WITHOUT_NUMBERS = (
     "capabilities",
     "plans",
     "calibration",
+    "laboratory",
+    "customer",
 )
 PLACED = ("bearings", "probes", "rings", "balancing", "hooks", "levers", "motors")
 """Tables of parts that have a place, if they have any, of their own."""

@@ -18,7 +18,7 @@ _SURE = {"half_width": 0, "distribution": "rectangular", "source": "stands in"}
 STAND_INS: Mapping[str, Any] = {
     "name": "rig", "title": "", "uut": {"model": "", "serial": ""}, "links": {}, "devices": {}, "channels": {},
     "parameters": {}, "geometry": {}, "sensors": {},
-    "site": {"place": "", "latitude_deg": 0.0, "elevation_m": 0.0, "gravity": {"value": 9.81, "unit": "m/s^2", **_SURE},
+    "site": {"place": "", "latitude_deg": 45.0, "elevation_m": 0.0, "gravity": {"value": 9.81, "unit": "m/s^2", **_SURE},
              "air_density": {"value": 1.2, "unit": "kg/m^3", **_SURE}},
     "mass_density": {"value": 8000, "unit": "kg/m^3", **_SURE}, "hanger": {"value": 1e-3, "unit": "kg", **_SURE},
     "hook_seat": {"value": 0, "unit": "m", **_SURE},

@@ -15,6 +15,7 @@ from bench.errors import AnalysisError, BenchError, RecordingError, SignalAbort
 from bench.findings import Effect, Finding
 from bench.link.counts import LinkCounts
 from bench.procedure import Measured, Procedure
+from bench.record.limited import limit_of, never_measured
 from bench.record.limits import Limit
 from bench.record.outcomes import SOUND, Outcome, outcome_of, unjudged
 from bench.record.records import (
@@ -31,6 +32,7 @@ from bench.record.specs import applied, in_unit
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
+from bench.run.certificates import overdue
 from bench.run.step_gaps import incomplete_steps, missing_steps
 
 logger = logging.getLogger("bench.run.evaluation")
@@ -123,8 +125,9 @@ def evaluate(
             else:
                 _accept(procedure, item, measured)
         for key, item in measured.items():
-            entries[key] = measurement(item, limits.get(item.quantity.name), recording.seed)
+            entries[key] = measurement(item, limit_of(limits, item.quantity.name, item.where), recording.seed)
         correlations = correlations_of(list(measured.values()))
+        findings += overdue(recording, measured.values())
     except SignalAbort:
         raise
     except Exception as error:
@@ -183,13 +186,17 @@ def _accept(procedure: Procedure, item: Measured, measured: dict[tuple[str, str]
 def _in_order(
     procedure: Procedure, entries: Mapping[tuple[str, str], Measurement], limits: Mapping[str, Limit], rig: RigFile
 ) -> tuple[Measurement, ...]:
-    """As declared, with a missing entry where nothing was yielded that a sound machine has, or that a limit asks for."""
+    """As declared, with a missing entry where nothing was yielded that a sound machine has, or that a limit asks for, of a
+    quantity or at a place."""
     out: list[Measurement] = []
     for quantity in procedure.measured_on(rig):
         found = [m for (name, _), m in entries.items() if name == quantity.name]
         limit = limits.get(quantity.name)
-        if found or quantity not in procedure.optional or limit is not None:
-            out += found or [missing(quantity, limit)]
+        placed = [missing(quantity, asked, place)
+                  for place, asked in never_measured(limits, quantity.name, (m.where for m in found))]  # fmt: skip
+        if limit is not None or (quantity not in procedure.optional and not placed):
+            found = found or [missing(quantity, limit)]
+        out += [*found, *placed]
     return tuple(out)
 
 

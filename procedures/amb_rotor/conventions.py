@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import reduce
 from operator import or_
@@ -16,12 +15,12 @@ from operator import or_
 from bench.errors import Lacking
 from bench.rigfile import RigFile
 from bench.rigfile.capabilities import Capabilities
-from bench.rigfile.places import CENTRE, PlaceError, Places
 from bench.rigfile.roles import ANGLE, SPEED, Status, is_bound
 from bench.rigfile.supports import axial_support, least_clearance, once_per_rig, two_planes
+from procedures.amb_rotor import loops
+from procedures.amb_rotor.stations import AXIAL, Stations, gaps, in_two_planes, stations
 from procedures.shared.unsupported import of_weight, unlike
 
-UNKNOWN_LAG = 4.0  # ticks: an amplifier of some 400 Hz behind a controller of 10 kHz
 Law = str
 """Of the controller, by the name that the rig file gives it; "": as the controller is set."""
 Variant = str
@@ -38,8 +37,8 @@ class AmbRotor:
     negative side, `coil_voltages` those of the same coils. `plane_voltages` are the channels of the greatest coil voltage of
     each plane, none where they are not told.
 
-    `can` is what its controller can be asked to do. `arms` are the places of both bearings from the centre of mass, m, towards
-    the far end; `stands_s` is how long after the last pulse the controller knows that the shaft stands, s.
+    `can` is what its controller can be asked to do. `stations` has where axes pull and probes look; `stands_s` is how long
+    after the last pulse the controller knows that the shaft stands, s.
     """
 
     axes: tuple[str, str, str, str]
@@ -55,9 +54,10 @@ class AmbRotor:
     voltage_limit: Status
     sensor_range: Status
     can: Capabilities
-    arms: tuple[float, float]
+    stations: Stations
     stands_s: float
     lag_s: float  # by which currents follow their references, as the controller knows it, or as the rig file says
+    loop_rad_s: float  # the rigid modes' own, by the laws that say so (`flatness`); infinite where none does
     gaps: Mapping[str, float]  # air gap by axis, m, as far as it is told
     marked: bool  # whether the angle and the speed are told by a mark
     clearance: float  # the least of the rings', m; infinite where the rig has none
@@ -76,8 +76,14 @@ class AmbRotor:
 
     @property
     def positions(self) -> tuple[str, ...]:
-        """Channels of the radial position sensors."""
+        """Channels of the position sensors that look along the radial axes."""
         return tuple(map(self.position, self.axes))
+
+    @property
+    def probed(self) -> bool:
+        """Whether every radial axis has a probe of its own, which reads the way the axis counts."""
+        signs = [self.stations.probes[self.probes[a]].sign for a in self.axes if a in self.probes]
+        return len(signs) == len(self.axes) and min(signs) > 0
 
     @property
     def all_positions(self) -> tuple[str, ...]:
@@ -154,17 +160,28 @@ class AmbRotor:
         Raises:
             Lacking: the controller takes no set point there.
         """
-        points = self.can.set_points
-        shaft: Mapping[str, str] = {str(name): parameter for name, parameter in points.shaft.items()}
+        shaft: Mapping[str, str] = {str(name): parameter for name, parameter in self.can.set_points.shaft.items()}
         if coordinate in shaft:
             return {shaft[coordinate]: value}
-        near, far = self.arms
-        by = {"y": (1.0, 1.0), "z": (1.0, 1.0), "theta": (near, far), "psi": (-near, -far)}.get(coordinate, (1.0,))
-        axes = self.along({"theta": "y", "psi": "z"}.get(coordinate, coordinate))
-        pairs = list(zip(axes, by, strict=True))
-        if missing := [axis or "the shaft" for axis, _ in pairs if axis not in points.axes]:
+        return self._by_axes({coordinate: value})
+
+    def points(self, at: Mapping[str, float]) -> dict[str, float]:
+        """As `point`, along several coordinates at once: where set points are by axis, an axis may look along more than one.
+
+        Raises:
+            Lacking: the controller takes no set point there.
+        """
+        if {str(name) for name in self.can.set_points.shaft} >= {*at}:
+            return {name: value for c, x in at.items() for name, value in self.point(c, x).items()}
+        return self._by_axes(at)
+
+    def _by_axes(self, at: Mapping[str, float]) -> dict[str, float]:
+        """By T (2.17) at each bearing; an axis that no coordinate moves is left alone."""
+        out = {self.axial if name == AXIAL else name: value for name, value in self.stations.moved(at).items()}
+        parameters = self.can.set_points.axes
+        if missing := [axis or "the shaft" for axis in out if axis not in parameters]:
             raise Lacking(f"capabilities.set_points: found none for {', '.join(missing)}")
-        return {points.axes[axis]: factor * value for axis, factor in pairs}
+        return {parameters[axis]: value for axis, value in out.items()}
 
     def moved_by(self, parameter: str) -> str | None:
         """The coordinate whose only set point a parameter is; None where it is none, or one of several."""
@@ -228,9 +245,10 @@ AMB_ROTOR = AmbRotor(
     voltage_limit=Status.VOLTAGE_LIMIT,
     sensor_range=Status.SENSOR_RANGE,
     can=Capabilities(),
-    arms=(-0.097, 0.081),
+    stations=in_two_planes(_AXES[:4], -0.097, 0.081),
     stands_s=1.0,  # it knows half a second after the last pulse
     lag_s=1 / (800 * math.pi),
+    loop_rad_s=math.inf,
     gaps={},
     marked=True,
     clearance=1e-4,
@@ -245,7 +263,7 @@ def conventions(rig: RigFile) -> AmbRotor:
     Raises:
         Lacking: the rig has other bearings, or one of them without what belongs to an axis.
     """
-    planes, axial = two_planes(rig), axial_support(rig)
+    planes, axial = two_planes(rig, probed=False), axial_support(rig)
     axes = [axis for plane in planes for axis in plane.axes]
     everywhere = [*axes, *([axial] if axial is not None else [])]
     first, second, third, fourth = (axis.name for axis in axes)
@@ -264,35 +282,12 @@ def conventions(rig: RigFile) -> AmbRotor:
         },
         plane_voltages=told if all(told) else (),
         can=rig.capabilities,
-        arms=(_from_centre(rig, planes[0].name), _from_centre(rig, planes[1].name)),
-        lag_s=_lag_s(rig),
-        gaps=_gaps(rig),
+        stations=stations(rig),
+        lag_s=loops.lag_s(rig),
+        loop_rad_s=loops.loop_rad_s(rig),
+        gaps=gaps(rig),
         lacks=unlike(rig, planes),
         unweighed=of_weight(rig, planes, (-lean, math.pi / 2 - lean)),
         marked=is_bound(rig, ANGLE) and is_bound(rig, SPEED),
         clearance=least_clearance(rig),
     )
-
-
-def _from_centre(rig: RigFile, bearing: str) -> float:
-    try:
-        return Places(rig).distance(CENTRE, f"bearings/{bearing}").value
-    except PlaceError as error:
-        raise Lacking(str(error)) from error
-
-
-def _lag_s(rig: RigFile) -> float:
-    can = rig.capabilities
-    if "rate" in can.model:
-        return 1 / rig.parameters[can.model["rate"]].default
-    return can.loop_delay_s or UNKNOWN_LAG * rig.devices["controller"].tick_s
-
-
-def _gaps(rig: RigFile) -> dict[str, float]:
-    places, out = Places(rig), dict[str, float]()
-    for name, bearing in rig.bearings.items():
-        if bearing.gap is not None:
-            with suppress(PlaceError):  # who needs it asks for it
-                gap = places.number(bearing.gap, f"bearings.{name}.gap")
-                out |= dict.fromkeys(bearing.axes, gap.factor * gap.number.value)
-    return out

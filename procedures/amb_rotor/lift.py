@@ -19,7 +19,8 @@ from procedures.shared import first_look
 
 REST, LIFT = "rest", "lift"
 LIFT_LOST, NO_SPEED = "lift-lost", "no-speed"
-NUDGES: tuple[tuple[str, float], ...] = (("y", 10e-6), ("theta", 100e-6))  # of the set points, m and rad
+NUDGES: tuple[tuple[str, float], ...] = (("y", 10e-6), ("theta", 100e-6))  # of the set points, m and rad, at most
+NEAR = 0.11  # of the least clearance, that a nudge moves the shaft by at a bearing, at most
 STEPS = 2 + 2 * len(NUDGES)  # that `lift_and_nudge` records
 
 
@@ -29,7 +30,7 @@ def lift_and_nudge(rig: Rig, record: Recorder) -> bool:
     machine = conventions(rig.file)
     with record.step(REST):
         rig.clock.sleep(0.3)
-    if any(rings.of_readings({name: rig.levitation.reading(name) for name in machine.positions}, rig.file)):
+    if any(rings.of_readings({name: rig.levitation.reading(name) for name in machine.stations.channels}, rig.file)):
         return False  # it lies below, on its rings: a probe that says otherwise may close a loop the wrong way round
     if not _lift(rig, record):
         return False
@@ -68,7 +69,8 @@ def _lift(rig: Rig, record: Recorder) -> bool:
 def _nudge(rig: Rig, record: Recorder) -> list[Nudge]:
     machine, made = conventions(rig.file), []
     names = nudges.watched(machine, tuple(rig.file.channels))
-    for coordinate, aside in NUDGES:
+    for coordinate, most in NUDGES:
+        aside = min(most, NEAR * machine.clearance / max(map(abs, machine.stations.moved({coordinate: 1.0}).values())))
         points, read = machine.point(coordinate, 0.0), []
         name = next(iter(points)) if len(points) == 1 else coordinate  # as the recording has it
         for value in (0.0, aside):

@@ -5,21 +5,25 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from procedures.amb_rotor.conventions import AmbRotor, conventions
-from procedures.amb_rotor.geometry import centre, nominal
+from procedures.amb_rotor.geometry import Facts, centre, nominal
 
+Array = npt.NDArray[np.float64]
 PROBE = "probe"
 OWN, OTHER = 0.5, 0.3  # shares of a nudge
-ANSWERS_A = 5e-3  # a nudge of 10 µm takes some 20 mA, and noise leaves 0.2 mA in a step
+ANSWERS = 0.25  # of what a magnet of that gap and bias asks for
+ALONG = 0.5  # cosine of an axis that a nudge of y moves
 
 
 @dataclass(frozen=True)
@@ -34,7 +38,7 @@ class Nudge:
 
 def watched(machine: AmbRotor, known: Sequence[str]) -> tuple[str, ...]:
     """Channels that are looked at: positions, and the coils' currents as far as they are `known`."""
-    return (*machine.positions, *(c for c in machine.currents if c in known))
+    return (*machine.stations.channels, *(c for c in machine.currents if c in known))
 
 
 def recorded(recording: Recording[Any]) -> list[Nudge]:
@@ -56,14 +60,14 @@ def judge(nudges: Sequence[Nudge], rig: RigFile) -> Iterator[Finding]:
     """Exchanged planes, axes or coils."""
     machine = conventions(rig)
     yield from _readings(nudges, machine, rig)
-    yield from _coils(nudges, machine)
+    yield from _coils(nudges, machine, nominal(rig))
 
 
 def _readings(nudges: Sequence[Nudge], machine: AmbRotor, rig: RigFile) -> Iterator[Finding]:
     facts = nominal(rig, 0.0)
     for nudge in nudges:
         wanted, name = nudge.wanted, nudge.name
-        means = [np.array([[read[p]] for p in machine.positions]) for read in (nudge.before, nudge.after)]
+        means = [_read(read, machine) for read in (nudge.before, nudge.after)]
         y, z, _, theta = (centre(means[1], facts) - centre(means[0], facts))[:, 0]
         if (coordinate := machine.moved_by(name) or name) == "theta":
             if theta < OWN * wanted:
@@ -80,21 +84,33 @@ def _readings(nudges: Sequence[Nudge], machine: AmbRotor, rig: RigFile) -> Itera
             yield Finding("axes-exchanged", text, name, Effect.ERROR)
 
 
-def _coils(nudges: Sequence[Nudge], machine: AmbRotor) -> Iterator[Finding]:
-    """A shaft that is held nearer to a magnet is pulled more by it, so that its coil carries less. That tells the coils of an
-    axis apart even where the mean currents do not: where the magnetic offset carries the weight they are nearly alike."""
+def _read(means: Mapping[str, float], machine: AmbRotor) -> Array:
+    """Of the radial probes (n, 1) m."""
+    return np.array([[means[p]] for p in machine.stations.channels])
+
+
+def _coils(nudges: Sequence[Nudge], machine: AmbRotor, facts: Facts) -> Iterator[Finding]:
+    """A shaft that is held nearer to a magnet is pulled more by it, so that its coil carries less: by about the bias over the
+    gap, K_x/K_i of a magnet of two like coils. That tells the coils of an axis apart even where the mean currents do not: where
+    the magnetic offset carries the weight they are nearly alike. Nothing where the rig file has no gap."""
+    to_axes = machine.stations.pulls
     for nudge in nudges:
         if (machine.moved_by(nudge.name) or nudge.name) != "y":
             continue
-        for axis in machine.along("y"):
-            (p, n), place = machine.pair(axis), machine.position(axis)
-            if not {p, n} <= nudge.after.keys():
+        change = (to_axes @ (centre(_read(nudge.after, machine), facts) - centre(_read(nudge.before, machine), facts)))[
+            :, 0
+        ]
+        for k, axis in enumerate(machine.axes):
+            (p, n), along = machine.pair(axis), to_axes[k, 0]
+            if abs(along) < ALONG or axis not in machine.gaps or not {p, n} <= nudge.after.keys():
                 continue
-            by = {c: nudge.after[c] - nudge.before[c] for c in (p, n, place)}
-            moved, answer = by[place], (by[p] - by[n]) / 2
-            if moved > OWN * nudge.wanted and answer > ANSWERS_A:
+            by = {c: nudge.after[c] - nudge.before[c] for c in (p, n)}
+            moved, answer = float(change[k]) * math.copysign(1, along), (by[p] - by[n]) / 2 * math.copysign(1, along)
+            bias = (nudge.before[p] + nudge.before[n]) / 2
+            if moved > OWN * abs(along) * nudge.wanted and answer > ANSWERS * bias / machine.gaps[axis] * moved:
                 text = (
-                    f"nearer by {moved * 1e6:.1f} µm to the upper magnet of {axis}, the shaft asks {answer * 1e3:+.1f} mA of "
-                    "it, as if it pulled the other way: suspect the two coils or their current sensors exchanged."
+                    f"nearer by {moved * 1e6:.1f} µm to the magnet of {p if along > 0 else n} on {axis}, the shaft asks "
+                    f"{answer * 1e3:+.1f} mA of it, as if it pulled the other way: suspect the two coils or their current "
+                    "sensors exchanged."
                 )
                 yield Finding("coils-exchanged", text, axis, Effect.ERROR)

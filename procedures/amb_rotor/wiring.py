@@ -33,16 +33,19 @@ def before_orbits(recording: Recording[Any]) -> Iterator[Finding]:
     for event in recording.events(NO_SPEED):
         text = f"the shaft does not reach {event['wanted'] * 30 / math.pi:.0f} r/min: {event['why']}"
         yield Finding("speed-not-reached", text, "drive", Effect.ERROR)
+    yield from rings.of_unshown(recording.rig)
 
 
 def _at_rest(recording: Recording[Any], machine: AmbRotor) -> Iterator[Finding]:
-    """On the rings the rotor lies below the middle on both axes, at the clearance over the square root of two."""
+    """On the rings the rotor lies below the middle along every axis that gravity pulls along."""
+    should = rings.expected(machine.stations)
+    names = machine.stations.channels
     for step in recording.steps(REST):
-        data = step.read(*machine.positions, STATUS)
+        data = step.read(*names, STATUS)
         beyond = bool((data[STATUS].astype(np.int64) & machine.sensor_range).any())
-        for name in machine.positions:
+        for name in names:
             mean = float(np.mean(data[name]))
-            if mean > 0:
+            if abs(should[name]) >= rings.TELLS and mean * should[name] < 0:
                 yield Finding(
                     "sensor-polarity",
                     f"{name} reads {mean * 1e6:+.0f} µm while the rotor lies on its "
@@ -64,7 +67,7 @@ def _at_rest(recording: Recording[Any], machine: AmbRotor) -> Iterator[Finding]:
 def _on_rings(recording: Recording[Any], machine: AmbRotor) -> Iterator[Finding]:
     """D_max and its share of the clearance rest on the sensors' zeros and on the rings, which show here alone."""
     for step in recording.steps(REST):
-        yield from rings.of_rings({name: step.mean(name) for name in machine.positions}, recording.rig)
+        yield from rings.of_rings({name: step.mean(name) for name in machine.stations.channels}, recording.rig)
 
 
 def _of_lift(recording: Recording[Any], machine: AmbRotor, fault: str) -> Iterator[Finding]:
@@ -72,6 +75,8 @@ def _of_lift(recording: Recording[Any], machine: AmbRotor, fault: str) -> Iterat
     exchanged, and by at most 1.5 times with the axes exchanged."""
     text, where = "", "lift"
     for step in recording.steps(LIFT):
+        if not machine.probed:
+            continue
         data = step.read(*machine.positions)
         x = np.array([data[name] for name in machine.positions])
         x = x - x[:, :20].mean(axis=1, keepdims=True)

@@ -73,7 +73,7 @@ def requires(rig: RigFile) -> Requires:
 def of_plan(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work, before anything starts."""
     yield from fitting.of_speeds(rig, plan.speeds_rad_s)
-    yield from fitting.of_slow_roll(plan.slow_rad_s, plan.slow_s, plan.speeds_rad_s)
+    yield from fitting.of_slow_roll(rig, plan.slow_rad_s, plan.slow_s, plan.speeds_rad_s)
     yield from fitting.of_captures(rig, plan.capture_s, RATE_HZ, 1, plan.speeds_rad_s)
     if max(plan.speeds_rad_s) * RPM > MOST_RPM + 1:
         top = max(plan.speeds_rad_s) * RPM

@@ -27,6 +27,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 
 procedure = Procedure(
     name="coast-down",
+    places=("down",),
     title="Coast-down of the levitated shaft",
     measures=run_up.MEASURES,
     state=RigState.READY,

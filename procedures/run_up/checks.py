@@ -71,7 +71,7 @@ def of_plan(rig: RigFile, plan: Passing) -> Iterable[str]:
     if plan.rate_rad_s2 and not any("acceleration" in d.registers for d in drives):
         yield "devices: found a drive without a register acceleration; a ramp needs one"
     yield from fitting.of_speeds(rig, plan.speeds_rad_s)
-    yield from fitting.of_slow_roll(plan.slow_rad_s, plan.slow_s, plan.speeds_rad_s)
+    yield from fitting.of_slow_roll(rig, plan.slow_rad_s, plan.slow_s, plan.speeds_rad_s)
     yield from fitting.of_captures(rig, plan.capture_s, plan.rate_hz, plan.orders, plan.speeds_rad_s)
 
 

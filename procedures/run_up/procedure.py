@@ -221,6 +221,7 @@ def requires(rig: RigFile) -> Requires:
 
 procedure = Procedure(
     name="run-up",
+    places=("up",),
     title="Run-up of the levitated shaft",
     measures=MEASURES,
     state=RigState.READY,

@@ -216,6 +216,7 @@ def requires(rig: RigFile) -> Requires:
 
 procedure = Procedure(
     name="sensitivity",
+    places=("at rest",),
     title="Sensitivity of the control loops",
     measures=MEASURES,
     state=RigState.READY,

@@ -214,6 +214,7 @@ def requires(rig: RigFile) -> Requires:
 
 procedure = Procedure(
     name="spindown",
+    places=("by the speed channel",),
     title="Drag of the levitated rotor by spindown",
     measures=MEASURES,
     state=RigState.LEVITATED,

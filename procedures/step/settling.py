@@ -47,7 +47,7 @@ END_S = 0.02  # before the record's end, within which nothing can be said to hav
 class Curve:
     """Fitted to steps (shares of each): `poles` 1/s, their `middle`, `fades` s, `terms` (SECOND, n) over the `_regressors` of a
     step, its sizes over `largest` m. `covariances` of one of the largest steps, of what fades and what swings, with `dof`;
-    `spreads` (SECOND, SECOND) what a case's mean has of them."""
+    `spreads` (SECOND, SECOND) what a case's mean has of them. It says nothing after `until` s, the end of the shortest step."""
 
     poles: Complex
     middle: complex
@@ -57,6 +57,7 @@ class Curve:
     spreads: tuple[Array, Array]
     dof: int
     largest: float
+    until: float
 
 
 @dataclass(frozen=True)
@@ -134,7 +135,7 @@ def fit(steps: Sequence[Done], poles: Complex, middle: complex | None = None) ->
     apart = scaled[:, :fading] - fade @ found[: fade.shape[1], :fading]
     noise = _propagated(np.array(left) * weight[:, None], made)[fading:, fading:]
     return Curve(
-        poles, middle, fades, found, (apart.T @ apart / dof, noise), (_spread(fade), _spread(first)), dof, largest
+        poles, middle, fades, found, (apart.T @ apart / dof, noise), (_spread(fade), _spread(first)), dof, largest, last
     )
 
 
@@ -182,7 +183,7 @@ def settling(curve: Curve, case: Case, steps: Sequence[Done], band: float, seed:
     window = float(np.mean([d.samples for d in steps])) * float(steps[0].t[1] - steps[0].t[0])
     noise = math.sqrt(float(np.mean([d.noise**2 for d in steps]))) / case.size / math.sqrt(len(steps))
     within = max(band, BAND_NOISE * noise)
-    t = _looked_at(curve, min(float(d.t[-1]) for d in steps))
+    t = _looked_at(curve, curve.until)
     made = columns(t, curve.poles, curve.middle, curve.fades, window)
     of = np.array(_regressors(case, -case.way * case.size / 2, curve.largest))
     off = made @ (of @ curve.terms) - 1

@@ -118,8 +118,8 @@ def slow_roll(dwells: Sequence[Dwell], speeds: Sequence[float], runout: tuple[st
     if not slow:
         text = "no slow roll: what the probes read of the journals' runout is in every vector, as if it were unbalance."
         yield Finding("no-slow-roll", text, "", Effect.INDETERMINATE, runout)
-    elif slow[0].speed > 1.02 * too_fast(speeds):
-        text = (f"the slow roll was made at {slow[0].speed * RPM:.0f} r/min; above {too_fast(speeds) * RPM:.0f} r/min "
+    elif slow[0].speed > 1.02 * (most := too_fast(speeds, slow[0].machine)):
+        text = (f"the slow roll was made at {slow[0].speed * RPM:.0f} r/min; above {most * RPM:.0f} r/min "
                 "unbalance and the loop's own response are in it.")  # fmt: skip
         yield Finding("slow-roll-too-fast", text, slow[0].where, Effect.INDETERMINATE, runout)
 

@@ -9,12 +9,11 @@ from bench.errors import BenchError
 from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
 from bench.units import RPM
-from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.shared.limits import landing_speed
 from procedures.synchronous.dwells import captured_channels
 
 SLOW_MOST = 0.15  # of the lowest speed of the plan, at slow roll, and of the loop's own frequency
-LOOP_RAD_S = 390.0  # sqrt(k1) of T Table 2.4: the rigid modes
 TURNS = 20  # that a slow roll needs
 PER_TURN = 4.0  # samples in a turn of the highest order
 
@@ -29,11 +28,12 @@ def of_speeds(rig: RigFile, speeds: Sequence[float]) -> Iterator[str]:
         yield f"speeds_rad_s: expected each once, and above {2 * landing * RPM:.0f} r/min, twice the landing speed"
 
 
-def of_slow_roll(rad_s: float, seconds: float, speeds: Sequence[float]) -> Iterator[str]:
+def of_slow_roll(rig: RigFile, rad_s: float, seconds: float, speeds: Sequence[float]) -> Iterator[str]:
     """A slow roll at `rad_s` (0: none) that is none beside the speeds in rad/s, or too short."""
-    if 0 < rad_s < 15 or rad_s > too_fast(speeds):
+    most = too_fast(speeds, conventions(rig))
+    if 0 < rad_s < 15 or rad_s > most:
         yield (f"slow_rad_s: found {rad_s * RPM:.0f} r/min; expected 0, or 143 (two turns a second and some more) to "
-               f"{too_fast(speeds) * RPM:.0f} r/min: faster, unbalance moves the shaft")  # fmt: skip
+               f"{most * RPM:.0f} r/min: faster, unbalance moves the shaft")  # fmt: skip
     if rad_s and rad_s * seconds < 2 * math.pi * TURNS:
         yield f"slow_s: found {seconds:g} s; expected {TURNS} turns at {rad_s * RPM:.0f} r/min or more"
 
@@ -58,6 +58,6 @@ def of_captures(rig: RigFile, capture_s: float, rate_hz: float, orders: int, spe
         yield f"capture_s: found {capture_s:g} s; expected five turns at {min(speeds) * RPM:.0f} r/min or more"
 
 
-def too_fast(speeds: Sequence[float]) -> float:
-    """Above this speed in rad/s a slow roll is none, beside the others in rad/s."""
-    return SLOW_MOST * min(*speeds, LOOP_RAD_S) if speeds else 0.0
+def too_fast(speeds: Sequence[float], machine: AmbRotor) -> float:
+    """Above this speed in rad/s a slow roll is none, beside the others in rad/s, and beside the loop where its own is known."""
+    return SLOW_MOST * min(*speeds, machine.loop_rad_s) if speeds else 0.0

@@ -40,7 +40,7 @@ def of_signals(orbits: Sequence[Orbit], plan: Plan) -> Iterator[Finding]:
     for o in orbits:
         upper, lower = upper_and_lower(o.machine)
         rows = (
-            *zip(o.machine.positions, o.path.readings, strict=True),
+            *zip(o.machine.stations.channels, o.path.readings, strict=True),
             *zip(upper, o.upper, strict=True),
             *zip(lower, o.lower, strict=True),
         )
@@ -64,7 +64,7 @@ def of_signals(orbits: Sequence[Orbit], plan: Plan) -> Iterator[Finding]:
 def _clipping(o: Orbit) -> Iterator[Finding]:
     """A live sensor has noise also where it is greatest; one that clips repeats its limit."""
     found = False
-    for name, x in zip(o.machine.positions, o.path.readings, strict=True):
+    for name, x in zip(o.machine.stations.channels, o.path.readings, strict=True):
         for limit in (x.max(), x.min()):
             if signals.longest_at(x, limit) >= HELD:
                 found = True

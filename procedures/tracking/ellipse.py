@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.errors import AnalysisError
-from procedures.amb_rotor.geometry import Facts, centre, distances
+from procedures.amb_rotor.geometry import Facts, centre, left
 
 Array = npt.NDArray[np.float64]
 SMOOTH_S = 3e-3  # of peaks at rest: the error of a sine of 10 Hz loses a thousandth
@@ -59,7 +59,7 @@ class Wave:
 
 @dataclass(frozen=True)
 class Path:
-    """One law's orbit: `t` (n,) s, `readings` (4, n) m of yi, zi, yo, zo, `turn_s` of a turn of the shaft, 0 at rest."""
+    """One law's orbit: `t` (n,) s, `readings` (probes, n) m, `turn_s` of a turn of the shaft, 0 at rest."""
 
     wave: Wave
     t: Array
@@ -94,9 +94,9 @@ def errors(path: Path, f: Facts) -> Array:
 
 
 def plane_errors(path: Path, f: Facts) -> Array:
-    """Errors at the sensors yi, zi, yo, zo in m, averaged as `errors`: (4, n)."""
+    """Errors at the n probes in m, averaged as `errors`: (n, samples)."""
     at = path.readings / np.array(f.gains)[:, None]
-    return averaged(path.t, at - np.tile(path.wave.at(path.t, f.t_0), (2, 1)), path.smooth_s)
+    return averaged(path.t, at - f.matrix[:, :2] @ path.wave.at(path.t, f.t_0), path.smooth_s)
 
 
 def revolutions(path: Path) -> list[npt.NDArray[np.bool_]]:
@@ -115,7 +115,7 @@ def revolutions(path: Path) -> list[npt.NDArray[np.bool_]]:
 @dataclass(frozen=True)
 class Turns:
     """Each whole revolution of the reference (m of them): `errors` (m, 4, k) of y, z in m and the tilts psi, theta in rad at k
-    equal parts of it, `planes` (m, 4, k) m at the sensors, `follows` (m, 2) what y and z do over what they should at the
+    equal parts of it, `planes` (m, n, k) m at the sensors, `follows` (m, 2) what y and z do over what they should at the
     reference's frequency, and `left` (m,) m to the rings. Revolutions are alike: noise is what differs between them."""
 
     errors: Array
@@ -131,7 +131,7 @@ class Turns:
 def turns(path: Path, f: Facts) -> Turns:
     """The revolutions of a path."""
     per = revolutions(path)
-    radius = distances(path.readings, f)
+    room = left(path.readings, f)
     both = np.concatenate([errors(path, f), plane_errors(path, f)])
     period = path.wave.tick * path.wave.ticks
     parts = np.arange(round(1 / path.wave.hz / period)) * period
@@ -141,7 +141,7 @@ def turns(path: Path, f: Facts) -> Turns:
         folded[:, :4],
         folded[:, 4:],
         followed(path, f)[1],
-        np.array([f.clearance - float(radius[:, m].max()) for m in per]),
+        np.array([float(room[m].min()) for m in per]),
     )
 
 

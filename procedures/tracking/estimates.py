@@ -12,8 +12,8 @@ from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.series import batch_means
-from procedures.amb_rotor.conventions import conventions
-from procedures.amb_rotor.geometry import Facts, nominal
+from procedures.amb_rotor.geometry import Facts, lengths, nominal
+from procedures.amb_rotor.stations import stations
 from procedures.shared.certificates import certified
 from procedures.tracking.ellipse import Turns, quantities, revolutions, turns
 from procedures.tracking.steps import Orbit, upper_and_lower
@@ -34,12 +34,11 @@ class Input:
     moved: Moved
 
 
-def _at(k: int, kind: str) -> Moved:
+def _at(k: int, kind: str, sign: int = 1) -> Moved:
     def moved(f: Facts, by: float) -> Facts:
         values = list(getattr(f, kind))
-        values[k] += by
-        four = (values[0], values[1], values[2], values[3])
-        return replace(f, gains=four) if kind == "gains" else replace(f, offsets=four)
+        values[k] += sign * by
+        return replace(f, gains=tuple(values)) if kind == "gains" else replace(f, offsets=tuple(values))
 
     return moved
 
@@ -54,12 +53,13 @@ def _one(kind: str) -> Moved:
 def inputs(rig: RigFile, tick_s: float, runout_m: float) -> list[Input]:
     """Everything that the facts are uncertain by."""
     out = []
-    for k, name in enumerate(conventions(rig).positions):
+    for k, (name, placed) in enumerate(stations(rig).probes.items()):
         s = rig.sensors[name]
-        out += [
-            Input(f"sensors/{name}/gain", f"gain of {name}", s.gain, _at(k, "gains")),
+        of_sensor = [
+            Input(f"sensors/{name}/gain", f"gain of {name}", s.gain, _at(k, "gains", placed.sign)),
             Input(f"sensors/{name}/offset", f"zero of {name}", s.offset, _at(k, "offsets")),
         ]
+        out += [i for i in of_sensor if i.stated.standard_uncertainty > 0]
         if runout_m > 0:
             allowed = Toleranced(
                 value=0.0,
@@ -71,12 +71,7 @@ def inputs(rig: RigFile, tick_s: float, runout_m: float) -> list[Input]:
                 source="plan: runout_m",
             )
             out.append(Input(f"runout/{name}", f"runout at {name}", allowed, _at(k, "offsets")))
-    for name, kind in (
-        ("com_to_inboard_sensor", "l_is"),
-        ("com_to_outboard_sensor", "l_os"),
-        ("clearance", "clearance"),
-    ):
-        out.append(Input(f"geometry/{name}", name.replace("_", " "), rig.geometry[name], _one(kind)))
+    out += [Input(length.identity, length.name, length.number, length.moved) for length in lengths(rig)]
     clock = Toleranced(
         value=0.0,
         unit="s",

@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from bench.figures import Figure, Series
-from procedures.amb_rotor.geometry import Facts, centre
+from procedures.amb_rotor.geometry import Facts, at_rings, centre
+from procedures.amb_rotor.stations import Ring
 from procedures.tracking.ellipse import errors, revolutions
 from procedures.tracking.steps import Orbit
 
@@ -16,17 +17,16 @@ def all_figures(orbits: Sequence[Orbit], facts: Mapping[str, Facts]) -> list[Fig
     """In the order of the report."""
     return [
         _orbit(orbits, facts),
-        _plane(orbits, facts, 0, "inboard"),
-        _plane(orbits, facts, 1, "outboard"),
+        *(_plane(orbits, facts, k, ring) for k, ring in enumerate(orbits[0].machine.stations.rings)),
         *(_errors(orbits, facts, k, axis) for k, axis in enumerate("yz")),
         *(_tilts(orbits, facts, k, name) for k, name in ((2, "ψ, about y"), (3, "θ, about z"))),
         *(_coils(o) for o in orbits),
     ]
 
 
-def _ring(f: Facts) -> Series:
+def _ring(clearance: float) -> Series:
     turn = np.linspace(0, 2 * np.pi, 181)
-    return Series("touchdown ring", 1e6 * f.clearance * np.cos(turn), 1e6 * f.clearance * np.sin(turn), "guide")
+    return Series("touchdown ring", 1e6 * clearance * np.cos(turn), 1e6 * clearance * np.sin(turn), "guide")
 
 
 def _two(o: Orbit) -> np.ndarray:
@@ -53,14 +53,15 @@ def _orbit(orbits: Sequence[Orbit], facts: Mapping[str, Facts]) -> Figure:
     )
 
 
-def _plane(orbits: Sequence[Orbit], facts: Mapping[str, Facts], k: int, name: str) -> Figure:
-    series = [_ring(facts[orbits[0].law])]
+def _plane(orbits: Sequence[Orbit], facts: Mapping[str, Facts], k: int, ring: Ring) -> Figure:
+    series = [_ring(facts[orbits[0].law].rings[k].clearance)]
     for o in orbits:
-        at = 1e6 * o.path.readings[2 * k : 2 * k + 2, _two(o)]
-        series.append(Series(o.law, at[0], at[1]))
+        f = facts[o.law]
+        y, z = at_rings(o.path.readings[:, _two(o)] / np.array(f.gains)[:, None], f)[k]
+        series.append(Series(o.law, 1e6 * y, 1e6 * z))
     return Figure(
-        f"ring-{name}",
-        f"Orbit at the {name} sensors",
+        f"ring-{ring.name}",
+        f"Orbit at the {ring.name} {'sensors' if ring.arm is None else 'ring'}",
         "Single samples, with the touchdown ring as the rig file states it; its middle is within the sensors' zero.",
         "y (µm)",
         "z (µm)",

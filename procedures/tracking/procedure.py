@@ -203,6 +203,7 @@ def requires(rig: RigFile) -> Requires:
 
 procedure = Procedure(
     name="tracking",
+    places=("at rest",),
     title="Tracking: the centre of mass follows an ellipse",
     measures=MEASURES,
     state=RigState.READY,

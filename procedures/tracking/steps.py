@@ -14,7 +14,7 @@ from bench.recording import Recording, Step
 from bench.rigfile import RigFile
 from bench.rigfile.roles import SPEED, STATUS
 from procedures.amb_rotor.conventions import AmbRotor, conventions
-from procedures.amb_rotor.geometry import Facts, distances
+from procedures.amb_rotor.geometry import Facts, left
 from procedures.amb_rotor.onset import onset
 from procedures.tracking.ellipse import Path, Wave
 
@@ -43,7 +43,7 @@ class Orbit:
 
     def ring_distance(self, facts: Facts) -> float:
         """The least distance to a ring that the readings show, as they stand: m, below zero inside it."""
-        return facts.clearance - float(distances(self.path.readings, facts).max())
+        return float(left(self.path.readings, facts).min())
 
     @property
     def where(self) -> str:
@@ -63,7 +63,7 @@ def upper_and_lower(machine: AmbRotor) -> tuple[tuple[str, ...], tuple[str, ...]
 def channels(machine: AmbRotor) -> tuple[str, ...]:
     """What is read of an orbit."""
     upper, lower = upper_and_lower(machine)
-    return (*machine.positions, *upper, *lower, SPEED, STATUS)
+    return (*machine.stations.channels, *upper, *lower, SPEED, STATUS)
 
 
 def sample_reference(rig: RigFile, hz: float, y: float, z: float, period_ns: int, ratio: int = 1) -> Wave:
@@ -119,10 +119,10 @@ def _read(recording: Recording[Any], step: Step, grown: Step | None, origin: int
     path = Path(
         _wave(recording, step),
         (data["t_ns"] - origin) * 1e-9,
-        np.array([data[c] for c in machine.positions]),
+        np.array([data[c] for c in machine.stations.channels]),
         2 * np.pi / float(np.median(speed)) if turning else 0.0,
     )
-    whole = path if grown is None else _join(grown, path, machine.positions, origin)
+    whole = path if grown is None else _join(grown, path, machine.stations.channels, origin)
     upper, lower = (np.array([data[c] for c in names]) for names in upper_and_lower(machine))
     flags = data[STATUS].astype(np.int64)
     return Orbit(str(labels["law"]), path, whole, upper, lower, flags, speed, t_0, clear, step, machine)

@@ -128,7 +128,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     yield from fitting.of_speeds(rig, plan.speeds_rad_s)
     if len(set(plan.variants)) < len(plan.variants) or (plan.observed and plan.law in ("", conventions(rig).plain_law)):
         yield "variants: expected each once, and with the plain law off alone: it compensates nothing"
-    yield from fitting.of_slow_roll(plan.slow_rad_s, plan.slow_s, plan.speeds_rad_s)
+    yield from fitting.of_slow_roll(rig, plan.slow_rad_s, plan.slow_s, plan.speeds_rad_s)
     yield from fitting.of_captures(rig, plan.capture_s, plan.rate_hz, plan.orders, plan.speeds_rad_s)
 
 
@@ -139,6 +139,7 @@ def figures(results: Results, recording: Recording[Plan]) -> Iterable[Shown]:
 
 procedure = Procedure(
     name="unbalance",
+    places=("at rest",),
     title="Unbalance response of the turning shaft",
     measures=MEASURES,
     state=RigState.READY,

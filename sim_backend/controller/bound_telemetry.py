@@ -15,8 +15,9 @@ from bench.rigfile.busload import frame_seconds
 from bench.rigfile.elements import Mark
 from bench.rigfile.messages import Message, MessageMap
 from sim_backend.controller.meanings import fault_codes, state_codes
+from sim_backend.controller.states import HELD
 from sim_backend.controller.telemetry import Readings, Span, kept
-from sim_backend.machine import SimulatedPlant, Truth
+from sim_backend.machine import PLANTED_S, SimulatedPlant, Truth
 from sim_backend.spoken import CONTROLLER, bits, tellable, told_as, warming
 
 Ints = npt.NDArray[np.int64]
@@ -67,6 +68,9 @@ class BoundTelemetry:
         said = {} if columns is None else bits(rig)
         self._bits = [(self._place[name], bit) for name, bit in said.items() if name in self._place]
         self._codes = {*CODES, *(bit.channel for bit in said.values())}
+        planted = {n: v for n, v in truth.planted().items() if n in rig.channels}
+        self._planted = {self._place[told_as(rig, n, self._known) or n]: v for n, v in planted.items()}
+        self._held_from: int | None = None
         self._tick_ns = round(plant.tick_s * 1e9)
         self._truth, self._sequence = truth, plant.tick // plant.period_ticks
         self._parts = []
@@ -106,6 +110,8 @@ class BoundTelemetry:
         ticks, values = self._readings.of(spans, n)
         for column, bit in self._bits:
             values[:, self._place[bit.channel]] += (bit.mask or 1) * (values[:, column] != 0)
+        if self._planted:
+            self._plant(values, ticks, np.repeat([s.state in HELD for s in spans], [len(s.rows) for s in spans]))
         sequence = np.arange(self._sequence, self._sequence + n)
         self._sequence += n
         batch = np.zeros((n, len(self._parts)), FRAME)
@@ -115,6 +121,15 @@ class BoundTelemetry:
             batch["length"][:, k] = part.message.length
             batch["data"][:, k, : part.message.length] = self._payloads(part, values, sequence, ticks)
         return kept(batch, sequence, self._truth).reshape(-1)
+
+    def _plant(self, values: npt.NDArray[np.float64], ticks: Ints, held: npt.NDArray[np.bool_]) -> None:
+        """Readings that are planted, from when the shaft is held first."""
+        if self._held_from is None and held.any():
+            self._held_from = int(ticks[held][0])
+        if self._held_from is not None:
+            told = held & (ticks < self._held_from + PLANTED_S * 1e9 / self._tick_ns)
+            for place, value in self._planted.items():
+                values[told, place] = value
 
     def _payloads(
         self, part: _Part, values: npt.NDArray[np.float64], sequence: Ints, ticks: Ints

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 
 import numpy as np
@@ -34,6 +35,12 @@ class Parameters:
         self.values = {name: p.default for name, p in rig.parameters.items()}
         for name, value in self.values.items():
             self._apply(name, value)
+
+    def on(self, plant: SimulatedPlant) -> Parameters:
+        """The same that act on another plant from now on, for truths that go two ways from one state."""
+        other = copy.copy(self)
+        other._plant, other.values, other.own = plant, dict(self.values), dict(self.own)
+        return other
 
     def read(self, index: int) -> tuple[str, float]:
         """Status and value in force."""

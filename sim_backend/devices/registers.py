@@ -15,8 +15,9 @@ from bench.errors import ConfigError
 from bench.rigfile import Device, RigFile
 from bench.rigfile.registers import RANGES, Register, RegisterRefused, Table, Words
 from sim_backend.controller.telemetry import AMBIENT_K, RISE_K, WARM_S
+from sim_backend.core import LEVITATE
 from sim_backend.devices.drive import SimulatedDrive
-from sim_backend.machine import SimulatedPlant, Truth
+from sim_backend.machine import PLANTED_S, SimulatedPlant, Truth
 
 ILLEGAL_ADDRESS, ILLEGAL_VALUE = 2, 3
 IDLE_A = 0.35  # what the supply feeds besides the copper of the windings
@@ -131,6 +132,7 @@ class RegisterBank:
 
     def __init__(self, rig: RigFile, truth: Truth, plant: SimulatedPlant) -> None:
         self._plant = plant
+        self._held_from: int | None = None
         self.drives: dict[str, SimulatedDrive] = {}
         self.devices: dict[str, RegisterBankDevice] = {}
         made = {"drive": self._drive, "supply": self._supply, "thermal": self._thermal}
@@ -177,7 +179,8 @@ class RegisterBank:
     def _drive(self, name: str, spec: Device, rig: RigFile, truth: Truth) -> RegisterBankDevice:
         drive = SimulatedDrive(self._plant, spec, truth, rig.envelope.max_speed_rad_s)
         self.drives[name] = drive
-        device = RegisterBankDevice(name, spec, drive.values, lambda names: _obeyed(device, drive, names), drive.asked)
+        values = self._told(name, drive.values, truth)
+        device = RegisterBankDevice(name, spec, values, lambda names: _obeyed(device, drive, names), drive.asked)
         return device
 
     def _supply(self, name: str, spec: Device, rig: RigFile, truth: Truth) -> RegisterBankDevice:
@@ -185,14 +188,28 @@ class RegisterBank:
             volts = truth.supply_V
             return {"voltage": volts, "current": IDLE_A + truth.machine.copper_W(self._plant) / volts, "state": 1.0}
 
-        return RegisterBankDevice(name, spec, values, lambda _: True, lambda: None)
+        return RegisterBankDevice(name, spec, self._told(name, values, truth), lambda _: True, lambda: None)
 
     def _thermal(self, name: str, spec: Device, rig: RigFile, truth: Truth) -> RegisterBankDevice:
         def values() -> Values:  # as the telemetry's temperatures, controller/telemetry.py
             warm = AMBIENT_K + RISE_K * (1 - math.exp(-self._plant.tick * self._plant.tick_s / WARM_S))
             return {n: warm + above for n, above in truth.machine.windings.items()} | {"ambient": AMBIENT_K}
 
-        return RegisterBankDevice(name, spec, values, lambda _: True, lambda: None)
+        return RegisterBankDevice(name, spec, self._told(name, values, truth), lambda _: True, lambda: None)
+
+    def _told(self, name: str, values: Callable[[], Values], truth: Truth) -> Callable[[], Values]:
+        """What a device measures, and from when the shaft is held first what is planted in its place."""
+        planted, plant = truth.planted(name), self._plant
+        if not planted:
+            return values
+
+        def told() -> Values:
+            held = plant.mode == LEVITATE
+            self._held_from = plant.tick if held and self._held_from is None else self._held_from
+            passed_s = (plant.tick - (self._held_from or 0)) * plant.tick_s
+            return {**values(), **(planted if held and passed_s < PLANTED_S else {})}
+
+        return told
 
 
 @dataclass(frozen=True)

@@ -113,7 +113,7 @@ def pty_port() -> Iterator[tuple[int, int]]:
 @contextmanager
 def metronome() -> Iterator[Callable[[int], None]]:
     """A call that returns when so many heartbeats of 5 ms have passed, or more time."""
-    beat = Beat(0x010, bytes(8), 4, fd=True, period_s=0.005)
+    beat = Beat(0x010, bytes(8), range(32, 48), fd=True, period_s=0.005)
     with socket_port() as (far, port), running(beat, WriterSpec("slcan", port.fileno())) as process:
 
         def passes(count: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import pytest
@@ -9,30 +10,54 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bench.errors import ConfigError
+from bench.link.codec import places_of
+from bench.rigfile.messages import load_messages
 from bench.wire import packet
 from drivers.beat import FD, RAW, Beat, Encoder, Schedule, WriterSpec
 
 MS = 1_000_000
-BEAT = Beat(0x010, bytes.fromhex("AABBCCDD00000000"), counter_at=4, fd=True, period_s=0.02, lease_s=0.1)
+BEAT = Beat(0x010, bytes.fromhex("AABBCCDD00000000"), range(32, 48), fd=True, period_s=0.02, lease_s=0.1)
 
 
 def test_the_counter_is_little_endian_and_wraps() -> None:
     assert BEAT.frame(1) == (0x010, bytes.fromhex("AABBCCDD01000000"), FD)
     assert BEAT.frame(0x1234)[1] == bytes.fromhex("AABBCCDD34120000")
     assert BEAT.frame(0x10000) == BEAT.frame(0)
-    assert Beat(0x010, bytes(8), 0, fd=False).frame(7) == (0x010, bytes.fromhex("0700000000000000"), 0)
+    assert Beat(0x010, bytes(8), range(16), fd=False).frame(7) == (0x010, bytes.fromhex("0700000000000000"), 0)
 
 
-@pytest.mark.parametrize("counter_at", [-1, 7, 8])
-def test_a_counter_outside_the_payload_is_refused(counter_at: int) -> None:
+@pytest.mark.parametrize("counter", [range(-1, 15), range(56, 72), range(64, 65), ()])
+def test_a_counter_outside_the_payload_is_refused(counter: Sequence[int]) -> None:
     with pytest.raises(ConfigError, match="8 bytes"):
-        Beat(0x010, bytes(8), counter_at, fd=True)
+        Beat(0x010, bytes(8), counter, fd=True)
+
+
+@pytest.mark.parametrize(
+    ("signal", "number", "payload"),  # of a message whose other bits are all set, by hand
+    [
+        ("0|16@1+", 0x1234, "3412FFFF"),
+        ("7|16@0+", 0x1234, "1234FFFF"),
+        ("8|8@1+", 0x1AB, "FFABFFFF"),
+        ("4|4@1+", 0x15, "5FFFFFFF"),
+        ("7|4@0+", 0x15, "5FFFFFFF"),
+        ("12|1@1+", 2, "FFEFFFFF"),
+        ("11|12@0+", 0xABC, "FFFABCFF"),
+        ("4|12@1+", 0xABC, "CFABFFFF"),
+        ("31|8@0+", 7, "FFFFFF07"),
+        ("7|32@0+", 0x01020304, "01020304"),
+    ],
+)
+def test_a_counter_has_any_width_and_byte_order(signal: str, number: int, payload: str) -> None:
+    """Motorola's start is the most significant bit, Intel's the least."""
+    dbc = f'VERSION ""\n\nBU_: A B\n\nBO_ 16 Alive: 4 A\n SG_ Count : {signal} (1,0) [0|0] "" B\n'
+    counter = places_of(load_messages(dbc)["Alive"].signal("Count"))
+    assert Beat(16, bytes.fromhex("FFFFFFFF"), counter, fd=False).frame(number)[1].hex().upper() == payload
 
 
 @pytest.mark.parametrize("period_s", [0.0, -1.0, 1.5, float("nan")])
 def test_a_period_over_the_lease_or_near_zero_is_refused(period_s: float) -> None:
     with pytest.raises(ConfigError, match="period"):
-        Beat(0x010, bytes(8), 4, fd=True, period_s=period_s)
+        Beat(0x010, bytes(8), range(32, 48), fd=True, period_s=period_s)
 
 
 def test_nothing_is_due_before_the_first_renewal() -> None:

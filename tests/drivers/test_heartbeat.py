@@ -33,7 +33,7 @@ from bench.wire import packet
 from drivers import heartbeat
 from drivers.heartbeat import Beat, HeartbeatProcess, WriterSpec
 
-BEAT = Beat(0x010, bytes(8), counter_at=4, fd=True, period_s=0.01, lease_s=1.0)
+BEAT = Beat(0x010, bytes(8), range(32, 48), fd=True, period_s=0.01, lease_s=1.0)
 SHORT = replace(BEAT, lease_s=0.05)  # five heartbeats
 ENDLESS = replace(BEAT, lease_s=1000.0)
 
@@ -278,7 +278,7 @@ def test_a_wire_that_cannot_be_used_is_a_configuration_error(writer: WriterSpec,
 
 def test_a_heartbeat_that_the_format_does_not_know_is_a_configuration_error() -> None:
     with socket_port() as (_, port), pytest.raises(ConfigError, match="9 bytes"):
-        HeartbeatProcess(Beat(0x010, bytes(9), 4, fd=True), WriterSpec("slcan", port.fileno()))
+        HeartbeatProcess(Beat(0x010, bytes(9), range(32, 48), fd=True), WriterSpec("slcan", port.fileno()))
 
 
 @pytest.mark.parametrize("program", ["/bin/false", "/no/such/python"])

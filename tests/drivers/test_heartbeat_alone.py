@@ -19,7 +19,7 @@ import os, select, signal, sys
 from drivers.heartbeat import Beat, HeartbeatProcess, WriterSpec
 port, lease_s, fork = int(sys.argv[1]), float(sys.argv[2]), sys.argv[3] == "fork"
 signal.signal(signal.SIGINT, lambda *_: os.write(1, b"interrupted\\n"))
-heart = HeartbeatProcess(Beat(0x010, bytes(8), 4, True, 0.01, lease_s), WriterSpec("slcan", port))
+heart = HeartbeatProcess(Beat(0x010, bytes(8), range(32, 48), True, 0.01, lease_s), WriterSpec("slcan", port))
 if fork and os.fork() == 0:  # a process that keeps the parent's end of the pipe open
     os.close(port)
     sys.stdin.read()

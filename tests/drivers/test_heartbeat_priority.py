@@ -36,7 +36,7 @@ def test_what_is_said_of_the_priority_is_what_the_system_gives(who: str) -> None
 
 def test_the_process_tells_what_it_was_granted() -> None:
     with socket_port() as (_, port):
-        heart = HeartbeatProcess(Beat(0x010, bytes(8), 4, True), WriterSpec("slcan", port.fileno()))
+        heart = HeartbeatProcess(Beat(0x010, bytes(8), range(32, 48), True), WriterSpec("slcan", port.fileno()))
         try:
             assert heart.unpreferred in ("", "Operation not permitted")
         finally:

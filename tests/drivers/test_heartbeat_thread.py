@@ -13,7 +13,7 @@ from bench.errors import LinkError
 from bench.link.frames import FD, SENT, FrameBatch, frame
 from drivers.heartbeat import Beat, HeartbeatThread
 
-BEAT = Beat(0x010, bytes(8), counter_at=4, fd=True, period_s=0.005, lease_s=1.0)
+BEAT = Beat(0x010, bytes(8), range(32, 48), fd=True, period_s=0.005, lease_s=1.0)
 DEADLINE_S = 30.0
 
 

@@ -21,7 +21,7 @@ from drivers.portable import Words
 
 MS = 1_000_000
 T0 = 1000 * MS
-BEAT = Beat(0x010, bytes(8), counter_at=4, fd=True, period_s=0.02, lease_s=0.1)
+BEAT = Beat(0x010, bytes(8), range(32, 48), fd=True, period_s=0.02, lease_s=0.1)
 SLCAN = WriterSpec("slcan")
 
 

@@ -23,7 +23,7 @@ from drivers.heartbeat import HeartbeatProcess
 from drivers.live_link import LiveLink
 from drivers.wires import Wire, open_wire
 
-BEAT = Beat(0x010, bytes(8), 4, True)
+BEAT = Beat(0x010, bytes(8), range(32, 48), True)
 SETUP = b"\r\rC\rV\rS8\rY5\rO\rV\rF\r"
 KINDS = pytest.mark.parametrize("tcp", [False, True], ids=["pty", "tcp"])
 
@@ -331,7 +331,7 @@ def test_what_cannot_be_opened_leaves_nothing() -> None:
     with pytest.raises(ConfigError, match="link can0: port /dev/ttyLEV2: found no such device"):
         LiveLink("can0", lambda: open_wire(LinkSpec(url="serial:/dev/ttyLEV2"), "can0"), BEAT)
     with far_end() as end:
-        wrong = Beat(0x1010, bytes(8), 4, True)  # a packet has 11-bit identifiers
+        wrong = Beat(0x1010, bytes(8), range(32, 48), True)  # a packet has 11-bit identifiers
         with pytest.raises(ConfigError, match="link can0: heartbeat"):
             LiveLink("can0", lambda: open_wire(spec(end, "serial"), "can0"), wrong)
     assert descriptors() == before

@@ -124,7 +124,13 @@ def test_the_example_is_a_rig_without_a_problem_and_fits_a_classic_bus() -> None
 
 def test_the_heartbeat_is_that_of_the_dbc() -> None:
     beat = beat_of(PLAIN, SIMULATED)
-    assert (beat.identifier, beat.payload, beat.counter_at, beat.fd, beat.period_s) == (16, bytes(4), 0, False, 0.02)
+    assert (beat.identifier, beat.payload, beat.counter, beat.fd, beat.period_s) == (
+        16,
+        bytes(4),
+        (*range(16),),
+        False,
+        0.02,
+    )
 
 
 @pytest.mark.long

@@ -11,9 +11,9 @@ from amb_stand import AMB_ROTOR
 
 from bench.rigfile import load_rig
 from bench.uncertainty import Estimate, Influence
-from procedures.amb_rotor import magnetics
+from procedures.amb_rotor import magnetics, pressed
 from procedures.amb_rotor.magnetics import Positions
-from procedures.amb_rotor.rings import EXCHANGES, of_readings, unexplained
+from procedures.amb_rotor.rings import EXCHANGES, of_readings
 from procedures.bearing_model.adjustment import Adjusted, adjust
 
 GAP, BETA, BIAS = 5.25e-4, 6.95e-7, 1.0
@@ -219,9 +219,11 @@ def test_readings_on_the_rings_forbid_the_lift() -> None:
 def test_where_a_failed_lift_presses_the_shaft_tells_the_exchange() -> None:
     """Outboard the upper coils of y pull it up, inboard the lower ones pull it down, each against its ring."""
     rig = load_rig("amb5dof")
+    known = pressed.known(rig)
+    assert known is not None
     p, n = np.array([0.0, 1.0, 2.0, 1.0]), np.array([2.0, 1.0, 0.0, 1.0])
     truth = np.array([-99e-6, -10e-6, 99e-6, 3e-6])
-    left = {e.told(("yi", "zi", "yo", "zo")): unexplained(truth[list(e.order)], p, n, rig) for e in EXCHANGES}
+    left = {e.told(("yi", "zi", "yo", "zo")): pressed.unexplained(truth[list(e.order)], p, n, known) for e in EXCHANGES}
     assert left[""] < 0.5
     assert min(left, key=lambda k: left[k]) == ""
     assert left["yi with yo"] > 4

@@ -115,6 +115,14 @@ def test_a_tail_along_the_bands_edge_is_told_where_it_crosses_and_left_open_wher
     assert not never.open
 
 
+def test_nothing_is_told_beyond_the_shortest_record() -> None:
+    """Records of a live run end when its computer comes round to it. A curve says nothing where it was not fitted to all."""
+    short, long = (made(0.6, tail=0.02, constant=0.3, record=record, seed=5) for record in (1.0, 3.0))
+    steps = [b if b.case == Case("A", 0.0, "y", 10e-6, 1) else a for a, b in zip(short, long, strict=True)]
+    bounds = interval(settling_estimate(Case("A", 0.0, "y", 10e-6, 1), settled(steps)))
+    assert bounds.low < true_time(0.6, tail=0.02, constant=0.3) < bounds.high
+
+
 @pytest.mark.parametrize("other", [34 + 583j, 9 + 565j, 62 + 598j])
 def test_an_oscillation_that_noise_makes_grow_hides_nothing(other: complex) -> None:
     """Position hardly has the second oscillation of some machines, so that noise makes its pole: to e^50 within the record."""

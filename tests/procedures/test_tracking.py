@@ -25,7 +25,7 @@ from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.rigfile.roles import Status
 from bench.uncertainty import Estimate
-from procedures.amb_rotor.geometry import Facts
+from procedures.amb_rotor.geometry import Edge, Facts
 from procedures.synchronous import bearings
 from procedures.tracking import checks, drift, estimates
 from procedures.tracking import ellipse as estimator
@@ -207,7 +207,9 @@ def test_plans_that_cannot_work_are_refused() -> None:
     assert procedure.problems(load_rig("tsbs12"), Plan())
 
 
-FACTS = Facts((1.0,) * 4, (0.0,) * 4, 0.078, 0.1, 0.0123, 1e-4)
+L_IS, L_OS = 0.078, 0.1
+RINGS = (Edge(0, None, 1e-4), Edge(1, None, 1e-4))
+FACTS = Facts((1.0,) * 4, (0.0,) * 4, (-L_IS, -L_IS, L_OS, L_OS), (0.0, math.pi / 2) * 2, 0.0123, RINGS)
 
 
 def orbit(hz: float, turn_s: float = 0.0, lag: float = 0.0, ratio: float = 1.0, tilt: float = 0.0) -> Orbit:
@@ -220,7 +222,7 @@ def orbit(hz: float, turn_s: float = 0.0, lag: float = 0.0, ratio: float = 1.0, 
     y, z = 50e-6 * ratio * np.sin(turn), 80e-6 * ratio * np.cos(turn)
     if turn_s:
         y, z = y + 8e-6 * np.cos(2 * math.pi * reads / turn_s), z + 8e-6 * np.sin(2 * math.pi * reads / turn_s)
-    at = [(y - FACTS.l_is * tilt), z, (y + FACTS.l_os * tilt), z]
+    at = [(y - L_IS * tilt), z, (y + L_OS * tilt), z]
     return Orbit(wave, end, np.array([x.mean(axis=1) for x in at], np.float64), turn_s)
 
 

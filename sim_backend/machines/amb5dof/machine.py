@@ -11,6 +11,7 @@ import numpy.typing as npt
 from bench.rigfile import RigFile
 from bench.rigfile.toleranced import Toleranced
 from sim_backend.machine import Machine, Truth
+from sim_backend.machines.amb5dof.motions import MOTIONS
 from sim_backend.machines.amb5dof.operator import Balancer
 from sim_backend.machines.amb5dof.params import AmbParams, runout
 from sim_backend.machines.amb5dof.plant import AXES, CHANNELS, COILS, TRACE, AmbPlant
@@ -202,5 +203,5 @@ AMB5DOF = Machine(
     radial=slice(0, 4), integral_gains=frozenset(("ki", "k0")), turns=False,
     channels=NEEDED, places=places, spoil=spoil, supply_V=48.0,
     windings={"temp_i": 0.0, "temp_o": 2.0, "temp_x": -3.0}, copper_W=copper_W, operator=operator,
-    traced=traced, controls=AmbPlant.settable,
+    traced=traced, controls=AmbPlant.settable, motions=MOTIONS,
 )  # fmt: skip

@@ -11,11 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from bench import units
-from bench.rigfile import RigFile
+from bench.rigfile import RigFile, protection
 from bench.rigfile.supports import once_per_rig
 from bench.rigfile.toleranced import Toleranced
 from sim_backend.machine import Machine, Truth
 from sim_backend.machines.twin.layout import Numbers, layout_of
+from sim_backend.machines.twin.motions import MOTIONS
 from sim_backend.machines.twin.nominal import nominal_of
 from sim_backend.machines.twin.operator import Fitter
 from sim_backend.machines.twin.params import TwinParams, params
@@ -51,7 +52,7 @@ def twin(rig: RigFile) -> Machine:
         make=make, radial=slice(0, len(layout.looking)), integral_gains=_integral_gains(rig), turns=False, channels=(),
         places=partial(places, rig), spoil=spoil, supply_V=nominal.set("supply_V", 48.0), windings=windings_of(rig),
         copper_W=copper_W,
-        operator=operator, traced=partial(traced, rig), daily=DAILY, columns=columns,
+        operator=operator, traced=partial(traced, rig), daily=DAILY, columns=columns, motions=MOTIONS,
     )  # fmt: skip
 
 
@@ -63,13 +64,15 @@ def stated(rig: RigFile) -> dict[str, Toleranced]:
 
 def defects_of(rig: RigFile) -> dict[str, float]:
     """Planted defects of a rig by name, and their harmless values. `exchange_*` is how it is wired, `told_*` acts on what
-    is told alone; `factor_*` scales what a parameter sets before it acts."""
+    is told alone; `factor_*` scales what a parameter sets before it acts; `reading.*` is what a protected channel, or register
+    of a device, tells in the first second in which the shaft is held, SI (0: what it reads)."""
     layout = layout_of(rig)
     out = dict(PLAIN)
     out |= {f"probe_sign.{name}": 1.0 for name in layout.probes}
     out |= {f"{way}_coils.{a.name}": 0.0 for a in layout.axes if len(a.coils) == 2 for way in ("exchange", "told")}
     out |= {f"{way}_probes.{a}.{b}": 0.0 for a, b in combinations(layout.probes, 2) for way in ("exchange", "told")}
     out |= {f"mass_error_{label}": 0.0 for label in rig.masses}
+    out |= {f"reading.{p.name.replace(' ', '.')}": 0.0 for p in protection.all_of(rig)}
     return out | {f"factor_{name}": 1.0 for name in rig.parameters}
 
 

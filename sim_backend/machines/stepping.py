@@ -1,0 +1,190 @@
+"""What a machine does when its set points step: what steps of one size show, and the poles of small motions, from readings of
+its ticks. Each machine's `truth_step` makes them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sim_backend.core import TICK_S
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+SMALL_M = 1e-8
+ANSWER = 2  # ticks from a set point's write to the amplifiers: computed one later, applied another one later
+DECIMATED_S, ROWS, ORDER = 4e-4, 60, 12  # of the identification: between samples, rows of the Hankel matrix, states
+BEGIN_S, LENGTH_S = 6e-4, 0.1  # of the record that it is made of
+SLOW_HZ, FAST_HZ, DAMPED = 15.0, 250.0, 0.95  # of the rigid modes: slower are integrators, faster filters and bending
+SWING_S, BAND_S = 0.08, 0.25  # of the first swing; of the response that makes the bandwidth
+PHASES = 3  # of the revolution, at which steps begin: what goes with one or two a turn has no mean
+COORDINATES = "yzx"
+
+
+@dataclass(frozen=True)
+class Watched:
+    """How a machine is stepped along one axis and seen. `tick_s`; `seen` makes of its readings (n, m) y, z, x of the centre of
+    mass and two tilts as lengths, (5, n) m: as read, or as they are where its second argument says so; `write` puts the set
+    point of `axis`, m."""
+
+    axis: str
+    seen: Callable[[Array, bool], Array]
+    write: Callable[[Any, float], None]
+    tick_s: float = TICK_S
+
+    def ticks(self, seconds: float) -> int:
+        """How many there are in a time."""
+        return round(seconds / self.tick_s)
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What steps of one size and direction show together: the mean of their responses `y` (n,) as shares of the step, as read,
+    at `t` s from the set point's write; `steady_error` m, of the shaft itself."""
+
+    t: Array
+    y: Array
+    steady_error: float
+    tick_s: float = TICK_S
+
+    @property
+    def overshoot(self) -> float:
+        """Greatest position beyond the step, as a share of it."""
+        return float(self.y[: self._swing].max()) - 1
+
+    @property
+    def rise_time(self) -> float:
+        """10 to 90 % of the step, s."""
+        top = int(np.argmax(self.y[: self._swing])) + 1
+        low, high = np.interp((0.1, 0.9), self.y[:top], self.t[:top])
+        return float(high - low)
+
+    @property
+    def bandwidth(self) -> float:
+        """Where the spectrum of the response's derivative falls below 0.707 for good, Hz."""
+        y = self.y[: round(BAND_S / self.tick_s)]
+        count = round(1 / (0.5 * self.tick_s))  # zeros behind, for lines 0.5 Hz apart
+        gain = np.abs(np.fft.rfft(np.diff(y, prepend=y[0]), count))[:1000]
+        last = int(np.flatnonzero(gain >= math.sqrt(0.5))[-1])
+        return 0.5 * float(np.interp(-math.sqrt(0.5), -gain[last : last + 2], [last, last + 1]))
+
+    def settling_time(self, band: float, window_s: float) -> float:
+        """Until the mean over a window stays in the band about 1."""
+        total = np.concatenate(([0.0], np.cumsum(self.y)))
+        n = round(window_s / self.tick_s)
+        at = np.arange(1, len(self.y) + 1)
+        mean = (total[at] - total[np.maximum(at - n, 0)]) / np.minimum(at, n)
+        outside = np.flatnonzero(np.abs(mean - 1) > band)
+        return 0.0 if not len(outside) else float(self.t[outside[-1]]) + self.tick_s
+
+    @property
+    def _swing(self) -> int:
+        return round(SWING_S / self.tick_s)
+
+
+def steps(
+    plant: Any, of: Watched, size: float, rest_s: float, record_s: float, *, wait_s: float = 0.0, turn_s: float = 0.0
+) -> dict[int, Shown]:
+    """Up, back, down and back, after `wait_s` and `rest_s`: by way (1 up, -1 down) what they show together; `turn_s` of a
+    revolution, 0 at rest. Where the shaft turns, the mean of steps at PHASES of its revolution, since unbalance makes the
+    bearings' slopes go with it."""
+    responses: dict[int, list[Array]] = {1: [], -1: []}
+    errors: dict[int, list[float]] = {1: [], -1: []}
+    for begin, end in ((0.0, size), (size, 0.0), (0.0, -size), (-size, 0.0)):
+        way = 1 if end > begin else -1
+        plant.run(of.ticks(wait_s))
+        before = plant.run(of.ticks(rest_s), 1)[1]
+        for phase in range(PHASES if turn_s else 1):
+            begun = plant.twin()
+            begun.run(of.ticks(phase * turn_s / PHASES))
+            moved, at_end = _moved(begun, of, end, before, record_s, turn_s)
+            responses[way].append(way * moved / size)
+            errors[way].append(at_end - way * size)
+        of.write(plant, end)
+        plant.run(of.ticks(record_s))
+    t = np.asarray(np.arange(of.ticks(record_s)) * of.tick_s, np.float64)
+    return {w: Shown(t, np.mean(y, axis=0), float(np.mean(errors[w])), of.tick_s) for w, y in responses.items()}
+
+
+def _moved(plant: Any, of: Watched, end: float, before: Array, record_s: float, turn_s: float) -> tuple[Array, float]:
+    """Along an axis, from where it rested `before`: the position as read (n,) m, and where the shaft itself is in the end. What
+    turns with the shaft is taken away, as a twin that makes no step shows it."""
+    k, many = COORDINATES.index(of.axis), of.ticks(record_s)
+    still = plant.twin()
+    of.write(plant, end)
+    after, beside = plant.run(many, 1)[1], still.run(many, 1)[1]
+    out = []
+    for true in (False, True):
+        x, twin, rest = (of.seen(trace, true)[k] for trace in (after, beside, before))
+        ticks = turn_s / of.tick_s
+        out.append(x - (twin - drift(twin, ticks)) - float(drift(rest, ticks).mean()))
+    return out[0], float(out[1][-of.ticks(min(0.2, record_s / 4)) :].mean())
+
+
+def drift(x: Array, ticks: float) -> Array:
+    """`x` (n,) without what goes with the revolution of so many ticks, 0 where nothing turns: its means over whole ones, with
+    straight lines between their middles."""
+    if not ticks:
+        return x
+    edges = np.arange(0, len(x) + 1e-9, ticks)
+    total = np.interp(edges, np.arange(len(x) + 1), np.concatenate(([0.0], np.cumsum(x))))
+    middles = (edges[1:] + edges[:-1]) / 2
+    return np.asarray(np.interp(np.arange(len(x)) + 0.5, middles, np.diff(total) / np.diff(edges)))
+
+
+@dataclass(frozen=True)
+class Small:
+    """Of small motions along an axis: `poles` 1/s of the rigid modes with a positive frequency, their `parts` in a unit step
+    when the amplifiers answer."""
+
+    poles: Complex
+    parts: Complex
+
+    @property
+    def pole(self) -> complex:
+        """Of the oscillation as it begins: the mean of the poles, each with its part."""
+        return complex((self.parts * self.poles).sum() / self.parts.sum())
+
+    @property
+    def damping(self) -> float:
+        """Damping ratio of that pole."""
+        return -self.pole.real / abs(self.pole)
+
+    @property
+    def frequency(self) -> float:
+        """Natural frequency of that pole, Hz."""
+        return abs(self.pole) / (2 * math.pi)
+
+
+def small(plant: Any, of: Watched, repeats: int = 1) -> Small:
+    """Poles by the eigensystem realisation algorithm (Juang and Pappa, 1985) from `repeats` steps of SMALL_M: the mean of what
+    each does beside a twin in the same noise that makes none."""
+    k, begin, every = COORDINATES.index(of.axis), of.ticks(BEGIN_S), of.ticks(DECIMATED_S)
+    length = begin + of.ticks(LENGTH_S)
+    made = np.zeros((5, length))
+    for _ in range(repeats):
+        other = plant.twin()
+        of.write(other, SMALL_M)
+        stepped, still = (of.seen(p.run(length, 1)[1], False) for p in (other, plant))
+        made += (stepped - still) / (repeats * SMALL_M)
+    sampled = np.diff(made[:, begin:length:every], axis=1)
+    values = _eigenvalues(sampled[np.abs(sampled).max(axis=1) > 1e-6])
+    s = np.log(values.astype(complex)) / (every * of.tick_s)
+    powers = values[None, :] ** np.arange(sampled.shape[1])[:, None]
+    parts = np.linalg.lstsq(powers, sampled[k].astype(complex), rcond=None)[0] / (values - 1)
+    hz = np.where(s.imag > 1.0, np.abs(s), 0.0) / (2 * np.pi)
+    use = (hz > SLOW_HZ) & (hz < FAST_HZ) & (-s.real < DAMPED * np.abs(s))
+    return Small(s[use], parts[use] * np.exp(-s[use] * (begin - ANSWER) * of.tick_s))
+
+
+def _eigenvalues(y: Array) -> Complex:
+    columns = y.shape[1] - ROWS
+    hankel = np.concatenate([y[:, i : i + columns] for i in range(ROWS)])
+    u, size, v = np.linalg.svd(hankel[:, :-1], full_matrices=False)
+    root = np.sqrt(size[:ORDER])
+    return np.asarray(np.linalg.eigvals((u[:, :ORDER].T @ hankel[:, 1:] @ v[:ORDER].T) / np.outer(root, root)))
