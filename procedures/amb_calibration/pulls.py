@@ -118,8 +118,8 @@ def pulls(rig: RigFile) -> tuple[Pull, ...]:
     """
     if (found := tilt(rig)) is not None and abs(math.cos(found.value)) < STANDS and not _pulleys(rig):
         raise Lacking(
-            f"no weight across the shaft: found one that stands (shaft.tilt {math.degrees(found.value):.4g}°), and what hangs on "
-            "it pulls along it; expected a hook with a pulley (hooks.NAME.pull, hooks.NAME.pulley), which pulls to the side"
+            f"no weight across the shaft: found one that stands (shaft.tilt {math.degrees(found.value):.4g}°), and what hangs "
+            "on it pulls along it; expected a hook with a pulley (hooks.NAME.pull, hooks.NAME.pulley), which pulls to the side"
         )
     if not rig.hooks:
         lines = ["hooks: found none; expected one, where known masses pull at the shaft"]
