@@ -8,10 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+TICKS = "controller.tick"
+"""Among samples by channel, the device's ticks; no channel's name has a dot."""
+
 
 @dataclass(frozen=True, slots=True)
 class ChannelInfo:
-    """A channel of a stream: name, SI unit, and numpy type on file ("f4" values, "u2" codes)."""
+    """A channel of a stream: name, SI unit, and numpy type on file ("f4" values, "f8" times of the device, "u2" codes)."""
 
     name: str
     unit: str

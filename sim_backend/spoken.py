@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from bench import units
 from bench.rigfile import RigFile
 from bench.rigfile.binding import COMMANDS, MODES, Binding
-from bench.rigfile.capabilities import Bit
+from bench.rigfile.capabilities import Bit, Capabilities
 from bench.rigfile.messages import Message, MessageMap
 from sim_backend.machine import Machine
 
@@ -69,7 +69,7 @@ def tellable(rig: RigFile, machine: Machine) -> frozenset[str]:
         return frozenset(
             (*machine.columns(rig), *warming(rig, machine), *CONTROLLER, *(b.channel for b in bits(rig).values()))
         )
-    base = (*machine.channels, *machine.windings, *CONTROLLER)
+    base = (*machine.channels, *machine.windings, *CONTROLLER, *(b.channel for b in bits(rig).values()))
     names = tuple(dict.fromkeys((*base, *rig.channels)))
     _, goals = machine.places(machine.defects, {name: k for k, name in enumerate(names)})
     return frozenset((*base, *(names[k] for k in goals)))
@@ -77,7 +77,12 @@ def tellable(rig: RigFile, machine: Machine) -> frozenset[str]:
 
 def bits(rig: RigFile) -> Mapping[str, Bit]:
     """Where the rig file's capabilities say each status: `status.contact.RING`, `status.current_limit` and the like."""
-    status = rig.capabilities.status
+    return bits_of(rig.capabilities)
+
+
+def bits_of(capabilities: Capabilities) -> Mapping[str, Bit]:
+    """The same of capabilities by themselves."""
+    status = capabilities.status
     said = {f"status.contact.{ring}": bit for ring, bit in status.contact.items()}
     return said | {f"status.{key}": bit for key, bit in status if isinstance(bit, Bit)}
 

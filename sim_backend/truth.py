@@ -30,12 +30,8 @@ def draw(
     `visit` is the same machine on another day.
 
     Raises:
-        ConfigError: an override names nothing, or the rig file has nothing to simulate.
+        ConfigError: an override names nothing, or no machine can be made of the rig file.
     """
-    if not rig.simulation:
-        raise ConfigError(
-            f"rig {rig.name}: found no [simulation] table, so that there is nothing to simulate; expected --backend live"
-        )
     machine = machine_of(rig)
     if lacking := tuple(unspoken(rig, machine)):
         raise ConfigError(f"rig {rig.name} cannot be simulated:", lacking)

@@ -7,7 +7,6 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 OWN = ROOT / "examples" / "own-controller"
 OPERATOR = '[links.operator]\nurl = "line:127.0.0.1:0"\n\n[devices.operator]\nlink = "operator"\nroles = ["operator"]\n'
-SIMULATION = '[simulation]\nmachine = "tsbs"\n'
 
 
 def plain_text() -> str:
@@ -17,7 +16,7 @@ def plain_text() -> str:
     motor = next(line for line in native.splitlines() if line.startswith("motor_to_outboard_amb = "))
     plain = plain.replace("[geometry]\n", f"[geometry]\n{motor}\n", 1)
     machine = native[native.index("[machine]\n") : native.index("# The machine (docs")]
-    drawn = native[native.index("[simulation]\n") :].replace("[simulation]\n", SIMULATION, 1)
+    drawn = native[native.index("[simulation]\n") :]
     plain = plain.replace("[masses]\n", f"{machine}\n[masses]\n", 1)
     plain = plain.replace("[devices.controller]\n", f"{OPERATOR}\n[devices.controller]\n", 1)
     return f"{plain}\n{drawn}"

@@ -45,6 +45,15 @@ def test_places_and_directions_of_the_servomotor() -> None:
                       for table in ("probes", "bearings/inboard" if a[1] == "i" else "bearings/outboard")}  # fmt: skip
 
 
+def test_directions_count_from_up_wherever_the_file_has_its_zero() -> None:
+    """The same machine, described from a zero that is 30 degrees clockwise of up: yi at 30 degrees there."""
+    stated = 'direction = { value = 0, unit = "deg", half_width = 0.3'
+    up = f'zero_at = "the terminal box"\nup = {QUARTER.replace("90", "30")}'
+    toml = changed(TOML, (stated, stated.replace("value = 0", "value = 30")), (FAR, f"{FAR}{up}"))
+    here, there = Places(RigFile.parse(TOML, DBC)), Places(RigFile.parse(toml, DBC))
+    assert {p: there.direction(p).value for p in there.directed} == {p: here.direction(p).value for p in here.directed}
+
+
 def test_a_certified_span_stands_before_two_places() -> None:
     """Two places that each have their own error would give the span a larger uncertainty than its certificate."""
     places = Places(load_rig("tsbs12"))
@@ -98,6 +107,8 @@ def test_schema_1_says_the_same(name: str) -> None:
 
 
 FAR = 'far_end = "outboard"\n'
+QUARTER = '{ value = 90, unit = "deg", half_width = 0, distribution = "rectangular", source = "drawing" }\n'
+UPRIGHT = f"tilt = {QUARTER}"
 UP = 'axes.yo = { direction = { of = "bearings/inboard/yi", plus_deg = 0 }'
 
 
@@ -143,6 +154,11 @@ UP = 'axes.yo = { direction = { of = "bearings/inboard/yi", plus_deg = 0 }'
         ("left = { length =", "left = { lenght =", "levers.left.lenght", "geometry/lever_left", "no such key"),
         ("plus_deg = -90 }, coils = [\"i_xi_p\"", "plus_deg = 900 }, coils = [\"i_xi_p\"",
          "bearings.inboard.axes.xi.direction.plus_deg", "900", "less than or equal to 360"),
+        (FAR, FAR + 'zero_at = "the terminal box"\n', "shaft.zero_at", "'the terminal box' on a shaft that does not stand",
+         "which direction, counted from there, is up"),
+        (FAR, FAR + f"{UPRIGHT}up = {QUARTER}", "shaft.up", "on a shaft that stands", "`zero_at` says"),
+        (FAR, FAR + 'up = "geometry/amb_span"\n', "shaft.up", "geometry/amb_span in m", "the kind of rad"),
+        (FAR, FAR + 'up = "geometry/am_span"\n', "shaft.up", "geometry/am_span", "such as geometry/amb_span"),
     ],
 )  # fmt: skip
 def test_a_contradiction_is_named_with_its_place(

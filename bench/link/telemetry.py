@@ -14,7 +14,7 @@ from bench.link.hosttime import HostMap
 from bench.link.sample_assembler import Assembler, Rows
 from bench.link.stillness import CODES, Stillness
 from bench.link.unwrapping import Unwrapping, signed
-from bench.rigfile import RigFile
+from bench.rigfile import RigFile, roles
 from bench.samples import ChannelInfo, SampleBlock, StreamLayout
 from bench.wire import sign
 
@@ -77,11 +77,12 @@ class TelemetryDecoder:
     @property
     def layout(self) -> StreamLayout:
         """The stream as it is recorded."""
+        whole = roles.whole_channels(self.rig)
         return StreamLayout(
             STREAM,
             self.period_ns,
             tuple(
-                ChannelInfo(name, units.UNITS[c.unit].si, "u2" if name in CODES else "f4")
+                ChannelInfo(name, units.UNITS[c.unit].si, "u2" if name in CODES else "f8" if name in whole else "f4")
                 for name, c in self.rig.channels.items()
             ),
         )

@@ -9,6 +9,9 @@ from bench.rigfile import RigFile
 from bench.rigfile.capabilities import is_bound as can
 from bench.rigfile.roles import is_bound, resolved
 
+TURNERS = frozenset(("drive", "rotation"))
+"""Roles of what turns a shaft."""
+
 
 @dataclass(frozen=True)
 class Requires:
@@ -38,7 +41,12 @@ class Requires:
     def _lacking(self, rig: RigFile) -> Iterator[str]:
         roles = {role for device in rig.devices.values() for role in device.roles}
         if missing := [r for r in self.roles if r not in roles]:
-            yield f"devices: found none in the role {' and none in the role '.join(missing)}"
+            none = f"devices: found none in the role {' and none in the role '.join(missing)}"
+            yield (
+                f"nothing turns it; {none}"
+                if {"drive", "rotation"} & {*missing} and TURNERS.isdisjoint(roles)
+                else none
+            )
         captured = () if rig.capture is None else rig.capture.channels
         needed = resolved(rig, (name for name in self.channels if "." not in name or is_bound(rig, name)))
         if absent := [role.partition(".")[2] for role in self.channels if "." in role and not is_bound(rig, role)]:

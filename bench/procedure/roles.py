@@ -30,8 +30,8 @@ class Load:
 NOTHING = Load("")
 Side = Literal["left", "right"]
 """An end of the lever, seen from its outboard end: a weight on the left turns the shaft forward."""
-Plane = Literal["inboard", "outboard"]
-"""A balancing plane."""
+Plane = str
+"""A balancing plane, by the rig file's name."""
 
 
 class Levitation(Protocol):

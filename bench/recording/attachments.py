@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -11,7 +12,7 @@ from bench.calibration import Calibration
 from bench.calibration.file import attached
 from bench.errors import AnalysisError, ConfigError, RecordingError
 from bench.plan import BenchPlan
-from bench.recording import stored
+from bench.recording import stored, storedplan
 from bench.recording.mcapfile import McapFile
 from bench.rigfile import MOST_DBC, MOST_TOML, RigFile
 
@@ -56,13 +57,21 @@ class Attachments(Generic[P]):
             RecordingError: the stored plan is not of that type.
         """
         try:
-            return kind.model_validate_json(self.attachment("plan.json"))
+            return kind.model_validate_json(json.dumps(self.plan_dict))
         except ValueError as error:
             raise RecordingError(f"{self.path}: its plan is no {kind.__name__}: {error}") from error
 
     @property
     def plan_dict(self) -> dict[str, Any]:
-        return self._json("plan.json", dict)
+        """The settings, as today's schema has them.
+
+        Raises:
+            RecordingError: the plan is not there, cannot be read, or is of a newer schema.
+        """
+        try:
+            return storedplan.migrated(self._json("plan.json", dict), self.run.get("procedure", ""))
+        except ConfigError as error:
+            raise RecordingError(f"recording {self.path}: {error}") from error
 
     @property
     def spec(self) -> dict[str, Any]:

@@ -20,7 +20,9 @@ from bench.samples import StreamLayout
 VERSION: Final = 2
 """2: frames carry the interface's own timestamp."""
 EVENTS: Final = "/events"
-_TYPES: Final = {"f4": ("TYPE_FLOAT", "<f4"), "u2": ("TYPE_FIXED32", "<u4")}
+_TYPES: Final = {"f4": ("TYPE_FLOAT", "<f4"), "f8": ("TYPE_DOUBLE", "<f8"), "u2": ("TYPE_FIXED32", "<u4")}
+KINDS: Final = tuple(_TYPES)
+"""Of channels: values, values that need all digits, codes."""
 HEAD: Final = (
     ("first_sample_index", "TYPE_FIXED64"),
     ("count", "TYPE_FIXED32"),
@@ -115,7 +117,7 @@ def view_names(layout: StreamLayout) -> list[str]:
     """The fields of a view message."""
     names = []
     for c in layout.channels:
-        names += [c.name, f"{c.name}_min", f"{c.name}_max"] if c.dtype == "f4" else [c.name]
+        names += [c.name] if c.dtype == "u2" else [c.name, f"{c.name}_min", f"{c.name}_max"]
     return names
 
 
@@ -188,7 +190,7 @@ class ViewWindows:
         values: list[npt.NDArray[Any]] = []
         for c in self._layout.channels:
             x = columns[c.name]
-            if c.dtype == "f4":
+            if c.dtype != "u2":
                 mean = np.add.reduceat(x, edges) / counts
                 values += [mean, np.minimum.reduceat(x, edges), np.maximum.reduceat(x, edges)]
             else:

@@ -26,7 +26,7 @@ from bench.clock import Clock
 from bench.errors import RecordingError
 from bench.link.frames import FRAME, FrameBatch
 from bench.recording.mcapwriter import McapWriter
-from bench.samples import SampleBlock, StreamLayout
+from bench.samples import TICKS, SampleBlock, StreamLayout
 
 LIVE_ITEMS = 400  # a live link hands over at most some tens of batches a second, so this is seconds
 WAITING_ITEMS = 8  # where the maker waits; in bench time it runs ahead of the disk by less than half a second
@@ -142,8 +142,8 @@ class Recorder:
         self._check(block)
         if len(block):
             self._put("samples", block)
-            for name in self._watched if self._watched.keys() <= block.columns.keys() else ():
-                self._watched[name].append(np.array(block.columns[name], np.float64))
+            for name in self._watched if self._watched.keys() <= {TICKS, *block.columns} else ():
+                self._watched[name].append(np.array(block.ticks if name == TICKS else block.columns[name], np.float64))
             _add(self.integrity.samples, block.stream, len(block))
             _add(self.integrity.lost, block.stream, block.lost_before)
 
@@ -165,8 +165,8 @@ class Recorder:
 
     @contextmanager
     def watching(self, channels: Sequence[str]) -> Iterator[dict[str, npt.NDArray[np.float64]]]:
-        """Within, samples that come are also kept: what is given has those of each of `channels` afterwards, (n,) SI, or
-        nothing where no sample of them all came. For decisions under way, never for a result."""
+        """Within, samples that come are also kept: what is given has those of each of `channels` afterwards, (n,) SI (ticks by
+        `bench.samples.TICKS`), or nothing where no sample of them all came. For decisions under way, never for a result."""
         seen: dict[str, npt.NDArray[np.float64]] = {}
         self._watched = {name: [] for name in channels}
         try:

@@ -26,7 +26,7 @@ from bench.recording.mcapfile import McapFile, index
 from bench.recording.readlimits import MB
 from bench.recording.steps import Step, Steps
 from bench.rigfile import roles
-from bench.samples import StreamLayout
+from bench.samples import TICKS, StreamLayout
 
 __all__ = ["Captured", "Recording", "Step", "Steps"]
 P = TypeVar("P", bound=BenchPlan)
@@ -133,19 +133,23 @@ class Recording(Attachments[P]):
         """
         if not any("." in name for name in channels):
             return self._read(channels, start_ns, end_ns)
-        found = self._read(roles.resolved(self.rig, channels), start_ns, end_ns)
+        found = self._read(roles.resolved(self.rig, channels), start_ns, end_ns, ticks=roles.AGE in channels)
         return roles.answered(self.rig, (*channels, "t_ns", "index"), found)
 
-    def _read(self, channels: tuple[str, ...], start_ns: int, end_ns: int) -> dict[str, npt.NDArray[Any]]:
+    def _read(
+        self, channels: tuple[str, ...], start_ns: int, end_ns: int, *, ticks: bool = False
+    ) -> dict[str, npt.NDArray[Any]]:
         stream = self._stream_of(channels)
-        count = 0
-        parts: dict[str, list[npt.NDArray[Any]]] = {name: [] for name in (*channels, "t_ns", "index")}
+        count, more = 0, (TICKS,) if ticks else ()
+        parts: dict[str, list[npt.NDArray[Any]]] = {name: [] for name in (*channels, "t_ns", "index", *more)}
         for block in self.blocks(stream, start_ns, end_ns):
             a, b = np.searchsorted(block.t_ns, [start_ns, end_ns])
             count += int(b - a) * len(parts)
             self.limit_samples(count)
             parts["t_ns"].append(block.t_ns[a:b])
             parts["index"].append(np.arange(block.first + a, block.first + b))
+            if ticks:
+                parts[TICKS].append(block.ticks[a:b])
             for name in channels:
                 parts[name].append(block.columns[name][a:b].astype(np.float64))
         empty = {"t_ns": np.zeros(0, np.int64), "index": np.zeros(0, np.int64)}

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from bench.errors import RecordingError
+from bench.recording.layout import KINDS
 from bench.samples import ChannelInfo, StreamLayout
 
 LONGEST_PERIOD_NS: Final = 10**13
@@ -72,7 +73,7 @@ def stream_of(name: str, text: str, where: str) -> StreamLayout:
         channels = tuple(ChannelInfo(*map(str, c)) for c in listed)
     except (TypeError, KeyError) as error:
         raise RecordingError(f"{where}: its layout cannot be read: {error!r}") from error
-    known = all(c.dtype in ("f4", "u2") for c in channels) and len({c.name for c in channels}) == len(channels)
+    known = all(c.dtype in KINDS for c in channels) and len({c.name for c in channels}) == len(channels)
     if not (type(period_ns) is int and 0 < period_ns < LONGEST_PERIOD_NS and known and len(channels) <= MOST_CHANNELS):
         raise RecordingError(f"{where}: its layout has a period or channels that no stream has")
     return StreamLayout(name, period_ns, channels)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from datetime import date
 from itertools import combinations
 from typing import Any
@@ -19,10 +20,12 @@ from bench.rigfile.toleranced import Toleranced
 
 APART_M = 1e-3  # two bearings of a kind that are nearer are one, or a slip
 APART_RAD = math.radians(10)  # two axes of a bearing that are nearer leave a direction unheld
+STANDS_RAD = math.radians(1)  # from upright
 AGREE = 3.0  # standard uncertainties of a span and of the places that it lies between, and
 AGREE_M = 1e-4  # what a drawing is rounded to
 KINDS = {"at": "m", "by": "m", "gap": "m", "clearance": "m", "radius": "m", "length": "m", "offset": "m", "runout": "m",
          "centre_of_mass": "m", "ends": "m", "direction": "rad", "pull": "rad", "zero": "rad", "tilt": "rad",
+         "up": "rad",
          "weight_angle": "rad", "misalignment": "rad", "mass": "kg", "weight_mass": "kg", "polar_inertia": "kg m^2",
          "transverse_inertia": "kg m^2", "stiffness": "N/m", "asymmetry": "1", "pole_pairs": "1", "friction": "1"}  # fmt: skip
 POSITIVE = ("gap", "clearance", "radius", "length", "mass", "polar_inertia", "transverse_inertia")
@@ -58,7 +61,7 @@ def _all(rig: RigFile) -> Iterator[Found]:
     yield from _certificates(rig)
     if rig.customer is not None and rig.laboratory is not None and rig.laboratory.customer:
         yield "laboratory.customer", rig.laboratory.customer, "[customer] alone, where there is one"
-    for contradictions in (_apart, _parallel, _ends, _spans, _rings):
+    for contradictions in (_apart, _parallel, _upright, _ends, _spans, _rings):
         yield from contradictions(rig, places)
 
 
@@ -201,6 +204,20 @@ def _parallel(rig: RigFile, places: Places) -> Iterator[Found]:
             if abs(math.sin(a - b)) < math.sin(APART_RAD):
                 yield (f"bearings.{bearing}.axes.{other}.direction", f"{math.degrees(b):g}°, along {one}",
                        f"an axis that is {math.degrees(APART_RAD):g}° or more from parallel")  # fmt: skip
+
+
+def _upright(rig: RigFile, places: Places) -> Iterator[Found]:
+    """Where directions do not count from up, the file says which of them is up, unless the shaft stands: then none is."""
+    if rig.shaft is None:
+        return
+    with suppress(PlaceError):
+        tilt = 0.0 if rig.shaft.tilt is None else places.number(rig.shaft.tilt, "shaft.tilt").number.value
+        stands = abs(math.cos(tilt)) < math.sin(STANDS_RAD)
+        if stands and rig.shaft.up is not None:
+            yield "shaft.up", "a direction on a shaft that stands", "none: `zero_at` says where directions have their 0"
+        if not stands and rig.shaft.up is None and rig.shaft.zero_at != "up":
+            yield ("shaft.zero_at", f"{rig.shaft.zero_at!r} on a shaft that does not stand",
+                   "`up` beside it: which direction, counted from there, is up")  # fmt: skip
 
 
 def _ends(rig: RigFile, places: Places) -> Iterator[Found]:

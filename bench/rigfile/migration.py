@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from bench.rigfile.former_plans import plans_of_schema_1
 from bench.rigfile.people import typed_laboratory
 
 Content = dict[str, Any]
@@ -41,7 +42,7 @@ def to_schema_2(data: Content) -> Content:
     people = (
         {"laboratory": typed_laboratory(_table(data, "laboratory"))} if isinstance(data.get("laboratory"), dict) else {}
     )
-    return {**{name: table for name, table in made.items() if table}, **data, **people}
+    return {**{name: table for name, table in made.items() if table}, **data, **people, **plans_of_schema_1(data)}
 
 
 def _table(data: Content, name: str) -> Content:

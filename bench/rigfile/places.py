@@ -143,12 +143,15 @@ class Places:
         return self.place(other) - self.place(one)
 
     def direction(self, part: str) -> Sum:
-        """Around the shaft, rad, counter-clockwise seen from outside the far end.
+        """Around the shaft, rad, counter-clockwise seen from outside the far end; from up, also where the file's 0 is another
+        direction and it says which one is up.
 
         Raises:
             PlaceError: no such part, it has no direction, or directions that are told by each other.
         """
-        return self._direction(part, ())
+        shaft = self.tables.shaft
+        from_zero = self._direction(part, ())
+        return from_zero if shaft is None or shaft.up is None else from_zero - self._sum(shaft.up, "shaft.up")
 
     def _direction(self, part: str, through: tuple[str, ...]) -> Sum:
         if part in through:

@@ -6,6 +6,7 @@ makes of their samples what was asked for.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from enum import IntFlag
 from typing import Any
@@ -13,15 +14,22 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from bench import units
 from bench.errors import Lacking
 from bench.rigfile.capabilities import Bit
+from bench.rigfile.messages import Signal
 from bench.rigfile.model import RigFile
 from bench.rigfile.places import PlaceError, Places
 from bench.rigfile.supports import once_per_rig
+from bench.samples import TICKS
 
 Samples = Mapping[str, npt.NDArray[Any]]
 ANGLE, SPEED, PULSES, EDGE = "mark.angle", "mark.speed", "mark.pulses", "mark.edge"
 STATUS = "controller.status"
+AGE = "mark.age"
+"""How long before a sample's time the last edge came, s; by `mark.edge` and the device's ticks."""
+FLOAT_BITS = 24  # of a whole number that a float of 32 bits still holds
+JUST_NS = 1_000_000  # an edge so little after a sample has just come, rounded
 
 
 class Status(IntFlag):
@@ -57,6 +65,8 @@ def answered(rig: RigFile, names: Iterable[str], samples: Samples) -> dict[str, 
     for name in asked:
         if name == STATUS:
             out[name] = status(rig, samples)
+        elif name == AGE:
+            out[name] = age_of_edge(rig, samples[_channels(rig, name)[0]], samples[TICKS])
         elif "." in name:
             out[name] = samples[_channels(rig, name)[0]]
     return out
@@ -75,7 +85,7 @@ def read_now(rig: RigFile, name: str, latest: Mapping[str, float]) -> float:
 
 def is_bound(rig: RigFile, role: str) -> bool:
     """Whether a rig has a channel for a role of the mark; it has always a status word, if only of zeros."""
-    return role == STATUS or bool(rig.mark is not None and getattr(rig.mark, role.partition(".")[2]))
+    return role == STATUS or bool(rig.mark is not None and getattr(rig.mark, _key(role)))
 
 
 def told_in(rig: RigFile, role: str) -> str:
@@ -89,9 +99,46 @@ def told_in(rig: RigFile, role: str) -> str:
 
 def wraps_at(rig: RigFile, channel: str) -> float:
     """Where a counter begins anew: as many as its signal holds, in its own steps."""
-    message, _, name = rig.channels[channel].signal.partition(".")
-    signal = rig.messages[message].signal(name)
+    signal = _signal_of(rig, channel)
     return float(2**signal.length) * abs(signal.scale)
+
+
+def age_of_edge(rig: RigFile, edge: npt.NDArray[np.float64], ticks: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+    """How long before each tick the last edge of the mark came, s (n,). `edge` is its time on the device's clock, s, `ticks`
+    are those of the same clock; both come round, and how often each has done so before anybody listened is not known. What both
+    tell together is the age less whole turns of their greatest common divisor."""
+    tick_ns = round(rig.devices["controller"].tick_s * 1e9)
+    since = ticks.astype(np.int64) * tick_ns - np.rint(edge * 1e9).astype(np.int64)
+    round_ns = edge_round_ns(rig)
+    return np.asarray(((since + JUST_NS) % round_ns - JUST_NS) * 1e-9, np.float64)
+
+
+def edge_round_ns(rig: RigFile) -> int:
+    """The longest age of an edge, ns, that its time and the telemetry's ticks tell together: an edge that is older shows as
+    less old."""
+    ticks = 1 << rig.messages[rig.binding.telemetry[0]].signal(rig.binding.tick).length
+    edges = 1 << _signal_of(rig, _channels(rig, EDGE)[0]).length
+    return math.gcd(ticks * round(rig.devices["controller"].tick_s * 1e9), round(edges * resolution_s(rig) * 1e9))
+
+
+def resolution_s(rig: RigFile) -> float:
+    """A step of the time of the mark's edge, s."""
+    signal = _signal_of(rig, _channels(rig, EDGE)[0])
+    return abs(signal.scale) * units.unit(signal.unit).factor
+
+
+def whole_channels(rig: RigFile) -> frozenset[str]:
+    """Channels that a float of 32 bits cannot hold: the time of the mark's edge; counters and bits that are wider than it."""
+    wide = [bit.channel for bit in bits(rig).values()] + [
+        _channels(rig, PULSES)[0] for _ in (0,) if is_bound(rig, PULSES)
+    ]
+    told = {c for c in wide if _signal_of(rig, c).length > FLOAT_BITS}
+    return frozenset(told | set(_channels(rig, EDGE) if is_bound(rig, EDGE) else ()))
+
+
+def _signal_of(rig: RigFile, channel: str) -> Signal:
+    message, _, name = rig.channels[channel].signal.partition(".")
+    return rig.messages[message].signal(name)
 
 
 def status(rig: RigFile, samples: Samples) -> npt.NDArray[np.int64]:
@@ -144,5 +191,10 @@ def _channels(rig: RigFile, name: str) -> tuple[str, ...]:
     if name == STATUS:
         return tuple(dict.fromkeys(bit.channel for bit in bits(rig).values()))
     if not is_bound(rig, name):
-        raise Lacking(f"mark: found no channel for {name.partition('.')[2]}")
-    return (str(getattr(rig.mark, name.partition(".")[2])),)
+        raise Lacking(f"mark: found no channel for {_key(name)}")
+    return (str(getattr(rig.mark, _key(name))),)
+
+
+def _key(role: str) -> str:
+    """Of the mark's table."""
+    return (EDGE if role == AGE else role).partition(".")[2]

@@ -119,7 +119,7 @@ def _schema(stream: StreamLayout, *, with_units: bool) -> pa.Schema:
     head = [pa.field("t_ns", pa.int64()), pa.field("index", pa.int64()), pa.field("tick", pa.uint64())]
     for c in stream.channels:
         name = f"{c.name} [{c.unit}]" if with_units and c.unit not in ("", "1") else c.name
-        kind = pa.float32() if c.dtype == "f4" else pa.uint32()
+        kind = {"f4": pa.float32(), "f8": pa.float64(), "u2": pa.uint32()}[c.dtype]
         head.append(pa.field(name, kind, metadata={"unit": c.unit}))
     return pa.schema(head)
 

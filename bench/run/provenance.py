@@ -11,6 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from bench.calibration.file import attachment
+from bench.recording import storedplan
 from bench.recording.recorder import RunHeader
 from bench.run.job import Job
 from bench.rundir import RunDirectory
@@ -51,7 +52,7 @@ def header(job: Job) -> RunHeader:
         attachments={
             "rig.toml": job.rig.toml_text.encode(),
             "rig.dbc": job.rig.dbc_text.encode(),
-            "plan.json": job.plan.model_dump_json().encode(),
+            "plan.json": storedplan.written(job.plan).encode(),
             "spec.json": json.dumps(limits, sort_keys=True).encode(),
             "calibrations.json": attachment(job.calibrations).encode(),
         },

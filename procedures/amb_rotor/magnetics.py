@@ -16,13 +16,15 @@ without an offset: F = K_i (ip - in)/2 + K_xi r.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from bench.rigfile.numbers import Sum
 from procedures.amb_rotor.conventions import AMB_ROTOR, AmbRotor
+from procedures.amb_rotor.stations import Placed, row, upward
 from procedures.shared import leastsquares
 from procedures.shared.leastsquares import Fit
 
@@ -32,8 +34,8 @@ Numbers = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Positions:
-    """Means (4, N) as the sensors read them, of the machine's radial axes: `read` m, `p` and `n` A (coils pulling to the
-    positive and the negative side)."""
+    """Means as the sensors read them: `read` (probes, N) m; of the machine's radial axes `p` and `n` (4, N) A (coils pulling to
+    the positive and the negative side)."""
 
     read: Array
     p: Array
@@ -78,6 +80,8 @@ def statics(d: Positions, p: Numbers) -> Statics:
     relaxed_z (m, where the coupling does not pull, off the rings' centre); per axis gain_*, zero_* (reading where the shaft
     is in the rings' centre), runout_*; per coil gain_*, offset_* of its current sensor.
     """
+    if "l_is" not in p:
+        return _by_tables(d, p)
     l_is, l_os, l_oa, axes = p["l_is"], p["l_os"], p["l_oa"], d.machine.axes
     l_ia, span = p["amb_span"] - l_oa, l_is + l_os
     off = np.array([d.read[k] / p[f"gain_{a}"] - p[f"runout_{a}"] for k, a in enumerate(axes)])
@@ -92,11 +96,57 @@ def statics(d: Positions, p: Numbers) -> Statics:
     pull = p["coupling"] * (at(-p["l_c"], off - zero) - relaxed)
     weight = p["mass"] * p["gravity"] * np.array([[math.cos(p["axes"])], [math.sin(p["axes"])]])
     force = np.concatenate([weight * l_oa + pull * (l_oa + p["l_c"]), weight * l_ia + pull * (l_ia - p["l_c"])])
+    pos, neg = _currents(d, p, axes)
+    return Statics(r, pos, neg, force / p["amb_span"])
+
+
+def _by_tables(d: Positions, p: Numbers) -> Statics:
+    """The same for a machine as the rig file's tables have it: with q = (y, z, psi, theta), P q what the probes see and A q
+    what is at the axes, forces f of the axes hold the shaft where A' f carries its weight and the coupling's pull."""
+    s, m = d.machine.stations, d.machine
+
+    def number(of: Sum) -> float:
+        return of.exact + sum(t.factor * p.get(number_key(t.identity), t.number.value) for t in of.terms)
+
+    def rows(placed: Iterable[Placed]) -> Array:
+        return np.array([row(number(at.arm), number(at.angle)) for at in placed])
+
+    reads, pulls = rows(s.probes.values()), rows(s.axes.values())
+    off = np.array(
+        [d.read[k] / (at.sign * p[f"gain_{c}"]) - p[f"runout_{c}"] for k, (c, at) in enumerate(s.probes.items())]
+    )
+    solved = np.linalg.pinv(reads)
+    q = solved @ off
+    up = np.array([*upward(number(s.first), s.hand, number(s.tilt)), 0.0, 0.0])
+    carried = (p["mass"] * p["gravity"] * up)[:, None] + np.zeros_like(q)
+    if p.get("coupling"):
+        at = p["coupling_at"]
+        end = np.array([[1.0, 0.0, 0.0, at], [0.0, 1.0, -at, 0.0]])
+        zero = np.array([[p[f"zero_{c}"] / (x.sign * p[f"gain_{c}"])] for c, x in s.probes.items()])
+        away = end @ (q - solved @ zero) - np.array([[p["relaxed_y"]], [p["relaxed_z"]]])
+        carried = carried + p["coupling"] * end.T @ away
+    pos, neg = _currents(d, p, m.axes)
+    return Statics(pulls @ q, pos, neg, np.linalg.solve(pulls.T, carried))
+
+
+def _currents(d: Positions, p: Numbers, axes: Sequence[str]) -> tuple[Array, Array]:
+    """Of the coils (4, N) A, freed of gains and offsets."""
     pos, neg = (
         np.array([(c[k] - p[f"offset_{a}_{s}"]) / p[f"gain_{a}_{s}"] for k, a in enumerate(axes)])
         for s, c in (("p", d.p), ("n", d.n))
     )
-    return Statics(r, pos, neg, force / p["amb_span"])
+    return pos, neg
+
+
+def number_key(identity: str) -> str:
+    """Under which a number of the rig file's tables goes among the inputs."""
+    return f"number {identity}"
+
+
+def gap_key(machine: AmbRotor, axis: str) -> str:
+    """Under which an axis' gap goes among the inputs: one that all share is "gap"."""
+    shared = {t.identity for t in machine.stations.gaps.values()}
+    return "gap" if len(shared) < 2 else number_key(machine.stations.gaps[axis].identity)
 
 
 def magnet(beta: float, offset: float, gap: float, r: Array, p: Array, n: Array) -> Array:
@@ -147,7 +197,7 @@ def fits(d: Positions, p: Numbers) -> dict[str, AxisFit]:
     out = {}
     for k, a in enumerate(d.machine.axes):
         of = (s.r[k], s.p[k], s.n[k], s.force[k])
-        fit = nonlinear(*of, p["gap"])
+        fit = nonlinear(*of, p[gap_key(d.machine, a)])
         out[a] = AxisFit(fit.terms, -fit.residuals, linear(*of))
     return out
 

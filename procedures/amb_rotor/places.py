@@ -88,12 +88,12 @@ class Held:
         p, n = (
             np.array([of[c] for c in names]) for names in zip(*map(self.machine.pair, self.machine.axes), strict=True)
         )
-        return Positions(np.array([of[c] for c in self.machine.positions]), p, n, self.machine)
+        return Positions(np.array([of[c] for c in self.machine.stations.channels]), p, n, self.machine)
 
 
 def channels(machine: AmbRotor) -> tuple[str, ...]:
     """What is read of a step."""
-    return (*machine.positions, *machine.currents, STATUS)
+    return (*machine.stations.channels, *machine.currents, STATUS)
 
 
 def of_readings(

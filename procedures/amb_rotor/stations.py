@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +31,7 @@ Array = npt.NDArray[np.float64]
 SQUARE = 1e-12  # of a cosine: what rounding leaves of nothing
 COORDINATES = ("y", "z", "psi", "theta")
 AXIAL = "x"
+NOTHING = Sum()
 DETERMINED = 1e-3  # least over greatest singular value, arms over their own length
 
 
@@ -63,15 +64,21 @@ class Ring:
 @dataclass(frozen=True)
 class Stations:
     """Of one machine. `axes` by name; `probes` by channel, those that look along an axis first, in the axes' order; `first` rad
-    is the direction of y around the shaft, `hand` 1 where z is counter-clockwise from it; `up`, shares of the upward unit
-    vector along y and z: short of 1 where the shaft does not lie."""
+    is the direction of y around the shaft, `hand` 1 where z is counter-clockwise from it; `tilt` rad from the horizontal;
+    `gaps` m by axis, where they are told."""
 
     axes: Mapping[str, Placed]
     probes: Mapping[str, Placed]
     rings: tuple[Ring, ...] = ()
-    first: float = 0.0
+    first: Sum = NOTHING
     hand: int = 1
-    up: tuple[float, float] = (1.0, 0.0)
+    tilt: Sum = NOTHING
+    gaps: Mapping[str, Term] = field(default_factory=dict)
+
+    @property
+    def up(self) -> tuple[float, float]:
+        """Shares of the upward unit vector along y and z; short of 1 where the shaft does not lie."""
+        return upward(self.first.value, self.hand, self.tilt.value)
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -172,18 +179,27 @@ def _stations(rig: RigFile, places: Places, planes: tuple[Support, Support]) -> 
     looking = {probe.channel: Placed(places.distance(CENTRE, f"probes/{name}"), turned(f"probes/{name}"), probe.sign)
                for name, probe in rig.probes.items() if probe.direction is not None}  # fmt: skip
     own = [a.position for p in planes for a in p.axes if a.position]
-    tilt = 0.0
-    if rig.shaft is not None and rig.shaft.tilt is not None:
-        tilt = _value(places.number(rig.shaft.tilt, "shaft.tilt"))
-    lies = _rounded(math.cos(tilt)) if tilt else 1.0
+    tilted = rig.shaft is not None and rig.shaft.tilt is not None
     return Stations(
         axes,
         {name: looking[name] for name in dict.fromkeys((*own, *looking))},
         tuple(_rings(rig, places, planes)),
-        y.value,
+        y,
         hand,
-        (lies * math.cos(y.value), lies * -hand * math.sin(y.value)),
+        Sum((places.number(rig.shaft.tilt, "shaft.tilt"),)) if tilted else Sum(),  # type: ignore[union-attr, arg-type]
+        {a: gap for p in planes for a, gap in _gap(rig, places, p)},
     )
+
+
+def _gap(rig: RigFile, places: Places, plane: Support) -> list[tuple[str, Term]]:
+    gap = rig.bearings[plane.name].gap
+    return [] if gap is None else [(a.name, places.number(gap, f"bearings.{plane.name}.gap")) for a in plane.axes]
+
+
+def upward(first: float, hand: int, tilt: float) -> tuple[float, float]:
+    """The upward unit vector along y and z, of y at `first` rad from up and a shaft that stands `tilt` rad."""
+    lies = _rounded(math.cos(tilt)) if tilt else 1.0
+    return lies * math.cos(first), lies * -hand * math.sin(first)
 
 
 def _rings(rig: RigFile, places: Places, planes: tuple[Support, Support]) -> list[Ring]:
@@ -204,10 +220,6 @@ def _nearest(arm: Sum | None, places: Places, names: list[str]) -> int:
     at = 0.0 if arm is None else arm.value
     far = [abs(places.distance(CENTRE, f"bearings/{name}").value - at) for name in names]
     return far.index(min(far))
-
-
-def _value(term: Term) -> float:
-    return term.factor * term.number.value
 
 
 def stated(rig: RigFile, number: Toleranced | str | None, key: str) -> Toleranced | None:

@@ -54,7 +54,7 @@ def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
     return replace(
-        required(machine),
+        required(rig),
         lacks=(*machine.lacks, *machine.unweighed, *of_scales(rig)),
         capabilities=(
             "set_points",

@@ -21,10 +21,12 @@ from procedures.balance.solution import Solved, Trials, runout_as_unbalance, sol
 from procedures.balance.steps import SIDES, Read, Recorded, Run, Weight, read_dwell
 from procedures.balance.vector_length import amount
 from procedures.shared.certificates import certified
-from procedures.synchronous import bearings, estimates, runout
+from procedures.synchronous import bearings, runout
 from procedures.synchronous.bearings import Known
+from procedures.synchronous.carrying import carried
 from procedures.synchronous.dwells import Dwell
 from procedures.synchronous.estimates import ForceBalance
+from procedures.synchronous.orbit_frame import covariance
 from procedures.synchronous.runout import Stand, Turning
 
 Array = npt.NDArray[np.float64]
@@ -182,7 +184,7 @@ def _linear(e: Estimate) -> Estimate:
 
 def _vectors(parts: Sequence[Estimate]) -> Vectors:
     values = np.array([parts[2 * k].value + 1j * parts[2 * k + 1].value for k in range(len(parts) // 2)])
-    return Vectors(values, estimates.covariance(parts), min(welch_satterthwaite(e) for e in parts))
+    return Vectors(values, covariance(parts), min(welch_satterthwaite(e) for e in parts))
 
 
 def permissible_of_planes(rig: RigFile, plan: Plan) -> tuple[Estimate, Estimate]:
@@ -236,4 +238,4 @@ def balance_forces(d: Dwell, off: Complex, rig: RigFile, known: Known) -> ForceB
     """The balance of forces of one dwell, with a runout (4,) m and what is known of the bearings."""
     read, s = read_dwell(d), Stand.of({name: e.value for name, e in bearings.collect_inputs(rig, known).items()})
     _, misfit = runout.unbalances(s, read.turning, off)
-    return ForceBalance(d, misfit, runout.mean_forces(s, read.means) / estimates.shares(rig, s))
+    return ForceBalance(d, misfit, carried(rig, s, read.means))

@@ -24,7 +24,7 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.uncertainty import Estimate
 from procedures.amb_rotor import magnetics
-from procedures.amb_rotor.magnetics import Positions
+from procedures.amb_rotor.magnetics import Positions, gap_key
 from procedures.shared.leastsquares import Fit
 from procedures.shared.type_a import scatter
 
@@ -32,6 +32,7 @@ Array = npt.NDArray[np.float64]
 BETA_UNIT, OFFSET_UNIT = 1e-7, 1e-5  # of the terms within the adjustment
 ROUNDS, SMALL = 30, 1e-3  # steps at most; the last one, in standard deviations of what is observed
 TOLD = 0.05  # u of an adjustment over the certificate's, below which the positions say nothing of that number
+HOLD = 1e-6  # in BETA_UNIT: an unknown that is held stays within so much
 STEP = 0.3  # of the numerical slopes, in standard uncertainties
 
 
@@ -57,6 +58,14 @@ class _Problem:
     values: dict[str, float]
     names: tuple[str, ...]  # inputs that are not exact
     u: Array
+    gaps: tuple[str, ...]  # by axis, which input
+    held: tuple[int, ...] = ()  # unknowns that nothing tells and that stay where they are
+
+    @property
+    def prior(self) -> Array:
+        """Rows of what is known without the positions: inputs by their certificates, and what is held."""
+        whole = np.eye(8 + len(self.names))
+        return np.vstack([whole[8:], whole[list(self.held)] / HOLD]) if self.held else whole[8:]
 
     def inputs(self, t: Array) -> dict[str, float]:
         shifts = t * self.u
@@ -68,7 +77,7 @@ class _Problem:
         s = magnetics.statics(self.means, p)
         terms = x[:8].reshape(4, 2)
         rows = [
-            magnetics.magnet(b * BETA_UNIT, o * OFFSET_UNIT, p["gap"], s.r[k], s.p[k], s.n[k]) - s.force[k]
+            magnetics.magnet(b * BETA_UNIT, o * OFFSET_UNIT, p[self.gaps[k]], s.r[k], s.p[k], s.n[k]) - s.force[k]
             for k, (b, o) in enumerate(terms)
         ]
         return np.concatenate(rows)
@@ -84,16 +93,30 @@ class _Problem:
 
 
 def adjust(
-    means: Positions, inputs: Mapping[str, Estimate], noise_N: Array, weighed_N: Array, starts: Array
+    means: Positions,
+    inputs: Mapping[str, Estimate],
+    noise_N: Array,
+    weighed_N: Array,
+    starts: Array,
+    unloaded: tuple[int, ...] = (),
 ) -> Adjusted:
     """`inputs` as `magnetics.statics` wants them, and the gap; `noise_N` (4,) of a position's mean, `weighed_N` (4,) the same
-    with what the model is not trusted with; `starts` (4, 2) terms.
+    with what the model is not trusted with; `starts` (4, 2) terms. Of `unloaded` axes, which carry nothing, any force constant
+    would do: that of the start is held, and none is told.
 
     Raises:
         AnalysisError: no solution.
     """
     names = tuple(n for n, e in inputs.items() if e.u > 0)
-    problem = _Problem(means, {n: e.value for n, e in inputs.items()}, names, np.array([inputs[n].u for n in names]))
+    gaps = tuple(gap_key(means.machine, a) for a in means.machine.axes)
+    problem = _Problem(
+        means,
+        {n: e.value for n, e in inputs.items()},
+        names,
+        np.array([inputs[n].u for n in names]),
+        gaps,
+        tuple(2 * k for k in unloaded),
+    )
     count = means.read.shape[1]
     x = np.concatenate([(starts / [BETA_UNIT, OFFSET_UNIT]).ravel(), np.zeros(len(names))])
     x = _least(problem, x, weighed_N)
@@ -107,12 +130,16 @@ def adjust(
 
 def _least(problem: _Problem, x: Array, noise: Array) -> Array:
     """By Gauss and Newton's steps, of the stacked problem: its normal matrix would lose half of the digits."""
-    prior = np.eye(len(x))[8:]
+    prior = problem.prior
+    kept = np.zeros(len(problem.held))
     per = np.repeat(1 / noise, problem.means.read.shape[1])
     for _ in range(ROUNDS):
         design = np.vstack([problem.slopes(x) * per[:, None], prior])
         scale = np.sqrt((design**2).sum(axis=0))
-        step = np.linalg.lstsq(design / scale, -np.concatenate([problem.left(x) * per, x[8:]]), rcond=None)[0] / scale
+        step = (
+            np.linalg.lstsq(design / scale, -np.concatenate([problem.left(x) * per, x[8:], kept]), rcond=None)[0]
+            / scale
+        )
         if not np.isfinite(step).all():
             break
         x = x + step
@@ -139,17 +166,18 @@ def _inverse(design: Array) -> Array:
 
 
 def _adjusted(problem: _Problem, inputs: Mapping[str, Estimate], x: Array, weighed: Array, noise: Array) -> Adjusted:
-    count, size, axes = problem.means.read.shape[1], len(x), problem.means.machine.axes
+    count, axes = problem.means.read.shape[1], problem.means.machine.axes
     slopes, left = problem.slopes(x), problem.left(x).reshape(4, count)
     weighted = slopes * np.repeat(1 / weighed, count)[:, None]
-    inverse = _inverse(np.vstack([weighted, np.eye(size)[8:]]))
+    inverse = _inverse(np.vstack([weighted, problem.prior]))
     units = np.concatenate([np.tile([BETA_UNIT, OFFSET_UNIT], 4), problem.u])
     values = problem.inputs(x[8:])
     rows = {f"{what}_{a}": 2 * k + j for k, a in enumerate(axes) for j, what in enumerate(("beta", "offset"))}
-    rows["gap"] = 8 + problem.names.index("gap")
-    estimates = {}
+    rows = {name: row for name, row in rows.items() if row not in problem.held}
+    rows |= {key: 8 + problem.names.index(key) for key in dict.fromkeys(problem.gaps) if key in problem.names}
+    estimates = {key: inputs[key] for key in problem.gaps if key not in problem.names}
     for name, row in rows.items():
-        value = float(x[row] * units[row]) if row < 8 else values["gap"]
+        value = float(x[row] * units[row]) if row < 8 else values[name]
         shares = inverse[row, 8:] * units[row] / problem.u
         estimates[name] = Estimate.exact(value) + _certified(problem, inputs, shares)
     terms = (x[:8] * units[:8]).reshape(4, 2)
@@ -161,7 +189,7 @@ def _adjusted(problem: _Problem, inputs: Mapping[str, Estimate], x: Array, weigh
         fit = Fit(terms[k], by_noise[of, of], -left[k], float(left[k] @ left[k]), count - 2, rows_of_k)
         gradients = {f"beta_{a}": [1, 0], f"offset_{a}": [0, 1]}
         noisy = scatter(fit, gradients, f"bearing-model/{a}", f"scatter of the positions, {a}")
-        estimates |= {name: estimates[name] + e for name, e in noisy.items()}
+        estimates |= {name: estimates[name] + e for name, e in noisy.items() if name in estimates}
     known = np.sqrt(np.maximum(1 - np.diag(inverse)[8:], 0.0))  # u of an adjustment, over the certificate's
     moved = {n: float(v) for n, v in zip(problem.names, x[8:], strict=True)}
     pulls = {n: moved[n] / float(k) for n, k in zip(problem.names, known, strict=True) if k > TOLD}

@@ -35,9 +35,9 @@ ALIKE = 0.9  # of the greatest: inputs that act alike are suspected together
 def of_signals(held: Held, tilted: Held, plan: Plan) -> Iterator[Finding]:
     """Lost samples, stuck channels, flags, and a shaft that moves within a step."""
     yield from signals.losses(held.lost, held.expected, plan.max_lost, held.where)
-    yield from signals.stuck(held.spread, (*held.machine.positions, *held.machine.currents))
+    yield from signals.stuck(held.spread, (*held.machine.stations.channels, *held.machine.currents))
     yield from _flags(held, tilted)
-    speed = np.abs([held.drift[c] for c in held.machine.positions]).max(axis=0) / (plan.average_s / 2)
+    speed = np.abs([held.drift[c] for c in held.machine.stations.channels]).max(axis=0) / (plan.average_s / 2)
     if speed.max() > plan.max_speed_m_s:
         text = (
             f"the shaft moves at up to {speed.max() * 1e6:.2g} µm/s within a step, {plan.max_speed_m_s * 1e6:.2g} µm/s "
@@ -70,8 +70,8 @@ def of_results(a: Analysis, plan: Plan) -> Iterator[Finding]:
     """The gap that the data ask for, the offset's sign, and the comparison with the linear model."""
     yield from _adjustments(a, plan)
     for axis in a.held.machine.axes:
-        offset = a.estimates[f"offset_{axis}"]
-        if offset.value + expanded(offset) < 0:
+        offset, known = a.estimates[f"offset_{axis}"], a.offsets_known.get(axis, 0.0)
+        if known > 0 and offset.value + expanded(offset) < 0:
             text = (
                 f"axis {axis}: the shaft is {-offset.value * 1e6:.0f} µm below the magnetic centre where the sensors "
                 "read zero; this stand's offsets are above it, towards the coils that carry. Either the stand was "
@@ -79,6 +79,8 @@ def of_results(a: Analysis, plan: Plan) -> Iterator[Finding]:
             )
             yield Finding("offset-against-load", text, axis, Effect.INDETERMINATE, (f"beta_{axis}", f"offset_{axis}"))
     for where, plane in a.held.machine.planes.items():
+        if f"misfit_ratio_{where}" not in a.estimates:
+            continue
         ratio = min(a.estimates[f"{k}_{where}"].value for k in ("misfit_ratio", "misfit_ratio_means"))
         if ratio < plan.min_ratio:
             text = (
@@ -86,19 +88,25 @@ def of_results(a: Analysis, plan: Plan) -> Iterator[Finding]:
                 f"{plan.min_ratio:g} is expected: the offset does not show at this bias, or the nonlinear model fits no "
                 "better."
             )
-            axes = [a.held.machine.axes[k] for k in plane]
+            axes = [a.held.machine.axes[k] for k in plane if a.held.machine.axes[k] in a.fits]
             doubted = tuple(
                 f"{q}_{name}" for q in ("beta", "offset") for name in axes
             )  # the ratio itself is what it is
-            yield Finding("linear-suffices", text, where, Effect.INDETERMINATE, doubted)
+            effect = Effect.INDETERMINATE if any(a.offsets_known.get(name) for name in axes) else Effect.NOTE
+            yield Finding("linear-suffices", text, where, effect, doubted)
     yield _compare(a)
+    if bare := [axis for axis in a.held.machine.axes if axis not in a.fits]:
+        text = (f"{' and '.join(bare)} carry none of the weight: their magnetic offsets are told, their force constants not, "
+                "since without a known force any would do.")  # fmt: skip
+        yield Finding("no-load", text, ", ".join(bare))
 
 
 def _compare(a: Analysis) -> Finding:
     """The linear model's two numbers beside the bearing's slopes, and the noise under both residual sums."""
     said = []
     for axis, f in a.fits.items():
-        k, stiffness = magnetics.slopes(f.terms, a.adjusted.values["gap"], a.bias_A)
+        gap = a.adjusted.values[magnetics.gap_key(a.held.machine, axis)]
+        k, stiffness = magnetics.slopes(f.terms, gap, a.bias_A)
         one, two = f.linear.terms
         true = f"true slopes {k:.3g} and {stiffness * 1e-3:.3g}"
         said.append(f"{axis}: {one:.3g} N/A and {two * 1e-3:.3g} N/mm, {true}")
@@ -126,6 +134,8 @@ def _adjustments(a: Analysis, plan: Plan) -> Iterator[Finding]:
         text = f"the positions contradict a certificate by {worst:.1f} standard deviations. Suspect: {listed}.{spring}"
         yield Finding("certificate-contradicted", text, _influence(a, suspects[0]).id, Effect.INDETERMINATE)
     for k, axis in enumerate(a.held.machine.axes):
+        if axis not in a.fits:
+            continue
         load, left = float(np.abs(a.statics.force[k]).mean()), np.abs(a.adjusted.residuals[k])
         if left.max() > plan.max_misfit * load:
             text = (
@@ -136,11 +146,15 @@ def _adjustments(a: Analysis, plan: Plan) -> Iterator[Finding]:
             place = next(where for where, plane in a.held.machine.planes.items() if k in plane)
             doubted = (f"beta_{axis}", f"offset_{axis}", f"misfit_ratio@{place}", f"misfit_ratio_means@{place}")
             yield Finding("misfit", text, axis, Effect.INDETERMINATE, doubted)
-    gap, drawing = a.adjusted.estimates["gap"], a.inputs["gap"]
+    told = []
+    for key in dict.fromkeys(magnetics.gap_key(a.held.machine, axis) for axis in a.held.machine.axes):
+        gap, drawing = a.adjusted.estimates[key], a.inputs[key]
+        name = "gap" if key == "gap" else _influence(a, key).name
+        told.append(f"{name} {gap.value * 1e6:.1f} ± {expanded(gap) * 1e6:.1f} µm "
+                    f"(95 %), the drawing has {drawing.value * 1e6:.1f} ± {expanded(drawing) * 1e6:.1f} µm")  # fmt: skip
     left = 1e3 * float(np.sqrt((a.adjusted.residuals**2).mean()))
     text = (
-        f"gap {gap.value * 1e6:.1f} ± {expanded(gap) * 1e6:.1f} µm (95 %), the drawing has {drawing.value * 1e6:.1f} ± "
-        f"{expanded(drawing) * 1e6:.1f} µm; the adjustment leaves {left:.2g} mN rms; the certificate that is "
+        f"{'; '.join(told)}; the adjustment leaves {left:.2g} mN rms; the certificate that is "
         f"contradicted most is {_told(a, max(pulls, key=lambda n: abs(pulls[n])))}"
     )
     yield Finding("adjusted", text)

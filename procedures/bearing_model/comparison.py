@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import reduce
+from operator import add
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +18,7 @@ import numpy.typing as npt
 from bench.uncertainty import Estimate, Influence
 from procedures.amb_rotor import magnetics
 from procedures.amb_rotor.conventions import AmbRotor
-from procedures.amb_rotor.magnetics import AxisFit, Statics
+from procedures.amb_rotor.magnetics import AxisFit, Statics, gap_key
 from procedures.amb_rotor.places import Held
 
 Array = npt.NDArray[np.float64]
@@ -39,7 +41,7 @@ class Sums:
     @staticmethod
     def of(held: Held, values: dict[str, float], k: int, f: AxisFit) -> Sums:
         """Of axis `k`."""
-        gap, steps = values["gap"], len(held)
+        gap, steps = values[gap_key(held.machine, held.machine.axes[k])], len(held)
         one, two = residuals(magnetics.statics(held.samples(), values), k, f, gap)
         low, high = residuals(magnetics.statics(held.parts(), values), k, f, gap)
         own = np.bincount(held.of_step, one) / np.bincount(held.of_step)
@@ -82,17 +84,25 @@ class Sums:
 
 
 def by_bearing(e: dict[str, Estimate], machine: AmbRotor) -> dict[str, Estimate]:
-    """By AMB, as T Table 2.2: the linear model's slopes as means of both axes, sums of squares of both."""
+    """By AMB, as T Table 2.2: the linear model's slopes as means of both axes, sums of squares of both; of those that carry."""
     out = {}
-    for where, (first, second) in machine.planes.items():
-        y, z = machine.axes[first], machine.axes[second]
+    for where, pair in machine.planes.items():
+        names = [machine.axes[k] for k in pair if f"misfit_{machine.axes[k]}" in e]
+        if not names:
+            continue
         for k in ("k_linear", "stiffness_linear"):
-            out[f"{k}_{where}"] = (e[f"{k}_{y}"] + e[f"{k}_{z}"]) * 0.5
-        total = {k: e[f"{k}_{y}"] + e[f"{k}_{z}"] for k in ("misfit", "misfit_linear", "quiet", "quiet_linear")}
+            out[f"{k}_{where}"] = _added([e[f"{k}_{a}"] for a in names]) * (1 / len(names))
+        total = {
+            k: _added([e[f"{k}_{a}"] for a in names]) for k in ("misfit", "misfit_linear", "quiet", "quiet_linear")
+        }
         out |= {f"{k}_{where}": total[k] for k in ("misfit", "misfit_linear")}
         out[f"misfit_ratio_{where}"] = total["misfit_linear"] / total["misfit"]
         out[f"misfit_ratio_means_{where}"] = total["quiet_linear"] / total["quiet"]
     return out
+
+
+def _added(estimates: list[Estimate]) -> Estimate:
+    return reduce(add, estimates)
 
 
 def residuals(s: Statics, k: int, f: AxisFit, gap: float) -> tuple[Array, Array]:

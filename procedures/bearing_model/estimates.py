@@ -10,21 +10,18 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.recording import Recording
-from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from procedures.amb_rotor import magnetics
-from procedures.amb_rotor.conventions import conventions
-from procedures.amb_rotor.magnetics import AxisFit, Statics
+from procedures.amb_rotor.conventions import AmbRotor
+from procedures.amb_rotor.magnetics import AxisFit, Statics, gap_key
 from procedures.amb_rotor.places import Held
 from procedures.bearing_model import comparison
 from procedures.bearing_model.adjustment import Adjusted, adjust
 from procedures.bearing_model.comparison import Sums
-from procedures.shared.certificates import certified
+from procedures.bearing_model.inputs import LOADED, fit_inputs
 from procedures.shared.type_a import scatter
 
 Array = npt.NDArray[np.float64]
-LENGTHS = {"l_is": "com_to_inboard_sensor", "l_os": "com_to_outboard_sensor", "l_oa": "com_to_outboard_amb",
-           "amb_span": "amb_span", "l_c": "com_to_coupling", "gap": "amb_gap"}  # fmt: skip
 TRUST = 1e-4  # of the load: jitter of currents whose squares count, bending, the telemetry's last digits
 
 
@@ -34,7 +31,7 @@ class Analysis:
 
     `statics` of all positions and `compared` of those at `bias_A`, which both models are compared on, with the adjusted
     inputs; `noise_N` is the standard deviation of a sample's and of a batch's force within its step, by axis; `inputs` as
-    certified; `samples` how many there are in the comparison.
+    certified; `samples` how many there are in the comparison; `offsets_known` m by axis, what the controller takes them for.
     """
 
     held: Held
@@ -47,6 +44,7 @@ class Analysis:
     noise_N: dict[str, tuple[float, float]]
     bias_A: float
     samples: int
+    offsets_known: dict[str, float]
 
 
 def evaluate(recording: Recording[Any], held: Held) -> Analysis:
@@ -55,15 +53,19 @@ def evaluate(recording: Recording[Any], held: Held) -> Analysis:
     Raises:
         AnalysisError: the positions determine nothing.
     """
-    bias = recording.plan.biases_A[0]
+    bias = float(held.labels["bias_A"][0])
     inputs = fit_inputs(recording.rig, recording.plan.coupled)
-    found = adjust(held.means(), inputs, *_start(held, {name: e.value for name, e in inputs.items()}))
+    values = {name: e.value for name, e in inputs.items()}
+    unloaded = find_unloaded(held, values)
+    found = adjust(held.means(), inputs, *_start(held, values, unloaded), unloaded)
     s = magnetics.statics(held.means(), found.values)
-    chosen = held.chosen(held.labels["bias_A"] == bias)
+    chosen = held.chosen(held.labels["bias_A"] == bias) if math.isfinite(bias) else held
     compared = magnetics.statics(chosen.means(), found.values)
     estimates = dict(found.estimates)
     fits, noise = {}, {}
     for k, a in enumerate(held.machine.axes):
+        if k in unloaded:
+            continue
         linear = magnetics.linear(compared.r[k], compared.p[k], compared.n[k], compared.force[k])
         fits[a] = AxisFit(found.terms[k], found.residuals[k], linear)
         slopes = {f"k_linear_{a}": [1, 0], f"stiffness_linear_{a}": [0, 1]}
@@ -73,49 +75,55 @@ def evaluate(recording: Recording[Any], held: Held) -> Analysis:
         estimates |= sums.estimates(a)
         noise[a] = sums.noise_N
     estimates |= comparison.by_bearing(estimates, held.machine)
-    return Analysis(held, s, compared, fits, inputs, found, estimates, noise, bias, len(chosen.of_step))
+    estimates |= of_slopes(found, held.machine, bias)
+    return Analysis(held, s, compared, fits, inputs, found, estimates, noise, bias, len(chosen.of_step),
+                    _offsets_known(recording, held.machine))  # fmt: skip
 
 
-def _start(held: Held, values: dict[str, float]) -> tuple[Array, Array, Array]:
-    """Noise (4,) of a position's mean force, the same (4,) for the weights, and the terms (4, 2) that fit each axis by itself.
+def _offsets_known(recording: Recording[Any], machine: AmbRotor) -> dict[str, float]:
+    named = {a: machine.model_offset(a) for a in machine.axes}
+    return {a: recording.rig.parameters[name].default for a, name in named.items() if name}
+
+
+def find_unloaded(held: Held, values: dict[str, float]) -> tuple[int, ...]:
+    """Numbers of the axes that carry none of the weight: they tell their offsets, and no force constant."""
+    load = np.abs(magnetics.statics(held.means(), values).force.mean(axis=1))
+    return tuple(k for k in range(len(load)) if load[k] < LOADED * load.max())
+
+
+def of_slopes(found: Adjusted, machine: AmbRotor, bias: float) -> dict[str, Estimate]:
+    """K_i and K_x by axis, slopes of the force at the magnetic centre with the bias in both coils: K_i = 4 beta i_b / gap^2,
+    K_x = 4 beta i_b^2 / gap^3. What the gap has in beta it mostly takes out of them again."""
+    out = {}
+    for a in machine.axes:
+        if f"beta_{a}" in found.estimates:
+            beta, gap = found.estimates[f"beta_{a}"], found.estimates[gap_key(machine, a)]
+            out[f"K_i_{a}"] = beta / (gap * gap) * (4 * bias)
+            out[f"K_x_{a}"] = beta / (gap * gap * gap) * (4 * bias**2)
+    return out
+
+
+def _start(held: Held, values: dict[str, float], unloaded: tuple[int, ...]) -> tuple[Array, Array, Array]:
+    """Noise (4,) of a position's mean force, the same (4,) for the weights, and the terms (4, 2) that fit each axis by itself;
+    without a load, the force constant that the others have on average, and the offset at which both coils pull alike.
 
     The noise is that of the batches; the weights also hold what the model is not trusted with. That does not average out over
     N positions; so each of them gets N of its variance.
     """
     s, parts = magnetics.statics(held.means(), values), magnetics.statics(held.parts(), values)
     noise, weighed, terms = np.zeros(4), np.zeros(4), np.zeros((4, 2))
+    gaps = [values[gap_key(held.machine, a)] for a in held.machine.axes]
+    for k in (k for k in range(4) if k not in unloaded):
+        terms[k] = magnetics.nonlinear(s.r[k], s.p[k], s.n[k], s.force[k], gaps[k]).terms
+    for k in unloaded:
+        others = [terms[j][0] for j in range(4) if j not in unloaded]
+        alike = gaps[k] * (s.n[k] - s.p[k]) / (s.n[k] + s.p[k])
+        terms[k] = float(np.mean(others)), float((alike - s.r[k]).mean())
     for k in range(4):
-        terms[k] = magnetics.nonlinear(s.r[k], s.p[k], s.n[k], s.force[k], values["gap"]).terms
         beta, offset = terms[k]
-        force = magnetics.magnet(beta, offset, values["gap"], parts.r[k], parts.p[k], parts.n[k]) - parts.force[k]
+        force = magnetics.magnet(beta, offset, gaps[k], parts.r[k], parts.p[k], parts.n[k]) - parts.force[k]
         batches = force.reshape(len(held), -1)
         noise[k] = math.sqrt(float(batches.var(axis=1, ddof=1).mean()) / batches.shape[1])
-        weighed[k] = math.hypot(noise[k], math.sqrt(len(held)) * TRUST * float(s.force[k].mean()))
+        pull = float(s.force[k].mean()) if k not in unloaded else beta * float((s.p[k] ** 2).mean()) / gaps[k] ** 2
+        weighed[k] = math.hypot(noise[k], math.sqrt(len(held)) * TRUST * pull)
     return noise, weighed, terms
-
-
-def fit_inputs(rig: RigFile, coupled: bool) -> dict[str, Estimate]:
-    """What the fits need besides the positions: certificates of the rig file as influences by identity."""
-    g, m, machine = rig.geometry, rig.machine, conventions(rig)
-    inputs = {"mass": certified("machine/mass", m["mass"], "mass of the shaft"),
-              "axes": certified("machine/radial_axes", m["radial_axes"], "angle of the axes to the vertical"),
-              "gravity": certified("site/gravity", rig.site.gravity, "gravity")}  # fmt: skip
-    inputs |= {key: certified(f"geometry/{name}", g[name], name.replace("_", " ")) for key, name in LENGTHS.items()}
-    spring = certified("geometry/coupling_stiffness", g["coupling_stiffness"], "stiffness of the coupling")
-    inputs["coupling"] = spring if coupled else Estimate.exact(0.0)
-    for d in "yz":
-        name = f"machine/coupling_offset/{d}"
-        inputs[f"relaxed_{d}"] = certified(name, m["coupling_offset"], f"where the coupling is relaxed, {d}")
-    for a in machine.axes:
-        probe = machine.position(a)
-        inputs[f"gain_{a}"] = certified(f"sensors/{probe}/gain", rig.sensors[probe].gain, f"gain of {probe}")
-        inputs[f"zero_{a}"] = certified(f"sensors/{probe}/offset", rig.sensors[probe].offset, f"zero of {probe}")
-        inputs[f"runout_{a}"] = certified(
-            f"machine/runout/{a}", m["runout"], f"runout of {probe} where the shaft rests"
-        )
-    for c, channel in ((f"{a}_{side}", channel) for a in machine.axes
-                       for side, channel in zip("pn", machine.pair(a), strict=True)):  # fmt: skip
-        sensor = rig.sensors[channel]
-        inputs[f"gain_{c}"] = certified(f"sensors/{channel}/gain", sensor.gain, f"gain of {channel}")
-        inputs[f"offset_{c}"] = certified(f"sensors/{channel}/offset", sensor.offset, f"offset of {channel}")
-    return inputs

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from bench.figures import Figure, Series
 from bench.rigfile import RigFile
 from procedures.amb_rotor import magnetics
+from procedures.amb_rotor.geometry import Edge, at_rings, nominal
 from procedures.bearing_model.estimates import Analysis
 
 DISPLACEMENT = "displacement at the AMB (µm)"
@@ -21,12 +23,16 @@ def all_figures(a: Analysis, rig: RigFile) -> list[Figure]:
 
 def _places(a: Analysis, rig: RigFile) -> Figure:
     turn = np.linspace(0, 2 * np.pi, 181)
-    radius = 1e6 * rig.geometry["clearance"].value
-    yi, zi, yo, zo = (1e6 * a.held.mean[name] for name in a.held.machine.positions)
+    machine = a.held.machine
+    radius, turned = 1e6 * machine.clearance, turn if np.isfinite(machine.clearance) else turn[:0]
+    f = nominal(rig)
+    facts = replace(f, rings=tuple(Edge(k, None, 0.0) for k in (0, 1)))
+    at = at_rings(
+        np.array([1e6 * a.held.mean[c] for c in machine.stations.channels]) / np.array(f.gains)[:, None], facts
+    )
     series = (
-        Series("touchdown ring", radius * np.cos(turn), radius * np.sin(turn), "guide"),
-        Series("inboard", yi, zi, "points"),
-        Series("outboard", yo, zo, "points"),
+        Series("touchdown ring", radius * np.cos(turned), radius * np.sin(turned), "guide"),
+        *(Series(name, y, z, "points") for name, (y, z) in zip(machine.planes, at, strict=True)),
     )
     caption = "Where the sensors saw the shaft at each position, within the touchdown ring."
     return Figure("positions", "Positions of the shaft", caption, "y (µm)", "z (µm)", series, kind="plane")
@@ -54,7 +60,8 @@ def _residuals(a: Analysis) -> Iterator[Figure]:
         ("residuals-nonlinear", "nonlinear model (T 2.8)", a.statics, of_nonlinear),
     ):
         series = tuple(
-            Series(axis, 1e6 * at.r[k], 1e3 * residuals[axis], "points") for k, axis in enumerate(a.held.machine.axes)
+            Series(axis, 1e6 * at.r[a.held.machine.axes.index(axis)], 1e3 * left, "points")
+            for axis, left in residuals.items()
         )
         title = f"Residuals of the {name}"
         yield Figure(key, title, caption, DISPLACEMENT, "residual (mN)", series, lines=(("zero", 0.0),))
@@ -62,12 +69,12 @@ def _residuals(a: Analysis) -> Iterator[Figure]:
 
 def _forces(a: Analysis) -> Figure:
     """Force of the magnets at equal currents over position: the fit's, and the linear model's line."""
-    k, bias = 0, a.bias_A
-    axis = a.held.machine.axes[k]
+    axis, bias = next(iter(a.fits)), a.bias_A
+    k = a.held.machine.axes.index(axis)
     f = a.fits[axis]
     r = np.linspace(float(a.compared.r[k].min()), float(a.compared.r[k].max()), 60)
     both = np.full_like(r, bias)
-    pull = magnetics.magnet(f.beta, f.offset, a.adjusted.values["gap"], r, both, both)
+    pull = magnetics.magnet(f.beta, f.offset, a.adjusted.values[magnetics.gap_key(a.held.machine, axis)], r, both, both)
     series = (
         Series("nonlinear, no control current", 1e6 * r, pull),
         Series("linear, no control current", 1e6 * r, f.linear.terms[1] * r),

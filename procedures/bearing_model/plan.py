@@ -12,12 +12,12 @@ class Plan(BenchPlan):
     """Settings, SI. Positions are a grid of the centre of mass in y and z, within a circle."""
 
     law: Law = ""  # of the controller's, one that holds a place exactly; as it is set where none is named
-    spacing_m: float = Field(20e-6, gt=0)
-    radius_m: float = Field(82e-6, gt=0)
+    spacing_m: float | None = Field(None, gt=0)  # a quarter of the radius where it is not given
+    radius_m: float | None = Field(None, gt=0)  # most of what ring and set points leave where it is not given
     tilt_rad: float = Field(3e-4, gt=0)  # of the check of the wiring
-    biases_A: tuple[float, ...] = Field(
-        (1.15, 0.8), min_length=1
-    )  # of each pass; T Table 2.2 is compared with the first
+    biases_A: tuple[
+        float, ...
+    ] = ()  # of each pass; T Table 2.2 is compared with the first; none: as the controller is set
     coupled: bool = True  # False: the operator has taken the coupling off
     settle_s: float = Field(0.6, gt=0)
     average_s: float = Field(0.5, ge=0.1)

@@ -7,7 +7,6 @@ linear model without intercept, T (2.9), makes of the same data.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
@@ -24,12 +23,15 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from procedures.amb_rotor import lift, rings
 from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
-from procedures.amb_rotor.laws import of_laws
 from procedures.amb_rotor.places import HOLD, LIFT, LIFT_LOST, REST, TILT, Held, channels, of_readings, read_steps
+from procedures.amb_rotor.stations import COORDINATES
 from procedures.bearing_model import checks, estimates, wiring
 from procedures.bearing_model import figures as drawn
 from procedures.bearing_model.comparison import COMPARED
 from procedures.bearing_model.estimates import Analysis
+from procedures.bearing_model.fitting import check
+from procedures.bearing_model.grid import biases, count_places, places, tilts
+from procedures.bearing_model.inputs import as_printed, lacking
 from procedures.bearing_model.plan import Plan
 from procedures.shared import assumptions, first_look
 
@@ -51,13 +53,16 @@ OF_LINEAR = {
         title="misfit ratio of batch means",
     ),
 }
-MEASURES = (*BETA.values(), *OFFSET.values(), *OF_LINEAR.values())
+BY_AXIS = {
+    "beta": Quantity("beta", "N m^2/A^2", "force constant of an axis, at the gap of the rig file"),
+    "offset": Quantity("offset", "m", "from the magnetic centre of an axis to where the probes read zero"),
+    "K_i": Quantity("K_i", "N/A", "dF/di of an axis at its magnetic centre, with the bias in both coils"),
+    "K_x": Quantity("K_x", "N/m", "dF/dx of an axis at its magnetic centre, with the bias in both coils"),
+}
+OF_AXES = (*BETA.values(), *OFFSET.values())
+MEASURES = (*OF_AXES, *OF_LINEAR.values())
 REST_S = 0.3
 BIAS_STEP_A = 0.1
-MARGIN = 5e-6  # of the radius: noise, and what the controller swings on the way
-GEOMETRY = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_outboard_amb", "amb_span", "amb_gap", "clearance",
-            "com_to_coupling", "coupling_stiffness")  # fmt: skip
-MACHINE = ("mass", "radial_axes", "runout", "coupling_offset")
 REACHED = ("sensors/*", "!sensors/pos_*/offset", "!sensors/i_?o_p/gain", "geometry/amb_gap", "geometry/coupling_stiffness",
            "geometry/com_to_coupling", "geometry/com_to_*_sensor")  # fmt: skip
 """Certificates that the adjustment contradicts before an error of theirs moves a result by 2 U: where what one carries of a
@@ -69,29 +74,13 @@ def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Controller parameters that the runner writes before levitation: flatness with constant current sum."""
     machine = conventions(rig)
     integrating = machine.can.settings.get("integrator", {}).get("on", {})
-    return {**machine.select(plan.law), **dict.fromkeys(machine.biases, plan.biases_A[0]), **integrating}
-
-
-def grid(plan: Plan) -> list[tuple[float, float]]:
-    """Positions (y, z) within the circle, row by row to and fro, so that every move is a short one."""
-    n = math.floor(plan.radius_m / plan.spacing_m + 1e-9)
-    levels = [round(k * plan.spacing_m, 9) for k in range(-n, n + 1)]
-    rows = []
-    for k, z in enumerate(levels):
-        row = [(y, z) for y in levels if math.hypot(y, z) <= plan.radius_m * (1 + 1e-9)]
-        rows.append(row if k % 2 == 0 else row[::-1])
-    return list(itertools.chain.from_iterable(rows))
-
-
-def tilts(plan: Plan) -> list[tuple[float, float]]:
-    """(psi, theta) of the check of the wiring."""
-    t = plan.tilt_rad
-    return [(0.0, 0.0), (t, 0.0), (-t, 0.0), (0.0, t), (0.0, -t)]
+    first = dict.fromkeys(machine.biases, plan.biases_A[0]) if plan.biases_A else {}
+    return {**machine.select(plan.law), **first, **integrating}
 
 
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records, for the progress display."""
-    return 2 + len(tilts(plan)) + len(plan.biases_A) * len(grid(plan))
+    return 2 + len(tilts(plan)) + max(1, len(plan.biases_A)) * count_places(plan)
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
@@ -101,22 +90,23 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     with record.step(REST):
         rig.clock.sleep(REST_S)
     machine = conventions(rig.file)
-    readings = {name: rig.levitation.reading(name) for name in machine.positions}
+    readings = {name: rig.levitation.reading(name) for name in machine.stations.channels}
     if any(rings.of_readings(readings, rig.file)) or not _lift(rig, record):
         return
     rig.clock.sleep(3 * plan.settle_s)
     tilted = _tilt(rig, plan, record)
-    for k, bias in enumerate(plan.biases_A):
-        _set_bias(rig, plan, bias)
+    for k, bias in enumerate(biases(rig.file, plan)):
+        if plan.biases_A:
+            _set_bias(rig, plan, bias)
         held = []
-        for y, z in grid(plan) if k % 2 == 0 else reversed(grid(plan)):
-            lift.write(rig, {**machine.point("y", y), **machine.point("z", z)})
+        for y, z in places(rig.file, plan) if k % 2 == 0 else reversed(places(rig.file, plan)):
+            lift.write(rig, machine.points({"y": y, "z": z}))
             rig.clock.sleep(plan.settle_s)
             with record.step(HOLD, y_m=y, z_m=z, bias_A=bias):
                 held.append(_watched(rig, plan, record))
         if k == 0 and not first_look.passes(rig, record, _of_first(rig.file, plan, held, tilted)):
             return
-    lift.write(rig, {**machine.point("y", 0.0), **machine.point("z", 0.0)})
+    lift.write(rig, machine.points({"y": 0.0, "z": 0.0}))
     rig.clock.sleep(plan.settle_s)
 
 
@@ -144,25 +134,25 @@ def _set_bias(rig: Rig, plan: Plan, bias: float) -> None:
 def _watched(rig: Rig, plan: Plan, record: Recorder) -> dict[str, float]:
     """Positions and currents at a place, as they come while the step is recorded, SI."""
     machine = conventions(rig.file)
-    return first_look.watched(rig, record, (*machine.positions, *machine.currents), plan.average_s)
+    return first_look.watched(rig, record, (*machine.stations.channels, *machine.currents), plan.average_s)
 
 
 def _of_first(
     rig: RigFile, plan: Plan, held: Sequence[Mapping[str, float]], tilted: Sequence[Mapping[str, float]]
 ) -> list[Finding]:
     """What the positions at the first bias show of the wiring, by what was read in each."""
-    (y, z), (psi, theta) = zip(*grid(plan), strict=True), zip(*tilts(plan), strict=True)
+    (y, z), (psi, theta) = zip(*places(rig, plan), strict=True), zip(*tilts(plan), strict=True)
     machine = conventions(rig)
-    places = of_readings({"y_m": y, "z_m": z}, held, machine)
+    first = of_readings({"y_m": y, "z_m": z}, held, machine)
     tilt = of_readings({"psi_rad": psi, "theta_rad": theta}, tilted, machine)
-    return list(wiring.of_wiring(places, tilt, rig)) or list(wiring.of_models(places, tilt, rig, plan))
+    return list(wiring.of_wiring(first, tilt, rig)) or list(wiring.of_models(first, tilt, rig, plan))
 
 
 def _tilt(rig: Rig, plan: Plan, record: Recorder) -> list[dict[str, float]]:
     seen = []
     machine = conventions(rig.file)
     for psi, theta in tilts(plan):
-        lift.write(rig, {**machine.point("psi", psi), **machine.point("theta", theta)})
+        lift.write(rig, machine.points({"psi": psi, "theta": theta}))
         rig.clock.sleep(plan.settle_s)
         with record.step(TILT, psi_rad=psi, theta_rad=theta):
             seen.append(_watched(rig, plan, record))
@@ -191,10 +181,15 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
 def measured(a: Analysis) -> Iterator[Measured]:
     """Each axis, then the comparison of each AMB."""
     for axis in a.held.machine.axes:
-        yield BETA[axis].measured(a.estimates[f"beta_{axis}"])
-        yield OFFSET[axis].measured(a.estimates[f"offset_{axis}"])
+        if axis in BETA:
+            yield BETA[axis].measured(a.estimates[f"beta_{axis}"])
+            yield OFFSET[axis].measured(a.estimates[f"offset_{axis}"])
+            continue
+        for name, quantity in BY_AXIS.items():
+            if f"{name}_{axis}" in a.estimates:
+                yield quantity.measured(a.estimates[f"{name}_{axis}"], axis)
     for where in a.held.machine.planes:
-        for name in COMPARED:
+        for name in (n for n in COMPARED if f"{n}_{where}" in a.estimates):
             yield OF_LINEAR[name].measured(a.estimates[f"{name}_{where}"], where)
 
 
@@ -206,37 +201,6 @@ def _of_data(recording: Recording[Plan], held: Held, tilted: Held) -> Iterator[F
         yield from wiring.of_models(held, tilted, rig, plan)
 
 
-def check(rig: RigFile, plan: Plan) -> Iterable[str]:
-    """What cannot work before anything starts."""
-    yield from of_laws(conventions(rig), "law", [plan.law])
-    places = len(grid(plan))
-    if places < 9:
-        yield f"spacing_m, radius_m: found {places} positions; expected nine or more"
-    g = rig.geometry
-    room = min(rings.room(rig), rig.envelope.max_levitated_position_m) - MARGIN
-    if plan.radius_m > room:
-        yield (
-            f"radius_m: found {plan.radius_m * 1e6:.1f} µm; the ring, the sensors' zeros and their runout leave "
-            f"{room * 1e6:.1f} µm"
-        )
-    machine = conventions(rig)
-    for name in (*machine.point("y", 0.0), *machine.point("z", 0.0)):
-        if plan.radius_m > rig.parameters[name].high:
-            yield f"radius_m: found {plan.radius_m * 1e6:.1f} µm; {name} goes to {rig.parameters[name].high * 1e6:.0f} µm"
-    arm = max(g[k].value for k in ("com_to_inboard_sensor", "com_to_outboard_sensor"))
-    tilted = machine.point("psi", plan.tilt_rad)
-    if any(abs(value) > rig.parameters[name].high for name, value in tilted.items()) or plan.tilt_rad * arm > room:
-        yield f"tilt_rad: found {plan.tilt_rad * 1e6:.0f} µrad; reference and ring allow less"
-    allowed, limit = rig.parameters[machine.biases[0]], rig.parameters[machine.can.current_limit].default
-    low, high = allowed.low, min(allowed.high, limit / 2)
-    for bias in plan.biases_A:
-        if not low <= bias <= high:
-            yield (
-                f"biases_A: found {bias:g} A; parameter and amplifiers, which have to give twice that, leave {low:g} to "
-                f"{high:g} A"
-            )
-
-
 def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
     """Positions, currents, forces by both models and residuals."""
     return drawn.all_figures(a, recording.rig)
@@ -245,21 +209,21 @@ def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
 def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
+    channels_of = (*machine.stations.channels, *machine.currents)
+    moves = tuple(f"capabilities.set_points: found none along {c}" for c in COORDINATES if not machine.can_point(c))
     return Requires(
-        lacks=(*machine.lacks, *machine.unweighed),
+        lacks=() if as_printed(rig) else (*lacking(rig), *moves),
         channels=channels(machine),
-        sensors=(*machine.positions, *machine.currents),
-        capabilities=("set_points", "bias", "current_limit"),
-        geometry=GEOMETRY,
-        machine=MACHINE,
-        uses=("settings.law",),
+        sensors=channels_of,
+        capabilities=("set_points",),
     )
 
 
 procedure = Procedure(
     name="bearing-model",
     title="Force constants and magnetic offsets of the radial AMBs by eccentric positioning",
-    measures=MEASURES,
+    measures=(*OF_AXES, *BY_AXIS.values(), *OF_LINEAR.values()),
+    optional=(*OF_AXES, *BY_AXIS.values()),  # each rig has its own axes; one without a load has no force constant
     state=RigState.READY,
     plan=Plan,
     acquire=acquire,

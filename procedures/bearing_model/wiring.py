@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -12,22 +13,26 @@ from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
 from procedures.amb_rotor import magnetics
-from procedures.amb_rotor.conventions import AmbRotor
-from procedures.amb_rotor.magnetics import Positions, Statics
+from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.amb_rotor.magnetics import Positions, Statics, gap_key
 from procedures.amb_rotor.places import Held
-from procedures.bearing_model.estimates import fit_inputs
+from procedures.bearing_model.estimates import find_unloaded
+from procedures.bearing_model.inputs import fit_inputs
 from procedures.bearing_model.plan import Plan
 
 Array = npt.NDArray[np.float64]
 FOLLOWS = 0.6  # a reading may answer a set point by this much less or more (the integrators are slow)
 SUSPECT = 0.05  # of the load: certificates within their tolerances leave a third of it before they are adjusted
+ALIKE = 0.9  # cosine between two probes that look the same way
+CENTRED = (
+    0.3  # of the bias over the gap, that the control current of an axis without a load falls with the displacement
+)
 BETTER = 4.0  # times smaller must a sum of squares be with other wiring, to suspect the wiring
 
 
 def model_answers(rig: RigFile) -> Array:
-    """What a reading of each axis (rows) does per set point y, z (m) and psi, theta (rad): T (2.17)."""
-    l_is, l_os = (rig.geometry[f"com_to_{b}_sensor"].value for b in ("inboard", "outboard"))
-    return np.array([[1, 0, 0, -l_is], [0, 1, l_is, 0], [1, 0, 0, l_os], [0, 1, -l_os, 0]])
+    """What each reading (rows) does per set point y, z (m) and psi, theta (rad): T (2.17)."""
+    return conventions(rig).stations.reads
 
 
 def fit_answers(held: Held, tilted: Held) -> Array:
@@ -37,7 +42,7 @@ def fit_answers(held: Held, tilted: Held) -> Array:
     design[:n, 0], design[:n, 1] = held.labels["y_m"], held.labels["z_m"]
     design[n:, 2], design[n:, 3] = tilted.labels["psi_rad"], tilted.labels["theta_rad"]
     design[:, 4] = 1
-    read = np.array([np.concatenate([held.mean[c], tilted.mean[c]]) for c in held.machine.positions])
+    read = np.array([np.concatenate([held.mean[c], tilted.mean[c]]) for c in held.machine.stations.channels])
     out: Array = np.linalg.lstsq(design, read.T, rcond=None)[0][:4].T
     return out
 
@@ -50,16 +55,16 @@ def of_wiring(held: Held, tilted: Held, rig: RigFile) -> Iterator[Finding]:
     def off(row: Array, model: Array) -> float:
         return float(np.abs((row - model) / scale).max())
 
-    for k in range(len(held.machine.axes)):
+    for k in range(len(want)):
         if off(have[k], want[k]) <= FOLLOWS:
             continue
-        least, j, sign = min((off(have[k], s * want[j]), j, s) for j in range(4) for s in (1, -1))
+        least, j, sign = min((off(have[k], s * want[j]), j, s) for j in range(len(want)) for s in (1, -1))
         yield _answers(held.machine, k, have[k]) if least > FOLLOWS else _answers_as(held.machine, k, j, sign)
 
 
 def _answers(machine: AmbRotor, k: int, row: Array) -> Finding:
     """A reading that answers as none of this rig should."""
-    name = machine.positions[k]
+    name = machine.stations.channels[k]
     text = (
         f"{name} follows y by {row[0]:+.2f}, z by {row[1]:+.2f}, psi by {row[2] * 1e3:+.0f} µm/mrad and "
         f"theta by {row[3] * 1e3:+.0f} µm/mrad; no reading of this rig should. A sensor clips, sticks or is "
@@ -69,12 +74,13 @@ def _answers(machine: AmbRotor, k: int, row: Array) -> Finding:
 
 
 def _answers_as(machine: AmbRotor, k: int, j: int, sign: int) -> Finding:
-    """A reading of axis k that answers as the one of axis j should, or its reverse."""
-    name, other = machine.positions[k], machine.positions[j]
+    """Reading k that answers as reading j should, or its reverse."""
+    name, other = (machine.stations.channels[i] for i in (k, j))
     if j == k:
         text = f"{name} answers its set points backwards: the probe's polarity is wrong."
         return Finding("sensor-polarity", text, name, Effect.ERROR)
-    what = "planes" if j % 2 == k % 2 else "axes"
+    one, two = (machine.stations.probes[i].angle.value for i in (name, other))
+    what = "planes" if abs(math.cos(one - two)) > ALIKE else "axes"
     text = (
         f"{name} answers as {other} should{' and backwards' if sign < 0 else ''}: "
         f"{what} are exchanged in the wiring or in the map."
@@ -152,11 +158,29 @@ def of_models(held: Held, tilted: Held, rig: RigFile, plan: Plan) -> Iterator[Fi
     means = Positions(read, p, n, held.machine)
     values = {name: e.value for name, e in fit_inputs(rig, plan.coupled).items()}
     by_gravity = {g: magnetics.statics(means, values | {"gravity": g * values["gravity"]}) for g in (1, -1)}
-    for k in range(len(held.machine.axes)):
+    unloaded = find_unloaded(held, values)
+    for k, axis in enumerate(held.machine.axes):
+        gap = values[gap_key(held.machine, axis)]
+        if k in unloaded:
+            yield from _without_load(by_gravity[1], k, gap, axis)
+            continue
         load = float(np.abs(by_gravity[1].force[k]).mean())
-        found = _judge(by_gravity[1], k, values["gap"], k, 1)
+        found = _judge(by_gravity[1], k, gap, k, 1)
         if not found.sane or found.worst > SUSPECT * load:
-            yield from _explain(held.machine, k, found, by_gravity, values["gap"], load)
+            yield from _explain(held.machine, k, found, by_gravity, gap, load)
+
+
+def _without_load(s: Statics, k: int, gap: float, axis: str) -> Iterator[Finding]:
+    """Without a load both coils pull alike, (i_b + i)/(i_b - i) = (gap - xi)/(gap + xi): the control current falls by the bias
+    over the gap for each metre, and rises where the coils are exchanged."""
+    bias, control = (s.p[k] + s.n[k]) / 2, (s.p[k] - s.n[k]) / 2
+    slope = float(np.polyfit(s.r[k], control, 1)[0])
+    if slope > -CENTRED * float(bias.mean()) / gap:
+        text = (
+            f"axis {axis}, which carries no weight, takes {slope * 1e-3:+.2f} mA of control current for each micrometre; "
+            f"{-float(bias.mean()) / gap * 1e-3:+.2f} mA are expected: its coils, or their current sensors, are exchanged."
+        )
+        yield Finding("coils-exchanged", text, axis, Effect.ERROR)
 
 
 def _explain(

@@ -18,10 +18,10 @@ from bench.units import RPM
 from procedures.run_up.estimates import DAMPED, Peak, Run, asked_margin
 from procedures.run_up.hum import of_peaks
 from procedures.run_up.plan import Passing
-from procedures.run_up.steps import LEAST_TURNS, MISSED, PASSAGE, Passage
+from procedures.run_up.steps import LEAST_TURNS, MISSED, PASSAGE, Passage, passed
 from procedures.shared import signals
 from procedures.shared.limits import landing_speed
-from procedures.synchronous import checks, fitting
+from procedures.synchronous import checks, facts, fitting
 from procedures.synchronous.checks import HELD
 from procedures.synchronous.hum import listen, of_dwells
 
@@ -71,6 +71,7 @@ def of_plan(rig: RigFile, plan: Passing) -> Iterable[str]:
     if plan.rate_rad_s2 and not any("acceleration" in d.registers for d in drives):
         yield "devices: found a drive without a register acceleration; a ramp needs one"
     yield from fitting.of_speeds(rig, plan.speeds_rad_s)
+    yield from fitting.of_bearings(rig, plan.slow_rad_s, len(plan.speeds_rad_s))
     yield from fitting.of_slow_roll(rig, plan.slow_rad_s, plan.slow_s, plan.speeds_rad_s)
     yield from fitting.of_captures(rig, plan.capture_s, plan.rate_hz, plan.orders, plan.speeds_rad_s)
 
@@ -128,7 +129,7 @@ def _speed_at(p: Passage, t: float) -> float:
 
 def _at(p: Passage, speed: float, plan: Passing) -> str:
     """What is measured at a speed, as findings name it."""
-    return f"@{speed * RPM:.0f} r/min, {p.direction}, {plan.law}"
+    return f"@{speed * RPM:.0f} r/min, {passed(p.direction, plan.law)}"
 
 
 def _doubted(p: Passage, samples: Mask, plan: Passing) -> tuple[str, ...]:
@@ -168,7 +169,7 @@ def _limits(p: Passage, plan: Passing) -> Iterator[Finding]:
 
 def _silent(p: Passage, rig: RigFile, plan: Passing) -> Iterator[Finding]:
     """A controller may not tell of contact; the probes show where the shaft went."""
-    clear = rig.geometry["clearance"].value
+    clear = facts.clearance(rig).value
     far = np.max([np.hypot(p.data[y], p.data[z]) for y, z in p.machine.planes.values()], axis=0)
     near = far > BY_THE_RING * clear
     if near.any() and not (p.flags & p.machine.contact).any():

@@ -22,7 +22,7 @@ from procedures.run_up import linear_model
 from procedures.run_up.line import DRAWS, Line
 from procedures.run_up.plan import Passing
 from procedures.run_up.steps import Curve, Passage, curve, near
-from procedures.synchronous import bearings
+from procedures.synchronous import bearings, facts, identified
 from procedures.synchronous import estimates as dwell_estimates
 from procedures.synchronous.dwells import Dwell
 from procedures.synchronous.estimates import Result, Results, Runout
@@ -38,6 +38,12 @@ LEFT = {LAG: "lag", BEND: "bend"}
 HARMONICS = "harmonics"
 BENDING = (*(f"{name}_{k}" for name in ("beta", "offset", "zero", "gain") for k in range(4)), "gap", "mass", "inertia",
            "l_ia", "l_oa", "l_is", "l_os")  # fmt: skip
+PLACED = (
+    *BENDING[:16],
+    "mass",
+    "inertia",
+    *(f"{name}_{k}" for name in ("gap", "at_axis", "at_probe") for k in range(4)),
+)
 """What the bend of the forces rests on; what else there is of it changes it by less than a twentieth."""
 
 
@@ -72,7 +78,7 @@ class Peak:
 @dataclass(frozen=True)
 class Run:
     """A passage with its curve; `shaft` (4, b) vectors of the shaft's centre, lag taken off; `peaks` of all probes; what the
-    turns about the captures' speeds say, None where none was passed."""
+    turns about the captures' speeds say, None where none was passed; what is `known` of the bearings."""
 
     passage: Passage
     curve: Curve
@@ -80,6 +86,7 @@ class Run:
     peaks: tuple[Peak, ...]
     near: Results | None
     slow: Dwell | None
+    known: bearings.Known
     clearance: float = field(default=math.nan)
 
 
@@ -88,15 +95,16 @@ def run(passage: Passage, slow: Dwell | None, recording: Recording[Any], plan: P
     rig = recording.rig
     found = curve(passage, plan.blocks)
     passed = [n for s in sorted(plan.speeds_rad_s) if (n := near(passage, recording, s, plan.law)) is not None]
-    clearance = rig.geometry["clearance"].value
+    clearance = facts.clearance(rig).value
     if not passed:
-        return Run(passage, found, found.values[:4], (), None, slow, clearance)
+        return Run(passage, found, found.values[:4], (), None, slow, known, clearance)
     dwells, left = [], []
     models = [transient.local(found.speed, found.values[k], found.covariance[k]) for k in range(12)]
     for dwell, width in passed:
         still, rest = _still(found, models, dwell, width)
         dwells.append(still)
         left.append(rest)
+    known = identified.of_dwells([*([] if slow is None else [slow]), *dwells], rig, known)
     results = dwell_estimates.results([*([] if slow is None else [slow]), *dwells], rig, known)
     results = replace(results, dwells=tuple(_with(r, rest) for r, rest in zip(results.dwells, left, strict=True)))
     inputs = bearings.collect_inputs(rig, known)
@@ -107,7 +115,12 @@ def run(passage: Passage, slow: Dwell | None, recording: Recording[Any], plan: P
         series = line.series()
         shaft.append(series[-1])
         peaks += _peaks(line, series, {name: bent[k] for name, bent in large.items()}, inputs, plan.running_rad_s)
-    return Run(passage, found, np.array(shaft), tuple(peaks), results, slow, clearance)
+    return Run(passage, found, np.array(shaft), tuple(peaks), results, slow, known, clearance)
+
+
+def bending(inputs: Mapping[str, Estimate]) -> tuple[str, ...]:
+    """Names of what the bend of the forces rests on: lengths as the rig file tells them."""
+    return BENDING if "gap" in inputs else PLACED
 
 
 def gains(rig: RigFile, plan: Passing) -> dict[str, float]:
@@ -121,7 +134,7 @@ def _large(
     """What large orbits add to the shaft's vectors (4, b) m, under ""; under the name of each of the `BENDING` inputs, if that
     is off by its standard uncertainty; under `HARMONICS`, without the second harmonics."""
     values, off = {name: e.value for name, e in inputs.items()}, {n: runouts[n].values for n in (1.0, 2.0)}
-    changed = {"": values} | {name: values | {name: values[name] + inputs[name].u} for name in BENDING}
+    changed = {"": values} | {name: values | {name: values[name] + inputs[name].u} for name in bending(inputs)}
     bends = {name: linear_model.bend(Stand.of(v), c, off, law, set_to) for name, v in changed.items()}
     once = replace(c, second=np.full_like(c.second, np.nan))
     return bends | {HARMONICS: linear_model.bend(Stand.of(values), once, off, law, set_to)}
@@ -138,9 +151,9 @@ def _peaks(
     runout = [
         (p, p.u * (1j if j else 1.0)) for j, p in enumerate(line.runout.parts[2 * line.k : 2 * line.k + 2]) if p.u
     ]
-    parts_ = [p for p, _ in runout] + [inputs[name] for name in BENDING]
+    parts_ = [p for p, _ in runout] + [inputs[name] for name in bending(inputs)]
     others = [series[-1], raw, once, series[-1] - large[HARMONICS]]
-    others += [*(best - u for _, u in runout), *(series[-1] - large[name] for name in BENDING)]
+    others += [*(best - u for _, u in runout), *(series[-1] - large[name] for name in bending(inputs))]
     speeds = line.found.speed
     scatter = line.scatter()
     each = parts(scatter[..., None])

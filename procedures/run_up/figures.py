@@ -48,13 +48,14 @@ def all_figures(run: Run, rig: RigFile, running: float) -> Iterator[Shown]:
     drawn = pictures.order_map("order-map", f"Order map of {name}, {p.name}", found)
     yield replace(drawn, caption=f"{drawn.caption} Faint curves that slant are higher orders that its means fold back.")
     yield _currents(run, rig)
-    yield _volts(run)
+    if p.machine.plane_voltages:
+        yield _volts(run)
     yield _speed(p)
     if run.near is not None:
         yield figures.farthest(run.near)
         for result in run.near.dwells[-1:]:
             for plane in planes:
-                yield figures.orbits(result, plane, run.clearance)
+                yield figures.orbits(result, plane, run.clearance, figures.where_y_is(rig))
             if result.dwell.full is not None:
                 for plane in planes:
                     yield figures.spectrum(result, plane)

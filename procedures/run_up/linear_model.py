@@ -25,7 +25,7 @@ import numpy.typing as npt
 
 from bench.rigfile.capabilities import Flatness
 from procedures.run_up.steps import Curve
-from procedures.synchronous.runout import SCALE, Stand, arms, impedance
+from procedures.synchronous.runout import SCALE, Stand, impedance
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -65,12 +65,12 @@ def bend(s: Stand, c: Curve, runouts: Mapping[float, Complex], law: str, gains: 
     else:
         loop, late = _flat(s, t, (k_p, k_n, k_x), whole, flat, gains)
         whole = whole - _inverted(s, c, gains, late)
-    at_amb, at_probe = arms(s.l_ia, s.l_oa), arms(s.l_is, s.l_os)
+    at_amb, at_probe = s.axes, s.probes
     return np.asarray(at_probe @ np.linalg.solve(loop, (at_amb.T @ whole).T[..., None])[..., 0].T)
 
 
 def _turns(s: Stand, c: Curve, runouts: Mapping[float, Complex]) -> _Turns:
-    to_amb = arms(s.l_ia, s.l_oa) @ np.linalg.inv(arms(s.l_is, s.l_os))
+    to_amb = s.axes @ np.linalg.inv(s.probes)
     gain, amp = s.gain[:, None], s.i_gain[:, None]
     place = to_amb @ ((c.means[:, :4].T - s.zero[:, None]) / gain) + s.offset[:, None]
     read = c.values[:4] / gain
@@ -84,8 +84,8 @@ def _turns(s: Stand, c: Curve, runouts: Mapping[float, Complex]) -> _Turns:
 
 def _force(s: Stand, place: Array, i: Array) -> Array:
     """T (2.4b) of the four axes, N; currents of the eight coils."""
-    beta = s.beta.reshape(4, *[1] * (place.ndim - 1))
-    return np.asarray(beta * ((i[::2] / (s.gap - place)) ** 2 - (i[1::2] / (s.gap + place)) ** 2))
+    beta, gap = (x.reshape(4, *[1] * (place.ndim - 1)) for x in (s.beta, s.gap))
+    return np.asarray(beta * ((i[::2] / (gap - place)) ** 2 - (i[1::2] / (gap + place)) ** 2))
 
 
 def _over(t: _Turns, s: Stand, x1: Complex, x2: Complex) -> Array:
@@ -97,7 +97,7 @@ def _over(t: _Turns, s: Stand, x1: Complex, x2: Complex) -> Array:
 
 def _slopes(s: Stand, t: _Turns) -> tuple[Array, Array, Array]:
     """K_p, K_n N/A and K_x N/m (4, b) of small orbits: with the currents that carry the same mean force."""
-    near, far = s.gap - t.place, s.gap + t.place
+    near, far = s.gap[:, None] - t.place, s.gap[:, None] + t.place
     beta = s.beta[:, None]
     mean = _over(t, s, t.x1, t.x2).mean(axis=-1)
     p, n = t.amps[::2], t.amps[1::2]
@@ -116,7 +116,8 @@ def _beyond(s: Stand, t: _Turns, k: tuple[Array, Array, Array], x1: Complex, x2:
 def _inverted(s: Stand, c: Curve, gains: Mapping[str, float], late: Complex) -> Complex:
     """N as the law takes it off (4, b): with its own gap and magnetic offsets, at what the probes read, late."""
     offset = np.array([gains[c.machine.model_offset(axis)] for axis in c.machine.axes])
-    idea = replace(s, gap=gains[c.machine.can.model["gap"]], offset=offset, gain=np.ones(4), zero=np.zeros(4))
+    gap = np.full(4, gains[c.machine.can.model["gap"]])
+    idea = replace(s, gap=gap, offset=offset, gain=np.ones(4), zero=np.zeros(4))
     t = _turns(idea, c, {1.0: np.zeros(4, complex), 2.0: np.zeros(4, complex)})
     return _beyond(idea, t, _slopes(idea, t), t.x1 * late, t.x2 * late**2)
 
@@ -124,7 +125,7 @@ def _inverted(s: Stand, c: Curve, gains: Mapping[str, float], late: Complex) -> 
 def _decentral(s: Stand, t: _Turns, k_p: Array, k_n: Array, k_x: Array) -> Complex:
     """Z (b, 4, 4) where each coil answers to its own probe."""
     answer = (k_p * t.i1[::2] + k_n * t.i1[1::2]) / t.read
-    at_amb, at_probe = arms(s.l_ia, s.l_oa), arms(s.l_is, s.l_os)
+    at_amb, at_probe = s.axes, s.probes
     alone = [impedance(s, k_x[:, b], w, w) for b, w in enumerate(t.speed)]
     return np.array([z - at_amb.T @ (answer[:, b, None] * at_probe) for b, z in enumerate(alone)])
 
@@ -133,11 +134,11 @@ def _flat(
     s: Stand, t: _Turns, k: tuple[Array, Array, Array], whole: Complex, flat: Flatness, gains: Mapping[str, float]
 ) -> tuple[Complex, Complex]:
     """Z (b, 4, 4) where the law asks for accelerations, and by how much it is late, e^(-j angle) (b,)."""
-    at_amb, mass = arms(s.l_ia, s.l_oa), np.diag([s.mass, s.mass, s.inertia, s.inertia])
+    at_amb, mass = s.axes, np.diag([s.mass, s.mass, s.inertia, s.inertia])
     force = at_amb.T @ (k[0] * t.i1[::2] + k[1] * t.i1[1::2] + k[2] * t.x1 + whole)
     end = np.array([[1, 0, 0, -s.l_c], [0, 1, s.l_c, 0.0]])
     held = s.coupling * end.T @ end
-    q = np.linalg.solve(arms(s.l_is, s.l_os), t.read)
+    q = np.linalg.solve(s.probes, t.read)
     asked, made = SCALE[:, None] * (mass @ q), SCALE[:, None] * (force - held @ q)
     g = -(asked.conj() * made).sum(axis=0) / (np.abs(asked) ** 2).sum(axis=0)
     w = t.speed

@@ -35,7 +35,7 @@ from procedures.shared import assumptions, first_look
 from procedures.synchronous import bearings, dwelling
 from procedures.synchronous import checks as dwell_checks
 from procedures.synchronous.coil_peaks import find_uncertified
-from procedures.synchronous.dwells import SLOW, captured_channels, read_dwell
+from procedures.synchronous.dwells import SLOW, can_capture, captured_channels, read_dwell
 from procedures.unbalance import procedure as unbalance
 from procedures.unbalance.procedure import CURRENT, D_MAX, MAJOR, READ, SHARE, VOLTAGE
 
@@ -139,7 +139,7 @@ def pass_speeds(rig: Rig, plan: Passing, record: Recorder, direction: str, goal:
 
 
 def _arm(rig: Rig, plan: Passing, speed: float) -> None:
-    if rig.capture is not None:
+    if rig.capture is not None and can_capture(rig.file):
         names = captured_channels(conventions(rig.file))
         rig.capture.arm(
             names, seconds=plan.capture_s, before_s=plan.capture_s / 2, rate_hz=plan.rate_hz, trigger=at_speed(speed)
@@ -148,7 +148,7 @@ def _arm(rig: Rig, plan: Passing, speed: float) -> None:
 
 def _fetch(rig: Rig, plan: Passing, record: Recorder, speed: float) -> None:
     """The capture at a speed; the analysis tells where there is none."""
-    if rig.capture is None:
+    if rig.capture is None or not can_capture(rig.file):
         return
     try:
         rig.capture.wait(plan.capture_s + AFTER_S)
@@ -180,7 +180,7 @@ def evaluate(recording: Recording[Any], findings: Findings) -> Run:
         run = estimates.run(passage, slow, recording, plan, known)
     except AnalysisError as error:  # a drive that was faster than it was told: too few turns for a curve
         findings.end(Finding("no-passage", str(error), passage.name, Effect.ERROR))
-    findings.add((bearings.describe(known), *find_uncertified(recording.rig)))
+    findings.add((bearings.describe(run.known), *find_uncertified(recording.rig), *dwelling.uncaptured(recording.rig)))
     findings.add(checks.of_run(run, recording, plan))
     return run
 
@@ -212,11 +212,9 @@ def figures(run: Run, recording: Recording[Any]) -> Iterable[Shown]:
 
 
 def requires(rig: RigFile) -> Requires:
-    """What the unbalance response needs, and the greatest coil voltage of each bearing."""
+    """What the unbalance response needs; the greatest coil voltage of each bearing is shown where it is told."""
     needed, told = unbalance.requires(rig), conventions(rig).plane_voltages
-    lacks = () if told else ("bearings: found a radial one without the voltage channel of its coils",)
-    return replace(needed, channels=(*needed.channels, *told), lacks=(*needed.lacks, *lacks),
-                   uses=(*needed.uses, "flatness", "gains"))  # fmt: skip
+    return replace(needed, channels=(*needed.channels, *told), uses=(*needed.uses, "flatness", "gains"))
 
 
 procedure = Procedure(

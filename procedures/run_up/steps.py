@@ -13,13 +13,15 @@ import numpy.typing as npt
 from bench.analysis import serial
 from bench.analysis.orders import synchronous
 from bench.analysis.sampling import Sampling
-from bench.analysis.tachometer import Tachometer, age, counted, tachometer
+from bench.analysis.tachometer import Tachometer
 from bench.analysis.vectors import parts
 from bench.errors import AnalysisError
 from bench.recording import Recording
-from bench.rigfile.roles import ANGLE, PULSES, SPEED, STATUS
+from bench.rigfile import RigFile
+from bench.rigfile.roles import STATUS
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.shared.signals import clips
+from procedures.synchronous import mark
 from procedures.synchronous.dwells import Dwell, full_rate, telemetry_channels
 
 Array = npt.NDArray[np.float64]
@@ -27,7 +29,6 @@ Complex = npt.NDArray[np.complex128]
 Integers = npt.NDArray[np.int64]
 PASSAGE = "passage"
 MISSED = "capture-missed"
-DRIVEN = "drive_actual_speed"
 LEAST_TURNS = 4  # of a block
 TOGETHER = 8  # blocks of equal turns
 ENDS = 0.004  # of the way, left out at either end: there the drive begins and ends its ramp
@@ -96,14 +97,15 @@ def read_passage(recording: Recording[Any]) -> Passage:
         raise AnalysisError("found no passage through the speeds; expected one (was the run stopped early?)")
     step, tick, machine = steps[0], recording.rig.devices["controller"].tick_s, conventions(recording.rig)
     names = (*machine.positions, *machine.currents)
-    data = step.read(*telemetry_channels(machine), *machine.plane_voltages)
+    data = step.read(*telemetry_channels(recording.rig), *machine.plane_voltages)
     t = (data["t_ns"] - recording.start_ns) * 1e-9
     if t.size < 100:
         raise AnalysisError(f"passage: found {t.size} samples; expected 100 or more")
     ticks = round(recording.streams["telemetry"].period_ns * 1e-9 / tick)
-    tacho = tachometer(*counted(t - tick, data[PULSES], age(data[ANGLE], data[SPEED])))
+    tacho = mark.tachometer_of(recording.rig, t, data)
     wide = np.array([data[c] for c in names])
-    drive = recording.channel(DRIVEN, step.start_ns, step.end_ns)
+    driven = driven_channel(recording.rig)
+    drive = recording.channel(driven, step.start_ns, step.end_ns)
     labels = step.labels
     return Passage(
         str(labels["direction"]),
@@ -114,7 +116,7 @@ def read_passage(recording: Recording[Any]) -> Passage:
         wide,
         np.array([data[c] for c in machine.plane_voltages]),
         data[STATUS].astype(np.int64),
-        ((drive["t_ns"] - recording.start_ns) * 1e-9, drive[DRIVEN]),
+        ((drive["t_ns"] - recording.start_ns) * 1e-9, drive[driven]),
         _moving(tacho.speed(t)),
         tuple(c for c, x in zip(names, wide, strict=True) if np.ptp(x) == 0),
         clips(wide[:4]),
@@ -122,6 +124,18 @@ def read_passage(recording: Recording[Any]) -> Passage:
         step.expected(),
         machine,
     )
+
+
+def driven_channel(rig: RigFile) -> str:
+    """Of the speed that the drive tells; as its registers are recorded.
+
+    Raises:
+        AnalysisError: no device has that role.
+    """
+    for name, device in rig.devices.items():
+        if "drive" in device.roles:
+            return f"{name}_actual_speed"
+    raise AnalysisError("devices: found none in the role drive")
 
 
 def _moving(speed: Array) -> slice:
@@ -209,6 +223,11 @@ def _ordered(joined: Sequence[Any], machine: AmbRotor) -> Curve:
     )
 
 
+def passed(direction: str, law: str) -> str:
+    """How a passage is named: by its direction, and the law where one was chosen."""
+    return f"{direction}, {law}" if law else direction
+
+
 def near(p: Passage, recording: Recording[Any], speed: float, law: str) -> tuple[Dwell, float] | None:
     """The turns about a speed as a dwell, with its capture where there is one, and by how much the speed went, rad/s; None
     where the shaft did not come through it."""
@@ -228,7 +247,7 @@ def near(p: Passage, recording: Recording[Any], speed: float, law: str) -> tuple
     full = full_rate(captures[0], p.machine) if captures else None
     driven = float(np.interp(p.t[k], *p.driven))
     dwell = Dwell(
-        PASSAGE, f"{p.direction}, {law}", speed, driven, False, p.tacho, track, full,
+        PASSAGE, passed(p.direction, law), speed, driven, False, p.tacho, track, full,
         int(np.bitwise_or.reduce(p.flags[part])), 0, (), 0, 1, recording.start_ns + round(p.t[k] * 1e9),
         p.sampling, p.machine,
     )  # fmt: skip

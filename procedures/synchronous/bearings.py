@@ -4,8 +4,8 @@ plan."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,7 +16,8 @@ from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.estimate import merged
 from procedures.amb_rotor.conventions import conventions
 from procedures.shared.certificates import certified
-from procedures.synchronous.runout import arms
+from procedures.synchronous.facts import collect_lengths
+from procedures.synchronous.runout import Stand
 
 BEARING_MODEL = "bearing-model"
 
@@ -24,11 +25,13 @@ BEARING_MODEL = "bearing-model"
 @dataclass(frozen=True)
 class Known:
     """What is known of the bearings: an adopted `calibration`; where there is none, how far the controller's betas (half width
-    `beta_share`, of them) and magnetic offsets (standard uncertainty `offset_u_m`, m) may be off."""
+    `beta_share`, of them) and magnetic offsets (standard uncertainty `offset_u_m`, m) may be off. `found` are the force
+    constants that the turning shaft itself told, where the controller knows none."""
 
     calibration: Calibration | None
     beta_share: float
     offset_u_m: float
+    found: Mapping[str, Estimate] = field(default_factory=dict)
 
     @classmethod
     def of(cls, calibrations: Iterable[Calibration], beta_share: float, offset_u_m: float) -> Known:
@@ -43,7 +46,12 @@ def needs(bearings: str) -> tuple[Need, ...]:
 
 def describe(known: Known) -> Finding:
     """A note on what the forces rest on."""
-    if (model := known.calibration) is not None:
+    if known.found:
+        sizes = ", ".join(f"{e.value:.3g} ± {2 * e.u / e.value:.1%}" for e in known.found.values())
+        text = (f"the controller knows no force constants and no calibration bearing-model was used: the dwells tell "
+                f"them by the shaft's mass and inertia, {sizes} N m²/A² by axis; magnetic centres are taken for the rings' "
+                f"with u = {known.offset_u_m * 1e6:.3g} µm")  # fmt: skip
+    elif (model := known.calibration) is not None:
         text = f"betas and magnetic offsets are those of {model.run_id}, {model.date[:10]}, with its influences"
     else:
         text = (f"no calibration bearing-model was used: betas are the controller's within ±{known.beta_share:.1%}, magnetic "
@@ -51,22 +59,40 @@ def describe(known: Known) -> Finding:
     return Finding("bearings", text, "", Effect.NOTE)
 
 
+def unknown(known: Known, rig: RigFile) -> Iterator[Finding]:
+    """Nothing tells the bearings' forces: no runout can be told from the shaft's motion."""
+    if known.calibration is None and not known.found and not has_model(rig):
+        text = ("nothing tells what the bearings' forces are: the controller knows no force constants, no calibration "
+                "bearing-model was used, and fewer than three speeds, slow roll included, do not tell them.")  # fmt: skip
+        yield Finding("bearings-unknown", text, "", Effect.ERROR)
+
+
 def collect_inputs(rig: RigFile, known: Known) -> dict[str, Estimate]:
-    """What the rig file says of the stand (`runout.Stand`), with what is known of its bearings."""
-    g = rig.geometry
-    out = _probes_and_coils(rig)
-    for name, key in (("gap", "amb_gap"), ("coupling", "coupling_stiffness"), ("l_ia", "com_to_inboard_amb"),
-                      ("l_oa", "com_to_outboard_amb"), ("l_is", "com_to_inboard_sensor"), ("l_os", "com_to_outboard_sensor"),
-                      ("l_iu", "com_to_inboard_balance"), ("l_ou", "com_to_outboard_balance"),
-                      ("l_c", "com_to_coupling")):  # fmt: skip
-        out[name] = certified(f"geometry/{key}", g[key], key.replace("_", " "))
-    for name, key in (("mass", "mass"), ("inertia", "transverse_inertia"), ("polar", "polar_inertia")):
-        out[name] = certified(f"machine/{key}", rig.machine[key], key.replace("_", " "))
-    return out | (
-        _planned(rig, known)
-        if known.calibration is None
-        else _calibrated(out, conventions(rig).axes, known.calibration)
-    )
+    """What the rig file says of the stand (`runout.Stand`), with what is known of its bearings.
+
+    Raises:
+        Lacking: the rig file does not say enough of the shaft.
+    """
+    out = {**_probes_and_coils(rig), **collect_lengths(rig)}
+    if known.calibration is not None:
+        return out | _calibrated(out, conventions(rig).axes, known.calibration)
+    return out | (_planned(rig, known) if has_model(rig) else {**_centred(rig, known), **known.found})
+
+
+def has_model(rig: RigFile) -> bool:
+    """Whether the controller knows force constants and magnetic offsets of all axes."""
+    machine = conventions(rig)
+    return all(machine.model_beta(a) and machine.model_offset(a) for a in machine.axes)
+
+
+def _centred(rig: RigFile, known: Known) -> dict[str, Estimate]:
+    """Magnetic centres in the middle of the rings, as far off as the plan says; force constants of nothing, until they are
+    found (`found`)."""
+    out = {}
+    for k, a in enumerate(conventions(rig).axes):
+        out[f"beta_{k}"] = Estimate.exact(0.0, "N m^2/A^2")
+        out[f"offset_{k}"] = _bound(f"model/offset_{a}", f"magnetic offset of {a}", 0.0, known.offset_u_m, "normal")
+    return out
 
 
 def _planned(rig: RigFile, known: Known) -> dict[str, Estimate]:
@@ -84,8 +110,9 @@ def _planned(rig: RigFile, known: Known) -> dict[str, Estimate]:
 def _calibrated(known: Mapping[str, Estimate], axes: Sequence[str], model: Calibration) -> dict[str, Estimate]:
     """Those of a calibration. Its offsets lead to where the probes read zero, these to the rings' centre: less what the
     zeros are at the bearings' planes, which then does not act on the forces any more."""
-    v = {name: known[name].value for name in ("l_ia", "l_oa", "l_is", "l_os")}
-    at_bearing = arms(v["l_ia"], v["l_oa"]) @ np.linalg.inv(arms(v["l_is"], v["l_os"]))
+    none = {f"{name}_{k}": 0.0 for name in ("beta", "offset") for k in range(4)}
+    s = Stand.of(none | {name: e.value for name, e in known.items()})
+    at_bearing = s.axes @ np.linalg.inv(s.probes)
     out = {}
     for k, a in enumerate(axes):
         out[f"beta_{k}"] = model.values[f"beta_{a}"]
@@ -102,9 +129,14 @@ def _probes_and_coils(rig: RigFile) -> dict[str, Estimate]:
     for start, names in (("", machine.positions), ("i_", machine.currents)):
         for k, name in enumerate(names):
             sensor = rig.sensors[name]
-            out[f"{start}gain_{k}"] = certified(f"sensors/{name}/gain", sensor.gain, f"gain of {name}")
+            gain = certified(f"sensors/{name}/gain", sensor.gain, f"gain of {name}")
+            out[f"{start}gain_{k}"] = gain * -1.0 if not start and _reads_back(rig, name) else gain
             out[f"{start}zero_{k}"] = certified(f"sensors/{name}/offset", sensor.offset, f"zero of {name}")
     return out
+
+
+def _reads_back(rig: RigFile, channel: str) -> bool:
+    return any(p.channel == channel and p.sign < 0 for p in rig.probes.values())
 
 
 def _bound(identity: str, name: str, value: float, u: float, distribution: str) -> Estimate:

@@ -219,7 +219,8 @@ def _told(results: Results) -> Iterator[Finding]:
     def polar(values: np.ndarray) -> str:
         return ", ".join(f"{abs(v) * 1e6:.2f} µm ∠{-np.degrees(np.angle(v)) % 360:.0f}°" for v in values)
 
-    text = (f"of yi, zi, yo, zo (0-pk, phase lag), at {slow.speed * RPM:.0f} r/min, {slow.date}: the probes read "
+    axes = ", ".join(slow.machine.axes)
+    text = (f"of {axes} (0-pk, phase lag), at {slow.speed * RPM:.0f} r/min, {slow.date}: the probes read "
             f"{polar(first.reading)}; by the forces the shaft itself moved {polar(first.shaft)}; subtracted is the runout "
             f"{polar(first.values)}.")  # fmt: skip
     yield Finding("slow-roll", text, slow.where)

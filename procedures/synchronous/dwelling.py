@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
+from bench.findings import Finding
 from bench.procedure.rig import Rig
 from bench.recording.recorder import Recorder
+from bench.rigfile import RigFile
 from procedures.amb_rotor import lift
 from procedures.amb_rotor.conventions import Law, Variant, conventions
-from procedures.synchronous.dwells import SLOW
+from procedures.synchronous.dwells import SLOW, TELLS, can_capture, telemetry_period_s
 
 
 def roll_slowly(rig: Rig, record: Recorder, law: Law, rad_s: float, seconds: float, settle_s: float) -> bool:
@@ -28,6 +32,16 @@ def step_labels(rig: Rig, speed: float, variant: Variant, number: int = 0) -> di
     """Of the `number`-th dwell at a speed in rad/s, or of the slow roll; below zero it is a repeat."""
     driven = rig.drive.speed_rad_s if rig.drive is not None else 0.0
     return {"speed_rad_s": speed, "variant": variant, "driven_rad_s": driven, "number": number, "again": number < 0}
+
+
+def uncaptured(rig: RigFile) -> Iterator[Finding]:
+    """What is not stated where the controller records nothing at its full rate."""
+    if not can_capture(rig):
+        hz = TELLS / telemetry_period_s(rig)
+        text = (f"the controller captures nothing of the turning shaft: nothing is stated above {hz:.0f} Hz, {TELLS:g} of its "
+                "telemetry's rate; no spectra, no needs of the coils, and D_max without motion that does not turn with the "
+                "shaft.")  # fmt: skip
+        yield Finding("telemetry-alone", text)
 
 
 def stop(rig: Rig) -> None:

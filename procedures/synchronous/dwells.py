@@ -13,20 +13,23 @@ import numpy.typing as npt
 
 from bench.analysis.orders import Track, synchronous
 from bench.analysis.sampling import Sampling
-from bench.analysis.tachometer import Tachometer, age, counted, tachometer
+from bench.analysis.tachometer import Tachometer, counted, tachometer
 from bench.analysis.vectors import Vectors
 from bench.errors import AnalysisError
 from bench.procedure.requires import Requires
 from bench.recording import Captured, Recording, Step
-from bench.rigfile.roles import ANGLE, PULSES, SPEED, STATUS
+from bench.rigfile import RigFile
+from bench.rigfile.roles import STATUS
 from bench.units import RPM
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.shared.signals import clips
+from procedures.synchronous import facts, mark
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 DWELL, SLOW, AGAIN = "dwell", "slow-roll", "again"
 ORDERS = (1.0, 2.0, 3.0)
+TELLS = 0.4  # of the telemetry's rate: what is above is not stated
 
 
 @dataclass(frozen=True)
@@ -94,9 +97,10 @@ class Dwell:
         return np.asarray(self.track.means[0])
 
 
-def telemetry_channels(machine: AmbRotor) -> tuple[str, ...]:
+def telemetry_channels(rig: RigFile) -> tuple[str, ...]:
     """What is read of the telemetry of a dwell."""
-    return (*machine.positions, *machine.currents, ANGLE, SPEED, PULSES, STATUS)
+    machine = conventions(rig)
+    return (*machine.positions, *machine.currents, *mark.told(rig), STATUS)
 
 
 def captured_channels(machine: AmbRotor) -> tuple[str, ...]:
@@ -104,15 +108,26 @@ def captured_channels(machine: AmbRotor) -> tuple[str, ...]:
     return (*machine.positions, *machine.currents, *machine.voltages, "pulses", "pulse_age")
 
 
-def required(machine: AmbRotor) -> Requires:
-    """What every procedure needs that watches the shaft while it turns."""
+def telemetry_period_s(rig: RigFile) -> float:
+    """From one sample of the telemetry to the next."""
+    return rig.messages[rig.binding.telemetry[0]].period_s
+
+
+def can_capture(rig: RigFile) -> bool:
+    """Whether the controller records at its full rate what orbits, spectra and the coils' needs are read of."""
+    return rig.capture is not None and set(captured_channels(conventions(rig))) <= set(rig.capture.channels)
+
+
+def required(rig: RigFile) -> Requires:
+    """What every procedure needs that watches the shaft while it turns; captures are used where the controller has them."""
+    machine = conventions(rig)
     return Requires(
-        lacks=(*machine.lacks, *machine.unweighed),
+        lacks=(*machine.lacks, *(() if facts.stated(rig) else facts.missing(rig))),
         roles=("levitation", "drive"),
-        channels=telemetry_channels(machine),
+        channels=(*machine.positions, *machine.currents, *mark.needed(rig), STATUS),
         sensors=(*machine.positions, *machine.currents),
-        capture=captured_channels(machine),
-        uses=("settings.law", "settings.compensation"),
+        capabilities=("set_points",),
+        uses=("settings.law", "settings.compensation", "capture"),
     )
 
 
@@ -136,13 +151,13 @@ def read_dwell(recording: Recording[Any], step: Step) -> Dwell:
     """
     tick, machine = recording.rig.devices["controller"].tick_s, conventions(recording.rig)
     names = (*machine.positions, *machine.currents)
-    data = step.read(*telemetry_channels(machine))
+    data = step.read(*telemetry_channels(recording.rig))
     t = (data["t_ns"] - recording.start_ns) * 1e-9
     ticks = round(recording.streams["telemetry"].period_ns * 1e-9 / tick)
     sampling = Sampling(tick, ticks, tick)
     if len(t) < 100:
         raise AnalysisError(f"{step.kind} {dict(step.labels)}: found {len(t)} samples; expected 100 or more")
-    tacho = tachometer(*counted(t - tick, data[PULSES], age(data[ANGLE], data[SPEED])))
+    tacho = mark.tachometer_of(recording.rig, t, data)
     wide = np.array([data[c] for c in names])
     track = synchronous(t, wide, tacho, sampling, orders=_seen(ORDERS, float(step.labels["speed_rad_s"]), ticks * tick))
     labels, flags = step.labels, data[STATUS].astype(np.int64)
@@ -161,7 +176,7 @@ def read_dwell(recording: Recording[Any], step: Step) -> Dwell:
 
 def _seen(orders: Sequence[float], speed: float, period: float) -> tuple[float, ...]:
     """Orders that the telemetry's period leaves well below half its rate."""
-    return tuple(n for n in orders if n == 1 or n * speed / (2 * math.pi) < 0.4 / period)
+    return tuple(n for n in orders if n == 1 or n * speed / (2 * math.pi) < TELLS / period)
 
 
 def full_rate(captured: Captured, machine: AmbRotor) -> Full:

@@ -15,17 +15,17 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate, welch_satterthwaite
 from bench.uncertainty.estimate import merged
 from procedures.amb_rotor.conventions import AmbRotor, conventions
-from procedures.shared.certificates import certified
-from procedures.synchronous import coil_peaks, runout
+from procedures.synchronous import coil_peaks, facts, mark, runout
 from procedures.synchronous.bearings import Known, collect_inputs
+from procedures.synchronous.carrying import carried
 from procedures.synchronous.d_max import farthest
 from procedures.synchronous.dwells import ORDERS, SLOW, Dwell
 from procedures.synchronous.nonsynchronous import beside_orders, folds
+from procedures.synchronous.orbit_frame import as_orbit, covariance, squared, squaring
 from procedures.synchronous.runout import Stand, Turning
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
-LSB_RAD = 2 * math.pi / 65536  # of the angle in the telemetry
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def results(dwells: Sequence[Dwell], rig: RigFile, known: Known) -> Results:
     inputs = collect_inputs(rig, known)
     nominal = Stand.of({name: e.value for name, e in inputs.items()})
     runouts = _runouts(inputs, rig, slow, fast)
-    clearance = certified("geometry/clearance", rig.geometry["clearance"], "least clearance")
+    clearance = facts.clearance(rig)
     done = tuple(_result(d, inputs, nominal, runouts, clearance, rig) for d in turning)
     return Results(done, runouts, slow, clearance)
 
@@ -155,7 +155,7 @@ def _parts(machine: AmbRotor) -> list[str]:
 
 
 def _unknown(rig: RigFile, order: float) -> Runout:
-    u, nothing = rig.machine["runout"].standard_uncertainty, np.zeros(4, complex)
+    u, nothing = facts.runout_u(rig), np.zeros(4, complex)
     names = _parts(conventions(rig))
     some = [Influence(f"runout/{order:g}/{p}", "runout, no slow roll", u, "m", "B", "normal") for p in names]
     return Runout(tuple(Estimate.of(0.0, i) for i in some), nothing, nothing, nothing, known=False)
@@ -169,7 +169,7 @@ def _result(
     clearance: Estimate,
     rig: RigFile,
 ) -> Result:
-    parts = {n: _shaft(d, inputs, runouts[n], n) for n in d.track.orders if n in runouts}
+    parts = {n: _shaft(d, inputs, runouts[n], n, rig) for n in d.track.orders if n in runouts}
     beside, folded = beside_orders(d), folds(d)
     parts[1.0] = _folded(d, parts[1.0], folded[1])
     values = np.array([parts[1.0][2 * k].value + 1j * parts[1.0][2 * k + 1].value for k in range(4)])
@@ -182,35 +182,29 @@ def _result(
         out["vector_sin", a] = -parts[1.0][2 * k + 1]
     for more, (plane, (y, z)) in zip(beside, d.machine.planes.items(), strict=True):
         chosen = [2 * y, 2 * y + 1, 2 * z, 2 * z + 1]
-        orbits[plane] = ellipse(Vectors(values[[y, z]], vectors.covariance[np.ix_(chosen, chosen)], vectors.dof))
-        out["major_half_axis", plane] = _major([parts[1.0][k] for k in chosen])
-        means = [_mean(d, inputs, k) for k in (y, z)]
+        across = squaring(nominal, (y, z))
+        at = {n: squared([p[k] for k in chosen], across) for n, p in parts.items()}
+        orbits[plane] = ellipse(as_orbit(vectors, (y, z), at[1.0], across))
+        out["major_half_axis", plane] = _major(at[1.0])
+        means = squared([_mean(d, inputs, k) for k in (y, z)], across)
         centres[plane] = (means[0].value, means[1].value)
-        far = farthest(means, {n: [p[k] for k in chosen] for n, p in parts.items()}, f"{d.where}/{plane}")
+        far = farthest(means, at, f"{d.where}/{plane}")
         far = _with_rest(far, float(more), f"{d.where}/{plane}")
         out["d_max", plane] = far
         out["d_max_share", plane] = _unit(far / clearance, "1")
         out |= coil_peaks.peaks(d, inputs, plane, rig)
     out["reading", ""] = _reading(d, inputs)
-    weight = runout.mean_forces(nominal, d.means) / shares(rig, nominal)
-    return Result(d, vectors, orbits, centres, misfit, weight, u, beside, folded, out)
+    return Result(d, vectors, orbits, centres, misfit, carried(rig, nominal, d.means), u, beside, folded, out)
 
 
-def shares(rig: RigFile, s: Stand) -> Array:
-    """What each axis carries of the weight, N."""
-    lean, whole = rig.machine["radial_axes"].value, s.mass * rig.site.gravity.value
-    inboard, outboard = whole * s.l_oa / (s.l_ia + s.l_oa), whole * s.l_ia / (s.l_ia + s.l_oa)
-    along = np.array([math.cos(lean), math.sin(lean)])
-    return np.concatenate([inboard * along, outboard * along])
-
-
-def _shaft(d: Dwell, inputs: Mapping[str, Estimate], off: Runout, order: float) -> list[Estimate]:
+def _shaft(d: Dwell, inputs: Mapping[str, Estimate], off: Runout, order: float, rig: RigFile) -> list[Estimate]:
     """Parts of the shaft's vectors (8,): reading over gain, less the runout; turned by what the angle may be off."""
     read = d.readings(order)
     scatter = estimates(
         read.parts, read.covariance, f"scatter/{d.where}/{order:g}", "scatter of the dwell", "m", read.dof
     )
-    angle = Estimate.of(0.0, Influence("tachometer/angle", "resolution of the angle", LSB_RAD / math.sqrt(12), "rad", "B",
+    by = "tachometer/angle" if mark.by_angle(rig) else f"tachometer/{d.where}"
+    angle = Estimate.of(0.0, Influence(by, "resolution of the angle", mark.angle_u(rig, d.speed), "rad", "B",
                                        "rectangular"))  # fmt: skip
     out = []
     for k in range(8):
@@ -241,14 +235,6 @@ def _with_rest(far: Estimate, beside: float, where: str) -> Estimate:
     half = Influence(f"beside/{where}", "motion that does not turn with the shaft", beside / (2 * math.sqrt(3)), "m", "B",
                      "rectangular")  # fmt: skip
     return far + Estimate.of(beside / 2, half)
-
-
-def covariance(parts: Sequence[Estimate]) -> Array:
-    """Joint covariance of estimates by their shared influences."""
-    each = [e.contributions for e in parts]
-    ids = sorted({i for some in each for i in some})
-    rows = np.array([[some.get(i, 0.0) for i in ids] for some in each])
-    return np.asarray(rows @ rows.T)
 
 
 def _major(parts: Sequence[Estimate]) -> Estimate:

@@ -11,7 +11,9 @@ from bench.rigfile.capture import Layout
 from bench.units import RPM
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.shared.limits import landing_speed
-from procedures.synchronous.dwells import captured_channels
+from procedures.synchronous.bearings import has_model
+from procedures.synchronous.dwells import TELLS, can_capture, captured_channels, telemetry_period_s
+from procedures.synchronous.identified import FEWEST
 
 SLOW_MOST = 0.15  # of the lowest speed of the plan, at slow roll, and of the loop's own frequency
 TURNS = 20  # that a slow roll needs
@@ -40,13 +42,14 @@ def of_slow_roll(rig: RigFile, rad_s: float, seconds: float, speeds: Sequence[fl
 
 def of_captures(rig: RigFile, capture_s: float, rate_hz: float, orders: int, speeds: Sequence[float]) -> Iterator[str]:
     """Captures that are too slow for the highest of the orders, too long for the controller, or of too few turns."""
+    if not can_capture(rig):
+        yield from _of_telemetry(rig, speeds)
+        return
     highest = orders * max(speeds) / (2 * math.pi)
     if rate_hz < PER_TURN * highest:
         yield (f"rate_hz: found {rate_hz:g}; expected {PER_TURN * highest:.0f} Hz or more for order {orders} at "
                f"{max(speeds) * RPM:.0f} r/min: what is above half of the rate folds back")  # fmt: skip
-    if rig.capture is None:
-        yield "capture: the controller has none; orbits and D_max are read at its full rate"
-        return
+    assert rig.capture is not None
     try:
         size = Layout.of(rig.capture, captured_channels(conventions(rig))).sample.itemsize * capture_s * rate_hz
     except BenchError as error:
@@ -56,6 +59,24 @@ def of_captures(rig: RigFile, capture_s: float, rate_hz: float, orders: int, spe
         yield f"capture_s: needs {size:.0f} bytes; the controller has {rig.capture.memory_bytes}"
     if capture_s * min(speeds) < 10 * math.pi:
         yield f"capture_s: found {capture_s:g} s; expected five turns at {min(speeds) * RPM:.0f} r/min or more"
+
+
+def _of_telemetry(rig: RigFile, speeds: Sequence[float]) -> Iterator[str]:
+    """Without captures the telemetry must see order 1."""
+    most = TELLS / telemetry_period_s(rig)
+    if max(speeds) / (2 * math.pi) > most:
+        yield (f"speeds_rad_s: found {max(speeds) * RPM:.0f} r/min; the controller captures nothing, and by its telemetry "
+               f"nothing is stated above {most:.0f} Hz, {most * 60:.0f} r/min")  # fmt: skip
+
+
+def of_bearings(rig: RigFile, slow_rad_s: float, speeds: int) -> Iterator[str]:
+    """Where neither the controller nor a calibration knows the bearings' force constants, the dwells must tell them."""
+    if has_model(rig):
+        return
+    if not slow_rad_s or speeds + 1 < FEWEST:
+        some = "a" if slow_rad_s else "no"
+        yield (f"speeds_rad_s: found {speeds} and {some} slow roll; expected two or more and a slow roll: the controller "
+               "knows no force constants, and only the shaft at several speeds tells them")  # fmt: skip
 
 
 def too_fast(speeds: Sequence[float], machine: AmbRotor) -> float:

@@ -21,6 +21,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from procedures.amb_rotor.stations import row
+
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 SCALE = np.array([1.0, 1.0, 10.0, 10.0])  # moments at arms of 0.1 m, beside forces
@@ -30,8 +32,9 @@ TURN = np.arange(32) * (2 * np.pi / 32)
 
 @dataclass(frozen=True)
 class Stand:
-    """What the balance needs, SI. `beta`, `offset`, `gain` (4,) in the order yi zi yo zo; `zero` (4,) of the probes; of the
-    eight coils `i_gain`, `i_zero`; lengths from the centre of mass."""
+    """What the balance needs, SI. `beta`, `offset`, `gain`, `gap` (4,) in the order yi zi yo zo; `zero` (4,) of the probes; of
+    the eight coils `i_gain`, `i_zero`; lengths from the centre of mass. `axes` and `probes` (4, 4) say what the bearings' axes
+    and the probes make of y z psi theta. `hand` is 1 where the shaft turns from y towards z, -1 where from z towards y."""
 
     beta: Array
     offset: Array
@@ -39,7 +42,7 @@ class Stand:
     zero: Array
     i_gain: Array
     i_zero: Array
-    gap: float
+    gap: Array
     coupling: float
     mass: float
     inertia: float
@@ -51,17 +54,27 @@ class Stand:
     l_iu: float
     l_ou: float
     l_c: float
+    axes: Array
+    probes: Array
+    hand: float = 1.0
 
     @classmethod
     def of(cls, v: Mapping[str, float]) -> Stand:
-        """From numbers by name, those of an array with `_0`, `_1`, ... ."""
+        """From numbers by name, those of an array with `_0`, `_1`, ... . Places and angles of each axis and probe where they
+        are told, else two planes of axes that look along y and z."""
 
-        def row(name: str, size: int = 4) -> Array:
+        def several(name: str, size: int = 4) -> Array:
             return np.array([v[f"{name}_{k}"] for k in range(size)])
 
+        told = "at_axis_0" in v
+        gap = several("gap") if told else np.full(4, v["gap"])
+        axes = placed(several("at_axis"), several("turn_axis")) if told else arms(v["l_ia"], v["l_oa"])
+        probes = placed(several("at_probe"), several("turn_probe")) if told else arms(v["l_is"], v["l_os"])
         return cls(
-            row("beta"), row("offset"), row("gain"), row("zero"), row("i_gain", 8), row("i_zero", 8), v["gap"], v["coupling"],
+            several("beta"), several("offset"), several("gain"), several("zero"), several("i_gain", 8), several("i_zero", 8),
+            gap, v["coupling"],
             v["mass"], v["inertia"], v["polar"], v["l_ia"], v["l_oa"], v["l_is"], v["l_os"], v["l_iu"], v["l_ou"], v["l_c"],
+            axes, probes, v.get("hand", 1.0),
         )  # fmt: skip
 
 
@@ -84,12 +97,23 @@ def arms(inboard: float, outboard: float) -> Array:
     return np.array([[1, 0, 0, -inboard], [0, 1, inboard, 0], [1, 0, 0, outboard], [0, 1, -outboard, 0.0]])
 
 
+def placed(at: Array, turn: Array) -> Array:
+    """The same of axes or probes at places (4,) m and angles (4,) rad from y towards z."""
+    return np.array([row(float(a), float(t)) for a, t in zip(at, turn, strict=True)])
+
+
+def waves(s: Stand) -> Complex:
+    """(4, 2): how an unbalance in each of two planes pulls along y and z there."""
+    late = -1j * s.hand
+    return np.array([[1, 0], [late, 0], [0, 1], [0, late]])
+
+
 def impedance(s: Stand, k_x: Array, speed: float, w: float) -> Complex:
     """D(w) - A' K_x A, (4, 4) N/m and N m."""
     gyro = np.zeros((4, 4))
-    gyro[2, 3], gyro[3, 2] = s.polar * speed, -s.polar * speed
+    gyro[2, 3], gyro[3, 2] = s.polar * s.hand * speed, -s.polar * s.hand * speed
     end = np.array([[1, 0, 0, -s.l_c], [0, 1, s.l_c, 0.0]])
-    at = arms(s.l_ia, s.l_oa)
+    at = s.axes
     still = s.coupling * end.T @ end - at.T @ np.diag(k_x) @ at
     return np.asarray(-(w**2) * np.diag([s.mass, s.mass, s.inertia, s.inertia]) + 1j * w * gyro + still)
 
@@ -98,7 +122,7 @@ def slopes(s: Stand, means: Array) -> tuple[Array, Array, Array]:
     """K_p, K_n N/A and K_x N/m of the four axes, at mean readings (12,)."""
     i = (means[4:] - s.i_zero) / s.i_gain
     p, n = i[::2], i[1::2]
-    place = arms(s.l_ia, s.l_oa) @ np.linalg.solve(arms(s.l_is, s.l_os), (means[:4] - s.zero) / s.gain)
+    place = s.axes @ np.linalg.solve(s.probes, (means[:4] - s.zero) / s.gain)
     near, far = s.gap - place - s.offset, s.gap + place + s.offset
     return (
         2 * s.beta * p / near**2,
@@ -123,7 +147,7 @@ def control_forces(s: Stand, turning: Turning) -> tuple[Complex, Array]:
         orders = {1.0: turning.vectors, **turning.higher}
         at = {n: Turning(turning.speed, turning.means, v) for n, v in orders.items()}
         force = force + forces_beyond_slopes(s, at, {n: v[:4] / s.gain for n, v in orders.items()})[1.0]
-    return np.asarray(arms(s.l_ia, s.l_oa).T @ force), k_x
+    return np.asarray(s.axes.T @ force), k_x
 
 
 def unbalances(s: Stand, turning: Turning, runout: Complex, more: Complex | None = None) -> tuple[Complex, float]:
@@ -131,9 +155,9 @@ def unbalances(s: Stand, turning: Turning, runout: Complex, more: Complex | None
     `more` (4,) N at the AMBs, beyond the slopes."""
     force, k_x = control_forces(s, turning)
     if more is not None:
-        force = force + arms(s.l_ia, s.l_oa).T @ more
+        force = force + s.axes.T @ more
     w = turning.speed
-    q = np.linalg.solve(arms(s.l_is, s.l_os), turning.vectors[:4] / s.gain - runout)
+    q = np.linalg.solve(s.probes, turning.vectors[:4] / s.gain - runout)
     inertial = impedance(s, k_x, w, w) @ q
     u, left = equivalent(s, inertial - force, w)
     whole = float(np.linalg.norm(SCALE * inertial) + np.linalg.norm(SCALE * force))
@@ -143,7 +167,7 @@ def unbalances(s: Stand, turning: Turning, runout: Complex, more: Complex | None
 def equivalent(s: Stand, force: Complex, w: float) -> tuple[Complex, float]:
     """Unbalance (2,) kg m in the planes that at `w` rad/s acts as forces and moments (4,), by least squares; the norm of what
     it leaves over, moments at arms of 0.1 m."""
-    acts = w**2 * arms(s.l_iu, s.l_ou).T @ np.array([[1, 0], [-1j, 0], [0, 1], [0, -1j]])
+    acts = w**2 * arms(s.l_iu, s.l_ou).T @ waves(s)
     target = SCALE * force
     u = np.linalg.lstsq(SCALE[:, None] * acts, target, rcond=None)[0]
     return np.asarray(u, np.complex128), float(np.linalg.norm(target - SCALE[:, None] * acts @ u))
@@ -156,19 +180,20 @@ def as_unbalance(s: Stand, means: Array, runout: Complex, w: float) -> Complex:
     X = A_s q + R the readings of U and R are X = G (U + U_R) with w^2 B U_R = H^-1 A_s^-1 R: the loop is in G alone.
     """
     _, _, k_x = slopes(s, means)
-    return equivalent(s, impedance(s, k_x, w, w) @ np.linalg.solve(arms(s.l_is, s.l_os), runout), w)[0]
+    return equivalent(s, impedance(s, k_x, w, w) @ np.linalg.solve(s.probes, runout), w)[0]
 
 
 def shaft_motion(s: Stand, turning: Turning, order: float, unbalance: Complex, more: Complex | None = None) -> Complex:
     """What the shaft itself does at the probes (4,) m, by the balance of forces; `more` (4,) N at the AMBs."""
     force, k_x = control_forces(s, turning)
     if more is not None:
-        force = force + arms(s.l_ia, s.l_oa).T @ more
+        force = force + s.axes.T @ more
     w = order * turning.speed
     if order == 1:
-        planes = np.array([unbalance[0], -1j * unbalance[0], unbalance[1], -1j * unbalance[1]])
+        late = -1j * s.hand
+        planes = np.array([unbalance[0], late * unbalance[0], unbalance[1], late * unbalance[1]])
         force = force + w**2 * arms(s.l_iu, s.l_ou).T @ planes
-    return np.asarray(arms(s.l_is, s.l_os) @ np.linalg.solve(impedance(s, k_x, turning.speed, w), force))
+    return np.asarray(s.probes @ np.linalg.solve(impedance(s, k_x, turning.speed, w), force))
 
 
 @dataclass(frozen=True)
@@ -215,7 +240,7 @@ def forces_beyond_slopes(
 ) -> dict[float, Complex]:
     """What T (2.4b) gives of each order beyond its slopes, (4,) N at the AMBs: i^2 and 1/gap^2 make of order 1 times order 2
     another order 1, a percent of it."""
-    to_amb = arms(s.l_ia, s.l_oa) @ np.linalg.inv(arms(s.l_is, s.l_os))
+    to_amb = s.axes @ np.linalg.inv(s.probes)
     means = next(iter(slow.values())).means
     place = (to_amb @ ((means[:4] - s.zero) / s.gain))[:, None] + np.zeros(len(TURN))
     i = ((means[4:] - s.i_zero) / s.i_gain)[:, None] + np.zeros(len(TURN))
@@ -225,6 +250,6 @@ def forces_beyond_slopes(
         turn, x, amps = np.exp(1j * n * TURN), to_amb @ shaft[n], at.vectors[4:] / s.i_gain
         place, i = place + (x[:, None] * turn).real, i + (amps[:, None] * turn).real
         straight[n] = k_p * amps[::2] + k_n * amps[1::2] + k_x * x
-    near, far = (s.gap + side * (place + s.offset[:, None]) for side in (-1, 1))
+    near, far = (s.gap[:, None] + side * (place + s.offset[:, None]) for side in (-1, 1))
     force = s.beta[:, None] * ((i[::2] / near) ** 2 - (i[1::2] / far) ** 2)
     return {n: 2 * (force * np.exp(-1j * n * TURN)).mean(axis=1) - straight[n] for n in slow}

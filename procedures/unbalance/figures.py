@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -12,18 +13,21 @@ from bench.figures import Figure, Series, Sheet, Shown
 from bench.rigfile import RigFile
 from bench.uncertainty import coverage_factor, interval
 from bench.units import RPM
+from procedures.amb_rotor.stations import stations
+from procedures.synchronous import facts
 from procedures.synchronous.checks import ZONES
 from procedures.synchronous.estimates import Result, Results
 
-Y_DEG = 45.0  # both radial axes stand at 45 degrees to the vertical; where y stands, seen along the shaft
 SHOWN_TURNS = 4
 
 
 def all_figures(results: Results, rig: RigFile) -> Iterator[Shown]:
     """In the order of the report."""
-    clearance = rig.geometry["clearance"].value
+    clearance, y_deg = facts.clearance(rig).value, where_y_is(rig)
     planes = results.machine.planes
-    drawn = [orbits(results.of(variant)[-1], plane, clearance) for plane in planes for variant in results.variants]
+    drawn = [
+        orbits(results.of(variant)[-1], plane, clearance, y_deg) for plane in planes for variant in results.variants
+    ]
     yield _dwells(results)
     yield drawn[0]
     yield farthest(results)
@@ -36,8 +40,16 @@ def all_figures(results: Results, rig: RigFile) -> Iterator[Shown]:
             shown = results.of(variant)[-1]
             if shown.dwell.full is not None:
                 yield spectrum(shown, plane)
-    yield _use(results, "current_peak", "A", "current")
-    yield _use(results, "voltage_peak", "V", "voltage")
+    if any(r.dwell.full is not None for r in results.dwells):
+        yield _use(results, "current_peak", "A", "current")
+        yield _use(results, "voltage_peak", "V", "voltage")
+
+
+def where_y_is(rig: RigFile) -> float:
+    """Of the first axis, degrees counter-clockwise from the right, seen along the shaft with up (or where directions have their
+    zero) above."""
+    s = stations(rig)
+    return 90.0 + s.hand * round(math.degrees(s.first.value), 6)
 
 
 def _dwells(results: Results) -> Sheet:
@@ -56,7 +68,7 @@ def _key(r: Result) -> str:
     return f"{r.dwell.variant}-{r.dwell.wanted * RPM:.0f}"
 
 
-def orbits(r: Result, plane: str, clearance: float) -> Figure:
+def orbits(r: Result, plane: str, clearance: float, y_deg: float) -> Figure:
     """The highest speed: some turns as read, and the shaft's own order 1 about its mean place."""
     y, z = r.dwell.machine.planes[plane]
     x1 = x2 = None
@@ -66,7 +78,7 @@ def orbits(r: Result, plane: str, clearance: float) -> Figure:
     shown = pictures.Orbit(
         f"{SHOWN_TURNS} turns as read", x1, x2, r.orbits[plane], r.centres[plane], "order 1 of the shaft"
     )
-    return pictures.orbits(f"orbit-{plane}-{_key(r)}", f"Orbit {plane}, {r.dwell.where}", [shown], clearance, Y_DEG)
+    return pictures.orbits(f"orbit-{plane}-{_key(r)}", f"Orbit {plane}, {r.dwell.where}", [shown], clearance, y_deg)
 
 
 def _bode(results: Results, plane: str) -> Figure:

@@ -7,7 +7,6 @@ D_max and its share of the clearance (ISO 14839-2), currents and voltages of the
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from typing import Any
 
 from bench.figures import Shown
@@ -23,7 +22,7 @@ from procedures.amb_rotor import lift, wiring
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.laws import of_laws, of_variants
 from procedures.shared import assumptions, first_look
-from procedures.synchronous import bearings, checks, dwelling, estimates, fitting
+from procedures.synchronous import bearings, checks, dwelling, estimates, fitting, identified
 from procedures.synchronous.coil_peaks import find_uncertified
 from procedures.synchronous.dwells import read_dwells, required
 from procedures.synchronous.estimates import Results
@@ -62,8 +61,6 @@ CURRENT = Quantity("current_peak", "A", "coil current of a plane that is exceede
 VOLTAGE = Quantity("voltage_peak", "V", "coil voltage of a plane that is exceeded for 1 % of the time, either way")
 MEASURES = (COSINE, SINE, MAJOR, D_MAX, SHARE, READ, CURRENT, VOLTAGE)
 LESS_RUNOUT = tuple(q.name for q in (COSINE, SINE, MAJOR, D_MAX, SHARE))
-LENGTHS = ("com_to_inboard_sensor", "com_to_outboard_sensor", "com_to_inboard_amb", "com_to_outboard_amb", "com_to_coupling",
-           "com_to_inboard_balance", "com_to_outboard_balance", "coupling_stiffness", "amb_gap", "clearance")  # fmt: skip
 
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
@@ -94,8 +91,10 @@ def evaluate(recording: Recording[Any], findings: Findings) -> Results:
     findings.gate([*checks.of_signals(dwells, plan.max_lost, plan.max_speed_error), *checks.sampling(dwells, plan.orders),
                    *checks.slow_roll(dwells, plan.speeds_rad_s, LESS_RUNOUT)])  # fmt: skip
     known = bearings.Known.of(recording.calibrations, plan.beta_share, plan.offset_u_m)
+    known = identified.of_dwells(dwells, recording.rig, known)
+    findings.gate(bearings.unknown(known, recording.rig))
     results = estimates.results(dwells, recording.rig, known)
-    findings.add((bearings.describe(known), *find_uncertified(recording.rig)))
+    findings.add((bearings.describe(known), *find_uncertified(recording.rig), *dwelling.uncaptured(recording.rig)))
     findings.add(of_dwells(listen(recording, results.slow), results.dwells))
     findings.add(checks.of_results(results))
     return results
@@ -112,13 +111,7 @@ def measured(results: Results) -> Iterator[Measured]:
 
 def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
-    machine = conventions(rig)
-    return replace(
-        required(machine),
-        capabilities=("set_points", *(f"model.{kind}_{axis}" for kind in ("beta", "offset") for axis in machine.axes)),
-        geometry=LENGTHS,
-        machine=("mass", "transverse_inertia", "polar_inertia", "radial_axes", "runout"),
-    )
+    return required(rig)
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
@@ -129,6 +122,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     if len(set(plan.variants)) < len(plan.variants) or (plan.observed and plan.law in ("", conventions(rig).plain_law)):
         yield "variants: expected each once, and with the plain law off alone: it compensates nothing"
     yield from fitting.of_slow_roll(rig, plan.slow_rad_s, plan.slow_s, plan.speeds_rad_s)
+    yield from fitting.of_bearings(rig, plan.slow_rad_s, len(plan.speeds_rad_s))
     yield from fitting.of_captures(rig, plan.capture_s, plan.rate_hz, plan.orders, plan.speeds_rad_s)
 
 

@@ -8,7 +8,7 @@ from procedures.amb_rotor import lift
 from procedures.amb_rotor.conventions import Variant, conventions
 from procedures.amb_rotor.lift import write
 from procedures.synchronous.dwelling import roll_slowly, step_labels
-from procedures.synchronous.dwells import DWELL, captured_channels
+from procedures.synchronous.dwells import DWELL, can_capture, captured_channels
 from procedures.unbalance.plan import Plan
 
 MARGIN_S = 0.1  # of a dwell beside its capture
@@ -46,10 +46,11 @@ def repeat_lowest(rig: Rig, plan: Plan, record: Recorder) -> None:
 
 def _dwell(rig: Rig, plan: Plan, record: Recorder, speed: float, variant: Variant, number: int) -> None:
     with record.step(DWELL, **step_labels(rig, speed, variant, number)):
-        if rig.capture is not None:
+        captures = rig.capture is not None and can_capture(rig.file)
+        if rig.capture is not None and captures:
             names = captured_channels(conventions(rig.file))
             rig.capture.arm(names, seconds=plan.capture_s, rate_hz=plan.rate_hz)
             rig.capture.wait(plan.capture_s + 5.0)
-        rig.clock.sleep(max(plan.dwell_s - plan.capture_s, MARGIN_S))
-    if rig.capture is not None:
+        rig.clock.sleep(max(plan.dwell_s - plan.capture_s, MARGIN_S) if captures else plan.dwell_s)
+    if rig.capture is not None and captures:
         rig.capture.upload(dwell=number, speed_rad_s=speed, variant=variant)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,14 +15,16 @@ from bench.rigfile import RigFile
 from bench.rigfile.busload import frame_seconds
 from bench.rigfile.elements import Mark
 from bench.rigfile.messages import Message, MessageMap
+from sim_backend.controller.controls import meanings
 from sim_backend.controller.meanings import fault_codes, state_codes
 from sim_backend.controller.states import HELD
 from sim_backend.controller.telemetry import Readings, Span, kept
-from sim_backend.machine import PLANTED_S, SimulatedPlant, Truth
-from sim_backend.spoken import CONTROLLER, bits, tellable, told_as, warming
+from sim_backend.machine import PLANTED_S, Machine, SimulatedPlant, Truth
+from sim_backend.spoken import CONTROLLER, bits, bits_of, tellable, told_as, warming
 
 Ints = npt.NDArray[np.int64]
-CODES = ("state", "fault", "flags")  # whole numbers that stand for themselves
+FLAGS = "flags"  # the status word of a machine that is not made of the rig file
+CODES = ("state", "fault", FLAGS)  # whole numbers that stand for themselves
 
 
 @dataclass(frozen=True)
@@ -65,9 +68,10 @@ class BoundTelemetry:
         self._readings = Readings(
             truth, self._place, codes, plant.period_ticks, plant.tick_s, columns, warming(rig, machine)
         )
+        self._word = [] if columns is not None else list(self._told_elsewhere(rig, machine))
         said = {} if columns is None else bits(rig)
         self._bits = [(self._place[name], bit) for name, bit in said.items() if name in self._place]
-        self._codes = {*CODES, *(bit.channel for bit in said.values())}
+        self._codes = {*CODES, *(bit.channel for bit in bits(rig).values())}
         planted = {n: v for n, v in truth.planted().items() if n in rig.channels}
         self._planted = {self._place[told_as(rig, n, self._known) or n]: v for n, v in planted.items()}
         self._held_from: int | None = None
@@ -79,6 +83,17 @@ class BoundTelemetry:
             bitrate = rig.link.bitrate
             after_s += frame_seconds(messages[name], bitrate, rig.link.data_bitrate) if k and bitrate else 0.0
             self._parts.append(self._part(rig, messages[name], round(after_s * 1e9)))
+
+    def _told_elsewhere(self, rig: RigFile, machine: Machine) -> Iterator[tuple[int, int, int]]:
+        """Of a machine that has a status word of its own, where the rig file has other bits for it: the word's bits, the place
+        where they are told, and the bits there."""
+        own = bits_of(meanings(rig, machine))
+        told = {
+            name: (self._place[told_as(rig, bit.channel, self._known) or FLAGS], bit.mask or 1)
+            for name, bit in bits(rig).items()
+        }
+        if any(told[name] != (self._place[FLAGS], own[name].mask) for name in told if name in own):
+            yield from ((own[name].mask or 0, *where) for name, where in told.items() if name in own)
 
     def _part(self, rig: RigFile, message: Message, after_ns: int) -> _Part:
         encoder = Encoder(message)
@@ -110,6 +125,11 @@ class BoundTelemetry:
         ticks, values = self._readings.of(spans, n)
         for column, bit in self._bits:
             values[:, self._place[bit.channel]] += (bit.mask or 1) * (values[:, column] != 0)
+        if self._word:
+            word = values[:, self._place[FLAGS]].astype(np.int64)
+            values[:, [place for _, place, _ in self._word]] = 0.0
+            for own, place, mask in self._word:
+                values[:, place] += mask * ((word & own) != 0)
         if self._planted:
             self._plant(values, ticks, np.repeat([s.state in HELD for s in spans], [len(s.rows) for s in spans]))
         sequence = np.arange(self._sequence, self._sequence + n)

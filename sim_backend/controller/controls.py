@@ -52,12 +52,17 @@ def in_force(rig: RigFile, machine: Machine, settings: Mapping[str, float]) -> d
     return {**used, **{c.name: c.of(value) for name, value in used.items() for c in chosen.get(name, ())}}
 
 
-def _by_meaning(rig: RigFile, machine: Machine) -> Iterator[tuple[str, Control]]:
-    """Where a rig file binds a capability to a parameter of another name than the machine's own has for it."""
+def meanings(rig: RigFile, machine: Machine) -> Capabilities:
+    """What the controls of a machine with a law of its own, and the bits of its status word `flags`, are."""
     axes = [axis for bearing in rig.bearings.values() for axis in bearing.axes]
     bearings = {name: b.model_dump() for name, b in rig.bearings.items()}
-    own = capabilities_by_name(dict.fromkeys((*machine.controls, *OWN)), {}, bearings, {}, axes)
-    meant = _by_place(Capabilities.model_validate(own))
+    known = dict.fromkeys((*machine.controls, *OWN))
+    return Capabilities.model_validate(capabilities_by_name(known, {"flags": {}}, bearings, dict(rig.rings), axes))
+
+
+def _by_meaning(rig: RigFile, machine: Machine) -> Iterator[tuple[str, Control]]:
+    """Where a rig file binds a capability to a parameter of another name than the machine's own has for it."""
+    meant = _by_place(meanings(rig, machine))
     for place, name in _by_place(rig.capabilities).items():
         if place in meant and name not in machine.controls:
             yield name, Control(meant[place])

@@ -52,10 +52,12 @@ class Ownership:
             self.name = {part: values[part] for part in NAME_PARTS}
         return {"session": self.session, "since": self.since, **self.name}
 
-    def beat(self, values: Mapping[str, float], tick: int) -> None:
-        """Take the owner's heartbeat; one whose counter stands still shows no life, and nobody becomes owner by one."""
-        if self.session and int(values["session"]) == self.session and int(values["counter"]) != self.counter:
-            self.heartbeat, self.counter = tick, int(values["counter"])
+    def beat(self, session: int | None, counter: int, tick: int) -> None:
+        """Take the owner's heartbeat, or, where heartbeats have no session, that of the one host that there is; one whose
+        counter stands still shows no life, and nobody becomes owner by one."""
+        mine = session is None or (self.session != 0 and session == self.session)
+        if mine and counter != self.counter:
+            self.heartbeat, self.counter = tick, counter
 
     def arm(self, tick: int) -> None:
         """The watchdog watches from here on; the command that leaves OFF is itself a sign of life."""

@@ -87,7 +87,8 @@ class Requests:
         return self._states.state in AT_REST
 
     def _heartbeat(self, v: Values, _: Tell) -> None:
-        self._owner.beat({"session": self._session(v), "counter": v[self._binding.heartbeat_counter]}, self._tick())
+        whose = int(v["session"]) if "session" in v else None
+        self._owner.beat(whose, int(v[self._binding.heartbeat_counter]), self._tick())
 
     def _claim(self, v: Values, tell: Tell) -> None:
         tell("Owner", self._owner.claim(v, self._tick(), self._resting))

@@ -125,7 +125,7 @@ def test_plans_limits_and_the_simulated_machine_are_checked_too(
     text = (RIGS / "tsbs12.toml").read_text(encoding="utf-8")
     for old, new in (
         ("[plans.amb-calibration]\n", "[plans.amb-calibraton]\nangles = 9\n[plans.amb-calibration]\nangels = 9\n"),
-        ("[simulation]\n", '[simulation]\nmachine = "mine"\n'),
+        ('machine = "tsbs"', 'machine = "mine"'),
         ("clearance = { value = 0.25", "clearance = { value = 0.6"),
     ):
         assert old in text
@@ -180,7 +180,7 @@ WRONG = {
     "parameters.bias_i.defualt": ("default = 3, low = 0", "default = 9, defualt = 3, low = 0"),
     "parameters.bias_i.default": ("", ""),  # of the same line
     "[plans.amb-calibration]: angels": ("[plans.amb-calibration]\n", "[plans.amb-calibration]\nangels = 9\n"),
-    "simulation.machine": ("[simulation]\n", '[simulation]\nmachine = "mine"\n'),
+    "simulation.machine": ('machine = "tsbs"', 'machine = "mine"'),
 }
 
 

@@ -18,7 +18,7 @@ def claim(owner: Ownership, who: Session, tick: int, resting: bool = True) -> Se
 
 
 def beat(owner: Ownership, session: int, counter: int, tick: int) -> None:
-    owner.beat({"session": session, "counter": counter}, tick)
+    owner.beat(session, counter, tick)
 
 
 def test_the_first_that_asks_has_it_and_the_second_is_told_who() -> None:

@@ -22,7 +22,7 @@ from procedures.balance.plan import Plan
 from procedures.balance.procedure import check
 from procedures.balance.steps import BASE, SIDES, Read, Run, Weight
 from procedures.synchronous import runout
-from procedures.synchronous.runout import Stand, Turning
+from procedures.synchronous.runout import Stand, Turning, arms
 from reports.figures import draw as draw_figure
 from sim_backend.truth import draw
 
@@ -239,8 +239,8 @@ def test_bending_and_adopted_bearings_are_in_what_is_left(sound: Balancing) -> N
 def test_a_runout_reads_like_the_unbalance_it_is_taken_for() -> None:
     """Whatever loop: a shaft in springs that follow the probes, turned by an unbalance or read with a runout."""
     stand = Stand(
-        np.full(4, 6.95e-7), np.full(4, 1.15e-4), np.ones(4), np.zeros(4), np.ones(8), np.zeros(8), 5.25e-4, 1200.0, 0.98,
-        5.84e-3, 1.71e-4, 0.097, 0.081, 0.078, 0.1, 0.097, 0.081, 0.155,
+        np.full(4, 6.95e-7), np.full(4, 1.15e-4), np.ones(4), np.zeros(4), np.ones(8), np.zeros(8), np.full(4, 5.25e-4), 1200.0,
+        0.98, 5.84e-3, 1.71e-4, 0.097, 0.081, 0.078, 0.1, 0.097, 0.081, 0.155, arms(0.097, 0.081), arms(0.078, 0.1),
     )  # fmt: skip
     means, w = np.array([0, 0, 0, 0, 1.2, 0.8, 1.2, 0.8, 1.1, 0.9, 1.1, 0.9]), 1000.0
     seen, acts = runout.arms(stand.l_is, stand.l_os), runout.arms(stand.l_ia, stand.l_oa).T
@@ -305,8 +305,8 @@ def test_the_force_of_coils_that_pull_in_turns_needs_the_higher_orders() -> None
     """Each coil has half waves of 2 A: order 1 of i_p^2 - i_n^2 is 8/(3 pi) of the amplitude's square, by hand; mean and
     order 1 alone give 2/pi."""
     stand = Stand(
-        np.full(4, 7e-7), np.zeros(4), np.ones(4), np.zeros(4), np.ones(8), np.zeros(8), 5e-4, 1200.0, 0.98, 5.84e-3,
-        1.71e-4, 0.097, 0.081, 0.078, 0.1, 0.097, 0.081, 0.155,
+        np.full(4, 7e-7), np.zeros(4), np.ones(4), np.zeros(4), np.ones(8), np.zeros(8), np.full(4, 5e-4), 1200.0, 0.98,
+        5.84e-3, 1.71e-4, 0.097, 0.081, 0.078, 0.1, 0.097, 0.081, 0.155, arms(0.097, 0.081), arms(0.078, 0.1),
     )  # fmt: skip
     turn = np.arange(1000) * (2 * np.pi / 1000)
     wave = 2.0 * np.cos(turn)
@@ -346,4 +346,4 @@ def test_plans_that_cannot_work_are_refused() -> None:
     assert f"{allowed * 1e3:.3g} g" in tight
     assert why(trial_kg=(0.99 * allowed, 1e-4), max_share=0.2) == ""
     bare = RIG.model_copy(update={"devices": {k: d for k, d in RIG.devices.items() if k != "drive"}})
-    assert procedure.procedure.problems(bare, Plan()) == ("devices: found none in the role drive",)
+    assert procedure.procedure.problems(bare, Plan()) == ("nothing turns it; devices: found none in the role drive",)

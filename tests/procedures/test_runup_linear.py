@@ -73,7 +73,7 @@ def test_an_orbit_half_as_large_bends_an_eighth_as_much() -> None:
 
 def test_a_law_that_inverts_the_forces_of_the_very_bearing_at_once_leaves_nothing() -> None:
     """CCS: its balance of forces is that of the accelerations it was set to, so it is not late; its offsets are right."""
-    s = stand(gap=GAINS["model_gap"], gain=np.ones(4), zero=np.zeros(4))
+    s = stand(gap=np.full(4, GAINS["model_gap"]), gain=np.ones(4), zero=np.zeros(4))
     gains = GAINS | {f"model_offset_{a}": 0.0 for a in ("yi", "zi", "yo", "zo")} | {"notch1_hz": 0.0, "notch2_hz": 0.0}
     shaft = 30e-6 * np.array([1, -1j, 1, -1j])
     rate = 1j * W / (1 + 1j * W / (2 * np.pi * gains["derivative_hz"]))

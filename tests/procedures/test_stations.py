@@ -74,11 +74,10 @@ def test_each_length_moves_the_facts_as_its_place_does(path: str) -> None:
 
 def lying(direction_deg: float, *, centre_m: float = 0.0, sign: int = 1) -> Stations:
     """Two probes each near -0.1 and 0.1 m of a lying shaft, the first at an angle from up."""
-    up = (math.cos(math.radians(direction_deg)), -math.sin(math.radians(direction_deg)))
     probes = {f"p{k}": Placed(Sum(exact=arm - centre_m), Sum(exact=math.radians(angle)), sign)
               for k, (arm, angle) in enumerate([(-0.1, 0), (-0.1, 90), (0.1, 0), (0.1, 90)])}  # fmt: skip
     axes = {f"a{k}": p for k, p in enumerate(probes.values())}
-    return Stations(axes, probes, (), math.radians(direction_deg), 1, up)
+    return Stations(axes, probes, (), Sum(exact=math.radians(direction_deg)))
 
 
 @pytest.mark.parametrize(

@@ -345,7 +345,9 @@ def test_plans_that_cannot_work_are_refused() -> None:
     assert "bytes" in why(capture_s=3.0)
     assert "with the plain law off alone" in why(law="PID", variants=("off", "corrected"))
     bare = rig.model_copy(update={"devices": {k: d for k, d in rig.devices.items() if k != "drive"}})
-    assert unbalance.procedure.problems(bare, unbalance.Plan()) == ("devices: found none in the role drive",)
+    assert unbalance.procedure.problems(bare, unbalance.Plan()) == (
+        "nothing turns it; devices: found none in the role drive",
+    )
     assert list(compensation.check(rig, compensation.Plan(law="CCS"))) == []
     assert "something must be compared" in "; ".join(compensation.check(rig, compensation.Plan(law="PID")))
     assert "envelope" in "; ".join(compensation.check(rig, compensation.Plan(law="CCS", switch_rad_s=1600.0)))
@@ -358,8 +360,9 @@ def test_plans_that_cannot_work_are_refused() -> None:
 def test_runout_by_forces_is_exact_on_its_own_model() -> None:
     """A made-up slow roll: shaft and currents that balance, and a runout on top of it."""
     stand = runout.Stand(
-        np.full(4, 6.95e-7), np.full(4, 1.15e-4), np.ones(4), np.zeros(4), np.ones(8), np.zeros(8), 5.25e-4, 1200.0, 0.98,
-        5.84e-3, 1.71e-4, 0.097, 0.081, 0.078, 0.1, 0.097, 0.081, 0.155,
+        np.full(4, 6.95e-7), np.full(4, 1.15e-4), np.ones(4), np.zeros(4), np.ones(8), np.zeros(8), np.full(4, 5.25e-4), 1200.0,
+        0.98, 5.84e-3, 1.71e-4, 0.097, 0.081, 0.078, 0.1, 0.097, 0.081, 0.155,
+        runout.arms(0.097, 0.081), runout.arms(0.078, 0.1),
     )  # fmt: skip
     means = np.array([0, 0, 0, 0, 1.2, 0.8, 1.2, 0.8, 1.1, 0.9, 1.1, 0.9])
     true, u = np.array([2e-6, -2e-6j, 1e-6j, 1e-6]), np.array([3e-6, 2e-6 * np.exp(1j)])
@@ -383,8 +386,9 @@ def test_runout_by_forces_is_exact_on_its_own_model() -> None:
 def test_orders_mix_in_forces_that_are_not_linear() -> None:
     """Orders 1 and 2 of one coil's current: i^2 makes 2 i1* i2 of them at order 1, beside its slope."""
     stand = runout.Stand(
-        np.full(4, 6.95e-7), np.zeros(4), np.ones(4), np.zeros(4), np.ones(8), np.zeros(8), 5.25e-4, 1200.0, 0.98,
-        5.84e-3, 1.71e-4, 0.097, 0.081, 0.078, 0.1, 0.097, 0.081, 0.155,
+        np.full(4, 6.95e-7), np.zeros(4), np.ones(4), np.zeros(4), np.ones(8), np.zeros(8), np.full(4, 5.25e-4), 1200.0,
+        0.98, 5.84e-3, 1.71e-4, 0.097, 0.081, 0.078, 0.1, 0.097, 0.081, 0.155,
+        runout.arms(0.097, 0.081), runout.arms(0.078, 0.1),
     )  # fmt: skip
     means, first, second = np.zeros(12), np.zeros(12, complex), np.zeros(12, complex)
     means[4], first[4], second[4] = 1.5, 0.05, 0.02j

@@ -24,19 +24,21 @@ class Balancer:
         self._plant, self._truth = plant, truth
         self._errors = [rig.machine.get(name) for name in ("weight_mass", "weight_angle")]
         self._radius = truth.values.get("geometry.balance_radius", 0.0)
+        self._planes = PLANES | {name: k for k, name in enumerate(rig.balancing)}
         self._fixed = 0
         if truth.defects.get("loose_weight"):
             plant.weights(0, truth.defects["loose_weight"], 0.0)
 
     def request(self, line: str) -> str:
-        """One line: `attach inboard KG RAD`, `detach inboard`, `ask TEXT`. Answers `ok SECONDS`, `yes` or `error TEXT`."""
+        """One line: `attach PLANE KG RAD`, `detach PLANE`, `ask TEXT`; planes by the rig file's names, or as they were called
+        before they had any. Answers `ok SECONDS`, `yes` or `error TEXT`."""
         match line.split():
             case ["ask", *_]:
                 return "yes"
-            case ["attach", "inboard" | "outboard" as plane, mass, angle] if self._radius and numbers(mass, angle):
-                self._attach(PLANES[plane], float(mass), float(angle))
-            case ["detach", "inboard" | "outboard" as plane] if self._radius:
-                self._plant.without_weights(PLANES[plane])
+            case ["attach", plane, mass, angle] if plane in self._planes and self._radius and numbers(mass, angle):
+                self._attach(self._planes[plane], float(mass), float(angle))
+            case ["detach", plane] if plane in self._planes and self._radius:
+                self._plant.without_weights(self._planes[plane])
             case _:
                 return f"error cannot {line.strip()!r}"
         return f"ok {WORK_S}"

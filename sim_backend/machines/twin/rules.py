@@ -63,6 +63,12 @@ def _unbalance(n: Nominal, _: int) -> Toleranced:
     return rectangular(0.75 * value, "kg m", 0.25 * value)
 
 
+def _drive_limit(n: Nominal) -> float:
+    """300 rad/s^2 of the polar inertia; less where the envelope lets a drive give less."""
+    most = n.rig.envelope.max_drive_torque_Nm
+    return min(300.0 * polar(n), math.inf if most is None else 0.85 * most)
+
+
 def _runout(order: int) -> Callable[[Nominal, int], Toleranced]:
     def of(n: Nominal, _: int) -> Toleranced:
         """As large in all as `[shaft] runout` says, rms."""
@@ -109,8 +115,8 @@ ONCE: Mapping[str, Rule] = {
     "viscous": _of(lambda n: polar(n) / 100.0, "N m s/rad", 0.2),
     "coulomb": _of(lambda n: 0.2 * polar(n), "N m", 0.2),
     "drive_gain": _of(lambda n: 20.0 * polar(n), "N m s/rad", 0.1),
-    "drive_limit": _of(lambda n: 300.0 * polar(n), "N m", 0.05),
-    "drive_ramp": _constant(200.0, "rad/s^2", 0.02),
+    "drive_limit": _of(lambda n: _drive_limit(n), "N m", 0.05),
+    "drive_ramp": _of(lambda n: _drive_limit(n) / polar(n) / 1.5, "rad/s^2", 0.02),
     "pulse_angle": _any,
     "start_angle": _any,
     "hand_angle": lambda n, k: _by_hand(n),

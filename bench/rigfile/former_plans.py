@@ -1,0 +1,44 @@
+"""What plans of schema 1 had by default and today's leave to the rig file: the law of the AMB stand's controller.
+
+Plans of schema 1 are those of recordings whose plan.json has no schema, and of rig files of schema 1. Their procedures knew the
+laws of one controller; today a plan that names none takes the law that the controller is set to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+PLAN_SCHEMA = 2
+
+BY_DEFAULT: Mapping[str, Mapping[str, Any]] = {
+    "step": {"a": {"law": 1.0}},
+    "bearing-model": {"law": "CCS"},  # it had no such setting
+    "unbalance": {"law": "CCS"},
+    "compensation": {"law": "CCS"},
+    "balance": {"law": "CCS"},
+    "run-up": {"law": "CCS"},
+    "coast-down": {"law": "CCS"},
+    "sensitivity": {"law": "PID"},
+}
+"""By procedure."""
+
+
+def plan_of_schema_1(procedure: str, plan: Mapping[str, Any]) -> dict[str, Any]:
+    """A plan of schema 1, whole or in part, as schema 2 has it: what it says itself stays."""
+    return {**BY_DEFAULT.get(procedure, {}), **plan}
+
+
+def plans_of_schema_1(data: Mapping[str, Any]) -> dict[str, Any]:
+    """The table `plans` of a rig file of schema 1; a controller without a parameter `law` had none to choose from."""
+    stated = data.get("plans", {})
+    parameters = data.get("parameters", {})
+    if not isinstance(stated, dict) or not isinstance(parameters, dict) or "law" not in parameters:
+        return {"plans": stated} if "plans" in data else {}
+    names = [*stated, *(name for name in BY_DEFAULT if name not in stated)]
+    tables = {name: stated.get(name, {}) for name in names}
+    return {
+        "plans": {
+            name: plan_of_schema_1(name, table) if isinstance(table, dict) else table for name, table in tables.items()
+        }
+    }

@@ -1,0 +1,62 @@
+"""Where the shaft is held: a grid of places within the rings, and the tilts before it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+from bench.rigfile import RigFile
+from procedures.amb_rotor import rings
+from procedures.amb_rotor.conventions import conventions
+from procedures.bearing_model.plan import Plan
+
+MARGIN = 5e-6  # of the radius: noise, and what the controller swings on the way
+USED, QUARTER = 0.9, 4  # of the room that is there; spacings in a radius
+
+
+def grid(radius_m: float, spacing_m: float) -> list[tuple[float, float]]:
+    """Positions (y, z) within the circle, row by row to and fro, so that every move is a short one."""
+    n = math.floor(radius_m / spacing_m + 1e-9)
+    levels = [round(k * spacing_m, 9) for k in range(-n, n + 1)]
+    rows = []
+    for k, z in enumerate(levels):
+        row = [(y, z) for y in levels if math.hypot(y, z) <= radius_m * (1 + 1e-9)]
+        rows.append(row if k % 2 == 0 else row[::-1])
+    return list(itertools.chain.from_iterable(rows))
+
+
+def places(rig: RigFile, plan: Plan) -> list[tuple[float, float]]:
+    """The grid of a plan on a rig."""
+    radius = plan.radius_m or most(rig)
+    return grid(radius, (plan.spacing_m if plan.radius_m else None) or radius / QUARTER)
+
+
+def biases(rig: RigFile, plan: Plan) -> tuple[float, ...]:
+    """Of each pass, A: the plan's; else one pass with that of the controller, as it is set."""
+    names = conventions(rig).biases
+    return plan.biases_A or ((rig.parameters[names[0]].default,) if names else (math.nan,))
+
+
+def find_room(rig: RigFile) -> float:
+    """What ring, zeros, runout and envelope leave of the radius, m."""
+    return min(rings.room(rig), rig.envelope.max_levitated_position_m) - MARGIN
+
+
+def most(rig: RigFile) -> float:
+    """Of the radius, m, by ring, envelope and set points: to whole micrometres."""
+    machine = conventions(rig)
+    highs = [rig.parameters[name].high / abs(value) for c in "yz" for name, value in machine.point(c, 1.0).items()]
+    return math.floor(USED * min(find_room(rig), *highs) * 1e6) * 1e-6
+
+
+def tilts(plan: Plan) -> list[tuple[float, float]]:
+    """(psi, theta) of the check of the wiring."""
+    t = plan.tilt_rad
+    return [(0.0, 0.0), (t, 0.0), (-t, 0.0), (0.0, t), (0.0, -t)]
+
+
+def count_places(plan: Plan) -> int:
+    """How many places a plan has, on any rig."""
+    if plan.radius_m is None:
+        return len(grid(float(QUARTER), 1.0))
+    return len(grid(plan.radius_m, plan.spacing_m or plan.radius_m / QUARTER))
