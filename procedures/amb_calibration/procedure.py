@@ -7,10 +7,8 @@ tangent at the current that carries the rotor's own weight. Horizontal constants
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +17,7 @@ from bench.findings import Ended, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
-from bench.procedure.roles import NOTHING, Load, RigState
+from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
@@ -31,15 +29,15 @@ from procedures.amb_calibration import figures as drawn
 from procedures.amb_calibration import fit as amb_calibration_fit
 from procedures.amb_calibration.estimates import less_sure, turned_by_hand, turning_point, unresolved_angles
 from procedures.amb_calibration.fit import Fit
+from procedures.amb_calibration.hanging import exercised, hung_up_and_down, sequence
 from procedures.amb_calibration.hypotheses import Contradiction
 from procedures.amb_calibration.inputs import fit_inputs, hand_rad
 from procedures.amb_calibration.plan import Plan
 from procedures.amb_calibration.pulls import SERVOMOTOR, Loaded, Pull, pulls
 from procedures.amb_calibration.scatter import Scatter, covariance_by_angle, covariance_over_a_turn, outputs, scatter
-from procedures.amb_calibration.steps import Hang, HangingData, HangOn, axes, channels, hung, read_hangings
+from procedures.amb_calibration.steps import HangingData, channels, hung, read_hangings
 from procedures.servomotor.loads import check_masses
-from procedures.shared import assumptions, first_look
-from procedures.shared.step_table import record_step
+from procedures.shared import assumptions
 from procedures.shared.weight import weight
 
 K_I = Quantity("K_i", "N/A", "inboard AMB: dF/di at zero control current, mean over a turn")
@@ -55,7 +53,6 @@ K2 = Quantity("K2", "N/A^2", "(d²F/di²)/2 of a bearing's axis, mean over a tur
 KW = Quantity("Kw", "N/A", "dF/di of a bearing's axis at the current that carries the rotor's own weight")
 BY_AXIS = (K, K2, KW)
 MEASURES = (*BY_BEARING, *BY_AXIS)
-CLEAR_A = 0.1  # a change of a control current that is no noise
 
 
 def measures_of(rig: RigFile) -> tuple[Quantity, ...]:
@@ -68,20 +65,6 @@ def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     return dict.fromkeys(turns.biases(rig), plan.bias_A)
 
 
-def sequence(plan: Plan) -> list[tuple[Load, int]]:
-    """Loads at one angle with their branch: up and down, mirrored in time, so that linear drift cancels.
-
-    The first zero was reached by unloading (at the previous angle, or by the exercise before the first).
-    """
-    up = [Load(label) for label in plan.masses]
-    return plan.rounds_at_angle * [
-        (NOTHING, -1),
-        *((x, 1) for x in up),
-        *((x, -1) for x in reversed(up[:-1])),
-        (NOTHING, -1),
-    ]
-
-
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records with one hook, for the progress display."""
     return plan.angles * len(sequence(plan))
@@ -92,47 +75,8 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     found = pulls(rig.file)
     for pull in found:
         hook = pull.hook if len(found) > 1 else ""
-        if not _exercised(rig, plan, record, pull, hook) or not _hung(rig, plan, record, pull, hook):
+        if not exercised(rig, plan, record, pull, hook) or not hung_up_and_down(rig, plan, record, pull, hook):
             return
-
-
-def _exercised(rig: Rig, plan: Plan, record: Recorder, pull: Pull, hook: str) -> bool:
-    """The first zero is then reached by unloading, like the others. False where the heaviest mass shows that wiring is wrong
-    and
-    nobody says to go on."""
-    before = _controls(rig, pull)
-    rig.operator.hang(Load(plan.masses[-1], hook))
-    rig.clock.sleep(plan.settle_s)
-    changes = {axis: after - before[axis] for axis, after in _controls(rig, pull).items()}
-    rig.operator.hang(Load("", hook))
-    seen = checks.wiring(pull, hung(rig.file, pull.hook), changes)
-    if max(map(abs, changes.values())) > CLEAR_A and not first_look.goes_on(rig, seen):
-        told: dict[str, Any] = {"changes": changes} | ({"hook": hook} if hook else {})
-        record.event(checks.WIRED_WRONG, **told)
-        return False  # an hour of hangings would say no more
-    return True
-
-
-def _hung(rig: Rig, plan: Plan, record: Recorder, pull: Pull, hook: str) -> bool:
-    """False where a bearing pulls with one coil alone, which no hanging changes."""
-    for turn in range(plan.angles):
-        angle = turns.turn(rig, 2 * math.pi * turn / plan.angles, plan.angles)
-        for k, (load, branch) in enumerate(sequence(plan)):
-            hanging = rig.operator.hang(replace(load, hook=hook))
-            rig.clock.sleep(plan.settle_s)
-            if turn == k == 0 and (needed := both_coils.at_no_load(pull, rig.levitation.reading, plan.bias_A)):
-                record.event(both_coils.ONE_SIDED, needed=needed)
-                return False
-            labels = HangOn(angle, hanging.label, branch, hook) if hook else Hang(angle, hanging.label, branch)
-            with record_step(record, labels):
-                rig.clock.sleep(plan.average_s)
-    return True
-
-
-def _controls(rig: Rig, pull: Pull) -> dict[str, float]:
-    """The control currents by axis as they are now, A."""
-    read = rig.levitation.reading
-    return {axis.name: (read(axis.coils[0]) - read(axis.coils[1])) / 2 for axis in axes(pull)}
 
 
 @dataclass(frozen=True)
