@@ -7,7 +7,7 @@ stand of the thesis, is what a declaration takes that has no rig (quantities by 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import reduce
 from operator import or_
@@ -194,6 +194,12 @@ class AmbRotor:
             return bool(self.point(coordinate, 0.0))
         except Lacking:
             return False
+
+    def unmoved(self, coordinates: Iterable[str]) -> tuple[str, ...]:
+        """A line for each coordinate along which a controller that takes set points takes none."""
+        points = self.can.set_points
+        asked = coordinates if points.axes or points.shaft else ()
+        return tuple(f"capabilities.set_points: found none along {c}" for c in asked if not self.can_point(c))
 
     def along(self, direction: str) -> tuple[str, ...]:
         """The axes along y, z (near end first) or x."""

@@ -210,12 +210,13 @@ def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
     channels_of = (*machine.stations.channels, *machine.currents)
-    moves = tuple(f"capabilities.set_points: found none along {c}" for c in COORDINATES if not machine.can_point(c))
+    moves = machine.unmoved(COORDINATES)
     return Requires(
         lacks=() if as_printed(rig) else (*lacking(rig), *moves),
         channels=channels(machine),
         sensors=channels_of,
         capabilities=("set_points",),
+        uses=("bias", "settings.law", "settings.integrator", "current_limit"),
     )
 
 

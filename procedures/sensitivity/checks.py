@@ -216,6 +216,8 @@ def _notes(results: Sequence[Result], plan: Plan) -> Iterator[Finding]:
                 f"{said}. It guarantees gain factors of {down:.2f} and {up:.2f} and {angle:.0f}° of phase. Half-power width "
                 f"{p.top.width:.3g} Hz, lines {p.taken.grid.step:g} Hz apart, least coherence {p.coherence:.3f}; "
                 f"{p.change:+.2%} ± {2 * p.u_change:.2%} at half the amplitude.")  # fmt: skip
+        if (top := _alone(r)) is not None:
+            text += f" One sine at a time: this is the greatest value up to {top:.4g} Hz, the highest line."
         yield Finding("zone", text, r.where)
         yield from _margins(r)
         if r.excluded:
@@ -224,10 +226,16 @@ def _notes(results: Sequence[Result], plan: Plan) -> Iterator[Finding]:
                 "orders-excluded", f"lines beside the orders of the shaft's speed were left out: {left} Hz.", r.where
             )
     peak = max((t.peak for r in results for t in r.taken), default=0.0)
-    text = (f"{plan.amplitude_A * 1e3:g} mA 0-pk in each line, at most {peak * 1e3:.0f} mA together, into the differential "
+    each = max((t.grid.amplitude for r in results for t in r.taken), default=plan.amplitude_A)
+    text = (f"{each * 1e3:g} mA 0-pk in each line, at most {peak * 1e3:.0f} mA together, into the differential "
             "current reference.")  # fmt: skip
     yield Finding("injection", text)
     yield Finding("scope", SCOPE)
+
+
+def _alone(r: Result) -> float | None:
+    """The highest line where each was injected by itself, Hz; None for combs."""
+    return float(r.curve.hz[-1]) if all(t.step_hz == 0 for t in r.taken) else None
 
 
 def _margins(r: Result) -> Iterator[Finding]:

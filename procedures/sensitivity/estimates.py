@@ -140,7 +140,8 @@ def _result(axis: str, speed: float, taken: Sequence[Taken]) -> Result:
         estimates["s_max_hz"] = _typed(
             best.top.at, best.top.u_at, "Hz", f"{where}/s_max_hz", "scatter of the peak's place", dof
         )
-    estimates |= margins([t for t in taken if t.kind == SURVEY], where)
+    wide = [t for t in taken if t.kind == SURVEY or (t.kind == REFINED and t.step_hz == 0)]  # lines of sines are few
+    estimates |= margins(wide, where)
     return Result(axis, speed, tuple(taken), _curve(taken), tuple(found), estimates)
 
 

@@ -11,6 +11,7 @@ from bench.rigfile.capture import Layout
 from bench.rigfile.envelope import Envelope
 from bench.units import RPM
 from procedures.amb_rotor.conventions import conventions
+from procedures.sensitivity import sines
 from procedures.sensitivity.injection import Comb, find_refusal
 from procedures.sensitivity.plan import Plan
 from procedures.sensitivity.steps import REFINED, captured_channels
@@ -19,28 +20,42 @@ from procedures.shared.limits import landing_speed
 LEAST_S = 4.0  # of a capture of the second grid: four periods of the finest
 
 
+def chosen_axes(rig: RigFile, plan: Plan) -> tuple[str, ...]:
+    """Those of the plan, or all of the machine's into which the controller injects."""
+    can = rig.capabilities.injection
+    return plan.axes or tuple(a for a in conventions(rig).all_axes if can is not None and a in can.axes)
+
+
 def of_plan(rig: RigFile, plan: Plan, combs: Sequence[tuple[str, Comb]]) -> Iterator[str]:
     """What the plan asks too much of: key, found, expected."""
     if max(plan.speeds_rad_s) > 0 and not any("drive" in d.roles for d in rig.devices.values()):
         yield "speeds_rad_s: the rig file has no device in the role drive, so that nothing turns the shaft; expected 0"
         return
+    if max(plan.speeds_rad_s) > 0 and not conventions(rig).marked:
+        yield "speeds_rad_s: the rig tells no angle and speed of the shaft; expected 0 alone"
+        return
+    known = tuple(rig.capabilities.injection.axes) if rig.capabilities.injection is not None else ()
+    for axis in (a for a in plan.axes if a not in known):
+        yield f"axes: found {axis}; the controller injects into {', '.join(known) or '(none)'}"
     yield from _injection(rig, plan, combs)
     yield from _speeds(rig, plan)
 
 
 def _injection(rig: RigFile, plan: Plan, combs: Sequence[tuple[str, Comb]]) -> Iterator[str]:
+    one = sines.makes_one(rig)
     refined = Comb(plan.low_hz, plan.low_hz, 128, plan.amplitude_A)  # at most, in the second pass
-    greatest = max([*(c for _, c in combs), refined], key=lambda c: c.peak)
+    greatest = max([*(c for _, c in combs), *(() if one else (refined,))], key=lambda c: c.peak)
     can = rig.capabilities.injection
     if can is not None and (why := find_refusal(Envelope(rig), can, greatest)):
-        yield f"amplitude_A: found {plan.amplitude_A:g} A for each line; expected less: {why}"
+        key, found = ("sine_A", greatest.amplitude) if one else ("amplitude_A", plan.amplitude_A)
+        yield f"{key}: found {found:g} A for each line; expected less: {why}"
     for key, value in (("low_hz", plan.low_hz), ("high_step_hz", plan.high_step_hz)):
         if math.log2(value) % 1:
             yield f"{key}: found {value:g}; expected a power of two: the lines must repeat after whole samples"
     if len({*plan.axes}) < len(plan.axes):
         yield f"axes: found {', '.join(plan.axes)}; expected each once"
     top = max(hz for _, c in combs for hz in c.hz)
-    if top > 0.45 * plan.rate_hz:
+    if top > 0.45 * sines.rate(rig, plan):
         yield (f"rate_hz: found {plan.rate_hz:g}; expected {top / 0.45:.0f} Hz or more for lines up to {top:g} Hz: what is "
                "above half of it folds back")  # fmt: skip
     yield from _memory(rig, plan, combs)
@@ -51,10 +66,13 @@ def _memory(rig: RigFile, plan: Plan, combs: Sequence[tuple[str, Comb]]) -> Iter
     speed = max(plan.speeds_rad_s)
     slowest = min((s for s in plan.speeds_rad_s if s > 0), default=0.0)
     extra = 0.1 + 4 * math.pi / slowest if slowest else 0.0
-    for kind, seconds in [*((k, plan.periods * c.period_s) for k, c in combs), (REFINED, LEAST_S)]:
+    for kind, seconds in [
+        *((k, plan.periods * c.period_s) for k, c in combs),
+        *(() if sines.makes_one(rig) else ((REFINED, LEAST_S),)),
+    ]:
         try:
             names = captured_channels(conventions(rig), kind, speed)
-            size = Layout.of(rig.capture, names).sample.itemsize * (seconds + extra) * plan.rate_hz
+            size = Layout.of(rig.capture, names).sample.itemsize * (seconds + extra) * sines.rate(rig, plan)
         except BenchError as error:
             yield str(error)
             return

@@ -19,12 +19,14 @@ CREST = 1.1  # greatest of Schroeder's phases over sqrt(2 lines) amplitudes: 1.0
 
 @dataclass(frozen=True)
 class Comb:
-    """Lines at `first`, `first` + `step`, ... Hz, `count` of them, each of `amplitude` A 0-pk."""
+    """Lines at `first`, `first` + `step`, ... Hz, `count` of them, each of `amplitude` A 0-pk; `repeat_s`, after how long a
+    single one counts as repeated, where that is not its own period."""
 
     first: float
     step: float
     count: int
     amplitude: float
+    repeat_s: float = 0.0
 
     @property
     def hz(self) -> list[float]:
@@ -34,6 +36,8 @@ class Comb:
     @property
     def period_s(self) -> float:
         """After which it repeats."""
+        if self.repeat_s:
+            return self.repeat_s
         a, b = Fraction(self.first).limit_denominator(4096), Fraction(self.step).limit_denominator(4096)
         whole = math.lcm(a.denominator, b.denominator)
         return whole / math.gcd(int(a * whole), int(b * whole))

@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from pydantic import Field
 
 from bench.procedure import BenchPlan
-from bench.units import RPM
 from procedures.amb_rotor.conventions import Law
-
-Axis = Literal["yi", "zi", "yo", "zo", "x"]
 
 
 class Plan(BenchPlan):
     """Settings of the injections, SI."""
 
     law: Law = ""
-    axes: tuple[Axis, ...] = Field(("yi", "zi", "yo", "zo", "x"), min_length=1)
-    speeds_rad_s: tuple[float, ...] = Field((0.0, 10000 / RPM), min_length=1)
-    amplitude_A: float = Field(4e-3, gt=0)  # of each line, 0-pk
+    axes: tuple[str, ...] = ()  # by the rig's names; none: all into which the controller injects
+    speeds_rad_s: tuple[float, ...] = Field((0.0,), min_length=1)
+    amplitude_A: float = Field(4e-3, gt=0)  # of each line of a comb, 0-pk
+    sine_A: float | None = Field(
+        None, gt=0
+    )  # where the controller makes one sine at a time; 3 % of the bias if not given
     low_hz: float = Field(2.0, gt=0)
     middle_hz: float = Field(256.0, gt=0)  # up to here the odd multiples of low_hz; above it every high_step_hz
     high_step_hz: float = Field(16.0, gt=0)
     high_hz: float = Field(2000.0, gt=0)
-    modes_hz: tuple[float, ...] = (650.0, 1240.0)  # bending modes, about which a finer grid is laid
+    modes_hz: tuple[float, ...] = ()  # bending modes, about which a finer grid is laid
     mode_within_hz: float = Field(26.0, gt=0)  # to either side
     mode_damping: float = Field(2e-3, gt=0)  # least that is expected of them
     periods: int = Field(4, ge=3)  # of the survey

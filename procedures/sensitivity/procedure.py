@@ -26,9 +26,10 @@ from bench.rigfile.capture import Layout
 from procedures.amb_rotor import lift, wiring
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.laws import of_laws
-from procedures.sensitivity import checks, estimates, fitting
+from procedures.sensitivity import checks, estimates, fitting, sines
 from procedures.sensitivity import figures as drawn
 from procedures.sensitivity.estimates import Candidate, Result
+from procedures.sensitivity.fitting import chosen_axes
 from procedures.sensitivity.injection import Comb, combs, inject
 from procedures.sensitivity.plan import Plan
 from procedures.sensitivity.steps import (
@@ -87,6 +88,11 @@ def refinements(plan: Plan, about: Candidate, speed: float) -> list[tuple[str, f
     return [(k, about.hz, Comb(first, step, count, plan.amplitude_A * f)) for k, f in ((REFINED, 1.0), (HALF, 0.5))]
 
 
+def first_pass(rig: RigFile, plan: Plan, speed: float) -> list[tuple[str, float, Comb]]:
+    """What is injected first: combs, or sines where the controller makes one at a time."""
+    return sines.surveys(rig, plan) if sines.makes_one(rig) else surveys(plan, speed)
+
+
 def size(rig: RigFile, kind: str, speed: float) -> int:
     """Bytes of a sample of what is captured."""
     assert rig.capture is not None
@@ -102,7 +108,7 @@ def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
 
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records at least, for the progress display."""
-    return lift.STEPS + len(plan.speeds_rad_s) * len(plan.axes) * (len(surveys(plan, 0.0)) + 2)
+    return lift.STEPS + len(plan.speeds_rad_s) * max(1, len(plan.axes)) * (len(surveys(plan, 0.0)) + 2)
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
@@ -116,7 +122,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     for speed in sorted(plan.speeds_rad_s):
         if speed and not lift.bring_to_speed(rig, record, speed, plan.settle_s):
             break
-        for axis in plan.axes:
+        for axis in chosen_axes(rig.file, plan):
             number = _axis(rig, plan, record, speed, axis, number)
     if rig.drive is not None and max(plan.speeds_rad_s) > 0:
         rig.drive.stop()
@@ -128,12 +134,14 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 def _axis(rig: Rig, plan: Plan, record: Recorder, speed: float, axis: str, number: int) -> int:
     """Both passes of an axis; the number of the next capture."""
     seen: list[Response] = []
-    for kind, about, comb in surveys(plan, speed):
+    one = sines.makes_one(rig.file)
+    for kind, about, comb in first_pass(rig.file, plan, speed):
         found = _take(rig, plan, record, speed, axis, kind, about, comb, number)
         seen += [found] if found is not None and kind != WIRING else []
         number += 1
-    for candidate in estimates.candidates(seen):
-        for kind, about, comb in refinements(plan, candidate, speed):
+    for candidate in estimates.candidates(sines.as_one(seen) if one else seen):
+        again = sines.refinements(rig.file, plan, candidate) if one else refinements(plan, candidate, speed)
+        for kind, about, comb in again:
             _take(rig, plan, record, speed, axis, kind, about, comb, number)
             number += 1
     return number
@@ -151,13 +159,13 @@ def _take(
     pulses = MARGIN_S + 4 * math.pi / speed if speed else 0.0
     seconds = comb.period_s * (plan.refined_periods if kind in (REFINED, HALF) else plan.periods)
     if kind in (REFINED, HALF):  # as many as fit
-        most = rig.capture.memory_bytes / size(rig.file, kind, speed) / plan.rate_hz - pulses
+        most = rig.capture.memory_bytes / size(rig.file, kind, speed) / sines.rate(rig.file, plan) - pulses
         seconds = comb.period_s * min(plan.refined_periods, math.floor(most / comb.period_s))
     seconds += pulses
     with inject(rig, axis, comb, plan.survey_start_s if kind == SURVEY else plan.start_s):
         with record.step(INJECT, **labels):
             names = captured_channels(conventions(rig.file), kind, speed)
-            rig.capture.arm(names, seconds=seconds, rate_hz=plan.rate_hz)
+            rig.capture.arm(names, seconds=seconds, rate_hz=sines.rate(rig.file, plan))
             rig.capture.wait(seconds + 5.0)
     data, grid = rig.capture.upload(None, **labels), grid_of(labels)
     if folds(grid, data.rate_hz):
@@ -173,7 +181,7 @@ def evaluate(recording: Recording[Any], findings: Findings) -> list[Result]:
     """S, its peak and the margins, of each axis and speed."""
     first_look.gate(recording, findings, wiring.before_orbits(recording))
     findings.gate([*wiring.before_orbits(recording), *checks.before(recording)])
-    plan, taken = recording.plan, read_taken(recording)
+    plan, taken = recording.plan, sines.joined(read_taken(recording))
     findings.gate(checks.of_signals(taken, plan))
     results = estimates.results(taken)
     findings.add(checks.of_results(results, plan))
@@ -192,7 +200,7 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
     yield from of_laws(conventions(rig), "law", [plan.law])
     yield from fitting.of_plan(
-        rig, plan, [(kind, comb) for s in plan.speeds_rad_s for kind, _, comb in surveys(plan, s)]
+        rig, plan, [(kind, comb) for s in plan.speeds_rad_s for kind, _, comb in first_pass(rig, plan, s)]
     )
 
 
@@ -205,12 +213,13 @@ def figures(results: Sequence[Result], recording: Recording[Plan]) -> Iterable[F
 def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
+    moves = machine.unmoved([c for c, _ in lift.NUDGES])
     return Requires(
-        lacks=(*machine.lacks, *machine.unweighed),
+        lacks=(*machine.stations.lacks, *moves),
         channels=telemetry_channels(machine),
-        capabilities=("set_points", "injection", "injection.lines", "injection.step"),
-        capture=(*LOOP, *PULSED, *machine.all_currents),
-        uses=("settings.law",),
+        capabilities=("set_points", "injection"),
+        capture=(*LOOP, *(PULSED if machine.marked else ()), *machine.all_currents),
+        uses=("settings.law", "settings.lift", "injection.lines", "injection.step", "mark"),
     )
 
 

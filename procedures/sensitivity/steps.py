@@ -70,6 +70,7 @@ class Taken:
     lost: int
     expected: int
     machine: AmbRotor
+    step_hz: float = 0.0  # of the comb; none of a sine
 
     @property
     def where(self) -> str:
@@ -109,7 +110,11 @@ def name_speed(speed: float) -> str:
 
 def telemetry_channels(machine: AmbRotor) -> tuple[str, ...]:
     """What is read of the telemetry."""
-    return (*machine.all_positions, STATUS, SPEED)
+    return (*machine.stations.channels, *_axial(machine), STATUS, *((SPEED,) if machine.marked else ()))
+
+
+def _axial(machine: AmbRotor) -> tuple[str, ...]:
+    return (machine.position(machine.axial),) if machine.axial in machine.probes else ()
 
 
 def captured_channels(machine: AmbRotor, kind: str, speed: float) -> tuple[str, ...]:
@@ -185,7 +190,8 @@ def _read(recording: Recording[Any], step: Step) -> Taken:
     return Taken(
         str(labels["axis"]), float(labels["speed_rad_s"]), turning, kind, float(labels["about_hz"]), grid, found, excluded,
         injected, float(np.abs(columns["inject"]).max()), clipped, follows, rate, flags,
-        clips([data[name] for name in machine.all_positions]), step.lost(), step.expected(), machine,
+        clips([data[name] for name in (*machine.stations.channels, *_axial(machine))]), step.lost(), step.expected(),
+        machine, float(labels["step_hz"]),
     )  # fmt: skip
 
 

@@ -12,6 +12,8 @@ import numpy.typing as npt
 from bench.rigfile.capture import CaptureSpec, Layout
 
 Array = npt.NDArray[np.float64]
+TOLD_BY = {"PULSE": "pulses", "SPEED": "speed"}
+WATCHING = ("RISES", "FALLS", *TOLD_BY)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,10 +65,14 @@ class CaptureMemory:
     def arm(self, order: Order) -> str:
         """Begin; the name of the status. What was recorded before is gone."""
         known = sum(1 << index for index in self._by_index)
-        watched = self._by_index.get(order.source) if order.trigger in ("RISES", "FALLS") else "speed"
+        watched = (
+            self._by_index.get(order.source) if order.trigger in ("RISES", "FALLS") else TOLD_BY.get(order.trigger)
+        )
         if self.every:
             return "WRONG_STATE"
-        if not order.mask or order.mask & ~known or watched is None:
+        if order.trigger != "NOW" and watched not in self._columns:  # of a machine without a mark: no pulse, no speed
+            watched = None
+        if not order.mask or order.mask & ~known or (watched is None and order.trigger in WATCHING):
             return "UNKNOWN_CHANNEL"
         if not order.divider or not 0 <= order.before < order.length or not np.isfinite(order.level):
             return "OUT_OF_RANGE"
@@ -76,7 +82,7 @@ class CaptureMemory:
         layout = Layout.of(self._spec, names)
         if order.length * layout.sample.itemsize > self._spec.memory_bytes:
             return "TOO_LARGE"
-        self._layout, self._watched = layout, self._columns["pulses" if order.trigger == "PULSE" else watched]
+        self._layout, self._watched = layout, self._columns.get(watched or "", 0)
         self.size = order.length * layout.sample.itemsize
         self.order, self.state, self.number = order, "ARMED", self.number + 1 & 0xFFFF
         self._clear()

@@ -1,73 +1,79 @@
-"""Sine fits: exact on exact sines, unbiased with noise, by the known scatter of IEEE 1057."""
+"""Sensitivity where the controller makes one sine at a time: the lines, and the result against the loop's linear model."""
 
 from __future__ import annotations
 
 import math
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from twin_loops import sensitivity
 
-from bench.errors import AnalysisError
-from procedures.shared.sines import known_frequency, unknown_frequency
+from bench.cli.virtual import simulated_run
+from bench.findings import Effect, Finding
+from bench.procedure import Measured
+from bench.rigfile import load_rig
+from procedures.sensitivity import sines
+from procedures.sensitivity.estimates import Candidate
+from procedures.sensitivity.margins import fall, phase
+from procedures.sensitivity.plan import Plan
+from procedures.sensitivity.procedure import check, procedure
+from procedures.sensitivity.steps import HALF, REFINED
 
-amplitudes, phases, offsets = st.floats(0.01, 100), st.floats(-3.1, 3.1), st.floats(-100, 100)
-
-
-@settings(deadline=None)
-@given(amplitudes, phases, offsets, st.floats(0.3, 40))
-def test_a_sine_of_known_frequency_is_found(amplitude: float, phase: float, offset: float, hz: float) -> None:
-    t = np.arange(500) * 1e-2 + 17.0
-    found = known_frequency(t, offset + amplitude * np.sin(2 * np.pi * hz * t + phase), hz)
-    assert found.amplitude == pytest.approx(amplitude, rel=1e-6, abs=1e-9)
-    assert found.offset == pytest.approx(offset, rel=1e-6, abs=1e-6)
-    assert math.remainder(found.phase - phase, 2 * math.pi) == pytest.approx(0, abs=1e-6)
-
-
-@settings(deadline=None)
-@given(amplitudes, phases, st.floats(0.5, 40), st.booleans())
-def test_a_sine_of_unknown_frequency_is_found(amplitude: float, phase: float, hz: float, guessed: bool) -> None:
-    t = np.arange(1000) * 1e-2 - 3.0
-    y = 2.0 + amplitude * np.sin(2 * np.pi * hz * t + phase)
-    found = unknown_frequency(t, y, hz * 1.002 if guessed else None)
-    assert found.hz == pytest.approx(hz, rel=1e-7)
-    assert found.amplitude == pytest.approx(amplitude, rel=1e-6)
-    assert math.remainder(found.phase - phase, 2 * math.pi) == pytest.approx(0, abs=1e-4)
-    np.testing.assert_allclose(found.at(t), y, atol=1e-5 * amplitude)
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+SPINDLE, STAND = (str(EXAMPLES / name) for name in ("vertical-spindle/spindle.toml", "plain-stand/stand.toml"))
+QUICK: dict[str, Any] = {"axes": ("y_vorn",), "settle_s": 1.0, "start_s": 0.3, "survey_start_s": 0.5}
 
 
-def test_uncertainty_is_that_of_white_noise() -> None:
-    """u(amplitude) = s sqrt(2/n), u(phase) = u(amplitude)/amplitude for whole periods."""
-    rng = np.random.default_rng(8)
-    t = np.arange(400) * 5e-3
-    found = [
-        known_frequency(t, 3 * np.sin(2 * np.pi * 5 * t + 0.4) + 0.2 * rng.normal(size=400), 5.0) for _ in range(300)
-    ]
-    expected = 0.2 * math.sqrt(2 / 400)
-    assert np.mean([f.u_amplitude for f in found]) == pytest.approx(expected, rel=0.05)
-    assert np.std([f.amplitude for f in found]) == pytest.approx(expected, rel=0.15)
-    assert np.mean([f.u_phase for f in found]) == pytest.approx(expected / 3, rel=0.05)
-    assert np.std([f.phase for f in found]) == pytest.approx(expected / 3, rel=0.15)
-    assert np.mean([f.rms for f in found]) == pytest.approx(0.2, rel=0.05)
+@pytest.mark.parametrize("sampled", [8000.0, 10000.0, 20000.0])
+def test_every_line_repeats_with_the_samples(sampled: float) -> None:
+    """By hand: 101 Hz in what repeats after 1/8 s becomes 104 Hz, 13 periods of it."""
+    for hz in np.geomspace(2.0, 2000.0, 61).tolist():
+        line = sines.sine(hz, 0.02, sampled)
+        assert line.hz == [line.first]
+        for whole in (line.period_s * sampled, line.period_s * line.first):
+            assert whole == pytest.approx(round(whole), abs=1e-9)
+        assert line.first == pytest.approx(hz, abs=0.5 / line.period_s)
+        assert line.peak == 0.02
+    assert sines.sine(101.0, 0.02, 8000.0).first == 104.0
 
 
-def test_noise_does_not_bias_the_frequency() -> None:
-    """Known bound: u(f) = sqrt(6/n) s / (pi A T)."""
-    rng = np.random.default_rng(9)
-    t = np.arange(500) * 4e-3
-    found = [unknown_frequency(t, np.sin(2 * np.pi * 7.3 * t) + 0.1 * rng.normal(size=500)).hz for _ in range(200)]
-    bound = math.sqrt(6 / 500) * 0.1 / (math.pi * 2.0)
-    assert np.mean(found) == pytest.approx(7.3, abs=4 * bound / math.sqrt(200))
-    assert np.std(found) == pytest.approx(bound, rel=0.2)
+def test_a_peak_is_refined_by_lines_within_its_width_at_both_amplitudes() -> None:
+    rig, plan = load_rig(STAND), Plan()
+    passes = sines.refinements(rig, plan, Candidate(124.0, 74.0))
+    full, half = ([c for kind, _, c in passes if kind == which] for which in (REFINED, HALF))
+    assert [c.first for c in full] == [c.first for c in half]
+    assert len([c for c in full if abs(c.first - 124) < 37]) >= 6
+    assert {c.amplitude for c in full} == {2 * c.amplitude for c in half} == {0.03 * 1.5}
+    assert all(c.first <= sines.highest(rig, plan) for c in full)
 
 
-@pytest.mark.parametrize("hz", [0.0, -1.0, math.nan])
-def test_a_frequency_must_be_one(hz: float) -> None:
-    with pytest.raises(AnalysisError):
-        known_frequency(np.arange(10.0), np.arange(10.0), hz)
+def test_a_plan_that_asks_too_much_is_refused_before_anything_starts() -> None:
+    rig = load_rig(STAND)
+    assert not [*check(rig, Plan()), *procedure.problems(rig, Plan())]
+    for plan, said in (
+        (Plan(sine_A=0.4), "sine_A: found 0.4 A"),
+        (Plan(axes=("yi",)), "axes: found yi; the controller injects into"),
+        (Plan(speeds_rad_s=(0.0, 500.0)), "nothing turns the shaft"),
+    ):
+        assert any(said in line for line in check(rig, plan))
+    assert any("no injection" in line for line in procedure.lacking(load_rig(SPINDLE)))
 
 
-def test_too_few_samples() -> None:
-    with pytest.raises(AnalysisError):
-        unknown_frequency(np.arange(4.0), np.arange(4.0))
+@pytest.mark.long
+@pytest.mark.timeout(300)
+def test_the_loop_of_another_laboratory_is_recovered_within_its_intervals(tmp_path: Path) -> None:
+    """Against the linear model of the same twin; three standard uncertainties and a thousandth, which is the model's own."""
+    run = simulated_run("sensitivity", STAND, 1, QUICK, tmp_path / "s.mcap")
+    assert [f.code for f in run.results if isinstance(f, Finding) and f.effect is not Effect.NOTE] == []
+    told = {m.quantity.name: m.estimate for m in run.results if isinstance(m, Measured)}
+    hz = np.geomspace(2.0, 1800.0, 3000)
+    true = sensitivity(run.drawn.plant, 3, hz)
+    open_loop, top = 1 / true - 1, int(np.abs(true).argmax())
+    for name, value in (("s_max", float(abs(true[top]))), ("s_max_hz", float(hz[top])), ("phase_margin", phase(open_loop)),
+                        ("gain_reduction", fall(open_loop))):  # fmt: skip
+        assert abs(told[name].value - value) < 3 * told[name].u + 1e-3 * value, name
+    zone = next(f for f in run.results if isinstance(f, Finding) and f.code == "zone")
+    assert "greatest value up to" in zone.text
+    assert math.isfinite(told["s_max"].u)
