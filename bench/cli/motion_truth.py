@@ -121,14 +121,14 @@ def _unbalance(done: Simulated) -> Found:
 
 
 def _balance(done: Simulated) -> Found:
-    from procedures.balance.steps import SIDES
+    from procedures.balance.planes import names_of
 
     of = done.drawn.machine.motions.left
     if of is None:
         return
     own = of(done.recording.rig, done.drawn, done.recording.events("operator"))
     for name, values in (("unbalance", own[0]), ("residual", own[-1])):
-        for side, value in zip(SIDES, values, strict=True):
+        for side, value in zip(names_of(done.recording.rig), values, strict=True):
             yield f"{name}_cos", side, float(value.real)
             yield f"{name}_sin", side, float(value.imag)
 

@@ -16,8 +16,7 @@ from bench.procedure.requires import Requires
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.units import RPM
-from procedures.amb_rotor.conventions import conventions
-from procedures.balance import decision, estimates
+from procedures.balance import decision, estimates, planes
 from procedures.balance.estimates import Balanced
 from procedures.balance.plan import Plan
 from procedures.balance.steps import (
@@ -25,12 +24,9 @@ from procedures.balance.steps import (
     DECISION,
     LIGHTER,
     REFUSED,
-    SIDES,
     Recorded,
     Run,
-    captured_channels,
 )
-from procedures.shared.unsupported import of_scales
 from procedures.synchronous import checks as dwell_checks
 from procedures.synchronous import fitting
 from procedures.synchronous.bearings import Known
@@ -44,53 +40,43 @@ SAME_PLACE_RAD = math.radians(0.1)
 DIFFERS = (
     0.02  # of what was mounted: how far a verification may be from the prediction, beside three times its uncertainty
 )
-NEEDED = (
-    *(f"com_to_{b}_{what}" for b in ("inboard", "outboard") for what in ("balance", "sensor", "amb")),
-    *("com_to_coupling", "balance_radius", "clearance", "coupling_stiffness", "amb_gap"),
-)
 
 
 def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
-    machine = conventions(rig)
-    return replace(
-        required(rig),
-        lacks=(*machine.lacks, *machine.unweighed, *of_scales(rig)),
-        capabilities=(
-            "set_points",
-            "bias",
-            "gains.kp",
-            "gains.kd",
-            *(f"model.{kind}_{axis}" for kind in ("beta", "offset") for axis in machine.axes),
-        ),
-        geometry=NEEDED,
-        machine=("mass", "transverse_inertia", "polar_inertia", "radial_axes", "runout", "weight_mass", "weight_angle"),
-        capture=captured_channels(machine),
-        uses=("settings.law", "flatness"),
-    )
+    needed = required(rig)
+    return replace(needed, lacks=(*needed.lacks, *planes.missing(rig)),
+                   uses=(*needed.uses, "bias", "gains", "model", "flatness"))  # fmt: skip
 
 
 def of_plan(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work, before anything starts."""
     yield from fitting.of_speeds(rig, plan.speeds_rad_s)
     yield from fitting.of_slow_roll(rig, plan.slow_rad_s, plan.slow_s, plan.speeds_rad_s)
+    yield from fitting.of_bearings(rig, plan.slow_rad_s, len(plan.speeds_rad_s))
     yield from fitting.of_captures(rig, plan.capture_s, RATE_HZ, 1, plan.speeds_rad_s)
     if max(plan.speeds_rad_s) * RPM > MOST_RPM + 1:
         top = max(plan.speeds_rad_s) * RPM
         yield f"speeds_rad_s: found {top:.0f} r/min; influence runs are made at {MOST_RPM:.0f} r/min or below"
     if 0 < plan.positions < 3:
         yield f"positions: found {plan.positions}; expected 0 (any angle), or three or more"
-    elif plan.positions:
-        for side, angle in zip(SIDES, plan.trial_angle_rad, strict=True):
-            step = 2 * math.pi / plan.positions
-            if abs(math.remainder(angle, step)) > SAME_PLACE_RAD:
-                yield (f"trial_angle_rad: found {math.degrees(angle):.4g}° {side}; the {plan.positions} positions are "
-                       f"{math.degrees(step):.4g}° apart, the first at 0°")  # fmt: skip
-    for side, kg, p in zip(SIDES, plan.trial_kg, (0, 1), strict=True):
+    else:
+        yield from _of_places(rig, plan)
+    for side, kg, p in zip(planes.names_of(rig), plan.trial_kg, (0, 1), strict=True):
         allowed = decision.allowed_kg(rig, plan, p)
         if not 0 < kg <= allowed:
             yield (f"trial_kg: found {kg * 1e3:g} g {side}; allowed are up to {allowed * 1e3:.3g} g: by the envelope, "
                    f"and by the predicted response, which may reach {plan.max_share:.0%} of the least clearance")  # fmt: skip
+
+
+def _of_places(rig: RigFile, plan: Plan) -> Iterator[str]:
+    """Trial weights beside the planes' holes."""
+    for plane, angle in zip(planes.planes_of(rig), plan.trial_angle_rad, strict=True):
+        if holes := decision.holes_of(plane, plan):
+            step = 2 * math.pi / holes
+            if abs(math.remainder(angle, step)) > SAME_PLACE_RAD:
+                yield (f"trial_angle_rad: found {math.degrees(angle):.4g}° {plane.name}; the {holes} positions are "
+                       f"{math.degrees(step):.4g}° apart, the first at 0°")  # fmt: skip
 
 
 def refusals(recording: Recording[Any]) -> Iterator[Finding]:
@@ -127,7 +113,7 @@ def of_runs(recorded: Recorded, rig: RigFile, plan: Plan, known: Known) -> Itera
     shown: list[decision.Shown] = []
     named = {r.name: r for r in recorded.runs}
     before = base
-    for side in SIDES:
+    for side in planes.names_of(rig):
         having = named.get(f"trial {side}")
         if having is None or not having.weights:
             return
@@ -159,7 +145,7 @@ def of_result(balance: Balanced, recorded: Recorded, shown: list[Run], plan: Pla
             yield from predicted(balance, before, after, rig)
     name = shown[-1].name
     values = balance.unbalance[name]
-    for p, side in enumerate(SIDES):
+    for p, side in enumerate(planes.names_of(rig)):
         size, most, per = abs(values.values[p]), bound(values.one(p)), balance.permissible[p].value
         text = (f"{side}: U_res {size / G_MM:.2f}, U {(most - size) / G_MM:.2f}, together {most / G_MM:.2f} g mm; U_per "
                 f"{per / G_MM:.2f} g mm (G{plan.grade_m_s * 1e3:g} at {plan.service_rad_s * RPM:.0f} r/min).")  # fmt: skip
@@ -170,10 +156,11 @@ def of_result(balance: Balanced, recorded: Recorded, shown: list[Run], plan: Pla
             yield Finding(
                 "not-reached", text, name, Effect.INDETERMINATE, (f"residual_cos@{side}", f"residual_sin@{side}")
             )
-    for p, side in enumerate(SIDES):
+    for p, plane in enumerate(balance.planes):
+        side, seen = plane.name, balance.solved.influence[-1, :, p] * plane.turned(1.0 + 0j)
         some = ", ".join(
             f"{axis} {abs(a):.3f} µm ∠{-math.degrees(np.angle(a)) % 360:.0f}°"
-            for axis, a in zip(recorded.machine.axes, balance.solved.influence[-1, :, p], strict=True)
+            for axis, a in zip(recorded.machine.axes, seen, strict=True)
         )
         text = (f"1 g mm at the scale's zero of the {side} plane, {max(plan.speeds_rad_s) * RPM:.0f} r/min (0-pk, phase "
                 f"lag): {some}; condition of all {balance.solved.condition:.1f}.")  # fmt: skip
@@ -183,18 +170,19 @@ def of_result(balance: Balanced, recorded: Recorded, shown: list[Run], plan: Pla
 
 def predicted(balance: Balanced, before: Run, after: Run, rig: RigFile) -> Iterator[Finding]:
     """What was measured against what was expected of the weights that were fixed in between."""
-    added = estimates.sum_weights(after.weights, balance.radius) - estimates.sum_weights(before.weights, balance.radius)
+    sides, both = planes.names_of(rig), balance.planes
+    added = estimates.sum_weights(after.weights, both) - estimates.sum_weights(before.weights, both)
     expected = balance.unbalance[before.name].values + added
     found = balance.unbalance[after.name]
     off = found.values - expected
     scale = float(np.abs(added).max())
     told = ", ".join(
         f"{side} {abs(e) / G_MM:.2f} g mm, found {abs(v) / G_MM:.2f} g mm"
-        for side, e, v in zip(SIDES, expected, found.values, strict=True)
+        for side, e, v in zip(sides, expected, found.values, strict=True)
     )
-    over = np.abs(off) - DIFFERS * scale - 3 * _between(balance, before, after, rig)
+    over = np.abs(off) - DIFFERS * scale - 3 * _between(balance, before, after)
     if over.max() > 0:
-        worst = SIDES[int(np.argmax(over))]
+        worst = sides[int(np.argmax(over))]
         text = (f"predicted {told}: the correction did not act as it should, most {worst}. Suspect a weight of another "
                 "mass, at another angle or in the other plane than the sheet says, or one that came loose.")  # fmt: skip
         yield Finding("correction-not-as-stated", text, after.name, Effect.INDETERMINATE)
@@ -202,14 +190,16 @@ def predicted(balance: Balanced, before: Run, after: Run, rig: RigFile) -> Itera
         yield Finding("verified", f"predicted {told}.", after.name)
 
 
-def _between(balance: Balanced, before: Run, after: Run, rig: RigFile) -> np.ndarray:
+def _between(balance: Balanced, before: Run, after: Run) -> np.ndarray:
     """Standard uncertainty by plane (2,), kg m, of what a correction should have changed and did: the budget of the difference
     of both runs, and the tolerances of the weights that were fixed in between."""
-    mass, angle = (rig.machine[name].standard_uncertainty for name in ("weight_mass", "weight_angle"))
     own = np.zeros(2)
     for w in after.weights:
         if w not in before.weights:
-            own[w.plane] += (balance.radius * mass) ** 2 + (balance.radius * w.kg * angle) ** 2
+            plane = balance.planes[w.plane]
+            radius = plane.radius.value
+            mass, angle = plane.weight_mass.standard_uncertainty, plane.weight_angle.standard_uncertainty
+            own[w.plane] += (radius * mass) ** 2 + (radius * w.kg * angle) ** 2
     pairs = zip(balance.parts[after.name], balance.parts[before.name], strict=True)
     apart = np.array([(a - b).u for a, b in pairs]).reshape(2, 2)
     return np.asarray(np.sqrt(own + (apart**2).sum(axis=1)))
@@ -217,12 +207,14 @@ def _between(balance: Balanced, before: Run, after: Run, rig: RigFile) -> np.nda
 
 def sheet(recorded: Recorded, code: str, rig: RigFile, plan: Plan) -> Iterator[Finding]:
     """The weights that stay on the shaft, for the operator."""
-    kept, radius = {w.number for w in recorded.on}, rig.geometry["balance_radius"].value
+    kept, both = {w.number for w in recorded.on}, planes.planes_of(rig)
     for w, purpose in recorded.fixed:
         if w.number in kept:
             degrees = math.degrees(w.angle) % 360
-            place = f" (position {round(degrees / 360 * plan.positions) % plan.positions})" if plan.positions else ""
-            text = (f"{purpose}: {w.kg * 1e3:.3f} g in the {SIDES[w.plane]} plane at {degrees:.1f}°{place} of its scale, "
-                    f"radius {radius * 1e3:g} mm ({w.kg * radius / G_MM:.2f} g mm), added. Angles are counted from y towards "
-                    "z, in the direction of rotation, while the scale's zero faces y.")  # fmt: skip
-            yield Finding(code, text, SIDES[w.plane])
+            plane = both[w.plane]
+            radius, holes = plane.radius.value, decision.holes_of(plane, plan)
+            place = f" (position {round(degrees / 360 * holes) % holes})" if holes else ""
+            text = (f"{purpose}: {w.kg * 1e3:.3f} g in the {plane.name} plane at {degrees:.1f}°{place} of its scale, "
+                    f"radius {radius * 1e3:g} mm ({w.kg * radius / G_MM:.2f} g mm), added. "
+                    f"{planes.describe(plane)}")  # fmt: skip
+            yield Finding(code, text, plane.name)

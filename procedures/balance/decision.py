@@ -20,9 +20,10 @@ from bench.units import RPM
 from procedures.amb_rotor.conventions import conventions
 from procedures.balance.estimates import Balanced
 from procedures.balance.plan import Plan
+from procedures.balance.planes import Plane, names_of, planes_of
 from procedures.balance.solution import Trials
-from procedures.balance.steps import SIDES, Read, Run, Weight
-from procedures.synchronous import bearings, runout
+from procedures.balance.steps import Read, Run, Weight
+from procedures.synchronous import bearings, facts, runout
 from procedures.synchronous.bearings import Known
 from procedures.synchronous.runout import Stand
 
@@ -33,6 +34,7 @@ OFF, ASTRAY = 0.25, 0.25  # of a weight: size, and what shows in the other plane
 TURNED_RAD, SLIPPED_RAD = math.radians(12), math.radians(15)
 SURE = 3.0  # of its u: a turn that what is known of the stand does not make
 JUST_RAD = 1e-6
+AMPLIFIED = 5.0  # by a loop that nobody knows, at most, of the response of a free shaft
 LIGHTER = 0.25  # of the planned trial weight: what is allowed beside a shaft that moves far; u = 1 mg is 4 % of 25 mg
 MILLIGRAM = 1e-6  # kg
 LIGHTEST_KG = 1e-6  # what a laboratory balance still tells from nothing
@@ -43,6 +45,22 @@ def gain(rig: RigFile, plan: Plan, plane: int) -> float:
     loop that the controller's gains are meant to make, s^2 + k2 s + k1 in each degree of freedom."""
     known = bearings.Known(None, plan.beta_share, plan.offset_u_m)
     stand = Stand.of({n: e.value for n, e in bearings.collect_inputs(rig, known).items()})
+    arm = (-stand.l_iu, stand.l_ou)[plane]
+    own = max(abs(1 / stand.mass + arm * at / stand.inertia) for at in (-stand.l_is, stand.l_os))
+    return (_amplified(rig, plan, stand) if _loop_is_known(rig, plan) else AMPLIFIED) * own
+
+
+def _loop_is_known(rig: RigFile, plan: Plan) -> bool:
+    """Whether the response follows from what the controller knows of its bearings, its gains and its bias."""
+    machine = conventions(rig)
+    if not bearings.has_model(rig):
+        return False
+    gained = all(machine.gain(key, machine.axes[0]) for key in ("kp", "kd")) and bool(machine.biases)
+    return plan.law in machine.can.flatness or gained
+
+
+def _amplified(rig: RigFile, plan: Plan, stand: Stand) -> float:
+    """The greatest response up to the highest speed over that of a free shaft far above its rigid modes."""
     p = {n: q.default for n, q in rig.parameters.items()}
     machine = conventions(rig)
     if (flat := machine.can.flatness.get(plan.law)) is None:
@@ -54,16 +72,14 @@ def gain(rig: RigFile, plan: Plan, plane: int) -> float:
     else:
         k1, k2 = p[flat.k1], p[flat.k2]
     w = np.linspace(1.0, max(plan.speeds_rad_s), 400)
-    most = float((w**2 / np.abs(k1 - w**2 + 1j * w * k2)).max())
-    arm = (-stand.l_iu, stand.l_ou)[plane]
-    return most * max(abs(1 / stand.mass + arm * at / stand.inertia) for at in (-stand.l_is, stand.l_os))
+    return float((w**2 / np.abs(k1 - w**2 + 1j * w * k2)).max())
 
 
 def allowed_kg(rig: RigFile, plan: Plan, plane: int, before: float = 0.0) -> float:
     """The greatest trial weight whose predicted response, beside `before` m that is there, stays within the plan's share of
     the least clearance and the envelope."""
-    c, radius = rig.geometry["clearance"], rig.geometry["balance_radius"].value
-    room = plan.max_share * (c.value - math.sqrt(3) * c.standard_uncertainty) - before
+    c, radius = facts.clearance(rig), planes_of(rig)[plane].radius.value
+    room = plan.max_share * (c.value - math.sqrt(3) * c.u) - before
     return float(min(max(room, 0.0) / gain(rig, plan, plane) / radius, rig.envelope.max_trial_weight_kg))
 
 
@@ -89,16 +105,19 @@ def slow_runout(slow: Read | None, base: Run, rig: RigFile, known: Known) -> Com
 @dataclass(frozen=True)
 class Shown:
     """A trial `weight`, and by speed and plane (s, 2) what the forces say that it `added`, over what it should; the angle from
-    the mark to the scale's zero is still in it. `turn_u` (s,) rad: of the angle at a speed against that at the highest."""
+    the mark to the scale's zero is still in it. `turn_u` (s,) rad: of the angle at a speed against that at the highest; names
+    of the planes, `sides`."""
 
     weight: Weight
     added: Complex
     turn_u: Callable[[int], float]
+    sides: tuple[str, str]
 
 
 def observe(before: Run, having: Run, weight: Weight, rig: RigFile, known: Known) -> Shown:
     """What the forces say of a weight, with what is known of the bearings; runout cancels."""
-    u = weight.unbalance(rig.geometry["balance_radius"].value)
+    own = planes_of(rig)[weight.plane]
+    u = own.turned(weight.unbalance(own.radius.value))
     pairs = list(zip(before.reads, having.reads, strict=True))
     inputs = bearings.collect_inputs(rig, known)
 
@@ -117,16 +136,16 @@ def observe(before: Run, having: Run, weight: Weight, rig: RigFile, known: Known
         return propagate(turn, inputs).u
 
     nominal = Stand.of({name: e.value for name, e in inputs.items()})
-    return Shown(weight, np.array([added(nominal, k) for k in range(len(pairs))]), turn_u)
+    return Shown(weight, np.array([added(nominal, k) for k in range(len(pairs))]), turn_u, names_of(rig))
 
 
 def of_trial(trial: Shown) -> Iterator[Finding]:
     """Did a trial weight do what it should, in its own plane, at every speed alike?"""
-    weight, added = trial.weight, trial.added
+    weight, added, sides = trial.weight, trial.added, trial.sides
     p, where, name = (
         weight.plane,
-        f"trial {SIDES[weight.plane]}",
-        f"{weight.kg * 1e3:g} g in the {SIDES[weight.plane]} plane",
+        f"trial {sides[weight.plane]}",
+        f"{weight.kg * 1e3:g} g in the {sides[weight.plane]} plane",
     )
     own, other = float(np.abs(added[-1, p])), float(np.abs(added[-1, 1 - p]))
     if own < LEAST and other < LEAST:
@@ -134,7 +153,7 @@ def of_trial(trial: Shown) -> Iterator[Finding]:
                 "was it there while the shaft turned? No correction is given.")  # fmt: skip
         yield Finding("trial-moved-nothing", text, where, Effect.ERROR)
     elif own < LEAST:
-        text = (f"the trial weight of {name} acts in the {SIDES[1 - p]} plane, as {other:.0%} of itself: it sits in the wrong "
+        text = (f"the trial weight of {name} acts in the {sides[1 - p]} plane, as {other:.0%} of itself: it sits in the wrong "
                 "plane.")  # fmt: skip
         yield Finding("weight-in-other-plane", text, where, Effect.ERROR)
     elif abs(own - 1) > OFF or other > ASTRAY:
@@ -200,13 +219,19 @@ def correction(balance: Balanced, name: str, rig: RigFile, plan: Plan) -> Correc
         return Correction((), reached=True)
     wanted: list[tuple[int, float, float]] = []
     for p, u in enumerate(balance.unbalance[name].values):
-        for part in split(-complex(u), plan.positions):
-            kg = abs(part) / balance.radius
+        holes = holes_of(balance.planes[p], plan)
+        for part in split(-complex(u), holes):
+            kg = abs(part) / balance.planes[p].radius.value
             if kg >= LIGHTEST_KG:
-                wanted.append((p, kg, _told(float(np.angle(part)), plan.positions)))
+                wanted.append((p, kg, _told(float(np.angle(part)), holes)))
     heaviest = max((kg for _, kg, _ in wanted), default=0.0)
     most = rig.envelope.max_trial_weight_kg
     return Correction(tuple(wanted), reached=False, too_heavy=heaviest if heaviest > most else 0.0)
+
+
+def holes_of(plane: Plane, plan: Plan) -> int:
+    """How many places a plane has, equally spaced; 0: any angle."""
+    return plan.positions or plane.positions
 
 
 def _told(angle: float, positions: int) -> float:
@@ -220,11 +245,10 @@ def _told(angle: float, positions: int) -> float:
 def trials_of(runs: Sequence[Run], rig: RigFile, leave: bool) -> Trials | None:
     """The trials among runs in order, None where one is missing."""
     named = {r.name: r for r in runs}
-    names = ["base", *(f"trial {s}" for s in SIDES)]
+    names = ["base", *(f"trial {s}" for s in names_of(rig))]
     if any(n not in named for n in names):
         return None
     base, i, o = (named[n] for n in names)
     if not i.weights or not o.weights:
         return None
-    return Trials(base, (base, i if leave else base), (i, o), (i.weights[-1], o.weights[-1]),
-                  rig.geometry["balance_radius"].value)  # fmt: skip
+    return Trials(base, (base, i if leave else base), (i, o), (i.weights[-1], o.weights[-1]), planes_of(rig))

@@ -17,11 +17,12 @@ from bench.uncertainty.estimate import merged
 from procedures.amb_rotor.conventions import conventions
 from procedures.balance import scatter as balance_scatter
 from procedures.balance.plan import Plan
+from procedures.balance.planes import Planes, all_told, names_of, planes_of
 from procedures.balance.solution import Solved, Trials, runout_as_unbalance, solve
-from procedures.balance.steps import SIDES, Read, Recorded, Run, Weight, read_dwell
+from procedures.balance.steps import Read, Recorded, Run, Weight, read_dwell
 from procedures.balance.vector_length import amount
 from procedures.shared.certificates import certified
-from procedures.synchronous import bearings, runout
+from procedures.synchronous import bearings, facts, runout
 from procedures.synchronous.bearings import Known
 from procedures.synchronous.carrying import carried
 from procedures.synchronous.dwells import Dwell
@@ -37,15 +38,15 @@ NONLINEAR = 3.0  # of (X/gap)^2
 
 @dataclass(frozen=True)
 class Balanced:
-    """Nominal solution; of each run the unbalance by plane as `vectors` (2,) kg m on the scale and its `parts` re, im by plane
-    (4,); U_per of each plane, kg m."""
+    """Nominal solution; of each run the unbalance by plane as `vectors` (2,) kg m on the planes' scales and its `parts` re, im
+    by plane (4,); U_per of each plane, kg m; the `planes`."""
 
     trials: Trials
     solved: Solved
     unbalance: Mapping[str, Vectors]
     parts: Mapping[str, tuple[Estimate, ...]]
     permissible: tuple[Estimate, Estimate]
-    radius: float
+    planes: Planes
 
 
 @dataclass(frozen=True)
@@ -53,17 +54,18 @@ class Result:
     """A balancing: the settings, the solution, the runs as recorded, the `last` run's name, influences by probe and plane."""
 
     plan: Plan
+    rig: RigFile
     balance: Balanced
     recorded: Recorded
     last: str
     influences: Mapping[tuple[str, str], tuple[Estimate, Estimate]]
 
 
-def sum_weights(weights: Sequence[Weight], radius: float) -> Complex:
-    """Sum of weights by plane, (2,) kg m."""
+def sum_weights(weights: Sequence[Weight], planes: Planes) -> Complex:
+    """Sum of weights by plane, (2,) kg m on the planes' scales."""
     out = np.zeros(2, complex)
     for w in weights:
-        out[w.plane] += w.unbalance(radius)
+        out[w.plane] += w.unbalance(planes[w.plane].radius.value)
     return out
 
 
@@ -74,10 +76,10 @@ def solve_runs(
 
     Certificates and the bearings' model go through the whole model, scatter through its linear part.
     """
-    radius = rig.geometry["balance_radius"].value
+    planes = trials.planes
     inputs = {
         **bearings.collect_inputs(rig, known),
-        **_weights(trials, rig),
+        **_weights(trials),
         **_bending(),
         **_nonlinear(trials, rig),
         **(_unmeasured(rig) if slow is None else {}),
@@ -93,6 +95,7 @@ def solve_runs(
             u = found.unbalance(_readings(run) / s.gain)
             whole = replace(found, taken=0 * found.taken).unbalance(_readings(run) / s.gain)
             u = u + whole * [complex(v[f"nonlinear_re_{p}"], v[f"nonlinear_im_{p}"]) for p in (0, 1)]
+            u = all_told(planes, u, (v["scale_0"], v["scale_1"]))
             out |= {f"{run.name}/{k}": float(x) for k, x in enumerate(u.view(np.float64))}
         return out
 
@@ -106,20 +109,24 @@ def solve_runs(
             for e, more in zip((out[f"{run.name}/{k}"] for k in range(4)), scatter, strict=True)
         )
     unbalance = {name: _vectors(p) for name, p in parts.items()}
-    return Balanced(trials, nominal, unbalance, parts, permissible_of_planes(rig, plan), radius)
+    return Balanced(trials, nominal, unbalance, parts, permissible_of_planes(rig, plan), planes)
 
 
 def _solve_with(v: Mapping[str, float], slow: Read | None, trials: Trials, near: Array) -> tuple[Stand, Solved]:
     """The stand and the solution with these inputs; `near` (s,), each speed over the first bending mode's, squared."""
     s = Stand.of(v)
-    some = [(complex(v[f"kg_{p}"] * v["radius"] * np.exp(1j * v[f"angle_{p}"])), _turnings(trials.before[p]),
-             _turnings(trials.having[p])) for p in (0, 1)]  # fmt: skip
+    some = [(_fixed(v, trials.planes, p), _turnings(trials.before[p]), _turnings(trials.having[p])) for p in (0, 1)]
     found = solve(s, None if slow is None else slow.turning, some, _turnings(trials.base))
     if slow is None:
         lost = runout_as_unbalance(s, _turnings(trials.base), _unknown(v), found.mark)
         found = replace(found, taken=found.taken + lost)
     bent = np.array([[v[f"bending_{j}{k}"] for k in (0, 1)] for j in (0, 1)])
     return s, replace(found, taken=found.taken + near[:, None] * (found.taken @ bent.T))
+
+
+def _fixed(v: Mapping[str, float], planes: Planes, p: int) -> complex:
+    """A plane's trial weight, kg m from the mark."""
+    return complex(v[f"kg_{p}"] * v[f"radius_{p}"] * np.exp(1j * planes[p].from_mark(v[f"angle_{p}"], v[f"scale_{p}"])))
 
 
 def _turnings(run: Run) -> list[Turning]:
@@ -132,7 +139,7 @@ def _readings(run: Run) -> Complex:
 
 def _unmeasured(rig: RigFile) -> dict[str, Estimate]:
     """Runout that nobody measured, by what the rig file says of it; both probes of a plane see the same journal."""
-    u = rig.machine["runout"].standard_uncertainty
+    u = facts.runout_u(rig)
     names = [f"{part}_{b}" for b in "io" for part in ("re", "im")]
     return {f"unknown_{n}": Estimate.of(0.0, Influence(f"runout/{n}", "runout, no slow roll", u, "m", "B", "normal"))
             for n in names}  # fmt: skip
@@ -156,26 +163,26 @@ def _nonlinear(trials: Trials, rig: RigFile) -> dict[str, Estimate]:
     """How far influence coefficients may be those of another amplitude: forces go as 1/gap^2, so that what the runs with trial
     weights say of the slope differs from that of a shaft at rest by some (X/gap)^2, X the greatest amplitude in them."""
     far = max(float(np.abs(_readings(r)).max()) for r in (*trials.before, *trials.having))
-    u = NONLINEAR * (far / rig.geometry["amb_gap"].value) ** 2
+    u = NONLINEAR * (far / facts.least_gap(rig)) ** 2
     return {
         f"nonlinear_{part}_{p}": Estimate.of(
             0.0, Influence(f"nonlinear/{side}/{part}", f"response not linear, {side}", u, "1", "B", "normal"))
-        for p, side in enumerate(SIDES) for part in ("re", "im")
+        for p, side in enumerate(names_of(rig)) for part in ("re", "im")
     }  # fmt: skip
 
 
-def _weights(trials: Trials, rig: RigFile) -> dict[str, Estimate]:
-    """Trial weights as the balance says and the scale shows; all sit at one radius."""
-    out = {"radius": certified("geometry/balance_radius", rig.geometry["balance_radius"], "radius of the weights")}
+def _weights(trials: Trials) -> dict[str, Estimate]:
+    """Trial weights as the balance says and the scale shows, at the planes' radii; where the scales begin."""
+    out = {f"radius_{p}": plane.radius for p, plane in enumerate(trials.planes)}
     for p, w in enumerate(trials.weights):
         for name, key, value, what in (
             ("kg", "weight_mass", w.kg, "mass"), ("angle", "weight_angle", w.angle, "angle")
         ):  # fmt: skip
-            t = rig.machine[key]
-            off = Influence(f"weight/{w.number}/{name}", f"{what} of the trial weight, {SIDES[p]}",
+            t = getattr(trials.planes[p], key)
+            off = Influence(f"weight/{w.number}/{name}", f"{what} of the trial weight, {trials.planes[p].name}",
                             t.standard_uncertainty, t.unit, "B", t.distribution, source=t.source)  # fmt: skip
             out[f"{name}_{p}"] = Estimate.of(value, off)
-    return out
+    return out | {f"scale_{p}": plane.zero for p, plane in enumerate(trials.planes)}
 
 
 def _linear(e: Estimate) -> Estimate:
@@ -189,9 +196,13 @@ def _vectors(parts: Sequence[Estimate]) -> Vectors:
 
 def permissible_of_planes(rig: RigFile, plan: Plan) -> tuple[Estimate, Estimate]:
     """U_per of each plane (ISO 21940-11), kg m, uncertain by the rotor's mass and the planes' places."""
-    inputs = {"mass": certified("machine/mass", rig.machine["mass"]),
-              "left": certified("geometry/com_to_inboard_balance", rig.geometry["com_to_inboard_balance"]),
-              "right": certified("geometry/com_to_outboard_balance", rig.geometry["com_to_outboard_balance"])}  # fmt: skip
+    if facts.stated(rig):
+        inputs = {"mass": certified("machine/mass", rig.machine["mass"]),
+                  "left": certified("geometry/com_to_inboard_balance", rig.geometry["com_to_inboard_balance"]),
+                  "right": certified("geometry/com_to_outboard_balance", rig.geometry["com_to_outboard_balance"])}  # fmt: skip
+    else:
+        one, other = planes_of(rig)
+        inputs = {"mass": facts.shaft_number(rig, "mass"), "left": one.at, "right": other.at}
 
     def model(v: dict[str, float]) -> dict[str, float]:
         i, o = allocated(permissible(plan.grade_m_s, v["mass"], plan.service_rad_s), v["left"], v["right"])
@@ -211,19 +222,19 @@ def influences(balance: Balanced, rig: RigFile) -> dict[tuple[str, str], tuple[E
     """Influence coefficients at the highest speed by probe and plane, cosine and sine, m/(kg m): scatter of both runs, the
     trial weight, and the probe's gain."""
     out, machine = {}, conventions(rig)
-    radius = certified("geometry/balance_radius", rig.geometry["balance_radius"], "radius of the weights")
-    known = _weights(balance.trials, rig)
-    for p, side in enumerate(SIDES):
+    known = _weights(balance.trials)
+    for p, plane in enumerate(balance.planes):
+        side, sense = plane.name, plane.sense
         before, having = balance.trials.before[p], balance.trials.having[p]
         scatter = [balance_scatter.of_read(f"{r.name}/{len(r.reads) - 1}", r.fastest, 4) for r in (before, having)]
         for k, axis in enumerate(machine.axes):
             parts, name = [scatter[n][2 * k + j] for n in (0, 1) for j in (0, 1)], machine.position(axis)
             inputs = {"a": parts[0], "b": parts[1], "c": parts[2], "d": parts[3], "kg": known[f"kg_{p}"],
-                      "angle": known[f"angle_{p}"], "radius": radius,
+                      "angle": known[f"angle_{p}"], "radius": plane.radius,
                       "gain": certified(f"sensors/{name}/gain", rig.sensors[name].gain, f"gain of {name}")}  # fmt: skip
 
-            def model(v: dict[str, float]) -> dict[str, float]:
-                u = v["kg"] * v["radius"] * v["gain"] * np.exp(1j * v["angle"])
+            def model(v: dict[str, float], by: int = sense) -> dict[str, float]:
+                u = v["kg"] * v["radius"] * v["gain"] * np.exp(1j * by * v["angle"])
                 z = complex((v["c"] - v["a"] + 1j * (v["d"] - v["b"])) / u)
                 return {"cos": z.real, "sin": -z.imag}
 

@@ -13,7 +13,8 @@ from bench.analysis.vectors import region
 from bench.figures import Figure, Series, Sheet, Shown
 from bench.units import RPM
 from procedures.balance.estimates import Balanced, Result
-from procedures.balance.steps import BASE, SIDES
+from procedures.balance.planes import Plane
+from procedures.balance.steps import BASE, Weight
 
 Complex = npt.NDArray[np.complex128]
 UM = 1e6
@@ -25,10 +26,10 @@ def all_figures(found: Result) -> Iterator[Shown]:
     balance = found.balance
     yield _weights(found, balance)
     yield _before_and_after(found, balance)
-    for p, side in enumerate(SIDES):
-        yield _residual(balance, found.last, p, side)
-    for p, side in enumerate(SIDES):
-        yield _sheet(found, balance, p, side)
+    for p, plane in enumerate(balance.planes):
+        yield _residual(balance, found.last, p, plane)
+    for p, plane in enumerate(balance.planes):
+        yield _sheet(found, balance, p, plane)
     for side, (probe, _) in found.recorded.machine.planes.items():
         yield _vectors(found, balance, side, probe)
 
@@ -37,19 +38,33 @@ def _weights(found: Result, balance: Balanced) -> Sheet:
     """What was fixed, in order."""
     on = {w.number for w in found.recorded.on}
     rows = tuple(
-        (purpose, SIDES[w.plane], f"{1e3 * w.kg:.3f}", f"{np.degrees(w.angle) % 360:.1f}",
-         f"{abs(w.unbalance(balance.radius)) / G_MM:.2f}", "on the shaft" if w.number in on else "taken off")
+        (purpose, balance.planes[w.plane].name, f"{1e3 * w.kg:.3f}", f"{np.degrees(w.angle) % 360:.1f}",
+         f"{abs(_on_scale(w, balance)) / G_MM:.2f}", "on the shaft" if w.number in on else "taken off")
         for w, purpose in found.recorded.fixed
     )  # fmt: skip
     head = ("Weight", "Plane", "mass (g)", "angle (°)", "unbalance (g mm)", "now")
-    return Sheet("weights", "Weights", f"At a radius of {1e3 * balance.radius:.1f} mm, on the scales of the planes: from y "
-                 "towards z, in the direction of rotation.", head, rows, (2, 3, 4))  # fmt: skip
+    radii = " and ".join(dict.fromkeys(f"{1e3 * plane.radius.value:.1f}" for plane in balance.planes))
+    way = (
+        ", as the planes' own scales read." if _scaled(balance) else ": from y towards z, in the direction of rotation."
+    )
+    return Sheet("weights", "Weights", f"At a radius of {radii} mm, on the scales of the planes{way}", head, rows,
+                 (2, 3, 4))  # fmt: skip
+
+
+def _scaled(balance: Balanced) -> bool:
+    """Whether the rig file tells where the scales begin."""
+    return any(plane.scaled for plane in balance.planes)
+
+
+def _on_scale(w: Weight, balance: Balanced) -> complex:
+    return w.unbalance(balance.planes[w.plane].radius.value)
 
 
 def _before_and_after(found: Result, balance: Balanced) -> Sheet:
     """Unbalance as found and as left, against the permissible one."""
     rows = []
-    for p, side in enumerate(SIDES):
+    for p, plane in enumerate(balance.planes):
+        side = plane.name
         before, after = (abs(complex(balance.unbalance[name].values[p])) / G_MM for name in (BASE, found.last))
         per = balance.permissible[p].value / G_MM
         rows.append((side, f"{before:.2f}", f"{after:.2f}", f"{per:.2f}", f"{100 * after / per:.0f} %"))
@@ -80,9 +95,10 @@ def _vectors(found: Result, balance: Balanced, side: str, probe: int) -> Figure:
     )  # fmt: skip
 
 
-def _residual(balance: Balanced, last: str, p: int, side: str) -> Figure:
+def _residual(balance: Balanced, last: str, p: int, plane: Plane) -> Figure:
     """What each verified run left, with its 95 % ellipse, in the circle of U_per."""
-    per = balance.permissible[p].value / G_MM
+    per, side = balance.permissible[p].value / G_MM, plane.name
+    on = "as it reads" if plane.scaled else "from y towards z, in the direction of rotation"
     names = [name for name in balance.unbalance if name.startswith("check")] or [last]
     series = [Series("U_per", per * np.cos(TURN), per * np.sin(TURN), "guide")]
     notes: list[tuple[str, float, float]] = []
@@ -94,29 +110,31 @@ def _residual(balance: Balanced, last: str, p: int, side: str) -> Figure:
         notes.append((f"{name}: {abs(z):.2f} g mm", z.real, z.imag))
     return Figure(
         f"residual-{side}", f"Residual unbalance {side} against the permissible one",
-        f"On the scale of the {side} plane: to the right along its zero, upwards a quarter turn on (from y towards z, in the "
-        f"direction of rotation). It is reached where the whole ellipse lies within the circle of U_per = {per:.2f} g mm.",
+        f"On the scale of the {side} plane: to the right along its zero, upwards a quarter turn on ({on}). It is "
+        f"reached where the whole ellipse lies within the circle of U_per = {per:.2f} g mm.",
         "along the scale's zero (g mm)", "a quarter turn on (g mm)", tuple(series), "plane", notes=tuple(notes),
     )  # fmt: skip
 
 
-def _sheet(found: Result, balance: Balanced, p: int, side: str) -> Figure:
+def _sheet(found: Result, balance: Balanced, p: int, plane: Plane) -> Figure:
     """Unbalance as found and the weights that were fixed, as vectors on the scale."""
     points = [("unbalance as found", complex(balance.unbalance[BASE].values[p]))]
-    points += [(purpose, w.unbalance(balance.radius)) for w, purpose in found.recorded.fixed if w.plane == p]
+    points += [(purpose, _on_scale(w, balance)) for w, purpose in found.recorded.fixed if w.plane == p]
     points = [(name, z / G_MM) for name, z in points]
     series = [
         Series(f"{name}, {abs(z):.2f} g mm ∠{np.degrees(np.angle(z)) % 360:.0f}°", np.array([0.0, z.real]),
                np.array([0.0, z.imag]), "both")
         for name, z in points
     ]  # fmt: skip
+    side = plane.name
+    faces = "its 0° faces y while the shaft stands with its zero there; angles grow from y to z, in the direction of rotation"
+    on = "angles grow as it reads" if plane.scaled else faces
     top = 1.4 * max(abs(z) for _, z in points)
     series.append(Series("scale", top * np.cos(TURN), top * np.sin(TURN), "guide"))
     notes = [(f"{k}°", top * np.cos(np.radians(k)), top * np.sin(np.radians(k))) for k in range(0, 360, 90)]
     return Figure(
         f"sheet-{side}", f"Unbalance and weights {side}",
-        f"On the scale of the {side} plane: its 0° faces y while the shaft stands with its zero there; angles grow from y "
-        "towards z, in the direction of rotation. Weights are added, at the radius of the plane. A trial weight is on "
+        f"On the scale of the {side} plane: {on}. Weights are added, at the radius of the plane. A trial weight is on "
         "the shaft in its own run alone, unless the plan leaves it.",
         "along the scale's zero (g mm)", "a quarter turn on (g mm)", tuple(series), "plane", notes=tuple(notes),
     )  # fmt: skip

@@ -11,7 +11,7 @@ from bench.findings import Effect, Finding
 from bench.uncertainty import Estimate, interval
 from bench.units import RPM
 from procedures.balance.estimates import Balanced
-from procedures.balance.steps import BASE, SIDES, Recorded
+from procedures.balance.steps import BASE, Recorded
 from procedures.synchronous import hum
 from procedures.synchronous.dwells import Complex, Dwell
 
@@ -50,17 +50,18 @@ def _worst(
     """What a line `h` (4,) m at the s-th speed moves most, over its U, and its name. It moves the readings that an unbalance
     follows from, and the influence coefficients by which it does."""
     all_ = balance.solved.influence
-    weights = [abs(w.unbalance(balance.radius)) for w in balance.trials.weights]
+    weights = [abs(balance.trials.unbalance(p)) for p in (0, 1)]
+    sides = [plane.name for plane in balance.planes]
     read = np.zeros(all_.shape[:2], complex)
     read[s] = h
     moved = np.abs(np.linalg.lstsq(all_.reshape(-1, 2), read.reshape(-1), rcond=None)[0])
     out = []
     for run in shown:
         share = TWO_RUNS * float(np.abs(balance.unbalance[run].values).max()) / min(weights)
-        for p, side in enumerate(SIDES):
+        for p, side in enumerate(sides):
             known = min(interval(e).U for e in balance.parts[run][2 * p : 2 * p + 2])
             out.append((float(moved[p]) * math.hypot(1, share) / known, f"the unbalance {side}, {run},"))
-    for p, side in enumerate(SIDES if s == len(all_) - 1 else ()):  # stated at the highest speed alone
+    for p, side in enumerate(sides if s == len(all_) - 1 else ()):  # stated at the highest speed alone
         for k, axis in enumerate(axes):
             known = min(interval(e).U for e in influences[axis, side])
             out.append((TWO_RUNS * abs(h[k]) / weights[p] / known, f"the influence of a weight {side} on {axis}"))

@@ -23,9 +23,10 @@ from procedures.balance import figures as drawn
 from procedures.balance.estimates import Result
 from procedures.balance.hum import of_balance
 from procedures.balance.plan import Plan
-from procedures.balance.steps import BASE, SIDES, read_runs
+from procedures.balance.planes import names_of
+from procedures.balance.steps import BASE, known_by, read_runs
 from procedures.shared import assumptions, first_look
-from procedures.synchronous import bearings
+from procedures.synchronous import bearings, dwelling
 from procedures.synchronous import checks as dwell_checks
 from procedures.synchronous.dwells import SLOW
 from procedures.synchronous.hum import listen
@@ -107,6 +108,8 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     findings.add(dwell_checks.of_signals(recorded.dwells, plan.max_lost, plan.max_speed_error, doubts=lambda _: ()))
     findings.add(dwell_checks.slow_roll(recorded.dwells, plan.speeds_rad_s))
     known = bearings.Known.of(recording.calibrations, plan.beta_share, plan.offset_u_m)
+    known = known_by(recorded.slow, recorded.runs, rig, known)
+    findings.gate(bearings.unknown(known, rig))
     findings.add(checks.of_runs(recorded, rig, plan, known))
     trials = decision.trials_of(recorded.runs, rig, plan.leave)
     if trials is None and not findings.wrong:
@@ -118,8 +121,8 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     verified = [r for r in recorded.runs if r.name.startswith("check")]
     shown = [trials.base, *([trials.having[1]] if plan.leave else []), *verified]
     balance = estimates.solve_runs(recorded.slow, shown, trials, rig, plan, known)
-    result = Result(plan, balance, recorded, shown[-1].name, estimates.influences(balance, rig))
-    findings.add([bearings.describe(known)])
+    result = Result(plan, rig, balance, recorded, shown[-1].name, estimates.influences(balance, rig))
+    findings.add([bearings.describe(known), *dwelling.uncaptured(rig)])
     findings.add(checks.of_result(balance, recorded, shown, plan, rig))
     slow = next((d for d in recorded.dwells if d.kind == SLOW), None)
     findings.add(of_balance(listen(recording, slow), recorded, balance, (BASE, result.last), result.influences))
@@ -129,7 +132,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
 def measured(result: Result) -> Iterator[Measured]:
     """By plane the unbalance as found and as left; the influence coefficients by probe and plane."""
     balance, last = result.balance, result.last
-    for p, side in enumerate(SIDES):
+    for p, side in enumerate(names_of(result.rig)):
         for quantity, k in ((FOUND_COS, 2 * p), (FOUND_SIN, 2 * p + 1)):
             yield quantity.measured(balance.parts[BASE][k], side)
         yield PERMITTED.measured(balance.permissible[p], side)

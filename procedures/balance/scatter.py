@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from bench.analysis.vectors import estimates
 from bench.uncertainty import Estimate, Influence
+from procedures.balance.planes import Planes
 from procedures.balance.solution import Solved, Trials, runout_as_unbalance
 from procedures.balance.steps import Read, Run
 from procedures.synchronous.runout import Stand, Turning, find_runout
@@ -51,20 +52,25 @@ def of_run(
 
     add(run, p)
     for j in (0, 1):
-        weight = trials.weights[j].unbalance(trials.radius)
+        weight = trials.unbalance(j)
         by: Complex = np.asarray(p * ((u + solution.taken)[:, j] / weight)[None, :, None], np.complex128)
         add(trials.having[j], -by)
         add(trials.before[j], by)
         if refit_u > 0:
-            _append(out, -np.eye(2) * (u + solution.taken[-1])[j] / weight, _refitted(trials.having[j], refit_u))
+            _append(
+                out,
+                trials.planes,
+                -np.eye(2) * (u + solution.taken[-1])[j] / weight,
+                _refitted(trials.having[j], refit_u),
+            )
     for (name, k), factor in factors.items():
-        _append(out, factor, of_read(f"{name}/{k}", reads[name, k], 4))
+        _append(out, trials.planes, factor, of_read(f"{name}/{k}", reads[name, k], 4))
     for k, read in enumerate(run.reads):
         if any(read.folds):
-            _append(out, p[:, k] / s.gain, _folded(read, f"{run.name}/{k}"))
+            _append(out, trials.planes, p[:, k] / s.gain, _folded(read, f"{run.name}/{k}"))
     if slow is not None:
         slowly = -np.einsum("jsp,spq,sqn->jn", p, a, _slow(s, solution, slow, trials))
-        _append(out, slowly, of_read("slow", slow, 12))
+        _append(out, trials.planes, slowly, of_read("slow", slow, 12))
     return out
 
 
@@ -86,14 +92,15 @@ def _refitted(run: Run, u: float) -> list[Estimate]:
     ]
 
 
-def _append(out: list[Terms], by: Complex, scatter: Sequence[Estimate]) -> None:
-    """Terms of dU = by (2, n) z, z complex by its parts (2n,), deviations alone."""
+def _append(out: list[Terms], planes: Planes, by: Complex, scatter: Sequence[Estimate]) -> None:
+    """Terms of dU = by (2, n) z on the planes' scales, z complex by its parts (2n,), deviations alone."""
     for plane in (0, 1):
         for n, z in enumerate(by[plane]):
             for part, e in ((1.0 + 0j, scatter[2 * n]), (1j, scatter[2 * n + 1])):
                 deviation = Estimate(0.0, e.unit, e.sensitivities)
-                out[2 * plane].append((float((z * part).real), deviation))
-                out[2 * plane + 1].append((float((z * part).imag), deviation))
+                moved = planes[plane].told(complex(z * part))
+                out[2 * plane].append((float(moved.real), deviation))
+                out[2 * plane + 1].append((float(moved.imag), deviation))
 
 
 def _slow(s: Stand, solution: Solved, slow: Read, trials: Trials) -> Complex:

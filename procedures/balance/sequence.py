@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from bench.errors import AnalysisError
 from bench.procedure.rig import Rig
-from bench.procedure.roles import Plane, RigState
+from bench.procedure.roles import RigState
 from bench.procedure.states import transition
 from bench.recording.recorder import Recorder
 from bench.rigfile.roles import STATUS
@@ -14,22 +15,25 @@ from procedures.amb_rotor import lift
 from procedures.amb_rotor.conventions import conventions
 from procedures.balance import decision, estimates
 from procedures.balance.plan import Plan
+from procedures.balance.planes import names_of
 from procedures.balance.steps import (
     BASE,
     DECISION,
     LIGHTER,
     MOUNT,
     REFUSED,
-    SIDES,
     UNMOUNT,
     Read,
     Run,
     Weight,
     captured_channels,
+    known_by,
     read_capture,
+    read_telemetry,
+    watched_channels,
 )
 from procedures.synchronous import bearings, dwelling
-from procedures.synchronous.dwells import DWELL, SLOW
+from procedures.synchronous.dwells import DWELL, SLOW, can_capture
 
 SLOW_HZ = 500.0  # of the slow roll's capture
 MARGIN_S = 0.1  # of a dwell beside its capture
@@ -46,12 +50,16 @@ class Work:
     runs: list[Run] = field(default_factory=list)
     slow: Read | None = None
     fixed: int = 0
+    found: tuple[int, bearings.Known] | None = None  # after so many runs
     dwells: int = 0
 
     @property
     def known(self) -> bearings.Known:
         """What is known of the bearings."""
-        return bearings.Known.of(self.record.calibrations, self.plan.beta_share, self.plan.offset_u_m)
+        known = bearings.Known.of(self.record.calibrations, self.plan.beta_share, self.plan.offset_u_m)
+        if self.found is None or self.found[0] != len(self.runs):
+            self.found = (len(self.runs), known_by(self.slow, self.runs, self.rig.file, known))
+        return self.found[1]
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
@@ -62,7 +70,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     dwelling.select(rig, plan.law)
     if not _roll(work) or not _run(work, BASE):
         return
-    for p, side in enumerate(SIDES):
+    for p, side in enumerate(names_of(rig.file)):
         kg, allowed = decision.trial_kg(rig.file, plan, work.runs[-1 if plan.leave else 0], p)
         if kg < plan.trial_kg[p]:
             record.event(LIGHTER if kg else REFUSED, plane=side, kg=plan.trial_kg[p], allowed_kg=kg or allowed)
@@ -120,14 +128,15 @@ def _dwell(
 ) -> Read | None:  # fmt: skip
     """A recorded dwell and what its capture says, None where that cannot be told."""
     rig, number, machine = work.rig, -1 if again else work.dwells, conventions(work.rig.file)
-    assert rig.capture is not None  # `check` refuses a rig without one
     driven = rig.drive.speed_rad_s if rig.drive is not None else 0.0
     labels = {"speed_rad_s": speed, "variant": name, "driven_rad_s": driven, "number": number, "again": again}
+    work.dwells += 1
+    if rig.capture is None or not can_capture(rig.file):
+        return _watch(work, kind, labels, seconds)
     with work.record.step(kind, **labels):
         rig.capture.arm(captured_channels(machine), seconds=capture_s, rate_hz=rate_hz)
         rig.capture.wait(capture_s + 5.0)
         rig.clock.sleep(max(seconds - capture_s, MARGIN_S))
-    work.dwells += 1
     touched = int(rig.levitation.reading(STATUS)) & machine.contact
     data = rig.capture.upload(run=name, speed_rad_s=speed)
     try:
@@ -136,9 +145,22 @@ def _dwell(
         return None  # of the pulses; the analysis says what is wrong with them
 
 
+def _watch(work: Work, kind: str, labels: Mapping[str, object], seconds: float) -> Read | None:
+    """The same by the telemetry as it comes, where the controller captures nothing."""
+    rig = work.rig
+    with work.record.step(kind, **labels), work.record.watching(watched_channels(rig.file)) as seen:
+        rig.clock.sleep(seconds)
+    if int(rig.levitation.reading(STATUS)) & conventions(rig.file).contact:
+        return None
+    try:
+        return read_telemetry(rig.file, seen, kind == SLOW)
+    except (AnalysisError, KeyError):
+        return None
+
+
 def _mount(work: Work, plane: int, kg: float, angle: float, purpose: str) -> None:
     """Have a weight fixed; the shaft is landed."""
-    side: Plane = "inboard" if plane == 0 else "outboard"
+    side = names_of(work.rig.file)[plane]
     with work.record.step(MOUNT, plane=side, kg=kg, angle_rad=angle, purpose=purpose):
         really = work.rig.operator.attach(side, kg, angle)
         if really != (kg, angle):
@@ -150,7 +172,7 @@ def _mount(work: Work, plane: int, kg: float, angle: float, purpose: str) -> Non
 
 def _unmount(work: Work, plane: int) -> None:
     """Have every weight of a plane taken off."""
-    side: Plane = "inboard" if plane == 0 else "outboard"
+    side = names_of(work.rig.file)[plane]
     with work.record.step(UNMOUNT, plane=side):
         work.rig.operator.detach(side)
     work.mounted = [w for w in work.mounted if w.plane != plane]

@@ -2,8 +2,8 @@
 
 At one speed the probes read X = A (U + U_R). Trial weights give A = (X_trial - X_before)/u, controller and bearings with it.
 U_R is what the runout R of the slow roll is taken for (`runout.as_unbalance`), of the shaft's own masses alone. Weights sit
-on a scale whose angle from the once-per-turn mark nobody knows; the forces of the trial weights tell it. A, U and u are on
-the scale, R and U_R are turned to it.
+on scales that are told from one zero, whose angle from the once-per-turn mark nobody needs to know; the forces of the trial
+weights tell it. A, U and u are from that zero, R and U_R are turned to it.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from procedures.balance.planes import Planes
 from procedures.balance.steps import Run, Weight
 from procedures.synchronous import runout
 from procedures.synchronous.runout import Stand, Turning
@@ -24,13 +25,18 @@ Trial = tuple[complex, Sequence[Turning], Sequence[Turning]]
 
 @dataclass(frozen=True)
 class Trials:
-    """Base run, and by plane the runs before and with its trial weight and that weight; the `radius` of all weights, m."""
+    """Base run, and by plane the runs before and with its trial weight and that weight; the `planes`."""
 
     base: Run
     before: tuple[Run, Run]
     having: tuple[Run, Run]
     weights: tuple[Weight, Weight]
-    radius: float
+    planes: Planes
+
+    def unbalance(self, plane: int) -> complex:
+        """Of a plane's trial weight, kg m from the mark."""
+        p = self.planes[plane]
+        return p.turned(self.weights[plane].unbalance(p.radius.value))
 
 
 @dataclass(frozen=True)

@@ -15,21 +15,27 @@ from bench.analysis.sampling import Sampling
 from bench.analysis.tachometer import Tachometer, counted, tachometer
 from bench.analysis.vectors import Vectors
 from bench.recording import Recording
+from bench.rigfile import RigFile
 from bench.rigfile.capture import CaptureData
-from procedures.amb_rotor.conventions import AmbRotor
-from procedures.synchronous.dwells import SLOW, Dwell, read_dwells
+from bench.rigfile.roles import answered, resolved
+from bench.samples import TICKS
+from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.balance.planes import names_of
+from procedures.synchronous import mark
+from procedures.synchronous.bearings import Known
+from procedures.synchronous.dwells import ORDERS, SLOW, Dwell, orders_seen, read_dwells, telemetry_period_s
+from procedures.synchronous.identified import Reading, find_bearings
 from procedures.synchronous.nonsynchronous import folds
 from procedures.synchronous.runout import Turning
 
 Array = npt.NDArray[np.float64]
 MOUNT, UNMOUNT, DECISION, REFUSED, LIGHTER = "mount", "unmount", "decision", "trial-refused", "trial-lighter"
 BASE = "base"
-SIDES = ("inboard", "outboard")
 
 
 @dataclass(frozen=True)
 class Weight:
-    """A weight in plane 0 (inboard) or 1: `kg` at `angle` rad of the plane's scale; the `number`-th that was fixed."""
+    """A weight in plane 0 (the near one) or 1: `kg` at `angle` rad of the plane's scale; the `number`-th that was fixed."""
 
     plane: int
     kg: float
@@ -37,7 +43,7 @@ class Weight:
     number: int
 
     def unbalance(self, radius: float) -> complex:
-        """kg m, complex, at a radius in m."""
+        """kg m, complex, on the plane's scale, at a radius in m."""
         return cmath.rect(self.kg * radius, self.angle)
 
 
@@ -100,6 +106,29 @@ def read_capture(data: CaptureData, machine: AmbRotor, slow: bool = False) -> Re
                 higher={} if slow else _higher(track))  # fmt: skip
 
 
+def read_telemetry(rig: RigFile, seen: Mapping[str, Array], slow: bool = False) -> Read:
+    """Vectors of the telemetry that has just come, by channel and ticks, where the controller captures nothing.
+
+    Raises:
+        AnalysisError: too few pulses or turns.
+    """
+    machine, tick = conventions(rig), rig.devices["controller"].tick_s
+    t = seen[TICKS] * tick
+    ticks = round(telemetry_period_s(rig) / tick)
+    tacho = mark.tachometer_of(rig, t, answered(rig, mark.told(rig), seen))
+    wide = np.array([seen[n] for n in (*machine.positions, *machine.currents)])
+    orders = orders_seen((ORDERS[:1] if slow else ORDERS), float(np.nanmean(tacho.speed(t))), ticks * tick)
+    track = synchronous(t, wide, tacho, Sampling(tick, ticks, tick), orders=orders)
+    return Read(float(track.speed[0]), np.asarray(track.means[0]), track.vectors(0, range(12)), tacho.sound,
+                higher={} if slow else _higher(track))  # fmt: skip
+
+
+def watched_channels(rig: RigFile) -> tuple[str, ...]:
+    """What is looked at of the telemetry for that."""
+    machine = conventions(rig)
+    return (*machine.positions, *machine.currents, *resolved(rig, mark.told(rig)), TICKS)
+
+
 def read_dwell(d: Dwell) -> Read:
     """Vectors of a dwell's telemetry."""
     higher = {} if d.kind == SLOW else _higher(d.track)
@@ -140,18 +169,19 @@ def read_runs(recording: Recording[Any], speeds: Sequence[float]) -> Recorded:
     dwells = read_dwells(recording)
     slow = next((read_dwell(d) for d in dwells if d.kind == SLOW), None)
     turning = [d for d in dwells if d.kind != SLOW]
+    sides = names_of(recording.rig)
     mounted: list[tuple[int, Weight | int]] = []
     fixed: list[tuple[Weight, str]] = []
     for step in recording.all_steps():
         labels = step.labels
         if step.kind == MOUNT:
             w = Weight(
-                SIDES.index(str(labels["plane"])), float(labels["kg"]), float(labels["angle_rad"]), len(fixed) + 1
+                sides.index(str(labels["plane"])), float(labels["kg"]), float(labels["angle_rad"]), len(fixed) + 1
             )
             fixed.append((w, str(labels["purpose"])))
             mounted.append((step.start_ns, w))
         elif step.kind == UNMOUNT:
-            mounted.append((step.start_ns, SIDES.index(str(labels["plane"]))))
+            mounted.append((step.start_ns, sides.index(str(labels["plane"]))))
     runs = []
     for name in dict.fromkeys(d.variant for d in turning):
         some = [d for d in turning if d.variant == name]
@@ -161,6 +191,14 @@ def read_runs(recording: Recording[Any], speeds: Sequence[float]) -> Recorded:
             on = _on(mounted, some[0].start_ns)
             runs.append(Run(name, on, tuple(read_dwell(d) for d in first), again))
     return Recorded(tuple(dwells), slow, tuple(runs), tuple(fixed), _on(mounted, 1 << 62))
+
+
+def known_by(slow: Read | None, runs: Sequence[Run], rig: RigFile, known: Known) -> Known:
+    """What is known of the bearings, where the runs must tell it themselves: each has an unbalance of its own."""
+    rolled = [] if slow is None else [("slow", slow, 0)]
+    reads = [*rolled, *((f"{r.name}/{k}", read, n) for n, r in enumerate(runs) for k, read in enumerate(r.reads))]
+    some = [Reading(name, r.speed, r.means, r.vectors, run) for name, r, run in reads]
+    return find_bearings(some, rig, known) if some else known
 
 
 def _on(mounted: Sequence[tuple[int, Weight | int]], at_ns: int) -> tuple[Weight, ...]:

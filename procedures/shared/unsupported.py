@@ -25,26 +25,6 @@ def of_weight(rig: RigFile, planes: tuple[Support, Support], frame: tuple[float,
     return (*_turned(planes, frame), *_tilt(rig))
 
 
-def of_scales(rig: RigFile) -> tuple[str, ...]:
-    """For what mounts weights: scales that begin at the mark and run with the angle, holes that the plan tells."""
-    out = []
-    for name, plane in rig.balancing.items():
-        if plane.sense < 0:
-            out.append(f"balancing.{name}.sense: found -1; this procedure takes a scale that runs counter-clockwise")
-        if plane.zero is not None and abs(_value(rig, plane.zero, "balancing.zero")) > math.radians(0.5):
-            out.append(f"balancing.{name}.zero: found a scale that begins elsewhere; this procedure takes the mark")
-    return tuple(out)
-
-
-def of_hooks(rig: RigFile) -> tuple[str, ...]:
-    """For what hangs masses: they pull down."""
-    return tuple(
-        f"hooks.{name}.pull: found a side pull; this procedure takes masses that pull down"
-        for name, hook in rig.hooks.items()
-        if hook.pull is not None or hook.pulley is not None
-    )
-
-
 def of_motors(rig: RigFile) -> tuple[str, ...]:
     """For what a motor's force or torque is measured with: the first segment is up."""
     return tuple(

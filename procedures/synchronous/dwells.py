@@ -159,7 +159,9 @@ def read_dwell(recording: Recording[Any], step: Step) -> Dwell:
         raise AnalysisError(f"{step.kind} {dict(step.labels)}: found {len(t)} samples; expected 100 or more")
     tacho = mark.tachometer_of(recording.rig, t, data)
     wide = np.array([data[c] for c in names])
-    track = synchronous(t, wide, tacho, sampling, orders=_seen(ORDERS, float(step.labels["speed_rad_s"]), ticks * tick))
+    track = synchronous(
+        t, wide, tacho, sampling, orders=orders_seen(ORDERS, float(step.labels["speed_rad_s"]), ticks * tick)
+    )
     labels, flags = step.labels, data[STATUS].astype(np.int64)
     captures = recording.captures(dwell=labels["number"]) if step.kind == DWELL else ()
     full = full_rate(captures[0], machine) if captures else None
@@ -174,7 +176,7 @@ def read_dwell(recording: Recording[Any], step: Step) -> Dwell:
     )  # fmt: skip
 
 
-def _seen(orders: Sequence[float], speed: float, period: float) -> tuple[float, ...]:
+def orders_seen(orders: Sequence[float], speed: float, period: float) -> tuple[float, ...]:
     """Orders that the telemetry's period leaves well below half its rate."""
     return tuple(n for n in orders if n == 1 or n * speed / (2 * math.pi) < TELLS / period)
 

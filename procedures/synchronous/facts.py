@@ -149,6 +149,14 @@ def clearance(rig: RigFile) -> Estimate:
     return min(found, key=lambda e: e.value)
 
 
+def least_gap(rig: RigFile) -> float:
+    """Air gap of the radial bearings, m; the least of them."""
+    if stated(rig):
+        return rig.geometry["amb_gap"].value
+    lengths = _by_tables(rig)
+    return min(lengths[f"gap_{k}"].value for k in range(4))
+
+
 def runout_u(rig: RigFile) -> float:
     """What a probe may read of a journal, rms over a turn, m."""
     if "runout" in rig.machine:

@@ -280,5 +280,6 @@ procedure = Procedure(
     step_count=step_count,
     fewest_steps=fewest_steps,
     optional=(*OF_PATH, *OF_POINTS),  # of a path that the controller follows, or of set points
+    former_steps=lambda plan: lift.STEPS + 1 + len(plan.order),  # what came before an orbit was not recorded
     method=read_method(__file__),
 )

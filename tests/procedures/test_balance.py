@@ -20,12 +20,13 @@ from bench.uncertainty import interval
 from procedures.balance import checks, decision, estimates, procedure
 from procedures.balance.plan import Plan
 from procedures.balance.procedure import check
-from procedures.balance.steps import BASE, SIDES, Read, Run, Weight
+from procedures.balance.steps import BASE, Read, Run, Weight
 from procedures.synchronous import runout
 from procedures.synchronous.runout import Stand, Turning, arms
 from reports.figures import draw as draw_figure
 from sim_backend.truth import draw
 
+SIDES = ("inboard", "outboard")
 pytestmark = pytest.mark.xdist_group("balance")  # one worker makes the sound run once
 
 
@@ -167,7 +168,7 @@ def test_corrections_at_positions_and_those_too_heavy(sound: Balancing) -> None:
     for p in (0, 1):
         sums = [sum(kg * np.exp(1j * a) for q, kg, a in c.weights if q == p) for c in (whole, parted)]
         assert abs(sums[0] - sums[1]) < 1e-9
-        assert abs(sums[0] * b.radius + b.unbalance[BASE].values[p]) < 1e-12
+        assert abs(sums[0] * b.planes[0].radius.value + b.unbalance[BASE].values[p]) < 1e-12
     assert decision.correction(b, "check 1", rig, plan).reached
     u = complex(b.unbalance[BASE].values[0])
     ahead = dataclasses.replace(b, unbalance={BASE: dataclasses.replace(
@@ -204,7 +205,7 @@ def test_trial_weights_left_on_say_the_same(sound: Balancing) -> None:
     left = estimates.solve_runs(recorded.slow, [base, both], trials, rig, plan, known(plan))
     assert np.abs(left.unbalance[BASE].values - b.unbalance[BASE].values).max() < 0.02 * G_MM
     more = left.unbalance[both.name].values - left.unbalance[BASE].values
-    assert np.abs(more - estimates.sum_weights(both.weights, left.radius)).max() < 0.02 * G_MM
+    assert np.abs(more - estimates.sum_weights(both.weights, left.planes)).max() < 0.02 * G_MM
     # taken for a run without the first weight, the second column is wrong by it
     wrong = decision.trials_of([base, inboard, both], rig, leave=False)
     assert wrong is not None

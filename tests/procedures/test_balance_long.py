@@ -87,7 +87,7 @@ def test_corrections_under_way_rest_on_the_adopted_bearings(tmp_path: Path) -> N
     b, recorded = run.found.balance, run.found.recorded
     assert b is not None
     assert recorded is not None
-    mounted = estimates.sum_weights([w for w, purpose in recorded.fixed if purpose == "correction 1"], b.radius)
+    mounted = estimates.sum_weights([w for w, purpose in recorded.fixed if purpose == "correction 1"], b.planes)
     plain = estimates.solve_runs(
         recorded.slow, [b.trials.base], b.trials, run.recording.rig, run.recording.plan, known(run.recording.plan))  # fmt: skip
     apart = [float(np.abs(mounted + x.unbalance[BASE].values).max()) / G_MM for x in (b, plain)]

@@ -20,10 +20,10 @@ from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.rigfile.roles import Status
-from bench.uncertainty import Estimate, interval
+from bench.uncertainty import Estimate, Influence, interval
 from bench.uncertainty.coverage import ensemble
 from procedures.amb_rotor.onset import onset
-from procedures.step import checks, estimates, oscillation, planes, response, scatter, settling
+from procedures.step import checks, estimates, oscillation, planes, response, scatter, settling, slewing
 from procedures.step import steps as step_steps
 from procedures.step.plan import Plan
 from procedures.step.procedure import MEASURES, check, procedure, recorded_s, step_count, waited_s
@@ -100,6 +100,44 @@ def test_damping_of_two_oscillations_that_are_almost_one() -> None:
     assert np.std([s.damping for s in found]) < 0.03 * true.damping
     later = exact.later(1e-4)
     assert later.damping == pytest.approx(exact.damping, rel=2e-3)
+
+
+def test_a_fast_integrator_is_fitted_beside_the_swing() -> None:
+    """A quarter of the step with a time constant as long as the swing is fitted: by a straight line the pole is a percent and
+    more off. The second oscillation of a shaft in two like bearings hardly shows in position, and its pole does not run off."""
+    rng = np.random.default_rng(4)
+    poles, parts = np.array([-320 + 447j, -470 + 480j]), np.array([-1.2 + 1.0j, 0.0])
+    t, period = np.arange(-20, 1500) * 5e-4, 5e-4
+    swung = (np.exp(np.outer(t, poles)) @ (parts * oscillation.shrinks(poles, period))).real
+    y = np.where(t > 0, 1.0 + 0.25 * np.exp(-np.maximum(t, 0) / 0.057) + np.where(t > 0, swung, 0.0), 0.0)
+    ones = [oscillation.One(t, np.array([y, 0 * y]) + 2e-3 * rng.normal(size=(2, t.size))) for _ in range(12)]
+    found = oscillation.swing(ones)
+    assert found.constant == pytest.approx(0.057, rel=0.02)
+    assert found.pole == pytest.approx(poles[0], rel=0.02)
+    assert found.at(np.array([5e-3]))[0] == pytest.approx(
+        1.0 + 0.25 * math.exp(-5 / 57) + (np.exp(poles[0] * 5e-3) * parts[0]).real, abs=2e-3
+    )
+    slow = [
+        oscillation.One(s.t, np.array([y - 0.25 * np.exp(-t / 0.057) + 0.25 * np.exp(-t / 0.58), s.both[1]]))
+        for s in ones
+    ]
+    assert oscillation.swing(slow).constant == 0.0  # a straight line does while the shaft swings
+
+
+@pytest.mark.parametrize(("rises", "told"), [((2.5e-3, 2.5e-3), 0), ((2.5e-3, 2.53e-3), 0), ((2.5e-3, 2.8e-3), 1)])
+def test_rises_that_go_with_the_size_are_ramps(rises: tuple[float, float], told: int) -> None:
+    noise = Influence(id="n", name="n", u=5e-6, unit="s", kind="A", distribution="normal")
+    results = {}
+    for size, rise in zip((10e-6, 20e-6), rises, strict=True):
+        for way in (1, -1):
+            case = step_steps.Case("A", 0.0, "y", size, way)
+            settled = settling.Settling(0.0, 0.02, np.zeros(0))
+            results[case] = estimates.Result(case, (), None, settled, 0.0, {"rise_time": Estimate.of(rise, noise)})
+    found = list(slewing.of_sizes(results))
+    assert len(found) == told
+    if told:  # 20 µm in T: rise² has grown by 0.6 T² less that of 10 µm, a quarter of it
+        rate = 20e-6 * math.sqrt(0.75 * 0.6 / (rises[1] ** 2 - rises[0] ** 2))
+        assert f"some {rate * 1e3:.2g} mm/s" in found[0].text
 
 
 def test_a7_the_estimate_settles_and_integral_action_does_not(tmp_path: Path) -> None:
