@@ -26,8 +26,8 @@ SPINDLE, STAND = str(EXAMPLES / "vertical-spindle/spindle.toml"), str(EXAMPLES /
 
 
 RUNNING = {
-    SPINDLE: {"step", "unbalance", "run-up", "coast-down", "balance"},
-    STAND: {"amb-calibration", "step", "bearing-model", "sensitivity"},
+    SPINDLE: {"step", "tracking", "unbalance", "run-up", "coast-down", "balance"},
+    STAND: {"amb-calibration", "step", "bearing-model", "sensitivity", "tracking"},
 }
 
 
