@@ -216,5 +216,6 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    former_steps=lambda plan: lift.STEPS + 1 + len(plan.order),  # what came before an orbit was not recorded
     method=read_method(__file__),
 )
