@@ -27,8 +27,8 @@ SPINDLE, STAND = str(EXAMPLES / "vertical-spindle/spindle.toml"), str(EXAMPLES /
 
 
 RUNNING = {
-    SPINDLE: {"step", "unbalance", "run-up", "coast-down", "balance"},
-    STAND: {"amb-calibration", "step", "bearing-model", "sensitivity"},
+    SPINDLE: {"step", "tracking", "unbalance", "run-up", "coast-down", "balance"},
+    STAND: {"amb-calibration", "step", "bearing-model", "sensitivity", "tracking"},
 }
 
 
@@ -98,7 +98,7 @@ def test_a_stand_that_nothing_turns_is_calibrated_by_hand(tmp_path: Path) -> Non
     }
     turned = [e["angle_rad"] for e in run.recording.events("operator") if e.get("action") == "turn"]
     assert len(turned) == 8
-    assert {"K@y_vorn", "K@y_vorn@7", "F0@y_hinten@0"} < set(run.calibration().values)
+    assert {"K@y_vorn", "K@y_vorn, 7", "F0@y_hinten, 0"} < set(run.calibration().values)
 
 
 @pytest.mark.parametrize(
