@@ -23,7 +23,7 @@ SPINDLE, STAND = str(EXAMPLES / "vertical-spindle/spindle.toml"), str(EXAMPLES /
 
 
 RUNNING = {
-    SPINDLE: {"step", "unbalance", "run-up", "coast-down", "balance"},
+    SPINDLE: {"step", "unbalance", "run-up", "coast-down", "balance", "spindown"},
     STAND: {"step", "bearing-model", "sensitivity"},
 }
 

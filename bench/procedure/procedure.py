@@ -82,7 +82,8 @@ class Procedure:
     a rig that has it, before anything starts, and names what cannot work. `settings` are the parameters of the rig's
     controller, SI, that the runner writes in READY, before it levitates. `optional` of the measures are those that a sound
     machine may lack: not missing where no limit asks. `step_count` is how many steps `acquire` will record, for the progress
-    display; 0 is unknown. `fewest_steps` is how many a run that goes to its end has at least, where these are fewer.
+    display; 0 is unknown. `fewest_steps` is how many a run that goes to its end has at least, where these are fewer;
+    `steps_on` the same where it depends on the rig.
     `evaluate` makes of a recording what all that follows needs, once, and tells its findings as it goes; it ends where one
     that is told at a gate is an error, and then nothing is measured nor drawn. Without it the recording itself is what
     follows needs. `measured` yields the quantities of it in the order of the report. `figures` come in the order in which
@@ -113,6 +114,7 @@ class Procedure:
     settings: Callable[[RigFile, Any], Mapping[str, float]] = field(default=_no_settings)
     step_count: Callable[[Any], int] = field(default=_unknown_count)
     fewest_steps: Callable[[Any], int] | None = None
+    steps_on: Callable[[RigFile, Any], int] | None = None
     needs: Callable[[Any], tuple[Need, ...]] = field(default=_no_needs)
     facts: Callable[[Any], Mapping[str, Estimate]] | None = None
     holds_for: Callable[[Any], Mapping[str, float]] = field(default=_numbers_of)
