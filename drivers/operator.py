@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -13,7 +14,8 @@ from bench.rigfile.envelope import Envelope
 
 
 class LineOperator:
-    """An operator that answers lines: `hang M2`, `hang -`, `lever left M2`, `lever left -`, `mount ring`, `mount -`,
+    """An operator that answers lines: `hang M2`, `hang -`, `hang HOOK M2`, `turn DEGREES`, `lever left M2`, `lever left -`,
+    `mount ring`, `mount -`,
     `attach inboard KG RAD`, `detach inboard`, `ask TEXT` (see the simulated backend's operators). `may_touch` raises while
     nobody may reach into the machine."""
 
@@ -30,8 +32,9 @@ class LineOperator:
             OperatorRefused: the other end cannot do it.
         """
         self._envelope.check_load(load.label)
-        self._do(f"hang {load.label or '-'}", f"hang {load.label or 'nothing'}")
-        self._note(action="hang", load=load.label)
+        where = f"{load.hook} " if load.hook else ""
+        self._do(f"hang {where}{load.label or '-'}", f"hang {load.label or 'nothing'}")
+        self._note(action="hang", load=load.label, **({"hook": load.hook} if load.hook else {}))
         return load
 
     def lever(self, side: Side, load: Load) -> Load:
@@ -45,6 +48,16 @@ class LineOperator:
         self._do(f"lever {side} {load.label or '-'}", f"hang {load.label or 'nothing'} on the lever's {side}")
         self._note(action="lever", side=side, load=load.label)
         return load
+
+    def turn(self, angle_rad: float) -> float:
+        """Have the shaft turned by hand to an angle of its scale, and wait until it stands there.
+
+        Raises:
+            OperatorRefused: the other end cannot do it.
+        """
+        self._do(f"turn {math.degrees(angle_rad)!r}", f"turn the shaft to {math.degrees(angle_rad):g}°")
+        self._note(action="turn", angle_rad=angle_rad)
+        return angle_rad
 
     def mount(self, part: str) -> None:
         """Have a part put on the shaft, or with "" what is on it taken off.

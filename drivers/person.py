@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 from bench.clock import Clock
@@ -42,8 +42,10 @@ class ConsoleOperator:
         """
         self._envelope.check_load(load.label)
         if load != self._hanging:
+            moved = load.hook and (self._hanging is None or load.hook != self._hanging.hook)
+            where = f"Put the hanger on the hook {load.hook}. " if moved else ""
             what = f"Hang {load.label} on the hanger" if load.label else "Take every mass off; leave the hanger on"
-            load = self._hanging = self._loaded(what, load)
+            load = self._hanging = replace(self._loaded(where + what, load), hook=load.hook)
         if self._then is not None:
             self._then.hang(load)
         return load
@@ -61,6 +63,23 @@ class ConsoleOperator:
         if self._then is not None:
             self._then.lever(side, really)
         return really
+
+    def turn(self, angle_rad: float) -> float:
+        """Ask for the levitated shaft to be turned by hand to an angle of its scale; return where it stands then, rad.
+
+        Raises:
+            OperatorAbort: the person answered stop.
+        """
+        degrees = math.degrees(angle_rad) % 360
+        stands = self._confirmed(
+            f"The shaft levitates and stands. Turn it by hand until {degrees:g}° of its scale is at the mark; let it go.",
+            "it stands there",
+            angle_rad,
+            _Other("It stands at another angle: type its degrees.", _degrees),
+        )
+        if self._then is not None:
+            self._then.turn(stands)
+        return stands
 
     def mount(self, part: str) -> None:
         """Ask for a part on the shaft, or for everything to be taken off.
@@ -216,6 +235,15 @@ class _Other(Generic[T]):
 
     more: str = ""
     read: Callable[[str], T | None] = lambda _: None
+
+
+def _degrees(answer: str) -> float | None:
+    """rad of an answer in degrees, None where it is none."""
+    try:
+        degrees = float(answer.removesuffix("°"))
+    except ValueError:
+        return None
+    return math.radians(degrees) if math.isfinite(degrees) else None
 
 
 class Misunderstood(Exception):

@@ -96,7 +96,7 @@ class Walked:
     @property
     def result(self) -> Any:
         """What the procedure makes of the recording."""
-        return load_procedure("amb-calibration").evaluated(self.recording).result
+        return load_procedure("amb-calibration").evaluated(self.recording).result[0]
 
 
 @pytest.fixture(scope="module")

@@ -24,6 +24,7 @@ class Load:
     """What hangs on the hook besides the hanger, or on the lever: a label of the rig file's `masses` table, or nothing."""
 
     label: str  # "" is nothing
+    hook: str = ""  # of the rig file; "": its only one
 
 
 NOTHING = Load("")
@@ -73,6 +74,9 @@ class Operator(Protocol):
     ) -> tuple[float, float]: ...  # a weight beside what is there; kg and rad of what was fixed; angle
     # on the plane's scale, counted from y towards z while its zero faces y; the shaft must be landed
     def detach(self, plane: Plane) -> None: ...  # every weight of that plane; the shaft must be landed
+    def turn(
+        self, angle_rad: float
+    ) -> float: ...  # the shaft, by hand, to that angle of its scale; where it stands then
     def ask(self, question: str) -> bool: ...  # yes or no
     def goes_on(self, wrong: str) -> bool: ...  # whether a run goes on that shows this; where nobody is, it does not
 

@@ -57,7 +57,7 @@ class Shaft(Part):
     """What turns, or moves. `tilt` is how far its far end stands above the horizontal: 0 where it lies, 90 degrees where it
     stands with the far end up. `zero_at` says where directions have their 0 if that is not up, and `up` which of them is up
     then, where the shaft does not stand. `sense`: which way the speed counts, -1 for clockwise seen from outside the far end.
-    `ends`: from where to where the shaft reaches."""
+    `ends`: from where to where the shaft reaches. `hand_angle`: how far off an angle is to which somebody turns the shaft."""
 
     mass: Number | None = None
     polar_inertia: Number | None = None
@@ -71,6 +71,7 @@ class Shaft(Part):
     sense: Literal[-1, 1] = 1
     ends: tuple[Place, Place] | None = None
     runout: Number | None = None
+    hand_angle: Number | None = None
 
 
 class Axis(Part):

@@ -31,6 +31,7 @@ from bench.record.records import (
 from bench.record.specs import applied, in_unit
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
+from bench.rigfile import RigFile
 from bench.run.certificates import overdue
 from bench.run.step_gaps import incomplete_steps, missing_steps
 
@@ -110,7 +111,7 @@ def evaluate(
         SignalAbort: the user stops it.
     """
     if stopped:
-        return Evaluation(_in_order(procedure, {}, limits), Correlations((), ()), ())
+        return Evaluation(_in_order(procedure, {}, limits, recording.rig), Correlations((), ()), ())
     stated, (limits, notes) = limits, applied(limits, recording.plan)
     limits, mistaken = in_unit(limits, procedure.measures)
     measured: dict[tuple[str, str], Measured] = {}
@@ -132,7 +133,7 @@ def evaluate(
     except Exception as error:
         findings.append(_failed(error))
         entries, correlations = {}, Correlations((), ())
-    measurements = _in_order(procedure, entries, limits)
+    measurements = _in_order(procedure, entries, limits, recording.rig)
     if recording.verdict_required and (nothing := unjudged(measurements, len(stated))) is not None:
         findings.append(nothing)
     return Evaluation(measurements, correlations, tuple(findings))
@@ -183,12 +184,12 @@ def _accept(procedure: Procedure, item: Measured, measured: dict[tuple[str, str]
 
 
 def _in_order(
-    procedure: Procedure, entries: Mapping[tuple[str, str], Measurement], limits: Mapping[str, Limit]
+    procedure: Procedure, entries: Mapping[tuple[str, str], Measurement], limits: Mapping[str, Limit], rig: RigFile
 ) -> tuple[Measurement, ...]:
     """As declared, with a missing entry where nothing was yielded that a sound machine has, or that a limit asks for, of a
     quantity or at a place."""
     out: list[Measurement] = []
-    for quantity in procedure.measures:
+    for quantity in procedure.measured_on(rig):
         found = [m for (name, _), m in entries.items() if name == quantity.name]
         limit = limits.get(quantity.name)
         placed = [missing(quantity, asked, place)

@@ -31,10 +31,9 @@ def incomplete_steps(recording: Recording[Any]) -> Iterator[Finding]:
 
 def missing_steps(procedure: Procedure, recording: Recording[Any]) -> Iterator[Finding]:
     """A finding where the recording has fewer steps than its plan asks for: what is concluded holds for another plan."""
+    planned = (procedure.fewest_steps or procedure.step_count)(recording.plan)
     if procedure.steps_on is not None:
-        planned = procedure.steps_on(recording.rig, recording.plan)
-    else:
-        planned = (procedure.fewest_steps or procedure.step_count)(recording.plan)
+        planned = min(planned, procedure.steps_on(recording.rig, recording.plan))
     if (there := len(recording.all_steps())) < planned:
         text = f"the plan asks for {planned} steps or more; the recording has {there}"
         yield Finding("steps-missing", text, "acquire", Effect.INDETERMINATE)

@@ -5,7 +5,7 @@ Thresholds are chosen so that a sound rig trips one in fewer than one run in a t
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -19,78 +19,84 @@ from procedures.amb_calibration import both_coils, hypotheses
 from procedures.amb_calibration.fit import Fit
 from procedures.amb_calibration.hypotheses import CHANCE, Contradiction, Suspect
 from procedures.amb_calibration.plan import Plan
+from procedures.amb_calibration.pulls import Loaded, Pull
 from procedures.amb_calibration.scatter import Scatter
-from procedures.amb_calibration.steps import AXES, VERTICAL, HangingData
-from procedures.servomotor import checks as servomotor_checks
-from procedures.servomotor.conventions import Servomotor
+from procedures.amb_calibration.steps import HangingData, axes
 from procedures.shared import signals
 
 Array = npt.NDArray[np.float64]
 
 FATAL = ("stuck-channel", "no-response", "axes-exchanged", "bearings-exchanged", "wrong-sign", "masses-exchanged")
 """Findings after which a fit means nothing and is not attempted."""
-NAMES = ("inboard", "outboard")
 WIRED_WRONG = "wired-wrong"  # event: changes of the control currents under the first mass, A
 MOST_WRONG = 0.03  # relative: a set of masses that is off by more would be seen by eye
+EXCHANGED = 0.5  # of the loaded axis' answer, that of an axis across the pull
 
 
-def of_signals(data: HangingData, machine: Servomotor, plan: Plan) -> Iterator[Finding]:
+def of_signals(data: HangingData, meanings: tuple[signals.Meaning, ...], plan: Plan) -> Iterator[Finding]:
     """Checks that need no fit: losses, stuck channels, saturation, contact, settling, wiring."""
-    table = data.table
-    yield from servomotor_checks.of_signals(table, machine, tuple(table.mean), plan.max_lost)
-    vertical = {machine.positions[axis]: machine.coils[axis] for axis in VERTICAL}
-    yield from signals.settled(table.mean, table.drift, vertical, plan.max_position_m, plan.max_drift_A, table.where)
-    yield from _wiring(data, machine)
+    table, pull = data.table, data.hangings.pull
+    yield from signals.losses(table.lost, table.expected, plan.max_lost, table.where)
+    yield from signals.stuck(table.spread, tuple(table.mean))
+    yield from signals.flagged(table.flags, meanings, table.where)
+    loaded = {axis.position: axis.coils for axis in pull.axes}
+    yield from signals.settled(table.mean, table.drift, loaded, plan.max_position_m, plan.max_drift_A, table.where)
+    yield from _wiring(data)
 
 
-def _wiring(data: HangingData, machine: Servomotor) -> Iterator[Finding]:
-    """Signs and axes, from how the control currents answer the load: the outboard AMB pulls more (positive), the
-    inboard one less (negative), the horizontal axes hardly at all (the axes stand within a few mrad of the plumb).
-    `acquire` asks the same after the first hanging."""
-    load = data.hangings.load
+def _wiring(data: HangingData) -> Iterator[Finding]:
+    """Signs and axes, from how the control currents answer the load. `acquire` asks the same after the first hanging."""
+    load, pull = data.hangings.load, data.hangings.pull
     heavy, light = load == load.max(), load < 0
+    mean = data.table.mean
 
-    def answer(axis: str) -> float:
-        control = machine.control(axis, data.table.mean.__getitem__)
+    def answer(axis: Loaded) -> float:
+        control = (mean[axis.coils[0]] - mean[axis.coils[1]]) / 2
         return float(control[heavy].mean() - control[light].mean())
 
-    yield from wiring(*(answer(axis) for axis in AXES))
+    yield from wiring(pull, data.hung, {axis.name: answer(axis) for axis in axes(pull)})
 
 
-def of_first(recording: Recording[Any]) -> Iterator[Finding]:
-    """What the first hanging showed, where the run ended by it."""
+def of_first(
+    recording: Recording[Any], pulls: Iterable[Pull], hung: Mapping[str, tuple[float, float]]
+) -> Iterator[Finding]:
+    """What the first hanging showed, where the run ended by it; `hung` by hook, as for `wiring`."""
+    known = {pull.hook: pull for pull in pulls}
     for event in recording.events(WIRED_WRONG):
-        yield from wiring(*(float(event["changes"][axis]) for axis in AXES))
-    yield from both_coils.of_first(recording)
+        pull = known[event.get("hook", next(iter(known)))]
+        yield from wiring(pull, hung[pull.hook], {name: float(x) for name, x in event["changes"].items()})
+    yield from both_coils.of_first(recording, known.values())
 
 
-def wiring(yi: float, yo: float, xi: float, xo: float) -> Iterator[Finding]:
-    """Findings by the changes of the four control currents in A under the heaviest mass."""
-    exchanged = [name for name, y, x in (("inboard", yi, xi), ("outboard", yo, xo)) if abs(x) > 0.5 * abs(y)]
-    if exchanged:
-        yield Finding(
-            "axes-exchanged",
-            f"the horizontal currents answer a vertical load at the {' and '.join(exchanged)} AMB (y {yi:+.3f}, "
-            f"{yo:+.3f} A; x {xi:+.3f}, {xo:+.3f} A for the heaviest mass): x and y look exchanged.",
-            "/".join(exchanged),
-            Effect.ERROR,
-        )
-    elif yi > 0 > yo:
-        yield Finding(
-            "bearings-exchanged",
-            f"the inboard current rises ({yi:+.3f} A) and the outboard one falls ({yo:+.3f} A) under the load: inboard "
-            "and outboard look exchanged, or both current signs are wrong.",
-            "i_yi, i_yo",
-            Effect.ERROR,
-        )
+def wiring(pull: Pull, hung: tuple[float, float], changes: Mapping[str, float]) -> Iterator[Finding]:
+    """Findings by the changes of the control currents in A under a mass, by axis. `hung` is the share of it that the near
+    and the
+    far bearing carry: what is hung beyond a bearing makes that one pull more against it, and the other one less; axes across
+    the
+    pull answer hardly at all (they stand within a few mrad of right angles)."""
+    told = ", ".join(f"{name} {x:+.3f} A" for name, x in changes.items())
+    crossed = [b for b in pull.axes if any(
+        abs(changes[a.name]) > EXCHANGED * abs(changes[b.name]) for a in pull.across if a.mate == b.name)]  # fmt: skip
+    right = {axis.name: changes[axis.name] * hung[axis.plane] * axis.lean > 0 for axis in pull.axes}
+    if crossed:
+        names = " and ".join(axis.bearing for axis in crossed)
+        text = (f"the currents across the load answer it at the {names} AMB ({told} for the heaviest mass): x and y look "
+                "exchanged.")  # fmt: skip
+        yield Finding("axes-exchanged", text, "/".join(axis.bearing for axis in crossed), Effect.ERROR)
+    elif not any(right.values()) and len({axis.plane for axis in pull.axes}) > 1:
+        one, two = (f"{pull.bearings[0]}", f"{pull.bearings[1]}")
+        text = (f"every control current answers the load the other way round ({told}): {one} and {two} look exchanged, or all "
+                "current signs are wrong.")  # fmt: skip
+        yield Finding("bearings-exchanged", text, ", ".join(right), Effect.ERROR)
     else:
-        for channel, name, value, expected in (("i_yi", "inboard", yi, -1), ("i_yo", "outboard", yo, 1)):
-            if value * expected <= 0:
+        for axis in pull.axes:
+            if not right[axis.name]:
+                should = "rise" if hung[axis.plane] * axis.lean > 0 else "fall"
                 yield Finding(
                     "wrong-sign",
-                    f"the {name} control current changes by {value:+.3f} A under the heaviest mass; a load outboard of "
-                    f"the outboard AMB makes it {'rise' if expected > 0 else 'fall'}. Check the sign of its sensors.",
-                    channel,
+                    f"the control current of the {axis.title} changes by {changes[axis.name]:+.3f} A under the heaviest mass; "
+                    f"a load on that hook makes it {should}. Check the sign of its sensors, and which coil is which.",
+                    axis.name,
                     Effect.ERROR,
                 )
 
@@ -120,13 +126,13 @@ def of_fit(
     yield from _outliers(data, f, s)
     span = np.ptp(f.forces, axis=(1, 2))
     hysteresis = np.abs(f.terms[:, :, 3].mean(axis=1)) / span
-    for b in (0, 1):
+    for b, axis in enumerate(f.pull.axes):
         if hysteresis[b] > 1e-3:
             yield Finding(
                 "hysteresis",
-                f"loading and unloading differ by {2 * hysteresis[b]:.2%} of the load range at the {NAMES[b]} AMB; it "
+                f"loading and unloading differ by {2 * hysteresis[b]:.2%} of the load range at the {axis.title}; it "
                 "is taken out of K by the branch term.",
-                NAMES[b],
+                axis.where,
             )
 
 
@@ -184,13 +190,13 @@ def _suspicion(masses: tuple[str, ...], load: int, extra: float, u: float, p: Ma
 
 def _outliers(data: HangingData, f: Fit, s: Scatter) -> Iterator[Finding]:
     """Single hangings beyond eight robust standard deviations and 0.3 % of the load range."""
-    for b in (0, 1):
+    for b, axis in enumerate(f.pull.axes):
         e = np.abs(s.rest[b])
         limit = max(8 * 1.4826 * float(np.median(e)), 3e-3 * float(np.ptp(f.forces[b])))
         if e.max() > limit:
             yield Finding(
                 "outlier",
-                f"one hanging is {e.max():.3f} N off the fit of the {NAMES[b]} AMB ({limit:.3f} N allowed); was the "
+                f"one hanging is {e.max():.3f} N off the fit of the {axis.title} ({limit:.3f} N allowed); was the "
                 "right mass hung, and was the hanger on?",
                 data.table.where(e),
                 Effect.INDETERMINATE,

@@ -1,6 +1,6 @@
 """Loads that contradict each other: how much, and which one mistake would make them agree.
 
-At each bearing F_0, K and K2 take three of the means over the loads; the others show by how much the stated masses contradict
+At each axis F_0, K and K2 take three of the means over the loads; the others show by how much the stated masses contradict
 each other. An error of all masses that goes with the load or with its square is not among that: K or K2 takes it.
 """
 
@@ -26,13 +26,15 @@ DOUBT = 0.05  # of the same: below it each mass is taken for less sure than its 
 @dataclass(frozen=True)
 class Contradiction:
     """`seen` (n,) N, the n ways in which the loads can contradict each other, their `covariance` (n, n) by certificates and
-    scatter, and their `effect` (n, L) N per kg of each load of `kg` (L,), nothing (the hanger) first; `dof` of the scatter."""
+    scatter, and their `effect` (n, L) N per kg of each load of `kg` (L,), nothing (the hanger) first; `dof` of the scatter;
+    `axes`, K."""
 
     seen: Array
     covariance: Array
     effect: Array
     kg: Array
     dof: int
+    axes: int = 2
 
     @property
     def total(self) -> float:
@@ -50,11 +52,11 @@ class Contradiction:
         )
 
     def of_masses(self) -> tuple[Array, Array]:
-        """What wrong masses can make of it, (n/2,), each in its standard deviation: both bearings see a load's error alike,
-        so that half of the ways say nothing of masses. And by how much a relative error of all masses spreads each."""
+        """What wrong masses can make of it, (n/K,), each in its standard deviation: all K axes see a load's error alike,
+        so that the other ways say nothing of masses. And by how much a relative error of all masses spreads each."""
         root = np.linalg.cholesky(self.covariance)
         ways, spread, _ = np.linalg.svd(np.linalg.solve(root, self.effect * self.kg))
-        count = len(self.seen) // 2
+        count = len(self.seen) // self.axes
         return ways[:, :count].T @ np.linalg.solve(root, self.seen), spread[:count]
 
     def chance(self, chi2: float, fitted: int = 0) -> float:
@@ -82,18 +84,19 @@ def contradiction(f: Fit, h: Hangings, s: Scatter, p: Mapping[str, float], u_mas
 
     `p` as for `fit.fit`; `u_mass` (L,) kg, nothing (the hanger) first.
     """
-    newton_per_kg = np.array(fit.hung_shares(p["hook_to_outboard"], p["amb_span"])) * p["gravity"]
+    newton_per_kg = np.array(fit.shares(f.pull, p)) * p["gravity"]
+    axes = range(len(f.terms))
     kg = np.array([0.0, *(p[f"mass_{k}"] for k in range(len(u_mass) - 1))])
     membership = np.eye(len(u_mass))[h.load.reshape(-1) + 1]
     averaging = (membership / membership.sum(axis=0)).T
-    maps = [averaging @ residual_maker(f, b) for b in (0, 1)]  # (L, A P) each
-    effect = np.concatenate([maps[b] @ membership * newton_per_kg[b] for b in (0, 1)])  # (2L, L): N per kg
-    noise = np.block([[(maps[b] * s.covariance[b, c].reshape(-1)) @ maps[c].T for c in (0, 1)] for b in (0, 1)])
+    maps = [averaging @ residual_maker(f, b) for b in axes]  # (L, A P) each
+    effect = np.concatenate([maps[b] @ membership * newton_per_kg[b] for b in axes])  # (K L, L): N per kg
+    noise = np.block([[(maps[b] * s.covariance[b, c].reshape(-1)) @ maps[c].T for c in axes] for b in axes])
     covariance = effect @ np.diag(u_mass**2) @ effect.T + noise
-    # F_0, K and K2 take three of the five means at each bearing; what is left of those directions is not information.
-    ways = np.linalg.eigh(covariance)[1][:, -2 * (len(u_mass) - 3) :]
+    # F_0, K and K2 take three of the five means at each axis; what is left of those directions is not information.
+    ways = np.linalg.eigh(covariance)[1][:, -len(axes) * (len(u_mass) - 3) :]
     return Contradiction(
-        ways.T @ s.level_means.reshape(-1), ways.T @ covariance @ ways, ways.T @ effect, kg, s.dof
+        ways.T @ s.level_means.reshape(-1), ways.T @ covariance @ ways, ways.T @ effect, kg, s.dof, len(axes)
     )  # fmt: skip
 
 

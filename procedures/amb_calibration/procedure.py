@@ -7,9 +7,8 @@ tangent at the current that carries the rotor's own weight. Horizontal constants
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,29 +17,27 @@ from bench.findings import Ended, Findings
 from bench.procedure import Measured, Procedure, Quantity, read_method
 from bench.procedure.requires import Requires
 from bench.procedure.rig import Rig
-from bench.procedure.roles import NOTHING, Load, RigState
+from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.roles import STATUS
 from bench.uncertainty import Estimate, propagate
-from procedures.amb_calibration import both_coils, checks, hypotheses
+from procedures.amb_calibration import both_coils, checks, hypotheses, turns
 from procedures.amb_calibration import by_angle as amb_calibration_by_angle
 from procedures.amb_calibration import figures as drawn
 from procedures.amb_calibration import fit as amb_calibration_fit
-from procedures.amb_calibration.estimates import less_sure, turning_point, unresolved_angles
+from procedures.amb_calibration.estimates import less_sure, turned_by_hand, turning_point, unresolved_angles
 from procedures.amb_calibration.fit import Fit
+from procedures.amb_calibration.hanging import exercised, hung_up_and_down, sequence
 from procedures.amb_calibration.hypotheses import Contradiction
+from procedures.amb_calibration.inputs import fit_inputs, hand_rad
 from procedures.amb_calibration.plan import Plan
-from procedures.amb_calibration.scatter import OUTPUTS, Scatter, covariance_by_angle, covariance_over_a_turn, scatter
-from procedures.amb_calibration.steps import AXES, VERTICAL, Hang, HangingData, channels, read_hangings
-from procedures.servomotor.conventions import Servomotor, conventions
-from procedures.servomotor.loads import certified_masses, certified_weighing, check_masses
-from procedures.servomotor.parameters import BIASES, named, needed
-from procedures.shared import assumptions, first_look
-from procedures.shared.certificates import certified, certified_sensors
-from procedures.shared.step_table import record_step
-from procedures.shared.unsupported import of_hooks
+from procedures.amb_calibration.pulls import SERVOMOTOR, Loaded, Pull, pulls
+from procedures.amb_calibration.scatter import Scatter, covariance_by_angle, covariance_over_a_turn, outputs, scatter
+from procedures.amb_calibration.steps import HangingData, channels, hung, read_hangings
+from procedures.servomotor.loads import check_masses
+from procedures.shared import assumptions
 from procedures.shared.weight import weight
 
 K_I = Quantity("K_i", "N/A", "inboard AMB: dF/di at zero control current, mean over a turn")
@@ -49,63 +46,44 @@ K2_I = Quantity("K2_i", "N/A^2", "inboard AMB: (d²F/di²)/2, mean over a turn")
 K2_O = Quantity("K2_o", "N/A^2", "outboard AMB: (d²F/di²)/2, mean over a turn")
 KW_I = Quantity("Kw_i", "N/A", "inboard AMB: dF/di at the current that carries the rotor's own weight")
 KW_O = Quantity("Kw_o", "N/A", "outboard AMB: dF/di at the current that carries the rotor's own weight")
-MEASURES = (K_I, K_O, K2_I, K2_O, KW_I, KW_O)
-CLEAR_A = 0.1  # a change of a control current that is no noise
+BY_BEARING = (K_I, K_O, K2_I, K2_O, KW_I, KW_O)
+"""Of a shaft that a self-bearing motor turns: by bearing, each along its upright axis."""
+K = Quantity("K", "N/A", "dF/di of a bearing's axis at zero control current, mean over a turn")
+K2 = Quantity("K2", "N/A^2", "(d²F/di²)/2 of a bearing's axis, mean over a turn")
+KW = Quantity("Kw", "N/A", "dF/di of a bearing's axis at the current that carries the rotor's own weight")
+BY_AXIS = (K, K2, KW)
+MEASURES = (*BY_BEARING, *BY_AXIS)
+
+
+def measures_of(rig: RigFile) -> tuple[Quantity, ...]:
+    """Those that a rig has: by bearing or by axis."""
+    return BY_BEARING if {a.key for p in pulls(rig) for a in p.axes} == {*SERVOMOTOR.keys} else BY_AXIS
 
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Controller parameters that the runner writes before levitation."""
-    return named(rig, dict.fromkeys(BIASES, plan.bias_A))
-
-
-def sequence(plan: Plan) -> list[tuple[Load, int]]:
-    """Loads at one angle with their branch: up and down, mirrored in time, so that linear drift cancels.
-
-    The first zero was reached by unloading (at the previous angle, or by the exercise before the first).
-    """
-    up = [Load(label) for label in plan.masses]
-    return [(NOTHING, -1), *((x, 1) for x in up), *((x, -1) for x in reversed(up[:-1])), (NOTHING, -1)]
+    return dict.fromkeys(turns.biases(rig), plan.bias_A)
 
 
 def step_count(plan: Plan) -> int:
-    """How many steps `acquire` records, for the progress display."""
+    """How many steps `acquire` records with one hook, for the progress display."""
     return plan.angles * len(sequence(plan))
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
-    """Hang every mass up and down at each angle; the hanger stays on throughout."""
-    machine = conventions(rig.file)
-    before = _controls(rig, machine)
-    rig.operator.hang(Load(plan.masses[-1]))  # exercise: the first zero is then reached by unloading, like the others
-    rig.clock.sleep(plan.settle_s)
-    changes = {axis: after - before[axis] for axis, after in _controls(rig, machine).items()}
-    rig.operator.hang(NOTHING)
-    if max(map(abs, changes.values())) > CLEAR_A and not first_look.goes_on(rig, checks.wiring(**changes)):
-        record.event(checks.WIRED_WRONG, changes=changes)  # an hour of hangings would say no more
-        return
-    for turn in range(plan.angles):
-        angle = 2 * math.pi * turn / plan.angles
-        rig.rotation.point(angle)
-        for k, (load, branch) in enumerate(sequence(plan)):
-            hanging = rig.operator.hang(load)
-            rig.clock.sleep(plan.settle_s)
-            if turn == k == 0 and (needed := both_coils.at_no_load(machine, rig.levitation.reading, plan.bias_A)):
-                record.event(both_coils.ONE_SIDED, needed=needed)
-                return
-            with record_step(record, Hang(angle, hanging.label, branch)):
-                rig.clock.sleep(plan.average_s)
-
-
-def _controls(rig: Rig, machine: Servomotor) -> dict[str, float]:
-    """The control currents by axis as they are now, A."""
-    return {axis: machine.control(axis, rig.levitation.reading) for axis in AXES}
+    """Hang every mass up and down at each angle, on each hook; its hanger stays on throughout."""
+    found = pulls(rig.file)
+    for pull in found:
+        hook = pull.hook if len(found) > 1 else ""
+        if not exercised(rig, plan, record, pull, hook) or not hung_up_and_down(rig, plan, record, pull, hook):
+            return
 
 
 @dataclass(frozen=True)
 class Analysis:
-    """Everything the measurements, findings, facts and figures are made of.
+    """Everything that what was hung on one hook says.
 
-    `estimates` are without the scatter of the hangings, means over a turn and values by angle; `spread` (A, 8, 8) is its
+    `estimates` are without the scatter of the hangings, means over a turn and values by angle; `spread` (A, 4 K, 4 K) is its
     covariance at each angle. `loads` is what the masses say against each other, `beyond` (relative) what that adds to each."""
 
     data: HangingData
@@ -116,15 +94,24 @@ class Analysis:
     beyond: float
     spread: np.ndarray
     estimates: dict[str, Estimate]
+    identity: str = "scatter"
 
 
-def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
-    """Fit, scatter and estimates with their influences."""
-    findings.gate(checks.of_first(recording))
+def evaluate(recording: Recording[Plan], findings: Findings) -> list[Analysis]:
+    """Fit, scatter and estimates with their influences, of each hook."""
+    rig, found = recording.rig, pulls(recording.rig)
+    findings.gate(checks.of_first(recording, found, {pull.hook: hung(rig, pull.hook) for pull in found}))
+    findings.add(turns.findings(recording))
+    return [_evaluated(recording, findings, pull, len(found) > 1) for pull in found]
+
+
+def _evaluated(recording: Recording[Plan], findings: Findings, pull: Pull, several: bool) -> Analysis:
     plan = recording.plan
-    data = read_hangings(recording)
-    findings.gate(checks.of_signals(data, conventions(recording.rig), plan), checks.FATAL)
+    data = read_hangings(recording, pull)
+    findings.gate(checks.of_signals(data, turns.limits(recording.rig), plan), checks.FATAL)
     a = _fitted(recording, data)
+    if several:
+        a = replace(a, identity=f"scatter/{pull.hook}")
     values = {name: e.value for name, e in a.inputs.items()}
     findings.gate(
         checks.of_fit(data, a.fit, a.scatter, a.loads, a.beyond, values, plan, masses_u(recording)), checks.FATAL
@@ -135,28 +122,50 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     return a
 
 
-def measured(a: Analysis) -> Iterator[Measured]:
-    """The six quantities."""
-    estimates = _scattered(a)
-    for quantity in MEASURES:
-        yield quantity.measured(estimates[quantity.name])
+def measured(parts: list[Analysis]) -> Iterator[Measured]:
+    """By bearing the six quantities of the servomotor; else three of each axis."""
+    by_bearing = {q.name: q for q in BY_BEARING}
+    estimates = {name: e for a in parts for name, e in _scattered(a).items()}
+    if by_bearing.keys() == estimates.keys():
+        for name, quantity in by_bearing.items():
+            yield quantity.measured(estimates[name])
+        return
+    for quantity in BY_AXIS:
+        for axis in (axis for a in parts for axis in a.fit.pull.axes):
+            yield quantity.measured(estimates[f"{quantity.name}_{axis.key}"], axis.where)
 
 
 def _scattered(a: Analysis) -> dict[str, Estimate]:
-    """The six quantities with the scatter of the hangings."""
-    terms = amb_calibration_by_angle.scatter_terms("scatter", covariance_over_a_turn(a.spread), a.scatter.dof)
-    return {q.name: a.estimates[q.name] + terms[q.name] for q in MEASURES}
+    """Three quantities of each axis with the scatter of the hangings."""
+    keys = a.fit.pull.keys
+    terms = amb_calibration_by_angle.scatter_terms(
+        a.identity, covariance_over_a_turn(a.spread), a.scatter.dof, keys=keys
+    )
+    return {name: a.estimates[name] + terms[name] for name in outputs(keys)}
 
 
-def facts(a: Analysis) -> dict[str, Estimate]:
-    """The six quantities, and K, K2 and F0 of each bearing at each angle, all with one scatter for each angle: what a later
+def facts(parts: list[Analysis]) -> dict[str, Estimate]:
+    """What was measured, and K, K2 and F0 of each axis at each angle, all with one scatter for each angle: what a later
     procedure takes at one angle and what it takes over a turn then stay correlated as they are."""
-    return amb_calibration_by_angle.with_scatter(a.estimates, a.spread, a.scatter.dof)
+    out: dict[str, Estimate] = {}
+    for a in parts:
+        keys = a.fit.pull.keys
+        found = amb_calibration_by_angle.with_scatter(a.estimates, a.spread, a.scatter.dof, keys, a.identity)
+        out |= {_fact(name, a.fit.pull.axes): e for name, e in found.items()}
+    return out
+
+
+def _fact(name: str, of: tuple[Loaded, ...]) -> str:
+    """`K_KEY@3` as `K@AXIS@3`, but of the servomotor."""
+    quantity, at, angle = name.partition("@")
+    kind, _, key = quantity.partition("_")
+    axis = next(axis for axis in of if axis.key == key)
+    return name if key in SERVOMOTOR.keys else f"{kind}@{axis.name}{at}{angle}"
 
 
 def _fitted(recording: Recording[Plan], data: HangingData) -> Analysis:
-    plan = recording.plan
-    inputs = fit_inputs(recording.rig, plan)
+    plan, rig = recording.plan, recording.rig
+    inputs = fit_inputs(rig, plan.masses, data.hangings.pull)
     count = len(plan.masses)
 
     def model(p: Mapping[str, float], top_branch: float = 1.0) -> dict[str, float]:
@@ -167,35 +176,25 @@ def _fitted(recording: Recording[Plan], data: HangingData) -> Analysis:
     values = {name: e.value for name, e in inputs.items()}
     fitted = amb_calibration_fit.fit(data.hangings, values, plan.bias_A, count)
     spread = scatter(fitted, data.hangings, count)
-    share = np.array(amb_calibration_fit.hung_shares(values["hook_to_outboard"], values["amb_span"]))
+    share = np.array(amb_calibration_fit.shares(fitted.pull, values))
     hanger = weight(values["hanger"], values["gravity"], values["air_density"], values["mass_density"])
     covariance = covariance_by_angle(fitted, spread, -share * float(hanger))
     loads = hypotheses.contradiction(fitted, data.hangings, spread, values, masses_u(recording))
     beyond = hypotheses.scatter_of_set(loads)
-    hung = {label: recording.rig.masses[label].value for label in plan.masses}
-    estimates = {name: less_sure(e, hung, beyond) for name, e in propagate(model, inputs).items()}
+    masses = {label: rig.masses[label].value for label in plan.masses}
+    estimates = {name: less_sure(e, masses, beyond) for name, e in propagate(model, inputs).items()}
     half_branch = model(values, top_branch=0.0)
+    by_key = {axis.key: (k, axis) for k, axis in enumerate(fitted.pull.axes)}
     for name, estimate in estimates.items():
-        estimates[name] = estimate + turning_point(name, half_branch[name] - estimate.value)
-        if name in OUTPUTS:
-            estimates[name] += unresolved_angles(name, fitted, plan.bias_A, values["amb_gap"])
+        k, axis = by_key[name.partition("@")[0].partition("_")[2]]
+        estimates[name] = estimate + turning_point(axis, half_branch[name] - estimate.value)
+        if name in outputs(fitted.pull.keys):
+            estimates[name] += unresolved_angles(
+                name, k, fitted, plan.bias_A, amb_calibration_fit.gap(axis.plane, values)
+            )
+            if turns.by_hand(rig) and plan.angles > 1:
+                estimates[name] += turned_by_hand(name, k, fitted, hand_rad(rig))
     return Analysis(data, inputs, fitted, spread, loads, beyond, covariance, estimates)
-
-
-def fit_inputs(rig: RigFile, plan: Plan) -> dict[str, Estimate]:
-    """What the fit needs besides the recording: certificates of the rig file, each as an influence by identity."""
-    g = rig.geometry
-    inputs = certified_weighing(rig) | {
-        "hook_to_outboard": certified("geometry/hook_to_outboard", g["hook_to_outboard"], "span hook to outboard AMB"),
-        "amb_span": certified("geometry/amb_span", g["amb_span"], "span AMB to AMB"),
-        "motor_to_outboard": Estimate.exact(g["com_to_motor"].value - g["com_to_outboard_amb"].value),
-        "amb_gap": certified("geometry/amb_gap", g["amb_gap"], "AMB gap (residual position)"),
-        "motor_stiffness": certified(
-            "geometry/motor_stiffness", g["motor_stiffness"], "motor stiffness (residual pos.)"
-        ),
-        "hanger": certified("masses/hanger", rig.hanger, "hanger"),
-    }
-    return inputs | certified_masses(rig, plan.masses) | certified_sensors(rig, conventions(rig).coils_along("y"))
 
 
 def masses_u(recording: Recording[Plan]) -> np.ndarray:
@@ -207,26 +206,32 @@ def masses_u(recording: Recording[Plan]) -> np.ndarray:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
-    return check_masses(rig, plan.masses)
+    yield from check_masses(rig, plan.masses)
+    if 1 < plan.angles < turns.FEWEST:
+        yield (f"angles: found {plan.angles}; expected {turns.FEWEST} or more, for a mean over a turn, or 1 for a shaft that "
+               "stays as it stands")  # fmt: skip
 
 
-def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
-    """Fit, residuals, one step over time, and both polar plots."""
-    values = {name: e.value for name, e in a.inputs.items()}
-    return drawn.all_figures(recording, a.data, a.fit, values)
+def figures(parts: list[Analysis], recording: Recording[Plan]) -> Iterable[Figure]:
+    """Of each hook: fit, residuals, one step over time, and both polar plots."""
+    for a in parts:
+        values = {name: e.value for name, e in a.inputs.items()}
+        for figure in drawn.all_figures(recording, a.data, a.fit, values):
+            yield figure if len(parts) == 1 else replace(figure, key=f"{figure.key}-{a.fit.pull.hook}")
 
 
 def requires(rig: RigFile) -> Requires:
-    """By the names that the rig's machine has."""
-    machine = conventions(rig)
+    """By the rig file's tables."""
+    found = pulls(rig)
     return Requires(
-        lacks=(*machine.lacks, *of_hooks(rig)),
-        roles=("levitation", "rotation"),
-        channels=(*channels(machine), STATUS),
-        sensors=machine.coils_of(*VERTICAL),
-        parameters=needed(rig, *BIASES, "angle.ref"),
-        geometry=("hook_to_outboard", "amb_span", "amb_gap", "com_to_motor", "motor_stiffness", *machine.levers),
+        lacks=tuple(turns.lacks(rig)),
+        roles=("levitation", "operator"),
+        channels=(*channels(rig), STATUS),
+        sensors=tuple(dict.fromkeys(coil for pull in found for axis in pull.axes for coil in axis.coils)),
+        parameters=turns.parameters(rig),
+        capabilities=("bias",),
         masses=True,
+        uses=("angle",),
     )
 
 
@@ -248,5 +253,6 @@ procedure = Procedure(
     holds_for=lambda plan: {"bias_A": plan.bias_A, "angles": plan.angles},
     reached=("masses/*", "!masses/hanger", "!masses/density"),
     assumes=assumptions.AMB_CALIBRATION,
+    measures_of=measures_of,
     method=read_method(__file__),
 )

@@ -10,21 +10,31 @@ import numpy.typing as npt
 from procedures.amb_calibration.fit import Fit, Hangings
 
 Array = npt.NDArray[np.float64]
+TERMS = ("K", "K2", "Kw")
 OUTPUTS = ("K_i", "K2_i", "Kw_i", "K_o", "K2_o", "Kw_o")
-CARRIED = ("F0_i", "F0_o")
-"""By angle only: F_0 of each bearing (see `fit.carried`)."""
-ORDER = (0, 1, 2, 4, 5, 6, 3, 7)  # from K, K2, Kw, F_0 of one bearing and of the other to OUTPUTS and CARRIED
+"""Of the servomotor, as `outputs` has them."""
+FLOOR = 1e-6  # of the greatest eigenvalue of the covariance between axes: the least
 
 
 @dataclass(frozen=True)
 class Scatter:
-    """`rest` (2, A, P) N: residuals freed of what is common to a load; `level_means` (2, L) N per load, nothing first;
-    `covariance` (2, 2, A, P) N^2 of one hanging, between the bearings; `dof` of it."""
+    """`rest` (K, A, P) N: residuals freed of what is common to a load; `level_means` (K, L) N per load, nothing first;
+    `covariance` (K, K, A, P) N^2 of one hanging, between the axes; `dof` of it."""
 
     rest: Array
     level_means: Array
     covariance: Array
     dof: int
+
+
+def outputs(keys: tuple[str, ...]) -> tuple[str, ...]:
+    """Of axes by key: K, K2 and Kw of the first, then of the next."""
+    return tuple(f"{name}_{key}" for key in keys for name in TERMS)
+
+
+def carried(keys: tuple[str, ...]) -> tuple[str, ...]:
+    """By angle only: F_0 of each axis (see `fit.carried`)."""
+    return tuple(f"F0_{key}" for key in keys)
 
 
 def scatter(f: Fit, h: Hangings, masses: int) -> Scatter:
@@ -38,15 +48,17 @@ def scatter(f: Fit, h: Hangings, masses: int) -> Scatter:
     levels = masses + 1
     membership = np.eye(levels)[h.load.reshape(-1) + 1]  # (A P, L)
     averaging = (membership / membership.sum(axis=0)).T  # (L, A P)
-    residuals = f.residuals.reshape(2, -1)
+    axes = len(f.residuals)
+    residuals = f.residuals.reshape(axes, -1)
     rest = residuals - residuals @ averaging.T @ membership.T
     common = np.eye(angles * points) - membership @ averaging
-    maps = np.stack([common @ residual_maker(f, b) for b in (0, 1)])
-    weight = (f.forces[1].reshape(-1) / np.abs(f.forces[1]).max()) ** 2  # relative load squared, about 0..1
+    maps = np.stack([common @ residual_maker(f, b) for b in range(axes)])
+    most = f.forces[int(np.argmax(np.abs(f.forces).max(axis=(1, 2))))]
+    weight = (most.reshape(-1) / np.abs(most).max()) ** 2  # relative load squared, about 0..1
     basis = np.stack([np.ones_like(weight), weight])  # (2, A P)
-    covariance = np.zeros((2, 2, angles * points))
-    for b in (0, 1):
-        for c in (0, b):
+    covariance = np.zeros((axes, axes, angles * points))
+    for b in range(axes):
+        for c in range(b + 1):
             expected = (maps[b] * maps[c]) @ basis.T
             seen = rest[b] * rest[c]
             a, g = np.linalg.lstsq(expected, seen, rcond=None)[0]
@@ -54,11 +66,24 @@ def scatter(f: Fit, h: Hangings, masses: int) -> Scatter:
                 a, g = max((seen.sum() / expected[:, 0].sum(), 0.0), (0.0, seen.sum() / expected[:, 1].sum()),
                            key=lambda ag: -float(((seen - expected @ np.array(ag)) ** 2).sum()))  # fmt: skip
             covariance[b, c] = covariance[c, b] = np.array([a, g]) @ basis
-    bound = 0.999 * np.sqrt(covariance[0, 0] * covariance[1, 1])
-    covariance[0, 1] = covariance[1, 0] = np.clip(covariance[0, 1], -bound, bound)
+    covariance = _possible(covariance)
     dof = angles * (points - 4) - (levels - 3)
-    shape = (2, angles, points)
-    return Scatter(rest.reshape(shape), residuals @ averaging.T, covariance.reshape(2, *shape), dof)
+    shape = (axes, angles, points)
+    return Scatter(rest.reshape(shape), residuals @ averaging.T, covariance.reshape(axes, *shape), dof)
+
+
+def _possible(covariance: Array) -> Array:
+    """Moments (K, K, N) that a covariance can have: no correlation beyond one, between more than two axes no negative variance
+    of any sum."""
+    for b in range(len(covariance)):
+        for c in range(b):
+            bound = 0.999 * np.sqrt(covariance[c, c] * covariance[b, b])
+            covariance[c, b] = covariance[b, c] = np.clip(covariance[c, b], -bound, bound)
+    if len(covariance) < 3:
+        return covariance
+    values, vectors = np.linalg.eigh(np.moveaxis(covariance, 2, 0))
+    kept = np.maximum(values, FLOOR * values.max(axis=1, keepdims=True))
+    return np.moveaxis(np.einsum("nij,nj,nkj->nik", vectors, kept, vectors), 0, 2)
 
 
 def residual_maker(f: Fit, b: int) -> Array:
@@ -72,19 +97,21 @@ def residual_maker(f: Fit, b: int) -> Array:
 
 
 def covariance_by_angle(f: Fit, s: Scatter, own_load: Array) -> Array:
-    """Type A covariance (A, 8, 8) of the terms at each angle, in the order of OUTPUTS and CARRIED.
+    """Type A covariance (A, 4 K, 4 K) of the terms at each angle, in the order of `outputs` and `carried`.
 
-    `own_load` (2,) N is the force at own weight in the fit's frame (see `fit.tangents`). Hangings are
-    independent of each other; the two bearings of one hanging are not (a load that seats badly moves both).
+    `own_load` (K,) N is the force at own weight in the fit's frame (see `fit.tangents`). Hangings are
+    independent of each other; the axes of one hanging are not (a load that seats badly moves both bearings).
     """
-    maps = np.stack([_term_gradients(f.terms[b], own_load[b]) @ f.solvers[b] for b in (0, 1)])  # (2, A, 4, P)
+    axes = range(len(f.terms))
+    maps = np.stack([_term_gradients(f.terms[b], own_load[b]) @ f.solvers[b] for b in axes])  # (K, A, 4, P)
     blocks: Array = np.einsum("bamp,canp,bcap->abmcn", maps, maps, s.covariance)
-    ordered: Array = blocks.reshape(-1, 8, 8)[np.ix_(range(len(blocks)), ORDER, ORDER)]
+    order = [*(4 * b + term for b in axes for term in range(3)), *(4 * b + 3 for b in axes)]
+    ordered: Array = blocks.reshape(-1, len(order), len(order))[np.ix_(range(len(blocks)), order, order)]
     return ordered
 
 
 def covariance_over_a_turn(by_angle: Array) -> Array:
-    """Type A covariance (8, 8) of the means over a turn; angles share no hanging."""
+    """Type A covariance (4 K, 4 K) of the means over a turn; angles share no hanging."""
     covariance: Array = by_angle.sum(axis=0) / len(by_angle) ** 2
     return covariance
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -9,21 +11,19 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.recording import Recording
+from bench.recording.steps import Steps
 from bench.rigfile import RigFile
-from procedures.amb_calibration.fit import Hangings
+from bench.rigfile.places import CENTRE, Places
+from bench.rigfile.supports import two_planes
+from procedures.amb_calibration.fit import Hangings, hung_shares
 from procedures.amb_calibration.plan import Plan
-from procedures.servomotor.conventions import Servomotor, conventions, displacement
+from procedures.amb_calibration.pulls import Loaded, Pull, pulls
+from procedures.servomotor.conventions import displacement
 from procedures.servomotor.loads import load_index
 from procedures.shared.step_table import Labels, StepTable, by_angle, tabulate
 
 Array = npt.NDArray[np.float64]
-AXES = ("yi", "yo", "xi", "xo")
-VERTICAL = ("yi", "yo")
-
-
-def channels(machine: Servomotor) -> tuple[str, ...]:
-    """What is recorded while masses hang, besides the flags."""
-    return (*machine.coils_of(*AXES), *machine.positions_of(*AXES))
+SAME_RAD = math.radians(1.0)  # a probe that looks so near to an axis' direction reads what moves along it
 
 
 @dataclass(frozen=True)
@@ -41,38 +41,96 @@ class Hang(Labels):
 
 
 @dataclass(frozen=True)
+class HangOn(Hang):
+    """The same where there are several hooks: on which one."""
+
+    hook: str
+
+
+@dataclass(frozen=True)
 class HangingData:
-    """`hangings` for the fit, and the `table` (A, P) of their steps."""
+    """`hangings` for the fit, and the `table` (A, P) of their steps; `hung`, the nominal share of a mass at the near and at the
+    far bearing."""
 
     hangings: Hangings
     table: StepTable[Hang]
     masses: tuple[str, ...]
+    hung: tuple[float, float]
 
 
-def read_hangings(recording: Recording[Plan]) -> HangingData:
-    """Read every "hang" step, in the order of its angle and time.
+def channels(rig: RigFile) -> tuple[str, ...]:
+    """What is recorded while masses hang, besides the flags: currents and positions of every axis."""
+    every = axes(pulls(rig)[0])
+    return (*(coil for a in every for coil in a.coils), *(a.position for a in every))
+
+
+def axes(pull: Pull) -> tuple[Loaded, ...]:
+    """All of both bearings: those that the pull loads, then those across it."""
+    return (*pull.axes, *pull.across)
+
+
+def read_hangings(recording: Recording[Plan], pull: Pull | None = None) -> HangingData:
+    """Read every "hang" step of a pull (that of the only hook), in the order of its angle and time.
 
     Raises:
         AnalysisError: there are no steps, an angle lacks some, or what hung is no mass of the plan.
     """
-    machine, masses = conventions(recording.rig), recording.plan.masses
-    steps, shape = by_angle(recording.steps(Hang.kind), "hangings")
-    table = tabulate(steps, Hang, channels(machine), shape=shape)
-    inboard, outboard, motor = _plane_positions(recording.rig, *table.stack(machine.positions_of(*VERTICAL)))
+    rig, masses = recording.rig, recording.plan.masses
+    several = len(pulls(rig)) > 1
+    pull = pull or pulls(rig)[0]
+    taken = [s for s in recording.steps(Hang.kind) if not several or s.labels["hook"] == pull.hook]
+    steps, shape = by_angle(Steps(tuple(taken)), "hangings")
+    table: StepTable[Hang] = tabulate(steps, HangOn if several else Hang, channels(rig), shape=shape)
+    at_motor, at = _displacements(rig, pull, table)
     hangings = Hangings(
-        np.stack([table.stack(machine.coils[axis]) for axis in VERTICAL]),
-        np.stack([inboard, outboard]),
-        motor,
+        np.stack([table.stack(axis.coils) for axis in pull.axes]),
+        at,
+        at_motor,
         load_index([hang.load for hang in table.labels], masses, "hanger").reshape(shape),
         table.each(lambda hang: hang.branch),
         table.each(lambda hang: hang.angle_rad)[:, 0].copy(),
+        pull,
     )
-    return HangingData(hangings, table, masses)
+    return HangingData(hangings, table, masses, hung(rig, pull.hook))
 
 
-def _plane_positions(rig: RigFile, y_inboard: Array, y_outboard: Array) -> tuple[Array, Array, Array]:
-    """Displacement at the inboard AMB, the outboard AMB and the motor from both sensor planes (T 6.7)."""
-    machine = conventions(rig)
-    inboard, outboard, motor = (rig.geometry[name].value for name in (*machine.ambs, "com_to_motor"))
-    at = [displacement(y_inboard, y_outboard, machine.sensor_share(z, rig)) for z in (-inboard, outboard, motor)]
-    return at[0], at[1], at[2]
+def hung(rig: RigFile, hook: str) -> tuple[float, float]:
+    """Share of a mass on a hook that the near and the far bearing carry, by the rig file's values."""
+    places, (near, far) = Places(rig), (f"bearings/{plane.name}" for plane in two_planes(rig))
+    return hung_shares(places.distance(far, f"hooks/{hook}").value, places.distance(near, far).value)
+
+
+def _displacements(rig: RigFile, pull: Pull, table: StepTable[Hang]) -> tuple[Array, Array]:
+    """Along each axis: displacement at the motor, zero without one, and at its bearing (T 6.7)."""
+    planes = [plane.name for plane in two_planes(rig)]
+    motor = next((f"motors/{name}" for name, m in rig.motors.items() if m.at is not None), "")
+    at, at_motor = [], []
+    for axis in pull.axes:
+        names = _looking(rig, axis)
+        readings = [table.mean[rig.probes[name].channel] * rig.probes[name].sign for name in names]
+        at.append(_displacement(rig, names, readings, f"bearings/{planes[axis.plane]}"))
+        at_motor.append(_displacement(rig, names, readings, motor) if motor else np.zeros_like(at[-1]))
+    return np.stack(at_motor), np.stack(at)
+
+
+def _looking(rig: RigFile, axis: Loaded) -> tuple[str, ...]:
+    """The probes that look the way of an axis, the one nearest to the near end and the one farthest from it."""
+    places, bearing = Places(rig), two_planes(rig)[axis.plane].name
+    own = places.direction(f"bearings/{bearing}/{axis.name}").value
+    found = sorted(
+        (places.distance(CENTRE, f"probes/{name}").value, name)
+        for name, probe in rig.probes.items()
+        if probe.direction is not None
+        and abs(math.remainder(places.direction(f"probes/{name}").value - own, 2 * math.pi)) < SAME_RAD
+    )
+    return tuple(dict.fromkeys((found[0][1], found[-1][1])))
+
+
+def _displacement(rig: RigFile, names: Sequence[str], readings: Sequence[Array], part: str) -> Array:
+    """At a part of the shaft, by the straight line through two probes; what the only one reads."""
+    if len(names) == 1:
+        return readings[0]
+    places = Places(rig)
+    near, far = (places.distance(CENTRE, f"probes/{name}").value for name in names)
+    share = (places.distance(CENTRE, part).value - near) / (far - near)
+    return displacement(readings[0], readings[1], share)

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
-ONSET_S, BEFORE_S = 4e-3, 0.03
+ONSET, BEFORE_S = 4, 0.03  # periods of the telemetry; s
 COARSE_S, FINE_S = 1e-4, 1e-5  # of the search
 LATE_S = 1.2e-5  # what a square of time leaves of the rotor's answer makes the start late, -20 to 30 us about this mean
 DELAY_TICKS = 2  # from the jump to the amplifiers: computed a tick late, applied one later
@@ -20,14 +20,15 @@ def onset(
     i = i_0 + J u(t) + c v(t), u the amplifiers' answer to a step and v the square of the time since, for the rotor that begins
     to follow; each averaged over the `ticks` readings of a sample. The start with the least misfit is taken.
     """
+    window = ONSET * ticks * tick
     reads = t[:, None] - tick * np.arange(1, ticks + 1)
-    near = (t > earliest - BEFORE_S) & (t < latest + ONSET_S)
+    near = (t > earliest - BEFORE_S) & (t < latest + window)
 
     def fitted(t_0: float) -> tuple[float, float, float]:
-        use = near & (t < t_0 + ONSET_S)
+        use = near & (t < t_0 + window)
         since = np.maximum(reads[use] - t_0 - DELAY_TICKS * tick, 0.0)
         answer = (1 - np.exp(-since / lag_s)).mean(axis=1)
-        design = np.column_stack([np.ones(use.sum()), answer, (since**2).mean(axis=1) / ONSET_S**2])
+        design = np.column_stack([np.ones(use.sum()), answer, (since**2).mean(axis=1) / window**2])
         terms, *_ = np.linalg.lstsq(design, current[use], rcond=None)
         return float(((current[use] - design @ terms) ** 2).mean()), t_0, float(terms[1])
 

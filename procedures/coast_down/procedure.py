@@ -37,6 +37,7 @@ procedure = Procedure(
     measured=run_up.measured,
     figures=run_up.figures,
     requires=run_up.requires,
+    measures_of=run_up.measures_of,
     check=run_up.check,
     settings=run_up.settings,
     step_count=run_up.step_count,

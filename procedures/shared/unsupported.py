@@ -25,15 +25,6 @@ def of_weight(rig: RigFile, planes: tuple[Support, Support], frame: tuple[float,
     return (*_turned(planes, frame), *_tilt(rig))
 
 
-def of_hooks(rig: RigFile) -> tuple[str, ...]:
-    """For what hangs masses: they pull down."""
-    return tuple(
-        f"hooks.{name}.pull: found a side pull; this procedure takes masses that pull down"
-        for name, hook in rig.hooks.items()
-        if hook.pull is not None or hook.pulley is not None
-    )
-
-
 def of_motors(rig: RigFile) -> tuple[str, ...]:
     """For what a motor's force or torque is measured with: the first segment is up."""
     return tuple(

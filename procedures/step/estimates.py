@@ -103,7 +103,7 @@ def _fits(ones: Sequence[One]) -> list[Swing]:
     """Of all steps of a case, then without each in turn; nothing where one does not fit."""
     try:
         whole = swing(ones)
-        return [whole, *(swing([o for j, o in enumerate(ones) if j != k], whole.poles) for k in range(len(ones)))]
+        return [whole, *(swing([o for j, o in enumerate(ones) if j != k], whole) for k in range(len(ones)))]
     except AnalysisError:
         return []
 
@@ -113,7 +113,7 @@ def _curve(done: Sequence[Done]) -> Curve:
         found = swing([_one(d) for d in done])
     except AnalysisError:
         return settling.fit(done, np.zeros(0, complex))
-    return settling.fit(done, found.poles, found.pole)
+    return settling.fit(done, found.poles, found.pole, found.constant)
 
 
 def settling_estimate(case: Case, settled: Settling) -> Estimate:
@@ -155,7 +155,7 @@ def _oscillation(group: str, results: Sequence[Result]) -> dict[str, Estimate]:
     kinds, n = [(r.case, o.begin) for r in results for o in r.ones], len(ones)
     try:
         whole = swing(ones)
-        left = [swing(ones[:k] + ones[k + 1 :], whole.poles) for k in range(n)]
+        left = [swing(ones[:k] + ones[k + 1 :], whole) for k in range(n)]
     except AnalysisError:
         return {}
     first = _first_order(results)

@@ -5,12 +5,15 @@ Each alone is ill determined, in the machine as in its data; their mean, each wi
 is what the response shows, and damping ratio and natural frequency are those of this mean pole.
 
 A mean over T of e^(p t) is (1 - e^(-p T))/(p T) times its value at the end of T: parts are freed of that.
+
+What a slow integrator takes away is a straight line while the shaft swings. A fast one, with a time constant of less than
+FAST_S, is no line: it is then fitted beside the oscillations, with its time constant, over as long as it takes (`fading_s`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -27,18 +30,32 @@ SCALE = 100.0  # 1/s, of the search
 APART = (1.0, 0.2), (1.06, 0.25)  # start of the search: frequencies over the guess, damping ratios
 SLOW_HZ, FAST_HZ = 15.0, 250.0  # of what levitates: slower are integrators, faster filters
 HARD = 0.95  # of damping: no oscillation
+FAST_S, SHORT_S, LASTS = (
+    0.2,
+    0.012,
+    3.0,
+)  # time constants of an integrator that is no straight line; how many of it are fitted
+LATEST_S = 1.0  # until which it is looked for
+ALIKE = 0.3  # of a pole: what the other one of a shaft in two bearings is off by
+PLAIN, TOLD = (
+    10.0,
+    5e-3,
+)  # what it is over its standard uncertainty, and at the step's beginning as a share of it, at least
+ROWS, STATES = 12, 4  # of where the search begins: rows of a Hankel matrix, and its states
 
 
 @dataclass(frozen=True)
 class Swing:
-    """Position as a share of the step: level + slope t + Re sum of parts e^(poles t), t s from the control's answer; `misfit`
-    rms."""
+    """Position as a share of the step: level + slope t + fades e^(-t/constant) + Re sum of parts e^(poles t), t s from the
+    control's answer; `misfit` rms. Where nothing fades fast `constant` is 0."""
 
     poles: Complex
     parts: Complex
     level: float
     slope: float
     misfit: float
+    fades: float = 0.0
+    constant: float = 0.0
 
     @property
     def pole(self) -> complex:
@@ -61,17 +78,24 @@ class Swing:
 
     def later(self, by: float) -> Swing:
         """The same with its parts as of `by` s later."""
-        return Swing(self.poles, self.parts * np.exp(self.poles * by), self.level, self.slope, self.misfit)
+        return replace(self, parts=self.parts * np.exp(self.poles * by))
 
     def at(self, t: Array) -> Array:
         """The curve itself."""
-        return np.asarray(self.level + self.slope * t + (np.exp(np.outer(t, self.poles)) @ self.parts).real)
+        return np.asarray(self._slow(t) + (np.exp(np.outer(t, self.poles)) @ self.parts).real)
+
+    def _slow(self, t: Array, shrunk: float = 1.0) -> Array:
+        line = self.level + self.slope * t
+        return line + self.fades * shrunk * np.exp(-t / self.constant) if self.constant else line
 
     def means(self, t: Array, period: float) -> Array:
         """Means over the period before t; beyond what was fitted (where one of the two may even grow) with the mean pole."""
         parts = self.parts * shrinks(self.poles, period)
         swung = np.exp(np.outer(np.minimum(t, UNTIL_S), self.poles)) @ parts
         swung *= np.exp(self.pole * np.maximum(t - UNTIL_S, 0.0))
+        if self.constant:
+            shrunk = float(shrinks(np.array([-1 / self.constant + 0j]), period)[0].real)
+            return np.asarray(self._slow(t, shrunk) + swung.real)
         return np.asarray(self.level + self.slope * (t - period / 2) + swung.real)
 
     @property
@@ -96,50 +120,129 @@ def shrinks(poles: Complex, period: float) -> Complex:
     return np.asarray((1 - np.exp(-poles * period)) / (poles * period))
 
 
-def swing(steps: Sequence[One], start: Complex | None = None) -> Swing:
-    """Of many steps together. Two oscillations, or one where the tilt says nothing; what is linear in the model is eliminated
-    (variable projection).
+def swing(steps: Sequence[One], start: Swing | None = None) -> Swing:
+    """Of many steps together. Two oscillations, or one where the tilt says nothing, and what fades fast where something does;
+    what is linear in the model is eliminated (variable projection). `start`: a fit to nearly the same steps.
 
     Raises:
         AnalysisError: no oscillation fits.
     """
+    constant = fading_s(steps) if start is None else start.constant
+    if not constant:
+        return _fitted(steps, None if start is None else start.poles, 0.0, 2)
+    if start is not None:
+        return _fitted(steps, start.poles, constant, len(start.poles), start.misfit)
+    poles = _poles(steps)
+    one = _fitted(steps, poles, constant, 1)
+    return _fitted(steps, one.poles[[0, 0]] * [1.0, APART[1][0]], one.constant, 2, one.misfit)
+
+
+def _fitted(steps: Sequence[One], start: Complex | None, constant: float, most: int, noise: float = 0.0) -> Swing:
+    """With up to `most` oscillations. The second one may hardly show; where the `noise` of a sample is given, it is taken for
+    one that is like the first, give or take ALIKE of it, as far as the data do not say otherwise."""
     from scipy import optimize
 
-    near = [(s.t > FROM_S) & (s.t < UNTIL_S) for s in steps]
+    until = max(UNTIL_S, LASTS * constant)
+    near = [(s.t > FROM_S) & (s.t < until) for s in steps]
     t = np.concatenate([s.t[m] for s, m in zip(steps, near, strict=True)])
     data = np.concatenate([s.weight * s.both[:, m] for s, m in zip(steps, near, strict=True)], axis=1).T
     weight = np.concatenate([np.full(int(m.sum()), s.weight) for s, m in zip(steps, near, strict=True)])
-    count = 2 if np.any(data[:, 1]) else 1
+    count = 2 if most > 1 and np.any(data[:, 1]) else 1
     data = data[:, :count]
+    swung, pulled, typical = slice(0, 2 * count), count > 1 and noise > 0, float(np.sqrt(np.mean(weight**2)))
 
     def columns(x: Array) -> Array:
-        e = np.exp(SCALE * np.outer(t, -x[0::2] + 1j * x[1::2]))
-        return np.asarray(np.column_stack([np.ones_like(t), t, e.real, -e.imag]) * weight[:, None])
+        e = np.exp(SCALE * np.outer(t, -x[swung][0::2] + 1j * x[swung][1::2]))
+        slow = np.exp(-SCALE * x[-1] * t) if constant else t
+        return np.asarray(np.column_stack([np.ones_like(t), slow, e.real, -e.imag]) * weight[:, None])
 
     def left(x: Array) -> Array:
         a = columns(x)
-        return np.asarray((data - a @ np.linalg.lstsq(a, data, rcond=None)[0]).ravel())
+        if not constant:
+            return np.asarray((data - a @ np.linalg.lstsq(a, data, rcond=None)[0]).ravel())
+        out = np.asarray(
+            (data - a @ np.linalg.lstsq(a.T @ a, a.T @ data, rcond=None)[0]).ravel()
+        )  # many rows: by squares
+        return np.append(out, noise * typical * (x[2:4] - x[0:2]) / (ALIKE * np.hypot(x[0], x[1]))) if pulled else out
 
     guess = _guess(steps[0]) / SCALE
     first = start[:count] / SCALE if start is not None and len(start) >= count else np.array(
         [guess * f * (-z + 1j) for f, z in APART[:count]]
     )  # fmt: skip
     x0 = np.column_stack([-first.real, first.imag]).ravel()
+    if constant:
+        x0 = np.append(x0, 1 / constant / SCALE)
     try:
         found = optimize.least_squares(left, x0, x_scale=0.1, method="lm", max_nfev=300)
         terms = np.linalg.lstsq(columns(found.x), data[:, 0], rcond=None)[0]
     except (ValueError, np.linalg.LinAlgError) as error:
         raise AnalysisError(f"no oscillation fits the response: {error}") from error
-    poles = SCALE * (-found.x[0::2] + 1j * found.x[1::2])
-    period = float(steps[0].t[1] - steps[0].t[0])
+    out = _swing_of(found.x, terms, count, float(steps[0].t[1] - steps[0].t[0]), bool(constant))
+    out = replace(out, misfit=float(np.sqrt(np.mean(found.fun**2) / np.mean(weight**2))))
+    if not (np.isfinite(out.pole) and 0 < out.damping < HARD and out.pole.imag > 0 and out.constant >= 0):
+        raise AnalysisError("no oscillation that dies away fits the response")
+    return out
+
+
+def _swing_of(x: Array, terms: Array, count: int, period: float, fading: bool) -> Swing:
+    """Of what was found, freed of the means over a period."""
+    poles: Complex = np.asarray(SCALE * (-x[0 : 2 * count : 2] + 1j * x[1 : 2 * count : 2]), np.complex128)
     parts = (terms[2 : 2 + count] + 1j * terms[2 + count :]) / shrinks(poles, period)
     turned = poles.imag < 0
     poles[turned], parts[turned] = poles[turned].conj(), parts[turned].conj()
-    out = Swing(poles, parts, float(terms[0] + terms[1] * period / 2), float(terms[1]),
-                float(np.sqrt(np.mean(found.fun**2) / np.mean(weight**2))))  # fmt: skip
-    if not (np.isfinite(out.pole) and 0 < out.damping < HARD and out.pole.imag > 0):
-        raise AnalysisError("no oscillation that dies away fits the response")
-    return out
+    if fading:
+        rate = SCALE * float(x[-1])
+        fades = float(terms[1]) / float(shrinks(np.array([-rate + 0j]), period)[0].real)
+        return Swing(poles, parts, float(terms[0]), 0.0, 0.0, fades, 1 / rate)
+    return Swing(poles, parts, float(terms[0] + terms[1] * period / 2), float(terms[1]), 0.0)
+
+
+def fading_s(steps: Sequence[One]) -> float:
+    """Time constant, s, of what fades after the swing, where it is shorter than FAST_S and plain beside the noise; 0 where it
+    is not, and a straight line does."""
+    t, y = _mean(steps, UNTIL_S, LATEST_S)
+    if len(t) < 20:
+        return 0.0
+    constants = np.geomspace(SHORT_S, 10 * FAST_S, 80)
+    fits = [np.linalg.lstsq(np.column_stack([np.ones_like(t), np.exp(-t / c)]), y[0], rcond=None) for c in constants]
+    left = np.array(
+        [float(((y[0] - f[0][0] - f[0][1] * np.exp(-t / c)) ** 2).sum()) for f, c in zip(fits, constants, strict=True)]
+    )
+    k = int(left.argmin())
+    explained = float(((y[0] - y[0].mean()) ** 2).sum()) - left[k]
+    plain = explained > PLAIN**2 * left[k] / (len(t) - 3) and abs(float(fits[k][0][1])) > TOLD
+    return float(constants[k]) if plain and k > 0 and constants[k] < FAST_S else 0.0
+
+
+def _mean(steps: Sequence[One], since: float, until: float) -> tuple[Array, Array]:
+    """Times (n,) and mean of position and tilt (2, n) by their weights, as long as every step has samples."""
+    near = [np.flatnonzero((s.t > since) & (s.t < until)) for s in steps]
+    many = min(map(len, near))
+    weights = np.array([s.weight**2 for s in steps])
+    both = np.average([s.both[:, k[:many]] for s, k in zip(steps, near, strict=True)], axis=0, weights=weights)
+    return np.average([s.t[k[:many]] for s, k in zip(steps, near, strict=True)], axis=0, weights=weights), both
+
+
+def _poles(steps: Sequence[One]) -> Complex | None:
+    """Where the search begins beside something that fades: of the mean response's realisation (Juang and Pappa, 1985) with a
+    level, what fades and one oscillation. None where that has none."""
+    t, both = _mean(steps, FROM_S, UNTIL_S)
+    period = float(t[1] - t[0])
+    y, columns = both, both.shape[1] - ROWS
+    if columns < 2 * STATES:
+        return None
+    hankel = np.concatenate([y[:, k : k + columns] for k in range(ROWS)])
+    u, size, v = np.linalg.svd(hankel[:, :-1], full_matrices=False)
+    root = np.sqrt(size[:STATES])
+    values = np.linalg.eigvals((u[:, :STATES].T @ hankel[:, 1:] @ v[:STATES].T) / np.outer(root, root))
+    found = np.log(np.where(values == 0, 1e-9, values).astype(complex)) / period
+    parts = np.linalg.lstsq(np.exp(np.outer(t - t[0], found)), y[0].astype(complex), rcond=None)[0]
+    size = np.abs(found) / (2 * np.pi)
+    swings = (found.imag > 0) & (size > SLOW_HZ) & (size < FAST_HZ) & (-found.real < HARD * np.abs(found))
+    if not swings.any():
+        return None
+    one = complex(found[np.argmax(np.where(swings, np.abs(parts), 0.0))])
+    return np.array([one * f for f, _ in APART])
 
 
 def _guess(step: One) -> float:

@@ -93,9 +93,10 @@ def lasting(poles: Complex) -> Complex:
     return np.asarray(np.minimum(poles.real, 0.0) + 1j * poles.imag)
 
 
-def fit(steps: Sequence[Done], poles: Complex, middle: complex | None = None) -> Curve:
+def fit(steps: Sequence[Done], poles: Complex, middle: complex | None = None, constant: float = 0.0) -> Curve:
     """Of steps of one setting, axis and speed; `poles` of their swing, none where nothing swings, and the `middle` of these,
-    each with its part in the swing (their mean where none is given).
+    each with its part in the swing (their mean where none is given); the time `constant` of what fades fast, 0 where nothing
+    does.
 
     Each step is fitted alone, then its terms over size and beginning. Noise that swings is taken from what the fits leave,
     over all times; what fades from the scatter of its terms, since a level's noise is slower than a record.
@@ -105,6 +106,7 @@ def fit(steps: Sequence[Done], poles: Complex, middle: complex | None = None) ->
     """
     last = min(float(d.t[-1]) for d in steps)
     fades = tuple(float(f) for f in FADES_S * APART ** np.arange(FADES) if f <= last)
+    fades = (*_faster(constant), *fades)
     fades = fades if len(poles) else (*HARD_S, *fades)
     poles = lasting(poles)
     middle = middle if middle is not None else complex(poles.mean()) if len(poles) else 0j
@@ -137,6 +139,12 @@ def fit(steps: Sequence[Done], poles: Complex, middle: complex | None = None) ->
     return Curve(
         poles, middle, fades, found, (apart.T @ apart / dof, noise), (_spread(fade), _spread(first)), dof, largest, last
     )
+
+
+def _faster(constant: float) -> tuple[float, ...]:
+    """Time constants before the usual ones: the one that was found, and others by about the same ratio until these; rising."""
+    many = math.ceil(math.log(FADES_S / constant) / math.log(APART) - 0.3) if 0 < constant < FADES_S else 0
+    return tuple(float(c) for c in np.geomspace(constant, FADES_S, many + 1)[:-1]) if many > 0 else ()
 
 
 def _spread(design: Array) -> Array:

@@ -24,7 +24,7 @@ from procedures.amb_rotor.laws import of_laws, of_variants
 from procedures.shared import assumptions, first_look
 from procedures.synchronous import bearings, checks, dwelling, estimates, fitting, identified
 from procedures.synchronous.coil_peaks import find_uncertified
-from procedures.synchronous.dwells import read_dwells, required
+from procedures.synchronous.dwells import can_capture, read_dwells, required
 from procedures.synchronous.estimates import Results
 from procedures.synchronous.hum import listen, of_dwells
 from procedures.unbalance import figures as drawn
@@ -109,6 +109,11 @@ def measured(results: Results) -> Iterator[Measured]:
                 yield known[name].measured(estimate, f"{place}, {result.dwell.where}" if place else result.dwell.where)
 
 
+def measures_of(rig: RigFile) -> tuple[Quantity, ...]:
+    """What the coils need is read of captures."""
+    return MEASURES if can_capture(rig) else tuple(q for q in MEASURES if q not in (CURRENT, VOLTAGE))
+
+
 def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     return required(rig)
@@ -143,6 +148,7 @@ procedure = Procedure(
     measured=measured,
     figures=figures,
     requires=requires,
+    measures_of=measures_of,
     check=check,
     settings=settings,
     step_count=step_count,

@@ -9,6 +9,21 @@ typedef struct {
     uint64_t key, counter;
 } core_noise;
 
+/* tones that are injected: their phasors, how far each turns in a tick, what they are made of */
+typedef struct {
+    double turn_c[128], turn_s[128], c[128], s[128], made[4];
+    int64_t ticks;
+    int32_t lines;
+} core_tones;
+
+/* what a controller knows of a once-per-turn mark: times of the last three pulses, where each mark fired; of the last reading
+ * angle, speed and age */
+typedef struct {
+    double last, before, earlier, fired[2], angle, speed, age;
+    int64_t pulses, counted;
+    int32_t known;
+} core_tacho;
+
 void core_normals(uint64_t seed, uint64_t stream, double *out, int64_t count);
 /* declarations end */
 

@@ -73,7 +73,7 @@ def by_scatter(e: Estimate) -> float:
 @pytest.mark.parametrize("i", [0.0, 0.2, 1.4])
 def test_f0_scatters_with_k_as_the_fit_has_it(done: Simulated, calibration: Calibration, i: float) -> None:
     """Of F0 + K i + K2 i^2 at each angle, directly from the hangings' covariance: no root of its own is left out."""
-    a, v = procedure.evaluated(done.recording).result, calibration.values
+    (a,), v = procedure.evaluated(done.recording).result, calibration.values
     for b, bearing in enumerate("io"):
         for k in range(ANGLES):
             load = v[f"F0_{bearing}@{k}"] + v[f"K_{bearing}@{k}"] * i + v[f"K2_{bearing}@{k}"] * i**2

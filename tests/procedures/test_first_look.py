@@ -135,7 +135,7 @@ def test_a_person_is_asked_after_the_first_mass(
     assert record["outcome"] == outcome
     found = [f["code"] for f in record["findings"] if f["effect"] == "error"]
     assert found == (["wrong-sign"] if outcome == "ERROR" else found)
-    assert "the inboard control current changes by +" in said
+    assert "the control current of the inboard AMB changes by +" in said
     assert "That is an error of this run. Go on all the same?" in said
     assert said.count("Hang M") == (1 if not steps else said.count("Hang M"))
 

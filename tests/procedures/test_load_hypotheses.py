@@ -12,6 +12,7 @@ from bench.recording import Recording
 from bench.uncertainty import Estimate, interval
 from procedures.amb_calibration import fit, hypotheses, procedure
 from procedures.amb_calibration.hypotheses import Contradiction
+from procedures.amb_calibration.inputs import fit_inputs
 from procedures.amb_calibration.scatter import scatter
 from procedures.amb_calibration.steps import read_hangings
 
@@ -87,7 +88,7 @@ def test_the_interval_of_a_suspect_holds_the_mass(sound: list[Simulated]) -> Non
     for run in sound:
         recording: Recording[procedure.Plan] = Recording.open(run.recording.path, procedure.Plan)
         data = read_hangings(recording)
-        true = {k: e.value for k, e in procedure.fit_inputs(recording.rig, recording.plan).items()}
+        true = {k: e.value for k, e in fit_inputs(recording.rig, recording.plan.masses, data.hangings.pull).items()}
         u = procedure.masses_u(recording)
         for k in range(4):
             for error in (-0.02, -0.003, 0.003, 0.02):

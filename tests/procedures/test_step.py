@@ -102,6 +102,28 @@ def test_damping_of_two_oscillations_that_are_almost_one() -> None:
     assert later.damping == pytest.approx(exact.damping, rel=2e-3)
 
 
+def test_a_fast_integrator_is_fitted_beside_the_swing() -> None:
+    """A quarter of the step with a time constant as long as the swing is fitted: by a straight line the pole is a percent and
+    more off. The second oscillation of a shaft in two like bearings hardly shows in position, and its pole does not run off."""
+    rng = np.random.default_rng(4)
+    poles, parts = np.array([-320 + 447j, -470 + 480j]), np.array([-1.2 + 1.0j, 0.0])
+    t, period = np.arange(-20, 1500) * 5e-4, 5e-4
+    swung = (np.exp(np.outer(t, poles)) @ (parts * oscillation.shrinks(poles, period))).real
+    y = np.where(t > 0, 1.0 + 0.25 * np.exp(-np.maximum(t, 0) / 0.057) + np.where(t > 0, swung, 0.0), 0.0)
+    ones = [oscillation.One(t, np.array([y, 0 * y]) + 2e-3 * rng.normal(size=(2, t.size))) for _ in range(12)]
+    found = oscillation.swing(ones)
+    assert found.constant == pytest.approx(0.057, rel=0.02)
+    assert found.pole == pytest.approx(poles[0], rel=0.02)
+    assert found.at(np.array([5e-3]))[0] == pytest.approx(
+        1.0 + 0.25 * math.exp(-5 / 57) + (np.exp(poles[0] * 5e-3) * parts[0]).real, abs=2e-3
+    )
+    slow = [
+        oscillation.One(s.t, np.array([y - 0.25 * np.exp(-t / 0.057) + 0.25 * np.exp(-t / 0.58), s.both[1]]))
+        for s in ones
+    ]
+    assert oscillation.swing(slow).constant == 0.0  # a straight line does while the shaft swings
+
+
 def test_a7_the_estimate_settles_and_integral_action_does_not(tmp_path: Path) -> None:
     measured, findings = stepped(tmp_path, 1, **A7)
     where = "{}, z, 10000 r/min, 20 µm up"

@@ -53,12 +53,6 @@ typedef struct {
 } amb_notch;
 
 typedef struct {
-    double turn_c[128], turn_s[128], c[128], s[128], made[4];
-    int64_t ticks;
-    int32_t lines;
-} amb_tones;
-
-typedef struct {
     /* of y, z, psi, theta: free motion, its rate, constant disturbance, synchronous displacement and its quadrature */
     double x[4][5], input[4], gain[5], speed, turn_c, turn_s, lead_c, lead_s, made[5];
     int32_t started, turning;
@@ -68,7 +62,7 @@ typedef struct {
     double rest[5], set[5], share, phase, lift_clock, filtered[5], previous[5], pid[5], sum[5];
     double coil[10], sent[10], waiting[10]; /* modelled currents; references acting, and acting from the next tick on */
     amb_notch notch;
-    amb_tones tones;
+    core_tones tones;
     amb_observer observer;
     int32_t mode, fresh, law;
 } amb_law_state;
@@ -86,18 +80,12 @@ typedef struct {
 } amb_motion;
 
 typedef struct {
-    double last, before, earlier, fired[2], angle, speed, age; /* times of the last three pulses; of the last reading: angle, speed, age */
-    int64_t pulses, counted;
-    int32_t known;
-} amb_tacho;
-
-typedef struct {
     double s[20]; /* x y z psi theta phi, their rates; bending y1 z1 y2 z2, their rates */
     double coil[10], voltage[10], weight_c[2], weight_s[2];
     double drive_gain, drive_limit, drive_ramp, drive_target, drive_speed;
     amb_reference applied, next;
     amb_law_state law;
-    amb_tacho tacho;
+    core_tacho tacho;
     core_noise noise;
     double sums[16], peak[3];
     int64_t tick, trip_tick;
@@ -115,31 +103,29 @@ double amb_follow(const amb_params *, double current, double reference, double t
 void amb_observer_gains(const amb_control *, amb_observer *, double speed);
 /* declarations end */
 
+#include "rotor.h"
+
 enum { VOLTAGE_LIMIT = 2, CONTACT_X = 16, CLIPPED = 32 };
 enum { X, Y, Z, PSI, THETA };
 enum { YI, ZI, YO, ZO, AXIAL };
 #define AMB_COLUMNS 24
 #define AMB_TRACE 32
-#define TWO_PI 6.283185307179586
 #define PER_TICK 1e4
 
 /* what does not change inside a run or a tick */
 typedef struct {
     double amb[2], sensor[2], unbalanced[2], per_mass, per_inertia, per_polar, per_current_lsb, per_position_lsb, per_gain[10];
-    double un_c[2], un_s[2], sum_c, sum_s, moment_c, moment_s, modal[4], square[2], damp[2];
-    double angle, turn_c, turn_s, torque, keep[3], runout_c[16], runout_s[16];
+    double square[2], damp[2], torque, keep[3], runout_c[16], runout_s[16];
+    turning turned;
     int32_t flexible, runs_out, near, steps[3];
 } amb_derived;
 void amb_derive(const amb_params *, int substeps, amb_derived *);
 void amb_unbalance(const amb_params *, const amb_state *, amb_derived *);
-void amb_at(amb_derived *, double angle);
 void amb_rates(const amb_params *, const amb_derived *, const double *s, const double *coil, double *ds);
 void amb_plane(const amb_derived *, const double *s, double station, const double *shape, double *y, double *z);
 void amb_sense(const amb_params *, amb_derived *, amb_state *, amb_reading *, double *coil);
-void amb_ticked(const amb_params *, amb_tacho *, double before, double after, int64_t tick);
 void amb_refer(const amb_control *, amb_law_state *, amb_motion *);
 void amb_notched(const amb_control *, amb_notch *, double *radial);
-double amb_injected(const amb_control *, amb_tones *);
 void amb_coordinates(const amb_control *, const double *at, double x, double *q);
 void amb_planes(const amb_control *, const double *q, double *at);
 void amb_betas(const amb_control *, double *beta);

@@ -3,11 +3,10 @@
 #include <math.h>
 #include <string.h>
 #include "amb5dof.h"
+#include "signal.h"
 
 #define KEEP(hz) (1 / (1 + TWO_PI * (hz) * TICK))
 enum { PID, CCS, CAC };
-
-static double clip(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
 
 /* T (2.25) without its branch. With D = kappa^2 - xi^2,
  * di = (F D^2/b - 4 kappa xi ib^2)/(2 [(kappa^2 + xi^2) ib + D sqrt(ib^2 + kappa xi F/b)]),
@@ -162,7 +161,8 @@ static void start(const amb_control *c, amb_law_state *l, const double *at) {
 static void inject(const amb_control *c, amb_law_state *l, amb_reference *out) {
     int axis = c->inject_axis < 0 ? 0 : c->inject_axis > 4 ? 4 : (int)c->inject_axis;
     double *pair = out->coil + 2 * axis;
-    out->inject = amb_injected(c, &l->tones);
+    core_injection asked = {c->inject_axis, c->inject_amplitude, c->inject_hz, c->inject_lines, c->inject_step};
+    out->inject = core_injected(&asked, &l->tones, TICK);
     out->before = (pair[0] - pair[1]) / 2;
     pair[0] = clip(pair[0] + out->inject, 0, c->current_limit);
     pair[1] = clip(pair[1] - out->inject, 0, c->current_limit);

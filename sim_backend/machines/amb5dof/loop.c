@@ -2,26 +2,19 @@
 #include <math.h>
 #include <string.h>
 #include "amb5dof.h"
-
-static double least(double a, double b) { return a < b ? a : b; }
-static double most(double a, double b) { return a > b ? a : b; }
-
-#define WHOLE 6755399441055744.0
-static double quantise(double x, double lsb, double per_lsb) {
-    return lsb > 0 ? lsb * (x * per_lsb + WHOLE - WHOLE) : x;
-}
+#include "mark.h"
 
 /* each sensor's runout: sum a_n cos(n phi + p_n), n = 1..4 */
 static void runout(const amb_derived *d, double *raw) {
     double c[4], s[4];
-    tsbs_turn(d->angle, c, s);
+    tsbs_turn(d->turned.angle, c, s);
     for (int k = 0; k < 4; k++)
         for (int n = 0; n < 4; n++) raw[k] += d->runout_c[4 * k + n] * c[n] - d->runout_s[4 * k + n] * s[n];
 }
 
 void amb_sense(const amb_params *p, amb_derived *d, amb_state *st, amb_reading *r, double *coil) {
     double raw[5];
-    amb_at(d, st->s[5]);
+    turned_to(&d->turned, st->s[5]);
     int swap = p->exchange_planes != 0;
     for (int b = 0; b < 2; b++) {
         double *at = raw + 2 * (b ^ swap);
@@ -46,50 +39,13 @@ void amb_sense(const amb_params *p, amb_derived *d, amb_state *st, amb_reading *
         double i = p->current_gain[k] * st->coil[k] + p->current_offset[k] + noise;
         coil[k] = quantise(i, p->current_lsb, d->per_current_lsb);
     }
-    /* speed from the last two pulses, less when the next is late; none below 2 Hz */
-    double age = st->tick * TICK - st->tacho.last, period = st->tacho.last - st->tacho.before;
-    st->tacho.age = age;
-    st->tacho.counted = st->tacho.pulses;
-    if (age > 0.5) st->tacho.known = 0;
-    st->tacho.speed = st->tacho.known >= 2 ? TWO_PI / most(period, age) : 0;
-    st->tacho.angle = TWO_PI * (st->tacho.pulses + (st->tacho.known >= 2 ? least(age / period, 1) : 0));
+    double share = read_mark(&st->tacho, st->tick * TICK);
+    st->tacho.angle = TWO_PI * (st->tacho.pulses + share);
     r->speed = st->tacho.speed;
 }
 
-static void pulse(amb_tacho *t, double when) {
-    t->earlier = t->before;
-    t->before = t->last;
-    t->last = when;
-    t->pulses++;
-    if (t->known < 2) t->known++;
-}
-
-/* Pulses between two angles of the shaft, timed by linear interpolation within the tick. A mark fires again only after
- * half a radian, so that a shaft that trembles at it gives one pulse. */
-void amb_ticked(const amb_params *p, amb_tacho *t, double before, double after, int64_t tick) {
-    const double marks[2] = {p->pulse_angle, p->pulse_angle - p->pulse_doubled};
-    for (int k = 0; k < (p->pulse_doubled != 0 ? 2 : 1); k++) {
-        double from = floor((before + marks[k]) / TWO_PI), to = floor((after + marks[k]) / TWO_PI);
-        if (from == to) continue;
-        double turn = most(from, to), mark = turn * TWO_PI - marks[k], share = (mark - before) / (after - before);
-        if (fabs(mark - t->fired[k]) < 0.5) continue;
-        t->fired[k] = mark;
-        if (k == 0 && p->pulse_missing > 0 && fmod(turn, p->pulse_missing) == 0) continue;
-        if (p->pulse_last > 0 && t->pulses >= p->pulse_last) continue;
-        pulse(t, (tick + share) * TICK);
-    }
-}
-
-/* Coil current after `time`: u = clip(L w (ref - i) + R i, +-u_max), L di/dt = u - R i. At the limit it goes towards
- * u_max/R; where u leaves the limit, i = (L w ref - u_max)/(L w - R), first-order at the rate w from there. */
 double amb_follow(const amb_params *p, double current, double reference, double time) {
-    double lw = p->inductance * p->amplifier_rate, r = p->resistance, rate = r / p->inductance;
-    double u = lw * (reference - current) + r * current;
-    if (fabs(u) <= p->u_max) return reference + (current - reference) * exp(-p->amplifier_rate * time);
-    double limit = u > 0 ? p->u_max : -p->u_max, edge = (lw * reference - limit) / (lw - r), end = limit / r;
-    double ratio = (end - current) / (end - edge), left = ratio > 0 ? time - log(ratio) / rate : -1;
-    if (left <= 0) return end + (current - end) * exp(-rate * time);
-    return reference + (edge - reference) * exp(-p->amplifier_rate * left);
+    return follow(p->inductance, p->amplifier_rate, p->resistance, p->u_max, current, reference, time);
 }
 
 /* the references as the amplifiers' own sensors make them; the voltages at the start of the tick as they read them; whether any is limited */
@@ -135,9 +91,7 @@ static void step(const amb_params *p, const amb_derived *d, amb_state *st, const
 static void hold(const amb_params *p, amb_state *st, amb_derived *d) {
     double left = st->drive_target - st->drive_speed, ramp = st->drive_ramp * TICK, *s = st->s, y, z;
     st->drive_speed += least(most(left, -ramp), ramp);
-    double pull = st->drive_gain * (st->drive_speed - s[11]);
-    d->torque = least(most(pull, -st->drive_limit), st->drive_limit);
-    if (s[11] != 0) d->torque -= p->coulomb * s[11] / sqrt(s[11] * s[11] + p->coulomb_speed * p->coulomb_speed);
+    d->torque = driven(st->drive_gain, st->drive_limit, st->drive_speed, p->coulomb, p->coulomb_speed, s[11]);
     if (!st->loose && p->loose_speed > 0 && fabs(s[11]) > p->loose_speed) {
         st->loose = 1;
         amb_unbalance(p, st, d);
@@ -234,6 +188,7 @@ int64_t amb_run(const amb_params *p, const amb_control *c, amb_state *st, int64_
     amb_derived d;
     amb_derive(p, st->substeps, &d);
     amb_unbalance(p, st, &d);
+    const core_mark mark = {p->pulse_angle, p->pulse_missing, p->pulse_doubled, p->pulse_last};
     while (done < ticks && (filled < row_limit || st->in_period)) {
         amb_reading r;
         double coil[10], to[10];
@@ -247,7 +202,7 @@ int64_t amb_run(const amb_params *p, const amb_control *c, amb_state *st, int64_
         hold(p, st, &d);
         int way = d.near ? 2 : limited, steps = d.steps[way];
         for (int k = 0; k < steps; k++) step(p, &d, st, to, limited, TICK / steps, d.keep[way]);
-        if (st->s[5] != d.angle) amb_ticked(p, &st->tacho, d.angle, st->s[5], st->tick);
+        if (st->s[5] != d.turned.angle) core_ticked(&mark, &st->tacho, d.turned.angle, st->s[5], st->tick, TICK);
         st->tick++;
         done++;
         if (++st->in_period == PERIOD) {

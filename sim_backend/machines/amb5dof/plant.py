@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Final, Literal, overload
+from typing import Any, Final
 
 import numpy as np
 
-from sim_backend.core.plant import PERIOD_TICKS, TICK_S, Array, CorePlant, fill, open_core
+from sim_backend.core.plant import TICK_S, Array, fill, open_core
+from sim_backend.core.turning import TurningPlant
 from sim_backend.machines.amb5dof.params import AmbControl, AmbParams
 
 AXES: Final = ("yi", "zi", "yo", "zo", "x")
@@ -34,7 +35,7 @@ PID, CCS, CAC = range(3)
 _ffi, _lib = open_core(Path(__file__).with_name("amb5dof.h"))
 
 
-class AmbPlant(CorePlant):
+class AmbPlant(TurningPlant):
     """The machine with its controller's laws. Owns its time: `run` is the only thing that advances it.
 
     Args:
@@ -42,9 +43,13 @@ class AmbPlant(CorePlant):
         control: initial values of the laws' parameters.
         seed: of all noise.
         substeps: integration steps per control tick; at least five while a voltage is limited, ten near a ring.
+
+    A row of `run` has CHANNELS, the readings of a tick TRACE; plane 0 is the inboard one.
     """
 
     settable = frozenset(AmbControl.__dataclass_fields__)
+    widths = len(CHANNELS), len(TRACE)
+    _ffi, _advance = _ffi, _lib.amb_run
 
     def __init__(
         self, params: AmbParams | None = None, seed: int = 0, *, control: AmbControl | None = None, substeps: int = 2
@@ -70,52 +75,9 @@ class AmbPlant(CorePlant):
         return float(self.tick * TICK_S - self._s.tacho.last)
 
     @property
-    def turn_s(self) -> float | None:
-        """The longer one of the last two times between pulses: one may be doubled. None before there are three pulses."""
-        t = self._s.tacho
-        return float(max(t.last - t.before, t.before - t.earlier)) if t.pulses >= 3 else None
-
-    @property
-    def phase(self) -> float:
-        """Phase of the ellipse's reference at the last reading, rad, for tests."""
-        return float(self._s.law.phase)
-
-    def weights(self, plane: int, unbalance: float, angle: float) -> None:
-        """Mount a weight in addition to what is there: `plane` 0 inboard, 1 outboard; mass times radius kg m; its angle on
-        the shaft in rad, from y towards z."""
-        self._s.weight_c[plane] += unbalance * np.cos(angle)
-        self._s.weight_s[plane] += unbalance * np.sin(angle)
-
-    def without_weights(self, plane: int) -> None:
-        """Take off every weight that has been mounted in a plane; what is mounted afterwards sits tight until it slips."""
-        self._s.weight_c[plane] = self._s.weight_s[plane] = 0.0
-        self._s.loose = 0
-
-    @property
     def currents(self) -> tuple[float, ...]:
         """True currents of the ten coils in A."""
         return tuple(self._s.coil)
-
-    @overload
-    def run(self, ticks: int, trace: Literal[0] = 0) -> Array: ...
-    @overload
-    def run(self, ticks: int, trace: Literal[1, 2, 5, 10, 20, 50, 100]) -> tuple[Array, Array]: ...
-    @overload
-    def run(self, ticks: int, trace: int) -> Array | tuple[Array, Array]: ...
-    def run(self, ticks: int, trace: int = 0) -> Array | tuple[Array, Array]:
-        """Advance by `ticks` control ticks, or to the end of the telemetry period in which a trip occurs.
-
-        Returns:
-            (n, len(CHANNELS)), one row per completed telemetry period of ten ticks; with `trace`, also the readings of every
-            `trace`-th tick (tick a multiple of it), (k, len(TRACE)).
-        """
-        start, limit = self.tick, (ticks + PERIOD_TICKS - 1) // PERIOD_TICKS + 1
-        rows = np.empty((limit, len(CHANNELS)))
-        kept = np.empty((ticks // trace + 1 if trace else 0, len(TRACE)))
-        at, into = (_ffi.cast("double *", x.ctypes.data) for x in (rows, kept))
-        _lib.amb_run(self._p, self._c, self._s, ticks, at, limit, into, trace)
-        rows = rows[: self.tick // PERIOD_TICKS - start // PERIOD_TICKS]
-        return (rows, kept[: -(-self.tick // trace) - -(-start // trace)]) if trace else rows
 
     def twin(self) -> AmbPlant:
         """Another one in the same state, whose noise goes on as this one's does: what the two do differently follows from what
@@ -129,10 +91,6 @@ class AmbPlant(CorePlant):
         s = self._s
         inner = np.array([list(row) for row in s.law.observer.x])
         return {"s": np.array(list(s.s)), "coil": np.array(list(s.coil)), "observer": inner}
-
-    def set_state(self, s: Array) -> None:
-        """Put the shaft somewhere, for tests: (20,) positions and rates."""
-        self._s.s[0:20] = [float(x) for x in s]
 
 
 def _vector(values: Array) -> Any:

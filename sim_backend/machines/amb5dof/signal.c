@@ -1,11 +1,8 @@
-/* What goes into the laws beside the readings: references, notch filters, injected tones. */
+/* What goes into the laws beside the readings: references, notch filters. */
 #include <math.h>
 #include <string.h>
 #include "amb5dof.h"
-
-static double toward(double from, double to, double step) {
-    return to > from + step ? from + step : to < from - step ? from - step : to;
-}
+#include "signal.h"
 
 /* a set point goes to its target at `slew`, or at once (and then without a rate) where that is 0 */
 static double slewed(double *set, double to, double slew) {
@@ -83,47 +80,6 @@ void amb_notched(const amb_control *c, amb_notch *n, double *radial) {
         int fresh = n->hz[k] == 0;
         if (hz[k] != n->hz[k] || q[k] != n->q[k]) design(n, k, hz[k], q[k]);
         const double *f = n->c + 3 * k;
-        for (int a = 0; a < 4; a++) { /* transposed direct form II; a fresh one starts settled */
-            double *past = n->past + 8 * k + 2 * a, in = radial[a];
-            if (fresh) {
-                past[1] = (f[0] - f[2]) * in;
-                past[0] = (1 - f[0]) * in;
-            }
-            double out = f[0] * in + past[0];
-            past[0] = f[1] * in - f[1] * out + past[1];
-            past[1] = f[0] * in - f[2] * out;
-            radial[a] = out;
-        }
+        for (int a = 0; a < 4; a++) radial[a] = notched(f, n->past + 8 * k + 2 * a, radial[a], fresh);
     }
-}
-
-/* Sine, or lines at hz + k step with Schroeder's phases - pi k (k + 1)/n, amplitude A each: phasors that are turned
- * from tick to tick and set right every tenth of a second. */
-double amb_injected(const amb_control *c, amb_tones *t) {
-    const double made[4] = {c->inject_hz, c->inject_lines, c->inject_step, c->inject_axis};
-    int lines = c->inject_lines > 128 ? 128 : c->inject_lines > 1 ? (int)c->inject_lines : 1;
-    if (c->inject_axis < 0 || c->inject_amplitude == 0) {
-        t->lines = 0;
-        return 0;
-    }
-    if (t->lines != lines || memcmp(made, t->made, sizeof made) != 0) {
-        t->lines = lines;
-        t->ticks = 0;
-        memcpy(t->made, made, sizeof made);
-    }
-    double sum = 0;
-    for (int k = 0; k < lines; k++) {
-        if (t->ticks % 1000 == 0) {
-            double w = TWO_PI * (c->inject_hz + k * c->inject_step);
-            double at = w * TICK * t->ticks - TWO_PI / 2 * k * (k + 1) / lines;
-            t->c[k] = cos(at), t->s[k] = sin(at);
-            t->turn_c[k] = cos(w * TICK), t->turn_s[k] = sin(w * TICK);
-        }
-        double pc = t->c[k], ps = t->s[k];
-        sum += ps;
-        t->c[k] = pc * t->turn_c[k] - ps * t->turn_s[k];
-        t->s[k] = ps * t->turn_c[k] + pc * t->turn_s[k];
-    }
-    t->ticks++;
-    return c->inject_amplitude * sum;
 }

@@ -2,13 +2,11 @@
  * PID in the actuator planes, constant current sum; slew-limited angle; open-loop motor currents through T (6.9). */
 #include <math.h>
 #include <string.h>
+#include "numbers.h"
 #include "tsbs.h"
 
-#define TWO_PI 6.283185307179586
 /* share of a first-order filter's memory that survives a tick (backward Euler) */
 #define KEEP(hz) (1 / (1 + TWO_PI * (hz) * TICK))
-
-static double clip(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
 
 static double toward(double from, double to, double step) { return from + clip(to - from, -step, step); }
 

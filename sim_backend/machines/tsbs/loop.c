@@ -1,17 +1,8 @@
 /* The sampled loop: sense, law, one-sample delay, amplifiers (exact) and mechanics (RK4), telemetry means, trips. */
 #include <math.h>
 #include <string.h>
+#include "numbers.h"
 #include "tsbs.h"
-
-static double least(double a, double b) { return a < b ? a : b; }
-static double most(double a, double b) { return a > b ? a : b; }
-
-/* Nearest multiple of lsb: at this size a double holds no fractions, so adding it rounds. Without a branch, for the sign
- * of what is nothing but noise cannot be predicted. */
-#define WHOLE 6755399441055744.0
-static double quantise(double x, double lsb, double per_lsb) {
-    return lsb > 0 ? lsb * (x * per_lsb + WHOLE - WHOLE) : x;
-}
 
 static double plane(const double *s, double z, int axis) { return axis ? s[1] - z * s[3] : s[0] + z * s[4]; }
 

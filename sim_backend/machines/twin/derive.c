@@ -43,7 +43,7 @@ void twin_derivative(const twin_params *p, const double *s, const double *coil, 
     twin_derived d;
     twin_derive(p, &d);
     twin_unbalance(p, 0, &d);
-    twin_at(&d, s[5]);
+    turned_to(&d.turned, s[5]);
     d.torque = torque;
     d.near = 1;
     memset(ds, 0, 20 * sizeof *ds);

@@ -2,9 +2,8 @@
  * axis on the displacement at that axis, which the probes' readings give by a fixed map, less what notch filters take of it. */
 #include <math.h>
 #include <string.h>
+#include "signal.h"
 #include "twin.h"
-
-static INLINE double clip(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
 
 /* displacements at the axes: sum over the probes of their columns times their readings */
 static void locate(const twin_params *p, int blocks, const twin_control *c, const double *position, double *at) {
@@ -15,22 +14,11 @@ static void locate(const twin_params *p, int blocks, const twin_control *c, cons
     }
 }
 
-/* (s^2 + w^2)/(s^2 + s w/Q + w^2), transposed direct form II; a fresh one starts settled */
-static void notched(const twin_control *c, twin_law_state *l, int axes, double *at) {
+static void filter(const twin_control *c, twin_law_state *l, int axes, double *at) {
     for (int m = 0; m < 2; m++) {
         const double *f = c->notch + 3 * m;
         if (f[0] == 0) continue;
-        for (int k = 0; k < axes; k++) {
-            double *past = l->past + 32 * m + 2 * k, in = at[k];
-            if (l->fresh) {
-                past[1] = (f[0] - f[2]) * in;
-                past[0] = (1 - f[0]) * in;
-            }
-            double out = f[0] * in + past[0];
-            past[0] = f[1] * in - f[1] * out + past[1];
-            past[1] = f[0] * in - f[2] * out;
-            at[k] = out;
-        }
+        for (int k = 0; k < axes; k++) at[k] = notched(f, l->past + 32 * m + 2 * k, at[k], l->fresh);
     }
 }
 
@@ -52,7 +40,8 @@ static void start(const twin_params *p, const twin_control *c, twin_law_state *l
 }
 
 static void inject(const twin_params *p, const twin_control *c, twin_law_state *l, twin_reference *out) {
-    out->inject = twin_injected(c, &l->tones, p->tick);
+    core_injection asked = {c->inject_axis, c->inject_amplitude, c->inject_hz, c->inject_lines, c->inject_step};
+    out->inject = core_injected(&asked, &l->tones, p->tick);
     if (c->inject_axis < 0) return;
     int last = p->radial + p->axial - 1, k = c->inject_axis > last ? last : (int)c->inject_axis, one = p->coils[k] == 1;
     double *plus = out->coil + k, *minus = out->coil + 16 + k;
@@ -83,7 +72,7 @@ void twin_law(const twin_params *p, const twin_derived *d, const twin_control *c
     memset(out, 0, sizeof *out);
     if (l->mode < LIFT && !l->fresh) return;
     locate(p, d->law_blocks, c, position, at);
-    notched(c, l, d->axes, at);
+    filter(c, l, d->axes, at);
     if (l->fresh) start(p, c, l, at);
     for (int k = 0; k < 4 * d->law_blocks; k++) {
         l->filtered[k] = keep * l->filtered[k] + gain * (at[k] - l->previous[k]);

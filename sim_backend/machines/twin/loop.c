@@ -1,21 +1,11 @@
 /* The sampled loop: sense, law, one sample of delay, amplifiers (exact) and mechanics (RK4), telemetry, trips. */
 #include <math.h>
 #include <string.h>
+#include "mark.h"
 #include "twin.h"
 
-static INLINE double least(double a, double b) { return a < b ? a : b; }
-static INLINE double most(double a, double b) { return a > b ? a : b; }
-
-/* Coil current after `time`: u = clip(L w (ref - i) + R i, +-u_max), L di/dt = u - R i. At the limit it goes towards
- * u_max/R; where u leaves the limit, i = (L w ref - u_max)/(L w - R), first-order at the rate w from there. */
 double twin_follow(const twin_params *p, int32_t axis, double current, double reference, double time) {
-    double l = p->inductance[axis], lw = l * p->amplifier_rate, r = p->resistance, rate = r / l;
-    double u = lw * (reference - current) + r * current;
-    if (fabs(u) <= p->u_max) return reference + (current - reference) * exp(-p->amplifier_rate * time);
-    double limit = u > 0 ? p->u_max : -p->u_max, edge = (lw * reference - limit) / (lw - r), end = limit / r;
-    double ratio = (end - current) / (end - edge), left = ratio > 0 ? time - log(ratio) / rate : -1;
-    if (left <= 0) return end + (current - end) * exp(-rate * time);
-    return reference + (edge - reference) * exp(-p->amplifier_rate * left);
+    return follow(p->inductance[axis], p->amplifier_rate, p->resistance, p->u_max, current, reference, time);
 }
 
 /* the references as the amplifiers' own sensors make them; the voltages at the start of the tick as they read them; whether any is limited */
@@ -83,9 +73,7 @@ static int nears(const twin_params *p, const twin_derived *d, const double *s) {
 static void hold(const twin_params *p, twin_state *st, twin_derived *d) {
     double left = st->drive_target - st->drive_speed, ramp = st->drive_ramp * p->tick, *s = st->s;
     st->drive_speed += least(most(left, -ramp), ramp);
-    double pull = st->drive_gain * (st->drive_speed - s[11]);
-    d->torque = least(most(pull, -st->drive_limit), st->drive_limit);
-    if (s[11] != 0) d->torque -= p->coulomb * s[11] / sqrt(s[11] * s[11] + p->coulomb_speed * p->coulomb_speed);
+    d->torque = driven(st->drive_gain, st->drive_limit, st->drive_speed, p->coulomb, p->coulomb_speed, s[11]);
     if (st->load_ticks > 0) {
         st->load_ticks--;
         for (int k = 0; k < 9; k++) st->load[k] += st->load_rate[k];
@@ -147,7 +135,8 @@ int64_t twin_run(const twin_params *p, const twin_control *c, twin_state *st, in
     twin_derived d;
     twin_derive(p, &d);
     twin_unbalance(p, st, &d);
-    twin_at(&d, st->s[5]);
+    turned_to(&d.turned, st->s[5]);
+    const core_mark mark = {p->pulse_angle, p->pulse_missing, p->pulse_doubled, p->pulse_last};
     while (done < ticks && (filled < row_limit || st->in_period)) {
         twin_sense(p, &d, st, position, coil);
         st->applied = st->next; /* one sample of delay */
@@ -159,7 +148,7 @@ int64_t twin_run(const twin_params *p, const twin_control *c, twin_state *st, in
         hold(p, st, &d);
         int way = d.near ? 2 : limited, steps = d.steps[way];
         for (int k = 0; k < steps; k++) step(p, &d, st, to, limited, p->tick / steps, d.keep[way]);
-        if (st->s[5] != d.angle) twin_ticked(p, &st->tacho, d.angle, st->s[5], st->tick);
+        if (st->s[5] != d.turned.angle) core_ticked(&mark, &st->tacho, d.turned.angle, st->s[5], st->tick, p->tick);
         st->tick++;
         done++;
         if (++st->in_period == p->period) {

@@ -7,10 +7,6 @@
 
 #define NEAREST 1e-4 /* of a gap: nearer, the iron saturates */
 
-typedef struct {
-    double x, y, z, psi, theta, torque, modal[4];
-} wrench;
-
 /* by their places: vectors that are handed over depend on the processor */
 static INLINE double sum(const v4 *a) { return ((*a)[0] + (*a)[1]) + ((*a)[2] + (*a)[3]); }
 
@@ -40,42 +36,19 @@ static INLINE void attract(int flexible, const twin_params *p, int blocks, const
     for (int j = 4; j < n; j++) w->modal[j - 4] += sum(total + j);
 }
 
-static INLINE void place(int flexible, const double *s, double station, const double *shape, double *y, double *z) {
-    *y = s[Y] + station * s[THETA];
-    *z = s[Z] - station * s[PSI];
-    if (!flexible) return;
-    *y += shape[0] * s[12] + shape[1] * s[14];
-    *z += shape[0] * s[13] + shape[1] * s[15];
-}
-
 void twin_plane(const twin_derived *d, const double *s, double station, const double *shape, double *y, double *z) {
-    place(d->flexible, s, station, shape, y, z);
-}
-
-static INLINE void add(int flexible, wrench *w, double station, const double *shape, double fy, double fz) {
-    w->y += fy;
-    w->z += fz;
-    w->theta += station * fy;
-    w->psi -= station * fz;
-    if (!flexible) return;
-    for (int k = 0; k < 2; k++) {
-        w->modal[2 * k] += shape[k] * fy;
-        w->modal[2 * k + 1] += shape[k] * fz;
-    }
+    placed(d->flexible, 1, s, station, shape, y, z);
 }
 
 static void touchdown(const twin_params *p, const twin_derived *d, const double *s, int k, wrench *w) {
-    double y, z, station = p->ring[k], clearance = p->clearance[k];
+    double y, z, fy, fz, brake, station = p->ring[k];
+    const ring at = {p->clearance[k], p->ring_stiffness, p->ring_damping, p->ring_friction, p->ring_radius};
     const double *shape = p->shape_ring + 2 * k;
-    twin_plane(d, s, station, shape, &y, &z);
-    if (y * y + z * z <= clearance * clearance) return;
-    double r = sqrt(y * y + z * z), ny = y / r, nz = z / r;
     double vy = s[6 + Y] + station * s[6 + THETA], vz = s[6 + Z] - station * s[6 + PSI];
-    double push = p->ring_stiffness * (r - clearance) + p->ring_damping * (vy * ny + vz * nz);
-    if (push <= 0) return;
-    double slip = -vy * nz + vz * ny + p->ring_radius * s[11], drag = p->ring_friction * push * tanh(slip / 0.01);
-    add(d->flexible, w, station, shape, -push * ny + drag * nz, -push * nz - drag * ny);
-    w->torque -= drag * p->ring_radius;
+    twin_plane(d, s, station, shape, &y, &z);
+    if (!touched(&at, y, z, vy, vz, s[11], &fy, &fz, &brake)) return;
+    pushed(d->flexible, 1, w, station, shape, fy, fz);
+    w->torque -= brake;
 }
 
 static void thrust(const twin_params *p, const double *s, const double *coil, wrench *w) {
@@ -89,69 +62,19 @@ static void thrust(const twin_params *p, const double *s, const double *coil, wr
 }
 
 void twin_unbalance(const twin_params *p, const twin_state *st, twin_derived *d) {
-    d->sum_c = d->sum_s = d->moment_c = d->moment_s = 0;
-    memset(d->modal, 0, sizeof d->modal);
-    for (int k = 0; k < p->planes; k++) {
-        double c = p->unbalance[k] * cos(p->unbalance_phase[k]), s = p->unbalance[k] * sin(p->unbalance_phase[k]);
-        if (st) {
-            double shift = st->loose ? p->loose_shift : 0; /* a loose weight has slipped along its groove */
-            c += st->weight_c[k] * cos(shift) - st->weight_s[k] * sin(shift);
-            s += st->weight_s[k] * cos(shift) + st->weight_c[k] * sin(shift);
-        }
-        d->sum_c += c;
-        d->sum_s += s;
-        d->moment_c += p->plane[k] * c;
-        d->moment_s += p->plane[k] * s;
-        for (int m = 0; m < 2; m++) {
-            d->modal[2 * m] += p->shape_plane[2 * k + m] * c;
-            d->modal[2 * m + 1] += p->shape_plane[2 * k + m] * s;
-        }
-    }
-}
-
-void twin_at(twin_derived *d, double angle) {
-    d->angle = angle;
-    d->turn_c = cos(angle);
-    d->turn_s = sin(angle);
-}
-
-/* cos and sin of an angle that is less than a tick away from d->angle: series while that is short, good to 1e-15 */
-static INLINE void turn(const twin_derived *d, double e, double *c, double *s) {
-    double q = e * e, ce = 1 - q / 2 * (1 - q / 12 * (1 - q / 30 * (1 - q / 56)));
-    double se = e * (1 - q / 6 * (1 - q / 20 * (1 - q / 42 * (1 - q / 72))));
-    if (q > 0.04) ce = cos(e), se = sin(e);
-    *c = d->turn_c * ce - d->turn_s * se;
-    *s = d->turn_s * ce + d->turn_c * se;
-}
-
-/* Unbalance u at the angle a: u w^2 (cos, sin)(phi + a) + u w' (sin, -cos)(phi + a): minus mass times the acceleration */
-static INLINE void unbalance(int flexible, const twin_derived *d, const double *s, double spin, wrench *w) {
-    double c, q, square = s[11] * s[11];
-    turn(d, s[5] - d->angle, &c, &q);
-    double rc = square * c + spin * q, rs = square * q - spin * c;
-    w->y += d->sum_c * rc - d->sum_s * rs;
-    w->z += d->sum_c * rs + d->sum_s * rc;
-    w->theta += d->moment_c * rc - d->moment_s * rs;
-    w->psi -= d->moment_c * rs + d->moment_s * rc;
-    if (!flexible) return;
-    for (int k = 0; k < 4; k += 2) {
-        w->modal[k] += d->modal[k] * rc - d->modal[k + 1] * rs;
-        w->modal[k + 1] += d->modal[k] * rs + d->modal[k + 1] * rc;
-    }
-}
-
-static void bend(const twin_params *p, const twin_derived *d, const double *s, const double *modal, double *ds) {
-    memcpy(ds + 12, s + 16, 4 * sizeof *ds);
-    for (int k = 0; k < 4; k++) {
-        int m = k / 2;
-        ds[16 + k] = p->mode_on[m] == 0 ? 0 : modal[k] / p->mode_mass[m] - d->damp[m] * s[16 + k] - d->square[m] * s[12 + k];
-    }
+    turning *t = &d->turned;
+    t->sum_c = t->sum_s = t->moment_c = t->moment_s = 0;
+    memset(t->modal, 0, sizeof t->modal);
+    double shift = st && st->loose ? p->loose_shift : 0; /* a loose weight has slipped along its groove */
+    for (int k = 0; k < p->planes; k++)
+        unbalanced(t, p->unbalance[k], p->unbalance_phase[k], st ? st->weight_c[k] : 0, st ? st->weight_s[k] : 0, shift,
+                   p->plane[k], p->shape_plane[2 * k], p->shape_plane[2 * k + 1]);
 }
 
 static void couple(const twin_params *p, const twin_derived *d, const double *s, wrench *w) {
     double y, z;
     twin_plane(d, s, p->coupling_at, p->shape_coupling, &y, &z);
-    add(d->flexible, w, p->coupling_at, p->shape_coupling, -p->coupling * (y - p->coupling_offset[0]),
+    pushed(d->flexible, 1, w, p->coupling_at, p->shape_coupling, -p->coupling * (y - p->coupling_offset[0]),
         -p->coupling * (z - p->coupling_offset[1]));
 }
 
@@ -164,7 +87,7 @@ static INLINE void rates(int flexible, int blocks, const twin_params *p, const t
     if (p->coupling > 0) couple(p, d, s, &w);
     for (int k = 0; d->near && k < p->rings; k++) touchdown(p, d, s, k, &w);
     double spin = (d->torque - p->viscous * s[11] + w.torque) * d->per_polar;
-    unbalance(flexible, d, s, spin, &w);
+    whirl(flexible, 1, &d->turned, s, spin, &w);
     double gyro = p->polar_inertia * s[11], ay = w.y * d->per_mass + p->gravity[1], az = w.z * d->per_mass + p->gravity[2];
     memcpy(ds, s + 6, 6 * sizeof *ds);
     ds[6 + X] = 0;
@@ -177,7 +100,7 @@ static INLINE void rates(int flexible, int blocks, const twin_params *p, const t
     ds[6 + PSI] = p->free_tilt * (w.psi - gyro * s[6 + THETA]) * d->per_inertia;
     ds[6 + THETA] = p->free_tilt * (w.theta + gyro * s[6 + PSI]) * d->per_inertia;
     ds[11] = spin;
-    if (flexible) bend(p, d, s, w.modal, ds);
+    if (flexible) bend(p->mode_on, p->mode_mass, d->damp, d->square, s, w.modal, ds);
 }
 
 void twin_rates(const twin_params *p, const twin_derived *d, const double *s, const double *coil, const double *load, double *ds) {

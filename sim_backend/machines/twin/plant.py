@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final, Literal, overload
+from typing import Any, Final
 
 import numpy as np
 
-from sim_backend.core.plant import Array, CorePlant, fill, open_core
+from sim_backend.core.plant import Array, fill, open_core
+from sim_backend.core.turning import TurningPlant
 from sim_backend.machines.twin.control import COORDINATES, TwinControl
 from sim_backend.machines.twin.params import TwinParams
 from sim_backend.machines.twin.told import Told
@@ -22,7 +23,7 @@ PLAIN: Final = ("slew", "slew_tilt", "lift_time_s", "current_limit", "derivative
 _ffi, _lib = open_core(Path(__file__).with_name("twin.h"))
 
 
-class TwinPlant(CorePlant):
+class TwinPlant(TurningPlant):
     """A rig's twin with its controller's law. Owns its time: `run` is the only thing that advances it.
 
     Attributes:
@@ -39,6 +40,8 @@ class TwinPlant(CorePlant):
         substeps: integration steps in 100 us; at least five while a voltage is limited, ten near a ring.
     """
 
+    _ffi, _advance = _ffi, _lib.twin_run
+
     def __init__(self, params: TwinParams, seed: int = 0, *, substeps: int = 2) -> None:
         self.params = params
         self._p: Any = _ffi.new("twin_params *")
@@ -50,6 +53,7 @@ class TwinPlant(CorePlant):
         self.axes, self.tick_s, self.period_ticks = names.axes, params.tick, params.period
         self.channels = tuple(dict.fromkeys(name for name, _ in names.rows))
         self.trace_channels = tuple(name for name, _ in names.ticks)
+        self.widths = len(names.rows), len(names.ticks)
         self._several = _joined(names.rows)
         _told(self._p, names.rows, names.ticks)
         self._settable = {name: (field, where) for name, field, where in settable(params.names)}
@@ -97,26 +101,7 @@ class TwinPlant(CorePlant):
     @property
     def turn_s(self) -> float | None:
         """The longer one of the last two times between pulses: one may be doubled. None before there are three pulses."""
-        t = self._s.tacho
-        return (
-            float(max(t.last - t.before, t.before - t.earlier)) if self.params.names.marked and t.pulses >= 3 else None
-        )
-
-    @property
-    def phase(self) -> float:
-        """Phase of the path at the last reading, rad, for tests."""
-        return float(self._s.law.phase)
-
-    def weights(self, plane: int, unbalance: float, angle: float) -> None:
-        """Mount a weight in addition to what is there: the plane's number; mass times radius, kg m; its angle from the
-        shaft's mark in the sense in which the shaft turns, rad."""
-        self._s.weight_c[plane] += unbalance * np.cos(angle)
-        self._s.weight_s[plane] += unbalance * np.sin(angle)
-
-    def without_weights(self, plane: int) -> None:
-        """Take off every weight that has been mounted in a plane; what is mounted afterwards sits tight until it slips."""
-        self._s.weight_c[plane] = self._s.weight_s[plane] = 0.0
-        self._s.loose = 0
+        return super().turn_s if self.params.names.marked else None
 
     def load(self, wrench: tuple[float, ...], ramp_s: float) -> None:
         """Let forces on x, y, z, moments psi, theta and four modal forces (N, N m) take the place of what acted, in
@@ -139,29 +124,7 @@ class TwinPlant(CorePlant):
         n = len(self.axes)
         return (*self._s.coil[0:n], *self._s.coil[16 : 16 + n])
 
-    @overload
-    def run(self, ticks: int, trace: Literal[0] = 0) -> Array: ...
-    @overload
-    def run(self, ticks: int, trace: Literal[1, 2, 5, 10, 20, 50, 100]) -> tuple[Array, Array]: ...
-    @overload
-    def run(self, ticks: int, trace: int) -> Array | tuple[Array, Array]: ...
-    def run(self, ticks: int, trace: int = 0) -> Array | tuple[Array, Array]:
-        """Advance by `ticks` control ticks, or to the end of the telemetry period in which a trip occurs.
-
-        Returns:
-            (n, len(channels)), one row per completed telemetry period; with `trace`, also the readings of every `trace`-th tick
-            (tick a multiple of it), (k, len(trace_channels)).
-        """
-        start, period = self.tick, self.period_ticks
-        limit = (ticks + period - 1) // period + 1
-        rows = np.empty((limit, len(self.params.names.rows)))
-        kept = np.empty((ticks // trace + 1 if trace else 0, len(self.trace_channels)))
-        at, into = (_ffi.cast("double *", x.ctypes.data) for x in (rows, kept))
-        _lib.twin_run(self._p, self._c, self._s, ticks, at, limit, into, trace)
-        rows = self._shown(rows[: self.tick // period - start // period])
-        return (rows, kept[: -(-self.tick // trace) - -(-start // trace)]) if trace else rows
-
-    def _shown(self, rows: Array) -> Array:
+    def shown(self, rows: Array) -> Array:
         """A ring that stands in several planes is touched where it is in any."""
         if self._several is None:
             return rows
@@ -178,10 +141,6 @@ class TwinPlant(CorePlant):
     def state(self) -> dict[str, Any]:
         """True state, for tests: `s` (20,) as in `twin.h`, `coil` (32,)."""
         return {"s": np.array(list(self._s.s)), "coil": np.array(list(self._s.coil))}
-
-    def set_state(self, s: Array) -> None:
-        """Put the shaft somewhere, for tests: (20,) positions and rates."""
-        self._s.s[0:20] = [float(x) for x in s]
 
 
 def core_fields(p: TwinParams) -> Mapping[str, Any]:

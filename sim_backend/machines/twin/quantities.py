@@ -11,6 +11,7 @@ import numpy as np
 
 from bench.rigfile import RigFile
 from sim_backend.machines.twin import linear
+from sim_backend.machines.twin.calibrated import calibrated
 from sim_backend.machines.twin.control import bias_of
 from sim_backend.machines.twin.layout import layout_of
 from sim_backend.machines.twin.nominal import nominal_of
@@ -21,7 +22,8 @@ from sim_backend.machines.twin.rules import short
 def quantities(rig: RigFile, p: TwinParams, settings: Mapping[str, float]) -> dict[str, float]:
     """By axis `beta` (N m^2/A^2), `K_i` (N/A) and `K_x` (N/m), the slopes of the force at the magnetic centre where both
     coils carry the bias that the controller's `settings` say, and `offset` (m, from the magnetic centre to where the probes
-    read zero); by balancing plane `unbalance` (kg m) and `unbalance_phase` (rad from the shaft's mark, in the sense in
+    read zero), and `K`, `K2`, `Kw` of each radial axis as hung masses show them (`calibrated`); by balancing plane
+    `unbalance` (kg m) and `unbalance_phase` (rad from the shaft's mark, in the sense in
     which it turns); `eccentricity` (m)."""
     out: dict[str, float] = {}
     layout, zero = layout_of(rig), offsets(p)
@@ -37,7 +39,17 @@ def quantities(rig: RigFile, p: TwinParams, settings: Mapping[str, float]) -> di
         out |= {f"unbalance@{short(part)}": p.unbalance[k],
                 f"unbalance_phase@{short(part)}": math.remainder(p.unbalance_phase[k], 2 * math.pi)}  # fmt: skip
     hz, damping = linear.slowest(p, _loop(rig, p, settings, zero))
+    out |= _calibrated(rig, p, settings)
     return out | {"eccentricity": abs(whole) / p.mass, "frequency": hz, "damping": damping}
+
+
+def _calibrated(rig: RigFile, p: TwinParams, settings: Mapping[str, float]) -> dict[str, float]:
+    """Of each radial axis with two coils, as masses show them: see `calibrated`."""
+    radial = layout_of(rig).radial
+    bias = np.array([_bias(rig, axis.bearing, settings) if len(axis.coils) == 2 else math.nan for axis in radial])
+    found = calibrated(p, bias)
+    return {f"{name}@{axis.name}": float(values[k]) for name, values in zip(("K", "K2", "Kw"), found, strict=True)
+            for k, axis in enumerate(radial) if len(axis.coils) == 2}  # fmt: skip
 
 
 def _loop(rig: RigFile, p: TwinParams, settings: Mapping[str, float], zero: tuple[float, ...]) -> linear.Loop:

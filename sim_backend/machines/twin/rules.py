@@ -82,6 +82,14 @@ def _runout(order: int) -> Callable[[Nominal, int], Toleranced]:
     return of
 
 
+def _by_hand(n: Nominal) -> Toleranced:
+    """As `[shaft] hand_angle` says, else within a degree."""
+    shaft = n.rig.shaft
+    if shaft is not None and shaft.hand_angle is not None:
+        return n.geometry.places.number(shaft.hand_angle, "shaft.hand_angle").number
+    return rectangular(0.0, "rad", math.radians(1.0))
+
+
 def _any(_: Nominal, __: int) -> Toleranced:
     return rectangular(0.0, "rad", math.pi)
 
@@ -111,7 +119,7 @@ ONCE: Mapping[str, Rule] = {
     "drive_ramp": _of(lambda n: _drive_limit(n) / polar(n) / 1.5, "rad/s^2", 0.02),
     "pulse_angle": _any,
     "start_angle": _any,
-    "hand_angle": lambda n, k: rectangular(0.0, "rad", math.radians(1.0)),
+    "hand_angle": lambda n, k: _by_hand(n),
     "ring_stiffness": _of(lambda n: 5e6 * n.mass, "N/m"),
     "ring_damping": _of(lambda n: 500.0 * n.mass, "N s/m"),
     "ring_friction": _constant(0.1, "1"),

@@ -1,17 +1,12 @@
 /* What the controller reads: probes with their errors and the journals' runout, coil currents, the once-per-turn mark. */
 #include <math.h>
 #include <string.h>
+#include "mark.h"
 #include "twin.h"
-
-static INLINE double least(double a, double b) { return a < b ? a : b; }
-static INLINE double most(double a, double b) { return a > b ? a : b; }
-
-#define WHOLE 6755399441055744.0
-static INLINE double quantise(double x, double lsb, double per_lsb) { return lsb > 0 ? lsb * (x * per_lsb + WHOLE - WHOLE) : x; }
 
 /* each probe's runout: sum of its columns times cos and sin of n phi, n = 1..4, which come from the angle addition theorem */
 static INLINE void runout(const twin_params *p, const twin_derived *d, double *raw) {
-    double c = d->turn_c, s = d->turn_s, cn = c, sn = s;
+    double c = d->turned.turn_c, s = d->turned.turn_s, cn = c, sn = s;
     for (int n = 0; n < 4; n++) {
         for (int b = 0; b < d->probe_blocks; b++) {
             int k = 4 * b;
@@ -34,21 +29,10 @@ static INLINE void look(const twin_params *p, const twin_derived *d, const doubl
     }
 }
 
-/* speed from the last two pulses, less when the next is late; none below 2 Hz */
-static void tell(twin_tacho *t, double now) {
-    double age = now - t->last, period = t->last - t->before;
-    t->age = age;
-    t->counted = t->pulses;
-    if (age > 0.5) t->known = 0;
-    t->speed = t->known >= 2 ? TWO_PI / most(period, age) : 0;
-    double turn = t->known >= 2 ? least(age / period, 1) : 0;
-    t->angle = TWO_PI * (turn < 0.5 ? turn : turn - 1);
-}
-
 void twin_sense(const twin_params *p, twin_derived *d, twin_state *st, double *position, double *coil) {
     double raw[16], noise[48] = {0};
     int axes = d->axes;
-    if (st->s[5] != d->angle) twin_at(d, st->s[5]);
+    if (st->s[5] != d->turned.angle) turned_to(&d->turned, st->s[5]);
     look(p, d, st->s, raw);
     if (d->runs_out) runout(p, d, raw);
     if (p->position_noise[0] > 0) core_draws(&st->noise, noise, p->probes);
@@ -68,29 +52,6 @@ void twin_sense(const twin_params *p, twin_derived *d, twin_state *st, double *p
             coil[j] = quantise(i, p->current_lsb, d->per_current_lsb);
         }
     }
-    tell(&st->tacho, st->tick * p->tick);
-}
-
-static void pulse(twin_tacho *t, double when) {
-    t->earlier = t->before;
-    t->before = t->last;
-    t->last = when;
-    t->pulses++;
-    if (t->known < 2) t->known++;
-}
-
-/* Pulses between two angles of the shaft, timed by linear interpolation within the tick. A mark fires again only after
- * half a radian, so that a shaft that trembles at it gives one pulse. */
-void twin_ticked(const twin_params *p, twin_tacho *t, double before, double after, int64_t tick) {
-    const double marks[2] = {p->pulse_angle, p->pulse_angle - p->pulse_doubled};
-    for (int k = 0; k < (p->pulse_doubled != 0 ? 2 : 1); k++) {
-        double from = floor((before + marks[k]) / TWO_PI), to = floor((after + marks[k]) / TWO_PI);
-        if (from == to) continue;
-        double turn = most(from, to), mark = turn * TWO_PI - marks[k], share = (mark - before) / (after - before);
-        if (fabs(mark - t->fired[k]) < 0.5) continue;
-        t->fired[k] = mark;
-        if (k == 0 && p->pulse_missing > 0 && fmod(turn, p->pulse_missing) == 0) continue;
-        if (p->pulse_last > 0 && t->pulses >= p->pulse_last) continue;
-        pulse(t, (tick + share) * p->tick);
-    }
+    double turn = read_mark(&st->tacho, st->tick * p->tick);
+    st->tacho.angle = TWO_PI * (turn < 0.5 ? turn : turn - 1);
 }

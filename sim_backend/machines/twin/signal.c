@@ -1,11 +1,8 @@
-/* What goes into the law beside the readings: set points, path, lift, injected tones. */
+/* What goes into the law beside the readings: set points, path, lift. */
 #include <math.h>
 #include <string.h>
+#include "signal.h"
 #include "twin.h"
-
-static double toward(double from, double to, double step) {
-    return to > from + step ? from + step : to < from - step ? from - step : to;
-}
 
 /* a set point goes to its target at `slew`, or at once (and then without a rate) where that is 0 */
 static double slewed(double *set, double to, double slew, double tick) {
@@ -70,35 +67,4 @@ void twin_refer(const twin_params *p, const twin_control *c, twin_law_state *l, 
         }
     }
     if (l->mode != LEVITATE) lift(c, l, p->tick, axes, r, v);
-}
-
-/* Sine, or lines at hz + k step with Schroeder's phases - pi k (k + 1)/n, amplitude A each: phasors that are turned
- * from tick to tick and set right every thousand ticks. */
-double twin_injected(const twin_control *c, twin_tones *t, double tick) {
-    const double made[4] = {c->inject_hz, c->inject_lines, c->inject_step, c->inject_axis};
-    int lines = c->inject_lines > 128 ? 128 : c->inject_lines > 1 ? (int)c->inject_lines : 1;
-    if (c->inject_axis < 0 || c->inject_amplitude == 0) {
-        t->lines = 0;
-        return 0;
-    }
-    if (t->lines != lines || memcmp(made, t->made, sizeof made) != 0) {
-        t->lines = lines;
-        t->ticks = 0;
-        memcpy(t->made, made, sizeof made);
-    }
-    double sum = 0;
-    for (int k = 0; k < lines; k++) {
-        if (t->ticks % 1000 == 0) {
-            double w = TWO_PI * (c->inject_hz + k * c->inject_step);
-            double at = w * tick * t->ticks - TWO_PI / 2 * k * (k + 1) / lines;
-            t->c[k] = cos(at), t->s[k] = sin(at);
-            t->turn_c[k] = cos(w * tick), t->turn_s[k] = sin(w * tick);
-        }
-        double pc = t->c[k], ps = t->s[k];
-        sum += ps;
-        t->c[k] = pc * t->turn_c[k] - ps * t->turn_s[k];
-        t->s[k] = ps * t->turn_c[k] + pc * t->turn_s[k];
-    }
-    t->ticks++;
-    return c->inject_amplitude * sum;
 }

@@ -3,8 +3,6 @@
 #include <string.h>
 #include "twin.h"
 
-static INLINE double most(double a, double b) { return a > b ? a : b; }
-
 void twin_collect(const twin_derived *d, twin_state *st, const double *position, const double *coil) {
     int probes = 4 * d->probe_blocks, axes = d->axes;
     for (int k = 0; k < probes; k++) st->sums[AT_POSITION + k] += position[k];
@@ -22,9 +20,9 @@ void twin_collect(const twin_derived *d, twin_state *st, const double *position,
 }
 
 /* the mark's last edge, in whole microseconds of the device's time */
-static double edge(const twin_tacho *t) { return t->pulses > 0 ? floor(t->last * 1e6) * 1e-6 : 0; }
+static double edge(const core_tacho *t) { return t->pulses > 0 ? floor(t->last * 1e6) * 1e-6 : 0; }
 
-static void turned(const twin_tacho *t, double *all) {
+static void turned(const core_tacho *t, double *all) {
     all[AT_ANGLE] = t->angle;
     all[AT_SPEED] = t->speed;
     all[AT_PULSES] = (double)t->counted;

@@ -50,26 +50,14 @@ typedef struct {
 } twin_control;
 
 typedef struct {
-    double turn_c[128], turn_s[128], c[128], s[128], made[4];
-    int64_t ticks;
-    int32_t lines;
-} twin_tones;
-
-typedef struct {
     double rest[16], set_axis[16], set[5], share, phase, lift_clock, filtered[16], previous[16], sum[16], past[64];
-    twin_tones tones;
+    core_tones tones;
     int32_t mode, fresh;
 } twin_law_state;
 
 typedef struct {
     double coil[32], inject, before, after;
 } twin_reference;
-
-typedef struct {
-    double last, before, earlier, fired[2], angle, speed, age; /* times of the last three pulses; of the last reading: angle, speed, age */
-    int64_t pulses, counted;
-    int32_t known;
-} twin_tacho;
 
 typedef struct {
     double s[20]; /* x y z psi theta phi, their rates; bending y1 z1 y2 z2, their rates */
@@ -79,7 +67,7 @@ typedef struct {
     double drive_gain, drive_limit, drive_ramp, drive_target, drive_speed;
     twin_reference applied, next;
     twin_law_state law;
-    twin_tacho tacho;
+    core_tacho tacho;
     core_noise noise;
     double sums[80], inject, before, after, peak[16];
     int64_t tick, trip_tick;
@@ -93,13 +81,13 @@ void twin_derivative(const twin_params *, const double *s, const double *coil, c
 double twin_follow(const twin_params *, int32_t axis, double current, double reference, double time);
 /* declarations end */
 
+#include "rotor.h"
+
 enum { CURRENT_LIMIT = 512, VOLTAGE_LIMITED = 1024, OUT_OF_RANGE = 2048, CONTACT_AXIAL = 256 }; /* below: a bit for each ring */
 enum { X, Y, Z, PSI, THETA };
 /* places in what can be told; see TOLD in plant.py */
 enum { AT_POSITION = 0, AT_CURRENT = 16, AT_VOLTAGE = 48, AT_PEAK = 80, AT_ANGLE = 96, AT_SPEED, AT_PULSES, AT_EDGE, AT_AGE,
        AT_INJECT, AT_BEFORE, AT_AFTER, AT_CONTACT, AT_CONTACT_AXIAL = 112, AT_LIMITS, AT_NOTHING = 116, AT_END };
-#define TWO_PI 6.283185307179586
-#define INLINE inline __attribute__((always_inline))
 
 /* four numbers at once, on any processor */
 typedef double v4 __attribute__((vector_size(32), aligned(8)));
@@ -108,21 +96,18 @@ typedef long long m4 __attribute__((vector_size(32), aligned(8)));
 /* what does not change inside a run or a tick */
 typedef struct {
     double per_mass, per_inertia, per_polar, per_tick, per_current_lsb, per_position_lsb, per_gain[32];
-    double sum_c, sum_s, moment_c, moment_s, modal[4], square[2], damp[2];
-    double angle, turn_c, turn_s, torque, keep[3], pull[32];
+    double square[2], damp[2], torque, keep[3], pull[32];
+    turning turned;
     int32_t axes, blocks, law_blocks, probe_blocks, flexible, runs_out, near, free_ticks, steps[3];
 } twin_derived;
 void twin_derive(const twin_params *, twin_derived *);
 void twin_unbalance(const twin_params *, const twin_state *, twin_derived *);
-void twin_at(twin_derived *, double angle);
 void twin_rates(const twin_params *, const twin_derived *, const double *s, const double *coil, const double *load, double *ds);
 void twin_plane(const twin_derived *, const double *s, double station, const double *shape, double *y, double *z);
 void twin_sense(const twin_params *, twin_derived *, twin_state *, double *position, double *coil);
-void twin_ticked(const twin_params *, twin_tacho *, double before, double after, int64_t tick);
 void twin_law(const twin_params *, const twin_derived *, const twin_control *, twin_law_state *, const double *position,
               twin_reference *);
 void twin_refer(const twin_params *, const twin_control *, twin_law_state *, double *r, double *v);
-double twin_injected(const twin_control *, twin_tones *, double tick);
 void twin_collect(const twin_derived *, twin_state *, const double *position, const double *coil);
 void twin_report(const twin_params *, const twin_derived *, twin_state *, double *row);
 void twin_record(const twin_params *, const twin_state *, const double *position, const double *coil, double *row);
