@@ -126,9 +126,13 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
 
 
 def requires(rig: RigFile) -> Requires:
-    """A drive, a mark, and the inertia."""
+    """A drive, a mark, and the inertia; without a mark that counts, a motor would do as well."""
     inertia = "polar_inertia" in rig.machine or (rig.shaft is not None and rig.shaft.polar_inertia is not None)
     lacks = () if inertia else ("shaft.polar_inertia: found none; B is the decay rate times the inertia",)
+    absent = ", ".join(role.partition(".")[2] for role in mark.needed(rig) if not is_bound(rig, role))
+    if absent and any("drive" in d.roles for d in rig.devices.values()):
+        none = f"devices: found none in the role rotation, and for a drive's run-downs the mark has no channel for {absent}"
+        return Requires(lacks=(none, *lacks))
     return Requires(roles=("levitation", "drive"), channels=(*mark.needed(rig), STATUS), lacks=lacks)
 
 
