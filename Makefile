@@ -9,7 +9,7 @@ READY := .venv/.ready
 # Tests start hundreds of processes: without its bytecode every one of them would compile the project again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check format ci-long faults links fuzz campaigns plants sound moved golden bench clean lock setup
+.PHONY: demo test check format ci-long faults links fuzz campaigns plants sound moved golden former bench clean lock setup
 
 demo: setup
 	$(BIN)/bench run amb-calibration --rig tsbs12 --seed 1
@@ -63,6 +63,11 @@ OLD ?= HEAD~1
 NEW ?= HEAD
 golden: setup
 	$(BIN)/python benchmarks/golden.py $(OLD) $(NEW)
+
+# Recordings and calibrations that an older commit makes, read by this one: make former FORMER=937c3b9
+FORMER ?= HEAD~1
+former: setup
+	$(BIN)/python -m benchmarks.former_recordings $(FORMER)
 
 bench: setup
 	$(BIN)/python benchmarks/analysis.py

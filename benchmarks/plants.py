@@ -4,6 +4,7 @@
     python benchmarks/plants.py spindown --table
 
 What is planted in PROCEDURE, and the short plan that it runs with, is in planted/PROCEDURE.toml; a run is that of `bench run`.
+A file for another rig has a name of its own and says which `procedure` it is for, as planted/spindle-step.toml does.
 Each size is tried on a few seeds first; then the sizes that may be the smallest one caught go on to all seeds. What is done is
 appended to FOLDER/PROCEDURE.jsonl, and the same command goes on from there. Caught is a run with a finding above a note, one
 that ended early, or one that lacks a result it declares. A shift is the error (value less truth) of a quiet run less that of
@@ -78,15 +79,15 @@ class Bed:
     units: Mapping[str, str]
 
 
-def bed_of(procedure: str) -> Bed:
-    """Read from its file."""
-    found = tomllib.loads((PLANTED / f"{procedure}.toml").read_text(encoding="utf-8"))
+def bed_of(name: str) -> Bed:
+    """Read from its file, which is called as its procedure is, or says which that is."""
+    found = tomllib.loads((PLANTED / f"{name}.toml").read_text(encoding="utf-8"))
     plants = tuple(
         tuple(Plant(p["name"], float(s), tuple(p.get("plan", ())), tuple(p.get("truth", ()))) for s in p["sizes"])
         for p in found["plant"]
     )
     units = {p["name"]: "" if p["unit"] == "1" else f" {p['unit']}" for p in found["plant"]}
-    return Bed(procedure, found["rig"], tuple(found["plan"]), found.get("chain", {}), plants, units)
+    return Bed(found.get("procedure", name), found["rig"], tuple(found["plan"]), found.get("chain", {}), plants, units)
 
 
 def fly(bed: Bed, procedure: str, plan: Sequence[str], seed: int, truth: Mapping[str, float],

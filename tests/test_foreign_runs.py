@@ -26,8 +26,8 @@ SPINDLE, STAND = str(EXAMPLES / "vertical-spindle/spindle.toml"), str(EXAMPLES /
 
 
 RUNNING = {
-    SPINDLE: {"step", "unbalance", "run-up", "coast-down", "balance", "spindown"},
-    STAND: {"amb-calibration", "step", "bearing-model", "sensitivity"},
+    SPINDLE: {"step", "tracking", "unbalance", "run-up", "coast-down", "balance", "spindown"},
+    STAND: {"amb-calibration", "step", "bearing-model", "sensitivity", "tracking"},
 }
 
 
@@ -59,6 +59,16 @@ def test_a_standing_shaft_with_axes_at_30_degrees_is_stepped(tmp_path: Path, see
     _two_writes_apart_are_told(recording)
 
 
+def test_a_controller_with_a_rate_of_its_own_is_told_by_the_sizes(tmp_path: Path) -> None:
+    """20 µm in half a millisecond, at a rate that no parameter sets: no step for a loop of 90 Hz that pushes as the set point
+    goes."""
+    plan = {"axes": ["y"], "settle_s": 1.0}
+    run = simulated_run("step", SPINDLE, 1, plan, tmp_path / "spindle.mcap", {"own_slew": 0.04})
+    assert "set-points-slewed" in wrong(run)
+    (text,) = (f.text for f in run.results if isinstance(f, Finding) and f.code == "set-points-slewed")
+    assert "bind it as set_points.slew" in text
+
+
 def _two_writes_apart_are_told(recording: Recording[Plan]) -> None:
     """The step rises in 2.6 ms: 0.2 ms between the set points of its bearings are told, 0.1 ms are not."""
     steps = read_steps(recording)
@@ -87,7 +97,7 @@ def test_a_stand_that_nothing_turns_is_calibrated_by_hand(tmp_path: Path) -> Non
     }
     turned = [e["angle_rad"] for e in run.recording.events("operator") if e.get("action") == "turn"]
     assert len(turned) == 8
-    assert {"K@y_vorn", "K@y_vorn@7", "F0@y_hinten@0"} < set(run.calibration().values)
+    assert {"K@y_vorn", "K@y_vorn, 7", "F0@y_hinten, 0"} < set(run.calibration().values)
 
 
 @pytest.mark.parametrize(

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from recordings import HEADER, record
+from recordings import HEADER, block, record
 from test_rigfile import of_schema_1
 
 from bench import catalogue
@@ -19,12 +20,12 @@ from bench.recording import Recording, storedplan
 from bench.recording.recorder import RunHeader
 from bench.rigfile import RigFile
 from bench.rigfile.former_plans import PLAN_SCHEMA, plan_of_schema_1
+from bench.run.step_gaps import missing_steps
 
 ROOT = Path(__file__).resolve().parent
 FORMER: dict[str, dict[str, Any]] = json.loads((ROOT / "former" / "plans.json").read_text(encoding="utf-8"))
 """The default plans of all procedures as plan.json had them before plans had a schema."""
 NAMES = [entry.name for entry in catalogue.PROCEDURES]
-SINCE = {"torque-constant": {"max_scale_drift"}, "bearing-model": {"law"}, "sensitivity": {"survey_start_s"}}
 STAND = [(ROOT.parent / "rigs" / f"amb5dof.{x}").read_text(encoding="utf-8") for x in ("toml", "dbc")]
 
 
@@ -34,8 +35,15 @@ def test_a_plan_of_schema_1_is_read_with_every_setting_that_it_had(name: str) ->
     made = now.model_validate_json(json.dumps(storedplan.migrated(then, name)))
     kept = json.loads(made.model_dump_json())
     assert {key: kept[key] for key in then} == then
-    assert kept.keys() - then.keys() == SINCE.get(name, set())
     assert kept.get("law", "CCS") == ("PID" if name == "sensitivity" else "CCS")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_a_plan_took_by_default_then_is_in_the_table(name: str) -> None:
+    """A default that moves since, with no intention to move results, belongs into `former_plans`."""
+    made = load_procedure(name).plan.model_validate(plan_of_schema_1(name, {}))
+    kept, then = json.loads(made.model_dump_json()), FORMER[name]
+    assert {key for key in then if kept[key] != then[key]} == ({"record_s"} if name == "step" else set())
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -91,3 +99,16 @@ def test_a_controller_without_a_choice_of_law_gets_none() -> None:
     toml, dbc = ((ROOT.parent / "rigs" / f"tsbs12.{x}").read_text(encoding="utf-8") for x in ("toml", "dbc"))
     assert RigFile.parse(of_schema_1(toml), dbc).plans == RigFile.parse(toml, dbc).plans
     assert re.search(r"^\[plans\.amb-calibration\]", toml, re.MULTILINE)
+
+
+@pytest.mark.parametrize(("plan", "told"), [(b"{}", []), (b'{"schema": 2}', ["steps-missing"])])
+def test_a_recording_of_plan_schema_1_has_the_steps_of_then(tmp_path: Path, plan: bytes, told: list[str]) -> None:
+    """One step is there; today two are recorded, then it was one."""
+    procedure = replace(load_procedure("spindown"), step_count=lambda _: 2, fewest_steps=None, former_steps=lambda _: 1)
+    record(
+        tmp_path / "a.mcap",
+        [block(0, 10)],
+        header=RunHeader(HEADER.metadata, dict(HEADER.attachments) | {"plan.json": plan}),
+    )
+    recording = Recording.open(tmp_path / "a.mcap", procedure.plan)
+    assert [f.code for f in missing_steps(procedure, recording)] == told

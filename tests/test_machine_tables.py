@@ -223,7 +223,7 @@ def test_a_mark_may_call_its_channels_as_it_likes(tmp_path: Path) -> None:
 
 
 def test_what_one_procedure_does_not_take_is_refused_by_it_alone(tmp_path: Path) -> None:
-    """A hook that pulls to the side without a pulley: another procedure does not read it. A scale may run either way."""
+    """A hook that pulls to the side without a pulley: another procedure does not read it. A scale the other way is taken."""
     hook = 'hook = { pull = { of = "bearings/inboard/yi", plus_deg = 90 }, '
     pulled = load_rig(written(tmp_path, changed(TOML, ("hook = { ", hook))))
     assert load_procedure("amb-calibration").lacking(pulled)[0].startswith("hooks.hook.pulley: found none")

@@ -28,6 +28,7 @@ from bench.lock import rig_lock
 from bench.procedure import BenchPlan, Procedure, plans
 from bench.record.specs import load_spec, misnamed
 from bench.rigfile import RigFile, linkurl, load_rig
+from bench.rigfile.aliases import by_names
 from bench.rigfile.envelope import Envelope
 from bench.run.job import Connect, Job
 
@@ -67,6 +68,7 @@ def planned(request: Request) -> tuple[Procedure, RigFile, BenchPlan]:
     _refuse_mixed_backends(request)
     procedure = load_procedure(request.procedure)
     rig = with_links(load_rig(request.rig), request.links)
+    procedure = procedure.on(rig)
     if lacking := procedure.lacking(rig):
         raise ConfigError("\n  ".join([f"{rig.name} cannot run {procedure.name}; nothing was started:", *lacking]))
     defaults = (f"{rig.path} [plans.{procedure.name}]", rig.plans.get(procedure.name, {}))
@@ -104,7 +106,7 @@ def prepare(request: Request, asking: Asking = quietly) -> tuple[Job, Connect]:
         job = Job(procedure, rig, plan, limits, "live", None, rig_lock(rig.link.url.partition("?")[0]), used,
                   judged)  # fmt: skip
         return job, live(rig, kind, injected, request.clear_fault, asking)
-    overrides = dict(plans.assignment(text) for text in request.truth)
+    overrides = by_names(rig.aliases, dict(plans.assignment(text) for text in request.truth))
     _refuse_words(overrides)
     visit = request.visit or 0
     connect = simulated(

@@ -45,6 +45,7 @@ def report_command(run: Path) -> int:
     with Supervisor().watching(), runlog.to_lines(_line):
         try:
             recording = Recording.open(directory.recording, procedure.plan)
+            procedure = procedure.on(recording.rig)
         except RecordingError as error:
             logger.warning("the report goes without its recording: %s", error)
         reporting.build(directory.path, record, procedure, recording)

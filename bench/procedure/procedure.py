@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,9 +11,11 @@ from bench.errors import Lacking
 from bench.figures import Shown
 from bench.findings import Ended, Finding, Findings
 from bench.plan import BenchPlan
+from bench.procedure.names import by_names_of, quantities_on
 from bench.procedure.requires import Requires
 from bench.procedure.roles import RigState
 from bench.quantity import Measured, Quantity
+from bench.rigfile.aliases import known_as
 
 if TYPE_CHECKING:
     from bench.calibration import Need
@@ -81,10 +83,10 @@ class Procedure:
     `requires` is what a rig must have, whatever the plan, by the names that its own file has. `check` looks at a plan against
     a rig that has it, before anything starts, and names what cannot work. `settings` are the parameters of the rig's
     controller, SI, that the runner writes in READY, before it levitates. `optional` of the measures are those that a sound
-    machine may lack: not missing where no limit asks; `measures_of` a rig are those that it may have at all (None: every
-    one). `step_count` is how many steps `acquire` will record, for the progress
+    machine may lack: not missing where no limit asks. `step_count` is how many steps `acquire` will record, for the progress
     display; 0 is unknown. `fewest_steps` is how many a run that goes to its end has at least, where these are fewer;
-    `steps_on` is `step_count` where that depends on the rig.
+    `former_steps` how many one of plan schema 1 has, where it had fewer; `steps_on` is `step_count` where that depends on the
+    rig.
     `evaluate` makes of a recording what all that follows needs, once, and tells its findings as it goes; it ends where one
     that is told at a gate is an error, and then nothing is measured nor drawn. Without it the recording itself is what
     follows needs. `measured` yields the quantities of it in the order of the report. `figures` come in the order in which
@@ -97,6 +99,9 @@ class Procedure:
     `reached` are patterns of influences' identities ("!" takes away again): a check of the procedure sees an error of such a
     one that matters. The others of Type B in its budgets are listed on the report as what no data can show, with the
     sentences of `assumes`: what is in no budget and no data of any size can show, each with its sensitivity.
+
+    `measures` are kinds of quantities, each at the places where it is measured; `on` a rig that has names of its own for them
+    they go by these, and `kinds` are what they were.
 
     `places` are words that stand in the `where` of what it measures, beside names of the rig and of the plan.
     """
@@ -116,30 +121,31 @@ class Procedure:
     step_count: Callable[[Any], int] = field(default=_unknown_count)
     fewest_steps: Callable[[Any], int] | None = None
     steps_on: Callable[[RigFile, Any], int] | None = None
+    former_steps: Callable[[Any], int] | None = None
     needs: Callable[[Any], tuple[Need, ...]] = field(default=_no_needs)
     facts: Callable[[Any], Mapping[str, Estimate]] | None = None
     holds_for: Callable[[Any], Mapping[str, float]] = field(default=_numbers_of)
     optional: tuple[Quantity, ...] = ()
-    measures_of: Callable[[RigFile], tuple[Quantity, ...]] | None = None
     reached: tuple[str, ...] = ()
     assumes: tuple[str, ...] = ()
     places: tuple[str, ...] = ()
+    kinds: tuple[Quantity, ...] = ()
     method: str = ""  # the report's section: plain paragraphs, parted by empty lines
 
     def steps(self, rig: RigFile, plan: Any) -> int:
         """How many steps `acquire` will record on a rig; 0 is unknown."""
         return self.step_count(plan) if self.steps_on is None else self.steps_on(rig, plan)
 
+    def on(self, rig: RigFile) -> Procedure:
+        """With its quantities by the names that a rig has for them at its places."""
+        measures, optional = (quantities_on(rig.aliases, some) for some in (self.measures, self.optional))
+        if measures == self.measures:
+            return self
+        return replace(self, measures=measures, optional=optional, kinds=self.kinds or self.measures)
+
     def problems(self, rig: RigFile, plan: Any) -> tuple[str, ...]:
         """What cannot work, found before anything starts: what the rig lacks, else what the plan asks too much of it."""
         return self.lacking(rig) or tuple(self.check(rig, plan))
-
-    def measured_on(self, rig: RigFile) -> tuple[Quantity, ...]:
-        """Those of the measures that a rig may have; all of them where it lacks what tells."""
-        try:
-            return self.measures if self.measures_of is None else self.measures_of(rig)
-        except Lacking:
-            return self.measures
 
     def lacking(self, rig: RigFile) -> tuple[str, ...]:
         """What the rig does not have, one line a table of its file; nothing where it can run the procedure."""
@@ -161,11 +167,12 @@ class Procedure:
         return Evaluated(tuple(findings.told), result, ended)
 
     def analyse(self, recording: Recording[Any]) -> Iterator[Measured | Finding]:
-        """What a closed recording says: findings first, then what was measured."""
+        """What a closed recording says, by the names of its rig: findings first, then what was measured."""
         found = self.evaluated(recording)
-        yield from found.findings
+        aliases = recording.rig.aliases
+        yield from (by_names_of(aliases, f) for f in found.findings)
         if not found.ended:
-            yield from self.measured(found.result)
+            yield from (by_names_of(aliases, item) for item in self.measured(found.result))
 
     def drawn(self, recording: Recording[Any]) -> Iterable[Shown]:
         """The figures of a recording; none where its evaluation ended early and left nothing to draw."""
@@ -178,9 +185,9 @@ class Procedure:
         found = self.evaluated(recording)
         if found.ended:
             return {}
-        if self.facts is not None:
-            return self.facts(found.result)
-        return named(m for m in self.measured(found.result) if isinstance(m, Measured))
+        facts = self.facts(found.result) if self.facts is not None else named(
+            m for m in self.measured(found.result) if isinstance(m, Measured))  # fmt: skip
+        return {known_as(recording.rig.aliases, name): estimate for name, estimate in facts.items()}
 
 
 def named(measured: Iterable[Measured]) -> Mapping[str, Estimate]:

@@ -9,9 +9,8 @@ from typing import Any, get_args
 from bench.procedure import Procedure
 from bench.record.limits import Limit
 from bench.rigfile import RigFile
-
-SEPARATOR = ", "
-COORDINATES = ("x", "y", "z", "psi", "theta")
+from bench.rigfile.aliases import SEPARATOR
+from bench.rigfile.placenames import places_named
 
 
 def limit_of(limits: Mapping[str, Limit], name: str, where: str) -> Limit | None:
@@ -39,13 +38,9 @@ def never_measured(limits: Mapping[str, Limit], name: str, wheres: Iterable[str]
 def words_of(rig: RigFile, of: Procedure) -> tuple[str, ...]:
     """The words that a place of a procedure's measurement may have beside numbers: what the rig file calls its places and its
     controller's settings, words of the plan, and the procedure's own."""
-    tables = (rig.bearings, rig.probes, rig.rings, rig.balancing, rig.hooks, rig.levers, rig.motors, rig.encoders)
-    axes = (axis for bearing in rig.bearings.values() for axis in bearing.axes)
-    names = (name for table in tables for name in table)
     settings = (name for kind in rig.capabilities.settings.values() for name in kind)
-    ends = () if rig.shaft is None else (rig.shaft.near_end, rig.shaft.far_end)
     planned = [rig.plans.get(of.name, {}), *((f.annotation, f.default) for f in of.plan.model_fields.values())]
-    words = [*axes, *names, *ends, *COORDINATES, *settings, *of.places, *_texts(planned)]
+    words = [*places_named(rig), *settings, *of.places, *_texts(planned)]
     return tuple(dict.fromkeys(word for word in words if word))
 
 

@@ -18,7 +18,7 @@ def wrong_limits(
 ) -> Iterator[Problem]:
     """What would judge nothing, each with its key in the file at `path` and with what was expected. `words` are those that
     places may have; without any, places are not looked at."""
-    units = {q.name: q.unit for q in of.measures}
+    units = {q.name: q.unit for q in (*of.measures, *of.kinds)}
     fields = {name: field.annotation for name, field in of.plan.model_fields.items()}
     for stated_for, limit in limits.items():
         key = f"limits.{of.name}.{stated_for}"

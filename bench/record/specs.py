@@ -20,6 +20,7 @@ from bench.record.limited import words_of
 from bench.record.limits import Limit, Setting
 from bench.record.speccheck import wrong_limits
 from bench.rigfile import RigFile
+from bench.rigfile.aliases import by_names, known_as
 
 SCHEMA = 1
 NOT_APPLIED = "limit-not-applied"  # a note: the limit was stated for other settings
@@ -97,10 +98,23 @@ def load_spec(
     """
     path, found = _read(rig_name, folders, file)
     limits = found.get(procedure, {})
+    if rig is not None:
+        limits = _by_names(limits, rig, f"limits.{procedure}", str(path))
+        of = of.on(rig) if of is not None else None
     words = words_of(rig, of) if rig is not None and of is not None else ()
     if of is not None and (problems := tuple(wrong_limits(limits, of, str(path), words))):
         raise ConfigError(f"spec {path} cannot be used:", problems)
     return limits
+
+
+def _by_names(limits: Mapping[str, Limit], rig: RigFile, key: str, path: str) -> Mapping[str, Limit]:
+    """Limits by the rig's own names of quantities at its places."""
+    named = {name: known_as(rig.aliases, name) for name in limits}
+    twice = tuple(Problem(path, f"{key}.{name}", "two limits of the same", f"one of {name}, {own}")
+                  for name, own in named.items() if name != own and own in limits)  # fmt: skip
+    if twice:
+        raise ConfigError(f"spec {path} cannot be used:", twice)
+    return by_names(rig.aliases, limits)
 
 
 def misnamed(rig_name: str, folders: Collection[Path] | None = None, *, file: Path | None = None) -> Iterator[Problem]:

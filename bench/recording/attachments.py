@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -15,6 +16,7 @@ from bench.plan import BenchPlan
 from bench.recording import stored, storedplan
 from bench.recording.mcapfile import McapFile
 from bench.rigfile import MOST_DBC, MOST_TOML, RigFile
+from bench.rigfile.aliases import with_full_names
 
 P = TypeVar("P", bound=BenchPlan)
 Q = TypeVar("Q", bound=BenchPlan)
@@ -74,19 +76,25 @@ class Attachments(Generic[P]):
             raise RecordingError(f"recording {self.path}: {error}") from error
 
     @property
+    def plan_schema(self) -> int:
+        """The schema of its plan.json; 1 where it says none."""
+        return storedplan.schema_of(self._json("plan.json", dict))
+
+    @property
     def spec(self) -> dict[str, Any]:
         """The acceptance limits that the run was made with, by quantity."""
         return self._json("spec.json", dict)
 
     @cached_property
     def calibrations(self) -> tuple[Calibration, ...]:
-        """The calibrations that the run used, whole, as they were then.
+        """The calibrations that the run used, whole, as they were then; values by the rig's own names, and by kind and place.
 
         Raises:
             RecordingError: they cannot be understood.
         """
         try:
-            return attached(self.attachment("calibrations.json"), f"recording {self.path}")
+            found = attached(self.attachment("calibrations.json"), f"recording {self.path}")
+            return tuple(replace(c, values=with_full_names(self.rig.aliases, c.values)) for c in found)
         except ConfigError as error:
             raise RecordingError(str(error)) from error
 

@@ -13,7 +13,7 @@ import queue
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,8 @@ from bench.clock import Clock
 from bench.errors import RecordingError
 from bench.link.frames import FRAME, FrameBatch
 from bench.recording.mcapwriter import McapWriter
+from bench.rigfile import RigFile
+from bench.rigfile.aliases import with_full_names
 from bench.samples import TICKS, SampleBlock, StreamLayout
 
 LIVE_ITEMS = 400  # a live link hands over at most some tens of batches a second, so this is seconds
@@ -112,8 +114,12 @@ class Recorder:
     @property
     def calibrations(self) -> tuple[Calibration, ...]:
         """Those that the run uses, for decisions under way: the same that `Recording.calibrations` gives the analysis."""
-        found = self._header.attachments.get("calibrations.json")
-        return () if found is None else attached(found.decode(), f"recording {self.path}")
+        stored = self._header.attachments
+        found = attached(stored.get("calibrations.json", b"[]").decode(), f"recording {self.path}")
+        if not found:
+            return ()
+        aliases = RigFile.parse(stored["rig.toml"].decode(), stored["rig.dbc"].decode()).aliases
+        return tuple(replace(c, values=with_full_names(aliases, c.values)) for c in found)
 
     def frames(self, link: str, batch: FrameBatch, lag_ns: int = 0) -> None:
         """Record frames as they came, or as they were sent (flag SENT); host time less `lag_ns` is sample time."""

@@ -3,6 +3,7 @@ of the wrong kind, channels that are not there."""
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -15,6 +16,7 @@ from bench.errors import Problem
 from bench.rigfile.elements import From, Of
 from bench.rigfile.model import RigFile
 from bench.rigfile.numbers import Sum, Term
+from bench.rigfile.placenames import places_named
 from bench.rigfile.places import CENTRE, PlaceError, Places
 from bench.rigfile.toleranced import Toleranced
 
@@ -59,6 +61,7 @@ def _all(rig: RigFile) -> Iterator[Found]:
     yield from _channels(rig)
     yield from _axes(rig)
     yield from _certificates(rig)
+    yield from _aliases(rig)
     if rig.customer is not None and rig.laboratory is not None and rig.laboratory.customer:
         yield "laboratory.customer", rig.laboratory.customer, "[customer] alone, where there is one"
     for contradictions in (_apart, _parallel, _upright, _ends, _spans, _rings):
@@ -170,6 +173,23 @@ def _certificates(rig: RigFile) -> Iterator[Found]:
         day, due = _day(c.date), _day(c.due)
         if day and due and due < day:
             yield f"certificates.{name}.due", c.due, f"no day before its date, {c.date}"
+
+
+def _aliases(rig: RigFile) -> Iterator[Found]:
+    """Names of quantities at places: of places that there are, each place's once."""
+    known, meant = places_named(rig), dict[str, str]()
+    for name, full in rig.aliases.items():
+        place = full.partition("@")[2]
+        if place not in known:
+            close = difflib.get_close_matches(place, known, 3)
+            yield (
+                f"aliases.{name}",
+                full,
+                f"KIND@PLACE with a place of the rig, such as {' or '.join(close or known[:3])}",
+            )
+        if full in meant:
+            yield f"aliases.{name}", full, f"one name of it; {meant[full]} is another"
+        meant[full] = name
 
 
 def _day(text: str) -> date | None:

@@ -1,11 +1,12 @@
-"""What plans of schema 1 had by default and today's leave to the rig file: the law of the AMB stand's controller.
+"""What plans of schema 1 had by default and today's leave to the rig file: laws, axes and sizes of the AMB stand.
 
-Plans of schema 1 are those of recordings whose plan.json has no schema, and of rig files of schema 1. Their procedures knew the
-laws of one controller; today a plan that names none takes the law that the controller is set to.
+Plans of schema 1 are those of recordings whose plan.json has no schema, and of rig files of schema 1. Their procedures knew one
+stand; today a plan that says nothing goes by the rig: the law that the controller is set to, its axes, its gaps.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,14 +14,16 @@ PLAN_SCHEMA = 2
 
 BY_DEFAULT: Mapping[str, Mapping[str, Any]] = {
     "step": {"a": {"law": 1.0}},
-    "bearing-model": {"law": "CCS"},  # it had no such setting
+    "bearing-model": {"law": "CCS", "spacing_m": 20e-6, "radius_m": 82e-6, "biases_A": [1.15, 0.8]},
+    "tracking": {"laws": ["CCS", "CAC"], "compare": ["PID"], "y_m": 50e-6, "z_m": 80e-6},
     "unbalance": {"law": "CCS"},
     "compensation": {"law": "CCS"},
     "balance": {"law": "CCS"},
     "run-up": {"law": "CCS"},
     "coast-down": {"law": "CCS"},
-    "sensitivity": {"law": "PID"},
-}
+    "sensitivity": {"law": "PID", "axes": ["yi", "zi", "yo", "zo", "x"], "speeds_rad_s": [0.0, 10000 * math.pi / 30],
+                    "modes_hz": [650.0, 1240.0]},
+}  # fmt: skip
 """By procedure."""
 
 

@@ -18,7 +18,8 @@ from bench.errors import ConfigError, Problem
 from bench.rigfile.binding import Binding
 from bench.rigfile.capabilities import Capabilities
 from bench.rigfile.capture import CaptureSpec
-from bench.rigfile.elements import FORMS, MachineTables
+from bench.rigfile.elements import FORMS, MachineTables, Name
+from bench.rigfile.former_names import with_aliases
 from bench.rigfile.former_parameters import with_capabilities
 from bench.rigfile.messages import MessageMap, load_messages
 from bench.rigfile.part import Part
@@ -157,6 +158,7 @@ class RigFile(MachineTables):
     capture: CaptureSpec | None = None
     envelope: Envelope
     capabilities: Capabilities = Capabilities()
+    aliases: Mapping[Name, Annotated[str, Field(pattern=r"^[^@]+@[^@]+$")]] = {}
     plans: Mapping[str, Mapping[str, Any]] = {}
     simulation: Annotated[Mapping[str, Any], BeforeValidator(simulated)] = {}
     toml_text: str = Field("", exclude=True)
@@ -223,7 +225,7 @@ class RigFile(MachineTables):
 def _parsed(toml_text: str, dbc_text: str, path: str) -> RigFile:
     """A rig file is frozen, and a chain of virtual runs reads the same one a dozen times."""
     stated = parse_text(toml_text, path)
-    data = with_capabilities(migrated(stated, path))
+    data = with_aliases(with_capabilities(migrated(stated, path)))
     around = {"toml_text": toml_text, "dbc_text": dbc_text, "path": path, "written_in": stated["schema"]}
     try:
         return RigFile.model_validate({**data, **around})

@@ -46,7 +46,8 @@ def calibration_of(
     rig, seed = recording.rig, recording.seed
     backend: Backend = "sim" if seed is not None else "served" if served else "live"
     known = {identity for c in recording.calibrations for identity in c.influences}
-    units = {q.name: q.unit for q in procedure.measures}  # propagation through a function leaves them empty
+    declared = (*procedure.on(rig).measures, *procedure.measures)
+    units = {q.name: q.unit for q in declared}  # propagation through a function leaves them empty
     named = {name: replace(e, unit=e.unit or units.get(name.partition("@")[0], "")) for name, e in facts.items()}
     values = adopted(named, run_id, known)
     identities = {i.id for e in values.values() for i in e.sensitivities}

@@ -31,7 +31,7 @@ from bench.record.records import (
 from bench.record.specs import applied, in_unit
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
-from bench.rigfile import RigFile
+from bench.rigfile.aliases import by_names
 from bench.run.certificates import overdue
 from bench.run.step_gaps import incomplete_steps, missing_steps
 
@@ -99,7 +99,7 @@ class Evaluation:
 
 
 def evaluate(
-    procedure: Procedure, recording: Recording[Any], limits: Mapping[str, Limit], *, stopped: bool
+    procedure: Procedure, recording: Recording[Any] | None, limits: Mapping[str, Limit], *, stopped: bool
 ) -> Evaluation:
     """Run `analyse` on the file and judge what it yields; what was declared and not yielded is missing.
 
@@ -110,10 +110,12 @@ def evaluate(
     Raises:
         SignalAbort: the user stops it.
     """
-    if stopped:
-        return Evaluation(_in_order(procedure, {}, limits, recording.rig), Correlations((), ()), ())
+    if recording is not None:  # there may be none of a run that was stopped
+        procedure, limits = procedure.on(recording.rig), by_names(recording.rig.aliases, limits)
+    if stopped or recording is None:
+        return Evaluation(_in_order(procedure, {}, limits), Correlations((), ()), ())
     stated, (limits, notes) = limits, applied(limits, recording.plan)
-    limits, mistaken = in_unit(limits, procedure.measures)
+    limits, mistaken = in_unit(limits, (*procedure.measures, *procedure.kinds))
     measured: dict[tuple[str, str], Measured] = {}
     findings = [*notes, *mistaken]
     entries: dict[tuple[str, str], Measurement] = {}
@@ -133,7 +135,7 @@ def evaluate(
     except Exception as error:
         findings.append(_failed(error))
         entries, correlations = {}, Correlations((), ())
-    measurements = _in_order(procedure, entries, limits, recording.rig)
+    measurements = _in_order(procedure, entries, limits)
     if recording.verdict_required and (nothing := unjudged(measurements, len(stated))) is not None:
         findings.append(nothing)
     return Evaluation(measurements, correlations, tuple(findings))
@@ -176,7 +178,7 @@ def _calibrations(recording: Recording[Any]) -> Iterator[Finding]:
 
 def _accept(procedure: Procedure, item: Measured, measured: dict[tuple[str, str], Measured]) -> None:
     key = (item.quantity.name, item.where)
-    if item.quantity not in procedure.measures:
+    if item.quantity not in (*procedure.measures, *procedure.kinds):
         raise AnalysisError(f"{procedure.name} yields {item.quantity.name}, which it does not declare")
     if key in measured:
         raise AnalysisError(f"{procedure.name} yields {item.quantity.name} {item.where} twice")
@@ -184,17 +186,18 @@ def _accept(procedure: Procedure, item: Measured, measured: dict[tuple[str, str]
 
 
 def _in_order(
-    procedure: Procedure, entries: Mapping[tuple[str, str], Measurement], limits: Mapping[str, Limit], rig: RigFile
+    procedure: Procedure, entries: Mapping[tuple[str, str], Measurement], limits: Mapping[str, Limit]
 ) -> tuple[Measurement, ...]:
     """As declared, with a missing entry where nothing was yielded that a sound machine has, or that a limit asks for, of a
     quantity or at a place."""
     out: list[Measurement] = []
-    for quantity in procedure.measured_on(rig):
+    for quantity in dict.fromkeys((*procedure.measures, *procedure.kinds)):
         found = [m for (name, _), m in entries.items() if name == quantity.name]
         limit = limits.get(quantity.name)
         placed = [missing(quantity, asked, place)
                   for place, asked in never_measured(limits, quantity.name, (m.where for m in found))]  # fmt: skip
-        if limit is not None or (quantity not in procedure.optional and not placed):
+        declared = quantity in procedure.measures and quantity not in procedure.optional
+        if limit is not None or (declared and not placed):
             found = found or [missing(quantity, limit)]
         out += [*found, *placed]
     return tuple(out)

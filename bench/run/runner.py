@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from bench import rundir, runlog
 from bench.errors import ConfigError, RecordingError, SignalAbort
@@ -164,7 +164,7 @@ def _written(directory: RunDirectory, result: RunResult) -> RunResult:
 
 def _evaluated(job: Job, recording: Recording[Any] | None, ending: Ending) -> Evaluation:
     nothing = recording is None or ending.stopped is not None
-    return evaluate(job.procedure, cast(Recording[Any], recording), job.limits, stopped=nothing)
+    return evaluate(job.procedure, recording, job.limits, stopped=nothing)
 
 
 def _reported(

@@ -31,7 +31,8 @@ def incomplete_steps(recording: Recording[Any]) -> Iterator[Finding]:
 
 def missing_steps(procedure: Procedure, recording: Recording[Any]) -> Iterator[Finding]:
     """A finding where the recording has fewer steps than its plan asks for: what is concluded holds for another plan."""
-    planned = (procedure.fewest_steps or procedure.step_count)(recording.plan)
+    former = procedure.former_steps if recording.plan_schema == 1 else None
+    planned = (former or procedure.fewest_steps or procedure.step_count)(recording.plan)
     if procedure.steps_on is not None:
         planned = min(planned, procedure.steps_on(recording.rig, recording.plan))
     if (there := len(recording.all_steps())) < planned:

@@ -65,7 +65,7 @@ class Ring:
 class Stations:
     """Of one machine. `axes` by name; `probes` by channel, those that look along an axis first, in the axes' order; `first` rad
     is the direction of y around the shaft, `hand` 1 where z is counter-clockwise from it; `tilt` rad from the horizontal;
-    `gaps` m by axis, where they are told."""
+    `gaps` m by axis, where they are told; `helpers`, the motors that hold the shaft beside the bearings."""
 
     axes: Mapping[str, Placed]
     probes: Mapping[str, Placed]
@@ -74,6 +74,7 @@ class Stations:
     hand: int = 1
     tilt: Sum = NOTHING
     gaps: Mapping[str, Term] = field(default_factory=dict)
+    helpers: tuple[str, ...] = ()
 
     @property
     def up(self) -> tuple[float, float]:
@@ -98,7 +99,8 @@ class Stations:
     @property
     def lacks(self) -> tuple[str, ...]:
         """What cannot be told of the shaft, a line each."""
-        out = []
+        out = [f"motors.{name}: found one that gives radial force; expected a shaft that its two bearings alone hold"
+               for name in self.helpers]  # fmt: skip
         if not _determine(self.reads):
             out.append(f"probes: found {len(self.probes)} radial, from which position and tilts do not follow; expected four "
                        "or more, of two directions in two planes")  # fmt: skip
@@ -188,6 +190,7 @@ def _stations(rig: RigFile, places: Places, planes: tuple[Support, Support]) -> 
         hand,
         Sum((places.number(rig.shaft.tilt, "shaft.tilt"),)) if tilted else Sum(),  # type: ignore[union-attr, arg-type]
         {a: gap for p in planes for a, gap in _gap(rig, places, p)},
+        tuple(name for name, motor in rig.motors.items() if "radial force" in motor.gives),
     )
 
 

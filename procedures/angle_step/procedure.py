@@ -36,11 +36,10 @@ RISE = Quantity("rise_time", "s", "10 to 90 % of the step of the angle")
 OVERSHOOT = Quantity("overshoot", "1", "greatest angle beyond the step, as a share of it")
 SETTLING = Quantity("settling_time", "s", "from the answer of the torque current until the angle stays in the band")
 FINAL = Quantity("final_error", "rad", "angle at the end less its reference")
-PEAK = Quantity("peak_outboard", "m", "greatest distance off centre at the outboard sensor during the step")
-PEAK_MOTOR = Quantity("peak_motor", "m", "greatest distance off centre at the motor during the step")
+PEAK = Quantity("peak", "m", "greatest distance off centre during the step, at the sensor of a bearing or at the motor")
 EXCESS = Quantity("excess", "m", "peak at the outboard sensor above that at standstill", title="excess over standstill")
 SATURATED = Quantity("saturated", "s", "how long an amplifier of the motor cut its demand")
-MEASURES = (RISE, OVERSHOOT, SETTLING, FINAL, PEAK, PEAK_MOTOR, EXCESS, SATURATED)
+MEASURES = (RISE, OVERSHOOT, SETTLING, FINAL, PEAK, EXCESS, SATURATED)
 TORQUE_CONSTANT = 2.87  # N m/A, T Table 6.2; for predictions before a run, and for nothing that is measured
 NEEDED = (
     "motor.share",
@@ -95,10 +94,12 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
 
 @dataclass(frozen=True)
 class Results:
-    """What was recorded, move by move, and what each case makes of it."""
+    """What was recorded, move by move, and what each case makes of it; `places` are what the rig calls the outboard bearing and
+    the motor."""
 
     moves: Sequence[Done]
     by_case: Mapping[Case, Result]
+    places: tuple[str, str]
 
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
@@ -110,14 +111,18 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     by_case = estimates.by_case(moves, rig, plan.band, 2 * math.pi / plan.encoder_counts)
     findings.add(checks.of_responses(by_case, plan, {c: _loop(rig, plan, c) for c in by_case}))
     findings.add(checks.compared(by_case))
-    return Results(moves, by_case)
+    return Results(moves, by_case, (conventions(rig).bearings[1], next(iter(rig.motors), "motor")))
 
 
 def measured(results: Results) -> Iterator[Measured]:
     """The quantities of each case."""
     for case, result in results.by_case.items():
-        for quantity in (q for q in MEASURES if q.name in result.estimates):
-            yield quantity.measured(result.estimates[quantity.name], case.where)
+        for quantity in MEASURES:
+            if quantity is PEAK:
+                for key, place in zip(("peak_outboard", "peak_motor"), results.places, strict=True):
+                    yield PEAK.measured(result.estimates[key], f"{place}, {case.where}")
+            elif quantity.name in result.estimates:
+                yield quantity.measured(result.estimates[quantity.name], case.where)
 
 
 def _loop(rig: RigFile, plan: Plan, case: Case) -> Loop:

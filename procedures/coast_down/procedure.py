@@ -37,12 +37,11 @@ procedure = Procedure(
     measured=run_up.measured,
     figures=run_up.figures,
     requires=run_up.requires,
-    measures_of=run_up.measures_of,
     check=run_up.check,
     settings=run_up.settings,
     step_count=run_up.step_count,
     needs=lambda plan: bearings.needs(plan.bearings),
-    optional=run_up.CRITICAL,
+    optional=run_up.procedure.optional,
     assumes=assumptions.PASSAGE,
     method=f"{read_method(__file__)}\n{run_up.procedure.method}",
 )

@@ -211,11 +211,6 @@ def figures(run: Run, recording: Recording[Any]) -> Iterable[Shown]:
     return drawn.all_figures(run, recording.rig, recording.plan.running_rad_s)
 
 
-def measures_of(rig: RigFile) -> tuple[Quantity, ...]:
-    """What the coils need is read of captures."""
-    return MEASURES if can_capture(rig) else tuple(q for q in MEASURES if q not in (CURRENT, VOLTAGE))
-
-
 def requires(rig: RigFile) -> Requires:
     """What the unbalance response needs; the greatest coil voltage of each bearing is shown where it is told."""
     needed, told = unbalance.requires(rig), conventions(rig).plane_voltages
@@ -234,12 +229,11 @@ procedure = Procedure(
     measured=measured,
     figures=figures,
     requires=requires,
-    measures_of=measures_of,
     check=check,
     settings=settings,
     step_count=step_count,
     needs=lambda plan: bearings.needs(plan.bearings),
-    optional=CRITICAL,
+    optional=(*CRITICAL, *unbalance.OF_CAPTURES),
     assumes=assumptions.PASSAGE,
     method=read_method(__file__),
 )

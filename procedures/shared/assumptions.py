@@ -77,6 +77,8 @@ ANGLE_STEP = (
 STEP = (
     "A set point that the controller scales is measured as the step that it makes: 1 % of it is 1 % of the step in "
     "steady_error, 1.5 % in overshoot, and half a swing or more in settling_time.",
+    "A controller that goes to its set points at a rate of its own makes ramps of them: found where the largest step rises "
+    "later than the smallest by 1 % and 1.5 U of the difference; less widens a rise by as much.",
 )
 UNBALANCE = (
     "Runout that changes with speed (a shaft that grows, probes that see its material) is in the vectors, half axes and D_max "

@@ -218,11 +218,6 @@ def figures(a: Analysis | Coasted, recording: Recording[Plan]) -> Iterable[Figur
     return drawn.all_figures(a.runs, a.angle, recording.plan.speed_rad_s)
 
 
-def measures_of(rig: RigFile) -> tuple[Quantity, ...]:
-    """A drive's run-downs are made at the bias that the controller has."""
-    return (B, T_C, J_Z) if coasting.applies(rig) else MEASURES
-
-
 def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     if coasting.applies(rig):
@@ -254,7 +249,7 @@ procedure = Procedure(
     step_count=step_count,
     fewest_steps=fewest_steps,
     steps_on=lambda rig, plan: coasting.steps(plan) if coasting.applies(rig) else step_count(plan),
-    measures_of=measures_of,
+    optional=(B_HIGH,),  # a drive's run-downs are made at the bias that the controller has
     facts=facts,
     holds_for=holds_for,
     assumes=assumptions.SPINDOWN,

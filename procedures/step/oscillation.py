@@ -30,17 +30,11 @@ SCALE = 100.0  # 1/s, of the search
 APART = (1.0, 0.2), (1.06, 0.25)  # start of the search: frequencies over the guess, damping ratios
 SLOW_HZ, FAST_HZ = 15.0, 250.0  # of what levitates: slower are integrators, faster filters
 HARD = 0.95  # of damping: no oscillation
-FAST_S, SHORT_S, LASTS = (
-    0.2,
-    0.012,
-    3.0,
-)  # time constants of an integrator that is no straight line; how many of it are fitted
+FAST_S, SHORT_S = 0.2, 0.012  # time constants of an integrator that is no straight line
+LASTS = 3.0  # times its time constant that it is fitted
 LATEST_S = 1.0  # until which it is looked for
 ALIKE = 0.3  # of a pole: what the other one of a shaft in two bearings is off by
-PLAIN, TOLD = (
-    10.0,
-    5e-3,
-)  # what it is over its standard uncertainty, and at the step's beginning as a share of it, at least
+PLAIN, TOLD = 10.0, 5e-3  # over its standard uncertainty, and at the beginning as a share of the step, at least
 ROWS, STATES = 12, 4  # of where the search begins: rows of a Hankel matrix, and its states
 
 
@@ -137,34 +131,53 @@ def swing(steps: Sequence[One], start: Swing | None = None) -> Swing:
     return _fitted(steps, one.poles[[0, 0]] * [1.0, APART[1][0]], one.constant, 2, one.misfit)
 
 
-def _fitted(steps: Sequence[One], start: Complex | None, constant: float, most: int, noise: float = 0.0) -> Swing:
-    """With up to `most` oscillations. The second one may hardly show; where the `noise` of a sample is given, it is taken for
-    one that is like the first, give or take ALIKE of it, as far as the data do not say otherwise."""
-    from scipy import optimize
+@dataclass(frozen=True)
+class _Data:
+    """Samples of all steps in one: times (n,), weights (n,), and what was seen times its weight (n, count); the time `constant`
+    s of what fades fast, 0 where nothing does; the `noise` of a sample where the second pole is taken for one like the
+    first."""
 
+    t: Array
+    weight: Array
+    seen: Array
+    constant: float
+    noise: float
+
+    def columns(self, x: Array) -> Array:
+        """Of what is linear: a level, a line or what fades, and the oscillations of `x`."""
+        many = 2 * self.seen.shape[1]
+        e = np.exp(SCALE * np.outer(self.t, -x[0:many:2] + 1j * x[1:many:2]))
+        slow = np.exp(-SCALE * x[-1] * self.t) if self.constant else self.t
+        return np.asarray(np.column_stack([np.ones_like(self.t), slow, e.real, -e.imag]) * self.weight[:, None])
+
+    def left(self, x: Array) -> Array:
+        """What the best linear terms leave; of many rows by their squares."""
+        a = self.columns(x)
+        if not self.constant:
+            return np.asarray((self.seen - a @ np.linalg.lstsq(a, self.seen, rcond=None)[0]).ravel())
+        out = np.asarray((self.seen - a @ np.linalg.lstsq(a.T @ a, a.T @ self.seen, rcond=None)[0]).ravel())
+        if self.noise == 0 or self.seen.shape[1] == 1:
+            return out
+        return np.append(out, self.noise * (x[2:4] - x[0:2]) / (ALIKE * np.hypot(x[0], x[1])))
+
+
+def _data(steps: Sequence[One], constant: float, most: int, noise: float) -> _Data:
     until = max(UNTIL_S, LASTS * constant)
     near = [(s.t > FROM_S) & (s.t < until) for s in steps]
     t = np.concatenate([s.t[m] for s, m in zip(steps, near, strict=True)])
     data = np.concatenate([s.weight * s.both[:, m] for s, m in zip(steps, near, strict=True)], axis=1).T
     weight = np.concatenate([np.full(int(m.sum()), s.weight) for s, m in zip(steps, near, strict=True)])
     count = 2 if most > 1 and np.any(data[:, 1]) else 1
-    data = data[:, :count]
-    swung, pulled, typical = slice(0, 2 * count), count > 1 and noise > 0, float(np.sqrt(np.mean(weight**2)))
+    return _Data(t, weight, data[:, :count], constant, noise * float(np.sqrt(np.mean(weight**2))))
 
-    def columns(x: Array) -> Array:
-        e = np.exp(SCALE * np.outer(t, -x[swung][0::2] + 1j * x[swung][1::2]))
-        slow = np.exp(-SCALE * x[-1] * t) if constant else t
-        return np.asarray(np.column_stack([np.ones_like(t), slow, e.real, -e.imag]) * weight[:, None])
 
-    def left(x: Array) -> Array:
-        a = columns(x)
-        if not constant:
-            return np.asarray((data - a @ np.linalg.lstsq(a, data, rcond=None)[0]).ravel())
-        out = np.asarray(
-            (data - a @ np.linalg.lstsq(a.T @ a, a.T @ data, rcond=None)[0]).ravel()
-        )  # many rows: by squares
-        return np.append(out, noise * typical * (x[2:4] - x[0:2]) / (ALIKE * np.hypot(x[0], x[1]))) if pulled else out
+def _fitted(steps: Sequence[One], start: Complex | None, constant: float, most: int, noise: float = 0.0) -> Swing:
+    """With up to `most` oscillations. The second one may hardly show; where the `noise` of a sample is given, it is taken for
+    one that is like the first, give or take ALIKE of it, as far as the data do not say otherwise."""
+    from scipy import optimize
 
+    data = _data(steps, constant, most, noise)
+    count = data.seen.shape[1]
     guess = _guess(steps[0]) / SCALE
     first = start[:count] / SCALE if start is not None and len(start) >= count else np.array(
         [guess * f * (-z + 1j) for f, z in APART[:count]]
@@ -173,12 +186,12 @@ def _fitted(steps: Sequence[One], start: Complex | None, constant: float, most: 
     if constant:
         x0 = np.append(x0, 1 / constant / SCALE)
     try:
-        found = optimize.least_squares(left, x0, x_scale=0.1, method="lm", max_nfev=300)
-        terms = np.linalg.lstsq(columns(found.x), data[:, 0], rcond=None)[0]
+        found = optimize.least_squares(data.left, x0, x_scale=0.1, method="lm", max_nfev=300)
+        terms = np.linalg.lstsq(data.columns(found.x), data.seen[:, 0], rcond=None)[0]
     except (ValueError, np.linalg.LinAlgError) as error:
         raise AnalysisError(f"no oscillation fits the response: {error}") from error
-    out = _swing_of(found.x, terms, count, float(steps[0].t[1] - steps[0].t[0]), bool(constant))
-    out = replace(out, misfit=float(np.sqrt(np.mean(found.fun**2) / np.mean(weight**2))))
+    out = _swing_of(found.x, np.asarray(terms, np.float64), count, float(steps[0].t[1] - steps[0].t[0]), bool(constant))
+    out = replace(out, misfit=float(np.sqrt(np.mean(found.fun**2) / np.mean(data.weight**2))))
     if not (np.isfinite(out.pole) and 0 < out.damping < HARD and out.pole.imag > 0 and out.constant >= 0):
         raise AnalysisError("no oscillation that dies away fits the response")
     return out

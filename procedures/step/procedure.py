@@ -24,7 +24,7 @@ from bench.units import RPM
 from procedures.amb_rotor import lift
 from procedures.amb_rotor.conventions import conventions
 from procedures.shared import assumptions
-from procedures.step import checks, estimates, planes
+from procedures.step import checks, estimates, planes, slewing
 from procedures.step import figures as drawn
 from procedures.step.estimates import Result
 from procedures.step.plan import Plan
@@ -173,6 +173,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     by_case = estimates.by_case(steps, recording.rig, plan.band)
     by_group = estimates.by_group(steps, by_case)
     findings.add(checks.of_results(by_case, by_group, plan))
+    findings.add(slewing.of_sizes(by_case))
     findings.add(checks.compare(by_case, plan.names))
     return Results(steps, by_case, by_group)
 

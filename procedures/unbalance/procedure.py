@@ -24,7 +24,7 @@ from procedures.amb_rotor.laws import of_laws, of_variants
 from procedures.shared import assumptions, first_look
 from procedures.synchronous import bearings, checks, dwelling, estimates, fitting, identified
 from procedures.synchronous.coil_peaks import find_uncertified
-from procedures.synchronous.dwells import can_capture, read_dwells, required
+from procedures.synchronous.dwells import read_dwells, required
 from procedures.synchronous.estimates import Results
 from procedures.synchronous.hum import listen, of_dwells
 from procedures.unbalance import figures as drawn
@@ -60,6 +60,8 @@ READ = Quantity(
 CURRENT = Quantity("current_peak", "A", "coil current of a plane that is exceeded for 1 % of the time")
 VOLTAGE = Quantity("voltage_peak", "V", "coil voltage of a plane that is exceeded for 1 % of the time, either way")
 MEASURES = (COSINE, SINE, MAJOR, D_MAX, SHARE, READ, CURRENT, VOLTAGE)
+OF_CAPTURES = (CURRENT, VOLTAGE)
+"""What is read of captures alone."""
 LESS_RUNOUT = tuple(q.name for q in (COSINE, SINE, MAJOR, D_MAX, SHARE))
 
 
@@ -109,11 +111,6 @@ def measured(results: Results) -> Iterator[Measured]:
                 yield known[name].measured(estimate, f"{place}, {result.dwell.where}" if place else result.dwell.where)
 
 
-def measures_of(rig: RigFile) -> tuple[Quantity, ...]:
-    """What the coils need is read of captures."""
-    return MEASURES if can_capture(rig) else tuple(q for q in MEASURES if q not in (CURRENT, VOLTAGE))
-
-
 def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     return required(rig)
@@ -148,7 +145,7 @@ procedure = Procedure(
     measured=measured,
     figures=figures,
     requires=requires,
-    measures_of=measures_of,
+    optional=OF_CAPTURES,
     check=check,
     settings=settings,
     step_count=step_count,

@@ -20,10 +20,10 @@ from bench.procedure import Measured
 from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.rigfile.roles import Status
-from bench.uncertainty import Estimate, interval
+from bench.uncertainty import Estimate, Influence, interval
 from bench.uncertainty.coverage import ensemble
 from procedures.amb_rotor.onset import onset
-from procedures.step import checks, estimates, oscillation, planes, response, scatter, settling
+from procedures.step import checks, estimates, oscillation, planes, response, scatter, settling, slewing
 from procedures.step import steps as step_steps
 from procedures.step.plan import Plan
 from procedures.step.procedure import MEASURES, check, procedure, recorded_s, step_count, waited_s
@@ -122,6 +122,22 @@ def test_a_fast_integrator_is_fitted_beside_the_swing() -> None:
         for s in ones
     ]
     assert oscillation.swing(slow).constant == 0.0  # a straight line does while the shaft swings
+
+
+@pytest.mark.parametrize(("rises", "told"), [((2.5e-3, 2.5e-3), 0), ((2.5e-3, 2.53e-3), 0), ((2.5e-3, 2.8e-3), 1)])
+def test_rises_that_go_with_the_size_are_ramps(rises: tuple[float, float], told: int) -> None:
+    noise = Influence(id="n", name="n", u=5e-6, unit="s", kind="A", distribution="normal")
+    results = {}
+    for size, rise in zip((10e-6, 20e-6), rises, strict=True):
+        for way in (1, -1):
+            case = step_steps.Case("A", 0.0, "y", size, way)
+            settled = settling.Settling(0.0, 0.02, np.zeros(0))
+            results[case] = estimates.Result(case, (), None, settled, 0.0, {"rise_time": Estimate.of(rise, noise)})
+    found = list(slewing.of_sizes(results))
+    assert len(found) == told
+    if told:  # 20 µm in T: rise² has grown by 0.6 T² less that of 10 µm, a quarter of it
+        rate = 20e-6 * math.sqrt(0.75 * 0.6 / (rises[1] ** 2 - rises[0] ** 2))
+        assert f"some {rate * 1e3:.2g} mm/s" in found[0].text
 
 
 def test_a7_the_estimate_settles_and_integral_action_does_not(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from bench.errors import BenchError
 from bench.figures import Figure
 from bench.record.records import Record, read_record
 from bench.recording import Recording
+from bench.rigfile.aliases import by_names
 from bench.rigfile.toleranced import Toleranced
 from bench.run import provenance
 from bench.rundir import RunDirectory
@@ -56,7 +57,7 @@ def _model(asked: Asked, sources: Sequence[Source], records: Sequence[Record], d
         schema=1, name=c.name, title=c.title, rig=rig.name, uut=rig.uut.model_dump(), rig_sha256=rig.digest,
         simulated=c.backend == "sim" or told, seed=seed, visit=visit, created=provenance.now(),
         complete=len(done) == len(asked.steps) and all(d.passed for d in done),
-        constants=campaign_model.constants_of(sources, c.equations),
+        constants=campaign_model.constants_of(sources, by_names(rig.aliases, c.equations)),
         correlations=campaign_model.correlations_of(sources), given=campaign_model.given(tables),
     )  # fmt: skip
 

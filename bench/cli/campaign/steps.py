@@ -9,10 +9,12 @@ from typing import Any
 
 from bench.calibration import Need, settings_differ
 from bench.campaign import Campaign, Step
+from bench.campaign.file import Equation
 from bench.cli.loading import load_procedure
 from bench.errors import ConfigError, Problem
 from bench.procedure import BenchPlan, Procedure, plans
 from bench.rigfile import RigFile
+from bench.rigfile.aliases import by_names, names_meant
 from bench.rigfile.envelope import Envelope
 
 
@@ -39,7 +41,7 @@ def planned(campaign: Campaign, path: str, rig: RigFile, short: bool) -> tuple[P
     problems: list[Problem] = []
     found: list[Planned] = []
     for number, step in enumerate(campaign.step, 1):
-        procedure = load_procedure(step.procedure)
+        procedure = load_procedure(step.procedure).on(rig)
         try:
             plan, assignments = _plan(procedure, step, rig, short)
         except ConfigError as error:
@@ -54,7 +56,7 @@ def planned(campaign: Campaign, path: str, rig: RigFile, short: bool) -> tuple[P
             )
         ]
         names = tuple(q.name for q in procedure.measures)
-        judged = names if step.judged is None else step.judged
+        judged = names if step.judged is None else names_meant(rig.aliases, step.judged)
         problems += [
             Problem(path, f"step.{number}.judged", repr(name), f"one of {', '.join(names)}")
             for name in judged
@@ -64,7 +66,7 @@ def planned(campaign: Campaign, path: str, rig: RigFile, short: bool) -> tuple[P
         needs = tuple(n for n in procedure.needs(plan) if not n.optional or n.procedure in before)
         found.append(Planned(number, procedure, plan, assignments, bool(step.adopt), judged, needs))
     problems += _unmet(found, path)
-    problems += _unknown_equations(campaign, found, path)
+    problems += _unknown_equations(by_names(rig.aliases, campaign.equations), len(campaign.step), found, path)
     if problems:
         raise ConfigError(f"campaign {campaign.name} cannot be run; nothing was started:", tuple(problems))
     return tuple(_adopting(found, campaign))
@@ -108,10 +110,12 @@ def _unmet(steps: list[Planned], path: str) -> Iterator[Problem]:
         before[step.procedure.name] = step
 
 
-def _unknown_equations(campaign: Campaign, steps: list[Planned], path: str) -> Iterator[Problem]:
+def _unknown_equations(
+    equations: Mapping[str, Equation], count: int, steps: list[Planned], path: str
+) -> Iterator[Problem]:
     known = {q.name for s in steps for q in s.procedure.measures}
-    for name in campaign.equations:
-        if name not in known and len(steps) == len(campaign.step):
+    for name in equations:
+        if name not in known and len(steps) == count:
             yield Problem(path, f"equations.{name}", "one", f"a quantity of the steps: {', '.join(sorted(known))}")
 
 

@@ -32,7 +32,8 @@ PLAIN = {
     "pulse_missing": 0.0, "pulse_doubled": 0.0, "pulse_last": 0.0, "loose_speed": 0.0, "loose_shift": 0.0, "loose_weight": 0.0,
     "weight_lost": 0.0, "weight_astray": 0.0, "weight_turned": 0.0, "weight_turned_rad": 0.0, "weight_heavy": 0.0,
     "weight_heavy_by": 0.0, "hum": 0.0, "hum_hz": 50.0, "hum_probe": 0.0, "hanger_off_at_zero": 0.0, "contact_silent": 0.0,
-    "drop_fraction": 0.0, "integrator_factor": 1.0, "dead_after_s": 0.0, "fault_after_s": 0.0, "drive_fault_after_s": 0.0,
+    "drop_fraction": 0.0, "own_slew": 0.0, "integrator_factor": 1.0, "dead_after_s": 0.0,
+    "fault_after_s": 0.0, "drive_fault_after_s": 0.0,
 }  # fmt: skip
 """Planted defects that any rig can have, and their harmless values: as those of `amb5dof`. `defects_of` has those of one
 rig."""

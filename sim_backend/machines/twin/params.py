@@ -110,6 +110,7 @@ class TwinParams:
     start_angle: float = 0.0
     lost_share: float = 0.98
     lost_time: float = 0.1
+    own_slew: float = 0.0  # m/s: a rate at which the controller follows set points, whatever it is told; 0: none
 
 
 def params(rig: RigFile, v: Numbers, d: Numbers) -> TwinParams:
@@ -129,7 +130,7 @@ def params(rig: RigFile, v: Numbers, d: Numbers) -> TwinParams:
         control=control_of(rig), names=told_of(rig, d), radial=len(layout.radial), axial=int(layout.axial is not None),
         probes=len(layout.probes), rings=len(layout.rings), planes=len(layout.planes),
         bearings=len(rig.bearings), tick=n.tick_s, period=n.period_ticks, free_tilt=float(free.tilts), free_radial=free.radial,
-        coil_limit=n.current_limit, trip_current=n.set("trip_current", 1.15 * n.current_limit),
+        coil_limit=n.current_limit, own_slew=d["own_slew"], trip_current=n.set("trip_current", 1.15 * n.current_limit),
         trip_speed=n.set("trip_speed", 1.1 * rig.envelope.max_speed_rad_s), **parts,  # type: ignore[arg-type]
     )  # fmt: skip
 

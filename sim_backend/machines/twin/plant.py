@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -57,6 +58,7 @@ class TwinPlant(TurningPlant):
         self._several = _joined(names.rows)
         _told(self._p, names.rows, names.ticks)
         self._settable = {name: (field, where) for name, field, where in settable(params.names)}
+        self.set("slew", params.control.slew)
         _lib.twin_start(self._p, self._s, seed & (2**64 - 1))
 
     def set(self, name: str, value: float) -> None:
@@ -68,6 +70,8 @@ class TwinPlant(TurningPlant):
             KeyError: the law has no such parameter.
         """
         field, where = self._settable[name]
+        if name == "slew" and self.params.own_slew:
+            value = min(value or math.inf, self.params.own_slew)
         if not where:
             setattr(self._c, field, value)
         for k in where:
@@ -145,7 +149,7 @@ class TwinPlant(TurningPlant):
 
 def core_fields(p: TwinParams) -> Mapping[str, Any]:
     """What of the parameters is the core's."""
-    return {name: value for name, value in vars(p).items() if name not in ("control", "names")}
+    return {name: value for name, value in vars(p).items() if name not in ("control", "names", "own_slew")}
 
 
 def _joined(rows: tuple[tuple[str, int], ...]) -> list[list[int]] | None:
