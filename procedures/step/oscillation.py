@@ -33,6 +33,9 @@ HARD = 0.95  # of damping: no oscillation
 FAST_S, SHORT_S = 0.2, 0.012  # time constants of an integrator that is no straight line
 LASTS = 3.0  # times its time constant that it is fitted
 LATEST_S = 1.0  # until which it is looked for
+TOGETHER = (
+    0.05  # of a pole, by which a second oscillation may move the mean; beyond, it fits noise and what filters leave
+)
 ALIKE = 0.3  # of a pole: what the other one of a shaft in two bearings is off by
 PLAIN, TOLD = 10.0, 5e-3  # over its standard uncertainty, and at the beginning as a share of the step, at least
 ROWS, STATES = 12, 4  # of where the search begins: rows of a Hankel matrix, and its states
@@ -128,7 +131,8 @@ def swing(steps: Sequence[One], start: Swing | None = None) -> Swing:
         return _fitted(steps, start.poles, constant, len(start.poles), start.misfit)
     poles = _poles(steps)
     one = _fitted(steps, poles, constant, 1)
-    return _fitted(steps, one.poles[[0, 0]] * [1.0, APART[1][0]], one.constant, 2, one.misfit)
+    both = _fitted(steps, one.poles[[0, 0]] * [1.0, APART[1][0]], one.constant, 2, one.misfit)
+    return both if abs(both.pole - one.pole) < TOGETHER * abs(one.pole) else one
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from bench.rigfile.places import CENTRE, Places
 from bench.rigfile.roles import ANGLE, SPEED, STATUS
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.amb_rotor.onset import onset
+from procedures.step import capturing
 from procedures.step.response import trailing
 
 Array = npt.NDArray[np.float64]
@@ -146,7 +147,7 @@ def _probe_arms(rig: RigFile) -> tuple[float, float]:
 
 def _read(recording: Recording[Any], step: Step) -> Done:
     machine = conventions(recording.rig)
-    data, labels = _whole(at_rest_if_untold(step.read(*channels(machine)))), step.labels
+    data, labels = _whole(at_rest_if_untold(capturing.read(step, channels(machine)))), step.labels
     axis, signed = str(labels["axis"]), float(labels["step_m"])
     case = Case(str(labels["setting"]), float(labels["speed_rad_s"]), axis, abs(signed), 1 if signed > 0 else -1)
     written = [e["t_ns"] for e in recording.events("parameter")
