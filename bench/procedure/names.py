@@ -12,7 +12,7 @@ from bench.rigfile.aliases import Aliases, names_meant, names_of, renamed
 
 def quantities_on(aliases: Aliases, quantities: Iterable[Quantity]) -> tuple[Quantity, ...]:
     """Declared quantities, each of which the rig has names for by these."""
-    return tuple(found for quantity in quantities for found in _called(aliases, quantity))
+    return tuple({found.name: found for quantity in quantities for found in _called(aliases, quantity)}.values())
 
 
 def _called(aliases: Aliases, quantity: Quantity) -> Iterator[Quantity]:

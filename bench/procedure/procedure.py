@@ -83,10 +83,10 @@ class Procedure:
     `requires` is what a rig must have, whatever the plan, by the names that its own file has. `check` looks at a plan against
     a rig that has it, before anything starts, and names what cannot work. `settings` are the parameters of the rig's
     controller, SI, that the runner writes in READY, before it levitates. `optional` of the measures are those that a sound
-    machine may lack: not missing where no limit asks; `measures_of` a rig are those that it may have at all (None: every
-    one). `step_count` is how many steps `acquire` will record, for the progress display; 0 is unknown. `fewest_steps` is how
-    many a run that goes to its end has at least, where these are fewer; `former_steps` how many one of plan schema 1 has,
-    where it had fewer.
+    machine may lack: not missing where no limit asks. `step_count` is how many steps `acquire` will record, for the progress
+    display; 0 is unknown. `fewest_steps` is how many a run that goes to its end has at least, where these are fewer;
+    `former_steps` how many one of plan schema 1 has, where it had fewer; `steps_on` is `step_count` where that depends on the
+    rig.
     `evaluate` makes of a recording what all that follows needs, once, and tells its findings as it goes; it ends where one
     that is told at a gate is an error, and then nothing is measured nor drawn. Without it the recording itself is what
     follows needs. `measured` yields the quantities of it in the order of the report. `figures` come in the order in which
@@ -120,36 +120,32 @@ class Procedure:
     settings: Callable[[RigFile, Any], Mapping[str, float]] = field(default=_no_settings)
     step_count: Callable[[Any], int] = field(default=_unknown_count)
     fewest_steps: Callable[[Any], int] | None = None
+    steps_on: Callable[[RigFile, Any], int] | None = None
     former_steps: Callable[[Any], int] | None = None
     needs: Callable[[Any], tuple[Need, ...]] = field(default=_no_needs)
     facts: Callable[[Any], Mapping[str, Estimate]] | None = None
     holds_for: Callable[[Any], Mapping[str, float]] = field(default=_numbers_of)
     optional: tuple[Quantity, ...] = ()
-    measures_of: Callable[[RigFile], tuple[Quantity, ...]] | None = None
     reached: tuple[str, ...] = ()
     assumes: tuple[str, ...] = ()
     places: tuple[str, ...] = ()
     kinds: tuple[Quantity, ...] = ()
     method: str = ""  # the report's section: plain paragraphs, parted by empty lines
 
+    def steps(self, rig: RigFile, plan: Any) -> int:
+        """How many steps `acquire` will record on a rig; 0 is unknown."""
+        return self.step_count(plan) if self.steps_on is None else self.steps_on(rig, plan)
+
     def on(self, rig: RigFile) -> Procedure:
-        """With the quantities that a rig may have, by the names that it has for them at its places."""
-        measures, optional = (quantities_on(rig.aliases, some) for some in (self.measured_on(rig), self.optional))
+        """With its quantities by the names that a rig has for them at its places."""
+        measures, optional = (quantities_on(rig.aliases, some) for some in (self.measures, self.optional))
         if measures == self.measures:
             return self
-        kinds = self.kinds or self.measures
-        return replace(self, measures=measures, optional=optional, kinds=kinds, measures_of=None)
+        return replace(self, measures=measures, optional=optional, kinds=self.kinds or self.measures)
 
     def problems(self, rig: RigFile, plan: Any) -> tuple[str, ...]:
         """What cannot work, found before anything starts: what the rig lacks, else what the plan asks too much of it."""
         return self.lacking(rig) or tuple(self.check(rig, plan))
-
-    def measured_on(self, rig: RigFile) -> tuple[Quantity, ...]:
-        """Those of the measures that a rig may have; all of them where it lacks what tells."""
-        try:
-            return self.measures if self.measures_of is None else self.measures_of(rig)
-        except Lacking:
-            return self.measures
 
     def lacking(self, rig: RigFile) -> tuple[str, ...]:
         """What the rig does not have, one line a table of its file; nothing where it can run the procedure."""

@@ -7,7 +7,7 @@ from typing import Any
 
 Content = dict[str, Any]
 ENDS = ("inboard", "outboard")
-BY_BEARING = {f"{kind}_{end[0]}": f"{kind}@{end}" for kind in ("K", "K2", "Kw", "F0") for end in ENDS}
+BY_BEARING = {f"{kind}_{end[0]}": f"{kind}@{end}" for kind in ("K", "K2", "Kw", "F0", "hanger") for end in ENDS}
 OF_MOTOR = {"peak_outboard": "peak@outboard", "peak_motor": "peak@motor"}
 AXES = ("yi", "zi", "yo", "zo")
 BY_AXIS = {f"{kind}_{axis}": f"{kind}@{axis}" for kind in ("beta", "offset") for axis in AXES}

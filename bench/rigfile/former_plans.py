@@ -15,6 +15,7 @@ PLAN_SCHEMA = 2
 BY_DEFAULT: Mapping[str, Mapping[str, Any]] = {
     "step": {"a": {"law": 1.0}},
     "bearing-model": {"law": "CCS", "spacing_m": 20e-6, "radius_m": 82e-6, "biases_A": [1.15, 0.8]},
+    "tracking": {"laws": ["CCS", "CAC"], "compare": ["PID"], "y_m": 50e-6, "z_m": 80e-6},
     "unbalance": {"law": "CCS"},
     "compensation": {"law": "CCS"},
     "balance": {"law": "CCS"},

@@ -33,31 +33,18 @@ from procedures.amb_calibration.hanging import exercised, hung_up_and_down, sequ
 from procedures.amb_calibration.hypotheses import Contradiction
 from procedures.amb_calibration.inputs import fit_inputs, hand_rad
 from procedures.amb_calibration.plan import Plan
-from procedures.amb_calibration.pulls import SERVOMOTOR, Loaded, Pull, pulls
+from procedures.amb_calibration.pulls import Loaded, Pull, pulls
 from procedures.amb_calibration.scatter import Scatter, covariance_by_angle, covariance_over_a_turn, outputs, scatter
 from procedures.amb_calibration.steps import HangingData, channels, hung, read_hangings
 from procedures.servomotor.loads import check_masses
 from procedures.shared import assumptions
 from procedures.shared.weight import weight
 
-K_I = Quantity("K_i", "N/A", "inboard AMB: dF/di at zero control current, mean over a turn")
-K_O = Quantity("K_o", "N/A", "outboard AMB: dF/di at zero control current, mean over a turn")
-K2_I = Quantity("K2_i", "N/A^2", "inboard AMB: (d²F/di²)/2, mean over a turn")
-K2_O = Quantity("K2_o", "N/A^2", "outboard AMB: (d²F/di²)/2, mean over a turn")
-KW_I = Quantity("Kw_i", "N/A", "inboard AMB: dF/di at the current that carries the rotor's own weight")
-KW_O = Quantity("Kw_o", "N/A", "outboard AMB: dF/di at the current that carries the rotor's own weight")
-BY_BEARING = (K_I, K_O, K2_I, K2_O, KW_I, KW_O)
-"""Of a shaft that a self-bearing motor turns: by bearing, each along its upright axis."""
 K = Quantity("K", "N/A", "dF/di of a bearing's axis at zero control current, mean over a turn")
 K2 = Quantity("K2", "N/A^2", "(d²F/di²)/2 of a bearing's axis, mean over a turn")
 KW = Quantity("Kw", "N/A", "dF/di of a bearing's axis at the current that carries the rotor's own weight")
-BY_AXIS = (K, K2, KW)
-MEASURES = (*BY_BEARING, *BY_AXIS)
-
-
-def measures_of(rig: RigFile) -> tuple[Quantity, ...]:
-    """Those that a rig has: by bearing or by axis."""
-    return BY_BEARING if {a.key for p in pulls(rig) for a in p.axes} == {*SERVOMOTOR.keys} else BY_AXIS
+MEASURES = (K, K2, KW)
+"""At each axis; of a shaft that a self-bearing motor turns at each bearing, along its upright axis."""
 
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
@@ -123,14 +110,9 @@ def _evaluated(recording: Recording[Plan], findings: Findings, pull: Pull, sever
 
 
 def measured(parts: list[Analysis]) -> Iterator[Measured]:
-    """By bearing the six quantities of the servomotor; else three of each axis."""
-    by_bearing = {q.name: q for q in BY_BEARING}
+    """Three quantities of each axis, or bearing."""
     estimates = {name: e for a in parts for name, e in _scattered(a).items()}
-    if by_bearing.keys() == estimates.keys():
-        for name, quantity in by_bearing.items():
-            yield quantity.measured(estimates[name])
-        return
-    for quantity in BY_AXIS:
+    for quantity in MEASURES:
         for axis in (axis for a in parts for axis in a.fit.pull.axes):
             yield quantity.measured(estimates[f"{quantity.name}_{axis.key}"], axis.where)
 
@@ -156,11 +138,11 @@ def facts(parts: list[Analysis]) -> dict[str, Estimate]:
 
 
 def _fact(name: str, of: tuple[Loaded, ...]) -> str:
-    """`K_KEY@3` as `K@AXIS@3`, but of the servomotor."""
-    quantity, at, angle = name.partition("@")
+    """`K_KEY@3` as `K@PLACE, 3`."""
+    quantity, _, angle = name.partition("@")
     kind, _, key = quantity.partition("_")
-    axis = next(axis for axis in of if axis.key == key)
-    return name if key in SERVOMOTOR.keys else f"{kind}@{axis.name}{at}{angle}"
+    place = next(axis.where for axis in of if axis.key == key)
+    return f"{kind}@{place}, {angle}" if angle else f"{kind}@{place}"
 
 
 def _fitted(recording: Recording[Plan], data: HangingData) -> Analysis:
@@ -253,6 +235,5 @@ procedure = Procedure(
     holds_for=lambda plan: {"bias_A": plan.bias_A, "angles": plan.angles},
     reached=("masses/*", "!masses/hanger", "!masses/density"),
     assumes=assumptions.AMB_CALIBRATION,
-    measures_of=measures_of,
     method=read_method(__file__),
 )

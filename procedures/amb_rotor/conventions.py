@@ -1,7 +1,6 @@
 """What an AMB rotor's stand calls its things: axes, planes, channels, status bits, laws and parameters.
 
-A procedure asks for them once, `machine = conventions(rig)`, and hands them on: all are those of the rig file. AMB_ROTOR, the
-stand of the thesis, is what a declaration takes that has no rig (quantities by axis).
+A procedure asks for them once, `machine = conventions(rig)`, and hands them on. AMB_ROTOR is for declarations without a rig.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from bench.rigfile.capabilities import Capabilities
 from bench.rigfile.roles import ANGLE, SPEED, Status, is_bound
 from bench.rigfile.supports import axial_support, least_clearance, once_per_rig, two_planes
 from procedures.amb_rotor import loops
-from procedures.amb_rotor.stations import AXIAL, Stations, gaps, in_two_planes, stations
+from procedures.amb_rotor.stations import ALONG, Stations, gaps, in_two_planes, stations
 from procedures.shared.unsupported import of_weight, unlike
 
 Law = str
@@ -37,8 +36,8 @@ class AmbRotor:
     negative side, `coil_voltages` those of the same coils. `plane_voltages` are the channels of the greatest coil voltage of
     each plane, none where they are not told.
 
-    `can` is what its controller can be asked to do. `stations` has where axes pull and probes look; `stands_s` is how long
-    after the last pulse the controller knows that the shaft stands, s.
+    `can` is what its controller can be asked to do. `stations` has where axes pull and probes look; `stands_s`: how long after
+    the last pulse the controller knows that the shaft stands, s.
     """
 
     axes: tuple[str, str, str, str]
@@ -59,6 +58,7 @@ class AmbRotor:
     lag_s: float  # by which currents follow their references, as the controller knows it, or as the rig file says
     loop_rad_s: float  # the rigid modes' own, by the laws that say so (`flatness`); infinite where none does
     gaps: Mapping[str, float]  # air gap by axis, m, as far as it is told
+    speed_told: bool
     marked: bool  # whether the angle and the speed are told by a mark
     clearance: float  # the least of the rings', m; infinite where the rig has none
     lacks: tuple[str, ...] = ()  # where the rig is not as these procedures take it
@@ -82,8 +82,7 @@ class AmbRotor:
     @property
     def probed(self) -> bool:
         """Whether every radial axis has a probe of its own, which reads the way the axis counts."""
-        signs = [self.stations.probes[self.probes[a]].sign for a in self.axes if a in self.probes]
-        return len(signs) == len(self.axes) and min(signs) > 0
+        return all(a in self.probes and self.stations.probes[self.probes[a]].sign > 0 for a in self.axes)
 
     @property
     def all_positions(self) -> tuple[str, ...]:
@@ -177,7 +176,7 @@ class AmbRotor:
 
     def _by_axes(self, at: Mapping[str, float]) -> dict[str, float]:
         """By T (2.17) at each bearing; an axis that no coordinate moves is left alone."""
-        out = {self.axial if name == AXIAL else name: value for name, value in self.stations.moved(at).items()}
+        out = {self.axial if name == ALONG else name: value for name, value in self.stations.moved(at).items()}
         parameters = self.can.set_points.axes
         if missing := [axis or "the shaft" for axis in out if axis not in parameters]:
             raise Lacking(f"capabilities.set_points: found none for {', '.join(missing)}")
@@ -256,6 +255,7 @@ AMB_ROTOR = AmbRotor(
     lag_s=1 / (800 * math.pi),
     loop_rad_s=math.inf,
     gaps={},
+    speed_told=True,
     marked=True,
     clearance=1e-4,
 )
@@ -294,6 +294,7 @@ def conventions(rig: RigFile) -> AmbRotor:
         gaps=gaps(rig),
         lacks=unlike(rig, planes),
         unweighed=of_weight(rig, planes, (-lean, math.pi / 2 - lean)),
+        speed_told=is_bound(rig, SPEED),
         marked=is_bound(rig, ANGLE) and is_bound(rig, SPEED),
         clearance=least_clearance(rig),
     )

@@ -31,6 +31,7 @@ Array = npt.NDArray[np.float64]
 SQUARE = 1e-12  # of a cosine: what rounding leaves of nothing
 COORDINATES = ("y", "z", "psi", "theta")
 AXIAL = "x"
+ALONG = ""  # where axes are asked for by name: along the shaft, and no axis is called so
 NOTHING = Sum()
 DETERMINED = 1e-3  # least over greatest singular value, arms over their own length
 
@@ -65,7 +66,7 @@ class Ring:
 class Stations:
     """Of one machine. `axes` by name; `probes` by channel, those that look along an axis first, in the axes' order; `first` rad
     is the direction of y around the shaft, `hand` 1 where z is counter-clockwise from it; `tilt` rad from the horizontal;
-    `gaps` m by axis, where they are told."""
+    `gaps` m by axis, where they are told; `helpers`, the motors that hold the shaft beside the bearings."""
 
     axes: Mapping[str, Placed]
     probes: Mapping[str, Placed]
@@ -74,6 +75,7 @@ class Stations:
     hand: int = 1
     tilt: Sum = NOTHING
     gaps: Mapping[str, Term] = field(default_factory=dict)
+    helpers: tuple[str, ...] = ()
 
     @property
     def up(self) -> tuple[float, float]:
@@ -98,7 +100,8 @@ class Stations:
     @property
     def lacks(self) -> tuple[str, ...]:
         """What cannot be told of the shaft, a line each."""
-        out = []
+        out = [f"motors.{name}: found one that gives radial force; expected a shaft that its two bearings alone hold"
+               for name in self.helpers]  # fmt: skip
         if not _determine(self.reads):
             out.append(f"probes: found {len(self.probes)} radial, from which position and tilts do not follow; expected four "
                        "or more, of two directions in two planes")  # fmt: skip
@@ -110,11 +113,11 @@ class Stations:
 
     def moved(self, at: Mapping[str, float]) -> dict[str, float]:
         """How far the shaft at some coordinates (m and rad) is off the middle along each axis, m; what does not move is left
-        out, and along the shaft it is that coordinate's own."""
+        out, and along the shaft (ALONG) it is that coordinate's own."""
         out: dict[str, float] = {}
         for coordinate, value in at.items():
             k = COORDINATES.index(coordinate) if coordinate != AXIAL else None
-            by = {AXIAL: 1.0} if k is None else {a: p.row[k] for a, p in self.axes.items() if p.row[k]}
+            by = {ALONG: 1.0} if k is None else {a: p.row[k] for a, p in self.axes.items() if p.row[k]}
             for axis, factor in by.items():
                 out[axis] = out[axis] + factor * value if axis in out else factor * value
         return out
@@ -188,6 +191,7 @@ def _stations(rig: RigFile, places: Places, planes: tuple[Support, Support]) -> 
         hand,
         Sum((places.number(rig.shaft.tilt, "shaft.tilt"),)) if tilted else Sum(),  # type: ignore[union-attr, arg-type]
         {a: gap for p in planes for a, gap in _gap(rig, places, p)},
+        tuple(name for name, motor in rig.motors.items() if "radial force" in motor.gives),
     )
 
 

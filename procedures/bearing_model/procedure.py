@@ -35,11 +35,6 @@ from procedures.bearing_model.inputs import as_printed, lacking
 from procedures.bearing_model.plan import Plan
 from procedures.shared import assumptions, first_look
 
-AXES = AMB_ROTOR.axes
-BETA = {a: Quantity(f"beta_{a}", "N m^2/A^2", f"force constant of axis {a}, at the same gap for all") for a in AXES}
-OFFSET = {
-    a: Quantity(f"offset_{a}", "m", f"axis {a}: from the magnetic centre to where the sensors read zero") for a in AXES
-}
 OF_LINEAR = {
     "k_linear": Quantity("k_linear", "N/A", "K_i of the linear model without intercept (not a slope of the bearing)"),
     "stiffness_linear": Quantity("stiffness_linear", "N/m", "K_xi of the linear model without intercept"),
@@ -56,11 +51,13 @@ OF_LINEAR = {
 BY_AXIS = {
     "beta": Quantity("beta", "N m^2/A^2", "force constant of an axis, at the gap of the rig file"),
     "offset": Quantity("offset", "m", "from the magnetic centre of an axis to where the probes read zero"),
+}
+SLOPES = {
     "K_i": Quantity("K_i", "N/A", "dF/di of an axis at its magnetic centre, with the bias in both coils"),
     "K_x": Quantity("K_x", "N/m", "dF/dx of an axis at its magnetic centre, with the bias in both coils"),
 }
-OF_AXES = (*BETA.values(), *OFFSET.values())
-MEASURES = (*OF_AXES, *OF_LINEAR.values())
+"""Of stands other than that of the thesis, whose results are beta and offset."""
+MEASURES = (*BY_AXIS.values(), *SLOPES.values(), *OF_LINEAR.values())
 REST_S = 0.3
 BIAS_STEP_A = 0.1
 REACHED = ("sensors/*", "!sensors/pos_*/offset", "!sensors/i_?o_p/gain", "geometry/amb_gap", "geometry/coupling_stiffness",
@@ -181,11 +178,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
 def measured(a: Analysis) -> Iterator[Measured]:
     """Each axis, then the comparison of each AMB."""
     for axis in a.held.machine.axes:
-        if axis in BETA:
-            yield BETA[axis].measured(a.estimates[f"beta_{axis}"])
-            yield OFFSET[axis].measured(a.estimates[f"offset_{axis}"])
-            continue
-        for name, quantity in BY_AXIS.items():
+        for name, quantity in (BY_AXIS if axis in AMB_ROTOR.axes else {**BY_AXIS, **SLOPES}).items():
             if f"{name}_{axis}" in a.estimates:
                 yield quantity.measured(a.estimates[f"{name}_{axis}"], axis)
     for where in a.held.machine.planes:
@@ -223,8 +216,11 @@ def requires(rig: RigFile) -> Requires:
 procedure = Procedure(
     name="bearing-model",
     title="Force constants and magnetic offsets of the radial AMBs by eccentric positioning",
-    measures=(*OF_AXES, *BY_AXIS.values(), *OF_LINEAR.values()),
-    optional=(*OF_AXES, *BY_AXIS.values()),  # each rig has its own axes; one without a load has no force constant
+    measures=MEASURES,
+    optional=(
+        *BY_AXIS.values(),
+        *SLOPES.values(),
+    ),  # each rig has its own axes; one without a load has no force constant
     state=RigState.READY,
     plan=Plan,
     acquire=acquire,

@@ -19,6 +19,7 @@ from procedures.force_constant import checks, estimates, fit
 from procedures.force_constant.plan import Plan
 from procedures.force_constant.steps import AtLevel, RampData, ramps
 from procedures.servomotor.conventions import conventions
+from procedures.servomotor.facts import of_ends
 from procedures.shared import first_look
 from procedures.shared.step_table import of_samples
 
@@ -30,7 +31,8 @@ SIGN, EXCHANGED = "segment-sign", "segments-exchanged"
 def passes(rig: Rig, plan: Plan, record: Recorder, seen: Sequence[tuple[AtLevel, Mapping[str, Array], int]]) -> bool:
     """Whether the run goes on after the first angle: each of its levels, what came there, and when in ns."""
     table = of_samples(*zip(*seen, strict=True), shape=(1, -1))
-    facts = next(c.values for c in record.calibrations if c.procedure == CALIBRATION)
+    known = next(c.values for c in record.calibrations if c.procedure == CALIBRATION)
+    facts = of_ends(rig.file, known)
     return first_look.passes(rig, record, judge(ramps(table, rig.file), rig.file, facts, plan))
 
 

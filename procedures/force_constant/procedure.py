@@ -34,6 +34,7 @@ from procedures.force_constant.fitting import check, requires
 from procedures.force_constant.plan import Plan
 from procedures.force_constant.steps import AtLevel, RampData, channels, read_ramps
 from procedures.servomotor.conventions import conventions
+from procedures.servomotor.facts import of_ends
 from procedures.servomotor.parameters import BIASES, CURRENTS, named, write
 from procedures.shared import assumptions, first_look
 from procedures.shared.step_table import record_step
@@ -128,7 +129,7 @@ class Analysis:
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """Both axes with their influences."""
     plan, rig, data = recording.plan, recording.rig, read_ramps(recording)
-    facts = recording.calibration(CALIBRATION).values
+    facts = of_ends(rig, recording.calibration(CALIBRATION).values)
     first_look.gate(recording, findings, first_angle.judge(data, rig, facts, plan))
     signals = list(checks.of_signals(data, conventions(rig), plan))
     findings.gate(signals, checks.FATAL)
@@ -154,7 +155,7 @@ def measured(a: Analysis) -> Iterator[Measured]:
 
 def contradictions(recording: Recording[Plan], a: Analysis) -> Iterator[Finding]:
     """Checks of the fits: the load at rest, wires, rows, levels, drift, axes."""
-    plan, known = recording.plan, recording.calibration(CALIBRATION).values
+    plan, known = recording.plan, of_ends(recording.rig, recording.calibration(CALIBRATION).values)
     rest = load_at_rest.compared(a.data.vertical, a.inputs, known, recording.rig, a.y.weight, plan.bias_A)
     yield from checks.load_moved(rest, 2 * a.y.mean.u)
     vertical: list[Finding] = []

@@ -34,6 +34,7 @@ from procedures.force_map.steps import AtPoint, MapData, channels, positions, re
 from procedures.servomotor import carrying, hold, segments, wiring
 from procedures.servomotor.conventions import conventions
 from procedures.servomotor.direction import of_probe
+from procedures.servomotor.facts import of_ends
 from procedures.servomotor.parameters import BIASES, named, needed, write
 from procedures.shared import assumptions
 from procedures.shared.step_table import record_step
@@ -125,7 +126,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> tuple[MapData, R
     plan, rig, data = recording.plan, recording.rig, read_points(recording)
     machine = conventions(rig)
     findings.gate(steps.of_signals(data, machine, plan), ("stuck-channel",))
-    inputs = estimates.inputs_of(rig, recording.calibration(CALIBRATION).values, plan.angles)
+    inputs = estimates.inputs_of(rig, of_ends(rig, recording.calibration(CALIBRATION).values), plan.angles)
     poles = 2 * round(rig.machine["pole_pairs"].value)
     result = estimates.evaluate(data, machine, inputs, plan.bias_A, plan.angles, poles)
     findings.add(steps.drifts(data, result.force, result.points.i_theta))

@@ -14,6 +14,7 @@ from procedures.negative_stiffness.fit import AmbFit, ByAmbs, ByMotor, MotorFit
 from procedures.negative_stiffness.plan import Plan
 from procedures.negative_stiffness.steps import Displaced
 from procedures.servomotor.conventions import Servomotor, conventions
+from procedures.servomotor.facts import of_ends
 from procedures.shared.certificates import certified, certified_gain, certified_sensors
 from procedures.shared.gradients import by_inputs
 from procedures.shared.step_table import StepTable
@@ -84,11 +85,12 @@ def fit_inputs(recording: Recording[Plan]) -> dict[str, Estimate]:
     """What the fits need besides the steps: calibrations, and certificates of the rig file as influences by identity."""
     rig, g = recording.rig, recording.rig.geometry
     amb, motor = recording.calibration("amb-calibration"), recording.calibration("force-constant")
+    known = of_ends(rig, amb.values)
     inputs = {
         "alpha_d": motor.values["alpha_d@0"],
         "chi": motor.values["alpha_dx"] / motor.values["alpha_d"],
-        "K_o": amb.values["K_o@0"],
-        "K2_o": amb.values["K2_o@0"],
+        "K_o": known["K_o@0"],
+        "K2_o": known["K2_o@0"],
         "bias_K": Estimate.exact(amb.settings["bias_A"]),
     }
     for key, name in (("l_is", "com_to_inboard_sensor"), ("l_os", "com_to_outboard_sensor"), ("z_oa", "com_to_outboard_amb"),

@@ -17,7 +17,7 @@ class Plan(BenchPlan):
     amplitude_A: float = Field(4e-3, gt=0)  # of each line of a comb, 0-pk
     sine_A: float | None = Field(
         None, gt=0
-    )  # where the controller makes one sine at a time; 3 % of the bias if not given
+    )  # where the controller makes one sine at a time; 1.5 % of the bias if not given
     low_hz: float = Field(2.0, gt=0)
     middle_hz: float = Field(256.0, gt=0)  # up to here the odd multiples of low_hz; above it every high_step_hz
     high_step_hz: float = Field(16.0, gt=0)

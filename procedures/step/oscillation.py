@@ -27,12 +27,16 @@ FROM_S, UNTIL_S = (
     0.05,
 )  # from where filters and current loops have died away; about three periods of what levitates
 SCALE = 100.0  # 1/s, of the search
+GREATEST = 300.0  # exponent of a swing that grows: its square is still a number
 APART = (1.0, 0.2), (1.06, 0.25)  # start of the search: frequencies over the guess, damping ratios
 SLOW_HZ, FAST_HZ = 15.0, 250.0  # of what levitates: slower are integrators, faster filters
 HARD = 0.95  # of damping: no oscillation
 FAST_S, SHORT_S = 0.2, 0.012  # time constants of an integrator that is no straight line
 LASTS = 3.0  # times its time constant that it is fitted
 LATEST_S = 1.0  # until which it is looked for
+TOGETHER = (
+    0.05  # of a pole, by which a second oscillation may move the mean; beyond, it fits noise and what filters leave
+)
 ALIKE = 0.3  # of a pole: what the other one of a shaft in two bearings is off by
 PLAIN, TOLD = 10.0, 5e-3  # over its standard uncertainty, and at the beginning as a share of the step, at least
 ROWS, STATES = 12, 4  # of where the search begins: rows of a Hankel matrix, and its states
@@ -128,7 +132,8 @@ def swing(steps: Sequence[One], start: Swing | None = None) -> Swing:
         return _fitted(steps, start.poles, constant, len(start.poles), start.misfit)
     poles = _poles(steps)
     one = _fitted(steps, poles, constant, 1)
-    return _fitted(steps, one.poles[[0, 0]] * [1.0, APART[1][0]], one.constant, 2, one.misfit)
+    both = _fitted(steps, one.poles[[0, 0]] * [1.0, APART[1][0]], one.constant, 2, one.misfit)
+    return both if abs(both.pole - one.pole) < TOGETHER * abs(one.pole) else one
 
 
 @dataclass(frozen=True)
@@ -146,7 +151,8 @@ class _Data:
     def columns(self, x: Array) -> Array:
         """Of what is linear: a level, a line or what fades, and the oscillations of `x`."""
         many = 2 * self.seen.shape[1]
-        e = np.exp(SCALE * np.outer(self.t, -x[0:many:2] + 1j * x[1:many:2]))
+        growth = np.minimum(-SCALE * np.outer(self.t, x[0:many:2]), GREATEST)  # where a search has gone astray
+        e = np.exp(growth + 1j * SCALE * np.outer(self.t, x[1:many:2]))
         slow = np.exp(-SCALE * x[-1] * self.t) if self.constant else self.t
         return np.asarray(np.column_stack([np.ones_like(self.t), slow, e.real, -e.imag]) * self.weight[:, None])
 

@@ -24,7 +24,7 @@ from bench.units import RPM
 from procedures.amb_rotor import lift
 from procedures.amb_rotor.conventions import conventions
 from procedures.shared import assumptions
-from procedures.step import checks, estimates, planes, slewing
+from procedures.step import capturing, checks, estimates, planes, slewing
 from procedures.step import figures as drawn
 from procedures.step.estimates import Result
 from procedures.step.plan import Plan
@@ -97,6 +97,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     lift.write(rig, model(rig.file, plan))
     if machine.can.set_points.slew:
         lift.write(rig, {machine.can.set_points.slew: 0.0})
+    captured, number = capturing.captures(rig.file, machine), 0
     now: tuple[str, float] | None = None
     for setting, speed, axis, size in cases(tuple(settings), plan.speeds_rad_s, plan.axes, plan.sizes_m):
         if (now is None or now[1] != speed) and not _at(rig, plan, record, speed):
@@ -117,9 +118,14 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
                     step_m=end - begin,
                     repeat=repeat,
                 ):
+                    if captured:
+                        capturing.arm(rig, machine, plan.rest_s + record_s)
                     rig.clock.sleep(plan.rest_s)
                     lift.write(rig, machine.point(axis, end))
                     rig.clock.sleep(record_s)
+                if captured:
+                    capturing.fetch(rig, number)
+                number += 1
     if rig.drive is not None and max(plan.speeds_rad_s) > 0:
         rig.drive.stop()
         rig.drive.coast()
@@ -241,7 +247,14 @@ def requires(rig: RigFile) -> Requires:
         channels=channels(machine),
         sensors=(*machine.all_positions, *machine.all_currents),
         capabilities=("set_points",),
-        uses=("settings.law", "gains", "bias", "model", "mark"),
+        uses=(
+            "settings.law",
+            "gains",
+            "bias",
+            "model",
+            "mark",
+            *(["capture"] if capturing.captures(rig, machine) else []),
+        ),
     )
 
 

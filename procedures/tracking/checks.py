@@ -48,7 +48,7 @@ def of_signals(orbits: Sequence[Orbit], plan: Plan) -> Iterator[Finding]:
             if np.ptp(values) == 0:
                 yield Finding("stuck-channel", f"{name} does not move at all during an orbit.", name, Effect.ERROR)
         yield from _clipping(o)
-        yield from _of_reference(o, o.law in plan.laws)
+        yield from _of_points(o) if o.path.points else _of_reference(o, o.law in plan.judged)
         if plan.speed_rad_s:
             off = float(np.abs(o.speed - plan.speed_rad_s).max()) / plan.speed_rad_s
             if off > STEADY:
@@ -119,6 +119,20 @@ def _of_reference(o: Orbit, judged: bool) -> Iterator[Finding]:
         yield from _of_drift(o, drift(o.whole, facts))
 
 
+def _of_points(o: Orbit) -> Iterator[Finding]:
+    """Does the shaft go where the set points are, each axis along its own?"""
+    facts, wave = nominal(o.step.recording.rig, o.t_0), o.path.wave
+    if o.clear < CLEAR:
+        text = f"the coil currents show no answer to set points ({o.clear:.1f} times their noise): their delay is not known."
+        yield Finding("start-not-seen", text, o.where, Effect.ERROR)
+    q, t = centre(o.path.readings, facts)[:2], o.path.t - o.path.t[0]
+    own = [known_frequency(t, x, wave.hz).amplitude for x in q]
+    if max(own) < APPLIED * max(wave.y, wave.z):
+        text = (f"the shaft moves by {own[0] * 1e6:.2g} and {own[1] * 1e6:.2g} µm at {wave.hz:g} Hz; the set points by "
+                f"{wave.y * 1e6:g} and {wave.z * 1e6:g} µm: they are not followed.")  # fmt: skip
+        yield Finding("reference-missing", text, o.where, Effect.ERROR)
+
+
 def _of_drift(o: Orbit, found: Drift | None) -> Iterator[Finding]:
     """A frequency that is a little off: its phase, which counts from the start, runs away by more than the budget has of it."""
     if found is None or not found.plain or abs(found.ahead_s) <= TIMING_TICKS * o.path.wave.tick:
@@ -134,7 +148,7 @@ def _of_drift(o: Orbit, found: Drift | None) -> Iterator[Finding]:
 def of_results(orbits: Sequence[Orbit], results: Mapping[str, Mapping[str, Estimate]], plan: Plan) -> Iterator[Finding]:
     """Contact, saturation, coils that should be off, and the laws side by side."""
     for o in orbits:
-        judged = o.law in plan.laws
+        judged = o.law in plan.judged
         yield from _of_contact(o, results[o.law]["ring_distance"], Effect.INDETERMINATE if judged else Effect.NOTE)
         current, voltage = o.machine.current_limit, o.machine.voltage_limit
         for bit, what in ((current, "current"), (voltage, "voltage")):
@@ -148,8 +162,8 @@ def of_results(orbits: Sequence[Orbit], results: Mapping[str, Mapping[str, Estim
                     Effect.INDETERMINATE if bad else Effect.NOTE,
                     (f"@{o.where}",),
                 )
-        low = results[o.law]["lower_current"]
-        if o.law == "CAC" and not o.path.turn_s and low.value - 2 * low.u > plan.max_lower_A:
+        low = results[o.law].get("lower_current")
+        if low is not None and o.law == "CAC" and not o.path.turn_s and low.value - 2 * low.u > plan.max_lower_A:
             yield Finding(
                 "lower-coils-on",
                 f"the lower coils carry up to {low.value:.3f} A with CAC ({plan.max_lower_A:g} A "
@@ -194,11 +208,17 @@ def _of_contact(o: Orbit, left: Estimate, effect: Effect) -> Iterator[Finding]:
 
 
 def _said(o: Orbit, r: Mapping[str, Estimate]) -> str:
+    touched = f"contact in {float((o.flags & o.machine.contact != 0).mean()):.0%} of the samples"
+    if o.path.points:
+        peak, rms, lag = r["contour_peak"], r["contour_rms"], r["phase_lag_y"]
+        return (f"{o.law or 'as set'}: off the ellipse by {peak.value * 1e6:.2f} ± {2 * peak.u * 1e6:.2f} µm at most, "
+                f"{rms.value * 1e6:.2f} µm rms, {lag.value / (2 * math.pi * o.path.wave.hz) * 1e3:.1f} ms behind in y, "
+                f"{touched}")  # fmt: skip
     y, z, psi, theta = (r[n] for n in ("error_peak_y", "error_peak_z", "tilt_psi", "tilt_theta"))
     low = r["lower_current"]
     return (
         f"{o.law}: peaks {y.value * 1e6:.1f} ± {2 * y.u * 1e6:.1f} µm in y, {z.value * 1e6:.1f} ± "
         f"{2 * z.u * 1e6:.1f} µm in z, "
         f"tilts {psi.value * 1e6:.0f} and {theta.value * 1e6:.0f} µrad, lower coils up to {low.value:.2f} A, "
-        f"contact in {float((o.flags & o.machine.contact != 0).mean()):.0%} of the samples"
+        f"{touched}"
     )

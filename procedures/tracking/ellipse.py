@@ -19,8 +19,10 @@ import numpy.typing as npt
 
 from bench.errors import AnalysisError
 from procedures.amb_rotor.geometry import Facts, centre, left
+from procedures.tracking.points import Points, contour
 
 Array = npt.NDArray[np.float64]
+OF_STEP = 0.125  # of a reference of set points
 SMOOTH_S = 3e-3  # of peaks at rest: the error of a sine of 10 Hz loses a thousandth
 
 
@@ -59,17 +61,20 @@ class Wave:
 
 @dataclass(frozen=True)
 class Path:
-    """One law's orbit: `t` (n,) s, `readings` (probes, n) m, `turn_s` of a turn of the shaft, 0 at rest."""
+    """One law's orbit: `t` (n,) s, `readings` (probes, n) m, `turn_s` of a turn of the shaft, 0 at rest; `points` where the
+    reference is a staircase of set points."""
 
     wave: Wave
     t: Array
     readings: Array
     turn_s: float
+    points: Points | None = None
 
     @property
     def smooth_s(self) -> float:
-        """Over how long peaks and rms are averaged: a turn of the shaft."""
-        return self.turn_s or SMOOTH_S
+        """Over how long peaks and rms are averaged: a turn of the shaft, or a part of a step of the reference."""
+        step = 0.0 if self.points is None else OF_STEP * float(np.median(np.diff(self.points.t)))
+        return self.turn_s or max(SMOOTH_S, step)
 
 
 def averaged(t: Array, x: Array, window: float) -> Array:
@@ -91,6 +96,11 @@ def errors(path: Path, f: Facts) -> Array:
     found = centre(path.readings, f)
     found[:2] -= path.wave.at(path.t, f.t_0)
     return averaged(path.t, found, path.smooth_s)
+
+
+def positions(path: Path, f: Facts) -> Array:
+    """y, z of the centre of mass in m and the tilts in rad, averaged as `errors`: (4, n)."""
+    return averaged(path.t, centre(path.readings, f), path.smooth_s)
 
 
 def plane_errors(path: Path, f: Facts) -> Array:
@@ -132,7 +142,8 @@ def turns(path: Path, f: Facts) -> Turns:
     """The revolutions of a path."""
     per = revolutions(path)
     room = left(path.readings, f)
-    both = np.concatenate([errors(path, f), plane_errors(path, f)])
+    stepped = path.points is not None
+    both = positions(path, f) if stepped else np.concatenate([errors(path, f), plane_errors(path, f)])
     period = path.wave.tick * path.wave.ticks
     parts = np.arange(round(1 / path.wave.hz / period)) * period
     grid = np.array([path.t[m][0] for m in per])[:1] + np.arange(len(per))[:, None] / path.wave.hz + parts
@@ -157,12 +168,40 @@ def followed(path: Path, f: Facts) -> tuple[Array, npt.NDArray[np.complex128]]:
 
 
 def _follows(path: Path, f: Facts, x: Array, m: npt.NDArray[np.bool_], axis: tuple[float, float, float]) -> complex:
+    if path.points is not None:
+        return _follows_points(path.points, path, f, x, m, path.wave.axes.index(axis))
     hz, size, lead = axis
     turn = 2 * math.pi * hz * (path.t[m] - path.wave.late - f.t_0) + lead
     sine, cosine, _ = np.linalg.lstsq(np.column_stack([np.sin(turn), np.cos(turn), np.ones_like(turn)]), x, rcond=None)[
         0
     ]
     return complex(sine, cosine) / (size * path.wave.shrinks(hz))
+
+
+def _follows_points(points: Points, path: Path, f: Facts, x: Array, m: npt.NDArray[np.bool_], axis: int) -> complex:
+    """The first harmonic of what was read over that of the staircase."""
+    hz, t = path.wave.hz, path.t[m] - path.wave.late
+    turn = 2 * math.pi * hz * t
+    cosine, sine, _ = np.linalg.lstsq(np.column_stack([np.cos(turn), np.sin(turn), np.ones_like(turn)]), x, rcond=None)[
+        0
+    ]
+    begin = float(t[0])
+    asked = points.harmonic(begin, begin + 1 / hz, hz, f.t_0)[axis]
+    return complex(complex(cosine, -sine) / asked / path.wave.shrinks(hz))
+
+
+def of_points(turns: Turns, wave: Wave) -> dict[str, float]:
+    """As `quantities`, where the reference is a staircase: how far the mean revolution is off the ellipse, along its normal, in
+    the place of errors in time."""
+    mean, follows = turns.errors.mean(axis=0), turns.follows.mean(axis=0)
+    off = contour(mean[0], mean[1], wave.y, wave.z)
+    spread = float(turns.errors[:, :2].var(axis=0, ddof=1).mean()) / len(turns.errors)
+    out = {"contour_peak": float(np.abs(off).max()),
+           "contour_rms": math.sqrt(max(float((off**2).mean()) - spread, 0.0))}  # fmt: skip
+    out |= dict(zip(("tilt_psi", "tilt_theta"), np.abs(mean[2:]).max(axis=1).tolist(), strict=True))
+    for k, axis in enumerate("yz"):
+        out[f"amplitude_ratio_{axis}"], out[f"phase_lag_{axis}"] = abs(follows[k]), -float(np.angle(follows[k]))
+    return out | {"ring_distance": float(turns.left.min())}
 
 
 def quantities(turns: Turns) -> dict[str, float]:

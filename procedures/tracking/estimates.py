@@ -15,11 +15,14 @@ from bench.uncertainty.series import batch_means
 from procedures.amb_rotor.geometry import Facts, lengths, nominal
 from procedures.amb_rotor.stations import stations
 from procedures.shared.certificates import certified
-from procedures.tracking.ellipse import Turns, quantities, revolutions, turns
+from procedures.tracking.ellipse import Path, Turns, of_points, quantities, revolutions, turns
 from procedures.tracking.steps import Orbit, upper_and_lower
 
 TIMING_TICKS = 0.5  # half width: how the reference's zero of phase stands to the answer of the currents
-UNITS = {"error": "m", "amplitude": "1", "phase": "rad", "tilt": "rad", "ring": "m"}
+UNITS = {"error": "m", "contour": "m", "amplitude": "1", "phase": "rad", "tilt": "rad", "ring": "m"}
+GROWS, SPREAD = math.sqrt(2 / math.pi), math.sqrt(1 - 2 / math.pi)
+"""Mean and standard deviation of the amount of a normal deviation of 1: the greatest distance to either side of the middle
+grows by an orbit's shift, whichever way it goes."""
 BLOCKS = 12  # of revolutions, left out in turn
 Moved = Callable[[Facts, float], Facts]
 
@@ -87,17 +90,22 @@ def inputs(rig: RigFile, tick_s: float, runout_m: float) -> list[Input]:
 
 def by_law(orbits: Sequence[Orbit], rig: RigFile, runout_m: float) -> dict[str, dict[str, Estimate]]:
     """Every quantity of each law."""
-    return {o.law: {**_of_path(o, rig, runout_m), **_of_coils(o, rig)} for o in orbits}
+    return {o.law: {**_of_path(o, rig, runout_m), **({} if o.path.points else _of_coils(o, rig))} for o in orbits}
+
+
+def _told(path: Path) -> Callable[[Turns], dict[str, float]]:
+    """What is made of the revolutions."""
+    return quantities if path.points is None else lambda whole: of_points(whole, path.wave)
 
 
 def _of_path(orbit: Orbit, rig: RigFile, runout_m: float) -> dict[str, Estimate]:
     path, facts = orbit.path, nominal(rig, orbit.t_0)
-    whole = turns(path, facts)
-    least = quantities(whole)
+    whole, told = turns(path, facts), _told(path)
+    least = told(whole)
     moved: list[tuple[Input, dict[str, float], dict[str, float]]] = []
     for i in inputs(rig, path.wave.tick, runout_m):
         u = i.stated.standard_uncertainty
-        up, down = (quantities(turns(path, i.moved(facts, by))) for by in (u, -u))
+        up, down = (told(turns(path, i.moved(facts, by))) for by in (u, -u))
         moved.append((i, up, down))
     scatter, out = _scatter(orbit, whole), {}
     for name, value in least.items():
@@ -109,13 +117,13 @@ def _of_path(orbit: Orbit, rig: RigFile, runout_m: float) -> dict[str, Estimate]
             bent, more = math.hypot(bent, second), more + second
             total = total + (certified(i.id, i.stated, i.name) - i.stated.value) * c
         total = total + scatter[name]
-        if (
-            bent > 0
-        ):  # a peak only grows by what the sensors hide: the second order belongs to the value (GUM 5.1.2, note)
-            total = (
-                total
-                + more
-                + _small(f"curvature/{orbit.law}/{name}", "second-order part of all inputs", bent, _unit(name))
+        if path.points is not None and name == "ring_distance":
+            bent, more = SPREAD * bent, -GROWS * bent
+        if bent > 0:
+            # a peak only grows by what the sensors hide: the second order belongs to the value (GUM 5.1.2, note)
+            total = total + more
+            total = total + _small(
+                f"curvature/{orbit.law}/{name}", "second-order part of all inputs", bent, _unit(name)
             )
         out[name] = replace(total, unit=_unit(name))
     return out
@@ -130,7 +138,8 @@ def _scatter(orbit: Orbit, whole: Turns) -> dict[str, Estimate]:
     rings is the least of single samples, and scatters as those of the revolutions do."""
     count = len(whole.left)
     blocks = min(BLOCKS, count)
-    left = [quantities(whole.without(np.arange(count) % blocks == b)) for b in range(blocks)]
+    told = _told(orbit.path)
+    left = [told(whole.without(np.arange(count) % blocks == b)) for b in range(blocks)]
     out = {}
     for name in left[0]:
         values = np.array([x[name] for x in left])

@@ -11,12 +11,14 @@ from procedures.amb_rotor.conventions import Law
 class Plan(BenchPlan):
     """Settings of the tracking test, SI."""
 
-    laws: tuple[Law, ...] = Field(("CCS", "CAC"), min_length=1)  # judged
-    compare: tuple[Law, ...] = ("PID",)  # only reported beside them; one that is judged is there already
+    laws: tuple[Law, ...] = ()  # judged; none: as the controller is set
+    compare: tuple[Law, ...] = ()  # only reported beside them; one that is judged is there already
     hz: float = Field(10.0, gt=0, le=50)
-    y_m: float = Field(50e-6, gt=0)
-    z_m: float = Field(80e-6, gt=0)
+    y_m: float | None = Field(None, gt=0)  # half axes; a fifth and three tenths of the least clearance if not given
+    z_m: float | None = Field(None, gt=0)
     ratio: int = Field(1, ge=1, le=5)  # turns of z in one of y: other figures of Lissajous
+    points: int = Field(48, ge=12)  # set points in a revolution where the controller has no path
+    points_hz: float = Field(0.5, gt=0, le=5)  # of the reference, where it is made of them
     speed_rad_s: float = Field(0.0, ge=0)  # 0: at rest
     observer: bool | None = None  # disturbance compensation; by default while it turns
     revolutions: int = Field(24, ge=6)  # of the reference
@@ -33,4 +35,9 @@ class Plan(BenchPlan):
     @property
     def order(self) -> tuple[Law, ...]:
         """All laws in the order in which they are done: one that touches comes last."""
-        return (*self.laws, *(law for law in self.compare if law not in self.laws))
+        return (*self.judged, *(law for law in self.compare if law not in self.judged))
+
+    @property
+    def judged(self) -> tuple[Law, ...]:
+        """The laws under test; "" is the controller as it is set."""
+        return self.laws or ("",)

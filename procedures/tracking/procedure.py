@@ -28,7 +28,7 @@ from procedures.amb_rotor.conventions import Law, conventions
 from procedures.amb_rotor.geometry import nominal
 from procedures.amb_rotor.laws import of_laws
 from procedures.shared import first_look
-from procedures.tracking import checks, estimates
+from procedures.tracking import by_points, checks, estimates
 from procedures.tracking import figures as drawn
 from procedures.tracking.plan import Plan
 from procedures.tracking.steps import GROWN, ORBIT, START, STARTED, Orbit, channels, read_orbits
@@ -49,11 +49,34 @@ THETA = Quantity("tilt_theta", "rad", "greatest tilt about z in the mean revolut
 DISTANCE = Quantity("ring_distance", "m", "least distance that is left to a touchdown ring")
 LOW = Quantity("lower_current", "A", "mean current of the lower coil that carries most")
 HIGH = Quantity("upper_current", "A", "mean current of the upper coil that carries most")
-MEASURES = (PEAK_Y, PEAK_Z, PLANE, RMS_Y, RMS_Z, RATIO_Y, RATIO_Z, LAG_Y, LAG_Z, PSI, THETA, DISTANCE, LOW, HIGH)
-LENGTHS = ("com_to_inboard_sensor", "com_to_outboard_sensor", "clearance")
+CONTOUR = Quantity(
+    "contour_peak", "m", "greatest distance of the mean revolution from the ellipse, along its normal, with set points"
+)
+CONTOUR_RMS = Quantity("contour_rms", "m", "root mean square of the same")
+OF_PATH = (PEAK_Y, PEAK_Z, PLANE, RMS_Y, RMS_Z, LOW, HIGH)
+OF_POINTS = (CONTOUR, CONTOUR_RMS)
+MEASURES = (
+    CONTOUR,
+    CONTOUR_RMS,
+    PEAK_Y,
+    PEAK_Z,
+    PLANE,
+    RMS_Y,
+    RMS_Z,
+    RATIO_Y,
+    RATIO_Z,
+    LAG_Y,
+    LAG_Z,
+    PSI,
+    THETA,
+    DISTANCE,
+    LOW,
+    HIGH,
+)
 UM = 1e6
 MARK_M = 15e-6  # of the jump that the reference starts with
 GROW, GROW_S = 25, 0.02
+FASTEST_HZ = 100.0  # of set points that a host writes one after the other
 NEAR = 0.95  # of the ring's clearance: no reference may go further
 
 
@@ -70,9 +93,24 @@ def step_count(plan: Plan) -> int:
     return lift.STEPS + 1 + 2 * len(plan.order)
 
 
+def fewest_steps(plan: Plan) -> int:
+    """How many there are where the reference is one of set points."""
+    return lift.STEPS + len(plan.order)
+
+
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     """Look at the rotor on its rings, lift it, nudge it, spin it up, and let it follow the reference with each law."""
     if not lift.lift_and_nudge(rig, record):
+        return
+    if rig.file.capabilities.path is None:
+        half_y, half_z = by_points.sizes(rig.file, plan)
+        for law in plan.order:
+            lift.write(rig, conventions(rig.file).select(law))
+            rig.clock.sleep(plan.settle_s)
+            labels = {"law": law, "judged": law in plan.judged, "hz": plan.points_hz, "y_m": half_y, "z_m": half_z,
+                      "speed_rad_s": 0.0, "ratio": 1}  # fmt: skip
+            by_points.follow(rig, plan, record, labels, ORBIT)
+        lift.write(rig, conventions(rig.file).select(conventions(rig.file).plain_law))
         return
     _start(rig, plan, record)
     if plan.speed_rad_s and not lift.bring_to_speed(rig, record, plan.speed_rad_s, plan.settle_s):
@@ -117,8 +155,9 @@ def _orbit(rig: Rig, plan: Plan, record: Recorder, law: Law) -> None:
         _size(rig, plan, part / GROW)
     with record.step(GROWN, law=law):  # the longer, the better it tells the reference's frequency
         rig.clock.sleep(plan.settle_s)
-    labels = {"hz": plan.hz, "y_m": plan.y_m, "z_m": plan.z_m, "speed_rad_s": plan.speed_rad_s, "ratio": plan.ratio}
-    with record.step(ORBIT, law=law, judged=law in plan.laws, **labels):
+    half_y, half_z = by_points.sizes(rig.file, plan)
+    labels = {"hz": plan.hz, "y_m": half_y, "z_m": half_z, "speed_rad_s": plan.speed_rad_s, "ratio": plan.ratio}
+    with record.step(ORBIT, law=law, judged=law in plan.judged, **labels):
         rig.clock.sleep(plan.revolutions / plan.hz + 0.05)
     for part in range(GROW - 1, -1, -1):
         _size(rig, plan, part / GROW)
@@ -126,7 +165,8 @@ def _orbit(rig: Rig, plan: Plan, record: Recorder, law: Law) -> None:
 
 def _size(rig: Rig, plan: Plan, share: float) -> None:
     path = _path(rig)
-    lift.write(rig, {path.y: plan.y_m * share, path.z: max(plan.z_m * share, MARK_M)})
+    half_y, half_z = by_points.sizes(rig.file, plan)
+    lift.write(rig, {path.y: half_y * share, path.z: max(half_z * share, MARK_M)})
     rig.clock.sleep(GROW_S)
 
 
@@ -153,8 +193,8 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
 def measured(results: Results) -> Iterator[Measured]:
     """The quantities of each law that is judged; the others are in a note."""
     for orbit in results.orbits:
-        if orbit.law in results.plan.laws:
-            for quantity in MEASURES:
+        if orbit.law in results.plan.judged:
+            for quantity in (q for q in MEASURES if q.name in results.by_law[orbit.law]):
                 yield quantity.measured(results.by_law[orbit.law][quantity.name], orbit.where)
 
 
@@ -167,12 +207,15 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         yield from of_laws(machine, key, laws)
         if len(set(laws)) < len(laws):
             yield f"{key}: found one twice; expected each once"
-    ring = NEAR * rig.geometry["clearance"].value
-    far = max(plan.y_m, plan.z_m)
+    if rig.capabilities.path is None:
+        yield from _points(rig, plan)
+        return
+    ring = NEAR * machine.clearance
+    far = max(by_points.sizes(rig, plan))
     if far > ring:
         yield f"y_m, z_m: found {far * UM:g} µm; expected at most {ring * UM:g} µm, {NEAR:.0%} of the ring's clearance"
-    if plan.z_m < MARK_M:
-        yield f"z_m: found {plan.z_m * UM:g} µm; expected {MARK_M * UM:g} µm or more, the jump that the reference starts with"
+    if (half_z := by_points.sizes(rig, plan)[1]) < MARK_M:
+        yield f"z_m: found {half_z * UM:g} µm; expected {MARK_M * UM:g} µm or more, the jump that the reference starts with"
     most = rig.envelope.max_speed_rad_s
     if plan.speed_rad_s > most:
         yield f"speed_rad_s: found {plan.speed_rad_s * RPM:.0f} r/min; the envelope allows {most * RPM:.0f} r/min"
@@ -185,6 +228,23 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         )
 
 
+def _points(rig: RigFile, plan: Plan) -> Iterator[str]:
+    """What set points cannot do."""
+    machine = conventions(rig)
+    highs = [rig.parameters[name].high / abs(value) for c in "yz" for name, value in machine.point(c, 1.0).items()]
+    most = min(NEAR * machine.clearance, *highs)
+    if max(by_points.sizes(rig, plan)) > most:
+        far = max(by_points.sizes(rig, plan))
+        yield f"y_m, z_m: found {far * UM:g} µm; expected at most {most * UM:g} µm, by rings and set points"
+    if plan.speed_rad_s:
+        yield "speed_rad_s: set points are followed by a shaft at rest; expected 0"
+    if plan.ratio != 1:
+        yield f"ratio: found {plan.ratio}; set points make an ellipse, expected 1"
+    if plan.points_hz * plan.points > FASTEST_HZ:
+        yield (f"points, points_hz: found {plan.points_hz * plan.points:g} set points in a second; expected at most "
+               f"{FASTEST_HZ:g}")  # fmt: skip
+
+
 def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
     """Orbits with the ring, errors over time and over the reference's revolution, tilts, coil currents."""
     facts = {o.law: nominal(recording.rig, o.t_0) for o in results.orbits}
@@ -194,10 +254,12 @@ def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
 def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
+    whole = machine.stations.channels
+    by_path = machine.lacks if machine.can.path is not None else ()
     return Requires(
-        channels=channels(machine), sensors=machine.positions, geometry=LENGTHS,
-        capabilities=("set_points", "path", "model.rate"),
-        lacks=(*machine.lacks, *machine.unweighed), uses=("settings.law", "settings.compensation"),
+        channels=channels(machine), sensors=(*whole, *machine.currents), capabilities=("set_points",),
+        lacks=(*machine.stations.lacks, *machine.unmoved(("y", "z", "theta")), *by_path),
+        uses=("path", "settings.law", "settings.compensation", "model", "mark"),
     )  # fmt: skip
 
 
@@ -216,6 +278,8 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    fewest_steps=fewest_steps,
+    optional=(*OF_PATH, *OF_POINTS),  # of a path that the controller follows, or of set points
     former_steps=lambda plan: lift.STEPS + 1 + len(plan.order),  # what came before an orbit was not recorded
     method=read_method(__file__),
 )

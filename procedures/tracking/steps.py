@@ -17,10 +17,12 @@ from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.amb_rotor.geometry import Facts, left
 from procedures.amb_rotor.onset import onset
 from procedures.tracking.ellipse import Path, Wave
+from procedures.tracking.points import delay, read_points
 
 Array = npt.NDArray[np.float64]
 START, GROWN, ORBIT = "start", "grown", "orbit"
 STARTED = "reference-started"
+GROWING = 0.25  # of a revolution, that set points begin with
 
 
 @dataclass(frozen=True)
@@ -48,10 +50,11 @@ class Orbit:
     @property
     def where(self) -> str:
         """How it is named to the reader."""
+        law = self.law or "as set"
         w, rpm = self.path.wave, float(np.median(self.speed)) * 30 / np.pi
         turning = f"{rpm:.0f} r/min" if self.path.turn_s else "at rest"
         figure = f"{w.hz:g} Hz" if w.ratio == 1 else f"{w.hz:g} Hz, {w.ratio} : 1"
-        return f"{self.law}, {figure}, {w.y * 1e6:g} × {w.z * 1e6:g} µm, {turning}"
+        return f"{law}, {figure}, {w.y * 1e6:g} × {w.z * 1e6:g} µm, {turning}"
 
 
 def upper_and_lower(machine: AmbRotor) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -63,7 +66,7 @@ def upper_and_lower(machine: AmbRotor) -> tuple[tuple[str, ...], tuple[str, ...]
 def channels(machine: AmbRotor) -> tuple[str, ...]:
     """What is read of an orbit."""
     upper, lower = upper_and_lower(machine)
-    return (*machine.stations.channels, *upper, *lower, SPEED, STATUS)
+    return (*machine.stations.channels, *upper, *lower, *((SPEED,) if machine.speed_told else ()), STATUS)
 
 
 def sample_reference(rig: RigFile, hz: float, y: float, z: float, period_ns: int, ratio: int = 1) -> Wave:
@@ -79,12 +82,27 @@ def read_orbits(recording: Recording[Any]) -> list[Orbit]:
         AnalysisError: there are none, or the reference has no start.
     """
     starts, orbits = list(recording.steps(START)), list(recording.steps(ORBIT))
-    if not orbits or not starts:
+    if orbits and not starts:
+        return [_read_points(recording, step) for step in orbits]
+    if not orbits:
         raise AnalysisError("found no orbits; expected those of the plan (was the run stopped early?)")
     origin = starts[0].start_ns
     t_0, clear = _start(recording, starts[0], _wave(recording, orbits[0]))
     grown = {str(step.labels["law"]): step for step in recording.steps(GROWN)}  # none in recordings of old
     return [_read(recording, step, grown.get(str(step.labels["law"])), origin, t_0, clear) for step in orbits]
+
+
+def _read_points(recording: Recording[Any], step: Step) -> Orbit:
+    """An orbit of set points, whose zero of phase is how late they act."""
+    points = read_points(step, step.start_ns)
+    if points is None:
+        raise AnalysisError("found no start of the reference, and no set points of it; expected one or the other")
+    orbit = _read(recording, step, None, step.start_ns, 0.0, 0.0)
+    t_0, clear = delay(points, orbit.path.t, orbit.upper, orbit.lower, orbit.machine, orbit.path.wave.tick)
+    whole = orbit.path.t > points.t[0] + GROWING / orbit.path.wave.hz
+    path = replace(orbit.path, t=orbit.path.t[whole], readings=orbit.path.readings[:, whole], points=points)
+    return replace(orbit, path=path, whole=path, upper=orbit.upper[:, whole], lower=orbit.lower[:, whole],
+                   flags=orbit.flags[whole], speed=orbit.speed[whole], t_0=t_0, clear=clear)  # fmt: skip
 
 
 def _wave(recording: Recording[Any], step: Step) -> Wave:
@@ -114,7 +132,7 @@ def _read(recording: Recording[Any], step: Step, grown: Step | None, origin: int
     labels, data = step.labels, step.read(*channels(machine))
     if len(data["t_ns"]) < 20:
         raise AnalysisError(f"{labels['law']}: found {len(data['t_ns'])} samples; expected a whole orbit")
-    speed = data[SPEED]
+    speed = data[SPEED] if machine.speed_told else np.zeros(len(data["t_ns"]))
     turning = float(labels["speed_rad_s"]) > 0 and float(np.median(speed)) > 0
     path = Path(
         _wave(recording, step),

@@ -45,7 +45,7 @@ def test_a_peak_is_refined_by_lines_within_its_width_at_both_amplitudes() -> Non
     full, half = ([c for kind, _, c in passes if kind == which] for which in (REFINED, HALF))
     assert [c.first for c in full] == [c.first for c in half]
     assert len([c for c in full if abs(c.first - 124) < 37]) >= 6
-    assert {c.amplitude for c in full} == {2 * c.amplitude for c in half} == {0.03 * 1.5}
+    assert {c.amplitude for c in full} == {2 * c.amplitude for c in half} == {0.015 * 1.5}
     assert all(c.first <= sines.highest(rig, plan) for c in full)
 
 
