@@ -210,9 +210,10 @@ def _of_contact(o: Orbit, left: Estimate, effect: Effect) -> Iterator[Finding]:
 def _said(o: Orbit, r: Mapping[str, Estimate]) -> str:
     touched = f"contact in {float((o.flags & o.machine.contact != 0).mean()):.0%} of the samples"
     if o.path.points:
-        peak, rms, lag = r["contour_peak"], r["contour_rms"], r["phase_lag_y"]
+        peak, rms = r["contour_peak"], r["contour_rms"]
+        late_s = r["phase_lag_y"].value / (2 * math.pi * o.path.wave.hz)
         return (f"{o.law or 'as set'}: off the ellipse by {peak.value * 1e6:.2f} ± {2 * peak.u * 1e6:.2f} µm at most, "
-                f"{rms.value * 1e6:.2f} µm rms, {lag.value / (2 * math.pi * o.path.wave.hz) * 1e3:.1f} ms behind in y, "
+                f"{rms.value * 1e6:.2f} µm rms, {abs(late_s) * 1e3:.1f} ms {'behind' if late_s > 0 else 'ahead'} in y, "
                 f"{touched}")  # fmt: skip
     y, z, psi, theta = (r[n] for n in ("error_peak_y", "error_peak_z", "tilt_psi", "tilt_theta"))
     low = r["lower_current"]

@@ -93,9 +93,9 @@ def step_count(plan: Plan) -> int:
     return lift.STEPS + 1 + 2 * len(plan.order)
 
 
-def fewest_steps(plan: Plan) -> int:
-    """How many there are where the reference is one of set points."""
-    return lift.STEPS + len(plan.order)
+def steps_on(rig: RigFile, plan: Plan) -> int:
+    """How many there are on a rig: an orbit of set points has no start, and nothing before it."""
+    return step_count(plan) if rig.capabilities.path is not None else lift.STEPS + len(plan.order)
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
@@ -278,7 +278,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
-    fewest_steps=fewest_steps,
+    steps_on=steps_on,
     optional=(*OF_PATH, *OF_POINTS),  # of a path that the controller follows, or of set points
     former_steps=lambda plan: lift.STEPS + 1 + len(plan.order),  # what came before an orbit was not recorded
     method=read_method(__file__),
