@@ -63,19 +63,19 @@ class Motions:
     Attributes:
         steps: `Small` motions along an axis, and by size and way what is `Shown` (`sim_backend.machines.stepping`).
         orbit: every quantity of a tracking test by its name.
-        whirl: of the controller's settings and a speed in rad/s.
-        left: unbalance by balancing plane, kg m as vectors, before and after what the operator did.
-        passage: of settings and two speeds, curves that know what is `critical` near a speed.
-        loop: of settings, the linear loop at rest.
+        whirl: of the controller's settings, a speed in rad/s and the channels of probes, two for each plane.
+        left: unbalance kg m of balancing planes by name, as vectors on their scales, before and after what the operator did.
+        passage: of settings, two speeds and channels, curves that know what is `critical` near a speed.
+        loop: of settings, the linear loop at rest, as the axes of these names have it, in their order.
         peak: of settings, an axis' number and a speed, the greatest sensitivity and where, Hz, of the shaft that turns.
     """
 
     steps: Callable[[RigFile, Any, StepsAsked], tuple[Any, Mapping[tuple[float, int], Any]]] | None = None
     orbit: Callable[[RigFile, Any, OrbitAsked], Mapping[str, float]] | None = None
-    whirl: Callable[[RigFile, Any, Numbers, float], Whirl] | None = None
-    left: Callable[[RigFile, Any, Sequence[Mapping[str, Any]]], Sequence[Any]] | None = None
-    passage: Callable[[RigFile, Any, Numbers, float, float], Any] | None = None
-    loop: Callable[[RigFile, Any, Numbers], Any] | None = None
+    whirl: Callable[[RigFile, Any, Numbers, float, Sequence[str]], Whirl] | None = None
+    left: Callable[[RigFile, Any, Sequence[Mapping[str, Any]], Sequence[str]], Sequence[Any]] | None = None
+    passage: Callable[[RigFile, Any, Numbers, float, float, Sequence[str]], Any] | None = None
+    loop: Callable[[RigFile, Any, Numbers, Sequence[str]], Any] | None = None
     peak: Callable[[RigFile, Any, Numbers, int, float], tuple[float, float]] | None = None
 
 

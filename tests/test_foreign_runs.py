@@ -27,7 +27,7 @@ SPINDLE, STAND = str(EXAMPLES / "vertical-spindle/spindle.toml"), str(EXAMPLES /
 
 
 RUNNING = {
-    SPINDLE: {"step", "tracking", "unbalance", "run-up", "coast-down", "balance"},
+    SPINDLE: {"step", "tracking", "unbalance", "run-up", "coast-down", "balance", "spindown"},
     STAND: {"amb-calibration", "step", "bearing-model", "sensitivity", "tracking"},
 }
 

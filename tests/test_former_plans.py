@@ -104,7 +104,8 @@ def test_a_controller_without_a_choice_of_law_gets_none() -> None:
 @pytest.mark.parametrize(("plan", "told"), [(b"{}", []), (b'{"schema": 2}', ["steps-missing"])])
 def test_a_recording_of_plan_schema_1_has_the_steps_of_then(tmp_path: Path, plan: bytes, told: list[str]) -> None:
     """One step is there; today two are recorded, then it was one."""
-    procedure = replace(load_procedure("spindown"), step_count=lambda _: 2, fewest_steps=None, former_steps=lambda _: 1)
+    spindown = load_procedure("spindown")
+    procedure = replace(spindown, step_count=lambda _: 2, fewest_steps=None, steps_on=None, former_steps=lambda _: 1)
     record(
         tmp_path / "a.mcap",
         [block(0, 10)],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -204,7 +205,7 @@ def test_the_servomotor_elsewhere_has_the_same_numbers(tmp_path: Path) -> None:
 @pytest.mark.timeout(900)
 def test_without_replies_the_numbers_are_those_of_other_noise(tmp_path: Path) -> None:
     """Levels and signals are not answered, and a sample in two messages is complete a frame later: the same machine is seen
-    at other times, so that values differ by a part of what noise does to them, and uncertainties hardly."""
+    at other times, so that values differ as two results of one machine may."""
     folders = [tmp_path / "here", tmp_path / "there"]
     for folder in folders:
         folder.mkdir()
@@ -215,5 +216,4 @@ def test_without_replies_the_numbers_are_those_of_other_noise(tmp_path: Path) ->
         assert set(ours) == set(theirs), procedure
         assert sorted(found) == sorted(also), procedure
         for name, (value, u) in ours.items():
-            assert abs(theirs[name][0] - value) <= 0.5 * u, (procedure, name)
-            assert theirs[name][1] == pytest.approx(u, rel=0.1), (procedure, name)
+            assert abs(theirs[name][0] - value) <= 3 * math.hypot(u, theirs[name][1]), (procedure, name)

@@ -21,7 +21,7 @@ from bench.rigfile.roles import resolved
 OF = {
     "tsbs12": ("amb-calibration", "force-constant", "negative-stiffness", "force-coupling", "torque-constant", "spindown",
                "angle-step", "slew", "force-map"),
-    "amb5dof": ("step", "bearing-model", "tracking", "unbalance", "compensation", "balance", "run-up", "coast-down",
+    "amb5dof": ("spindown", "step", "bearing-model", "tracking", "unbalance", "compensation", "balance", "run-up", "coast-down",
                 "sensitivity"),
 }  # fmt: skip
 PAIRS = [(rig, name) for rig, names in OF.items() for name in names]

@@ -116,5 +116,6 @@ def _short(lacking: tuple[str, ...]) -> tuple[str, ...]:
         return ()
     names = lacking[0].split(", ")
     some = ", ".join(names) if len(names) <= NAMED + 1 else f"{', '.join(names[:NAMED])} and {len(names) - NAMED} more"
-    others = [line.partition(":")[0] for line in lacking[1:]]
+    first = lacking[0].partition(":")[0]
+    others = [table for table in dict.fromkeys(line.partition(":")[0] for line in lacking[1:]) if table != first]
     return (f"{some}; also {', '.join(others)}" if others else some,)

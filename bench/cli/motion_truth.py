@@ -115,7 +115,7 @@ def _unbalance(done: Simulated) -> Found:
         machine = dwell.machine
         law = {**(machine.poles if plan.observed else {}), **machine.select(plan.law)}
         settings = _settings(done, law, machine.variants[dwell.variant])
-        true = of(done.recording.rig, done.drawn, settings, dwell.speed)
+        true = of(done.recording.rig, done.drawn, settings, dwell.speed, machine.positions)
         yield from _vectors(machine.axes, true.shaft, dwell.where)
         yield from _distances(machine.planes, true, dwell.where)
 
@@ -126,9 +126,10 @@ def _balance(done: Simulated) -> Found:
     of = done.drawn.machine.motions.left
     if of is None:
         return
-    own = of(done.recording.rig, done.drawn, done.recording.events("operator"))
+    names = names_of(done.recording.rig)
+    own = of(done.recording.rig, done.drawn, done.recording.events("operator"), names)
     for name, values in (("unbalance", own[0]), ("residual", own[-1])):
-        for side, value in zip(names_of(done.recording.rig), values, strict=True):
+        for side, value in zip(names, values, strict=True):
             yield f"{name}_cos", side, float(value.real)
             yield f"{name}_sin", side, float(value.imag)
 
@@ -144,7 +145,7 @@ def _passage(done: Simulated) -> Found:
     rig, machine = done.recording.rig, conventions(done.recording.rig)
     settings = _settings(done, machine.variants["off"], plan.parameters, machine.select(plan.law))
     for result in run.near.dwells:
-        true, where = of.whirl(rig, done.drawn, settings, result.dwell.speed), result.dwell.where
+        true, where = of.whirl(rig, done.drawn, settings, result.dwell.speed, machine.positions), result.dwell.where
         yield from _vectors(machine.axes, true.shaft, where)
         yield from _distances(machine.planes, true, where)
         for plane, (y, z) in machine.planes.items():
@@ -154,7 +155,7 @@ def _passage(done: Simulated) -> Found:
     if not peaks or of.passage is None:
         return
     ends = [x for p in run.peaks for x in (p.low, p.speed.value, p.high) if math.isfinite(x)]
-    held = of.passage(rig, done.drawn, settings, 0.85 * min(ends), 1.1 * max(ends))
+    held = of.passage(rig, done.drawn, settings, 0.85 * min(ends), 1.1 * max(ends), machine.positions)
     for p in peaks:
         speed, amplitude, factor = held.critical(machine.axes.index(p.axis), p.speed.value)
         yield "critical_speed", p.where, speed
@@ -168,6 +169,7 @@ def _sensitivity(done: Simulated) -> Found:
 
     from bench.units import RPM
     from procedures.amb_rotor.conventions import conventions
+    from procedures.sensitivity.fitting import chosen_axes
     from procedures.sensitivity.margins import fall, phase, rise
 
     plan: Any = done.recording.plan
@@ -176,8 +178,8 @@ def _sensitivity(done: Simulated) -> Found:
     for speed in plan.speeds_rad_s:
         if (of.peak if speed else of.loop) is None:
             continue
-        loop = None if speed or of.loop is None else of.loop(rig, done.drawn, settings)
-        for axis in plan.axes:
+        loop = None if speed or of.loop is None else of.loop(rig, done.drawn, settings, machine.all_axes)
+        for axis in chosen_axes(rig, plan):
             k, where = machine.all_axes.index(axis), f"{axis}, {f'{speed * RPM:.0f} r/min' if speed else 'at rest'}"
             if loop is not None:
                 value, hz = loop.peak(k, plan.low_hz, plan.high_hz)

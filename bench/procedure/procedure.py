@@ -85,7 +85,8 @@ class Procedure:
     controller, SI, that the runner writes in READY, before it levitates. `optional` of the measures are those that a sound
     machine may lack: not missing where no limit asks. `step_count` is how many steps `acquire` will record, for the progress
     display; 0 is unknown. `fewest_steps` is how many a run that goes to its end has at least, where these are fewer;
-    `former_steps` how many one of plan schema 1 has, where it had fewer.
+    `former_steps` how many one of plan schema 1 has, where it had fewer; `steps_on` is `step_count` where that depends on the
+    rig.
     `evaluate` makes of a recording what all that follows needs, once, and tells its findings as it goes; it ends where one
     that is told at a gate is an error, and then nothing is measured nor drawn. Without it the recording itself is what
     follows needs. `measured` yields the quantities of it in the order of the report. `figures` come in the order in which
@@ -119,6 +120,7 @@ class Procedure:
     settings: Callable[[RigFile, Any], Mapping[str, float]] = field(default=_no_settings)
     step_count: Callable[[Any], int] = field(default=_unknown_count)
     fewest_steps: Callable[[Any], int] | None = None
+    steps_on: Callable[[RigFile, Any], int] | None = None
     former_steps: Callable[[Any], int] | None = None
     needs: Callable[[Any], tuple[Need, ...]] = field(default=_no_needs)
     facts: Callable[[Any], Mapping[str, Estimate]] | None = None
@@ -129,6 +131,10 @@ class Procedure:
     places: tuple[str, ...] = ()
     kinds: tuple[Quantity, ...] = ()
     method: str = ""  # the report's section: plain paragraphs, parted by empty lines
+
+    def steps(self, rig: RigFile, plan: Any) -> int:
+        """How many steps `acquire` will record on a rig; 0 is unknown."""
+        return self.step_count(plan) if self.steps_on is None else self.steps_on(rig, plan)
 
     def on(self, rig: RigFile) -> Procedure:
         """With its quantities by the names that a rig has for them at its places."""

@@ -129,7 +129,7 @@ def _moved(
                 transition(rig, procedure.state)
                 up = True
                 progress.stage("acquire")
-                progress.total(procedure.step_count(job.plan))
+                progress.total(procedure.steps(job.rig, job.plan))
                 procedure.acquire(rig, job.plan, cast(Recorder, WatchedSteps(recorder, progress, live.catch_up)))
         except BaseException as error:
             # Whatever it is, also SystemExit: the machine is made safe first.

@@ -33,6 +33,8 @@ def missing_steps(procedure: Procedure, recording: Recording[Any]) -> Iterator[F
     """A finding where the recording has fewer steps than its plan asks for: what is concluded holds for another plan."""
     former = procedure.former_steps if recording.plan_schema == 1 else None
     planned = (former or procedure.fewest_steps or procedure.step_count)(recording.plan)
+    if procedure.steps_on is not None:
+        planned = min(planned, procedure.steps_on(recording.rig, recording.plan))
     if (there := len(recording.all_steps())) < planned:
         text = f"the plan asks for {planned} steps or more; the recording has {there}"
         yield Finding("steps-missing", text, "acquire", Effect.INDETERMINATE)

@@ -29,7 +29,7 @@ def fit_inputs(rig: RigFile, masses: Sequence[str], pull: Pull) -> dict[str, Est
         "hook_to_outboard": summed(hook, f"span hook to {far.name} AMB"),
         "amb_span": summed(span, "span AMB to AMB"),
     }
-    out |= _motor(rig, places, f"bearings/{far.name}") | _gaps(rig, places, (near.name, far.name))
+    out |= _gaps(rig, places, (near.name, far.name)) | _motor(rig, places, f"bearings/{far.name}")
     out["hanger"] = certified("masses/hanger", rig.hanger, "hanger")
     out |= _directions(rig, places, pull) | certified_masses(rig, masses)
     coils = {f"{axis.key}{end}": coil for axis in pull.axes for end, coil in zip("pn", axis.coils, strict=True)}

@@ -17,7 +17,7 @@ from bench.rigfile.capabilities import Capabilities
 from bench.rigfile.roles import ANGLE, SPEED, Status, is_bound
 from bench.rigfile.supports import axial_support, least_clearance, once_per_rig, two_planes
 from procedures.amb_rotor import loops
-from procedures.amb_rotor.stations import AXIAL, Stations, gaps, in_two_planes, stations
+from procedures.amb_rotor.stations import ALONG, Stations, gaps, in_two_planes, stations
 from procedures.shared.unsupported import of_weight, unlike
 
 Law = str
@@ -176,7 +176,7 @@ class AmbRotor:
 
     def _by_axes(self, at: Mapping[str, float]) -> dict[str, float]:
         """By T (2.17) at each bearing; an axis that no coordinate moves is left alone."""
-        out = {self.axial if name == AXIAL else name: value for name, value in self.stations.moved(at).items()}
+        out = {self.axial if name == ALONG else name: value for name, value in self.stations.moved(at).items()}
         parameters = self.can.set_points.axes
         if missing := [axis or "the shaft" for axis in out if axis not in parameters]:
             raise Lacking(f"capabilities.set_points: found none for {', '.join(missing)}")

@@ -31,6 +31,7 @@ Array = npt.NDArray[np.float64]
 SQUARE = 1e-12  # of a cosine: what rounding leaves of nothing
 COORDINATES = ("y", "z", "psi", "theta")
 AXIAL = "x"
+ALONG = ""  # where axes are asked for by name: along the shaft, and no axis is called so
 NOTHING = Sum()
 DETERMINED = 1e-3  # least over greatest singular value, arms over their own length
 
@@ -112,11 +113,11 @@ class Stations:
 
     def moved(self, at: Mapping[str, float]) -> dict[str, float]:
         """How far the shaft at some coordinates (m and rad) is off the middle along each axis, m; what does not move is left
-        out, and along the shaft it is that coordinate's own."""
+        out, and along the shaft (ALONG) it is that coordinate's own."""
         out: dict[str, float] = {}
         for coordinate, value in at.items():
             k = COORDINATES.index(coordinate) if coordinate != AXIAL else None
-            by = {AXIAL: 1.0} if k is None else {a: p.row[k] for a, p in self.axes.items() if p.row[k]}
+            by = {ALONG: 1.0} if k is None else {a: p.row[k] for a, p in self.axes.items() if p.row[k]}
             for axis, factor in by.items():
                 out[axis] = out[axis] + factor * value if axis in out else factor * value
         return out

@@ -124,6 +124,9 @@ def _start(held: Held, values: dict[str, float], unloaded: tuple[int, ...]) -> t
         force = magnetics.magnet(beta, offset, gaps[k], parts.r[k], parts.p[k], parts.n[k]) - parts.force[k]
         batches = force.reshape(len(held), -1)
         noise[k] = math.sqrt(float(batches.var(axis=1, ddof=1).mean()) / batches.shape[1])
-        pull = float(s.force[k].mean()) if k not in unloaded else beta * float((s.p[k] ** 2).mean()) / gaps[k] ** 2
+        coil = (
+            0.0 if "l_is" in values else beta * float((s.p[k] ** 2).mean()) / gaps[k] ** 2
+        )  # a small load is a difference
+        pull = float(s.force[k].mean()) if coil == 0 else max(abs(float(s.force[k].mean())), coil)
         weighed[k] = math.hypot(noise[k], math.sqrt(len(held)) * TRUST * pull)
     return noise, weighed, terms

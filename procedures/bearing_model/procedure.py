@@ -59,6 +59,7 @@ SLOPES = {
 """Of stands other than that of the thesis, whose results are beta and offset."""
 MEASURES = (*BY_AXIS.values(), *SLOPES.values(), *OF_LINEAR.values())
 REST_S = 0.3
+FAR = 3  # times as long as from place to place
 BIAS_STEP_A = 0.1
 REACHED = ("sensors/*", "!sensors/pos_*/offset", "!sensors/i_?o_p/gain", "geometry/amb_gap", "geometry/coupling_stiffness",
            "geometry/com_to_coupling", "geometry/com_to_*_sensor")  # fmt: skip
@@ -95,6 +96,11 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     for k, bias in enumerate(biases(rig.file, plan)):
         if plan.biases_A:
             _set_bias(rig, plan, bias)
+        if not as_printed(
+            rig.file
+        ):  # to the first place it is far; the stand of the thesis has recordings without a wait
+            lift.write(rig, machine.points(dict(zip("yz", _first_of(rig.file, plan, k), strict=True))))
+            rig.clock.sleep(FAR * plan.settle_s)
         held = []
         for y, z in places(rig.file, plan) if k % 2 == 0 else reversed(places(rig.file, plan)):
             lift.write(rig, machine.points({"y": y, "z": z}))
@@ -105,6 +111,11 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
             return
     lift.write(rig, machine.points({"y": 0.0, "z": 0.0}))
     rig.clock.sleep(plan.settle_s)
+
+
+def _first_of(rig: RigFile, plan: Plan, k: int) -> tuple[float, float]:
+    """Where pass `k` begins: every second one goes backwards."""
+    return places(rig, plan)[0 if k % 2 == 0 else -1]
 
 
 def _lift(rig: Rig, record: Recorder) -> bool:

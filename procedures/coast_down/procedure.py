@@ -41,7 +41,7 @@ procedure = Procedure(
     settings=run_up.settings,
     step_count=run_up.step_count,
     needs=lambda plan: bearings.needs(plan.bearings),
-    optional=run_up.CRITICAL,
+    optional=run_up.procedure.optional,
     assumes=assumptions.PASSAGE,
     method=f"{read_method(__file__)}\n{run_up.procedure.method}",
 )

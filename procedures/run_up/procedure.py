@@ -233,7 +233,7 @@ procedure = Procedure(
     settings=settings,
     step_count=step_count,
     needs=lambda plan: bearings.needs(plan.bearings),
-    optional=CRITICAL,
+    optional=(*CRITICAL, *unbalance.OF_CAPTURES),
     assumes=assumptions.PASSAGE,
     method=read_method(__file__),
 )

@@ -17,7 +17,7 @@ APART_M = 1e-3  # of a place by the machine's tables from that by `geometry`
 def unlike(rig: RigFile, planes: tuple[Support, Support]) -> tuple[str, ...]:
     """For every procedure, a line each: axes of one plane that look where those of the other do, probes that grow along their
     axis, a shaft that turns counter-clockwise, and numbers of `geometry` that say what the machine's tables say."""
-    return (*_twisted(planes), *_sense(rig), *_probes(rig), *_contradicted(rig, planes))
+    return (*_twisted(planes), *_sense(rig), *_probes(rig, planes), *_contradicted(rig, planes))
 
 
 def of_weight(rig: RigFile, planes: tuple[Support, Support], frame: tuple[float, float]) -> tuple[str, ...]:
@@ -63,9 +63,10 @@ def _tilt(rig: RigFile) -> Iterator[str]:
         yield "shaft.tilt: found a shaft that does not lie; this procedure takes one that does"
 
 
-def _probes(rig: RigFile) -> Iterator[str]:
+def _probes(rig: RigFile, planes: Sequence[Support]) -> Iterator[str]:
+    read = {axis.position for plane in planes for axis in plane.axes}
     for name, probe in rig.probes.items():
-        if probe.sign < 0:
+        if probe.sign < 0 and probe.channel in read:
             yield (f"probes.{name}.sign: found -1; this procedure takes readings that grow along the axis: give the DBC's "
                    "factor its sign")  # fmt: skip
 

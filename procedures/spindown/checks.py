@@ -6,7 +6,7 @@ Thresholds are chosen so that a sound rig trips one in fewer than one run in a t
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -189,7 +189,7 @@ def of_drive(recording: Recording[Any], drag: Drag) -> Iterator[Finding]:
     if name not in recording.streams:
         return
     names = {c.name for c in recording.streams[name].channels}
-    yield from _drive_off(recording, names)
+    yield from drives_on(recording, names)
     torque = next((n for n in sorted(names) if n.endswith("torque")), None)
     if torque is None:
         return
@@ -251,7 +251,13 @@ def stated_reach(stated: Estimate) -> float:
     return stated.u * math.sqrt(3) if rectangular else 2 * stated.u
 
 
-def _drive_off(recording: Recording[Any], names: set[str]) -> Iterator[Finding]:
+def _told(labels: Mapping[str, Any]) -> str:
+    """Which run-down: by its bias, or its number."""
+    return f"{labels['bias_A']:g} A" if "bias_A" in labels else f"run {int(labels['repeat']) + 1}"
+
+
+def drives_on(recording: Recording[Any], names: set[str]) -> Iterator[Finding]:
+    """Torque, or running, while the rotor should coast, by the channels' `names`."""
     for name in sorted(names):
         if not name.endswith(("torque", "running")):
             continue
@@ -260,5 +266,5 @@ def _drive_off(recording: Recording[Any], names: set[str]) -> Iterator[Finding]:
             values = step.read(name)[name][1:]  # the first reading may be from before
             if len(values) and abs(values).max() > limit:
                 yield Finding("drive-not-off", f"{name} reads {abs(values).max():.3g} while the rotor should coast.",
-                              f"{step.labels['bias_A']:g} A", Effect.INDETERMINATE)  # fmt: skip
+                              _told(step.labels), Effect.INDETERMINATE)  # fmt: skip
                 break

@@ -24,8 +24,9 @@ from procedures.servomotor import hold
 from procedures.servomotor.conventions import conventions
 from procedures.servomotor.parameters import BIASES, named, needed, write
 from procedures.shared import assumptions
-from procedures.spindown import checks, estimates
+from procedures.spindown import checks, coasting, estimates
 from procedures.spindown import figures as drawn
+from procedures.spindown.coasting import Coasted
 from procedures.spindown.estimates import Drag
 from procedures.spindown.plan import Plan
 from procedures.spindown.running_up import let_go, run_up
@@ -42,6 +43,8 @@ SLOW = (0.1, 0.15, 0.2, 0.25, 0.3)  # shares of the speed that the drive also ho
 
 def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
     """Lifted at the first bias and with the angle released: no loop is closed before the encoder's direction is known."""
+    if coasting.applies(rig):
+        return coasting.settings(rig)
     return named(rig, {**dict.fromkeys(BIASES, plan.bias_A), **hold.RELEASED})
 
 
@@ -63,7 +66,11 @@ def fewest_steps(plan: Plan) -> int:
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
-    """Run down in both directions at both biases, and with the ring; the angle is held again in the end."""
+    """Run down in both directions at both biases, and with the ring; the angle is held again in the end. Where the rig has no
+    motor, as `coasting`."""
+    if coasting.applies(rig.file):
+        coasting.acquire(rig, plan, record)
+        return
     hold.probe(rig, record)
     by = "drive" if plan.run_up == "drive" or (plan.run_up == "auto" and rig.drive is not None) else "motor"
     for group, bias in groups(plan):
@@ -139,8 +146,10 @@ class Analysis:
     inertia: Estimate
 
 
-def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
-    """The run-downs, evaluated by the angle and by the speed."""
+def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis | Coasted:
+    """The run-downs, evaluated by the angle and by the speed; where the rig has no motor, as `coasting`."""
+    if coasting.applies(recording.rig):
+        return coasting.evaluate(recording, findings)
     findings.gate(checks.before_fits(recording))
     plan, rig, runs = recording.plan, recording.rig, read_run_downs(recording)
     angle, speed = (estimates.evaluate(runs, rig, m, plan.bias_A, plan.bias_high_A) for m in ("angle", "speed"))
@@ -154,21 +163,25 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     return Analysis(runs, angle, speed, _inertia(angle, rig))
 
 
-def measured(a: Analysis) -> Iterator[Measured]:
+def measured(a: Analysis | Coasted) -> Iterator[Measured]:
     """B and T_c by the speed, and all quantities by the angle, which are the results."""
-    for quantity in (B, T_C):
-        yield quantity.measured(a.speed.estimates[quantity.name], "by the speed channel")
+    if isinstance(a, Analysis):
+        for quantity in (B, T_C):
+            yield quantity.measured(a.speed.estimates[quantity.name], "by the speed channel")
     estimates = facts(a)
     for quantity in MEASURES:
-        yield quantity.measured(estimates[quantity.name])
+        if quantity.name in estimates:
+            yield quantity.measured(estimates[quantity.name])
 
 
 def _inertia(result: Drag, rig: RigFile) -> Estimate:
     return result.estimates.get("J_z") or estimates.stated_inertia(rig)
 
 
-def facts(a: Analysis) -> dict[str, Estimate]:
+def facts(a: Analysis | Coasted) -> dict[str, Estimate]:
     """What a calibration of this rig holds: the results by the angle."""
+    if isinstance(a, Coasted):
+        return dict(a.estimates)
     return {**a.angle.estimates, "J_z": a.inertia}
 
 
@@ -179,6 +192,9 @@ def holds_for(plan: Plan) -> dict[str, float]:
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     """What cannot work before anything starts."""
+    if coasting.applies(rig):
+        yield from coasting.check(rig, plan)
+        return
     needed = ["ring_inertia"] if plan.added_inertia else ["polar_inertia"]
     for name in needed:
         if name not in rig.machine:
@@ -195,13 +211,17 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
         yield "run_up: found drive; the rig file has no device in that role"
 
 
-def figures(a: Analysis, recording: Recording[Plan]) -> Iterable[Figure]:
+def figures(a: Analysis | Coasted, recording: Recording[Plan]) -> Iterable[Figure]:
     """Speed over time with fit and residuals, deceleration and loss power over speed."""
+    if isinstance(a, Coasted):
+        return coasting.figures(a)
     return drawn.all_figures(a.runs, a.angle, recording.plan.speed_rad_s)
 
 
 def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
+    if coasting.applies(rig):
+        return coasting.requires(rig)
     machine = conventions(rig)
     return Requires(
         lacks=machine.lacks,
@@ -228,6 +248,8 @@ procedure = Procedure(
     settings=settings,
     step_count=step_count,
     fewest_steps=fewest_steps,
+    steps_on=lambda rig, plan: coasting.steps(plan) if coasting.applies(rig) else step_count(plan),
+    optional=(B_HIGH,),  # a drive's run-downs are made at the bias that the controller has
     facts=facts,
     holds_for=holds_for,
     assumes=assumptions.SPINDOWN,

@@ -27,6 +27,7 @@ FROM_S, UNTIL_S = (
     0.05,
 )  # from where filters and current loops have died away; about three periods of what levitates
 SCALE = 100.0  # 1/s, of the search
+GREATEST = 300.0  # exponent of a swing that grows: its square is still a number
 APART = (1.0, 0.2), (1.06, 0.25)  # start of the search: frequencies over the guess, damping ratios
 SLOW_HZ, FAST_HZ = 15.0, 250.0  # of what levitates: slower are integrators, faster filters
 HARD = 0.95  # of damping: no oscillation
@@ -150,7 +151,8 @@ class _Data:
     def columns(self, x: Array) -> Array:
         """Of what is linear: a level, a line or what fades, and the oscillations of `x`."""
         many = 2 * self.seen.shape[1]
-        e = np.exp(SCALE * np.outer(self.t, -x[0:many:2] + 1j * x[1:many:2]))
+        growth = np.minimum(-SCALE * np.outer(self.t, x[0:many:2]), GREATEST)  # where a search has gone astray
+        e = np.exp(growth + 1j * SCALE * np.outer(self.t, x[1:many:2]))
         slow = np.exp(-SCALE * x[-1] * self.t) if self.constant else self.t
         return np.asarray(np.column_stack([np.ones_like(self.t), slow, e.real, -e.imag]) * self.weight[:, None])
 

@@ -16,6 +16,7 @@ from bench.recording import Recording, Step
 from bench.rigfile import RigFile
 from bench.rigfile.places import CENTRE, Places
 from bench.rigfile.roles import ANGLE, SPEED, STATUS
+from bench.rigfile.supports import radial_supports
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.amb_rotor.onset import onset
 from procedures.step import capturing
@@ -23,6 +24,7 @@ from procedures.step.response import trailing
 
 Array = npt.NDArray[np.float64]
 STEP = "set-point"
+SQUARE = math.sin(math.radians(1.0))  # of a cosine: axes that are so near to right angles are meant to be
 ORDERS = (1, 2, 3, 4)  # per turn: unbalance and the runout of the journals
 TURNING_RAD_S = 20.0
 GONE = 0.25  # of the way: until then the currents push
@@ -125,13 +127,27 @@ def by_group(steps: list[Done]) -> dict[str, list[Done]]:
 
 
 def shares(rig: RigFile, axis: str) -> dict[str, float]:
-    """Of which sensors the position along an axis is made at the centre of mass, and how."""
+    """Of which sensors the position along an axis is made at the centre of mass, and how. Where the axes of a bearing are not
+    at right angles z, which is, has of the readings that look along y what the others see of it: z = (v - u cos a)/sin a."""
     machine = conventions(rig)
     names = [machine.position(a) for a in machine.along(axis)]
     if len(names) == 1:
         return {names[0]: 1.0}
     l_is, l_os = _probe_arms(rig)
-    return {names[0]: l_os / (l_is + l_os), names[1]: l_is / (l_is + l_os)}
+    own = {names[0]: l_os / (l_is + l_os), names[1]: l_is / (l_is + l_os)}
+    apart = _between(rig)
+    if axis != "z" or abs(math.cos(apart)) < SQUARE:
+        return own
+    first = [machine.position(a) for a in machine.along("y")]
+    lean, aside = math.cos(apart), abs(math.sin(apart))
+    seen = {c: -w * lean / aside for c, w in zip(first, own.values(), strict=True)}
+    return {c: w / aside for c, w in own.items()} | seen
+
+
+def _between(rig: RigFile) -> float:
+    """The angle between the axes of a bearing, rad."""
+    machine, directions = conventions(rig), {a.name: a.direction for s in radial_supports(rig) for a in s.axes}
+    return directions[machine.along("z")[0]] - directions[machine.along("y")[0]]
 
 
 def _probe_arms(rig: RigFile) -> tuple[float, float]:
@@ -210,11 +226,20 @@ def _done(
         case, float(step.labels["begin_m"]), since[keep], clean[0][keep], (case.way * (raw - raw[rest].mean()))[keep],
         clean[1][keep], clean[2][keep], clean[3][keep], quiet,
         float(trailing(level, samples)[round(samples) :].std()), samples, float(amplitude[0]), slope, answered,
-        tuple(float(c[first : max(min(first + 3, pushed), first + 1)].sum()) for c in clean[4:]),
+        _kicks(clean[4:], case.way * np.array(ends), rest, first),
         (float(data[SPEED].min()), float(data[SPEED].max())), int(np.bitwise_or.reduce(flags)),
         tuple(c for c in (*machine.all_positions, *machine.all_currents) if np.ptp(data[c]) == 0), step.lost(), step.expected(),
         machine,
     )  # fmt: skip
+
+
+def _kicks(control: Array, ends: Array, rest: npt.NDArray[np.bool_], first: int) -> tuple[float, ...]:
+    """Of each bearing's control current (k, n) what pushes at first, A: before the sample in which the shaft has gone a quarter
+    of its way in that bearing's own plane (k, n). Where the centre of mass is not between the bearings, one of them is there
+    long before the other."""
+    still = ends - ends[:, rest].mean(axis=1, keepdims=True)
+    until = [min(first + 3, _before_it_moves(y, rest) - 1) for y in still]
+    return tuple(float(c[first : max(last, first + 1)].sum()) for c, last in zip(control, until, strict=True))
 
 
 def _before_it_moves(position: Array, rest: npt.NDArray[np.bool_]) -> int:

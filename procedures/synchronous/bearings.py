@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bench.calibration import Calibration, Need
+from bench.errors import AnalysisError
 from bench.findings import Effect, Finding
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
@@ -115,12 +116,20 @@ def _calibrated(known: Mapping[str, Estimate], axes: Sequence[str], model: Calib
     at_bearing = s.axes @ np.linalg.inv(s.probes)
     out = {}
     for k, a in enumerate(axes):
-        out[f"beta_{k}"] = model.values[f"beta_{a}"]
+        out[f"beta_{k}"] = _fact(model, "beta", a)
         terms = [(float(at_bearing[k, j]) / known[f"gain_{j}"].value, known[f"zero_{j}"]) for j in range(4)]
-        offset = model.values[f"offset_{a}"]
+        offset = _fact(model, "offset", a)
         value = offset.value + sum(w * e.value for w, e in terms)
         out[f"offset_{k}"] = Estimate(value, "m", merged([(1.0, offset), *terms]))
     return out
+
+
+def _fact(model: Calibration, kind: str, axis: str) -> Estimate:
+    """Of an axis, by its name or as the AMB stand of the thesis calls it."""
+    for name in (f"{kind}@{axis}", f"{kind}_{axis}"):
+        if name in model.values:
+            return model.values[name]
+    raise AnalysisError(f"the calibration {model.procedure} ({model.run_id}) has no {kind}@{axis}")
 
 
 def _probes_and_coils(rig: RigFile) -> dict[str, Estimate]:

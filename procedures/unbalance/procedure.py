@@ -60,6 +60,8 @@ READ = Quantity(
 CURRENT = Quantity("current_peak", "A", "coil current of a plane that is exceeded for 1 % of the time")
 VOLTAGE = Quantity("voltage_peak", "V", "coil voltage of a plane that is exceeded for 1 % of the time, either way")
 MEASURES = (COSINE, SINE, MAJOR, D_MAX, SHARE, READ, CURRENT, VOLTAGE)
+OF_CAPTURES = (CURRENT, VOLTAGE)
+"""What is read of captures alone."""
 LESS_RUNOUT = tuple(q.name for q in (COSINE, SINE, MAJOR, D_MAX, SHARE))
 
 
@@ -143,6 +145,7 @@ procedure = Procedure(
     measured=measured,
     figures=figures,
     requires=requires,
+    optional=OF_CAPTURES,
     check=check,
     settings=settings,
     step_count=step_count,

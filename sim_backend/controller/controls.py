@@ -92,8 +92,8 @@ def _of_plant(rig: RigFile) -> Iterator[tuple[str, Control]]:
         rig.bearings.values(), key=lambda b: b.kind == "axial"
     )  # as the plant has them: the axial one last
     axes = [axis for bearing in bearings for axis in bearing.axes]
-    for table in (c.set_points.axes, c.set_points.shaft):
-        yield from ((name, Control(f"ref.{where}")) for where, name in table.items())
+    for way, table in (("axis", c.set_points.axes), ("shaft", c.set_points.shaft)):
+        yield from ((name, Control(f"ref.{way}.{where}")) for where, name in table.items())
     yield from ((c.set_points.slew, Control("slew")), (c.set_points.slew_tilt, Control("slew_tilt")))
     yield from ((name, Control(f"bias.{bearing}")) for bearing, name in c.bias.items())
     for gain, stated in c.gains:

@@ -26,7 +26,7 @@ def test_a_machine_made_of_the_rig_file_takes_what_capabilities_bind() -> None:
     found = controls(load_rig("amb5dof"), MADE)
     names = {n: tuple(c.name for c in chosen) for n, chosen in found.items()}
     assert names["bias"] == ("bias.inboard", "bias.outboard")
-    assert names["ref_theta"] == ("ref.theta",)
+    assert names["ref_theta"] == ("ref.shaft.theta",)
     assert set(names["kp"]) == {"kp.yi", "kp.zi", "kp.yo", "kp.zo", "kp.x"}
     assert (names["ellipse_on"], names["inject_amplitude"], names["slew"]) == (
         ("path.on",),

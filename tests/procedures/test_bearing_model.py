@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from amb_stand import AMB_ROTOR
+from odd_rig import odd_rig
 from reanalysed import reanalysed
 
 from bench.cli.virtual import Simulated, simulated_run
@@ -271,6 +272,19 @@ def test_coils_that_are_exchanged_show_without_a_load(lying: Simulated) -> None:
     other = [exchanged(x, "StromXRechtsVorn", "StromXLinksVorn") for x in (held, tilted)]
     wrong = list(wiring.of_models(*other, run.recording.rig, run.recording.plan))
     assert [(f.code, f.where) for f in wrong] == [("coils-exchanged", "x_vorn")]
+
+
+@pytest.mark.long
+def test_axes_and_probes_at_any_angle_tell_every_bearing(tmp_path: Path) -> None:
+    """Oblique and twisted axes, probes along none of them and in three planes: each axis carries some of the weight."""
+    run = simulated_run(NAME, odd_rig(tmp_path), 3, {"settle_s": 0.4, "average_s": 0.3}, tmp_path / "s.mcap")
+    assert serious(run) == {}
+    told = {f"{m.quantity.name}@{m.where}": m.estimate for m in run.results if isinstance(m, Measured)}
+    known = {name for name in told if name in run.truth}
+    assert known == {f"{q}@{a}" for q in ("beta", "offset", "K_i", "K_x")
+                     for a in ("y_vorn", "x_vorn", "y_hinten", "x_hinten")}  # fmt: skip
+    for name in known:
+        assert abs(told[name].value - run.truth[name]) < 3.3 * told[name].u, name
 
 
 def test_a_standing_shaft_has_no_known_force() -> None:

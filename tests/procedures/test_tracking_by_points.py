@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from odd_rig import odd_rig
 from twin_facts import SILENT, true_facts
 
 from bench.cli.virtual import simulated_run
@@ -47,8 +48,13 @@ def test_a_contour_error_is_across_the_ellipse_whatever_the_place_along_it() -> 
     assert contour(y, z, 40e-6, 60e-6) == pytest.approx(np.full(50, 2e-6), abs=1e-9)
 
 
-@pytest.mark.parametrize("path", [STAND, pytest.param(SPINDLE, marks=pytest.mark.long)], ids=["stand", "spindle"])
+LONG = pytest.mark.long
+
+
+@pytest.mark.parametrize("path", [STAND, pytest.param(SPINDLE, marks=LONG), pytest.param("odd", marks=LONG)],
+                         ids=["stand", "spindle", "odd"])  # fmt: skip
 def test_a_shaft_follows_set_points_as_the_same_twin_without_noise(path: str, tmp_path: Path) -> None:
+    path = odd_rig(tmp_path) if path == "odd" else path
     run = simulated_run("tracking", path, 1, QUICK, tmp_path / "s.mcap")
     assert [f.code for f in run.results if isinstance(f, Finding) and f.effect is not Effect.NOTE] == []
     silent = simulated_run("tracking", path, 1, QUICK, tmp_path / "t.mcap", SILENT)

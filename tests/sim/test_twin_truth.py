@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from bench.rigfile import RigFile, load_rig
+from sim_backend.machines.twin import truth_sensitivity, truth_whirl
 from sim_backend.machines.twin.quiet import Sight, floating
 from sim_backend.machines.twin.truth_step import steps_asked
 from sim_backend.motion import StepsAsked
@@ -82,3 +83,45 @@ def test_sight_tells_the_shaft_from_drawn_probes(path: str) -> None:
     assert np.hypot(y, z) == pytest.approx(np.hypot(1e-5, 2e-5), rel=1e-6)
     assert (theta / sight.arm, -psi / sight.arm) == pytest.approx((5e-5, 4e-5), rel=1e-6)
     assert x == pytest.approx(3e-6 if sight.along else 0.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("axis", [0, 3])
+def test_the_loop_s_sensitivity_is_that_of_injected_sines(axis: int) -> None:
+    """Two ways to one number: the linear model's, and the core's own injection into an axis of the machine without noise."""
+    rig = rig_of(STAND)
+    drawn = draw(
+        rig, 1, {name: 0.0 for name in draw(rig, 1).values if name.startswith("runout_") and "phase" not in name}
+    )
+    settings = {name: p.default for name, p in rig.parameters.items()}
+    names = [a for b in rig.bearings.values() for a in b.axes]
+    made, plant = truth_sensitivity.loop(rig, drawn, settings, names), floating(rig, drawn, settings).plant
+    for hz in (20.0, 80.0, 250.0):
+        other = plant.twin()
+        for key, value in (("axis", axis), ("hz", hz), ("amplitude", 1e-3), ("lines", 1.0)):
+            other.set(f"inject.{key}", value)
+        other.run(round(1.0 / other.tick_s))
+        trace = other.run(round(0.5 / other.tick_s), 1)[1]
+        into, after = (trace[:, other.trace_channels.index(name)] for name in ("inject", "after"))
+        wave = np.exp(-2j * np.pi * hz * other.tick_s * np.arange(len(trace)))
+        seen = (wave @ (after - after.mean())) / (wave @ into)
+        assert made.sensitivity(hz)[0, axis] == pytest.approx(seen, rel=0.01), hz
+
+
+def test_a_shaft_that_turns_whirls_as_its_unbalance_makes_it() -> None:
+    """Small orbits go with the unbalance, most in its own plane; the second probe comes a quarter of a turn later."""
+    rig = rig_of(SPINDLE)
+    values = {name: 0.0 for name in draw(rig, 2).values if name.startswith("runout_") and "phase" not in name}
+    settings = {name: p.default for name, p in rig.parameters.items()}
+    channels = ["DispLowerU", "DispLowerV", "DispUpperU", "DispUpperV"]
+    once, twice = (
+        truth_whirl.whirl(
+            rig, draw(rig, 2, {**values, "unbalance.lower": size, "unbalance.upper": 0.0}), settings, 600.0, channels
+        )
+        for size in (1e-6, 2e-6)
+    )
+    assert np.abs(twice.shaft) == pytest.approx(2 * np.abs(once.shaft), rel=0.02)
+    assert abs(once.shaft[0]) > 2 * abs(once.shaft[2])  # the plane of the weight
+    lag = np.angle(once.shaft[1] / once.shaft[0])
+    assert lag == pytest.approx(-np.pi / 2, abs=0.05)  # the second probe is a quarter of a turn on
+    far = np.abs(once.shaft).max()
+    assert once.d_max[0] > 0.9 * far

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from bench.rigfile import RigFile
 from sim_backend.machine import Truth
@@ -12,8 +12,8 @@ from sim_backend.machines.stepping import Shown, Small
 from sim_backend.motion import Motions, OrbitAsked, StepsAsked, Whirl
 
 if TYPE_CHECKING:
-    from sim_backend.machines.amb5dof.truth_passage import Curves
     from sim_backend.machines.amb5dof.truth_sensitivity import Loop
+    from sim_backend.machines.passing import Curves
 
 Numbers = Mapping[str, float]
 
@@ -34,21 +34,32 @@ def orbit(_: RigFile, drawn: Truth, asked: OrbitAsked) -> dict[str, float]:
     )  # fmt: skip
 
 
-def whirl(_: RigFile, drawn: Truth, settings: Numbers, speed: float) -> Whirl:
-    """At a speed, with the noise that the controller has."""
+def whirl(_: RigFile, drawn: Truth, settings: Numbers, speed: float, channels: Sequence[str]) -> Whirl:
+    """At a speed, with the noise that the controller has; of its four radial probes."""
+    del channels
     found = truth_unbalance.motion(drawn.plant, settings, speed)
     return Whirl(found.shaft, found.d_max, (drawn.plant.clearance,) * 2)
 
 
-def passage(_: RigFile, drawn: Truth, settings: Numbers, low: float, high: float) -> Curves:
-    """Between two speeds, rad/s."""
+def left(
+    rig: RigFile, drawn: Truth, events: Sequence[Mapping[str, Any]], names: Sequence[str]
+) -> list[truth_balance.Complex]:
+    """In its two planes."""
+    del names
+    return truth_balance.left(rig, drawn, events)
+
+
+def passage(_: RigFile, drawn: Truth, settings: Numbers, low: float, high: float, channels: Sequence[str]) -> Curves:
+    """Between two speeds, rad/s, of its four radial probes."""
+    del channels
     from sim_backend.machines.amb5dof import truth_passage  # scipy: what asks for no curves starts without it
 
     return truth_passage.curves(drawn.plant, settings, low, high)
 
 
-def loop(_: RigFile, drawn: Truth, settings: Numbers) -> Loop:
-    """At rest."""
+def loop(_: RigFile, drawn: Truth, settings: Numbers, axes: Sequence[str]) -> Loop:
+    """At rest; of its five axes."""
+    del axes
     from sim_backend.machines.amb5dof import truth_sensitivity
 
     return truth_sensitivity.loop(drawn.plant, settings)
@@ -61,4 +72,4 @@ def peak(_: RigFile, drawn: Truth, settings: Numbers, axis: int, speed: float) -
     return truth_sensitivity.quiet_peak(drawn.plant, settings, axis, speed)
 
 
-MOTIONS = Motions(steps=steps, orbit=orbit, whirl=whirl, left=truth_balance.left, passage=passage, loop=loop, peak=peak)
+MOTIONS = Motions(steps=steps, orbit=orbit, whirl=whirl, left=left, passage=passage, loop=loop, peak=peak)

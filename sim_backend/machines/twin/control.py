@@ -163,8 +163,11 @@ def working_point(n: Nominal, k: int, force: float) -> Point:
     key = f"rig {n.rig.name}: bearings.{axis.bearing}.axes.{axis.name}"
     if len(axis.coils) == 1:
         if force <= 0.02 * n.mass * n.gravity:
-            found = f"{key}.coils: found one, against which {force:.3g} N of the weight pull"
-            raise ConfigError(f"{found}; expected two coils, or a weight that the coil can pull against")
+            found = f"{key}.coils: found one, which pulls the way in which {-force:.3g} N of the weight pull"
+            upper = "; on a shaft that stands, call the upper end `far_end`" if axis is n.layout.axial else ""
+            raise ConfigError(
+                f"{found}; expected two, or one on the axis' positive side that carries the weight{upper}"
+            )
         bias = near * math.sqrt(force / beta)
         if bias > 0.8 * n.current_limit:
             found = f"{key}: carries {force:.3g} N with {bias:.3g} A; expected 0.8 of its current limit of "

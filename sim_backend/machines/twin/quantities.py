@@ -38,7 +38,7 @@ def quantities(rig: RigFile, p: TwinParams, settings: Mapping[str, float]) -> di
         whole += cmath.rect(p.unbalance[k], p.unbalance_phase[k])
         out |= {f"unbalance@{short(part)}": p.unbalance[k],
                 f"unbalance_phase@{short(part)}": math.remainder(p.unbalance_phase[k], 2 * math.pi)}  # fmt: skip
-    hz, damping = linear.slowest(p, _loop(rig, p, settings, zero))
+    hz, damping = linear.slowest(p, loop_of(rig, p, settings, zero))
     out |= _calibrated(rig, p, settings)
     return out | {"eccentricity": abs(whole) / p.mass, "frequency": hz, "damping": damping}
 
@@ -52,7 +52,7 @@ def _calibrated(rig: RigFile, p: TwinParams, settings: Mapping[str, float]) -> d
             for k, axis in enumerate(radial) if len(axis.coils) == 2}  # fmt: skip
 
 
-def _loop(rig: RigFile, p: TwinParams, settings: Mapping[str, float], zero: tuple[float, ...]) -> linear.Loop:
+def loop_of(rig: RigFile, p: TwinParams, settings: Mapping[str, float], zero: tuple[float, ...]) -> linear.Loop:
     """The radial axes as the controller's settings have them."""
     radial, bound = layout_of(rig).radial, rig.capabilities.gains
     gains = {}
