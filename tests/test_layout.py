@@ -48,7 +48,7 @@ def test_a_block_of_one_sample_byte_by_byte() -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(
-    kinds=st.lists(st.sampled_from(["f4", "u2"]), min_size=1, max_size=150),
+    kinds=st.lists(st.sampled_from(["f4", "f8", "u2"]), min_size=1, max_size=150),
     count=st.integers(1, 300),
     seed=st.integers(0, 2**32),
 )
@@ -57,7 +57,7 @@ def test_the_protobuf_runtime_and_our_decoder_read_what_was_encoded(kinds: list[
     plan = StreamLayout("s", 1000, tuple(ChannelInfo(f"c{k}", "1", kind) for k, kind in enumerate(kinds)))
     generator = np.random.default_rng(seed)
     columns = {
-        c.name: generator.standard_normal(count).astype(np.float32) if c.dtype == "f4"
+        c.name: generator.standard_normal(count).astype(c.dtype) if c.dtype != "u2"
         else generator.integers(0, 1 << 16, count) for c in plan.channels
     }  # fmt: skip
     data = encoded(count, plan, **columns)

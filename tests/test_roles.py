@@ -11,10 +11,26 @@ from test_rigfile import changed
 
 from bench.errors import Lacking
 from bench.procedure.requires import Requires
-from bench.rigfile import RigFile
-from bench.rigfile.roles import ANGLE, EDGE, SPEED, STATUS, Status, answered, bits, read_now, resolved, untold
+from bench.rigfile import RigFile, load_rig
+from bench.rigfile.roles import (
+    AGE,
+    ANGLE,
+    EDGE,
+    SPEED,
+    STATUS,
+    Status,
+    answered,
+    bits,
+    edge_round_ns,
+    read_now,
+    resolved,
+    untold,
+    whole_channels,
+)
+from bench.samples import TICKS
 
 ROOT = Path(__file__).resolve().parent.parent
+SPINDLE = str(ROOT / "examples/vertical-spindle/spindle.toml")
 
 
 def rig(*changes: tuple[str, str], name: str = "amb5dof") -> RigFile:
@@ -108,3 +124,21 @@ def test_rings_in_the_bearings_planes_and_none_at_all() -> None:
     assert {flag for flag, _ in untold(silent)} == contacts | {Status.CURRENT_LIMIT, Status.SENSOR_RANGE}
     bare = silent.model_copy(update={"rings": {}})
     assert {flag for flag, _ in untold(bare)} == {Status.CURRENT_LIMIT, Status.SENSOR_RANGE}
+
+
+def test_an_edge_is_as_old_as_both_clocks_say_however_often_they_came_round() -> None:
+    """Ticks of 50 us in 24 bits, an edge in whole microseconds of 32 bits: after two hours the one came round eight times, the
+    other once, and what was unwrapped since a bench listens began at no round. By hand: they share 2^25 us."""
+    spindle = load_rig(SPINDLE)
+    assert edge_round_ns(spindle) == 2**25 * 1000
+    assert whole_channels(spindle) == {"MarkTime"}
+    assert not whole_channels(rig()) | whole_channels(rig(name="tsbs12"))
+    ticks = np.arange(144_000_000, 144_000_400, 10)  # two hours
+    ages = np.linspace(0.0, 0.49, ticks.size)
+    edge = np.floor((ticks * 5e-5 - ages) * 1e6) * 1e-6 % (2**32 * 1e-6)
+    for heard in (ticks, ticks % 2**24, ticks - 3 * 2**24):
+        said = answered(spindle, (AGE,), {"MarkTime": edge, TICKS: heard.astype(np.uint64)})
+        assert said.keys() == {AGE, TICKS}
+        assert np.abs(said[AGE] - ages).max() < 1.01e-6
+    late = answered(spindle, (AGE,), {"MarkTime": ticks[:1] * 5e-5 % (2**32 * 1e-6) + 1e-6, TICKS: ticks[:1]})
+    assert late[AGE][0] == pytest.approx(-1e-6, abs=1e-8)

@@ -1,6 +1,7 @@
 """Rigs as strangers write them by the pages alone: `overhung`, whose centre of mass is beyond both bearings, with three planes
 of probes of which one falls, directions from a drain plug and a heartbeat of one bit; `hanging`, which stands, with axes 60
-degrees apart of which one has a coordinate's name, one axial coil, seven messages in both byte orders, no state for landing."""
+degrees apart of which one has a coordinate's name, one axial coil, seven messages in both byte orders, no state for landing;
+`slant` at 30 degrees, whose set points are the shaft's, whose status bits are signals, and whose controller tells no bias."""
 
 from __future__ import annotations
 
@@ -19,16 +20,16 @@ from bench.rigfile.supports import radial_supports
 from procedures.amb_rotor.conventions import conventions
 
 FOLDER = Path(__file__).resolve().parent / "strangers"
-OVERHUNG, HANGING = str(FOLDER / "overhung.toml"), str(FOLDER / "hanging.toml")
-BOTH = pytest.mark.parametrize("path", [OVERHUNG, HANGING], ids=["overhung", "hanging"])
+OVERHUNG, HANGING, SLANT = (str(FOLDER / f"{name}.toml") for name in ("overhung", "hanging", "slant"))
+ALL = pytest.mark.parametrize("path", [OVERHUNG, HANGING, SLANT], ids=["overhung", "hanging", "slant"])
 
 
-@BOTH
+@ALL
 def test_nothing_is_wrong_with_the_files(path: str) -> None:
     assert check_rig(path)[0] == ()
 
 
-@BOTH
+@ALL
 def test_each_procedure_says_what_it_makes_of_the_rig_once(path: str) -> None:
     found = abilities(load_rig(path))
     assert [a.procedure for a in found] == [entry.name for entry in catalogue.PROCEDURES]
@@ -51,7 +52,7 @@ def test_an_axis_may_be_called_as_a_coordinate_is() -> None:
     assert not machine.can_point("x")
 
 
-@BOTH
+@ALL
 @pytest.mark.parametrize("axis", ["y", pytest.param("z", marks=pytest.mark.long)])
 def test_steps_find_nothing_wrong_with_a_sound_rig(path: str, axis: str, tmp_path: Path) -> None:
     """Where the centre of mass is beyond both bearings, the farther one brakes before the shaft has gone its way; where axes
@@ -60,3 +61,12 @@ def test_steps_find_nothing_wrong_with_a_sound_rig(path: str, axis: str, tmp_pat
     found = {f.code for f in run.results if isinstance(f, Finding) and f.effect is not Effect.NOTE}
     assert found <= {"not-settled", "telemetry-too-slow"}  # at 500 samples a second
     assert any(isinstance(m, Measured) for m in run.results) or "telemetry-too-slow" in found
+
+
+@pytest.mark.long
+def test_without_a_bias_forces_are_found_and_slopes_are_not_told(tmp_path: Path) -> None:
+    run = simulated_run("bearing-model", SLANT, 1, {}, tmp_path / "places.mcap")
+    assert [f.code for f in run.results if isinstance(f, Finding) and f.effect is not Effect.NOTE] == []
+    found = {m.quantity.name for m in run.results if isinstance(m, Measured)}
+    assert {"beta", "offset"} <= found
+    assert not {"K_i", "K_x"} & found

@@ -96,7 +96,7 @@ def _ends(rig: RigFile, channel: str) -> tuple[float, float]:
     """Of a signal, SI, less some steps."""
     message, _, name = rig.channels[channel].signal.partition(".")
     s = rig.messages[message].signal(name)
-    unit = units.UNITS[s.unit]
+    unit = units.unit(s.unit)
     low, high = (-math.inf, math.inf)
     if not s.is_float:
         raw = (-(1 << s.length - 1), (1 << s.length - 1) - 1) if s.signed else (0, (1 << s.length) - 1)

@@ -110,7 +110,7 @@ def of_readings(
 
 
 def read_steps(recording: Recording[Any], kind: str, labels: tuple[str, ...], batches: int) -> Held:
-    """Every step of `kind`.
+    """Every step of `kind`; a label that it has not is no number.
 
     Raises:
         AnalysisError: there are none, or one has fewer samples than `batches`.
@@ -131,7 +131,7 @@ def read_steps(recording: Recording[Any], kind: str, labels: tuple[str, ...], ba
         parts,
         {c: np.concatenate([r["every"][c] for r in read]) for c in names if c != STATUS},
         np.repeat(np.arange(len(read)), [r["samples"] for r in read]),
-        {key: np.array([float(s.labels[key]) for s in steps]) for key in labels},
+        {key: np.array([float(s.labels.get(key, np.nan)) for s in steps]) for key in labels},
         np.array([float(s.lost()) for s in steps]),
         np.array([float(s.expected()) for s in steps]),
         np.array([r["flags"] for r in read]),
@@ -143,7 +143,8 @@ def read_steps(recording: Recording[Any], kind: str, labels: tuple[str, ...], ba
 def _name(kind: str, labels: dict[str, Any]) -> str:
     if kind == TILT:
         return f"tilt psi {labels['psi_rad'] * 1e6:+.0f}, theta {labels['theta_rad'] * 1e6:+.0f} µrad"
-    return f"y {labels['y_m'] * 1e6:+.0f}, z {labels['z_m'] * 1e6:+.0f} µm at {labels['bias_A']:g} A"
+    bias = f" at {labels['bias_A']:g} A" if "bias_A" in labels else ""
+    return f"y {labels['y_m'] * 1e6:+.0f}, z {labels['z_m'] * 1e6:+.0f} µm{bias}"
 
 
 def _read(step: Step, names: tuple[str, ...], batches: int) -> dict[str, Any]:

@@ -75,7 +75,7 @@ def evaluate(recording: Recording[Any], held: Held) -> Analysis:
         estimates |= sums.estimates(a)
         noise[a] = sums.noise_N
     estimates |= comparison.by_bearing(estimates, held.machine)
-    estimates |= of_slopes(found, held.machine, bias)
+    estimates |= of_slopes(found, held.machine, bias) if math.isfinite(bias) else {}
     return Analysis(held, s, compared, fits, inputs, found, estimates, noise, bias, len(chosen.of_step),
                     _offsets_known(recording, held.machine))  # fmt: skip
 

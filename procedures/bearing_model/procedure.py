@@ -105,7 +105,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         for y, z in places(rig.file, plan) if k % 2 == 0 else reversed(places(rig.file, plan)):
             lift.write(rig, machine.points({"y": y, "z": z}))
             rig.clock.sleep(plan.settle_s)
-            with record.step(HOLD, y_m=y, z_m=z, bias_A=bias):
+            with record.step(HOLD, y_m=y, z_m=z, **({"bias_A": bias} if math.isfinite(bias) else {})):
                 held.append(_watched(rig, plan, record))
         if k == 0 and not first_look.passes(rig, record, _of_first(rig.file, plan, held, tilted)):
             return

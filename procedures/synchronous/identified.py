@@ -112,6 +112,8 @@ def _solved(s: Stand, readings: Sequence[Reading], rounds: int) -> tuple[Array, 
     for _ in range(rounds):
         design, target = _system(s, readings, runout)
         scale = np.sqrt((design**2).sum(axis=0))
+        if not scale.all():
+            raise AnalysisError("the dwells do not tell the bearings' force constants: nothing moves")
         terms, _, rank, _ = np.linalg.lstsq(design / scale, target, rcond=1e-12)
         if rank < len(scale):
             raise AnalysisError("the dwells do not tell the bearings' force constants: too few speeds")
