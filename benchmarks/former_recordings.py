@@ -50,7 +50,7 @@ def main() -> int:
     parser.add_argument("--only", action="append", default=[], metavar="PROCEDURE")
     parser.add_argument("--keep", type=Path, help="where the recordings stay; by default nothing is kept")
     asked = parser.parse_args()
-    names = asked.only or sorted(p.stem for p in golden.PLANTED.glob("*.toml"))
+    names = asked.only or golden.planned_procedures()
     failed = False
     with tempfile.TemporaryDirectory() as scratch:
         old = (asked.keep or Path(scratch)).resolve() / "old"
@@ -94,8 +94,8 @@ def not_taken(rig: str, folder: Path, seed: int) -> Iterator[str]:
 
 
 def _needs() -> Iterator[object]:
-    for path in sorted(golden.PLANTED.glob("*.toml")):
-        procedure = load_procedure(path.stem)
+    for name in golden.planned_procedures():
+        procedure = load_procedure(name)
         yield from procedure.needs(procedure.plan())
 
 

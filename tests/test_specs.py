@@ -57,7 +57,9 @@ def spec_of(folder: Path, entries: str) -> Path:
 
 
 def test_the_shipped_spec() -> None:
-    limits = load_spec("tsbs12", "amb-calibration", load_procedure("amb-calibration"), (INSTALLED,))
+    limits = load_spec(
+        "tsbs12", "amb-calibration", load_procedure("amb-calibration"), (INSTALLED,), rig=load_rig("tsbs12")
+    )
     assert set(limits) == {"K_i", "K_o"}
     assert (limits["K_i"].low, limits["K_i"].high) == pytest.approx((65.88, 80.52))
     assert (limits["K_o"].low, limits["K_o"].high) == pytest.approx((66.96, 81.84))
@@ -225,7 +227,7 @@ def test_a_limit_that_cannot_be_met_is_told_of_once(entry: str, said: str) -> No
 @pytest.mark.parametrize("rig", ["tsbs12", "amb5dof"])
 def test_the_shipped_limits_suit_their_procedures(rig: str, entry: catalogue.Entry) -> None:
     procedure = load_procedure(entry.name)
-    limits = load_spec(rig, entry.name, procedure, (INSTALLED,))
+    limits = load_spec(rig, entry.name, procedure, (INSTALLED,), rig=load_rig(rig))
     assert list(misnamed(rig, (INSTALLED,))) == []
     found, notes = applied(limits, procedure.plan.model_validate(load_rig(rig).plans.get(entry.name, {})))
     assert (set(found), notes) == (set(limits), ())  # by default they judge

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bench.errors import Lacking
+from bench.errors import ConfigError, Lacking
 from bench.figures import Shown
 from bench.findings import Ended, Finding, Findings
 from bench.plan import BenchPlan
@@ -153,6 +153,8 @@ class Procedure:
             return self.requires(rig).lacking(rig)
         except Lacking as error:
             return error.lines
+        except ConfigError as error:  # a DBC that cannot be read, which `bench check` names by itself
+            return (str(error),)
 
     def evaluated(self, recording: Recording[Any]) -> Evaluated:
         """What `evaluate` makes of a recording and what it finds in it, made the first time it is asked for."""

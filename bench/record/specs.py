@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Collection, Iterator, Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -211,7 +212,8 @@ def _stated(setting: Setting) -> str:
     return f"= {setting:g}" if isinstance(setting, float) else f"= {setting}"
 
 
-def parse_spec(text: str, name: str = "spec") -> dict[str, dict[str, Limit]]:
+@lru_cache(maxsize=4)  # a listing asks for the limits of each procedure
+def parse_spec(text: str, name: str = "spec") -> Mapping[str, Mapping[str, Limit]]:
     """Procedure -> quantity -> limit.
 
     Raises:

@@ -11,6 +11,7 @@ from typing import Any
 
 from bench.rigfile.elements import ORIGIN, From, MachineTables, Of
 from bench.rigfile.numbers import Sum, Term, numbers_in, referred
+from bench.rigfile.once import once_per_rig
 from bench.rigfile.toleranced import Toleranced
 
 CENTRE = "centre_of_mass"
@@ -40,6 +41,12 @@ class PlaceError(ValueError):
         self.key, self.found, self.expected = key, found, expected
 
 
+@once_per_rig
+def _numbers(tables: MachineTables) -> Mapping[str, Toleranced]:
+    fields = type(tables).model_fields
+    return dict(numbers_in({name: getattr(tables, name) for name in fields if name not in WITHOUT_NUMBERS}))
+
+
 @dataclass(frozen=True)
 class Places:
     """Of one rig file. Parts are known by table and name, as `bearings/upper`; an axis as `bearings/upper/u`."""
@@ -49,8 +56,7 @@ class Places:
     @cached_property
     def known(self) -> Mapping[str, Toleranced]:
         """Every number by its identity, but what only the simulator draws from."""
-        fields = type(self.tables).model_fields
-        return dict(numbers_in({name: getattr(self.tables, name) for name in fields if name not in WITHOUT_NUMBERS}))
+        return _numbers(self.tables)
 
     @cached_property
     def _stated(self) -> dict[str, Any]:

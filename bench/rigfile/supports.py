@@ -3,34 +3,16 @@
 from __future__ import annotations
 
 import math
-import weakref
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import wraps
-from typing import TypeVar
 
 from bench.errors import Lacking
 from bench.rigfile.elements import Probe
 from bench.rigfile.model import RigFile
+from bench.rigfile.once import once_per_rig as once_per_rig  # those who ask for bearings ask once
 from bench.rigfile.places import PlaceError, Places
 
-T = TypeVar("T")
 ALONG_RAD = math.radians(1.0)  # a probe that looks another way than an axis by more is not the axis' own
-
-
-def once_per_rig(make: Callable[[RigFile], T]) -> Callable[[RigFile], T]:
-    """A function of a rig file that is called time and again with the same one."""
-    known: dict[int, tuple[weakref.ref[RigFile], T]] = {}
-
-    @wraps(make)
-    def remembered(rig: RigFile) -> T:
-        found = known.get(id(rig))
-        if found is None or found[0]() is not rig:
-            found = known[id(rig)] = (weakref.ref(rig, lambda _, key=id(rig): known.pop(key, None)), make(rig))  # type: ignore[misc]
-        return found[1]
-
-    return remembered
 
 
 @dataclass(frozen=True)
