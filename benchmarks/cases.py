@@ -22,6 +22,11 @@ RIGS = {
     "amb5dof": ("bearing-model", "step", "tracking", "unbalance", "compensation", "balance", "run-up", "coast-down",
                 "sensitivity"),
 }  # fmt: skip
+FOREIGN = {
+    "examples/vertical-spindle/spindle.toml": ("step", "unbalance", "balance", "run-up", "coast-down"),
+    "examples/plain-stand/stand.toml": ("amb-calibration", "bearing-model", "step", "sensitivity"),
+}
+"""Rigs of the examples, by their twins: default plans alone."""
 ENDS: Mapping[str, tuple[Mapping[str, Any], ...]] = {
     "amb-calibration": ({"bias_A": 2.5}, {"bias_A": 4.0}),
     "torque-constant": ({"bias_A": 2.0}, {"bias_A": 4.0}),
@@ -85,6 +90,19 @@ def cases_of(rig: str, only: list[str]) -> Iterator[Case]:
                 continue
             if (plan := plan_of(rig, procedure, changes)) is not None:
                 yield Case(rig, name, json.dumps(changes), bool(procedure.needs(plan)))
+
+
+def foreign_cases(rig: str, only: list[str]) -> Iterator[Case]:
+    """Default plans, alone where no calibration is needed, and in the chain where the rig can make what it uses."""
+    for name in FOREIGN[rig]:
+        procedure = load(name)
+        needs = procedure.needs(procedure.plan())
+        if only and name not in only:
+            continue
+        if all(n.optional for n in needs):
+            yield Case(rig, name, "{}", False)
+        if needs and {*needed_by(name)} <= {*FOREIGN[rig]}:
+            yield Case(rig, name, "{}", True)
 
 
 def plan_of(rig: str, procedure: Procedure, changes: Mapping[str, Any]) -> BenchPlan | None:

@@ -32,7 +32,7 @@ from bench.record.outcomes import outcome_of
 from bench.record.records import Measurement, measurement, missing
 from bench.record.specs import applied, load_spec
 from bench.rigfile import load_rig
-from benchmarks.cases import RIGS, TRUTH, Case, cases_of, load, needed
+from benchmarks.cases import FOREIGN, RIGS, TRUTH, Case, cases_of, foreign_cases, load, needed
 
 
 def main() -> None:
@@ -44,6 +44,9 @@ def main() -> None:
     parser.add_argument("--choices", type=int, default=20, help="rigs of each choice of a plan")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--only", action="append", default=[], metavar="PROCEDURE")
+    parser.add_argument(
+        "--foreign", action="store_true", help="the rigs of the examples, by their twins, with default plans"
+    )
     parser.add_argument("--report", action="store_true")
     asked = parser.parse_args()
     if not asked.report:
@@ -59,8 +62,9 @@ def run_missing(asked: argparse.Namespace) -> None:
     waiting = []
     with pool(asked.jobs) as (workers, _):
         for seed in seeds:
-            for rig in RIGS:
-                cases = [c for c in cases_of(rig, asked.only) if seed - asked.first < limit_of(c, asked)]
+            for rig in FOREIGN if asked.foreign else RIGS:
+                found = foreign_cases(rig, asked.only) if asked.foreign else cases_of(rig, asked.only)
+                cases = [c for c in found if seed - asked.first < limit_of(c, asked)]
                 left = [c for c in cases if (rig, c.name, seed) not in known]
                 if left:
                     waiting.append(workers.submit(run_rig, rig, seed, left, asked.file))
@@ -128,7 +132,7 @@ def run_case(case: Case, seed: int, path: Path, known: Mapping[str, Calibration]
 
 def judged(done: Simulated, rig: str) -> dict[str, Any]:
     """Outcome by the rig's limits, findings that are no notes, verdicts that are not pass, values that are off."""
-    limits, _ = applied(load_spec(rig, done.procedure.name), done.recording.plan)
+    limits, _ = applied(load_spec(load_rig(rig).name, done.procedure.name), done.recording.plan)
     findings = [r for r in done.results if isinstance(r, Finding)]
     measured = [r for r in done.results if isinstance(r, Measured)]
     entries = [measurement(m, limits.get(m.quantity.name), done.seed) for m in measured]
@@ -196,11 +200,11 @@ def report(lines: list[dict[str, Any]]) -> None:
         spent[e["rig"], e["case"]] += e["cpu_s"]
     for key, counts in ends.items():
         told = ", ".join(f"{n} {end}" for end, n in counts.most_common())
-        print(f"{key[0]:8} {key[1]:58} {told}  ({spent[key] / counts.total():.1f} s each)")
+        print(f"{Path(key[0]).stem:8} {key[1]:58} {told}  ({spent[key] / counts.total():.1f} s each)")
     for e in lines:
         if e["outcome"] not in ("PASS", "DONE") or e.get("off"):
             deserved = ", as the truth deserves" if e.get("deserved") and not e.get("off") else ""
-            print(f"{e['rig']} {e['case']} seed {e['seed']}: {e['outcome']}{deserved}")
+            print(f"{Path(e['rig']).stem} {e['case']} seed {e['seed']}: {e['outcome']}{deserved}")
             for text in [*e["wrong"], *e.get("off", ())]:
                 print(f"    {text}")
 

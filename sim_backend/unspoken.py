@@ -8,6 +8,7 @@ from contextlib import suppress
 from bench.errors import ConfigError, Problem
 from bench.rigfile import RigFile
 from bench.rigfile.messages import MessageMap, load_messages
+from sim_backend.controller.controls import without_control
 from sim_backend.controller.meanings import FAULTS
 from sim_backend.core import PERIOD_TICKS, TICK_S
 from sim_backend.machine import Machine
@@ -31,6 +32,7 @@ def unspoken(rig: RigFile, machine: Machine) -> Iterator[Problem]:
         yield Problem(rig.path, f"channels.{name}", f"what the simulated {machine.name} has no reading for", expected)
     if machine.columns is None:
         yield from _of_time(rig, messages, machine)
+        yield from _of_controls(rig, machine)
     yield from _of_faults(rig)
 
 
@@ -41,6 +43,14 @@ def _of_time(rig: RigFile, messages: MessageMap, machine: Machine) -> Iterator[P
     if first is not None and abs(first.period_s - PERIOD_TICKS * TICK_S) > 1e-9:
         expected = f"{PERIOD_TICKS * TICK_S:g} s, that of {machine.name}"
         yield Problem(rig.link.dbc, f'BA_ "GenMsgCycleTime" of {first.name}', f"{first.period_s:g} s", expected)
+
+
+def _of_controls(rig: RigFile, machine: Machine) -> Iterator[Problem]:
+    for key, name in without_control(rig, machine):
+        expected = "bearings and axes by the names that it has in the shipped rig file, or a twin (`machine` left out)"
+        yield Problem(
+            rig.path, f"capabilities.{key}", f"{name}, which the simulated {machine.name} would not hear", expected
+        )
 
 
 def _of_faults(rig: RigFile) -> Iterator[Problem]:

@@ -53,6 +53,8 @@ def test_a_standing_shaft_with_axes_at_30_degrees_is_stepped(tmp_path: Path, see
             assert abs(m.estimate.value - true) < 2 * interval(m.estimate, seed).U, (m.quantity.name, m.where)
     shown = ("overshoot", "rise_time", "settling_time", "steady_error", "bandwidth")
     assert compared == {"damping": 1, "natural_frequency": 1, **dict.fromkeys(shown, 4)}
+    (frame,) = (f.text for f in run.results if isinstance(f, Finding) and f.code == "coordinates")
+    assert frame.startswith("y is along LowU and UppU, 30° from the terminal box.")
     recording = Recording.open(tmp_path / "spindle.mcap", Plan)
     written = [e["t_ns"] for e in recording.events("parameter") if e["name"] in ("TargetLowerU", "TargetUpperU")]
     assert written

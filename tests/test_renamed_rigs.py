@@ -14,6 +14,7 @@ from foreign_map import foreign
 
 from bench.calibration import Calibration
 from bench.cli.virtual import Simulated, simulated_run
+from bench.errors import ConfigError
 from bench.findings import Finding
 from bench.link.session import Session
 from bench.procedure import Measured
@@ -217,3 +218,14 @@ def test_without_replies_the_numbers_are_those_of_other_noise(tmp_path: Path) ->
         assert sorted(found) == sorted(also), procedure
         for name, (value, u) in ours.items():
             assert abs(theirs[name][0] - value) <= 3 * math.hypot(u, theirs[name][1]), (procedure, name)
+
+
+def test_bearings_by_other_names_are_refused_where_the_machine_would_not_hear(tmp_path: Path) -> None:
+    """A parameter that acts on nothing, silently, would be the worst of answers."""
+    path = Path(elsewhere(tmp_path, replies=True))
+    text = path.read_text(encoding="utf-8")
+    path.write_text(re.sub(r"\binboard\b(?! to)", "near", text), encoding="utf-8")
+    with pytest.raises(ConfigError, match="cannot be simulated") as refused:
+        draw(load_rig(str(path)), 1)
+    told = {p.key: p.found for p in refused.value.problems}
+    assert "would not hear" in told["capabilities.bias.near"]

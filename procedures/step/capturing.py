@@ -38,8 +38,10 @@ def channels(machine: AmbRotor) -> tuple[str, ...]:
 
 def captures(rig: RigFile, machine: AmbRotor) -> bool:
     """Whether a rig's steps are captured: its telemetry is slow, and its controller records all that a step needs."""
-    period_s = rig.messages[rig.binding.telemetry[0]].period_s
-    return rig.capture is not None and period_s > SLOW_S and set(channels(machine)) <= set(rig.capture.channels)
+    first = rig.messages.messages.get(rig.binding.telemetry[0])
+    if rig.capture is None or first is None:
+        return False
+    return first.period_s > SLOW_S and set(channels(machine)) <= set(rig.capture.channels)
 
 
 def arm(rig: Rig, machine: AmbRotor, seconds: float) -> None:

@@ -170,7 +170,7 @@ def _kicks(steps: Sequence[Done]) -> Iterator[Finding]:
             if d.answered and len(d.kicks) == count and d.kicks[k] < 0 and d.y[d.t > 0.75 * d.t[-1]].mean() > 0
         ]
         if len(wrong) > len(steps) / 2:
-            bearing = ("inboard", "outboard")[k] if count == 2 else "axial"
+            bearing = tuple(steps[0].machine.planes)[k] if count == 2 else "axial"
             yield Finding("current-sign", f"the {bearing} control current answers against the step, and the shaft "
                                           f"goes the right way: "
                           "the current sensors of its coils are exchanged.", wrong[0].case.where, Effect.ERROR)  # fmt: skip

@@ -98,9 +98,10 @@ def _control(done: Sequence[Done]) -> Figure:
     series = tuple(
         Series(d.case.setting, 1e3 * d.t[m], d.control[m]) for d in done for m in [(d.t > BEFORE_S) & (d.t < SWING_S)]
     )
+    bearings = " and ".join(done[0].machine.planes)
+    which = f"{bearings} together" if done[0].case.axis != "x" else f"of {done[0].machine.axial}"
     return Figure(f"control-{_key(done[0].case)}", f"Control current, {_title(done[0].case)}",
-                  "Positive less negative coil, inboard and outboard together, from where it rested. It says when the "
-                  "step began.",
+                  f"Positive less negative coil, {which}, from where it rested. It says when the step began.",
                   "time since the set point acts (ms)", "current (A)", series)  # fmt: skip
 
 

@@ -21,7 +21,7 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from bench.units import RPM
-from procedures.amb_rotor import lift
+from procedures.amb_rotor import frame, lift
 from procedures.amb_rotor.conventions import conventions
 from procedures.shared import assumptions
 from procedures.step import capturing, checks, estimates, planes, slewing
@@ -178,6 +178,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     findings.gate(checks.of_steps(steps, plan), checks.FATAL, Results(steps))
     by_case = estimates.by_case(steps, recording.rig, plan.band)
     by_group = estimates.by_group(steps, by_case)
+    findings.add(frame.describe(recording.rig, plan.axes))
     findings.add(checks.of_results(by_case, by_group, plan))
     findings.add(slewing.of_sizes(by_case))
     findings.add(checks.compare(by_case, plan.names))

@@ -68,6 +68,15 @@ def _by_meaning(rig: RigFile, machine: Machine) -> Iterator[tuple[str, Control]]
             yield name, Control(meant[place])
 
 
+def without_control(rig: RigFile, machine: Machine) -> Iterator[tuple[str, str]]:
+    """Capabilities that a machine with a law of its own does not have, by their keys, and the parameters that are bound to
+    them: of bearings and axes that it knows by other names."""
+    meant = _by_place(meanings(rig, machine))
+    for place, name in _by_place(rig.capabilities).items():
+        if place not in meant and name not in (*machine.controls, *OWN):
+            yield place[0], name
+
+
 def _by_place(c: Capabilities) -> dict[tuple[str, int], str]:
     """Parameters by their key, those of a setting by their number in it: there the key has their own names."""
     out: dict[tuple[str, int], str] = {}

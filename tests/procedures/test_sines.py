@@ -69,7 +69,7 @@ def test_the_loop_of_another_laboratory_is_recovered_within_its_intervals(tmp_pa
     assert [f.code for f in run.results if isinstance(f, Finding) and f.effect is not Effect.NOTE] == []
     told = {m.quantity.name: m.estimate for m in run.results if isinstance(m, Measured)}
     hz = np.geomspace(2.0, 1800.0, 3000)
-    true = sensitivity(run.drawn.plant, 3, hz)
+    true = sensitivity(run.recording.rig, run.drawn.plant, "y_vorn", hz)
     open_loop, top = 1 / true - 1, int(np.abs(true).argmax())
     for name, value in (("s_max", float(abs(true[top]))), ("s_max_hz", float(hz[top])), ("phase_margin", phase(open_loop)),
                         ("gain_reduction", fall(open_loop))):  # fmt: skip

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from odd_rig import odd_rig
 
 from bench.rigfile import load_rig
 from bench.rigfile.model import RigFile
@@ -96,7 +97,7 @@ def test_what_a_probe_reads_of_a_shaft_on_its_rings(of: Stations, shares: list[f
 
 def at_rest(rig: RigFile, y: float, z: float) -> dict[str, float]:
     """Readings of a shaft that is off the middle by y and z m, without tilt."""
-    return {name: row(0.0, p.angle.value)[0] * y + row(0.0, p.angle.value)[1] * z
+    return {name: row(0.0, p.angle.value, p.sign)[0] * y + row(0.0, p.angle.value, p.sign)[1] * z
             for name, p in stations(rig).probes.items()}  # fmt: skip
 
 
@@ -110,6 +111,16 @@ def test_a_shaft_that_lies_across_one_axis_tells_the_other_axis_alone() -> None:
     assert [f.code for f in rings.of_readings(at_rest(rig, -230e-6, 0.0), rig)] == ["ring-too-far"] * 2
     assert [f.code for f in rings.of_readings(at_rest(rig, -150e-6, 0.0), rig)] == ["ring-too-near"] * 2
     assert set(rings.unshown(rig)) == {"LageXVorn", "LageXHinten"}
+
+
+def test_a_probe_that_counts_backwards_reads_above_the_middle_at_rest(tmp_path: Path) -> None:
+    """y of this rig is at 10 degrees: straight down is -cos 10 along y, and, z being at -80, sin 10 the other way along z."""
+    rig = load_rig(odd_rig(tmp_path))
+    down = at_rest(rig, -200e-6 * math.cos(math.radians(10)), -200e-6 * math.sin(math.radians(10)))
+    assert down["LageXVorn"] > 0
+    assert list(rings.of_readings(down, rig)) == []
+    wrong = down | {"LageXVorn": -down["LageXVorn"]}
+    assert [(f.code, f.where) for f in rings.of_readings(wrong, rig)] == [("sensor-polarity", "LageXVorn")]
 
 
 def test_of_a_shaft_that_stands_gravity_tells_no_polarity() -> None:
