@@ -17,7 +17,7 @@ import numpy.typing as npt
 from bench.errors import Lacking
 from bench.rigfile import RigFile
 from bench.rigfile.elements import BalancingPlane
-from bench.rigfile.places import Places
+from bench.rigfile.places import CENTRE, PlaceError, Places
 from bench.rigfile.supports import once_per_rig
 from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import Estimate
@@ -72,6 +72,20 @@ def missing(rig: RigFile) -> Iterator[str]:
         for key in ("weight_mass", "weight_angle"):
             if getattr(plane, key) is None:
                 yield f"balancing.{name}.{key}: found none; expected what is not known of a weight that is fixed there"
+    yield from _one_sided(rig)
+
+
+def _one_sided(rig: RigFile) -> Iterator[str]:
+    """What is permissible is shared out between planes on both sides of the centre of mass."""
+    places = Places(rig)
+    try:
+        at = [places.distance(CENTRE, f"balancing/{name}").value for name in rig.balancing]
+    except PlaceError as error:
+        yield str(error)
+        return
+    if min(at) >= 0 or max(at) <= 0:
+        told = ", ".join(f"{name} at {1e3 * x:+.4g} mm" for name, x in zip(rig.balancing, at, strict=True))
+        yield f"balancing: found {told} from the centre of mass; this procedure takes planes on both sides of it"
 
 
 @once_per_rig

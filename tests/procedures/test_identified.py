@@ -12,7 +12,7 @@ import pytest
 from bench.analysis.vectors import Vectors
 from bench.errors import AnalysisError
 from bench.rigfile import load_rig
-from procedures.balance.planes import names_of, planes_of
+from procedures.balance.planes import missing, names_of, planes_of
 from procedures.synchronous import bearings, facts
 from procedures.synchronous.identified import Reading, find_bearings
 from procedures.synchronous.runout import Stand, arms, impedance, slopes, waves
@@ -98,5 +98,11 @@ def test_a_scale_begins_where_it_does_and_runs_either_way() -> None:
             weight = 2e-6 * np.exp(1j * angle)
             assert plane.turned(weight) == pytest.approx(2e-6 * np.exp(1j * plane.from_mark(angle)))
             assert plane.told(plane.turned(weight)) == pytest.approx(weight)
+    assert not list(missing(SPINDLE))
+    both = {
+        name: part.model_copy(update={"at": SPINDLE.balancing["upper"].at}) for name, part in SPINDLE.balancing.items()
+    }
+    (said,) = missing(SPINDLE.model_copy(update={"balancing": both}))
+    assert "lower at +190 mm, upper at +190 mm from the centre of mass" in said
     plain = planes_of(load_rig("amb5dof"))[0]
     assert plain.turned(1 + 2j) == plain.told(1 + 2j) == 1 + 2j
