@@ -119,7 +119,7 @@ def test_what_is_wrong_with_masses_or_coils_is_told(
 
 
 PULLEY = """[hooks.seite]
-at = { from = "bearings/vorn", by = { value = 60, unit = "mm", half_width = 0.1, distribution = "rectangular", source = "" } }
+at = { from = "bearings/vorn", by = { value = 60, unit = "mm", half_width = 0.1, distribution = "rectangular", source = "-" } }
 pull = { value = -90, unit = "deg", half_width = 0.5, distribution = "rectangular", source = "set by a level" }
 
 [hooks.seite.pulley]

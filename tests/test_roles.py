@@ -24,11 +24,13 @@ from bench.rigfile.roles import (
     edge_round_ns,
     read_now,
     resolved,
+    untold,
     whole_channels,
 )
 from bench.samples import TICKS
 
-SPINDLE = str(Path(__file__).resolve().parent.parent / "examples/vertical-spindle/spindle.toml")
+ROOT = Path(__file__).resolve().parent.parent
+SPINDLE = str(ROOT / "examples/vertical-spindle/spindle.toml")
 
 
 def rig(*changes: tuple[str, str], name: str = "amb5dof") -> RigFile:
@@ -65,16 +67,63 @@ def test_the_status_word_is_made_of_the_bits_of_any_channels() -> None:
 
 
 def test_the_servomotor_has_other_bits_for_the_same_meanings() -> None:
-    said = answered(rig(name="tsbs12"), (STATUS,), {"flags": np.array([1.0, 2.0, 8.0])})[STATUS]
+    servomotor = rig(name="tsbs12")
+    samples = {name: np.zeros(3) for name in resolved(servomotor, (STATUS,))}
+    said = answered(servomotor, (STATUS,), {**samples, "flags": np.array([1.0, 2.0, 8.0])})[STATUS]
     assert said.tolist() == [Status.CURRENT_LIMIT, Status.SEGMENT_LIMIT, Status.CONTACT_FAR]
 
 
-def test_a_controller_that_says_nothing_has_a_status_of_zeros() -> None:
+def stand(*without: str) -> RigFile:
+    """The plain stand, whose controller does not say some of it."""
+    folder = ROOT / "examples/plain-stand"
+    toml = (folder / "stand.toml").read_text(encoding="utf-8")
+    begin, end = toml.index("[capabilities.status]"), toml.index("[capture]")
+    lines = [line for line in toml[begin:end].splitlines() if not line.startswith(without)]
+    kept = toml[:begin] + "\n".join(lines) + "\n" + toml[end:]
+    return RigFile.parse(kept, (folder / "stand.dbc").read_text(encoding="cp1252"))
+
+
+SILENT = ("contact", "current_limit", "voltage_limit", "sensor_range")
+
+
+def at_rest(of: RigFile) -> dict[str, np.ndarray]:
+    samples = {name: np.zeros(3) for name in resolved(of, (STATUS,))}
+    return samples | ({"Versorgung": np.full(3, 24.0)} if "Versorgung" in samples else {})
+
+
+@pytest.mark.parametrize(
+    ("changed_to", "told"),
+    [({"LageYVorn": [0.0, -150e-6, -192e-6], "LageYHinten": [0.0, -150e-6, -192e-6]},
+      [0, 0, Status.CONTACT_NEAR | Status.CONTACT_FAR]),  # 200 um, less some 13 of tolerances
+     ({"LageXVorn": [0.0, -90e-6, -120e-6], "LageYVorn": [0.0, -90e-6, -120e-6]}, [0, 0, Status.CONTACT_FAR]),
+     ({"StromYObenHinten": [3.4, 3.7, 3.8]}, [0, 0, Status.CURRENT_LIMIT]),  # 3.8 A is what the envelope allows: 98 % of it
+     ({"SpannungVorn": [10.0, 22.0, 23.5]}, [0, 0, Status.VOLTAGE_LIMIT]),  # of 24 V
+     ({"LageXHinten": [0.0, 100e-6, 255.97e-6], "LageXVorn": [0.0, 0.0, -200e-6]}, [0, 0, Status.SENSOR_RANGE])],
+)  # fmt: skip
+def test_what_no_bit_tells_is_judged_from_readings(changed_to: dict[str, list[float]], told: list[int]) -> None:
+    """Positions against the clearance at the rings' own places, currents, voltages against the supply, the ends of a signal."""
+    silent = stand(*SILENT)
+    assert bits(silent) == {}
+    samples = at_rest(silent) | {name: np.array(x) for name, x in changed_to.items()}
+    seen = answered(silent, (STATUS,), samples)[STATUS].tolist()
+    assert [s & t if t else s for s, t in zip(seen, told, strict=True)] == told
+
+
+def test_what_a_bit_tells_is_not_judged() -> None:
+    """Of a kind that is bound the controller has the word."""
+    assert untold(stand()) == ()
+    assert {flag for flag, _ in untold(stand("contact"))} == {Status.CONTACT_NEAR, Status.CONTACT_FAR}
+    assert untold(rig()) == ()
+
+
+def test_rings_in_the_bearings_planes_and_none_at_all() -> None:
     toml, dbc = RIGS["tsbs12"]
     begin, end = toml.index("[capabilities.status]"), toml.index("[parameters]")
     silent = RigFile.parse(toml[:begin] + toml[end:], dbc)
-    assert bits(silent) == {}
-    assert answered(silent, (STATUS,), {"pos_yi": np.zeros(3)})[STATUS].tolist() == [0, 0, 0]
+    contacts = {Status.CONTACT_NEAR, Status.CONTACT_FAR}
+    assert {flag for flag, _ in untold(silent)} == contacts | {Status.CURRENT_LIMIT, Status.SENSOR_RANGE}
+    bare = silent.model_copy(update={"rings": {}})
+    assert {flag for flag, _ in untold(bare)} == {Status.CURRENT_LIMIT, Status.SENSOR_RANGE}
 
 
 def test_an_edge_is_as_old_as_both_clocks_say_however_often_they_came_round() -> None:

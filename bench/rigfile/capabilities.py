@@ -116,7 +116,8 @@ class Bit(Part):
 
 
 class Status(Part):
-    """What the controller says of the machine, by its meaning; what it does not say no procedure learns."""
+    """What the controller says of the machine, by its meaning; what it does not say is judged from readings
+    (`bench.rigfile.judged`)."""
 
     contact: Mapping[Name, Bit] = {}
     current_limit: Bit | None = None

@@ -16,7 +16,9 @@ import numpy.typing as npt
 
 from bench import units
 from bench.errors import Lacking
+from bench.rigfile import judged
 from bench.rigfile.capabilities import Bit
+from bench.rigfile.judged import Judged
 from bench.rigfile.messages import Signal
 from bench.rigfile.model import RigFile
 from bench.rigfile.places import PlaceError, Places
@@ -142,11 +144,14 @@ def _signal_of(rig: RigFile, channel: str) -> Signal:
 
 
 def status(rig: RigFile, samples: Samples) -> npt.NDArray[np.int64]:
-    """The status word (n,), by the channels that the controller tells it in."""
+    """The status word (n,), by the channels that the controller tells it in, and by readings where it does not."""
     word: npt.NDArray[np.int64] | None = None
     for flag, bit in bits(rig).items():
         told = samples[bit.channel].astype(np.int64)
         shown = np.where((told & bit.mask if bit.mask else told) != 0, int(flag), 0)
+        word = shown if word is None else word | shown
+    for flag, found in untold(rig):
+        shown = np.where(found.shows(samples), int(flag), 0)
         word = shown if word is None else word | shown
     if word is not None:
         return word
@@ -162,6 +167,18 @@ def bits(rig: RigFile) -> dict[Status, Bit]:
     for name, bit in told.contact.items():
         found[_contact(rig, name)] = bit
     return {flag: bit for flag, bit in found.items() if bit is not None}
+
+
+@once_per_rig
+def untold(rig: RigFile) -> tuple[tuple[Status, Judged], ...]:
+    """What is judged from readings, as no bit of its kind is bound."""
+    told = rig.capabilities.status
+    kinds = ((told.current_limit, Status.CURRENT_LIMIT, judged.currents), (told.voltage_limit, Status.VOLTAGE_LIMIT,
+    judged.voltages),
+             (told.sensor_range, Status.SENSOR_RANGE, judged.ranges))  # fmt: skip
+    found = [(flag, of(rig)) for bound, flag, of in kinds if bound is None]
+    out = [(flag, one) for flag, one in found if one is not None]
+    return (*out, *((_contact(rig, ring), one) for ring, one in (judged.rings(rig) if not told.contact else ())))
 
 
 def _contact(rig: RigFile, ring: str) -> Status:
@@ -189,7 +206,8 @@ def _channels(rig: RigFile, name: str) -> tuple[str, ...]:
     if "." not in name:
         return (name,)
     if name == STATUS:
-        return tuple(dict.fromkeys(bit.channel for bit in bits(rig).values()))
+        behind = (channel for _, one in untold(rig) for channel in one.channels)
+        return tuple(dict.fromkeys((*(bit.channel for bit in bits(rig).values()), *behind)))
     if not is_bound(rig, name):
         raise Lacking(f"mark: found no channel for {_key(name)}")
     return (str(getattr(rig.mark, _key(name))),)

@@ -13,6 +13,7 @@ from bench.errors import AnalysisError
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.estimate import Deviations
+from procedures.amb_rotor.conventions import AmbRotor
 from procedures.shared.certificates import certified
 from procedures.step import response, settling
 from procedures.step import steps as step_steps
@@ -67,6 +68,10 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
         found = {name: pooled(name, case, s) for name, s in seen.items() if case in s.values}
         if math.isfinite(settled.time):
             found["settling_time"] = settling_estimate(case, settled)
+            if untold := _untold_lag_s(all_of[0].machine):
+                found["settling_time"] += bound(
+                    f"lag/{case.group}", "lag of the currents, which is not told", untold, "s"
+                )
         period = float(all_of[0].t[1] - all_of[0].t[0])
         found["rise_time"] += bound(f"sampling/rise/{case.where}", "sampling", RISE_SHARE * period, "s")
         found["steady_error"] += _gained(case, rig)
@@ -137,6 +142,12 @@ def settling_estimate(case: Case, settled: Settling) -> Estimate:
 
     made = Estimate(settled.time, "s", {noise: 1.0}, sampled if noise.u else None)
     return made + bound(f"start/{case.where}", "start of the step", START_S, "s")
+
+
+def _untold_lag_s(machine: AmbRotor) -> float:
+    """By how much the start may be off where the rig file does not say how the currents lag: half of what is taken."""
+    told = "rate" in machine.can.model or machine.can.loop_delay_s
+    return 0.0 if told else machine.lag_s / 2
 
 
 def by_group(steps: list[Done], results: Mapping[Case, Result]) -> dict[str, dict[str, Estimate]]:
