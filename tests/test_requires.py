@@ -154,3 +154,20 @@ def test_what_is_required_is_known_without_numerics() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == [str(len(catalogue.PROCEDURES))]
+
+
+@pytest.mark.parametrize("name", ["unbalance", "run-up", "coast-down"])
+def test_what_only_captures_show_is_missing_where_there_are_captures(name: str) -> None:
+    spindle = load_rig(str(Path(__file__).parent.parent / "examples/vertical-spindle/spindle.toml"))
+    for rig, may_lack in ((load_rig("amb5dof"), False), (spindle, True)):
+        optional = {q.name for q in load_procedure(name).on(rig).optional}
+        assert ({"current_peak", "voltage_peak"} <= optional) is may_lack
+
+
+def test_tracking_declares_what_a_rig_follows() -> None:
+    spindle = load_rig(str(Path(__file__).parent.parent / "examples/vertical-spindle/spindle.toml"))
+    rigs = (spindle, load_rig("amb5dof"))
+    of_path, of_points = ({q.name for q in load_procedure("tracking").on(rig).optional} for rig in rigs)
+    assert "error_peak_y" in of_path
+    assert "error_peak_y" not in of_points
+    assert of_points

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -54,6 +55,10 @@ def _no_settings(_rig: RigFile, _plan: Any) -> Mapping[str, float]:
     return {}
 
 
+def _all_told(_: RigFile) -> tuple[Quantity, ...]:
+    return ()
+
+
 def _unknown_count(_: Any) -> int:
     return 0
 
@@ -83,10 +88,10 @@ class Procedure:
     `requires` is what a rig must have, whatever the plan, by the names that its own file has. `check` looks at a plan against
     a rig that has it, before anything starts, and names what cannot work. `settings` are the parameters of the rig's
     controller, SI, that the runner writes in READY, before it levitates. `optional` of the measures are those that a sound
-    machine may lack: not missing where no limit asks. `step_count` is how many steps `acquire` will record, for the progress
-    display; 0 is unknown. `fewest_steps` is how many a run that goes to its end has at least, where these are fewer;
-    `former_steps` how many one of plan schema 1 has, where it had fewer; `steps_on` is `step_count` where that depends on the
-    rig.
+    machine may lack: not missing where no limit asks; `untold` are those that a rig cannot show, whatever its state.
+    `step_count` is how many steps `acquire` will record, for the progress display; 0 is unknown. `fewest_steps` is how many
+    a run that goes to its end has at least, where these are fewer; `former_steps` how many one of plan schema 1 has, where
+    it had fewer; `steps_on` is `step_count` where that depends on the rig.
     `evaluate` makes of a recording what all that follows needs, once, and tells its findings as it goes; it ends where one
     that is told at a gate is an error, and then nothing is measured nor drawn. Without it the recording itself is what
     follows needs. `measured` yields the quantities of it in the order of the report. `figures` come in the order in which
@@ -126,6 +131,7 @@ class Procedure:
     facts: Callable[[Any], Mapping[str, Estimate]] | None = None
     holds_for: Callable[[Any], Mapping[str, float]] = field(default=_numbers_of)
     optional: tuple[Quantity, ...] = ()
+    untold: Callable[[RigFile], tuple[Quantity, ...]] = field(default=_all_told)
     reached: tuple[str, ...] = ()
     assumes: tuple[str, ...] = ()
     places: tuple[str, ...] = ()
@@ -138,8 +144,12 @@ class Procedure:
 
     def on(self, rig: RigFile) -> Procedure:
         """With its quantities by the names that a rig has for them at its places."""
-        measures, optional = (quantities_on(rig.aliases, some) for some in (self.measures, self.optional))
-        if measures == self.measures:
+        untold: tuple[Quantity, ...] = ()
+        with suppress(Lacking):  # a rig that it cannot run on: `lacking` says so
+            untold = self.untold(rig)
+        may_lack = tuple(dict.fromkeys((*self.optional, *untold)))
+        measures, optional = (quantities_on(rig.aliases, some) for some in (self.measures, may_lack))
+        if (measures, optional) == (self.measures, self.optional):
             return self
         return replace(self, measures=measures, optional=optional, kinds=self.kinds or self.measures)
 

@@ -135,7 +135,7 @@ def _balancing(g: Content, m: Content) -> Content:
 def _coupling(g: Content, m: Content) -> Content:
     if "com_to_coupling" not in g:
         return {}
-    return {"at": "geometry/com_to_coupling", **_refer("stiffness", "geometry/coupling_stiffness", g),
+    return {"at": "-geometry/com_to_coupling", **_refer("stiffness", "geometry/coupling_stiffness", g),
             **_refer("offset", "machine/coupling_offset", m)}  # fmt: skip
 
 

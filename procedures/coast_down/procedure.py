@@ -42,6 +42,7 @@ procedure = Procedure(
     step_count=run_up.step_count,
     needs=lambda plan: bearings.needs(plan.bearings),
     optional=run_up.procedure.optional,
+    untold=run_up.procedure.untold,
     assumes=assumptions.PASSAGE,
     method=f"{read_method(__file__)}\n{run_up.procedure.method}",
 )

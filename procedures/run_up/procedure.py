@@ -233,7 +233,8 @@ procedure = Procedure(
     settings=settings,
     step_count=step_count,
     needs=lambda plan: bearings.needs(plan.bearings),
-    optional=(*CRITICAL, *unbalance.OF_CAPTURES),
+    optional=CRITICAL,
+    untold=unbalance.of_captures,
     assumes=assumptions.PASSAGE,
     method=read_method(__file__),
 )

@@ -279,7 +279,7 @@ procedure = Procedure(
     settings=settings,
     step_count=step_count,
     steps_on=steps_on,
-    optional=(*OF_PATH, *OF_POINTS),  # of a path that the controller follows, or of set points
+    untold=lambda rig: OF_POINTS if rig.capabilities.path is not None else OF_PATH,
     former_steps=lambda plan: lift.STEPS + 1 + len(plan.order),  # what came before an orbit was not recorded
     method=read_method(__file__),
 )

@@ -24,7 +24,7 @@ from procedures.amb_rotor.laws import of_laws, of_variants
 from procedures.shared import assumptions, first_look
 from procedures.synchronous import bearings, checks, dwelling, estimates, fitting, identified
 from procedures.synchronous.coil_peaks import find_uncertified
-from procedures.synchronous.dwells import read_dwells, required
+from procedures.synchronous.dwells import can_capture, read_dwells, required
 from procedures.synchronous.estimates import Results
 from procedures.synchronous.hum import listen, of_dwells
 from procedures.unbalance import figures as drawn
@@ -133,6 +133,11 @@ def figures(results: Results, recording: Recording[Plan]) -> Iterable[Shown]:
     return drawn.all_figures(results, recording.rig)
 
 
+def of_captures(rig: RigFile) -> tuple[Quantity, ...]:
+    """What a rig cannot show whose controller captures nothing."""
+    return () if can_capture(rig) else OF_CAPTURES
+
+
 procedure = Procedure(
     name="unbalance",
     places=("at rest",),
@@ -145,7 +150,7 @@ procedure = Procedure(
     measured=measured,
     figures=figures,
     requires=requires,
-    optional=OF_CAPTURES,
+    untold=of_captures,
     check=check,
     settings=settings,
     step_count=step_count,
