@@ -47,7 +47,6 @@ class Requires:
                 if {"drive", "rotation"} & {*missing} and TURNERS.isdisjoint(roles)
                 else none
             )
-        captured = () if rig.capture is None else rig.capture.channels
         needed = resolved(rig, (name for name in self.channels if "." not in name or is_bound(rig, name)))
         if absent := [role.partition(".")[2] for role in self.channels if "." in role and not is_bound(rig, role)]:
             yield f"mark: found no channel for {', '.join(dict.fromkeys(absent))}"
@@ -57,16 +56,19 @@ class Requires:
             ("parameters", tuple(name for name in self.parameters if "." not in name), rig.parameters),
             ("geometry", self.geometry, rig.geometry),
             ("machine", self.machine, rig.machine),
-            ("capture.channels", self.capture, captured),
         )
         for table, names, found in tables:
-            if names and table == "capture.channels" and rig.capture is None:
-                yield "capture: found none; expected a controller that records at its full rate"
-            elif missing := [n for n in dict.fromkeys(names) if n not in found]:
+            if missing := [n for n in dict.fromkeys(names) if n not in found]:
                 yield f"{table}: found no {', '.join(missing)}"
         unbound = [key for key in dict.fromkeys(self.capabilities) if not can(rig.capabilities, key)]
         if unbound := [*unbound, *(name for name in dict.fromkeys(self.parameters) if "." in name)]:
             yield f"capabilities: found no {', '.join(unbound)}"
+        if self.capture and rig.capture is None:
+            yield "capture: found none; expected a controller that records at its full rate"
+        elif missing := [
+            n for n in dict.fromkeys(self.capture) if rig.capture is None or n not in rig.capture.channels
+        ]:
+            yield f"capture.channels: found no {', '.join(missing)}"
         if self.masses and not rig.masses:
             yield "masses: found none; expected certified masses to hang"
         yield from self.lacks
