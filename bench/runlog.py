@@ -15,7 +15,7 @@ ROOMS = ("bench", "drivers", "procedures", "reports", "sim_backend")
 class _Forward(logging.Handler):
     """Hands each record's text to a function; the standard library's way to attach one."""
 
-    def __init__(self, level: int, sink: Callable[[logging.LogRecord], None]) -> None:
+    def __init__(self, level: int, sink: Callable[[logging.LogRecord], object]) -> None:
         super().__init__(level)
         self._sink = sink
 
@@ -68,7 +68,7 @@ def show(logger: logging.Logger, text: str) -> None:
 
 
 @contextmanager
-def warnings_to(event: Callable[[str, str], None]) -> Iterator[None]:
+def warnings_to(event: Callable[[str, str], object]) -> Iterator[None]:
     """Within the block each warning calls `event(logger name, text)`."""
     with _attached(_Forward(logging.WARNING, lambda r: event(r.name, r.getMessage())), logging.WARNING):
         yield

@@ -75,9 +75,9 @@ class Orders:
             if p.when == "resting" and self._mode() not in STANDING:  # nobody answers: the refusal must be ours
                 raise BenchError(f"parameter {parameter} can be written at rest only; the controller is {self._mode()}")
             signals[p.signal.partition(".")[2]] = self._raw(p.signal, value)
-        standing = self._standing(message)
+        standing, at = self._standing(message), None
         for parameter, value in values.items():
-            self._tell(parameter, value)
+            at = self._tell(parameter, value, at)  # they go together, whatever the computer does meanwhile
         self._send_held(message, {**standing, **signals})
 
     def _write_indexed(self, parameter: str, value: float) -> None:
@@ -96,9 +96,10 @@ class Orders:
         if not _reads_back(reply["value"], value):
             raise Refused(f"{parameter}: wrote {value!r}, the controller reads back {reply['value']!r}")
 
-    def _tell(self, parameter: str, value: float) -> None:
-        if self.recorder is not None:
-            self.recorder.event("parameter", name=parameter, value=value)
+    def _tell(self, parameter: str, value: float, at_ns: int | None = None) -> int | None:
+        if self.recorder is None:
+            return None
+        return self.recorder.event("parameter", at_ns, name=parameter, value=value)
 
     def restore(self) -> tuple[str, ...]:
         """Set every parameter that another host left elsewhere to the rig file's value, at rest; the names of those.

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 
 from bench.errors import ConfigError
 from bench.rigfile import RigFile
+from bench.rigfile.aliases import by_names
 from sim_backend.controller.controls import in_force
 from sim_backend.draws import draw_one
 from sim_backend.machine import Truth
@@ -39,7 +40,10 @@ def draw(
     values = {n: draw_one(t, seed, n, visit if n in machine.daily else 0) for n, t in tolerances.items()}
     values |= {k: float(v) for k, v in rig.simulation.items() if isinstance(v, int | float)}
     defects = dict(machine.defects)
-    wanted = dict(overrides or {})
+    # A drawn value goes before a quantity of the same name.
+    own, given = {*values, *defects, *machine.targets}, dict(overrides or {})
+    wanted = {k: v for k, v in given.items() if k in own}
+    wanted |= by_names(rig.aliases, {k: v for k, v in given.items() if k not in own})
     used = in_force(rig, machine, settings or {})
     targets = {k: wanted.pop(k) for k in machine.targets if k in wanted}
     for name, value in wanted.items():

@@ -19,6 +19,7 @@ from bench.record.specs import load_spec
 from bench.rigfile import RigFile, load_rig
 from bench.rigfile.aliases import by_names, in_full, known_as, names_meant, renamed, with_full_names
 from bench.uncertainty import Estimate
+from sim_backend.truth import draw
 
 ALIASES = {"K_i": "K@inboard", "K_o": "K@outboard", "error_y": "error@y"}
 K = Quantity("K", "N/A", "dF/di")
@@ -103,3 +104,9 @@ def test_a_campaign_may_go_by_either_name() -> None:
     assert step.judged == ("peak_motor",)
     assert {"peak_motor", "peak_outboard"} <= {q.name for q in step.procedure.measures}
     assert json.dumps([q.name for q in step.procedure.measures]).count('"peak"') == 0
+
+
+def test_a_drawn_value_goes_before_a_quantity_of_its_name() -> None:
+    """`hanger` is a weight that is drawn, and what amb-calibration finds of it at each bearing."""
+    rig = load_rig("tsbs12")
+    assert draw(rig, 0, {"hanger": 0.3}).values["hanger"] == 0.3

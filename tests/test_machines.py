@@ -14,9 +14,9 @@ ROOT = Path(__file__).resolve().parents[1]
 
 @pytest.mark.long
 @pytest.mark.timeout(3600)
-@pytest.mark.parametrize(("rig", "seed"), [("tsbs12", 0), ("amb5dof", 0)])
-def test_a_sound_rig_is_green(tmp_path: Path, rig: str, seed: int) -> None:
-    """Nine procedures each; the nine of the other machine are skipped, and say what is lacking."""
+@pytest.mark.parametrize(("rig", "seed", "skipped"), [("tsbs12", 0, 9), ("amb5dof", 0, 8)])
+def test_a_sound_rig_is_green(tmp_path: Path, rig: str, seed: int, skipped: int) -> None:
+    """Those of the other machine are skipped, and say what is lacking."""
     junit = tmp_path / "junit.xml"
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "procedures", f"--rig={rig}", f"--seed={seed}", "--no-report", "-p",
@@ -26,10 +26,12 @@ def test_a_sound_rig_is_green(tmp_path: Path, rig: str, seed: int) -> None:
     assert done.returncode == 0, done.stdout
     suite = ElementTree.parse(junit).getroot().find("testsuite")
     assert suite is not None
-    assert [suite.get(k) for k in ("tests", "failures", "errors", "skipped")] == ["18", "0", "0", "9"]
+    assert [suite.get(k) for k in ("tests", "failures", "errors", "skipped")] == ["18", "0", "0", str(skipped)]
     for item in suite.iter("testcase"):
         named = {str(p.get("name")): str(p.get("value")) for p in item.findall("properties/property")}
-        skipped = item.find("skipped")
+        left_out = item.find("skipped")
         assert (
-            named["outcome"] in ("pass", "done") if skipped is None else "cannot run it" in str(skipped.get("message"))
+            named["outcome"] in ("pass", "done")
+            if left_out is None
+            else "cannot run it" in str(left_out.get("message"))
         )

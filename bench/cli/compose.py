@@ -28,7 +28,6 @@ from bench.lock import rig_lock
 from bench.procedure import BenchPlan, Procedure, plans
 from bench.record.specs import load_spec, misnamed
 from bench.rigfile import RigFile, linkurl, load_rig
-from bench.rigfile.aliases import by_names
 from bench.rigfile.envelope import Envelope
 from bench.run.job import Connect, Job
 
@@ -106,7 +105,7 @@ def prepare(request: Request, asking: Asking = quietly) -> tuple[Job, Connect]:
         job = Job(procedure, rig, plan, limits, "live", None, rig_lock(rig.link.url.partition("?")[0]), used,
                   judged)  # fmt: skip
         return job, live(rig, kind, injected, request.clear_fault, asking)
-    overrides = by_names(rig.aliases, dict(plans.assignment(text) for text in request.truth))
+    overrides = dict(plans.assignment(text) for text in request.truth)
     _refuse_words(overrides)
     visit = request.visit or 0
     connect = simulated(

@@ -19,7 +19,6 @@ from bench.procedure import Measured, Procedure
 from bench.progress import Silent
 from bench.recording import Recording
 from bench.rigfile import load_rig
-from bench.rigfile.aliases import by_names
 from bench.run.adoption import calibration_of
 from bench.run.evaluation import yielded
 from bench.run.job import Job
@@ -120,7 +119,7 @@ def flown(
     chosen, file = load_procedure(procedure), load_rig(rig)
     settings = chosen.plan.model_validate({**file.plans.get(procedure, {}), **plan})
     used = given(chosen.needs(settings), calibrations or {})
-    drawn = draw(file, seed, by_names(file.aliases, truth or {}), chosen.settings(file, settings), visit=visit)
+    drawn = draw(file, seed, truth, chosen.settings(file, settings), visit=visit)
     job = Job(chosen.on(file), file, settings, {}, "sim", seed, calibrations=tuple(used), visit=visit)
     supervisor = Supervisor()
     with opening.of_truth(file, drawn, "auto", substeps=knobs.substeps, slice_s=knobs.slice_s)(supervisor) as live:

@@ -153,11 +153,12 @@ class Recorder:
             _add(self.integrity.samples, block.stream, len(block))
             _add(self.integrity.lost, block.stream, block.lost_before)
 
-    def event(self, kind: str, t_ns: int | None = None, **data: Any) -> None:
-        """Record something that happened; `data` are JSON values."""
+    def event(self, kind: str, t_ns: int | None = None, **data: Any) -> int:
+        """Record something that happened, at `t_ns` or now; `data` are JSON values. The time, ns."""
         at = self._clock.now_ns() if t_ns is None else t_ns
         self._put("event", at, json.dumps({"kind": kind, "t_ns": at, **data}, allow_nan=False).encode())
         self.integrity.events += 1
+        return at
 
     @contextmanager
     def step(self, kind: str, **labels: Any) -> Iterator[None]:
