@@ -99,7 +99,7 @@ class Orders:
     def _tell(self, parameter: str, value: float, at_ns: int | None = None) -> int | None:
         if self.recorder is None:
             return None
-        return self.recorder.event("parameter", at_ns, name=parameter, value=value)
+        return self.recorder.event("parameter", t_ns=at_ns, name=parameter, value=value)
 
     def restore(self) -> tuple[str, ...]:
         """Set every parameter that another host left elsewhere to the rig file's value, at rest; the names of those.
