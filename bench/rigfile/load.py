@@ -20,7 +20,7 @@ def load_rig(rig: str) -> RigFile:
     return _checked(text.toml, text.dbc, str(text.path))
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)
 def _checked(toml_text: str, dbc_text: str, path: str) -> RigFile:
     loaded = RigFile.parse(toml_text, dbc_text, path)
     problems = problems_of(loaded)

@@ -97,7 +97,7 @@ def _why(error: Exception) -> str:
     return str(cause) if isinstance(cause, database.errors.Error) else "it breaks off, or holds what no DBC does"
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)
 def _read(dbc: str) -> Any:
     """Parsing takes longer than all else that opening a rig does, and a run does it at both ends of the link."""
     return database.load_string(dbc, database_format="dbc", strict=True)

@@ -27,6 +27,7 @@ from bench.recording import Recording
 from bench.rigfile import load_rig
 from bench.rigfile.roles import Status
 from bench.uncertainty import Estimate, Influence, interval
+from procedures.amb_rotor.conventions import conventions
 from procedures.compensation import procedure as compensation
 from procedures.synchronous import checks, dwells, estimates, runout
 from procedures.synchronous import d_max as unbalance_d_max
@@ -307,7 +308,8 @@ def test_an_order_that_the_telemetry_takes_for_order_1_is_named(tmp_path: Path, 
 def test_motion_that_does_not_turn_with_the_shaft_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """D_max is of what turns with the shaft: at 47 Hz beside it the shaft went to 45 µm, and D_max said 16 in zone A."""
     shaken = {"inject_amplitude": 0.1, "inject_hz": 47.0, "inject_lines": 1.0, "inject_axis": 0.0}
-    monkeypatch.setitem(AMB_ROTOR.variants, "off", {**AMB_ROTOR.variants["off"], **shaken})
+    variants = conventions(load_rig("amb5dof")).variants  # of the rig file that the run reads
+    monkeypatch.setitem(variants, "off", {**variants["off"], **shaken})  # type: ignore[arg-type]
     run = simulated_run("unbalance", "amb5dof", SEED, ONE, tmp_path / "recording.mcap", {})
     found = [f for f in run.results if isinstance(f, Finding) and f.code == "not-synchronous"]
     assert found[0].effect is Effect.INDETERMINATE
