@@ -46,6 +46,8 @@ PROCEDURES = (
     _room("run-up", "Run-up through the critical speeds: Bode, polar, waterfall, amplification"),
     _room("coast-down", "Coast-down through the critical speeds, analysed as a run-up"),
     _room("sensitivity", "Sensitivity of the control loops by injection, with zones and margins"),
+    _room("derivative", "Gain, error and band of an algebraic derivative, by injection"),
+    _room("estimator-compare", "Velocity estimators in the loop: errors before, answers to a load"),
     _room("force-map", "Terms of the motor's force over displacement, currents and load"),
 )
 
@@ -120,7 +122,8 @@ def _path(kind: str, name: str, folders: tuple[Path, Path], known: Callable[[], 
         if path.is_file():
             return path
     looked = f"(looked for a path, in ./{folders[0]} and in {folders[1]})"
-    raise ConfigError(f"{_unknown(kind, name, [r.name for r in known()])} {looked}")
+    here = f"{name}.toml is a file: give it with its ending. " if Path(f"{name}.toml").is_file() else ""
+    raise ConfigError(f"{here}{_unknown(kind, name, [r.name for r in known()])} {looked}")
 
 
 def _unknown(kind: str, name: str, known: list[str]) -> str:

@@ -28,6 +28,7 @@ LABELS = (
     ("_kg", 1e-3, " g"), ("_m", 1e-6, " µm"), ("_A", 1.0, " A"), ("_hz", 1.0, " Hz"), ("_s", 1.0, " s"),
 )  # fmt: skip
 """Ends of their names, SI; what one of the unit that is told is in SI, and the unit."""
+TILTS = ("psi", "theta")  # set points of angles among those of a shaft
 WAYS = {1: "loading", -1: "unloading"}  # of the label `branch`
 
 
@@ -60,7 +61,11 @@ def of_setting(key: str, values: Sequence[float]) -> tuple[str, list[float]]:
 
 
 def of_labels(labels: Mapping[str, Any]) -> str:
-    """A step's labels for people: speeds in r/min, motion in µm, angles in degrees; what has no value is left out."""
+    """A step's labels for people: speeds in r/min, motion in µm, angles in degrees; what has no value is left out. A set
+    point's `name` with its `value`, SI, is one."""
+    if labels.keys() == {"name", "value"} and isinstance(labels["value"], float):
+        unit = "µrad" if any(t in str(labels["name"]) for t in TILTS) else "µm"
+        return f"{labels['name']} {_number(1e6 * labels['value'])} {unit}"
     return ", ".join(text for name, value in labels.items() if (text := _label(name, value)))
 
 

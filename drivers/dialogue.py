@@ -11,6 +11,7 @@ from bench.errors import NoReply
 from bench.link import Link
 from bench.link.codec import Decoder, encode
 from bench.link.frames import ERROR, FD, SENT, FrameBatch, frame
+from bench.link.segments import of_host
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.messages import Message
@@ -28,6 +29,7 @@ class Dialogue:
     def __init__(self, rig: RigFile, link: Link, now_ns: Callable[[], int]) -> None:
         self._rig, self._link, self._now_ns = rig, link, now_ns
         self._decoders = {m.identifier: Decoder(m) for n, m in rig.messages.messages.items() if n in REPLIES}
+        self._segments = of_host(rig.messages) if rig.link.classic and rig.capture is not None else None
         self._answers: deque[tuple[str, dict[str, float], int]] = deque(maxlen=KEPT)
         self._held: dict[str, dict[str, float]] = {}
         self._token, self._tokens = 0, dict[str, int]()  # the last, and that of each kind of request
@@ -61,9 +63,12 @@ class Dialogue:
         identifiers = batch["id"].tolist()
         if self._decoders.keys().isdisjoint(identifiers):
             return
-        for k, identifier in enumerate(identifiers):
-            if self._recorder is None and identifier in self._decoders:
-                self._early.append(batch[k : k + 1].copy())
+        if self._recorder is None:
+            self._early.extend(batch[k : k + 1].copy() for k, i in enumerate(identifiers) if i in self._decoders)
+        if self._segments is not None:
+            batch, answers = self._segments.incoming(batch)
+            self._go_out(answers)
+        for k, identifier in enumerate(batch["id"].tolist()):
             decoder = self._decoders.get(identifier)
             if decoder is None or batch["flags"][k] & ERROR:
                 continue
@@ -188,6 +193,11 @@ class Dialogue:
         """Send a message as it is."""
         m = self._rig.messages[message]
         batch = frame(m.identifier, encode(m, values), flags=SENT | (FD if m.fd else 0), t_ns=self._now_ns())
+        self._go_out(batch if self._segments is None else self._segments.outgoing(batch))
+
+    def _go_out(self, batch: FrameBatch) -> None:
+        if not len(batch):
+            return
         self._link.send(batch)
         if self._recorder is not None:
             self._recorder.frames(self._link.name, batch)

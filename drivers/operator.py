@@ -8,14 +8,14 @@ from typing import Any
 
 from bench.clock import Clock
 from bench.errors import OperatorRefused
-from bench.procedure.roles import Load, Plane, Side
+from bench.procedure.roles import Load, Plane, Push, Side
 from bench.recording.recorder import Recorder
 from bench.rigfile.envelope import Envelope
 
 
 class LineOperator:
-    """An operator that answers lines: `hang M2`, `hang -`, `hang HOOK M2`, `turn DEGREES`, `lever left M2`, `lever left -`,
-    `mount ring`, `mount -`,
+    """An operator that answers lines: `hang M2`, `hang -`, `hang HOOK M2`, `turn DEGREES`, `push DEGREES`,
+    `push -`, `lever left M2`, `lever left -`, `mount ring`, `mount -`,
     `attach inboard KG RAD`, `detach inboard`, `ask TEXT` (see the simulated backend's operators). `may_touch` raises while
     nobody may reach into the machine."""
 
@@ -91,6 +91,21 @@ class LineOperator:
         self.may_touch()
         self._do(f"detach {plane}", f"take the weights off the {plane} plane")
         self._note(action="detach", plane=plane)
+
+    def push(self, way: Push | None) -> bool:
+        """Have the landed shaft pushed aside and held, or with None let go; False where the other end does not do such.
+
+        Raises:
+            InterlockError: the shaft is not landed.
+        """
+        self.may_touch()
+        line = "push -" if way is None else f"push {math.degrees(way.angle_rad)!r}"
+        try:
+            self._do(line, "let go of the shaft" if way is None else f"push the shaft {way.axis}")
+        except OperatorRefused:
+            return False
+        self._note(action="push", **({"axis": way.axis, "angle_rad": way.angle_rad} if way is not None else {}))
+        return True
 
     def _do(self, line: str, what: str) -> None:
         answer = self._request(line).split()

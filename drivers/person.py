@@ -9,7 +9,7 @@ from typing import Generic, TypeVar
 
 from bench.clock import Clock
 from bench.errors import InterlockError, OperatorAbort
-from bench.procedure.roles import NOTHING, Load, Plane, Side
+from bench.procedure.roles import NOTHING, Load, Plane, Push, Side
 from bench.recording.recorder import Recorder
 from bench.rigfile.envelope import Envelope
 from drivers.operator import LineOperator
@@ -23,7 +23,8 @@ CLEAR = "take tools and hands away"
 
 class ConsoleOperator:
     """`prompt` shows a question and returns the line that is typed. What is confirmed is passed on to `then` (a simulated rig's
-    line), if there is one. `may_touch` raises while nobody may reach into the machine."""
+    line), if there is one. `may_touch` raises while nobody may reach into the machine. `attended` is False where nobody is
+    there unless what has to be done asks for somebody."""
 
     def __init__(
         self, prompt: Callable[[str], str], clock: Clock, envelope: Envelope, then: LineOperator | None
@@ -31,6 +32,7 @@ class ConsoleOperator:
         self._prompt, self._clock, self._envelope, self._then = prompt, clock, envelope, then
         self._hanging: Load | None = None  # on the hanger; None is not known
         self.recorder: Recorder | None = None
+        self.attended = True
         self.may_touch: Callable[[], None] = lambda: None
 
     def hang(self, load: Load) -> Load:
@@ -128,6 +130,29 @@ class ConsoleOperator:
         self._confirmed(what, "that is done", None, _Other())
         if self._then is not None:
             self._then.detach(plane)
+
+    def push(self, way: Push | None) -> bool:
+        """Ask for the landed shaft to be pushed aside and held, or, with None, to be let go; False where the person skips it,
+        or nobody is there.
+
+        Raises:
+            InterlockError: the shaft is not landed.
+            OperatorAbort: the person answered stop.
+        """
+        if not self.attended:
+            return False
+        self.may_touch()
+        if way is None:
+            self._confirmed(f"Let go of the shaft; {CLEAR}.", "that is done", None, _Other())
+            return self._then is None or self._then.push(None)
+        degrees = math.degrees(way.angle_rad) % 360
+        counts = f"{degrees:.0f}° from {way.zero}, counter-clockwise seen from outside the {way.end} end"
+        done = self._confirmed(
+            f"{LANDED} It will be lifted once its probes are known to count the right way. Push it by hand at its middle "
+            f"{way.axis} ({counts}) until it touches its rings, and hold it there.",
+            "it is held there", True, _Other("To leave it out, as it was shown before: type skip.", _skipped),
+        )  # fmt: skip
+        return done and (self._then is None or self._then.push(way))
 
     def ask(self, question: str) -> bool:
         """Whether the person says yes.
@@ -244,6 +269,11 @@ def _degrees(answer: str) -> float | None:
     except ValueError:
         return None
     return math.radians(degrees) if math.isfinite(degrees) else None
+
+
+def _skipped(answer: str) -> bool | None:
+    """False where something is left out, None where the answer says something else."""
+    return False if answer == "skip" else None
 
 
 class Misunderstood(Exception):

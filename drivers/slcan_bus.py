@@ -67,15 +67,7 @@ class SlcanBatchBus(can.BusABC):
         if receive_own_messages:
             self._is_shutdown = True  # nothing was opened
             raise can.CanInterfaceNotImplementedError("slcan_batch: an SLCAN adapter does not send back what it sent")
-        self._now_ns = now_ns or WallClock().now_ns
-        self._writing = threading.Lock()
-        self._ask: Callable[[bytes], None] = self._write
-        self._waiting: deque[can.Message] = deque()
-        self.octets = 0  # that came since it was set up, without what the adapter itself answers
-        self.simulated = False  # whether the adapter says that it is that of a served simulation
-        self._came = 0  # frames while it was set up
-        self._filter: Callable[[FrameBatch], Any] | None = None
-        self.stream = SlcanStream(timestamp=timestamp, remotes=True)
+        self._begin(now_ns, timestamp)
         self.brs = data_bitrate is not None and fd is not False
         self.channel_info = f"SLCAN on {channel}"
         try:
@@ -90,6 +82,22 @@ class SlcanBatchBus(can.BusABC):
             self._is_shutdown = True
             raise
         self._can_protocol = can.CanProtocol.CAN_FD if self.brs or fd else can.CanProtocol.CAN_20
+        self._open(channel, bitrate)
+
+    def _begin(self, now_ns: Callable[[], int] | None, timestamp: bool) -> None:
+        """What is counted and kept, before anything is opened."""
+        self._now_ns = now_ns or WallClock().now_ns
+        self._writing = threading.Lock()
+        self._ask: Callable[[bytes], None] = self._write
+        self._waiting: deque[can.Message] = deque()
+        self.octets = 0  # that came since it was set up, without what the adapter itself answers
+        self.simulated = False  # whether the adapter says that it is that of a served simulation
+        self._came = 0  # frames while it was set up
+        self._filter: Callable[[FrameBatch], Any] | None = None
+        self.stream = SlcanStream(timestamp=timestamp, remotes=True)
+
+    def _open(self, channel: str, bitrate: int) -> None:
+        """Set the adapter up; what cannot be is shut down again."""
         try:
             self._knows_status = self._start(channel, bitrate)
         except BaseException as error:

@@ -34,6 +34,10 @@ from reports.view import (
 
 Content = Mapping[str, Any]
 CERTIFICATES = ("certificate-overdue", "certificate-ahead")
+UNSHOWN = (
+    "polarity-not-shown",
+    "one-way",
+)  # notes of what the data of this run cannot show: they stand with the assumptions
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,7 +64,7 @@ def view_of(record: Content, around: Surroundings, shown: Sequence[Drawn | Sheet
     measurements = front.main_first([budgets.named(m) for m in told])
     findings = tuple(_findings(record, around))
     rows = tuple(resultrows.row(m, around.definitions, around.titles) for m in measurements)
-    judged_title, judged, judged_note = front.judged(rows)
+    judged_title, judged, judged_note = front.judged(vectors.folded(record, measurements, rows))
     like = many.names(measurements)
     first_budgets, more_budgets = _budgets(measurements, like, around)
     rig_name = str(around.rig.get("name") or record.get("rig") or text.DASH)
@@ -90,8 +94,8 @@ def view_of(record: Content, around: Surroundings, shown: Sequence[Drawn | Sheet
         decision_rule=DECISION_RULE,
         unseen=unseen.unseen(measurements, around.reached, around.titles),
         about_unseen=unseen.ABOUT,
-        assumed=tuple(_prose(a, around) for a in around.assumes) if rows else (),
-        notes=tuple(f for f in findings if not f.loud and f.code not in CERTIFICATES),
+        assumed=_assumed(around, findings) if rows else (),
+        notes=tuple(f for f in findings if not f.loud and f.code not in (*CERTIFICATES, *(UNSHOWN if rows else ()))),
         figures=front.entries(shown),
         budgets=first_budgets,
         method=tuple(_prose(p, around) for p in _paragraphs(around.method)),
@@ -127,6 +131,12 @@ def _budgets(
     chosen = front.budgeted(few)
     tables_of = [(m in chosen, budgets.budget_table(m, around.rig, around.titles)) for m in few]
     return tuple(t for told, t in tables_of if told), tuple(t for told, t in tables_of if not told)
+
+
+def _assumed(around: Surroundings, findings: Sequence[FindingRow]) -> tuple[str, ...]:
+    """Sentences on what is in no budget and no data can show: the procedure's, and what this run could not look at."""
+    of_run = [f.text[:1].upper() + f.text[1:] for f in findings if f.code in UNSHOWN and not f.loud]
+    return (*(_prose(a, around) for a in around.assumes), *of_run)
 
 
 def _prose(said: str, around: Surroundings) -> str:

@@ -23,6 +23,7 @@ def _template() -> Template:
         lstrip_blocks=True,
     )
     environment.filters["prose"] = _prose
+    environment.filters["css"] = _css_string
     return environment.get_template("report.html.j2")
 
 
@@ -32,6 +33,12 @@ def _prose(said: str) -> Markup:
         Markup("<i>{}</i><sub>{}</sub>").format(part, below) if below else escape(part)
         for part, below in text.symbols(said)
     )
+
+
+def _css_string(said: str) -> Markup:
+    """A text as a string of a style sheet: every sign but letters, digits and blanks by its number."""
+    plain = (c if c.isascii() and (c.isalnum() or c == " ") else f"\\{ord(c):06x}" for c in said)
+    return Markup('"{}"').format(Markup("".join(plain)))
 
 
 @cache

@@ -11,6 +11,7 @@ from bench import display_units
 from reports import text
 from reports.view import Correlations, Fact, Symbol, Table
 
+SETTING_DIGITS = 7  # of a setting that is told in another unit than the plan has it in
 PAGE_WIDTH = 14  # columns of a correlation matrix
 NARROW_NAME = 6  # letters that the head of such a column holds
 SMALL_CORRELATION = 0.05
@@ -204,7 +205,8 @@ def _setting(key: str, value: Any) -> tuple[str, Any]:
     many = value if isinstance(value, list | tuple) else [value]
     if not many or any(isinstance(v, bool) or not isinstance(v, int | float) for v in many):
         return key, value
-    name, numbers = display_units.of_setting(key, many)
+    name, exact = display_units.of_setting(key, many)
+    numbers = [float(f"{v:.{SETTING_DIGITS}g}") for v in exact]
     return name, value if name == key else numbers if isinstance(value, list | tuple) else numbers[0]
 
 

@@ -51,11 +51,18 @@ def unseen(
     ranked = sorted(best.values(), key=lambda found: -found[0])
     shown = [found for found in ranked if found[0] >= SHOWN][:MOST]
     rows = [_row(*found, titles or {}, alike) for found in shown]
-    if left := ranked[len(shown) :]:
+    left = ranked[len(shown) :]
+    if left:
         noun = "influence" if len(left) == 1 else "influences"
         rows.append((f"{len(left)} further {noun}", f"below {_share(left[0][0])} each", "", "", ""))
     header = ("Influence", "Share of variance", "Result", "Moved by one u", "Sensitivity")
-    return Table("", header, tuple(rows), (1, 3, 4))
+    return Table("", header, tuple(rows), (1, 3, 4), _named(left, alike))
+
+
+def _named(left: Sequence[tuple[float, Content, Content]], alike: Mapping[str, set[str]]) -> str:
+    """What is summed up, by name: an error of it is as little seen as one of the others."""
+    names = (_alike(str(e.get("name") or e.get("influence")), alike) for *_, e in left)
+    return f"The further ones: {', '.join(text.prose(name) for name in names)}." if left else ""
 
 
 def _kind(name: str) -> str:
@@ -71,14 +78,18 @@ def _row(
     where = text.prose(tables.place(measurement))
     unit = str(measurement.get("unit") or "")
     name = str(entry.get("name") or entry.get("influence"))
-    others = len(alike[_kind(name)]) - 1
     return (
-        name + (f" (and {others} alike)" if others else ""),
+        _alike(name, alike),
         _share(share),
         _called(tables.symbol_of(str(measurement.get("name", "")), titles)) + (f" ({where})" if where else ""),
         text.with_unit(text.significant(abs(float(entry.get("contribution") or 0.0))), unit),
         budgets.sensitivity(entry, unit),
     )
+
+
+def _alike(name: str, alike: Mapping[str, set[str]]) -> str:
+    others = len(alike[_kind(name)]) - 1
+    return name + (f" (and {others} alike)" if others else "")
 
 
 def _called(symbol: Symbol) -> str:

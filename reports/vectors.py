@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from bench import display_units
 from reports import tables, text
-from reports.view import Table
+from reports.view import ResultRow, Table
 
 COS, SIN = "_cos", "_sin"
 MOST_ANGLE = math.radians(45)  # a half width beyond which an angle says nothing
@@ -17,9 +18,31 @@ Content = Mapping[str, Any]
 
 def table(record: Content) -> Table:
     """A row for each pair of results `x_cos`, `x_sin` of one place; no rows where a record has none."""
+    return Table("", ("Vector", "Where", "Amount", "Peak to peak", "Angle"), tuple(_told(record).values()), (2, 3, 4))
+
+
+def folded(record: Content, measurements: Sequence[Content], rows: Sequence[ResultRow]) -> list[ResultRow]:
+    """Rows of results in which a vector that nothing judged is one, by amount and angle, in the place of its two components."""
+    told, out = _told(record), []
+    for m, row in zip(measurements, rows, strict=True):
+        name, where = str(m.get("name", "")), m.get("where")
+        stem = name.removesuffix(COS).removesuffix(SIN)
+        vector = told.get((stem, where)) if stem != name and row.tone == "none" else None
+        if vector is None:
+            out.append(row)
+        elif name.endswith(COS):
+            _, _, amount, _, angle = vector
+            called = row.symbol.plain.rpartition(", ")[0] or row.symbol.plain
+            turned = f" ∠ {angle}" if angle != text.DASH else ""
+            out.append(replace(row, symbol=replace(row.symbol, plain=called), result=f"{amount}{turned}"))
+    return out
+
+
+def _told(record: Content) -> dict[tuple[str, Any], tuple[str, ...]]:
+    """By name without its end, and place."""
     measurements = [m for m in record.get("measurements") or () if isinstance(m, Mapping)]
-    rows = tuple(_row(a, b, r) for a, b, r in _pairs(measurements, _coefficients(record, measurements)))
-    return Table("", ("Vector", "Where", "Amount", "Peak to peak", "Angle"), rows, (2, 3, 4))
+    pairs = _pairs(measurements, _coefficients(record, measurements))
+    return {(str(a["name"]).removesuffix(COS), a.get("where")): _row(a, b, r) for a, b, r in pairs}
 
 
 def _pairs(

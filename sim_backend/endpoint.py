@@ -65,7 +65,7 @@ class InProcessLink:
 
     def __init__(self, rig: RigFile, clock: SimulatedRig, session: int, faults: Sequence[Fault] = ()) -> None:
         self._clock = clock
-        self._heartbeat = message = load_messages(rig.dbc_text)[rig.binding.heartbeat]
+        self._heartbeat = message = load_messages(rig.dbc_text, classic=rig.link.classic)[rig.binding.heartbeat]
         owned = {"session": session} if any(s.name == "session" for s in message.signals) else {}
         self._beat = np.frombuffer(encode(message, owned), np.uint8)[None]
         self._count_at = message.signal(rig.binding.heartbeat_counter)

@@ -34,7 +34,8 @@ class StepsAsked:
 @dataclass(frozen=True)
 class OrbitAsked:
     """A path that the shaft follows: y sin(a), z cos(ratio a) m, a with `hz`; `settings` as those of steps, `speed` rad/s, and
-    how long it follows before it is looked at, s."""
+    how long it follows before it is looked at, s. Where set points are written one after the other: how many `points` to a
+    revolution, and the set points, by parameter, `at` y and z m."""
 
     settings: Numbers
     hz: float
@@ -43,6 +44,8 @@ class OrbitAsked:
     ratio: float
     speed: float
     settle_s: float
+    points: int = 0
+    at: Callable[[float, float], Numbers] | None = None
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,31 @@ class Whirl:
     shaft: Complex
     d_max: tuple[float, ...]
     clearance: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class BandAsked:
+    """What is asked of the estimator that a controller lets watch: `settings` as those of steps, `lines` Hz, the error at the
+    edges of the band, and another frequency `at` Hz."""
+
+    settings: Numbers
+    lines: Sequence[float]
+    limit: float
+    at: float
+
+
+@dataclass(frozen=True)
+class CompareAsked:
+    """Estimators that close the loop in turn: `settings` as those of steps; the parameters that choose each, by its name, of
+    those that are `engaged` while their compensation is switched on, and of those that are `loaded` with the mass `load`; how
+    long each is looked at before, and how long one that compensates is left alone, s."""
+
+    settings: Numbers
+    engaged: Mapping[str, Numbers]
+    loaded: Mapping[str, Numbers]
+    load: str
+    lead_s: float
+    calm_s: float
 
 
 @dataclass(frozen=True)
@@ -67,7 +95,10 @@ class Motions:
         left: unbalance kg m of balancing planes by name, as vectors on their scales, before and after what the operator did.
         passage: of settings, two speeds and channels, curves that know what is `critical` near a speed.
         loop: of settings, the linear loop at rest, as the axes of these names have it, in their order.
+        band: what the watched estimator does, by name and line (an empty text where it is none's).
+        compare: what estimators do in the loop, by quantity and name, and ratios of two.
         peak: of settings, an axis' number and a speed, the greatest sensitivity and where, Hz, of the shaft that turns.
+        drag: what stops the shaft that turns freely, by the names of a spindown: B N m s/rad, T_c N m, J_z kg m^2.
     """
 
     steps: Callable[[RigFile, Any, StepsAsked], tuple[Any, Mapping[tuple[float, int], Any]]] | None = None
@@ -77,6 +108,15 @@ class Motions:
     passage: Callable[[RigFile, Any, Numbers, float, float, Sequence[str]], Any] | None = None
     loop: Callable[[RigFile, Any, Numbers, Sequence[str]], Any] | None = None
     peak: Callable[[RigFile, Any, Numbers, int, float], tuple[float, float]] | None = None
+    compare: Callable[[RigFile, Any, CompareAsked], Mapping[tuple[str, str], float]] | None = None
+    drag: Callable[[Any], Mapping[str, float]] | None = None
+    band: Callable[[RigFile, Any, BandAsked], Mapping[tuple[str, float | None], float]] | None = None
 
 
 NONE = Motions()
+
+
+def drag(drawn: Any) -> Mapping[str, float]:
+    """Of a plant that nothing but `viscous` and `coulomb` drag stops: J_z w' = -B w - T_c."""
+    p = drawn.plant
+    return {"B": p.viscous, "T_c": p.coulomb, "J_z": p.polar_inertia}

@@ -19,7 +19,7 @@ def unspoken(rig: RigFile, machine: Machine) -> Iterator[Problem]:
     """Channels that the machine has no reading for, a tick or period that is not its own, faults that nobody knows. A binding
     that leads nowhere is told by `bench.rigfile.check`."""
     try:
-        messages = load_messages(rig.dbc_text)
+        messages = load_messages(rig.dbc_text, classic=rig.link.classic)
     except ConfigError:  # told by whoever reads the rig file
         return
     if own_words(messages, machine, rig.binding):

@@ -70,3 +70,10 @@ def test_the_load_of_tsbs12() -> None:
     # telemetry 170 us a ms; heartbeat 57 us in 20 ms; on demand 50 times a second 57 us (8 bytes), 49 us (4), 170 us (64)
     by_hand = 0.170 + 57e-6 / 20e-3 + ON_DEMAND_HZ * (4 * 57e-6 + 2 * 49e-6 + 2 * 170e-6)
     assert load.total == pytest.approx(by_hand, rel=1e-12)
+
+
+def test_a_message_in_segments_counted_by_hand() -> None:
+    # 32 bytes on classic CAN: 6 in the first frame, 7 in each of the next four: five frames of 8 bytes, 135 bits each
+    assert frame_seconds(message(32), 500e3, None) == pytest.approx(5 * 135 / 500e3, rel=1e-14)
+    # 12 bytes: 6 and 6
+    assert frame_seconds(message(12), 500e3, None) == pytest.approx(2 * 135 / 500e3, rel=1e-14)

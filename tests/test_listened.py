@@ -101,6 +101,13 @@ def test_a_wrong_length_is_told_beside_the_dbcs() -> None:
     assert "never came" in summary(heard, troubles(heard), {}, 80)
 
 
+def test_the_segments_of_an_upload_have_no_wrong_length() -> None:
+    heard = listening("amb5dof")
+    block, status = (heard.rig.messages[n].identifier for n in ("CaptureBlock", "CaptureStatus"))
+    hear(heard, joined([frame(block, bytes(12), t_ns=START_NS), frame(status, bytes(8), t_ns=START_NS)]), 0.1)
+    assert [m.name for m, _ in heard.census.misshapen] == ["CaptureStatus"]  # the bus has CAN FD
+
+
 @pytest.mark.parametrize(("signal", "plain"), [("seq", "sequence"), ("tick", "tick")])
 def test_a_counter_that_stands_is_told(signal: str, plain: str) -> None:
     heard = of_tsbs12(values=lambda k: {**readings(k), signal: 77})

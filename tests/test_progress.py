@@ -77,6 +77,8 @@ def test_labels_are_in_the_fields_units() -> None:
 
 def test_a_load_and_its_branch_are_told_in_words() -> None:
     assert of_labels({"angle_rad": 0.0, "load": "M1", "branch": -1}) == "angle 0°, M1, unloading"
+    assert of_labels({"name": "y", "value": 1e-5}) == "y 10 µm"
+    assert of_labels({"name": "theta", "value": 1e-4}) == "theta 100 µrad"
     assert of_labels({"load": "", "branch": 1, "again": False}) == "no load, loading"
 
 

@@ -130,10 +130,11 @@ def test_the_page_of_captures_is_up_to_date_and_its_bytes_are_right() -> None:
     ]  # fmt: skip
 
 
-def test_the_page_of_the_amb_stand_is_up_to_date() -> None:
-    page = PAGE.with_name("amb5dof.md").read_text(encoding="utf-8")
-    assert protocoldoc.replaced(page, protocoldoc.own_sections(load_rig("amb5dof"))) == page, (
-        "run: python -m bench.rigfile.protocoldoc amb5dof --own --into docs/reference/amb5dof.md"
+@pytest.mark.parametrize("rig", ["amb5dof", "amb1dof"])
+def test_the_page_of_a_rig_is_up_to_date(rig: str) -> None:
+    page = PAGE.with_name(f"{rig}.md").read_text(encoding="utf-8")
+    assert protocoldoc.replaced(page, protocoldoc.own_sections(load_rig(rig))) == page, (
+        f"run: python -m bench.rigfile.protocoldoc {rig} --own --into docs/reference/{rig}.md"
     )
 
 

@@ -1,7 +1,12 @@
 """Rigs as strangers write them by the pages alone: `overhung`, whose centre of mass is beyond both bearings, with three planes
 of probes of which one falls, directions from a drain plug and a heartbeat of one bit; `hanging`, which stands, with axes 60
 degrees apart of which one has a coordinate's name, one axial coil, seven messages in both byte orders, no state for landing;
-`slant` at 30 degrees, whose set points are the shaft's, whose status bits are signals, and whose controller tells no bias."""
+`slant` at 30 degrees, whose set points are the shaft's, whose status bits are signals, and whose controller tells no bias.
+
+Of six more only what is new: `threeplanes` of six probes with masses; `incline`, overhung and 20 degrees up; `gemischt`, whose
+second bearing is turned by 45 degrees, on classic CAN with German states in cp1252 and a probe that counts backwards; `lento`,
+which sends every 5 ms in mil and has nobody to push; `skewed`, standing, axes 60 degrees apart, clockwise; `solo`, one bearing
+of four axes, which no procedure takes."""
 
 from __future__ import annotations
 
@@ -10,17 +15,22 @@ from pathlib import Path
 import pytest
 
 from bench import catalogue
+from bench.cli.__main__ import main
 from bench.cli.abilities import abilities
+from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import simulated_run
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.rigfile.check import check_rig
 from bench.rigfile.supports import radial_supports
+from bench.uncertainty import interval
 from procedures.amb_rotor.conventions import conventions
 
+SHORT = {"slow_s": 6.0, "dwell_s": 1.5, "settle_s": 1.0}
 FOLDER = Path(__file__).resolve().parent / "strangers"
 OVERHUNG, HANGING, SLANT = (str(FOLDER / f"{name}.toml") for name in ("overhung", "hanging", "slant"))
+NEW = ("threeplanes", "incline", "gemischt", "lento", "skewed")
 ALL = pytest.mark.parametrize("path", [OVERHUNG, HANGING, SLANT], ids=["overhung", "hanging", "slant"])
 
 
@@ -35,6 +45,86 @@ def test_each_procedure_says_what_it_makes_of_the_rig_once(path: str) -> None:
     assert [a.procedure for a in found] == [entry.name for entry in catalogue.PROCEDURES]
     assert not any(a.problems for a in found)
     assert "step" in [a.procedure for a in found if a.able]
+
+
+@pytest.mark.parametrize("name", [*NEW, "solo"])
+def test_nothing_is_wrong_with_more_files(name: str) -> None:
+    path = str(FOLDER / f"{name}.toml")
+    assert check_rig(path)[0] == ()
+    found = abilities(load_rig(path))
+    assert not any(a.problems for a in found)
+    able = {a.procedure for a in found if a.able}
+    if name == "solo":
+        assert able == set()
+        assert {line for a in found for line in a.lacking} >= {"bearings: found 1 radial; expected two"}
+    else:
+        assert able >= {"spindown", "step", "tracking", "unbalance", "balance", "run-up", "coast-down"}
+
+
+@pytest.mark.long
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("name", NEW)
+def test_a_turning_stranger_tells_the_truth(name: str, tmp_path: Path) -> None:
+    """Vectors, orbits and D_max beside what the shaft of the twin does; nothing is found wrong with it."""
+    run = simulated_run("unbalance", str(FOLDER / f"{name}.toml"), 1, SHORT, tmp_path / "run.mcap")
+    found = [f for f in run.results if isinstance(f, Finding) and f.effect is not Effect.NOTE]
+    assert found == []
+    truth = truth_of_motion(run)
+    told = {f"{m.quantity.name}@{m.where}": m.estimate for m in run.results if isinstance(m, Measured)}
+    off = [(e.value - truth[key]) / interval(e).U for key, e in told.items() if key in truth]
+    assert len(off) >= 20
+    assert sum(x * x for x in off) / len(off) < 1
+    assert max(map(abs, off)) < 2
+
+
+WRONG_TURNS = (
+    ("axes.A135 = { direction = { value = 135,", "axes.A135 = { direction = { value = 49,", "49°, along A45"),
+    ('wegB90", at = { value = 355', 'wegB90", at = { value = 555', "555 mm, beyond the shaft"),
+    ('at = { value = 330, unit = "mm"', 'at = { value = 90.4, unit = "mm"', "90.4 mm, where A is"),
+    ('mass = { value = 5, unit = "kg"', 'mass = { value = 5, unit = "N"', "shaft/mass in N"),
+    ('bias = { A = "bias_A"', 'bias = { A = "biass_A"', "expected a parameter of this file, such as bias_A"),
+    ('B0 = "sp_B0"', 'B1 = "sp_B0"', "expected an axis of this file: A45, A135, B0, B90"),
+    ("max_current_A = 8\n", "", "envelope.max_current_A: found nothing"),
+    ('wegB0 = { signal = "', 'wegB0x = { signal = "', "probes.B0.channel: found wegB0; expected a channel of this rig"),
+    ("clearance = { value = 0.2,", "clearance = { value = 0.7,", "or the journal strikes the AMB first"),
+    ('"schwebt frei" = "LEVITATED"', '"schwebt" = "LEVITATED"', "found a state that the controller does not have"),
+    ('"Go.order" = 1 }', '"Go.order" = 2 }', "a controller could not tell which is meant"),
+    ('runout = { value = 0, unit = "um"', 'runout = { value = 0, unit = "grad"', "write deg or gon"),
+    ('signal = "Set.sp_A45"', 'signal = "Set.sp_A46"', "message Set has no signal 'sp_A46'"),
+    (
+        'sp_B90 = { signal = "Set.sp_B90", unit = "m"',
+        'sp_B90 = { signal = "Set.sp_B90", unit = "rad"',
+        "sp_B90, in rad",
+    ),
+    ('gap = { value = 0.5, unit = "mm"', 'gap = { value = 0.5, unit = "m"', "look at the unit"),
+    ("sign = -1", "sign = 2", "probes.A135.sign: found 2"),
+)
+
+
+def changed(folder: Path, *turns: tuple[str, str, str]) -> str:
+    text = (FOLDER / "gemischt.toml").read_text(encoding="utf-8")
+    for old, new, _ in turns:
+        assert old in text, old
+        text = text.replace(old, new, 1)
+    (folder / "gemischt.toml").write_text(text, encoding="utf-8")
+    (folder / "gemischt.dbc").write_bytes((FOLDER / "gemischt.dbc").read_bytes())
+    return str(folder / "gemischt.toml")
+
+
+def test_every_wrong_turn_is_told_at_once(tmp_path: Path) -> None:
+    """One that breaks the types, such as a unit that means two things, hides none of the others."""
+    told = "\n".join(map(str, check_rig(changed(tmp_path, *WRONG_TURNS))[0]))
+    assert [said for _, _, said in WRONG_TURNS if said not in told] == []
+
+
+def test_a_part_that_nobody_can_place_hides_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What a procedure makes of it is said where procedures are listed."""
+    lost = ('{ of = "bearings/A/A45", plus_deg = 0 }', '{ of = "bearings/A/Q45", plus_deg = 0 }', "")
+    twice = ('i_B0_p", "i_B0_n"', 'i_B0_p", "i_B90_n"', "")
+    assert main(("check", changed(tmp_path, lost, twice))) == 2
+    err = capsys.readouterr().err
+    assert "probes.A45.direction.of: found bearings/A/Q45; expected what has a direction" in err
+    assert "found i_B90_n; expected a channel of its own" in err
 
 
 def test_directions_of_the_overhung_rotor_count_from_up() -> None:

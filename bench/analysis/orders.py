@@ -22,6 +22,8 @@ from bench.analysis.vectors import Vectors, complexes, parts
 from bench.errors import AnalysisError
 
 BATCHES = 16
+IN_TURN = 2.5  # samples, on the average: a turn is told up to 0.4 of their rate
+IN_BATCH = 10  # samples of a batch in whose turns there are fewer than four each
 
 
 @dataclass(frozen=True)
@@ -136,8 +138,10 @@ def _cuts(angle: Array, turns: int | None, batches: int) -> tuple[npt.NDArray[np
     valid = np.flatnonzero(np.isfinite(angle))
     low, high = valid[0], valid[-1] + 1
     cuts = low + np.searchsorted(angle[low:high], TURN * (edges[:-1, None] + inner))
-    if (np.diff(cuts, axis=1) < 4 * np.diff(inner)).any():
-        raise AnalysisError("synchronous vectors: fewer than four samples in a turn; record faster")
+    samples, turned = np.diff(cuts, axis=1), np.diff(inner)
+    if (samples < np.maximum(IN_TURN * turned, np.minimum(4 * turned, IN_BATCH))).any():
+        found = f"fewer than {IN_TURN:g} samples in a turn, or too few turns"
+        raise AnalysisError(f"synchronous vectors: {found}; record faster, or longer")
     return cuts, m
 
 

@@ -35,6 +35,20 @@ class Orbit:
 
 
 @dataclass(frozen=True)
+class Outlook:
+    """How orbits are looked at: `x_probe_deg` is where probe x stands, counterclockwise from the right; `seen` is from where,
+    and which way the shaft turns; `right` and `above` are what lies there of a shaft that lies."""
+
+    x_probe_deg: float = 0.0
+    seen: str = "Seen along the shaft"
+    right: str = "horizontal"
+    above: str = "vertical"
+
+
+DOWN_THE_SHAFT = Outlook()
+
+
+@dataclass(frozen=True)
 class Curve:
     """Vectors `values` (b,) m 0-pk at `speed` (b,) rad/s; `u` (b,) m, expanded, where bars are wanted."""
 
@@ -44,9 +58,9 @@ class Curve:
     u: Array | None = None
 
 
-def orbits(key: str, title: str, shown: Sequence[Orbit], clearance: float, x_probe_deg: float = 0.0) -> Figure:
-    """Orbits within the clearance circle, seen along the shaft with up above: `x_probe_deg` is where probe x stands,
-    counterclockwise from the right. The synchronous orbit is blank before its keyphasor dot."""
+def orbits(key: str, title: str, shown: Sequence[Orbit], clearance: float, outlook: Outlook = DOWN_THE_SHAFT) -> Figure:
+    """Orbits within the clearance circle. The synchronous orbit is blank before its keyphasor dot."""
+    x_probe_deg = outlook.x_probe_deg
     what, closer = "", _closer(shown, clearance, x_probe_deg)
     if closer is not None:
         what = " Beside it the same, closer."
@@ -70,10 +84,10 @@ def orbits(key: str, title: str, shown: Sequence[Orbit], clearance: float, x_pro
     return Figure(
         key,
         title,
-        "Seen along the shaft; X and Y are where the probes stand. The dot is where the shaft's centre is as the "
+        f"{outlook.seen}; X and Y are where the probes stand. The dot is where the shaft's centre is as the "
         f"once-per-turn mark passes; the blank comes just before it.{what}",
-        "horizontal (µm)",
-        "vertical (µm)",
+        f"{outlook.right} (µm)",
+        f"{outlook.above} (µm)",
         tuple(series),
         "plane",
         notes=notes,

@@ -19,6 +19,7 @@ from bench.errors import AnalysisError
 
 ORDERS = ((3, 1), (3, 2), (4, 2), (4, 3), (5, 3), (6, 4))  # terms in u above and below
 POINTS, DRAWS = 201, 300
+LEAST = 6  # lines
 STEPS = 40  # of the descent, at most
 NEGLIGIBLE = 1e-3  # weight of an order
 STRONG = 0.25  # share of a curve that a pole must give to be a resonance
@@ -86,7 +87,7 @@ def orders(x: Array, z: Complex, power: Array, dof: float) -> list[Rational]:
     between two lines, narrower than they can show, is passed over: noise makes such poles."""
     from scipy.special import chdtrc, fdtrc
 
-    if x.size < 6 or z.shape != x.shape or power.shape != x.shape:
+    if x.size < LEAST or z.shape != x.shape or power.shape != x.shape:
         raise AnalysisError(
             f"rational model: found {x.size} lines and {power.size} variances; expected six or more of each"
         )
@@ -116,12 +117,7 @@ def _hides(below: Complex, u: Array) -> bool:
 def top(model: Rational, low: float, high: float, seed: int = 0) -> Top:
     """The greatest abs between two places. Noise of the model's covariance, drawn onto the curve, gives bias and spread."""
     x = np.linspace(low, high, POINTS)
-    z = model.at(x)
-    slopes = _slopes(model.above, model.below, (x - model.middle) / model.half)
-    values, vectors = np.linalg.eigh(model.covariance)
-    normal = np.random.default_rng(seed).standard_normal((2, DRAWS, values.size))
-    terms = ((normal[0] + 1j * normal[1]) * np.sqrt(np.maximum(values, 0) / 2)) @ vectors.T
-    sizes = np.abs(z + terms @ slopes.T)
+    z, sizes = model.at(x), np.abs(drawn_curves(model, x, seed))
     k = int(np.abs(z).argmax())
     found, places = _crest(x, np.abs(z)[None])
     drawn, at = _crest(x, sizes)
@@ -141,18 +137,36 @@ def top(model: Rational, low: float, high: float, seed: int = 0) -> Top:
 def averaged(models: Sequence[Rational], low: float, high: float) -> Top:
     """The greatest abs by several orders of the same lines: means with Akaike's weights, `u` with the spread between the
     orders; width, and whether it lies inside, by the first of them."""
-    told = np.array([model.akaike for model in models])
-    share = np.exp((told.min() - told) / 2)
-    share /= share.sum()
-    kept = [(w, top(m, low, high)) for w, m in zip(share, models, strict=True) if w > NEGLIGIBLE]
+    kept = [(w, top(m, low, high)) for w, m in weighed(models)]
     weight, tops = np.array([w for w, _ in kept]) / sum(w for w, _ in kept), [t for _, t in kept]
     value, u, bias, at, u_at = np.array([(t.value, t.u, t.bias, t.at, t.u_at) for t in tops]).T
 
-    def pooled(means: Array, spreads: Array) -> tuple[float, float]:
-        mean = float(weight @ means)
-        return mean, float(np.sqrt(weight @ (spreads**2 + (means - mean) ** 2)))
+    return Top(
+        *pooled(weight, value, u), float(weight @ bias), *pooled(weight, at, u_at), tops[0].width, tops[0].inside
+    )
 
-    return Top(*pooled(value, u), float(weight @ bias), *pooled(at, u_at), tops[0].width, tops[0].inside)
+
+def weighed(models: Sequence[Rational]) -> list[tuple[float, Rational]]:
+    """Akaike's weights of several orders of the same lines; those that say nothing are left out."""
+    told = np.array([model.akaike for model in models])
+    share = np.exp((told.min() - told) / 2)
+    share /= share.sum()
+    return [(float(w), m) for w, m in zip(share, models, strict=True) if w > NEGLIGIBLE]
+
+
+def pooled(weight: Array, means: Array, spreads: Array) -> tuple[float, float]:
+    """Weighted mean of several models, and its standard uncertainty with the spread between them."""
+    mean = float(weight @ means)
+    return mean, float(np.sqrt(weight @ (spreads**2 + (means - mean) ** 2)))
+
+
+def drawn_curves(model: Rational, x: Array, seed: int = 0) -> Complex:
+    """Curves (DRAWS, m) at `x` (m,): the model's, onto which noise of its covariance is drawn."""
+    slopes = _slopes(model.above, model.below, (x - model.middle) / model.half)
+    values, vectors = np.linalg.eigh(model.covariance)
+    normal = np.random.default_rng(seed).standard_normal((2, DRAWS, values.size))
+    terms = ((normal[0] + 1j * normal[1]) * np.sqrt(np.maximum(values, 0) / 2)) @ vectors.T
+    return np.asarray(model.at(x) + terms @ slopes.T)
 
 
 def _crest(x: Array, size: Array) -> tuple[Array, Array]:

@@ -12,8 +12,8 @@ from typing import Annotated
 
 import typer
 
+from bench.cli import options as o
 from bench.cli import stored
-from bench.cli.options import Backend, Calibrations, Keep, OperatorKind, Out, Verbose
 from bench.cli.status import run_app
 
 app = typer.Typer(
@@ -56,7 +56,7 @@ def list_(
 
 @app.command()
 def check(
-    rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig file, or its name in rigs/.")],
+    rig: o.RigArgument,
     procedure: Annotated[str, typer.Argument(metavar="PROCEDURE", help="Say all that it lacks for this one.")] = "",
 ) -> int:
     """Validate a rig file, name every error at once, and say what it can run."""
@@ -68,70 +68,36 @@ def check(
 @app.command()
 def run(
     procedure: Annotated[str, typer.Argument(metavar="PROCEDURE", help="A name that `bench list` shows.")],
-    rig: Annotated[str, typer.Option("--rig", metavar="RIG", help="A rig file, or its name in rigs/.")],
-    backend: Annotated[Backend, typer.Option(help="The simulated rig, or the real one.")] = Backend.SIM,
-    seed: Annotated[int | None, typer.Option(min=0, help="Which virtual rig (simulation only; default 0).")] = None,
-    visit: Annotated[
-        int | None, typer.Option(min=0, help="Another day of the same virtual rig (simulation only; default 0).")
-    ] = None,
-    plan: Annotated[list[str] | None, typer.Option(metavar="KEY=VALUE", help="A setting; repeatable.")] = None,
-    plan_file: Annotated[Path | None, typer.Option("--plan-file", help="Settings from a TOML file.")] = None,
-    truth: Annotated[
-        list[str] | None, typer.Option("--truth", metavar="KEY=VALUE", help="Fix what the simulator draws; repeatable.")
-    ] = None,
-    link: Annotated[
-        list[str] | None, typer.Option("--link", metavar="NAME=URL", help="Another address for a link; repeatable.")
-    ] = None,
-    fault: Annotated[
-        list[str] | None, typer.Option("--fault", metavar="FAULT", help="A fault to inject; repeatable.")
-    ] = None,
-    clear_fault: Annotated[
-        bool, typer.Option("--clear-fault", help="Clear a fault that an earlier run left (live only).")
-    ] = False,
-    out: Out = Path("runs"),
-    operator: Annotated[
-        OperatorKind | None, typer.Option(help="Default: auto in simulation, console on a terminal.")
-    ] = None,
-    no_report: Annotated[bool, typer.Option("--no-report", help="Leave the report out.")] = False,
-    calibrations: Calibrations = None,
-    allow_expired: Annotated[
-        bool, typer.Option("--allow-expired", help="Use calibrations that are overdue; the report says so.")
-    ] = False,
-    spec: Annotated[
-        Path | None, typer.Option("--spec", metavar="FILE", help="Acceptance limits; default specs/<rig>.toml.")
-    ] = None,
-    require_verdict: Annotated[
-        bool, typer.Option("--require-verdict", help="A run that no limit judged is an ERROR, not DONE.")
-    ] = False,
-    verbose: Verbose = False,
+    rig: o.RigOption,
+    backend: Annotated[o.Backend, typer.Option(help="The simulated rig, or the real one.")] = o.Backend.SIM,
+    seed: o.Seed = None,
+    visit: o.Visit = None,
+    plan: o.Plans = None,
+    plan_file: o.PlanFile = None,
+    truth: o.Truth = None,
+    link: o.Links = None,
+    fault: o.Faults = None,
+    clear_fault: o.ClearFault = False,
+    out: o.Out = Path("runs"),
+    operator: o.Operator = None,
+    no_report: o.NoReport = False,
+    calibrations: o.Calibrations = None,
+    allow_expired: o.AllowExpired = False,
+    spec: o.Spec = None,
+    require_verdict: o.RequireVerdict = False,
+    verbose: o.Verbose = False,
 ) -> int:
     """Run a procedure on a rig. The last line on standard output is the run directory."""
     from bench.cli.compose import Request
     from bench.cli.run import run_command
 
-    return run_command(
-        Request(
-            procedure=procedure,
-            rig=rig,
-            backend=backend.value,
-            seed=seed,
-            visit=visit,
-            plan=tuple(plan or ()),
-            plan_file=plan_file,
-            truth=tuple(truth or ()),
-            links=tuple(link or ()),
-            faults=tuple(fault or ()),
-            clear_fault=clear_fault,
-            out=out,
-            operator=operator.value if operator else None,
-            report=not no_report,
-            calibrations=calibrations,
-            allow_expired=allow_expired,
-            spec=spec,
-            require_verdict=require_verdict,
-        ),
-        verbose,
-    )
+    asked = Request(
+        procedure=procedure, rig=rig, backend=backend.value, seed=seed, visit=visit, links=tuple(link or ()),
+        plan=tuple(plan or ()), plan_file=plan_file, truth=tuple(truth or ()), faults=tuple(fault or ()),
+        clear_fault=clear_fault, out=out, operator=operator.value if operator else None, report=not no_report,
+        calibrations=calibrations, allow_expired=allow_expired, spec=spec, require_verdict=require_verdict,
+    )  # fmt: skip
+    return run_command(asked, verbose)
 
 
 @app.command()
@@ -140,19 +106,17 @@ def campaign(
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes for many rigs; default: one per core.")] = None,
     out: Annotated[Path, typer.Option("--out", help="Folder of the campaign directories.")] = Path("runs"),
     rig: Annotated[str | None, typer.Option("--rig", metavar="RIG", help="Another rig than the file's.")] = None,
-    backend: Annotated[Backend | None, typer.Option(help="The simulated rig, or the real one.")] = None,
+    backend: Annotated[o.Backend | None, typer.Option(help="The simulated rig, or the real one.")] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="One virtual rig: which.")] = None,
     visit: Annotated[
         int | None, typer.Option(min=0, help="Another day of the same virtual rigs; default the file's.")
     ] = None,
     count: Annotated[int | None, typer.Option(min=1, help="Many virtual rigs: how many.")] = None,
     first_seed: Annotated[int | None, typer.Option("--first-seed", min=0, help="Many: the first seed.")] = None,
-    link: Annotated[
-        list[str] | None, typer.Option("--link", metavar="NAME=URL", help="Another address for a link; repeatable.")
-    ] = None,
-    operator: Annotated[OperatorKind | None, typer.Option(help="One rig: as for `run`.")] = None,
+    link: o.Links = None,
+    operator: Annotated[o.OperatorKind | None, typer.Option(help="One rig: as for `run`.")] = None,
     no_report: Annotated[bool, typer.Option("--no-report", help="Leave reports and summary out.")] = False,
-    keep: Annotated[Keep | None, typer.Option(help="Many: whose recordings stay; default missed.")] = None,
+    keep: Annotated[o.Keep | None, typer.Option(help="Many: whose recordings stay; default missed.")] = None,
     go_on: Annotated[
         bool, typer.Option("--go-on", help="One rig: go on after a step that is neither PASS nor DONE.")
     ] = False,
@@ -169,27 +133,12 @@ def campaign(
     from bench.cli.campaign.asked import CampaignRequest
     from bench.cli.campaign.command import campaign_command
 
-    return campaign_command(
-        CampaignRequest(
-            campaign=file,
-            jobs=jobs,
-            out=out,
-            rig=rig,
-            backend=backend.value if backend else None,
-            seed=seed,
-            visit=visit,
-            count=count,
-            first_seed=first_seed,
-            links=tuple(link or ()),
-            operator=operator.value if operator else None,
-            report=not no_report,
-            keep=keep.value if keep else None,
-            go_on=go_on,
-            new=new,
-            short=short,
-            scheduler=scheduler,
-        )
-    )
+    asked = CampaignRequest(
+        campaign=file, jobs=jobs, out=out, rig=rig, backend=backend.value if backend else None, seed=seed, visit=visit,
+        count=count, first_seed=first_seed, links=tuple(link or ()), operator=operator.value if operator else None,
+        report=not no_report, keep=keep.value if keep else None, go_on=go_on, new=new, short=short, scheduler=scheduler,
+    )  # fmt: skip
+    return campaign_command(asked)
 
 
 for of_stored_runs in (stored.adopt, stored.calibrations, stored.analyse, stored.report, stored.runs, stored.export):
@@ -198,13 +147,11 @@ for of_stored_runs in (stored.adopt, stored.calibrations, stored.analyse, stored
 
 @app.command()
 def listen(
-    rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig file, or its name in rigs/.")],
-    link: Annotated[
-        list[str] | None, typer.Option("--link", metavar="NAME=URL", help="Another address for a link; repeatable.")
-    ] = None,
+    rig: o.RigArgument,
+    link: o.Links = None,
     seconds: Annotated[float | None, typer.Option(min=0.1, help="End by itself; default: on Ctrl-C.")] = None,
     record: Annotated[bool, typer.Option("--record", help="Keep what came, in a run directory.")] = False,
-    out: Out = Path("runs"),
+    out: o.Out = Path("runs"),
     poll: Annotated[
         bool, typer.Option("--poll", help="Read the register devices too: a request each time; nothing is written.")
     ] = False,
@@ -233,20 +180,16 @@ def listen(
 
 @app.command()
 def serve(
-    rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig file, or its name in rigs/.")],
+    rig: o.RigArgument,
     seed: Annotated[int, typer.Option(min=0, help="Which virtual rig.")] = 0,
     visit: Annotated[int, typer.Option(min=0, help="Another day of the same virtual rig.")] = 0,
-    truth: Annotated[
-        list[str] | None, typer.Option("--truth", metavar="KEY=VALUE", help="Fix what the simulator draws; repeatable.")
-    ] = None,
+    truth: o.Truth = None,
     bind: Annotated[str, typer.Option(metavar="ADDR", help="Address of every TCP port.")] = "127.0.0.1",
     truth_file: Annotated[Path | None, typer.Option("--truth-file", help="Write what was drawn to this file.")] = None,
     link: Annotated[
         list[str] | None, typer.Option("--link", metavar="NAME=URL", help="Listen somewhere else; repeatable.")
     ] = None,
-    fault: Annotated[
-        list[str] | None, typer.Option("--fault", metavar="FAULT", help="A fault to inject; repeatable.")
-    ] = None,
+    fault: o.Faults = None,
 ) -> int:
     """Serve the simulated rig in real time, for `run --backend live` and for programs of your own.
 

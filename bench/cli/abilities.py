@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from bench import catalogue
 from bench.cli.loading import load_procedure
-from bench.errors import ConfigError, Problem
+from bench.errors import ConfigError, Lacking, Problem
 from bench.procedure import BenchPlan, Procedure
 from bench.procedure.plans import assemble
 from bench.record.specs import load_spec
@@ -61,7 +61,10 @@ def _ability(rig: RigFile, procedure: Procedure) -> Ability:
         problems += error.problems or (Problem("specs", f"limits.{procedure.name}", str(error), "limits"),)
     if plan is None or lacking:
         return Ability(procedure.name, lacking, problems=tuple(problems))
-    unfit = (*procedure.check(rig, plan), *Envelope(rig).problems_of(dict(procedure.settings(rig, plan))))
+    try:
+        unfit = (*procedure.check(rig, plan), *Envelope(rig).problems_of(dict(procedure.settings(rig, plan))))
+    except Lacking as error:  # a part whose place nobody can tell, which `bench check` names by itself
+        return Ability(procedure.name, error.lines, problems=tuple(problems))
     return Ability(procedure.name, unfit=unfit, problems=tuple(problems))
 
 

@@ -8,15 +8,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from bench.errors import BenchError
 from bench.findings import Finding
 from bench.procedure import Measured
+from bench.rigfile.aliases import known_as
 
 if TYPE_CHECKING:
     from bench.cli.virtual import Simulated
+    from procedures.amb_rotor.conventions import AmbRotor
     from sim_backend.motion import Whirl
 
 MARGIN_POINTS = 20000
@@ -30,7 +33,8 @@ def truth_of_motion(done: Simulated) -> dict[str, float]:
     try:
         if of is None or not any(isinstance(r, Measured) for r in done.results):
             return {}
-        return {f"{name}@{where}": value for name, where, value in of(done)}
+        aliases = done.recording.rig.aliases
+        return {known_as(aliases, f"{name}@{where}" if where else name): value for name, where, value in of(done)}
     except BenchError:
         return {}
 
@@ -77,19 +81,27 @@ def _step(done: Simulated) -> Found:
 
 
 def _tracking(done: Simulated) -> Found:
+    from procedures.tracking.by_points import sizes
+    from procedures.tracking.procedure import placed
     from procedures.tracking.steps import read_orbits
     from sim_backend.motion import OrbitAsked
 
     plan: Any = done.recording.plan
-    of = done.drawn.machine.motions.orbit
+    rig, of = done.recording.rig, done.drawn.machine.motions.orbit
+    half_y, half_z = sizes(rig, plan)
     for orbit in read_orbits(done.recording):
-        if orbit.law in plan.laws and of is not None:
-            asked = OrbitAsked(
-                _settings(done, orbit.machine.select(orbit.law)), hz=plan.hz, y=plan.y_m, z=plan.z_m, ratio=plan.ratio,
-                speed=plan.speed_rad_s, settle_s=plan.settle_s,
-            )  # fmt: skip
-            for name, value in of(done.recording.rig, done.drawn, asked).items():
-                yield name, orbit.where, value
+        if orbit.law in plan.judged and of is not None:
+            settings, machine = _settings(done, orbit.machine.select(orbit.law)), orbit.machine
+            asked = OrbitAsked(settings, plan.hz, half_y, half_z, plan.ratio, plan.speed_rad_s, plan.settle_s)
+            if orbit.path.points is not None:
+                at = partial(_at, machine)
+                asked = replace(asked, hz=plan.points_hz, points=plan.points, at=at)
+            found = of(rig, done.drawn, asked)
+            yield from ((quantity.name, where, found[name]) for name, quantity, where in placed(orbit, found))
+
+
+def _at(machine: AmbRotor, y: float, z: float) -> Mapping[str, float]:
+    return machine.points({"y": y, "z": z})
 
 
 def _vectors(axes: Iterable[str], shaft: Iterable[complex], where: str) -> Found:
@@ -136,6 +148,8 @@ def _balance(done: Simulated) -> Found:
 
 def _passage(done: Simulated) -> Found:
     """Vectors, orbits and D_max where the speed stands; what is critical at the speeds where the run found it."""
+    import numpy as np
+
     from procedures.amb_rotor.conventions import conventions
 
     plan: Any = done.recording.plan
@@ -148,8 +162,9 @@ def _passage(done: Simulated) -> Found:
         true, where = of.whirl(rig, done.drawn, settings, result.dwell.speed, machine.positions), result.dwell.where
         yield from _vectors(machine.axes, true.shaft, where)
         yield from _distances(machine.planes, true, where)
-        for plane, (y, z) in machine.planes.items():
-            a, b = true.shaft[y], true.shaft[z]
+        for plane, pair in machine.planes.items():
+            looking = [machine.stations.probes[machine.positions[k]] for k in pair]
+            a, b = np.linalg.solve([[p.sign * x for x in p.row[:2]] for p in looking], [true.shaft[k] for k in pair])
             yield "major_half_axis", f"{plane}, {where}", float(abs(a + 1j * b) + abs(a - 1j * b)) / 2
     peaks = [p for p in run.peaks if p.critical]
     if not peaks or of.passage is None:
@@ -194,6 +209,37 @@ def _sensitivity(done: Simulated) -> Found:
                     yield name, where, margin(open_loop)
 
 
+def _spindown(done: Simulated) -> Found:
+    of = done.drawn.machine.motions.drag
+    yield from ((name, "", value) for name, value in (of(done.drawn) if of is not None else {}).items())
+
+
+def _derivative(done: Simulated) -> Found:
+    from sim_backend.motion import BandAsked
+
+    plan: Any = done.recording.plan
+    band = done.drawn.machine.motions.band
+    if band is None:
+        return
+    asked = BandAsked(_settings(done), plan.lines_hz, plan.limit, plan.at_hz)
+    for (name, hz), value in band(done.recording.rig, done.drawn, asked).items():
+        yield name, "" if hz is None else f"{hz:g} Hz", value
+
+
+def _compare(done: Simulated) -> Found:
+    from procedures.one_axis.conventions import conventions
+    from sim_backend.motion import CompareAsked
+
+    plan: Any = done.recording.plan
+    compare, machine = done.drawn.machine.motions.compare, conventions(done.recording.rig)
+    if compare is None:
+        return
+    engaged, loaded = ({e: machine.choose("estimator", e) for e in names} for names in (plan.engaged, plan.loaded))
+    asked = CompareAsked(_settings(done), engaged, loaded, plan.load, plan.lead_s, plan.calm_s)
+    for (name, where), value in compare(done.recording.rig, done.drawn, asked).items():
+        yield name, where, value
+
+
 TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "step": _step,
     "tracking": _tracking,
@@ -203,4 +249,7 @@ TRUTHS: Mapping[str, Callable[[Any], Found]] = {
     "run-up": _passage,
     "coast-down": _passage,
     "sensitivity": _sensitivity,
+    "spindown": _spindown,
+    "derivative": _derivative,
+    "estimator-compare": _compare,
 }

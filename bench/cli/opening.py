@@ -198,9 +198,10 @@ def _operator_on_a_line(rig: RigFile, controller: Controller, stack: ExitStack) 
     from drivers.operator import LineOperator
     from drivers.operator_line import OperatorLine
 
-    if "operator" not in rig.devices:
+    name = rig.link_of("operator")
+    if name is None:
         return None
-    line = stack.enter_context(OperatorLine.open(rig.links[rig.devices["operator"].link].url))
+    line = stack.enter_context(OperatorLine.open(rig.links[name].url))
     asking = Background(controller.clock, "requests to the operator")
     stack.callback(asking.close)
     return LineOperator(asking.of(line.request), controller.clock, controller.envelope)
@@ -233,6 +234,7 @@ def _operators(
 
     if kind == "console" or line is None:
         person = ConsoleOperator(prompt(controller.clock), controller.clock, controller.envelope, line)
+        person.attended = kind == "console"
         return [person, line] if line is not None else [person]
     return [line]
 

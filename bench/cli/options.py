@@ -51,3 +51,30 @@ Verbose = Annotated[
     bool, typer.Option("--verbose", "-v", help="Say every result and every note, not only what was judged.")
 ]
 RunArgument = Annotated[Path, typer.Argument(metavar="RUN", help="A run directory.")]
+RigArgument = Annotated[str, typer.Argument(metavar="RIG", help="A rig file, or its name in rigs/.")]
+RigOption = Annotated[str, typer.Option("--rig", metavar="RIG", help="A rig file, or its name in rigs/.")]
+Seed = Annotated[int | None, typer.Option(min=0, help="Which virtual rig (simulation only; default 0).")]
+Visit = Annotated[
+    int | None, typer.Option(min=0, help="Another day of the same virtual rig (simulation only; default 0).")
+]
+Plans = Annotated[list[str] | None, typer.Option("--plan", metavar="KEY=VALUE", help="A setting; repeatable.")]
+PlanFile = Annotated[Path | None, typer.Option("--plan-file", help="Settings from a TOML file.")]
+Truth = Annotated[
+    list[str] | None, typer.Option("--truth", metavar="KEY=VALUE", help="Fix what the simulator draws; repeatable.")
+]
+Links = Annotated[
+    list[str] | None, typer.Option("--link", metavar="NAME=URL", help="Another address for a link; repeatable.")
+]
+Faults = Annotated[list[str] | None, typer.Option("--fault", metavar="FAULT", help="A fault to inject; repeatable.")]
+ClearFault = Annotated[bool, typer.Option("--clear-fault", help="Clear a fault that an earlier run left (live only).")]
+Operator = Annotated[OperatorKind | None, typer.Option(help="Default: auto in simulation, console on a terminal.")]
+NoReport = Annotated[bool, typer.Option("--no-report", help="Leave the report out.")]
+AllowExpired = Annotated[
+    bool, typer.Option("--allow-expired", help="Use calibrations that are overdue; the report says so.")
+]
+Spec = Annotated[
+    Path | None, typer.Option("--spec", metavar="FILE", help="Acceptance limits; default specs/<rig>.toml.")
+]
+RequireVerdict = Annotated[
+    bool, typer.Option("--require-verdict", help="A run that no limit judged is an ERROR, not DONE.")
+]

@@ -120,11 +120,11 @@ def open_ports(
             ports.append(PtyPort(f"{name} {scheme}:{{}}", peer, selector))
         address = (bind, _port(spec.url, scheme))
         ports.append(TcpPort(f"{name} {scheme}:{SOCKET}{{}}", address, peer, selector))
-    if "operator" in rig.devices:
+    hands = rig.link_of("operator")
+    if hands is not None:
         operator = truth.machine.operator(rig, plant, truth)
-        name = rig.devices["operator"].link
-        address = (bind, _port(rig.links[name].url, "line"))
-        ports.append(TcpPort(f"{name} line:{{}}", address, lambda: LinePeer(operator.request), selector))
+        address = (bind, _port(rig.links[hands].url, "line"))
+        ports.append(TcpPort(f"{hands} line:{{}}", address, lambda: LinePeer(operator.request), selector))
 
 
 def _port(url: str, scheme: str) -> int:
@@ -139,8 +139,8 @@ def _check_links(rig: RigFile, assignments: Sequence[str]) -> None:
     """An address given on purpose must be one that can be listened on; the rig file may name a real adapter."""
     expected: dict[str, tuple[str, ...]] = {}
     expected[rig.devices["controller"].link] = ("slcan:socket://HOST:PORT", "serial:socket://HOST:PORT")
-    if "operator" in rig.devices:
-        expected[rig.devices["operator"].link] = ("line:HOST:PORT",)
+    if hands := rig.link_of("operator"):
+        expected[hands] = ("line:HOST:PORT",)
     for device in rig.devices.values():
         if device.registers:
             expected[device.link] = ("modbus-tcp:HOST:PORT", "modbus-rtu-tcp:HOST:PORT")

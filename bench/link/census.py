@@ -107,12 +107,14 @@ class Census:
 
     @property
     def misshapen(self) -> list[tuple[Message, dict[int, int]]]:
-        """Messages of which frames came that do not have the DBC's length: lengths that came, and how many."""
+        """Messages of which frames came that do not have the DBC's length: lengths that came, and how many. Not those whose
+        frames are segments of something longer."""
         out = []
         for identifier, tally in sorted(self.by_id.items()):
             message = self.known.get(identifier)
-            wrong = {n: c for n, c in sorted(tally.lengths.items()) if message is not None and n != message.length}
-            if message is not None and wrong:
+            if message is None or _segmented(message):
+                continue
+            if wrong := {n: c for n, c in sorted(tally.lengths.items()) if n != message.length}:
                 out.append((message, wrong))
         return out
 
@@ -135,3 +137,7 @@ class Census:
 
     def _of_host(self, message: Message) -> bool:
         return message.identifier == self._heartbeat or bool(self._host and message.sender == self._host)
+
+
+def _segmented(m: Message) -> bool:
+    return m.name == "CaptureBlock" or (m.length > 8 and not m.fd)

@@ -202,7 +202,9 @@ def _channels(heard: Listened) -> Iterator[Trouble]:
         names = [n for n, r in readings.items() if getattr(r, field) and n not in told]
         told.update(names)
         if names:
-            yield Trouble(key, f"{_some(names)} {text}. Next: {step}")
+            ages = field == "ends" and any(heard.rig.channels[n].unit == "s" for n in names)
+            calm = " (an age of the heartbeat does so while no host drives)" if ages else ""
+            yield Trouble(key, f"{_some(names)} {text}{calm}. Next: {step}")
     still = [n for n, r in readings.items() if heard.rig.noisy(n) and r.count > 1 and not r.moves]
     if still and heard.seconds >= PATIENCE_S and heard.readings.held:
         yield Trouble("stuck", f"{_some(still)} read the same all the time while the rotor is held; the rig file says that "

@@ -9,6 +9,8 @@ from bench.findings import Finding
 from bench.quantity import Measured, Quantity
 from bench.rigfile.aliases import Aliases, names_meant, names_of, renamed
 
+LETTERS = {"psi": "ψ", "theta": "θ"}  # places as a title has them
+
 
 def quantities_on(aliases: Aliases, quantities: Iterable[Quantity]) -> tuple[Quantity, ...]:
     """Declared quantities, each of which the rig has names for by these."""
@@ -21,7 +23,7 @@ def _called(aliases: Aliases, quantity: Quantity) -> Iterator[Quantity]:
 
 
 def _at(quantity: Quantity, name: str, place: str) -> Quantity:
-    title = f"{quantity.title} {place}" if quantity.title else ""
+    title = f"{quantity.title} {LETTERS.get(place, place)}" if quantity.title else ""
     return Quantity(name, quantity.unit, f"{place}: {quantity.about}", title)
 
 

@@ -28,6 +28,19 @@ class Load:
 
 
 NOTHING = Load("")
+
+
+@dataclass(frozen=True, slots=True)
+class Push:
+    """A push of the shaft that is not lifted, by hand: `axis` says it by the rig file's names, `angle_rad` counts around the
+    shaft from `zero`, counter-clockwise for who looks at the `end` from outside."""
+
+    axis: str
+    angle_rad: float
+    zero: str
+    end: str
+
+
 Side = Literal["left", "right"]
 """An end of the lever, seen from its outboard end: a weight on the left turns the shaft forward."""
 Plane = str
@@ -77,6 +90,11 @@ class Operator(Protocol):
     def turn(
         self, angle_rad: float
     ) -> float: ...  # the shaft, by hand, to that angle of its scale; where it stands then
+    def push(
+        self, way: Push | None
+    ) -> (
+        bool
+    ): ...  # the landed shaft, aside until it touches; returns while it is held; None: let go; False: nobody does
     def ask(self, question: str) -> bool: ...  # yes or no
     def goes_on(self, wrong: str) -> bool: ...  # whether a run goes on that shows this; where nobody is, it does not
 

@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from bench.rigfile.elements import Name
 from bench.rigfile.part import Part
+from bench.rigfile.toleranced import Toleranced
 
 Coordinate = Literal["x", "y", "z", "psi", "theta"]
 
@@ -130,7 +131,8 @@ class Capabilities(Part):
     """`bias` is by bearing; `settings` are by kind and name: the parameters that choose it; of kind "law" the first is what a
     lift and a stop go by, unless "lift" says more. `gains` are of the
     laws that are no `flatness`, which is by the name of a law. `model` is what the controller knows of the machine, by meaning.
-    `loop_delay_s` is from a reading to the current that follows it."""
+    `loop_delay` is from the instant of a reading until the current that answers it has gone 63 % of its way (1 - 1/e): what
+    the controller computes, one tick at least, and the amplifier's time constant. `loop_delay_s` is the same in short."""
 
     set_points: SetPoints = SetPoints()
     path: Path | None = None
@@ -147,7 +149,18 @@ class Capabilities(Part):
     lift_time: str = ""
     watchdog: str = ""
     current_limit: str = ""
-    loop_delay_s: float | None = Field(default=None, gt=0)
+    loop_delay: Toleranced | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _in_short(cls, data: Any) -> Any:
+        """A plain number of seconds, known to a tenth: one that is counted in ticks or read from a data sheet is rounded."""
+        value = data.get("loop_delay_s") if isinstance(data, dict) else None
+        if not isinstance(value, int | float) or "loop_delay" in data:
+            return data
+        told = {"value": value, "unit": "s", "half_width": abs(value) / 10, "distribution": "rectangular",
+                "source": "capabilities.loop_delay_s, which states no tolerance: a tenth of it"}  # fmt: skip
+        return {**{key: of for key, of in data.items() if key != "loop_delay_s"}, "loop_delay": told}
 
 
 def parameters_named(c: Capabilities) -> Iterator[tuple[str, str]]:

@@ -16,7 +16,14 @@ CODES = ("state", "fault")
 
 def problems_of(rig: RigFile) -> Iterator[Problem]:
     """Each with its key, what was found and what is expected."""
-    for key, found, expected in (*_parameters(rig), *_names(rig), *_values(rig), *_status(rig), *_units(rig)):
+    for key, found, expected in (
+        *_parameters(rig),
+        *_names(rig),
+        *_values(rig),
+        *_status(rig),
+        *_units(rig),
+        *_delay(rig),
+    ):
         yield Problem(rig.path, f"capabilities.{key}", found, expected)
 
 
@@ -42,6 +49,17 @@ def _units(rig: RigFile) -> Iterator[Line]:
         parameter = rig.parameters.get(name)
         if si and parameter is not None and parameter.unit in units.UNITS and units.UNITS[parameter.unit].si != si:
             yield key, f"{name}, in {parameter.unit}", f"a parameter in {si}"
+
+
+def _delay(rig: RigFile) -> Iterator[Line]:
+    delay, controller = rig.capabilities.loop_delay, rig.devices.get("controller")
+    if delay is None:
+        return
+    if delay.unit != "s":
+        yield "loop_delay.unit", delay.unit, "a time"
+    elif controller is not None and delay.value <= controller.tick_s:
+        longer = f"more than a tick, {controller.tick_s * 1e3:g} ms: it holds computing and the amplifier's lag"
+        yield "loop_delay", f"{delay.value * 1e3:g} ms", longer
 
 
 def _names(rig: RigFile) -> Iterator[Line]:

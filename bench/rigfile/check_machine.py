@@ -31,19 +31,10 @@ KINDS = {"at": "m", "by": "m", "gap": "m", "clearance": "m", "radius": "m", "len
          "weight_angle": "rad", "misalignment": "rad", "mass": "kg", "weight_mass": "kg", "polar_inertia": "kg m^2",
          "transverse_inertia": "kg m^2", "stiffness": "N/m", "asymmetry": "1", "pole_pairs": "1", "friction": "1"}  # fmt: skip
 POSITIVE = ("gap", "clearance", "radius", "length", "mass", "polar_inertia", "transverse_inertia")
-TABLES = (
-    "shaft",
-    "bearings",
-    "probes",
-    "mark",
-    "rings",
-    "balancing",
-    "coupling",
-    "hooks",
-    "levers",
-    "motors",
-    "encoders",
-)
+LIKELY = {"gap": (1e-6, 1e-2), "clearance": (1e-6, 0.1), "radius": (1e-4, 10.0), "at": (0.0, 10.0), "by": (0.0, 10.0),
+          "centre_of_mass": (0.0, 10.0)}  # m; what is beyond is a slip of the unit  # fmt: skip
+TABLES = ("shaft", "bearings", "probes", "mark", "rings", "balancing", "coupling", "hooks", "levers", "motors",
+          "encoders")  # fmt: skip
 
 Found = tuple[str, str, str]
 
@@ -81,6 +72,12 @@ def _numbers(rig: RigFile, places: Places) -> Iterator[Found]:
             yield key, f"{term.identity} in {term.number.unit}", f"a unit of the kind of {KINDS[name]}"
         elif name in POSITIVE and term.factor * term.number.value <= 0:
             yield key, f"{term.factor * term.number.value:g} {term.number.unit}", "a positive number"
+        elif (
+            isinstance(stated, Toleranced)
+            and name in LIKELY
+            and not (low := LIKELY[name][0]) <= abs(term.number.value) <= (high := LIKELY[name][1])
+        ):
+            yield key, f"{term.number.value:g} m", f"{low:g} to {high:g} m: look at the unit"
 
 
 def _stated(tree: Any, path: tuple[str, ...]) -> Iterator[tuple[str, str, Toleranced | str]]:

@@ -75,8 +75,8 @@ class MessageMap:
         raise KeyError(f"{message}.{signal} has no value named {choice}")
 
 
-def load_messages(dbc: str, name: str = "dbc") -> MessageMap:
-    """Read DBC text.
+def load_messages(dbc: str, name: str = "dbc", *, classic: bool = False) -> MessageMap:
+    """Read DBC text; on a `classic` bus no message is a frame of CAN FD.
 
     Raises:
         ConfigError: it is not a DBC, or signals overlap or do not fit.
@@ -85,7 +85,7 @@ def load_messages(dbc: str, name: str = "dbc") -> MessageMap:
         read = _read(dbc)
     except Exception as error:  # cantools raises a dozen kinds, all meaning this
         raise ConfigError(f"{name}: not a usable DBC: {_why(error)}") from error
-    return MessageMap({m.name: _message(m) for m in read.messages})
+    return MessageMap({m.name: _message(m, classic) for m in read.messages})
 
 
 def _why(error: Exception) -> str:
@@ -103,9 +103,9 @@ def _read(dbc: str) -> Any:
     return database.load_string(dbc, database_format="dbc", strict=True)
 
 
-def _message(m: Any) -> Message:
+def _message(m: Any, classic: bool) -> Message:
     identifier = m.frame_id | (1 << 31 if m.is_extended_frame else 0)
-    fd = bool(m.is_fd) or m.length > 8
+    fd = (bool(m.is_fd) or m.length > 8) and not classic
     period = (m.cycle_time or 0) * 1e-3
     sender = m.senders[0] if m.senders else ""
     signals = tuple(_signal(s) for s in m.signals)

@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping
 from functools import cached_property, lru_cache
 from typing import Annotated, Any, Literal
+from urllib.parse import parse_qsl
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
@@ -54,6 +55,14 @@ class LinkSpec(Part):
     options: Mapping[str, str | int | float | bool] = {}  # passed on to the interface's library as they are
     reconnect_s: float = Field(0.0, ge=0, le=30)  # how long to try again after the link was lost; 0: not at all
     heartbeat: Literal["process", "thread"] = "process"
+
+    @property
+    def classic(self) -> bool:
+        """A CAN bus without CAN FD: a bit rate, no data bit rate, and no setting `fd` of the interface."""
+        scheme, _, rest = self.url.partition(":")
+        fd = self.options.get("fd", dict(parse_qsl(rest.partition("?")[2])).get("fd", "false"))
+        asked = str(fd).lower() not in ("false", "0")
+        return scheme.lower() != "serial" and self.bitrate is not None and self.data_bitrate is None and not asked
 
 
 Role = Literal["levitation", "rotation", "motion", "operator", "drive", "supply", "thermal"]
@@ -196,12 +205,16 @@ class RigFile(MachineTables):
     @cached_property
     def messages(self) -> MessageMap:
         """The message map of the rig's DBC."""
-        return load_messages(self.dbc_text, self.link.dbc)
+        return load_messages(self.dbc_text, self.link.dbc, classic=self.link.classic)
 
     @property
     def binding(self) -> Binding:
         """How the controller's messages are used."""
         return self.devices["controller"].binding
+
+    def link_of(self, role: Role) -> str | None:
+        """The name of the link of the device in a role; None without one."""
+        return next((d.link for d in self.devices.values() if role in d.roles), None)
 
     def choices(self, channel: str) -> Mapping[int, str]:
         """The names of a channel's codes, from the DBC's value table."""

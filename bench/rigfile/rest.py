@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from bench.errors import Problem
 from bench.inputfile import DEPTH, parse_toml
+from bench.rigfile.elements import FORMS
 from bench.rigfile.model import RigFile
 from bench.rigfile.text import RigText, migrated
 
@@ -65,7 +66,7 @@ def _entry(key: str) -> str:
 
 def _at_fault(error: Mapping[str, Any]) -> list[str]:
     """Where to cut: at the key, or where one is missing at the table that lacks it."""
-    path = [str(part) for part in error["loc"]]
+    path = [str(part) for part in error["loc"] if part not in FORMS]
     return path[:-1] if error["type"] == "missing" else path
 
 

@@ -30,6 +30,7 @@ FATAL = ("stuck-channel", "no-response", "axes-exchanged", "bearings-exchanged",
 """Findings after which a fit means nothing and is not attempted."""
 WIRED_WRONG = "wired-wrong"  # event: changes of the control currents under the first mass, A
 MOST_WRONG = 0.03  # relative: a set of masses that is off by more would be seen by eye
+ASKEW = 0.06  # of the answer along the pull: 3.4 degrees, by which K changes by 0.2 % where the axis is along it
 EXCHANGED = 0.5  # of the loaded axis' answer, that of an axis across the pull
 
 
@@ -54,7 +55,26 @@ def _wiring(data: HangingData) -> Iterator[Finding]:
         control = (mean[axis.coils[0]] - mean[axis.coils[1]]) / 2
         return float(control[heavy].mean() - control[light].mean())
 
-    yield from wiring(pull, data.hung, {axis.name: answer(axis) for axis in axes(pull)})
+    changes = {axis.name: answer(axis) for axis in axes(pull)}
+    wrong = list(wiring(pull, data.hung, changes))
+    yield from wrong or askew(pull, changes)
+
+
+def askew(pull: Pull, changes: Mapping[str, float]) -> Iterator[Finding]:
+    """An axis across the pull shows how the bearing is turned: at right angles it answers by lean_a K_b / (lean_b K_a) of what
+    the axis along the pull does, of which the force constants' ratio is known to a third."""
+    for own in (
+        a for a in pull.axes if a.key == a.name
+    ):  # a bearing that a motor turns between is by the thesis' equations
+        for other in (a for a in pull.across if a.mate == own.name):
+            seen, should = changes[other.name] / changes[own.name], other.lean / own.lean
+            if abs(seen - should) > ASKEW + abs(should) / 3:
+                text = (
+                    f"under the heaviest mass the current along {other.name} changes by {seen:+.2f} of that along {own.name}; "
+                    f"by the directions of the rig file it should by {should:+.2f}: suspect bearings.{own.bearing}.axes, the "
+                    "direction of the pull, or what zero_at and up say."
+                )
+                yield Finding("pull-askew", text, own.bearing, Effect.INDETERMINATE)
 
 
 def of_first(

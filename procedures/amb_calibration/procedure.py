@@ -42,7 +42,7 @@ from procedures.shared.weight import weight
 
 K = Quantity("K", "N/A", "dF/di of a bearing's axis at zero control current, mean over a turn")
 K2 = Quantity("K2", "N/A^2", "(d²F/di²)/2 of a bearing's axis, mean over a turn")
-KW = Quantity("Kw", "N/A", "dF/di of a bearing's axis at the current that carries the rotor's own weight")
+KW = Quantity("Kw", "N/A", "dF/di of a bearing's axis at the current that carries the rotor's own weight", title="K_w")
 MEASURES = (K, K2, KW)
 """At each axis; of a shaft that a self-bearing motor turns at each bearing, along its upright axis."""
 

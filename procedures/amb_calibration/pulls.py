@@ -96,7 +96,7 @@ def leans(pull: Pull, p: Mapping[str, float]) -> list[float | None]:
     "friction" of a pulley, "tilt" rad of a shaft that does not lie."""
     out: list[float | None] = []
     for axis in pull.axes:
-        share = None if axis.plumb else _lean(axis, pull, p)
+        share = _lean(axis, pull, p) if not axis.plumb else None if axis.lean > 0 else -1.0  # -1: it looks down
         factor = (1 - p["friction"] if pull.sideways else 1.0) * (math.cos(p["tilt"]) if pull.tilted else 1.0)
         plain = not (pull.sideways or pull.tilted)
         out.append(share if plain else (axis.lean if share is None else share) * factor)

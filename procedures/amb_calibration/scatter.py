@@ -14,6 +14,7 @@ TERMS = ("K", "K2", "Kw")
 OUTPUTS = ("K_i", "K2_i", "Kw_i", "K_o", "K2_o", "Kw_o")
 """Of the servomotor, as `outputs` has them."""
 FLOOR = 1e-6  # of the greatest eigenvalue of the covariance between axes: the least
+MOST_ALIKE = 0.999  # correlation between two axes
 
 
 @dataclass(frozen=True)
@@ -41,8 +42,9 @@ def scatter(f: Fit, h: Hangings, masses: int) -> Scatter:
     """Split residuals into a part common to each load (wrong masses, wrong model) and the rest, and model the rest.
 
     A load that seats differently each time scatters with its weight, noise does not; so the covariance of a hanging is
-    a + g W^2, fitted by moments: E[e e'] = sum_q T_q T'_q (a + g W_q^2), T the map from errors to the rest. Degrees
-    of freedom: A (P - 4) from the fits, less the L - 3 that the load means take.
+    a + g W^2, each of a and g by itself one that a covariance can be, fitted by moments: E[e e'] = sum_q T_q T'_q
+    (a + g W_q^2), T the map from errors to the rest. Degrees of freedom: A (P - 4) from the fits, less the L - 3 that the load
+    means take.
     """
     angles, points = h.load.shape
     levels = masses + 1
@@ -56,32 +58,40 @@ def scatter(f: Fit, h: Hangings, masses: int) -> Scatter:
     most = f.forces[int(np.argmax(np.abs(f.forces).max(axis=(1, 2))))]
     weight = (most.reshape(-1) / np.abs(most).max()) ** 2  # relative load squared, about 0..1
     basis = np.stack([np.ones_like(weight), weight])  # (2, A P)
-    covariance = np.zeros((axes, axes, angles * points))
-    for b in range(axes):
-        for c in range(b + 1):
-            expected = (maps[b] * maps[c]) @ basis.T
-            seen = rest[b] * rest[c]
-            a, g = np.linalg.lstsq(expected, seen, rcond=None)[0]
-            if b == c and min(a, g) <= 0:  # a variance cannot be negative: keep the term that explains more
-                a, g = max((seen.sum() / expected[:, 0].sum(), 0.0), (0.0, seen.sum() / expected[:, 1].sum()),
-                           key=lambda ag: -float(((seen - expected @ np.array(ag)) ** 2).sum()))  # fmt: skip
-            covariance[b, c] = covariance[c, b] = np.array([a, g]) @ basis
-    covariance = _possible(covariance)
+    covariance = np.einsum("bcq,qn->bcn", _amounts(maps, rest, basis), basis)
     dof = angles * (points - 4) - (levels - 3)
     shape = (axes, angles, points)
     return Scatter(rest.reshape(shape), residuals @ averaging.T, covariance.reshape(axes, *shape), dof)
 
 
-def _possible(covariance: Array) -> Array:
-    """Moments (K, K, N) that a covariance can have: no correlation beyond one, between more than two axes no negative variance
-    of any sum."""
-    for b in range(len(covariance)):
+def _amounts(maps: Array, rest: Array, basis: Array) -> Array:
+    """Of each of the `basis` (2, A P) how much there is of it between the axes, (K, K, 2) N^2. The errors of hangings are two,
+    one that all have and one that goes with the load; each has its own correlation between two axes, and an error that an
+    axis does not show is correlated with nothing: bounded as a sum they could leave a heavy load without scatter."""
+    axes = range(len(maps))
+    out = np.zeros((len(maps), len(maps), len(basis)))
+    for b in axes:
+        expected, seen = (maps[b] * maps[b]) @ basis.T, rest[b] * rest[b]
+        a, g = np.linalg.lstsq(expected, seen, rcond=None)[0]
+        if min(a, g) <= 0:  # a variance cannot be negative: keep the term that explains more
+            a, g = max((seen.sum() / expected[:, 0].sum(), 0.0), (0.0, seen.sum() / expected[:, 1].sum()),
+                       key=lambda ag: -float(((seen - expected @ np.array(ag)) ** 2).sum()))  # fmt: skip
+        out[b, b] = a, g
+    for b in axes:
         for c in range(b):
-            bound = 0.999 * np.sqrt(covariance[c, c] * covariance[b, b])
-            covariance[c, b] = covariance[b, c] = np.clip(covariance[c, b], -bound, bound)
-    if len(covariance) < 3:
-        return covariance
-    values, vectors = np.linalg.eigh(np.moveaxis(covariance, 2, 0))
+            bound = MOST_ALIKE * np.sqrt(out[b, b] * out[c, c])
+            if (both := bound > 0).any():
+                expected = (maps[b] * maps[c]) @ basis[both].T
+                found = np.linalg.lstsq(expected, rest[b] * rest[c], rcond=None)[0]
+                out[b, c, both] = out[c, b, both] = np.clip(found, -bound[both], bound[both])
+    return _possible(out)
+
+
+def _possible(amounts: Array) -> Array:
+    """Of more than two axes (K, K, 2), what a covariance can be: no negative variance of any sum."""
+    if len(amounts) < 3:
+        return amounts
+    values, vectors = np.linalg.eigh(np.moveaxis(amounts, 2, 0))
     kept = np.maximum(values, FLOOR * values.max(axis=1, keepdims=True))
     return np.moveaxis(np.einsum("nij,nj,nkj->nik", vectors, kept, vectors), 0, 2)
 

@@ -18,7 +18,7 @@ from bench.rigfile.roles import ANGLE, SPEED, Status, is_bound
 from bench.rigfile.supports import axial_support, least_clearance, once_per_rig, two_planes
 from procedures.amb_rotor import loops
 from procedures.amb_rotor.stations import ALONG, Stations, gaps, in_two_planes, stations
-from procedures.shared.unsupported import of_weight, unlike
+from procedures.shared.unsupported import contradicted, crooked, of_weight
 
 Law = str
 """Of the controller, by the name that the rig file gives it; "": as the controller is set."""
@@ -62,6 +62,7 @@ class AmbRotor:
     marked: bool  # whether the angle and the speed are told by a mark
     clearance: float  # the least of the rings', m; infinite where the rig has none
     lacks: tuple[str, ...] = ()  # where the rig is not as these procedures take it
+    crooked: tuple[str, ...] = ()  # where it is not two planes of like axes; what goes by rows takes it
     unweighed: tuple[str, ...] = ()  # where it is not as those take it that go by the shaft's weight
 
     @property
@@ -201,10 +202,11 @@ class AmbRotor:
         return tuple(f"capabilities.set_points: found none along {c}" for c in asked if not self.can_point(c))
 
     def along(self, direction: str) -> tuple[str, ...]:
-        """The axes along y, z (near end first) or x."""
+        """The axes along y, z (near end first) or x; of a bearing's two the one that looks more along."""
         if direction == "x":
             return (self.axial,)
-        return tuple(self.axes[pair["yz".index(direction)]] for pair in self.planes.values())
+        k, sort = "yz".index(direction), self.stations.sorted_pair
+        return tuple(sort(self.axes[one], self.axes[other])[k] for one, other in self.planes.values())
 
     def position(self, axis: str) -> str:
         """Channel of an axis' position sensor.
@@ -272,27 +274,25 @@ def conventions(rig: RigFile) -> AmbRotor:
     planes, axial = two_planes(rig, probed=False), axial_support(rig)
     axes = [axis for plane in planes for axis in plane.axes]
     everywhere = [*axes, *([axial] if axial is not None else [])]
-    first, second, third, fourth = (axis.name for axis in axes)
     told = tuple(plane.voltage for plane in planes)
     lean = rig.machine["radial_axes"].value if "radial_axes" in rig.machine else math.pi / 4
     return replace(
         AMB_ROTOR,
-        axes=(first, second, third, fourth),
+        axes=(axes[0].name, axes[1].name, axes[2].name, axes[3].name),
         axial=axial.name if axial is not None else "",
         planes={plane.name: (2 * k, 2 * k + 1) for k, plane in enumerate(planes)},
         rings=dict(zip((plane.name for plane in planes), AMB_ROTOR.rings.values(), strict=True)),
         probes={axis.name: axis.position for axis in everywhere if axis.position},
         pulls={axis.name: (axis.coils[0], axis.coils[1]) for axis in everywhere if len(axis.coils) == 2},
-        coil_voltages={
-            axis.name: (axis.voltages[0], axis.voltages[1]) for axis in everywhere if len(axis.voltages) == 2
-        },
+        coil_voltages={a.name: (a.voltages[0], a.voltages[1]) for a in everywhere if len(a.voltages) == 2},
         plane_voltages=told if all(told) else (),
         can=rig.capabilities,
         stations=stations(rig),
         lag_s=loops.lag_s(rig),
         loop_rad_s=loops.loop_rad_s(rig),
         gaps=gaps(rig),
-        lacks=unlike(rig, planes),
+        lacks=tuple(contradicted(rig, planes)),
+        crooked=crooked(rig, planes),
         unweighed=of_weight(rig, planes, (-lean, math.pi / 2 - lean)),
         speed_told=is_bound(rig, SPEED),
         marked=is_bound(rig, ANGLE) and is_bound(rig, SPEED),

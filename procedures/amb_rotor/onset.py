@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+
 import numpy as np
 import numpy.typing as npt
+
+from procedures.amb_rotor.conventions import AmbRotor
 
 Array = npt.NDArray[np.float64]
 ONSET, BEFORE_S = 4, 0.03  # periods of the telemetry; s
@@ -12,15 +17,30 @@ LATE_S = 1.2e-5  # what a square of time leaves of the rotor's answer makes the 
 DELAY_TICKS = 2  # from the jump to the amplifiers: computed a tick late, applied one later
 
 
+def pushing(machine: AmbRotor, direction: str, axis: str, by_channel: Mapping[str, Array]) -> Array:
+    """The difference (n,) A of an axis' two currents, as it pushes the shaft along y, z or x."""
+    p, n = machine.pair(axis)
+    return (by_channel[p] - by_channel[n]) * math.copysign(1.0, machine.stations.share(direction, axis))
+
+
 def onset(
-    t: Array, current: Array, earliest: float, latest: float, *, tick: float, ticks: int, lag_s: float
+    t: Array,
+    current: Array,
+    earliest: float,
+    latest: float,
+    *,
+    tick: float,
+    ticks: int,
+    lag_s: float,
+    window_s: float | None = None,
 ) -> tuple[float, float]:
     """When the set point jumped, s on the time of the samples `t` (n,), and the jump of `current` (n,) over its noise.
 
     i = i_0 + J u(t) + c v(t), u the amplifiers' answer to a step and v the square of the time since, for the rotor that begins
-    to follow; each averaged over the `ticks` readings of a sample. The start with the least misfit is taken.
+    to follow; each averaged over the `ticks` readings of a sample. The start with the least misfit is taken, over `window_s`
+    from it on (by default ONSET periods).
     """
-    window = ONSET * ticks * tick
+    window = ONSET * ticks * tick if window_s is None else window_s
     reads = t[:, None] - tick * np.arange(1, ticks + 1)
     near = (t > earliest - BEFORE_S) & (t < latest + window)
 

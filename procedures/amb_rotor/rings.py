@@ -184,8 +184,8 @@ def of_unshown(rig: RigFile) -> Iterator[Finding]:
             why += ", the shaft stands"
         text = (
             f"no check of polarity was made of {', '.join(names)}: {why}. That the shaft floats shows that probes and coils "
-            "agree; an axis that is reversed as a whole, probe and coils, is turned by 180° in the results. Push the shaft by "
-            "hand and look at the readings."
+            "agree; an axis that is reversed as a whole, probe and coils, is turned by 180° in the results. Run it with "
+            "somebody at the terminal, who is asked to push the shaft."
         )
         yield Finding("polarity-not-shown", text)
 
@@ -198,7 +198,7 @@ def before(recording: Recording[Any]) -> list[Finding]:
         found += of_readings({name: step.mean(name) for name in stations(rig).channels}, rig)
     for event, step in zip(recording.events(LIFT_LOST), recording.steps(LIFT), strict=False):
         found.append(_of_lift(step, str(event["fault"]), rig))
-    return [*found, *of_unshown(rig)]
+    return found
 
 
 def _of_lift(step: Step, fault: str, rig: RigFile) -> Finding:

@@ -65,7 +65,8 @@ class Ring:
 @dataclass(frozen=True)
 class Stations:
     """Of one machine. `axes` by name; `probes` by channel, those that look along an axis first, in the axes' order; `first` rad
-    is the direction of y around the shaft, `hand` 1 where z is counter-clockwise from it; `tilt` rad from the horizontal;
+    is the direction of y around the shaft, `hand` 1 where z is counter-clockwise from it; `sense` 1 where the shaft turns
+    counter-clockwise, -1 where it turns clockwise; `tilt` rad from the horizontal;
     `gaps` m by axis, where they are told; `helpers`, the motors that hold the shaft beside the bearings."""
 
     axes: Mapping[str, Placed]
@@ -73,6 +74,7 @@ class Stations:
     rings: tuple[Ring, ...] = ()
     first: Sum = NOTHING
     hand: int = 1
+    sense: int = 1
     tilt: Sum = NOTHING
     gaps: Mapping[str, Term] = field(default_factory=dict)
     helpers: tuple[str, ...] = ()
@@ -81,6 +83,11 @@ class Stations:
     def up(self) -> tuple[float, float]:
         """Shares of the upward unit vector along y and z; short of 1 where the shaft does not lie."""
         return upward(self.first.value, self.hand, self.tilt.value)
+
+    @property
+    def spin(self) -> int:
+        """1 where the shaft turns from y towards z, -1 where from z towards y."""
+        return self.hand * self.sense
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -111,6 +118,14 @@ class Stations:
             )
         return tuple(out)
 
+    def share(self, direction: str, axis: str) -> float:
+        """How far the shaft moves along an axis where it moves along y or z by one; 1 along x."""
+        return 1.0 if direction == AXIAL else self.axes[axis].row[COORDINATES.index(direction)]
+
+    def sorted_pair(self, one: str, other: str) -> tuple[str, str]:
+        """Of a bearing's two axes the one that is more along y, and the other."""
+        return (other, one) if self.share("y", one) ** 2 + SQUARE < self.share("y", other) ** 2 else (one, other)
+
     def moved(self, at: Mapping[str, float]) -> dict[str, float]:
         """How far the shaft at some coordinates (m and rad) is off the middle along each axis, m; what does not move is left
         out, and along the shaft (ALONG) it is that coordinate's own."""
@@ -121,10 +136,6 @@ class Stations:
             for axis, factor in by.items():
                 out[axis] = out[axis] + factor * value if axis in out else factor * value
         return out
-
-    def at_bearings(self, gains: Array) -> Array:
-        """(4, n): from readings, over the probes' `gains` (n,), to displacements at the axes, by least squares."""
-        return np.asarray(self.pulls @ np.linalg.pinv(self.reads) / gains)
 
 
 def row(arm: float, angle: float, sign: int = 1) -> tuple[float, float, float, float]:
@@ -189,6 +200,7 @@ def _stations(rig: RigFile, places: Places, planes: tuple[Support, Support]) -> 
         tuple(_rings(rig, places, planes)),
         y,
         hand,
+        1 if rig.shaft is None else rig.shaft.sense,
         Sum((places.number(rig.shaft.tilt, "shaft.tilt"),)) if tilted else Sum(),  # type: ignore[union-attr, arg-type]
         {a: gap for p in planes for a, gap in _gap(rig, places, p)},
         tuple(name for name, motor in rig.motors.items() if "radial force" in motor.gives),

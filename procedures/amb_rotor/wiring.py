@@ -11,7 +11,7 @@ import numpy as np
 from bench.findings import Effect, Finding
 from bench.recording import Recording
 from bench.rigfile.roles import STATUS
-from procedures.amb_rotor import nudges, rings
+from procedures.amb_rotor import nudges, pushes, rings
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.amb_rotor.lift import LIFT, LIFT_LOST, NO_SPEED, REST
 
@@ -25,6 +25,10 @@ def before_orbits(recording: Recording[Any]) -> Iterator[Finding]:
     yield from wrong
     if wrong:
         return
+    shown = list(pushes.of_recording(recording))
+    if any(f.effect is Effect.ERROR for f in shown):
+        yield from shown
+        return
     lost = recording.events(LIFT_LOST)
     if lost:
         yield from _of_lift(recording, machine, str(lost[0]["fault"]))
@@ -33,7 +37,7 @@ def before_orbits(recording: Recording[Any]) -> Iterator[Finding]:
     for event in recording.events(NO_SPEED):
         text = f"the shaft does not reach {event['wanted'] * 30 / math.pi:.0f} r/min: {event['why']}"
         yield Finding("speed-not-reached", text, "drive", Effect.ERROR)
-    yield from rings.of_unshown(recording.rig)
+    yield from shown
 
 
 def _at_rest(recording: Recording[Any], machine: AmbRotor) -> Iterator[Finding]:
@@ -97,6 +101,11 @@ def _of_lift(recording: Recording[Any], machine: AmbRotor, fault: str) -> Iterat
                     "in one plane or both"
                 ),
             )
+    if len(recording.steps(pushes.PUSH)):
+        text = (
+            f"{text or 'its path points to nothing'}; pushes before the lift showed that the probes count the right way along "
+            f"their axes: suspect the coils first"
+        )
     yield Finding(
         "lift-lost",
         f"the rotor was lost in the lift ({fault}); {text or 'no wiring is suspected by its path'}.",

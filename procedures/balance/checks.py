@@ -24,6 +24,7 @@ from procedures.balance.steps import (
     DECISION,
     LIGHTER,
     REFUSED,
+    TAKEN_OFF,
     Recorded,
     Run,
 )
@@ -84,6 +85,10 @@ def refusals(recording: Recording[Any]) -> Iterator[Finding]:
         text = (f"{e['allowed_kg'] * 1e3:.3g} g was fixed in place of {e['kg'] * 1e3:g} g: beside what the shaft does already, "
                 "more would leave the plan's share of the clearance.")  # fmt: skip
         yield Finding(LIGHTER, text, str(e["plane"]))
+    for e in recording.events(TAKEN_OFF):
+        text = (f"the trial weight was taken off before the one {e['plane']} was fixed: with both the shaft could leave the "
+                "plan's share of the clearance. The influence of both is told against the base run.")  # fmt: skip
+        yield Finding(TAKEN_OFF, text, str(e["taken"]))
     for e in recording.events(REFUSED):
         text = (
             f"the trial weight of {e['kg'] * 1e3:g} g {e['plane']} was refused: beside what the shaft does already its "
@@ -112,14 +117,15 @@ def of_runs(recorded: Recorded, rig: RigFile, plan: Plan, known: Known) -> Itera
     yield from dwell_checks.weight(looked)
     shown: list[decision.Shown] = []
     named = {r.name: r for r in recorded.runs}
-    before = base
+    last = base
     for side in planes.names_of(rig):
         having = named.get(f"trial {side}")
         if having is None or not having.weights:
             return
+        before = decision.before_trial(base, last, having)
         shown.append(decision.observe(before, having, having.weights[-1], rig, known))
         yield from decision.of_trial(shown[-1])
-        before = having if plan.leave else base
+        last = having
     yield from decision.of_trials(shown[0], shown[1])
 
 

@@ -31,6 +31,7 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 LEAST = 0.5  # of what it should do, by the forces: less, and a trial weight moved nothing
 OFF, ASTRAY = 0.25, 0.25  # of a weight: size, and what shows in the other plane
+CLOSE, FAR = 0.06, 4.0  # a size that is nearer passes; one between that and OFF within so many of its u
 TURNED_RAD, SLIPPED_RAD = math.radians(12), math.radians(15)
 SURE = 3.0  # of its u: a turn that what is known of the stand does not make
 JUST_RAD = 1e-6
@@ -105,12 +106,13 @@ def slow_runout(slow: Read | None, base: Run, rig: RigFile, known: Known) -> Com
 @dataclass(frozen=True)
 class Shown:
     """A trial `weight`, and by speed and plane (s, 2) what the forces say that it `added`, over what it should; the angle from
-    the mark to the scale's zero is still in it. `turn_u` (s,) rad: of the angle at a speed against that at the highest; names
-    of the planes, `sides`."""
+    the mark to the scale's zero is still in it. `turn_u` (s,) rad: of the angle at a speed against that at the highest;
+    `size_u`: of the size at the highest; names of the planes, `sides`."""
 
     weight: Weight
     added: Complex
     turn_u: Callable[[int], float]
+    size_u: Callable[[], float]
     sides: tuple[str, str]
 
 
@@ -135,8 +137,12 @@ def observe(before: Run, having: Run, weight: Weight, rig: RigFile, known: Known
 
         return propagate(turn, inputs).u
 
+    def size_u() -> float:
+        by_forces = propagate(lambda v: float(abs(added(Stand.of(v), -1)[weight.plane])), inputs).u
+        return math.hypot(by_forces, own.radius.u / own.radius.value, own.weight_mass.standard_uncertainty / weight.kg)
+
     nominal = Stand.of({name: e.value for name, e in inputs.items()})
-    return Shown(weight, np.array([added(nominal, k) for k in range(len(pairs))]), turn_u, names_of(rig))
+    return Shown(weight, np.array([added(nominal, k) for k in range(len(pairs))]), turn_u, size_u, names_of(rig))
 
 
 def of_trial(trial: Shown) -> Iterator[Finding]:
@@ -156,9 +162,9 @@ def of_trial(trial: Shown) -> Iterator[Finding]:
         text = (f"the trial weight of {name} acts in the {sides[1 - p]} plane, as {other:.0%} of itself: it sits in the wrong "
                 "plane.")  # fmt: skip
         yield Finding("weight-in-other-plane", text, where, Effect.ERROR)
-    elif abs(own - 1) > OFF or other > ASTRAY:
+    elif abs(own - 1) > OFF or other > ASTRAY or (abs(own - 1) > CLOSE and abs(own - 1) > FAR * trial.size_u()):
         text = (f"by the forces the trial weight of {name} acts as {own:.0%} of itself there and as {other:.0%} in the other "
-                "plane: suspect its mass or its place, or an unbalance that changed as it was mounted.")  # fmt: skip
+                "plane: suspect its mass, its place or the plane's radius, or an unbalance that changed with it.")  # fmt: skip
         yield Finding("weight-not-as-stated", text, where, Effect.ERROR)
     turns = np.abs(np.angle(added[:, p] / added[-1, p])) if own >= LEAST else np.zeros(1)
     k, turn = int(np.argmax(turns)), float(turns.max())
@@ -242,7 +248,12 @@ def _told(angle: float, positions: int) -> float:
     return angle % whole if whole - angle % whole > JUST_RAD else 0.0
 
 
-def trials_of(runs: Sequence[Run], rig: RigFile, leave: bool) -> Trials | None:
+def before_trial(base: Run, last: Run, having: Run) -> Run:
+    """The run that a trial weight is told against: the `last` one where what it had on stayed on, else the base run."""
+    return last if set(last.weights) <= set(having.weights) else base
+
+
+def trials_of(runs: Sequence[Run], rig: RigFile) -> Trials | None:
     """The trials among runs in order, None where one is missing."""
     named = {r.name: r for r in runs}
     names = ["base", *(f"trial {s}" for s in names_of(rig))]
@@ -251,4 +262,4 @@ def trials_of(runs: Sequence[Run], rig: RigFile, leave: bool) -> Trials | None:
     base, i, o = (named[n] for n in names)
     if not i.weights or not o.weights:
         return None
-    return Trials(base, (base, i if leave else base), (i, o), (i.weights[-1], o.weights[-1]), planes_of(rig))
+    return Trials(base, (base, before_trial(base, i, o)), (i, o), (i.weights[-1], o.weights[-1]), planes_of(rig))

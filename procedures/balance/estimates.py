@@ -15,6 +15,7 @@ from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence, propagate, welch_satterthwaite
 from bench.uncertainty.estimate import merged
 from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.lengths import lengths_by_name
 from procedures.balance import scatter as balance_scatter
 from procedures.balance.plan import Plan
 from procedures.balance.planes import Planes, all_told, names_of, planes_of
@@ -197,9 +198,12 @@ def _vectors(parts: Sequence[Estimate]) -> Vectors:
 def permissible_of_planes(rig: RigFile, plan: Plan) -> tuple[Estimate, Estimate]:
     """U_per of each plane (ISO 21940-11), kg m, uncertain by the rotor's mass and the planes' places."""
     if facts.stated(rig):
-        inputs = {"mass": certified("machine/mass", rig.machine["mass"]),
-                  "left": certified("geometry/com_to_inboard_balance", rig.geometry["com_to_inboard_balance"]),
-                  "right": certified("geometry/com_to_outboard_balance", rig.geometry["com_to_outboard_balance"])}  # fmt: skip
+        left, right = (lengths_by_name(rig)[name] for name in ("l_iu", "l_ou"))
+        inputs = {
+            "mass": certified("machine/mass", rig.machine["mass"]),
+            "left": certified(left.identity, left.number),
+            "right": certified(right.identity, right.number),
+        }
     else:
         one, other = planes_of(rig)
         inputs = {"mass": facts.shaft_number(rig, "mass"), "left": one.at, "right": other.at}

@@ -117,24 +117,48 @@ def _residual(balance: Balanced, last: str, p: int, plane: Plane) -> Figure:
 
 
 def _sheet(found: Result, balance: Balanced, p: int, plane: Plane) -> Figure:
-    """Unbalance as found and the weights that were fixed, as vectors on the scale."""
+    """Unbalance as found and the weights that were fixed, as vectors: on the scale, or, where the rig file tells how that lies
+    on the shaft, as who looks at the shaft sees it."""
     points = [("unbalance as found", complex(balance.unbalance[BASE].values[p]))]
     points += [(purpose, _on_scale(w, balance)) for w, purpose in found.recorded.fixed if w.plane == p]
     points = [(name, z / G_MM) for name, z in points]
     series = [
-        Series(f"{name}, {abs(z):.2f} g mm ∠{np.degrees(np.angle(z)) % 360:.0f}°", np.array([0.0, z.real]),
-               np.array([0.0, z.imag]), "both")
+        _arrow(f"{name}, {abs(z):.2f} g mm ∠{np.degrees(np.angle(z)) % 360:.0f}°", _seen(plane, z))
         for name, z in points
-    ]  # fmt: skip
-    side = plane.name
-    faces = "its 0° faces y while the shaft stands with its zero there; angles grow from y to z, in the direction of rotation"
-    on = "angles grow as it reads" if plane.scaled else faces
+    ]
     top = 1.4 * max(abs(z) for _, z in points)
     series.append(Series("scale", top * np.cos(TURN), top * np.sin(TURN), "guide"))
-    notes = [(f"{k}°", top * np.cos(np.radians(k)), top * np.sin(np.radians(k))) for k in range(0, 360, 90)]
+    ticks = [(k, top * _seen(plane, np.exp(1j * np.radians(k)))) for k in range(0, 360, 90)]
+    notes = [(f"{k}°", z.real, z.imag) for k, z in ticks]
+    if plane.scaled:
+        series.append(Series("once-per-turn mark", np.array([top]), np.array([0.0]), "mark"))
+    right = "towards the mark" if plane.scaled else "along the scale's zero"
     return Figure(
-        f"sheet-{side}", f"Unbalance and weights {side}",
-        f"On the scale of the {side} plane: {on}. Weights are added, at the radius of the plane. A trial weight is on "
+        f"sheet-{plane.name}", f"Unbalance and weights {plane.name}",
+        f"{_looked_at(found, plane)} Weights are added, at the radius of the plane. A trial weight is on "
         "the shaft in its own run alone, unless the plan leaves it.",
-        "along the scale's zero (g mm)", "a quarter turn on (g mm)", tuple(series), "plane", notes=tuple(notes),
+        f"{right} (g mm)", "a quarter turn on (g mm)", tuple(series), "plane", notes=tuple(notes),
     )  # fmt: skip
+
+
+def _arrow(label: str, tip: complex) -> Series:
+    return Series(label, np.array([0.0, tip.real]), np.array([0.0, tip.imag]), "both")
+
+
+def _seen(plane: Plane, on_scale: complex) -> complex:
+    """From the mark, in the direction of rotation, where the rig file tells how the scale lies on the shaft."""
+    return plane.turned(on_scale) if plane.scaled else on_scale
+
+
+def _looked_at(found: Result, plane: Plane) -> str:
+    if not plane.scaled:
+        return (
+            f"On the scale of the {plane.name} plane: its 0° faces y while the shaft stands with its zero there; angles grow "
+            "from y to z, in the direction of rotation."
+        )
+    shaft = found.rig.shaft
+    end = shaft.far_end if shaft is not None else "far"
+    return (
+        f"Seen from outside the {end} end, from where the shaft turns counter-clockwise, with its mark to the right; numbers "
+        f"are those of the {plane.name} plane's own scale. From the other end it is seen mirrored."
+    )

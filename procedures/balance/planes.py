@@ -21,6 +21,7 @@ from bench.rigfile.places import CENTRE, PlaceError, Places
 from bench.rigfile.supports import once_per_rig
 from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import Estimate
+from procedures.amb_rotor.lengths import number
 from procedures.synchronous import facts
 
 Complex = npt.NDArray[np.complex128]
@@ -112,9 +113,9 @@ def _plane(rig: RigFile, name: str, at: Estimate) -> Plane:
     p, places, key = rig.balancing[name], Places(rig), f"balancing.{name}"
     zero = Estimate.exact(0.0, "rad")
     if p.zero is not None:
-        zero = facts.number(rig, p.zero, f"{key}.zero", f"zero of the scale, {name}")
+        zero = number(rig, p.zero, f"{key}.zero", f"zero of the scale, {name}")
     mass, angle = (_weight(places, p, key, what) for what in ("weight_mass", "weight_angle"))
-    radius = facts.number(rig, p.radius, f"{key}.radius", "radius of the weights")
+    radius = number(rig, p.radius, f"{key}.radius", "radius of the weights")
     return Plane(name, at, radius, zero, p.sense, mass, angle, p.positions or 0, p.zero is not None or p.sense < 0)
 
 

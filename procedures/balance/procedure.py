@@ -15,7 +15,7 @@ from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.rigfile import RigFile
 from bench.units import RPM
-from procedures.amb_rotor import lift, wiring
+from procedures.amb_rotor import lift, pushes, wiring
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.laws import of_laws
 from procedures.balance import checks, decision, estimates, sequence
@@ -40,7 +40,7 @@ FOUND_COS = Quantity(
 FOUND_SIN = Quantity(
     "unbalance_sin",
     "kg m",
-    "as unbalance_cos: component a quarter turn on, from y towards z",
+    "as unbalance_cos: component a quarter turn on, as the scale counts",
     title="unbalance, a quarter turn on",
 )
 LEFT_COS = Quantity(
@@ -52,7 +52,7 @@ LEFT_COS = Quantity(
 LEFT_SIN = Quantity(
     "residual_sin",
     "kg m",
-    "as residual_cos: component a quarter turn on, from y towards z",
+    "as residual_cos: component a quarter turn on, as the scale counts",
     title="residual, a quarter turn on",
 )
 SHARE = Quantity(
@@ -88,7 +88,7 @@ def settings(rig: RigFile, plan: Plan) -> dict[str, float]:
 def step_count(plan: Plan) -> int:
     """How many steps `acquire` records at most."""
     runs = 3 + plan.corrections
-    mounts = 2 + (0 if plan.leave else 2) + plan.corrections * (2 if plan.positions == 0 else 4)
+    mounts = 2 + (1 if plan.leave else 2) + plan.corrections * (2 if plan.positions == 0 else 4)
     return lift.STEPS + (plan.slow_rad_s > 0) + runs * (len(plan.speeds_rad_s) + plan.repeat) + mounts
 
 
@@ -111,7 +111,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Result:
     known = known_by(recorded.slow, recorded.runs, rig, known)
     findings.gate(bearings.unknown(known, rig))
     findings.add(checks.of_runs(recorded, rig, plan, known))
-    trials = decision.trials_of(recorded.runs, rig, plan.leave)
+    trials = decision.trials_of(recorded.runs, rig)
     if trials is None and not findings.wrong:
         text = "the runs with trial weights were not completed: no influence coefficients."
         findings.add([Finding("no-trials", text, "", Effect.ERROR)])
@@ -171,6 +171,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    steps_on=lambda rig, plan: step_count(plan) + pushes.count(rig),
     fewest_steps=fewest_steps,
     needs=lambda plan: bearings.needs(plan.bearings),
     assumes=assumptions.BALANCE,

@@ -22,6 +22,7 @@ from procedures.balance.steps import (
     LIGHTER,
     MOUNT,
     REFUSED,
+    TAKEN_OFF,
     UNMOUNT,
     Read,
     Run,
@@ -71,7 +72,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     if not _roll(work) or not _run(work, BASE):
         return
     for p, side in enumerate(names_of(rig.file)):
-        kg, allowed = decision.trial_kg(rig.file, plan, work.runs[-1 if plan.leave else 0], p)
+        kg, allowed = _allowed(work, p)
         if kg < plan.trial_kg[p]:
             record.event(LIGHTER if kg else REFUSED, plane=side, kg=plan.trial_kg[p], allowed_kg=kg or allowed)
         if not kg:
@@ -82,6 +83,20 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         if not plan.leave:
             _unmount(work, p)
     _correct(work)
+
+
+def _allowed(work: Work, plane: int) -> tuple[float, float]:
+    """As `decision.trial_kg`. A trial weight that was to stay on is taken off where with it the next one may not turn."""
+    rig, plan, base = work.rig.file, work.plan, work.runs[0]
+    kg, allowed = decision.trial_kg(rig, plan, work.runs[-1] if work.mounted else base, plane)
+    if kg or not work.mounted:
+        return kg, allowed
+    alone = decision.trial_kg(rig, plan, base, plane)
+    if alone[0]:
+        sides = names_of(rig)
+        work.record.event(TAKEN_OFF, plane=sides[plane], taken=sides[1 - plane])
+        _unmount(work, 1 - plane)
+    return alone
 
 
 def _roll(work: Work) -> bool:
@@ -181,7 +196,7 @@ def _unmount(work: Work, plane: int) -> None:
 def _has_acted(work: Work, plane: int) -> bool:
     """Whether the trial weight of the last run did what it should."""
     base, last = work.runs[0], work.runs[-1]
-    before = work.runs[-2] if work.plan.leave else base
+    before = decision.before_trial(base, work.runs[-2], last)
     shown = decision.observe(before, last, last.weights[-1], work.rig.file, work.known)
     return not list(decision.of_trial(shown))
 
@@ -189,7 +204,7 @@ def _has_acted(work: Work, plane: int) -> bool:
 def _correct(work: Work) -> None:
     """Corrections, each with its verification run, until it is reached or the plan allows no more."""
     rig, plan = work.rig.file, work.plan
-    trials = decision.trials_of(work.runs, rig, plan.leave)
+    trials = decision.trials_of(work.runs, rig)
     assert trials is not None
     by_plane = zip(trials.before, trials.having, trials.weights, strict=True)
     inboard, outboard = (decision.observe(*of, rig, work.known) for of in by_plane)

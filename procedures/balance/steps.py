@@ -30,6 +30,7 @@ from procedures.synchronous.runout import Turning
 
 Array = npt.NDArray[np.float64]
 MOUNT, UNMOUNT, DECISION, REFUSED, LIGHTER = "mount", "unmount", "decision", "trial-refused", "trial-lighter"
+TAKEN_OFF = "trial-taken-off"
 BASE = "base"
 
 

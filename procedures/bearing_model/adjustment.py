@@ -136,16 +136,19 @@ def _least(problem: _Problem, x: Array, noise: Array) -> Array:
     for _ in range(ROUNDS):
         design = np.vstack([problem.slopes(x) * per[:, None], prior])
         scale = np.sqrt((design**2).sum(axis=0))
-        step = (
-            np.linalg.lstsq(design / scale, -np.concatenate([problem.left(x) * per, x[8:], kept]), rcond=None)[0]
-            / scale
-        )
+        wanted = -np.concatenate([problem.left(x) * per, x[8:], kept])
+        if not (np.isfinite(design).all() and np.isfinite(wanted).all() and scale.all()):
+            break  # it went where the model has no numbers, or where an unknown moves nothing
+        step = np.linalg.lstsq(design / scale, wanted, rcond=None)[0] / scale
         if not np.isfinite(step).all():
             break
         x = x + step
         if float(np.abs(design @ step).max()) < SMALL:
             return x
-    raise AnalysisError("the positions and the certificates have no solution together")
+    raise AnalysisError(
+        "the positions and the certificates have no solution together: suspect directions, places, gap or mass of the rig "
+        "file, or exchanged channels"
+    )
 
 
 def _inverse(design: Array) -> Array:

@@ -137,7 +137,7 @@ def _adjustments(a: Analysis, plan: Plan) -> Iterator[Finding]:
         listed = ", ".join(_told(a, name) for name in suspects[:4])
         spring = "" if plan.coupled else " The plan says that the coupling is off: is it?"
         text = f"the positions contradict a certificate by {worst:.1f} standard deviations. Suspect: {listed}.{spring}"
-        yield Finding("certificate-contradicted", text, _influence(a, suspects[0]).id, Effect.INDETERMINATE)
+        yield Finding("certificate-contradicted", text, influence(a, suspects[0]).id, Effect.INDETERMINATE)
     for k, axis in enumerate(a.held.machine.axes):
         if axis not in a.fits:
             continue
@@ -154,7 +154,7 @@ def _adjustments(a: Analysis, plan: Plan) -> Iterator[Finding]:
     told = []
     for key in dict.fromkeys(magnetics.gap_key(a.held.machine, axis) for axis in a.held.machine.axes):
         gap, drawing = a.adjusted.estimates[key], a.inputs[key]
-        name = "gap" if key == "gap" else _influence(a, key).name
+        name = "gap" if key == "gap" else influence(a, key).name
         told.append(f"{name} {gap.value * 1e6:.1f} ± {expanded(gap) * 1e6:.1f} µm "
                     f"(95 %), the drawing has {drawing.value * 1e6:.1f} ± {expanded(drawing) * 1e6:.1f} µm")  # fmt: skip
     left = 1e3 * float(np.sqrt((a.adjusted.residuals**2).mean()))
@@ -166,9 +166,9 @@ def _adjustments(a: Analysis, plan: Plan) -> Iterator[Finding]:
 
 
 def _told(a: Analysis, name: str) -> str:
-    return f"{_influence(a, name).name} ({a.adjusted.pulls[name]:+.1f})"
+    return f"{influence(a, name).name} ({a.adjusted.pulls[name]:+.1f})"
 
 
-def _influence(a: Analysis, name: str) -> Influence:
+def influence(a: Analysis, name: str) -> Influence:
     """The one that an input has: certificates are influences by themselves."""
     return next(iter(a.inputs[name].sensitivities))

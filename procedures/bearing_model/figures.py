@@ -11,6 +11,7 @@ from bench.figures import Figure, Series
 from bench.rigfile import RigFile
 from procedures.amb_rotor import magnetics
 from procedures.amb_rotor.geometry import Edge, at_rings, nominal
+from procedures.bearing_model.checks import influence
 from procedures.bearing_model.estimates import Analysis
 
 DISPLACEMENT = "displacement at the AMB (µm)"
@@ -92,7 +93,7 @@ def _adjustments(a: Analysis) -> Figure:
     moved = a.adjusted.moved
     at = np.arange(1.0, len(moved) + 1)
     most = sorted(moved, key=lambda name: -abs(moved[name]))[:3]
-    named = ", ".join(f"{name} ({list(moved).index(name) + 1}) {moved[name]:+.1f}" for name in most)
+    named = ", ".join(f"{influence(a, n).name} ({list(moved).index(n) + 1}) {moved[n]:+.1f}" for n in most)
     caption = (
         "How far the positions move each certified number, over its standard uncertainty; beyond the lines they contradict "
         f"the certificate, if they tell of it at all. The most: {named}."

@@ -6,27 +6,25 @@ from collections.abc import Iterator
 
 from bench.errors import Lacking
 from bench.rigfile import RigFile
-from bench.rigfile.numbers import Sum
 from bench.rigfile.places import CENTRE, PlaceError, Places
 from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import Estimate
 from procedures.amb_rotor.conventions import AmbRotor, conventions
+from procedures.amb_rotor.lengths import in_words, lengths_by_name, named, summed
 from procedures.amb_rotor.magnetics import gap_key, number_key
 from procedures.amb_rotor.stations import stated
 from procedures.shared.certificates import certified
 
-LENGTHS = {"l_is": "com_to_inboard_sensor", "l_os": "com_to_outboard_sensor", "l_oa": "com_to_outboard_amb",
-           "amb_span": "amb_span", "l_c": "com_to_coupling", "gap": "amb_gap"}  # fmt: skip
-GEOMETRY = (*LENGTHS.values(), "clearance", "coupling_stiffness")
+LENGTHS = ("l_is", "l_os", "l_oa", "amb_span", "l_c", "gap")
 MACHINE = ("mass", "radial_axes", "runout", "coupling_offset")
 LOADED = 0.05  # of the greatest load of an axis: below it an axis tells no force constant
 
 
 def as_printed(rig: RigFile) -> bool:
-    """Whether the rig file has the numbers of the stand of the thesis by their names, and the tables say the same."""
+    """Whether each length is one number, and the table `machine` has the shaft's, as on the stand of the thesis."""
     machine = conventions(rig)
-    named = {*GEOMETRY} <= rig.geometry.keys() and {*MACHINE} <= rig.machine.keys()
-    return named and machine.probed and not machine.lacks and not machine.unweighed
+    told = {*LENGTHS, "clearance", "coupling"} <= lengths_by_name(rig).keys() and {*MACHINE} <= rig.machine.keys()
+    return told and machine.probed and not machine.crooked and not machine.lacks and not machine.unweighed
 
 
 def lacking(rig: RigFile) -> Iterator[str]:
@@ -51,12 +49,12 @@ def fit_inputs(rig: RigFile, coupled: bool) -> dict[str, Estimate]:
 
 
 def _printed(rig: RigFile, coupled: bool) -> dict[str, Estimate]:
-    g, m, machine = rig.geometry, rig.machine, conventions(rig)
+    found, m, machine = lengths_by_name(rig), rig.machine, conventions(rig)
     inputs = {"mass": certified("machine/mass", m["mass"], "mass of the shaft"),
               "axes": certified("machine/radial_axes", m["radial_axes"], "angle of the axes to the vertical"),
               "gravity": certified("site/gravity", rig.site.gravity, "gravity")}  # fmt: skip
-    inputs |= {key: certified(f"geometry/{name}", g[name], name.replace("_", " ")) for key, name in LENGTHS.items()}
-    spring = certified("geometry/coupling_stiffness", g["coupling_stiffness"], "stiffness of the coupling")
+    inputs |= {name: named(found[name]) for name in LENGTHS}
+    spring = certified(found["coupling"].identity, found["coupling"].number, "stiffness of the coupling")
     inputs["coupling"] = spring if coupled else Estimate.exact(0.0)
     for d in "yz":
         name = f"machine/coupling_offset/{d}"
@@ -74,7 +72,7 @@ def _of_tables(rig: RigFile, coupled: bool) -> dict[str, Estimate]:
               "gravity": certified("site/gravity", rig.site.gravity, "gravity")}  # fmt: skip
     sums = [s.first, s.tilt, *(x for p in (*s.probes.values(), *s.axes.values()) for x in (p.arm, p.angle))]
     for term in (t for total in sums for t in total.terms):
-        inputs[number_key(term.identity)] = certified(term.identity, term.number, spelled(term.identity))
+        inputs[number_key(term.identity)] = certified(term.identity, term.number, in_words(term.identity))
     for axis, gap in s.gaps.items():
         inputs[gap_key(machine, axis)] = certified(gap.identity, gap.number, f"gap of {axis}")
     inputs |= _coupling(rig, coupled)
@@ -98,25 +96,13 @@ def _coupling(rig: RigFile, coupled: bool) -> dict[str, Estimate]:
     offset = stated(rig, rig.coupling.offset, "coupling.offset")
     out = {
         "coupling": certified("coupling/stiffness", stiffness, "stiffness of the coupling"),
-        "coupling_at": _summed(at),
+        "coupling_at": summed(at, "m"),
     }
     for d in "yz":
         identity = f"coupling/offset/{d}"
         out[f"relaxed_{d}"] = (Estimate.exact(0.0) if offset is None else
                                certified(identity, offset, f"where the coupling is relaxed, {d}"))  # fmt: skip
     return out
-
-
-def _summed(of: Sum) -> Estimate:
-    out = Estimate.exact(of.exact)
-    for t in of.terms:
-        out = out + certified(t.identity, t.number) * t.factor
-    return out
-
-
-def spelled(identity: str) -> str:
-    """An identity in words, for a budget: `bearings/vorn/at` is "bearings vorn at"."""
-    return identity.replace("/", " ").replace("_", " ")
 
 
 def _probe(rig: RigFile, probe: str, key: str, identity: str, runout: Toleranced | None) -> dict[str, Estimate]:

@@ -21,7 +21,7 @@ from bench.procedure.states import transition
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from procedures.amb_rotor import lift, rings
+from procedures.amb_rotor import frame, lift, pushes, rings
 from procedures.amb_rotor.conventions import AMB_ROTOR, conventions
 from procedures.amb_rotor.places import HOLD, LIFT, LIFT_LOST, REST, TILT, Held, channels, of_readings, read_steps
 from procedures.amb_rotor.stations import COORDINATES
@@ -33,6 +33,7 @@ from procedures.bearing_model.fitting import check
 from procedures.bearing_model.grid import biases, count_places, places, tilts
 from procedures.bearing_model.inputs import as_printed, lacking
 from procedures.bearing_model.plan import Plan
+from procedures.bearing_model.stillness import await_still
 from procedures.shared import assumptions, first_look
 
 OF_LINEAR = {
@@ -89,7 +90,9 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         rig.clock.sleep(REST_S)
     machine = conventions(rig.file)
     readings = {name: rig.levitation.reading(name) for name in machine.stations.channels}
-    if any(rings.of_readings(readings, rig.file)) or not _lift(rig, record):
+    if any(rings.of_readings(readings, rig.file)) or any(pushes.judge(pushes.ask(rig, record), rig.file)):
+        return
+    if not _lift(rig, record):
         return
     rig.clock.sleep(3 * plan.settle_s)
     tilted = _tilt(rig, plan, record)
@@ -101,6 +104,7 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
         ):  # to the first place it is far; the stand of the thesis has recordings without a wait
             lift.write(rig, machine.points(dict(zip("yz", _first_of(rig.file, plan, k), strict=True))))
             rig.clock.sleep(FAR * plan.settle_s)
+            await_still(rig, record, machine.currents)
         held = []
         for y, z in places(rig.file, plan) if k % 2 == 0 else reversed(places(rig.file, plan)):
             lift.write(rig, machine.points({"y": y, "z": z}))
@@ -178,11 +182,12 @@ def read(recording: Recording[Plan]) -> tuple[Held, Held]:
 
 def evaluate(recording: Recording[Plan], findings: Findings) -> Analysis:
     """The adjustment of all positions, and both models compared."""
-    findings.gate(rings.before(recording))
+    findings.gate([*rings.before(recording), *pushes.of_recording(recording)])
     held, tilted = read(recording)
     findings.gate(first_look.with_first(recording, _of_data(recording, held, tilted)), checks.FATAL)
     a = estimates.evaluate(recording, held)
     findings.add(checks.of_results(a, recording.plan))
+    findings.add(frame.describe(recording.rig, ("y", "z")))
     return a
 
 
@@ -242,6 +247,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    steps_on=lambda rig, plan: step_count(plan) + pushes.count(rig),
     reached=REACHED,
     assumes=assumptions.BEARING_MODEL,
     method=read_method(__file__),

@@ -9,7 +9,7 @@ from bench.procedure import Procedure, read_method
 from bench.procedure.rig import Rig
 from bench.procedure.roles import RigState
 from bench.recording.recorder import Recorder
-from procedures.amb_rotor import lift
+from procedures.amb_rotor import lift, pushes
 from procedures.coast_down.plan import Plan
 from procedures.run_up import procedure as run_up
 from procedures.shared import assumptions
@@ -40,6 +40,7 @@ procedure = Procedure(
     check=run_up.check,
     settings=run_up.settings,
     step_count=run_up.step_count,
+    steps_on=lambda rig, plan: run_up.step_count(plan) + pushes.count(rig),
     needs=lambda plan: bearings.needs(plan.bearings),
     optional=run_up.procedure.optional,
     untold=run_up.procedure.untold,

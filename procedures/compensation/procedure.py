@@ -21,7 +21,7 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate
 from bench.units import RPM
-from procedures.amb_rotor import lift
+from procedures.amb_rotor import lift, pushes
 from procedures.amb_rotor.conventions import conventions
 from procedures.compensation import checks, switching
 from procedures.compensation import figures as drawn
@@ -176,6 +176,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    steps_on=lambda rig, plan: step_count(plan) + pushes.count(rig),
     needs=lambda plan: bearings.needs(plan.bearings),
     assumes=assumptions.UNBALANCE,
     method=f"{unbalance.procedure.method}\n{read_method(__file__)}",

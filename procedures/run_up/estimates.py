@@ -161,7 +161,7 @@ def _peaks(
     for number, c in enumerate(criticals(speeds, best, covariance, scatter=scatter), 1):
         where = f"{axis}/{number}"
         (as_it_was, before, lag, bend, *shifts) = moved(speeds, best, others, covariance, c)[1]
-        slopes = [(part, shift / part.u) for part, shift in zip(parts_, shifts, strict=True)]
+        slopes = [(part, shift / part.u) for part, shift in zip(parts_, shifts, strict=True) if part.u]
         numbers = {"speed": c.speed, "amplitude": c.amplitude + float(as_it_was[1]), "factor": c.factor}
         made, scattered = {}, scatter_of(c, where, line.dof(c.speed))
         for j, (name, value) in enumerate(numbers.items()):

@@ -55,7 +55,7 @@ def all_figures(run: Run, rig: RigFile, running: float) -> Iterator[Shown]:
         yield figures.farthest(run.near)
         for result in run.near.dwells[-1:]:
             for plane in planes:
-                yield figures.orbits(result, plane, run.clearance, figures.where_y_is(rig))
+                yield figures.orbits(result, plane, run.clearance, figures.outlook(rig))
             if result.dwell.full is not None:
                 for plane in planes:
                     yield figures.spectrum(result, plane)

@@ -22,7 +22,7 @@ from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.capture import at_speed
 from bench.units import RPM
-from procedures.amb_rotor import lift, wiring
+from procedures.amb_rotor import lift, pushes, wiring
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.laws import of_laws
 from procedures.amb_rotor.lift import NO_SPEED
@@ -232,6 +232,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    steps_on=lambda rig, plan: step_count(plan) + pushes.count(rig),
     needs=lambda plan: bearings.needs(plan.bearings),
     optional=CRITICAL,
     untold=unbalance.of_captures,

@@ -114,7 +114,7 @@ def read_passage(recording: Recording[Any]) -> Passage:
         Sampling(tick, ticks, tick),
         t,
         wide,
-        np.array([data[c] for c in machine.plane_voltages]),
+        np.array([data[c] for c in machine.plane_voltages]).reshape(-1, t.size),
         data[STATUS].astype(np.int64),
         ((drive["t_ns"] - recording.start_ns) * 1e-9, drive[driven]),
         _moving(tacho.speed(t)),

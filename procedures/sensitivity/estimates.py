@@ -88,11 +88,11 @@ def binary(x: float) -> float:
     return float(2.0 ** math.floor(math.log2(x)))
 
 
-def candidates(seen: Sequence[Response]) -> list[Candidate]:
-    """Where a survey peaks, the greatest first, and those that come near it."""
+def candidates(seen: Sequence[Response], octaves: bool = False) -> list[Candidate]:
+    """Where a survey peaks, the greatest first, and those that come near it; `octaves`: its lines stand that far apart."""
     if not seen:
         return []
-    hz, z, power = merged([(r, shared_noise(r)) for r in seen])
+    hz, z, power = merged([(r, shared_noise(r, octaves)) for r in seen])
     size, free = np.abs(z) - np.sqrt(power), np.ones(hz.size, bool)
     out: list[Candidate] = []
     while free.any() and len(out) < CANDIDATES:

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from bench.analysis import peaks
+from bench.analysis import peaks, rational
 from bench.analysis.responses import Response
 from bench.uncertainty import Estimate, Influence
 from procedures.sensitivity.steps import Taken
@@ -28,6 +28,8 @@ VAGUE = 0.2  # relative standard uncertainty above which a margin is not told
 FAINT = 0.1  # where |L| is less, it is noise that crosses the axis: a gain that may rise tenfold is not told
 LOW, NODES, BETWEEN = 12, 4, 20  # lines between which the loop is bent, how many make a curve, points of it in a step
 REACHES, DEGREE = (1.8, 1.5, 1.3), 3  # of the crossing's frequency, to either side, and of the polynomial of ln f
+OF_SINES = (3.0, 2.5, 2.1)  # the same where six lines are an octave
+ABOUT = 1.5  # of the frequency where |L| is 1: lines by which single sines' phase margin is told
 MISFIT = 3.0  # standard deviations of its chi-squared over what noise explains: a bending mode is among the lines
 
 
@@ -42,11 +44,15 @@ def margins(surveys: Sequence[Taken], where: str) -> dict[str, Estimate]:
     smooth = peaks.smoother(hz, z, covariance)
     base, drawn = smooth.at_lines(z), peaks.noise(covariance, 0, DRAWS)
     seen = smooth.everywhere(z), smooth.everywhere(base), smooth.everywhere(base + drawn)
+    alone = all(t.step_hz == 0 for t in surveys)
     found = {
-        "phase_margin": ("rad", _told(seen, lambda s: phase(1 / s - 1))),
+        "phase_margin": (
+            "rad",
+            _modelled(smooth.x, seen[0], (hz, z, power)) if alone else _told(seen, lambda s: phase(1 / s - 1)),
+        ),
         # about the curve as it is seen: the local models follow it less well where it ends
         "gain_reduction": ("1", _told((z, z, z + drawn), lambda s: fall(between(hz, 1 / s - 1)))),
-        "gain_increase": ("1", _least(hz, z, base, power, drawn, smooth)),
+        "gain_increase": ("1", _least(hz, z, base, power, drawn, smooth, OF_SINES if alone else REACHES)),
     }
     dof = {name: max(float(min(t.dof for t in surveys)), 1.0) for name in found}
     dof["gain_reduction"] = max(float(min(t.dof_at_ends for t in surveys)), 1.0)
@@ -77,6 +83,35 @@ def _told(curves: tuple[Complex, Complex, Complex], of: Callable[[Complex], floa
     seen, base, drawn = curves
     found, again, values = of(seen), of(base), np.array([of(each) for each in drawn])
     return _freed(found, again, values)
+
+
+def _modelled(x: Array, seen: Complex, lines: tuple[Array, Complex, Array]) -> tuple[float, float] | None:
+    """The phase margin of lines that stand unevenly, and its u: by rational models of those about where |L| is 1, which the
+    smoothed curve `seen` at `x` shows. Local models of as many lines would reach over octaves beside a refined peak."""
+    at = (
+        _crossings(np.abs(1 / seen - 1) - 1, 1 / seen - 1),
+        _crossings(np.abs(1 / seen - 1) - 1, x.astype(np.complex128)).real,
+    )
+    if not at[0].size:
+        return None
+    middle = float(at[1][int(np.abs(np.angle(-at[0])).argmin())])
+    near = (lines[0] > middle / ABOUT) & (lines[0] < middle * ABOUT)
+    hz = lines[0][near]
+    if hz.size < rational.LEAST:
+        return None
+    kept = rational.weighed(rational.orders(hz, lines[1][near], lines[2][near], math.inf))
+    fine = np.linspace(hz[0], hz[-1], 20 * hz.size)
+    told = [_of_model(m, fine) for _, m in kept]
+    known = [(w, t) for (w, _), t in zip(kept, told, strict=True) if t is not None]
+    if not known:
+        return None
+    weight = np.array([w for w, _ in known]) / sum(w for w, _ in known)
+    return rational.pooled(weight, *np.array([t for _, t in known]).T)
+
+
+def _of_model(model: rational.Rational, fine: Array) -> tuple[float, float] | None:
+    seen = model.at(fine)
+    return _told((seen, seen, rational.drawn_curves(model, fine)), lambda s: phase(1 / s - 1))
 
 
 def _freed(found: float, again: float, values: Array) -> tuple[float, float] | None:
@@ -134,7 +169,13 @@ def between(hz: Array, loop: Complex) -> Complex:
 
 
 def _least(
-    hz: Array, z: Complex, base: Complex, power: Array, drawn: Complex, smooth: peaks.Smoother
+    hz: Array,
+    z: Complex,
+    base: Complex,
+    power: Array,
+    drawn: Complex,
+    smooth: peaks.Smoother,
+    reaches: Sequence[float] = REACHES,
 ) -> tuple[float, float] | None:
     """|L| where it crosses the negative real axis below 1, and its u, by a polynomial about where a first look sees that;
     `base` is S as its local models have it at the lines."""
@@ -144,7 +185,7 @@ def _least(
     if not can.any():
         return None
     middle = float(at[1][can][np.argmin(at[0][can])])
-    for reach in REACHES:
+    for reach in reaches:
         near = (hz > middle / reach) & (hz < middle * reach)
         x, many = np.log(hz[near] / middle), int(near.sum())
         if many < 3 * (DEGREE + 1):

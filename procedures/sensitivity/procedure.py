@@ -23,7 +23,7 @@ from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
 from bench.rigfile.capture import Layout
-from procedures.amb_rotor import lift, wiring
+from procedures.amb_rotor import lift, pushes, wiring
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.laws import of_laws
 from procedures.sensitivity import checks, estimates, fitting, sines
@@ -139,7 +139,7 @@ def _axis(rig: Rig, plan: Plan, record: Recorder, speed: float, axis: str, numbe
         found = _take(rig, plan, record, speed, axis, kind, about, comb, number)
         seen += [found] if found is not None and kind != WIRING else []
         number += 1
-    for candidate in estimates.candidates(sines.as_one(seen) if one else seen):
+    for candidate in estimates.candidates(sines.as_one(seen) if one else seen, one):
         again = sines.refinements(rig.file, plan, candidate) if one else refinements(plan, candidate, speed)
         for kind, about, comb in again:
             _take(rig, plan, record, speed, axis, kind, about, comb, number)
@@ -238,6 +238,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    steps_on=lambda rig, plan: step_count(plan) + pushes.count(rig),
     optional=(PHASE, FALL, RISE),  # a margin that the survey does not resolve is not told
     assumes=assumptions.SENSITIVITY,
     method=read_method(__file__),

@@ -80,7 +80,7 @@ class Taken:
     @property
     def noise(self) -> Array:
         """Mean square (m,) of the noise in S at each line: in shares of abs(S) it hardly changes from line to line."""
-        return shared_noise(self.response)
+        return shared_noise(self.response, octaves=self.kind == SURVEY and self.step_hz == 0)
 
     @property
     def dof(self) -> float:
@@ -93,11 +93,16 @@ class Taken:
         return 2 * self.response.dof * min(self.response.hz.size, FEW + 1)
 
 
-def shared_noise(r: Response) -> Array:
+def shared_noise(r: Response, octaves: bool = False) -> Array:
     """Mean square (m,) of the noise in a response, its share of abs squared averaged over neighbouring lines: as many to
-    either side, since the share grows with the frequency, but a few at the ends."""
+    either side, since the share grows with the frequency, but a few at the ends. Where neighbours reach over `octaves`, a
+    parabola of the logarithms says first how it grows: the mean of what grows as a square is not what is in the middle."""
     size = np.maximum(np.abs(r.values) ** 2, 1e-12)
     share = np.trace(r.covariance, axis1=1, axis2=2) / size
+    if octaves and share.size > SHARING and (share > 0).all():
+        x = np.log(r.hz)
+        grown = np.exp(np.polyval(np.polyfit(x, np.log(share), 2), x))
+        share, size = share / grown, size * grown
     reach = [min(max(k, FEW), max(share.size - 1 - k, FEW), SHARING) for k in range(share.size)]
     near = [share[max(0, k - n) : k + n + 1].mean() for k, n in enumerate(reach)]
     return np.asarray(np.array(near) * size)

@@ -20,6 +20,7 @@ TORQUE_CONSTANT = (
     "A lever that is not level by 1° takes 0.015 % off every torque, and off alpha_tau.",
 )
 BEARING_MODEL = (
+    "An error of the shaft's mass, whose weight is the known force, changes β, K_i and K_x by its share.",
     "An axis that is reversed as a whole, coils, probe and gravity, is the same machine seen from below: only the sign of its "
     "offset differs.",
     "A coupling that turns the shaft, besides its spring's pull: a moment of 1 N mm changes the force of either AMB by 5.6 mN, "
@@ -61,6 +62,16 @@ FORCE_COUPLING = (
 FORCE_MAP = (
     "A coil's current sensor of the inboard AMB whose gain changed since its calibration changes alpha_1 and alpha_5 by that "
     "share.",
+)
+ESTIMATOR_COMPARE = (
+    "An estimate of the disturbance that is wrong by a constant, or by a sine of the exciter's own frequency, is not seen in "
+    "disturbance_error: 5 % of the force constant in the controller's model is 0.1 N of 2 N.",
+    "The load comes on as it does in every repeat; a weight that swings on its thread moves peak and integral of all alike.",
+)
+DERIVATIVE = (
+    "The captured position is the one that the law took, and the velocity the one of the same tick: a tick between them turns "
+    "the phase by 0.036° per Hz.",
+    "A sampling time that the controller counts wrongly changes every gain by its share; it is found from 0.1 % on.",
 )
 SLEW = (
     "A controller whose reference swings by another amplitude than it was told changes the amplitude ratio by that share, and "

@@ -40,12 +40,6 @@ class Sine:
         """Standard uncertainty of the amplitude from the residuals, taken as white."""
         return self._spread(np.array(self.fit.terms[:2]) / max(self.amplitude, 1e-300))
 
-    @property
-    def u_phase(self) -> float:
-        """Standard uncertainty of the phase in rad from the residuals, taken as white."""
-        a, b = self.fit.terms[:2]
-        return self._spread(np.array([b, -a]) / max(self.amplitude, 1e-300) ** 2)
-
     def _spread(self, slope: Array) -> float:
         return math.sqrt(max(float(slope @ self.fit.covariance[:2, :2] @ slope), 0.0))
 

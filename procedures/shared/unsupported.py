@@ -15,9 +15,15 @@ APART_M = 1e-3  # of a place by the machine's tables from that by `geometry`
 
 
 def unlike(rig: RigFile, planes: tuple[Support, Support]) -> tuple[str, ...]:
-    """For every procedure, a line each: axes of one plane that look where those of the other do, probes that grow along their
-    axis, a shaft that turns counter-clockwise, and numbers of `geometry` that say what the machine's tables say."""
-    return (*_twisted(planes), *_sense(rig), *_probes(rig, planes), *_contradicted(rig, planes))
+    """For what takes two planes of like axes, a line each: axes of one plane that look where those of the other do, probes that
+    grow along their axis, a shaft that turns counter-clockwise, and numbers of `geometry` that say what the machine's tables
+    say."""
+    return (*crooked(rig, planes), *contradicted(rig, planes))
+
+
+def crooked(rig: RigFile, planes: tuple[Support, Support]) -> tuple[str, ...]:
+    """How a machine is not two planes of like axes, each read along itself, of a shaft that turns counter-clockwise."""
+    return (*_twisted(planes), *_sense(rig), *_probes(rig, planes))
 
 
 def of_weight(rig: RigFile, planes: tuple[Support, Support], frame: tuple[float, float]) -> tuple[str, ...]:
@@ -71,7 +77,7 @@ def _probes(rig: RigFile, planes: Sequence[Support]) -> Iterator[str]:
                    "factor its sign")  # fmt: skip
 
 
-def _contradicted(rig: RigFile, planes: tuple[Support, Support]) -> Iterator[str]:
+def contradicted(rig: RigFile, planes: tuple[Support, Support]) -> Iterator[str]:
     """Distances from the centre of mass that procedures read from `geometry`, where the tables put the part elsewhere."""
     places = Places(rig)
     for side, plane, towards in zip(("inboard", "outboard"), planes, (-1.0, 1.0), strict=True):

@@ -26,7 +26,7 @@ from procedures.amb_rotor.conventions import conventions
 from procedures.spindown import coasts, fit
 from procedures.spindown.coasts import COAST, SPIN, Coasting, read_coasts, slowest
 from procedures.spindown.plan import Plan
-from procedures.synchronous import facts, mark
+from procedures.synchronous import mark
 
 NOT_REACHED = "not-reached"
 
@@ -150,8 +150,3 @@ def figures(found: Coasted) -> Iterable[Figure]:
     yield Figure("residuals-angle", "Residuals of the angle", "Measured angle less its fit, a few edges. A wave over all of it "
                  "would be drag of another shape.", "time (s)", "residual (mrad)", tuple(left),
                  lines=(("zero", 0.0),))  # fmt: skip
-
-
-def inertia_of(rig: RigFile) -> Estimate:
-    """The rig file's polar inertia, kg m^2."""
-    return facts.shaft_number(rig, "polar_inertia")

@@ -32,9 +32,11 @@ from procedures.spindown.plan import Plan
 from procedures.spindown.running_up import let_go, run_up
 from procedures.spindown.steps import RunDown, channels, coils, read_run_downs
 
-B = Quantity("B", "N m s/rad", "viscous drag at the bias of the plan, mean over both directions")
-B_HIGH = Quantity("B_high", "N m s/rad", "viscous drag at the higher bias, mean over both directions")
-T_C = Quantity("T_c", "N m", "Coulomb torque of the rotor alone at the bias of the plan, mean over both directions")
+B = Quantity("B", "N m s/rad", "viscous drag, mean over the directions that it was turned in")
+B_HIGH = Quantity(
+    "B_high", "N m s/rad", "viscous drag at the higher bias, mean over the directions that it was turned in"
+)
+T_C = Quantity("T_c", "N m", "Coulomb torque of the rotor alone, mean over the directions that it was turned in")
 J_Z = Quantity("J_z", "kg m^2", "polar inertia: by the ring where one was mounted, else the rig file's as used")
 MEASURES = (B, B_HIGH, T_C, J_Z)
 RAMP_S = 0.25  # what is left of the run-up's ramp when the speed is nearly there

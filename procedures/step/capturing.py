@@ -24,6 +24,7 @@ from bench.rigfile.capture import Layout
 from bench.rigfile.roles import STATUS
 from procedures.amb_rotor.conventions import AmbRotor
 
+Array = npt.NDArray[np.float64]
 Samples = dict[str, npt.NDArray[Any]]
 SLOW_S = 1.5e-3  # of telemetry: what stands farther apart shows no rise of a stiff loop
 MEAN_S = 5e-4  # what a capture's readings are averaged over
@@ -33,7 +34,8 @@ SPARE_S = 0.05  # that a capture ends before its step
 
 def channels(machine: AmbRotor) -> tuple[str, ...]:
     """What is captured of a step."""
-    return (*machine.all_positions, *machine.all_currents)
+    positions = dict.fromkeys((*machine.all_positions, *machine.stations.channels))
+    return (*positions, *machine.all_currents)
 
 
 def captures(rig: RigFile, machine: AmbRotor) -> bool:
@@ -65,12 +67,9 @@ def fetch(rig: Rig, number: int) -> None:
 def read(step: Step, names: Sequence[str]) -> Samples:
     """Samples of a step by channel or role, with `t_ns` and `index`: of its telemetry, or, where it was captured, of that. What
     was not captured is as the telemetry has it: the status of the whole step, else interpolated."""
-    told = step.read(*names)
-    events = (e for e in step.recording.events("capture") if OF_STEP in e["labels"])
-    mine = next((e for e in events if step.start_ns <= e["start_ns"] < step.end_ns), None)
-    if mine is None:
+    told, found = step.read(*names), _captured(step)
+    if found is None:
         return told
-    found = Captured.of(step.recording, mine)
     tick_s = step.recording.rig.devices["controller"].tick_s
     fast = averaged(found, [n for n in names if n in found.channels], tick_s)
     t = (fast["t_ns"] - fast["t_ns"][0]) * 1e-9
@@ -82,6 +81,21 @@ def read(step: Step, names: Sequence[str]) -> Samples:
         elif name not in fast:
             fast[name] = np.interp(t, slow, told[name])
     return fast
+
+
+def read_control(step: Step, pairs: Sequence[tuple[str, str]]) -> tuple[npt.NDArray[np.int64], Array] | None:
+    """Single readings of a captured step: their times, ns, and the sum of the differences of `pairs` of coils, A (n,)."""
+    found = _captured(step)
+    if found is None:
+        return None
+    data = found.arrays(*(name for pair in pairs for name in pair))
+    return data["t_ns"], np.asarray(sum(data[p] - data[n] for p, n in pairs), np.float64)
+
+
+def _captured(step: Step) -> Captured | None:
+    events = (e for e in step.recording.events("capture") if OF_STEP in e["labels"])
+    mine = next((e for e in events if step.start_ns <= e["start_ns"] < step.end_ns), None)
+    return None if mine is None else Captured.of(step.recording, mine)
 
 
 def averaged(capture: Captured, names: Sequence[str], tick_s: float) -> Samples:

@@ -13,18 +13,23 @@ from bench.errors import AnalysisError
 from bench.rigfile import RigFile
 from bench.uncertainty import Estimate, Influence
 from bench.uncertainty.estimate import Deviations
-from procedures.amb_rotor.conventions import AmbRotor
+from procedures.amb_rotor import loops
 from procedures.shared.certificates import certified
 from procedures.step import response, settling
 from procedures.step import steps as step_steps
-from procedures.step.oscillation import One, Swing, swing
+from procedures.step.oscillation import TOGETHER, One, Swing, swing
+from procedures.step.position import shares
 from procedures.step.scatter import jackknifed, left_out, pooled, repeated, weighed
 from procedures.step.settling import Curve, Settling
 from procedures.step.steps import Case, Done
 
 Array = npt.NDArray[np.float64]
-RISE_SHARE = 0.012  # of a period: what the spline leaves of a crossing, over all phases of the step in its period
-ALIAS = 3e-3  # of the bandwidth: what stands above half the sampling rate
+# Of a period: what the spline leaves of a crossing, over all phases of the step in its period; from SMOOTH samples in a rise
+# on it falls as their cube, since the spline is one of third order (0.004 at 5.1 samples without noise, 0.006 at 4.4).
+RISE_SHARE, SMOOTH = 0.012, 3.6
+# Of the bandwidth b: what the sampling rate r folds onto it from r - b. From a tenth of r - b on it falls as the cube of
+# b/(r - b): response and mean together lose three orders there (0.0007 at 0.061 without noise, 0.001 at 0.07).
+ALIAS, FOLDED = 3e-3, 0.1
 HARMONIC = 0.1  # of the directions' difference of overshoot: the top's second harmonic, which oscillations leave out
 START_S = 1e-4  # how well the control currents tell when the set point acted
 # Second-order effect of a step's size over the square of its first-order effect: damping either way; frequency from none to
@@ -68,24 +73,33 @@ def by_case(steps: list[Done], rig: RigFile, band: float) -> dict[Case, Result]:
         found = {name: pooled(name, case, s) for name, s in seen.items() if case in s.values}
         if math.isfinite(settled.time):
             found["settling_time"] = settling_estimate(case, settled)
-            if untold := _untold_lag_s(all_of[0].machine):
-                found["settling_time"] += bound(
-                    f"lag/{case.group}", "lag of the currents, which is not told", untold, "s"
-                )
+            if (lag := lag_estimate(rig)) is not None:
+                found["settling_time"] += lag
         period = float(all_of[0].t[1] - all_of[0].t[0])
-        found["rise_time"] += bound(f"sampling/rise/{case.where}", "sampling", RISE_SHARE * period, "s")
+        left = spline_left(found["rise_time"].value, period)
+        found["rise_time"] += bound(f"sampling/rise/{case.where}", "sampling", left, "s")
         found["steady_error"] += _gained(case, rig)
         other = seen["overshoot"].values.get(replace(case, way=-case.way))
         if "overshoot" in found and other is not None:
             half = HARMONIC * abs(found["overshoot"].value - other)
             found["overshoot"] += bound(f"harmonic/{case.where}", "second harmonic of the swing", half, "1")
         if "bandwidth" in found:
-            found["bandwidth"] += bound(
-                f"aliasing/{case.where}", "above half the sampling rate", ALIAS * found["bandwidth"].value, "Hz"
-            )
+            folded = aliased(found["bandwidth"].value, period)
+            found["bandwidth"] += bound(f"aliasing/{case.where}", "above half the sampling rate", folded, "Hz")
         error = float(np.mean([_late(o) - 1 for o in ones[case]]))
         out[case] = Result(case, ones[case], fits[case][0] if fits[case] else None, settled, error, found)
     return out
+
+
+def spline_left(rise: float, period: float) -> float:
+    """Half width of what the spline leaves of a rise in s, from means over `period` s."""
+    return RISE_SHARE * period * min(1.0, (SMOOTH * period / rise) ** 3)
+
+
+def aliased(bandwidth: float, period: float) -> float:
+    """Half width of what sampling every `period` s folds onto a bandwidth, Hz; all of ALIAS where the rate is not above it."""
+    above = 1 / period - bandwidth
+    return ALIAS * bandwidth * min(1.0, (bandwidth / above / FOLDED) ** 3 if above > 0 else 1.0)
 
 
 def _one(d: Done) -> One:
@@ -144,24 +158,28 @@ def settling_estimate(case: Case, settled: Settling) -> Estimate:
     return made + bound(f"start/{case.where}", "start of the step", START_S, "s")
 
 
-def _untold_lag_s(machine: AmbRotor) -> float:
-    """By how much the start may be off where the rig file does not say how the currents lag: half of what is taken."""
-    told = "rate" in machine.can.model or machine.can.loop_delay_s
-    return 0.0 if told else machine.lag_s / 2
+def lag_estimate(rig: RigFile) -> Estimate | None:
+    """Zero s, with what is not known of the currents' lag: where it is longer the step began earlier. None where the controller
+    knows it."""
+    doubt = loops.lag_doubt(rig)
+    return None if doubt is None else certified(loops.DELAY, doubt, "loop delay: how the currents lag")
 
 
-def by_group(steps: list[Done], results: Mapping[Case, Result]) -> dict[str, dict[str, Estimate]]:
+def by_group(steps: list[Done], results: Mapping[Case, Result], rig: RigFile) -> dict[str, dict[str, Estimate]]:
     """Of each setting, axis and speed: the oscillation, and how far size and direction matter."""
     out: dict[str, dict[str, Estimate]] = {}
     for group in step_steps.by_group(steps):
         of = [r for c, r in results.items() if c.group == group]
-        out[group] = _oscillation(group, of) | _linearity(of)
+        out[group] = _oscillation(group, of, rig) | _linearity(of)
     return out
 
 
-def _oscillation(group: str, results: Sequence[Result]) -> dict[str, Estimate]:
+def _oscillation(group: str, results: Sequence[Result], rig: RigFile) -> dict[str, Estimate]:
     """Damping and natural frequency from all steps together, those of large ones weighing more; uncertainty by leaving out
-    one step after the other, among those of its kind. Nothing where there is no oscillation."""
+    one step after the other, among those of its kind. Nothing where there is no oscillation.
+
+    Where one oscillation stands for two beside what fades fast, the mean pole p may be off by TOGETHER |p| in any direction,
+    1/sqrt(2) of that in frequency (d|p|) and in damping ratio (sqrt(1 - zeta^2) d|p|/|p|)."""
     ones = [o for r in results for o in r.ones]
     kinds, n = [(r.case, o.begin) for r in results for o in r.ones], len(ones)
     try:
@@ -169,7 +187,7 @@ def _oscillation(group: str, results: Sequence[Result]) -> dict[str, Estimate]:
         left = [swing(ones[:k] + ones[k + 1 :], whole) for k in range(n)]
     except AnalysisError:
         return {}
-    first = _first_order(results)
+    first, lag = _first_order(results), lag_estimate(rig)
     shares = np.array([o.weight**2 for o in ones])
     shares /= shares.sum()
     out = {}
@@ -194,6 +212,14 @@ def _oscillation(group: str, results: Sequence[Result]) -> dict[str, Estimate]:
         out[name] = Estimate.of(value * (1 - (low + high) / 2 * first**2), jackknife)
         out[name] += bound(f"start/{name}/{group}", "start of the step", moved, unit)
         out[name] += bound(f"size/{name}/{group}", "size of the steps", (high - low) / 2 * first**2 * value, unit)
+        if whole.constant and len(whole.poles) == 1:
+            half = TOGETHER / math.sqrt(2) * (value if name != "damping" else math.sqrt(1 - value**2))
+            out[name] += bound(
+                f"second/{name}/{group}", "second oscillation, which is not told from the first", half, unit
+            )
+        if lag is not None:
+            slope = (of(whole.later(-START_S)) - of(whole.later(START_S))) / (2 * START_S)
+            out[name] += replace(lag * slope, unit=unit)
     return out
 
 
@@ -227,7 +253,7 @@ def bound(identity: str, name: str, half: float, unit: str) -> Estimate:
 def _gained(case: Case, rig: RigFile) -> Estimate:
     """Zero m, with what the gains of the position sensors make of the step's length."""
     out = Estimate.exact(0.0, "m")
-    for channel, share in step_steps.shares(rig, case.axis).items():
+    for channel, share in shares(rig, case.axis).items():
         gain = certified(f"sensors/{channel}/gain", rig.sensors[channel].gain, f"gain of {channel}")
         out = out + (gain - gain.value) * (-case.way * case.size * share / gain.value)
     return replace(out, unit="m")

@@ -24,10 +24,11 @@ from bench.units import RPM
 from procedures.amb_rotor import frame, lift
 from procedures.amb_rotor.conventions import conventions
 from procedures.shared import assumptions
-from procedures.step import capturing, checks, estimates, planes, slewing
+from procedures.step import capturing, checks, estimates, hum, planes, slewing
 from procedures.step import figures as drawn
 from procedures.step.estimates import Result
 from procedures.step.plan import Plan
+from procedures.step.position import is_plain
 from procedures.step.record_length import enough_s, faded_s
 from procedures.step.steps import STEP, TURNING_RAD_S, Case, Done, cases, channels, read_steps
 
@@ -177,10 +178,11 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     findings.gate(exchanged, so_far=Results(steps))
     findings.gate(checks.of_steps(steps, plan), checks.FATAL, Results(steps))
     by_case = estimates.by_case(steps, recording.rig, plan.band)
-    by_group = estimates.by_group(steps, by_case)
+    by_group = estimates.by_group(steps, by_case, recording.rig)
     findings.add(frame.describe(recording.rig, plan.axes))
     findings.add(checks.of_results(by_case, by_group, plan))
     findings.add(slewing.of_sizes(by_case))
+    findings.add(hum.find_hum(steps, by_case))
     findings.add(checks.compare(by_case, plan.names))
     return Results(steps, by_case, by_group)
 
@@ -243,10 +245,11 @@ def figures(results: Results, recording: Recording[Plan]) -> Iterable[Figure]:
 def requires(rig: RigFile) -> Requires:
     """By the names that the rig's machine has."""
     machine = conventions(rig)
+    read = channels(machine)
     return Requires(
-        lacks=machine.lacks,
-        channels=channels(machine),
-        sensors=(*machine.all_positions, *machine.all_currents),
+        lacks=machine.lacks if is_plain(rig) else (*machine.lacks, *machine.stations.lacks),
+        channels=read,
+        sensors=capturing.channels(machine),
         capabilities=("set_points",),
         uses=(
             "settings.law",

@@ -14,21 +14,17 @@ import numpy.typing as npt
 from bench.errors import AnalysisError
 from bench.recording import Recording, Step
 from bench.rigfile import RigFile
-from bench.rigfile.places import CENTRE, Places
 from bench.rigfile.roles import ANGLE, SPEED, STATUS
-from bench.rigfile.supports import radial_supports
 from procedures.amb_rotor.conventions import AmbRotor, conventions
-from procedures.amb_rotor.onset import onset
-from procedures.step import capturing
+from procedures.amb_rotor.onset import pushing
+from procedures.step import acting, capturing
+from procedures.step.position import ends_of, made_of, shares
 from procedures.step.response import trailing
 
 Array = npt.NDArray[np.float64]
 STEP = "set-point"
-SQUARE = math.sin(math.radians(1.0))  # of a cosine: axes that are so near to right angles are meant to be
 ORDERS = (1, 2, 3, 4)  # per turn: unbalance and the runout of the journals
 TURNING_RAD_S = 20.0
-GONE = 0.25  # of the way: until then the currents push
-ANSWER = 0.25  # of the greatest change of the control current: where it first gets there, the step began
 AT_REST_S = 6e-3  # what a position is averaged over where the shaft does not turn
 EARLY_TICKS = (
     1.5  # a sample's last reading is one tick old, and stands for half a tick either way; the law acts at the next
@@ -90,7 +86,7 @@ class Done:
 
 def channels(machine: AmbRotor) -> tuple[str, ...]:
     """What is read of a step."""
-    return (*machine.all_positions, *machine.all_currents, *marked(machine), STATUS)
+    return (*capturing.channels(machine), *marked(machine), STATUS)
 
 
 def marked(machine: AmbRotor) -> tuple[str, ...]:
@@ -126,41 +122,6 @@ def by_group(steps: list[Done]) -> dict[str, list[Done]]:
     return out
 
 
-def shares(rig: RigFile, axis: str) -> dict[str, float]:
-    """Of which sensors the position along an axis is made at the centre of mass, and how. Where the axes of a bearing are not
-    at right angles z, which is, has of the readings that look along y what the others see of it: z = (v - u cos a)/sin a."""
-    machine = conventions(rig)
-    names = [machine.position(a) for a in machine.along(axis)]
-    if len(names) == 1:
-        return {names[0]: 1.0}
-    l_is, l_os = _probe_arms(rig)
-    own = {names[0]: l_os / (l_is + l_os), names[1]: l_is / (l_is + l_os)}
-    apart = _between(rig)
-    if axis != "z" or abs(math.cos(apart)) < SQUARE:
-        return own
-    first = [machine.position(a) for a in machine.along("y")]
-    lean, aside = math.cos(apart), abs(math.sin(apart))
-    seen = {c: -w * lean / aside for c, w in zip(first, own.values(), strict=True)}
-    return {c: w / aside for c, w in own.items()} | seen
-
-
-def _between(rig: RigFile) -> float:
-    """The angle between the axes of a bearing, rad."""
-    machine, directions = conventions(rig), {a.name: a.direction for s in radial_supports(rig) for a in s.axes}
-    return directions[machine.along("z")[0]] - directions[machine.along("y")[0]]
-
-
-def _probe_arms(rig: RigFile) -> tuple[float, float]:
-    """Of the near and the far probes from the centre of mass, m: as the controller knows them, or by the rig file."""
-    known = rig.capabilities.model
-    if {"l_is", "l_os"} <= known.keys():
-        return rig.parameters[known["l_is"]].default, rig.parameters[known["l_os"]].default
-    machine, places = conventions(rig), Places(rig)
-    by_channel = {probe.channel: name for name, probe in rig.probes.items()}
-    near, far = (places.distance(CENTRE, f"probes/{by_channel[machine.position(a)]}").value for a in machine.along("y"))
-    return -near, far
-
-
 def _read(recording: Recording[Any], step: Step) -> Done:
     machine = conventions(recording.rig)
     data, labels = _whole(at_rest_if_untold(capturing.read(step, channels(machine)))), step.labels
@@ -170,7 +131,7 @@ def _read(recording: Recording[Any], step: Step) -> Done:
                if e["name"] in machine.point(axis, 0.0) and step.start_ns <= e["t_ns"] < step.end_ns]  # fmt: skip
     if not written:
         raise AnalysisError(f"{case.where}: found no write of the set point within the step")
-    rest = data["t_ns"] <= written[0]
+    rest = acting.still_at(data["t_ns"], made_of(data, shares(recording.rig, axis), len(data["t_ns"])), written[0])
     if rest.sum() < 50 or (~rest).sum() < 100:
         raise AnalysisError(f"{case.where}: found {int(rest.sum())} samples before the step and {int((~rest).sum())} after; "
                             "expected at least 50 and 100")  # fmt: skip
@@ -200,23 +161,21 @@ def _done(
     rig: RigFile, step: Step, case: Case, data: Mapping[str, npt.NDArray[Any]], rest: npt.NDArray[np.bool_]
 ) -> Done:
     axis, other, machine = case.axis, {"y": "z", "z": "y", "x": "y"}[case.axis], conventions(rig)
-    raw = sum((w * data[c] for c, w in shares(rig, axis).items()), np.zeros(len(rest)))
-    across = sum((w * data[c] for c, w in shares(rig, other).items()), np.zeros(len(rest)))
-    along = machine.along(axis)
-    ends = [data[machine.position(a)] for a in along]
+    raw, across = (made_of(data, shares(rig, one), len(rest)) for one in (axis, other))
+    ends = [made_of(data, of, len(rest)) for of in ends_of(rig, axis)]
     tilt = (ends[1] - ends[0]) / 2 if len(ends) > 1 else np.zeros(len(rest))
-    ones = [data[p] - data[n] for p, n in map(machine.pair, along)]
+    ones = [pushing(machine, axis, a, data) for a in machine.along(axis)]
     control = sum(ones, np.zeros(len(rest)))
     t = (data["t_ns"] - data["t_ns"][0]) * 1e-9
     turning = float(np.median(data[SPEED])) > TURNING_RAD_S
     signals = np.array([raw, tilt, across, control, *ones])
     clean, amplitude = _still(t, signals, data[ANGLE], rest) if turning else (signals, np.zeros(len(signals)))
     clean = case.way * (clean - clean[:, rest].mean(axis=1, keepdims=True))
-    pushed = _before_it_moves(clean[0], rest)
-    first, answered = _answer(clean[4:], rest, pushed)
+    first, answered = acting.answer(clean[4:], rest, acting.before_it_moves(clean[0], rest))
     period = float(np.median(np.diff(t)))
     samples = 2 * math.pi / float(np.median(data[SPEED])) / period if turning else AT_REST_S / period
-    since = t - _acted(rig, t, clean[3], first, period) - EARLY_TICKS * rig.devices["controller"].tick_s
+    began = acting.acted(rig, step, t, clean[3], first, origin_ns=int(data["t_ns"][0]), turning=turning)
+    since = t - began - EARLY_TICKS * rig.devices["controller"].tick_s
     keep = slice(max(first - 20, 0), None)
     quiet = clean[0][rest]
     slope = float(np.polyfit(t[rest], quiet, 1)[0])
@@ -226,47 +185,11 @@ def _done(
         case, float(step.labels["begin_m"]), since[keep], clean[0][keep], (case.way * (raw - raw[rest].mean()))[keep],
         clean[1][keep], clean[2][keep], clean[3][keep], quiet,
         float(trailing(level, samples)[round(samples) :].std()), samples, float(amplitude[0]), slope, answered,
-        _kicks(clean[4:], case.way * np.array(ends), rest, first),
+        acting.kicks(clean[4:], case.way * np.array(ends), rest, first),
         (float(data[SPEED].min()), float(data[SPEED].max())), int(np.bitwise_or.reduce(flags)),
         tuple(c for c in (*machine.all_positions, *machine.all_currents) if np.ptp(data[c]) == 0), step.lost(), step.expected(),
         machine,
     )  # fmt: skip
-
-
-def _kicks(control: Array, ends: Array, rest: npt.NDArray[np.bool_], first: int) -> tuple[float, ...]:
-    """Of each bearing's control current (k, n) what pushes at first, A: before the sample in which the shaft has gone a quarter
-    of its way in that bearing's own plane (k, n). Where the centre of mass is not between the bearings, one of them is there
-    long before the other."""
-    still = ends - ends[:, rest].mean(axis=1, keepdims=True)
-    until = [min(first + 3, _before_it_moves(y, rest) - 1) for y in still]
-    return tuple(float(c[first : max(last, first + 1)].sum()) for c, last in zip(control, until, strict=True))
-
-
-def _before_it_moves(position: Array, rest: npt.NDArray[np.bool_]) -> int:
-    """The sample at which the shaft has gone a quarter of its way, at least two after the write: until then the currents push
-    it there, from then on they brake it, and hold it where the magnets' negative stiffness helps it along."""
-    begin = int(np.flatnonzero(~rest)[0])
-    way = float(position[-(len(position) - begin) // 4 :].mean())
-    gone = np.flatnonzero(position[begin:] > GONE * way) if way > 0 else np.zeros(0, np.int64)
-    return begin + max(int(gone[0]) + 1 if gone.size else 40, 2)
-
-
-def _answer(control: Array, rest: npt.NDArray[np.bool_], until: int) -> tuple[int, bool]:
-    """The first sample, before `until`, at which a bearing's control current (k, n) shows the step; the one after the write,
-    where none does."""
-    begin = int(np.flatnonzero(~rest)[0])
-    window = np.abs(control[:, begin:until]).max(axis=0)
-    noise = float(control[:, rest].std(axis=1).max())
-    if window.max() < 8 * noise:
-        return begin, False
-    return begin + int(np.argmax(window > max(ANSWER * window.max(), 4 * noise))), True
-
-
-def _acted(rig: RigFile, t: Array, control: Array, first: int, period: float) -> float:
-    """When the set point changed, s: finer than a period, by the control currents."""
-    tick = rig.devices["controller"].tick_s
-    ticks, lag = round(period / tick), conventions(rig).lag_s
-    return onset(t, control, t[first] - 1.8 * period, t[first] - 0.5 * period, tick=tick, ticks=ticks, lag_s=lag)[0]
 
 
 def _still(t: Array, signals: Array, angle: Array, rest: npt.NDArray[np.bool_]) -> tuple[Array, Array]:

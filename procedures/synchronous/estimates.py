@@ -184,7 +184,7 @@ def _result(
         chosen = [2 * y, 2 * y + 1, 2 * z, 2 * z + 1]
         across = squaring(nominal, (y, z))
         at = {n: squared([p[k] for k in chosen], across) for n, p in parts.items()}
-        orbits[plane] = ellipse(as_orbit(vectors, (y, z), at[1.0], across))
+        orbits[plane] = ellipse(as_orbit(vectors, (y, z), at[1.0], across), nominal.hand > 0)
         out["major_half_axis", plane] = _major(at[1.0])
         means = squared([_mean(d, inputs, k) for k in (y, z)], across)
         centres[plane] = (means[0].value, means[1].value)

@@ -1,6 +1,7 @@
 """What the rig file says of a shaft that turns: its mass and inertias, where it is held, watched and loaded, its clearance.
 
-A rig whose lengths stand under `geometry`, by the names of the AMB stand, is read by them; every other by the machine's tables.
+All by the machine's tables. Where each length is one number, with a table `machine` as the AMB stand has it, they are taken as
+they are printed; on every other rig as rows of places and angles.
 """
 
 from __future__ import annotations
@@ -9,26 +10,23 @@ from collections.abc import Iterator
 
 from bench.errors import Lacking
 from bench.rigfile import RigFile
-from bench.rigfile.numbers import Sum
 from bench.rigfile.places import CENTRE, PlaceError, Places
 from bench.rigfile.supports import two_planes
-from bench.rigfile.toleranced import Toleranced
 from bench.uncertainty import Estimate
 from bench.uncertainty.estimate import merged
 from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.lengths import lengths_by_name, named, number, summed
 from procedures.amb_rotor.stations import stations
 from procedures.shared.certificates import certified
 
-LENGTHS = (("gap", "amb_gap"), ("coupling", "coupling_stiffness"), ("l_ia", "com_to_inboard_amb"),
-           ("l_oa", "com_to_outboard_amb"), ("l_is", "com_to_inboard_sensor"), ("l_os", "com_to_outboard_sensor"),
-           ("l_iu", "com_to_inboard_balance"), ("l_ou", "com_to_outboard_balance"), ("l_c", "com_to_coupling"))  # fmt: skip
-"""What is asked for, and its name under `geometry`."""
+LENGTHS = ("gap", "coupling", "l_ia", "l_oa", "l_is", "l_os", "l_iu", "l_ou", "l_c")
 SHAFT = (("mass", "mass"), ("inertia", "transverse_inertia"), ("polar", "polar_inertia"))
 
 
 def stated(rig: RigFile) -> bool:
-    """Whether lengths stand under `geometry`, by the names of the AMB stand."""
-    return all(key in rig.geometry for _, key in LENGTHS)
+    """Whether each length is one number, and the table `machine` has the shaft's, as on the AMB stand, which is not crooked."""
+    said = {key for _, key in SHAFT} | {"runout", "radial_axes"} <= rig.machine.keys()
+    return said and {*LENGTHS} <= lengths_by_name(rig).keys() and not conventions(rig).crooked
 
 
 def collect_lengths(rig: RigFile) -> dict[str, Estimate]:
@@ -38,7 +36,8 @@ def collect_lengths(rig: RigFile) -> dict[str, Estimate]:
         Lacking: the tables do not say enough.
     """
     if stated(rig):
-        out = {name: certified(f"geometry/{key}", rig.geometry[key], key.replace("_", " ")) for name, key in LENGTHS}
+        found = lengths_by_name(rig)
+        out = {name: named(found[name]) for name in LENGTHS}
         return out | {name: shaft_number(rig, key) for name, key in SHAFT}
     if lines := tuple(missing(rig)):
         raise Lacking(*lines)
@@ -51,7 +50,7 @@ def missing(rig: RigFile) -> Iterator[str]:
     yield from (f"shaft.{key}: found none" for _, key in SHAFT if not _says(rig, key))
     if not _says(rig, "runout"):
         yield "shaft.runout: found none; expected what the probes read at most of a shaft that stands still in its turning"
-    if not [r for r in rig.rings.values() if r.kind == "radial"] and "clearance" not in rig.geometry:
+    if not [r for r in rig.rings.values() if r.kind == "radial"]:
         yield "rings: found no radial one; D_max is over the least clearance"
     yield from (f"bearings.{p.name}.gap: found none" for p in two_planes(rig) if rig.bearings[p.name].gap is None)
     yield from s.lacks
@@ -70,25 +69,6 @@ def shaft_number(rig: RigFile, key: str) -> Estimate:
         return certified(f"machine/{key}", rig.machine[key], key.replace("_", " "))
     assert rig.shaft is not None
     return number(rig, getattr(rig.shaft, key), f"shaft.{key}", key.replace("_", " "))
-
-
-def number(rig: RigFile, told: Toleranced | str, key: str, name: str) -> Estimate:
-    """A number that a table states or refers to, by its identity; `name` for a budget."""
-    term = Places(rig).number(told, key)
-    found = certified(term.identity, term.number, name)
-    return (
-        found if term.factor == 1.0 else Estimate(term.factor * found.value, found.unit, merged([(term.factor, found)]))
-    )
-
-
-def summed(total: Sum, unit: str) -> Estimate:
-    """A sum of the rig file's numbers as an Estimate that shares each."""
-    terms = [(t.factor, certified(t.identity, t.number, _spelled(t.identity))) for t in total.terms]
-    return Estimate(total.value, unit, merged(terms))
-
-
-def _spelled(identity: str) -> str:
-    return identity.replace("/", " ").replace("_", " ")
 
 
 def _by_tables(rig: RigFile) -> dict[str, Estimate]:
@@ -110,7 +90,7 @@ def _by_tables(rig: RigFile) -> dict[str, Estimate]:
                         ("l_is", s.probes[machine.position(machine.axes[0])].arm),
                         ("l_os", s.probes[machine.position(machine.axes[2])].arm)):  # fmt: skip
         out[name] = summed(-total if name in ("l_ia", "l_is") else total, "m")
-    out["hand"] = Estimate.exact(float(s.hand), "1")
+    out["hand"] = Estimate.exact(float(s.spin), "1")
     return out | _coupling(rig, places)
 
 
@@ -142,8 +122,6 @@ def unbalance_planes(rig: RigFile) -> tuple[str, str]:
 
 def clearance(rig: RigFile) -> Estimate:
     """The least of the radial rings, m."""
-    if "clearance" in rig.geometry:
-        return certified("geometry/clearance", rig.geometry["clearance"], "least clearance")
     rings = {n: r for n, r in rig.rings.items() if r.kind == "radial"}
     found = [number(rig, r.clearance, f"rings.{n}.clearance", "least clearance") for n, r in rings.items()]
     return min(found, key=lambda e: e.value)
@@ -152,7 +130,7 @@ def clearance(rig: RigFile) -> Estimate:
 def least_gap(rig: RigFile) -> float:
     """Air gap of the radial bearings, m; the least of them."""
     if stated(rig):
-        return rig.geometry["amb_gap"].value
+        return lengths_by_name(rig)["gap"].number.value
     lengths = _by_tables(rig)
     return min(lengths[f"gap_{k}"].value for k in range(4))
 

@@ -1,4 +1,4 @@
-"""Orbits where two probes do not look at right angles to each other: along y and z by both."""
+"""Orbits where two probes of a plane do not look along y and z: by both of them."""
 
 from __future__ import annotations
 
@@ -10,15 +10,25 @@ import numpy.typing as npt
 from bench.analysis.vectors import Vectors
 from bench.uncertainty import Estimate
 from bench.uncertainty.estimate import merged
+from procedures.amb_rotor.stations import Stations
 from procedures.synchronous.runout import Stand
 
 Array = npt.NDArray[np.float64]
 
 
 def squaring(s: Stand, pair: tuple[int, int]) -> Array | None:
-    """(2, 2) by which displacements along two probes become such along y and z; None where the probes look at right angles."""
-    ways = s.probes[list(pair), :2]
-    return None if np.allclose(ways @ ways.T, np.eye(2), atol=1e-9) else np.asarray(np.linalg.inv(ways), np.float64)
+    """(2, 2) by which displacements along two probes become such along y and z; None where the probes look so."""
+    return _squaring(s.probes[list(pair), :2])
+
+
+def seen(s: Stations, channels: Sequence[str], readings: Array) -> Array:
+    """Readings (2, n) of two probes along y and z; as they are where the probes look so."""
+    across = _squaring(np.array([s.probes[c].row[:2] for c in channels]))
+    return readings if across is None else across @ readings
+
+
+def _squaring(ways: Array) -> Array | None:
+    return None if np.allclose(ways, np.eye(2), atol=1e-9) else np.asarray(np.linalg.inv(ways), np.float64)
 
 
 def squared(found: Sequence[Estimate], across: Array | None) -> list[Estimate]:
@@ -35,7 +45,7 @@ def squared(found: Sequence[Estimate], across: Array | None) -> list[Estimate]:
 
 
 def as_orbit(vectors: Vectors, pair: tuple[int, int], at: Sequence[Estimate], across: Array | None) -> Vectors:
-    """Of the shaft's centre where two probes stand, along y and z, or along the probes where these are at right angles."""
+    """Of the shaft's centre where two probes stand, along y and z."""
     if across is not None:
         values = np.array([at[2 * k].value + 1j * at[2 * k + 1].value for k in (0, 1)])
         return Vectors(values, covariance(at), vectors.dof)

@@ -23,9 +23,11 @@ FATAL = (
     "reference-missing",
     "reference-frequency",
     "axes-exchanged",
+    "sensor-polarity",
     "sensor-clipped",
     "start-not-seen",
 )
+FOLLOWED = 0.5  # of what the set points ask of a probe
 APPLIED, OFF_HZ = 0.3, 2e-3  # share of the amplitude, relative error of the frequency
 CLEAR = 8.0  # jump of the current at the start, over the noise of a sample
 HELD = 5  # samples in a row at an extreme: a sensor that clips
@@ -131,6 +133,27 @@ def _of_points(o: Orbit) -> Iterator[Finding]:
         text = (f"the shaft moves by {own[0] * 1e6:.2g} and {own[1] * 1e6:.2g} µm at {wave.hz:g} Hz; the set points by "
                 f"{wave.y * 1e6:g} and {wave.z * 1e6:g} µm: they are not followed.")  # fmt: skip
         yield Finding("reference-missing", text, o.where, Effect.ERROR)
+    else:
+        yield from _of_probes(o)
+
+
+def _of_probes(o: Orbit) -> Iterator[Finding]:
+    """Each probe reads what its place and direction make of the set points: nudges, and gravity, show some probes only."""
+    points = o.path.points
+    if points is None:
+        return
+    at = np.clip(np.searchsorted(points.t, o.path.t, side="right") - 1, 0, len(points.t) - 1)
+    asked = o.machine.stations.reads[:, :2] @ np.array([points.y[at], points.z[at]])
+    for name, read, should in zip(o.machine.stations.channels, o.path.readings, asked, strict=True):
+        should = should - should.mean()
+        share = float(read @ should / (should @ should))
+        if share < FOLLOWED:
+            code, suspect = ("axes-exchanged", "its reading exchanged with another probe's")
+            if share < -FOLLOWED:
+                code, suspect = "sensor-polarity", "the sign of its reading"
+            text = (f"{name} moves by {share:+.2f} of what the set points ask of the shaft where it stands, the others as they "
+                    f"should: suspect {suspect}.")  # fmt: skip
+            yield Finding(code, text, name, Effect.ERROR)
 
 
 def _of_drift(o: Orbit, found: Drift | None) -> Iterator[Finding]:

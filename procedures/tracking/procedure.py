@@ -23,7 +23,7 @@ from bench.rigfile import RigFile
 from bench.rigfile.capabilities import Path
 from bench.uncertainty import Estimate
 from bench.units import RPM
-from procedures.amb_rotor import lift, wiring
+from procedures.amb_rotor import frame, lift, pushes, wiring
 from procedures.amb_rotor.conventions import Law, conventions
 from procedures.amb_rotor.geometry import nominal
 from procedures.amb_rotor.laws import of_laws
@@ -33,19 +33,12 @@ from procedures.tracking import figures as drawn
 from procedures.tracking.plan import Plan
 from procedures.tracking.steps import GROWN, ORBIT, START, STARTED, Orbit, channels, read_orbits
 
-PEAK_Y = Quantity(
-    "error_peak_y", "m", "greatest error of the centre of mass in the mean revolution of the reference, y"
-)
-PEAK_Z = Quantity("error_peak_z", "m", "as error_peak_y, z")
-PLANE = Quantity("error_peak_plane", "m", "as error_peak_y, at the sensor where it is greatest")
-RMS_Y = Quantity("error_rms_y", "m", "root mean square of the error of the centre of mass, y")
-RMS_Z = Quantity("error_rms_z", "m", "as error_rms_y, z")
-RATIO_Y = Quantity("amplitude_ratio_y", "1", "amplitude at the reference's frequency over the reference's, y")
-RATIO_Z = Quantity("amplitude_ratio_z", "1", "as amplitude_ratio_y, z")
-LAG_Y = Quantity("phase_lag_y", "rad", "phase behind the reference at its frequency, y")
-LAG_Z = Quantity("phase_lag_z", "rad", "as phase_lag_y, z")
-PSI = Quantity("tilt_psi", "rad", "greatest tilt about y in the mean revolution of the reference", title="tilt ψ")
-THETA = Quantity("tilt_theta", "rad", "greatest tilt about z in the mean revolution of the reference", title="tilt θ")
+PEAK = Quantity("error_peak", "m", "greatest error of the centre of mass in the mean revolution of the reference")
+PLANE = Quantity("error_peak_plane", "m", "as error_peak, at the sensor where it is greatest")
+RMS = Quantity("error_rms", "m", "root mean square of the error of the centre of mass")
+RATIO = Quantity("amplitude_ratio", "1", "amplitude at the reference's frequency over the reference's")
+LAG = Quantity("phase_lag", "rad", "phase behind the reference at its frequency")
+TILT = Quantity("tilt", "rad", "greatest tilt about that axis in the mean revolution of the reference", title="tilt")
 DISTANCE = Quantity("ring_distance", "m", "least distance that is left to a touchdown ring")
 LOW = Quantity("lower_current", "A", "mean current of the lower coil that carries most")
 HIGH = Quantity("upper_current", "A", "mean current of the upper coil that carries most")
@@ -53,26 +46,11 @@ CONTOUR = Quantity(
     "contour_peak", "m", "greatest distance of the mean revolution from the ellipse, along its normal, with set points"
 )
 CONTOUR_RMS = Quantity("contour_rms", "m", "root mean square of the same")
-OF_PATH = (PEAK_Y, PEAK_Z, PLANE, RMS_Y, RMS_Z, LOW, HIGH)
+OF_PATH = (PEAK, PLANE, RMS, LOW, HIGH)
 OF_POINTS = (CONTOUR, CONTOUR_RMS)
-MEASURES = (
-    CONTOUR,
-    CONTOUR_RMS,
-    PEAK_Y,
-    PEAK_Z,
-    PLANE,
-    RMS_Y,
-    RMS_Z,
-    RATIO_Y,
-    RATIO_Z,
-    LAG_Y,
-    LAG_Z,
-    PSI,
-    THETA,
-    DISTANCE,
-    LOW,
-    HIGH,
-)
+MEASURES = (CONTOUR, CONTOUR_RMS, PEAK, PLANE, RMS, RATIO, LAG, TILT, DISTANCE, LOW, HIGH)
+ALONG = {PEAK: "yz", RMS: "yz", RATIO: "yz", LAG: "yz", TILT: ("psi", "theta")}
+"""Quantities of a direction of the shaft's motion, which is a part of their place."""
 UM = 1e6
 MARK_M = 15e-6  # of the jump that the reference starts with
 GROW, GROW_S = 25, 0.02
@@ -95,7 +73,8 @@ def step_count(plan: Plan) -> int:
 
 def steps_on(rig: RigFile, plan: Plan) -> int:
     """How many there are on a rig: an orbit of set points has no start, and nothing before it."""
-    return step_count(plan) if rig.capabilities.path is not None else lift.STEPS + len(plan.order)
+    own = step_count(plan) if rig.capabilities.path is not None else lift.STEPS + len(plan.order)
+    return own + pushes.count(rig)
 
 
 def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
@@ -187,6 +166,7 @@ def evaluate(recording: Recording[Plan], findings: Findings) -> Results:
     findings.gate(checks.of_signals(orbits, plan), checks.FATAL)
     by_law = estimates.by_law(orbits, recording.rig, plan.runout_m)
     findings.add(checks.of_results(orbits, by_law, plan))
+    findings.add(frame.describe(recording.rig, ("y", "z")))
     return Results(plan, orbits, by_law)
 
 
@@ -194,8 +174,17 @@ def measured(results: Results) -> Iterator[Measured]:
     """The quantities of each law that is judged; the others are in a note."""
     for orbit in results.orbits:
         if orbit.law in results.plan.judged:
-            for quantity in (q for q in MEASURES if q.name in results.by_law[orbit.law]):
-                yield quantity.measured(results.by_law[orbit.law][quantity.name], orbit.where)
+            found = results.by_law[orbit.law]
+            yield from (quantity.measured(found[name], where) for name, quantity, where in placed(orbit, found))
+
+
+def placed(orbit: Orbit, found: Iterable[str]) -> Iterator[tuple[str, Quantity, str]]:
+    """What is told of an orbit, by the names of `estimates`: quantity and place."""
+    for quantity in MEASURES:
+        for direction in ALONG.get(quantity, ("",)):
+            name = f"{quantity.name}_{direction}" if direction else quantity.name
+            if name in found:
+                yield name, quantity, f"{direction}, {orbit.where}" if direction else orbit.where
 
 
 def check(rig: RigFile, plan: Plan) -> Iterable[str]:

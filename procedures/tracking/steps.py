@@ -15,7 +15,7 @@ from bench.rigfile import RigFile
 from bench.rigfile.roles import SPEED, STATUS
 from procedures.amb_rotor.conventions import AmbRotor, conventions
 from procedures.amb_rotor.geometry import Facts, left
-from procedures.amb_rotor.onset import onset
+from procedures.amb_rotor.onset import onset, pushing
 from procedures.tracking.ellipse import Path, Wave
 from procedures.tracking.points import delay, read_points
 
@@ -120,7 +120,7 @@ def _start(recording: Recording[Any], start: Step, wave: Wave) -> tuple[float, f
     answered = [e["t_ns"] for e in inside if e["kind"] == STARTED]
     if not written or not answered or len(begun["t_ns"]) < 20:
         raise AnalysisError("found no start of the reference; expected its write within the step, and samples about it")
-    current = np.sum([begun[p] - begun[n] for p, n in map(machine.pair, machine.along("z"))], axis=0)
+    current = np.sum([pushing(machine, "z", a, begun) for a in machine.along("z")], axis=0)
     lag = conventions(recording.rig).lag_s
     earliest, latest = ((t - start.start_ns) * 1e-9 for t in (written[0], answered[0]))
     at = (begun["t_ns"] - start.start_ns) * 1e-9

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
+import numpy.typing as npt
 
 from bench.analysis import pictures
 from bench.analysis.spectra import full
@@ -17,17 +18,18 @@ from procedures.amb_rotor.stations import stations
 from procedures.synchronous import facts
 from procedures.synchronous.checks import ZONES
 from procedures.synchronous.estimates import Result, Results
+from procedures.synchronous.orbit_frame import seen
 
+Array = npt.NDArray[np.float64]
 SHOWN_TURNS = 4
+STANDS = 0.05  # of gravity across the shaft: with less it has no "up"
 
 
 def all_figures(results: Results, rig: RigFile) -> Iterator[Shown]:
     """In the order of the report."""
-    clearance, y_deg = facts.clearance(rig).value, where_y_is(rig)
+    clearance, way = facts.clearance(rig).value, outlook(rig)
     planes = results.machine.planes
-    drawn = [
-        orbits(results.of(variant)[-1], plane, clearance, y_deg) for plane in planes for variant in results.variants
-    ]
+    drawn = [orbits(results.of(variant)[-1], plane, clearance, way) for plane in planes for variant in results.variants]
     yield _dwells(results)
     yield drawn[0]
     yield farthest(results)
@@ -45,11 +47,19 @@ def all_figures(results: Results, rig: RigFile) -> Iterator[Shown]:
         yield _use(results, "voltage_peak", "V", "voltage")
 
 
-def where_y_is(rig: RigFile) -> float:
-    """Of the first axis, degrees counter-clockwise from the right, seen along the shaft with up (or where directions have their
-    zero) above."""
-    s = stations(rig)
-    return 90.0 + s.hand * round(math.degrees(s.first.value), 6)
+def outlook(rig: RigFile) -> pictures.Outlook:
+    """From outside the end from which z is counter-clockwise of y, with up above; of a shaft that stands, with the place where
+    directions have their zero above."""
+    s, shaft = stations(rig), rig.shaft
+    assert shaft is not None  # `requires` says so
+    end = shaft.far_end if s.hand > 0 else shaft.near_end or "near"
+    way = "counter-clockwise" if s.hand > 0 else "clockwise"
+    seen = f"Seen from outside the {end} end, from where the shaft turns {way}"
+    y_deg = 90.0 + s.hand * round(math.degrees(s.first.value), 6)
+    if math.hypot(*s.up) > STANDS:
+        return pictures.Outlook(y_deg, seen)
+    zero = "0°" if shaft.zero_at == "up" else f"0° ({shaft.zero_at})"
+    return pictures.Outlook(y_deg, seen, f"towards {270 if s.hand > 0 else 90}°", f"towards {zero}")
 
 
 def _dwells(results: Results) -> Sheet:
@@ -68,17 +78,24 @@ def _key(r: Result) -> str:
     return f"{r.dwell.variant}-{r.dwell.wanted * RPM:.0f}"
 
 
-def orbits(r: Result, plane: str, clearance: float, y_deg: float) -> Figure:
+def orbits(r: Result, plane: str, clearance: float, way: pictures.Outlook) -> Figure:
     """The highest speed: some turns as read, and the shaft's own order 1 about its mean place."""
     y, z = r.dwell.machine.planes[plane]
     x1 = x2 = None
     if r.dwell.full is not None:
         count = round(SHOWN_TURNS * 2 * np.pi / r.dwell.speed * r.dwell.full.rate)
-        x1, x2 = r.dwell.full.positions[y, :count], r.dwell.full.positions[z, :count]
+        x1, x2 = _centre(r, (y, z))[:, :count]
     shown = pictures.Orbit(
         f"{SHOWN_TURNS} turns as read", x1, x2, r.orbits[plane], r.centres[plane], "order 1 of the shaft"
     )
-    return pictures.orbits(f"orbit-{plane}-{_key(r)}", f"Orbit {plane}, {r.dwell.where}", [shown], clearance, y_deg)
+    return pictures.orbits(f"orbit-{plane}-{_key(r)}", f"Orbit {plane}, {r.dwell.where}", [shown], clearance, way)
+
+
+def _centre(r: Result, pair: tuple[int, int]) -> Array:
+    """(2, n) along y and z, of what two probes read in a capture."""
+    assert r.dwell.full is not None
+    machine = r.dwell.machine
+    return seen(machine.stations, [machine.positions[k] for k in pair], r.dwell.full.positions[list(pair)])
 
 
 def _bode(results: Results, plane: str) -> Figure:
@@ -105,7 +122,9 @@ def _polar(results: Results, plane: str) -> Figure:
 def spectrum(r: Result, plane: str) -> Figure:
     y, z = r.dwell.machine.planes[plane]
     assert r.dwell.full is not None
-    found = full(r.dwell.full.positions[y], r.dwell.full.positions[z], r.dwell.full.rate)
+    forward = r.dwell.machine.stations.spin > 0
+    both = _centre(r, (y, z))
+    found = full(both[0], both[1], r.dwell.full.rate, x_to_y=forward)
     title = f"Full spectrum {plane}, {r.dwell.where}"
     return pictures.full_spectrum(f"spectrum-{plane}-{_key(r)}", title, found, r.dwell.speed, 1500.0)
 

@@ -18,7 +18,7 @@ from bench.procedure.roles import RigState
 from bench.recording import Recording
 from bench.recording.recorder import Recorder
 from bench.rigfile import RigFile
-from procedures.amb_rotor import lift, wiring
+from procedures.amb_rotor import lift, pushes, wiring
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.laws import of_laws, of_variants
 from procedures.shared import assumptions, first_look
@@ -154,6 +154,7 @@ procedure = Procedure(
     check=check,
     settings=settings,
     step_count=step_count,
+    steps_on=lambda rig, plan: step_count(plan) + pushes.count(rig),
     needs=lambda plan: bearings.needs(plan.bearings),
     assumes=assumptions.UNBALANCE,
     method=read_method(__file__),

@@ -13,7 +13,7 @@ from bench.rigfile import RigFile, linkurl
 from bench.rigfile.busload import upload_frame_seconds
 from bench.rigfile.messages import MessageMap
 from bench.wire.captureblock import block, pieces
-from bench.wire.isotp import Sender, TransferError
+from bench.wire.isotp import FrameLength, Sender, TransferError
 from bench.wire.packet import LIMIT, MESSAGE, PAYLOAD_LIMIT
 from sim_backend.controller.capture_memory import CaptureMemory, Order
 from sim_backend.controller.ownership import Ownership
@@ -40,6 +40,8 @@ class CapturePort:
         self._tick_ns = round(tick_s * 1e9)
         self._capacity = rig.capture.memory_bytes
         self._map = messages
+        self._flags = 0 if rig.link.classic else FD
+        self._frame_length: FrameLength = 8 if rig.link.classic else 64
         self._spacing = {"CaptureBlock": _can_ns(rig) or self._tick_ns, "CaptureData": _serial_ns(rig)}
         self._sender: Sender | None = None
         self._message = "CaptureBlock"
@@ -80,7 +82,7 @@ class CapturePort:
         batch["t_ns"] = (
             self._free_ns + (np.arange(count) * spacing).astype(np.int64) + clock[0] - clock[1] * self._tick_ns
         )
-        batch["id"], batch["flags"] = self._map[self._message].identifier, FD
+        batch["id"], batch["flags"] = self._map[self._message].identifier, self._flags
         batch["length"] = [len(p) for p in payloads]
         whole = b"".join(p.ljust(64, b"\0") for p in payloads)
         batch["data"] = np.frombuffer(whole, np.uint8).reshape(-1, 64)
@@ -110,7 +112,7 @@ class CapturePort:
         if form == "PIECES":
             self._queue("CaptureData", pieces(number, offset, data), tick)
         else:
-            self._sender = Sender(block(number, offset, data), 64)
+            self._sender = Sender(block(number, offset, data), self._frame_length)
             self._queue("CaptureBlock", (self._sender.start(),), tick)
         return ""
 

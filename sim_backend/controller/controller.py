@@ -10,6 +10,7 @@ from typing import cast
 from bench.link.codec import encode
 from bench.link.fault_injection import Fault
 from bench.link.frames import FD, FrameBatch, by_time, empty_batch, frame, joined
+from bench.link.segments import of_controller
 from bench.rigfile import RigFile
 from bench.rigfile.messages import load_messages
 from sim_backend.controller.bound_telemetry import BoundTelemetry
@@ -42,7 +43,7 @@ class SimulatedController:
     """
 
     def __init__(self, rig: RigFile, truth: Truth, faults: Sequence[Fault] = (), substeps: int = 2) -> None:
-        self._rig, self._map = rig, load_messages(rig.dbc_text)
+        self._rig, self._map = rig, load_messages(rig.dbc_text, classic=rig.link.classic)
         self.truth = truth
         self._machine = truth.machine
         self.plant = self._machine.make(truth.plant, truth.noise, substeps)
@@ -52,6 +53,7 @@ class SimulatedController:
         self.captures: CapturePort | None = None
         self._own_words = own_words(self._map, self._machine, rig.binding)
         self._held = empty_batch()
+        self._segments = of_controller(self._map) if rig.link.classic and rig.capture is not None else None
         self.restart()
         self._owner.heartbeat = 0  # it has been on since then
         self._encoder: TelemetryEncoder | BoundTelemetry
@@ -73,9 +75,17 @@ class SimulatedController:
         Returns:
             What the controller sent, with its times.
         """
-        if self.faults is None:
-            return self.run(ticks, incoming, t0_ns)
-        return self.faults.advance(self, ticks, incoming, t0_ns)
+        answers = incoming[:0]
+        if self._segments is not None:
+            incoming, answers = self._segments.incoming(incoming)
+        sent = (
+            self.run(ticks, incoming, t0_ns)
+            if self.faults is None
+            else self.faults.advance(self, ticks, incoming, t0_ns)
+        )
+        if self._segments is None:
+            return sent
+        return by_time(joined([self._segments.outgoing(sent), answers]))
 
     def run(self, ticks: int, incoming: FrameBatch, t0_ns: int) -> FrameBatch:
         """`advance` as if there were no faults."""

@@ -40,7 +40,7 @@ def made() -> dict[str, Figure]:
     figures = (
         pictures.bode("bode", "t", [curve]),
         pictures.polar("polar", "t", [curve]),
-        pictures.orbits("orbits", "t", seen, 1e-4, 45.0),
+        pictures.orbits("orbits", "t", seen, 1e-4, pictures.Outlook(45.0)),
         pictures.waterfall("waterfall", "t", waterfall(t, x, tacho, FULL, segment=1024, count=12), 300.0),
         pictures.order_map("map", "t", order_map(t, x, tacho, FULL, turns=8)),
         pictures.full_spectrum("full", "t", full(x, np.zeros_like(x), 5000.0), 500.0, 300.0),

@@ -126,7 +126,7 @@ def test_expired(bench: Bench) -> None:
     assert [f["code"] for f in record["findings"]] == ["calibration-expired"]
     assert bench("report", str(directory))[0] == 0
     page = (directory / "report.html").read_text(encoding="utf-8")
-    assert page.count("Made with an expired calibration") == 2
+    assert page.count("Made with an expired calibration") == 3  # page 1, the end, the head of each printed page
     status, _, err = bench("adopt", str(directory))  # what rests on it says so too
     assert status == 0
     assert "tiny-levitated had expired on 2026-01-01" in err

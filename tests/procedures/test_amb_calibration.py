@@ -18,9 +18,10 @@ from bench.record.records import measurement
 from bench.record.specs import load_spec
 from bench.rigfile import load_rig
 from bench.uncertainty import interval
-from procedures.amb_calibration import both_coils
+from procedures.amb_calibration import both_coils, checks
 from procedures.amb_calibration.plan import Plan
 from procedures.amb_calibration.procedure import check, procedure
+from procedures.amb_calibration.pulls import Loaded, Pull
 from sim_backend.truth import draw
 
 SHORT = {"settle_s": 0.3, "average_s": 0.2}
@@ -190,3 +191,14 @@ def test_what_the_loads_leave_one_number_is_not_reported_as_two(
     run = simulated_run("amb-calibration", "tsbs12", 0, {**SHORT, "bias_A": 2.05}, tmp_path / "recording.mcap")
     assert [(f.code, f.where) for f in run.results if isinstance(f, Finding)] == [("one-sided", "outboard")]
     assert not any(isinstance(m, Measured) for m in run.results)
+
+
+@pytest.mark.parametrize(
+    ("lean", "seen", "told"), [(0.0, 0.02, False), (0.17, 0.0, True), (0.17, 0.2, False), (0.0, 0.17, True)]
+)
+def test_an_axis_across_the_pull_shows_how_the_bearing_is_turned(lean: float, seen: float, told: bool) -> None:
+    """By hand: axes turned by 10 degrees answer across the pull by sin 10° = 0.17 of what they answer along it."""
+    along = Loaded("y", "y", "axis y", 0, ("p", "n"), "", "x", "front", 1.0, True)
+    across = Loaded("x", "x", "axis x", 0, ("p", "n"), "", "y", "front", lean, False)
+    found = list(checks.askew(Pull("hook", (along,), (across,)), {"y": 0.6, "x": 0.6 * seen}))
+    assert [(f.code, f.where) for f in found] == [("pull-askew", "front")] * told

@@ -199,7 +199,7 @@ def test_trial_weights_left_on_say_the_same(sound: Balancing) -> None:
         weights=(*inboard.weights, *outboard.weights),
         reads=tuple(added(g, o) for g, o in zip(grown, outboard.reads, strict=True)),
     )
-    trials = decision.trials_of([base, inboard, both], rig, leave=True)
+    trials = decision.trials_of([base, inboard, both], rig)
     assert trials is not None
     assert (trials.before, trials.weights) == ((base, inboard), (inboard.weights[0], outboard.weights[0]))
     left = estimates.solve_runs(recorded.slow, [base, both], trials, rig, plan, known(plan))
@@ -207,8 +207,7 @@ def test_trial_weights_left_on_say_the_same(sound: Balancing) -> None:
     more = left.unbalance[both.name].values - left.unbalance[BASE].values
     assert np.abs(more - estimates.sum_weights(both.weights, left.planes)).max() < 0.02 * G_MM
     # taken for a run without the first weight, the second column is wrong by it
-    wrong = decision.trials_of([base, inboard, both], rig, leave=False)
-    assert wrong is not None
+    wrong = dataclasses.replace(trials, before=(base, base))
     assert (
         estimates.solve_runs(recorded.slow, [base], wrong, rig, plan, known(plan)).solved.condition
         > 1.3 * b.solved.condition
@@ -348,3 +347,13 @@ def test_plans_that_cannot_work_are_refused() -> None:
     assert why(trial_kg=(0.99 * allowed, 1e-4), max_share=0.2) == ""
     bare = RIG.model_copy(update={"devices": {k: d for k, d in RIG.devices.items() if k != "drive"}})
     assert procedure.procedure.problems(bare, Plan()) == ("nothing turns it; devices: found none in the role drive",)
+
+
+@pytest.mark.parametrize(
+    ("size", "u", "told"), [(1.05, 0.001, False), (0.9, 0.01, True), (0.9, 0.05, False), (1.3, 0.2, True)]
+)
+def test_a_trial_weight_is_held_against_what_is_known_of_the_stand(size: float, u: float, told: bool) -> None:
+    """A radius or a mass of the rig file that is off by a tenth moves the unbalance by more than its U."""
+    added = np.array([[size, 0.01]], complex)
+    seen = decision.Shown(Weight(0, 1e-4, 0.0, 1), added, lambda _: 0.1, lambda: u, SIDES)
+    assert [f.code for f in decision.of_trial(seen)] == ["weight-not-as-stated"] * told

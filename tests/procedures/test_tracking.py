@@ -32,7 +32,7 @@ from procedures.tracking import ellipse as estimator
 from procedures.tracking.ellipse import Path as Orbit
 from procedures.tracking.ellipse import Wave
 from procedures.tracking.plan import Plan
-from procedures.tracking.procedure import MEASURES, OF_POINTS, check, procedure, step_count
+from procedures.tracking.procedure import OF_POINTS, check, procedure, step_count
 from procedures.tracking.steps import read_orbits
 from procedures.unbalance import procedure as unbalance
 from reports.figures import draw as draw_figure
@@ -79,7 +79,9 @@ def test_what_a_gain_truly_changes_is_in_the_truth(tmp_path: Path) -> None:
 def test_a4_flatness_follows_and_the_pid_touches(tmp_path: Path) -> None:
     """T 2.6.2: CCS and CAC within 3 um and 45 urad, CAC by the upper coils alone; PID over 20 um, and on the ring at 100 um."""
     measured, findings = tracked(tmp_path)
-    assert {name for name, _ in measured} == {q.name for q in MEASURES} - {q.name for q in OF_POINTS}
+    assert {name for name, _ in measured} == {q.name for q in procedure.on(load_rig("amb5dof")).measures} - {
+        q.name for q in OF_POINTS
+    }
     assert {law for _, law in measured} == {"CCS", "CAC"}
     for law in ("CCS", "CAC"):
         for axis in "yz":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,16 +11,18 @@ import pytest
 from odd_rig import odd_rig
 from twin_facts import SILENT, true_facts
 
+from bench.cli.motion_truth import truth_of_motion
 from bench.cli.virtual import simulated_run
 from bench.findings import Effect, Finding
 from bench.procedure import Measured
 from bench.rigfile import load_rig
 from bench.uncertainty import interval
+from procedures.tracking import checks
 from procedures.tracking.ellipse import of_points, turns
 from procedures.tracking.plan import Plan
 from procedures.tracking.points import Points, contour
-from procedures.tracking.procedure import check, procedure
-from procedures.tracking.steps import read_orbits
+from procedures.tracking.procedure import check, placed, procedure
+from procedures.tracking.steps import Orbit, read_orbits
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 SPINDLE, STAND = (str(EXAMPLES / name) for name in ("vertical-spindle/spindle.toml", "plain-stand/stand.toml"))
@@ -59,12 +62,32 @@ def test_a_shaft_follows_set_points_as_the_same_twin_without_noise(path: str, tm
     assert [f.code for f in run.results if isinstance(f, Finding) and f.effect is not Effect.NOTE] == []
     silent = simulated_run("tracking", path, 1, QUICK, tmp_path / "t.mcap", SILENT)
     (orbit,) = read_orbits(silent.recording)
-    true = of_points(turns(orbit.path, true_facts(silent.recording.rig, silent.drawn)), orbit.path.wave)
-    told = {m.quantity.name: m for m in run.results if isinstance(m, Measured)}
+    wired_wrong(orbit)
+    found = of_points(turns(orbit.path, true_facts(silent.recording.rig, silent.drawn)), orbit.path.wave)
+    true = {(quantity.name, where): found[name] for name, quantity, where in placed(orbit, found)}
+    told = {(m.quantity.name, m.where): m for m in run.results if isinstance(m, Measured)}
     assert told.keys() == true.keys()
-    for name, m in told.items():
-        assert m.where.startswith("as set, 0.5 Hz")
-        assert m.estimate.value == pytest.approx(true[name], abs=1.7 * interval(m.estimate).U), name
+    assert {where.split("as set, 0.5 Hz")[0] for _, where in told} == {"", "y, ", "z, ", "psi, ", "theta, "}
+    for place, m in told.items():
+        assert m.estimate.value == pytest.approx(true[place], abs=1.7 * interval(m.estimate).U), place
+    followed = truth_of_motion(run)
+    assert {name for name, _ in told} == {name.partition("@")[0] for name in followed} | {"ring_distance"}
+    for (name, where), m in told.items():
+        if name != "ring_distance":
+            assert followed[f"{name}@{where}"] == pytest.approx(true[name, where], abs=0.5 * interval(m.estimate).U), (
+                name
+            )
+
+
+def wired_wrong(orbit: Orbit) -> None:
+    """Every probe whose sign is wrong is named by the set points alone, also one that neither weight nor nudges show."""
+    for k, name in enumerate(orbit.machine.stations.channels):
+        turned = orbit.path.readings.copy()
+        turned[k] *= -1
+        seen = replace(orbit, path=replace(orbit.path, readings=turned))
+        told = [(f.code, f.where) for f in checks.of_signals([seen], Plan())]
+        assert told == [("sensor-polarity", name)]
+    assert not list(checks.of_signals([orbit], Plan()))
 
 
 def test_what_set_points_cannot_do_is_told_before_anything_starts() -> None:

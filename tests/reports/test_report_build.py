@@ -514,6 +514,6 @@ def test_the_calibrations_used_are_named_and_an_expired_one_stands_on_every_page
     assert view().about_calibrations == "The results rest on no earlier calibration."
     made = compose.view_of(record(calibrations=[used | {"state": "expired"}], seed=None), around())
     assert made.expired == "Made with an expired calibration"
-    assert html.render(made).count(made.expired) == 2  # at the top, and where the page ends
+    assert html.render(made).count(made.expired) == 3  # at the top, where the page ends, and on each page of print
     pages = pdf.render(made, None)
     assert pages.startswith(b"%PDF")

@@ -207,12 +207,12 @@ def test_masses_hang_down_or_pull_over_a_pulley() -> None:
 
 
 def test_weights_are_fixed_on_the_planes_own_scale() -> None:
-    """The disc's scale begins 20 degrees on from the mark and runs clockwise, as the spindle's speed does: 30 degrees on it
-    are 20 - 30 counter-clockwise of the mark, and 10 in the sense of the speed."""
+    """The disc's scale begins 20 degrees on from the mark and runs backwards: 30 degrees on it are 20 - 30 from the mark in the
+    direction of rotation, which here is clockwise (docs/reference/angles.md)."""
     fitter, plant = at_work(SPINDLE_RIG)
     assert fitter.request(f"attach disc 1e-3 {math.radians(30)!r}").startswith("ok")
     s = plant._s  # type: ignore[attr-defined]
-    assert math.degrees(math.atan2(s.weight_s[0], s.weight_c[0])) == pytest.approx(10)
+    assert math.degrees(math.atan2(s.weight_s[0], s.weight_c[0])) == pytest.approx(-10)
     assert math.hypot(s.weight_c[0], s.weight_s[0]) == pytest.approx(1e-3 * 0.03)
     fitter.request("detach disc")
     assert s.weight_c[0] == s.weight_s[0] == 0

@@ -9,7 +9,7 @@ from bench.rigfile import RigFile
 from sim_backend.machine import Truth
 from sim_backend.machines.amb5dof import truth_balance, truth_step, truth_track, truth_unbalance
 from sim_backend.machines.stepping import Shown, Small
-from sim_backend.motion import Motions, OrbitAsked, StepsAsked, Whirl
+from sim_backend.motion import Motions, OrbitAsked, StepsAsked, Whirl, drag
 
 if TYPE_CHECKING:
     from sim_backend.machines.amb5dof.truth_sensitivity import Loop
@@ -72,4 +72,4 @@ def peak(_: RigFile, drawn: Truth, settings: Numbers, axis: int, speed: float) -
     return truth_sensitivity.quiet_peak(drawn.plant, settings, axis, speed)
 
 
-MOTIONS = Motions(steps=steps, orbit=orbit, whirl=whirl, left=left, passage=passage, loop=loop, peak=peak)
+MOTIONS = Motions(steps=steps, orbit=orbit, whirl=whirl, left=left, passage=passage, loop=loop, peak=peak, drag=drag)

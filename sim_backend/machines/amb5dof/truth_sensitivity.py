@@ -23,6 +23,7 @@ from sim_backend.machines.amb5dof.plant import TRACE, ccs, derivative
 from sim_backend.machines.amb5dof.reference_law import Model
 from sim_backend.machines.amb5dof.truth_step import floating
 from sim_backend.machines.amb5dof.truth_unbalance import angle_of
+from sim_backend.machines.peaks import greatest
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -61,13 +62,7 @@ class Loop:
 
     def peak(self, axis: int, low: float, high: float) -> tuple[float, float]:
         """Greatest abs(S_jj) between two frequencies in Hz, and where."""
-        hz = np.geomspace(low, high, 4000)
-        for _ in range(4):
-            size = np.abs(self.sensitivity(hz)[:, axis])
-            k = int(size.argmax())
-            hz = np.linspace(hz[max(k - 2, 0)], hz[min(k + 2, hz.size - 1)], 200)
-        size = np.abs(self.sensitivity(hz)[:, axis])
-        return float(size.max()), float(hz[size.argmax()])
+        return greatest(lambda hz: np.abs(self.sensitivity(hz)[:, axis]), low, high, points=4000, fine=200, rounds=4)
 
 
 def loop(p: AmbParams, settings: Mapping[str, float], speed: float = 0.0, substeps: int = 2) -> Loop:

@@ -62,16 +62,19 @@ def free_motions(p: TwinParams) -> Array:
 
 
 def _slopes(p: TwinParams, k: int, bias: float, force: float, xi: float) -> tuple[float, float]:
-    """dF/di and dF/dxi where the axis gives `force`; i is what both coils change by with opposite signs, or the one coil
-    alone."""
+    """dF/di and dF/dxi where the axis gives `force`; i is what the references of both coils change by with opposite signs, or
+    that of the one coil alone. A coil carries (reference - offset)/gain: its amplifier follows its own current sensor."""
     beta, near, far = p.beta[k], p.gap[k] - xi, p.gap[k] + xi
+    (gain_p, off_p), (gain_n, off_n) = ((p.current_gain[j], p.current_offset[j]) for j in (k, 16 + k))
     if p.coils[k] == 1:
         i = near * math.sqrt(max(force, 0.0) / beta)
-        return 2 * beta * i / near**2, 2 * beta * i**2 / near**3
-    plus, minus = 1 / near**2, 1 / far**2  # force/beta = plus (b + i)^2 - minus (b - i)^2: a quadratic in i
-    a, b, c = plus - minus, 2 * bias * (plus + minus), bias**2 * (plus - minus) - force / beta
+        return 2 * beta * i / near**2 / gain_p, 2 * beta * i**2 / near**3
+    plus, minus = (gain_p * near) ** -2, (gain_n * far) ** -2
+    # force/beta = plus (bias - off_p + i)^2 - minus (bias - off_n - i)^2: a quadratic in i
+    own_p, own_n = bias - off_p, bias - off_n
+    a, b, c = plus - minus, 2 * (plus * own_p + minus * own_n), plus * own_p**2 - minus * own_n**2 - force / beta
     i = -c / b if abs(a) * bias < 1e-12 * b else (-b + math.sqrt(max(b * b - 4 * a * c, 0.0))) / (2 * a)
-    p_i, n_i = bias + i, bias - i
+    p_i, n_i = own_p + i, own_n - i
     return 2 * beta * (p_i * plus + n_i * minus), 2 * beta * (p_i**2 * plus / near + n_i**2 * minus / far)
 
 

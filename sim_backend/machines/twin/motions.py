@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from bench.rigfile import RigFile
 from sim_backend.machine import Truth
-from sim_backend.machines.twin import truth_balance, truth_sensitivity, truth_step, truth_whirl
-from sim_backend.motion import Motions
+from sim_backend.machines.twin import truth_balance, truth_sensitivity, truth_step, truth_track, truth_whirl
+from sim_backend.motion import Motions, drag
 
 if TYPE_CHECKING:
     from sim_backend.machines.passing import Curves
@@ -25,5 +25,5 @@ def passage(
 
 MOTIONS = Motions(
     steps=truth_step.steps_asked, whirl=truth_whirl.whirl, left=truth_balance.left, passage=passage,
-    loop=truth_sensitivity.loop,
+    loop=truth_sensitivity.loop, orbit=truth_track.orbit, drag=drag,
 )  # fmt: skip

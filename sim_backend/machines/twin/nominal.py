@@ -102,8 +102,11 @@ class Nominal:
 
     @cached_property
     def amplifier_hz(self) -> float:
-        """Bandwidth of the current loops: as set, else a tenth of the tick's rate, 200 Hz to 1 kHz."""
-        return self.set("amplifier_hz", min(max(0.1 / self.tick_s, 200.0), 1000.0))
+        """Bandwidth of the current loops: as set, else what the rig file's loop delay leaves after a tick, else a tenth of the
+        tick's rate, 200 Hz to 1 kHz."""
+        told = self.rig.capabilities.loop_delay
+        by_rule = min(max(0.1 / self.tick_s, 200.0), 1000.0)
+        return self.set("amplifier_hz", by_rule if told is None else 1 / (2 * math.pi * (told.value - self.tick_s)))
 
     @cached_property
     def tilt(self) -> float:

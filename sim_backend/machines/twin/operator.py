@@ -30,12 +30,14 @@ class Fitter:
         self._geometry = Geometry(rig, layout_of(rig), truth.values)
         self._columns = Columns(self._geometry, nominal_of(rig), truth.values)
         self._fixed = self._hung = self._turned = 0
+        self._hanging = (0.0,) * 9
         if truth.defects.get("loose_weight"):
             plant.weights(0, truth.defects["loose_weight"], 0.0)
 
     def request(self, line: str) -> str:
         """One line: `hang M2`, `hang -`, `hang HOOK M2`, `attach PLANE KG RAD` (on the plane's scale), `detach PLANE`,
-        `turn DEG` (the mark so far on from where it is told, as the speed counts), `mount ring`, `mount -`, `ask TEXT`.
+        `turn DEG` (the mark so far on from where it is told, as the speed counts), `push DEG` (the shaft aside, as the rig
+        file's directions count), `push -` (let go), `mount ring`, `mount -`, `ask TEXT`.
         Answers `ok SECONDS` (when it is done), `yes` or `error TEXT`."""
         hooks, planes = self._rig.hooks, list(self._rig.balancing)
         match line.split():
@@ -53,6 +55,10 @@ class Fitter:
                 self._plant.without_weights(planes.index(plane))
             case ["turn", angle] if _numbers(angle) and abs(self._plant.shaft_speed) < 0.1:
                 self._turn(math.radians(float(angle)))
+            case ["push", "-"]:
+                self._plant.load(self._hanging, HAND_OVER_S)
+            case ["push", angle] if _numbers(angle) and abs(self._plant.shaft_speed) < 0.1:
+                self._push(layout_of(self._rig).sense * math.radians(float(angle)))
             case ["mount", "ring" | "-" as part] if RING in self._truth.values:
                 self._plant.mount(self._truth.values[RING] if part == "ring" else 0.0)
             case _:
@@ -79,9 +85,17 @@ class Fitter:
             along, angle, across = 0.0, g.angle(f"hooks/{name}") + off, newtons * kept
         fy, fz = across * math.cos(angle), across * math.sin(angle)
         one, two = self._columns.shape(station)
-        self._plant.load(
-            (along, fy, fz, -station * fz, station * fy, one * fy, one * fz, two * fy, two * fz), HAND_OVER_S
-        )
+        self._hanging = (along, fy, fz, -station * fz, station * fy, one * fy, one * fz, two * fy, two * fz)
+        self._plant.load(self._hanging, HAND_OVER_S)
+
+    def _push(self, angle: float) -> None:
+        """By hand, midway between the rings, with as much as the shaft weighs, beside what hangs."""
+        newtons = self._plant.params.mass * self._truth.values["site.gravity"]
+        at = [self._geometry.station(ring.part) for ring in layout_of(self._rig).rings]
+        station, fy, fz = (min(at) + max(at)) / 2, newtons * math.cos(angle), newtons * math.sin(angle)
+        one, two = self._columns.shape(station)
+        push = (0.0, fy, fz, -station * fz, station * fy, one * fy, one * fz, two * fy, two * fz)
+        self._plant.load(tuple(a + b for a, b in zip(self._hanging, push, strict=True)), HAND_OVER_S)
 
     def _pulley(self, hook: Hook, name: str) -> tuple[float, float]:
         """What share of the weight it hands on, and by how much it is off, rad."""
@@ -104,7 +118,7 @@ class Fitter:
         plane, g = self._rig.balancing[names[k]], self._geometry
         zero = 0.0 if plane.zero is None else g.number(plane.zero, f"balancing.{names[k]}.zero")
         heavier, turned = self._errors(names[k], plane)
-        at = layout_of(self._rig).sense * (zero + plane.sense * (angle + turned))
+        at = zero + plane.sense * (angle + turned)  # in the direction of rotation, whichever it is
         radius = g.number(plane.radius, f"balancing.{names[k]}.radius")
         if not defects["weight_lost"]:
             self._plant.weights(k, (mass + heavier) * radius, at)

@@ -113,6 +113,16 @@ class Sight:
         y, z = way @ q[:2]
         return np.array([y, z, along, self.arm * q[3], -self.arm * q[2]])
 
+    def centre(self, trace: Array) -> Array:
+        """y, z, psi, theta (4, n), m and rad, of the centre of mass as it is, from where probes read zero: y along the first
+        axis of the bearing nearest to the near end, z across it, to the side of its second axis."""
+        q = self._true[0] @ trace[:, self.looking].T
+        (c, s), second = self._ways[True]
+        frame = np.array([[c, s], [-s, c]])
+        frame[1] *= -1.0 if frame[1] @ second < 0 else 1.0
+        (y, z), (theta, minus_psi) = frame @ q[:2], frame @ np.array([q[3], -q[2]])
+        return np.array([y, z, -minus_psi, theta])
+
 
 def _ways(columns: Columns) -> Array:
     """(2, 2): what a unit of y and z is along the first bearing's axes, or along one and a quarter turn on."""

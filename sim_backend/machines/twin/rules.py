@@ -69,6 +69,18 @@ def _drive_limit(n: Nominal) -> float:
     return min(300.0 * polar(n), math.inf if most is None else 0.85 * most)
 
 
+def _amplifier(n: Nominal, _: int) -> Toleranced:
+    """To within what the rig file states of its loop delay: d(1/T) = -dT/T^2."""
+    told = n.rig.capabilities.loop_delay
+    if told is None:
+        return rectangular(n.amplifier_hz, "Hz", 0.05 * n.amplifier_hz)
+    share = n.amplifier_hz / (told.value - n.tick_s)
+    spread = {
+        key: None if was is None else was * share for key, was in (("u", told.u), ("half_width", told.half_width))
+    }
+    return told.model_copy(update={"value": n.amplifier_hz, "unit": "Hz", "id": "", **spread})
+
+
 def _runout(order: int) -> Callable[[Nominal, int], Toleranced]:
     def of(n: Nominal, _: int) -> Toleranced:
         """As large in all as `[shaft] runout` says, rms."""
@@ -111,7 +123,7 @@ BY_JOURNAL: Mapping[str, Rule] = {
 }
 ONCE: Mapping[str, Rule] = {
     "resistance": _constant(1.0, "Ohm", 0.05),
-    "amplifier_hz": _of(lambda n: n.amplifier_hz, "Hz", 0.05),
+    "amplifier_hz": _amplifier,
     "viscous": _of(lambda n: polar(n) / 100.0, "N m s/rad", 0.2),
     "coulomb": _of(lambda n: 0.2 * polar(n), "N m", 0.2),
     "drive_gain": _of(lambda n: 20.0 * polar(n), "N m s/rad", 0.1),
@@ -139,7 +151,9 @@ dot and theirs."""
 def drawn(rig: RigFile) -> dict[str, Toleranced]:
     """Every number of the twin that is drawn, by its name: the rig file's by identity ("/" as "."), its sensors' by channel,
     and those of the tables above."""
-    out = {drawn_as(name): t for name, t in Places(rig).known.items() if not name.startswith("sensors/")}
+    out = {
+        drawn_as(name): t for name, t in Places(rig).known.items() if not name.startswith(("sensors/", "capabilities/"))
+    }
     n = nominal_of(rig)
     out |= dict(_sensors(n)) | dict(_shaft(n)) | dict(_open(n))
     return out

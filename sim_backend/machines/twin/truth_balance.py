@@ -40,14 +40,14 @@ def left(rig: RigFile, truth: Truth, events: Iterable[Mapping[str, Any]], names:
     ledger = Ledger(len(stated))
     own = np.array([cmath.rect(p.unbalance[k], p.unbalance_phase[k]) for k in range(len(stated))])
     hands = Fitter(rig, ledger, truth)  # type: ignore[arg-type]
-    geometry, sense = Geometry(rig, layout_of(rig), truth.values), layout_of(rig).sense
+    geometry = Geometry(rig, layout_of(rig), truth.values)
 
     def told() -> Complex:
         whole, out = own + ledger.fixed, []
         for name in names:
             plane, u = rig.balancing[name], complex(whole[stated.index(name)])
             zero = 0.0 if plane.zero is None else geometry.number(plane.zero, f"balancing.{name}.zero")
-            on = (u if sense > 0 else u.conjugate()) * cmath.exp(-1j * zero)
+            on = u * cmath.exp(-1j * zero)
             out.append(on if plane.sense > 0 else on.conjugate())
         return np.array(out)
 

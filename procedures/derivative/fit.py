@@ -1,0 +1,141 @@
+"""The bare model: what an estimator that is reset every P samples makes of a sine, by the samples' place in that period.
+
+The estimate is linear in the positions, and its weights repeat every P samples. So the samples at one place j of the period see
+one time-invariant filter, and over y = Re Y exp(j w t) they are Re H_j j w Y exp(j w t). Their mean over j is the gain at the
+line, what differs from it the sidebands at f +- n/eps, and
+
+    error^2 = mean_j |H_j - 1|^2 = |mean_j H_j - 1|^2 + mean_j |H_j - mean H|^2.
+
+Noise adds to a square. Two stretches of a record have noise of their own: the product of the one's H_j - 1 with the conjugate
+of the other's has the same mean, without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.errors import AnalysisError
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+MOVING_HZ = 1500.0  # above it the body does not follow its own noise
+
+
+@dataclass(frozen=True)
+class Places:
+    """H_j of a line, (b, P) by stretch of the record and place in the period; `amplitude` m of the position, 0-pk."""
+
+    h: Complex
+    amplitude: float
+
+    @property
+    def gain(self) -> Complex:
+        """Mean over the period, (b,)."""
+        return np.asarray(self.h.mean(axis=1))
+
+    def square(self, use: npt.NDArray[np.bool_], about: Complex | float = 1.0) -> float:
+        """mean_j |H_j - about|^2 without what noise adds, of the stretches `use` (b,)."""
+        off = (self.h - about)[use]
+        count = len(off)
+        whole, own = np.abs(off.sum(axis=0)) ** 2, (np.abs(off) ** 2).sum(axis=0)
+        return float((whole - own).mean() / (count * (count - 1)))
+
+    @property
+    def error(self) -> tuple[float, float]:
+        """RMS error over the derivative's rms, and its standard uncertainty by the jackknife over stretches."""
+        return self._rooted(1.0)
+
+    @property
+    def sideband(self) -> tuple[float, float]:
+        """Of that what is at f +- n/eps."""
+        return self._rooted(self.gain[:, None])
+
+    def _rooted(self, about: Complex | float) -> tuple[float, float]:
+        count = len(self.h)
+        value = self.square(np.ones(count, bool), about)
+        less = [self.square(np.arange(count) != k, about) for k in range(count)]
+        u = float(np.sqrt((count - 1) * np.var(less)))
+        root = float(np.sqrt(max(value, u)))  # of a square that is lost in its noise
+        return float(np.sqrt(max(value, 0.0))), u / (2 * root) if root > 0 else 0.0
+
+
+def places(y: Array, v: Array, hz: float, beside: float, spacing: int, tick_s: float, blocks: int) -> Places:
+    """H_j of position (n,) m and velocity (n,) m/s under a sine at `hz`, with whatever goes with `beside` Hz taken out.
+
+    Raises:
+        AnalysisError: a stretch has too few periods of the resets for the sine.
+    """
+    length = len(y) // blocks // spacing * spacing
+    if length < 8 * spacing:
+        raise AnalysisError(f"{hz:g} Hz: found {len(y)} samples; expected {8 * blocks * spacing} or more")
+    found, sizes = [], []
+    for b in range(blocks):
+        at = slice(b * length, (b + 1) * length)
+        t = (np.arange(length) + b * length) * tick_s
+        design = terms(t, hz, beside)
+        position = np.linalg.lstsq(design, y[at], rcond=None)[0]
+        phasor = position[1] - 1j * position[2]
+        rows = v[at].reshape(-1, spacing)
+        each = [np.linalg.lstsq(design[j::spacing], rows[:, j], rcond=None)[0] for j in range(spacing)]
+        out = np.array([c[1] - 1j * c[2] for c in each])
+        found.append(out / (2j * np.pi * hz * phasor))
+        sizes.append(abs(phasor))
+    return Places(np.array(found), float(np.mean(sizes)))
+
+
+def detuned(y: Array, hz: float, beside: float, tick_s: float) -> float:
+    """By how much of itself the frequency of a line in a position (n,) m is off `hz`, by the phases of both halves."""
+    half = len(y) // 2
+    t = np.arange(2 * half) * tick_s
+    phasors = []
+    for part in (slice(0, half), slice(half, 2 * half)):
+        found = np.linalg.lstsq(terms(t[part], hz, beside), y[part], rcond=None)[0]
+        phasors.append(found[1] - 1j * found[2])
+    return float(np.angle(phasors[1] / phasors[0]) / (2 * np.pi * hz * half * tick_s))
+
+
+def terms(t: npt.NDArray[Any], *lines: float) -> Array:
+    """A constant, and cosine and sine of each line, (n, 1 + 2 m)."""
+    waves = [f(2 * np.pi * hz * t) for hz in lines for f in (np.cos, np.sin)]
+    return np.column_stack([np.ones_like(t), *waves])
+
+
+def noise(
+    y: Array,
+    v: Array,
+    beside: float,
+    spacing: int,
+    tick_s: float,
+    blocks: int,
+    power: Callable[[npt.NDArray[Any]], Array],
+) -> Array:
+    """Noise of the velocity over that of the position (b,) 1/s, by stretch of a quiet record.
+
+    The position's noise is what is above half of the highest frequency, where the body itself does not move. Below MOVING_HZ it
+    does, and what the estimator makes of it is taken off: the spectrum of the position, less its noise, times `power`, the
+    estimator's own mean square per position, 1/s^2 of Hz. The velocity is without what goes with the place in the period and
+    with `beside` Hz.
+    """
+    length, out = len(y) // blocks // spacing * spacing, []
+    hz = np.fft.rfftfreq(length, tick_s)
+    slow = (hz > 0) & (hz < MOVING_HZ)
+    gained = power(hz[slow])
+    for b in range(blocks):
+        at = slice(b * length, (b + 1) * length)
+        design = terms((np.arange(length) + b * length) * tick_s, beside)
+        rows, left = v[at].reshape(-1, spacing), np.empty((length // spacing, spacing))
+        for j in range(spacing):
+            own = design[j::spacing]
+            left[:, j] = rows[:, j] - own @ np.linalg.lstsq(own, rows[:, j], rcond=None)[0]
+        free = len(rows) / (len(rows) - design.shape[1])
+        position = y[at] - design @ np.linalg.lstsq(design, y[at], rcond=None)[0]
+        spectrum = np.abs(np.fft.rfft(position)) ** 2 / length
+        white = float(spectrum[len(spectrum) // 2 : -1].mean())
+        moved = float(((spectrum[slow] - white) * gained).sum()) * 2 / length
+        out.append(np.sqrt(max(float((left**2).mean()) * free - moved, 0.0) / white))
+    return np.array(out)

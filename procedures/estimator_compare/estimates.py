@@ -1,0 +1,83 @@
+"""From captures to estimates: means over the repeats, and ratios of two estimators paired by them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.uncertainty import Estimate, Influence
+from procedures.estimator_compare import fit
+from procedures.estimator_compare.plan import Plan
+from procedures.estimator_compare.steps import ENGAGE, HANG, Taken, of_kind
+
+Array = npt.NDArray[np.float64]
+SWITCHED, LOADED = ("velocity_error", "disturbance_error", "y_50_100"), ("peak", "integral", "quiet", "velocity_noise")
+UNITS = {"velocity_error": "1", "disturbance_error": "N", "y_50_100": "m", "peak": "m", "integral": "m s", "quiet": "m",
+         "velocity_noise": "m/s"}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Result:
+    """By quantity and estimator the values (repeats,), the estimates, and those of ratios by quantity and pair."""
+
+    values: Mapping[str, Mapping[str, Array]]
+    estimates: Mapping[str, Mapping[str, Estimate]]
+    ratios: Mapping[str, Mapping[str, Estimate]]
+    taken: tuple[Taken, ...]
+
+
+def evaluate(taken: Sequence[Taken], plan: Plan, harmonic_hz: float) -> Result:
+    """Every estimate.
+
+    Raises:
+        AnalysisError: a switch or a load cannot be found in its capture.
+    """
+    values: dict[str, dict[str, Array]] = {name: {} for name in (*SWITCHED, *LOADED)}
+    for kind, names, of in ((ENGAGE, SWITCHED, plan.engaged), (HANG, LOADED, plan.loaded)):
+        for estimator in of:
+            some = of_kind(taken, kind, estimator)
+            found = np.array([_of_one(t, plan, harmonic_hz) for t in some])
+            for k, name in enumerate(names):
+                values[name][estimator] = found[:, k]
+    estimates = {name: {e: _mean(x, UNITS[name], f"{name}/{e}") for e, x in by.items()} for name, by in values.items()}
+    return Result(values, estimates, _ratios(values, plan), tuple(taken))
+
+
+def _of_one(t: Taken, plan: Plan, harmonic_hz: float) -> tuple[float, ...]:
+    expected = round(plan.lead_s / t.tick_s)
+    if t.kind == ENGAGE:
+        at = fit.switched_at(t.current, t.y, t.v, t.disturbance, expected, t.tick_s)
+        return (fit.velocity_error(t.y, t.v, at, t.tick_s), fit.ripple(t.disturbance, at, harmonic_hz, t.tick_s),
+                fit.later(t.y, at, t.tick_s))  # fmt: skip
+    at = fit.moved_at(t.y, expected, t.tick_s)
+    return (*fit.answer(t.y, at, t.tick_s), float(t.y[:at].std()), fit.above(t.v[:at], t.tick_s))
+
+
+def _mean(x: Array, unit: str, identity: str) -> Estimate:
+    u = float(x.std(ddof=1)) / math.sqrt(len(x))
+    return Estimate.of(
+        float(x.mean()), Influence(f"scatter/{identity}", "scatter of the repeats", u, unit, "A", "normal", len(x) - 1)
+    )
+
+
+def _ratios(values: Mapping[str, Mapping[str, Array]], plan: Plan) -> dict[str, dict[str, Estimate]]:
+    """Geometric means over the repeats, each of two estimators in the same repeat: the first over the last of those that are
+    switched, each other over the first of those that are loaded."""
+    pairs = {name: [(e, plan.engaged[-1]) for e in plan.engaged[:-1]] for name in SWITCHED}
+    pairs |= {name: [(e, plan.loaded[0]) for e in plan.loaded[1:]] for name in LOADED}
+    return {name: {f"{a} / {b}": _ratio(values[name][a], values[name][b], f"{name}/{a}/{b}") for a, b in of}
+            for name, of in pairs.items()}  # fmt: skip
+
+
+def _ratio(a: Array, b: Array, identity: str) -> Estimate:
+    count = min(len(a), len(b))
+    logs = np.log(a[:count] / b[:count])
+    value, u = math.exp(float(logs.mean())), float(logs.std(ddof=1)) / math.sqrt(count)
+    influence = Influence(
+        f"scatter/ratio/{identity}", "scatter of the repeats, paired", value * u, "1", "A", "normal", count - 1
+    )
+    return Estimate.of(value, influence)

@@ -1,0 +1,78 @@
+"""When the set point of a step acted, by the coil currents that answer it; which of them push, and which way."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.recording import Step
+from bench.rigfile import RigFile
+from procedures.amb_rotor.conventions import conventions
+from procedures.amb_rotor.onset import onset
+from procedures.step import capturing
+
+Array = npt.NDArray[np.float64]
+GONE = 0.25  # of the way: until then the currents push
+ANSWER = 0.25  # of the greatest change of the control current: where it first gets there, the step began
+SURELY_S, PLAIN, FEWEST = 5e-3, 8.0, 25  # before a quarter of the way; standard deviations; samples that tell them
+WINDOW_S = 1.5e-3  # of single readings, from the start on: the shaft has hardly moved
+
+
+def still_at(t_ns: npt.NDArray[np.int64], position: Array, written_ns: int) -> npt.NDArray[np.bool_]:
+    """Which of the samples at `t_ns` (n,) lie before the step, of which `position` (n,) is read: those before the set point was
+    written. Where the host's clock and the controller's do not agree, on a host that is late, the shaft goes before that by the
+    telemetry's times; then those from SURELY_S before it goes are none."""
+    rest: npt.NDArray[np.bool_] = np.asarray(t_ns <= written_ns)
+    known = position[rest][: int(rest.sum()) // 2]
+    if len(known) < FEWEST:
+        return rest
+    moved = np.abs(position - known.mean())
+    way = float(moved[-(len(moved) // 4) :].mean())
+    early = np.flatnonzero(rest & (moved > max(GONE * way, PLAIN * float(known.std()))))
+    return rest & (t_ns < t_ns[early[0]] - SURELY_S * 1e9) if len(early) else rest
+
+
+def kicks(control: Array, ends: Array, rest: npt.NDArray[np.bool_], first: int) -> tuple[float, ...]:
+    """Of each bearing's control current (k, n) what pushes at first, A: before the sample in which the shaft has gone a quarter
+    of its way in that bearing's own plane (k, n). Where the centre of mass is not between the bearings, one of them is there
+    long before the other."""
+    still = ends - ends[:, rest].mean(axis=1, keepdims=True)
+    until = [min(first + 3, before_it_moves(y, rest) - 1) for y in still]
+    return tuple(float(c[first : max(last, first + 1)].sum()) for c, last in zip(control, until, strict=True))
+
+
+def before_it_moves(position: Array, rest: npt.NDArray[np.bool_]) -> int:
+    """The sample at which the shaft has gone a quarter of its way, at least two after the write: until then the currents push
+    it there, from then on they brake it, and hold it where the magnets' negative stiffness helps it along."""
+    begin = int(np.flatnonzero(~rest)[0])
+    way = float(position[-(len(position) - begin) // 4 :].mean())
+    gone = np.flatnonzero(position[begin:] > GONE * way) if way > 0 else np.zeros(0, np.int64)
+    return begin + max(int(gone[0]) + 1 if gone.size else 40, 2)
+
+
+def answer(control: Array, rest: npt.NDArray[np.bool_], until: int) -> tuple[int, bool]:
+    """The first sample, before `until`, at which a bearing's control current (k, n) shows the step; the one after the write,
+    where none does."""
+    begin = int(np.flatnonzero(~rest)[0])
+    window = np.abs(control[:, begin:until]).max(axis=0)
+    noise = float(control[:, rest].std(axis=1).max())
+    if window.max() < 8 * noise:
+        return begin, False
+    return begin + int(np.argmax(window > max(ANSWER * window.max(), 4 * noise))), True
+
+
+def acted(rig: RigFile, step: Step, t: Array, control: Array, first: int, *, origin_ns: int, turning: bool) -> float:
+    """When the set point changed, s on the time `t` (n,) of samples that counts from `origin_ns`: finer than their period, by
+    the control currents (n,); by their single readings where the step was captured and nothing turns."""
+    machine, tick = conventions(rig), rig.devices["controller"].tick_s
+    period = float(np.median(np.diff(t)))
+    earliest, latest = t[first] - 1.8 * period, t[first] - 0.5 * period
+    single = (
+        None
+        if turning
+        else capturing.read_control(step, [machine.pair(a) for a in machine.along(str(step.labels["axis"]))])
+    )
+    if single is None:
+        return onset(t, control, earliest, latest, tick=tick, ticks=round(period / tick), lag_s=machine.lag_s)[0]
+    at: Array = np.asarray((single[0] - origin_ns) * 1e-9 + tick, np.float64)
+    return onset(at, single[1], earliest, latest, tick=tick, ticks=1, lag_s=machine.lag_s, window_s=WINDOW_S)[0]

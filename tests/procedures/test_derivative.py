@@ -1,0 +1,139 @@
+"""The response of an algebraic derivative through the whole path: bands, sidebands, a constant, noise; plants."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bench.cli.motion_truth import truth_of_motion
+from bench.cli.virtual import Simulated, simulated_run
+from bench.findings import Effect, Finding
+from bench.procedure import Measured
+from bench.rigfile import load_rig
+from bench.uncertainty import coverage_factor
+from procedures.derivative import fit
+from procedures.derivative.plan import Plan
+from procedures.derivative.procedure import BY_LINE, MEASURES, WHOLE, check, procedure, step_count
+from procedures.one_axis.bank import LITERAL, aligned, bank, literal
+from reports.figures import draw as draw_figure
+
+QUICK = {"lines_hz": (7.3, 15.1, 53.3, 90.7), "record_s": 2.0, "periods": 12}
+TABLE = [  # degree, spacing in ms, band by Euler, upper edge exact, noise gain, false derivative by Euler
+    (5, 6, (15, 90), 99, 2474, 27.8), (6, 6, (3, 117), 127, 3785, 1.75), (6, 9, (0.5, 80), 84, 2468, 0.52),
+    (7, 6, (25, 146), 154, 5428, 56.7), (7, 9, (13, 99), 103, 3512, 25.4), (7, 12, (8, 75), 77, 2594, 14.4),
+    (7, 18, (4, 50), 51, 1703, 6.4), (8, 9, (4, 118), 121, 4772, 2.0), (8, 12, (1, 89), 90, 3509, 0.85),
+    (9, 9, (18, 138), 139, 6272, None), (9, 12, (12, 104), 104, 4586, None),
+]  # fmt: skip
+
+
+def derived(folder: Path, seed: int = 1, truth: Mapping[str, float] | None = None, **plan: Any) -> Simulated:
+    return simulated_run("derivative", "amb1dof", seed, {**QUICK, **plan}, folder / "recording.mcap", truth)
+
+
+def wrong(run: Simulated) -> dict[str, Finding]:
+    return {r.code: r for r in run.results if isinstance(r, Finding) and r.effect is not Effect.NOTE}
+
+
+@pytest.mark.parametrize(("degree", "ms", "band", "high", "noise", "false"), TABLE)
+def test_bands_of_the_grid(
+    degree: int, ms: int, band: tuple[float, float], high: float, noise: float, false: float
+) -> None:
+    """The grid behind T Fig. 4.2, to the whole Hz that it is read with: the lower edge is Euler's alone."""
+    hz = np.concatenate([[0.1, 0.2, 0.5], np.arange(1.0, 201.0)])
+    euler, exact = (bank(degree, 10 * ms, rule, 1e-4) for rule in ("euler", "exact"))
+    inside, far = (hz[b.error(hz) < 0.293] for b in (euler, exact))
+    assert (inside[0], inside[-1]) == band
+    assert (far[0], far[-1]) == (0.1, high)
+    assert euler.noise_gain == pytest.approx(noise, abs=1)
+    assert false is None or euler.false_derivative == pytest.approx(false, rel=0.02)
+
+
+def test_literal_equations_are_off_by_more_than_the_derivative() -> None:
+    hz = np.array([10.0, 40.0, 80.0])
+    right = bank(7, 120, "exact", 1e-4).error(hz)
+    assert right == pytest.approx([0, 0.012, 0.334], abs=1e-3)
+    for which, error in zip(LITERAL, ((13.17, 3.30, 1.50), (79.02, 19.75, 10.05)), strict=True):
+        assert literal(7, 120, "exact", 1e-4, which).error(hz) == pytest.approx(error, abs=0.01)
+
+
+def test_places_of_a_known_estimator() -> None:
+    """A sine through weights, without noise: every response by its place, the gain and the error to rounding."""
+    weights, hz = bank(6, 90, "euler", 1e-4), 23.7
+    t = np.arange(20000) * 1e-4
+    y = 1e-4 * np.sin(2 * np.pi * hz * t + 0.4)
+    v = weights.applied(y, 17)
+    found = fit.places(y[179:], v, hz, 40.0, 90, 1e-4, 4)
+    own = weights.responses(np.array([hz]))[:, 0]
+    assert found.gain == pytest.approx(np.full(4, own.mean()), abs=1e-9)
+    assert found.error[0] == pytest.approx(float(weights.error(np.array([hz]))[0]), rel=1e-9)
+    assert aligned(weights.rows, y[179 - 179 :], np.concatenate([np.zeros(179), v])) == pytest.approx(
+        (17, 0.0), abs=1e-9
+    )
+
+
+def test_the_truth_is_recovered(tmp_path: Path) -> None:
+    run = derived(tmp_path)
+    truth = truth_of_motion(run)
+    assert wrong(run) == {}
+    measured = {
+        f"{m.quantity.name}@{m.where}".removesuffix("@"): m.estimate for m in run.results if isinstance(m, Measured)
+    }
+    assert {name.partition("@")[0] for name in measured} == {q.name for q in MEASURES}
+    assert measured.keys() == truth.keys()
+    off = {name: (e.value - truth[name]) / (coverage_factor(7) * e.u) for name, e in measured.items()}
+    assert max(map(abs, off.values())) < 1.4
+    assert np.sqrt(np.mean(np.square([*off.values()]))) < 0.7
+    assert measured["false_derivative"].value == pytest.approx(14.37, abs=0.1)
+    assert truth["edge_high"] == pytest.approx(75.6, abs=0.1)
+    figures = list(procedure.drawn(run.recording))
+    assert [f.key for f in figures] == ["error", "gain", "sidebands"]
+    for figure in figures:
+        assert draw_figure(figure)
+
+
+@pytest.mark.parametrize(
+    ("truth", "code", "looks"),
+    [
+        ({"literal_sign": 1}, "not-this-estimator", "degree 7 with + in (4.11)"),
+        pytest.param(
+            {"literal_weights": 1}, "not-this-estimator", "degree 7 without the sign of (4.15)", marks=pytest.mark.long
+        ),
+        pytest.param({"factor_window_s": 121 / 120}, "not-this-estimator", "spacing 12.1 ms", marks=pytest.mark.long),
+        pytest.param({"factor_degree": 8 / 7}, "not-this-estimator", "degree 8", marks=pytest.mark.long),
+        pytest.param({"sample_factor": 1.005}, "not-this-estimator", "Nor is it any other", marks=pytest.mark.long),
+        pytest.param({"factor_watched": 0}, "not-this-estimator", "Nor is it any other", marks=pytest.mark.long),
+        ({"factor_inject_hz": 1.001}, "line-detuned", "another frequency"),
+        ({"factor_inject_amplitude": 0}, "no-line", "at the injected line"),
+        pytest.param({"factor_inject_hz": 1.1}, "no-line", "at the injected line", marks=pytest.mark.long),
+    ],
+)
+def test_planted_defects_do_not_pass(tmp_path: Path, truth: dict[str, float], code: str, looks: str) -> None:
+    run = derived(tmp_path, 2, truth, lines_hz=(15.1, 53.3), record_s=1.5)
+    assert code in wrong(run)
+    assert looks in wrong(run)[code].text
+
+
+@pytest.mark.parametrize(
+    ("plan", "said"),
+    [
+        ({"lines_hz": (41.6, 60.0)}, "half of one"),
+        ({"lines_hz": (43.3, 60.0)}, "an image of the harmonic"),
+        ({"lines_hz": (15.0, 83.0)}, "a multiple of 1/eps"),
+        ({"lines_hz": (38.0, 60.0)}, "the harmonic"),
+        ({"lines_hz": (30.0, 15.0)}, "in order"),
+        ({"window_s": 0.01205}, "whole ticks"),
+        ({"lines_hz": (0.5, 60.0), "periods": 40}, "memory holds"),
+    ],
+)
+def test_a_plan_that_cannot_work_is_told(plan: dict[str, Any], said: str) -> None:
+    assert any(said in line for line in check(load_rig("amb1dof"), Plan(**plan)))
+
+
+def test_the_default_plan_fits() -> None:
+    assert [*check(load_rig("amb1dof"), Plan())] == []
+    assert step_count(Plan()) == 11
+    assert {q.name for q in (*BY_LINE, *WHOLE)} == {q.name for q in procedure.measures}
