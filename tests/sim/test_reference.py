@@ -142,7 +142,15 @@ def test_core_equals_the_reference_in_closed_loop() -> None:
         (CONTROL, START, {"encoder_sign": -1.0}),
         (dataclasses.replace(CONTROL, lag_compensation=1.0), START, {}),
     ],
-    ids=["motor carries", "step, T (6.9)", "step, T (6.24)", "sine, lever", "slip, exchanged", "encoder backwards", "lag compensated"],
+    ids=[
+        "motor carries",
+        "step, T (6.9)",
+        "step, T (6.24)",
+        "sine, lever",
+        "slip, exchanged",
+        "encoder backwards",
+        "lag compensated",
+    ],
 )
 def test_what_the_chain_adds_equals_the_reference(
     control: ControlParams, start: Sequence[float], change: dict[str, float]

@@ -143,8 +143,8 @@ def derivative(
     weight: float = 0.0,
     lever: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
 ) -> Array:
-    """Right-hand side of the mechanics, (14,), for tests against the reference. `segment` (4,) along the field that gamma turns,
-    complex where it has a part across it; `lever`: weight N, moment N m, how far it has slipped rad, inertia added to the
+    """Right-hand side of the mechanics, (14,), for tests against the reference. `segment` (4,) along the field that gamma
+    turns, complex where it has a part across it; `lever`: weight N, moment N m, how far it has slipped rad, inertia added to the
     shaft's kg m^2."""
     p = _ffi.new("tsbs_params *")
     fill(p, vars(params))
@@ -153,8 +153,8 @@ def derivative(
         return _ffi.new("double[]", [float(v) for v in x])
 
     out, along = _ffi.new("double[14]"), np.asarray(segment)
-    _lib.tsbs_derivative(p, c(s), c(coil), c(np.concatenate([along.real, along.imag])), c(np.zeros(4) if play is None else play), gamma, hung_mass,
-                         weight, c(np.array(lever)), out)  # fmt: skip
+    currents, lag = np.concatenate([along.real, along.imag]), np.zeros(4) if play is None else play
+    _lib.tsbs_derivative(p, c(s), c(coil), c(currents), c(lag), gamma, hung_mass, weight, c(np.array(lever)), out)
     return np.array(list(out))
 
 

@@ -164,7 +164,9 @@ def simulate(
     advance = advance or (lambda interval, s: runge_kutta(interval, s, 2))
     s, law = [float(x) for x in start], Law(c)
     coils, segments, follow = [0.0] * 10, [0j] * 4, [0.0] * RADIAL
-    held, along, turn = [0.0] * 10, [0j] * 4, 1 + 0j
+    held = [0.0] * 10
+    along: Sequence[complex] = [0j] * 4
+    turn = 1 + 0j
     hanging, before, weight = Hanging(0, 0.0, 0.0, 0.0), 0.0, 0.0
     driving, drive = Driving(0, 0.0, 0.0, 0.0, 0.0), None
     levering, lever, from_lever = Levering(0, 0.0, 0.0, 0.0, 0.0), EMPTY, EMPTY
@@ -216,9 +218,7 @@ def levered(p: PlantParams, to: Levering, before: Lever, now: Lever, tick: int, 
 def settled_coils(p: PlantParams, reference: Sequence[float], now_s: float) -> list[float]:
     """Currents that the amplifiers of the coils tend to, (10,) A. Each loop closes on its own sensor, errors included."""
     rows = zip(reference, p.coil_limit, p.current_offset, p.current_drift, p.current_gain, strict=True)
-    return [
-        max((clip(r, 0, limit) - offset - drift * now_s) / gain, 0.0) for r, limit, offset, drift, gain in rows
-    ]
+    return [max((clip(r, 0, limit) - offset - drift * now_s) / gain, 0.0) for r, limit, offset, drift, gain in rows]
 
 
 def settled_segments(p: PlantParams, reference: Sequence[complex], now_s: float) -> list[complex]:
