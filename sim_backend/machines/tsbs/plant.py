@@ -144,8 +144,8 @@ def derivative(
     lever: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
 ) -> Array:
     """Right-hand side of the mechanics, (14,), for tests against the reference. `segment` (4,) along the field that gamma
-    turns, complex where it has a part across it; `lever`: weight N, moment N m, how far it has slipped rad, inertia added to the
-    shaft's kg m^2."""
+    turns, complex where it has a part across it; `lever`: weight N, moment N m, how far it has slipped rad, inertia added to
+    the shaft's kg m^2."""
     p = _ffi.new("tsbs_params *")
     fill(p, vars(params))
 

@@ -49,8 +49,8 @@ EMPTY = Lever()
 @dataclass
 class Loads:
     """What acts on the mechanics besides its state: true currents (10,), (4,) complex in the stator's frame, hysteresis
-    lag (4,), hung mass kg and its weight N, the external drive and the lever; `held` are the coil currents (10,) at the start of
-    the tick, by which the drag goes."""
+    lag (4,), hung mass kg and its weight N, the external drive and the lever; `held` are the coil currents (10,) at the start
+    of the tick, by which the drag goes."""
 
     coil: Vector
     segment: Sequence[complex]
