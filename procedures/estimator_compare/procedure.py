@@ -37,7 +37,8 @@ VELOCITY = Quantity(
 DISTURBANCE = Quantity(
     "disturbance_error", "N", "RMS of the estimated disturbance less a constant and a sine, before the switch"
 )
-AFTER = Quantity("y_50_100", "m", "RMS position 50 to 100 ms after the compensation was switched on")
+AFTER = Quantity("y_50_100", "m", "RMS position 50 to 100 ms after the compensation was switched on",
+                 title="RMS position 50 to 100 ms")  # fmt: skip
 PEAK = Quantity("peak", "m", "greatest deviation of the position after a load is hung")
 INTEGRAL = Quantity("integral", "m s", "integral over 1 s of the deviation's size after a load is hung")
 QUIET = Quantity("quiet", "m", "standard deviation of the position before the load")
