@@ -98,7 +98,9 @@ def lines_clear(plan: Plan, harmonic_hz: float) -> Iterator[str]:
     for hz in plan.lines_hz:
         others = {"a multiple of 1/eps": 0.0, "the harmonic": harmonic_hz, "twice the line": 2 * hz, "three times the line": 3 * hz,
                   "the harmonic and two lines": harmonic_hz + 2 * hz, "the harmonic less two lines": harmonic_hz - 2 * hz}  # fmt: skip
-        apart = {name: (other - hz, other + hz) for name, other in others.items()} | {"half a multiple of 1/eps": (2 * hz,)}
+        apart = {name: (other - hz, other + hz) for name, other in others.items()} | {
+            "half a multiple of 1/eps": (2 * hz,)
+        }
         for name, each in apart.items():
             near = min(abs(x - rate * round(x / rate)) for x in each)
             if near < min(plan.clear_hz, hz * 0.9):

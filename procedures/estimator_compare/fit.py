@@ -6,6 +6,8 @@ of +-REACH_S that ends at CUT_HZ and delays nothing. It lacks the motion above C
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -23,6 +25,7 @@ LATER = (
     0.1,
 )  # s after the switch: what the feedback left of the transient is gone, what the estimate is wrong by is not
 WHOLE_S = 1.0  # of the integral
+TURNS, TRIED = 0.01, 21  # of the exciter's frequency: how far it may be off, and how many are tried within that
 
 
 def derivative(y: Array, tick_s: float) -> Array:
@@ -81,16 +84,25 @@ def velocity_error(y: Array, v: Array, until: int, tick_s: float) -> float:
     return rms(v[:until][inside] - true[inside]) / rms(true[inside])
 
 
-def ripple(disturbance: Array, until: int, hz: float, tick_s: float) -> float:
-    """RMS of the estimated disturbance (n,) N less a constant and a sine near `hz`, before sample `until`: what it is wrong
-    by, as far as it is not itself constant or at that frequency."""
-    x, t = disturbance[:until], np.arange(until) * tick_s
+def exciter_hz(disturbances: Sequence[Array], near: float, tick_s: float) -> float:
+    """The exciter's frequency, within TURNS of `near` Hz, of what was estimated of the disturbance, each (n,) N.
 
-    def left(f: float) -> float:
-        design = np.column_stack([np.ones(until), np.cos(2 * np.pi * f * t), np.sin(2 * np.pi * f * t)])
-        return rms(x - design @ np.linalg.lstsq(design, x, rcond=None)[0])
+    Least squares over all of them, each with its own scatter: they have one exciter, and one of them alone would take for its
+    sine what only looks like one for its few periods. The lowest of the tried frequencies, and a parabola through it.
+    """
+    tried = near * np.linspace(1 - TURNS, 1 + TURNS, TRIED)
+    cost = np.array([sum(len(x) * np.log(rms(besides(x, hz, tick_s))) for x in disturbances) for hz in tried])
+    k = int(np.clip(np.argmin(cost), 1, TRIED - 2))
+    left, least, right = cost[k - 1 : k + 2]
+    return float(tried[k] + (tried[1] - tried[0]) * (left - right) / (2 * (left - 2 * least + right)))
 
-    return min(left(f) for f in hz * np.linspace(0.99, 1.01, 9))
+
+def besides(x: Array, hz: float, tick_s: float) -> Array:
+    """What a disturbance (n,) N has besides a constant and a sine: what its estimate is wrong by, as far as that is not itself
+    constant or at the exciter's frequency."""
+    t = np.arange(len(x)) * tick_s
+    design = np.column_stack([np.ones(len(x)), np.cos(2 * np.pi * hz * t), np.sin(2 * np.pi * hz * t)])
+    return np.asarray(x - design @ np.linalg.lstsq(design, x, rcond=None)[0])
 
 
 def later(y: Array, at: int, tick_s: float) -> float:
