@@ -39,7 +39,8 @@ typedef struct {
     core_tones tones;
     double rest, lift_clock, injected, control;
     int64_t clock;
-    int32_t mode, fresh, warm, was_free;
+    int32_t mode, fresh, warm, was_free, degree;
+    double weight[9]; /* a_1p of that degree */
 } amb1_law_state;
 
 typedef struct {
