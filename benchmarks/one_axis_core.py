@@ -49,7 +49,8 @@ def ours() -> Callable[[], int]:
 def other(path: Path, folder: Path) -> Callable[[], int]:
     """A run of the other one, its C compiled with the core's flags; returns its ticks."""
     spec = spec_from_file_location("other_core", path)
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module: Any = module_from_spec(spec)
     spec.loader.exec_module(module)
     made = folder / "other.so"

@@ -71,7 +71,8 @@ static void overlapping(const amb1_params *p, const amb1_control *c, const amb1_
         found[k] = filtered(p, l, (int)c->rule, l->filter + k, y, 0);
         if (c->rule == EXACT && n[k] >= spacing) found[k] = l->warm >= n[k] ? weighted(table, l, n[k]) : 0;
     }
-    l->estimate[OVERLAPPING] = found[n[1] < n[0] ? 0 : 1];
+    int older = n[1] < n[0] ? 0 : 1;
+    l->estimate[OVERLAPPING] = found[p->swapped != 0 ? 1 - older : older];
 }
 
 void amb1_estimate(const amb1_params *p, const amb1_control *c, const amb1_table *table, amb1_law_state *l, double y) {
@@ -84,6 +85,12 @@ void amb1_estimate(const amb1_params *p, const amb1_control *c, const amb1_table
     l->estimate[DIFFERENCE] = l->filtered;
     alone(p, c, table + 1, l, y);
     overlapping(p, c, table, l, y);
+    if (p->late != 0) {
+        double now[4];
+        memcpy(now, l->estimate, sizeof now);
+        for (int k = SINGLE; k <= OVERLAPPING; k++) l->estimate[k] = l->before[k];
+        memcpy(l->before, now, sizeof now);
+    }
     l->clock++;
     if (l->warm < PAST) l->warm++;
 }
