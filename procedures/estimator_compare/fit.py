@@ -25,7 +25,7 @@ LATER = (
     0.1,
 )  # s after the switch: what the feedback left of the transient is gone, what the estimate is wrong by is not
 WHOLE_S = 1.0  # of the integral
-TURNS, TRIED = 0.01, 21  # of the exciter's frequency: how far it may be off, and how many are tried within that
+TURNS, TRIED = 0.05, 41  # of the exciter's frequency: how far it may be off, and how many are tried within that
 
 
 def derivative(y: Array, tick_s: float) -> Array:
@@ -89,10 +89,15 @@ def exciter_hz(disturbances: Sequence[Array], near: float, tick_s: float) -> flo
 
     Least squares over all of them, each with its own scatter: they have one exciter, and one of them alone would take for its
     sine what only looks like one for its few periods. The lowest of the tried frequencies, and a parabola through it.
+
+    Raises:
+        AnalysisError: it is none within TURNS.
     """
     tried = near * np.linspace(1 - TURNS, 1 + TURNS, TRIED)
     cost = np.array([sum(len(x) * np.log(rms(besides(x, hz, tick_s))) for x in disturbances) for hz in tried])
-    k = int(np.clip(np.argmin(cost), 1, TRIED - 2))
+    k = int(np.argmin(cost))
+    if k in (0, TRIED - 1):
+        raise AnalysisError(f"found no exciter within {TURNS:.0%} of {near:g} Hz, what the controller takes it for")
     left, least, right = cost[k - 1 : k + 2]
     return float(tried[k] + (tried[1] - tried[0]) * (left - right) / (2 * (left - 2 * least + right)))
 

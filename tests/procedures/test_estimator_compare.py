@@ -118,6 +118,8 @@ def test_the_exciter_is_found_among_what_the_resets_make() -> None:
     ]
     hz = fit.exciter_hz(some, 40.0, TICK)
     assert hz == pytest.approx(40.13, abs=0.03)
+    with pytest.raises(AnalysisError, match="no exciter"):
+        fit.exciter_hz(some, 43.0, TICK)
     assert fit.rms(fit.besides(some[0], hz, TICK)) == pytest.approx(math.sqrt(0.5 + 0.01), rel=0.05)
 
 
