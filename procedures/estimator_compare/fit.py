@@ -17,7 +17,8 @@ Array = npt.NDArray[np.float64]
 CUT_HZ, REACH_S = 400.0, 0.01
 OUTSTANDING = 1000.0  # times the variance without: a current that holds the disturbance
 NOISE_HZ = 100.0  # above the exciter and what the feedback does
-NEAR_S = 0.1  # of where the switch is expected
+NEAR_S = 0.1  # before where the switch is expected: none yet
+LATE_S = 0.4  # after it: what a request may take over a link that is busy
 SURE = 8.0  # standard deviations of a quiet position: moved
 EARLY_S = 5e-3  # before it is seen to move
 LATER = (
@@ -54,7 +55,7 @@ def switched_at(current: Array, y: Array, v: Array, disturbance: Array, expected
     near = round(NEAR_S / tick_s)
     a, b = y / np.abs(y).max(), v / np.abs(v).max()
     design = np.column_stack([np.ones(len(y)), a, b, a * a, a * b, a**3, a * a * b])
-    sure, late = slice(0, expected - near), slice(min(expected + near, len(y) - near // 2), len(y))
+    sure, late = slice(0, expected - near), slice(min(expected + round(LATE_S / tick_s), len(y) - near // 2), len(y))
     left = current - design @ np.linalg.lstsq(design[sure], current[sure], rcond=None)[0]
     share = float((left[late] @ disturbance[late]) / (disturbance[late] @ disturbance[late]))
     more = np.cumsum(left**2 - (left - share * disturbance) ** 2)  # by how much the second fits better so far
