@@ -21,7 +21,7 @@ from reports.figurestyle import GRID, INK, PALETTE, STYLE
 
 Array = npt.NDArray[np.float64]
 WIDE_IN = 6.85  # 174 mm: the A4 text block
-GOOD, BAD, PALE = "#0072B2", "#D55E00", "#cfd6dd"
+GOOD, BAD = "#0072B2", "#D55E00"
 KINDS = {  # first part of an influence's identity -> legend, colour
     "sensors": ("sensors: gains and offsets", PALETTE[0]),
     "masses": ("masses, buoyancy", PALETTE[1]),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from bench import display_units
@@ -38,11 +38,36 @@ def folded(record: Content, measurements: Sequence[Content], rows: Sequence[Resu
     return out
 
 
+@dataclass(frozen=True)
+class Vector:
+    """Of one name and place: amount and `expanded` in SI, `angle` in [0, 2 pi) and its half width `swings`, rad."""
+
+    amount: float
+    expanded: float
+    angle: float
+    swings: float
+
+    @property
+    def points(self) -> bool:
+        """Whether the angle says something."""
+        return self.swings <= MOST_ANGLE
+
+
+def vectors(record: Content) -> dict[tuple[str, Any], Vector]:
+    """By name without its end, and place."""
+    return {key: _vector(a, b, r) for key, a, b, r in _found(record)}
+
+
 def _told(record: Content) -> dict[tuple[str, Any], tuple[str, ...]]:
     """By name without its end, and place."""
+    return {key: _row(a, _vector(a, b, r)) for key, a, b, r in _found(record)}
+
+
+def _found(record: Content) -> Iterator[tuple[tuple[str, Any], Content, Content, float]]:
+    """Key, both components and their correlation."""
     measurements = [m for m in record.get("measurements") or () if isinstance(m, Mapping)]
-    pairs = _pairs(measurements, _coefficients(record, measurements))
-    return {(str(a["name"]).removesuffix(COS), a.get("where")): _row(a, b, r) for a, b, r in pairs}
+    for a, b, r in _pairs(measurements, _coefficients(record, measurements)):
+        yield (str(a["name"]).removesuffix(COS), a.get("where")), a, b, r
 
 
 def _pairs(
@@ -79,19 +104,23 @@ def _same_vector(a: Content, b: Content) -> bool:
     return len(stems) == 1 and a.get("where") == b.get("where")
 
 
-def _row(cosine: Content, sine: Content, r: float) -> tuple[str, ...]:
+def _vector(cosine: Content, sine: Content, r: float) -> Vector:
     """Amount and angle with their half widths, linear in those of the components and their correlation."""
     c, s = float(cosine["value"]), float(sine["value"])
     u, v = (float(m.get("expanded_uncertainty") or 0.0) for m in (cosine, sine))
     size = math.hypot(c, s)
     along = math.sqrt(max(0.0, (c * u) ** 2 + (s * v) ** 2 + 2 * r * c * s * u * v)) / size if size else max(u, v)
     across = math.sqrt(max(0.0, (s * u) ** 2 + (c * v) ** 2 - 2 * r * c * s * u * v)) / size**2 if size else math.inf
-    symbol, one = display_units.of_result(str(cosine.get("unit") or ""), size)
-    known = across <= MOST_ANGLE
+    return Vector(size, along, math.atan2(s, c) % (2 * math.pi), across)
+
+
+def _row(cosine: Content, v: Vector) -> tuple[str, ...]:
+    symbol, one = display_units.of_result(str(cosine.get("unit") or ""), v.amount)
+    angle = text.result(math.degrees(v.angle), math.degrees(v.swings), "deg") if v.points else text.DASH
     return (
         str(cosine["name"]).removesuffix(COS).replace("_", " "),
         tables.place(cosine),
-        text.result(size / one, along / one, symbol),
-        text.with_unit(text.significant(2 * size / one, 3), symbol) if cosine.get("unit") == "m" else text.DASH,
-        text.result(math.degrees(math.atan2(s, c)) % 360, math.degrees(across), "deg") if known else text.DASH,
+        text.result(v.amount / one, v.expanded / one, symbol),
+        text.with_unit(text.significant(2 * v.amount / one, 3), symbol) if cosine.get("unit") == "m" else text.DASH,
+        angle,
     )

@@ -36,11 +36,12 @@ def show_abilities(rig: str) -> int:
         ConfigError: there is no such rig, or its file has problems; every one is in it.
     """
     with _nothing_collected():
+        from bench.cli import sampled
         from bench.cli.abilities import abilities, listed
         from bench.rigfile import load_rig
 
         loaded = load_rig(rig)
-        sys.stdout.write(f"procedures on {loaded.name}\n{listed(abilities(loaded), rig)}")
+        sys.stdout.write(f"procedures on {loaded.name}\n{listed(abilities(loaded), rig)}{sampled.told(loaded)}")
     return PASS
 
 
@@ -74,7 +75,7 @@ def _load_line(load: BusLoad) -> str:
 def check_rig_file(rig: str, procedure: str = "") -> int:
     """Every problem of a rig file with file, key, found and expected, on standard error, what protects it and which
     procedures it can run; 2 if there is a problem, or if it cannot run the one that is asked for."""
-    from bench.cli import protected
+    from bench.cli import protected, sampled
     from bench.cli.abilities import Ability, abilities, told, unknown_plans
     from bench.rigfile.check import as_far_as_read, check_rig
 
@@ -98,9 +99,11 @@ def check_rig_file(rig: str, procedure: str = "") -> int:
     if procedure:
         lines = [line for a in able for line in (*a.lacking, *a.unfit)]
         sys.stdout.write("\n  ".join([f"{path} {'cannot' if lines else 'can'} run {procedure}", *lines]) + "\n")
+        sys.stdout.write(sampled.told(file) if file is not None and not problems else "")
         return USAGE if problems or lines else PASS
     sys.stdout.write(protected.told(file) + _of_certificates(file) if file is not None and not problems else "")
     sys.stdout.write(told(able, rig) if able else "")
+    sys.stdout.write(sampled.told(file) if file is not None and not problems else "")
     return USAGE if problems else PASS
 
 

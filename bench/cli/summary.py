@@ -7,16 +7,14 @@ import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from bench import display_units
+from bench.cli.result_rows import Row, rows, spread, titled
 from bench.findings import Effect
 from bench.record.limits import Verdict
 from bench.record.outcomes import Outcome, outranking
-from bench.record.records import FindingEntry, LimitEntry, Measurement, Record
+from bench.record.records import FindingEntry, Record
 from bench.record.specs import NOT_APPLIED
-from bench.uncertainty import stated
 
 SHOWN = 12  # results, unless all are asked for
-ORDER = (Verdict.FAIL, Verdict.INDETERMINATE, Verdict.MISSING, Verdict.PASS, Verdict.NONE)
 LABEL = 9  # columns of "judged", "report" and their like
 REPORTS = ("report.html", "report.pdf")
 
@@ -27,7 +25,7 @@ def summary(record: Record, directory: Path, *, whole: bool = False, width: int 
     measured = [m for m in record.measurements if not (ended and m.value is None)]
     deciding = [f for f in record.findings if f.effect is not Effect.NOTE]
     notes = [f for f in record.findings if f.effect is Effect.NOTE]
-    results = sorted(measured, key=lambda m: ORDER.index(m.verdict))
+    results = rows(record, measured)
     shown = results if whole else _first(results)
     lines = [f"{record.outcome.value.upper()}: {record.procedure} on {record.rig}"]
     lines += _labelled("decided", _decided(record, deciding), width)
@@ -43,10 +41,10 @@ def summary(record: Record, directory: Path, *, whole: bool = False, width: int 
     return "\n".join([*lines, *_labelled("see", there[:1] or [str(directory)], None)]) + "\n"
 
 
-def _first(results: Sequence[Measurement]) -> Sequence[Measurement]:
-    """The judged ones; where nothing was judged, the first."""
-    judged = [m for m in results if m.verdict is not Verdict.NONE]
-    return (judged or results)[:SHOWN]
+def _first(results: Sequence[Row]) -> Sequence[Row]:
+    """The judged ones; where nothing was judged, the first of each quantity."""
+    judged = [r for r in results if r.verdict is not Verdict.NONE]
+    return judged[:SHOWN] if judged else spread(results, SHOWN)
 
 
 def _decided(record: Record, deciding: Sequence[FindingEntry]) -> list[str]:
@@ -54,11 +52,11 @@ def _decided(record: Record, deciding: Sequence[FindingEntry]) -> list[str]:
     failed: dict[tuple[str, ...], list[str]] = {}
     for m in record.measurements:
         if m.verdict is Verdict.FAIL:
-            failed.setdefault(outranking(m, record.findings), []).append(_name(m))
+            failed.setdefault(outranking(m, record.findings), []).append(titled(m.name, m.where))
     lines = [_some("outside its limit" + (f", but outranked by {', '.join(codes)}" if codes else ""), names)
              for codes, names in sorted(failed.items())]  # fmt: skip
     lines += [_finding(f) for f in deciding]
-    crossing = [_name(m) for m in record.measurements if m.verdict is Verdict.INDETERMINATE]
+    crossing = [titled(m.name, m.where) for m in record.measurements if m.verdict is Verdict.INDETERMINATE]
     lines += [_some("crosses a limit", crossing)] if crossing else []
     if record.outcome is Outcome.DONE:
         lines = ["no acceptance limit was applied", *(f.text for f in record.findings if f.code == NOT_APPLIED)]
@@ -69,49 +67,20 @@ def _some(words: str, names: Sequence[str]) -> str:
     return f"{words}: {'; '.join(names[:3])}" + (f" and {len(names) - 3} more" if len(names) > 3 else "")
 
 
-def _table(results: Sequence[Measurement], width: int) -> list[str]:
+def _table(results: Sequence[Row], width: int) -> list[str]:
     """A line each: name with its place, value, verdict, limit. Where that is wider than `width`, limits that were met are left
     to the report, and the others stand on lines of their own."""
-    rows = [
-        (_name(m), _value(m), "" if m.verdict is Verdict.NONE else m.verdict.value, _limit(m.limit)) for m in results
-    ]
-    widths = [max((len(row[k]) for row in rows), default=0) for k in range(3)]
-    lines = ["  ".join(text.ljust(w) for text, w in zip(row, [*widths, 0], strict=True)).rstrip() for row in rows]
+    told_of = [(r.name, r.value, "" if r.verdict is Verdict.NONE else r.verdict.value, r.limit) for r in results]
+    widths = [max((len(row[k]) for row in told_of), default=0) for k in range(3)]
+    lines = ["  ".join(text.ljust(w) for text, w in zip(row, [*widths, 0], strict=True)).rstrip() for row in told_of]
     if max(map(len, lines), default=0) <= width:
         return lines
     told: list[str] = []
-    for m, row in zip(results, rows, strict=True):
+    for r, row in zip(results, told_of, strict=True):
         told.append("  ".join(text.ljust(w) for text, w in zip(row[:3], widths, strict=True)).rstrip())
-        if row[3] and m.verdict is not Verdict.PASS:
+        if row[3] and r.verdict is not Verdict.PASS:
             told.append(f"  {row[3]}")
     return told
-
-
-def _name(m: Measurement) -> str:
-    return f"{m.name} ({m.where})" if m.where else m.name
-
-
-def _value(m: Measurement) -> str:
-    if m.value is None or m.expanded_uncertainty is None:
-        return "not measured"
-    symbol, one = display_units.of_result(m.unit, max(abs(m.value), m.expanded_uncertainty))
-    return f"{stated(m.value / one, m.expanded_uncertainty / one)}{_unit(symbol)}".replace("+-", "±")
-
-
-def _limit(limit: LimitEntry | None) -> str:
-    """Its range in the unit in which its ends are told."""
-    if limit is None:
-        return ""
-    symbol, one = display_units.of_result(limit.unit, max(abs(x) for x in (limit.low, limit.high) if x is not None))
-    unit = _unit(symbol)
-    low, high = (None if x is None else f"{x / one:.4g}" for x in (limit.low, limit.high))
-    if low is None:
-        return f"at most {high}{unit}"
-    return f"at least {low}{unit}" if high is None else f"{low} to {high}{unit}"
-
-
-def _unit(symbol: str) -> str:
-    return "" if symbol == "1" else f" {symbol}".replace(" u", " µ")
 
 
 def _finding(f: FindingEntry) -> str:

@@ -1,16 +1,13 @@
 """What hung masses pull at: by the rig file's tables, which axes of the bearings feel them, and how much of it each.
 
 A weight W on a hook pulls down, or over a pulley to one side. A bearing whose axes look along a and b, which need not be at
-right
-angles, answers a pull of 1 N at its plane by c_a along a and c_b along b, both together a force of 1 N against the pull:
-with the
-angle o of that force
+right angles, answers a pull of 1 N at its plane by c_a along a and c_b along b, both together a force of 1 N against the pull:
+with the angle o of that force
 
     c_a = sin(b - o)/sin(b - a)        c_b = sin(o - a)/sin(b - a)
 
 At right angles c is the cosine of the angle between axis and force. An axis that feels less than a quarter of the pull (75.5
-degrees
-from it and more) is not calibrated by it: the error of its direction would be most of what it feels.
+degrees from it and more) is not calibrated by it: the error of its direction would be most of what it feels.
 """
 
 from __future__ import annotations
@@ -35,11 +32,9 @@ BRANCHES = {"i": "inboard AMB", "o": "outboard AMB"}
 
 @dataclass(frozen=True)
 class Loaded:
-    """An axis that a pull loads. `key` is how results call it inside of the analysis, `title` how the reader knows it;
-    `plane` 0 of
-    the bearing nearer to the near end, 1 of the other; `lean` is c of the page's equation, `mate` the other axis of its
-    `bearing`;
-    `plumb`: it looks along the pull, so that the directions' errors do not matter."""
+    """An axis that a pull loads. `key` is how results call it inside of the analysis, `title` how the reader knows it; `plane`
+    0 of the bearing nearer to the near end, 1 of the other; `lean` is c of the page's equation, `mate` the other axis of its
+    `bearing`; `plumb`: it looks along the pull, so that the directions' errors do not matter."""
 
     key: str
     name: str
@@ -61,8 +56,7 @@ class Loaded:
 @dataclass(frozen=True)
 class Pull:
     """What is hung on one hook. `axes` are calibrated, `across` feel too little of it; `direction` in which it pulls, rad,
-    math.pi
-    is down; `sideways`: by a pulley."""
+    math.pi is down; `sideways`: by a pulley."""
 
     hook: str
     axes: tuple[Loaded, ...]
@@ -91,9 +85,8 @@ SERVOMOTOR = Pull("", (_plain("i", 0), _plain("o", 1)))
 
 
 def leans(pull: Pull, p: Mapping[str, float]) -> list[float | None]:
-    """c of each axis by the model's inputs; None is 1. `p` has "at_<axis>" rad of axes that are not plumb, "misalignment"
-    rad and
-    "friction" of a pulley, "tilt" rad of a shaft that does not lie."""
+    """c of each axis by the model's inputs; None is 1. `p` has "at_<axis>" rad of axes that are not plumb, "misalignment" rad
+    and "friction" of a pulley, "tilt" rad of a shaft that does not lie."""
     out: list[float | None] = []
     for axis in pull.axes:
         share = _lean(axis, pull, p) if not axis.plumb else None if axis.lean > 0 else -1.0  # -1: it looks down

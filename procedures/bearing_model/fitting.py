@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from bench.rigfile import RigFile
+from procedures.amb_rotor import rings
 from procedures.amb_rotor.conventions import conventions
 from procedures.amb_rotor.laws import of_laws
-from procedures.bearing_model.grid import find_room, most, places
+from procedures.bearing_model.grid import find_room, most, places, protected, reach
 from procedures.bearing_model.plan import Plan
 
 
@@ -22,17 +23,32 @@ def check(rig: RigFile, plan: Plan) -> Iterable[str]:
     room = find_room(rig)
     radius = plan.radius_m or most(rig)
     if radius > room:
-        yield (
-            f"radius_m: found {radius * 1e6:.1f} µm; the ring, the sensors' zeros and their runout leave {room * 1e6:.1f} µm"
-        )
+        yield (f"radius_m: found {radius * 1e6:.1f} µm; {_nearest(rig)} leave {room * 1e6:.1f} µm")
     for name, value in (*machine.point("y", radius).items(), *machine.point("z", radius).items()):
-        if abs(value) > rig.parameters[name].high:
-            yield f"radius_m: found {radius * 1e6:.1f} µm; {name} goes to {rig.parameters[name].high * 1e6:.0f} µm"
-    arm = max(abs(p.arm.value) for p in machine.stations.probes.values())
-    tilted = machine.point("psi", plan.tilt_rad)
-    if any(abs(value) > rig.parameters[name].high for name, value in tilted.items()) or plan.tilt_rad * arm > room:
-        yield f"tilt_rad: found {plan.tilt_rad * 1e6:.0f} µrad; reference and ring allow less"
+        if abs(value) > reach(rig, name):
+            yield f"radius_m: found {radius * 1e6:.1f} µm; {name} goes to {reach(rig, name) * 1e6:.0f} µm"
+    if plan.tilt_rad > (most_tilted := _tilted(rig)):
+        yield (
+            f"tilt_rad: found {plan.tilt_rad * 1e6:.0f} µrad; set points, {_nearest(rig)} leave {most_tilted * 1e6:.0f} µrad"
+        )
     yield from _biases(rig, plan)
+
+
+def _nearest(rig: RigFile) -> str:
+    """What ends the room."""
+    if protected(rig) < rings.room(rig):
+        return "the limits of the probes (envelope, protect) and a margin"
+    return "the ring, the sensors' zeros and their runout"
+
+
+def _tilted(rig: RigFile) -> float:
+    """The greatest tilt, rad, that set points, probes and rings leave."""
+    machine = conventions(rig)
+    s = machine.stations
+    arms = [*(p.arm for p in s.probes.values()), *(ring.arm for ring in s.rings if ring.arm is not None)]
+    arm = max(abs(a.value) for a in arms)
+    points = {**machine.point("psi", 1.0), **machine.point("theta", 1.0)}
+    return min([find_room(rig) / arm, *(reach(rig, name) / abs(v) for name, v in points.items() if v)])
 
 
 def _biases(rig: RigFile, plan: Plan) -> Iterator[str]:

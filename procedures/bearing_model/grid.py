@@ -6,6 +6,7 @@ import itertools
 import math
 
 from bench.rigfile import RigFile
+from bench.rigfile.protection import of_channels
 from procedures.amb_rotor import rings
 from procedures.amb_rotor.conventions import conventions
 from procedures.bearing_model.plan import Plan
@@ -38,15 +39,26 @@ def biases(rig: RigFile, plan: Plan) -> tuple[float, ...]:
 
 
 def find_room(rig: RigFile) -> float:
-    """What ring, zeros, runout and envelope leave of the radius, m."""
-    return min(rings.room(rig), rig.envelope.max_levitated_position_m) - MARGIN
+    """What ring, zeros, runout and protection leave of the radius, m."""
+    return min(rings.room(rig), protected(rig)) - MARGIN
+
+
+def protected(rig: RigFile) -> float:
+    """How far from zero the nearest limit of a radial probe is while the shaft is held, m; infinite where there is none."""
+    probes = conventions(rig).stations.probes
+    return min((min(p.high, -p.low) for p in of_channels(rig) if p.name in probes), default=math.inf)
 
 
 def most(rig: RigFile) -> float:
-    """Of the radius, m, by ring, envelope and set points: to whole micrometres."""
+    """Of the radius, m, by ring, protection and set points: to whole micrometres."""
     machine = conventions(rig)
-    highs = [rig.parameters[name].high / abs(value) for c in "yz" for name, value in machine.point(c, 1.0).items()]
+    highs = [reach(rig, name) / abs(value) for c in "yz" for name, value in machine.point(c, 1.0).items()]
     return math.floor(USED * min(find_room(rig), *highs) * 1e6) * 1e-6
+
+
+def reach(rig: RigFile, parameter: str) -> float:
+    """How far a set point goes to either side, m or rad."""
+    return min(rig.parameters[parameter].high, -rig.parameters[parameter].low)
 
 
 def tilts(plan: Plan) -> list[tuple[float, float]]:

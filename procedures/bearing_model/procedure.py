@@ -34,6 +34,7 @@ from procedures.bearing_model.grid import biases, count_places, places, tilts
 from procedures.bearing_model.inputs import as_printed, lacking
 from procedures.bearing_model.plan import Plan
 from procedures.bearing_model.stillness import await_still
+from procedures.bearing_model.walking import Place, go
 from procedures.shared import assumptions, first_look
 
 OF_LINEAR = {
@@ -60,6 +61,8 @@ SLOPES = {
 """Of stands other than that of the thesis, whose results are beta and offset."""
 MEASURES = (*BY_AXIS.values(), *SLOPES.values(), *OF_LINEAR.values())
 REST_S = 0.3
+CENTRE: Place = {"y": 0.0, "z": 0.0}
+UPRIGHT: Place = {"psi": 0.0, "theta": 0.0}
 FAR = 3  # times as long as from place to place
 BIAS_STEP_A = 0.1
 REACHED = ("sensors/*", "!sensors/pos_*/offset", "!sensors/i_?o_p/gain", "geometry/amb_gap", "geometry/coupling_stiffness",
@@ -95,25 +98,25 @@ def acquire(rig: Rig, plan: Plan, record: Recorder) -> None:
     if not _lift(rig, record):
         return
     rig.clock.sleep(3 * plan.settle_s)
-    tilted = _tilt(rig, plan, record)
+    tilted, at = _tilt(rig, plan, record), CENTRE
     for k, bias in enumerate(biases(rig.file, plan)):
         if plan.biases_A:
             _set_bias(rig, plan, bias)
         if not as_printed(
             rig.file
         ):  # to the first place it is far; the stand of the thesis has recordings without a wait
-            lift.write(rig, machine.points(dict(zip("yz", _first_of(rig.file, plan, k), strict=True))))
+            at = go(rig, plan, at, dict(zip("yz", _first_of(rig.file, plan, k), strict=True)))
             rig.clock.sleep(FAR * plan.settle_s)
             await_still(rig, record, machine.currents)
         held = []
         for y, z in places(rig.file, plan) if k % 2 == 0 else reversed(places(rig.file, plan)):
-            lift.write(rig, machine.points({"y": y, "z": z}))
+            at = go(rig, plan, at, {"y": y, "z": z})
             rig.clock.sleep(plan.settle_s)
             with record.step(HOLD, y_m=y, z_m=z, **({"bias_A": bias} if math.isfinite(bias) else {})):
                 held.append(_watched(rig, plan, record))
         if k == 0 and not first_look.passes(rig, record, _of_first(rig.file, plan, held, tilted)):
             return
-    lift.write(rig, machine.points({"y": 0.0, "z": 0.0}))
+    go(rig, plan, at, CENTRE)
     rig.clock.sleep(plan.settle_s)
 
 
@@ -162,13 +165,13 @@ def _of_first(
 
 def _tilt(rig: Rig, plan: Plan, record: Recorder) -> list[dict[str, float]]:
     seen = []
-    machine = conventions(rig.file)
+    at: Place = UPRIGHT
     for psi, theta in tilts(plan):
-        lift.write(rig, machine.points({"psi": psi, "theta": theta}))
+        at = go(rig, plan, at, {"psi": psi, "theta": theta})
         rig.clock.sleep(plan.settle_s)
         with record.step(TILT, psi_rad=psi, theta_rad=theta):
             seen.append(_watched(rig, plan, record))
-    lift.write(rig, machine.point("theta", 0.0))
+    lift.write(rig, conventions(rig.file).point("theta", 0.0))
     return seen
 
 

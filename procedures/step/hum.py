@@ -17,13 +17,14 @@ from bench.findings import Effect, Finding
 from bench.uncertainty import interval
 from procedures.step.checks import touched
 from procedures.step.estimates import Result
-from procedures.step.steps import Case, Done, by_group
+from procedures.step.steps import ORDERS, Case, Done, by_group
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 NO_POLES: Complex = np.zeros(0, np.complex128)
 LOWEST_HZ, FEWEST = 10.0, 100  # below it a rest has too few periods; samples of a rest
 SIDES = 4, 8  # bins beside a line that tell what lies under it; a window of Hann has two
+WIDE = 3.0  # bins about an order that are its own: a window of Hann has two, and a line is not at a bin
 CLEAR = 6.0  # times that, in power: the mean of 16 rests is there once in 1e12, a swing of damping 0.2 has 2
 MATTERS = 0.5  # of an overshoot's U: less moves nothing that is told
 
@@ -36,16 +37,19 @@ def find_hum(steps: Sequence[Done], results: Mapping[Case, Result]) -> Iterator[
     for group, of in by_group(list(steps)).items():
         doubts = [interval(r.estimates["overshoot"]).U * c.size for c, r in results.items()
                   if c.group == group and "overshoot" in r.estimates]  # fmt: skip
-        hz, amplitude = line([d.rest for d in of], float(np.median(np.diff(of[0].t))), poles)
+        turned = [n * float(np.mean([d.speeds for d in of])) / (2 * np.pi) for n in ORDERS]
+        hz, amplitude = line([d.rest for d in of], float(np.median(np.diff(of[0].t))), poles, turned)
         if doubts and amplitude > MATTERS * min(doubts):
             text = (f"while the shaft rests before the steps its position swings by {amplitude * 1e6:.2g} µm at {hz:.3g} Hz: "
                     "mains hum in probes or cables, or something that shakes the stand; and so do the responses.")  # fmt: skip
             yield Finding("hum", text, group, Effect.INDETERMINATE, touched(of, steps))
 
 
-def line(rests: Sequence[Array], period: float, poles: Complex = NO_POLES) -> tuple[float, float]:
+def line(
+    rests: Sequence[Array], period: float, poles: Complex = NO_POLES, orders: Sequence[float] = ()
+) -> tuple[float, float]:
     """Frequency, Hz, and amplitude, m, of the plainest line in the mean spectrum of rests with samples every `period` s; zeros
-    where there is none. `poles` are the loop's, rad/s."""
+    where there is none. `poles` are the loop's, rad/s; `orders` of the shaft, Hz, are no lines of it."""
     many = min(map(len, rests))
     if many < FEWEST:
         return 0.0, 0.0
@@ -54,6 +58,7 @@ def line(rests: Sequence[Array], period: float, poles: Complex = NO_POLES) -> tu
     power = np.mean([np.abs(np.fft.rfft(x * window)) ** 2 for x in still], axis=0)
     first, beside = max(round(LOWEST_HZ * many * period), SIDES[1] + 1), np.arange(SIDES[0], SIDES[1] + 1)
     at = np.arange(first, len(power) - SIDES[1])
+    at = at[[all(abs(k - hz * many * period) > WIDE for hz in orders) for k in at]]
     if not len(at):
         return 0.0, 0.0
     hill = _hill(np.arange(len(power)) / (many * period), poles)

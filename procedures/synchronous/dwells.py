@@ -27,7 +27,7 @@ from procedures.synchronous import facts, mark
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
-DWELL, SLOW, AGAIN = "dwell", "slow-roll", "again"
+DWELL, SLOW = "dwell", "slow-roll"
 ORDERS = (1.0, 2.0, 3.0)
 TELLS = 0.4  # of the telemetry's rate: what is above is not stated
 

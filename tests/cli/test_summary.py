@@ -82,3 +82,30 @@ def test_results_that_are_too_wide_leave_limits_that_were_met_to_the_report(tmp_
     shown = [line for line in lines if "±" in line or line.strip().startswith("at most")]
     assert max(map(len, shown)) <= 80
     assert [line.split()[-1] for line in shown] == ["fail", "µm", "pass"]
+
+
+def test_vectors_that_nothing_judged_are_told_by_amount_and_angle(tmp_path: Path) -> None:
+    """3 and 4 µm with 0.4 µm each: 5 µm at 53.13 degrees, with 0.4 µm and 0.4/5 rad."""
+    found = [result("vector_cos", Verdict.NONE, 3e-6, "yi"), result("vector_sin", Verdict.NONE, 4e-6, "yi"),
+             result("residual_cos", Verdict.PASS, 1e-6), result("residual_sin", Verdict.NONE, 1e-6)]  # fmt: skip
+    told = summary(record(Outcome.PASS, *found), tmp_path, whole=True)
+    assert "vector (yi)   5.00 ± 0.40 µm ∠ 53.1 ± 4.6°\n" in told
+    assert "vector_cos" not in told
+    assert "residual_cos  1.00 ± 0.40 µm  " in told
+    assert "residual_sin  1.00 ± 0.40 µm\n" in told
+
+
+def test_no_quantity_crowds_out_the_others(tmp_path: Path) -> None:
+    """Twelve lines of 20 values of one quantity and 3 of another; of each the one of no particular place first."""
+    found = [*(result("reading", Verdict.NONE, where=f"{k}") for k in range(20)),
+             *(result("d_max", Verdict.NONE, where=w) for w in ("a", "b", ""))]  # fmt: skip
+    lines = summary(record(Outcome.DONE, *found), tmp_path).splitlines()
+    listed = [line for line in lines if " µm" in line]
+    assert len(listed) == 12
+    assert [line.split("12.30")[0].removeprefix("  results").strip() for line in listed[-4:]] == [
+        "reading (8)",
+        "d_max",
+        "d_max (a)",
+        "d_max (b)",
+    ]
+    assert "11 more results" in lines[-2]

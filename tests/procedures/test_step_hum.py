@@ -51,6 +51,12 @@ def test_the_swing_of_a_loop_that_is_hardly_damped_is_no_line(damping: float) ->
     assert amplitude == pytest.approx(2e-7, rel=0.2)
 
 
+def test_what_turns_with_the_shaft_is_no_line_and_hum_beside_it_is_one() -> None:
+    """What is left of an orbit at 3000 r/min was taken for hum, and the steps of sound stands ended INDETERMINATE."""
+    assert line(rests(5e-8), PERIOD, orders=(50, 100)) == (0.0, 0.0)
+    assert line(rests(5e-8), PERIOD, orders=(35, 70))[0] == pytest.approx(50, abs=2)
+
+
 def test_rests_that_are_too_short_say_nothing() -> None:
     assert line([x[:80] for x in rests(5e-8)], PERIOD) == (0.0, 0.0)
 

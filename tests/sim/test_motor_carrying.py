@@ -128,7 +128,8 @@ def test_segment_amplifier_closes_on_its_own_sensor() -> None:
     plant = Plant(dataclasses.replace(p, segment_drift=(0.0, 0.1, 0.0, 0.0)), control=released)
     plant.mode = LEVITATE
     plant.run(10000)
-    read, true = plant.run(10)[-1][SEGMENTS], plant.state()["segment"]
+    read, state = plant.run(10)[-1][SEGMENTS], plant.state()
+    true = (state["segment"] / state["turn"]).real
     assert read[0] == pytest.approx(1.0, abs=1e-3)
     assert true[0] == pytest.approx((1 - 0.05) / 0.98, abs=1e-3)
     assert true[1] - true[3] == pytest.approx(-0.1 * plant.tick * 1e-4, abs=1e-3)  # it drifts, and the loop follows

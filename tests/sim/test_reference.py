@@ -80,7 +80,7 @@ def run_core(
     plant = Plant(p, control=c)
     plant.set_state(np.array(start))
     plant.mode = LEVITATE
-    states, currents = [np.array(start)], [np.zeros(14)]
+    states, currents = [np.array(start)], [np.zeros(14, complex)]
     for tick in range(ticks):
         for h in (h for h in hangings if h.tick == tick):
             plant.load(h.mass_kg, h.weight_N, h.ramp_s)
@@ -109,10 +109,12 @@ def test_right_hand_side_equals_the_core(spread: float) -> None:
     p, touched = blemished(), 0
     for _ in range(200):
         s = scale * rng.normal(size=14) * np.where(np.arange(14) < 5, spread, 1)
-        coil, segment, play = rng.uniform(0, 8, 10), rng.uniform(-5, 5, 4), rng.uniform(-1e-3, 1e-3, 4)
+        coil, play = rng.uniform(0, 8, 10), rng.uniform(-1e-3, 1e-3, 4)
+        segment = rng.uniform(-5, 5, 4) + 1j * rng.uniform(-5, 5, 4)
         hung = rng.uniform(0, 10), rng.uniform(-3, 3), rng.uniform(-1, 1), rng.uniform(0, 0.05)
         found = derivative(p, s, coil, segment, play=play, gamma=0.03, hung_mass=2.0, weight=19.0, lever=hung)
-        loads = reference.Loads(coil, segment, play, 0.03, 2.0, 19.0, lever=reference.Lever(*hung))
+        there = reference.stator(p, segment, 0.03, s[5])
+        loads = reference.Loads(coil, there, play, 2.0, 19.0, lever=reference.Lever(*hung))
         expected = reference.derivative(p, s, loads)
         np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-9)
         ends = [(s[0] + z * s[4], s[1] - z * s[3]) for z in p.z_sensor]
@@ -138,8 +140,17 @@ def test_core_equals_the_reference_in_closed_loop() -> None:
         (SWINGING, STANDING, {}),
         (SWINGING, STANDING, {"lever_slip": 0.3, "exchange_segments": 1.0}),
         (CONTROL, START, {"encoder_sign": -1.0}),
+        (dataclasses.replace(CONTROL, lag_compensation=1.0), START, {}),
     ],
-    ids=["motor carries", "step, T (6.9)", "step, T (6.24)", "sine, lever", "slip, exchanged", "encoder backwards"],
+    ids=[
+        "motor carries",
+        "step, T (6.9)",
+        "step, T (6.24)",
+        "sine, lever",
+        "slip, exchanged",
+        "encoder backwards",
+        "lag compensated",
+    ],
 )
 def test_what_the_chain_adds_equals_the_reference(
     control: ControlParams, start: Sequence[float], change: dict[str, float]

@@ -148,6 +148,7 @@ static void rotation(const tsbs_control *c, const tsbs_gains *g, tsbs_law_state 
     carry(c, g->keep, l, r->position + 2, current);
     allocate(c, current[0], current[1], i, out->segment);
     out->gamma = c->gamma;
+    out->ahead = c->lag_compensation != 0 ? l->angle_filtered * c->segment_lag : 0;
 }
 
 void tsbs_law(const tsbs_control *c, tsbs_law_state *l, const tsbs_reading *r, tsbs_reference *out) {

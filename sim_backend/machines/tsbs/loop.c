@@ -34,9 +34,12 @@ void tsbs_sense(const tsbs_params *p, tsbs_derived *d, tsbs_state *st, tsbs_read
         coil[k] = quantise(i, p->current_lsb, d->per_current_lsb);
     }
     double scale = 1 + p->segment_scale_drift * now; /* of what the four sensors share */
+    tsbs_reference field = {.gamma = st->applied.gamma};
+    tsbs_commutate(p, d, &field);
     for (int k = 0; k < 4; k++) {
         double noise = p->current_noise * normal[15 + k];
-        double i = scale * p->segment_sense[k] * st->segment[k] + p->segment_offset[k] + p->segment_drift[k] * now + noise;
+        double along = st->segment[k] * field.turn_c + st->segment[k + 4] * field.turn_s;
+        double i = scale * p->segment_sense[k] * along + p->segment_offset[k] + p->segment_drift[k] * now + noise;
         segment[k] = quantise(i, p->current_lsb, d->per_current_lsb);
     }
     double angle = p->encoder_sign * (s[5] + p->encoder_offset);
@@ -50,7 +53,7 @@ static void amplifiers(const tsbs_params *p, const tsbs_derived *d, tsbs_state *
     int enabled = st->law.mode != OFF;
     for (int k = 0; k < 10; k++) /* a current that has died away is none: denormal numbers are slow */
         if (st->coil[k] < 1e-30) st->coil[k] = 0;
-    for (int k = 0; k < 4; k++)
+    for (int k = 0; k < 8; k++)
         if (fabs(st->segment[k]) < 1e-30) st->segment[k] = 0;
     for (int k = 0; k < 10; k++) { /* the inner loop closes on its own sensor */
         double ref = enabled ? least(most(st->applied.coil[k], 0), p->coil_limit[k]) : 0;
@@ -59,7 +62,9 @@ static void amplifiers(const tsbs_params *p, const tsbs_derived *d, tsbs_state *
     double per_scale = 1 / (1 + p->segment_scale_drift * now);
     for (int k = 0; k < 4; k++) {
         double ref = least(most(st->applied.segment[k], -p->segment_limit), p->segment_limit);
-        segment[k] = enabled ? (ref - p->segment_offset[k] - p->segment_drift[k] * now) * d->per_sense[k] * per_scale : 0;
+        double to = enabled ? (ref - p->segment_offset[k] - p->segment_drift[k] * now) * d->per_sense[k] * per_scale : 0;
+        segment[k] = to * st->applied.turn_c;
+        segment[k + 4] = to * st->applied.turn_s;
     }
 }
 
@@ -68,7 +73,7 @@ static void approach(const double *from, const double *to, int n, double keep, d
 }
 
 static void step(const tsbs_params *p, const tsbs_derived *d, tsbs_state *st, const double *coil_to, const double *segment_to, double h) {
-    double c1[10], c2[10], g0[3], g1[3], g2[3], to[3], k1[14], k2[14], k3[14], k4[14], at[14];
+    double c1[10], c2[10], g0[8], g1[8], g2[8], to[8], k1[14], k2[14], k3[14], k4[14], at[14];
     double w0 = st->weight, w1 = w0, w2 = w0;
     if (st->weight_rate > 0) {
         double left = st->weight_to - w0, step = st->weight_rate * h;
@@ -80,8 +85,8 @@ static void step(const tsbs_params *p, const tsbs_derived *d, tsbs_state *st, co
     approach(c1, coil_to, 10, half, c2);
     tsbs_mix(p, st->segment, g0); /* one rate for all segments: what acts of them goes by it too */
     tsbs_mix(p, segment_to, to);
-    approach(g0, to, 3, seg, g1);
-    approach(g1, to, 3, seg, g2);
+    approach(g0, to, 8, seg, g1);
+    approach(g1, to, 8, seg, g2);
     double *s = st->s, m = st->hung_mass;
     tsbs_rates(p, d, s, st->coil, g0, st->play, m, w0, k1);
     for (int k = 0; k < 14; k++) at[k] = s[k] + h / 2 * k1[k];
@@ -92,7 +97,7 @@ static void step(const tsbs_params *p, const tsbs_derived *d, tsbs_state *st, co
     tsbs_rates(p, d, at, c2, g2, st->play, m, w2, k4);
     for (int k = 0; k < 14; k++) s[k] += h / 6 * (k1[k] + 2 * k2[k] + 2 * k3[k] + k4[k]);
     memcpy(st->coil, c2, sizeof c2);
-    approach(st->segment, segment_to, 4, seg * seg, st->segment);
+    approach(st->segment, segment_to, 8, seg * seg, st->segment);
     st->weight = w2;
 }
 
@@ -169,6 +174,7 @@ void tsbs_start(const tsbs_params *p, const tsbs_control *c, tsbs_state *st, uin
     st->s[0] = (p->ring_x[0] * zo - p->ring_x[1] * zi) / (zo - zi);
     st->s[4] = (p->ring_x[1] - p->ring_x[0]) / (zo - zi);
     st->angle_before = st->s[5];
+    st->next.turn_c = 1;
 }
 
 /* Runs `ticks` control ticks, or fewer when a trip occurs (then to the end of the telemetry period). Each completed
@@ -182,16 +188,13 @@ int64_t tsbs_run(const tsbs_params *p, const tsbs_control *c, tsbs_state *st, in
     tsbs_derive(p, TICK / st->substeps, &d);
     tsbs_gains g;
     tsbs_settle(c, &g);
-    double gamma = NAN;
     while (done < ticks && (filled < row_limit || st->in_period)) {
         tsbs_reading r;
-        double coil[10], segment[4], coil_to[10], segment_to[4];
+        double coil[10], segment[4], coil_to[10], segment_to[8];
         tsbs_sense(p, &d, st, &r, coil, segment);
         st->applied = st->next; /* one sample of delay */
-        /* commutation goes by the encoder: one that counts backwards puts the currents at minus the rotor's angle */
-        double at = p->encoder_sign < 0 ? st->applied.gamma - 2 * st->s[5] : st->applied.gamma;
-        if (at != gamma) tsbs_commutate(p, gamma = at, &d);
         tsbs_act(c, &g, &st->law, &r, &st->next);
+        tsbs_commutate(p, &d, &st->next);
         st->speed = d.speed_keep * st->speed + (1 - d.speed_keep) * (r.angle - st->angle_before) / TICK;
         st->angle_before = r.angle;
         watch(p, st, coil, st->speed);

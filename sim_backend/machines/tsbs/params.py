@@ -162,5 +162,7 @@ class ControlParams:
     derivative_on_error: float = 0.0
     sine_amplitude: float = 0.0
     sine_hz: float = 0.0
+    lag_compensation: float = 0.0
+    segment_lag: float = 1.5e-4 + 1 / (2 * math.pi * 2000)
     share_i: float = (0.161 - 0.115) / 0.213
     share_o: float = (0.161 + 0.010) / 0.213

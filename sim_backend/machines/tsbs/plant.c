@@ -1,16 +1,32 @@
 /* Mechanics and forces: T (6.6) with (6.5) and (2.4), plus gyroscopics, unbalance, runout, touchdown and the hung mass. */
+/* of the four segments what acts, each q + j d: X = (s4 - s2)/2, Y = (s1 - s3)/2, and the means of each pair */
+enum { XQ, YQ, VQ, HQ, XD, YD, VD, HD };
 #include <math.h>
 #include <string.h>
 #include "tsbs.h"
 
-/* cos and sin of an angle that is less than a tick away from d->angle: two short series, good to 1e-15 at 200 rad/s */
-static void turn(const tsbs_derived *d, double e, double *c, double *s) {
+/* From cos and sin of an angle those of one that is e further, less than a tick: two short series, good to 1e-15 at
+ * 200 rad/s, and for M times the angle at 80 rad/s. */
+static void turn(double c0, double s0, double e, double *c, double *s) {
     double q = e * e;
     /* by factors, for a division costs as much as ten of them */
     double ce = 1 - q * (1.0 / 2) * (1 - q * (1.0 / 12) * (1 - q * (1.0 / 30)));
     double se = e * (1 - q * (1.0 / 6) * (1 - q * (1.0 / 20) * (1 - q * (1.0 / 42))));
-    *c = d->turn_c * ce - d->turn_s * se;
-    *s = d->turn_s * ce + d->turn_c * se;
+    *c = c0 * ce - s0 * se;
+    *s = s0 * ce + c0 * se;
+}
+
+/* cos and sin of n times an angle, n whole, from its own by squaring */
+static void times(double n, double c, double s, double *nc, double *ns) {
+    double re = 1, im = 0;
+    for (int left = (int)n; left > 0; left /= 2) {
+        double a = re * c - im * s, b = re * s + im * c, square = c * c - s * s;
+        if (left % 2) re = a, im = b;
+        s = 2 * c * s;
+        c = square;
+    }
+    *nc = re;
+    *ns = im;
 }
 
 void tsbs_turn(double angle, double *c, double *s) {
@@ -40,6 +56,7 @@ void tsbs_at(tsbs_derived *d, double angle, double *tc, double *ts) {
     d->angle = angle;
     d->turn_c = tc[0];
     d->turn_s = ts[0];
+    times(d->pole_pairs, tc[0], ts[0], &d->pole_c, &d->pole_s);
     for (int b = 0; b < 2; b++) {
         double x0 = 0, x1 = 0, x2 = 0, x3 = 0, y0 = 0, y1 = 0, y2 = 0, y3 = 0;
         for (int k = 0; k < 4; k++) {
@@ -60,18 +77,17 @@ void tsbs_at(tsbs_derived *d, double angle, double *tc, double *ts) {
     }
 }
 
-void tsbs_commutate(const tsbs_params *p, double gamma, tsbs_derived *d) {
-    double turn = p->pole_pairs * (gamma - p->gamma_zero);
-    double c = cos(turn), q = sin(turn);
-    d->direct = p->alpha_d * c;
-    d->cross = p->alpha_c * q;
-    d->turning = p->alpha_tau * c;
-    d->ripple_dc = p->alpha_2 * c; /* alpha_2 cos(b) and alpha_3 sin(b), b = P theta + turn, by the cos and sin of P theta */
-    d->ripple_ds = p->alpha_2 * q;
-    d->ripple_qc = p->alpha_3 * q;
-    d->ripple_qs = p->alpha_3 * c;
-    d->ripple_tc = p->beta_4 * c; /* beta_4 cos(3 P theta + turn) */
-    d->ripple_ts = p->beta_4 * q;
+/* From the frame in which the law has its currents to the stator's: by M (theta + gamma + ahead), as its encoder tells the
+ * angle, less the commutation's own zero. An encoder that counts backwards puts the currents at minus the rotor's angle. */
+void tsbs_commutate(const tsbs_params *p, tsbs_derived *d, tsbs_reference *r) {
+    double by = r->gamma + r->ahead - p->gamma_zero, pole_s = p->encoder_sign < 0 ? -d->pole_s : d->pole_s;
+    if (by != d->field) {
+        d->field = by;
+        d->field_c = cos(p->pole_pairs * by);
+        d->field_s = sin(p->pole_pairs * by);
+    }
+    r->turn_c = d->pole_c * d->field_c - pole_s * d->field_s;
+    r->turn_s = pole_s * d->field_c + d->pole_c * d->field_s;
 }
 
 /* What holds over a tick. Lever: its weight, its moment, how far it has slipped, and the inertia added to the shaft's.
@@ -129,7 +145,8 @@ void tsbs_derive(const tsbs_params *p, double step, tsbs_derived *d) {
     d->segment_keep = exp(-p->segment_rate * step / 2);
     d->speed_keep = exp(-6.283185307179586 * 20 * TICK);
     d->drive_gain = d->drive_limit = d->drive_speed = 0;
-    tsbs_commutate(p, 0, d);
+    d->pole_pairs = p->pole_pairs;
+    d->field = NAN;
 }
 
 /* T (2.4): F = beta (ip^2/(gap - xi)^2 - in^2/(gap + xi)^2); below a gap of 0.2 mm the iron saturates */
@@ -179,48 +196,57 @@ static void touchdown(const tsbs_params *p, const double *s, int b, wrench *w) {
     w->torque -= drag * p->ring_radius;
 }
 
-/* what acts of the four segments' currents: (e4 - e2)/2, (e1 - e3)/2 and the mean of all, T (6.5) */
+/* what acts of the four segments' currents in the stator's frame: X, Y and the means of segments 1, 3 and of 2, 4 */
 void tsbs_mix(const tsbs_params *p, const double *segment, double *mixed) {
     int first = p->exchange_segments != 0;
-    double e1 = segment[first] * p->segment_gain[0], e2 = segment[!first] * p->segment_gain[1];
-    double e3 = segment[2] * p->segment_gain[2], e4 = segment[3] * p->segment_gain[3];
-    mixed[0] = (e4 - e2) / 2;
-    mixed[1] = (e1 - e3) / 2;
-    mixed[2] = (e1 + e2 + e3 + e4) / 4;
+    const double *g = p->segment_gain;
+    for (int k = 0; k < 8; k += 4) {
+        double s1 = segment[k + first] * g[0], s2 = segment[k + !first] * g[1];
+        double s3 = segment[k + 2] * g[2], s4 = segment[k + 3] * g[3];
+        mixed[k] = (s4 - s2) / 2;
+        mixed[k + 1] = (s1 - s3) / 2;
+        mixed[k + 2] = (s1 + s3) / 2;
+        mixed[k + 3] = (s2 + s4) / 2;
+    }
 }
 
-/* T (6.5), and from T (5.25) the ripple with P theta, the pull by the torque current and the side pull. That the ripple
- * goes with P theta + M gamma follows from T (6.1): with u = M (Phi - theta), sin(u) sin(u - M gamma) is half of
- * cos(M gamma) - cos(P Phi - (P theta + M gamma)). Coulomb friction is smoothed by x / sqrt(1 + x^2) about standstill. */
-static void motor(const tsbs_params *p, const tsbs_derived *d, const double *s, const double *mixed,
-                  double c1, double s1, wrench *w) {
-    double ix = mixed[0], iy = mixed[1], mean = mixed[2];
-    double c2 = 2 * c1 * c1 - 1, s2 = 2 * c1 * s1, c4 = 2 * c2 * c2 - 1, s4 = 2 * c2 * s2;
-    double c8 = 2 * c4 * c4 - 1, s8 = 2 * c4 * s4, c16 = 2 * c8 * c8 - 1, s16 = 2 * c8 * s8;
-    double c48 = c16 * (4 * c16 * c16 - 3), s48 = s16 * (3 - 4 * s16 * s16), slow = s[11] * d->per_coulomb_speed;
-    double direct = d->direct - d->ripple_dc * c16 + d->ripple_ds * s16;
-    double cross = d->cross + d->ripple_qs * s16 + d->ripple_qc * c16;
-    double turning = d->turning + d->ripple_tc * c48 - d->ripple_ts * s48;
+/* T (6.5) for currents of any phase, and from T (5.25) the ripple with P theta, the pull by the torque current and the side
+ * pull. In the rotor's frame, s = S exp(-j M theta), segment k has q_k + j d_k. T (6.1) has sin u sin(u - M gamma) under its
+ * integral, u = M (Phi - theta), half of cos(M gamma) - cos(P Phi - (P theta + M gamma)): with q = i cos M gamma and
+ * d = i sin M gamma the direct force goes with q and the cross force with d, and since it is linear in the current so for any
+ * q and d. Ripple: i cos(P theta + M gamma) is q cos P theta - d sin P theta. Side pull: a segment pulls with the square of its
+ * current, (alpha_6/4) (|s1|^2 - |s3|^2) = alpha_6 Re(Y conj V), V the mean of 1 and 3; T has its i_y i_theta.
+ * Coulomb friction is smoothed by x / sqrt(1 + x^2) about standstill. */
+static void motor(const tsbs_params *p, const tsbs_derived *d, const double *s, const double *m, double e, wrench *w) {
+    double c, q;
+    turn(d->pole_c, d->pole_s, d->pole_pairs * e, &c, &q);
+    double xq = m[XQ] * c + m[XD] * q, xd = m[XD] * c - m[XQ] * q, yq = m[YQ] * c + m[YD] * q, yd = m[YD] * c - m[YQ] * q;
+    double re = (m[VQ] + m[HQ]) / 2, im = (m[VD] + m[HD]) / 2, mean = re * c + im * q, mean_d = im * c - re * q;
+    double pull_x = p->alpha_6 * (m[YQ] * m[VQ] + m[YD] * m[VD]), pull_y = p->alpha_6 * (m[XQ] * m[HQ] + m[XD] * m[HD]);
+    double c2 = 2 * c * c - 1, s2 = 2 * c * q, c6 = c2 * (4 * c2 * c2 - 3), s6 = s2 * (3 - 4 * s2 * s2);
+    double slow = s[11] * d->per_coulomb_speed;
     double x = s[0] + p->z_motor * s[4] + p->motor_x, y = s[1] - p->z_motor * s[3] + p->motor_y;
-    double across = p->alpha_4 * mean, pull = p->alpha_6 * mean;
-    add(w, p->z_motor, direct * ix - cross * iy - across * y + p->alpha_x * x + pull * iy,
-        direct * iy + cross * ix + across * x + p->alpha_x * y - pull * ix);
-    w->torque += turning * mean + p->beta_2 * (x * iy - y * ix) - d->viscous * s[11] -
-                 d->coulomb * slow / sqrt(1 + slow * slow) - p->detent * (s16 * d->detent_c + c16 * d->detent_s);
+    double across = p->alpha_4 * mean, a2 = p->alpha_2, a3 = p->alpha_3;
+    double fx = p->alpha_d * xq - p->alpha_c * yd - a2 * (xq * c2 - xd * s2) - a3 * (yq * s2 + yd * c2);
+    double fy = p->alpha_d * yq + p->alpha_c * xd - a2 * (yq * c2 - yd * s2) + a3 * (xq * s2 + xd * c2);
+    add(w, p->z_motor, fx - across * y + p->alpha_x * x + pull_x, fy + across * x + p->alpha_x * y - pull_y);
+    w->torque += p->alpha_tau * mean + p->beta_4 * (mean * c6 - mean_d * s6) + p->beta_2 * (x * yq - y * xq) -
+                 d->viscous * s[11] - d->coulomb * slow / sqrt(1 + slow * slow) -
+                 p->detent * (s2 * d->detent_c + c2 * d->detent_s);
 }
 
 void tsbs_rates(const tsbs_params *p, const tsbs_derived *d, const double *s, const double *coil,
                 const double *mixed, const double *play, double hung_mass, double weight, double *ds) {
     wrench w = {0};
     double tc, ts, e = s[5] - d->angle, force[4];
-    turn(d, e, &tc, &ts);
+    turn(d->turn_c, d->turn_s, e, &tc, &ts);
     radial(d, s, e, coil, play, force);
     for (int b = 0; b < 2; b++) {
         add(&w, p->z_amb[b], force[2 * b], force[2 * b + 1]);
         if (d->near) touchdown(p, s, b, &w);
     }
     w.fz = amb_force(p->beta_z, p->gap_z, s[2], coil[8], coil[9]);
-    motor(p, d, s, mixed, tc, ts, &w);
+    motor(p, d, s, mixed, e, &w);
     if (d->drive_gain > 0) {
         double torque = d->drive_gain * (d->drive_speed - s[11]), limit = d->drive_limit;
         w.torque += torque > limit ? limit : torque < -limit ? -limit : torque;
@@ -256,12 +282,17 @@ void tsbs_derivative(const tsbs_params *p, const double *s, const double *coil, 
                      const double *play, double gamma, double hung_mass, double weight, const double *lever, double *ds) {
     tsbs_derived d;
     tsbs_derive(p, TICK, &d);
-    tsbs_commutate(p, gamma, &d);
     double tc[4], ts[4];
     tsbs_at(&d, s[5], tc, ts);
+    tsbs_reference at = {.gamma = gamma};
+    tsbs_commutate(p, &d, &at);
     tsbs_hold(p, coil, lever, &d);
-    double mixed[3];
-    tsbs_mix(p, segment, mixed);
+    double stator[8], mixed[8];
+    for (int k = 0; k < 4; k++) {
+        stator[k] = segment[k] * at.turn_c - segment[k + 4] * at.turn_s;
+        stator[k + 4] = segment[k] * at.turn_s + segment[k + 4] * at.turn_c;
+    }
+    tsbs_mix(p, stator, mixed);
     d.near = 1;
     tsbs_rates(p, &d, s, coil, mixed, play, hung_mass, weight, ds);
 }

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from sim_backend.core.plant import PERIOD_TICKS, TICK_S, Array, CorePlant, fill, open_core
 from sim_backend.machines.tsbs.params import ControlParams, PlantParams
@@ -93,8 +94,13 @@ class Plant(CorePlant):
 
     @property
     def currents(self) -> tuple[float, ...]:
-        """True currents in A: ten coils, then four motor segments."""
-        return (*self._s.coil, *self._s.segment)
+        """True currents in A: ten coils, then the amplitudes of four motor segments."""
+        return (*self._s.coil, *(abs(i) for i in self._segment))
+
+    @property
+    def _segment(self) -> list[complex]:
+        parts = list(self._s.segment)
+        return [complex(*pair) for pair in zip(parts[:4], parts[4:], strict=True)]
 
     def run(self, ticks: int) -> Array:
         """Advance by `ticks` control ticks, or to the end of the telemetry period in which a trip occurs.
@@ -109,12 +115,14 @@ class Plant(CorePlant):
         return rows[: tick // PERIOD_TICKS - (tick - done) // PERIOD_TICKS]
 
     def state(self) -> dict[str, Any]:
-        """True state, for tests: `s` (14,) positions and rates, `coil` (10,), `segment` (4,), weight in N."""
+        """True state, for tests: `s` (14,) positions and rates, `coil` (10,), `segment` (4,) complex in the stator's frame,
+        `turn`, what turns the law's frame into that, weight in N."""
         s = self._s
         return {
             "s": np.array(list(s.s)),
             "coil": np.array(list(s.coil)),
-            "segment": np.array(list(s.segment)),
+            "segment": np.array(self._segment),
+            "turn": complex(s.applied.turn_c, s.applied.turn_s),
             "weight": float(s.weight),
         }
 
@@ -127,7 +135,7 @@ def derivative(
     params: PlantParams,
     s: Array,
     coil: Array,
-    segment: Array,
+    segment: npt.ArrayLike,
     *,
     play: Array | None = None,
     gamma: float = 0.0,
@@ -135,17 +143,18 @@ def derivative(
     weight: float = 0.0,
     lever: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
 ) -> Array:
-    """Right-hand side of the mechanics, (14,), for tests against the reference. `lever`: weight N, moment N m, how far it
-    has slipped rad, inertia added to the shaft's kg m^2."""
+    """Right-hand side of the mechanics, (14,), for tests against the reference. `segment` (4,) along the field that gamma
+    turns, complex where it has a part across it; `lever`: weight N, moment N m, how far it has slipped rad, inertia added to
+    the shaft's kg m^2."""
     p = _ffi.new("tsbs_params *")
     fill(p, vars(params))
 
     def c(x: Array) -> Any:
         return _ffi.new("double[]", [float(v) for v in x])
 
-    out = _ffi.new("double[14]")
-    _lib.tsbs_derivative(p, c(s), c(coil), c(segment), c(np.zeros(4) if play is None else play), gamma, hung_mass,
-                         weight, c(np.array(lever)), out)  # fmt: skip
+    out, along = _ffi.new("double[14]"), np.asarray(segment)
+    currents, lag = np.concatenate([along.real, along.imag]), np.zeros(4) if play is None else play
+    _lib.tsbs_derivative(p, c(s), c(coil), c(currents), c(lag), gamma, hung_mass, weight, c(np.array(lever)), out)
     return np.array(list(out))
 
 

@@ -6,6 +6,7 @@ the thesis; x horizontal, y up; planes are signed distances from the centre of m
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -47,14 +48,13 @@ EMPTY = Lever()
 
 @dataclass
 class Loads:
-    """What acts on the mechanics besides its state: true currents (10,), (4,), hysteresis lag (4,), phase angle gamma,
-    hung mass kg and its weight N, the external drive and the lever; `held` are the coil currents (10,) at the start of the
-    tick, by which the drag goes."""
+    """What acts on the mechanics besides its state: true currents (10,), (4,) complex in the stator's frame, hysteresis
+    lag (4,), hung mass kg and its weight N, the external drive and the lever; `held` are the coil currents (10,) at the start
+    of the tick, by which the drag goes."""
 
     coil: Vector
-    segment: Vector
+    segment: Sequence[complex]
     play: Vector
-    gamma: float = 0.0
     hung_mass: float = 0.0
     weight: float = 0.0
     drive: Drive | None = None
@@ -75,27 +75,37 @@ class Drive:
         return min(max(self.gain * (self.speed - spin), -self.limit), self.limit)
 
 
-def motor(
-    p: PlantParams, x: float, y: float, theta: float, gamma: float, segment: Vector
-) -> tuple[float, float, float]:
-    """Forces N and torque N m of the motor, displaced by x and y from its magnetic centre: T (5.25) at any gamma.
+SEGMENTS = (1j, -1 + 0j, -1j, 1 + 0j)
+"""Where segments 1 to 4 push for a positive current, as x + j y: up, left, down, right (T 6.9)."""
 
-    For gamma = 0 this is T (5.25) less its terms 7 to 9, with beta_4 of the text below; without ripple and displacement it
-    is T (6.5). Under the integral of T (6.1) stands sin u sin(u - M gamma) with u = M (Phi - theta), which is
-    [cos(M gamma) - cos(P Phi - (P theta + M gamma))] / 2: the ripple goes with P theta + M gamma.
+
+def stator(p: PlantParams, along: Sequence[complex], gamma: float, theta: float) -> list[complex]:
+    """Segment currents in the stator's frame, of those along and across a field turned by gamma at a rotor's angle."""
+    turn = cmath.exp(1j * p.pole_pairs * (theta + gamma - p.gamma_zero))
+    return [turn * i for i in along]
+
+
+def motor(p: PlantParams, x: float, y: float, theta: float, segment: Sequence[complex]) -> tuple[float, float, float]:
+    """Forces N and torque N m of the motor, displaced by x and y from its magnetic centre: T (5.25) for currents of any phase.
+
+    `segment` (4,) A in the stator's frame; in the rotor's s = S exp(-j M theta) = q + j d. With q = i cos(M gamma) and
+    d = i sin(M gamma) of a field turned by gamma, forces and torque are T (6.5), which is linear in the current. At gamma = 0
+    this is T (5.25) less its terms 7 to 9, with beta_4 of the text below. Under the integral of T (6.1) stands
+    sin u sin(u - M gamma) with u = M (Phi - theta), which is [cos(M gamma) - cos(P Phi - (P theta + M gamma))] / 2: the
+    ripple goes with P theta + M gamma, i cos(P theta + M gamma) = Re(s exp(j P theta)).
     """
     wired = [segment[k] for k in ((1, 0, 2, 3) if p.exchange_segments else range(4))]
-    current = [gain * i for gain, i in zip(p.segment_gain, wired, strict=True)]
-    ix, iy, turn = (current[3] - current[1]) / 2, (current[0] - current[2]) / 2, sum(current) / 4
-    shift = p.pole_pairs * (gamma - p.gamma_zero)
-    poles = 2 * p.pole_pairs
-    b = poles * theta + shift
-    direct = p.alpha_d * math.cos(shift) - p.alpha_2 * math.cos(b)
-    cross = p.alpha_c * math.sin(shift) + p.alpha_3 * math.sin(b)
-    fx = direct * ix - cross * iy - p.alpha_4 * y * turn + p.alpha_x * x + p.alpha_6 * iy * turn
-    fy = direct * iy + cross * ix + p.alpha_4 * x * turn + p.alpha_x * y - p.alpha_6 * ix * turn
-    torque = (p.alpha_tau * math.cos(shift) + p.beta_4 * math.cos(3 * poles * theta + shift)) * turn
-    return fx, fy, torque + p.beta_2 * (x * iy - y * ix)
+    poles, mean, pushed, force = 2 * p.pole_pairs, 0j, 0j, p.alpha_x * complex(x, y)
+    for gain, current, way in zip(p.segment_gain, wired, SEGMENTS, strict=True):
+        s = gain * current * cmath.exp(-1j * p.pole_pairs * theta)
+        ripple = s * cmath.exp(1j * poles * theta)
+        direct, cross = p.alpha_d * s.real - p.alpha_2 * ripple.real, p.alpha_c * s.imag + p.alpha_3 * ripple.imag
+        force += way * complex(direct, cross) / 2 - 1j * way * p.alpha_6 * abs(s) ** 2 / 4
+        pushed += way * s.real / 2
+        mean += s / 4
+    force += 1j * p.alpha_4 * mean.real * complex(x, y)
+    torque = p.alpha_tau * mean.real + p.beta_4 * (mean * cmath.exp(3j * poles * theta)).real
+    return force.real, force.imag, torque + p.beta_2 * (x * pushed.imag - y * pushed.real)
 
 
 def friction(p: PlantParams, spin: float, u: Loads) -> float:
@@ -125,7 +135,7 @@ def derivative(p: PlantParams, s: Array, u: Loads) -> Array:
         forces.append(contact)
         torque += drag
     mx, my = x + p.z_motor * psi + p.motor_x, y - p.z_motor * phi + p.motor_y
-    *pushed, turned = motor(p, mx, my, theta, u.gamma, u.segment)
+    *pushed, turned = motor(p, mx, my, theta, u.segment)
     forces.append((p.z_motor, pushed[0], pushed[1]))
     torque += turned - friction(p, spin, u) - p.detent * math.sin(16 * theta + p.detent_phase)
     torque += u.drive.torque(spin) if u.drive else 0.0

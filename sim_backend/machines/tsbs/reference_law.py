@@ -29,7 +29,8 @@ def keep(hz: float) -> float:
 class Law:
     """Control law while levitating: PID in the actuator planes with constant current sum, angle loop, T (6.9).
 
-    `radial` and `rotation` take the readings of one tick and return the references of 10 coils and 4 segments in A.
+    `radial` and `rotation` take the readings of one tick and return the references of 10 coils and 4 segments in A, these
+    along a field that is turned by `gamma` and `ahead` from the angle read.
     """
 
     c: ControlParams
@@ -48,6 +49,8 @@ class Law:
     phase: float = 0.0
     share: float = 0.0
     carrier: Carrier = field(default_factory=lambda: Carrier())
+    gamma: float = 0.0
+    ahead: float = 0.0
 
     def planes(self, y: Sequence[float]) -> list[float]:
         """Displacement at the actuators from the sensors, T (6.7) with the controller's geometry."""
@@ -83,7 +86,8 @@ class Law:
         c, k = self.c, keep(self.c.angle_hz)
         before = angle if self.angle_previous is None else self.angle_previous
         self.angle_slope = k * self.angle_slope + (1 - k) * (angle - before) / TICK_S
-        self.angle_previous = angle
+        self.angle_previous, self.gamma = angle, c.gamma
+        self.ahead = self.angle_slope * c.segment_lag if c.lag_compensation else 0.0
         released = not c.torque_on or c.kp_theta == c.kd_theta == c.ki_theta == 0
         if released:
             self.angle_target, self.speed_target, self.angle_integral = angle, self.angle_slope, 0.0

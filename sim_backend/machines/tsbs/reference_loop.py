@@ -6,12 +6,14 @@ times real time, so it serves windows of a few tenths of a second.
 
 from __future__ import annotations
 
+import cmath
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
 from sim_backend.machines.tsbs.params import ControlParams, PlantParams
@@ -76,10 +78,11 @@ class Levering:
 
 @dataclass(frozen=True)
 class Trace:
-    """States before the first and after every tick, (n + 1, 14); currents likewise: ten coils, then four segments."""
+    """States before the first and after every tick, (n + 1, 14); currents likewise: ten coils, then four segments in the
+    stator's frame, complex."""
 
     s: Array
-    currents: Array
+    currents: npt.NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
@@ -88,10 +91,11 @@ class Interval:
 
     p: PlantParams
     tick: int
-    currents: Sequence[float]
-    target: Sequence[float]
+    coils: Sequence[float]
+    segments: Sequence[complex]
+    coils_to: Sequence[float]
+    segments_to: Sequence[complex]
     lag: Sequence[float]
-    gamma: float
     hanging: Hanging
     weight_before: float
     drive: Drive | None
@@ -99,10 +103,17 @@ class Interval:
 
     def loads(self, part: float) -> Loads:
         """What acts after the share `part` of the tick."""
-        i = amplifier(self.p, self.currents, self.target, part * TICK_S)
+        coils, segments = self.flowing(part)
         weight = self.hanging.weight(self.weight_before, self.tick + part)
-        mass, held = self.hanging.mass_kg, self.currents[:10]
-        return Loads(i[:10], i[10:], self.lag, self.gamma, mass, weight, self.drive, self.lever, held)
+        return Loads(coils, segments, self.lag, self.hanging.mass_kg, weight, self.drive, self.lever, self.coils)
+
+    def flowing(self, part: float) -> tuple[list[float], list[complex]]:
+        """Currents after the share `part` of the tick: first-order lags, exact for a constant target, in the stator's frame."""
+        coil, segment = (math.exp(-rate * part * TICK_S) for rate in (self.p.amplifier_rate, self.p.segment_rate))
+        return (
+            [b + (a - b) * coil for a, b in zip(self.coils, self.coils_to, strict=True)],
+            [b + (a - b) * segment for a, b in zip(self.segments, self.segments_to, strict=True)],
+        )
 
 
 def runge_kutta(interval: Interval, s: Sequence[float], substeps: int) -> list[float]:
@@ -152,11 +163,14 @@ def simulate(
     """
     advance = advance or (lambda interval, s: runge_kutta(interval, s, 2))
     s, law = [float(x) for x in start], Law(c)
-    currents, reference, gamma, follow = [0.0] * 14, [0.0] * 14, 0.0, [0.0] * RADIAL
+    coils, segments, follow = [0.0] * 10, [0j] * 4, [0.0] * RADIAL
+    held = [0.0] * 10
+    along: Sequence[complex] = [0j] * 4
+    turn = 1 + 0j
     hanging, before, weight = Hanging(0, 0.0, 0.0, 0.0), 0.0, 0.0
     driving, drive = Driving(0, 0.0, 0.0, 0.0, 0.0), None
     levering, lever, from_lever = Levering(0, 0.0, 0.0, 0.0, 0.0), EMPTY, EMPTY
-    states, flows = [s], [currents]
+    states, flows = [s], [[*coils, *segments]]
     for tick in range(ticks):
         for new in (h for h in hangings if h.tick == tick):
             if hanging.mass_kg == 0:  # the strap is just taut
@@ -167,15 +181,19 @@ def simulate(
         if begun := [x for x in leverings if x.tick == tick]:
             levering, from_lever, lever = begun[-1], lever, dataclasses.replace(lever, slip=0.0)
         lever = levered(p, levering, from_lever, lever, tick, s[5])
-        target = settled_currents(p, reference, tick * TICK_S)  # of the sample before: one sample of delay
-        lag, commutated = hysteresis(p, currents, follow), gamma - 2 * s[5] if p.encoder_sign < 0 else gamma
-        interval = Interval(p, tick, currents, target, lag, commutated, hanging, before, drive, lever)
+        coils_to = settled_coils(p, held, tick * TICK_S)  # of the sample before: one sample of delay
+        segments_to = [turn * i for i in settled_segments(p, along, tick * TICK_S)]
+        lag = hysteresis(p, coils, follow)
+        interval = Interval(p, tick, coils, segments, coils_to, segments_to, lag, hanging, before, drive, lever)
         angle, y = p.encoder_sign * (s[5] + p.encoder_offset), read_positions(p, s)
-        reference, gamma = [*law.radial(y), *law.rotation(angle, y[2:4])], c.gamma
+        held, along = law.radial(y), law.rotation(angle, y[2:4])
+        field = p.encoder_sign * s[5] + law.gamma + law.ahead - p.gamma_zero
+        turn = cmath.exp(1j * p.pole_pairs * field)
         s = advance(interval, s)
-        currents, weight = amplifier(p, currents, target, TICK_S), hanging.weight(before, tick + 1)
+        weight = hanging.weight(before, tick + 1)
+        coils, segments = interval.flowing(1.0)
         states.append(s)
-        flows.append(currents)
+        flows.append([*coils, *segments])
     return Trace(np.array(states), np.array(flows))
 
 
@@ -197,27 +215,20 @@ def levered(p: PlantParams, to: Levering, before: Lever, now: Lever, tick: int, 
     return Lever(weight, moment, slip, to.mass_kg * to.arm_m**2 + to.ring)
 
 
-def settled_currents(p: PlantParams, reference: Sequence[float], now_s: float) -> list[float]:
-    """Currents that the amplifiers tend to, (14,) A. Each loop closes on its own sensor, errors included."""
-    coil = [
-        max((clip(r, 0, limit) - offset - drift * now_s) / gain, 0)
-        for r, limit, offset, drift, gain in zip(
-            reference[:10], p.coil_limit, p.current_offset, p.current_drift, p.current_gain, strict=True
-        )
-    ]
+def settled_coils(p: PlantParams, reference: Sequence[float], now_s: float) -> list[float]:
+    """Currents that the amplifiers of the coils tend to, (10,) A. Each loop closes on its own sensor, errors included."""
+    rows = zip(reference, p.coil_limit, p.current_offset, p.current_drift, p.current_gain, strict=True)
+    return [max((clip(r, 0, limit) - offset - drift * now_s) / gain, 0.0) for r, limit, offset, drift, gain in rows]
+
+
+def settled_segments(p: PlantParams, reference: Sequence[complex], now_s: float) -> list[complex]:
+    """The same of the segments, (4,) A along the field: the amplifiers cut what is beyond their limit, phase kept."""
     scale = 1 + p.segment_scale_drift * now_s
-    return coil + [
-        (clip(r, -p.segment_limit, p.segment_limit) - offset - drift * now_s) / (gain * scale)
-        for r, offset, drift, gain in zip(
-            reference[10:], p.segment_offset, p.segment_drift, p.segment_sense, strict=True
-        )
+    rows = zip(reference, p.segment_offset, p.segment_drift, p.segment_sense, strict=True)
+    return [
+        (r * min(1.0, p.segment_limit / max(abs(r), 1e-9)) - offset - drift * now_s) / (gain * scale)
+        for r, offset, drift, gain in rows
     ]
-
-
-def amplifier(p: PlantParams, now: Sequence[float], to: Sequence[float], after_s: float) -> list[float]:
-    """Currents `after_s` later: first-order lags, exact for a constant target."""
-    coil, segment = math.exp(-p.amplifier_rate * after_s), math.exp(-p.segment_rate * after_s)
-    return [b + (a - b) * (coil if k < 10 else segment) for k, (a, b) in enumerate(zip(now, to, strict=True))]
 
 
 def hysteresis(p: PlantParams, i: Sequence[float], follow: list[float]) -> list[float]:

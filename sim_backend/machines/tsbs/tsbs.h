@@ -45,6 +45,8 @@ typedef struct {
     /* the motor instead of the outboard AMB; how the segments share force and torque (0: T 6.9, 1: T 6.19 with 6.24) */
     double motor_share, share_slew, kp_m, kd_m, ki_m, ref_xm, ref_ym, allocation, segment_max;
     double derivative_on_error, sine_amplitude, sine_hz;
+    /* 1: commutation ahead by the speed times segment_lag s, the time by which the segment currents are late */
+    double lag_compensation, segment_lag;
     /* the controller's own idea of the planes: plane = share * outboard reading + (1 - share) * inboard reading */
     double share_i, share_o;
 } tsbs_control;
@@ -62,12 +64,13 @@ typedef struct {
 } tsbs_reading;
 
 typedef struct {
-    double coil[10], segment[4], gamma;
+    double coil[10], segment[4], gamma, ahead;  /* segments along the field, which gamma and `ahead` rad turn */
+    double turn_c, turn_s;                      /* from there to the stator */
 } tsbs_reference;
 
 typedef struct {
     double s[14];           /* x y z phi psi theta and their rates; height and speed of the hung mass */
-    double coil[10], segment[4], play[4], follow[4];
+    double coil[10], segment[8], play[4], follow[4]; /* segments in the stator's frame: four real parts, four imaginary ones */
     double hung_mass, weight, weight_to, weight_rate;
     /* external drive: torque = gain * (speed - the shaft's), at most limit; speed goes to its target by the ramp; gain 0: off */
     double drive_gain, drive_limit, drive_ramp, drive_target, drive_speed;
@@ -104,8 +107,8 @@ typedef struct {
      * gap, plane, magnetic offset, runout of the journal as cubics about `angle` */
     double axis_beta[4], axis_gap[4], axis_z[4], axis_offset[4], runout[4][4];
     double unbalance, gravity_x, gravity_y;
-    /* of this tick: the motor's constants at its gamma, the drive, the drag, the lever, the inertia */
-    double direct, cross, turning, ripple_dc, ripple_ds, ripple_qc, ripple_qs, ripple_tc, ripple_ts;
+    /* of this tick: M times the angle, and by how much the field is turned; the drive, the drag, the lever, the inertia */
+    double pole_pairs, pole_c, pole_s, field, field_c, field_s;
     double drive_gain, drive_limit, drive_speed, viscous, coulomb;
     double lever_weight, lever_c, lever_s, polar_inertia, per_polar;
 } tsbs_derived;
@@ -116,7 +119,7 @@ typedef struct {
 void tsbs_settle(const tsbs_control *, tsbs_gains *);
 void tsbs_act(const tsbs_control *, const tsbs_gains *, tsbs_law_state *, const tsbs_reading *, tsbs_reference *);
 void tsbs_derive(const tsbs_params *, double step, tsbs_derived *);
-void tsbs_commutate(const tsbs_params *, double gamma, tsbs_derived *);
+void tsbs_commutate(const tsbs_params *, tsbs_derived *, tsbs_reference *);
 void tsbs_hold(const tsbs_params *, const double *coil, const double *lever, tsbs_derived *);
 void tsbs_turn(double angle, double *c, double *s);
 void tsbs_at(tsbs_derived *, double angle, double *c, double *s);
