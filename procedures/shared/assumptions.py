@@ -71,7 +71,8 @@ ESTIMATOR_COMPARE = (
 DERIVATIVE = (
     "The captured position is the one that the law took, and the velocity the one of the same tick: a tick between them turns "
     "the phase by 0.036° per Hz.",
-    "A sampling time that the controller counts wrongly changes every gain by its share; it is found from 0.1 % on.",
+    "Time is the controller's: a clock that is fast by 1e-4 changes gains and errors by that share, and the frequencies of "
+    "lines and edges by as much.",
 )
 SLEW = (
     "A controller whose reference swings by another amplitude than it was told changes the amplitude ratio by that share, and "
@@ -90,8 +91,9 @@ STEP = (
     "steady_error, 1.5 % in overshoot, and half a swing or more in settling_time.",
     "A controller that goes to its set points at a rate of its own makes ramps of them: found where the largest step rises "
     "later than the smallest by 1 % and 1.5 U of the difference; less widens a rise by as much.",
-    "A sample of telemetry is taken for the mean over its period. Where it is a reading at the period's end, overshoots come "
-    "too large: by 0.4 % of the swing where a twentieth of the swing's period passes between samples, by its square elsewhere.",
+    "A sample of telemetry is taken for the mean over its period, also where binding.samples says otherwise. Where it is a "
+    "reading at the period's end, overshoots come too large: by 0.4 % of the swing where a twentieth of the swing's period "
+    "passes between samples, by its square elsewhere.",
 )
 UNBALANCE = (
     "Runout that changes with speed (a shaft that grows, probes that see its material) is in the vectors, half axes and D_max "
