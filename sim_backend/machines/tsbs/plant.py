@@ -48,6 +48,7 @@ class Plant(CorePlant):
         self._s: Any = state
         fill(self._p, vars(self.params))
         fill(self._c, vars(control or ControlParams()))
+        self._c.pole_pairs = self.params.pole_pairs
         _lib.tsbs_start(self._p, self._c, self._s, seed & (2**64 - 1))
 
     @property
