@@ -139,7 +139,9 @@ def unbalance(i: Array) -> float:
     return float(np.sqrt(((i[:, 0] - i[:, 1]) ** 2).mean() / ((i.sum(axis=1)) ** 2).mean()))
 
 
-@pytest.mark.parametrize(("offset_x", "hz", "saved"), [(91e-6, 0.25, -0.266), (0.0, 0.25, -0.335), (-91e-6, -0.25, -0.257)])
+@pytest.mark.parametrize(
+    ("offset_x", "hz", "saved"), [(91e-6, 0.25, -0.266), (0.0, 0.25, -0.335), (-91e-6, -0.25, -0.257)]
+)
 def test_balancing_takes_load_off_the_vertical_current(offset_x: float, hz: float, saved: float) -> None:
     """22 N of horizontal load is 91 um of motor_x. Figures of the prototype; without balancing the unbalance is 0.47."""
     before, after, _ = balanced(offset_x, hz)
@@ -178,7 +180,7 @@ def test_six_phases_by_hand() -> None:
 
 
 def test_six_phases_hold_and_step_without_a_trace_in_the_orbit() -> None:
-    """The motor carries with the frame turned by 45 degrees; 15 degrees of the angle leave 1 um with priority, 50 um without."""
+    """The motor carries with the frame turned by 45 degrees; 15 degrees leave 1 um with priority, 50 um without."""
     peaks = {}
     for allocation in (3.0, 4.0):
         plant = levitated(centred())

@@ -46,7 +46,8 @@ void tsbs_carry(const tsbs_control *c, double keep, tsbs_law_state *l, const dou
     }
     goal(c, l, set);
     tsbs_observe(c, l, y);
-    tsbs_balance(c, l);
+    if (c->balance != 0 || l->balancing != 0 || l->gamma != c->gamma) tsbs_balance(c, l);
+    field(c, l);
     for (int a = 0; a < 2; a++) {
         double error = set[a] - y[a];
         l->motor_filtered[a] = keep * l->motor_filtered[a] + (1 - keep) * (y[a] - l->motor_previous[a]) / TICK;
@@ -101,5 +102,4 @@ void tsbs_balance(const tsbs_control *c, tsbs_law_state *l) {
         l->balancing = 0;
     }
     l->gamma = c->gamma_slew > 0 ? toward(l->gamma, to, c->gamma_slew * TICK) : to;
-    field(c, l);
 }

@@ -78,8 +78,10 @@ static void approach(const double *from, const double *to, int n, double keep, d
     for (int k = 0; k < n; k++) out[k] = to[k] + (from[k] - to[k]) * keep;
 }
 
-static void step(const tsbs_params *p, const tsbs_derived *d, tsbs_state *st, const double *coil_to, const double *segment_to, double h) {
-    double c1[10], c2[10], g0[8], g1[8], g2[8], to[8], k1[14], k2[14], k3[14], k4[14], at[14];
+/* `mixed`: what acts of the segments, which goes to `mixed_to` by their one rate */
+static void step(const tsbs_params *p, const tsbs_derived *d, tsbs_state *st, const double *coil_to, double *mixed,
+                 const double *mixed_to, double h) {
+    double c1[10], c2[10], g1[8], g2[8], k1[14], k2[14], k3[14], k4[14], at[14];
     double w0 = st->weight, w1 = w0, w2 = w0;
     if (st->weight_rate > 0) {
         double left = st->weight_to - w0, step = st->weight_rate * h;
@@ -89,12 +91,10 @@ static void step(const tsbs_params *p, const tsbs_derived *d, tsbs_state *st, co
     double half = d->coil_keep, seg = d->segment_keep;
     approach(st->coil, coil_to, 10, half, c1);
     approach(c1, coil_to, 10, half, c2);
-    tsbs_mix(p, st->segment, g0); /* one rate for all segments: what acts of them goes by it too */
-    tsbs_mix(p, segment_to, to);
-    approach(g0, to, 8, seg, g1);
-    approach(g1, to, 8, seg, g2);
+    approach(mixed, mixed_to, 8, seg, g1);
+    approach(g1, mixed_to, 8, seg, g2);
     double *s = st->s, m = st->hung_mass;
-    tsbs_rates(p, d, s, st->coil, g0, st->play, m, w0, k1);
+    tsbs_rates(p, d, s, st->coil, mixed, st->play, m, w0, k1);
     for (int k = 0; k < 14; k++) at[k] = s[k] + h / 2 * k1[k];
     tsbs_rates(p, d, at, c1, g1, st->play, m, w1, k2);
     for (int k = 0; k < 14; k++) at[k] = s[k] + h / 2 * k2[k];
@@ -103,7 +103,7 @@ static void step(const tsbs_params *p, const tsbs_derived *d, tsbs_state *st, co
     tsbs_rates(p, d, at, c2, g2, st->play, m, w2, k4);
     for (int k = 0; k < 14; k++) s[k] += h / 6 * (k1[k] + 2 * k2[k] + 2 * k3[k] + k4[k]);
     memcpy(st->coil, c2, sizeof c2);
-    approach(st->segment, segment_to, 8, seg * seg, st->segment);
+    memcpy(mixed, g2, sizeof g2);
     st->weight = w2;
 }
 
@@ -215,7 +215,11 @@ int64_t tsbs_run(const tsbs_params *p, const tsbs_control *c, tsbs_state *st, in
         hysteresis(p, st);
         drive(st, &d);
         hold(p, st, &d);
-        for (int k = 0; k < st->substeps; k++) step(p, &d, st, coil_to, segment_to, TICK / st->substeps);
+        double mixed[8], mixed_to[8];
+        tsbs_mix(p, st->segment, mixed);
+        tsbs_mix(p, segment_to, mixed_to);
+        for (int k = 0; k < st->substeps; k++) step(p, &d, st, coil_to, mixed, mixed_to, TICK / st->substeps);
+        approach(st->segment, segment_to, 8, d.segment_tick, st->segment);
         st->tick++;
         done++;
         if (++st->in_period == PERIOD) {

@@ -119,7 +119,7 @@ void tsbs_rotate(const tsbs_control *c, const tsbs_gains *g, tsbs_law_state *l, 
     double asked = torque(c, g, l, r), current[] = {0, 0};
     l->i_x = toward(l->i_x, c->i_x, c->i_ramp * TICK);
     l->i_y = toward(l->i_y, c->i_y, c->i_ramp * TICK);
-    if (l->share == 0) tsbs_balance(c, l);
+    if (l->share == 0 && l->gamma != c->gamma) tsbs_balance(c, l);
     tsbs_carry(c, g->keep, l, r->position + 2, current);
     if (c->allocation >= SIX) { /* axes turned by 45 degrees: x6 = (x + y)/sqrt 2, y6 = (-x + y)/sqrt 2; T (7.6), corrected */
         double x = current[0] + current[1], y = current[1] - current[0];

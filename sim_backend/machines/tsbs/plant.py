@@ -47,9 +47,13 @@ class Plant(CorePlant):
         state.substeps = substeps
         self._s: Any = state
         fill(self._p, vars(self.params))
-        fill(self._c, vars(control or ControlParams()))
-        self._c.pole_pairs = self.params.pole_pairs
+        fill(self._c, vars(control or ControlParams()) | {"pole_pairs": self.params.pole_pairs})
         _lib.tsbs_start(self._p, self._c, self._s, seed & (2**64 - 1))
+
+    @property
+    def lifted(self) -> slice | None:
+        """Where the motor lifts its end, it may stay on its ring: the inboard end alone has to come to rest."""
+        return slice(0, 2) if self._c.lift_by else None
 
     @property
     def speed(self) -> float:

@@ -109,7 +109,7 @@ enum { SEGMENT_SATURATED = 2 };
 typedef struct {
     double runout_c[8], runout_s[8], target_c[8], target_s[8], tilt_c, tilt_s, motor_c, motor_s;
     double per_position_lsb, per_current_lsb, per_gain[10], per_sense[4], per_mass, per_inertia, per_coulomb_speed;
-    double angle, turn_c, turn_s, detent_c, detent_s, unbalance_c, unbalance_s, coil_keep, segment_keep, speed_keep;
+    double angle, turn_c, turn_s, detent_c, detent_s, unbalance_c, unbalance_s, coil_keep, segment_keep, segment_tick, speed_keep;
     int near; /* a ring may be touched within this tick */
     /* radial axes in the order xi, yi, xo, yo, so that one loop, and with it one vector, does all four: force constant,
      * gap, plane, magnetic offset, runout of the journal as cubics about `angle` */
