@@ -35,8 +35,6 @@ class SimulatedPlant(Protocol):
     @property
     def moved(self) -> bool: ...  # the lift or landing has run its course
     @property
-    def lifted(self) -> slice | None: ...  # columns that a lift brings to rest, if not the machine's radial
-    @property
     def speed(self) -> float: ...  # rad/s, as the controller sees it
     @property
     def pulse_age_s(self) -> float | None: ...  # since the last once-per-turn pulse; None: speed not by pulses

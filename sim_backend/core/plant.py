@@ -84,11 +84,6 @@ class CorePlant:
         law.mode = mode
 
     @property
-    def lifted(self) -> slice | None:
-        """Columns of the rows that come to rest at the end of a lift, where these are not the machine's `radial`."""
-        return None
-
-    @property
     def moved(self) -> bool:
         """Whether the lift or landing has run its course."""
         return bool(self._s.law.lift_clock >= self._c.lift_time_s)

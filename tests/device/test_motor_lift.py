@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import pytest
 from test_controller import RIG, Host
@@ -12,12 +13,21 @@ from sim_backend.machines.tsbs.params import PlantParams
 CONTACT_O = 8
 
 
+def lifted(settings: Mapping[str, float]) -> Host:
+    """A host whose controller has been told that at rest, and holds the rotor."""
+    host = Host()
+    assert host.command("ENABLE") == "OK"
+    for name, value in settings.items():
+        assert host.set(name, value)[0] == "OK"
+    assert host.command("LEVITATE") == "OK"
+    host.run(2.0)
+    assert host.device.state == "LEVITATED"
+    return host
+
+
 def test_the_inboard_end_alone_decides_when_the_motor_lifts() -> None:
     """At gamma 0 the outboard end stays on its ring; 3.5 degrees lift it, 0 keeps it up, and a landing puts it down."""
-    host = Host()
-    assert host.set("lift_by", 1.0)[0] == "OK"
-    assert host.set("allocation", 1.0)[0] == "OK"
-    host.levitate()
+    host = lifted({"lift_by": 1.0, "allocation": 1.0})
     assert (host.telemetry(0.5)["flags"].astype(int) & CONTACT_O).all()
     assert host.set("gamma_slew", math.radians(2.0))[0] == "OK"
     host.set("gamma", math.radians(3.5))
@@ -34,16 +44,12 @@ def test_the_inboard_end_alone_decides_when_the_motor_lifts() -> None:
 
 @pytest.mark.parametrize("name", ["lift_by", "model_mass"])
 def test_some_of_it_only_while_the_rotor_rests(name: str) -> None:
-    host = Host()
-    assert host.set(name, 1.0)[0] == "OK"
-    host.set(name, RIG.parameters[name].default)
-    host.levitate()
+    host = lifted({name: RIG.parameters[name].default})
     assert host.set(name, 1.0)[0] == "WRONG_STATE"
 
 
 def test_a_run_at_the_torque_limit_is_guarded_below_the_trip() -> None:
     """The speed that ends it cannot be set above 0.9 of the trip, 72 rad/s."""
-    host = Host()
-    host.levitate()
+    host = lifted({})
     assert RIG.parameters["speed_ref"].high <= 0.9 * PlantParams().trip_speed
     assert host.set("speed_ref", 0.91 * PlantParams().trip_speed)[0] == "OUT_OF_RANGE"

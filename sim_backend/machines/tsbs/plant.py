@@ -52,7 +52,7 @@ class Plant(CorePlant):
 
     @property
     def lifted(self) -> slice | None:
-        """Where the motor lifts its end, it may stay on its ring: the inboard end alone has to come to rest."""
+        """Columns that a lift brings to rest, if not all radial ones: an end that the motor lifts may stay on its ring."""
         return slice(0, 2) if self._c.lift_by else None
 
     @property
