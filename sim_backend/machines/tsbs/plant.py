@@ -52,8 +52,9 @@ class Plant(CorePlant):
 
     @property
     def lifted(self) -> slice | None:
-        """Columns that a lift brings to rest, if not all radial ones: an end that the motor lifts may stay on its ring."""
-        return slice(0, 2) if self._c.lift_by else None
+        """Columns that a lift brings to rest, if not all radial ones. An end that the motor lifts may stay on its ring; the
+        shaft is then inclined, and of the inboard sensors, which are beside the bearing, only the horizontal one reads 0."""
+        return slice(0, 1) if self._c.lift_by else None
 
     @property
     def speed(self) -> float:
